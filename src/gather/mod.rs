@@ -1,0 +1,28 @@
+//! What the light looks like at the vertices of the refined mesh.
+
+/// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
+#[derive(Debug, Clone, Default)]
+pub struct BakedSurface {
+    /// Index in `Scene::surfaces`.
+    pub surface: usize,
+    /// Vertices as points of input triangles: attributes are interpolated with these weights.
+    pub vertices: Vec<BakedVertex>,
+    /// Triangles, counter-clockwise from the front.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// One output vertex.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BakedVertex {
+    /// Index of the input triangle in `Surface::triangles`.
+    pub triangle: u32,
+    /// Barycentric weights of the triangle's three corners, each in [0, 1], sum 1.
+    pub weights: [f64; 3],
+    /// Tristimulus irradiance on the front (Km = 683 lm/W: Y is lux).
+    pub irradiance: [f32; 3],
+    /// Tristimulus radiosity that leaves the front, own emission included, in lm/m2 (Y); radiance is this over pi.
+    pub radiosity: [f32; 3],
+    /// The same radiosity divided by the paint's texture and vertex colour where there is one: linear sRGB, lm/m2.
+    /// Times the texture (and vertex colour) this shows the radiosity. Equal to the radiosity's colour where there is none.
+    pub light: [f32; 3],
+}

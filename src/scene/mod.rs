@@ -1,0 +1,239 @@
+//! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
+
+use crate::spectrum::{Grid, Leaves};
+use glam::{DMat4, DVec3, Vec3};
+use std::sync::Arc;
+
+/// A room, read and checked.
+///
+/// Positions are in the file's units (metres in glTF), world space, right-handed, +Y up.
+#[derive(Debug)]
+pub struct Scene {
+    /// The document as read: written back by the output with the light added.
+    pub source: Source,
+    /// The wavelength grid that every spectrum here is sampled on.
+    pub grid: Grid,
+    /// One entry for each drawn primitive at each node (and each instance of it).
+    pub surfaces: Vec<Surface>,
+    /// Materials; `Surface::material` points in here.
+    pub materials: Vec<Material>,
+    /// Decoded images that some paint, emission or alpha mask uses.
+    pub images: Vec<Image>,
+    /// The distinct light spectra ("lamps by colour"); emissions and lights point in here.
+    pub spectra: Vec<LightSpectrum>,
+    /// Punctual lights.
+    pub lights: Vec<PunctualLight>,
+    /// Cameras of the file.
+    pub cameras: Vec<Camera>,
+    /// What the user should know: nothing is dropped in silence.
+    pub warnings: Vec<String>,
+}
+
+/// The glTF document behind a scene: kept whole, so that names, cameras, extras and unknown things survive.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The file that was read.
+    pub path: std::path::PathBuf,
+    /// The whole JSON, as in the file.
+    pub json: serde_json::Value,
+    /// The buffers of the document, decoded, in order of the JSON's `buffers`.
+    pub buffers: Vec<Arc<[u8]>>,
+}
+
+/// A primitive at a node: the unit of input and of output.
+#[derive(Debug, Clone)]
+pub struct Surface {
+    /// For messages: `node 4 'Chair', mesh 1 'seat', primitive 0`.
+    pub name: String,
+    /// Index of the node in the document.
+    pub node: usize,
+    /// Index of the mesh in the document.
+    pub mesh: usize,
+    /// Index of the primitive in the mesh.
+    pub primitive: usize,
+    /// Which instance of EXT_mesh_gpu_instancing this is.
+    pub instance: Option<usize>,
+    /// Index in [`Scene::materials`].
+    pub material: usize,
+    /// From the primitive's local space to world space (with the instance's transform, if any).
+    pub to_world: DMat4,
+    /// Vertices, world space.
+    pub positions: Vec<DVec3>,
+    /// Shading normals, world space, unit length; none: flat triangles.
+    pub normals: Option<Vec<Vec3>>,
+    /// Texture coordinates by set; `Material` textures name the set.
+    pub texcoords: Vec<Vec<[f32; 2]>>,
+    /// COLOR_0, linear, multiplies the base colour.
+    pub colors: Option<Vec<[f32; 4]>>,
+    /// Triangles, counter-clockwise seen from the front in world space (mirrored nodes already turned).
+    /// Index into `positions`, which is also the index into the original vertex attributes.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// A Lambertian material, one- or two-sided.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// For messages and side files.
+    pub name: String,
+    /// Index in the document; none for glTF's default material.
+    pub index: Option<usize>,
+    /// Does the back reflect and emit too?
+    pub sides: Sides,
+    /// Albedo of the base colour factor (or the measured reflectance) on the grid's leaves, each in [0, 0.999].
+    pub reflectance: Leaves,
+    /// Where the reflectance comes from, for `inspect`.
+    pub reflectance_from: String,
+    /// Linear base colour factor; [1, 1, 1] where the reflectance is measured.
+    pub base_color: [f32; 3],
+    /// Texture that multiplies the base colour; none where the reflectance is measured.
+    pub paint: Option<Texture>,
+    /// Do vertex colours of a surface multiply the base colour? False where the reflectance is measured.
+    pub vertex_paint: bool,
+    /// What the surface gives out.
+    pub emission: Option<Emission>,
+    /// Holes.
+    pub alpha: Alpha,
+}
+
+/// Which sides of a surface reflect and emit. The other side is black and blocks light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sides {
+    /// Only the front.
+    Front,
+    /// Both, alike.
+    Both,
+}
+
+/// Coverage.
+#[derive(Debug, Clone)]
+pub enum Alpha {
+    /// No holes.
+    Opaque,
+    /// A point is a hole where `factor * texture alpha * vertex alpha < cutoff`.
+    Mask {
+        /// Threshold.
+        cutoff: f32,
+        /// Base colour factor's alpha.
+        factor: f32,
+        /// Base colour texture.
+        texture: Option<Texture>,
+    },
+}
+
+/// Lambertian emission: radiance(leaf) = spectra[light].power[leaf] * shape[leaf] * texture luminance shape, W/m2/sr/nm.
+#[derive(Debug, Clone)]
+pub struct Emission {
+    /// Index in [`Scene::spectra`].
+    pub light: usize,
+    /// Multiplier of the light's power per leaf, at the emissive factor.
+    pub shape: Leaves,
+    /// Emissive texture; then the shape of a point is `scale * upsample(factor * texel)`.
+    pub texture: Option<Texture>,
+    /// Linear emissive factor.
+    pub color: [f32; 3],
+    /// For textured emission: multiplier of the upsampled `color * texel` (both brought into [0, 1] first).
+    pub scale: f64,
+    /// Where the spectrum comes from, for `inspect`.
+    pub from: String,
+}
+
+/// A spectrum that lamps share. Lamps given by colour share D65 and differ by `shape`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LightSpectrum {
+    /// `cie/F2`, `blackbody/2700`, a file name ...
+    pub name: String,
+    /// Relative power per nm on the grid's leaves.
+    pub power: Leaves,
+}
+
+/// A light without extent. Radiant intensity in W/sr/nm (point, spot) or irradiance in W/m2/nm (directional).
+#[derive(Debug, Clone)]
+pub struct PunctualLight {
+    /// For messages.
+    pub name: String,
+    /// Kind and its parameters.
+    pub kind: LightKind,
+    /// World position.
+    pub position: DVec3,
+    /// World direction in which it shines, unit length.
+    pub direction: DVec3,
+    /// Index in [`Scene::spectra`].
+    pub light: usize,
+    /// intensity(leaf) = spectra[light].power[leaf] * shape[leaf].
+    pub shape: Leaves,
+}
+
+/// Kinds of KHR_lights_punctual.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightKind {
+    /// Shines alike in all directions.
+    Point,
+    /// A cone: full inside `inner`, zero outside `outer`, (half angles, radians), glTF's smooth fall-off between.
+    Spot {
+        /// Half angle of full intensity.
+        inner: f64,
+        /// Half angle where the light ends.
+        outer: f64,
+    },
+    /// Parallel light.
+    Directional,
+}
+
+/// A camera of the file in world space; looks along -Z of its own space.
+#[derive(Debug, Clone)]
+pub struct Camera {
+    /// For file names.
+    pub name: String,
+    /// Camera to world.
+    pub to_world: DMat4,
+    /// Vertical field of view in radians, or the half height of an orthographic view.
+    pub projection: Projection,
+    /// Width by height; none: 4 by 3.
+    pub aspect: Option<f64>,
+}
+
+/// Projection of a camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// Vertical field of view, radians.
+    Perspective(f64),
+    /// Half of the height, in the file's units.
+    Orthographic(f64),
+}
+
+/// A texture reference: image, coordinates, sampler, KHR_texture_transform.
+#[derive(Debug, Clone)]
+pub struct Texture {
+    /// Index in [`Scene::images`].
+    pub image: usize,
+    /// Which set of coordinates.
+    pub texcoord: usize,
+    /// KHR_texture_transform as rows of a 2x3 matrix on (u, v, 1).
+    pub transform: [[f32; 3]; 2],
+    /// Wrapping in u and v.
+    pub wrap: [Wrap; 2],
+}
+
+/// Wrapping of texture coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wrap {
+    /// Tile.
+    Repeat,
+    /// Tile, every second one turned.
+    Mirror,
+    /// Hold the edge.
+    Clamp,
+}
+
+/// A decoded image: linear light, alpha as is.
+#[derive(Debug, Clone)]
+pub struct Image {
+    /// For messages.
+    pub name: String,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Linear RGBA, row by row from the top.
+    pub pixels: Vec<[f32; 4]>,
+}
