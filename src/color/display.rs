@@ -43,11 +43,15 @@ impl LinearSrgb {
     /// The white has Y = 1 and lies inside of the triangle of the primaries.
     pub fn with_white(white: Xyz) -> Self {
         let columns = PRIMARIES.map(|[x, y]| [x / y, 1.0, (1.0 - x - y) / y]);
-        let unscaled: [[f64; 3]; 3] = std::array::from_fn(|row| std::array::from_fn(|col| columns[col][row]));
+        let unscaled: [[f64; 3]; 3] =
+            std::array::from_fn(|row| std::array::from_fn(|col| columns[col][row]));
         let scale = multiply(&invert(&unscaled), white);
         let to_xyz: [[f64; 3]; 3] =
             std::array::from_fn(|row| std::array::from_fn(|col| unscaled[row][col] * scale[col]));
-        Self { to_xyz, from_xyz: invert(&to_xyz) }
+        Self {
+            to_xyz,
+            from_xyz: invert(&to_xyz),
+        }
     }
 
     /// XYZ of a linear colour.
@@ -77,12 +81,20 @@ impl LinearSrgb {
 pub fn encode(linear: f64) -> f64 {
     // max before min: NaN becomes 0.
     let linear = linear.max(0.0).min(1.0);
-    if linear <= KNEE { SLOPE * linear } else { (1.0 + OFFSET) * linear.powf(1.0 / GAMMA) - OFFSET }
+    if linear <= KNEE {
+        SLOPE * linear
+    } else {
+        (1.0 + OFFSET) * linear.powf(1.0 / GAMMA) - OFFSET
+    }
 }
 
 /// The linear value of an sRGB one in [0, 1].
 pub fn decode(encoded: f64) -> f64 {
-    if encoded <= SLOPE * KNEE { encoded / SLOPE } else { ((encoded + OFFSET) / (1.0 + OFFSET)).powf(GAMMA) }
+    if encoded <= SLOPE * KNEE {
+        encoded / SLOPE
+    } else {
+        ((encoded + OFFSET) / (1.0 + OFFSET)).powf(GAMMA)
+    }
 }
 
 /// The sRGB byte of a linear value, rounded.
@@ -113,7 +125,11 @@ mod tests {
     /// The matrix printed in IEC 61966-2-1:1999 (four digits).
     #[test]
     fn matrix_is_the_printed_one() {
-        let printed = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]];
+        let printed = [
+            [0.4124, 0.3576, 0.1805],
+            [0.2126, 0.7152, 0.0722],
+            [0.0193, 0.1192, 0.9505],
+        ];
         let ours = LinearSrgb::standard().to_xyz;
         for (row, expected) in ours.iter().zip(printed) {
             for (value, expected) in row.iter().zip(expected) {
@@ -129,7 +145,8 @@ mod tests {
         assert!(rgb.iter().all(|c| (c - 1.0).abs() < 1e-14), "{rgb:?}");
     }
 
-    /// Values of palette 0.7, an independent implementation.
+    /// palette 0.7, an independent implementation, takes D65 as (0.95047, 1, 1.08883); x, y = 0.3127, 0.3290 is
+    /// (0.95046, 1, 1.08906), hence the tolerance.
     #[test]
     fn agrees_with_palette() {
         use palette::{FromColor, LinSrgb, Srgb, Xyz};
@@ -139,10 +156,13 @@ mod tests {
             let theirs = Xyz::from_color(LinSrgb::new(r, g, b));
             let ours = srgb.to_xyz(rgb);
             for (a, b) in ours.into_iter().zip([theirs.x, theirs.y, theirs.z]) {
-                assert!((a - b).abs() < 2e-4, "{a} {b}");
+                assert!((a - b).abs() < 3e-4, "{a} {b}");
             }
             let encoded: Srgb<f64> = Srgb::from_linear(LinSrgb::new(r, g, b));
-            for (linear, theirs) in rgb.into_iter().zip([encoded.red, encoded.green, encoded.blue]) {
+            for (linear, theirs) in rgb
+                .into_iter()
+                .zip([encoded.red, encoded.green, encoded.blue])
+            {
                 assert!((encode(linear) - theirs).abs() < 1e-6);
             }
         }
@@ -150,8 +170,11 @@ mod tests {
 
     #[test]
     fn bytes() {
-        assert_eq!([0.0, 1.0, f64::NAN, -1.0, 2.0].map(encode_byte), [0, 255, 0, 0, 255]);
-        assert_eq!(encode_byte(0.214_041), 128);
+        assert_eq!(
+            [0.0, 1.0, f64::NAN, -1.0, 2.0].map(encode_byte),
+            [0, 255, 0, 0, 255]
+        );
+        assert_eq!(encode_byte(0.215_861), 128);
     }
 
     proptest! {

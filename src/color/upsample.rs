@@ -15,8 +15,10 @@ use crate::data::{Outside, named};
 use crate::spectrum::{Grid, LEAVES, Leaves};
 use std::sync::OnceLock;
 
-/// Steps of the table along each of r, g, b. 16 keep it at 1.2 MB, within a core's second-level cache.
-const STEPS: usize = 16;
+/// Steps of the table along each of r, g, b. Measured over 20 000 random colours, largest dE00 between table and solved
+/// spectrum under A / F2 / F11 (under D65 it is 0): 16 steps .97 / .70 / .93, 20 steps .55 / .37 / .50, 24 steps
+/// .32 / .20 / .28. With 24 the table is 4 MB and takes 45 ms on two cores; a look-up takes 0.2 us, a solve 5 us.
+const STEPS: usize = 24;
 
 /// Levenberg-Marquardt: at most this many steps; a colour takes 5 to 40, the brightest saturated ones most.
 const MAX_STEPS: usize = 200;
@@ -50,10 +52,17 @@ impl Upsampler {
         let mut weights = Observer::cie1931().weights(grid);
         let total: f64 = power.iter().zip(&weights[1]).map(|(s, y)| s * y).sum();
         for row in &mut weights {
-            row.iter_mut().zip(&power).for_each(|(w, s)| *w *= s / total);
+            row.iter_mut()
+                .zip(&power)
+                .for_each(|(w, s)| *w *= s / total);
         }
         let white = weights.map(|row| row.iter().sum());
-        Self { weights, white, srgb: LinearSrgb::with_white(white), table: OnceLock::new() }
+        Self {
+            weights,
+            white,
+            srgb: LinearSrgb::with_white(white),
+            table: OnceLock::new(),
+        }
     }
 
     /// The linear sRGB colour of a reflectance under D65; the inverse of [`Self::reflectance`].
@@ -63,7 +72,9 @@ impl Upsampler {
 
     /// Tristimulus values of a reflectance under D65; Y of white is 1.
     pub fn xyz(&self, reflectance: &Leaves) -> Xyz {
-        self.weights.each_ref().map(|row| row.iter().zip(reflectance).map(|(w, r)| w * r).sum())
+        self.weights
+            .each_ref()
+            .map(|row| row.iter().zip(reflectance).map(|(w, r)| w * r).sum())
     }
 
     /// D65 on the grid, Y = 1.
@@ -98,11 +109,13 @@ impl Upsampler {
             return [rgb[0]; LEAVES];
         }
         let table = self.table.get_or_init(|| self.make_table());
-        // Cell and place in the cell along each axis; the nodes stand at (i / STEPS)^2.
+        // Cell and place in the cell along each axis; rounding to a neighbouring cell puts the place on its edge.
         let mut cell = [0; 3];
         let mut place = [0.0; 3];
         for a in 0..3 {
-            cell[a] = ((rgb[a].sqrt() * STEPS as f64) as usize).min(STEPS - 1);
+            cell[a] = (((rgb[a] as f32).cbrt().asin()
+                * (std::f32::consts::FRAC_2_PI * STEPS as f32)) as usize)
+                .min(STEPS - 1);
             let (low, high) = (node(cell[a]), node(cell[a] + 1));
             place[a] = ((rgb[a] - low) / (high - low)).clamp(0.0, 1.0);
         }
@@ -121,7 +134,10 @@ impl Upsampler {
         let [a, b, c, d] = corners.map(|i| &table[i]);
         let [wa, wb, wc, wd] = shares;
         std::array::from_fn(|leaf| {
-            wa * f64::from(a[leaf]) + wb * f64::from(b[leaf]) + wc * f64::from(c[leaf]) + wd * f64::from(d[leaf])
+            wa * f64::from(a[leaf])
+                + wb * f64::from(b[leaf])
+                + wc * f64::from(c[leaf])
+                + wd * f64::from(d[leaf])
         })
     }
 
@@ -161,8 +177,11 @@ impl Upsampler {
             if size < TOLERANCE * TOLERANCE {
                 break;
             }
-            let Some(step) = damped_step(&jacobian, &residual, damping) else { break };
-            let next: [f64; 3] = std::array::from_fn(|i| (best[i] - step[i]).clamp(-FLAT_LIMIT, FLAT_LIMIT));
+            let Some(step) = damped_step(&jacobian, &residual, damping) else {
+                break;
+            };
+            let next: [f64; 3] =
+                std::array::from_fn(|i| (best[i] - step[i]).clamp(-FLAT_LIMIT, FLAT_LIMIT));
             let (new_residual, new_jacobian) = self.residual(&next, &target);
             if norm2(&new_residual) < size {
                 (best, residual, jacobian) = (next, new_residual, new_jacobian);
@@ -203,7 +222,11 @@ impl Upsampler {
             const KNEE: f64 = 216.0 / 24389.0;
             const LINEAR: f64 = 841.0 / 108.0;
             let v = xyz[a] / self.white[a];
-            let slope = if v > KNEE { 1.0 / (3.0 * (v * v).cbrt()) } else { LINEAR };
+            let slope = if v > KNEE {
+                1.0 / (3.0 * (v * v).cbrt())
+            } else {
+                LINEAR
+            };
             slope / self.white[a]
         });
         let jacobian = [
@@ -222,10 +245,12 @@ fn index(cell: [usize; 3]) -> usize {
     (0..3).map(|a| cell[a] * STRIDES[a]).sum()
 }
 
-/// Linear value of a node: closer together in the dark, where the eye is finer.
+/// Linear value of a node, sin^3: close together in the dark, where the eye is finer, and at the bright end, where the
+/// spectra change fastest with the colour.
 fn node(i: usize) -> f64 {
-    let v = i as f64 / STEPS as f64;
-    v * v
+    (std::f64::consts::FRAC_PI_2 * i as f64 / STEPS as f64)
+        .sin()
+        .powi(3)
 }
 
 /// The middle of a leaf on [-1, 1].
@@ -269,17 +294,20 @@ fn damped_step(jacobian: &[[f64; 3]; 3], residual: &[f64; 3], damping: f64) -> O
         return None;
     }
     let m = glam::DMat3::from_cols_array_2d(&std::array::from_fn(|i| {
-        std::array::from_fn(|j| normal[i][j] / (scale[i] * scale[j]) + if i == j { damping } else { 0.0 })
+        std::array::from_fn(|j| {
+            normal[i][j] / (scale[i] * scale[j]) + if i == j { damping } else { 0.0 }
+        })
     }));
     let b = glam::DVec3::from_array(std::array::from_fn(|i| right[i] / scale[i]));
     let step = m.inverse() * b;
-    step.is_finite().then(|| std::array::from_fn(|i| step[i] / scale[i]))
+    step.is_finite()
+        .then(|| std::array::from_fn(|i| step[i] / scale[i]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::de2000;
+    use crate::color::{de2000, tristimulus};
     use proptest::prelude::*;
 
     fn difference(upsampler: &Upsampler, rgb: [f32; 3], reflectance: &Leaves) -> f64 {
@@ -300,7 +328,10 @@ mod tests {
                     for k in 0..=n {
                         let rgb = [level(i), level(j), level(k)];
                         let reflectance = upsampler.reflectance(rgb);
-                        assert!(reflectance.iter().all(|r| (0.0..=1.0).contains(r)), "{rgb:?}");
+                        assert!(
+                            reflectance.iter().all(|r| (0.0..=1.0).contains(r)),
+                            "{rgb:?}"
+                        );
                         let d = difference(&upsampler, rgb, &reflectance);
                         if d > worst.0 {
                             worst = (d, rgb);
@@ -317,7 +348,10 @@ mod tests {
         let upsampler = Upsampler::new(&Grid::default());
         for grey in [0.0, 1e-6, 0.18, 0.5, 0.95, 1.0f32] {
             assert_eq!(upsampler.reflectance([grey; 3]), [f64::from(grey); LEAVES]);
-            assert_eq!(upsampler.reflectance_fast([grey; 3]), [f64::from(grey); LEAVES]);
+            assert_eq!(
+                upsampler.reflectance_fast([grey; 3]),
+                [f64::from(grey); LEAVES]
+            );
         }
     }
 
@@ -326,25 +360,50 @@ mod tests {
         let upsampler = Upsampler::new(&Grid::default());
         assert_eq!(upsampler.reflectance([2.0, 5.0, 1.5]), [1.0; LEAVES]);
         assert_eq!(upsampler.reflectance([f32::NAN, -1.0, 0.0]), [0.0; LEAVES]);
-        assert_eq!(upsampler.reflectance_fast([f32::NAN, -1.0, 0.0]), [0.0; LEAVES]);
+        assert_eq!(
+            upsampler.reflectance_fast([f32::NAN, -1.0, 0.0]),
+            [0.0; LEAVES]
+        );
     }
 
     /// Within the gamut, neighbours differ by no more than their colours do: no jump to another branch of solutions.
     #[test]
     fn spectra_change_smoothly_with_colour() {
         let upsampler = Upsampler::new(&Grid::default());
-        for path in [[[0.6, 0.5, 0.1], [0.1, 0.3, 0.7]], [[0.5, 0.5, 0.5], [0.8, 0.1, 0.1]]] {
+        for path in [
+            [[0.6, 0.5, 0.1], [0.1, 0.3, 0.7]],
+            [[0.5, 0.5, 0.5], [0.8, 0.1, 0.1]],
+        ] {
             let mut before: Option<Leaves> = None;
             for i in 0..=200 {
                 let s = i as f32 / 200.0;
-                let now = upsampler.reflectance(std::array::from_fn(|a| path[0][a] * (1.0 - s) + path[1][a] * s));
+                let now = upsampler.reflectance(std::array::from_fn(|a| {
+                    path[0][a] * (1.0 - s) + path[1][a] * s
+                }));
                 if let Some(before) = before {
-                    let jump = now.iter().zip(&before).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+                    let jump = now
+                        .iter()
+                        .zip(&before)
+                        .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
                     assert!(jump < 0.03, "{jump} at {s}");
                 }
                 before = Some(now);
             }
         }
+    }
+
+    /// The weights of another lamp, Y of white is 1.
+    fn under(lamp: &str) -> ([Leaves; 3], Xyz) {
+        let grid = Grid::default();
+        let power = grid.means(&named(lamp).unwrap().table, Outside::Hold);
+        let mut weights = Observer::cie1931().weights(&grid);
+        let total: f64 = power.iter().zip(&weights[1]).map(|(s, y)| s * y).sum();
+        for row in &mut weights {
+            row.iter_mut()
+                .zip(&power)
+                .for_each(|(w, s)| *w *= s / total);
+        }
+        (weights, weights.map(|row| row.iter().sum()))
     }
 
     proptest! {
@@ -360,9 +419,13 @@ mod tests {
             prop_assert!(fast.iter().all(|r| (0.0..=1.0).contains(r)));
             let d = de2000(upsampler.xyz(&exact), upsampler.xyz(&fast), upsampler.white);
             prop_assert!(d < 0.5, "dE00 {}", d);
-            // The spectra themselves, not only their colours.
-            let far = exact.iter().zip(&fast).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / LEAVES as f64;
-            prop_assert!(far.sqrt() < 0.06, "rms {}", far.sqrt());
+            // Not only the same colour under D65 but nearly the same spectrum: other lamps cannot tell them apart.
+            for lamp in ["cie/A", "cie/F2", "cie/F11"] {
+                let (weights, white) = under(lamp);
+                let [a, b] = [&exact, &fast].map(|r| tristimulus(r, &weights));
+                let d = de2000(a, b, white);
+                prop_assert!(d < 0.5, "dE00 {} under {}", d, lamp);
+            }
         }
     }
 }
