@@ -1,5 +1,8 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
+pub mod document;
+mod raw;
+
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};
 use std::sync::Arc;
