@@ -18,7 +18,10 @@ pub struct Grid {
 impl Grid {
     /// Leaves over `start..end` nm.
     pub fn new(start: f64, end: f64) -> Self {
-        Self { start, width: (end - start) / LEAVES as f64 }
+        Self {
+            start,
+            width: (end - start) / LEAVES as f64,
+        }
     }
 
     /// Left edge of a leaf, nm.
