@@ -27,9 +27,6 @@ fn baked(scene: &Scene) -> Read {
     let look = Exposure::new(1e-3);
     let glb = baked_glb(scene, &surfaces, &look).unwrap();
     assert_eq!(glb.bytes, baked_glb(scene, &surfaces, &look).unwrap().bytes);
-    if let Ok(path) = std::env::var("HAARLIGHT_KEEP") {
-        std::fs::write(path, &glb.bytes).unwrap();
-    }
     read(&glb.bytes)
 }
 
@@ -61,6 +58,17 @@ impl Read {
         };
         (positions, indices.chunks(3).map(turn).collect())
     }
+}
+
+/// Leaves the file in `target/tmp` for `tools/validate.mjs`.
+#[test]
+fn the_file_for_the_validator() {
+    let scene = room();
+    let surfaces = refine(&scene, 3);
+    let glb = baked_glb(&scene, &surfaces, &Exposure::auto(&scene, &surfaces)).unwrap();
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("output_room.glb");
+    haarlight::output::file::write_atomic(&path, None, |w| w.write_all(&glb.bytes)).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), glb.bytes);
 }
 
 #[test]
