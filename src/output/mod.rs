@@ -1,1 +1,9 @@
-//! To be written.
+//! What the program writes: the baked room, pictures, arrays; and how a file is put in place.
+
+pub mod exposure;
+pub mod file;
+pub mod gltf;
+pub mod refined;
+
+pub use exposure::Exposure;
+pub use gltf::{BakedGlb, baked_glb};

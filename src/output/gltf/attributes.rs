@@ -1,0 +1,265 @@
+//! Vertex attributes of the refined mesh, in the primitive's local space.
+//!
+//! Input attributes are interpolated from the document's own data in f64; from the scene's world-space copy (brought
+//! back by the inverse transform) where the data sits in a Draco stream. Everything is written as f32.
+
+use super::{Writer, accessor, accessor::Table, index};
+use crate::error::{Error, Result};
+use crate::gather::BakedSurface;
+use crate::output::{exposure, refined};
+use crate::scene::{Alpha, Surface};
+use glam::{DMat3, DVec3};
+use serde_json::{Map, Value, json};
+
+/// glTF component type of f32.
+const FLOAT: u64 = 5126;
+
+impl Writer<'_> {
+    /// Adds all attributes of one refined primitive to the buffer; returns its `attributes` object.
+    pub(super) fn attributes(&mut self, primitive: &Value, baked: &BakedSurface) -> Result<Value> {
+        let scene = self.scene;
+        let surface = &scene.surfaces[baked.surface];
+        let input = Input::new(primitive, surface, &scene.source)?;
+        let mut out = Map::new();
+
+        out.insert(
+            "POSITION".into(),
+            json!(self.bin.positions(&input.positions(baked))),
+        );
+        if let Some(normals) = input.normals(baked) {
+            out.insert("NORMAL".into(), json!(self.bin.floats(&normals)));
+            if let Some(tangents) = input.tangents(baked, &normals) {
+                out.insert("TANGENT".into(), json!(self.bin.floats(&tangents)));
+            }
+        }
+        for name in input.names() {
+            let accessor = match name.split_once('_') {
+                Some(("TEXCOORD", _)) => input
+                    .rows::<2>(baked, &name)
+                    .map(|rows| self.bin.floats(&rows)),
+                Some(("COLOR", set)) if set != "0" => self.any_width(&input, baked, &name),
+                Some(("", _)) if name != "_XYZ" && input.is_float(&name) => {
+                    self.any_width(&input, baked, &name)
+                }
+                _ => None,
+            };
+            if let Some(accessor) = accessor {
+                out.insert(name, json!(accessor));
+            }
+        }
+        out.insert("COLOR_0".into(), json!(self.light(surface, baked)));
+        let radiosity: Vec<[f32; 3]> = baked.vertices.iter().map(|v| v.radiosity).collect();
+        out.insert("_XYZ".into(), json!(self.bin.floats(&radiosity)));
+        Ok(Value::Object(out))
+    }
+
+    fn any_width(&mut self, input: &Input, baked: &BakedSurface, name: &str) -> Option<usize> {
+        match input.table(name)?.components {
+            1 => input
+                .rows::<1>(baked, name)
+                .map(|rows| self.bin.floats(&rows)),
+            2 => input
+                .rows::<2>(baked, name)
+                .map(|rows| self.bin.floats(&rows)),
+            3 => input
+                .rows::<3>(baked, name)
+                .map(|rows| self.bin.floats(&rows)),
+            _ => input
+                .rows::<4>(baked, name)
+                .map(|rows| self.bin.floats(&rows)),
+        }
+    }
+
+    /// COLOR_0: exposed light times vertex paint; with alpha where the input's vertex alpha makes holes or blends.
+    fn light(&mut self, surface: &Surface, baked: &BakedSurface) -> usize {
+        let material = &self.scene.materials[surface.material];
+        let mut colors = Vec::with_capacity(baked.vertices.len());
+        for vertex in &baked.vertices {
+            let [r, g, b, alpha] = refined::vertex_color(surface, vertex);
+            let paint = if material.vertex_paint {
+                [r, g, b]
+            } else {
+                [1.0; 3]
+            };
+            let wanted: [f64; 3] = std::array::from_fn(|i| {
+                self.look.scale * f64::from(vertex.light[i]) * f64::from(paint[i])
+            });
+            let shown = exposure::into_display(wanted).map(|c| c as f32);
+            self.clipped += usize::from(wanted.iter().any(|&c| !(0.0..=1.0).contains(&c)));
+            colors.push([shown[0], shown[1], shown[2], alpha.clamp(0.0, 1.0)]);
+        }
+        let blends =
+            matches!(material.alpha, Alpha::Mask { .. }) || colors.iter().any(|c| c[3] < 1.0);
+        if surface.colors.is_some() && blends {
+            self.bin.floats(&colors)
+        } else {
+            let opaque: Vec<[f32; 3]> = colors.iter().map(|c| [c[0], c[1], c[2]]).collect();
+            self.bin.floats(&opaque)
+        }
+    }
+}
+
+/// The attributes of an input primitive, by name.
+struct Input<'a> {
+    surface: &'a Surface,
+    primitive: &'a Value,
+    tables: Vec<(String, Table)>,
+    /// World to local, where it exists and the document's own positions cannot be read.
+    to_local: Option<glam::DMat4>,
+}
+
+impl<'a> Input<'a> {
+    fn new(
+        primitive: &'a Value,
+        surface: &'a Surface,
+        source: &crate::scene::Source,
+    ) -> Result<Self> {
+        let mut tables = Vec::new();
+        if let Some(attributes) = primitive.get("attributes").and_then(Value::as_object)
+            && !accessor::is_draco(primitive)
+        {
+            for name in attributes.keys() {
+                let count = surface.positions.len();
+                let table = index(&primitive["attributes"], name)
+                    .and_then(|a| accessor::read(source, a, count));
+                tables.extend(table.map(|table| (name.clone(), table)));
+            }
+        }
+        let mut input = Self {
+            surface,
+            primitive,
+            tables,
+            to_local: None,
+        };
+        if input.vectors("POSITION").is_none() {
+            if surface.to_world.determinant() == 0.0 {
+                return Err(Error::input(
+                    &surface.name,
+                    "compressed vertices under a transform that flattens them cannot be written back",
+                    "save the room without compression",
+                ));
+            }
+            input.to_local = Some(surface.to_world.inverse());
+        }
+        Ok(input)
+    }
+
+    /// Attribute names other than POSITION, NORMAL and TANGENT, in the document's order.
+    fn names(&self) -> Vec<String> {
+        let attributes = self.primitive.get("attributes").and_then(Value::as_object);
+        attributes
+            .into_iter()
+            .flatten()
+            .map(|(name, _)| name.clone())
+            .collect()
+    }
+
+    fn table(&self, name: &str) -> Option<&Table> {
+        self.tables
+            .iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, table)| table)
+    }
+
+    /// Three-component data.
+    fn vectors(&self, name: &str) -> Option<&Table> {
+        self.table(name).filter(|t| t.components == 3)
+    }
+
+    /// Custom attributes are interpolated only where they are floats: whole numbers are ids.
+    fn is_float(&self, name: &str) -> bool {
+        self.table(name).is_some_and(|t| t.component == FLOAT)
+    }
+
+    fn positions(&self, baked: &BakedSurface) -> Vec<[f32; 3]> {
+        let place = |v| match (self.vectors("POSITION"), self.to_local) {
+            (Some(local), _) => self.blend(local, v),
+            (None, Some(to_local)) => to_local.transform_point3(refined::position(self.surface, v)),
+            // `new` sets `to_local` where there are no positions.
+            (None, None) => DVec3::ZERO,
+        };
+        baked
+            .vertices
+            .iter()
+            .map(|v| place(v).as_vec3().to_array())
+            .collect()
+    }
+
+    /// Unit normals; none: the input has none and its triangles are flat.
+    fn normals(&self, baked: &BakedSurface) -> Option<Vec<[f32; 3]>> {
+        // Normals go to world by the inverse transpose, so they come back by the transpose.
+        let back = DMat3::from_mat4(self.surface.to_world).transpose();
+        let local = self.vectors("NORMAL");
+        if local.is_none() && (self.surface.normals.is_none() || self.to_local.is_none()) {
+            return None;
+        }
+        let normal = |v| {
+            let smooth = local.and_then(|table| self.blend(table, v).try_normalize());
+            let world = || (back * refined::normal(self.surface, v)).normalize_or(DVec3::Y);
+            smooth.unwrap_or_else(world).as_vec3().to_array()
+        };
+        Some(baked.vertices.iter().map(normal).collect())
+    }
+
+    fn tangents(&self, baked: &BakedSurface, normals: &[[f32; 3]]) -> Option<Vec<[f32; 4]>> {
+        let table = self.table("TANGENT").filter(|t| t.components == 4)?;
+        let tangent = |(vertex, normal): (&crate::gather::BakedVertex, &[f32; 3])| {
+            // Opposite tangents cancel: any direction across the normal will do there.
+            let across = || DVec3::from(normal.map(f64::from)).any_orthonormal_vector();
+            let direction = self
+                .blend(table, vertex)
+                .try_normalize()
+                .unwrap_or_else(across);
+            // The handedness is +1 or -1 and is not interpolated: the nearest corner's.
+            let weights = vertex.weights;
+            let nearest = (0..3).fold(
+                0,
+                |best, k| if weights[k] > weights[best] { k } else { best },
+            );
+            let hand = table.row(refined::corners(self.surface, vertex)[nearest])[3];
+            let [x, y, z] = direction.as_vec3().to_array();
+            [x, y, z, if hand < 0.0 { -1.0 } else { 1.0 }]
+        };
+        Some(baked.vertices.iter().zip(normals).map(tangent).collect())
+    }
+
+    /// Interpolated data of `N` components; texture coordinates fall back on the scene's.
+    fn rows<const N: usize>(&self, baked: &BakedSurface, name: &str) -> Option<Vec<[f32; N]>> {
+        if let Some(table) = self.table(name).filter(|t| t.components == N) {
+            let row = |v: &crate::gather::BakedVertex| {
+                let corners = refined::corners(self.surface, v);
+                std::array::from_fn(|i| {
+                    (0..3)
+                        .map(|k| v.weights[k] * table.row(corners[k])[i])
+                        .sum::<f64>() as f32
+                })
+            };
+            return Some(baked.vertices.iter().map(row).collect());
+        }
+        let set: usize = name.strip_prefix("TEXCOORD_")?.parse().ok()?;
+        let coordinates = self
+            .surface
+            .texcoords
+            .get(set)
+            .filter(|c| c.len() == self.surface.positions.len())?;
+        let row = |v: &crate::gather::BakedVertex| {
+            let corners = refined::corners(self.surface, v);
+            std::array::from_fn(|i| {
+                let at = |k: usize| {
+                    coordinates[corners[k]]
+                        .get(i)
+                        .map_or(0.0, |&c| v.weights[k] * f64::from(c))
+                };
+                (at(0) + at(1) + at(2)) as f32
+            })
+        };
+        Some(baked.vertices.iter().map(row).collect())
+    }
+
+    /// First three components, interpolated.
+    fn blend(&self, table: &Table, vertex: &crate::gather::BakedVertex) -> DVec3 {
+        let corners = refined::corners(self.surface, vertex);
+        let at = |k: usize| vertex.weights[k] * DVec3::from_slice(table.row(corners[k]));
+        at(0) + at(1) + at(2)
+    }
+}

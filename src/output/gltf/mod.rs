@@ -1,0 +1,236 @@
+//! The baked room as one GLB: the input document with its meshes replaced by the refined ones, light in COLOR_0.
+//!
+//! COLOR_0 = clip(exposure * light * vertex paint), linear sRGB, confined to [0, 1] as glTF 2.0 (section 3.7.2.1) asks;
+//! with KHR_materials_unlit a viewer shows COLOR_0 * base colour texture, which is the radiosity.
+//! `_XYZ` holds the unclipped truth: tristimulus radiosity, Y in lm/m2.
+//! What the bake does not touch (names, nodes, cameras, lights, animations, extras, unknown extensions) is kept.
+//! Not kept: skins and morph targets of baked meshes (the light belongs to one pose), material variants of baked
+//! primitives, instance attributes other than the transform.
+
+mod accessor;
+mod attributes;
+mod buffer;
+mod image;
+mod keep;
+mod material;
+mod meshes;
+
+use super::{Exposure, refined};
+use crate::error::{Error, Result};
+use crate::gather::BakedSurface;
+use crate::scene::Scene;
+use buffer::Bin;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+/// Version of `asset.extras.haarlight`.
+pub const EXTRAS_VERSION: u32 = 1;
+
+/// A written room and what is to be said about it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BakedGlb {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Vertices written with light.
+    pub vertices: usize,
+    /// Triangles written with light.
+    pub triangles: usize,
+    /// Vertices whose COLOR_0 had to be clipped into [0, 1] (lamps, spots beside them).
+    pub clipped: usize,
+    /// What could not be carried over.
+    pub warnings: Vec<String>,
+}
+
+/// Writes the room with its light: see the module's words.
+///
+/// Equal input gives equal bytes.
+///
+/// # Errors
+/// The refined mesh is broken (internal fault), an instance transform cannot be read, or the result passes 4 GiB.
+pub fn baked_glb(scene: &Scene, surfaces: &[BakedSurface], look: &Exposure) -> Result<BakedGlb> {
+    refined::check(scene, surfaces)?;
+    let mut writer = Writer::new(scene, surfaces, look);
+    writer.raw_views();
+    writer.images();
+    writer.meshes()?;
+    writer.animations();
+    writer.other_accessors();
+    writer.extensions();
+    writer.asset();
+    writer.finish()
+}
+
+/// The document under construction.
+struct Writer<'a> {
+    scene: &'a Scene,
+    look: &'a Exposure,
+    /// The refined meshes by (node, instance), then primitive.
+    baked: BTreeMap<(usize, Option<usize>), BTreeMap<usize, Vec<&'a BakedSurface>>>,
+    /// The new document; its accessors and buffer views are in `bin` until the end.
+    json: Map<String, Value>,
+    bin: Bin,
+    /// Old accessor to new one, for what is carried over.
+    accessors: BTreeMap<usize, usize>,
+    materials: material::Unlit,
+    /// Does a kept primitive have vertices that need KHR_mesh_quantization?
+    quantized: bool,
+    vertices: usize,
+    triangles: usize,
+    clipped: usize,
+    warnings: Vec<String>,
+}
+
+impl<'a> Writer<'a> {
+    fn new(scene: &'a Scene, surfaces: &'a [BakedSurface], look: &'a Exposure) -> Self {
+        let mut baked: BTreeMap<_, BTreeMap<usize, Vec<&BakedSurface>>> = BTreeMap::new();
+        for refined in surfaces.iter().filter(|s| !s.triangles.is_empty()) {
+            let surface = &scene.surfaces[refined.surface];
+            let place = baked.entry((surface.node, surface.instance)).or_default();
+            place.entry(surface.primitive).or_default().push(refined);
+        }
+        Self {
+            scene,
+            look,
+            baked,
+            json: scene.source.json.as_object().cloned().unwrap_or_default(),
+            bin: Bin::default(),
+            accessors: BTreeMap::new(),
+            materials: material::Unlit::default(),
+            quantized: false,
+            vertices: 0,
+            triangles: 0,
+            clipped: 0,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// What the file says about itself.
+    fn asset(&mut self) {
+        let facts = json!({
+            "version": EXTRAS_VERSION,
+            "program": concat!("haarlight ", env!("CARGO_PKG_VERSION")),
+            "exposure": {
+                "scale": self.look.scale,
+                "white_luminance_cd_m2": self.look.white_luminance(),
+            },
+            "attributes": {
+                "COLOR_0": "linear sRGB, radiosity over base colour texture, times exposure.scale, clipped to [0, 1]",
+                "_XYZ": "CIE 1931 tristimulus radiosity, lm/m2, not clipped",
+            },
+            "clipped_vertices": self.clipped,
+        });
+        let asset = self.json.entry("asset").or_insert_with(|| json!({}));
+        let Some(asset) = asset.as_object_mut() else {
+            return;
+        };
+        asset.entry("version").or_insert_with(|| json!("2.0"));
+        asset
+            .entry("generator")
+            .or_insert_with(|| json!(concat!("haarlight ", env!("CARGO_PKG_VERSION"))));
+        match asset.get_mut("extras") {
+            Some(Value::Object(extras)) => {
+                extras.insert("haarlight".into(), facts);
+            }
+            // Extras may be anything; what is not an object moves aside.
+            Some(other) => *other = json!({ "haarlight": facts, "original": other.take() }),
+            None => {
+                asset.insert("extras".into(), json!({ "haarlight": facts }));
+            }
+        }
+    }
+
+    fn finish(mut self) -> Result<BakedGlb> {
+        let (bytes, views, accessors) = self.bin.finish();
+        let lists = [("bufferViews", views), ("accessors", accessors)];
+        for (key, list) in lists {
+            put_list(&mut self.json, key, list);
+        }
+        if bytes.is_empty() {
+            self.json.shift_remove("buffers");
+        } else {
+            self.json
+                .insert("buffers".into(), json!([{ "byteLength": bytes.len() }]));
+        }
+        let json = serde_json::to_vec(&Value::Object(self.json))
+            .map_err(|problem| Error::Internal(format!("glTF JSON: {problem}")))?;
+        Ok(BakedGlb {
+            bytes: container(json, bytes)?,
+            vertices: self.vertices,
+            triangles: self.triangles,
+            clipped: self.clipped,
+            warnings: self.warnings,
+        })
+    }
+}
+
+/// glTF forbids empty lists: they are left out.
+fn put_list(json: &mut Map<String, Value>, key: &str, list: Vec<Value>) {
+    if list.is_empty() {
+        json.shift_remove(key);
+    } else {
+        json.insert(key.into(), Value::Array(list));
+    }
+}
+
+/// The elements of a top-level list, or none.
+fn list<'j>(json: &'j Value, key: &str) -> &'j [Value] {
+    json.get(key)
+        .and_then(Value::as_array)
+        .map_or(&[], Vec::as_slice)
+}
+
+/// A non-negative integer field.
+fn index(json: &Value, key: &str) -> Option<usize> {
+    json.get(key)
+        .and_then(Value::as_u64)
+        .and_then(|i| usize::try_from(i).ok())
+}
+
+/// An extension's object.
+fn extension<'j>(json: &'j Value, name: &str) -> Option<&'j Value> {
+    json.get("extensions").and_then(|e| e.get(name))
+}
+
+/// Takes an extension (or other key below `key`) away, and the holder with it when that was the last.
+fn remove_below(json: &mut Value, key: &str, name: &str) {
+    let Some(object) = json.as_object_mut() else {
+        return;
+    };
+    let Some(holder) = object.get_mut(key).and_then(Value::as_object_mut) else {
+        return;
+    };
+    holder.shift_remove(name);
+    if holder.is_empty() {
+        object.shift_remove(key);
+    }
+}
+
+/// GLB container (glTF 2.0, section 4.4): header, JSON chunk padded with spaces, BIN chunk padded with zeros.
+fn container(mut json: Vec<u8>, mut bin: Vec<u8>) -> Result<Vec<u8>> {
+    json.resize(json.len().next_multiple_of(4), b' ');
+    bin.resize(bin.len().next_multiple_of(4), 0);
+    let bin_chunk = if bin.is_empty() { 0 } else { 8 + bin.len() };
+    let length = 12 + 8 + json.len() + bin_chunk;
+    let Ok(total) = u32::try_from(length) else {
+        return Err(Error::input(
+            "output",
+            format!("the baked room takes {length} bytes and a GLB holds at most 4 GiB"),
+            "ask for a larger --error",
+        ));
+    };
+    // Chunks are shorter than the whole, so they fit as well.
+    let size = |chunk: &[u8]| (chunk.len() as u32).to_le_bytes();
+    let mut out = Vec::with_capacity(length);
+    out.extend(b"glTF");
+    out.extend(2u32.to_le_bytes());
+    out.extend(total.to_le_bytes());
+    out.extend(size(&json));
+    out.extend(b"JSON");
+    out.extend(&json);
+    if !bin.is_empty() {
+        out.extend(size(&bin));
+        out.extend(b"BIN\0");
+        out.extend(&bin);
+    }
+    Ok(out)
+}
