@@ -1,4 +1,6 @@
-//! What the light looks like at the vertices of the refined mesh.
+//! What the light looks like at points and at the vertices of the refined mesh.
+
+pub mod point;
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
 #[derive(Debug, Clone, Default)]

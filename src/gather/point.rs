@@ -6,7 +6,7 @@
 
 use crate::geometry::{Segment, lambert_polygon};
 use crate::hierarchy::{Element, NONE, Node, Sample, Tree};
-use crate::link::{Sight, View, point_factor};
+use crate::link::{Sight, View, Way, blockers_of, point_factor};
 use crate::scene::{LightKind, PunctualLight};
 use crate::solve::light::Light;
 use glam::DVec3;
@@ -49,7 +49,7 @@ pub struct Gathered {
 /// Reused memory of one thread and its ray count.
 #[derive(Debug, Default)]
 pub struct Memory {
-    stack: Vec<(u32, bool)>,
+    stack: Vec<(u32, Way, f32)>,
     samples: Vec<Sample>,
     segments: Vec<Segment>,
     weights: Vec<f64>,
@@ -72,9 +72,31 @@ pub struct Gatherer<'a> {
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
     pub closed: bool,
+    /// Take visibility from the links instead of looking again?
+    pub stored: bool,
 }
 
 impl Gatherer<'_> {
+    /// Gathers what comes straight from lamps.
+    pub fn direct(&self, to: &Receiver, memory: &mut Memory) -> [f32; 64] {
+        let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0 };
+        let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
+        memory.stack.clear();
+        let mut above = to.leaf;
+        while let Some(id) = above {
+            let row = self.light.neighbours.row(id).iter();
+            memory.stack.extend(row.filter(|&&(other, ..)| lit(other)));
+            above = Some(self.tree.node(id).parent).filter(|&p| p != NONE);
+        }
+        while let Some((id, way, v)) = memory.stack.pop() {
+            if lit(id) {
+                self.visit(to, id, way, v, memory, &mut out);
+            }
+        }
+        self.punctual(to, memory, &mut out);
+        out.direct
+    }
+
     /// Gathers at a point.
     pub fn at(&self, to: &Receiver, memory: &mut Memory) -> Gathered {
         let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0 };
@@ -83,17 +105,17 @@ impl Gatherer<'_> {
             Some(leaf) => {
                 let mut id = leaf;
                 while id != NONE {
-                    for &(other, clear) in self.light.neighbours.row(id) {
-                        memory.stack.push((other, clear));
+                    for &(other, way, v) in self.light.neighbours.row(id) {
+                        memory.stack.push((other, way, v));
                     }
                     id = self.tree.node(id).parent;
                 }
             }
-            None if !self.tree.nodes.is_empty() => memory.stack.push((0, false)),
+            None if !self.tree.nodes.is_empty() => memory.stack.push((0, Way::Crowded, 0.5)),
             None => {}
         }
-        while let Some((id, clear)) = memory.stack.pop() {
-            self.visit(to, id, clear, memory, &mut out);
+        while let Some((id, way, v)) = memory.stack.pop() {
+            self.visit(to, id, way, v, memory, &mut out);
         }
         if self.closed && out.seen > 0.5 {
             let scale = (1.0 / out.seen) as f32;
@@ -108,8 +130,9 @@ impl Gatherer<'_> {
         out
     }
 
-    fn visit(&self, to: &Receiver, id: u32, clear: bool, memory: &mut Memory, out: &mut Gathered) {
+    fn visit(&self, to: &Receiver, id: u32, way: Way, v: f32, memory: &mut Memory, out: &mut Gathered) {
         let node = self.tree.node(id);
+        let clear = way == Way::Clear || !self.sight.occlusion;
         if !self.can_see(to, node) {
             return;
         }
@@ -123,7 +146,7 @@ impl Gatherer<'_> {
             let factor = node.area / (std::f64::consts::PI * gap * gap + node.area);
             let far = distance > 4.0 * node.radius;
             if !far || factor * (spread + 0.3 * (reflected + emitted)) > self.tolerance {
-                memory.stack.extend(node.child_range().map(|c| (c, clear)));
+                memory.stack.extend(node.child_range().map(|c| (c, way, v)));
                 return;
             }
             self.cluster(to, id, node, clear, memory, out);
@@ -135,12 +158,17 @@ impl Gatherer<'_> {
             return;
         }
         let size = if clear { (node.radius / distance.max(1e-300)).min(1.0) } else { 1.0 };
-        if !node.is_leaf() && (node.element == NONE || factor * spread * size > self.tolerance) {
-            memory.stack.extend(node.child_range().map(|c| (c, clear)));
+        if self.has_parts(node) && (node.element == NONE || factor * spread * size > self.tolerance) {
+            memory.stack.extend(node.child_range().map(|c| (c, way, v)));
             return;
         }
-        let visible = if clear { 1.0 } else { self.visible(to, id, node, factor * (reflected + emitted), emitted > 0.0, memory) };
+        let visible = if clear { 1.0 } else if self.stored { f64::from(v) } else { self.visible(to, id, way, factor, factor * (reflected + emitted), emitted > 0.0, memory) };
         self.add(id, factor, visible, out);
+    }
+
+    /// Are the children of a node known to the solution? Elements split after it are not.
+    fn has_parts(&self, node: &Node) -> bool {
+        !node.is_leaf() && (node.child as usize) < self.light.bright_emitted.len()
     }
 
     /// Adds a patch with a factor and its visible share.
@@ -209,12 +237,17 @@ impl Gatherer<'_> {
     }
 
     /// Visible share of a polygon patch. `carries` is what it would bring unblocked, share of white.
-    fn visible(&self, to: &Receiver, id: u32, node: &Node, carries: f64, lamp: bool, memory: &mut Memory) -> f64 {
-        if !self.sight.occlusion {
-            return 1.0;
-        }
+    #[expect(clippy::too_many_arguments, reason = "one caller")]
+    fn visible(&self, to: &Receiver, id: u32, way: Way, factor: f64, carries: f64, lamp: bool, memory: &mut Memory) -> f64 {
+        let node = self.tree.node(id);
         let Some(element) = self.tree.element(node) else { return 1.0 };
         let plane = self.tree.face_plane[element.face as usize];
+        if let Way::Listed { .. } = way {
+            let list = blockers_of(&self.light.neighbours.blockers, way);
+            if let Some(seen) = self.sight.visible_factor(to.point, to.normal, &element.corners, [to.plane, plane], list) {
+                return (seen / factor).min(1.0);
+            }
+        }
         if lamp {
             return self.lamp_visible(to, element, plane, carries, memory);
         }
@@ -223,30 +256,22 @@ impl Gatherer<'_> {
         let count = wanted.clamp(RAYS[0], RAYS[1]);
         let shift = crate::link::pattern(to.seed, id, 2);
         let normal = node.normal;
-        let (mut seen, mut total) = (0.0, 0.0);
-        for (from, upto) in [(0, RAYS[0]), (RAYS[0], count)] {
-            memory.segments.clear();
-            memory.weights.clear();
-            for k in from..upto {
-                let p = element.at(crate::hierarchy::stratified(k, RAYS[1], shift));
-                let d = p - to.point;
-                let r2 = d.length_squared();
-                let (c1, c2) = (to.normal.dot(d), -normal.dot(d));
-                if c1 > 0.0 && c2 > 0.0 && r2 > 0.0 {
-                    memory.weights.push(c1 * c2 / (r2 * r2));
-                    memory.segments.push(Segment { from: to.point.as_vec3(), to: p.as_vec3(), planes: [to.plane, plane] });
-                }
-            }
-            self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
-            memory.rays += memory.segments.len() as u64;
-            for (w, &b) in memory.weights.iter().zip(&memory.blocked) {
-                total += w;
-                seen += if b { 0.0 } else { *w };
-            }
-            if seen == 0.0 || seen == total {
-                break;
+        memory.segments.clear();
+        memory.weights.clear();
+        for k in 0..count {
+            let p = element.at(crate::hierarchy::stratified(k, RAYS[1], shift));
+            let d = p - to.point;
+            let r2 = d.length_squared();
+            let (c1, c2) = (to.normal.dot(d), -normal.dot(d));
+            if c1 > 0.0 && c2 > 0.0 && r2 > 0.0 {
+                memory.weights.push(c1 * c2 / (r2 * r2));
+                memory.segments.push(Segment { from: to.point.as_vec3(), to: p.as_vec3(), planes: [to.plane, plane] });
             }
         }
+        self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+        memory.rays += memory.segments.len() as u64;
+        let total: f64 = memory.weights.iter().sum();
+        let seen: f64 = memory.weights.iter().zip(&memory.blocked).filter(|(_, b)| !**b).map(|(w, _)| w).sum();
         if total > 0.0 { seen / total } else { 0.0 }
     }
 

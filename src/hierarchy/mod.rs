@@ -6,4 +6,5 @@ mod tree;
 mod validate;
 
 pub use mesh::{Face, Mesh};
+pub(crate) use tree::stratified;
 pub use tree::{Element, NONE, Node, Sample, Tree};

@@ -5,6 +5,7 @@
 //! (Hanrahan, Salzman and Aupperle 1991); clusters split as built.
 
 use super::mesh::{Face, Mesh};
+use crate::geometry::sampling::triangle_weights;
 use glam::DVec3;
 
 /// No node.
@@ -93,7 +94,7 @@ pub struct Sample {
 }
 
 /// The hierarchy of one room.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Tree {
     /// All nodes; the root is node 0; children after parents.
     pub nodes: Vec<Node>,
@@ -117,6 +118,11 @@ impl Tree {
     /// Builds the clusters over all faces of `mesh`.
     pub fn new(mesh: &Mesh) -> Self {
         super::build::build(mesh)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.nodes.len() * size_of::<Node>() + self.elements.len() * size_of::<Element>() + self.faces.len() * 64
     }
 
     /// A node by index.
@@ -198,18 +204,16 @@ impl Tree {
 }
 
 /// Barycentric weights of point `k` of `count`: an R2 sequence (Roberts 2018) shifted by `u`, folded into the triangle.
-fn stratified(k: usize, count: usize, u: [f64; 2]) -> [f64; 3] {
+pub(crate) fn stratified(k: usize, count: usize, u: [f64; 2]) -> [f64; 3] {
     if count == 1 {
         return [1.0 / 3.0; 3];
+    }
+    if count == 3 {
+        // Strang and Fix (1973): exact for quadratic functions.
+        return std::array::from_fn(|c| if c == k { 2.0 / 3.0 } else { 1.0 / 6.0 });
     }
     // 1/p and 1/p^2 for the plastic number p = 1.3247...
     let x = (u[0] + 0.754_877_666_246_692_8 * (k as f64 + 1.0)).fract();
     let y = (u[1] + 0.569_840_290_998_053_3 * (k as f64 + 1.0)).fract();
-    barycentric([x, y])
-}
-
-/// Equal-area map of the unit square onto barycentric weights.
-pub(crate) fn barycentric([x, y]: [f64; 2]) -> [f64; 3] {
-    let root = x.sqrt();
-    [1.0 - root, root * (1.0 - y), root * y]
+    triangle_weights([x, y])
 }

@@ -5,7 +5,8 @@
 //! formula lies in [0, 1] however near the polygon is.
 
 use super::visibility::{View, segment};
-use super::{Link, Room};
+use super::contour::exchange;
+use super::{Link, Room, Way};
 use crate::geometry::{Segment, lambert_polygon};
 use crate::hierarchy::{Node, Sample, Tree};
 use glam::DVec3;
@@ -15,9 +16,15 @@ use std::f64::consts::PI;
 const POLYGONS: u32 = 4;
 /// Points that stand for a larger cluster.
 const CLUSTER_POINTS: usize = 8;
-/// Rays of a pair at first, and more where the first disagree.
-const RAYS: usize = 4;
-const MORE_RAYS: usize = 16;
+/// Beyond this gap one point does: 1/r^2 changes by less than 2 % over the smaller end, and evenly.
+const FAR: f64 = 8.0;
+/// Below this gap points would err by more than 1 %: contour integrals are used.
+const NEAR: f64 = 2.5;
+/// Points that look past a short list of blockers.
+const POINTS: usize = 6;
+/// Rays of a pair. Their number does not depend on what they find: stopping when the first agree would make hidden
+/// pairs too dark and open ones too bright.
+const RAYS: usize = 8;
 
 /// Reused memory of one thread, and what it did.
 #[derive(Debug, Default)]
@@ -96,18 +103,9 @@ fn point_to_point(s: &Sample, t: &Sample) -> f64 {
     if c1 <= 0.0 || c2 <= 0.0 { 0.0 } else { c1 * c2 / (r2 * (PI * r2 + t.area)) }
 }
 
-/// How many points the sampled end gets: one where the other end looks the same from everywhere, more when close.
-fn points_for(a: &Node, b: &Node) -> usize {
-    let gap = a.centre.distance(b.centre) / (a.radius + b.radius);
-    if gap > 6.0 {
-        1
-    } else if gap > 2.5 {
-        4
-    } else if gap > 1.3 {
-        7
-    } else {
-        16
-    }
+/// Distance of two nodes' centres in sums of their radii.
+fn gap(a: &Node, b: &Node) -> f64 {
+    a.centre.distance(b.centre) / (a.radius + b.radius)
 }
 
 /// Works out the link between two patches; none if they exchange nothing. `view` is what is known of the way between.
@@ -123,7 +121,14 @@ pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch)
     };
     let (s, t) = if a_sampled { (a, b) } else { (b, a) };
     let (ns, nt) = (tree.node(s), tree.node(t));
-    let count = if simple(ns) { points_for(ns, nt) } else { CLUSTER_POINTS.max(points_for(ns, nt)) };
+    let gap = gap(ns, nt);
+    let count = if !simple(ns) {
+        if gap > NEAR { CLUSTER_POINTS } else { 2 * CLUSTER_POINTS }
+    } else if gap > FAR {
+        1
+    } else {
+        3
+    };
     let shift = pattern(room.seed, a, b);
     tree.samples(s, count, shift, &mut scratch.a);
     if simple(nt) {
@@ -138,6 +143,9 @@ pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch)
         least = least.min(f);
         most = most.max(f);
     }
+    if simple(ns) && simple(nt) && gap < NEAR {
+        open = contours(tree, ns, nt);
+    }
     if open <= 0.0 {
         return None;
     }
@@ -145,50 +153,76 @@ pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch)
     let size = ns.radius / ns.centre.distance(nt.centre).max(ns.radius + f64::MIN_POSITIVE);
     // One point says nothing about variation: 1/r^2 over the patch's own size does.
     let variation = if count == 1 { 2.0 * size } else { (0.5 * (most - least) / mean).min(4.0) };
-    let visible = if *view == View::Clear { 1.0 } else { sampled_visibility(room, s, t, shift, view, scratch) };
+    let visible = match view {
+        View::Clear => 1.0,
+        View::Listed(list) if simple(nt) => clipped_visibility(room, s, t, shift, list, scratch)
+            .unwrap_or_else(|| sampled_visibility(room, s, t, shift, view, scratch)),
+        _ => sampled_visibility(room, s, t, shift, view, scratch),
+    };
     Some(Link {
         a,
         b,
         exchange: (open * visible) as f32,
         open_exchange: open as f32,
         variation: variation as f32,
-        clear: *view == View::Clear,
+        way: if *view == View::Clear { Way::Clear } else { Way::Crowded },
     })
+}
+
+/// Unoccluded exchange of two small sets of faces.
+fn contours(tree: &Tree, a: &Node, b: &Node) -> f64 {
+    let mut sum = 0.0;
+    for (one, i) in polygons(tree, a) {
+        for (two, k) in polygons(tree, b) {
+            if tree.face_plane[i] != tree.face_plane[k] {
+                sum += exchange(&one, &two);
+            }
+        }
+    }
+    sum
+}
+
+/// Visible share by points on one end that see exactly what is left of the polygons of the other.
+fn clipped_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], list: &[u32], scratch: &mut Scratch) -> Option<f64> {
+    let tree = room.tree;
+    tree.samples(s, POINTS, shift, &mut scratch.a);
+    let (mut seen, mut total) = (0.0, 0.0);
+    for p in &scratch.a {
+        for (corners, entry) in polygons(tree, tree.node(t)) {
+            let plane = tree.face_plane[entry];
+            if plane == p.plane || tree.face_normal[entry].dot(p.point - corners[0]) <= 0.0 {
+                continue;
+            }
+            let open = lambert_polygon(p.point, p.normal, &corners);
+            if open > 0.0 {
+                total += open;
+                seen += room.sight.visible_factor(p.point, p.normal, &corners, [p.plane, plane], list)?;
+            }
+        }
+    }
+    Some(if total > 0.0 { (seen / total).min(1.0) } else { 1.0 })
 }
 
 /// Visible share by rays between points of both ends, each weighted by what it would carry.
 fn sampled_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], view: &View, scratch: &mut Scratch) -> f64 {
-    let mut seen = 0.0;
-    let mut total = 0.0;
-    for (round, count) in [RAYS, MORE_RAYS].into_iter().enumerate() {
-        let turn = 0.618_033_988_749_894_9 * (round + 1) as f64;
-        let (u, v) = ([(shift[0] + turn).fract(), shift[1]], [shift[1], (shift[0] + 2.0 * turn).fract()]);
-        room.tree.samples(s, count, u, &mut scratch.a);
-        room.tree.samples(t, count, v, &mut scratch.b);
-        scratch.segments.clear();
-        scratch.weights.clear();
-        for (k, p) in scratch.a.iter().enumerate() {
-            // Pair the points of both patterns crosswise, so that neighbours on one end are not neighbours on the other.
-            let q = &scratch.b[(k * 7 + 3) % count];
-            let weight = point_to_point(p, q);
-            if weight > 0.0 {
-                scratch.segments.push(segment(p, q));
-                scratch.weights.push(weight);
-            }
-        }
-        room.sight.blocked(&scratch.segments, view, &mut scratch.blocked);
-        scratch.rays += scratch.segments.len() as u64;
-        for (w, &blocked) in scratch.weights.iter().zip(&scratch.blocked) {
-            total += w;
-            if !blocked {
-                seen += w;
-            }
-        }
-        // All agree: take their word (a blocked minority of a few per cent is what refinement and the gather find).
-        if total > 0.0 && (seen == 0.0 || seen == total) {
-            break;
+    let (u, v) = (shift, [shift[1], (shift[0] + 0.618_033_988_749_894_9).fract()]);
+    room.tree.samples(s, RAYS, u, &mut scratch.a);
+    room.tree.samples(t, RAYS, v, &mut scratch.b);
+    scratch.segments.clear();
+    scratch.weights.clear();
+    for (k, p) in scratch.a.iter().enumerate() {
+        // Pair the points of both patterns crosswise, so that neighbours on one end are not neighbours on the other.
+        let q = &scratch.b[(k * 5 + 3) % RAYS];
+        let weight = point_to_point(p, q);
+        if weight > 0.0 {
+            scratch.segments.push(segment(p, q));
+            scratch.weights.push(weight);
         }
     }
+    room.sight.blocked(&scratch.segments, view, &mut scratch.blocked);
+    scratch.rays += scratch.segments.len() as u64;
+    let total: f64 = scratch.weights.iter().sum();
+    let seen: f64 = scratch.weights.iter().zip(&scratch.blocked).filter(|(_, b)| !**b).map(|(w, _)| w).sum();
     if total > 0.0 { seen / total } else { 1.0 }
 }
 

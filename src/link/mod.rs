@@ -1,16 +1,19 @@
 //! Links: who exchanges light with whom, how much, and how well that is known.
 
 mod balance;
+mod contour;
 mod kernel;
 mod refine;
 mod store;
 mod visibility;
 
+pub(crate) use balance::row_sums;
 pub use balance::{Balance, balance};
+pub(crate) use kernel::pattern;
 pub use kernel::{Scratch, evaluate, facing, point_factor};
-pub use refine::{Demand, Graph, refine};
+pub use refine::{Demand, Graph, MAX_DEPTH, Refined, blockers_of};
 pub use store::LinkRows;
-pub use visibility::{Sight, View};
+pub use visibility::{Opaque, Sight, View};
 
 use crate::hierarchy::Tree;
 
@@ -27,8 +30,8 @@ pub struct Link {
     pub open_exchange: f32,
     /// Relative variation of the point-to-patch factor, half of (greatest - least) over the mean.
     pub variation: f32,
-    /// Is it proved that nothing blocks?
-    pub clear: bool,
+    /// What may block.
+    pub way: Way,
 }
 
 impl Link {
@@ -36,6 +39,22 @@ impl Link {
     pub fn visibility(&self) -> f32 {
         if self.open_exchange > 0.0 { (self.exchange / self.open_exchange).min(1.0) } else { 0.0 }
     }
+}
+
+/// What may stand between the ends of a link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// Nothing: proved.
+    Clear,
+    /// Only a few triangles: `Graph::blockers[start..start + count]`.
+    Listed {
+        /// First.
+        start: u32,
+        /// How many.
+        count: u8,
+    },
+    /// Anything.
+    Crowded,
 }
 
 /// What links are made of: the patches and what may stand between them.

@@ -6,12 +6,12 @@
 //! parallel and splits elements in order, so the result does not depend on the number of threads.
 
 use super::visibility::View;
-use super::{Link, Room, Scratch, Sight, evaluate, facing};
+use super::{Link, Room, Scratch, Sight, Way, evaluate, facing};
 use crate::hierarchy::{NONE, Node, Tree};
 use rayon::prelude::*;
 
 /// Deepest quartering of a face: side lengths shrink to 1/4096.
-const MAX_DEPTH: u8 = 12;
+pub const MAX_DEPTH: u8 = 12;
 /// Pairs a task evaluates: enough to pay for a task, few enough to share out.
 const CHUNK: usize = 64;
 
@@ -33,7 +33,7 @@ impl Demand<'_> {
     pub fn error(&self, tree: &Tree, link: &Link) -> f64 {
         let visibility = f64::from(link.visibility());
         // An unproved "hidden" is right to about one in the rays cast; "partly" misplaces light like a coin.
-        let doubt = if link.clear { 0.0 } else { (visibility * (1.0 - visibility)).sqrt().max(0.1) };
+        let doubt = if link.way == Way::Clear { 0.0 } else { (visibility * (1.0 - visibility)).sqrt().max(0.1) };
         let misplaced = f64::from(link.open_exchange) * (f64::from(link.variation) * visibility + doubt);
         let at = |receiver: u32, source: u32| {
             let area = tree.node(receiver).area;
@@ -49,6 +49,8 @@ impl Demand<'_> {
 pub struct Graph {
     /// The links, in an order that depends on the input only.
     pub links: Vec<Link>,
+    /// Lists of triangles that may block, for the links that have one.
+    pub blockers: Vec<u32>,
 }
 
 /// What one refinement did.
@@ -89,12 +91,24 @@ impl Graph {
                     done.capped += u64::from(wants);
                 }
             }
+            // Lists of links that are opened go; the others move up.
+            let blockers = std::mem::take(&mut self.blockers);
+            for link in &mut kept {
+                if let Way::Listed { count, .. } = link.way {
+                    let start = self.blockers.len() as u32;
+                    self.blockers.extend(blockers_of(&blockers, link.way));
+                    link.way = Way::Listed { start, count };
+                }
+            }
             self.links = kept;
             open = split
                 .into_par_iter()
                 .map(|link| {
-                    let known = if link.clear { View::Clear } else { View::Crowded };
-                    let view = sight.view(tree, tree.node(link.a), tree.node(link.b), &known);
+                    let view = match link.way {
+                        Way::Clear => View::Clear,
+                        Way::Listed { .. } => View::Listed(blockers_of(&blockers, link.way).to_vec()),
+                        Way::Crowded => sight.view(tree, tree.node(link.a), tree.node(link.b), &View::Crowded),
+                    };
                     (link, view)
                 })
                 .collect();
@@ -119,15 +133,35 @@ impl Graph {
     /// Good links are kept, the others opened.
     fn sort_out(&mut self, tree: &Tree, demand: &Demand, fresh: Vec<(Link, View)>, open: &mut Vec<(Link, View)>, done: &mut Refined) {
         for (link, view) in fresh {
-            if demand.error(tree, &link) <= demand.threshold {
-                self.links.push(link);
-            } else if splittable(tree, &link, demand).is_some() {
+            let good = demand.error(tree, &link) <= demand.threshold;
+            if !good && splittable(tree, &link, demand).is_some() {
                 open.push((link, view));
-            } else {
-                done.capped += 1;
-                self.links.push(link);
+                continue;
             }
+            done.capped += u64::from(!good);
+            self.keep(link, &view);
         }
+    }
+
+    fn keep(&mut self, link: Link, view: &View) {
+        let way = match view {
+            View::Clear => Way::Clear,
+            View::Crowded => Way::Crowded,
+            View::Listed(list) => {
+                let start = self.blockers.len() as u32;
+                self.blockers.extend(list);
+                Way::Listed { start, count: list.len() as u8 }
+            }
+        };
+        self.links.push(Link { way, ..link });
+    }
+}
+
+/// The triangles that a way lists.
+pub fn blockers_of(blockers: &[u32], way: Way) -> &[u32] {
+    match way {
+        Way::Listed { start, count } => &blockers[start as usize..start as usize + usize::from(count)],
+        Way::Clear | Way::Crowded => &[],
     }
 }
 

@@ -1,10 +1,13 @@
 //! Is the way between two patches clear? Exactly where the shaft between them is empty, by rays elsewhere.
 
-use crate::geometry::{Patch, RayIndex, Segment, Shaft, ShaftContents};
-use crate::hierarchy::{Node, Sample, Tree};
+use crate::geometry::{Patch, RayIndex, Segment, Shaft, ShaftContents, lambert_visible};
+use crate::hierarchy::{Mesh, Node, Sample, Tree};
+use glam::DVec3;
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
-const LISTED: usize = 32;
+const LISTED: usize = 24;
+/// A polygon seen past its blockers may fall into this many pieces before rays take over.
+const PIECES: usize = 48;
 
 /// Tells whether a point of a masked triangle is solid: triangle, then barycentrics of its second and third corner.
 pub type Opaque<'a> = dyn Fn(u32, f32, f32) -> bool + Sync + 'a;
@@ -15,6 +18,8 @@ pub struct Sight<'a> {
     pub rays: &'a RayIndex,
     /// Holes of alpha-masked triangles; none where the room has none.
     pub opaque: Option<&'a Opaque<'a>>,
+    /// Where the triangles are.
+    pub mesh: &'a Mesh,
     /// False where nothing can block (a convex room): then no ray is cast and no shaft is built.
     pub occlusion: bool,
 }
@@ -43,19 +48,38 @@ impl Sight<'_> {
         }
         let shaft = Shaft::between(&patch(tree, a), &patch(tree, b));
         match self.rays.blockers(&shaft, candidates, LISTED) {
-            ShaftContents::None => View::Clear,
-            ShaftContents::Some(list) => View::Listed(list.to_vec()),
+            ShaftContents::Clear => View::Clear,
+            ShaftContents::Few(list) => View::Listed(list),
             ShaftContents::Many => View::Crowded,
         }
+    }
+
+    /// Factor from a point to the visible part of a polygon past the listed triangles, exactly; none where that takes
+    /// too many pieces or a blocker has holes. `planes`: of the point and of the polygon, which do not block.
+    pub fn visible_factor(&self, point: DVec3, normal: DVec3, polygon: &[DVec3; 3], planes: [u32; 2], list: &[u32]) -> Option<f64> {
+        if self.opaque.is_some() {
+            return None;
+        }
+        let mut corners = [[DVec3::ZERO; 3]; LISTED];
+        let mut count = 0;
+        for &triangle in list {
+            if !planes.contains(&self.mesh.plane[triangle as usize]) {
+                corners[count] = self.mesh.triangles[triangle as usize].map(|v| self.mesh.positions[v as usize]);
+                count += 1;
+            }
+        }
+        lambert_visible(point, normal, polygon, &corners[..count], PIECES)
     }
 
     /// For each segment: is it blocked?
     pub fn blocked(&self, segments: &[Segment], view: &View, out: &mut Vec<bool>) {
         out.clear();
+        out.resize(segments.len(), false);
         match (view, self.opaque) {
-            (View::Clear, _) => out.resize(segments.len(), false),
-            (_, Some(opaque)) => out.extend(segments.iter().map(|s| self.rays.occluded_with(s, &opaque))),
-            (View::Listed(list), None) => self.rays.occluded_by(list, segments, out),
+            (View::Clear, _) => {}
+            (View::Listed(list), Some(opaque)) => self.rays.occluded_by(list, segments, out, &opaque),
+            (View::Listed(list), None) => self.rays.occluded_by(list, segments, out, &|_, _, _| true),
+            (View::Crowded, Some(opaque)) => self.rays.occluded_many_with(segments, out, &opaque),
             (View::Crowded, None) => self.rays.occluded_many(segments, out),
         }
     }
@@ -69,10 +93,7 @@ pub(super) fn segment(s: &Sample, t: &Sample) -> Segment {
 /// A node as the end of a shaft.
 fn patch(tree: &Tree, node: &Node) -> Patch {
     match tree.element(node) {
-        Some(e) => Patch::triangle(e.corners, tree.face_normal[e.face as usize], tree.face_plane[e.face as usize]),
-        None if node.flat => {
-            Patch::flat_box(node.low, node.high, node.normal, tree.face_plane[node.faces.0 as usize])
-        }
-        None => Patch::bounds(node.low, node.high),
+        Some(e) => Patch::Triangle { corners: e.corners, plane: tree.face_plane[e.face as usize] },
+        None => Patch::Box { low: node.low, high: node.high },
     }
 }

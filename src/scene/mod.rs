@@ -1,7 +1,11 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
+pub mod alpha;
 pub mod document;
+pub mod effects;
+pub mod material;
 mod raw;
+mod texture;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};

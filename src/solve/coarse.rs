@@ -8,9 +8,9 @@ use super::conjugate::System;
 use super::lanes::Lanes;
 use super::operator::Operator;
 use super::rows::{Rows, padded};
-use crate::color::difference::luv_jacobian;
+use crate::color::luv_jacobian;
 use crate::hierarchy::{NONE, Node, Tree};
-use crate::link::{Link, LinkRows};
+use crate::link::{Link, LinkRows, Way};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{LEAVES, Leaves, Partition};
 use glam::DVec3;
@@ -26,6 +26,7 @@ pub struct Coarse {
     links: LinkRows,
     leaves: Vec<u32>,
     factor: Vec<f32>,
+    areas: Vec<f64>,
     /// Reflectance of each patch.
     reflectance: Vec<Leaves>,
     /// Exitance or first irradiance of each patch by light, as shape on the leaves.
@@ -54,7 +55,7 @@ pub struct Choice {
 
 impl Coarse {
     /// Sums links and sources over a cut of `tree`.
-    pub fn new(tree: &Tree, links: &[Link], factor: &[f32], leaves: &[u32], dense: &dyn Dense, lights: usize) -> Self {
+    pub fn new(tree: &Tree, links: &[Link], factor: &[f32], areas: &[f64], leaves: &[u32], dense: &dyn Dense, lights: usize) -> Self {
         let group = cut(tree);
         let count = group.iter().filter(|&&g| g != NONE).map(|&g| g as usize + 1).max().unwrap_or(0);
         let mut area = vec![0.0; count];
@@ -62,7 +63,7 @@ impl Coarse {
         let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
         let mut punctual = emission.clone();
         for &leaf in leaves {
-            let (g, a) = (group[leaf as usize] as usize, tree.node(leaf).area);
+            let (g, a) = (group[leaf as usize] as usize, areas[leaf as usize]);
             area[g] += a;
             add(&mut reflectance[g], &dense.reflectance(leaf), a);
             for light in 0..lights {
@@ -90,7 +91,7 @@ impl Coarse {
                 if g > 0.0 {
                     // A patch of the model may light itself; the row holds it twice, so half is stored.
                     let g = if a == b { 0.5 * g } else { g };
-                    pairs.push(Link { a: a as u32 + 1, b: b as u32 + 1, exchange: g as f32, open_exchange: g as f32, variation: 0.0, clear: true });
+                    pairs.push(Link { a: a as u32 + 1, b: b as u32 + 1, exchange: g as f32, open_exchange: g as f32, variation: 0.0, way: Way::Clear });
                 }
             }
         }
@@ -99,6 +100,7 @@ impl Coarse {
             links: LinkRows::new(count + 1, &pairs),
             leaves: (1..=count as u32).collect(),
             factor: vec![1.0; count + 1],
+            areas: std::iter::once(area.iter().sum()).chain(area.iter().copied()).collect(),
             reflectance,
             emission,
             punctual,
@@ -131,7 +133,7 @@ impl Coarse {
                 *g = g.max(*r);
             }
         }
-        let operator = Operator { tree: &self.tree, links: &self.links, leaves: &self.leaves, factor: &self.factor };
+        let operator = Operator { tree: &self.tree, links: &self.links, leaves: &self.leaves, areas: &self.areas, factor: &self.factor };
         let (mut nodes, mut gathered) = (Rows::zero(count + 1, L), Rows::zero(count + 1, L));
         let mut first = Rows::zero(count, L);
         operator.irradiance::<L>(&e, &mut nodes, &mut gathered, &mut first);

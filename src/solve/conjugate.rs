@@ -37,12 +37,12 @@ pub struct System<'a> {
 impl System<'_> {
     /// Reflected radiosity of the leaves (by leaf) from the irradiance of the first bounce, starting from a guess.
     pub fn solve<const L: usize>(&self, first: &Rows, reflected: &mut Rows, tolerance: f64) -> Convergence {
-        let tree = self.operator.tree;
+        let (tree, areas) = (self.operator.tree, self.operator.areas);
         let leaves = self.operator.leaves;
         let count = leaves.len();
         let mut root = Rows::zero(count, L);
         for ((root, rho), &leaf) in root.all_mut::<L>().iter_mut().zip(self.reflectance.all::<L>()).zip(leaves) {
-            let area = tree.node(leaf).area as f32;
+            let area = areas[leaf as usize] as f32;
             *root = rho.map(|x| (x * area).sqrt());
         }
         let mut work = Work {
@@ -59,7 +59,7 @@ impl System<'_> {
         for (((y, guess), r), &leaf) in
             y.all_mut::<L>().iter_mut().zip(reflected.all::<L>()).zip(root.all::<L>()).zip(leaves)
         {
-            let area = tree.node(leaf).area as f32;
+            let area = areas[leaf as usize] as f32;
             *y = std::array::from_fn(|l| if r[l] > 0.0 { guess[l] * area / r[l] } else { 0.0 });
         }
         let norm = dot::<L>(&b, &b).map(|x| x.max(f64::MIN_POSITIVE));
@@ -104,7 +104,7 @@ impl System<'_> {
             rr = next;
         }
         for (((out, y), r), &leaf) in reflected.all_mut::<L>().iter_mut().zip(y.all::<L>()).zip(root.all::<L>()).zip(leaves) {
-            let inverse = (1.0 / tree.node(leaf).area) as f32;
+            let inverse = (1.0 / areas[leaf as usize]) as f32;
             *out = std::array::from_fn(|l| y[l] * r[l] * inverse);
         }
         done
@@ -112,10 +112,10 @@ impl System<'_> {
 
     /// `(1 - K) y`.
     fn apply<const L: usize>(&self, y: &Rows, root: &Rows, work: &mut Work, out: &mut Rows) {
-        let tree = self.operator.tree;
+        let areas = self.operator.areas;
         let rows = work.radiosity.all_mut::<L>().iter_mut().zip(y.all::<L>()).zip(root.all::<L>());
         for (((b, y), r), &leaf) in rows.zip(self.operator.leaves) {
-            let inverse = (1.0 / tree.node(leaf).area) as f32;
+            let inverse = (1.0 / areas[leaf as usize]) as f32;
             *b = std::array::from_fn(|l| y[l] * r[l] * inverse);
         }
         self.operator.irradiance::<L>(&work.radiosity, &mut work.nodes, &mut work.gathered, out);

@@ -4,10 +4,10 @@
 //! two rounds are nearly independent and fall by a factor q a round, so that the distance d between the rounds tells
 //! the error of the later one: `e = d / sqrt(1 + 1 / q^2)`.
 
-use crate::color::difference::{de_luv, de2000};
+use crate::color::{de_luv, de2000};
 use crate::gather::point::Receiver;
-use crate::geometry::Pcg;
-use crate::hierarchy::{Tree, barycentric};
+use crate::geometry::sampling::{Pcg, triangle_weights};
+use crate::hierarchy::Tree;
 use glam::DVec3;
 
 /// Points that are watched.
@@ -40,7 +40,7 @@ impl Probes {
             for k in 0..POINTS {
                 let target = (k as f64 + rng.f64()) / POINTS as f64 * root.area;
                 let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
-                let weights = barycentric([rng.f64(), rng.f64()]);
+                let weights = triangle_weights([rng.f64(), rng.f64()]);
                 let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
                 points.push((entry as u32, weights, element.at(weights), tree.face_normal[entry]));
             }

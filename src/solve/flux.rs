@@ -1,37 +1,161 @@
 //! Where the light goes: closedness, a first guess of brightness, and the flux balance
 //! `emitted = absorbed + escaped` (any geometry, any wavelength).
 
-use crate::geometry::{Pcg, RayIndex, cosine_direction};
-use crate::hierarchy::{Mesh, Tree, barycentric};
-use crate::link::{Closed, Sight};
+use crate::geometry::RayIndex;
+use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02, triangle_weights};
+use crate::hierarchy::{Mesh, NONE, Tree};
+use crate::link::Sight;
 use crate::scene::Scene;
 use crate::spectrum::Leaves;
+use glam::DVec3;
+use rayon::prelude::*;
 
 /// Rays that test whether a room is closed.
 const ESCAPE_RAYS: usize = 8192;
+/// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, at least, and at the most.
+const LEAF_RAYS: [usize; 3] = [48, 8, 128];
+/// Rays that tell whether a point is covered.
+const COVER_RAYS: u32 = 4;
+/// Least share of a leaf's area that counts as bare.
+const LEAST_BARE: f64 = 1e-3;
+/// Leaves that a task looks at.
+const CHUNK: usize = 64;
+
+/// Can light leave the room, or be lost on a black back?
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Closed {
+    /// No ray of thousands did.
+    Yes,
+    /// Some did.
+    No,
+}
 
 /// Casts rays from the fronts of all faces: the room is closed if every one meets the front of something.
 pub fn closedness(mesh: &Mesh, tree: &Tree, rays: &RayIndex, sight: &Sight, seed: u64) -> Closed {
     let Some(root) = tree.nodes.first() else { return Closed::No };
     if sight.opaque.is_some() {
-        // Holes lead somewhere else; rows are then only kept from exceeding 1.
+        // Holes lead somewhere else.
         return Closed::No;
     }
     let mut rng = Pcg::new(seed ^ 0x00c1_05ed);
-    let reach = (4.0 * mesh.half_size) as f32;
     for _ in 0..ESCAPE_RAYS {
         let target = rng.f64() * root.area;
         let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
         let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
-        let from = element.at(barycentric([rng.f64(), rng.f64()]));
+        let from = element.at(triangle_weights([rng.f64(), rng.f64()]));
         let direction = cosine_direction(tree.face_normal[entry], [rng.f64(), rng.f64()]);
-        match rays.closest(from.as_vec3(), direction.as_vec3(), reach, tree.face_plane[entry]) {
-            None => return Closed::No,
-            Some(hit) if hit.behind && tree.entry[hit.triangle as usize][1] == crate::hierarchy::NONE => return Closed::No,
-            Some(_) => {}
+        if meets(mesh, tree, rays, from, direction, tree.face_plane[entry]) != Meets::Front {
+            return Closed::No;
         }
     }
     Closed::Yes
+}
+
+/// What a ray from a surface meets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Meets {
+    Front,
+    /// The black back of a one-sided surface: the ray started inside something solid.
+    Back,
+    Nothing,
+}
+
+fn meets(mesh: &Mesh, tree: &Tree, rays: &RayIndex, from: DVec3, direction: DVec3, plane: u32) -> Meets {
+    let reach = (4.0 * mesh.half_size) as f32;
+    match rays.closest(from.as_vec3(), direction.as_vec3(), reach, plane) {
+        None => Meets::Nothing,
+        Some(hit) if hit.from_behind && tree.entry[hit.triangle as usize][1] == NONE => Meets::Back,
+        Some(_) => Meets::Front,
+    }
+}
+
+/// Is a point of a surface covered by something solid that stands on it or ends there? Then it sees backs only.
+pub fn covered(mesh: &Mesh, tree: &Tree, rays: &RayIndex, point: DVec3, normal: DVec3, plane: u32, seed: u64) -> bool {
+    (0..COVER_RAYS).all(|k| meets(mesh, tree, rays, point, cosine_direction(normal, sequence02(k, seed)), plane) == Meets::Back)
+}
+
+/// How leaves look out: what their rows must sum to, and how much of their area looks out at all.
+#[derive(Debug, Clone, Default)]
+pub struct Outlook {
+    /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
+    pub target: Vec<f32>,
+    /// For each node that is a leaf: share of its area that is not covered by something solid. NaN elsewhere.
+    pub bare: Vec<f32>,
+}
+
+impl Outlook {
+    /// Looks out of new leaves. A leaf below one whose rays all met fronts is not looked at again. Returns the rays cast.
+    pub fn extend(&mut self, mesh: &Mesh, tree: &Tree, rays: &RayIndex, closed: Closed, seed: u64) -> u64 {
+        let old = self.target.len();
+        self.target.resize(tree.nodes.len(), f32::NAN);
+        self.bare.resize(tree.nodes.len(), f32::NAN);
+        if closed == Closed::Yes {
+            self.target[old..].fill(1.0);
+            self.bare[old..].fill(1.0);
+            return 0;
+        }
+        let mut open = Vec::new();
+        for k in 0..tree.nodes.len() {
+            let node = &tree.nodes[k];
+            if !node.is_leaf() || !self.target[k].is_nan() {
+                continue;
+            }
+            let above = node.parent as usize;
+            if node.parent != NONE && self.target[above] == 1.0 && self.bare[above] == 1.0 {
+                (self.target[k], self.bare[k]) = (1.0, 1.0);
+            } else {
+                open.push(k);
+            }
+        }
+        let leaves = tree.nodes.iter().filter(|n| n.is_leaf()).count();
+        let mean = tree.nodes.first().map_or(0.0, |n| n.area) / leaves.max(1) as f64;
+        let found: Vec<(f32, f32, u64)> = open
+            .par_chunks(CHUNK)
+            .flat_map_iter(|chunk| {
+                chunk.iter().map(|&k| {
+                    let node = &tree.nodes[k];
+                    let element = &tree.elements[node.element as usize];
+                    let wanted = (LEAF_RAYS[0] as f64 * (node.area / mean)).ceil() as usize;
+                    let count = wanted.clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
+                    let (at, to) = (hash(seed, k as u64), hash(seed ^ 1, k as u64));
+                    let (mut fronts, mut backs) = (0, 0);
+                    for i in 0..count as u32 {
+                        let from = element.at(triangle_weights(sequence02(i, at)));
+                        let direction = cosine_direction(node.normal, sequence02(i, to));
+                        match meets(mesh, tree, rays, from, direction, tree.face_plane[element.face as usize]) {
+                            Meets::Front => fronts += 1,
+                            Meets::Back => backs += 1,
+                            Meets::Nothing => {}
+                        }
+                    }
+                    let bare = (count - backs) as f64 / count as f64;
+                    let target = if backs < count { fronts as f64 / (count - backs) as f64 } else { 0.0 };
+                    (target as f32, bare as f32, count as u64)
+                })
+            })
+            .collect();
+        let mut cast = 0;
+        for (k, (target, bare, count)) in open.into_iter().zip(found) {
+            (self.target[k], self.bare[k]) = (target, bare);
+            cast += count;
+        }
+        cast
+    }
+
+    /// Area of every node that looks out; never quite zero, so that nothing is divided by zero.
+    pub fn areas(&self, tree: &Tree) -> Vec<f64> {
+        let mut areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
+        for k in (0..areas.len()).rev() {
+            let node = &tree.nodes[k];
+            areas[k] = if node.is_leaf() {
+                node.area * f64::from(self.bare[k]).max(LEAST_BARE)
+            } else {
+                node.child_range().map(|c| areas[c as usize]).sum()
+            };
+        }
+        areas
+    }
 }
 
 /// What is known before the first solution.
@@ -87,7 +211,7 @@ pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> 
         let node = &tree.nodes[k];
         bright[k] = if node.is_leaf() {
             let m = material(node.faces.0 as usize);
-            (super::light::brightness(glow[m], white) + 0.5 * albedo[m]) as f32
+            (0.5 * albedo[m]) as f32
         } else {
             node.child_range().map(|c| f64::from(bright[c as usize]) * tree.node(c).area).sum::<f64>() as f32 / node.area as f32
         };
@@ -98,8 +222,10 @@ pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> 
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct Balance {
-    /// Luminous flux given out by surfaces and received from punctual lights, lm.
+    /// Luminous flux given out by surfaces, lm.
     pub emitted_lm: f64,
+    /// Luminous flux that fronts receive straight from lamps of any kind, lm.
+    pub received_lm: f64,
     /// Luminous flux absorbed by fronts, lm.
     pub absorbed_lm: f64,
     /// Luminous flux that left the room or met a black back, lm: by row sums below 1.
@@ -110,25 +236,26 @@ pub struct Balance {
 
 /// Sums the flux of a solution in f64: rows by leaf, `sums` the balanced row sums by node, `punctual` the irradiance
 /// from punctual lights by leaf.
-pub(super) fn flux(tree: &Tree, lanes: &super::lanes::Lanes, leaves: &[u32], rows: &FluxRows, sums: &[f64]) -> Balance {
+pub(super) fn flux(areas: &[f64], lanes: &super::lanes::Lanes, leaves: &[u32], rows: &FluxRows, sums: &[f64]) -> Balance {
     let n = lanes.len();
-    let (mut emitted, mut absorbed, mut escaped) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let (mut emitted, mut received, mut absorbed, mut escaped) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     for (k, &leaf) in leaves.iter().enumerate() {
-        let area = tree.node(leaf).area;
+        let area = areas[leaf as usize];
         for l in 0..n {
             let get = |r: &super::Rows| f64::from(r.row(k)[l]);
-            let (e, r, h, p, rho) = (get(rows.emission), get(rows.reflected), get(rows.irradiance), get(rows.punctual), get(rows.reflectance));
-            emitted[l] += area * (e + p);
+            let (e, r, h, f, rho) = (get(rows.emission), get(rows.reflected), get(rows.irradiance), get(rows.first), get(rows.reflectance));
+            emitted[l] += area * e;
+            received[l] += area * f;
             absorbed[l] += area * (1.0 - rho) * h;
-            escaped[l] += area * (e + r) * (1.0 - sums[leaf as usize]);
+            escaped[l] += area * r * (1.0 - sums[leaf as usize]);
         }
     }
     let worst = (0..n)
-        .filter(|&l| emitted[l] > 0.0)
-        .map(|l| ((absorbed[l] + escaped[l]) / emitted[l] - 1.0).abs())
+        .filter(|&l| received[l] > 0.0)
+        .map(|l| ((absorbed[l] + escaped[l]) / received[l] - 1.0).abs())
         .fold(0.0, f64::max);
     let lumens = |x: &[f64]| x.iter().zip(lanes.xyz()).map(|(x, w)| x * w[1]).sum();
-    Balance { emitted_lm: lumens(&emitted), absorbed_lm: lumens(&absorbed), escaped_lm: lumens(&escaped), worst_band: worst }
+    Balance { emitted_lm: lumens(&emitted), received_lm: lumens(&received), absorbed_lm: lumens(&absorbed), escaped_lm: lumens(&escaped), worst_band: worst }
 }
 
 /// Rows by leaf that the flux is summed from.
@@ -136,6 +263,6 @@ pub(super) struct FluxRows<'a> {
     pub(super) emission: &'a super::Rows,
     pub(super) reflected: &'a super::Rows,
     pub(super) irradiance: &'a super::Rows,
-    pub(super) punctual: &'a super::Rows,
+    pub(super) first: &'a super::Rows,
     pub(super) reflectance: &'a super::Rows,
 }

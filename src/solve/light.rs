@@ -3,7 +3,7 @@
 use super::lanes::Lanes;
 use super::rows::Rows;
 use crate::hierarchy::Tree;
-use crate::link::Link;
+use crate::link::{Graph, Way};
 
 /// The light in a room after a round.
 #[derive(Debug, Clone, Default)]
@@ -65,17 +65,20 @@ pub fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
     (0..3).map(|k| if white[k] > 0.0 { xyz[k] / white[k] } else { 0.0 }).sum::<f64>() / 3.0
 }
 
-/// For each node, the other ends of its links and whether the way is proved clear. Links found blocked are here too:
+/// For each node, the other ends of its links and what may stand between. Links found blocked are here too:
 /// a point may see what sixteen rays did not.
 #[derive(Debug, Clone, Default)]
 pub struct Neighbours {
     start: Vec<u32>,
-    ends: Vec<(u32, bool)>,
+    ends: Vec<(u32, Way, f32)>,
+    /// Lists that [`Way::Listed`] points into.
+    pub blockers: Vec<u32>,
 }
 
 impl Neighbours {
     /// Sorts links into rows.
-    pub fn new(nodes: usize, links: &[Link]) -> Self {
+    pub fn new(nodes: usize, graph: &Graph) -> Self {
+        let links = &graph.links;
         let mut start = vec![0_u32; nodes + 1];
         for link in links {
             start[link.a as usize + 1] += 1;
@@ -85,24 +88,28 @@ impl Neighbours {
             start[k + 1] += start[k];
         }
         let mut next = start.clone();
-        let mut ends = vec![(0, false); start[nodes] as usize];
+        let mut ends = vec![(0, Way::Clear, 1.0); start[nodes] as usize];
         for link in links {
             for (end, other) in [(link.a, link.b), (link.b, link.a)] {
-                ends[next[end as usize] as usize] = (other, link.clear);
+                ends[next[end as usize] as usize] = (other, link.way, link.visibility());
                 next[end as usize] += 1;
             }
         }
-        Self { start, ends }
+        Self { start, ends, blockers: graph.blockers.clone() }
     }
 
     /// Other ends of a node's links.
-    pub fn row(&self, node: u32) -> &[(u32, bool)] {
+    pub fn row(&self, node: u32) -> &[(u32, Way, f32)] {
         let k = node as usize;
+        // Elements split after the links were made have none of their own.
+        if k + 1 >= self.start.len() {
+            return &[];
+        }
         &self.ends[self.start[k] as usize..self.start[k + 1] as usize]
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        4 * self.start.len() + size_of::<(u32, bool)>() * self.ends.len()
+        4 * self.start.len() + size_of::<(u32, Way, f32)>() * self.ends.len() + 4 * self.blockers.len()
     }
 }

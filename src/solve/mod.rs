@@ -4,6 +4,7 @@
 
 mod coarse;
 mod conjugate;
+mod direct;
 mod estimate;
 mod flux;
 pub mod lanes;
@@ -21,13 +22,14 @@ use crate::color::Observer;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
 use crate::hierarchy::{Mesh, Tree};
-use crate::link::{Balance, Closed, Demand, Graph, LinkRows, Opaque, Sight, balance};
+use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance};
 use crate::scene::effects::Plan;
 use crate::scene::{PunctualLight, Scene};
-use crate::spectrum::{LEAVES, Leaves, Partition};
+use crate::spectrum::Leaves;
 use conjugate::{Convergence, System};
+pub use flux::Closed;
 use lanes::Lanes;
-use light::{Light, Neighbours, brightness};
+use light::{Light, Neighbours};
 use operator::Operator;
 use rayon::prelude::*;
 use sources::{Painter, Sources};
@@ -70,10 +72,12 @@ const FIRST_THRESHOLD: f64 = 0.02;
 const THRESHOLD_STEP: f64 = 3.0;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
-/// The solve ends at this share of the asked-for error (relative): far below geometry and spectrum.
-const SOLVE_SHARE: f64 = 0.002;
+/// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
+const SOLVE_SHARE: f64 = 0.004;
 /// The working partition may cause this share of the asked-for error.
 const SPECTRUM_SHARE: f64 = 0.2;
+/// What one patch may misplace in a gather, share of the asked-for error.
+const GATHER_SHARE: f64 = 0.1;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 const DE_PER_PERCENT: f64 = 0.35;
 
@@ -90,9 +94,15 @@ pub struct Bake {
     weights: [Leaves; 3],
     lanes: Lanes,
     spectrum_error: f64,
+    outlook: flux::Outlook,
+    /// Area of each node that is not covered.
+    areas: Vec<f64>,
     balance: Balance,
     light: Light,
+    /// Reflected radiosity of the round before, by node: where a solve starts.
+    previous: Rows,
     lamps: Vec<(PunctualLight, Vec<f32>)>,
+    direct: direct::Direct,
     probes: estimate::Probes,
     rounds: Vec<Round>,
     started: Instant,
@@ -117,9 +127,13 @@ impl Bake {
         let probes = estimate::Probes::new(&tree, settings.seed);
         let mut bake = Self {
             closed: Closed::No,
+            outlook: flux::Outlook::default(),
+            areas: Vec::new(),
             balance: Balance::default(),
             light: Light::default(),
+            previous: Rows::default(),
             lamps: Vec::new(),
+            direct: direct::Direct::default(),
             graph: Graph::default(),
             rounds: Vec::new(),
             spectrum_error: 0.0,
@@ -148,42 +162,58 @@ impl Bake {
         let demand = Demand {
             bright: &bright,
             total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
-            threshold,
+            threshold: threshold / std::env::var("LT").map_or(1.0, |x| x.parse().unwrap()),
             least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
         };
         let mut tree = std::mem::take(&mut self.tree);
         let mut graph = std::mem::take(&mut self.graph);
         let seed = self.settings.seed;
-        let refined = self.with_sight(|bake, sight| {
-            punctual::refine(&mut tree, sight, &bake.scene, &bake.mesh, &demand, bake.light.white, &bake.weights);
-            graph.refine(&mut tree, sight, seed, &demand)
-        });
+        let refined = self.with_sight(|_, sight| graph.refine(&mut tree, sight, seed, &demand));
         self.tree = tree;
         self.graph = graph;
-        clock.lap("refine");
+        clock.lap("links");
 
-        let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
-        self.balance = balance(&self.tree, &rows, self.closed);
-        clock.lap("balance");
-
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
-        let shadowed = self.with_sight(|bake, sight| punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh, bake.closed));
         if round < 2 {
-            self.choose_lanes(&leaves, &shadowed);
+            self.choose_lanes();
         }
         clock.lap("spectrum");
 
-        let convergence = match padded(self.lanes.len()) {
-            8 => self.solve::<8>(&rows, &leaves, &shadowed),
-            16 => self.solve::<16>(&rows, &leaves, &shadowed),
-            32 => self.solve::<32>(&rows, &leaves, &shadowed),
-            _ => self.solve::<64>(&rows, &leaves, &shadowed),
+        let direct_rays = self.direct.rays;
+        let demand = Demand { threshold, ..demand };
+        self.gather_direct(&demand);
+        clock.lap("direct");
+
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
+        let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
+        let escape_rays = self.look_out();
+        self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
+        clock.lap("balance");
+
+        let solved = match padded(self.lanes.len()) {
+            8 => self.solve::<8>(&rows, &leaves),
+            16 => self.solve::<16>(&rows, &leaves),
+            32 => self.solve::<32>(&rows, &leaves),
+            _ => self.solve::<64>(&rows, &leaves),
         };
         clock.lap("solve");
 
-        let error = self.estimate(round, &convergence);
+        let receivers = self.probes.receivers(&self.tree, round);
+        let seen: Vec<[f64; 3]> = self.gather(&receivers).iter().map(|g| self.lanes.tristimulus(&g.irradiance)).collect();
+        let distance = self.probes.compare(seen, self.light.white);
         clock.lap("estimate");
-        let record = record::Round::new(self, round, threshold, &refined, &convergence, error, rows.bytes(), &clock);
+        let record = Round::new(
+            self,
+            record::Measured {
+                threshold,
+                refined: &refined,
+                convergence: &solved.0,
+                distance,
+                flux: solved.1,
+                link_bytes: rows.bytes(),
+                rays: refined.rays + escape_rays + self.direct.rays - direct_rays,
+                clock: &clock,
+            },
+        );
         self.rounds.push(record);
         &self.rounds[round]
     }
@@ -194,7 +224,7 @@ impl Bake {
     fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
         let opaque = |triangle: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v]);
         let opaque: Option<&Opaque> = if self.plan.alpha_masks() { Some(&opaque) } else { None };
-        f(self, &Sight { rays: &self.rays, opaque, occlusion: self.plan.occlusion() })
+        f(self, &Sight { rays: &self.rays, mesh: &self.mesh, opaque, occlusion: self.plan.occlusion() })
     }
 
     /// How bright every node is beside the white: from the last solution, or a guess before the first.
@@ -206,45 +236,99 @@ impl Bake {
             return guess.bright;
         }
         let light = &self.light;
-        (0..nodes).map(|k| light.bright_reflected[k] + light.bright_emitted[k]).collect()
+        (0..nodes).map(|k| light.bright_reflected[k]).collect()
     }
 
     /// Chooses the working partition on a small model of the room.
-    fn choose_lanes(&mut self, leaves: &[u32], shadowed: &punctual::Shadowed) {
+    fn choose_lanes(&mut self) {
         self.spectrum_error = 0.0;
         if self.settings.representation == Representation::Dense || self.scene.spectra.is_empty() || self.tree.nodes.is_empty() {
             self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
             return;
         }
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
+        let shadowed = self.with_sight(|bake, sight| punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh));
+        let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
+        self.look_out();
+        let factor = balance(&self.tree, &rows, &self.areas, &self.outlook.target).factor;
         let painter = Painter::new(&self.scene, &self.mesh);
-        let dense = sources::DenseSources::new(&painter, &self.tree, &self.scene, shadowed, leaves);
-        let model = coarse::Coarse::new(&self.tree, &self.graph.links, &self.balance.factor, leaves, &dense, self.scene.spectra.len());
+        let dense = sources::DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
+        let model = coarse::Coarse::new(&self.tree, &self.graph.links, &factor, &self.areas, &leaves, &dense, self.scene.spectra.len());
         let choice = model.choose(&self.scene.spectra, &self.weights, self.light.white, SPECTRUM_SHARE * self.settings.error);
         self.lanes = Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights);
         self.spectrum_error = choice.error;
         // The lanes of an earlier round mean something else: the next solve starts afresh.
         self.light.reflected = Rows::default();
+        self.direct = direct::Direct::default();
+    }
+
+    /// Learns how new leaves look out; returns the rays cast.
+    fn look_out(&mut self) -> u64 {
+        let rays = self.outlook.extend(&self.mesh, &self.tree, &self.rays, self.closed, self.settings.seed);
+        self.areas = self.outlook.areas(&self.tree);
+        rays
+    }
+
+    /// Gathers direct light on all leaves, splitting those that it varies over.
+    fn gather_direct(&mut self, demand: &Demand) {
+        let width = padded(self.lanes.len());
+        match width {
+            8 => self.place_emission::<8>(),
+            16 => self.place_emission::<16>(),
+            32 => self.place_emission::<32>(),
+            _ => self.place_emission::<64>(),
+        }
+        self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
+        let white = self.light.white;
+        let weights: Vec<f64> = self.lanes.xyz().iter().map(|&xyz| light::brightness(xyz, white)).collect();
+        let mut tree = std::mem::take(&mut self.tree);
+        let mut direct = std::mem::take(&mut self.direct);
+        self.with_sight(|bake, sight| {
+            direct.refine(&mut tree, demand, &weights, &|tree, to, memory| {
+                let row = Gatherer { tree, ..bake.gatherer(sight) }.direct(to, memory);
+                let dark = row.iter().all(|&x| x == 0.0);
+                let hidden = dark && bake.closed == Closed::No && flux::covered(&bake.mesh, tree, &bake.rays, to.point, to.normal, to.plane, to.seed);
+                (!hidden).then_some(row)
+            });
+        });
+        self.tree = tree;
+        self.direct = direct;
+    }
+
+    /// Puts emission and links in place for a gather.
+    fn place_emission<const L: usize>(&mut self) {
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
+        let painter = Painter::new(&self.scene, &self.mesh);
+        let emission = painter.paint(&self.tree, &leaves, &self.lanes).emission;
+        self.look_out();
+        self.light.emitted = self.on_nodes::<L>(&emission, &leaves);
+        self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
+        self.light.half_size = self.mesh.half_size;
+        self.previous = std::mem::replace(&mut self.light.reflected, Rows::zero(self.tree.nodes.len(), L));
+        let mut light = std::mem::take(&mut self.light);
+        light.measure(&self.tree, &self.lanes);
+        self.light = light;
     }
 
     /// Solves on the current links and measures the solution.
-    fn solve<const L: usize>(&mut self, rows: &LinkRows, leaves: &[u32], shadowed: &punctual::Shadowed) -> Convergence {
+    fn solve<const L: usize>(&mut self, rows: &LinkRows, leaves: &[u32]) -> (Convergence, flux::Balance) {
         let painter = Painter::new(&self.scene, &self.mesh);
         let Sources { reflectance, emission, greatest } = painter.paint(&self.tree, leaves, &self.lanes);
-        self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
         let nodes = self.tree.nodes.len();
-        let operator = Operator { tree: &self.tree, links: rows, leaves, factor: &self.balance.factor };
-        let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
         let mut first = Rows::zero(leaves.len(), L);
-        operator.irradiance::<L>(&emission, &mut means, &mut gathered, &mut first);
-        shadowed.add_to(&self.lamps, &mut first);
+        for (k, &leaf) in leaves.iter().enumerate() {
+            let row = self.direct.row(leaf);
+            first.row_mut(k)[..row.len()].copy_from_slice(row);
+        }
+        let operator = Operator { tree: &self.tree, links: rows, leaves, areas: &self.areas, factor: &self.balance.factor };
         let mut reflected = self.guess::<L>(leaves);
         let system = System { operator, reflectance: &reflectance, greatest: &greatest };
-        let tolerance = SOLVE_SHARE * self.settings.error / DE_PER_PERCENT * 0.01 * 100.0;
         let convergence = if self.plan.interreflection() {
-            system.solve::<L>(&first, &mut reflected, tolerance.min(1e-3))
+            system.solve::<L>(&first, &mut reflected, SOLVE_SHARE * self.settings.error)
         } else {
             Convergence::default()
         };
+        let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
         let mut irradiance = Rows::zero(leaves.len(), L);
         system.operator.irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
         for (h, f) in irradiance.all_mut::<L>().iter_mut().zip(first.all::<L>()) {
@@ -258,26 +342,30 @@ impl Bake {
                 *r = std::array::from_fn(|l| h[l] * rho[l]);
             }
         }
+        let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
+        let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
+        let fluxes = flux::FluxRows { emission: &emission, reflected: &reflected, irradiance: &irradiance, first: &first, reflectance: &reflectance };
+        let flux = flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums);
         self.light = Light {
             reflected: self.on_nodes::<L>(&reflected, leaves),
             emitted: self.on_nodes::<L>(&emission, leaves),
             irradiance,
             leaves: leaves.to_vec(),
-            neighbours: Neighbours::new(nodes, &self.graph.links),
+            neighbours: Neighbours::new(nodes, &self.graph),
             white: self.light.white,
             half_size: self.mesh.half_size,
             ..Light::default()
         };
         self.light.white = self.settings.white.unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
         self.light.measure(&self.tree, &self.lanes);
-        convergence
+        (convergence, flux)
     }
 
     /// Area-weighted mean irradiance, tristimulus.
     pub fn mean_irradiance(&self) -> [f64; 3] {
         let (mut sum, mut area) = ([0.0; 3], 0.0);
         for (k, &leaf) in self.light.leaves.iter().enumerate() {
-            let a = self.tree.node(leaf).area;
+            let a = self.areas[leaf as usize];
             let xyz = self.lanes.tristimulus(self.light.irradiance.row(k));
             sum = std::array::from_fn(|c| sum[c] + a * xyz[c]);
             area += a;
@@ -288,14 +376,14 @@ impl Bake {
     /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.
     fn guess<const L: usize>(&self, leaves: &[u32]) -> Rows {
         let mut rows = Rows::zero(leaves.len(), L);
-        if self.light.reflected.width() == L {
-            let known = self.light.reflected.len();
+        if self.previous.width() == L {
+            let known = self.previous.len();
             for (row, &leaf) in rows.all_mut::<L>().iter_mut().zip(leaves) {
                 let mut id = leaf;
                 while id as usize >= known {
                     id = self.tree.node(id).parent;
                 }
-                *row = self.light.reflected.all::<L>()[id as usize];
+                *row = self.previous.all::<L>()[id as usize];
             }
         }
         rows
@@ -307,8 +395,37 @@ impl Bake {
         for (row, &leaf) in by_leaf.all::<L>().iter().zip(leaves) {
             rows.all_mut::<L>()[leaf as usize] = *row;
         }
-        operator::pull::<L>(&self.tree, rows.all_mut::<L>());
+        operator::pull::<L>(&self.tree, &self.areas, rows.all_mut::<L>());
         rows
+    }
+
+    /// Experiment.
+    pub fn regather(&mut self) {
+        let leaves = self.light.leaves.clone();
+        let receivers: Vec<Receiver> = leaves
+            .iter()
+            .map(|&leaf| {
+                let e = self.tree.elements[self.tree.node(leaf).element as usize];
+                Receiver { point: e.at([1.0 / 3.0; 3]), normal: self.tree.face_normal[e.face as usize], plane: self.tree.face_plane[e.face as usize], leaf: Some(leaf), seed: u64::from(leaf) }
+            })
+            .collect();
+        let g: Vec<Gathered> = self.with_sight(|bake, sight| {
+            let gatherer = Gatherer { stored: std::env::var("STORED").is_ok(), tolerance: 1e9, ..bake.gatherer(sight) };
+            receivers.par_iter().map_init(Memory::default, |memory, r| gatherer.at(r, memory)).collect()
+        });
+        let painter = Painter::new(&self.scene, &self.mesh);
+        let sources = painter.paint(&self.tree, &leaves, &self.lanes);
+        let width = self.light.width();
+        let mut rows = Rows::zero(leaves.len(), width);
+        for (k, g) in g.iter().enumerate() {
+            for (l, x) in rows.row_mut(k).iter_mut().enumerate() {
+                *x = (g.irradiance[l] - g.direct[l] + self.direct.row(leaves[k]).get(l).copied().unwrap_or(0.0)) * sources.reflectance.row(k)[l];
+            }
+        }
+        self.light.reflected = match width { 8 => self.on_nodes::<8>(&rows, &leaves), 16 => self.on_nodes::<16>(&rows, &leaves), 32 => self.on_nodes::<32>(&rows, &leaves), _ => self.on_nodes::<64>(&rows, &leaves) };
+        let mut light = std::mem::take(&mut self.light);
+        light.measure(&self.tree, &self.lanes);
+        self.light = light;
     }
 
     /// Gathers at receivers, in order.
@@ -327,7 +444,13 @@ impl Bake {
             lamps: &self.lamps,
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
+            stored: false,
         }
+    }
+
+    /// Mean number of intervals that a patch needs.
+    fn intervals_mean(&self) -> f64 {
+        self.lanes.len() as f64
     }
 
     /// What the lanes stand for.
@@ -368,6 +491,11 @@ impl Bake {
     /// Does light always meet a front?
     pub fn closed(&self) -> Closed {
         self.closed
+    }
+
+    /// The ray index.
+    pub fn rays(&self) -> &RayIndex {
+        &self.rays
     }
 
     /// What was asked for.

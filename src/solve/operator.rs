@@ -21,6 +21,8 @@ pub struct Operator<'a> {
     pub links: &'a LinkRows,
     /// Leaves of the hierarchy, ascending.
     pub leaves: &'a [u32],
+    /// Area of each node that takes part.
+    pub areas: &'a [f64],
     /// Balance factors by node.
     pub factor: &'a [f32],
 }
@@ -34,7 +36,7 @@ impl Operator<'_> {
             let d = self.factor[leaf as usize];
             mean[leaf as usize] = row.map(|x| d * x);
         }
-        pull(self.tree, mean);
+        pull(self.tree, self.areas, mean);
         let mean = nodes.all::<L>();
         gathered.all_mut::<L>().par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
             for (k, row) in rows.iter_mut().enumerate() {
@@ -46,7 +48,7 @@ impl Operator<'_> {
                         sum[lane] += exchange * b[lane];
                     }
                 }
-                let inverse = (1.0 / self.tree.nodes[node].area) as f32;
+                let inverse = (1.0 / self.areas[node]) as f32;
                 *row = sum.map(|x| x * inverse);
             }
         });
@@ -60,14 +62,14 @@ impl Operator<'_> {
 }
 
 /// Area-weighted means from the leaves to the root.
-pub fn pull<const L: usize>(tree: &Tree, rows: &mut [[f32; L]]) {
+pub fn pull<const L: usize>(tree: &Tree, areas: &[f64], rows: &mut [[f32; L]]) {
     for (k, node) in tree.nodes.iter().enumerate().rev() {
         if node.is_leaf() {
             continue;
         }
         let mut mean = [0.0_f32; L];
         for child in node.child_range() {
-            let share = (tree.node(child).area / node.area) as f32;
+            let share = (areas[child as usize] / areas[k]) as f32;
             for (m, x) in mean.iter_mut().zip(&rows[child as usize]) {
                 *m += share * x;
             }

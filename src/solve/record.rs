@@ -4,7 +4,7 @@ use super::Bake;
 use super::conjugate::Convergence;
 use super::estimate::Distance;
 use super::flux::Balance;
-use crate::link::Refined;
+use crate::link::{Refined, Way};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -182,7 +182,7 @@ impl Round {
             elements: light.leaves.len(),
             nodes: bake.tree.nodes.len(),
             links: bake.graph.links.len(),
-            links_clear: bake.graph.links.iter().filter(|l| l.clear).count(),
+            links_clear: bake.graph.links.iter().filter(|l| l.way == Way::Clear).count(),
             intervals_working: bake.lanes.len(),
             intervals_mean: bake.intervals_mean(),
             memory_bytes: bake.tree.bytes()

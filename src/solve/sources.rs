@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use super::rows::{Rows, padded};
-use crate::color::upsample::Upsampler;
+use crate::color::Upsampler;
 use crate::hierarchy::{Element, Mesh, Tree};
 use crate::scene::{Emission, Material, Scene, Surface, Texture};
 use crate::spectrum::Leaves;
@@ -154,4 +154,62 @@ pub(crate) fn weights_of(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     let wb = (p - a).cross(c - a).dot(normal) / square;
     let wc = (b - a).cross(p - a).dot(normal) / square;
     [1.0 - wb - wc, wb, wc]
+}
+
+/// What single leaves reflect, emit and get from punctual lights, at full resolution.
+pub(super) struct DenseSources<'a> {
+    painter: &'a Painter<'a>,
+    tree: &'a Tree,
+    shadowed: &'a super::punctual::Shadowed,
+    /// Position of each leaf node in the list of leaves.
+    place: Vec<u32>,
+}
+
+impl<'a> DenseSources<'a> {
+    pub(super) fn new(painter: &'a Painter<'a>, tree: &'a Tree, shadowed: &'a super::punctual::Shadowed, leaves: &[u32]) -> Self {
+        let mut place = vec![u32::MAX; tree.nodes.len()];
+        for (k, &leaf) in leaves.iter().enumerate() {
+            place[leaf as usize] = k as u32;
+        }
+        Self { painter, tree, shadowed, place }
+    }
+
+    fn of(&self, leaf: u32) -> (&'a Material, usize, Element) {
+        let element = self.tree.elements[self.tree.node(leaf).element as usize];
+        let triangle = self.tree.faces[element.face as usize].triangle as usize;
+        (&self.painter.scene.materials[self.painter.mesh.material[triangle] as usize], triangle, element)
+    }
+}
+
+impl super::coarse::Dense for DenseSources<'_> {
+    fn reflectance(&self, leaf: u32) -> Leaves {
+        let (m, triangle, element) = self.of(leaf);
+        match self.painter.paint_of(m, triangle, &element) {
+            Some(color) => self.painter.clamped(color),
+            None => m.reflectance,
+        }
+    }
+
+    fn emission(&self, leaf: u32, light: usize) -> Option<Leaves> {
+        let (m, triangle, element) = self.of(leaf);
+        let e = m.emission.as_ref().filter(|e| e.light == light)?;
+        Some(match self.painter.glow_of(m, triangle, &element) {
+            Some((e, shape)) => shape.map(|x| PI * e.scale * x),
+            None => e.shape.map(|x| PI * x),
+        })
+    }
+
+    fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves> {
+        let mut sum: Option<Leaves> = None;
+        for &(lamp, factor) in &self.shadowed.by_leaf[self.place[leaf as usize] as usize] {
+            let lamp = &self.painter.scene.lights[lamp as usize];
+            if lamp.light == light {
+                let sum = sum.get_or_insert([0.0; crate::spectrum::LEAVES]);
+                for (s, x) in sum.iter_mut().zip(&lamp.shape) {
+                    *s += f64::from(factor) * x;
+                }
+            }
+        }
+        sum
+    }
 }

@@ -1,0 +1,8 @@
+//! An independent answer: unbiased Monte Carlo in all 64 leaves, with confidence intervals.
+//!
+//! It shares the scene, the welded triangles and the ray index with the solver, and nothing else: no links, no lanes,
+//! no form factors, no balance.
+
+mod path;
+
+pub use path::{Answer, Audit};

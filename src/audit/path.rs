@@ -1,0 +1,306 @@
+//! Irradiance at a point by path tracing, all leaves along one path (Lambertian surfaces scatter all wavelengths alike).
+//!
+//! `H = pi * mean of L_i` over cosine-distributed directions; lamps are also sampled by area, and both ways are combined
+//! by the balance heuristic (Veach and Guibas 1995). Paths end by Russian roulette, so no bounce is cut off.
+//! Figures are *measured*: each comes with the standard error of independent batches.
+
+use crate::color::Upsampler;
+use crate::geometry::RayIndex;
+use crate::geometry::sampling::{Pcg, cosine_direction, on_triangle, sequence02};
+use crate::geometry::{NO_PLANE, Segment};
+use crate::hierarchy::{Face, Mesh};
+use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
+use crate::spectrum::{LEAVES, Leaves};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Independent batches a point; their spread gives the standard error.
+pub const BATCHES: usize = 16;
+/// Bounces after which roulette decides.
+const SURE_BOUNCES: usize = 3;
+
+/// The estimator.
+pub struct Audit<'a> {
+    scene: &'a Scene,
+    mesh: &'a Mesh,
+    rays: &'a RayIndex,
+    upsampler: Upsampler,
+    /// Faces that emit, and the running sum of what they are chosen by.
+    lamps: Vec<(Face, f64)>,
+    total: f64,
+    masked: bool,
+}
+
+/// Irradiance at a point: mean and standard error per leaf, W/m2/nm, and the batch means for anything derived.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// Mean.
+    pub mean: Leaves,
+    /// Means of the batches.
+    pub batches: Vec<Leaves>,
+}
+
+impl Answer {
+    /// Mean and standard error of a linear function of the leaves.
+    pub fn linear(&self, weights: &Leaves) -> (f64, f64) {
+        let dot = |x: &Leaves| x.iter().zip(weights).map(|(x, w)| x * w).sum::<f64>();
+        let mean = dot(&self.mean);
+        let n = self.batches.len() as f64;
+        let variance = self.batches.iter().map(|b| (dot(b) - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+        (mean, (variance / n).sqrt())
+    }
+}
+
+/// A place that light scatters at.
+struct Vertex {
+    point: DVec3,
+    normal: DVec3,
+    plane: u32,
+}
+
+impl<'a> Audit<'a> {
+    /// Prepares the lamps of a room.
+    pub fn new(scene: &'a Scene, mesh: &'a Mesh, rays: &'a RayIndex) -> Self {
+        let mut lamps = Vec::new();
+        let mut total = 0.0;
+        for &face in &mesh.faces {
+            let material = &scene.materials[mesh.material[face.triangle as usize] as usize];
+            if let Some(e) = &material.emission {
+                let power: f64 = e.shape.iter().zip(&scene.spectra[e.light].power).map(|(s, p)| s * p).sum();
+                if power > 0.0 {
+                    total += power * mesh.area[face.triangle as usize];
+                    lamps.push((face, total));
+                }
+            }
+        }
+        let masked = scene.materials.iter().any(|m| matches!(m.alpha, Alpha::Mask { .. }));
+        Self { scene, mesh, rays, upsampler: Upsampler::new(&scene.grid), lamps, total, masked }
+    }
+
+    /// Irradiance at points (recentred) with unit normals; `planes` hold the plane id of the face a point lies on, or
+    /// [`NO_PLANE`]. `paths` a point.
+    pub fn irradiance(&self, points: &[(DVec3, DVec3, u32)], paths: usize, seed: u64) -> Vec<Answer> {
+        let each = paths.div_ceil(BATCHES);
+        points
+            .par_iter()
+            .enumerate()
+            .map(|(k, &(point, normal, plane))| {
+                let start = Vertex { point, normal, plane };
+                let batches: Vec<Leaves> = (0..BATCHES)
+                    .map(|batch| {
+                        let mut rng = Pcg::new(seed ^ ((k as u64) << 20) ^ ((batch as u64) << 56) ^ 0xa0d1_7000);
+                        let (shift_a, shift_b) = (rng_u64(&mut rng), rng_u64(&mut rng));
+                        let mut sum = [0.0; LEAVES];
+                        for path in 0..each {
+                            let first = [sequence02(path as u32, shift_a), sequence02(path as u32, shift_b)];
+                            self.path(&start, first, &mut rng, &mut sum);
+                        }
+                        sum.map(|x| x / each as f64)
+                    })
+                    .collect();
+                let mut mean = [0.0; LEAVES];
+                for b in &batches {
+                    for (m, x) in mean.iter_mut().zip(b) {
+                        *m += x / BATCHES as f64;
+                    }
+                }
+                Answer { mean, batches }
+            })
+            .collect()
+    }
+
+    /// Adds one path's irradiance.
+    fn path(&self, start: &Vertex, first: [[f64; 2]; 2], rng: &mut Pcg, sum: &mut Leaves) {
+        let mut throughput = [1.0; LEAVES];
+        let mut at = Vertex { ..*start };
+        let (mut toward_lamp, mut toward_any) = (first[0], first[1]);
+        for bounce in 0.. {
+            self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
+            self.punctual(&at, &throughput, sum);
+            let direction = cosine_direction(at.normal, toward_any);
+            let Some(hit) = self.closest(at.point, direction, at.plane) else { return };
+            let triangle = hit.triangle as usize;
+            let material = &self.scene.materials[self.mesh.material[triangle] as usize];
+            if hit.from_behind && material.sides == Sides::Front {
+                return;
+            }
+            let normal = if hit.from_behind { -self.mesh.normal[triangle] } else { self.mesh.normal[triangle] };
+            let weights = [1.0 - hit.uv[0] - hit.uv[1], hit.uv[0], hit.uv[1]];
+            let corners = self.mesh.triangles[triangle].map(|v| self.mesh.positions[v as usize]);
+            let point = corners[0] * f64::from(weights[0]) + corners[1] * f64::from(weights[1]) + corners[2] * f64::from(weights[2]);
+            if let Some(radiance) = self.radiance(triangle, weights) {
+                let d = point - at.point;
+                let r2 = d.length_squared();
+                let by_direction = at.normal.dot(direction).max(0.0) / PI;
+                let cosine = -normal.dot(d) / r2.sqrt();
+                let by_area = self.chance(triangle) * r2 / cosine.max(1e-300);
+                let share = by_direction / (by_direction + by_area);
+                for l in 0..LEAVES {
+                    sum[l] += throughput[l] * PI * radiance[l] * share;
+                }
+            }
+            let albedo = self.albedo(triangle, weights);
+            for (t, a) in throughput.iter_mut().zip(&albedo) {
+                *t *= a;
+            }
+            let greatest = throughput.iter().copied().fold(0.0, f64::max);
+            if greatest <= 0.0 {
+                return;
+            }
+            if bounce >= SURE_BOUNCES {
+                let survive = greatest.min(0.98);
+                if rng.f64() >= survive {
+                    return;
+                }
+                for t in &mut throughput {
+                    *t /= survive;
+                }
+            }
+            at = Vertex { point, normal, plane: self.mesh.plane[triangle] };
+            toward_lamp = [rng.f64(), rng.f64()];
+            toward_any = [rng.f64(), rng.f64()];
+        }
+    }
+
+    /// Density per area with which a lamp's triangle is chosen.
+    fn chance(&self, triangle: usize) -> f64 {
+        let material = &self.scene.materials[self.mesh.material[triangle] as usize];
+        let Some(e) = &material.emission else { return 0.0 };
+        let power: f64 = e.shape.iter().zip(&self.scene.spectra[e.light].power).map(|(s, p)| s * p).sum();
+        if self.total > 0.0 { power / self.total } else { 0.0 }
+    }
+
+    /// Light straight from a point on a lamp.
+    fn lamp_sample(&self, at: &Vertex, square: [f64; 2], rng: &mut Pcg, throughput: &Leaves, sum: &mut Leaves) {
+        if self.lamps.is_empty() {
+            return;
+        }
+        let target = rng.f64() * self.total;
+        let index = self.lamps.partition_point(|&(_, upto)| upto <= target).min(self.lamps.len() - 1);
+        let face = self.lamps[index].0;
+        let corners = self.mesh.corners(face);
+        let q = on_triangle(&corners, square);
+        let d = q - at.point;
+        let r2 = d.length_squared();
+        let r = r2.sqrt();
+        let (c1, c2) = (at.normal.dot(d) / r, -self.mesh.face_normal(face).dot(d) / r);
+        let triangle = face.triangle as usize;
+        if !(c1 > 0.0 && c2 > 0.0) || self.mesh.plane[triangle] == at.plane {
+            return;
+        }
+        let segment = Segment { from: at.point.as_vec3(), to: q.as_vec3(), planes: [at.plane, self.mesh.plane[triangle]] };
+        if self.blocked(&segment) {
+            return;
+        }
+        let [a, b, c] = self.mesh.triangles[triangle].map(|v| self.mesh.positions[v as usize]);
+        let n = (b - a).cross(c - a);
+        let wb = (q - a).cross(c - a).dot(n) / n.length_squared();
+        let wc = (b - a).cross(q - a).dot(n) / n.length_squared();
+        let Some(radiance) = self.radiance(triangle, [(1.0 - wb - wc) as f32, wb as f32, wc as f32]) else { return };
+        // A two-sided lamp is in the list once for each side: the density of a point is that of its own side.
+        let by_area = self.chance(triangle) * r2 / c2;
+        let by_direction = c1 / PI;
+        let factor = c1 / (by_area + by_direction);
+        for l in 0..LEAVES {
+            sum[l] += throughput[l] * radiance[l] * factor;
+        }
+    }
+
+    fn punctual(&self, at: &Vertex, throughput: &Leaves, sum: &mut Leaves) {
+        for light in &self.scene.lights {
+            let position = light.position - self.mesh.centre;
+            let (factor, end) = if light.kind == LightKind::Directional {
+                (-at.normal.dot(light.direction), at.point - light.direction * (4.0 * self.mesh.half_size))
+            } else {
+                let d = position - at.point;
+                let r2 = d.length_squared();
+                let spot = match light.kind {
+                    LightKind::Spot { inner, outer } => {
+                        let along = -light.direction.dot(d) / r2.sqrt();
+                        ((along - outer.cos()) / (inner.cos() - outer.cos()).max(1e-3)).clamp(0.0, 1.0).powi(2)
+                    }
+                    _ => 1.0,
+                };
+                (spot * at.normal.dot(d) / (r2 * r2.sqrt()), position)
+            };
+            if !(factor > 0.0) {
+                continue;
+            }
+            let segment = Segment { from: at.point.as_vec3(), to: end.as_vec3(), planes: [at.plane, NO_PLANE] };
+            if self.blocked(&segment) {
+                continue;
+            }
+            let power = &self.scene.spectra[light.light].power;
+            for l in 0..LEAVES {
+                sum[l] += throughput[l] * factor * power[l] * light.shape[l];
+            }
+        }
+    }
+
+    fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<crate::geometry::Hit> {
+        let reach = (4.0 * self.mesh.half_size) as f32;
+        if self.masked {
+            let opaque = |t: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v]);
+            return self.rays.closest_with(from.as_vec3(), direction.as_vec3(), reach, plane, &opaque);
+        }
+        self.rays.closest(from.as_vec3(), direction.as_vec3(), reach, plane)
+    }
+
+    fn blocked(&self, segment: &Segment) -> bool {
+        if self.masked {
+            let opaque = |t: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v]);
+            return self.rays.occluded_with(segment, &opaque);
+        }
+        self.rays.occluded(segment)
+    }
+
+    /// Emitted radiance at a point of a triangle, W/m2/sr/nm.
+    fn radiance(&self, triangle: usize, weights: [f32; 3]) -> Option<Leaves> {
+        let e = self.scene.materials[self.mesh.material[triangle] as usize].emission.as_ref()?;
+        let power = &self.scene.spectra[e.light].power;
+        let shape = match &e.texture {
+            Some(texture) => {
+                let texel = self.texel(texture, triangle, weights);
+                let color = std::array::from_fn(|k| e.color[k] * texel[k]);
+                self.upsampler.reflectance_fast(color).map(|x| x * e.scale)
+            }
+            None => e.shape,
+        };
+        Some(std::array::from_fn(|l| power[l] * shape[l]))
+    }
+
+    fn albedo(&self, triangle: usize, weights: [f32; 3]) -> Leaves {
+        let material = &self.scene.materials[self.mesh.material[triangle] as usize];
+        let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
+        let colors = surface.colors.as_ref().filter(|_| material.vertex_paint);
+        if material.paint.is_none() && colors.is_none() {
+            return material.reflectance;
+        }
+        let mut color = material.base_color;
+        if let Some(texture) = &material.paint {
+            let texel = self.texel(texture, triangle, weights);
+            color = std::array::from_fn(|k| color[k] * texel[k]);
+        }
+        if let Some(colors) = colors {
+            let corners = surface.triangles[self.mesh.origin[triangle].1 as usize];
+            for (c, x) in color.iter_mut().enumerate() {
+                *x *= (0..3).map(|k| colors[corners[k] as usize][c] * weights[k]).sum::<f32>();
+            }
+        }
+        self.upsampler.reflectance_fast(color).map(|x| x.min(crate::scene::material::GREATEST_ALBEDO))
+    }
+
+    fn texel(&self, texture: &Texture, triangle: usize, weights: [f32; 3]) -> [f32; 4] {
+        let (surface, local) = self.mesh.origin[triangle];
+        let surface = &self.scene.surfaces[surface as usize];
+        let Some(uvs) = surface.texcoords.get(texture.texcoord) else { return [1.0; 4] };
+        let corners = surface.triangles[local as usize];
+        let uv = std::array::from_fn(|c| (0..3).map(|k| uvs[corners[k] as usize][c] * weights[k]).sum());
+        texture.sample(&self.scene.images, uv)
+    }
+}
+
+fn rng_u64(rng: &mut Pcg) -> u64 {
+    u64::from(rng.u32()) << 32 | u64::from(rng.u32())
+}

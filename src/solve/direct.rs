@@ -1,0 +1,116 @@
+//! Light straight from lamps, of any kind, on the hierarchy: gathered exactly at points of every leaf, never linked.
+//!
+//! Leaves over which direct light varies are split, which is where shadow boundaries and hot spots are; links then only
+//! carry reflected light, which is smooth. What a leaf got stays known for the rounds after.
+
+use crate::gather::point::{Memory, Receiver};
+use crate::hierarchy::{Tree, stratified};
+use crate::link::{Demand, MAX_DEPTH};
+use rayon::prelude::*;
+
+/// Points of a leaf: the rule of Strang and Fix (1973) that is exact for quadratic functions.
+const POINTS: [[f64; 3]; 3] = [[2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0]];
+/// Further points that are tried where some are covered.
+const MORE_POINTS: usize = 8;
+/// Leaves that a task looks at.
+const CHUNK: usize = 32;
+
+/// Direct irradiance of nodes that are or were leaves.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Direct {
+    rows: Vec<Option<Box<[f32]>>>,
+    /// Half the range of brightness over a leaf's points.
+    spread: Vec<f32>,
+    /// Rays cast so far.
+    pub(super) rays: u64,
+}
+
+impl Direct {
+    /// Direct irradiance of a leaf by lane.
+    pub(super) fn row(&self, leaf: u32) -> &[f32] {
+        self.rows[leaf as usize].as_deref().unwrap_or(&[])
+    }
+
+    /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
+    /// `weights` turn a row into brightness, share of white; `gather` gives none for a point that something covers.
+    pub(super) fn refine(&mut self, tree: &mut Tree, demand: &Demand, weights: &[f64], gather: &(impl Fn(&Tree, &Receiver, &mut Memory) -> Option<[f32; 64]> + Sync)) {
+        let mut open: Vec<u32> = (0..tree.nodes.len() as u32).filter(|&k| tree.node(k).is_leaf()).collect();
+        while !open.is_empty() {
+            self.rows.resize(tree.nodes.len(), None);
+            self.spread.resize(tree.nodes.len(), 0.0);
+            let fresh: Vec<u32> = open.iter().copied().filter(|&k| self.rows[k as usize].is_none()).collect();
+            let width = weights.len();
+            let parts: Vec<(Vec<(Box<[f32]>, f32)>, u64)> = fresh
+                .par_chunks(CHUNK)
+                .map(|chunk| {
+                    let mut memory = Memory::default();
+                    let all = chunk.iter().map(|&leaf| at_leaf(tree, leaf, width, weights, gather, &mut memory)).collect();
+                    (all, memory.rays)
+                })
+                .collect();
+            let mut next = fresh.iter();
+            for (part, rays) in parts {
+                self.rays += rays;
+                for ((row, spread), &leaf) in part.into_iter().zip(next.by_ref()) {
+                    self.rows[leaf as usize] = Some(row);
+                    self.spread[leaf as usize] = spread;
+                }
+            }
+            let mut children = Vec::new();
+            for leaf in open {
+                let node = tree.node(leaf);
+                let depth = tree.elements[node.element as usize].depth;
+                let error = f64::from(self.spread[leaf as usize]) * (node.area / demand.total_area).sqrt();
+                if error > demand.threshold && node.area > demand.least_area && depth < MAX_DEPTH {
+                    tree.subdivide(leaf);
+                    children.extend(tree.node(leaf).child_range());
+                }
+            }
+            open = children;
+        }
+    }
+}
+
+/// Mean row over the points of a leaf, and half the range of brightness.
+fn at_leaf(
+    tree: &Tree,
+    leaf: u32,
+    width: usize,
+    weights: &[f64],
+    gather: &(impl Fn(&Tree, &Receiver, &mut Memory) -> Option<[f32; 64]> + Sync),
+    memory: &mut Memory,
+) -> (Box<[f32]>, f32) {
+    let element = &tree.elements[tree.node(leaf).element as usize];
+    let entry = element.face as usize;
+    let mut mean = vec![0.0_f32; width].into_boxed_slice();
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    let mut bare = 0;
+    // The points of the rule; where one is covered, others until three are found or the leaf counts as covered.
+    let more = (0..MORE_POINTS).map(|k| stratified(k, MORE_POINTS, [0.5, 0.5]));
+    for (k, at) in POINTS.into_iter().chain(more).enumerate() {
+        if bare == POINTS.len() {
+            break;
+        }
+        let to = Receiver {
+            point: element.at(at),
+            normal: tree.face_normal[entry],
+            plane: tree.face_plane[entry],
+            leaf: Some(leaf),
+            seed: u64::from(leaf) << 4 | k as u64,
+        };
+        let Some(row) = gather(tree, &to, memory) else { continue };
+        bare += 1;
+        let mut bright = 0.0;
+        for ((m, x), w) in mean.iter_mut().zip(row).zip(weights) {
+            *m += x;
+            bright += f64::from(x) * w;
+        }
+        least = least.min(bright);
+        most = most.max(bright);
+    }
+    let share = 1.0 / bare.max(1) as f32;
+    for m in &mut mean {
+        *m *= share;
+    }
+    (mean, (0.5 * (most - least).max(0.0)) as f32)
+}
