@@ -17,8 +17,8 @@ use wide::f32x8;
 /// neighbour's plane by a few roundings of its coordinates (2^-24), and must not be hidden by it.
 pub const END_GAP: f32 = 1e-6;
 
-/// Entries of a traversal's stack before it moves to the heap; a tree of a million triangles needs about 60.
-const STACK: usize = 128;
+/// Entries of a traversal's stack before it moves to the heap; a tree of a million triangles seldom needs as many.
+const STACK: usize = 64;
 
 /// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,19 +47,20 @@ pub struct RayIndex {
 const NOWHERE: u32 = u32::MAX;
 
 /// A line prepared for boxes.
-pub(crate) struct Slabs {
-    origin: [f32x8; 3],
+struct Slabs {
+    /// 1/d, and start/d.
     inverse: [f32x8; 3],
+    offset: [f32x8; 3],
     /// 1 where the line runs down its axis, so that its high side comes first.
     down: [usize; 3],
 }
 
 /// Direction components nearer to zero than this are taken as this: a finite slab distance, far beyond any scene.
-const LEAST_COMPONENT: f32 = 1e-30;
+pub(crate) const LEAST_COMPONENT: f32 = 1e-30;
 
 /// 1/d, finite.
 #[inline(always)]
-pub(crate) fn safe_inverse(d: f32) -> f32 {
+fn safe_inverse(d: f32) -> f32 {
     1.0 / if d.abs() < LEAST_COMPONENT {
         LEAST_COMPONENT.copysign(d)
     } else {
@@ -69,24 +70,24 @@ pub(crate) fn safe_inverse(d: f32) -> f32 {
 
 impl Slabs {
     #[inline(always)]
-    pub(crate) fn new(from: Vec3, direction: Vec3) -> Self {
+    fn new(from: Vec3, direction: Vec3) -> Self {
         let inverse = direction.to_array().map(safe_inverse);
         Self {
-            origin: from.to_array().map(f32x8::splat),
             inverse: inverse.map(f32x8::splat),
+            offset: [0, 1, 2].map(|axis| f32x8::splat(from[axis] * inverse[axis])),
             down: inverse.map(|x| usize::from(x < 0.0)),
         }
     }
 
     /// Where the line enters the eight boxes, and a bit for each that it meets before `t_max`.
     #[inline(always)]
-    pub(crate) fn enter(&self, node: &Node, t_max: f32) -> (f32x8, u32) {
+    fn enter(&self, node: &Node, t_max: f32) -> (f32x8, u32) {
         let mut near = f32x8::ZERO;
         let mut far = f32x8::splat(t_max);
         for axis in 0..3 {
             let down = self.down[axis];
-            let first = (node.bounds[down][axis] - self.origin[axis]) * self.inverse[axis];
-            let last = (node.bounds[1 - down][axis] - self.origin[axis]) * self.inverse[axis];
+            let first = node.bounds[down][axis].mul_sub(self.inverse[axis], self.offset[axis]);
+            let last = node.bounds[1 - down][axis].mul_sub(self.inverse[axis], self.offset[axis]);
             near = near.fast_max(first);
             far = far.fast_min(last);
         }
@@ -168,6 +169,15 @@ impl RayIndex {
     /// Low and high corner of all triangles.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.tree.bounds
+    }
+
+    /// The largest coordinate, either sign.
+    pub(crate) fn reach(&self) -> f32 {
+        self.tree
+            .bounds
+            .map(|corner| corner.abs().max_element())
+            .into_iter()
+            .fold(0.0, f32::max)
     }
 
     /// Bytes held.
@@ -487,7 +497,7 @@ mod tests {
             let masked: Vec<bool> = (0..count).map(|k| k % 3 == 0).collect();
             let index = RayIndex::build(&positions, &triangles, &planes, &masked);
             let opaque = |triangle: u32, u: f32, v: f32| {
-                (triangle + (u * 8.0) as u32 + (v * 8.0) as u32) % 2 == 0
+                (triangle + (u * 8.0) as u32 + (v * 8.0) as u32).is_multiple_of(2)
             };
             let mut segments = Vec::new();
             for _ in 0..120 {

@@ -1,41 +1,56 @@
 //! Sixteen segments at once through the tree.
 //!
 //! A node's eight boxes are first tested against the whole packet (interval arithmetic over its ends and directions), the boxes
-//! that survive against the sixteen segments, and a leaf's triangles one after another against those segments
-//! that are still open. The answers are the same bits as from one segment at a time.
+//! that survive against the sixteen segments. In a leaf, triangles with all ends of the packet on one side of their
+//! plane are dropped, eight at a time, and the others tested one after another against those segments that are
+//! still open. The answers are the same bits as from one segment at a time.
 
-use super::index::{RayIndex, Stack, safe_inverse};
+use super::index::{LEAST_COMPONENT, RayIndex, Stack};
 use super::segment::{NO_PLANE, Segment};
 use super::tree::{LEAF, Node};
-use super::triangle::{Block, PACKET, Shear, meet_lines};
+use super::triangle::{Block, PACKET, meet_lines};
 use glam::Vec3;
-use wide::{f32x8, f32x16};
+use wide::{f32x8, f32x16, u32x16};
 
-/// Up to sixteen segments that share their main axis.
+/// Up to sixteen segments.
 pub(crate) struct Packet {
-    /// Main axis last, as in [`Shear::axes`].
-    axes: [usize; 3],
-    /// In turned axes.
+    turn: Turn,
+    /// In turned axes, see [`super::triangle::Shear`].
     origin: [f32x16; 3],
     slope: [f32x16; 3],
     range: [f32x16; 2],
-    /// In the axes of the world.
-    start: [f32x16; 3],
+    /// In the axes of the world: 1/d, and start/d.
     inverse: [f32x16; 3],
-    planes: [[u32; PACKET]; 2],
+    offset: [f32x16; 3],
+    planes: [u32x16; 2],
     bundle: Bundle,
+    /// The lanes that hold a segment.
+    open: u32,
+}
+
+/// Which axes of the world become x, y, z.
+enum Turn {
+    /// The same for all segments.
+    Same([usize; 3]),
+    /// Masks of the lanes whose main axis is x, and y.
+    Mixed([f32x16; 2]),
 }
 
 /// Bounds on all segments of a packet.
 struct Bundle {
-    /// Bounds on the starts and on the ends, by axis.
-    starts: [[f32; 2]; 3],
-    ends: [[f32; 2]; 3],
-    /// Bounds on 1/d where all segments run the same way along an axis.
+    /// Least and greatest start, and end.
+    starts: [Vec3; 2],
+    ends: [Vec3; 2],
+    /// Bounds on 1/d.
     inverse: [[f32; 2]; 3],
-    /// +1, -1, or 0 where they do not.
+    /// +1, -1 where all segments run the same way along an axis, else 0.
     way: [i8; 3],
+    /// Slack of the test for sides of a plane, in units of the normal's components' sum.
+    slack: f32,
 }
+
+/// Roundings of f32, of the scene's reach, that the side of a plane is uncertain by: 2^-20.
+const SIDE_SLACK: f32 = 1.0 / 1_048_576.0;
 
 impl Packet {
     /// A bit for each segment that something blocks.
@@ -44,12 +59,10 @@ impl Packet {
         segments: &[Segment],
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
-        if index.tree.nodes.is_empty() {
-            return 0;
+        match Self::new(index, segments) {
+            Some(packet) if !index.tree.nodes.is_empty() => packet.traverse(index, opaque),
+            _ => 0,
         }
-        Self::each(index, segments, |packet, open| {
-            packet.traverse(index, open, opaque)
-        })
     }
 
     /// As [`Self::occluded`], by the triangles of a list.
@@ -59,92 +72,104 @@ impl Packet {
         segments: &[Segment],
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
-        Self::each(index, segments, |packet, open| {
-            let mut hidden = 0;
-            for &id in list {
-                if let Some((block, place)) = index.place(id) {
-                    let lanes = open & !hidden;
-                    hidden |= packet.meet_one(&index.tree.blocks[block], place, lanes, opaque);
-                    if hidden == open {
-                        break;
-                    }
+        let Some(packet) = Self::new(index, segments) else {
+            return 0;
+        };
+        let mut open = packet.open;
+        for &id in list {
+            if let Some((block, place)) = index.place(id) {
+                open &= !packet.meet_one(&index.tree.blocks[block], place, open, opaque);
+                if open == 0 {
+                    break;
                 }
             }
-            hidden
+        }
+        packet.open & !open
+    }
+
+    /// None of no segments. Free lanes repeat the first.
+    #[inline(always)]
+    fn new(index: &RayIndex, segments: &[Segment]) -> Option<Self> {
+        let first = segments.first()?;
+        let count = segments.len().min(PACKET);
+        let mut rows = [row(first); PACKET];
+        for (place, segment) in rows.iter_mut().zip(segments) {
+            *place = row(segment);
+        }
+        let (mut least, mut most) = (rows[0], rows[0]);
+        for row in &rows[1..] {
+            least = least.fast_min(*row);
+            most = most.fast_max(*row);
+        }
+        let low = f32x8::transpose(std::array::from_fn(|k| rows[k]));
+        let high = f32x8::transpose(std::array::from_fn(|k| rows[k + 8]));
+        let column: [f32x16; 8] = std::array::from_fn(|k| join(low[k], high[k]));
+        let [fx, fy, fz, tx, ty, tz, p0, p1] = column;
+
+        let from = [fx, fy, fz];
+        let d = [tx - fx, ty - fy, tz - fz];
+        let size = d.map(f32x16::abs);
+        let main_z = size[2].simd_ge(size[0]) & size[2].simd_ge(size[1]);
+        let main_y = size[1].simd_ge(size[0]) & !main_z;
+        let main_x = !(main_y | main_z);
+        let lanes = 0xffff;
+        let turn = match [main_x, main_y, main_z].map(f32x16::to_bitmask) {
+            [m, _, _] if m == lanes => Turn::Same([1, 2, 0]),
+            [_, m, _] if m == lanes => Turn::Same([2, 0, 1]),
+            [_, _, m] if m == lanes => Turn::Same([0, 1, 2]),
+            _ => Turn::Mixed([main_x, main_y]),
+        };
+        let turned = turn.lanes(d);
+        let inverse = f32x16::ONE / turned[2];
+        let gap = f32x16::splat(index.gap) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+
+        let least_component = f32x16::splat(LEAST_COMPONENT);
+        let inverses = d.map(|x| {
+            let tiny = x.abs().simd_lt(least_component);
+            let sign = x & f32x16::splat(-0.0);
+            f32x16::ONE / tiny.select(least_component | sign, x)
+        });
+        let mut bundle = Bundle {
+            starts: [ends_of(least).0, ends_of(most).0],
+            ends: [ends_of(least).1, ends_of(most).1],
+            inverse: [[0.0; 2]; 3],
+            way: [0; 3],
+            slack: SIDE_SLACK * index.reach(),
+        };
+        for axis in 0..3 {
+            bundle.inverse[axis] = [
+                reduce(inverses[axis], f32::min),
+                reduce(inverses[axis], f32::max),
+            ];
+            let [a, b] = bundle.inverse[axis];
+            bundle.way[axis] = i8::from(a > 0.0) - i8::from(b < 0.0);
+        }
+        Some(Self {
+            origin: turn.lanes(from),
+            slope: [turned[0] * inverse, turned[1] * inverse, inverse],
+            range: [gap, f32x16::ONE - gap],
+            offset: [0, 1, 2].map(|axis| from[axis] * inverses[axis]),
+            inverse: inverses,
+            planes: [p0.to_bits(), p1.to_bits()],
+            turn,
+            bundle,
+            open: (1 << count) - 1,
         })
     }
 
-    /// Makes a packet for each main axis among the segments, and gathers the answers.
-    #[inline(always)]
-    fn each(index: &RayIndex, segments: &[Segment], ask: impl Fn(&Self, u32) -> u32) -> u32 {
-        let mut lines = [(Vec3::ZERO, Shear::new(Vec3::ZERO, Vec3::Z, [0.0; 2])); PACKET];
-        let mut by_axis = [0u32; 3];
-        for (k, segment) in segments.iter().take(PACKET).enumerate() {
-            lines[k] = index.line(segment);
-            by_axis[lines[k].1.axes[2]] |= 1 << k;
-        }
-        let mut hidden = 0;
-        for open in by_axis {
-            if open != 0 {
-                hidden |= ask(&Self::new(segments, &lines, open), open);
-            }
-        }
-        hidden
-    }
-
-    /// Lanes outside `open` repeat one that is in it.
-    fn new(segments: &[Segment], lines: &[(Vec3, Shear); PACKET], open: u32) -> Self {
-        let first = open.trailing_zeros() as usize;
-        let lane = |k: usize| if open >> k & 1 == 1 { k } else { first };
-        let gather = |f: &dyn Fn(usize) -> f32| f32x16::new(std::array::from_fn(|k| f(lane(k))));
-        let inverse: [[f32; PACKET]; 3] =
-            [0, 1, 2].map(|axis| std::array::from_fn(|k| safe_inverse(lines[lane(k)].0[axis])));
-        let mut bundle = Bundle {
-            starts: [[f32::INFINITY, f32::NEG_INFINITY]; 3],
-            ends: [[f32::INFINITY, f32::NEG_INFINITY]; 3],
-            inverse: [[f32::INFINITY, f32::NEG_INFINITY]; 3],
-            way: [0; 3],
-        };
-        for (axis, inverse) in inverse.iter().enumerate() {
-            for k in 0..PACKET {
-                let segment = &segments[lane(k)];
-                widen(&mut bundle.starts[axis], segment.from[axis]);
-                widen(&mut bundle.ends[axis], segment.to[axis]);
-                widen(&mut bundle.inverse[axis], inverse[k]);
-            }
-            let [low, high] = bundle.inverse[axis];
-            bundle.way[axis] = i8::from(low > 0.0) - i8::from(high < 0.0);
-        }
-        Self {
-            axes: lines[first].1.axes,
-            origin: [0, 1, 2].map(|axis| gather(&|k| lines[k].1.origin[axis])),
-            slope: [0, 1, 2].map(|axis| gather(&|k| lines[k].1.slope[axis])),
-            range: [0, 1].map(|side| gather(&|k| lines[k].1.range[side])),
-            start: [0, 1, 2].map(|axis| gather(&|k| segments[k].from[axis])),
-            inverse: inverse.map(f32x16::new),
-            planes: [0, 1].map(|end| std::array::from_fn(|k| segments[lane(k)].planes[end])),
-            bundle,
-        }
-    }
-
-    /// Walks the tree with the lanes of `open`; returns those that are hidden.
-    fn traverse(
-        &self,
-        index: &RayIndex,
-        open: u32,
-        opaque: &impl Fn(u32, f32, f32) -> bool,
-    ) -> u32 {
-        let mut hidden = 0;
+    /// Walks the tree; returns the lanes that are hidden.
+    fn traverse(&self, index: &RayIndex, opaque: &impl Fn(u32, f32, f32) -> bool) -> u32 {
+        let mut open = self.open;
         let mut stack = Stack::new((0u32, open));
         while let Some((entry, lanes)) = stack.pop() {
-            let lanes = lanes & !hidden;
+            let lanes = lanes & open;
             if lanes == 0 {
                 continue;
             }
             if entry & LEAF != 0 {
                 let block = &index.tree.blocks[(entry & !LEAF) as usize];
-                hidden |= self.meet_block(block, lanes, opaque);
-                if hidden == open {
+                open &= !self.meet_block(block, lanes, opaque);
+                if open == 0 {
                     break;
                 }
                 continue;
@@ -160,7 +185,7 @@ impl Packet {
                 }
             }
         }
-        hidden
+        self.open & !open
     }
 
     /// A bit for each segment that meets the box of one child.
@@ -171,8 +196,8 @@ impl Packet {
         for axis in 0..3 {
             let low = f32x16::splat(node.bounds[0][axis].as_array()[child]);
             let high = f32x16::splat(node.bounds[1][axis].as_array()[child]);
-            let a = (low - self.start[axis]) * self.inverse[axis];
-            let b = (high - self.start[axis]) * self.inverse[axis];
+            let a = low.mul_sub(self.inverse[axis], self.offset[axis]);
+            let b = high.mul_sub(self.inverse[axis], self.offset[axis]);
             near = near.fast_max(a.fast_min(b));
             far = far.fast_min(a.fast_max(b));
         }
@@ -187,14 +212,14 @@ impl Packet {
         lanes: u32,
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
-        let mut hidden = 0;
-        for place in 0..block.count as usize {
-            hidden |= self.meet_one(block, place, lanes & !hidden, opaque);
-            if hidden == lanes {
-                break;
-            }
+        let mut open = lanes;
+        let mut places = self.bundle.straddles(block);
+        while places != 0 && open != 0 {
+            let place = places.trailing_zeros() as usize;
+            places &= places - 1;
+            open &= !self.meet_one(block, place, open, opaque);
         }
-        hidden
+        lanes & !open
     }
 
     /// A bit for each segment of `lanes` that one triangle of the block blocks.
@@ -206,42 +231,83 @@ impl Packet {
         lanes: u32,
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
-        let corners = self.turned(block, place);
+        let corners = block.corner_lane(place);
+        let corners = match &self.turn {
+            Turn::Same(axes) => corners.map(|c| axes.map(|k| f32x16::splat(c[k]))),
+            mixed => corners.map(|c| mixed.lanes(c.map(f32x16::splat))),
+        };
         let (met, e) = meet_lines(corners, self.origin, self.slope, self.range);
         let mut met = met & lanes;
-        let mut hidden = 0;
+        if met == 0 {
+            return 0;
+        }
         let plane = block.planes[place];
+        if plane != NO_PLANE {
+            let id = u32x16::splat(plane);
+            met &= !(self.planes[0].simd_eq(id) | self.planes[1].simd_eq(id)).to_bitmask();
+        }
+        if block.masked >> place & 1 == 0 {
+            return met;
+        }
+        let mut hidden = 0;
         while met != 0 {
             let lane = met.trailing_zeros() as usize;
             met &= met - 1;
-            if plane != NO_PLANE && self.planes.iter().any(|side| side[lane] == plane) {
-                continue;
-            }
-            let blocks = block.masked >> place & 1 == 0 || {
-                let det = e.det.as_array()[lane];
-                let (v, w) = (e.v.as_array()[lane], e.w.as_array()[lane]);
-                opaque(block.ids[place], v / det, w / det)
-            };
-            hidden |= u32::from(blocks) << lane;
+            let det = e.det.as_array()[lane];
+            let (v, w) = (e.v.as_array()[lane], e.w.as_array()[lane]);
+            hidden |= u32::from(opaque(block.ids[place], v / det, w / det)) << lane;
         }
         hidden
     }
+}
 
-    /// Corners of a triangle of a block in turned axes.
+impl Turn {
+    /// World axes to turned axes.
     #[inline(always)]
-    fn turned(&self, block: &Block, place: usize) -> [[f32; 3]; 3] {
-        let [x, y, z] = self.axes;
-        block
-            .corners
-            .map(|corner| [x, y, z].map(|axis| corner[axis].as_array()[place]))
+    fn lanes(&self, [x, y, z]: [f32x16; 3]) -> [f32x16; 3] {
+        match self {
+            Self::Same(axes) => axes.map(|k| [x, y, z][k]),
+            Self::Mixed([main_x, main_y]) => {
+                let pick = |a, b, c| main_x.select(a, main_y.select(b, c));
+                [pick(y, z, x), pick(z, x, y), pick(x, y, z)]
+            }
+        }
     }
 }
 
-/// Takes a value into an interval.
+/// A segment as one row: ends, then planes.
 #[inline(always)]
-fn widen(interval: &mut [f32; 2], x: f32) {
-    interval[0] = interval[0].min(x);
-    interval[1] = interval[1].max(x);
+fn row(s: &Segment) -> f32x8 {
+    let [p, q] = s.planes.map(f32::from_bits);
+    f32x8::new([s.from.x, s.from.y, s.from.z, s.to.x, s.to.y, s.to.z, p, q])
+}
+
+/// The two ends in a row.
+#[inline(always)]
+fn ends_of(row: f32x8) -> (Vec3, Vec3) {
+    let [a, b, c, d, e, f, _, _] = row.to_array();
+    (Vec3::new(a, b, c), Vec3::new(d, e, f))
+}
+
+#[inline(always)]
+fn join(low: f32x8, high: f32x8) -> f32x16 {
+    let (low, high) = (low.to_array(), high.to_array());
+    f32x16::new(std::array::from_fn(|k| {
+        if k < 8 { low[k] } else { high[k - 8] }
+    }))
+}
+
+#[inline(always)]
+fn reduce(x: f32x16, with: impl Fn(f32, f32) -> f32) -> f32 {
+    let mut x = x.to_array();
+    let mut half = PACKET / 2;
+    while half > 0 {
+        for k in 0..half {
+            x[k] = with(x[k], x[k + half]);
+        }
+        half /= 2;
+    }
+    x[0]
 }
 
 impl Bundle {
@@ -253,7 +319,8 @@ impl Bundle {
         let mut apart = f32x8::ZERO;
         for axis in 0..3 {
             let [low, high] = [node.bounds[0][axis], node.bounds[1][axis]];
-            let [start, end] = [self.starts[axis], self.ends[axis]];
+            let start = self.starts.map(|s| s[axis]);
+            let end = self.ends.map(|e| e[axis]);
             let least = f32x8::splat(start[0].min(end[0]));
             let most = f32x8::splat(start[1].max(end[1]));
             apart = apart | low.simd_gt(most) | high.simd_lt(least);
@@ -277,5 +344,33 @@ impl Bundle {
         }
         let open = near.simd_le(far).to_bitmask() & !apart.to_bitmask();
         open & ((1 << node.count) - 1)
+    }
+
+    /// A bit for each triangle whose plane may have ends of the bundle on both sides.
+    #[inline(always)]
+    fn straddles(&self, block: &Block) -> u32 {
+        let [a, b, c] = block.corners;
+        let [u, v] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+        let n = [
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        ];
+        // The least and greatest height of the two boxes of ends over the plane.
+        let mut low = [f32x8::ZERO; 2];
+        let mut high = [f32x8::ZERO; 2];
+        let mut slack = f32x8::ZERO;
+        for axis in 0..3 {
+            for (k, ends) in [self.starts, self.ends].iter().enumerate() {
+                let [p, q] = ends.map(|e| (f32x8::splat(e[axis]) - a[axis]) * n[axis]);
+                low[k] += p.fast_min(q);
+                high[k] += p.fast_max(q);
+            }
+            slack += n[axis].abs();
+        }
+        slack *= f32x8::splat(self.slack);
+        let below = high[0].fast_max(high[1]).simd_lt(-slack);
+        let above = low[0].fast_min(low[1]).simd_gt(slack);
+        !(below | above).to_bitmask() & ((1 << block.count) - 1)
     }
 }

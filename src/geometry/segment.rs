@@ -7,6 +7,7 @@ pub const NO_PLANE: u32 = u32::MAX;
 
 /// The open segment between two points, usually on two surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Segment {
     /// One end, in the space of the index.
     pub from: Vec3,

@@ -159,15 +159,15 @@ impl Shear {
     }
 }
 
-/// Sixteen lines that share their main axis against one triangle.
+/// Sixteen lines against one triangle, in the turned axes of each line.
 #[inline(always)]
 pub(crate) fn meet_lines(
-    corners: [[f32; 3]; 3],
+    corners: [[f32x16; 3]; 3],
     origin: [f32x16; 3],
     slope: [f32x16; 3],
     range: [f32x16; 2],
 ) -> (u32, Edges<f32x16>) {
-    let e = edges(corners.map(|c| c.map(f32x16::splat)), origin, slope);
+    let e = edges(corners, origin, slope);
     let low = e.u.fast_min(e.v).fast_min(e.w);
     let high = e.u.fast_max(e.v).fast_max(e.w);
     let zero = f32x16::ZERO;
@@ -306,7 +306,9 @@ mod tests {
                 let slope = [0, 1, 2].map(|k| pick(&|l| l.slope[k]));
                 let range = [0, 1].map(|k| pick(&|l| l.range[k]));
                 for triangle in &triangles {
-                    let corners = triangle.1.map(|c| same[0].axes.map(|k| c[k]));
+                    let corners = triangle
+                        .1
+                        .map(|c| same[0].axes.map(|k| f32x16::splat(c[k])));
                     let (met, _) = meet_lines(corners, origin, slope, range);
                     for (k, line) in same.iter().enumerate() {
                         assert_eq!(met >> k & 1 == 1, line.meet(triangle.1).is_some());
