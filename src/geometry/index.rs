@@ -71,12 +71,22 @@ fn safe_inverse(d: f32) -> f32 {
 impl Slabs {
     #[inline(always)]
     fn new(from: Vec3, direction: Vec3) -> Self {
-        let inverse = direction.to_array().map(safe_inverse);
-        Self {
-            inverse: inverse.map(f32x8::splat),
-            offset: [0, 1, 2].map(|axis| f32x8::splat(from[axis] * inverse[axis])),
-            down: inverse.map(|x| usize::from(x < 0.0)),
+        let inverse = [
+            safe_inverse(direction.x),
+            safe_inverse(direction.y),
+            safe_inverse(direction.z),
+        ];
+        let mut slabs = Self {
+            inverse: [f32x8::ZERO; 3],
+            offset: [f32x8::ZERO; 3],
+            down: [0; 3],
+        };
+        for (axis, &x) in inverse.iter().enumerate() {
+            slabs.inverse[axis] = f32x8::splat(x);
+            slabs.offset[axis] = f32x8::splat(from[axis] * x);
+            slabs.down[axis] = usize::from(x < 0.0);
         }
+        slabs
     }
 
     /// Where the line enters the eight boxes, and a bit for each that it meets before `t_max`.

@@ -101,34 +101,59 @@ impl Packet {
             least = least.fast_min(*row);
             most = most.fast_max(*row);
         }
-        let low = f32x8::transpose(std::array::from_fn(|k| rows[k]));
-        let high = f32x8::transpose(std::array::from_fn(|k| rows[k + 8]));
-        let column: [f32x16; 8] = std::array::from_fn(|k| join(low[k], high[k]));
-        let [fx, fy, fz, tx, ty, tz, p0, p1] = column;
+        let [
+            r0,
+            r1,
+            r2,
+            r3,
+            r4,
+            r5,
+            r6,
+            r7,
+            r8,
+            r9,
+            ra,
+            rb,
+            rc,
+            rd,
+            re,
+            rf,
+        ] = rows;
+        let low = f32x8::transpose([r0, r1, r2, r3, r4, r5, r6, r7]);
+        let high = f32x8::transpose([r8, r9, ra, rb, rc, rd, re, rf]);
+        let [fx, fy, fz] = [
+            join(low[0], high[0]),
+            join(low[1], high[1]),
+            join(low[2], high[2]),
+        ];
+        let [tx, ty, tz] = [
+            join(low[3], high[3]),
+            join(low[4], high[4]),
+            join(low[5], high[5]),
+        ];
+        let [p0, p1] = [join(low[6], high[6]), join(low[7], high[7])];
 
         let from = [fx, fy, fz];
         let d = [tx - fx, ty - fy, tz - fz];
-        let size = d.map(f32x16::abs);
+        let size = [d[0].abs(), d[1].abs(), d[2].abs()];
         let main_z = size[2].simd_ge(size[0]) & size[2].simd_ge(size[1]);
         let main_y = size[1].simd_ge(size[0]) & !main_z;
         let main_x = !(main_y | main_z);
         let lanes = 0xffff;
-        let turn = match [main_x, main_y, main_z].map(f32x16::to_bitmask) {
-            [m, _, _] if m == lanes => Turn::Same([1, 2, 0]),
-            [_, m, _] if m == lanes => Turn::Same([2, 0, 1]),
-            [_, _, m] if m == lanes => Turn::Same([0, 1, 2]),
-            _ => Turn::Mixed([main_x, main_y]),
+        let turn = if main_x.to_bitmask() == lanes {
+            Turn::Same([1, 2, 0])
+        } else if main_y.to_bitmask() == lanes {
+            Turn::Same([2, 0, 1])
+        } else if main_z.to_bitmask() == lanes {
+            Turn::Same([0, 1, 2])
+        } else {
+            Turn::Mixed([main_x, main_y])
         };
         let turned = turn.lanes(d);
         let inverse = f32x16::ONE / turned[2];
         let gap = f32x16::splat(index.gap) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
 
-        let least_component = f32x16::splat(LEAST_COMPONENT);
-        let inverses = d.map(|x| {
-            let tiny = x.abs().simd_lt(least_component);
-            let sign = x & f32x16::splat(-0.0);
-            f32x16::ONE / tiny.select(least_component | sign, x)
-        });
+        let inverses = [safe_inverse(d[0]), safe_inverse(d[1]), safe_inverse(d[2])];
         let mut bundle = Bundle {
             starts: [ends_of(least).0, ends_of(most).0],
             ends: [ends_of(least).1, ends_of(most).1],
@@ -137,10 +162,7 @@ impl Packet {
             slack: SIDE_SLACK * index.reach(),
         };
         for axis in 0..3 {
-            bundle.inverse[axis] = [
-                reduce(inverses[axis], f32::min),
-                reduce(inverses[axis], f32::max),
-            ];
+            bundle.inverse[axis] = range_of(inverses[axis]);
             let [a, b] = bundle.inverse[axis];
             bundle.way[axis] = i8::from(a > 0.0) - i8::from(b < 0.0);
         }
@@ -148,7 +170,7 @@ impl Packet {
             origin: turn.lanes(from),
             slope: [turned[0] * inverse, turned[1] * inverse, inverse],
             range: [gap, f32x16::ONE - gap],
-            offset: [0, 1, 2].map(|axis| from[axis] * inverses[axis]),
+            offset: [fx * inverses[0], fy * inverses[1], fz * inverses[2]],
             inverse: inverses,
             planes: [p0.to_bits(), p1.to_bits()],
             turn,
@@ -232,9 +254,18 @@ impl Packet {
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
         let corners = block.corner_lane(place);
+        let [a, b, c] = corners;
         let corners = match &self.turn {
-            Turn::Same(axes) => corners.map(|c| axes.map(|k| f32x16::splat(c[k]))),
-            mixed => corners.map(|c| mixed.lanes(c.map(f32x16::splat))),
+            &Turn::Same([x, y, z]) => [
+                splat([a[x], a[y], a[z]]),
+                splat([b[x], b[y], b[z]]),
+                splat([c[x], c[y], c[z]]),
+            ],
+            mixed => [
+                mixed.lanes(splat(a)),
+                mixed.lanes(splat(b)),
+                mixed.lanes(splat(c)),
+            ],
         };
         let (met, e) = meet_lines(corners, self.origin, self.slope, self.range);
         let mut met = met & lanes;
@@ -266,11 +297,12 @@ impl Turn {
     #[inline(always)]
     fn lanes(&self, [x, y, z]: [f32x16; 3]) -> [f32x16; 3] {
         match self {
-            Self::Same(axes) => axes.map(|k| [x, y, z][k]),
-            Self::Mixed([main_x, main_y]) => {
-                let pick = |a, b, c| main_x.select(a, main_y.select(b, c));
-                [pick(y, z, x), pick(z, x, y), pick(x, y, z)]
-            }
+            &Self::Same([a, b, c]) => [[x, y, z][a], [x, y, z][b], [x, y, z][c]],
+            Self::Mixed([main_x, main_y]) => [
+                main_x.select(y, main_y.select(z, x)),
+                main_x.select(z, main_y.select(x, y)),
+                main_x.select(x, main_y.select(y, z)),
+            ],
         }
     }
 }
@@ -278,7 +310,7 @@ impl Turn {
 /// A segment as one row: ends, then planes.
 #[inline(always)]
 fn row(s: &Segment) -> f32x8 {
-    let [p, q] = s.planes.map(f32::from_bits);
+    let [p, q] = [f32::from_bits(s.planes[0]), f32::from_bits(s.planes[1])];
     f32x8::new([s.from.x, s.from.y, s.from.z, s.to.x, s.to.y, s.to.z, p, q])
 }
 
@@ -290,24 +322,41 @@ fn ends_of(row: f32x8) -> (Vec3, Vec3) {
 }
 
 #[inline(always)]
-fn join(low: f32x8, high: f32x8) -> f32x16 {
-    let (low, high) = (low.to_array(), high.to_array());
-    f32x16::new(std::array::from_fn(|k| {
-        if k < 8 { low[k] } else { high[k - 8] }
-    }))
+fn splat([x, y, z]: [f32; 3]) -> [f32x16; 3] {
+    [f32x16::splat(x), f32x16::splat(y), f32x16::splat(z)]
 }
 
 #[inline(always)]
-fn reduce(x: f32x16, with: impl Fn(f32, f32) -> f32) -> f32 {
-    let mut x = x.to_array();
-    let mut half = PACKET / 2;
-    while half > 0 {
-        for k in 0..half {
-            x[k] = with(x[k], x[k + half]);
-        }
-        half /= 2;
+fn join(low: f32x8, high: f32x8) -> f32x16 {
+    let mut all = [0.0; PACKET];
+    all[..8].copy_from_slice(low.as_array());
+    all[8..].copy_from_slice(high.as_array());
+    f32x16::new(all)
+}
+
+/// 1/d, finite; as in one segment's slabs.
+#[inline(always)]
+fn safe_inverse(d: f32x16) -> f32x16 {
+    let least = f32x16::splat(LEAST_COMPONENT);
+    let tiny = d.abs().simd_lt(least);
+    f32x16::ONE / tiny.select(least | (d & f32x16::splat(-0.0)), d)
+}
+
+/// Least and greatest lane.
+#[inline(always)]
+fn range_of(x: f32x16) -> [f32; 2] {
+    let x = x.to_array();
+    let (mut low, mut high) = ([0.0; 8], [0.0; 8]);
+    low.copy_from_slice(&x[..8]);
+    high.copy_from_slice(&x[8..]);
+    let (low, high) = (f32x8::new(low), f32x8::new(high));
+    let [least, most] = [low.fast_min(high).to_array(), low.fast_max(high).to_array()];
+    let (mut a, mut b) = (least[0], most[0]);
+    for k in 1..8 {
+        a = a.min(least[k]);
+        b = b.max(most[k]);
     }
-    x[0]
+    [a, b]
 }
 
 impl Bundle {
@@ -319,8 +368,8 @@ impl Bundle {
         let mut apart = f32x8::ZERO;
         for axis in 0..3 {
             let [low, high] = [node.bounds[0][axis], node.bounds[1][axis]];
-            let start = self.starts.map(|s| s[axis]);
-            let end = self.ends.map(|e| e[axis]);
+            let start = [self.starts[0][axis], self.starts[1][axis]];
+            let end = [self.ends[0][axis], self.ends[1][axis]];
             let least = f32x8::splat(start[0].min(end[0]));
             let most = f32x8::splat(start[1].max(end[1]));
             apart = apart | low.simd_gt(most) | high.simd_lt(least);
@@ -336,7 +385,8 @@ impl Bundle {
             } else {
                 (start[0], start[1])
             };
-            let [a, b] = self.inverse[axis].map(f32x8::splat);
+            let a = f32x8::splat(self.inverse[axis][0]);
+            let b = f32x8::splat(self.inverse[axis][1]);
             let into = first - f32x8::splat(early);
             let out = last - f32x8::splat(late);
             near = near.fast_max((into * a).fast_min(into * b));
@@ -350,7 +400,8 @@ impl Bundle {
     #[inline(always)]
     fn straddles(&self, block: &Block) -> u32 {
         let [a, b, c] = block.corners;
-        let [u, v] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+        let u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+        let v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
         let n = [
             u[1] * v[2] - u[2] * v[1],
             u[2] * v[0] - u[0] * v[2],
@@ -362,7 +413,8 @@ impl Bundle {
         let mut slack = f32x8::ZERO;
         for axis in 0..3 {
             for (k, ends) in [self.starts, self.ends].iter().enumerate() {
-                let [p, q] = ends.map(|e| (f32x8::splat(e[axis]) - a[axis]) * n[axis]);
+                let p = (f32x8::splat(ends[0][axis]) - a[axis]) * n[axis];
+                let q = (f32x8::splat(ends[1][axis]) - a[axis]) * n[axis];
                 low[k] += p.fast_min(q);
                 high[k] += p.fast_max(q);
             }

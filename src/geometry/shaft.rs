@@ -345,9 +345,11 @@ impl Sides8 {
         for k in 0..self.count {
             let n = self.normal[k];
             // The corner of the box that is deepest inside.
-            let [x, y, z] = [0, 1, 2]
-                .map(|axis| node.bounds[usize::from(n[axis] < 0.0)][axis] * f32x8::splat(n[axis]));
-            out |= (x + y + z).simd_gt(f32x8::splat(self.offset[k]));
+            let mut depth = f32x8::ZERO;
+            for (axis, &x) in n.iter().enumerate() {
+                depth += node.bounds[usize::from(x < 0.0)][axis] * f32x8::splat(x);
+            }
+            out |= depth.simd_gt(f32x8::splat(self.offset[k]));
         }
         !out.to_bitmask() & ((1 << node.count) - 1)
     }
@@ -357,14 +359,15 @@ impl Sides8 {
     fn triangles(&self, block: &Block) -> u32 {
         let mut out = f32x8::ZERO;
         for k in 0..self.count {
-            let n = self.normal[k].map(f32x8::splat);
-            let [a, b, c] = block
-                .corners
-                .map(|p| p[0] * n[0] + p[1] * n[1] + p[2] * n[2]);
-            out |= a
-                .fast_min(b)
-                .fast_min(c)
-                .simd_gt(f32x8::splat(self.offset[k]));
+            let mut depth = [f32x8::ZERO; 3];
+            for (axis, &x) in self.normal[k].iter().enumerate() {
+                let x = f32x8::splat(x);
+                for (depth, corner) in depth.iter_mut().zip(&block.corners) {
+                    *depth += corner[axis] * x;
+                }
+            }
+            let least = depth[0].fast_min(depth[1]).fast_min(depth[2]);
+            out |= least.simd_gt(f32x8::splat(self.offset[k]));
         }
         !out.to_bitmask() & ((1 << block.count) - 1)
     }

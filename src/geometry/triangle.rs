@@ -58,14 +58,9 @@ pub(crate) fn edges<T>(corners: [[T; 3]; 3], origin: [T; 3], slope: [T; 3]) -> E
 where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>,
 {
-    let [a, b, c] = corners.map(|corner| {
-        let z = corner[2] - origin[2];
-        [
-            (corner[0] - origin[0]) - slope[0] * z,
-            (corner[1] - origin[1]) - slope[1] * z,
-            slope[2] * z,
-        ]
-    });
+    let a = sheared(corners[0], origin, slope);
+    let b = sheared(corners[1], origin, slope);
+    let c = sheared(corners[2], origin, slope);
     let u = c[0] * b[1] - c[1] * b[0];
     let v = a[0] * c[1] - a[1] * c[0];
     let w = b[0] * a[1] - b[1] * a[0];
@@ -76,6 +71,20 @@ where
         det: (u + v) + w,
         height: (u * a[2] + v * b[2]) + w * c[2],
     }
+}
+
+/// A corner seen along the line. (No closures here and below: array maps of wide vectors are not always inlined.)
+#[inline(always)]
+fn sheared<T>(corner: [T; 3], origin: [T; 3], slope: [T; 3]) -> [T; 3]
+where
+    T: Copy + Sub<Output = T> + Mul<Output = T>,
+{
+    let z = corner[2] - origin[2];
+    [
+        (corner[0] - origin[0]) - slope[0] * z,
+        (corner[1] - origin[1]) - slope[1] * z,
+        slope[2] * z,
+    ]
 }
 
 /// The axis that a direction runs along most: the last one of equals.
@@ -96,16 +105,13 @@ impl Shear {
     #[inline(always)]
     pub(crate) fn new(from: Vec3, direction: Vec3, range: [f32; 2]) -> Self {
         let z = main_axis(direction);
-        let axes = [(z + 1) % 3, (z + 2) % 3, z];
-        let inverse = 1.0 / direction[axes[2]];
+        let [x, y, z] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
+        let (from, direction) = (from.to_array(), direction.to_array());
+        let inverse = 1.0 / direction[z];
         Self {
-            axes,
-            origin: axes.map(|k| from[k]),
-            slope: [
-                direction[axes[0]] * inverse,
-                direction[axes[1]] * inverse,
-                inverse,
-            ],
+            axes: [x, y, z],
+            origin: [from[x], from[y], from[z]],
+            slope: [direction[x] * inverse, direction[y] * inverse, inverse],
             range,
         }
     }
@@ -135,12 +141,11 @@ impl Shear {
     #[inline(always)]
     pub(crate) fn block_edges(&self, block: &Block) -> Edges<f32x8> {
         let [x, y, z] = self.axes;
+        let [a, b, c] = &block.corners;
         edges(
-            block
-                .corners
-                .map(|corner| [corner[x], corner[y], corner[z]]),
-            self.origin.map(f32x8::splat),
-            self.slope.map(f32x8::splat),
+            [[a[x], a[y], a[z]], [b[x], b[y], b[z]], [c[x], c[y], c[z]]],
+            splat8(self.origin),
+            splat8(self.slope),
         )
     }
 
@@ -157,6 +162,11 @@ impl Shear {
             & height.simd_lt(size * f32x8::splat(self.range[1])))
         .to_bitmask()
     }
+}
+
+#[inline(always)]
+fn splat8([x, y, z]: [f32; 3]) -> [f32x8; 3] {
+    [f32x8::splat(x), f32x8::splat(y), f32x8::splat(z)]
 }
 
 /// Sixteen lines against one triangle, in the turned axes of each line.
@@ -226,9 +236,18 @@ impl Block {
     /// The corners of the triangle in a lane.
     #[inline(always)]
     pub(crate) fn corner_lane(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.corners
-            .map(|corner| corner.map(|axis| axis.as_array()[lane]))
+        let [a, b, c] = &self.corners;
+        [pick(a, lane), pick(b, lane), pick(c, lane)]
     }
+}
+
+#[inline(always)]
+fn pick(point: &[f32x8; 3], lane: usize) -> [f32; 3] {
+    [
+        point[0].as_array()[lane],
+        point[1].as_array()[lane],
+        point[2].as_array()[lane],
+    ]
 }
 
 #[cfg(test)]
