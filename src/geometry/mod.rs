@@ -8,12 +8,14 @@
 //! | `tree` | the eight-wide tree over the triangles |
 //! | [`index`] | [`RayIndex`]: is a segment blocked, what does a ray hit |
 //! | `packet` | sixteen segments at once |
-//! | [`shaft`] | what could block between two patches |
+//! | [`shaft`] | the space between two patches |
+//! | [`blockers`] | which triangles of the index reach into a shaft |
 //! | [`clip`] | the visible part of a polygon from a point |
 //! | [`polygon`] | form factor from an element of surface to a polygon |
 //! | [`lanes`] | the same for eight pairs at once |
 //! | [`sampling`] | repeatable points on triangles and directions in a hemisphere |
 
+pub mod blockers;
 pub mod clip;
 pub mod index;
 pub mod lanes;
@@ -26,10 +28,11 @@ pub mod shaft;
 mod tree;
 mod triangle;
 
+pub use blockers::ShaftContents;
 pub use clip::{lambert_visible, visible_part};
 pub use index::{Hit, RayIndex};
 pub use lanes::{lambert_points_x8, lambert_triangles_x8};
 pub use plane::plane_ids;
 pub use polygon::lambert_polygon;
 pub use segment::{NO_PLANE, Segment};
-pub use shaft::{Patch, Shaft, ShaftContents};
+pub use shaft::{Patch, Shaft};
