@@ -11,7 +11,7 @@ use super::segment::NO_PLANE;
 use super::shaft::{SIDES, Shaft, dot, splat};
 use super::tree::{LEAF, Node};
 use super::triangle::{BLOCK, Block};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use wide::{f32x8, f64x8};
 
 /// Triangles between two patches.
@@ -166,12 +166,9 @@ impl RayIndex {
             cap,
         };
         let fits = match candidates {
-            Some(list) => list.iter().all(|&id| {
-                self.place(id).is_none_or(|(block, lane)| {
-                    let block = &self.tree.blocks[block];
-                    !self.between(shaft, block, lane) || found.push(id)
-                })
-            }),
+            Some(list) => list
+                .chunks(BLOCK)
+                .all(|ids| self.sift(shaft, &self.gather(ids), &mut found)),
             None => self.search(shaft, &mut found),
         };
         if !fits {
@@ -202,29 +199,46 @@ impl RayIndex {
                 continue;
             }
             let block = &self.tree.blocks[(entry & !LEAF) as usize];
-            let (mut open, sure) = triangles(shaft, block, f64::from(self.gap));
-            while open != 0 {
-                let lane = open.trailing_zeros() as usize;
-                open &= open - 1;
-                let blocks = if sure >> lane & 1 == 1 {
-                    !own_plane(shaft, block, lane)
-                } else {
-                    self.between(shaft, block, lane)
-                };
-                if blocks && !found.push(block.ids[lane]) {
-                    return false;
-                }
+            if !self.sift(shaft, block, found) {
+                return false;
             }
         }
         true
     }
 
-    /// Could this triangle block? The exact test.
-    fn between(&self, shaft: &Shaft, block: &Block, lane: usize) -> bool {
-        let [a, b, c] = block.corner_lane(lane);
-        let corner = |p: [f32; 3]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
-        !own_plane(shaft, block, lane)
-            && shaft.holds(&[corner(a), corner(b), corner(c)], f64::from(self.gap))
+    /// Adds the triangles of a block that may block; false when there are too many.
+    fn sift(&self, shaft: &Shaft, block: &Block, found: &mut Found) -> bool {
+        let gap = f64::from(self.gap);
+        let (mut open, sure) = triangles(shaft, block, gap);
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize;
+            open &= open - 1;
+            let blocks = !own_plane(shaft, block, lane)
+                && (sure >> lane & 1 == 1 || {
+                    let [a, b, c] = block.corner_lane(lane);
+                    let corner = |p: [f32; 3]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
+                    shaft.cut_holds(&[corner(a), corner(b), corner(c)], gap)
+                });
+            if blocks && !found.push(block.ids[lane]) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// A block of triangles from anywhere.
+    fn gather(&self, ids: &[u32]) -> Block {
+        Block::new(ids.iter().filter_map(|&id| {
+            let (block, lane) = self.place(id)?;
+            let block = &self.tree.blocks[block];
+            let corners = block.corner_lane(lane).map(Vec3::from);
+            Some((
+                id,
+                corners,
+                block.planes[lane],
+                block.masked >> lane & 1 == 1,
+            ))
+        }))
     }
 }
 
@@ -298,6 +312,15 @@ mod tests {
                 ShaftContents::Few(list) => list,
                 ShaftContents::Many => panic!("there are fewer than 100"),
             };
+            let plain: Vec<u32> = (2..24)
+                .filter(|&k| {
+                    shaft.holds(
+                        &scene[k as usize].map(|p| p.as_vec3().as_dvec3()),
+                        index.gap.into(),
+                    )
+                })
+                .collect();
+            assert_eq!(list, plain);
             let all: Vec<u32> = (0..24).collect();
             assert_eq!(index.blockers(&shaft, Some(&all), 100), contents);
             if !list.is_empty() {

@@ -230,7 +230,7 @@ impl Shaft {
     }
 
     /// Could a triangle block between the patches? `gap`: how far it may reach into the shaft without counting.
-    pub(super) fn holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
+    pub fn holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
         let [a, b, c] = *triangle;
         let mut crossed = 0u32;
         for (k, side) in self.sides().iter().enumerate() {
@@ -259,11 +259,17 @@ impl Shaft {
         if least >= -gap || most <= gap {
             return false;
         }
-        // What is left after cutting at the sides that cross it.
-        let mut polygon = Polygon::new(triangle);
-        for (k, side) in self.sides().iter().enumerate() {
-            if crossed >> k & 1 == 1 && !polygon.cut(side, gap) {
-                return false;
+        crossed == 0 || self.cut_holds(triangle, gap)
+    }
+
+    /// The last step of [`Self::holds`]: is something left of a triangle when all sides have cut it?
+    pub(super) fn cut_holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
+        let mut outline = Outline::new(triangle);
+        for side in self.sides() {
+            match outline.cut(side, gap) {
+                Left::Nothing => return false,
+                Left::Some => {}
+                Left::TooMany => return true,
             }
         }
         true
@@ -280,43 +286,91 @@ pub(super) fn dot(a: [f64x8; 3], b: [f64x8; 3]) -> f64x8 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A convex polygon that is cut again and again, without allocation.
-struct Polygon {
-    corners: [DVec3; 3 + SIDES],
+/// A convex polygon of up to eight corners, coordinate by coordinate.
+struct Outline {
+    corners: [[f64; 8]; 3],
     count: usize,
 }
 
-impl Polygon {
+/// What a cut leaves.
+enum Left {
+    Nothing,
+    Some,
+    /// More than eight corners; callers stop there, on the safe side.
+    TooMany,
+}
+
+impl Outline {
     fn new(triangle: &[DVec3; 3]) -> Self {
-        let mut corners = [DVec3::ZERO; 3 + SIDES];
-        corners[..3].copy_from_slice(triangle);
-        Self { corners, count: 3 }
+        let mut outline = Self {
+            corners: [[0.0; 8]; 3],
+            count: 3,
+        };
+        for (k, corner) in triangle.iter().enumerate() {
+            outline.set(k, *corner);
+        }
+        outline
     }
 
-    /// Keeps what is deeper than `gap` inside; false if that is nothing. Each cut of a convex polygon adds at most one corner.
-    fn cut(&mut self, side: &HalfSpace, gap: f64) -> bool {
-        let mut kept = [DVec3::ZERO; 3 + SIDES];
-        let mut count = 0;
-        let mut push = |corner: DVec3| {
-            if let Some(place) = kept.get_mut(count) {
-                *place = corner;
-                count += 1;
-            }
-        };
-        let mut before = self.corners[self.count - 1];
-        let mut d0 = side.outside(before) + gap;
-        for &corner in &self.corners[..self.count] {
-            let d1 = side.outside(corner) + gap;
-            if (d0 < 0.0) != (d1 < 0.0) {
-                push(before + (corner - before) * (d0 / (d0 - d1)));
-            }
-            if d1 < 0.0 {
-                push(corner);
-            }
-            (before, d0) = (corner, d1);
+    fn set(&mut self, k: usize, corner: DVec3) {
+        for (row, x) in self.corners.iter_mut().zip(corner.to_array()) {
+            row[k] = x;
         }
-        self.corners = kept;
-        self.count = count;
-        count >= 3
+    }
+
+    fn get(&self, k: usize) -> DVec3 {
+        DVec3::new(self.corners[0][k], self.corners[1][k], self.corners[2][k])
+    }
+
+    /// Keeps what is deeper than `gap` inside.
+    #[inline]
+    fn cut(&mut self, side: &HalfSpace, gap: f64) -> Left {
+        let [x, y, z] = &self.corners;
+        let points = [f64x8::new(*x), f64x8::new(*y), f64x8::new(*z)];
+        let depth = dot(points, splat(side.normal)) - f64x8::splat(side.offset - gap);
+        let all = (1 << self.count) - 1;
+        let inside = depth.simd_lt(f64x8::ZERO).to_bitmask() & all;
+        if inside == all {
+            return Left::Some;
+        }
+        if inside == 0 {
+            return Left::Nothing;
+        }
+        // The corners inside follow one another; the outline comes in before the first of them and goes out after the last.
+        let depth = depth.to_array();
+        let next = |k: usize| if k + 1 == self.count { 0 } else { k + 1 };
+        let before = (inside << 1 | inside >> (self.count - 1)) & all;
+        let first = (inside & !before).trailing_zeros() as usize;
+        let crossing = |k: usize, l: usize| {
+            let (a, b) = (self.get(k), self.get(l));
+            a + (b - a) * (depth[k] / (depth[k] - depth[l]))
+        };
+        let mut kept = Self {
+            corners: [[0.0; 8]; 3],
+            count: 1,
+        };
+        let last_out = if first == 0 {
+            self.count - 1
+        } else {
+            first - 1
+        };
+        kept.set(0, crossing(last_out, first));
+        let mut k = first;
+        loop {
+            if kept.count + 1 == 8 {
+                return Left::TooMany;
+            }
+            kept.set(kept.count, self.get(k));
+            kept.count += 1;
+            let after = next(k);
+            if inside >> after & 1 == 0 {
+                kept.set(kept.count, crossing(k, after));
+                kept.count += 1;
+                break;
+            }
+            k = after;
+        }
+        *self = kept;
+        Left::Some
     }
 }
