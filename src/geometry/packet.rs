@@ -52,6 +52,9 @@ struct Bundle {
 /// Roundings of f32, of the scene's reach, that the side of a plane is uncertain by: 2^-20.
 const SIDE_SLACK: f32 = 1.0 / 1_048_576.0;
 
+/// Ends within a box of this share of the scene's surface are one place. Measured in a room of 350 000 triangles.
+const COMMON_PLACE: f32 = 0.01;
+
 impl Packet {
     /// A bit for each segment that something blocks.
     pub(crate) fn occluded(
@@ -59,9 +62,14 @@ impl Packet {
         segments: &[Segment],
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
+        if index.tree.nodes.is_empty() {
+            return 0;
+        }
         match Self::new(index, segments) {
-            Some(packet) if !index.tree.nodes.is_empty() => packet.traverse(index, opaque),
-            _ => 0,
+            Some(packet) if packet.worthwhile(index) => packet.traverse(index, opaque),
+            _ => (0..).zip(segments).fold(0, |hidden, (k, segment)| {
+                hidden | u32::from(index.occluded_with(segment, opaque)) << k
+            }),
         }
     }
 
@@ -177,6 +185,20 @@ impl Packet {
             bundle,
             open: (1 << count) - 1,
         })
+    }
+
+    /// In a tree of more than one node, segments that have neither a way along their main axes nor a place in common are faster one by one.
+    #[inline(always)]
+    fn worthwhile(&self, index: &RayIndex) -> bool {
+        if index.tree.nodes.len() <= 1 || matches!(self.turn, Turn::Same(_)) {
+            return true;
+        }
+        let area = |[low, high]: [Vec3; 2]| {
+            let d = high - low;
+            d.x * d.y + d.y * d.z + d.z * d.x
+        };
+        let loose = area(self.bundle.starts).min(area(self.bundle.ends));
+        loose < COMMON_PLACE * area(index.tree.bounds)
     }
 
     /// Walks the tree; returns the lanes that are hidden.

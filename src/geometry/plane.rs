@@ -7,7 +7,6 @@
 //! uncertain, 3 tolerance / altitude.
 
 use glam::DVec3;
-use std::collections::HashMap;
 
 /// How far from a plane its triangles' corners may be, of the diagonal of the scene's box: about one rounding of f32
 /// coordinates. In a room of 10 m this is below 1 micrometre.
@@ -56,7 +55,12 @@ pub fn plane_ids(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<u32> {
 
     let mut leaders: Vec<Plane> = Vec::new();
     let mut leader_of = vec![usize::MAX; triangles.len()];
-    let mut grid = Grid::new(FIRST_CELL, tolerance, centre.distance(high));
+    let mut grid = Grid::new(
+        FIRST_CELL,
+        tolerance,
+        centre.distance(high),
+        triangles.len(),
+    );
     for k in order {
         let (Some(plane), Some(corners)) = (planes[k], corners[k]) else {
             continue;
@@ -65,17 +69,20 @@ pub fn plane_ids(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<u32> {
         while grid.cell < 2.0 * uncertain {
             grid = grid.coarser(&leaders);
         }
-        let found = grid.candidates(&plane).filter(|&l| {
+        let mut found = usize::MAX;
+        grid.candidates(&plane, uncertain, |l| {
             let leader = &leaders[l];
-            corners
-                .iter()
-                .all(|p| (leader.normal.dot(*p) - leader.offset).abs() <= tolerance)
+            let on = |p: &DVec3| (leader.normal.dot(*p) - leader.offset).abs() <= tolerance;
+            if l < found && corners.iter().all(on) {
+                found = l;
+            }
         });
-        leader_of[k] = found.min().unwrap_or_else(|| {
+        if found == usize::MAX {
             grid.insert(leaders.len(), &plane);
+            found = leaders.len();
             leaders.push(plane);
-            leaders.len() - 1
-        });
+        }
+        leader_of[k] = found;
     }
     number(&leader_of)
 }
@@ -115,71 +122,94 @@ fn own_plane([a, b, c]: &[DVec3; 3], tolerance: f64) -> Option<Plane> {
     })
 }
 
-/// Planes by normal and offset, in cells of one size; both signs of a plane are looked up.
+/// Planes by normal and offset, in cells of one size; both signs of a plane are looked up. A table of chains: a bucket may hold
+/// planes of several cells, which the caller tells apart anyway.
 struct Grid {
     cell: f64,
     offset_cell: f64,
     tolerance: f64,
     radius: f64,
-    /// Last leader in a cell.
-    last: HashMap<[i64; 4], usize>,
-    /// The leader before each leader in its cell.
-    before: Vec<usize>,
+    /// Last leader in each bucket; the length is a power of two.
+    last: Vec<u32>,
+    /// The leader before each leader in its bucket.
+    before: Vec<u32>,
 }
 
+/// End of a chain.
+const NONE: u32 = u32::MAX;
+
 impl Grid {
-    fn new(cell: f64, tolerance: f64, radius: f64) -> Self {
+    fn new(cell: f64, tolerance: f64, radius: f64, capacity: usize) -> Self {
         Self {
             cell,
             offset_cell: 2.0 * tolerance + cell * radius,
             tolerance,
             radius,
-            last: HashMap::new(),
+            last: vec![NONE; (2 * capacity).next_power_of_two()],
             before: Vec::new(),
         }
     }
 
     fn coarser(&self, leaders: &[Plane]) -> Self {
-        let mut grid = Self::new(self.cell * COARSER, self.tolerance, self.radius);
+        let mut grid = Self::new(
+            self.cell * COARSER,
+            self.tolerance,
+            self.radius,
+            self.last.len() / 2,
+        );
         for (k, plane) in leaders.iter().enumerate() {
             grid.insert(k, plane);
         }
         grid
     }
 
-    /// Coordinates in cells.
-    fn place(&self, normal: DVec3, offset: f64) -> [f64; 4] {
-        let n = normal / self.cell;
-        [n.x, n.y, n.z, offset / self.offset_cell]
+    fn bucket(&self, cell: [i64; 4]) -> usize {
+        let mixed = cell
+            .iter()
+            .fold(0, |h, &x| super::sampling::hash(h, x as u64));
+        mixed as usize & (self.last.len() - 1)
     }
 
     fn insert(&mut self, leader: usize, plane: &Plane) {
-        let key = self
-            .place(plane.normal, plane.offset)
-            .map(|x| x.floor() as i64);
-        let before = self.last.insert(key, leader);
-        self.before.push(before.unwrap_or(usize::MAX));
+        let n = plane.normal / self.cell;
+        let cell = [n.x, n.y, n.z, plane.offset / self.offset_cell].map(|x| x.floor() as i64);
+        let bucket = self.bucket(cell);
+        self.before
+            .push(std::mem::replace(&mut self.last[bucket], leader as u32));
     }
 
-    /// Every leader within half a cell in normal and offset, and some more.
-    fn candidates<'a>(&'a self, plane: &Plane) -> impl Iterator<Item = usize> + 'a {
-        let plane = *plane;
-        [1.0, -1.0]
-            .into_iter()
-            .flat_map(move |sign| {
-                let low = self
-                    .place(plane.normal * sign, plane.offset * sign)
-                    .map(|x| (x - 0.5).floor() as i64);
-                (0..16i64).map(move |corner| {
-                    std::array::from_fn::<i64, 4, _>(|axis| low[axis] + (corner >> axis & 1))
-                })
-            })
-            .filter_map(|key| self.last.get(&key).copied())
-            .flat_map(move |last| {
-                std::iter::successors(Some(last), move |&k| {
-                    Some(self.before[k]).filter(|&k| k != usize::MAX)
-                })
-            })
+    /// Calls with every leader whose normal may be within `uncertain` of the plane's or its opposite, and offset accordingly, and
+    /// with some more.
+    fn candidates(&self, plane: &Plane, uncertain: f64, mut call: impl FnMut(usize)) {
+        // At most half a cell each, so at most two cells an axis.
+        let reach = [
+            uncertain,
+            uncertain,
+            uncertain,
+            self.tolerance + uncertain * self.radius,
+        ];
+        for sign in [1.0, -1.0] {
+            let n = plane.normal * sign;
+            let centre = [n.x, n.y, n.z, plane.offset * sign];
+            let size = [self.cell, self.cell, self.cell, self.offset_cell];
+            let at = |axis: usize, by: f64| {
+                ((centre[axis] + by * reach[axis]) / size[axis]).floor() as i64
+            };
+            let low = [0, 1, 2, 3].map(|axis| at(axis, -1.0));
+            let two = [0, 1, 2, 3].map(|axis| at(axis, 1.0) - low[axis]);
+            for corner in 0..16i64 {
+                let step = [0, 1, 2, 3].map(|axis| corner >> axis & 1);
+                if (0..4).any(|axis| step[axis] > two[axis]) {
+                    continue;
+                }
+                let cell = [0, 1, 2, 3].map(|axis| low[axis] + step[axis]);
+                let mut leader = self.last[self.bucket(cell)];
+                while leader != NONE {
+                    call(leader as usize);
+                    leader = self.before[leader as usize];
+                }
+            }
+        }
     }
 }
 
