@@ -1,5 +1,5 @@
-//! How fast are visibility queries? Rays a second on one core, in a Cornell box (36 triangles) and in a furnished room
-//! (about 250 000), one at a time and in batches, against the plain use of the `obvhs` index with the same watertight test.
+//! How fast are visibility queries? Rays a second on one core, in a Cornell box (34 triangles) and in a furnished room
+//! (about 350 000), one at a time and in batches, against the plain use of the `obvhs` index with the same watertight test.
 //!
 //! `cargo bench --bench rays`
 
@@ -8,7 +8,7 @@ use divan::{Bencher, black_box};
 use glam::{DVec3, Mat4, Vec3, Vec3A, vec3};
 use haarlight::geometry::sampling::{Pcg, hash, sequence02, triangle_weights};
 use haarlight::geometry::{NO_PLANE, Patch, RayIndex, Segment, Shaft, ShaftContents};
-use haarlight::geometry::{lanes, plane_ids};
+use haarlight::geometry::{lambert_visible, lanes, plane_ids};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
@@ -184,7 +184,7 @@ fn cornell() -> Mesh {
     for quad in quads {
         mesh.quad(quad.map(|p| (Vec3::from_array(p) - 278.0) * 0.01));
     }
-    // The published box has 32 triangles with the front open; close it to have as many as a room with a door.
+    // The front is open in the published box; closed here.
     let front = [
         [0.0, 0.0, 0.0],
         [552.8, 0.0, 0.0],
@@ -618,6 +618,46 @@ fn closest(bencher: Bencher<'_, '_>, at: Where) {
     });
 }
 
+fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a).normalize()
+}
+
+/// The visible form factor of the Cornell box's light from points on all surfaces: list of blockers, clipping, and factor.
+#[divan::bench]
+fn light_from_points(bencher: Bencher<'_, '_>) {
+    let room: &Room = &CORNELL;
+    let light = [2, 3].map(|k| room.triangles[k].map(|p| p.as_dvec3()));
+    bencher
+        .counter(ItemsCount::new(2 * room.patches.len()))
+        .bench(|| {
+            let mut sum = 0.0;
+            for (k, [a, _]) in black_box(&room.patches).iter().enumerate() {
+                let (at, normal) = ((a[0] + a[1] + a[2]) / 3.0, normal(a));
+                let from = Patch::Point {
+                    at,
+                    normal,
+                    plane: room.pairs[16 * k].planes[0],
+                };
+                for light in &light {
+                    let to = Patch::Triangle {
+                        corners: *light,
+                        plane: room.planes[2],
+                    };
+                    let list = match room.index.blockers(&Shaft::between(&from, &to), None, 16) {
+                        ShaftContents::Few(list) => list,
+                        _ => Vec::new(),
+                    };
+                    let blockers: Vec<[DVec3; 3]> = list
+                        .iter()
+                        .filter_map(|&k| Some(room.index.triangle(k)?.map(|p| p.as_dvec3())))
+                        .collect();
+                    sum += lambert_visible(at, normal, light, &blockers, 64).unwrap_or(0.0);
+                }
+            }
+            sum
+        });
+}
+
 /// Form factors from points to triangles, one at a time.
 #[divan::bench]
 fn lambert_single(bencher: Bencher<'_, '_>) {
@@ -625,9 +665,10 @@ fn lambert_single(bencher: Bencher<'_, '_>) {
     bencher.counter(ItemsCount::new(8 * pairs.len())).bench(|| {
         let mut sum = 0.0;
         for [a, b] in black_box(pairs) {
+            let normal = normal(a);
             for k in 0..8 {
                 let point = a[0].lerp(a[1], f64::from(k) / 8.0);
-                sum += haarlight::geometry::lambert_polygon(point, DVec3::Z, b);
+                sum += haarlight::geometry::lambert_polygon(point, normal, b);
             }
         }
         sum
@@ -642,7 +683,7 @@ fn lambert_x8(bencher: Bencher<'_, '_>) {
         let mut sum = 0.0;
         for [a, b] in black_box(pairs) {
             let points: [DVec3; 8] = std::array::from_fn(|k| a[0].lerp(a[1], k as f64 / 8.0));
-            sum += lanes::lambert_points_x8(lanes::lanes_of(&points), DVec3::Z, b).reduce_add();
+            sum += lanes::lambert_points_x8(lanes::lanes_of(&points), normal(a), b).reduce_add();
         }
         sum
     });

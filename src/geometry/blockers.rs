@@ -6,11 +6,12 @@
 //! Safe side: a pair reported as clear has no blocker, but for what reaches less than the index's gap into the shaft (1e-6 of the scene's
 //! half size; neighbours touch it everywhere).
 
-use super::index::{RayIndex, Stack};
+use super::index::RayIndex;
 use super::segment::NO_PLANE;
 use super::shaft::{SIDES, Shaft, dot, splat};
 use super::tree::{LEAF, Node};
 use super::triangle::{BLOCK, Block};
+use super::walk::Stack;
 use glam::{DVec3, Vec3};
 use wide::{f32x8, f64x8};
 
@@ -389,6 +390,7 @@ mod tests {
                 };
                 for _ in 0..50 {
                     let mut on = |patch: &Patch| match patch {
+                        Patch::Point { at, .. } => *at,
                         Patch::Triangle { corners, .. } => {
                             on_triangle(corners, [random.f64(), random.f64()])
                         }
@@ -407,6 +409,51 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn shafts_from_a_point_list_what_hides_a_part_of_the_target() {
+        let mut random = Pcg::new(29);
+        let mut listed = 0;
+        for _ in 0..2_000 {
+            let mut point = |s: f64| DVec3::new(random.f64(), random.f64(), random.f64()) * s;
+            let scene: Vec<[DVec3; 3]> = (0..12)
+                .map(|_| {
+                    let at = point(1.0);
+                    [0; 3].map(|_| (at + point(0.4)).as_vec3().as_dvec3())
+                })
+                .collect();
+            let index = index_of(&scene);
+            let (at, target) = (point(1.0), scene[0]);
+            let normal = (target[0] + target[1] + target[2]) / 3.0 - at;
+            let patches = [
+                Patch::Point {
+                    at,
+                    normal,
+                    plane: NO_PLANE,
+                },
+                Patch::Triangle {
+                    corners: target,
+                    plane: 0,
+                },
+            ];
+            if !front(&target, at) || target.iter().any(|&q| normal.dot(q - at) <= 0.0) {
+                continue;
+            }
+            let shaft = Shaft::between(&patches[0], &patches[1]);
+            let list = match index.blockers(&shaft, None, 100) {
+                ShaftContents::Few(list) => list,
+                _ => Vec::new(),
+            };
+            for (k, blocker) in scene.iter().enumerate().skip(1) {
+                let pieces = crate::geometry::visible_part(at, &target, &[*blocker], 100).unwrap();
+                let whole = pieces == [target.to_vec()];
+                // A touch below the gap is not listed; no random triangle touches so lightly.
+                assert_eq!(list.contains(&(k as u32)), !whole, "triangle {k}");
+            }
+            listed += list.len();
+        }
+        assert!(listed > 100, "{listed}");
     }
 
     #[test]

@@ -8,17 +8,14 @@
 
 use super::packet::Packet;
 use super::segment::{NO_PLANE, Segment};
-use super::tree::{Input, LEAF, Node, Tree};
+use super::tree::{Input, LEAF, Tree};
 use super::triangle::{BLOCK, Block, PACKET, Shear};
+use super::walk::{Slabs, Stack, push_by_distance};
 use glam::Vec3;
-use wide::f32x8;
 
 /// Hits nearer than this to an end of a segment do not count, of the scene's half size: an end on an edge is off the
 /// neighbour's plane by a few roundings of its coordinates (2^-24), and must not be hidden by it.
 pub const END_GAP: f32 = 1e-6;
-
-/// Entries of a traversal's stack before it moves to the heap; a tree of a million triangles seldom needs as many.
-const STACK: usize = 64;
 
 /// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,105 +42,6 @@ pub struct RayIndex {
 
 /// In [`RayIndex::places`]: the triangle was left out.
 const NOWHERE: u32 = u32::MAX;
-
-/// A line prepared for boxes.
-struct Slabs {
-    /// 1/d, and start/d.
-    inverse: [f32x8; 3],
-    offset: [f32x8; 3],
-    /// 1 where the line runs down its axis, so that its high side comes first.
-    down: [usize; 3],
-}
-
-/// Direction components nearer to zero than this are taken as this: a finite slab distance, far beyond any scene.
-pub(crate) const LEAST_COMPONENT: f32 = 1e-30;
-
-/// 1/d, finite.
-#[inline(always)]
-fn safe_inverse(d: f32) -> f32 {
-    1.0 / if d.abs() < LEAST_COMPONENT {
-        LEAST_COMPONENT.copysign(d)
-    } else {
-        d
-    }
-}
-
-impl Slabs {
-    #[inline(always)]
-    fn new(from: Vec3, direction: Vec3) -> Self {
-        let inverse = [
-            safe_inverse(direction.x),
-            safe_inverse(direction.y),
-            safe_inverse(direction.z),
-        ];
-        let mut slabs = Self {
-            inverse: [f32x8::ZERO; 3],
-            offset: [f32x8::ZERO; 3],
-            down: [0; 3],
-        };
-        for (axis, &x) in inverse.iter().enumerate() {
-            slabs.inverse[axis] = f32x8::splat(x);
-            slabs.offset[axis] = f32x8::splat(from[axis] * x);
-            slabs.down[axis] = usize::from(x < 0.0);
-        }
-        slabs
-    }
-
-    /// Where the line enters the eight boxes, and a bit for each that it meets before `t_max`.
-    #[inline(always)]
-    fn enter(&self, node: &Node, t_max: f32) -> (f32x8, u32) {
-        let mut near = f32x8::ZERO;
-        let mut far = f32x8::splat(t_max);
-        for axis in 0..3 {
-            let down = self.down[axis];
-            let first = node.bounds[down][axis].mul_sub(self.inverse[axis], self.offset[axis]);
-            let last = node.bounds[1 - down][axis].mul_sub(self.inverse[axis], self.offset[axis]);
-            near = near.fast_max(first);
-            far = far.fast_min(last);
-        }
-        (
-            near,
-            near.simd_le(far).to_bitmask() & ((1 << node.count) - 1),
-        )
-    }
-}
-
-/// A stack on the stack, and on the heap when it is full.
-pub(crate) struct Stack<T: Copy> {
-    place: [T; STACK],
-    used: usize,
-    spill: Vec<T>,
-}
-
-impl<T: Copy> Stack<T> {
-    #[inline(always)]
-    pub(crate) fn new(first: T) -> Self {
-        Self {
-            place: [first; STACK],
-            used: 1,
-            spill: Vec::new(),
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn push(&mut self, item: T) {
-        if let Some(place) = self.place.get_mut(self.used) {
-            *place = item;
-            self.used += 1;
-        } else {
-            self.spill.push(item);
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn pop(&mut self) -> Option<T> {
-        if let Some(item) = self.spill.pop() {
-            return Some(item);
-        }
-        self.used = self.used.checked_sub(1)?;
-        self.place.get(self.used).copied()
-    }
-}
 
 impl RayIndex {
     /// Builds the index. Triangle k lies in plane `planes[k]` and has an alpha mask if `masked[k]`; missing entries mean no
@@ -179,6 +77,18 @@ impl RayIndex {
     /// Low and high corner of all triangles.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.tree.bounds
+    }
+
+    /// The corners of a triangle, as the index holds them; None for one that was left out.
+    pub fn triangle(&self, id: u32) -> Option<[Vec3; 3]> {
+        let (block, lane) = self.place(id)?;
+        Some(self.tree.blocks[block].corner_lane(lane).map(Vec3::from))
+    }
+
+    /// Has the triangle an alpha mask?
+    pub fn is_masked(&self, id: u32) -> bool {
+        self.place(id)
+            .is_some_and(|(block, lane)| self.tree.blocks[block].masked >> lane & 1 == 1)
     }
 
     /// The largest coordinate, either sign.
@@ -392,29 +302,6 @@ impl RayIndex {
                 from_behind: (b - a).cross(c - a).dot(direction) > 0.0,
             }
         })
-    }
-}
-
-/// Pushes the children that the line meets, the farthest first.
-#[inline(always)]
-fn push_by_distance(node: &Node, slabs: &Slabs, t_max: f32, stack: &mut Stack<(f32, u32)>) {
-    let (near, mut met) = slabs.enter(node, t_max);
-    let near = near.to_array();
-    let mut sorted = [(0.0f32, 0u32); super::tree::WIDTH];
-    let mut count = 0;
-    while met != 0 {
-        let lane = met.trailing_zeros() as usize;
-        met &= met - 1;
-        let mut place = count;
-        while place > 0 && sorted[place - 1].0 < near[lane] {
-            sorted[place] = sorted[place - 1];
-            place -= 1;
-        }
-        sorted[place] = (near[lane], node.children[lane]);
-        count += 1;
-    }
-    for &entry in &sorted[..count] {
-        stack.push(entry);
     }
 }
 

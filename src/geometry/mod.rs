@@ -5,7 +5,7 @@
 //! | [`plane`] | ids for planes: which triangles lie in one plane |
 //! | [`segment`] | the segment that a ray query asks about |
 //! | `triangle` | the watertight segment-triangle test, for one triangle, 8 triangles or 16 segments |
-//! | `tree` | the eight-wide tree over the triangles |
+//! | `tree`, `walk` | the eight-wide tree over the triangles |
 //! | [`index`] | [`RayIndex`]: is a segment blocked, what does a ray hit |
 //! | `packet` | sixteen segments at once |
 //! | [`shaft`] | the space between two patches |
@@ -27,6 +27,7 @@ pub mod segment;
 pub mod shaft;
 mod tree;
 mod triangle;
+mod walk;
 
 pub use blockers::ShaftContents;
 pub use clip::{lambert_visible, visible_part};

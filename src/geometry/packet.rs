@@ -5,10 +5,11 @@
 //! plane are dropped, eight at a time, and the others tested one after another against those segments that are
 //! still open. The answers are the same bits as from one segment at a time.
 
-use super::index::{LEAST_COMPONENT, RayIndex, Stack};
+use super::index::RayIndex;
 use super::segment::{NO_PLANE, Segment};
 use super::tree::{LEAF, Node};
 use super::triangle::{Block, PACKET, meet_lines};
+use super::walk::{LEAST_COMPONENT, Stack};
 use glam::Vec3;
 use wide::{f32x8, f32x16, u32x16};
 
@@ -169,9 +170,9 @@ impl Packet {
             way: [0; 3],
             slack: SIDE_SLACK * index.reach(),
         };
-        for axis in 0..3 {
-            bundle.inverse[axis] = range_of(inverses[axis]);
-            let [a, b] = bundle.inverse[axis];
+        for (axis, &inverse) in inverses.iter().enumerate() {
+            let [a, b] = range_of(inverse);
+            bundle.inverse[axis] = [a, b];
             bundle.way[axis] = i8::from(a > 0.0) - i8::from(b < 0.0);
         }
         Some(Self {

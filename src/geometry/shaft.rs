@@ -21,6 +21,15 @@ pub enum Patch {
         /// Triangles of this plane never block.
         plane: u32,
     },
+    /// A point of a surface that looks along a normal.
+    Point {
+        /// Where.
+        at: DVec3,
+        /// Unit normal; what is behind does not block. Zero: it looks everywhere.
+        normal: DVec3,
+        /// Triangles of this plane never block.
+        plane: u32,
+    },
     /// A box around a cluster.
     Box {
         /// Low corner.
@@ -84,6 +93,11 @@ impl Patch {
                 count: 3,
                 edges: &TRIANGLE_EDGES,
             },
+            Self::Point { at, .. } => Shape {
+                corners: [at; 8],
+                count: 1,
+                edges: &[],
+            },
             Self::Box { low, high } => Shape {
                 corners: std::array::from_fn(|k| {
                     let side = |axis: usize| {
@@ -103,7 +117,7 @@ impl Patch {
 
     fn plane(&self) -> u32 {
         match *self {
-            Self::Triangle { plane, .. } => plane,
+            Self::Triangle { plane, .. } | Self::Point { plane, .. } => plane,
             Self::Box { .. } => NO_PLANE,
         }
     }
@@ -118,6 +132,13 @@ impl Patch {
                 Some(HalfSpace {
                     normal,
                     offset: normal.dot(a),
+                })
+            }
+            Self::Point { at, normal, .. } => {
+                let normal = -normal.try_normalize()?;
+                Some(HalfSpace {
+                    normal,
+                    offset: normal.dot(at),
                 })
             }
             Self::Box { .. } => None,
