@@ -10,6 +10,7 @@
 //! | `packet` | sixteen segments at once |
 //! | [`shaft`] | the space between two patches |
 //! | [`blockers`] | which triangles of the index reach into a shaft |
+//! | [`hidden`] | is a pair hidden as a whole |
 //! | [`clip`] | the visible part of a polygon from a point |
 //! | [`polygon`] | form factor from an element of surface to a polygon |
 //! | [`lanes`] | the same for eight pairs at once |
@@ -17,6 +18,7 @@
 
 pub mod blockers;
 pub mod clip;
+pub mod hidden;
 pub mod index;
 pub mod lanes;
 mod packet;
