@@ -1,0 +1,451 @@
+//! Sixteen segments at once through the tree.
+//!
+//! A node's eight boxes are first tested against the whole packet (interval arithmetic over its ends and directions), the boxes
+//! that survive against the sixteen segments. In a leaf, triangles with all ends of the packet on one side of their
+//! plane are dropped, eight at a time, and the others tested one after another against those segments that are
+//! still open. The answers are the same bits as from one segment at a time.
+
+use super::index::RayIndex;
+use super::segment::{NO_PLANE, Segment};
+use super::tree::{LEAF, Node};
+use super::triangle::{Block, PACKET, meet_lines};
+use super::walk::{LEAST_COMPONENT, Stack};
+use glam::Vec3;
+use wide::{f32x8, f32x16, u32x16};
+
+/// Up to sixteen segments.
+pub(crate) struct Packet {
+    turn: Turn,
+    /// In turned axes, see [`super::triangle::Shear`].
+    origin: [f32x16; 3],
+    slope: [f32x16; 3],
+    range: [f32x16; 2],
+    /// In the axes of the world: 1/d, and start/d.
+    inverse: [f32x16; 3],
+    offset: [f32x16; 3],
+    planes: [u32x16; 2],
+    bundle: Bundle,
+    /// The lanes that hold a segment.
+    open: u32,
+}
+
+/// Which axes of the world become x, y, z.
+enum Turn {
+    /// The same for all segments.
+    Same([usize; 3]),
+    /// Masks of the lanes whose main axis is x, and y.
+    Mixed([f32x16; 2]),
+}
+
+/// Bounds on all segments of a packet.
+struct Bundle {
+    /// Least and greatest start, and end.
+    starts: [Vec3; 2],
+    ends: [Vec3; 2],
+    /// Bounds on 1/d.
+    inverse: [[f32; 2]; 3],
+    /// +1, -1 where all segments run the same way along an axis, else 0.
+    way: [i8; 3],
+    /// Slack of the test for sides of a plane, in units of the normal's components' sum.
+    slack: f32,
+}
+
+/// Roundings of f32, of the scene's reach, that the side of a plane is uncertain by: 2^-20.
+const SIDE_SLACK: f32 = 1.0 / 1_048_576.0;
+
+/// Ends within a box of this share of the scene's surface are one place. Measured in a room of 350 000 triangles.
+const COMMON_PLACE: f32 = 0.01;
+
+impl Packet {
+    /// A bit for each segment that something blocks.
+    pub(crate) fn occluded(
+        index: &RayIndex,
+        segments: &[Segment],
+        opaque: &impl Fn(u32, f32, f32) -> bool,
+    ) -> u32 {
+        if index.tree.nodes.is_empty() {
+            return 0;
+        }
+        match Self::new(index, segments) {
+            Some(packet) if packet.worthwhile(index) => packet.traverse(index, opaque),
+            _ => (0..).zip(segments).fold(0, |hidden, (k, segment)| {
+                hidden | u32::from(index.occluded_with(segment, opaque)) << k
+            }),
+        }
+    }
+
+    /// As [`Self::occluded`], by the triangles of a list.
+    pub(crate) fn occluded_by(
+        index: &RayIndex,
+        list: &[u32],
+        segments: &[Segment],
+        opaque: &impl Fn(u32, f32, f32) -> bool,
+    ) -> u32 {
+        let Some(packet) = Self::new(index, segments) else {
+            return 0;
+        };
+        let mut open = packet.open;
+        for &id in list {
+            if let Some((block, place)) = index.place(id) {
+                open &= !packet.meet_one(&index.tree.blocks[block], place, open, opaque);
+                if open == 0 {
+                    break;
+                }
+            }
+        }
+        packet.open & !open
+    }
+
+    /// None of no segments. Free lanes repeat the first.
+    #[inline(always)]
+    fn new(index: &RayIndex, segments: &[Segment]) -> Option<Self> {
+        let first = segments.first()?;
+        let count = segments.len().min(PACKET);
+        let mut rows = [row(first); PACKET];
+        for (place, segment) in rows.iter_mut().zip(segments) {
+            *place = row(segment);
+        }
+        let (mut least, mut most) = (rows[0], rows[0]);
+        for row in &rows[1..] {
+            least = least.fast_min(*row);
+            most = most.fast_max(*row);
+        }
+        let [
+            r0,
+            r1,
+            r2,
+            r3,
+            r4,
+            r5,
+            r6,
+            r7,
+            r8,
+            r9,
+            ra,
+            rb,
+            rc,
+            rd,
+            re,
+            rf,
+        ] = rows;
+        let low = f32x8::transpose([r0, r1, r2, r3, r4, r5, r6, r7]);
+        let high = f32x8::transpose([r8, r9, ra, rb, rc, rd, re, rf]);
+        let [fx, fy, fz] = [
+            join(low[0], high[0]),
+            join(low[1], high[1]),
+            join(low[2], high[2]),
+        ];
+        let [tx, ty, tz] = [
+            join(low[3], high[3]),
+            join(low[4], high[4]),
+            join(low[5], high[5]),
+        ];
+        let [p0, p1] = [join(low[6], high[6]), join(low[7], high[7])];
+
+        let from = [fx, fy, fz];
+        let d = [tx - fx, ty - fy, tz - fz];
+        let size = [d[0].abs(), d[1].abs(), d[2].abs()];
+        let main_z = size[2].simd_ge(size[0]) & size[2].simd_ge(size[1]);
+        let main_y = size[1].simd_ge(size[0]) & !main_z;
+        let main_x = !(main_y | main_z);
+        let lanes = 0xffff;
+        let turn = if main_x.to_bitmask() == lanes {
+            Turn::Same([1, 2, 0])
+        } else if main_y.to_bitmask() == lanes {
+            Turn::Same([2, 0, 1])
+        } else if main_z.to_bitmask() == lanes {
+            Turn::Same([0, 1, 2])
+        } else {
+            Turn::Mixed([main_x, main_y])
+        };
+        let turned = turn.lanes(d);
+        let inverse = f32x16::ONE / turned[2];
+        let gap = f32x16::splat(index.gap) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+
+        let inverses = [safe_inverse(d[0]), safe_inverse(d[1]), safe_inverse(d[2])];
+        let mut bundle = Bundle {
+            starts: [ends_of(least).0, ends_of(most).0],
+            ends: [ends_of(least).1, ends_of(most).1],
+            inverse: [[0.0; 2]; 3],
+            way: [0; 3],
+            slack: SIDE_SLACK * index.reach(),
+        };
+        for (axis, &inverse) in inverses.iter().enumerate() {
+            let [a, b] = range_of(inverse);
+            bundle.inverse[axis] = [a, b];
+            bundle.way[axis] = i8::from(a > 0.0) - i8::from(b < 0.0);
+        }
+        Some(Self {
+            origin: turn.lanes(from),
+            slope: [turned[0] * inverse, turned[1] * inverse, inverse],
+            range: [gap, f32x16::ONE - gap],
+            offset: [fx * inverses[0], fy * inverses[1], fz * inverses[2]],
+            inverse: inverses,
+            planes: [p0.to_bits(), p1.to_bits()],
+            turn,
+            bundle,
+            open: (1 << count) - 1,
+        })
+    }
+
+    /// In a tree of more than one node, segments that have neither a way along their main axes nor a place in common are faster one by one.
+    #[inline(always)]
+    fn worthwhile(&self, index: &RayIndex) -> bool {
+        if index.tree.nodes.len() <= 1 || matches!(self.turn, Turn::Same(_)) {
+            return true;
+        }
+        let area = |[low, high]: [Vec3; 2]| {
+            let d = high - low;
+            d.x * d.y + d.y * d.z + d.z * d.x
+        };
+        let loose = area(self.bundle.starts).min(area(self.bundle.ends));
+        loose < COMMON_PLACE * area(index.tree.bounds)
+    }
+
+    /// Walks the tree; returns the lanes that are hidden.
+    fn traverse(&self, index: &RayIndex, opaque: &impl Fn(u32, f32, f32) -> bool) -> u32 {
+        let mut open = self.open;
+        let mut stack = Stack::new((0u32, open));
+        while let Some((entry, lanes)) = stack.pop() {
+            let lanes = lanes & open;
+            if lanes == 0 {
+                continue;
+            }
+            if entry & LEAF != 0 {
+                let block = &index.tree.blocks[(entry & !LEAF) as usize];
+                open &= !self.meet_block(block, lanes, opaque);
+                if open == 0 {
+                    break;
+                }
+                continue;
+            }
+            let node = &index.tree.nodes[entry as usize];
+            let mut met = self.bundle.enter(node);
+            while met != 0 {
+                let child = met.trailing_zeros() as usize;
+                met &= met - 1;
+                let through = self.enter(node, child) & lanes;
+                if through != 0 {
+                    stack.push((node.children[child], through));
+                }
+            }
+        }
+        self.open & !open
+    }
+
+    /// A bit for each segment that meets the box of one child.
+    #[inline(always)]
+    fn enter(&self, node: &Node, child: usize) -> u32 {
+        let mut near = f32x16::ZERO;
+        let mut far = f32x16::ONE;
+        for axis in 0..3 {
+            let low = f32x16::splat(node.bounds[0][axis].as_array()[child]);
+            let high = f32x16::splat(node.bounds[1][axis].as_array()[child]);
+            let a = low.mul_sub(self.inverse[axis], self.offset[axis]);
+            let b = high.mul_sub(self.inverse[axis], self.offset[axis]);
+            near = near.fast_max(a.fast_min(b));
+            far = far.fast_min(a.fast_max(b));
+        }
+        near.simd_le(far).to_bitmask()
+    }
+
+    /// A bit for each segment of `lanes` that a triangle of the block blocks.
+    #[inline(always)]
+    fn meet_block(
+        &self,
+        block: &Block,
+        lanes: u32,
+        opaque: &impl Fn(u32, f32, f32) -> bool,
+    ) -> u32 {
+        let mut open = lanes;
+        let mut places = self.bundle.straddles(block);
+        while places != 0 && open != 0 {
+            let place = places.trailing_zeros() as usize;
+            places &= places - 1;
+            open &= !self.meet_one(block, place, open, opaque);
+        }
+        lanes & !open
+    }
+
+    /// A bit for each segment of `lanes` that one triangle of the block blocks.
+    #[inline(always)]
+    fn meet_one(
+        &self,
+        block: &Block,
+        place: usize,
+        lanes: u32,
+        opaque: &impl Fn(u32, f32, f32) -> bool,
+    ) -> u32 {
+        let corners = block.corner_lane(place);
+        let [a, b, c] = corners;
+        let corners = match &self.turn {
+            &Turn::Same([x, y, z]) => [
+                splat([a[x], a[y], a[z]]),
+                splat([b[x], b[y], b[z]]),
+                splat([c[x], c[y], c[z]]),
+            ],
+            mixed => [
+                mixed.lanes(splat(a)),
+                mixed.lanes(splat(b)),
+                mixed.lanes(splat(c)),
+            ],
+        };
+        let (met, e) = meet_lines(corners, self.origin, self.slope, self.range);
+        let mut met = met & lanes;
+        if met == 0 {
+            return 0;
+        }
+        let plane = block.planes[place];
+        if plane != NO_PLANE {
+            let id = u32x16::splat(plane);
+            met &= !(self.planes[0].simd_eq(id) | self.planes[1].simd_eq(id)).to_bitmask();
+        }
+        if block.masked >> place & 1 == 0 {
+            return met;
+        }
+        let mut hidden = 0;
+        while met != 0 {
+            let lane = met.trailing_zeros() as usize;
+            met &= met - 1;
+            let det = e.det.as_array()[lane];
+            let (v, w) = (e.v.as_array()[lane], e.w.as_array()[lane]);
+            hidden |= u32::from(opaque(block.ids[place], v / det, w / det)) << lane;
+        }
+        hidden
+    }
+}
+
+impl Turn {
+    /// World axes to turned axes.
+    #[inline(always)]
+    fn lanes(&self, [x, y, z]: [f32x16; 3]) -> [f32x16; 3] {
+        match self {
+            &Self::Same([a, b, c]) => [[x, y, z][a], [x, y, z][b], [x, y, z][c]],
+            Self::Mixed([main_x, main_y]) => [
+                main_x.select(y, main_y.select(z, x)),
+                main_x.select(z, main_y.select(x, y)),
+                main_x.select(x, main_y.select(y, z)),
+            ],
+        }
+    }
+}
+
+/// A segment as one row: ends, then planes.
+#[inline(always)]
+fn row(s: &Segment) -> f32x8 {
+    let [p, q] = [f32::from_bits(s.planes[0]), f32::from_bits(s.planes[1])];
+    f32x8::new([s.from.x, s.from.y, s.from.z, s.to.x, s.to.y, s.to.z, p, q])
+}
+
+/// The two ends in a row.
+#[inline(always)]
+fn ends_of(row: f32x8) -> (Vec3, Vec3) {
+    let [a, b, c, d, e, f, _, _] = row.to_array();
+    (Vec3::new(a, b, c), Vec3::new(d, e, f))
+}
+
+#[inline(always)]
+fn splat([x, y, z]: [f32; 3]) -> [f32x16; 3] {
+    [f32x16::splat(x), f32x16::splat(y), f32x16::splat(z)]
+}
+
+#[inline(always)]
+fn join(low: f32x8, high: f32x8) -> f32x16 {
+    let mut all = [0.0; PACKET];
+    all[..8].copy_from_slice(low.as_array());
+    all[8..].copy_from_slice(high.as_array());
+    f32x16::new(all)
+}
+
+/// 1/d, finite; as in one segment's slabs.
+#[inline(always)]
+fn safe_inverse(d: f32x16) -> f32x16 {
+    let least = f32x16::splat(LEAST_COMPONENT);
+    let tiny = d.abs().simd_lt(least);
+    f32x16::ONE / tiny.select(least | (d & f32x16::splat(-0.0)), d)
+}
+
+/// Least and greatest lane.
+#[inline(always)]
+fn range_of(x: f32x16) -> [f32; 2] {
+    let x = x.to_array();
+    let (mut low, mut high) = ([0.0; 8], [0.0; 8]);
+    low.copy_from_slice(&x[..8]);
+    high.copy_from_slice(&x[8..]);
+    let (low, high) = (f32x8::new(low), f32x8::new(high));
+    let [least, most] = [low.fast_min(high).to_array(), low.fast_max(high).to_array()];
+    let (mut a, mut b) = (least[0], most[0]);
+    for k in 1..8 {
+        a = a.min(least[k]);
+        b = b.max(most[k]);
+    }
+    [a, b]
+}
+
+impl Bundle {
+    /// A bit for each child whose box some segment of the bundle might meet.
+    #[inline(always)]
+    fn enter(&self, node: &Node) -> u32 {
+        let mut near = f32x8::ZERO;
+        let mut far = f32x8::ONE;
+        let mut apart = f32x8::ZERO;
+        for axis in 0..3 {
+            let [low, high] = [node.bounds[0][axis], node.bounds[1][axis]];
+            let start = [self.starts[0][axis], self.starts[1][axis]];
+            let end = [self.ends[0][axis], self.ends[1][axis]];
+            let least = f32x8::splat(start[0].min(end[0]));
+            let most = f32x8::splat(start[1].max(end[1]));
+            apart = apart | low.simd_gt(most) | high.simd_lt(least);
+            let way = self.way[axis];
+            if way == 0 {
+                continue;
+            }
+            // For segments that run up: (low - start) / d is least for the largest start, and for the largest or least 1/d as
+            // its sign says; the way out is bounded in the same manner.
+            let (first, last) = if way > 0 { (low, high) } else { (high, low) };
+            let (early, late) = if way > 0 {
+                (start[1], start[0])
+            } else {
+                (start[0], start[1])
+            };
+            let a = f32x8::splat(self.inverse[axis][0]);
+            let b = f32x8::splat(self.inverse[axis][1]);
+            let into = first - f32x8::splat(early);
+            let out = last - f32x8::splat(late);
+            near = near.fast_max((into * a).fast_min(into * b));
+            far = far.fast_min((out * a).fast_max(out * b));
+        }
+        let open = near.simd_le(far).to_bitmask() & !apart.to_bitmask();
+        open & ((1 << node.count) - 1)
+    }
+
+    /// A bit for each triangle whose plane may have ends of the bundle on both sides.
+    #[inline(always)]
+    fn straddles(&self, block: &Block) -> u32 {
+        let [a, b, c] = block.corners;
+        let u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+        let v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
+        let n = [
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        ];
+        // The least and greatest height of the two boxes of ends over the plane.
+        let mut low = [f32x8::ZERO; 2];
+        let mut high = [f32x8::ZERO; 2];
+        let mut slack = f32x8::ZERO;
+        for axis in 0..3 {
+            for (k, ends) in [self.starts, self.ends].iter().enumerate() {
+                let p = (f32x8::splat(ends[0][axis]) - a[axis]) * n[axis];
+                let q = (f32x8::splat(ends[1][axis]) - a[axis]) * n[axis];
+                low[k] += p.fast_min(q);
+                high[k] += p.fast_max(q);
+            }
+            slack += n[axis].abs();
+        }
+        slack *= f32x8::splat(self.slack);
+        let below = high[0].fast_max(high[1]).simd_lt(-slack);
+        let above = low[0].fast_min(low[1]).simd_gt(slack);
+        !(below | above).to_bitmask() & ((1 << block.count) - 1)
+    }
+}
