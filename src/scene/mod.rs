@@ -1,7 +1,19 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
+mod accessor;
+mod check;
+mod compression;
+mod container;
 pub mod document;
+pub mod geometry;
+mod image;
+mod json;
+mod nodes;
+mod primitive;
 mod raw;
+mod texture;
+mod texture_info;
+mod uri;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};
