@@ -5,7 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::scene::Source;
-use crate::scene::accessor::{Accessors, Buffers};
+use crate::scene::buffers::{Buffers, Views};
 use crate::scene::check::Check;
 use crate::scene::compression;
 use crate::scene::container;
@@ -14,7 +14,7 @@ use crate::scene::nodes::{self, Placed};
 use crate::scene::raw;
 pub use crate::scene::raw::{AlphaMode, RawLight, RawLightKind, RawMaterial};
 use crate::scene::texture_info::Slots;
-use crate::scene::{geometry, uri};
+use crate::scene::uri;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -155,8 +155,8 @@ impl Source {
             return None;
         }
         let view = item.index("bufferView", check)?;
-        let buffers = geometry::sound(self.buffers.clone());
-        let span = Accessors::new(&self.json, &buffers).view(view, &item.place, check)?;
+        let buffers = Buffers::sound(self.buffers.clone());
+        let span = Views::new(&self.json, &buffers).view(view, &item.place, check)?;
         Some(span.bytes().to_vec())
     }
 }

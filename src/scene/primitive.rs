@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 const AGAIN: &str = "export the file again";
 /// Texture coordinate sets that are read; more are left out with a warning.
-const MAX_TEXCOORDS: usize = 16;
+pub(crate) const MAX_TEXCOORDS: usize = 8;
 
 /// A primitive before it is placed.
 #[derive(Debug, Clone, Default)]
@@ -103,7 +103,7 @@ fn checked(
         accessors,
         check,
     };
-    let positions = vertices.read::<3>("POSITION")?;
+    let positions = vertices.read::<3>("POSITION", None)?;
     if let Some(index) = positions
         .iter()
         .position(|p| !p.iter().all(|x| x.is_finite()))
@@ -189,6 +189,7 @@ fn draco(
         return Err(Reported);
     };
     let span = accessors
+        .views
         .view(view, &extension.place, check)
         .ok_or(Reported)?;
     let mut counts = Vec::new();
@@ -218,7 +219,11 @@ struct Vertices<'a, 'b> {
 }
 
 impl Vertices<'_, '_> {
-    fn read<const N: usize>(&mut self, semantic: &str) -> Option<Vec<[f32; N]>> {
+    fn read<const N: usize>(
+        &mut self,
+        semantic: &str,
+        count: Option<usize>,
+    ) -> Option<Vec<[f32; N]>> {
         let place = format!("{}, {semantic}", self.attributes.place);
         if let Some(mesh) = self.unpacked {
             if let Some((_, plain)) = mesh.attributes.iter().find(|(name, _)| name == semantic) {
@@ -231,7 +236,7 @@ impl Vertices<'_, '_> {
             }
         }
         let accessor = self.attributes.index(semantic, self.check)?;
-        self.accessors.vectors(accessor, &place, self.check)
+        self.accessors.vectors(accessor, count, &place, self.check)
     }
 
     /// The inner none: the primitive does not have it; the outer one: it is broken, which was reported.
@@ -243,10 +248,11 @@ impl Vertices<'_, '_> {
         if !self.attributes.map.contains_key(semantic) {
             return Some(None);
         }
-        let values = self.read::<N>(semantic)?;
+        let values = self.read::<N>(semantic, Some(count))?;
         if values.len() == count {
             return Some(Some(values));
         }
+        // Only what Draco unpacked can come here.
         let place = format!("{}, {semantic}", self.attributes.place);
         let what = format!("has {} elements for {count} vertices", values.len());
         self.check.problem(&place, what, AGAIN);
