@@ -24,7 +24,7 @@ pub(crate) fn cameras(json: &Value, placed: &[Placed], check: &mut Check) -> Vec
                 let names = [item.name(), node.name()];
                 let name = names.into_iter().find(|name| !name.is_empty());
                 cameras.push(Camera {
-                    name: name.map_or_else(|| format!("camera {index}"), str::to_owned),
+                    name: name.map_or_else(|| format!("camera {index}"), json::short),
                     to_world: placed.to_world,
                     projection,
                     aspect,

@@ -17,7 +17,7 @@ use crate::scene::texture_info::Slots;
 use crate::scene::uri;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 const AGAIN: &str = "export the file again";
@@ -148,7 +148,7 @@ impl Source {
             let given = item.text("uri", check)?;
             let read = uri::read(folder(&self.path), given);
             let failed = |why| check.problem(&item.place, why, "put the image there");
-            return read.map_err(failed).ok().map(|(bytes, _)| bytes);
+            return read.map_err(failed).ok();
         }
         if !item.map.contains_key("bufferView") {
             check.problem(&item.place, "has neither a URI nor a bufferView", AGAIN);
@@ -227,7 +227,7 @@ fn buffers(json: &Value, folder: &Path, bin: Option<&[u8]>, check: &mut Check) -
         sound: Vec::new(),
     };
     // Buffers of one file share its bytes: else a small document could ask for a large file many times.
-    let mut files: BTreeMap<&str, Arc<[u8]>> = BTreeMap::new();
+    let mut files: BTreeMap<PathBuf, Arc<[u8]>> = BTreeMap::new();
     for index in 0..json::len(json, "buffers") {
         let read = buffer(json, index, folder, bin, placeholders, &mut files, check);
         buffers.sound.push(read.is_some());
@@ -236,13 +236,13 @@ fn buffers(json: &Value, folder: &Path, bin: Option<&[u8]>, check: &mut Check) -
     buffers
 }
 
-fn buffer<'a>(
-    json: &'a Value,
+fn buffer(
+    json: &Value,
     index: usize,
     folder: &Path,
     bin: Option<&[u8]>,
     placeholders: bool,
-    files: &mut BTreeMap<&'a str, Arc<[u8]>>,
+    files: &mut BTreeMap<PathBuf, Arc<[u8]>>,
     check: &mut Check,
 ) -> Option<Arc<[u8]>> {
     let Some(item) = json::item(json, "buffers", "buffer", index) else {
@@ -255,16 +255,9 @@ fn buffer<'a>(
     };
     let bytes = if item.map.contains_key("uri") {
         let given = item.text("uri", check)?;
-        match files.get(given) {
-            Some(known) => Arc::clone(known),
-            None => {
-                let failed = |why| check.problem(&item.place, why, "put the buffer there");
-                let (bytes, _) = uri::read(folder, given).map_err(failed).ok()?;
-                let bytes: Arc<[u8]> = bytes.into();
-                files.insert(given, Arc::clone(&bytes));
-                bytes
-            }
-        }
+        let read = shared(folder, given, files);
+        let failed = |why| check.problem(&item.place, why, "put the buffer there");
+        read.map_err(failed).ok()?
     } else if let (0, Some(bin)) = (index, bin) {
         Arc::from(bin)
     } else if placeholders {
@@ -281,4 +274,23 @@ fn buffer<'a>(
         return None;
     }
     Some(bytes)
+}
+
+/// The bytes behind a URI; those of one file are read once.
+fn shared(
+    folder: &Path,
+    given: &str,
+    files: &mut BTreeMap<PathBuf, Arc<[u8]>>,
+) -> std::result::Result<Arc<[u8]>, String> {
+    let path = match uri::locate(folder, given)? {
+        uri::Place::Here(bytes) => return Ok(bytes.into()),
+        uri::Place::File(path) => path,
+    };
+    if let Some(known) = files.get(&path) {
+        return Ok(Arc::clone(known));
+    }
+    let bytes = uri::read_file(&path).map_err(|e| format!("'{}' {e}", json::short(given)))?;
+    let bytes: Arc<[u8]> = bytes.into();
+    files.insert(path, Arc::clone(&bytes));
+    Ok(bytes)
 }

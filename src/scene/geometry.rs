@@ -63,10 +63,15 @@ impl Document {
             accessors: Accessors::new(json, &self.buffers),
             primitives: BTreeMap::new(),
             tally: Tally::default(),
+            unpacked: MAX_VERTICES,
+            placed: MAX_VERTICES,
         };
         let mut surfaces = Vec::new();
         if reader.fits(&mut check) {
             for placed in &self.placed {
+                if check.is_full() {
+                    break;
+                }
                 reader.place(placed, &mut surfaces, &mut check);
             }
         }
@@ -91,6 +96,7 @@ impl Document {
     fn images(&self, check: &mut Check) -> Vec<Image> {
         let count = self.slots.images.len();
         let mut images = Vec::with_capacity(count);
+        let mut pixels = image::MAX_PIXELS;
         for slot in &self.slots.images {
             let Some(index) = *slot else {
                 images.push(image::neutral(""));
@@ -100,7 +106,8 @@ impl Document {
             let (name, place) = item.map_or_else(Default::default, |i| (i.name(), i.place));
             let bytes = self.source.image_bytes(index).map_err(|e| e.to_string());
             let decoded = bytes.and_then(|bytes| {
-                image::decode(name, &bytes, count).map_err(|why| format!("{place}: {why}"))
+                image::decode(name, &bytes, count, &mut pixels)
+                    .map_err(|why| format!("{place}: {why}"))
             });
             images.push(decoded.unwrap_or_else(|why| {
                 check.warn(format!("{why}; grey stands in for the image"));
@@ -142,6 +149,11 @@ struct Reader<'a> {
     /// Read primitives by mesh and index; none: without area, or broken and reported.
     primitives: BTreeMap<(usize, usize), Option<Primitive>>,
     tally: Tally,
+    /// Vertices and triangles that primitives may still have before they are placed. The claims bound plain ones; what
+    /// Draco unpacks to is known only then.
+    unpacked: usize,
+    /// Vertices and triangles that may still be placed.
+    placed: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -238,6 +250,13 @@ impl<'a> Reader<'a> {
             else {
                 continue;
             };
+            let size = read.size().saturating_mul(copies.len());
+            if size > self.placed {
+                let what = format!("with it the room has more than {MAX_VERTICES} vertices");
+                check.problem(&primitive.place, what, "split or simplify the room");
+                return;
+            }
+            self.placed -= size;
             for (instance, to_world) in &copies {
                 let mut name = primitive.place.clone();
                 if let Some(instance) = instance {
@@ -287,9 +306,10 @@ impl<'a> Reader<'a> {
         if self.primitives.contains_key(&(mesh, index)) {
             return;
         }
-        let outcome = primitive::read(primitive, &mut self.accessors, MAX_VERTICES, check);
+        let outcome = primitive::read(primitive, &mut self.accessors, self.unpacked, check);
         let read = match outcome {
             Outcome::Sound(mut read) => {
+                self.unpacked = self.unpacked.saturating_sub(read.size());
                 if primitive.map.contains_key("targets") {
                     let what = "primitives have morph targets; their base shape is taken";
                     self.tally.count(what, 1, &primitive.place);

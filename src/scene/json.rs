@@ -52,10 +52,9 @@ pub(crate) fn referred<'a>(
 /// Names from a file may be long; messages are not.
 pub(crate) fn short(name: &str) -> String {
     const LONGEST: usize = 60;
-    if name.chars().count() <= LONGEST {
-        name.to_owned()
-    } else {
-        format!("{}...", name.chars().take(LONGEST).collect::<String>())
+    match name.char_indices().nth(LONGEST) {
+        None => name.to_owned(),
+        Some((end, _)) => format!("{}...", &name[..end]),
     }
 }
 

@@ -22,6 +22,14 @@ pub(crate) struct Primitive {
     pub(crate) triangles: Vec<[u32; 3]>,
 }
 
+impl Primitive {
+    /// The greater of the numbers of vertices and triangles (a strip has up to as many triangles as vertices, a list
+    /// seldom more than twice).
+    pub(crate) fn size(&self) -> usize {
+        self.positions.len().max(self.triangles.len() / 2)
+    }
+}
+
 /// `mode` of a primitive that has an area.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {

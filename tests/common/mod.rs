@@ -1,5 +1,7 @@
 //! Builds small glTF files in memory.
 
+#![allow(dead_code, reason = "no test file uses all of it")]
+
 use haarlight::scene::document::Document;
 use haarlight::scene::geometry::Geometry;
 use serde_json::{Value, json};
@@ -49,7 +51,13 @@ impl Room {
     }
 
     /// Appends an accessor with its bytes; returns its index.
-    pub(crate) fn accessor(&mut self, bytes: &[u8], component: u32, kind: &str, count: usize) -> usize {
+    pub(crate) fn accessor(
+        &mut self,
+        bytes: &[u8],
+        component: u32,
+        kind: &str,
+        count: usize,
+    ) -> usize {
         let view = self.view(bytes);
         let accessor =
             json!({"bufferView": view, "componentType": component, "type": kind, "count": count});
@@ -124,7 +132,6 @@ pub(crate) fn push(list: &mut Value, value: Value) -> usize {
 }
 
 /// A PNG of these RGBA pixels.
-#[allow(dead_code, reason = "not every test file has textures")]
 pub(crate) fn png(width: u32, height: u32, pixels: &[[u8; 4]]) -> Vec<u8> {
     let image = image::RgbaImage::from_vec(width, height, pixels.concat()).unwrap();
     let mut bytes = std::io::Cursor::new(Vec::new());
