@@ -179,7 +179,8 @@ pub(crate) fn whole(value: &Value) -> Option<usize> {
     }
     let number = value.as_f64()?;
     // The range check makes the conversion exact.
-    (number >= 0.0 && number < LARGEST && number.fract() == 0.0).then_some(number as usize)
+    let sound = (0.0..LARGEST).contains(&number) && number.fract() == 0.0;
+    sound.then_some(number as usize)
 }
 
 #[cfg(test)]

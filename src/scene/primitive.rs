@@ -3,7 +3,7 @@
 
 use crate::scene::accessor::{Accessors, to_vectors};
 use crate::scene::check::Check;
-use crate::scene::compression::{self, DracoMesh};
+use crate::scene::compression::{self, DracoMesh, Unpacked};
 use crate::scene::json::Item;
 use std::collections::BTreeMap;
 
@@ -107,7 +107,7 @@ fn checked(
     };
     let mut vertices = Vertices {
         attributes: &attributes,
-        unpacked: packed.as_ref(),
+        packed: packed.as_ref(),
         accessors,
         check,
     };
@@ -221,27 +221,32 @@ fn draco(
 /// The attributes of one primitive, packed or plain.
 struct Vertices<'a, 'b> {
     attributes: &'a Item<'a>,
-    unpacked: Option<&'a DracoMesh>,
+    packed: Option<&'a DracoMesh>,
     accessors: &'a mut Accessors<'b>,
     check: &'a mut Check,
 }
 
-impl Vertices<'_, '_> {
+impl<'a> Vertices<'a, '_> {
+    /// What Draco unpacked under a name.
+    fn unpacked(&self, semantic: &str) -> Option<&'a Unpacked> {
+        let attributes = &self.packed?.attributes;
+        let found = attributes.iter().find(|(name, _)| name == semantic);
+        found.map(|(_, plain)| plain)
+    }
+
     fn read<const N: usize>(
         &mut self,
         semantic: &str,
         count: Option<usize>,
     ) -> Option<Vec<[f32; N]>> {
         let place = format!("{}, {semantic}", self.attributes.place);
-        if let Some(mesh) = self.unpacked {
-            if let Some((_, plain)) = mesh.attributes.iter().find(|(name, _)| name == semantic) {
-                if plain.width == N {
-                    return Some(to_vectors(&plain.bytes, plain.component, plain.normalized));
-                }
-                let what = format!("has {} components an element, not {N}", plain.width);
-                self.check.problem(&place, what, AGAIN);
-                return None;
+        if let Some(plain) = self.unpacked(semantic) {
+            if plain.width == N {
+                return Some(to_vectors(&plain.bytes, plain.component, plain.normalized));
             }
+            let what = format!("has {} components an element, not {N}", plain.width);
+            self.check.problem(&place, what, AGAIN);
+            return None;
         }
         let accessor = self.attributes.index(semantic, self.check)?;
         self.accessors.vectors(accessor, count, &place, self.check)
@@ -273,15 +278,13 @@ impl Vertices<'_, '_> {
         if !self.attributes.map.contains_key(NAME) {
             return Some(None);
         }
-        let unpacked = self
-            .unpacked
-            .and_then(|m| m.attributes.iter().find(|(n, _)| n == NAME));
-        let width = match unpacked {
-            Some((_, plain)) => plain.width,
+        let width = match self.unpacked(NAME) {
+            Some(plain) => plain.width,
             None => {
                 let place = format!("{}, {NAME}", self.attributes.place);
                 let accessor = self.attributes.index(NAME, self.check)?;
-                self.accessors.layout(accessor, &place, self.check)?.1.width
+                let (_, layout) = self.accessors.layout(accessor, &place, self.check)?;
+                layout.width
             }
         };
         if width == 4 {

@@ -122,3 +122,99 @@ fn replace_bad(normals: &mut [Vec3], surface: &Surface) -> usize {
     }
     count
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat4;
+    use proptest::prelude::*;
+
+    fn surface(to_world: DMat4) -> Surface {
+        Surface {
+            name: "s".into(),
+            node: 0,
+            mesh: 0,
+            primitive: 0,
+            instance: None,
+            material: 0,
+            to_world,
+            positions: Vec::new(),
+            normals: None,
+            texcoords: Vec::new(),
+            colors: None,
+            triangles: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_counts_as_an_area_does_not_depend_on_the_unit() {
+        for scale in [1e-150, 1e-9, 1.0, 1e9, 1e150] {
+            let at = |x: f64, y: f64| DVec3::new(x, y, 0.0) * scale;
+            // A sliver of aspect a million stays, a line and a point go.
+            assert!(has_area([at(0.0, 0.0), at(1.0, 0.0), at(0.5, 1e-6)]));
+            assert!(!has_area([at(0.0, 0.0), at(1.0, 1.0), at(3.0, 3.0)]));
+            assert!(!has_area([at(0.0, 0.0), at(0.0, 0.0), at(1.0, 0.0)]));
+            assert!(!has_area([at(1.0, 2.0); 3]));
+        }
+        // Details of a millimetre a thousand kilometres away.
+        let far = DVec3::splat(1e6);
+        let corner = |x: f64, y: f64| far + DVec3::new(x, y, 0.0);
+        assert!(has_area([
+            corner(0.0, 0.0),
+            corner(1e-3, 0.0),
+            corner(0.0, 1e-3)
+        ]));
+        assert!(!has_area([
+            corner(0.0, 0.0),
+            corner(1e-3, 1e-3),
+            corner(2e-3, 2e-3)
+        ]));
+    }
+
+    #[test]
+    fn a_flattened_mesh_is_left_out_whole() {
+        let read = Primitive {
+            positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+            ..Primitive::default()
+        };
+        let (mut tally, mut check) = (Tally::default(), Check::new("f"));
+        let flat = DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0));
+        assert!(in_world(surface(flat), &read, &mut tally, &mut check).is_none());
+        // Flat across its own plane it is the same triangle.
+        let flat = DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0));
+        assert!(in_world(surface(flat), &read, &mut tally, &mut check).is_some());
+        let huge = DMat4::from_scale(DVec3::splat(f64::MAX));
+        let read = Primitive {
+            positions: vec![[9.0; 3]; 3],
+            ..read
+        };
+        assert!(in_world(surface(huge), &read, &mut tally, &mut check).is_none());
+        assert!(check.has_problems());
+    }
+
+    proptest! {
+        /// Under any matrix the normal of a plane stays upright on it, on the side that the triangle shows.
+        #[test]
+        fn normals_stay_upright(m in prop::array::uniform9(-2.0f64..2.0), a in prop::array::uniform9(-1.0f32..1.0)) {
+            let linear = glam::DMat3::from_cols_array(&m);
+            prop_assume!(linear.determinant().abs() > 0.05);
+            let positions: Vec<[f32; 3]> = a.chunks(3).map(|c| [c[0], c[1], c[2]]).collect();
+            let [p, q, r] = [0, 1, 2].map(|i: usize| Vec3::from(positions[i]));
+            let normal = (q - p).cross(r - p);
+            prop_assume!(normal.length() > 0.05);
+            let read = Primitive {
+                positions,
+                normals: Some(vec![normal.to_array(); 3]),
+                triangles: vec![[0, 1, 2]],
+                ..Primitive::default()
+            };
+            let (mut tally, mut check) = (Tally::default(), Check::new("f"));
+            let placed = in_world(surface(DMat4::from_mat3(linear)), &read, &mut tally, &mut check).unwrap();
+            let [a, b, c] = placed.triangles[0].map(|i| placed.positions[i as usize]);
+            let front = (b - a).cross(c - a).normalize();
+            let shading = placed.normals.unwrap()[0].as_dvec3();
+            prop_assert!((front - shading).length() < 1e-3, "{front} {shading}");
+        }
+    }
+}
