@@ -1,17 +1,12 @@
-//! Reading glTF: small documents built here, one matter each, then rooms from other tools, read whole.
-//!
-//! The rooms are looked for in the folder that HAARLIGHT_ROOMS names, else in `../shared/scenes`; without it these tests
-//! pass without looking.
+//! Reading glTF: small documents built here, one matter each.
 
 mod common;
 
-use common::{F32, Room, U8, U16, png, push};
+use common::{Room, U8, U16, png, push};
 use glam::{DVec3, Vec3};
 use haarlight::scene::document::{AlphaMode, Document, RawLightKind};
-use haarlight::scene::geometry::Geometry;
 use haarlight::scene::{Projection, Surface, Wrap};
 use serde_json::json;
-use std::path::PathBuf;
 
 /// Front of the first triangle, unit length.
 fn front(surface: &Surface) -> DVec3 {
@@ -404,6 +399,7 @@ fn extensions_are_refused_or_noted_by_name() {
 #[cfg(feature = "draco")]
 #[test]
 fn draco_packed_cube() {
+    use common::F32;
     let mut room = Room::triangle();
     // A cube of edge 2 around the origin, 24 vertices with normals and coordinates, packed by draco-gltf 0.7.
     let packed = room.view(include_bytes!("corpus/cube.drc"));
@@ -436,6 +432,7 @@ fn draco_packed_cube() {
 #[cfg(feature = "meshopt")]
 #[test]
 fn meshopt_packed_vertices_and_indices() {
+    use common::F32;
     let corners: Vec<[f32; 3]> = (0..8)
         .map(|i| [i & 1, i >> 1 & 1, i >> 2].map(|b| b as f32))
         .collect();
@@ -530,124 +527,32 @@ fn files_beside_the_document() {
     );
 }
 
-fn rooms() -> Option<PathBuf> {
-    let named = std::env::var_os("HAARLIGHT_ROOMS").map(PathBuf::from);
-    let folder =
-        named.unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes"));
-    folder.is_dir().then_some(folder)
-}
-
-fn load(name: &str) -> Option<(Document, Geometry)> {
-    let document = Document::open(rooms()?.join(name)).unwrap();
-    let geometry = document.load_geometry().check().unwrap();
-    for surface in &geometry.surfaces {
-        let vertices = surface.positions.len();
-        assert!(
-            surface
-                .triangles
-                .iter()
-                .flatten()
-                .all(|&i| (i as usize) < vertices)
-        );
-        assert!(surface.normals.as_ref().is_none_or(|n| n.len() == vertices));
-        assert!(surface.texcoords.iter().all(|t| t.len() == vertices));
-        assert!(surface.material < document.raw_materials().len());
-        for normal in surface.normals.iter().flatten() {
-            assert!((normal.length() - 1.0).abs() < 1e-4);
+#[test]
+fn packed_geometry_without_its_decoder_is_refused_by_name() {
+    for (name, built_in) in [
+        ("KHR_draco_mesh_compression", cfg!(feature = "draco")),
+        ("EXT_meshopt_compression", cfg!(feature = "meshopt")),
+    ] {
+        let mut room = Room::triangle();
+        room.json["extensionsRequired"] = json!([name]);
+        match room.load() {
+            Ok(_) => assert!(built_in),
+            Err(e) => assert!(!built_in && e.to_string().contains(name), "{e}"),
         }
     }
-    Some((document, geometry))
-}
-
-fn triangles(geometry: &Geometry) -> usize {
-    geometry.surfaces.iter().map(|s| s.triangles.len()).sum()
-}
-
-/// Width, height and depth of everything.
-fn extent(geometry: &Geometry) -> [f64; 3] {
-    let points = || geometry.surfaces.iter().flat_map(|s| &s.positions);
-    [0, 1, 2].map(|k| {
-        let most = points().map(|p| p[k]).fold(f64::MIN, f64::max);
-        let least = points().map(|p| p[k]).fold(f64::MAX, f64::min);
-        most - least
-    })
 }
 
 #[test]
-fn cornell_box() {
-    let Some((document, geometry)) = load("cornell-bevy.glb") else {
-        return;
-    };
-    assert_eq!(triangles(&geometry), 36);
-    assert!(
-        (extent(&geometry)[0] - 556.0).abs() < 1.0,
-        "{:?}",
-        extent(&geometry)
-    );
-    let lamps = document
-        .raw_materials()
-        .iter()
-        .filter(|m| m.emissive_factor != [0.0; 3]);
-    assert_eq!(lamps.count(), 1);
-    assert!(document.raw_lights().is_empty());
-}
-
-#[test]
-fn home_theater_from_separate_files() {
-    let Some((document, geometry)) = load("home-theater/home-theater.gltf") else {
-        return;
-    };
-    // Ten of the 7,915 triangles have three points on a line.
-    assert_eq!(triangles(&geometry), 7905);
-    let flat = "10 triangles have no area";
-    assert!(geometry.warnings.iter().any(|w| w.starts_with(flat)));
-    assert_eq!(document.raw_materials().len(), 20);
-    let [x, y, z] = extent(&geometry);
-    assert!((x - 6.1).abs() < 0.1 && (y - 3.3).abs() < 0.1 && (z - 7.1).abs() < 0.1);
-}
-
-#[test]
-fn home_theater_lit() {
-    let Some((document, geometry)) = load("home-theater-lit.glb") else {
-        return;
-    };
-    assert_eq!(triangles(&geometry), 7905);
-    let [light] = document.raw_lights() else {
-        panic!("one spot")
-    };
+fn specular_glossiness_materials_give_their_diffuse_colour() {
+    let mut room = Room::triangle();
+    room.primitive()["material"] = json!(0);
+    room.json["extensionsRequired"] = json!(["KHR_materials_pbrSpecularGlossiness"]);
+    room.json["materials"] = json!([{"extensions": {"KHR_materials_pbrSpecularGlossiness":
+        {"diffuseFactor": [0.5, 0.25, 0.125, 1]}}}]);
+    let (document, _) = room.load().unwrap();
+    let material = &document.raw_materials()[0];
     assert_eq!(
-        (light.kind, light.name.as_str()),
-        (RawLightKind::Spot, "projector")
+        (material.base_color_factor, material.metallic),
+        ([0.5, 0.25, 0.125, 1.0], 0.0)
     );
-    assert_eq!(
-        (light.intensity, light.inner, light.outer),
-        (700.0, 0.3, 0.45)
-    );
-}
-
-#[test]
-fn living_room_with_textures() {
-    let Some((document, geometry)) = load("living-kaykit.glb") else {
-        return;
-    };
-    assert_eq!(triangles(&geometry), 13_898);
-    assert!(geometry.warnings.is_empty(), "{:?}", geometry.warnings);
-    assert_eq!(geometry.images.len(), 4);
-    assert!(
-        geometry
-            .images
-            .iter()
-            .all(|image| image.pixels.len() == image.width * image.height)
-    );
-    assert!(geometry.images.iter().all(|image| image.width > 1));
-    assert_eq!(document.raw_lights().len(), 2);
-}
-
-#[test]
-fn canteen_with_instances() {
-    let Some((document, geometry)) = load("canteen-big.glb") else {
-        return;
-    };
-    assert_eq!(triangles(&geometry), 260_812);
-    assert_eq!(document.raw_lights().len(), 8);
 }

@@ -23,10 +23,11 @@ use std::sync::Arc;
 const AGAIN: &str = "export the file again";
 
 /// Extensions that are read. The packed ones count only where their decoder is built in.
-const READ: [&str; 6] = [
+const READ: [&str; 7] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
@@ -51,6 +52,23 @@ const HARMLESS: [&str; 13] = [
 ];
 
 /// A document: everything read, nothing yet turned into geometry.
+///
+/// ```
+/// use haarlight::scene::document::Document;
+/// use std::path::Path;
+///
+/// // One triangle of three float positions; the buffer is in the file.
+/// let room = br#"{"asset": {"version": "2.0"}, "nodes": [{"name": "floor", "mesh": 0}],
+///     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+///     "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3}],
+///     "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36,
+///     "uri": "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAAAAAIA/"}]}"#;
+/// let document = Document::from_bytes(Path::new("room.gltf"), room)?;
+/// let geometry = document.load_geometry().check()?;
+/// assert_eq!(geometry.surfaces[0].name, "node 0 'floor', mesh 0, primitive 0");
+/// assert_eq!(geometry.surfaces[0].positions[1].x, 1.0);
+/// # Ok::<(), haarlight::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Document {
     /// The JSON and the buffers.

@@ -188,8 +188,17 @@ fn draco(
         return Ok(None);
     };
     if !compression::is_built_in(compression::DRACO) {
-        // Not required, or the document would have been refused: the accessors have plain bytes too.
-        return Ok(None);
+        // The accessors may have plain bytes too.
+        let position = attributes.index("POSITION", check);
+        let place = format!("{}, POSITION", item.place);
+        let position = position.and_then(|index| accessors.layout(index, &place, check));
+        let (position, _) = position.ok_or(Reported)?;
+        if position.map.contains_key("bufferView") {
+            return Ok(None);
+        }
+        let what = format!("needs {}, which this build leaves out", compression::DRACO);
+        check.problem(&item.place, what, "export without this compression");
+        return Err(Reported);
     }
     extension.place = format!("{}, {}", item.place, compression::DRACO);
     let Some(view) = extension.index("bufferView", check) else {

@@ -168,6 +168,15 @@ fn material(
         let texture = pbr.child("baseColorTexture", check);
         out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
     }
+    if let Some(diffuse) = item.extension("KHR_materials_pbrSpecularGlossiness", check) {
+        // Its diffuse part is all that a Lambertian surface has; glTF prefers it to the fallback beside it.
+        let factor = diffuse.numbers::<4>("diffuseFactor", check);
+        let factor = factor.unwrap_or([1.0; 4]);
+        out.base_color_factor = factor.map(|x| unit(x, "diffuseFactor", item, check));
+        out.metallic = 0.0;
+        let texture = diffuse.child("diffuseTexture", check);
+        out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
+    }
     let texture = item.child("emissiveTexture", check);
     out.emissive_texture = texture.and_then(|t| slots.texture(json, &t, check));
     emission(item, &mut out, check);

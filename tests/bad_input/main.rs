@@ -46,7 +46,10 @@ fn judge(name: &str, bytes: &[u8], outcome: Outcome) {
 #[test]
 fn every_case_comes_to_its_outcome() {
     for (name, bytes, outcome) in cases() {
-        judge(name, &bytes, outcome);
+        // Without the decoder the plain accessors of the same primitive are read, and they are sound.
+        if cfg!(feature = "draco") || name != "draco_broken" {
+            judge(name, &bytes, outcome);
+        }
     }
 }
 
