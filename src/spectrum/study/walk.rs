@@ -22,6 +22,10 @@ pub struct Sample {
     pub luv_error: f64,
     /// True error, CIEDE2000.
     pub de2000: f64,
+    /// dE*uv that is left when the estimated error is added back.
+    pub corrected_luv: f64,
+    /// CIEDE2000 of the same.
+    pub corrected_de2000: f64,
 }
 
 /// Runs `step` on every product and measures the outcome; one list of samples for each level.
@@ -82,7 +86,11 @@ fn measure<I: Interval>(
     light: &Light,
     cmf: &CmfTree,
 ) -> Sample {
-    let (reference, ours) = (tristimulus(exact, cmf.leaves()), list.xyz(cmf));
+    let (reference, ours, corrected) = (
+        tristimulus(exact, cmf.leaves()),
+        list.xyz(cmf),
+        list.corrected_xyz(cmf),
+    );
     Sample {
         intervals: list.partition().count(),
         operation,
@@ -92,6 +100,8 @@ fn measure<I: Interval>(
             .sqrt(),
         luv_error: de_luv(reference, ours, light.white),
         de2000: de2000(reference, ours, light.white),
+        corrected_luv: de_luv(reference, corrected, light.white),
+        corrected_de2000: de2000(reference, corrected, light.white),
     }
 }
 
