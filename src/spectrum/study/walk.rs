@@ -28,51 +28,77 @@ pub struct Sample {
     pub corrected_de2000: f64,
 }
 
-/// Runs `step` on every product and measures the outcome; one list of samples for each level.
+/// What a walk starts from: a light, its tree, its list, and the trees of the patches.
+#[derive(Debug, Clone)]
+pub struct Start<'a, I> {
+    chart: &'a Chart,
+    light: &'a Light,
+    source: Tree<I>,
+    materials: Vec<Tree<I>>,
+}
+
+impl<'a, I: Interval> Start<'a, I> {
+    /// Builds the trees (pre-processing, 3.1.2).
+    pub fn new(chart: &'a Chart, light: &'a Light) -> Self {
+        let materials = chart
+            .reflectances
+            .iter()
+            .map(|r| Tree::new(r, &chart.cmf))
+            .collect();
+        Self {
+            chart,
+            light,
+            source: Tree::new(&light.power, &chart.cmf),
+            materials,
+        }
+    }
+
+    /// The light's tree.
+    pub fn source(&self) -> &Tree<I> {
+        &self.source
+    }
+
+    /// The patches' trees.
+    pub fn materials(&self) -> &[Tree<I>] {
+        &self.materials
+    }
+}
+
+/// Runs `step` on every product of the first `depth` levels (in 1..=3) and measures the outcome.
 ///
 /// `step` gets the product on the cut of the level before and the path that leads to it.
 pub fn walk<I: Interval>(
-    chart: &Chart,
-    light: &Light,
-    source: &List<I>,
+    start: &Start<'_, I>,
+    list: &List<I>,
+    depth: usize,
     mut step: impl FnMut(&mut List<I>, &Path<'_, I>) -> Operation,
 ) -> [Vec<Sample>; 3] {
-    let cmf = &chart.cmf;
-    let tree = Tree::new(&light.power, cmf);
-    let materials: Vec<Tree<I>> = chart
-        .reflectances
-        .iter()
-        .map(|r| Tree::new(r, cmf))
-        .collect();
+    let cmf = &start.chart.cmf;
     let mut samples = [const { Vec::new() }; 3];
-    let mut lists = [source.clone(), source.clone(), source.clone()];
-    let mut visit =
-        |level: usize, lists: &mut [List<I>; 3], reflections: &[&Tree<I>], exact: &Leaves| {
-            let mut list = List::black();
-            let from = if level == 0 {
-                source
-            } else {
-                &lists[level - 1]
-            };
-            from.reflect(reflections[level], cmf, &mut list);
-            let operation = step(
-                &mut list,
-                &Path {
-                    source: &tree,
-                    reflections,
-                },
-            );
-            samples[level].push(measure(&list, operation, exact, light, cmf));
-            lists[level].copy_from(&list);
-        };
-    for a in &materials {
-        let first = times(&light.power, a.leaves());
-        visit(0, &mut lists, &[a], &first);
-        for b in &materials {
+    let mut lists = [List::black(), List::black(), List::black()];
+    let mut visit = |lists: &mut [List<I>; 3], reflections: &[&Tree<I>], exact: &Leaves| {
+        let level = reflections.len() - 1;
+        let mut product = List::black();
+        let from = if level == 0 { list } else { &lists[level - 1] };
+        from.reflect(reflections[level], cmf, &mut product);
+        let operation = step(
+            &mut product,
+            &Path {
+                source: &start.source,
+                reflections,
+            },
+        );
+        samples[level].push(measure(&product, operation, exact, start.light, cmf));
+        lists[level].copy_from(&product);
+    };
+    for a in &start.materials {
+        let first = times(&start.light.power, a.leaves());
+        visit(&mut lists, &[a], &first);
+        for b in start.materials.iter().filter(|_| depth > 1) {
             let second = times(&first, b.leaves());
-            visit(1, &mut lists, &[a, b], &second);
-            for c in &materials {
-                visit(2, &mut lists, &[a, b, c], &times(&second, c.leaves()));
+            visit(&mut lists, &[a, b], &second);
+            for c in start.materials.iter().filter(|_| depth > 2) {
+                visit(&mut lists, &[a, b, c], &times(&second, c.leaves()));
             }
         }
     }

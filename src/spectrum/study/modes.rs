@@ -1,0 +1,189 @@
+//! The open questions as modes of one loop: what controls the error, and what that buys at equal interval count.
+//!
+//! Modes: the paper's control; the guarantee (the bound, not the estimate, must be at most eps_max); perceptual control
+//! (Jacobian of XYZ -> L*u*v* at the current colour, any sibling pair); perceptual control of the bound. All are measured
+//! twice: with the list's tristimulus values, and with the estimated error added back ("corrected").
+
+use super::chart::{Chart, Light};
+use super::walk::{LEVELS, Sample, Start, walk};
+use crate::color::{Xyz, luv_jacobian};
+use crate::spectrum::{
+    Bounded, Control, Estimate, Interval, List, Metric, Moment, Operation, Path, control, represent,
+};
+use serde::Serialize;
+
+/// Steps of the search for the limit that gives a wanted interval count: 0.1 % of the limit.
+const SEARCH_STEPS: usize = 16;
+/// The limit is looked for in this range of dE*uv.
+const SEARCH_RANGE: [f64; 2] = [1e-3, 1e2];
+
+/// One light, mode and level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Name of the light, with the adaptation white if it is not the light's own.
+    pub light: String,
+    /// Name of the mode.
+    pub mode: &'static str,
+    /// Name of the level.
+    pub level: &'static str,
+    /// eps_max, in XYZ or dE*uv.
+    pub limit: f64,
+    /// Average number of intervals.
+    pub intervals_mean: f64,
+    /// Share of products whose true error in XYZ is above the paper's eps_max, percent.
+    pub above_eps_max: f64,
+    /// Error of the list's tristimulus values, dE*uv.
+    pub luv: Spread,
+    /// The same, CIEDE2000.
+    pub de2000: Spread,
+    /// With the estimated error added back, dE*uv.
+    pub corrected_luv: Spread,
+    /// The same, CIEDE2000.
+    pub corrected_de2000: Spread,
+}
+
+/// Mean, 95th percentile and greatest of a colour difference.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Mean.
+    pub mean: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// Greatest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// Of any numbers.
+    pub fn new(mut values: Vec<f64>) -> Self {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        Self {
+            mean,
+            p95: percentile(&mut values, 95.0),
+            max: values.last().copied().unwrap_or(0.0),
+        }
+    }
+}
+
+/// A percentile (in 0..=100) by nearest rank; sorts the values. 0 for none.
+pub fn percentile(values: &mut [f64], percent: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let rank = (percent / 100.0 * values.len() as f64).ceil() as usize;
+    values.get(rank.max(1) - 1).copied().unwrap_or(0.0)
+}
+
+/// Runs all modes for one light, which carries its adaptation white.
+pub fn measure(chart: &Chart, light: &Light, name: &str) -> Vec<Row> {
+    let mut rows = Vec::new();
+    let mut record = |mode, limits: [f64; 3], samples: [Vec<Sample>; 3]| {
+        rows.extend((0..3).map(|level| row(name, mode, level, limits[level], &samples[level])));
+    };
+    let eps = Control::PAPER.eps_max;
+
+    let xyz = |_: Xyz| Metric::Xyz;
+    let paper = run::<Estimate>(chart, light, &[eps; 3], 3, &xyz, &Control::PAPER);
+    let wanted = paper.each_ref().map(|samples| {
+        samples.iter().map(|s| s.intervals as f64).sum::<f64>() / samples.len() as f64
+    });
+    record("paper", [eps; 3], paper);
+
+    let guarantee = Control::within(eps);
+    record(
+        "guarantee",
+        [eps; 3],
+        run::<Bounded>(chart, light, &[eps; 3], 3, &xyz, &guarantee),
+    );
+
+    let luv = |colour: Xyz| Metric::Luv(luv_jacobian(colour, light.white));
+    let (limits, samples) = at_equal_count::<Moment>(chart, light, wanted, &luv);
+    record("perceptual", limits, samples);
+    let (limits, samples) = at_equal_count::<Bounded>(chart, light, wanted, &luv);
+    record("perceptual bound", limits, samples);
+    rows
+}
+
+/// One limit for each level, chosen one after the other so that each level needs `wanted` intervals on average.
+fn at_equal_count<I: Interval>(
+    chart: &Chart,
+    light: &Light,
+    wanted: [f64; 3],
+    metric: &dyn Fn(Xyz) -> Metric,
+) -> ([f64; 3], [Vec<Sample>; 3]) {
+    let mut limits = [1.0; 3];
+    for level in 0..3 {
+        let [mut low, mut high] = SEARCH_RANGE;
+        for _ in 0..SEARCH_STEPS {
+            limits[level] = (low * high).sqrt();
+            let samples = &run::<I>(
+                chart,
+                light,
+                &limits,
+                level + 1,
+                metric,
+                &Control::within(1.0),
+            )[level];
+            let intervals: usize = samples.iter().map(|s| s.intervals).sum();
+            if intervals as f64 > wanted[level] * samples.len() as f64 {
+                low = limits[level]
+            } else {
+                high = limits[level]
+            }
+        }
+        // The side that needs no more intervals than wanted.
+        limits[level] = high;
+    }
+    (
+        limits,
+        run::<I>(chart, light, &limits, 3, metric, &Control::within(1.0)),
+    )
+}
+
+/// The tests with a metric that may depend on the colour, and one eps_max for each level.
+fn run<I: Interval>(
+    chart: &Chart,
+    light: &Light,
+    limits: &[f64; 3],
+    depth: usize,
+    metric: &dyn Fn(Xyz) -> Metric,
+    settings: &Control,
+) -> [Vec<Sample>; 3] {
+    let start = Start::<I>::new(chart, light);
+    let list = represent(start.source(), &chart.cmf, &metric(light.white), limits[0]);
+    let step = |list: &mut List<I>, path: &Path<'_, I>| -> Operation {
+        let eps_max = limits[path.reflections.len() - 1];
+        let scaled = Control {
+            eps_min: settings.eps_min / settings.eps_max * eps_max,
+            eps_max,
+            ..*settings
+        };
+        control(
+            list,
+            path,
+            &chart.cmf,
+            &metric(list.corrected_xyz(&chart.cmf)),
+            &scaled,
+        )
+    };
+    walk(&start, &list, depth, step)
+}
+
+fn row(light: &str, mode: &'static str, level: usize, limit: f64, samples: &[Sample]) -> Row {
+    let spread = |f: &dyn Fn(&Sample) -> f64| Spread::new(samples.iter().map(f).collect());
+    let above = samples
+        .iter()
+        .filter(|s| s.xyz_error > Control::PAPER.eps_max)
+        .count();
+    Row {
+        light: light.to_owned(),
+        mode,
+        level: LEVELS[level],
+        limit,
+        intervals_mean: samples.iter().map(|s| s.intervals as f64).sum::<f64>()
+            / samples.len() as f64,
+        above_eps_max: 100.0 * above as f64 / samples.len() as f64,
+        luv: spread(&|s| s.luv_error),
+        de2000: spread(&|s| s.de2000),
+        corrected_luv: spread(&|s| s.corrected_luv),
+        corrected_de2000: spread(&|s| s.corrected_de2000),
+    }
+}
