@@ -8,6 +8,7 @@ mod control;
 mod grid;
 mod interval;
 mod list;
+pub mod methods;
 mod partition;
 mod product;
 mod source;

@@ -5,7 +5,7 @@
 
 use super::chart::{Chart, Light};
 use super::modes::percentile;
-use super::walk::{LEVELS, Start, walk};
+use super::walk::{LEVELS, Start, sample};
 use crate::color::tristimulus;
 use crate::spectrum::{Bounded, Control, Metric, control, represent};
 use serde::Serialize;
@@ -45,7 +45,7 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
     let mut loose = [const { Vec::new() }; 3];
     let mut errors = [0.0; 3];
     let mut violations = [0; 3];
-    let samples = walk(&start, &list, 3, |list, path| {
+    let samples = sample(&start, &list, |list, path| {
         let level = path.reflections.len() - 1;
         let operation = control(list, path, &chart.cmf, &Metric::Xyz, &settings);
         let truth = tristimulus(&path.leaves(), chart.cmf.leaves());

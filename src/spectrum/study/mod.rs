@@ -2,9 +2,10 @@
 
 pub mod bounds;
 mod chart;
+pub mod compare;
 pub mod modes;
 pub mod table1;
 mod walk;
 
 pub use chart::{Chart, Light, Reflectances};
-pub use walk::{LEVELS, Sample, Start, walk};
+pub use walk::{Extent, LEVELS, Sample, Start, sample, walk};

@@ -1,7 +1,7 @@
 //! Table 1 (paper 4.1): intervals, errors and operations, measured beside printed.
 
 use super::chart::{Chart, Light};
-use super::walk::{Sample, Start, walk};
+use super::walk::{Sample, Start, sample};
 use crate::color::de_luv;
 use crate::spectrum::{Control, Estimate, Metric, Operation, control, represent};
 use serde::Serialize;
@@ -95,7 +95,7 @@ impl Column {
             xyz_error: Metric::Xyz.size(list.error(), list.radius()),
             luv_error: de_luv(list.xyz(&chart.cmf), light.white, light.white),
         };
-        let levels = walk(&start, &list, 3, |list, path| {
+        let levels = sample(&start, &list, |list, path| {
             control(list, path, &chart.cmf, &Metric::Xyz, &Control::PAPER)
         });
         let [primary, secondary, tertiary] =
