@@ -1,6 +1,7 @@
 //! Bakes light into glTF rooms in full spectrum, by progressive hierarchical radiosity.
 
 pub mod audit;
+pub mod cli;
 pub mod color;
 pub mod data;
 pub mod error;
