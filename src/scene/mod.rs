@@ -1,7 +1,13 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
+mod check;
 pub mod document;
+pub mod effects;
+pub(crate) mod light;
+pub(crate) mod material;
 mod raw;
+pub(crate) mod spectra_file;
+mod uri;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};

@@ -1,0 +1,454 @@
+//! The plan: which effects a scene calls for. What is off costs nothing; what the program lacks is named.
+//!
+//! Only what some surface or lamp of the scene uses counts. A plan never leaves out an effect that could change the
+//! picture: where a question would be too dear to answer, the effect runs.
+
+use super::material::listed;
+use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
+use crate::spectrum::Leaves;
+use glam::DVec3;
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+/// How far behind a plane a vertex of a convex room may lie, as a share of the room's size. Positions are stored as f32
+/// (6e-8 of their size) and may have been turned by a node; a gap of 1e-6 hides nothing that a link could see.
+const CONVEX_TOLERANCE: f64 = 1e-6;
+
+/// The convexity test gives up (and occlusion runs) past this many plane-vertex pairs: 0.1 s.
+const CONVEX_PAIRS: usize = 100_000_000;
+
+/// The effects, in the order of the list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Light that surfaces pass on.
+    Interreflection,
+    /// Surfaces that block light.
+    Occlusion,
+    /// More than one band.
+    Colour,
+    /// More than one light spectrum.
+    LightSpectra,
+    /// Images on paint, lamps or holes.
+    Textures,
+    /// Holes.
+    AlphaMasks,
+    /// Surfaces that give out light.
+    EmissiveSurfaces,
+    /// Lights without extent that shine all around.
+    PointLights,
+    /// Lights without extent that shine in a cone.
+    SpotLights,
+    /// Parallel light.
+    DirectionalLights,
+    /// Surfaces whose back reflects and emits too.
+    TwoSided,
+}
+
+impl Kind {
+    /// The effect's name in plans and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Interreflection => "interreflection",
+            Self::Occlusion => "occlusion",
+            Self::Colour => "colour",
+            Self::LightSpectra => "several light spectra",
+            Self::Textures => "textures",
+            Self::AlphaMasks => "alpha masks",
+            Self::EmissiveSurfaces => "emissive surfaces",
+            Self::PointLights => "point lights",
+            Self::SpotLights => "spot lights",
+            Self::DirectionalLights => "directional lights",
+            Self::TwoSided => "two-sided surfaces",
+        }
+    }
+}
+
+/// One line of the plan.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Effect {
+    /// [`Kind::name`], or the name of an effect that the program lacks.
+    pub name: String,
+    /// Does it run?
+    pub runs: bool,
+    /// Does the program lack it?
+    pub lacking: bool,
+    /// Why, in words.
+    pub reason: String,
+}
+
+/// What runs for a scene, what does not, and why.
+///
+/// Displays as a table; serializes as a list of `{name, runs, lacking, reason}`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Plan {
+    effects: Vec<Effect>,
+}
+
+impl Plan {
+    /// The plan for a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let used: BTreeSet<usize> = scene.surfaces.iter().map(|s| s.material).collect();
+        let used: Vec<&Material> = used
+            .into_iter()
+            .filter_map(|m| scene.materials.get(m))
+            .collect();
+        let mut plan = Self {
+            effects: Vec::new(),
+        };
+        plan.add(Kind::Interreflection, interreflection(&used));
+        plan.add(Kind::Occlusion, occlusion(scene));
+        plan.add(Kind::Colour, colour(scene, &used));
+        let spectra = scene.spectra.len();
+        let names: Vec<String> = scene.spectra.iter().map(|s| s.name.clone()).collect();
+        plan.add(
+            Kind::LightSpectra,
+            match spectra {
+                0 => (false, "no lamp".into()),
+                1 => (false, format!("all light is {}", names[0])),
+                n => (true, format!("{n}: {}", listed(&names))),
+            },
+        );
+        let textured = |m: &&&Material| {
+            let mask = matches!(
+                &m.alpha,
+                Alpha::Mask {
+                    texture: Some(_),
+                    ..
+                }
+            );
+            m.paint.is_some() || mask || m.emission.as_ref().is_some_and(|e| e.texture.is_some())
+        };
+        plan.add(
+            Kind::Textures,
+            counted(used.iter().filter(textured), "material"),
+        );
+        let masked = |m: &&&Material| matches!(m.alpha, Alpha::Mask { .. });
+        plan.add(
+            Kind::AlphaMasks,
+            counted(used.iter().filter(masked), "material"),
+        );
+        plan.add(
+            Kind::EmissiveSurfaces,
+            counted(used.iter().filter(|m| m.emission.is_some()), "material"),
+        );
+        let lights = |is: fn(&LightKind) -> bool| {
+            let names: Vec<String> = scene
+                .lights
+                .iter()
+                .filter(|l| is(&l.kind))
+                .map(|l| quoted(&l.name))
+                .collect();
+            number_of(&names, "light")
+        };
+        plan.add(Kind::PointLights, lights(|k| matches!(k, LightKind::Point)));
+        plan.add(
+            Kind::SpotLights,
+            lights(|k| matches!(k, LightKind::Spot { .. })),
+        );
+        plan.add(
+            Kind::DirectionalLights,
+            lights(|k| matches!(k, LightKind::Directional)),
+        );
+        plan.add(
+            Kind::TwoSided,
+            counted(used.iter().filter(|m| m.sides == Sides::Both), "material"),
+        );
+        for lack in lacking(&scene.source.json) {
+            plan.effects.push(Effect {
+                name: lack.effect,
+                runs: false,
+                lacking: true,
+                reason: lack.reason,
+            });
+        }
+        plan
+    }
+
+    /// Does this effect run?
+    pub fn runs(&self, kind: Kind) -> bool {
+        self.effects.iter().any(|e| e.name == kind.name() && e.runs)
+    }
+
+    /// The lines, [`Kind`]s in order, then what the program lacks.
+    pub fn effects(&self) -> &[Effect] {
+        &self.effects
+    }
+
+    fn add(&mut self, kind: Kind, (runs, reason): (bool, String)) {
+        self.effects.push(Effect {
+            name: kind.name().into(),
+            runs,
+            lacking: false,
+            reason,
+        });
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self
+            .effects
+            .iter()
+            .map(|e| e.name.chars().count())
+            .max()
+            .unwrap_or(0);
+        for Effect {
+            name,
+            runs,
+            lacking,
+            reason,
+        } in &self.effects
+        {
+            let state = match (lacking, runs) {
+                (true, _) => "lacking",
+                (_, true) => "runs",
+                _ => "off",
+            };
+            writeln!(f, "{name:width$}  {state:7}  {reason}")?;
+        }
+        Ok(())
+    }
+}
+
+fn quoted(name: &str) -> String {
+    format!("'{name}'")
+}
+
+fn number_of(names: &[String], what: &str) -> (bool, String) {
+    match names.len() {
+        0 => (false, "none".into()),
+        1 => (true, format!("1 {what}: {}", names[0])),
+        n => (true, format!("{n} {what}s: {}", listed(names))),
+    }
+}
+
+fn counted<'a, 'b: 'a>(
+    materials: impl Iterator<Item = &'a &'b Material>,
+    what: &str,
+) -> (bool, String) {
+    number_of(
+        &materials.map(|m| quoted(&m.name)).collect::<Vec<_>>(),
+        what,
+    )
+}
+
+/// A texture or a vertex colour multiplies: black stays black.
+fn interreflection(used: &[&Material]) -> (bool, String) {
+    let bright = used
+        .iter()
+        .filter(|m| m.reflectance.iter().any(|r| *r > 0.0))
+        .count();
+    match bright {
+        0 => (false, "every surface is black".into()),
+        n if n == used.len() => (true, "every surface reflects".into()),
+        n => (true, format!("{n} of {} materials reflect", used.len())),
+    }
+}
+
+fn is_flat(spectrum: &Leaves) -> bool {
+    spectrum.iter().all(|v| *v == spectrum[0])
+}
+
+fn is_grey(image: &Image) -> bool {
+    image.pixels.iter().all(|[r, g, b, _]| r == g && g == b)
+}
+
+/// One band is enough where every reflectance is flat and every lamp is its light spectrum times a number.
+fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
+    let grey_image = |index: usize| scene.images.get(index).is_some_and(is_grey);
+    let mut greys: BTreeMap<usize, bool> = BTreeMap::new();
+    let mut grey = |index: usize| *greys.entry(index).or_insert_with(|| grey_image(index));
+    for material in used {
+        if !is_flat(&material.reflectance) {
+            return (true, format!("'{}' has a colour", material.name));
+        }
+        if material.paint.as_ref().is_some_and(|t| !grey(t.image)) {
+            return (
+                true,
+                format!("the texture of '{}' has colours", material.name),
+            );
+        }
+        if let Some(emission) = &material.emission {
+            let tinted = emission.texture.as_ref().is_some_and(|t| !grey(t.image));
+            if tinted || !is_flat(&emission.shape) {
+                return (
+                    true,
+                    format!("the light of '{}' has a colour of its own", material.name),
+                );
+            }
+        }
+    }
+    if let Some(light) = scene.lights.iter().find(|l| !is_flat(&l.shape)) {
+        return (
+            true,
+            format!("the light '{}' has a colour of its own", light.name),
+        );
+    }
+    let painted = |s: &&Surface| {
+        let counts = scene
+            .materials
+            .get(s.material)
+            .is_some_and(|m| m.vertex_paint);
+        counts
+            && s.colors
+                .iter()
+                .flatten()
+                .any(|[r, g, b, _]| r != g || g != b)
+    };
+    if let Some(surface) = scene.surfaces.iter().find(painted) {
+        return (true, format!("{} has vertex colours", surface.name));
+    }
+    (false, "every surface is grey: one band".into())
+}
+
+/// Off where nothing can stand between two points that see each other's front, nor between a point and a light.
+fn occlusion(scene: &Scene) -> (bool, String) {
+    match blocked(&scene.surfaces, &scene.lights) {
+        None => (
+            false,
+            "the room is convex and empty: nothing can block".into(),
+        ),
+        Some(reason) => (true, reason),
+    }
+}
+
+/// Why something could block; none if every vertex and every light lies on or before every triangle's plane.
+///
+/// Then a segment between two points of the surfaces (or to a light) never passes from the front of a triangle to its
+/// back. A parallel light comes from infinity: it must shine on the front of every triangle.
+fn blocked(surfaces: &[Surface], lights: &[PunctualLight]) -> Option<String> {
+    let vertices: Vec<DVec3> = surfaces
+        .iter()
+        .flat_map(|s| s.positions.iter().copied())
+        .collect();
+    let low = vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = vertices
+        .iter()
+        .copied()
+        .fold(DVec3::NEG_INFINITY, DVec3::max);
+    let tolerance = CONVEX_TOLERANCE * (high - low).length();
+    let stands = |l: &&PunctualLight| l.kind != LightKind::Directional;
+    let mut pairs = 0;
+    for surface in surfaces {
+        for triangle in &surface.triangles {
+            let [a, b, c] = triangle.map(|i| surface.positions[i as usize]);
+            // A triangle without area has no plane, and hides nothing.
+            let Some(normal) = (b - a).cross(c - a).try_normalize() else {
+                continue;
+            };
+            let behind = |p: DVec3| normal.dot(p - a) < -tolerance;
+            if vertices.iter().any(|p| behind(*p)) {
+                return Some(format!("{} has something behind it", surface.name));
+            }
+            if let Some(light) = lights.iter().filter(stands).find(|l| behind(l.position)) {
+                return Some(format!(
+                    "the light '{}' stands behind {}",
+                    light.name, surface.name
+                ));
+            }
+            let parallel = lights.iter().filter(|l| l.kind == LightKind::Directional);
+            if let Some(light) = parallel
+                .into_iter()
+                .find(|l| normal.dot(l.direction) > -CONVEX_TOLERANCE)
+            {
+                return Some(format!(
+                    "the light '{}' shines on the back of {}",
+                    light.name, surface.name
+                ));
+            }
+            pairs += vertices.len();
+            if pairs > CONVEX_PAIRS {
+                return Some("too many triangles to show that the room is convex".into());
+            }
+        }
+    }
+    None
+}
+
+/// Something that a document asks for and the program lacks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lacking {
+    /// The effect.
+    pub effect: String,
+    /// Extension and materials.
+    pub reason: String,
+}
+
+/// Extensions that change the light and that the program lacks, with what they mean.
+const LACKING: &[(&str, &str)] = &[
+    ("EXT_lights_ies", "measured photometry"),
+    ("EXT_lights_image_based", "sky"),
+    ("EXT_lights_image_based_environment", "sky"),
+    ("KHR_environment_map", "sky"),
+    ("KHR_lights_environment", "sky"),
+    ("KHR_materials_anisotropy", "gloss"),
+    ("KHR_materials_clearcoat", "gloss (coat)"),
+    ("KHR_materials_diffuse_transmission", "diffuse transmission"),
+    ("KHR_materials_dispersion", "dispersion"),
+    ("KHR_materials_iridescence", "iridescence"),
+    (
+        "KHR_materials_pbrSpecularGlossiness",
+        "specular-glossiness colours",
+    ),
+    ("KHR_materials_sheen", "sheen"),
+    ("KHR_materials_specular", "gloss"),
+    ("KHR_materials_subsurface", "light below the surface"),
+    ("KHR_materials_transmission", "transmission"),
+    ("KHR_materials_volume", "transmission through volumes"),
+    ("KHR_materials_volume_scatter", "scattering in volumes"),
+    ("MSFT_lod", "levels of detail"),
+];
+
+/// What a document asks for and the program lacks: by the extensions in use, with the materials that carry them.
+pub fn lacking(document: &Value) -> Vec<Lacking> {
+    let mut carriers: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for name in document["extensionsUsed"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str)
+    {
+        carriers.entry(name).or_default();
+    }
+    for (index, material) in document["materials"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .enumerate()
+    {
+        let name = material["name"].as_str().filter(|n| !n.is_empty());
+        let name = name.map_or_else(|| format!("material {index}"), quoted);
+        for extension in material["extensions"]
+            .as_object()
+            .into_iter()
+            .flat_map(|o| o.keys())
+        {
+            carriers.entry(extension).or_default().push(name.clone());
+        }
+    }
+    let mut found = Vec::new();
+    for (extension, materials) in carriers {
+        if let Some((_, effect)) = LACKING.iter().find(|(name, _)| *name == extension) {
+            let reason = match materials.is_empty() {
+                true => extension.to_string(),
+                false => format!("{extension} ({})", listed(&materials)),
+            };
+            found.push(Lacking {
+                effect: effect.to_string(),
+                reason,
+            });
+        }
+    }
+    found
+}
+
+/// The same as warnings.
+pub(crate) fn warnings(document: &Value) -> Vec<String> {
+    lacking(document)
+        .into_iter()
+        .map(|l| format!("{}: {} is left out", l.reason, l.effect))
+        .collect()
+}
