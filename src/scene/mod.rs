@@ -1,12 +1,22 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
+mod accessor;
 mod check;
+mod compression;
+mod container;
 pub mod document;
 pub mod effects;
-pub(crate) mod light;
-pub(crate) mod material;
+pub mod geometry;
+mod image;
+mod json;
+mod light;
+mod material;
+mod nodes;
+mod primitive;
 mod raw;
-pub(crate) mod spectra_file;
+mod spectra_file;
+mod texture;
+mod texture_info;
 mod uri;
 
 use crate::spectrum::{Grid, Leaves};
