@@ -1,0 +1,183 @@
+//! A spectrum as a list of intervals (paper 3.1.1): what a ray or a patch carries.
+//!
+//! The list is a cut of the range and, packed in order of wavelength, one record for each interval. It has room for all
+//! 64, so no operation allocates.
+
+use super::grid::{LEAVES, Leaves};
+use super::interval::{Cmf, Interval, Representative};
+use super::partition::Partition;
+use super::tree::{CmfTree, Tree, node};
+
+/// A piecewise constant spectrum with its errors.
+#[derive(Debug, Clone)]
+pub struct List<I> {
+    partition: Partition,
+    intervals: [I; LEAVES],
+}
+
+impl<I: Interval> List<I> {
+    /// The spectrum of a tree on a cut.
+    pub fn new(tree: &Tree<I>, partition: Partition) -> Self {
+        let mut list = Self::black();
+        list.partition = partition;
+        for (slot, (first, len)) in list.intervals.iter_mut().zip(partition.iter()) {
+            *slot = *tree.node(node(first, len));
+        }
+        list
+    }
+
+    /// A spectrum that is exactly constant on each interval; `values` holds at least as many as the cut has intervals.
+    ///
+    /// # Panics
+    /// If there are too few values.
+    pub fn from_values(partition: Partition, values: &[f64]) -> Self {
+        let mut list = Self::black();
+        list.set(partition, values);
+        list
+    }
+
+    /// Writes values known to be exact over the list, see [`List::from_values`].
+    ///
+    /// # Panics
+    /// If there are too few values.
+    pub fn set(&mut self, partition: Partition, values: &[f64]) {
+        self.partition = partition;
+        for (slot, &value) in self.intervals.iter_mut().zip(&values[..partition.count()]) {
+            *slot = I::constant(value);
+        }
+    }
+
+    /// Nothing, as one interval.
+    pub fn black() -> Self {
+        Self {
+            partition: Partition::ROOT,
+            intervals: [I::default(); LEAVES],
+        }
+    }
+
+    /// The cut.
+    #[inline]
+    pub fn partition(&self) -> Partition {
+        self.partition
+    }
+
+    /// Its intervals, in order of wavelength.
+    #[inline]
+    pub fn intervals(&self) -> &[I] {
+        &self.intervals[..self.partition.count()]
+    }
+
+    /// Room for the records of a cut, to be filled by the caller.
+    pub(super) fn reset(&mut self, partition: Partition) -> &mut [I] {
+        self.partition = partition;
+        &mut self.intervals[..partition.count()]
+    }
+
+    /// Sum of the estimated errors: what the tristimulus values of the list lack.
+    #[inline]
+    pub fn error(&self) -> Cmf {
+        self.intervals()
+            .iter()
+            .fold([0.0; 3], |sum, i| add(sum, i.error()))
+    }
+
+    /// Sum of the radii of the errors.
+    #[inline]
+    pub fn radius(&self) -> Cmf {
+        self.intervals()
+            .iter()
+            .fold([0.0; 3], |sum, i| add(sum, i.radius()))
+    }
+
+    /// Change to tristimulus values (3.3): A = sum of value times A_a.
+    #[inline]
+    pub fn xyz(&self, cmf: &CmfTree) -> Cmf {
+        let mut sum = [0.0; 3];
+        for (interval, (first, len)) in self.intervals().iter().zip(self.partition.iter()) {
+            let weights = cmf.node(node(first, len));
+            for a in 0..3 {
+                sum[a] += interval.value() * weights[a];
+            }
+        }
+        sum
+    }
+
+    /// The list on the 64 leaves.
+    pub fn leaves(&self) -> Leaves {
+        let mut leaves = [0.0; LEAVES];
+        for (interval, (first, len)) in self.intervals().iter().zip(self.partition.iter()) {
+            leaves[first..first + len].fill(interval.value());
+        }
+        leaves
+    }
+
+    /// Replaces the interval at `first` by two; nothing happens to one of a single leaf.
+    pub fn split(&mut self, first: usize, halves: [I; 2]) {
+        let Some(finer) = self.partition.split(first) else {
+            return;
+        };
+        let (rank, count) = (self.partition.rank(first), self.partition.count());
+        self.intervals.copy_within(rank + 1..count, rank + 2);
+        self.intervals[rank..rank + 2].copy_from_slice(&halves);
+        self.partition = finer;
+    }
+
+    /// What the sibling pair whose left half starts at `first` would be as one interval.
+    #[inline]
+    pub fn merged(&self, first: usize, cmf: &CmfTree, rule: Representative) -> I {
+        let (rank, n) = (
+            self.partition.rank(first),
+            node(first, self.partition.len_at(first)),
+        );
+        I::merged(
+            &self.intervals[rank],
+            &self.intervals[rank + 1],
+            [cmf.node(n), cmf.node(n + 1)],
+            rule,
+        )
+    }
+
+    /// Replaces the sibling pair whose left half starts at `first` by one interval; nothing happens if there is no such pair.
+    pub fn merge(&mut self, first: usize, whole: I) {
+        let (rank, count) = (self.partition.rank(first), self.partition.count());
+        let Some(coarser) = self.partition.merge(first) else {
+            return;
+        };
+        self.intervals[rank] = whole;
+        self.intervals.copy_within(rank + 2..count, rank + 1);
+        self.partition = coarser;
+    }
+
+    /// Checks what must hold of every list.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn validate(&self) -> Result<(), String> {
+        if !Partition::is_valid(self.partition.bits()) {
+            return Err(format!("cut {:x} is not dyadic", self.partition.bits()));
+        }
+        for (rank, interval) in self.intervals().iter().enumerate() {
+            let finite =
+                interval.value().is_finite() && interval.error().iter().all(|e| e.is_finite());
+            if !finite || !interval.radius().iter().all(|r| *r >= 0.0) {
+                return Err(format!("interval {rank}: {interval:?}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<I: Interval> List<I> {
+    /// Copies the cut and the records in use: cheaper than `clone`, which copies the room of all 64.
+    #[inline]
+    pub fn copy_from(&mut self, other: &Self) {
+        let count = other.partition.count();
+        self.partition = other.partition;
+        self.intervals[..count].copy_from_slice(&other.intervals[..count]);
+    }
+}
+
+#[inline]
+pub(super) fn add(a: Cmf, b: Cmf) -> Cmf {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}

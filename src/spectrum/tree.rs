@@ -1,0 +1,232 @@
+//! The data base of the pre-processing step (paper 3.1.2): spectra and colour matching functions as binary trees.
+//!
+//! A tree has 127 nodes, level j in 0..=6 and index i in 0..2^j; node (j, i) covers the leaves
+//! [i 2^(6-j), (i+1) 2^(6-j)). It is stored as an array in heap order: (j, i) lies at 2^j + i.
+//!
+//! The average of eq. 3 is the value that makes the sum of the squares of the three errors of eq. 2 least.
+
+use super::grid::{LEAVES, Leaves};
+use super::interval::{Cmf, Interval};
+use super::partition::Partition;
+
+/// Nodes of a tree in heap order; index 0 is not used.
+pub const NODES: usize = 2 * LEAVES;
+
+/// Heap index of the node over `len` leaves from `first`.
+#[inline]
+pub fn node(first: usize, len: usize) -> usize {
+    // `len` is a power of two and divides `first`, so the shift is an exact division.
+    (LEAVES + first) >> len.trailing_zeros()
+}
+
+/// First leaf and number of leaves of a node.
+pub fn span(node: usize) -> (usize, usize) {
+    let level = node.ilog2();
+    let len = LEAVES >> level;
+    ((node - (1 << level)) * len, len)
+}
+
+/// The colour matching functions on every node: A_a = integral of a_bar over the node, without K.
+///
+/// It also fixes how spectra are averaged (eq. 3). Under a light, see [`CmfTree::under`], it weighs by that light.
+#[derive(Debug, Clone)]
+pub struct CmfTree {
+    leaves: [Leaves; 3],
+    nodes: [Cmf; NODES],
+}
+
+impl CmfTree {
+    /// From the weights of the leaves (finite, not negative), e.g. [`crate::color::Observer::weights`].
+    pub fn new(leaves: [Leaves; 3]) -> Self {
+        let mut nodes = [[0.0; 3]; NODES];
+        for leaf in 0..LEAVES {
+            nodes[LEAVES + leaf] = leaves.each_ref().map(|a| a[leaf]);
+        }
+        for n in (1..LEAVES).rev() {
+            nodes[n] = std::array::from_fn(|a| nodes[2 * n][a] + nodes[2 * n + 1][a]);
+        }
+        Self { leaves, nodes }
+    }
+
+    /// The same with a light as further weight: power times a_bar.
+    ///
+    /// A spectrum B = S q is then held as its ratio q to the light S. Averages, errors and tristimulus values are those
+    /// of B although only q, which is smooth even under line spectra, is cut into intervals.
+    #[must_use]
+    pub fn under(&self, power: &Leaves) -> Self {
+        Self::new(
+            self.leaves
+                .each_ref()
+                .map(|a| std::array::from_fn(|leaf| a[leaf] * power[leaf])),
+        )
+    }
+
+    /// Weights of the leaves.
+    pub fn leaves(&self) -> &[Leaves; 3] {
+        &self.leaves
+    }
+
+    /// Sums over a node.
+    #[inline]
+    pub fn node(&self, node: usize) -> &Cmf {
+        &self.nodes[node]
+    }
+
+    /// The value of `f` on a node by eq. 3; the plain mean where all weights are zero.
+    pub fn average(&self, f: &Leaves, node: usize) -> f64 {
+        let (first, len) = span(node);
+        let (mut above, mut below) = (0.0, 0.0);
+        for a in 0..3 {
+            let whole = self.nodes[node][a];
+            above += whole
+                * (first..first + len)
+                    .map(|leaf| f[leaf] * self.leaves[a][leaf])
+                    .sum::<f64>();
+            below += whole * whole;
+        }
+        if below > 0.0 {
+            above / below
+        } else {
+            f[first..first + len].iter().sum::<f64>() / len as f64
+        }
+    }
+
+    /// Values of `f` on the intervals of a cut by eq. 3, packed at the front of the result.
+    ///
+    /// ```
+    /// use haarlight::{color::Observer, spectrum::{CmfTree, Grid, Partition}};
+    /// let grid = Grid::default();
+    /// let cmf = CmfTree::new(Observer::cie1931().weights(&grid));
+    /// let constant = cmf.weighted_average(&[0.5; 64], Partition::uniform(2));
+    /// assert!(constant[..4].iter().all(|v| (v - 0.5).abs() < 1e-15));
+    /// ```
+    pub fn weighted_average(&self, f: &Leaves, partition: Partition) -> Leaves {
+        let mut values = [0.0; LEAVES];
+        for (value, (first, len)) in values.iter_mut().zip(partition.iter()) {
+            *value = self.average(f, node(first, len));
+        }
+        values
+    }
+}
+
+/// A spectrum as a binary tree: for each node the average and what the interval type keeps of its errors.
+#[derive(Debug, Clone)]
+pub struct Tree<I> {
+    leaves: Leaves,
+    nodes: [I; NODES],
+}
+
+impl<I: Interval> Tree<I> {
+    /// From the leaves (finite).
+    pub fn new(f: &Leaves, cmf: &CmfTree) -> Self {
+        let mut nodes = [I::default(); NODES];
+        for (n, slot) in nodes.iter_mut().enumerate().skip(1) {
+            let (first, len) = span(n);
+            let over = first..first + len;
+            // The average of a leaf is the leaf itself, to the last bit: its errors are exactly 0.
+            let average = if len == 1 {
+                f[first]
+            } else {
+                cmf.average(f, n)
+            };
+            *slot = I::new(
+                average,
+                &f[over.clone()],
+                cmf.leaves.each_ref().map(|a| &a[over.clone()]),
+            );
+        }
+        Self { leaves: *f, nodes }
+    }
+
+    /// The leaves it was made from.
+    pub fn leaves(&self) -> &Leaves {
+        &self.leaves
+    }
+
+    /// A node by heap index.
+    #[inline]
+    pub fn node(&self, node: usize) -> &I {
+        &self.nodes[node]
+    }
+
+    /// Checks what must hold: leaves are exact, and the errors of two children are their parent's up to the change of value.
+    ///
+    /// # Errors
+    /// The first node that is wrong.
+    pub fn validate(&self, cmf: &CmfTree) -> Result<(), String> {
+        for n in 1..NODES {
+            let (first, len) = span(n);
+            let (value, error) = (self.nodes[n].value(), self.nodes[n].error());
+            for a in 0..3 {
+                let exact: f64 = (first..first + len)
+                    .map(|leaf| (self.leaves[leaf] - value) * cmf.leaves[a][leaf])
+                    .sum();
+                let scale: f64 = (first..first + len)
+                    .map(|leaf| self.leaves[leaf].abs() * cmf.leaves[a][leaf])
+                    .sum();
+                if (error[a] - exact).abs() > 1e-12 * scale || (len == 1 && error[a] != 0.0) {
+                    return Err(format!(
+                        "node {n}: error {a} is {}, should be {exact}",
+                        error[a]
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectrum::Estimate;
+    use crate::spectrum::testing::{cmf, patch};
+    use proptest::prelude::*;
+
+    #[test]
+    fn heap_order() {
+        for n in 1..NODES {
+            let (first, len) = span(n);
+            assert_eq!(node(first, len), n);
+        }
+        assert_eq!(span(1), (0, 64));
+        assert_eq!(span(127), (63, 1));
+    }
+
+    #[test]
+    fn without_weights_the_average_is_the_mean() {
+        let blind = CmfTree::new([[0.0; LEAVES]; 3]);
+        let ramp = std::array::from_fn(|leaf| leaf as f64);
+        assert_eq!(blind.average(&ramp, 1), 31.5);
+        assert!(
+            Tree::<Estimate>::new(&ramp, &blind)
+                .validate(&blind)
+                .is_ok()
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn the_average_minimises_the_squared_errors(f in patch(), n in 1usize..NODES, step in -0.1..0.1f64) {
+            let cmf = cmf();
+            let tree = Tree::<Estimate>::new(&f, &cmf);
+            prop_assert_eq!(tree.validate(&cmf), Ok(()));
+            let (first, len) = span(n);
+            let squares = |value: f64| (0..3).map(|a| (first..first + len).map(|k| (f[k] - value) * cmf.leaves()[a][k]).sum::<f64>().powi(2)).sum::<f64>();
+            let average = tree.node(n).value;
+            prop_assert!(squares(average) <= squares(average + step) + 1e-12);
+        }
+
+        #[test]
+        fn under_a_light_the_ratio_has_the_errors_of_the_product(q in patch(), light in patch(), n in 1usize..NODES) {
+            let cmf = cmf();
+            let under = cmf.under(&light);
+            let node = *Tree::<Estimate>::new(&q, &under).node(n);
+            let (first, len) = span(n);
+            for a in 0..3 {
+                let exact: f64 = (first..first + len).map(|k| light[k] * (q[k] - node.value) * cmf.leaves()[a][k]).sum();
+                prop_assert!((node.error[a] - exact).abs() < 1e-12);
+            }
+        }
+    }
+}
