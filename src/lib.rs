@@ -1,5 +1,6 @@
 //! Bakes light into glTF rooms in full spectrum, by progressive hierarchical radiosity.
 
+pub mod cli;
 pub mod color;
 pub mod data;
 pub mod error;

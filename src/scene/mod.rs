@@ -6,10 +6,13 @@ mod compression;
 mod container;
 pub mod document;
 pub mod effects;
+pub mod facts;
 pub mod geometry;
 mod image;
 mod json;
+pub mod lacking;
 mod light;
+mod load;
 mod material;
 mod nodes;
 mod primitive;
@@ -18,6 +21,8 @@ mod spectra_file;
 mod texture;
 mod texture_info;
 mod uri;
+
+pub use load::Options;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};
