@@ -80,7 +80,7 @@ fn page(facts: &Facts, plan: &Plan, unsupported: &[String], warnings: &[String])
             if closed.largest_is_closed {
                 "closed"
             } else {
-                "open"
+                "not shown to be closed"
             },
             closed.closed_parts,
             closed.parts,

@@ -341,7 +341,10 @@ fn blocked(surfaces: &[Surface], lights: &[PunctualLight]) -> Option<String> {
             };
             let behind = |p: DVec3| normal.dot(p - a) < -tolerance;
             if vertices.iter().any(|p| behind(*p)) {
-                return Some(format!("{} has something behind it", surface.name));
+                return Some(format!(
+                    "{} turns its back on a part of the room",
+                    surface.name
+                ));
             }
             if let Some(light) = lights.iter().filter(stands).find(|l| behind(l.position)) {
                 return Some(format!(

@@ -5,7 +5,7 @@ use super::document::Document;
 use super::light::{self, Lamps};
 use super::material;
 use super::spectra_file::SpectraFile;
-use super::{Scene, lacking};
+use super::{Scene, Surface, lacking};
 use crate::color::Upsampler;
 use crate::error::{Error, Result};
 use crate::spectrum::Grid;
@@ -48,6 +48,7 @@ impl Scene {
         let mut lamps = Lamps::new(&grid, &upsampler);
         let mut materials = material::materials(
             raw_materials,
+            &tinted(raw_materials.len(), &geometry.surfaces),
             &file,
             path,
             &grid,
@@ -81,4 +82,17 @@ impl Scene {
             warnings,
         })
     }
+}
+
+/// For each material: do all surfaces that carry it have vertex colours?
+fn tinted(materials: usize, surfaces: &[Surface]) -> Vec<bool> {
+    let mut tinted = vec![false; materials];
+    for colored in [true, false] {
+        for surface in surfaces.iter().filter(|s| s.colors.is_some() == colored) {
+            if let Some(slot) = tinted.get_mut(surface.material) {
+                *slot = colored;
+            }
+        }
+    }
+    tinted
 }

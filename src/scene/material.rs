@@ -29,9 +29,14 @@ struct Said {
     bright: Vec<String>,
 }
 
-/// The materials of a document, in its order.
+/// The materials of a document, in its order. `tinted[i]`: vertex colours darken material i wherever it is used.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one call; each is a different thing"
+)]
 pub(crate) fn materials(
     raw: &[RawMaterial],
+    tinted: &[bool],
     file: &SpectraFile,
     room: &Path,
     grid: &Grid,
@@ -42,14 +47,17 @@ pub(crate) fn materials(
     let mut said = Said::default();
     let made = raw
         .iter()
-        .map(|raw| {
+        .zip(tinted)
+        .map(|(raw, tinted)| {
             let name = name_of(raw);
             let place = format!("material '{name}'");
             let spectra = file.material(&name, raw.extras.as_ref(), room, grid, check);
             let raw = &checked(raw, &place, check);
             said.hear(raw, &name);
-            let mut material = paint(raw, &name, spectra.reflectance.as_ref(), upsampler);
-            if albedo_is_brought_down(raw, spectra.reflectance.as_ref()) {
+            let measured = spectra.reflectance.as_ref();
+            let (mut material, bright) = paint(raw, &name, measured, upsampler);
+            // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
+            if bright && (measured.is_some() || !tinted && raw.base_color_texture.is_none()) {
                 said.bright.push(name);
             }
             material.emission = emission(raw, &spectra, &place, lamps, check);
@@ -90,12 +98,13 @@ fn checked(raw: &RawMaterial, place: &str, check: &mut Check) -> RawMaterial {
     raw
 }
 
+/// The material without its emission, and whether its albedo had to be brought down.
 fn paint(
     raw: &RawMaterial,
     name: &str,
     measured: Option<&Sampled>,
     upsampler: &Upsampler,
-) -> Material {
+) -> (Material, bool) {
     let [r, g, b, alpha] = raw.base_color_factor;
     let base_color = [r, g, b].map(|c| c.min(1.0));
     let (reflectance, from) = match measured {
@@ -105,7 +114,8 @@ fn paint(
             format!("colour {r:.3} {g:.3} {b:.3}, upsampled"),
         ),
     };
-    Material {
+    let bright = reflectance.iter().any(|v| *v > GREATEST_ALBEDO);
+    let material = Material {
         name: name.into(),
         index: raw.index,
         sides: if raw.double_sided {
@@ -134,20 +144,8 @@ fn paint(
             },
             AlphaMode::Opaque | AlphaMode::Blend => Alpha::Opaque,
         },
-    }
-}
-
-/// Under a texture the factor is 1 as a rule and says nothing of the albedo.
-fn albedo_is_brought_down(raw: &RawMaterial, measured: Option<&Sampled>) -> bool {
-    match measured {
-        Some(measured) => measured.leaves.iter().any(|v| *v > GREATEST_ALBEDO),
-        None => {
-            let over = raw.base_color_factor[..3]
-                .iter()
-                .any(|c| f64::from(*c) > GREATEST_ALBEDO);
-            over && raw.base_color_texture.is_none()
-        }
-    }
+    };
+    (material, bright)
 }
 
 fn emission(
@@ -264,7 +262,16 @@ mod tests {
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
         let file = SpectraFile::default();
-        let mut made = materials(raw, &file, room, &grid, &upsampler, &mut lamps, &mut check);
+        let mut made = materials(
+            raw,
+            &vec![false; raw.len()],
+            &file,
+            room,
+            &grid,
+            &upsampler,
+            &mut lamps,
+            &mut check,
+        );
         let spectra = lamps.finish(&mut made, &mut []);
         let (problems, warnings) = check.into_parts();
         (
@@ -352,7 +359,14 @@ mod tests {
         let room = folder.path().join("room.glb");
         let file = SpectraFile::default();
         let mut made = materials(
-            &raws, &file, &room, &grid, &upsampler, &mut lamps, &mut check,
+            &raws,
+            &[false; 5],
+            &file,
+            &room,
+            &grid,
+            &upsampler,
+            &mut lamps,
+            &mut check,
         );
         let spectra = lamps.finish(&mut made, &mut []);
         assert_eq!(spectra.len(), 2, "equal spectra are one");
