@@ -3,6 +3,7 @@
 //! Only what some surface or lamp of the scene uses counts. A plan never leaves out an effect that could change the
 //! picture: where a question would be too dear to answer, the effect runs.
 
+use super::json::short;
 use super::lacking::lacking;
 use super::material::listed;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
@@ -214,7 +215,7 @@ impl fmt::Display for Plan {
 }
 
 fn quoted(name: &str) -> String {
-    format!("'{name}'")
+    format!("'{}'", short(name))
 }
 
 fn number_of(names: &[String], what: &str) -> (bool, String) {
@@ -263,12 +264,12 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
     let mut grey = |index: usize| *greys.entry(index).or_insert_with(|| grey_image(index));
     for material in used {
         if !is_flat(&material.reflectance) {
-            return (true, format!("'{}' has a colour", material.name));
+            return (true, format!("{} has a colour", quoted(&material.name)));
         }
         if material.paint.as_ref().is_some_and(|t| !grey(t.image)) {
             return (
                 true,
-                format!("the texture of '{}' has colours", material.name),
+                format!("the texture of {} has colours", quoted(&material.name)),
             );
         }
         if let Some(emission) = &material.emission {
@@ -276,7 +277,10 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
             if tinted || !is_flat(&emission.shape) {
                 return (
                     true,
-                    format!("the light of '{}' has a colour of its own", material.name),
+                    format!(
+                        "the light of {} has a colour of its own",
+                        quoted(&material.name)
+                    ),
                 );
             }
         }
@@ -284,7 +288,7 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
     if let Some(light) = scene.lights.iter().find(|l| !is_flat(&l.shape)) {
         return (
             true,
-            format!("the light '{}' has a colour of its own", light.name),
+            format!("the light {} has a colour of its own", quoted(&light.name)),
         );
     }
     let painted = |s: &&Surface| {
@@ -348,8 +352,9 @@ fn blocked(surfaces: &[Surface], lights: &[PunctualLight]) -> Option<String> {
             }
             if let Some(light) = lights.iter().filter(stands).find(|l| behind(l.position)) {
                 return Some(format!(
-                    "the light '{}' stands behind {}",
-                    light.name, surface.name
+                    "the light {} stands behind {}",
+                    quoted(&light.name),
+                    surface.name
                 ));
             }
             let parallel = lights.iter().filter(|l| l.kind == LightKind::Directional);
@@ -358,8 +363,9 @@ fn blocked(surfaces: &[Surface], lights: &[PunctualLight]) -> Option<String> {
                 .find(|l| normal.dot(l.direction) > -CONVEX_TOLERANCE)
             {
                 return Some(format!(
-                    "the light '{}' shines on the back of {}",
-                    light.name, surface.name
+                    "the light {} shines on the back of {}",
+                    quoted(&light.name),
+                    surface.name
                 ));
             }
             pairs += vertices.len();

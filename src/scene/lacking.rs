@@ -2,6 +2,7 @@
 //!
 //! Known are the extensions that change the light. Nothing of them is worked out: each is named, with its materials.
 
+use super::json::short;
 use super::material::listed;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -58,7 +59,10 @@ pub fn lacking(document: &Value) -> Vec<Lacking> {
         .enumerate()
     {
         let name = material["name"].as_str().filter(|n| !n.is_empty());
-        let name = name.map_or_else(|| format!("material {index}"), |n| format!("'{n}'"));
+        let name = name.map_or_else(
+            || format!("material {index}"),
+            |n| format!("'{}'", short(n)),
+        );
         for extension in material["extensions"]
             .as_object()
             .into_iter()

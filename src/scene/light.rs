@@ -10,6 +10,7 @@
 //! KHR_lights_punctual's `range` is a cut-off of renderers, not of light: it is passed over with a warning.
 
 use super::check::Check;
+use super::json::short;
 use super::raw::{RawLight, RawLightKind};
 use super::spectra_file::{Sampled, SpectraFile};
 use super::{LightKind, LightSpectrum, Material, PunctualLight};
@@ -209,7 +210,7 @@ pub(crate) fn punctual(
     raw.iter()
         .filter_map(|light| {
             let name = name_of(light);
-            let place = format!("node {}, light '{name}'", light.node);
+            let place = format!("node {}, light '{}'", light.node, short(&name));
             let values = light.color.iter().chain([&light.intensity]);
             if values.clone().any(|v| !v.is_finite() || *v < 0.0) {
                 let what = "has a colour or intensity that is negative or not a number";

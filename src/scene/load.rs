@@ -23,6 +23,15 @@ pub struct Options {
 impl Scene {
     /// Reads a room.
     ///
+    /// ```
+    /// use haarlight::scene::{Options, Scene, effects::{Kind, Plan}};
+    /// let room = Scene::load("scenes/convex.glb", &Options::default())?;
+    /// assert_eq!(room.materials[0].name, "floor");
+    /// // Nothing can block in a convex empty room, so that no visibility is worked out.
+    /// assert!(!Plan::of(&room).runs(Kind::Occlusion));
+    /// # Ok::<(), haarlight::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// [`Error::Io`] if there is no such file; [`Error::Input`] with all problems of document, geometry, materials,
     /// lights and spectra.

@@ -6,19 +6,45 @@
 //! No gloss, no transmission.
 
 use super::check::Check;
+use super::json::short;
 use super::light::{Lamp, Lamps};
 use super::raw::{AlphaMode, RawMaterial};
 use super::spectra_file::{MaterialSpectra, Sampled, SpectraFile};
 use super::{Alpha, Emission, Material, Sides};
 use crate::color::Upsampler;
-use crate::spectrum::Grid;
+use crate::spectrum::{Grid, Leaves};
 use std::path::Path;
 
 /// Greatest albedo: at 1 a closed room that emits has no steady state, near it the condition is 1/(1 - albedo).
-pub(crate) const GREATEST_ALBEDO: f64 = 0.999;
+pub const GREATEST_ALBEDO: f64 = 0.999;
 
 /// From here on a material counts as a metal in warnings.
 const METALLIC: f32 = 0.5;
+
+impl Material {
+    /// The reflectance where paint (texel times vertex colour, linear) multiplies the base colour; `[1, 1, 1]`, and any
+    /// paint on a measured material, leave [`Material::reflectance`]. Greys come out exactly flat.
+    pub fn reflectance_at(&self, paint: [f32; 3], upsampler: &Upsampler) -> Leaves {
+        if paint == [1.0; 3] || self.paint.is_none() && !self.vertex_paint {
+            return self.reflectance;
+        }
+        let rgb = std::array::from_fn(|i| self.base_color[i] * paint[i]);
+        upsampler
+            .reflectance_fast(rgb)
+            .map(|r| r.min(GREATEST_ALBEDO))
+    }
+}
+
+impl Emission {
+    /// The shape at a point whose emissive texture has this linear value; `[1, 1, 1]` gives [`Emission::shape`].
+    pub fn shape_at(&self, texel: [f32; 3], upsampler: &Upsampler) -> Leaves {
+        if texel == [1.0; 3] {
+            return self.shape;
+        }
+        let rgb = std::array::from_fn(|i| self.color[i] * texel[i]);
+        upsampler.reflectance_fast(rgb).map(|s| s * self.scale)
+    }
+}
 
 /// What the warnings name materials for.
 #[derive(Default)]
@@ -50,7 +76,7 @@ pub(crate) fn materials(
         .zip(tinted)
         .map(|(raw, tinted)| {
             let name = name_of(raw);
-            let place = format!("material '{name}'");
+            let place = format!("material '{}'", short(&name));
             let spectra = file.material(&name, raw.extras.as_ref(), room, grid, check);
             let raw = &checked(raw, &place, check);
             said.hear(raw, &name);
@@ -219,7 +245,7 @@ impl Said {
         ];
         for (names, what) in warnings {
             if !names.is_empty() {
-                let names: Vec<String> = names.iter().map(|n| format!("'{n}'")).collect();
+                let names: Vec<String> = names.iter().map(|n| format!("'{}'", short(n))).collect();
                 check.warn(format!("{what} ({})", listed(&names)));
             }
         }
@@ -402,6 +428,16 @@ mod tests {
         assert_eq!(materials[1].base_color, [1.0; 3]);
         assert_eq!(materials[1].reflectance_from, "cornell/red");
         assert!(materials[1].reflectance[50] > 5.0 * materials[1].reflectance[10]);
+        let upsampler = Upsampler::new(&Grid::default());
+        let paint = [0.5, 0.25, 1.0];
+        assert_eq!(
+            materials[1].reflectance_at(paint, &upsampler),
+            materials[1].reflectance
+        );
+        let painted = upsampler.rgb(&materials[0].reflectance_at(paint, &upsampler));
+        for (seen, wanted) in painted.into_iter().zip([0.1, 0.075, 0.4]) {
+            assert!((seen - wanted).abs() < 1e-4, "{seen} {wanted}");
+        }
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod texture_info;
 mod uri;
 
 pub use load::Options;
+pub use material::GREATEST_ALBEDO;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};
@@ -144,7 +145,8 @@ pub enum Alpha {
     },
 }
 
-/// Lambertian emission: radiance(leaf) = spectra[light].power[leaf] * shape[leaf] * texture luminance shape, W/m2/sr/nm.
+/// Lambertian emission: `radiance(leaf) = spectra[light].power[leaf] * shape[leaf]`, W/m2/sr/nm; where there is a
+/// texture the shape differs from point to point ([`Emission::shape_at`]).
 #[derive(Debug, Clone)]
 pub struct Emission {
     /// Index in [`Scene::spectra`].
@@ -183,7 +185,7 @@ pub struct PunctualLight {
     pub direction: DVec3,
     /// Index in [`Scene::spectra`].
     pub light: usize,
-    /// intensity(leaf) = spectra[light].power[leaf] * shape[leaf].
+    /// `intensity(leaf) = spectra[light].power[leaf] * shape[leaf]`.
     pub shape: Leaves,
 }
 

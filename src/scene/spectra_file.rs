@@ -19,6 +19,7 @@
 //! Unknown keys of the file are a warning; unknown keys of `extras` belong to other programs and are passed over.
 
 use super::check::Check;
+use super::json::short;
 use super::uri;
 use crate::data::{Kind, Named, Outside, Table, edit_distance, named, nearest};
 use crate::spectrum::{Grid, Leaves};
@@ -116,13 +117,13 @@ impl SpectraFile {
         };
         reader.keys(top, &["materials", "lights"], &place);
         for (name, entry) in reader.entries(top, "materials", &place) {
-            let place = format!("{place}: material '{name}'");
+            let place = format!("{place}: material '{}'", short(name));
             reader.known(name, materials, "material", &place);
             let spectra = reader.material(entry, &place);
             file.materials.insert(name.clone(), spectra);
         }
         for (name, entry) in reader.entries(top, "lights", &place) {
-            let place = format!("{place}: light '{name}'");
+            let place = format!("{place}: light '{}'", short(name));
             reader.known(name, lights, "light", &place);
             if let Some(spectrum) = reader.light(entry, &place) {
                 file.lights.insert(name.clone(), spectrum);
@@ -148,7 +149,7 @@ impl SpectraFile {
         };
         let own = extras
             .filter(|extras| extras.is_object())
-            .map(|extras| reader.material(extras, &format!("material '{name}', extras")))
+            .map(|extras| reader.material(extras, &format!("material '{}', extras", short(name))))
             .unwrap_or_default();
         self.materials
             .get(name)
@@ -181,20 +182,20 @@ impl SpectraFile {
             unknown: Unknown::Ignore,
         };
         is_ours
-            .then(|| reader.light(extras, &format!("light '{name}', extras")))
+            .then(|| reader.light(extras, &format!("light '{}', extras", short(name))))
             .flatten()
     }
 }
 
 /// The three nearest of the room's own names.
-fn nearest_of<'a>(name: &str, names: &'a [String]) -> Vec<&'a str> {
+fn nearest_of(name: &str, names: &[String]) -> Vec<String> {
     let mut ranked: Vec<(usize, &str)> = names
         .iter()
         .map(|n| (edit_distance(name, n), n.as_str()))
         .collect();
     ranked.sort();
     ranked.dedup();
-    ranked.into_iter().take(3).map(|(_, n)| n).collect()
+    ranked.into_iter().take(3).map(|(_, n)| short(n)).collect()
 }
 
 /// `room.spectra.json` for `room.glb`, if it is there.
@@ -326,7 +327,7 @@ impl Reader<'_> {
                 None
             }
             None => {
-                let what = format!("no spectrum is named '{name}'");
+                let what = format!("no spectrum is named '{}'", short(name));
                 let next = format!("the nearest names are {}", nearest(name).join(", "));
                 self.check.problem(place, what, next);
                 None
@@ -401,7 +402,8 @@ impl Reader<'_> {
         }
         for key in object.keys().filter(|key| !known.contains(&key.as_str())) {
             self.check.warn(format!(
-                "{place}: unknown key \"{key}\"; known are {}",
+                "{place}: unknown key \"{}\"; known are {}",
+                short(key),
                 known.join(", ")
             ));
         }

@@ -181,6 +181,41 @@ pub fn control<I: Interval>(
     }
 }
 
+/// Merges pairs while the error stays at most `eps_max`: the shortest list that the greedy choice of pairs finds.
+///
+/// A list whose error is already above the limit is left as it is. Returns the number of merges.
+///
+/// ```
+/// use haarlight::color::{Observer, luv_jacobian};
+/// use haarlight::spectrum::{CmfTree, Control, Grid, Metric, Moment, List, Partition, coarsen};
+/// let cmf = CmfTree::new(Observer::cie1931().weights(&Grid::default()));
+/// let mut list = List::<Moment>::from_values(Partition::uniform(4), &[0.5; 16]);
+/// let (white, colour) = (*cmf.node(1), list.xyz(&cmf));
+/// let metric = Metric::Luv(luv_jacobian(colour, white));
+/// coarsen(&mut list, &cmf, &metric, &Control::within(0.5));
+/// assert_eq!(list.partition(), Partition::ROOT);
+/// ```
+pub fn coarsen<I: Interval>(
+    list: &mut List<I>,
+    cmf: &CmfTree,
+    metric: &Metric,
+    settings: &Control,
+) -> usize {
+    let mut merges = 0;
+    while list.partition().count() > settings.floor {
+        let Some((first, whole)) = best_pair(list, cmf, metric, settings) else {
+            break;
+        };
+        let change = difference(list, list.partition().rank(first), &whole);
+        if metric.size(add(list.error(), change), list.radius()) > settings.eps_max {
+            break;
+        }
+        list.merge(first, whole);
+        merges += 1;
+    }
+    merges
+}
+
 /// Change of the whole error when the pair at `rank` becomes `whole`.
 fn difference<I: Interval>(list: &List<I>, rank: usize, whole: &I) -> Cmf {
     let (l, r, w) = (

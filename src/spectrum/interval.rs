@@ -32,6 +32,15 @@ pub trait Interval: Copy + Default + std::fmt::Debug {
     #[must_use]
     fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], rule: Representative) -> Self;
 
+    /// One half of an interval, whose own spectrum is not known beyond the record of the whole; `whole` and `half` are the
+    /// sums of the colour matching functions. The errors of the two halves add up to that of the whole.
+    #[must_use]
+    fn half(&self, whole: &Cmf, half: &Cmf) -> Self;
+
+    /// This plus `factor` (not negative) times another spectrum on the same interval.
+    #[must_use]
+    fn plus(&self, factor: f64, other: &Self) -> Self;
+
     /// The value.
     fn value(&self) -> f64;
 
@@ -104,6 +113,29 @@ impl Interval for Estimate {
         Self { value, error }
     }
 
+    fn half(&self, whole: &Cmf, half: &Cmf) -> Self {
+        let share = |a: usize| {
+            if whole[a] > 0.0 {
+                half[a] / whole[a]
+            } else {
+                0.0
+            }
+        };
+        Self {
+            value: self.value,
+            error: std::array::from_fn(|a| self.error[a] * share(a)),
+        }
+    }
+
+    #[inline]
+    fn plus(&self, factor: f64, other: &Self) -> Self {
+        let error = std::array::from_fn(|a| self.error[a] + factor * other.error[a]);
+        Self {
+            value: self.value + factor * other.value,
+            error,
+        }
+    }
+
     #[inline]
     fn value(&self) -> f64 {
         self.value
@@ -157,6 +189,15 @@ impl Interval for Moment {
     #[inline]
     fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], rule: Representative) -> Self {
         Self(Estimate::merged(&left.0, &right.0, cmf, rule))
+    }
+
+    fn half(&self, whole: &Cmf, half: &Cmf) -> Self {
+        Self(self.0.half(whole, half))
+    }
+
+    #[inline]
+    fn plus(&self, factor: f64, other: &Self) -> Self {
+        Self(self.0.plus(factor, &other.0))
     }
 
     #[inline]

@@ -13,6 +13,8 @@ use super::tree::{CmfTree, Tree, node};
 pub struct List<I> {
     partition: Partition,
     intervals: [I; LEAVES],
+    /// Radius of the error of the whole: the sum over the intervals, or less where an interval was halved blindly.
+    radius: Cmf,
 }
 
 impl<I: Interval> List<I> {
@@ -23,6 +25,7 @@ impl<I: Interval> List<I> {
         for (slot, (first, len)) in list.intervals.iter_mut().zip(partition.iter()) {
             *slot = *tree.node(node(first, len));
         }
+        list.settle();
         list
     }
 
@@ -45,6 +48,7 @@ impl<I: Interval> List<I> {
         for (slot, &value) in self.intervals.iter_mut().zip(&values[..partition.count()]) {
             *slot = I::constant(value);
         }
+        self.radius = [0.0; 3];
     }
 
     /// Nothing, as one interval.
@@ -52,6 +56,7 @@ impl<I: Interval> List<I> {
         Self {
             partition: Partition::ROOT,
             intervals: [I::default(); LEAVES],
+            radius: [0.0; 3],
         }
     }
 
@@ -81,12 +86,34 @@ impl<I: Interval> List<I> {
             .fold([0.0; 3], |sum, i| add(sum, i.error()))
     }
 
-    /// Sum of the radii of the errors.
+    /// How far the error of the whole may lie from [`List::error`], for each tristimulus value; zero where that is not known.
     #[inline]
     pub fn radius(&self) -> Cmf {
-        self.intervals()
+        self.radius
+    }
+
+    /// After the records were written: the radius of the whole is the sum over the intervals.
+    #[inline]
+    pub(super) fn settle(&mut self) {
+        self.radius = self
+            .intervals()
             .iter()
-            .fold([0.0; 3], |sum, i| add(sum, i.radius()))
+            .fold([0.0; 3], |sum, i| add(sum, i.radius()));
+    }
+
+    /// Sets the radius of the whole to one that is known to be less than the sum.
+    pub(super) fn set_radius(&mut self, radius: Cmf) {
+        self.radius = radius;
+    }
+
+    /// Tristimulus values with the estimated error added back: as near to the truth as the list can tell, within
+    /// [`List::radius`]. The list carries the errors anyway, so this costs a sum.
+    ///
+    /// The paper controls the error of [`List::xyz`] and gives that out. On its own tests these values are on average 3
+    /// (primary) to 6 (tertiary) times nearer to the truth.
+    #[inline]
+    pub fn corrected_xyz(&self, cmf: &CmfTree) -> Cmf {
+        add(self.xyz(cmf), self.error())
     }
 
     /// Change to tristimulus values (3.3): A = sum of value times A_a.
@@ -120,6 +147,25 @@ impl<I: Interval> List<I> {
         self.intervals.copy_within(rank + 1..count, rank + 2);
         self.intervals[rank..rank + 2].copy_from_slice(&halves);
         self.partition = finer;
+        self.settle();
+    }
+
+    /// Halves the interval at `first` without knowledge of more than its record: values and the error of the whole stay.
+    pub fn halve(&mut self, first: usize, cmf: &CmfTree) {
+        if self.partition.split(first).is_none() {
+            return;
+        }
+        let (rank, n) = (
+            self.partition.rank(first),
+            node(first, self.partition.len_at(first)),
+        );
+        let whole = self.intervals[rank];
+        let radius = self.radius;
+        self.split(
+            first,
+            [2 * n, 2 * n + 1].map(|child| whole.half(cmf.node(n), cmf.node(child))),
+        );
+        self.radius = radius;
     }
 
     /// What the sibling pair whose left half starts at `first` would be as one interval.
@@ -173,6 +219,7 @@ impl<I: Interval> List<I> {
     pub fn copy_from(&mut self, other: &Self) {
         let count = other.partition.count();
         self.partition = other.partition;
+        self.radius = other.radius;
         self.intervals[..count].copy_from_slice(&other.intervals[..count]);
     }
 }

@@ -54,5 +54,6 @@ impl<I: Interval> List<I> {
             let n = node(first, len);
             *slot = s.times(reflectance.node(n), cmf.node(n));
         }
+        out.settle();
     }
 }

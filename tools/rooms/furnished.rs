@@ -46,8 +46,8 @@ fn at_detail(detail: usize) -> Glb {
     glb.camera(
         "window side",
         dvec3(5.6, 1.6, 0.4),
-        dvec3(1.6, 0.8, 3.6),
-        1.1,
+        dvec3(2.4, 0.8, 4.2),
+        1.2,
         4.0 / 3.0,
     );
     glb.camera(

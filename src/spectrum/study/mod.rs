@@ -1,8 +1,11 @@
 //! The paper's tests (section 4) as measurements that anyone can repeat.
 
+pub mod bounds;
 mod chart;
+pub mod compare;
+pub mod modes;
 pub mod table1;
 mod walk;
 
 pub use chart::{Chart, Light, Reflectances};
-pub use walk::{LEVELS, Sample, walk};
+pub use walk::{Extent, LEVELS, Sample, Start, sample, walk};

@@ -1,16 +1,16 @@
 //! Table 1 (paper 4.1): intervals, errors and operations, measured beside printed.
 
 use super::chart::{Chart, Light};
-use super::walk::{Sample, walk};
+use super::walk::{Sample, Start, sample};
 use crate::color::de_luv;
-use crate::spectrum::{Control, Estimate, Metric, Operation, Tree, control, represent};
+use crate::spectrum::{Control, Estimate, Metric, Operation, control, represent};
 use serde::Serialize;
 
 /// "Refinement of S".
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Source {
     /// Number of intervals.
-    pub intervals: f64,
+    pub intervals: usize,
     /// Length of the error in XYZ, Y of the source = 1.
     pub xyz_error: f64,
     /// dE*uv.
@@ -83,14 +83,19 @@ impl Level {
 impl Column {
     /// Runs the paper's tests for one light with the paper's control.
     pub fn measure(chart: &Chart, light: &Light) -> Self {
-        let tree = Tree::<Estimate>::new(&light.power, &chart.cmf);
-        let list = represent(&tree, &chart.cmf, &Metric::Xyz, Control::PAPER.eps_max);
+        let start = Start::<Estimate>::new(chart, light);
+        let list = represent(
+            start.source(),
+            &chart.cmf,
+            &Metric::Xyz,
+            Control::PAPER.eps_max,
+        );
         let source = Source {
-            intervals: list.partition().count() as f64,
+            intervals: list.partition().count(),
             xyz_error: Metric::Xyz.size(list.error(), list.radius()),
             luv_error: de_luv(list.xyz(&chart.cmf), light.white, light.white),
         };
-        let levels = walk(chart, light, &list, |list, path| {
+        let levels = sample(&start, &list, |list, path| {
             control(list, path, &chart.cmf, &Metric::Xyz, &Control::PAPER)
         });
         let [primary, secondary, tertiary] =
@@ -113,7 +118,7 @@ impl Column {
 pub const PRINTED: [Column; 3] = [
     Column {
         source: Source {
-            intervals: 8.0,
+            intervals: 8,
             xyz_error: 0.0014,
             luv_error: 0.26,
         },
@@ -127,7 +132,7 @@ pub const PRINTED: [Column; 3] = [
     },
     Column {
         source: Source {
-            intervals: 7.0,
+            intervals: 7,
             xyz_error: 0.0013,
             luv_error: 0.33,
         },
@@ -141,7 +146,7 @@ pub const PRINTED: [Column; 3] = [
     },
     Column {
         source: Source {
-            intervals: 11.0,
+            intervals: 11,
             xyz_error: 0.0015,
             luv_error: 0.27,
         },

@@ -22,77 +22,152 @@ pub struct Sample {
     pub luv_error: f64,
     /// True error, CIEDE2000.
     pub de2000: f64,
+    /// dE*uv that is left when the estimated error is added back.
+    pub corrected_luv: f64,
+    /// CIEDE2000 of the same.
+    pub corrected_de2000: f64,
 }
 
-/// Runs `step` on every product and measures the outcome; one list of samples for each level.
-///
-/// `step` gets the product on the cut of the level before and the path that leads to it.
+/// What a walk starts from: a light, its tree, its list, and the trees of the patches.
+#[derive(Debug, Clone)]
+pub struct Start<'a, I> {
+    chart: &'a Chart,
+    light: &'a Light,
+    source: Tree<I>,
+    materials: Vec<Tree<I>>,
+}
+
+impl<'a, I: Interval> Start<'a, I> {
+    /// Builds the trees (pre-processing, 3.1.2).
+    pub fn new(chart: &'a Chart, light: &'a Light) -> Self {
+        let materials = chart
+            .reflectances
+            .iter()
+            .map(|r| Tree::new(r, &chart.cmf))
+            .collect();
+        Self {
+            chart,
+            light,
+            source: Tree::new(&light.power, &chart.cmf),
+            materials,
+        }
+    }
+
+    /// The light's tree.
+    pub fn source(&self) -> &Tree<I> {
+        &self.source
+    }
+
+    /// The patches' trees.
+    pub fn materials(&self) -> &[Tree<I>] {
+        &self.materials
+    }
+}
+
+/// How much of the 24 + 24^2 + 24^3 products a walk visits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// Only so many levels, in 1..=3, and of the third level one in `stride` products, spread evenly over the chart.
+    Part {
+        /// Levels.
+        levels: usize,
+        /// One in so many tertiary products.
+        stride: usize,
+    },
+    /// Everything.
+    Whole,
+}
+
+/// Calls `step` with every product: the list on the cut of the level before, the path that leads to it, the exact leaves.
+/// What `step` makes of the list is what the next level starts from.
 pub fn walk<I: Interval>(
-    chart: &Chart,
-    light: &Light,
-    source: &List<I>,
-    mut step: impl FnMut(&mut List<I>, &Path<'_, I>) -> Operation,
-) -> [Vec<Sample>; 3] {
-    let cmf = &chart.cmf;
-    let tree = Tree::new(&light.power, cmf);
-    let materials: Vec<Tree<I>> = chart
-        .reflectances
-        .iter()
-        .map(|r| Tree::new(r, cmf))
-        .collect();
-    let mut samples = [const { Vec::new() }; 3];
-    let mut lists = [source.clone(), source.clone(), source.clone()];
-    let mut visit =
-        |level: usize, lists: &mut [List<I>; 3], reflections: &[&Tree<I>], exact: &Leaves| {
-            let mut list = List::black();
-            let from = if level == 0 {
-                source
-            } else {
-                &lists[level - 1]
-            };
-            from.reflect(reflections[level], cmf, &mut list);
-            let operation = step(
-                &mut list,
-                &Path {
-                    source: &tree,
-                    reflections,
-                },
-            );
-            samples[level].push(measure(&list, operation, exact, light, cmf));
-            lists[level].copy_from(&list);
-        };
-    for a in &materials {
-        let first = times(&light.power, a.leaves());
-        visit(0, &mut lists, &[a], &first);
-        for b in &materials {
-            let second = times(&first, b.leaves());
-            visit(1, &mut lists, &[a, b], &second);
-            for c in &materials {
-                visit(2, &mut lists, &[a, b, c], &times(&second, c.leaves()));
+    start: &Start<'_, I>,
+    list: &List<I>,
+    extent: Extent,
+    mut step: impl FnMut(&mut List<I>, &Path<'_, I>, &Leaves),
+) {
+    let (depth, stride) = match extent {
+        Extent::Part { levels, stride } => (levels, stride),
+        Extent::Whole => (3, 1),
+    };
+    let cmf = &start.chart.cmf;
+    let (mut first, mut second, mut third) = (List::black(), List::black(), List::black());
+    let mut visit = |from: &List<I>, to: &mut List<I>, reflections: &[&Tree<I>], exact: &Leaves| {
+        from.reflect(reflections[reflections.len() - 1], cmf, to);
+        step(
+            to,
+            &Path {
+                source: &start.source,
+                reflections,
+            },
+            exact,
+        );
+    };
+    for (i, a) in start.materials.iter().enumerate() {
+        let once = times(&start.light.power, a.leaves());
+        visit(list, &mut first, &[a], &once);
+        for (j, b) in start.materials.iter().enumerate().filter(|_| depth > 1) {
+            let twice = times(&once, b.leaves());
+            visit(&first, &mut second, &[a, b], &twice);
+            for (_, c) in start
+                .materials
+                .iter()
+                .enumerate()
+                .filter(|(k, _)| depth > 2 && (i + j + k) % stride == 0)
+            {
+                visit(&second, &mut third, &[a, b, c], &times(&twice, c.leaves()));
             }
         }
     }
-    samples
 }
 
-fn measure<I: Interval>(
-    list: &List<I>,
-    operation: Operation,
-    exact: &Leaves,
-    light: &Light,
-    cmf: &CmfTree,
-) -> Sample {
-    let (reference, ours) = (tristimulus(exact, cmf.leaves()), list.xyz(cmf));
-    Sample {
-        intervals: list.partition().count(),
-        operation,
-        xyz_error: (0..3)
-            .map(|a| (reference[a] - ours[a]).powi(2))
-            .sum::<f64>()
-            .sqrt(),
-        luv_error: de_luv(reference, ours, light.white),
-        de2000: de2000(reference, ours, light.white),
+impl Sample {
+    /// Measures a list against the exact leaves.
+    pub fn new<I: Interval>(
+        list: &List<I>,
+        operation: Operation,
+        exact: &Leaves,
+        light: &Light,
+        cmf: &CmfTree,
+    ) -> Self {
+        let (reference, ours, corrected) = (
+            tristimulus(exact, cmf.leaves()),
+            list.xyz(cmf),
+            list.corrected_xyz(cmf),
+        );
+        Self {
+            intervals: list.partition().count(),
+            operation,
+            xyz_error: (0..3)
+                .map(|a| (reference[a] - ours[a]).powi(2))
+                .sum::<f64>()
+                .sqrt(),
+            luv_error: de_luv(reference, ours, light.white),
+            de2000: de2000(reference, ours, light.white),
+            corrected_luv: de_luv(reference, corrected, light.white),
+            corrected_de2000: de2000(reference, corrected, light.white),
+        }
     }
+}
+
+/// Samples of a whole walk, level by level; `step` controls the list and says what it did.
+pub fn sample<I: Interval>(
+    start: &Start<'_, I>,
+    list: &List<I>,
+    mut step: impl FnMut(&mut List<I>, &Path<'_, I>) -> Operation,
+) -> [Vec<Sample>; 3] {
+    let mut samples = [const { Vec::new() }; 3];
+    walk(start, list, Extent::Whole, |list, path, exact| {
+        let operation = step(list, path);
+        samples[path.reflections.len() - 1].push(Sample::new(
+            list,
+            operation,
+            exact,
+            start.light,
+            &start.chart.cmf,
+        ));
+    });
+    samples
 }
 
 fn times(a: &Leaves, b: &Leaves) -> Leaves {

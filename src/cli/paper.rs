@@ -1,0 +1,213 @@
+//! `haarlight paper`: the tables of Rougeron and Péroche 1997, measured beside printed, and what lies beyond them.
+//!
+//! Results go to stdout. `--json` gives one object with `table1` (by light), `table2`, `control`, `bounds`, `methods`;
+//! field by field it is documented on the row types of [`crate::spectrum::study`]. Shares are in percent.
+
+use crate::spectrum::study::table1::{Column, PRINTED, ROWS, mean_differences};
+use crate::spectrum::study::{Chart, LEVELS, Light, Reflectances, bounds, modes};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::io::Write as _;
+
+/// The paper's tables, measured beside printed.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct PaperArgs {
+    /// One JSON object instead of tables.
+    #[arg(long)]
+    json: bool,
+    /// Which measured chart stands in for the paper's, which is not published.
+    #[arg(long, value_enum, default_value_t)]
+    reflectances: Reflectances,
+}
+
+/// Everything that is measured.
+struct Results {
+    columns: [Column; 3],
+    control: Vec<modes::Row>,
+    bounds: Vec<bounds::Row>,
+}
+
+/// Runs the tests and prints them.
+///
+/// # Errors
+/// If stdout cannot be written.
+pub fn run(args: &PaperArgs) -> crate::Result<()> {
+    let results = measure(args.reflectances);
+    let text = if args.json {
+        format!("{:#}\n", to_json(&results))
+    } else {
+        to_text(&results)
+    };
+    std::io::stdout()
+        .write_all(text.as_bytes())
+        .map_err(|source| crate::Error::io("stdout".as_ref(), source))
+}
+
+fn measure(source: Reflectances) -> Results {
+    let chart = Chart::new(source);
+    let lights = chart.lights();
+    let white = chart.light("D65").white;
+    let mut control: Vec<_> = lights
+        .iter()
+        .flat_map(|light| modes::measure(&chart, light, light.name))
+        .collect();
+    // Several lights in one scene are seen under one white.
+    for light in lights.iter().filter(|light| light.white != white) {
+        control.extend(modes::measure(
+            &chart,
+            &Light {
+                white,
+                ..light.clone()
+            },
+            &format!("{} under D65", light.name),
+        ));
+    }
+    Results {
+        columns: lights
+            .each_ref()
+            .map(|light| Column::measure(&chart, light)),
+        control,
+        bounds: lights
+            .iter()
+            .flat_map(|light| bounds::measure(&chart, light))
+            .collect(),
+    }
+}
+
+fn to_json(results: &Results) -> Value {
+    let [c, d65, f2] = &results.columns;
+    json!({
+        "table1": { "C": c, "D65": d65, "F2": f2 },
+        "control": results.control,
+        "bounds": results.bounds,
+    })
+}
+
+fn to_text(results: &Results) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = table1(&mut text, &results.columns);
+    let _ = control(&mut text, &results.control);
+    let _ = bound(&mut text, &results.bounds);
+    text
+}
+
+fn table1(text: &mut String, columns: &[Column; 3]) -> std::fmt::Result {
+    writeln!(text, "Table 1: measured (printed)\n")?;
+    writeln!(text, "{:22}{:>18}{:>18}{:>18}", "", "C", "D65", "F2")?;
+    let source = |column: &Column| {
+        [
+            column.source.intervals as f64,
+            column.source.xyz_error,
+            column.source.luv_error,
+        ]
+    };
+    for (row, name) in ["S: intervals", "S: XYZ error", "S: Luv error"]
+        .into_iter()
+        .enumerate()
+    {
+        let digits = [0, 4, 2][row];
+        write!(text, "{name:22}")?;
+        for (ours, printed) in columns.iter().zip(&PRINTED) {
+            write!(
+                text,
+                "{:>18}",
+                format!(
+                    "{:.digits$} ({:.digits$})",
+                    source(ours)[row],
+                    source(printed)[row]
+                )
+            )?;
+        }
+        writeln!(text)?;
+    }
+    for (level, name) in LEVELS.into_iter().enumerate() {
+        writeln!(text, "{name}")?;
+        for (row, name) in ROWS.into_iter().enumerate() {
+            let unit = if row < 5 { "" } else { " %" };
+            write!(text, "  {:20}", format!("{name}{unit}"))?;
+            for (ours, printed) in columns.iter().zip(&PRINTED) {
+                write!(
+                    text,
+                    "{:>18}",
+                    format!(
+                        "{:.2} ({:.2})",
+                        ours.levels()[level].rows()[row],
+                        printed.levels()[level].rows()[row]
+                    )
+                )?;
+            }
+            writeln!(text)?;
+        }
+    }
+    let differences = ROWS
+        .iter()
+        .zip(mean_differences(columns))
+        .map(|(name, d)| format!("{name} {d:.2}"));
+    writeln!(
+        text,
+        "\nMean |measured - printed| over lights and levels: {}\n",
+        differences.collect::<Vec<_>>().join(", ")
+    )
+}
+
+fn control(text: &mut String, rows: &[modes::Row]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "What controls the error (dE as mean / 95th percentile / max; corrected: estimated error added back)\n"
+    )?;
+    writeln!(
+        text,
+        "{:13}{:18}{:10}{:>7}{:>10}{:>9}{:>22}{:>22}{:>22}{:>22}",
+        "light",
+        "control",
+        "level",
+        "limit",
+        "intervals",
+        "> eps %",
+        "dE*uv",
+        "dE00",
+        "corrected dE*uv",
+        "corrected dE00"
+    )?;
+    let spread = |s: &modes::Spread| format!("{:.2} / {:.2} / {:.2}", s.mean, s.p95, s.max);
+    for r in rows {
+        write!(
+            text,
+            "{:13}{:18}{:10}{:>7.3}{:>10.2}{:>9.2}",
+            r.light, r.mode, r.level, r.limit, r.intervals_mean, r.above_eps_max
+        )?;
+        for s in [&r.luv, &r.de2000, &r.corrected_luv, &r.corrected_de2000] {
+            write!(text, "{:>22}", spread(s))?;
+        }
+        writeln!(text)?;
+    }
+    writeln!(text)
+}
+
+fn bound(text: &mut String, rows: &[bounds::Row]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "Bound of the neglected term (control by the bound, the paper's eps; looseness: bound / true error of the estimator)\n"
+    )?;
+    writeln!(
+        text,
+        "{:7}{:10}{:>9}{:>11}{:>9}{:>9}{:>13}{:>9}",
+        "light", "level", "products", "violations", "median", "95th", "mean error", "> eps %"
+    )?;
+    for r in rows {
+        writeln!(
+            text,
+            "{:7}{:10}{:>9}{:>11}{:>9.2}{:>9.2}{:>13.6}{:>9.2}",
+            r.light,
+            r.level,
+            r.products,
+            r.violations,
+            r.looseness_median,
+            r.looseness_p95,
+            r.estimator_error_mean,
+            r.above_eps_max
+        )?;
+    }
+    writeln!(text)
+}

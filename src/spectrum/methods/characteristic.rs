@@ -1,0 +1,96 @@
+//! Characteristic vectors (paper 2.2.2, Peercy 1993): an orthonormal basis E_i made for the scene.
+//!
+//! Training set: S, S R_i and S R_i R_j. The basis are the eigenvectors of the m greatest eigenvalues of its second
+//! moments. A reflectance is the matrix R_ij = sum R E_i E_j, tristimulus values are T_ki = sum E_i a_bar_k.
+
+use super::Method;
+use crate::color::Xyz;
+use crate::spectrum::{CmfTree, LEAVES, Leaves};
+use nalgebra::{SMatrix, SymmetricEigen};
+
+/// Spectra as coordinates in a trained basis.
+#[derive(Debug, Clone)]
+pub struct Characteristic {
+    basis: Vec<Leaves>,
+    light: Vec<f64>,
+    weights: Vec<Xyz>,
+}
+
+impl Characteristic {
+    /// m vectors (in 1..=64) for a light and the reflectances of a scene.
+    pub fn new(cmf: &CmfTree, light: &Leaves, reflectances: &[Leaves], m: usize) -> Self {
+        let mut moments = SMatrix::<f64, LEAVES, LEAVES>::zeros();
+        let mut add = |spectrum: &Leaves| {
+            let v = SMatrix::<f64, LEAVES, 1>::from_fn(|k, _| spectrum[k]);
+            moments.ger(1.0, &v, &v, 1.0);
+        };
+        add(light);
+        for first in reflectances {
+            let once: Leaves = std::array::from_fn(|k| light[k] * first[k]);
+            add(&once);
+            for second in reflectances {
+                add(&std::array::from_fn(|k| once[k] * second[k]));
+            }
+        }
+        let eigen = SymmetricEigen::new(moments);
+        let mut order: Vec<usize> = (0..LEAVES).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let basis: Vec<Leaves> = order[..m]
+            .iter()
+            .map(|&i| std::array::from_fn(|k| eigen.eigenvectors[(k, i)]))
+            .collect();
+        let dot = |a: &Leaves, b: &Leaves| (0..LEAVES).map(|k| a[k] * b[k]).sum::<f64>();
+        let coordinates = basis.iter().map(|e| dot(e, light)).collect();
+        let weights = basis
+            .iter()
+            .map(|e| cmf.leaves().each_ref().map(|a| dot(e, a)))
+            .collect();
+        Self {
+            basis,
+            light: coordinates,
+            weights,
+        }
+    }
+}
+
+impl Method for Characteristic {
+    fn name(&self) -> &'static str {
+        "characteristic vectors"
+    }
+
+    fn terms(&self) -> usize {
+        self.basis.len()
+    }
+
+    fn light(&self) -> Vec<f64> {
+        self.light.clone()
+    }
+
+    /// The matrix R_ij row by row.
+    fn material(&self, reflectance: &Leaves) -> Vec<f64> {
+        let entry = |i: &Leaves, j: &Leaves| {
+            (0..LEAVES)
+                .map(|k| reflectance[k] * i[k] * j[k])
+                .sum::<f64>()
+        };
+        self.basis
+            .iter()
+            .flat_map(|i| self.basis.iter().map(move |j| entry(i, j)))
+            .collect()
+    }
+
+    fn reflect(&self, spectrum: &[f64], material: &[f64], out: &mut [f64]) {
+        for (out, row) in out.iter_mut().zip(material.chunks_exact(spectrum.len())) {
+            *out = row.iter().zip(spectrum).map(|(r, s)| r * s).sum();
+        }
+    }
+
+    fn xyz(&self, spectrum: &[f64]) -> Xyz {
+        spectrum
+            .iter()
+            .zip(&self.weights)
+            .fold([0.0; 3], |sum, (s, w)| {
+                std::array::from_fn(|a| sum[a] + s * w[a])
+            })
+    }
+}

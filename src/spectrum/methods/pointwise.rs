@@ -1,0 +1,96 @@
+//! Methods whose product is term by term: each term is a weighted mean of the leaves, and tristimulus values are sums of
+//! the terms with fixed weights.
+
+use super::Method;
+use crate::color::Xyz;
+use crate::spectrum::{LEAVES, Leaves};
+
+/// n terms, each a mean of the leaves.
+#[derive(Debug, Clone)]
+pub struct Pointwise {
+    name: &'static str,
+    /// The means: for each term the weights of the leaves, of sum 1.
+    means: Vec<Leaves>,
+    /// Tristimulus weights of each term.
+    weights: Vec<Xyz>,
+    /// The light's terms; all 1 where the light is in the weights.
+    light: Vec<f64>,
+}
+
+impl Pointwise {
+    /// From means, weights and the light's terms. The weights are scaled so that the light has Y = 1.
+    pub(super) fn new(
+        name: &'static str,
+        means: Vec<Leaves>,
+        weights: Vec<Xyz>,
+        light: Vec<f64>,
+    ) -> Self {
+        let mut this = Self {
+            name,
+            means,
+            weights,
+            light,
+        };
+        let y = this.xyz(&this.light)[1];
+        if y > 0.0 {
+            this.weights.iter_mut().for_each(|w| *w = w.map(|w| w / y));
+        }
+        this
+    }
+
+    /// The terms of a spectrum.
+    pub fn terms_of(&self, spectrum: &Leaves) -> Vec<f64> {
+        self.means
+            .iter()
+            .map(|mean| mean_of(mean, spectrum))
+            .collect()
+    }
+}
+
+/// The mean of a spectrum with given weights.
+pub(super) fn mean_of(mean: &Leaves, spectrum: &Leaves) -> f64 {
+    (0..LEAVES).map(|leaf| mean[leaf] * spectrum[leaf]).sum()
+}
+
+/// The mean that is the value at a position in leaves (leaf k's value holds at k), linear between, in [0, 63].
+pub(super) fn value_at(position: f64) -> Leaves {
+    let position = position.clamp(0.0, (LEAVES - 1) as f64);
+    let below = (position as usize).min(LEAVES - 2);
+    let mut mean = [0.0; LEAVES];
+    mean[below] = 1.0 - (position - below as f64);
+    mean[below + 1] = position - below as f64;
+    mean
+}
+
+impl Method for Pointwise {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn terms(&self) -> usize {
+        self.means.len()
+    }
+
+    fn light(&self) -> Vec<f64> {
+        self.light.clone()
+    }
+
+    fn material(&self, reflectance: &Leaves) -> Vec<f64> {
+        self.terms_of(reflectance)
+    }
+
+    fn reflect(&self, spectrum: &[f64], material: &[f64], out: &mut [f64]) {
+        for ((out, s), r) in out.iter_mut().zip(spectrum).zip(material) {
+            *out = s * r;
+        }
+    }
+
+    fn xyz(&self, spectrum: &[f64]) -> Xyz {
+        spectrum
+            .iter()
+            .zip(&self.weights)
+            .fold([0.0; 3], |sum, (s, w)| {
+                std::array::from_fn(|a| sum[a] + s * w[a])
+            })
+    }
+}
