@@ -4,6 +4,7 @@
 //! their spectrum comes from, the plan of effects, and warnings. Nothing is solved.
 //!
 //! `--json` prints one object: `{"version": 1, "facts": ..., "plan": [...], "unsupported": [...], "warnings": [...]}`;
+//! `unsupported` are the extensions that are not read (the page has them among its warnings);
 //! the fields of `facts` are those of [`Facts`], with units in their names.
 
 use crate::error::{Error, Result};
@@ -58,13 +59,13 @@ pub fn run(args: &InspectArgs, grid: Grid, out: &mut impl Write) -> Result<()> {
         });
         format!("{all:#}\n")
     } else {
-        page(&facts, &plan, &unsupported, &scene.warnings)
+        page(&facts, &plan, &scene.warnings)
     };
     out.write_all(text.as_bytes())
         .map_err(|e| Error::io("standard output".as_ref(), e))
 }
 
-fn page(facts: &Facts, plan: &Plan, unsupported: &[String], warnings: &[String]) -> String {
+fn page(facts: &Facts, plan: &Plan, warnings: &[String]) -> String {
     let [low, high] = facts.bounds_m;
     let size: Vec<String> = (0..3).map(|a| format!("{:.3}", high[a] - low[a])).collect();
     let closed = &facts.closed;
@@ -141,12 +142,6 @@ fn page(facts: &Facts, plan: &Plan, unsupported: &[String], warnings: &[String])
     lines.extend(table(&rows));
     lines.push("\nEffects".into());
     lines.extend(plan.to_string().lines().map(|l| format!("  {l}")));
-    if !unsupported.is_empty() {
-        lines.push(format!(
-            "\nExtensions that are not read: {}",
-            unsupported.join(", ")
-        ));
-    }
     if !warnings.is_empty() {
         lines.push("\nWarnings".into());
         lines.extend(warnings.iter().map(|w| format!("  {w}")));

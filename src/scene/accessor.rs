@@ -1,15 +1,13 @@
 //! Reads accessors (glTF 2.0, sections 3.6.2 and 5.1): every component type, strides, sparse values, normalised
-//! integers (also as KHR_mesh_quantization allows them), views packed by EXT_meshopt_compression.
+//! integers (also as KHR_mesh_quantization allows them).
 //!
 //! Every bound is checked against the bytes that are there before anything is allocated. A normalised integer c means
 //! c / max, for signed types max(c / max, -1) (glTF 2.0, section 3.6.2.2).
 
+use crate::scene::buffers::{Buffers, Span, Views};
 use crate::scene::check::Check;
-use crate::scene::compression;
 use crate::scene::json::{self, Item};
 use serde_json::Value;
-use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// Elements that an accessor without bytes (all zeros) may have even in a small file.
 const FREE_ZEROS: usize = 65_536;
@@ -102,46 +100,22 @@ impl Layout {
     }
 }
 
-/// A stretch of bytes that a buffer view names.
-#[derive(Debug, Clone)]
-pub(crate) struct Span {
-    data: Arc<[u8]>,
-    start: usize,
-    end: usize,
-    stride: Option<usize>,
-}
-
-impl Span {
-    /// The bytes.
-    pub(crate) fn bytes(&self) -> &[u8] {
-        // Both ends were checked when the span was made.
-        &self.data[self.start..self.end]
-    }
-}
-
-/// The buffers of a document, some of which may be missing (that was reported where it was found).
-#[derive(Debug, Clone)]
-pub(crate) struct Buffers {
-    /// In order of the JSON's `buffers`; empty where `sound` is false.
-    pub(crate) bytes: Vec<Arc<[u8]>>,
-    /// Are the bytes there?
-    pub(crate) sound: Vec<bool>,
-}
-
-/// Reads the accessors of one document; remembers what it unpacked.
+/// Reads the accessors of one document.
 #[derive(Debug)]
 pub(crate) struct Accessors<'a> {
     json: &'a Value,
-    buffers: &'a Buffers,
-    unpacked: BTreeMap<usize, Option<Span>>,
+    /// Bytes of all buffers together.
+    total: usize,
+    /// Where the bytes come from.
+    pub(crate) views: Views<'a>,
 }
 
 impl<'a> Accessors<'a> {
     pub(crate) fn new(json: &'a Value, buffers: &'a Buffers) -> Self {
         Self {
             json,
-            buffers,
-            unpacked: BTreeMap::new(),
+            total: buffers.total(),
+            views: Views::new(json, buffers),
         }
     }
 
@@ -185,16 +159,22 @@ impl<'a> Accessors<'a> {
         Some((item, layout))
     }
 
-    /// Vectors of `N` components.
+    /// Vectors of `N` components; another number of them than `count` is a problem, found before they are read.
     pub(crate) fn vectors<const N: usize>(
         &mut self,
         index: usize,
+        count: Option<usize>,
         place: &str,
         check: &mut Check,
     ) -> Option<Vec<[f32; N]>> {
         let (item, layout) = self.layout(index, place, check)?;
         if layout.width != N {
             let what = format!("has {} components an element, not {N}", layout.width);
+            check.problem(&item.place, what, AGAIN);
+            return None;
+        }
+        if let Some(count) = count.filter(|&count| count != layout.count) {
+            let what = format!("has {} elements for {count} vertices", layout.count);
             check.problem(&item.place, what, AGAIN);
             return None;
         }
@@ -224,103 +204,20 @@ impl<'a> Accessors<'a> {
         each.map(|bytes| layout.component.index(bytes)).collect()
     }
 
-    /// The bytes of buffer view `index`, used at `place`.
-    pub(crate) fn view(&mut self, index: usize, place: &str, check: &mut Check) -> Option<Span> {
-        if let Some(known) = self.unpacked.get(&index) {
-            return known.clone();
-        }
-        let mut item = json::referred(self.json, "bufferViews", "bufferView", index, place, check)?;
-        item.place = format!("{place}, {}", item.place);
-        for name in compression::MESHOPT {
-            let Some(mut packed) = item.extension(name, check) else {
-                continue;
-            };
-            packed.place = format!("{}, {name}", item.place);
-            let span = self.unpack(&packed, check);
-            self.unpacked.insert(index, span.clone());
-            return span;
-        }
-        let span = self.stretch(&item, check)?;
-        match span.stride {
-            Some(0) => {
-                check.problem(&item.place, "has a byteStride of 0", AGAIN);
-                None
-            }
-            _ => Some(span),
-        }
-    }
-
-    /// The stretch of a buffer that `buffer`, `byteOffset` and `byteLength` of an item name.
-    fn stretch(&self, item: &Item<'_>, check: &mut Check) -> Option<Span> {
-        let Some(buffer) = item.index("buffer", check) else {
-            check.problem(&item.place, "names no buffer", AGAIN);
-            return None;
-        };
-        let Some(data) = self.buffers.bytes.get(buffer) else {
-            let what = format!("refers to buffer {buffer}, which the document does not have");
-            check.problem(&item.place, what, AGAIN);
-            return None;
-        };
-        if !self.buffers.sound[buffer] {
-            return None;
-        }
-        let start = item.index("byteOffset", check).unwrap_or(0);
-        let Some(length) = item.index("byteLength", check) else {
-            check.problem(&item.place, "has no byteLength", AGAIN);
-            return None;
-        };
-        let end = start.checked_add(length).filter(|&end| end <= data.len());
-        let Some(end) = end else {
-            let what = format!(
-                "reaches from byte {start} over {length} bytes, but buffer {buffer} has {}",
-                data.len()
-            );
-            check.problem(&item.place, what, AGAIN);
-            return None;
-        };
-        Some(Span {
-            data: Arc::clone(data),
-            start,
-            end,
-            stride: item.index("byteStride", check),
-        })
-    }
-
-    fn unpack(&self, packed: &Item<'_>, check: &mut Check) -> Option<Span> {
-        let source = self.stretch(packed, check)?;
-        let stride = packed.index("byteStride", check).unwrap_or(0);
-        let count = packed.index("count", check).unwrap_or(0);
-        let mode = packed.text("mode", check).unwrap_or("");
-        let filter = packed.text("filter", check).unwrap_or("NONE");
-        match compression::unpack_meshopt(source.bytes(), stride, count, mode, filter) {
-            Ok(bytes) => Some(Span {
-                start: 0,
-                end: bytes.len(),
-                data: bytes.into(),
-                stride: Some(stride),
-            }),
-            Err(what) => {
-                check.problem(&packed.place, what, "export without this compression");
-                None
-            }
-        }
-    }
-
     /// All elements, tightly packed, with the sparse ones put in.
     fn elements(&mut self, item: &Item<'_>, layout: Layout, check: &mut Check) -> Option<Vec<u8>> {
         let offset = item.index("byteOffset", check).unwrap_or(0);
         let at = &item.place;
         let mut bytes = match item.index("bufferView", check) {
             Some(view) => {
-                let span = self.view(view, at, check)?;
+                let span = self.views.view(view, at, check)?;
                 packed(&span, offset, layout, true)
                     .map_err(|what| check.problem(at, what, AGAIN))
                     .ok()?
             }
             None if item.map.contains_key("bufferView") => return None,
             None => {
-                let total: usize = self.buffers.bytes.iter().map(|b| b.len()).sum();
-                if layout.count > total.max(FREE_ZEROS) {
+                if layout.count > self.total.max(FREE_ZEROS) {
                     let what = format!("claims {} elements, but has no bytes", layout.count);
                     check.problem(at, what, AGAIN);
                     return None;
@@ -374,7 +271,7 @@ impl<'a> Accessors<'a> {
                 return None;
             };
             let offset = item.index("byteOffset", check).unwrap_or(0);
-            let span = self.view(view, &at, check)?;
+            let span = self.views.view(view, &at, check)?;
             packed(&span, offset, layout, false)
                 .map_err(|what| check.problem(&at, what, AGAIN))
                 .ok()
@@ -450,7 +347,9 @@ mod tests {
 
     /// Reads accessor 0 of `json` over one buffer as vectors; the problems' text if there are any.
     fn vectors<const N: usize>(json: &Value, buffer: &[u8]) -> Result<Vec<[f32; N]>, String> {
-        read(json, buffer, |a, check| a.vectors::<N>(0, "here", check))
+        read(json, buffer, |a, check| {
+            a.vectors::<N>(0, None, "here", check)
+        })
     }
 
     fn indices(json: &Value, buffer: &[u8]) -> Result<Vec<u32>, String> {
@@ -462,10 +361,7 @@ mod tests {
         buffer: &[u8],
         with: impl Fn(&mut Accessors<'_>, &mut Check) -> Option<T>,
     ) -> Result<T, String> {
-        let buffers = Buffers {
-            bytes: vec![buffer.into()],
-            sound: vec![true],
-        };
+        let buffers = Buffers::sound(vec![buffer.into()]);
         let mut check = Check::new("f");
         let got = with(&mut Accessors::new(json, &buffers), &mut check);
         let (problems, _) = check.into_parts();

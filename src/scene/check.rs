@@ -64,10 +64,15 @@ impl Check {
         !self.problems.is_empty()
     }
 
+    /// Is the list of problems full? Then there is no point in looking for more.
+    pub(crate) fn is_full(&self) -> bool {
+        self.problems.len() >= MAX_LISTED
+    }
+
     /// Problems and warnings, each list closed by a count of what it left out.
     pub(crate) fn into_parts(mut self) -> (Vec<Problem>, Vec<String>) {
         if self.more_problems > 0 {
-            let what = format!("{} more problems", self.more_problems);
+            let what = format!("{} more problems at least", self.more_problems);
             let place = self.file.clone();
             self.problems.push(Problem::new(
                 place,

@@ -96,13 +96,13 @@ mod meshopt_codec {
         }
         // The decoder asserts what is checked here.
         let mut bytes = match mode {
-            "ATTRIBUTES" if stride % 4 == 0 && (4..=MAX_STRIDE).contains(&stride) => {
+            "ATTRIBUTES" if stride.is_multiple_of(4) && (4..=MAX_STRIDE).contains(&stride) => {
                 vertices(packed, stride, count)?
             }
-            "TRIANGLES" if count % 3 == 0 && stride == 2 => {
+            "TRIANGLES" if count.is_multiple_of(3) && stride == 2 => {
                 shorts(&failed(::meshopt::decode_index_buffer(packed, count))?)
             }
-            "TRIANGLES" if count % 3 == 0 && stride == 4 => {
+            "TRIANGLES" if count.is_multiple_of(3) && stride == 4 => {
                 longs(&failed(::meshopt::decode_index_buffer(packed, count))?)
             }
             "INDICES" if stride == 2 => {

@@ -5,7 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::scene::Source;
-use crate::scene::accessor::{Accessors, Buffers};
+use crate::scene::buffers::{Buffers, Views};
 use crate::scene::check::Check;
 use crate::scene::compression;
 use crate::scene::container;
@@ -14,19 +14,20 @@ use crate::scene::nodes::{self, Placed};
 use crate::scene::raw;
 pub use crate::scene::raw::{AlphaMode, RawLight, RawLightKind, RawMaterial};
 use crate::scene::texture_info::Slots;
-use crate::scene::{geometry, uri};
+use crate::scene::uri;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 const AGAIN: &str = "export the file again";
 
 /// Extensions that are read. The packed ones count only where their decoder is built in.
-const READ: [&str; 6] = [
+const READ: [&str; 7] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
@@ -51,6 +52,23 @@ const HARMLESS: [&str; 13] = [
 ];
 
 /// A document: everything read, nothing yet turned into geometry.
+///
+/// ```
+/// use haarlight::scene::document::Document;
+/// use std::path::Path;
+///
+/// // One triangle of three float positions; the buffer is in the file.
+/// let room = br#"{"asset": {"version": "2.0"}, "nodes": [{"name": "floor", "mesh": 0}],
+///     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+///     "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3}],
+///     "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36,
+///     "uri": "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAAAAAIA/"}]}"#;
+/// let document = Document::from_bytes(Path::new("room.gltf"), room)?;
+/// let geometry = document.load_geometry().check()?;
+/// assert_eq!(geometry.surfaces[0].name, "node 0 'floor', mesh 0, primitive 0");
+/// assert_eq!(geometry.surfaces[0].positions[1].x, 1.0);
+/// # Ok::<(), haarlight::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Document {
     /// The JSON and the buffers.
@@ -148,15 +166,15 @@ impl Source {
             let given = item.text("uri", check)?;
             let read = uri::read(folder(&self.path), given);
             let failed = |why| check.problem(&item.place, why, "put the image there");
-            return read.map_err(failed).ok().map(|(bytes, _)| bytes);
+            return read.map_err(failed).ok();
         }
         if !item.map.contains_key("bufferView") {
             check.problem(&item.place, "has neither a URI nor a bufferView", AGAIN);
             return None;
         }
         let view = item.index("bufferView", check)?;
-        let buffers = geometry::sound(self.buffers.clone());
-        let span = Accessors::new(&self.json, &buffers).view(view, &item.place, check)?;
+        let buffers = Buffers::sound(self.buffers.clone());
+        let span = Views::new(&self.json, &buffers).view(view, &item.place, check)?;
         Some(span.bytes().to_vec())
     }
 }
@@ -227,7 +245,7 @@ fn buffers(json: &Value, folder: &Path, bin: Option<&[u8]>, check: &mut Check) -
         sound: Vec::new(),
     };
     // Buffers of one file share its bytes: else a small document could ask for a large file many times.
-    let mut files: BTreeMap<&str, Arc<[u8]>> = BTreeMap::new();
+    let mut files: BTreeMap<PathBuf, Arc<[u8]>> = BTreeMap::new();
     for index in 0..json::len(json, "buffers") {
         let read = buffer(json, index, folder, bin, placeholders, &mut files, check);
         buffers.sound.push(read.is_some());
@@ -236,13 +254,13 @@ fn buffers(json: &Value, folder: &Path, bin: Option<&[u8]>, check: &mut Check) -
     buffers
 }
 
-fn buffer<'a>(
-    json: &'a Value,
+fn buffer(
+    json: &Value,
     index: usize,
     folder: &Path,
     bin: Option<&[u8]>,
     placeholders: bool,
-    files: &mut BTreeMap<&'a str, Arc<[u8]>>,
+    files: &mut BTreeMap<PathBuf, Arc<[u8]>>,
     check: &mut Check,
 ) -> Option<Arc<[u8]>> {
     let Some(item) = json::item(json, "buffers", "buffer", index) else {
@@ -255,16 +273,9 @@ fn buffer<'a>(
     };
     let bytes = if item.map.contains_key("uri") {
         let given = item.text("uri", check)?;
-        match files.get(given) {
-            Some(known) => Arc::clone(known),
-            None => {
-                let failed = |why| check.problem(&item.place, why, "put the buffer there");
-                let (bytes, _) = uri::read(folder, given).map_err(failed).ok()?;
-                let bytes: Arc<[u8]> = bytes.into();
-                files.insert(given, Arc::clone(&bytes));
-                bytes
-            }
-        }
+        let read = shared(folder, given, files);
+        let failed = |why| check.problem(&item.place, why, "put the buffer there");
+        read.map_err(failed).ok()?
     } else if let (0, Some(bin)) = (index, bin) {
         Arc::from(bin)
     } else if placeholders {
@@ -281,4 +292,23 @@ fn buffer<'a>(
         return None;
     }
     Some(bytes)
+}
+
+/// The bytes behind a URI; those of one file are read once.
+fn shared(
+    folder: &Path,
+    given: &str,
+    files: &mut BTreeMap<PathBuf, Arc<[u8]>>,
+) -> std::result::Result<Arc<[u8]>, String> {
+    let path = match uri::locate(folder, given)? {
+        uri::Place::Here(bytes) => return Ok(bytes.into()),
+        uri::Place::File(path) => path,
+    };
+    if let Some(known) = files.get(&path) {
+        return Ok(Arc::clone(known));
+    }
+    let bytes = uri::read_file(&path).map_err(|e| format!("'{}' {e}", json::short(given)))?;
+    let bytes: Arc<[u8]> = bytes.into();
+    files.insert(path, Arc::clone(&bytes));
+    Ok(bytes)
 }

@@ -8,20 +8,24 @@
 //! elements. So the memory for images is bounded: [`MAX_TEXELS`] in all.
 
 use crate::scene::Image;
-use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+use image::{DynamicImage, GenericImageView, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
 /// Texels of all images together (16 bytes each).
 const MAX_TEXELS: usize = 1 << 26;
 /// Texels of one image: 2048 x 2048.
 const MAX_IMAGE: usize = 1 << 22;
-/// Pixels across or down in the file.
+/// Pixels of all images in the files together: a minute of decoding.
+pub(crate) const MAX_PIXELS: u64 = 1 << 32;
+/// Pixels across or down in one file, and in all of it.
 const MAX_SIDE: u32 = 16_384;
+const MAX_FILE_PIXELS: u64 = 1 << 27;
 /// Bytes that decoding one image may take.
 const MAX_DECODE: u64 = 1 << 30;
-/// The most pixels that one byte of a file can become: deflate reaches 1032 bytes a byte, each of up to 8 pixels;
-/// JPEG stays below that.
-const MAX_RATIO: u64 = 1032 * 8;
+/// The most that one byte of a file can become: deflate (RFC 1951) reaches 1032 bytes; JPEG needs at least a bit for each
+/// block of 64 pixels and plane, so stays below 512 pixels.
+const MAX_PNG_RATIO: u64 = 1032;
+const MAX_JPEG_RATIO: u64 = 512;
 
 /// What stands in for an image that cannot be read: a grey that neither brightens nor darkens much.
 pub(crate) fn neutral(name: &str) -> Image {
@@ -33,8 +37,13 @@ pub(crate) fn neutral(name: &str) -> Image {
     }
 }
 
-/// Decodes one of `count` images, or says why not.
-pub(crate) fn decode(name: &str, bytes: &[u8], count: usize) -> Result<Image, String> {
+/// Decodes one of `count` images, or says why not; `room` is how many pixels may still be decoded.
+pub(crate) fn decode(
+    name: &str,
+    bytes: &[u8],
+    count: usize,
+    room: &mut u64,
+) -> Result<Image, String> {
     let bad = |e: image::ImageError| e.to_string();
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
@@ -43,9 +52,9 @@ pub(crate) fn decode(name: &str, bytes: &[u8], count: usize) -> Result<Image, St
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| e.to_string())?;
-    if reader.format().is_none() {
+    let Some(format) = reader.format() else {
         return Err("it is neither PNG nor JPEG".into());
-    }
+    };
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(bad)?;
     let (width, height) = decoder.dimensions();
@@ -53,12 +62,22 @@ pub(crate) fn decode(name: &str, bytes: &[u8], count: usize) -> Result<Image, St
     if pixels == 0 {
         return Err("it has no pixels".into());
     }
-    if pixels > (bytes.len() as u64).saturating_mul(MAX_RATIO) {
+    let size = bytes.len() as u64;
+    let believable = if format == ImageFormat::Jpeg {
+        pixels <= size.saturating_mul(MAX_JPEG_RATIO)
+    } else {
+        let bits = u64::from(decoder.original_color_type().bits_per_pixel());
+        pixels * bits / 8 <= size.saturating_mul(MAX_PNG_RATIO)
+    };
+    if !believable || pixels > MAX_FILE_PIXELS {
         return Err(format!(
-            "it claims {width} x {height} pixels in {} bytes",
-            bytes.len()
+            "it claims {width} x {height} pixels in {size} bytes"
         ));
     }
+    if pixels > *room {
+        return Err("there are too many pixels in all images together".into());
+    }
+    *room -= pixels;
     let decoded = DynamicImage::from_decoder(decoder).map_err(bad)?;
     let budget = (MAX_TEXELS / count.max(1)).clamp(1, MAX_IMAGE);
     Ok(linear(name, &decoded, budget))
@@ -86,13 +105,12 @@ fn linear(name: &str, decoded: &DynamicImage, budget: usize) -> Image {
             [from_srgb(r), from_srgb(g), from_srgb(b), a]
         })
     } else {
-        let narrow = decoded.to_rgba8();
         let table: Vec<f32> = (0..=255u8)
             .map(|e| from_srgb(f32::from(e) / 255.0))
             .collect();
         let of = |raw: u8| table[usize::from(raw)];
         boxed(width, height, shrink, |x, y| {
-            let [r, g, b, a] = narrow.get_pixel(x, y).0;
+            let [r, g, b, a] = decoded.get_pixel(x, y).0;
             [of(r), of(g), of(b), f32::from(a) / 255.0]
         })
     };
@@ -143,7 +161,7 @@ fn from_srgb(encoded: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{ImageFormat, Rgb, RgbImage, Rgba, RgbaImage};
+    use image::{Rgb, RgbImage, Rgba, RgbaImage};
 
     fn png(image: impl Into<DynamicImage>) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
@@ -154,7 +172,7 @@ mod tests {
     #[test]
     fn colour_is_linearised_and_alpha_is_not() {
         let bytes = png(RgbaImage::from_pixel(3, 2, Rgba([188, 0, 255, 128])));
-        let image = decode("a", &bytes, 1).unwrap();
+        let image = decode("a", &bytes, 1, &mut { MAX_PIXELS }).unwrap();
         assert_eq!((image.width, image.height, image.pixels.len()), (3, 2, 6));
         let [r, g, b, a] = image.pixels[5];
         // sRGB 188 is 0.5029 of linear light.
@@ -167,11 +185,11 @@ mod tests {
         let mut bytes = Cursor::new(Vec::new());
         let grey = RgbImage::from_pixel(8, 8, Rgb([128; 3]));
         grey.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
-        let image = decode("a", bytes.get_ref(), 1).unwrap();
+        let image = decode("a", bytes.get_ref(), 1, &mut { MAX_PIXELS }).unwrap();
         assert!((image.pixels[0][0] - 0.2159).abs() < 0.01);
         let deep =
             image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(2, 2, image::Luma([0x8000]));
-        let image = decode("a", &png(deep), 1).unwrap();
+        let image = decode("a", &png(deep), 1, &mut { MAX_PIXELS }).unwrap();
         assert!((image.pixels[0][0] - 0.214_06).abs() < 1e-4);
     }
 
@@ -197,13 +215,16 @@ mod tests {
         bytes[16..24].copy_from_slice(&[0, 0, 0x3F, 0xFF, 0, 0, 0x3F, 0xFF]);
         let sum = crc(&bytes[12..29]);
         bytes[29..33].copy_from_slice(&sum.to_be_bytes());
-        let why = decode("a", &bytes, 1).unwrap_err();
+        let why = decode("a", &bytes, 1, &mut { MAX_PIXELS }).unwrap_err();
         assert!(why.contains("claims 16383 x 16383"), "{why}");
-        assert!(decode("a", b"", 1).is_err());
-        assert!(decode("a", b"RIFF....WEBP", 1).is_err());
+        assert!(decode("a", b"", 1, &mut { MAX_PIXELS }).is_err());
+        assert!(decode("a", b"RIFF....WEBP", 1, &mut { MAX_PIXELS }).is_err());
         let good = png(RgbImage::new(4, 4));
         for end in 0..good.len() - 12 {
-            assert!(decode("a", &good[..end], 1).is_err(), "{end}");
+            assert!(
+                decode("a", &good[..end], 1, &mut { MAX_PIXELS }).is_err(),
+                "{end}"
+            );
         }
     }
 

@@ -52,10 +52,9 @@ pub(crate) fn referred<'a>(
 /// Names from a file may be long; messages are not.
 pub(crate) fn short(name: &str) -> String {
     const LONGEST: usize = 60;
-    if name.chars().count() <= LONGEST {
-        name.to_owned()
-    } else {
-        format!("{}...", name.chars().take(LONGEST).collect::<String>())
+    match name.char_indices().nth(LONGEST) {
+        None => name.to_owned(),
+        Some((end, _)) => format!("{}...", &name[..end]),
     }
 }
 
@@ -180,7 +179,8 @@ pub(crate) fn whole(value: &Value) -> Option<usize> {
     }
     let number = value.as_f64()?;
     // The range check makes the conversion exact.
-    (number >= 0.0 && number < LARGEST && number.fract() == 0.0).then_some(number as usize)
+    let sound = (0.0..LARGEST).contains(&number) && number.fract() == 0.0;
+    sound.then_some(number as usize)
 }
 
 #[cfg(test)]

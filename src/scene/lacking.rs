@@ -28,10 +28,6 @@ const LACKING: &[(&str, &str)] = &[
     ("KHR_materials_diffuse_transmission", "diffuse transmission"),
     ("KHR_materials_dispersion", "dispersion"),
     ("KHR_materials_iridescence", "iridescence"),
-    (
-        "KHR_materials_pbrSpecularGlossiness",
-        "specular-glossiness colours",
-    ),
     ("KHR_materials_sheen", "sheen"),
     ("KHR_materials_specular", "gloss"),
     ("KHR_materials_subsurface", "light below the surface"),

@@ -1,6 +1,8 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
 mod accessor;
+mod buffers;
+mod camera;
 mod check;
 mod compression;
 mod container;
@@ -9,6 +11,7 @@ pub mod effects;
 pub mod facts;
 pub mod geometry;
 mod image;
+mod instances;
 mod json;
 pub mod lacking;
 mod light;
@@ -21,6 +24,7 @@ mod spectra_file;
 mod texture;
 mod texture_info;
 mod uri;
+mod world;
 
 pub use load::Options;
 pub use material::GREATEST_ALBEDO;

@@ -3,13 +3,13 @@
 
 use crate::scene::accessor::{Accessors, to_vectors};
 use crate::scene::check::Check;
-use crate::scene::compression::{self, DracoMesh};
+use crate::scene::compression::{self, DracoMesh, Unpacked};
 use crate::scene::json::Item;
 use std::collections::BTreeMap;
 
 const AGAIN: &str = "export the file again";
 /// Texture coordinate sets that are read; more are left out with a warning.
-const MAX_TEXCOORDS: usize = 16;
+pub(crate) const MAX_TEXCOORDS: usize = 8;
 
 /// A primitive before it is placed.
 #[derive(Debug, Clone, Default)]
@@ -20,6 +20,14 @@ pub(crate) struct Primitive {
     pub(crate) colors: Option<Vec<[f32; 4]>>,
     /// Every index is below the number of positions.
     pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+impl Primitive {
+    /// The greater of the numbers of vertices and triangles (a strip has up to as many triangles as vertices, a list
+    /// seldom more than twice).
+    pub(crate) fn size(&self) -> usize {
+        self.positions.len().max(self.triangles.len() / 2)
+    }
 }
 
 /// `mode` of a primitive that has an area.
@@ -99,11 +107,11 @@ fn checked(
     };
     let mut vertices = Vertices {
         attributes: &attributes,
-        unpacked: packed.as_ref(),
+        packed: packed.as_ref(),
         accessors,
         check,
     };
-    let positions = vertices.read::<3>("POSITION")?;
+    let positions = vertices.read::<3>("POSITION", None)?;
     if let Some(index) = positions
         .iter()
         .position(|p| !p.iter().all(|x| x.is_finite()))
@@ -180,8 +188,17 @@ fn draco(
         return Ok(None);
     };
     if !compression::is_built_in(compression::DRACO) {
-        // Not required, or the document would have been refused: the accessors have plain bytes too.
-        return Ok(None);
+        // The accessors may have plain bytes too.
+        let position = attributes.index("POSITION", check);
+        let place = format!("{}, POSITION", item.place);
+        let position = position.and_then(|index| accessors.layout(index, &place, check));
+        let (position, _) = position.ok_or(Reported)?;
+        if position.map.contains_key("bufferView") {
+            return Ok(None);
+        }
+        let what = format!("needs {}, which this build leaves out", compression::DRACO);
+        check.problem(&item.place, what, "export without this compression");
+        return Err(Reported);
     }
     extension.place = format!("{}, {}", item.place, compression::DRACO);
     let Some(view) = extension.index("bufferView", check) else {
@@ -189,6 +206,7 @@ fn draco(
         return Err(Reported);
     };
     let span = accessors
+        .views
         .view(view, &extension.place, check)
         .ok_or(Reported)?;
     let mut counts = Vec::new();
@@ -212,26 +230,35 @@ fn draco(
 /// The attributes of one primitive, packed or plain.
 struct Vertices<'a, 'b> {
     attributes: &'a Item<'a>,
-    unpacked: Option<&'a DracoMesh>,
+    packed: Option<&'a DracoMesh>,
     accessors: &'a mut Accessors<'b>,
     check: &'a mut Check,
 }
 
-impl Vertices<'_, '_> {
-    fn read<const N: usize>(&mut self, semantic: &str) -> Option<Vec<[f32; N]>> {
+impl<'a> Vertices<'a, '_> {
+    /// What Draco unpacked under a name.
+    fn unpacked(&self, semantic: &str) -> Option<&'a Unpacked> {
+        let attributes = &self.packed?.attributes;
+        let found = attributes.iter().find(|(name, _)| name == semantic);
+        found.map(|(_, plain)| plain)
+    }
+
+    fn read<const N: usize>(
+        &mut self,
+        semantic: &str,
+        count: Option<usize>,
+    ) -> Option<Vec<[f32; N]>> {
         let place = format!("{}, {semantic}", self.attributes.place);
-        if let Some(mesh) = self.unpacked {
-            if let Some((_, plain)) = mesh.attributes.iter().find(|(name, _)| name == semantic) {
-                if plain.width == N {
-                    return Some(to_vectors(&plain.bytes, plain.component, plain.normalized));
-                }
-                let what = format!("has {} components an element, not {N}", plain.width);
-                self.check.problem(&place, what, AGAIN);
-                return None;
+        if let Some(plain) = self.unpacked(semantic) {
+            if plain.width == N {
+                return Some(to_vectors(&plain.bytes, plain.component, plain.normalized));
             }
+            let what = format!("has {} components an element, not {N}", plain.width);
+            self.check.problem(&place, what, AGAIN);
+            return None;
         }
         let accessor = self.attributes.index(semantic, self.check)?;
-        self.accessors.vectors(accessor, &place, self.check)
+        self.accessors.vectors(accessor, count, &place, self.check)
     }
 
     /// The inner none: the primitive does not have it; the outer one: it is broken, which was reported.
@@ -243,10 +270,11 @@ impl Vertices<'_, '_> {
         if !self.attributes.map.contains_key(semantic) {
             return Some(None);
         }
-        let values = self.read::<N>(semantic)?;
+        let values = self.read::<N>(semantic, Some(count))?;
         if values.len() == count {
             return Some(Some(values));
         }
+        // Only what Draco unpacked can come here.
         let place = format!("{}, {semantic}", self.attributes.place);
         let what = format!("has {} elements for {count} vertices", values.len());
         self.check.problem(&place, what, AGAIN);
@@ -259,15 +287,13 @@ impl Vertices<'_, '_> {
         if !self.attributes.map.contains_key(NAME) {
             return Some(None);
         }
-        let unpacked = self
-            .unpacked
-            .and_then(|m| m.attributes.iter().find(|(n, _)| n == NAME));
-        let width = match unpacked {
-            Some((_, plain)) => plain.width,
+        let width = match self.unpacked(NAME) {
+            Some(plain) => plain.width,
             None => {
                 let place = format!("{}, {NAME}", self.attributes.place);
                 let accessor = self.attributes.index(NAME, self.check)?;
-                self.accessors.layout(accessor, &place, self.check)?.1.width
+                let (_, layout) = self.accessors.layout(accessor, &place, self.check)?;
+                layout.width
             }
         };
         if width == 4 {

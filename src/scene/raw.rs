@@ -168,6 +168,15 @@ fn material(
         let texture = pbr.child("baseColorTexture", check);
         out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
     }
+    if let Some(diffuse) = item.extension("KHR_materials_pbrSpecularGlossiness", check) {
+        // Its diffuse part is all that a Lambertian surface has; glTF prefers it to the fallback beside it.
+        let factor = diffuse.numbers::<4>("diffuseFactor", check);
+        let factor = factor.unwrap_or([1.0; 4]);
+        out.base_color_factor = factor.map(|x| unit(x, "diffuseFactor", item, check));
+        out.metallic = 0.0;
+        let texture = diffuse.child("diffuseTexture", check);
+        out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
+    }
     let texture = item.child("emissiveTexture", check);
     out.emissive_texture = texture.and_then(|t| slots.texture(json, &t, check));
     emission(item, &mut out, check);
@@ -230,6 +239,20 @@ fn unit(value: f64, key: &str, item: &Item<'_>, check: &mut Check) -> f32 {
     value.clamp(0.0, 1.0) as f32
 }
 
+/// Bytes of names and extras that all lights together may carry.
+const MAX_CARRIED: usize = 1 << 26;
+
+/// About how many bytes a JSON value takes.
+fn weight(value: &Value) -> usize {
+    let inside = match value {
+        Value::String(text) => text.len(),
+        Value::Array(list) => list.iter().map(weight).sum(),
+        Value::Object(map) => map.iter().map(|(key, v)| key.len() + weight(v)).sum(),
+        _ => 0,
+    };
+    inside + size_of::<Value>()
+}
+
 /// The punctual lights at the nodes of the scene.
 pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<RawLight> {
     const NAME: &str = "KHR_lights_punctual";
@@ -237,6 +260,7 @@ pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<
     let nothing = Value::Null;
     let table = table.unwrap_or(&nothing);
     let mut lights = Vec::new();
+    let mut carried = 0usize;
     for place in placed {
         let Some(node) = json::item(json, "nodes", "node", place.node) else {
             continue;
@@ -250,7 +274,17 @@ pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<
         let Some(index) = index else { continue };
         let item = json::referred(table, "lights", "light", index, &node.place, check);
         let Some(item) = item else { continue };
-        lights.extend(light(&item, &node, place, check));
+        let Some(light) = light(&item, &node, place, check) else {
+            continue;
+        };
+        // Every node gets a copy of its light's name and extras.
+        carried += light.name.len() + light.extras.as_ref().map_or(0, weight);
+        if carried > MAX_CARRIED {
+            let what = "the names and extras of the lights are too large for so many nodes";
+            check.problem("", what, "shorten the extras of the lights");
+            return Vec::new();
+        }
+        lights.push(light);
     }
     lights
 }

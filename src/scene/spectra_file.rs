@@ -338,7 +338,7 @@ impl Reader<'_> {
     fn csv(&mut self, path: &str, place: &str) -> Option<Table> {
         let next = "give a CSV of wavelength_nm,value inside the folder of the file that names it";
         let bytes = match uri::read(&self.folder, path) {
-            Ok((bytes, _)) => bytes,
+            Ok(bytes) => bytes,
             Err(why) => {
                 self.check.problem(place, why, next);
                 return None;

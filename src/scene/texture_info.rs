@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 pub(crate) struct Slots {
     /// For each slot the image in the document; none: a texture without an image.
     pub(crate) images: Vec<Option<usize>>,
+    by_image: BTreeMap<Option<usize>, usize>,
     by_source: BTreeMap<String, usize>,
 }
 
@@ -40,7 +41,13 @@ impl Slots {
                 Some(image)
             }
             None => {
-                let named = texture.extension_names().join(", ");
+                let named = texture.map.get("extensions").and_then(Value::as_object);
+                let named: Vec<&str> = named
+                    .into_iter()
+                    .flat_map(|m| m.keys().map(String::as_str))
+                    .take(3)
+                    .collect();
+                let named = json::short(&named.join(", "));
                 let why = if named.is_empty() {
                     "no image".to_owned()
                 } else {
@@ -65,6 +72,9 @@ impl Slots {
     }
 
     fn slot(&mut self, json: &Value, image: Option<usize>) -> usize {
+        if let Some(&slot) = self.by_image.get(&image) {
+            return slot;
+        }
         let source = match image {
             None => String::new(),
             Some(index) => {
@@ -81,6 +91,7 @@ impl Slots {
         if slot == next {
             self.images.push(image);
         }
+        self.by_image.insert(image, slot);
         slot
     }
 }

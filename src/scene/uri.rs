@@ -11,14 +11,31 @@ use std::path::{Path, PathBuf};
 /// The longest piece of a refused URI that a message repeats.
 const SHOWN: usize = 80;
 
-/// The bytes behind a URI, as `(bytes, media type if the URI names one)`, or one sentence on why not.
-pub(crate) fn read(folder: &Path, uri: &str) -> Result<(Vec<u8>, Option<String>), String> {
+/// Where the bytes of a URI are.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// In the URI itself; decoded.
+    Here(Vec<u8>),
+    /// In a file of the document's folder; two URIs of one file give the same path.
+    File(PathBuf),
+}
+
+/// Follows a URI, or says in one sentence why not.
+pub(crate) fn locate(folder: &Path, uri: &str) -> Result<Place, String> {
     if has_prefix(uri, "data:") {
-        return data(uri).map_err(|e| format!("the data URI {e}"));
+        return data(uri)
+            .map(Place::Here)
+            .map_err(|e| format!("the data URI {e}"));
     }
-    let path = resolve(folder, uri)?;
-    let bytes = read_file(&path).map_err(|e| format!("'{}' {e}", shown(uri)))?;
-    Ok((bytes, None))
+    resolve(folder, uri).map(Place::File)
+}
+
+/// The bytes behind a URI, or one sentence on why not.
+pub(crate) fn read(folder: &Path, uri: &str) -> Result<Vec<u8>, String> {
+    match locate(folder, uri)? {
+        Place::Here(bytes) => Ok(bytes),
+        Place::File(path) => read_file(&path).map_err(|e| format!("'{}' {e}", shown(uri))),
+    }
 }
 
 /// The whole of a regular file, no more than it holds when it is opened.
@@ -104,17 +121,16 @@ fn percent_decode(text: &str) -> Option<Vec<u8>> {
     Some(out)
 }
 
-fn data(uri: &str) -> Result<(Vec<u8>, Option<String>), String> {
+fn data(uri: &str) -> Result<Vec<u8>, String> {
     let body = &uri["data:".len()..];
     let (head, body) = body.split_once(',').ok_or("has no comma")?;
-    let mut parts = head.split(';');
-    let media = parts.next().filter(|m| !m.is_empty()).map(str::to_owned);
-    let bytes = if parts.any(|part| part.eq_ignore_ascii_case("base64")) {
-        base64(body).ok_or("is not valid base64")?
+    // The first part is the media type, which the bytes themselves tell better.
+    let mut flags = head.split(';').skip(1);
+    if flags.any(|flag| flag.eq_ignore_ascii_case("base64")) {
+        base64(body).ok_or_else(|| "is not valid base64".into())
     } else {
-        percent_decode(body).ok_or("is not validly percent-encoded")?
-    };
-    Ok((bytes, media))
+        percent_decode(body).ok_or_else(|| "is not validly percent-encoded".into())
+    }
 }
 
 /// Base64 (RFC 4648, section 4; the URL alphabet of section 5 is understood too); padding may be missing.
@@ -169,9 +185,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join("tex")).unwrap();
         std::fs::write(dir.path().join("tex/a b%.bin"), b"xyz").unwrap();
-        let (bytes, media) = read(dir.path(), "tex/a%20b%25.bin").unwrap();
-        assert_eq!((bytes.as_slice(), media), (&b"xyz"[..], None));
-        assert!(read(dir.path(), "./tex//a b%25.bin").is_ok());
+        assert_eq!(read(dir.path(), "tex/a%20b%25.bin").unwrap(), b"xyz");
+        let place = |uri: &str| locate(dir.path(), uri).unwrap();
+        assert_eq!(place("./tex//a b%25.bin"), place("tex/a%20b%25.bin"));
     }
 
     #[test]
@@ -223,7 +239,7 @@ mod tests {
         link("in", &inside.join("own"));
         assert!(reason(&inside, "out").contains("leads out"));
         assert!(reason(&inside, "zero").contains("leads out"));
-        assert_eq!(read(&inside, "in").unwrap().0, b"o");
+        assert_eq!(read(&inside, "in").unwrap(), b"o");
         assert!(
             read_file(Path::new("/dev/zero"))
                 .unwrap_err()
@@ -250,11 +266,9 @@ mod tests {
             ("Zm9vYmFy", "foobar"),
         ] {
             let uri = format!("data:image/png;base64,{coded}");
-            let (bytes, media) = read(folder, &uri).unwrap();
-            assert_eq!(bytes, plain.as_bytes());
-            assert_eq!(media.as_deref(), Some("image/png"));
+            assert_eq!(read(folder, &uri).unwrap(), plain.as_bytes());
         }
-        assert_eq!(read(folder, "DATA:,a%20b").unwrap().0, b"a b");
+        assert_eq!(read(folder, "DATA:,a%20b").unwrap(), b"a b");
         assert!(reason(folder, "data:;base64,Z").contains("base64"));
         assert!(reason(folder, "data:;base64,Z!!!").contains("base64"));
         assert!(reason(folder, "data:nothing").contains("comma"));
