@@ -79,8 +79,7 @@ impl LinearSrgb {
 /// assert_eq!(encode(7.0), 1.0);
 /// ```
 pub fn encode(linear: f64) -> f64 {
-    // max before min: NaN becomes 0.
-    let linear = linear.max(0.0).min(1.0);
+    let linear = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
     if linear <= KNEE {
         SLOPE * linear
     } else {

@@ -268,8 +268,7 @@ fn evaluate(c: &[f64; 3]) -> Leaves {
 }
 
 fn inside(rgb: [f32; 3]) -> [f64; 3] {
-    // max before min: NaN becomes 0.
-    rgb.map(|c| f64::from(c.max(0.0).min(1.0)))
+    rgb.map(|c| if c > 0.0 { f64::from(c.min(1.0)) } else { 0.0 })
 }
 
 fn norm2(v: &[f64; 3]) -> f64 {

@@ -8,4 +8,4 @@ pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
 pub use registry::{Kind, Named, named, names, nearest};
 pub use table::{CsvProblem, Outside, Table};
 
-pub(crate) use registry::cmf_1931;
+pub(crate) use registry::{cmf_1931, edit_distance};

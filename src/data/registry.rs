@@ -158,7 +158,7 @@ pub fn nearest(name: &str) -> Vec<String> {
 }
 
 /// Levenshtein distance of the lower-case forms; letters beyond the 64th do not count.
-fn edit_distance(a: &str, b: &str) -> usize {
+pub(crate) fn edit_distance(a: &str, b: &str) -> usize {
     let letters = |text: &str| text.to_lowercase().chars().take(64).collect::<Vec<char>>();
     let (a, b) = (letters(a), letters(b));
     let mut row: Vec<usize> = (0..=b.len()).collect();

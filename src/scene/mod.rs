@@ -8,17 +8,27 @@ mod check;
 mod compression;
 mod container;
 pub mod document;
+pub mod effects;
+pub mod facts;
 pub mod geometry;
 mod image;
 mod instances;
 mod json;
+pub mod lacking;
+mod light;
+mod load;
+mod material;
 mod nodes;
 mod primitive;
 mod raw;
+mod spectra_file;
 mod texture;
 mod texture_info;
 mod uri;
 mod world;
+
+pub use load::Options;
+pub use material::GREATEST_ALBEDO;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};
@@ -140,7 +150,8 @@ pub enum Alpha {
     },
 }
 
-/// Lambertian emission: radiance(leaf) = spectra[light].power[leaf] * shape[leaf] * texture luminance shape, W/m2/sr/nm.
+/// Lambertian emission: `radiance(leaf) = spectra[light].power[leaf] * shape[leaf]`, W/m2/sr/nm; where there is a
+/// texture the shape differs from point to point ([`Emission::shape_at`]).
 #[derive(Debug, Clone)]
 pub struct Emission {
     /// Index in [`Scene::spectra`].
@@ -179,7 +190,7 @@ pub struct PunctualLight {
     pub direction: DVec3,
     /// Index in [`Scene::spectra`].
     pub light: usize,
-    /// intensity(leaf) = spectra[light].power[leaf] * shape[leaf].
+    /// `intensity(leaf) = spectra[light].power[leaf] * shape[leaf]`.
     pub shape: Leaves,
 }
 

@@ -5,8 +5,11 @@
 mod cells;
 mod cie171;
 mod cornell;
+mod furnished;
 mod glb;
+mod shapes;
 mod simple;
+mod textures;
 
 use clap::Parser;
 use glb::Glb;
@@ -22,6 +25,9 @@ struct Args {
     /// Write only the room of this name.
     #[arg(long)]
     only: Option<String>,
+    /// Triangles of the furnished room, about; 1 000 to 500 000 make sense.
+    #[arg(long, default_value_t = 1500)]
+    triangles: usize,
 }
 
 /// A room: name, content, side file.
@@ -69,9 +75,10 @@ const ROOMS: &[Room] = &[
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
     std::fs::create_dir_all(&args.dir)?;
+    let wanted = |name: &str| args.only.as_deref().is_none_or(|only| only == name);
     let mut written = 0;
     for (name, make, spectra) in ROOMS {
-        if args.only.as_deref().is_some_and(|only| only != *name) {
+        if !wanted(name) {
             continue;
         }
         write(&args.dir, name, make())?;
@@ -79,6 +86,10 @@ fn main() -> anyhow::Result<()> {
             let text = format!("{:#}\n", spectra());
             std::fs::write(args.dir.join(format!("{name}.spectra.json")), text)?;
         }
+        written += 1;
+    }
+    if wanted("furnished") {
+        write(&args.dir, "furnished", furnished::room(args.triangles))?;
         written += 1;
     }
     anyhow::ensure!(written > 0, "no room has that name");

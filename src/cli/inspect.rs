@@ -1,0 +1,233 @@
+//! `haarlight inspect ROOM [--json] [--spectra FILE]`: what the program sees in a room.
+//!
+//! Prints triangles, areas, whether the room is closed, lamps with lumens, materials with albedo (Y under D65) and where
+//! their spectrum comes from, the plan of effects, and warnings. Nothing is solved.
+//!
+//! `--json` prints one object: `{"version": 1, "facts": ..., "plan": [...], "unsupported": [...], "warnings": [...]}`;
+//! `unsupported` are the extensions that are not read (the page has them among its warnings);
+//! the fields of `facts` are those of [`Facts`], with units in their names.
+
+use crate::error::{Error, Result};
+use crate::scene::document::Document;
+use crate::scene::effects::Plan;
+use crate::scene::facts::{Facts, LightFact};
+use crate::scene::{Options, Scene};
+use crate::spectrum::Grid;
+use serde_json::json;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Version of the JSON form.
+const VERSION: u32 = 1;
+
+/// Arguments of `inspect`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct InspectArgs {
+    /// The room, .glb or .gltf.
+    pub room: PathBuf,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub json: bool,
+    /// Spectra of materials and lights (default: ROOM's name with .spectra.json, if it is there).
+    #[arg(long, value_name = "FILE")]
+    pub spectra: Option<PathBuf>,
+}
+
+/// Reads the room and prints what is in it.
+///
+/// # Errors
+/// As [`Scene::load`]; [`Error::Io`] if `out` cannot be written to.
+pub fn run(args: &InspectArgs, grid: Grid, out: &mut impl Write) -> Result<()> {
+    let document = Document::open(&args.room)?;
+    let unsupported = document.unsupported.clone();
+    let scene = Scene::from_document(
+        document,
+        &Options {
+            grid,
+            spectra: args.spectra.clone(),
+        },
+    )?;
+    let facts = Facts::of(&scene);
+    let plan = Plan::of(&scene);
+    let text = if args.json {
+        let all = json!({
+            "version": VERSION,
+            "facts": facts,
+            "plan": plan,
+            "unsupported": unsupported,
+            "warnings": scene.warnings,
+        });
+        format!("{all:#}\n")
+    } else {
+        page(&facts, &plan, &scene.warnings)
+    };
+    out.write_all(text.as_bytes())
+        .map_err(|e| Error::io("standard output".as_ref(), e))
+}
+
+fn page(facts: &Facts, plan: &Plan, warnings: &[String]) -> String {
+    let [low, high] = facts.bounds_m;
+    let size: Vec<String> = (0..3).map(|a| format!("{:.3}", high[a] - low[a])).collect();
+    let closed = &facts.closed;
+    let mut lines = vec![
+        facts.room.clone(),
+        format!(
+            "  {} triangles in {} surfaces, {:.4} m2",
+            facts.triangles, facts.surfaces, facts.area_m2
+        ),
+        format!("  {} m (x, y, z)", size.join(" x ")),
+        format!(
+            "  {}: {} of {} parts closed, {} open edges",
+            if closed.largest_is_closed {
+                "closed"
+            } else {
+                "not shown to be closed"
+            },
+            closed.closed_parts,
+            closed.parts,
+            closed.open_edges
+        ),
+        format!(
+            "  {} to {} nm in 64 leaves",
+            facts.range_nm[0], facts.range_nm[1]
+        ),
+    ];
+    if !facts.cameras.is_empty() {
+        lines.push(format!("  cameras: {}", facts.cameras.join(", ")));
+    }
+    lines.push("\nLamps".into());
+    let mut rows = vec![
+        ["name", "kind", "flux lm", "", "spectrum"]
+            .map(String::from)
+            .to_vec(),
+    ];
+    for light in &facts.lights {
+        let flux = light.flux_lm.map_or("-".into(), |f| format!("{f:.1}"));
+        rows.push(vec![
+            light.name.clone(),
+            light.kind.into(),
+            flux,
+            strength(light),
+            light.spectrum.clone(),
+        ]);
+    }
+    if facts.lights.is_empty() {
+        rows = vec![vec!["none: the room stays dark".into()]];
+    }
+    lines.extend(table(&rows));
+    lines.push("\nMaterials".into());
+    let mut rows = vec![
+        [
+            "name",
+            "triangles",
+            "area m2",
+            "albedo",
+            "sides",
+            "reflectance",
+        ]
+        .map(String::from)
+        .to_vec(),
+    ];
+    for material in &facts.materials {
+        let textured = if material.textured { ", textured" } else { "" };
+        rows.push(vec![
+            material.name.clone(),
+            material.triangles.to_string(),
+            format!("{:.3}", material.area_m2),
+            format!("{:.3}", material.albedo_y),
+            material.sides.into(),
+            format!("{}{textured}", material.reflectance),
+        ]);
+    }
+    lines.extend(table(&rows));
+    lines.push("\nEffects".into());
+    lines.extend(plan.to_string().lines().map(|l| format!("  {l}")));
+    if !warnings.is_empty() {
+        lines.push("\nWarnings".into());
+        lines.extend(warnings.iter().map(|w| format!("  {w}")));
+    }
+    lines.join("\n") + "\n"
+}
+
+fn strength(light: &LightFact) -> String {
+    let units = [
+        (light.luminance_cd_m2, "cd/m2"),
+        (light.intensity_cd, "cd"),
+        (light.illuminance_lx, "lx"),
+    ];
+    let given = units
+        .iter()
+        .find_map(|(value, unit)| Some(format!("{:.1} {unit}", (*value)?)));
+    given.unwrap_or_else(|| "textured".into())
+}
+
+/// Columns padded to their widest cell; the last one is left as it is.
+fn table(rows: &[Vec<String>]) -> Vec<String> {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |c: usize| {
+        rows.iter()
+            .filter_map(|r| r.get(c))
+            .map(|t| t.chars().count())
+            .max()
+            .unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    rows.iter()
+        .map(|row| {
+            let cells = row
+                .iter()
+                .zip(&widths)
+                .map(|(cell, &width)| format!("{cell:width$}"));
+            format!("  {}", cells.collect::<Vec<_>>().join("  ").trim_end())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn inspect(room: &str, json: bool) -> String {
+        let room = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("scenes")
+            .join(room);
+        let mut out = Vec::new();
+        run(
+            &InspectArgs {
+                room,
+                json,
+                spectra: None,
+            },
+            Grid::default(),
+            &mut out,
+        )
+        .unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn the_page_says_what_is_there() {
+        let page = inspect("two-rooms.glb", false);
+        for text in [
+            "692 triangles",
+            "closed: 1 of 1 parts",
+            "cie/F11",
+            "macbeth/dark_skin",
+            "6000.0 cd/m2",
+            "Effects",
+        ] {
+            assert!(page.contains(text), "{text}\n{page}");
+        }
+    }
+
+    #[test]
+    fn the_json_carries_units_and_version() {
+        let json: serde_json::Value =
+            serde_json::from_str(&inspect("cie171-5.4.glb", true)).unwrap();
+        assert_eq!(json["version"], 1);
+        assert!((json["facts"]["lights"][0]["flux_lm"].as_f64().unwrap() - 10_000.0).abs() < 0.01);
+        assert_eq!(json["plan"][0]["name"], "interreflection");
+        assert_eq!(json["plan"][0]["runs"], false);
+    }
+}

@@ -1,0 +1,516 @@
+//! The plan: which effects a scene calls for. What is off costs nothing; what the program lacks is named.
+//!
+//! Only what some surface or lamp of the scene uses counts. A plan never leaves out an effect that could change the
+//! picture: where a question would be too dear to answer, the effect runs.
+
+use super::json::short;
+use super::lacking::lacking;
+use super::material::listed;
+use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
+use crate::spectrum::Leaves;
+use glam::DVec3;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+/// How far behind a plane a vertex of a convex room may lie, as a share of the room's size. Positions are stored as f32
+/// (6e-8 of their size) and may have been turned by a node; a gap of 1e-6 hides nothing that a link could see.
+const CONVEX_TOLERANCE: f64 = 1e-6;
+
+/// The convexity test gives up (and occlusion runs) past this many plane-vertex pairs: 0.1 s.
+const CONVEX_PAIRS: usize = 100_000_000;
+
+/// The effects, in the order of the list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Light that surfaces pass on.
+    Interreflection,
+    /// Surfaces that block light.
+    Occlusion,
+    /// More than one band.
+    Colour,
+    /// More than one light spectrum.
+    LightSpectra,
+    /// Images on paint, lamps or holes.
+    Textures,
+    /// Holes.
+    AlphaMasks,
+    /// Surfaces that give out light.
+    EmissiveSurfaces,
+    /// Lights without extent that shine all around.
+    PointLights,
+    /// Lights without extent that shine in a cone.
+    SpotLights,
+    /// Parallel light.
+    DirectionalLights,
+    /// Surfaces whose back reflects and emits too.
+    TwoSided,
+}
+
+impl Kind {
+    /// The effect's name in plans and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Interreflection => "interreflection",
+            Self::Occlusion => "occlusion",
+            Self::Colour => "colour",
+            Self::LightSpectra => "several light spectra",
+            Self::Textures => "textures",
+            Self::AlphaMasks => "alpha masks",
+            Self::EmissiveSurfaces => "emissive surfaces",
+            Self::PointLights => "point lights",
+            Self::SpotLights => "spot lights",
+            Self::DirectionalLights => "directional lights",
+            Self::TwoSided => "two-sided surfaces",
+        }
+    }
+}
+
+/// One line of the plan.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Effect {
+    /// [`Kind::name`], or the name of an effect that the program lacks.
+    pub name: String,
+    /// Does it run?
+    pub runs: bool,
+    /// Does the program lack it?
+    pub lacking: bool,
+    /// Why, in words.
+    pub reason: String,
+}
+
+/// What runs for a scene, what does not, and why.
+///
+/// Displays as a table; serializes as a list of `{name, runs, lacking, reason}`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Plan {
+    effects: Vec<Effect>,
+}
+
+impl Plan {
+    /// The plan for a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let used: BTreeSet<usize> = scene.surfaces.iter().map(|s| s.material).collect();
+        let used: Vec<&Material> = used
+            .into_iter()
+            .filter_map(|m| scene.materials.get(m))
+            .collect();
+        let mut plan = Self {
+            effects: Vec::new(),
+        };
+        plan.add(Kind::Interreflection, interreflection(&used));
+        plan.add(Kind::Occlusion, occlusion(scene));
+        plan.add(Kind::Colour, colour(scene, &used));
+        let spectra = scene.spectra.len();
+        let names: Vec<String> = scene.spectra.iter().map(|s| s.name.clone()).collect();
+        plan.add(
+            Kind::LightSpectra,
+            match spectra {
+                0 => (false, "no lamp".into()),
+                1 => (false, format!("all light is {}", names[0])),
+                n => (true, format!("{n}: {}", listed(&names))),
+            },
+        );
+        let textured = |m: &&&Material| {
+            let mask = matches!(
+                &m.alpha,
+                Alpha::Mask {
+                    texture: Some(_),
+                    ..
+                }
+            );
+            m.paint.is_some() || mask || m.emission.as_ref().is_some_and(|e| e.texture.is_some())
+        };
+        plan.add(
+            Kind::Textures,
+            counted(used.iter().filter(textured), "material"),
+        );
+        let masked = |m: &&&Material| matches!(m.alpha, Alpha::Mask { .. });
+        plan.add(
+            Kind::AlphaMasks,
+            counted(used.iter().filter(masked), "material"),
+        );
+        plan.add(
+            Kind::EmissiveSurfaces,
+            counted(used.iter().filter(|m| m.emission.is_some()), "material"),
+        );
+        let lights = |is: fn(&LightKind) -> bool| {
+            let names: Vec<String> = scene
+                .lights
+                .iter()
+                .filter(|l| is(&l.kind))
+                .map(|l| quoted(&l.name))
+                .collect();
+            number_of(&names, "light")
+        };
+        plan.add(Kind::PointLights, lights(|k| matches!(k, LightKind::Point)));
+        plan.add(
+            Kind::SpotLights,
+            lights(|k| matches!(k, LightKind::Spot { .. })),
+        );
+        plan.add(
+            Kind::DirectionalLights,
+            lights(|k| matches!(k, LightKind::Directional)),
+        );
+        plan.add(
+            Kind::TwoSided,
+            counted(used.iter().filter(|m| m.sides == Sides::Both), "material"),
+        );
+        for lack in lacking(&scene.source.json) {
+            plan.effects.push(Effect {
+                name: lack.effect,
+                runs: false,
+                lacking: true,
+                reason: lack.reason,
+            });
+        }
+        plan
+    }
+
+    /// Does this effect run?
+    pub fn runs(&self, kind: Kind) -> bool {
+        self.effects.iter().any(|e| e.name == kind.name() && e.runs)
+    }
+
+    /// The lines, [`Kind`]s in order, then what the program lacks.
+    pub fn effects(&self) -> &[Effect] {
+        &self.effects
+    }
+
+    fn add(&mut self, kind: Kind, (runs, reason): (bool, String)) {
+        self.effects.push(Effect {
+            name: kind.name().into(),
+            runs,
+            lacking: false,
+            reason,
+        });
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self
+            .effects
+            .iter()
+            .map(|e| e.name.chars().count())
+            .max()
+            .unwrap_or(0);
+        for Effect {
+            name,
+            runs,
+            lacking,
+            reason,
+        } in &self.effects
+        {
+            let state = match (lacking, runs) {
+                (true, _) => "lacking",
+                (_, true) => "runs",
+                _ => "off",
+            };
+            writeln!(f, "{name:width$}  {state:7}  {reason}")?;
+        }
+        Ok(())
+    }
+}
+
+fn quoted(name: &str) -> String {
+    format!("'{}'", short(name))
+}
+
+fn number_of(names: &[String], what: &str) -> (bool, String) {
+    match names.len() {
+        0 => (false, "none".into()),
+        1 => (true, format!("1 {what}: {}", names[0])),
+        n => (true, format!("{n} {what}s: {}", listed(names))),
+    }
+}
+
+fn counted<'a, 'b: 'a>(
+    materials: impl Iterator<Item = &'a &'b Material>,
+    what: &str,
+) -> (bool, String) {
+    number_of(
+        &materials.map(|m| quoted(&m.name)).collect::<Vec<_>>(),
+        what,
+    )
+}
+
+/// A texture or a vertex colour multiplies: black stays black.
+fn interreflection(used: &[&Material]) -> (bool, String) {
+    let bright = used
+        .iter()
+        .filter(|m| m.reflectance.iter().any(|r| *r > 0.0))
+        .count();
+    match bright {
+        0 => (false, "every surface is black".into()),
+        n if n == used.len() => (true, "every surface reflects".into()),
+        n => (true, format!("{n} of {} materials reflect", used.len())),
+    }
+}
+
+fn is_flat(spectrum: &Leaves) -> bool {
+    spectrum.iter().all(|v| *v == spectrum[0])
+}
+
+fn is_grey(image: &Image) -> bool {
+    image.pixels.iter().all(|[r, g, b, _]| r == g && g == b)
+}
+
+/// One band is enough where every reflectance is flat and every lamp is its light spectrum times a number.
+fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
+    let grey_image = |index: usize| scene.images.get(index).is_some_and(is_grey);
+    let mut greys: BTreeMap<usize, bool> = BTreeMap::new();
+    let mut grey = |index: usize| *greys.entry(index).or_insert_with(|| grey_image(index));
+    for material in used {
+        if !is_flat(&material.reflectance) {
+            return (true, format!("{} has a colour", quoted(&material.name)));
+        }
+        if material.paint.as_ref().is_some_and(|t| !grey(t.image)) {
+            return (
+                true,
+                format!("the texture of {} has colours", quoted(&material.name)),
+            );
+        }
+        if let Some(emission) = &material.emission {
+            let tinted = emission.texture.as_ref().is_some_and(|t| !grey(t.image));
+            if tinted || !is_flat(&emission.shape) {
+                return (
+                    true,
+                    format!(
+                        "the light of {} has a colour of its own",
+                        quoted(&material.name)
+                    ),
+                );
+            }
+        }
+    }
+    if let Some(light) = scene.lights.iter().find(|l| !is_flat(&l.shape)) {
+        return (
+            true,
+            format!("the light {} has a colour of its own", quoted(&light.name)),
+        );
+    }
+    let painted = |s: &&Surface| {
+        let counts = scene
+            .materials
+            .get(s.material)
+            .is_some_and(|m| m.vertex_paint);
+        counts
+            && s.colors
+                .iter()
+                .flatten()
+                .any(|[r, g, b, _]| r != g || g != b)
+    };
+    if let Some(surface) = scene.surfaces.iter().find(painted) {
+        return (true, format!("{} has vertex colours", surface.name));
+    }
+    (false, "every surface is grey: one band".into())
+}
+
+/// Off where nothing can stand between two points that see each other's front, nor between a point and a light.
+fn occlusion(scene: &Scene) -> (bool, String) {
+    match blocked(&scene.surfaces, &scene.lights) {
+        None => (
+            false,
+            "the room is convex and empty: nothing can block".into(),
+        ),
+        Some(reason) => (true, reason),
+    }
+}
+
+/// Why something could block; none if every vertex and every light lies on or before every triangle's plane.
+///
+/// Then a segment between two points of the surfaces (or to a light) never passes from the front of a triangle to its
+/// back. A parallel light comes from infinity: it must shine on the front of every triangle.
+fn blocked(surfaces: &[Surface], lights: &[PunctualLight]) -> Option<String> {
+    let vertices: Vec<DVec3> = surfaces
+        .iter()
+        .flat_map(|s| s.positions.iter().copied())
+        .collect();
+    let low = vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = vertices
+        .iter()
+        .copied()
+        .fold(DVec3::NEG_INFINITY, DVec3::max);
+    let tolerance = CONVEX_TOLERANCE * (high - low).length();
+    let stands = |l: &&PunctualLight| l.kind != LightKind::Directional;
+    let mut pairs = 0;
+    for surface in surfaces {
+        for triangle in &surface.triangles {
+            let [a, b, c] = triangle.map(|i| surface.positions[i as usize]);
+            // A triangle without area has no plane, and hides nothing.
+            let Some(normal) = (b - a).cross(c - a).try_normalize() else {
+                continue;
+            };
+            let behind = |p: DVec3| normal.dot(p - a) < -tolerance;
+            if vertices.iter().any(|p| behind(*p)) {
+                return Some(format!(
+                    "{} turns its back on a part of the room",
+                    surface.name
+                ));
+            }
+            if let Some(light) = lights.iter().filter(stands).find(|l| behind(l.position)) {
+                return Some(format!(
+                    "the light {} stands behind {}",
+                    quoted(&light.name),
+                    surface.name
+                ));
+            }
+            let parallel = lights.iter().filter(|l| l.kind == LightKind::Directional);
+            if let Some(light) = parallel
+                .into_iter()
+                .find(|l| normal.dot(l.direction) > -CONVEX_TOLERANCE)
+            {
+                return Some(format!(
+                    "the light {} shines on the back of {}",
+                    quoted(&light.name),
+                    surface.name
+                ));
+            }
+            pairs += vertices.len();
+            if pairs > CONVEX_PAIRS {
+                return Some("too many triangles to show that the room is convex".into());
+            }
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Options;
+    use std::path::Path;
+
+    fn room(name: &str) -> Scene {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("scenes")
+            .join(name);
+        Scene::load(path, &Options::default()).unwrap()
+    }
+
+    fn running(scene: &Scene) -> Vec<String> {
+        let plan = Plan::of(scene);
+        plan.effects()
+            .iter()
+            .filter(|e| e.runs)
+            .map(|e| e.name.clone())
+            .collect()
+    }
+
+    #[test]
+    fn a_cornell_box_calls_for_colour_and_occlusion() {
+        let plan = [
+            "interreflection",
+            "occlusion",
+            "colour",
+            "emissive surfaces",
+        ];
+        for name in ["cornell.glb", "cornell-closed.glb", "cornell-d65.glb"] {
+            assert_eq!(running(&room(name)), plan, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_convex_empty_room_has_nothing_to_block() {
+        assert_eq!(
+            running(&room("convex.glb")),
+            ["interreflection", "colour", "emissive surfaces"]
+        );
+    }
+
+    #[test]
+    fn black_walls_pass_nothing_on_and_grey_ones_need_one_band() {
+        assert_eq!(running(&room("cie171-5.4.glb")), ["point lights"]);
+        assert_eq!(running(&room("cie171-5.3.glb")), ["emissive surfaces"]);
+        assert_eq!(
+            running(&room("cie171-5.7.glb")),
+            ["occlusion", "emissive surfaces"]
+        );
+        assert_eq!(
+            running(&room("cie171-5.8.glb")),
+            ["interreflection", "point lights"]
+        );
+        assert_eq!(
+            running(&room("furnace.glb")),
+            ["interreflection", "emissive surfaces"]
+        );
+    }
+
+    #[test]
+    fn two_lamps_are_two_light_spectra() {
+        let scene = room("two-rooms.glb");
+        assert!(Plan::of(&scene).runs(Kind::LightSpectra));
+        assert_eq!(scene.spectra.len(), 2);
+    }
+
+    #[test]
+    fn a_lamp_outside_of_a_convex_room_is_blocked_by_its_walls() {
+        let mut scene = room("cie171-5.4.glb");
+        assert!(!Plan::of(&scene).runs(Kind::Occlusion));
+        scene.lights[0].position = DVec3::new(2.0, 5.0, -2.0);
+        assert!(Plan::of(&scene).runs(Kind::Occlusion));
+        // Sunlight meets the backs of a closed room.
+        scene.lights[0].kind = LightKind::Directional;
+        assert!(Plan::of(&scene).runs(Kind::Occlusion));
+        // But an open floor it lights without anything between.
+        let mut floor = room("cie171-5.2-isotropic.glb");
+        floor.lights[0].kind = LightKind::Directional;
+        floor.lights[0].direction = DVec3::NEG_Y;
+        assert!(!Plan::of(&floor).runs(Kind::Occlusion));
+    }
+
+    #[test]
+    fn a_dent_or_an_object_is_no_convex_room() {
+        let mut scene = room("cie171-5.4.glb");
+        // A corner drawn in by more than rounding.
+        scene.surfaces[0].positions[0] += DVec3::splat(0.01);
+        assert!(Plan::of(&scene).runs(Kind::Occlusion));
+        assert!(Plan::of(&room("corridor.glb")).runs(Kind::Occlusion));
+        // A single floor from which the walls were taken has nothing before it.
+        assert!(!Plan::of(&room("cie171-5.2.glb")).runs(Kind::Occlusion));
+    }
+
+    #[test]
+    fn grey_paint_with_grey_texture_and_vertices_stays_one_band() {
+        let mut scene = room("furnace.glb");
+        scene.images.push(Image {
+            name: "t".into(),
+            width: 1,
+            height: 1,
+            pixels: vec![[0.3, 0.3, 0.3, 1.0]],
+        });
+        scene.materials[0].paint = Some(super::super::Texture {
+            image: 0,
+            texcoord: 0,
+            transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            wrap: [super::super::Wrap::Repeat; 2],
+        });
+        let plan = Plan::of(&scene);
+        assert!(plan.runs(Kind::Textures) && !plan.runs(Kind::Colour));
+        scene.surfaces[0].colors = Some(vec![
+            [0.5, 0.5, 0.5, 1.0];
+            scene.surfaces[0].positions.len()
+        ]);
+        assert!(!Plan::of(&scene).runs(Kind::Colour));
+        scene.surfaces[0].colors.as_mut().unwrap()[0][0] = 0.6;
+        assert!(Plan::of(&scene).runs(Kind::Colour));
+        scene.surfaces[0].colors = None;
+        scene.images[0].pixels[0][2] = 0.2;
+        assert!(Plan::of(&scene).runs(Kind::Colour));
+    }
+
+    #[test]
+    fn the_plan_reads_as_a_table_and_as_json() {
+        let plan = Plan::of(&room("convex.glb"));
+        let text = plan.to_string();
+        assert!(
+            text.contains("occlusion              off      the room is convex and empty"),
+            "{text}"
+        );
+        let json = serde_json::to_value(&plan).unwrap();
+        assert_eq!(json[1]["name"], "occlusion");
+        assert_eq!(json[1]["runs"], false);
+    }
+}

@@ -1,0 +1,107 @@
+//! A room from its file: document, geometry, paint and lamps, and everything that is wrong with any of them together.
+
+use super::check::Check;
+use super::document::Document;
+use super::light::{self, Lamps};
+use super::material;
+use super::spectra_file::SpectraFile;
+use super::{Scene, Surface, lacking};
+use crate::color::Upsampler;
+use crate::error::{Error, Result};
+use crate::spectrum::Grid;
+use std::path::{Path, PathBuf};
+
+/// How to read a room.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The wavelengths to work on; 380 to 780 nm by default.
+    pub grid: Grid,
+    /// The file of spectra; none: `room.spectra.json` beside `room.glb`, if there is one.
+    pub spectra: Option<PathBuf>,
+}
+
+impl Scene {
+    /// Reads a room.
+    ///
+    /// ```
+    /// use haarlight::scene::{Options, Scene, effects::{Kind, Plan}};
+    /// let room = Scene::load("scenes/convex.glb", &Options::default())?;
+    /// assert_eq!(room.materials[0].name, "floor");
+    /// // Nothing can block in a convex empty room, so that no visibility is worked out.
+    /// assert!(!Plan::of(&room).runs(Kind::Occlusion));
+    /// # Ok::<(), haarlight::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Io`] if there is no such file; [`Error::Input`] with all problems of document, geometry, materials,
+    /// lights and spectra.
+    pub fn load(path: impl AsRef<Path>, options: &Options) -> Result<Self> {
+        Self::from_document(Document::open(path)?, options)
+    }
+
+    /// The room that a document holds.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn from_document(document: Document, options: &Options) -> Result<Self> {
+        let geometry = document.load_geometry();
+        let path = &document.source.path;
+        let mut check = Check::new(path.display().to_string());
+        let (raw_materials, raw_lights) = (document.raw_materials(), document.raw_lights());
+        let names: Vec<String> = raw_materials.iter().map(material::name_of).collect();
+        let light_names: Vec<String> = raw_lights.iter().map(light::name_of).collect();
+        let grid = options.grid;
+        let asked = options.spectra.as_deref();
+        let file = SpectraFile::open(path, asked, &names, &light_names, &grid, &mut check);
+        let upsampler = Upsampler::new(&grid);
+        let mut lamps = Lamps::new(&grid, &upsampler);
+        let mut materials = material::materials(
+            raw_materials,
+            &tinted(raw_materials.len(), &geometry.surfaces),
+            &file,
+            path,
+            &grid,
+            &upsampler,
+            &mut lamps,
+            &mut check,
+        );
+        let mut lights = light::punctual(raw_lights, &file, path, &mut lamps, &mut check);
+        let spectra = lamps.finish(&mut materials, &mut lights);
+        for warning in lacking::warnings(&document.source.json) {
+            check.warn(warning);
+        }
+
+        let (found, said) = check.into_parts();
+        let mut problems = geometry.problems;
+        problems.extend(found);
+        if !problems.is_empty() {
+            return Err(Error::Input(problems));
+        }
+        let mut warnings = geometry.warnings;
+        warnings.extend(said);
+        Ok(Self {
+            source: document.source,
+            grid,
+            surfaces: geometry.surfaces,
+            materials,
+            images: geometry.images,
+            spectra,
+            lights,
+            cameras: geometry.cameras,
+            warnings,
+        })
+    }
+}
+
+/// For each material: do all surfaces that carry it have vertex colours?
+fn tinted(materials: usize, surfaces: &[Surface]) -> Vec<bool> {
+    let mut tinted = vec![false; materials];
+    for colored in [true, false] {
+        for surface in surfaces.iter().filter(|s| s.colors.is_some() == colored) {
+            if let Some(slot) = tinted.get_mut(surface.material) {
+                *slot = colored;
+            }
+        }
+    }
+    tinted
+}
