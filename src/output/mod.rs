@@ -5,6 +5,7 @@ pub mod exposure;
 pub mod exr;
 pub mod file;
 pub mod gltf;
+pub mod npz;
 pub mod picture;
 mod raster;
 pub mod refined;
