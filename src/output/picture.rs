@@ -95,7 +95,7 @@ impl Picture {
         let view = View::new(scene, camera, width, height);
         let pixels = raster::draw(&meshes, &view, [width, height], grid, |samples| {
             (0..width)
-                .map(|x| pixel(samples, x, width, grid, &shade))
+                .map(|x| pixel(&meshes, samples, [x, width, grid], &shade))
                 .collect()
         });
         Ok(Self {
@@ -177,30 +177,47 @@ fn shade(meshes: &Refined, srgb: &LinearSrgb, look: &Exposure, hit: &Hit) -> Sha
 }
 
 /// Mean over the samples of column `x` of a pixel row.
+///
+/// Light is linear over a triangle: its samples in a pixel are shaded once, at their mean place. Texels are not:
+/// a textured triangle is shaded at every sample.
 fn pixel(
+    meshes: &Refined,
     samples: &[Option<Hit>],
-    x: usize,
-    width: usize,
-    grid: usize,
+    place: [usize; 3],
     shade: &impl Fn(&Hit) -> Shade,
 ) -> Pixel {
-    let mut sums = [[0.0; 3]; 3];
-    let mut covered = 0;
+    let [x, width, grid] = place;
+    // (triangle, with the sum of its samples' weights; number of samples)
+    let mut groups: Vec<(Hit, f64)> = Vec::new();
     for row in samples.chunks(width * grid) {
         for hit in row[x * grid..][..grid].iter().flatten() {
-            let values = shade(hit);
-            covered += 1;
-            for (sum, value) in sums
-                .as_flattened_mut()
-                .iter_mut()
-                .zip(values.as_flattened())
-            {
-                *sum += value;
+            let same = |(other, _): &&mut (Hit, f64)| {
+                other.mesh == hit.mesh && other.triangle == hit.triangle
+            };
+            match groups.iter_mut().rev().find(same) {
+                Some((group, count)) if !meshes.is_textured(hit) => {
+                    *count += 1.0;
+                    group.weights = std::array::from_fn(|i| group.weights[i] + hit.weights[i]);
+                }
+                _ => groups.push((*hit, 1.0)),
             }
         }
     }
+    let mut sums = [[0.0; 3]; 3];
+    let mut covered = 0.0;
+    for (mut hit, count) in groups {
+        hit.weights = hit.weights.map(|w| w / count);
+        covered += count;
+        for (sum, value) in sums
+            .as_flattened_mut()
+            .iter_mut()
+            .zip(shade(&hit).as_flattened())
+        {
+            *sum += count * value;
+        }
+    }
     let count = (grid * grid) as f64;
-    let coverage = (f64::from(covered) / count) as f32;
+    let coverage = (covered / count) as f32;
     let [rgb, xyz, shown] = sums.map(|sum| sum.map(|c| (c / count) as f32));
     Pixel {
         rgb,

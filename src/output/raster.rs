@@ -99,6 +99,19 @@ impl Setup {
         })
     }
 
+    /// About where a row enters and leaves the triangle.
+    fn span(&self, y: f64, [mut from, mut to]: [f64; 2]) -> [f64; 2] {
+        for edge in &self.edges {
+            let zero = -(edge.y * y + edge.z) / edge.x;
+            if edge.x > 0.0 {
+                from = from.max(zero);
+            } else if edge.x < 0.0 {
+                to = to.min(zero);
+            }
+        }
+        [from, to]
+    }
+
     /// Corner weights and depth at a sample inside the triangle.
     fn sample(&self, x: f64, y: f64) -> Option<([f64; 3], f64)> {
         let at = self.edges.map(|e| e.x * x + e.y * y + e.z);
@@ -197,12 +210,12 @@ fn draw_band(
     grid: usize,
 ) -> Vec<Option<Hit>> {
     let across = width * grid;
+    let down = count * grid;
     let step = 1.0 / grid as f64;
     // Sample numbers from pixel coordinates; samples lie in the middle of their cells.
-    let number = |pixel: f64, offset: f64, most: usize| {
-        (((pixel - offset) / step).max(0.0) as usize).min(most)
-    };
-    let mut depths = vec![f64::INFINITY; across * count * grid];
+    let number = |pixel: f64, most: usize| ((pixel / step).max(0.0) as usize).min(most);
+    let top = first as f64;
+    let mut depths = vec![f64::INFINITY; across * down];
     let mut hits = vec![None; depths.len()];
     let size = [width, first + count];
     for &[mesh, triangle] in triangles {
@@ -211,11 +224,11 @@ fn draw_band(
         };
         let holes = meshes.has_holes(mesh as usize);
         let [x0, x1, y0, y1] = setup.bounds;
-        for row in number(y0, first as f64, count * grid)
-            ..(number(y1, first as f64, count * grid) + 1).min(count * grid)
-        {
-            let y = first as f64 + (row as f64 + 0.5) * step;
-            for column in number(x0, 0.0, across)..(number(x1, 0.0, across) + 1).min(across) {
+        for row in number(y0 - top, down)..(number(y1 - top, down) + 1).min(down) {
+            let y = top + (row as f64 + 0.5) * step;
+            let [from, to] = setup.span(y, [x0, x1]);
+            // A sample more on both sides: the span is rounded, the test below is exact.
+            for column in number(from - step, across)..(number(to + step, across) + 1).min(across) {
                 let Some((weights, depth)) = setup.sample((column as f64 + 0.5) * step, y) else {
                     continue;
                 };
@@ -294,6 +307,12 @@ impl<'a> Refined<'a> {
         let baked = &self.surfaces[hit.mesh as usize];
         let corners = baked.triangles[hit.triangle as usize].map(|v| &baked.vertices[v as usize]);
         (&self.scene.surfaces[baked.surface], corners)
+    }
+
+    /// Does a texture multiply the light of this hit?
+    pub(super) fn is_textured(&self, hit: &Hit) -> bool {
+        let surface = &self.scene.surfaces[self.surfaces[hit.mesh as usize].surface];
+        self.scene.materials[surface.material].paint.is_some()
     }
 
     /// Texture coordinates of a set, interpolated.

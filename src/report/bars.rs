@@ -131,9 +131,6 @@ mod tests {
         let svg = bars().to_svg();
         assert_eq!(svg, bars().to_svg());
         assert!(svg.contains(">0.450<") && svg.contains(">1.34<") && svg.contains(">4.90<"));
-        if let Ok(name) = std::env::var("HAARLIGHT_CHART") {
-            std::fs::write(std::env::temp_dir().join(format!("bars-{name}")), svg).unwrap();
-        }
     }
 
     #[test]

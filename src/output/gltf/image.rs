@@ -7,8 +7,11 @@ use std::path::{Component, Path, PathBuf};
 /// Largest image file that is taken in, bytes.
 const LIMIT: u64 = 1 << 30;
 
+/// The sRGB bytes nearest to the linear 0.5 that a scene takes for an image it cannot read.
+const NEUTRAL: [u8; 4] = [188, 188, 188, 255];
+
 impl Writer<'_> {
-    /// Takes external images into the buffer. What cannot be read becomes one white pixel, with a warning.
+    /// Takes external images into the buffer. What cannot be read becomes one grey pixel, with a warning.
     pub(super) fn images(&mut self) {
         let mut images = self
             .json
@@ -25,9 +28,9 @@ impl Writer<'_> {
             }
             let bytes = external(&self.scene.source.path, &uri).unwrap_or_else(|| {
                 self.warnings.push(format!(
-                    "image {i} '{uri}' cannot be read; the baked room has a white pixel for it"
+                    "image {i} '{uri}' cannot be read; the baked room has a grey pixel for it"
                 ));
-                png(&[[255; 4]], 1, 1)
+                png(&[NEUTRAL], 1, 1)
             });
             image["mimeType"] = json!(mime(&bytes));
             image["bufferView"] = json!(self.bin.view(&bytes, Use::Data));

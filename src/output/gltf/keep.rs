@@ -49,6 +49,11 @@ impl Writer<'_> {
                     count,
                 )
             });
+        if bytes.is_none() && accessor.get("bufferView").is_some() {
+            self.warnings.push(format!(
+                "accessor {old} cannot be read; the baked room has zeros for it"
+            ));
+        }
         if let Some(object) = accessor.as_object_mut() {
             object.shift_remove("byteOffset");
             object.shift_remove("bufferView");
