@@ -1,1 +1,3 @@
+//! The `haarlight` command.
+
 fn main() {}

@@ -1,1 +1,11 @@
-//! To be written.
+//! Published tables (CIE observer, illuminants, measured reflectances) and readers of spectra.
+
+mod blackbody;
+mod registry;
+mod table;
+
+pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
+pub use registry::{Kind, Named, named, names, nearest};
+pub use table::{CsvProblem, Outside, Table};
+
+pub(crate) use registry::cmf_1931;

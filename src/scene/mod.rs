@@ -1,6 +1,7 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
-mod texture;
+pub mod document;
+mod raw;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};

@@ -1,4 +1,9 @@
 //! The 64 leaves that every spectrum is held on (paper 2.1.1).
+//!
+//! Two ways to bring a table onto the leaves: the exact band means of the piecewise linear table, and the paper's
+//! convention, the value at the left edge of the leaf (380, 385, ... 695 nm). Units: nm.
+
+use crate::data::{Outside, Table};
 
 /// Number of leaves: 2^6, the finest level of every spectral tree.
 pub const LEAVES: usize = 64;
@@ -24,14 +29,63 @@ impl Grid {
         }
     }
 
-    /// Left edge of a leaf, nm.
+    /// The paper's range: 380 to 700 nm, 5 nm a leaf.
+    pub fn paper() -> Self {
+        Self::new(380.0, 700.0)
+    }
+
+    /// Left edge of the first leaf, nm.
+    pub fn start(&self) -> f64 {
+        self.start
+    }
+
+    /// Right edge of the last leaf, nm.
+    pub fn end(&self) -> f64 {
+        self.left(LEAVES)
+    }
+
+    /// Left edge of a leaf, nm; `left(64)` is the end of the range.
     pub fn left(&self, leaf: usize) -> f64 {
         self.start + self.width * leaf as f64
+    }
+
+    /// Middle of a leaf, nm.
+    pub fn middle(&self, leaf: usize) -> f64 {
+        self.start + self.width * (leaf as f64 + 0.5)
     }
 
     /// Width of a leaf, nm.
     pub fn width(&self) -> f64 {
         self.width
+    }
+
+    /// The leaf that holds a wavelength; the end of the range belongs to the last leaf.
+    pub fn leaf_of(&self, nm: f64) -> Option<usize> {
+        if !(self.start..=self.end()).contains(&nm) {
+            return None;
+        }
+        // Not negative as nm >= start; 64 only at the very end.
+        Some((((nm - self.start) / self.width) as usize).min(LEAVES - 1))
+    }
+
+    /// Mean of the table over each leaf, exact for the piecewise linear table.
+    ///
+    /// ```
+    /// use haarlight::{data::{Outside, Table}, spectrum::Grid};
+    /// let ramp = Table::parse_csv("380,0\n700,320").unwrap();
+    /// let means = Grid::paper().means(&ramp, Outside::Zero);
+    /// assert_eq!(means[0], 2.5);
+    /// assert_eq!(Grid::paper().left_edges(&ramp, Outside::Zero)[1], 5.0);
+    /// ```
+    pub fn means(&self, table: &Table, outside: Outside) -> Leaves {
+        std::array::from_fn(|leaf| {
+            table.integral(self.left(leaf), self.left(leaf + 1), outside) / self.width
+        })
+    }
+
+    /// Value of the table at the left edge of each leaf: the convention behind the paper's Table 1.
+    pub fn left_edges(&self, table: &Table, outside: Outside) -> Leaves {
+        std::array::from_fn(|leaf| table.at(self.left(leaf), outside))
     }
 }
 
@@ -39,5 +93,31 @@ impl Default for Grid {
     /// 380 to 780 nm, 6.25 nm a leaf.
     fn default() -> Self {
         Self::new(380.0, 780.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn leaves_tile_the_range() {
+        for grid in [Grid::paper(), Grid::default(), Grid::new(360.0, 830.0)] {
+            assert_eq!(grid.leaf_of(grid.start()), Some(0));
+            assert_eq!(grid.leaf_of(grid.end()), Some(63));
+            assert_eq!(grid.leaf_of(grid.end() + 0.1), None);
+            assert_eq!(grid.leaf_of(f64::NAN), None);
+            for leaf in 0..LEAVES {
+                assert_eq!(grid.leaf_of(grid.middle(leaf)), Some(leaf));
+            }
+        }
+    }
+
+    #[test]
+    fn means_keep_the_integral() {
+        let table = crate::data::named("cie/F11").unwrap().table;
+        let grid = Grid::default();
+        let sum: f64 = grid.means(&table, Outside::Zero).iter().sum();
+        assert!((sum * grid.width() - table.integral(380.0, 780.0, Outside::Zero)).abs() < 1e-9);
     }
 }

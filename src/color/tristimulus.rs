@@ -1,0 +1,39 @@
+//! Change to tristimulus values (paper 3.3, eq. 1): A = k * sum over the leaves of S a_bar.
+//!
+//! The factor k is the caller's: 683 lm/W for absolute values, 1 / sum(S y_bar) for a source that counts as 1.
+
+use super::Xyz;
+use crate::spectrum::{LEAVES, Leaves};
+
+/// `sum spectrum * weights` for X, Y, Z, without a factor.
+pub fn tristimulus(spectrum: &Leaves, weights: &[Leaves; 3]) -> Xyz {
+    weights
+        .each_ref()
+        .map(|w| (0..LEAVES).map(|leaf| spectrum[leaf] * w[leaf]).sum())
+}
+
+/// The paper's K = 1 / sum(S y_bar), with which the source has Y = 1; 0 for a source without visible light.
+pub fn normalization(source: &Leaves, weights: &[Leaves; 3]) -> f64 {
+    let y = tristimulus(source, weights)[1];
+    if y > 0.0 { 1.0 / y } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::Observer;
+    use crate::data::{Outside, named};
+    use crate::spectrum::Grid;
+
+    #[test]
+    fn a_source_counts_as_one() {
+        let grid = Grid::paper();
+        let weights = Observer::cie1931().samples(&grid);
+        for name in ["cie/C", "cie/D65", "cie/F2"] {
+            let source = grid.left_edges(&named(name).unwrap().table, Outside::Zero);
+            let k = normalization(&source, &weights);
+            assert!((k * tristimulus(&source, &weights)[1] - 1.0).abs() < 1e-15);
+        }
+        assert_eq!(normalization(&[0.0; LEAVES], &weights), 0.0);
+    }
+}

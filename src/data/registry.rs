@@ -1,0 +1,256 @@
+//! Spectra by name: `cie/F2`, `macbeth/white`, `cornell/red`, `blackbody/2700`.
+//!
+//! The tables lie beside this file as CSV, each with its source, edition, step, range, units and licence.
+
+use super::table::Columns;
+use super::{Table, blackbody};
+
+/// What a named table is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Relative spectral power.
+    Illuminant,
+    /// Reflectance factor, [0, 1].
+    Reflectance,
+}
+
+/// A spectrum of the registry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Named {
+    /// Its values.
+    pub table: Table,
+    /// What they mean.
+    pub kind: Kind,
+}
+
+/// Temperatures that `blackbody/...` takes, K.
+const TEMPERATURES: std::ops::RangeInclusive<f64> = 500.0..=50_000.0;
+
+struct File {
+    prefix: &'static str,
+    kind: Kind,
+    csv: &'static str,
+}
+
+const FILES: [File; 9] = [
+    File {
+        prefix: "cie",
+        kind: Kind::Illuminant,
+        csv: include_str!("illuminants.csv"),
+    },
+    File {
+        prefix: "cie",
+        kind: Kind::Illuminant,
+        csv: include_str!("fluorescent.csv"),
+    },
+    File {
+        prefix: "cie",
+        kind: Kind::Illuminant,
+        csv: include_str!("fluorescent_fl3.csv"),
+    },
+    File {
+        prefix: "cie",
+        kind: Kind::Illuminant,
+        csv: include_str!("discharge.csv"),
+    },
+    File {
+        prefix: "cie",
+        kind: Kind::Illuminant,
+        csv: include_str!("led.csv"),
+    },
+    File {
+        prefix: "macbeth",
+        kind: Kind::Reflectance,
+        csv: include_str!("colorchecker_ohta.csv"),
+    },
+    File {
+        prefix: "babelcolor",
+        kind: Kind::Reflectance,
+        csv: include_str!("colorchecker_babelcolor.csv"),
+    },
+    File {
+        prefix: "cornell",
+        kind: Kind::Reflectance,
+        csv: include_str!("cornell_walls.csv"),
+    },
+    File {
+        prefix: "cornell",
+        kind: Kind::Illuminant,
+        csv: include_str!("cornell_light.csv"),
+    },
+];
+
+impl File {
+    fn columns(&self) -> Columns {
+        Columns::parse(self.csv).expect("built-in tables are well formed")
+    }
+}
+
+/// The spectrum of that name, none if there is no such name.
+///
+/// ```
+/// use haarlight::data::{Kind, Outside, named};
+/// let f2 = named("cie/F2").unwrap();
+/// assert_eq!(f2.kind, Kind::Illuminant);
+/// assert_eq!(f2.table.at(545.0, Outside::Zero), 24.88);
+/// assert_eq!(named("cie/FL2"), Some(f2));
+/// assert_eq!(named("blackbody/2700").unwrap().table.at(560.0, Outside::Zero), 100.0);
+/// assert_eq!(named("cie/F99"), None);
+/// ```
+pub fn named(name: &str) -> Option<Named> {
+    let (prefix, column) = name.split_once('/')?;
+    if prefix == "blackbody" {
+        let kelvin = column
+            .parse::<f64>()
+            .ok()
+            .filter(|kelvin| TEMPERATURES.contains(kelvin))?;
+        return Some(Named {
+            table: blackbody(kelvin),
+            kind: Kind::Illuminant,
+        });
+    }
+    // CIE 015:2004 renamed F1-F12 to FL1-FL12.
+    let old_name = column
+        .strip_prefix("FL")
+        .filter(|rest| !rest.contains('.'))
+        .map(|rest| format!("F{rest}"));
+    let column = old_name.as_deref().unwrap_or(column);
+    FILES
+        .iter()
+        .filter(|file| file.prefix == prefix)
+        .find_map(|file| {
+            let table = file.columns().table(column)?;
+            Some(Named {
+                table,
+                kind: file.kind,
+            })
+        })
+}
+
+/// Every name, in the order of the publications; one blackbody stands for all of them.
+pub fn names() -> Vec<String> {
+    let mut names = Vec::new();
+    for file in &FILES {
+        names.extend(
+            file.columns()
+                .names
+                .iter()
+                .map(|column| format!("{}/{column}", file.prefix)),
+        );
+    }
+    names.push("blackbody/2700".into());
+    names
+}
+
+/// The three names nearest to `name` by edit distance (letter case is free), nearest first.
+///
+/// ```
+/// assert_eq!(haarlight::data::nearest("cie/d65x")[0], "cie/D65");
+/// assert_eq!(haarlight::data::nearest("cornel/red")[0], "cornell/red");
+/// ```
+pub fn nearest(name: &str) -> Vec<String> {
+    let mut ranked: Vec<(usize, String)> = names()
+        .into_iter()
+        .map(|known| (edit_distance(name, &known), known))
+        .collect();
+    ranked.sort_by_key(|(distance, _)| *distance);
+    ranked.into_iter().take(3).map(|(_, known)| known).collect()
+}
+
+/// Levenshtein distance of the lower-case forms; letters beyond the 64th do not count.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let letters = |text: &str| text.to_lowercase().chars().take(64).collect::<Vec<char>>();
+    let (a, b) = (letters(a), letters(b));
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, &from) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &to) in b.iter().enumerate() {
+            let replace = diagonal + usize::from(from != to);
+            diagonal = row[j + 1];
+            row[j + 1] = replace.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+/// The CIE 1931 2 degree observer: x_bar, y_bar, z_bar at 360-830 nm in steps of 1 nm.
+pub(crate) fn cmf_1931() -> [Table; 3] {
+    let columns =
+        Columns::parse(include_str!("cmf_1931.csv")).expect("built-in tables are well formed");
+    ["x_bar", "y_bar", "z_bar"].map(|name| {
+        columns
+            .table(name)
+            .expect("the observer has three functions")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_resolves_and_is_its_own_nearest() {
+        let names = names();
+        assert_eq!(names.len(), 7 + 12 + 15 + 5 + 9 + 24 + 24 + 3 + 1 + 1);
+        for name in &names {
+            assert!(named(name).is_some(), "{name}");
+            assert_eq!(&nearest(name)[0], name);
+        }
+    }
+
+    #[test]
+    fn unknown_names_are_none() {
+        for name in [
+            "",
+            "cie",
+            "cie/",
+            "/",
+            "blackbody/",
+            "blackbody/499",
+            "blackbody/nan",
+            "blackbody/inf",
+            "cie/FL3.16",
+            "D65",
+        ] {
+            assert_eq!(named(name), None, "{name}");
+        }
+        assert_eq!(nearest(&"x".repeat(100_000)).len(), 3);
+    }
+
+    #[test]
+    fn reflectances_are_physical() {
+        for name in names() {
+            let named = named(&name).unwrap();
+            if named.kind == Kind::Reflectance {
+                assert!(
+                    named.table.values().iter().all(|v| (0.0..=1.0).contains(v)),
+                    "{name}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn headers_state_their_source() {
+        for csv in FILES
+            .iter()
+            .map(|file| file.csv)
+            .chain([include_str!("cmf_1931.csv")])
+        {
+            for key in [
+                "# source: ",
+                "# edition: ",
+                "# range: ",
+                "# units: ",
+                "# licence: ",
+                "# original: ",
+            ] {
+                assert!(
+                    csv.lines().any(|line| line.starts_with(key)),
+                    "{key} missing"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,332 @@
+//! Irradiance at a point: every link of the element that holds it (or the whole room), evaluated anew for that point.
+//!
+//! `H(p) = sum over patches F(p -> b) V(p, b) B_b`, with exact polygon factors. A patch whose light varies is entered
+//! (its children take its place) while that could misplace more than the tolerance; a lamp is entered until it is even.
+//! Ways that a link proved clear cost no ray; others get rays in number with what they carry.
+
+use crate::geometry::{Segment, lambert_polygon};
+use crate::hierarchy::{Element, NONE, Node, Sample, Tree};
+use crate::link::{Sight, View, point_factor};
+use crate::scene::{LightKind, PunctualLight};
+use crate::solve::light::Light;
+use glam::DVec3;
+
+/// Rays to a patch at least, and at the most.
+const RAYS: [usize; 2] = [4, 32];
+/// Points that stand for a far cluster.
+const CLUSTER_POINTS: usize = 8;
+/// Faces of a cluster that are treated as polygons.
+const POLYGONS: u32 = 4;
+/// How often a lamp's triangle is quartered where its shadow boundary crosses it.
+const LAMP_DEPTH: u32 = 6;
+
+/// Where light is received.
+#[derive(Debug, Clone, Copy)]
+pub struct Receiver {
+    /// The point, recentred.
+    pub point: DVec3,
+    /// Unit normal for the cosine.
+    pub normal: DVec3,
+    /// Plane of the face that the point lies on; `u32::MAX` for a point in the air.
+    pub plane: u32,
+    /// Leaf of the hierarchy whose links are used; none: the whole room is searched.
+    pub leaf: Option<u32>,
+    /// Distinguishes sampling patterns.
+    pub seed: u64,
+}
+
+/// Light at a point.
+#[derive(Debug, Clone)]
+pub struct Gathered {
+    /// Irradiance by lane.
+    pub irradiance: [f32; 64],
+    /// Of which straight from lamps.
+    pub direct: [f32; 64],
+    /// Sum of visible factors: 1 in a closed room.
+    pub seen: f64,
+}
+
+/// Reused memory of one thread and its ray count.
+#[derive(Debug, Default)]
+pub struct Memory {
+    stack: Vec<(u32, bool)>,
+    samples: Vec<Sample>,
+    segments: Vec<Segment>,
+    weights: Vec<f64>,
+    blocked: Vec<bool>,
+    /// Rays cast.
+    pub rays: u64,
+}
+
+/// Everything a gather looks at.
+pub struct Gatherer<'a> {
+    /// Patches.
+    pub tree: &'a Tree,
+    /// The solution.
+    pub light: &'a Light,
+    /// What blocks.
+    pub sight: &'a Sight<'a>,
+    /// Punctual lights with their rows of radiant intensity (or normal irradiance), recentred.
+    pub lamps: &'a [(PunctualLight, Vec<f32>)],
+    /// What one patch may misplace, share of the white's irradiance.
+    pub tolerance: f64,
+    /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
+    pub closed: bool,
+}
+
+impl Gatherer<'_> {
+    /// Gathers at a point.
+    pub fn at(&self, to: &Receiver, memory: &mut Memory) -> Gathered {
+        let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0 };
+        memory.stack.clear();
+        match to.leaf {
+            Some(leaf) => {
+                let mut id = leaf;
+                while id != NONE {
+                    for &(other, clear) in self.light.neighbours.row(id) {
+                        memory.stack.push((other, clear));
+                    }
+                    id = self.tree.node(id).parent;
+                }
+            }
+            None if !self.tree.nodes.is_empty() => memory.stack.push((0, false)),
+            None => {}
+        }
+        while let Some((id, clear)) = memory.stack.pop() {
+            self.visit(to, id, clear, memory, &mut out);
+        }
+        if self.closed && out.seen > 0.5 {
+            let scale = (1.0 / out.seen) as f32;
+            for x in &mut out.irradiance {
+                *x *= scale;
+            }
+        }
+        for (x, d) in out.irradiance.iter_mut().zip(&out.direct) {
+            *x += d;
+        }
+        self.punctual(to, memory, &mut out);
+        out
+    }
+
+    fn visit(&self, to: &Receiver, id: u32, clear: bool, memory: &mut Memory, out: &mut Gathered) {
+        let node = self.tree.node(id);
+        if !self.can_see(to, node) {
+            return;
+        }
+        let k = id as usize;
+        let (reflected, emitted) = (f64::from(self.light.bright_reflected[k]), f64::from(self.light.bright_emitted[k]));
+        let spread = f64::from(self.light.spread[k]);
+        let distance = (node.centre - to.point).length();
+        if node.faces.1 > POLYGONS {
+            // Greatest factor the whole cluster could have, by its projected area.
+            let gap = (distance - node.radius).max(0.0);
+            let factor = node.area / (std::f64::consts::PI * gap * gap + node.area);
+            let far = distance > 4.0 * node.radius;
+            if !far || factor * (spread + 0.3 * (reflected + emitted)) > self.tolerance {
+                memory.stack.extend(node.child_range().map(|c| (c, clear)));
+                return;
+            }
+            self.cluster(to, id, node, clear, memory, out);
+            return;
+        }
+        let sample = Sample { point: to.point, normal: to.normal, plane: to.plane, area: 1.0 };
+        let factor = point_factor(self.tree, &sample, node, &[]);
+        if factor <= 0.0 {
+            return;
+        }
+        let size = if clear { (node.radius / distance.max(1e-300)).min(1.0) } else { 1.0 };
+        if !node.is_leaf() && (node.element == NONE || factor * spread * size > self.tolerance) {
+            memory.stack.extend(node.child_range().map(|c| (c, clear)));
+            return;
+        }
+        let visible = if clear { 1.0 } else { self.visible(to, id, node, factor * (reflected + emitted), emitted > 0.0, memory) };
+        self.add(id, factor, visible, out);
+    }
+
+    /// Adds a patch with a factor and its visible share.
+    fn add(&self, id: u32, factor: f64, visible: f64, out: &mut Gathered) {
+        let seen = (factor * visible) as f32;
+        out.seen += factor * visible;
+        let k = id as usize;
+        let width = self.light.width();
+        for (x, r) in out.irradiance[..width].iter_mut().zip(self.light.reflected.row(k)) {
+            *x += seen * r;
+        }
+        if self.light.bright_emitted[k] > 0.0 {
+            for (x, e) in out.direct[..width].iter_mut().zip(self.light.emitted.row(k)) {
+                *x += seen * e;
+            }
+        }
+    }
+
+    /// Could any of the patch be in front of the receiver, and the receiver in front of any of the patch?
+    fn can_see(&self, to: &Receiver, node: &Node) -> bool {
+        let from = node.centre - to.point;
+        let reach = (0.5 * (node.high - node.low)).dot(to.normal.abs()).min(node.radius);
+        if to.normal.dot(from) + reach <= 0.0 {
+            return false;
+        }
+        if node.flat {
+            let entry = node.faces.0 as usize;
+            return self.tree.face_plane[entry] != to.plane && -node.normal.dot(from) + (0.5 * (node.high - node.low)).dot(node.normal.abs()) > 0.0;
+        }
+        let distance = from.length();
+        if distance <= node.radius || node.cone <= 0.0 {
+            return true;
+        }
+        let angle = node.normal.angle_between(-from) - (node.radius / distance).asin() - node.cone.acos();
+        angle < 0.5 * std::f64::consts::PI
+    }
+
+    /// A far cluster by points, each with its own ray.
+    fn cluster(&self, to: &Receiver, id: u32, node: &Node, clear: bool, memory: &mut Memory, out: &mut Gathered) {
+        let shift = crate::link::pattern(to.seed, id, 1);
+        self.tree.samples(id, CLUSTER_POINTS, shift, &mut memory.samples);
+        let _ = node;
+        memory.segments.clear();
+        memory.weights.clear();
+        for s in &memory.samples {
+            let d = s.point - to.point;
+            let r2 = d.length_squared();
+            let (c1, c2) = (to.normal.dot(d), -s.normal.dot(d));
+            if c1 > 0.0 && c2 > 0.0 && s.plane != to.plane {
+                memory.weights.push(c1 * c2 / (r2 * (std::f64::consts::PI * r2 + s.area)) * s.area);
+                memory.segments.push(Segment { from: to.point.as_vec3(), to: s.point.as_vec3(), planes: [to.plane, s.plane] });
+            }
+        }
+        let factor: f64 = memory.weights.iter().sum();
+        if factor <= 0.0 {
+            return;
+        }
+        let mut visible = 1.0;
+        if !clear && self.sight.occlusion {
+            self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            memory.rays += memory.segments.len() as u64;
+            let open = memory.weights.iter().zip(&memory.blocked).filter(|(_, b)| !**b).map(|(w, _)| w);
+            visible = open.sum::<f64>() / factor;
+        }
+        self.add(id, factor, visible, out);
+    }
+
+    /// Visible share of a polygon patch. `carries` is what it would bring unblocked, share of white.
+    fn visible(&self, to: &Receiver, id: u32, node: &Node, carries: f64, lamp: bool, memory: &mut Memory) -> f64 {
+        if !self.sight.occlusion {
+            return 1.0;
+        }
+        let Some(element) = self.tree.element(node) else { return 1.0 };
+        let plane = self.tree.face_plane[element.face as usize];
+        if lamp {
+            return self.lamp_visible(to, element, plane, carries, memory);
+        }
+        // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
+        let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
+        let count = wanted.clamp(RAYS[0], RAYS[1]);
+        let shift = crate::link::pattern(to.seed, id, 2);
+        let normal = node.normal;
+        let (mut seen, mut total) = (0.0, 0.0);
+        for (from, upto) in [(0, RAYS[0]), (RAYS[0], count)] {
+            memory.segments.clear();
+            memory.weights.clear();
+            for k in from..upto {
+                let p = element.at(crate::hierarchy::stratified(k, RAYS[1], shift));
+                let d = p - to.point;
+                let r2 = d.length_squared();
+                let (c1, c2) = (to.normal.dot(d), -normal.dot(d));
+                if c1 > 0.0 && c2 > 0.0 && r2 > 0.0 {
+                    memory.weights.push(c1 * c2 / (r2 * r2));
+                    memory.segments.push(Segment { from: to.point.as_vec3(), to: p.as_vec3(), planes: [to.plane, plane] });
+                }
+            }
+            self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            memory.rays += memory.segments.len() as u64;
+            for (w, &b) in memory.weights.iter().zip(&memory.blocked) {
+                total += w;
+                seen += if b { 0.0 } else { *w };
+            }
+            if seen == 0.0 || seen == total {
+                break;
+            }
+        }
+        if total > 0.0 { seen / total } else { 0.0 }
+    }
+
+    /// Visible share of a lamp's triangle: quartered where rays disagree, until a quarter carries less than the tolerance.
+    fn lamp_visible(&self, to: &Receiver, element: &Element, plane: u32, carries: f64, memory: &mut Memory) -> f64 {
+        let mut seen = 0.0;
+        let mut total = 0.0;
+        let mut open = vec![(element.corners, 0_u32)];
+        while let Some((corners, depth)) = open.pop() {
+            let factor = lambert_polygon(to.point, to.normal, &corners);
+            if factor <= 0.0 {
+                continue;
+            }
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            memory.segments.clear();
+            // Corners drawn a little inwards: a ray along the very edge says nothing about the inside.
+            for p in [middle, corners[0].lerp(middle, 0.15), corners[1].lerp(middle, 0.15), corners[2].lerp(middle, 0.15)] {
+                memory.segments.push(Segment { from: to.point.as_vec3(), to: p.as_vec3(), planes: [to.plane, plane] });
+            }
+            self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            memory.rays += 4;
+            let blocked = memory.blocked.iter().filter(|b| **b).count();
+            let share = carries * 0.25_f64.powi(depth as i32);
+            let mixed = blocked != 0 && blocked != 4;
+            if depth < LAMP_DEPTH && ((mixed && share > self.tolerance) || share > 64.0 * self.tolerance) {
+                let [a, b, c] = corners;
+                let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
+                open.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]].map(|t| (t, depth + 1)));
+                continue;
+            }
+            total += factor;
+            seen += factor * (4 - blocked) as f64 / 4.0;
+        }
+        if total > 0.0 { seen / total } else { 0.0 }
+    }
+
+    /// Light of punctual lights, one ray each.
+    fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
+        for (lamp, row) in self.lamps {
+            let (factor, end) = match punctual_factor(lamp, to, self.light.half_size) {
+                Some(x) => x,
+                None => continue,
+            };
+            if self.sight.occlusion {
+                memory.segments.clear();
+                memory.segments.push(Segment { from: to.point.as_vec3(), to: end.as_vec3(), planes: [to.plane, u32::MAX] });
+                self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+                memory.rays += 1;
+                if memory.blocked[0] {
+                    continue;
+                }
+            }
+            for ((x, d), r) in out.irradiance.iter_mut().zip(&mut out.direct).zip(row) {
+                *x += factor as f32 * r;
+                *d += factor as f32 * r;
+            }
+        }
+    }
+}
+
+/// What turns a punctual light's intensity into irradiance at a receiver, and where the ray to it ends.
+pub fn punctual_factor(lamp: &PunctualLight, to: &Receiver, half_size: f64) -> Option<(f64, DVec3)> {
+    if lamp.kind == LightKind::Directional {
+        let cosine = -to.normal.dot(lamp.direction);
+        return (cosine > 0.0).then(|| (cosine, to.point - lamp.direction * (4.0 * half_size)));
+    }
+    let d = lamp.position - to.point;
+    let r2 = d.length_squared();
+    let cosine = to.normal.dot(d) / r2.sqrt();
+    if !(cosine > 0.0 && r2 > 0.0) {
+        return None;
+    }
+    let spot = match lamp.kind {
+        LightKind::Spot { inner, outer } => {
+            // The fall-off that KHR_lights_punctual gives: smooth between the cosines of both angles.
+            let along = -lamp.direction.dot(d) / r2.sqrt();
+            let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
+            ((along - outer.cos()) * scale).clamp(0.0, 1.0).powi(2)
+        }
+        _ => 1.0,
+    };
+    (spot > 0.0).then(|| (spot * cosine / r2, lamp.position))
+}

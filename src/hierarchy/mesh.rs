@@ -1,0 +1,123 @@
+//! All surfaces of a scene as one welded mesh of triangles, and the faces (sides) that light leaves and meets.
+//!
+//! Positions are recentred on the middle of the scene, f64, in the file's units. Welding joins vertices at equal
+//! positions, so that neighbours know each other across surfaces.
+
+use crate::geometry::plane_ids;
+use crate::scene::{Scene, Sides};
+use glam::DVec3;
+use std::collections::HashMap;
+
+/// One side of a triangle: what emits, reflects and receives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Face {
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// The back of a two-sided triangle?
+    pub back: bool,
+}
+
+/// The welded triangles of a scene.
+#[derive(Debug)]
+pub struct Mesh {
+    /// What was subtracted from world positions.
+    pub centre: DVec3,
+    /// Half the diagonal of the bounding box.
+    pub half_size: f64,
+    /// Distinct positions, recentred.
+    pub positions: Vec<DVec3>,
+    /// Corners, counter-clockwise from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Surface and triangle in it that each triangle came from.
+    pub origin: Vec<(u32, u32)>,
+    /// Material of each triangle.
+    pub material: Vec<u32>,
+    /// Plane of each triangle: equal for triangles in one plane, whichever way they face.
+    pub plane: Vec<u32>,
+    /// Unit normal of the front of each triangle.
+    pub normal: Vec<DVec3>,
+    /// Area of each triangle.
+    pub area: Vec<f64>,
+    /// All sides that take part.
+    pub faces: Vec<Face>,
+    /// First triangle of each surface, then the end: triangles of a surface stand together, in its own order.
+    pub first_triangle: Vec<u32>,
+}
+
+impl Mesh {
+    /// Welds the surfaces of `scene`.
+    pub fn new(scene: &Scene) -> Self {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for p in scene.surfaces.iter().flat_map(|s| &s.positions) {
+            low = low.min(*p);
+            high = high.max(*p);
+        }
+        if low.x > high.x {
+            (low, high) = (DVec3::ZERO, DVec3::ZERO);
+        }
+        let centre = 0.5 * (low + high);
+        let mut mesh = Self {
+            centre,
+            half_size: 0.5 * (high - low).length(),
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            origin: Vec::new(),
+            material: Vec::new(),
+            plane: Vec::new(),
+            normal: Vec::new(),
+            area: Vec::new(),
+            faces: Vec::new(),
+            first_triangle: vec![0],
+        };
+        let mut welded: HashMap<[u64; 3], u32> = HashMap::new();
+        for (s, surface) in scene.surfaces.iter().enumerate() {
+            let ids: Vec<u32> = surface
+                .positions
+                .iter()
+                .map(|p| {
+                    let q = *p - centre;
+                    // Adding zero turns -0 into +0, so that both weld.
+                    let key = (q + DVec3::ZERO).to_array().map(f64::to_bits);
+                    *welded.entry(key).or_insert_with(|| {
+                        mesh.positions.push(q);
+                        mesh.positions.len() as u32 - 1
+                    })
+                })
+                .collect();
+            let both = scene.materials[surface.material].sides == Sides::Both;
+            for (t, corners) in surface.triangles.iter().enumerate() {
+                let corners = corners.map(|c| ids[c as usize]);
+                let [a, b, c] = corners.map(|c| mesh.positions[c as usize]);
+                let cross = (b - a).cross(c - a);
+                let triangle = mesh.triangles.len() as u32;
+                mesh.triangles.push(corners);
+                mesh.origin.push((s as u32, t as u32));
+                mesh.material.push(surface.material as u32);
+                mesh.normal.push(cross.normalize_or_zero());
+                mesh.area.push(0.5 * cross.length());
+                // A triangle without area blocks nothing and receives nothing; it stays in the output only.
+                if cross.length_squared() > 0.0 {
+                    mesh.faces.push(Face { triangle, back: false });
+                    if both {
+                        mesh.faces.push(Face { triangle, back: true });
+                    }
+                }
+            }
+            mesh.first_triangle.push(mesh.triangles.len() as u32);
+        }
+        mesh.plane = plane_ids(&mesh.positions, &mesh.triangles);
+        mesh
+    }
+
+    /// Corners of a face, counter-clockwise seen from that side.
+    pub fn corners(&self, face: Face) -> [DVec3; 3] {
+        let [a, b, c] = self.triangles[face.triangle as usize].map(|v| self.positions[v as usize]);
+        if face.back { [a, c, b] } else { [a, b, c] }
+    }
+
+    /// Unit normal of a face, out of that side.
+    pub fn face_normal(&self, face: Face) -> DVec3 {
+        let n = self.normal[face.triangle as usize];
+        if face.back { -n } else { n }
+    }
+}

@@ -1,0 +1,9 @@
+//! From triangles to the tree that links attach to: faces at the bottom of a cluster tree, elements below them.
+
+mod build;
+mod mesh;
+mod tree;
+mod validate;
+
+pub use mesh::{Face, Mesh};
+pub use tree::{Element, NONE, Node, Sample, Tree};

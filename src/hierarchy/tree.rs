@@ -1,0 +1,215 @@
+//! The tree of patches: clusters of faces above, faces in the middle, elements (quarters of quarters) below.
+//!
+//! Nodes stand in an arena in which children come after their parent and side by side, so that *pull* (leaves to root)
+//! is one backward and *push* one forward sweep. Elements split one to four at their edge midpoints
+//! (Hanrahan, Salzman and Aupperle 1991); clusters split as built.
+
+use super::mesh::{Face, Mesh};
+use glam::DVec3;
+
+/// No node.
+pub const NONE: u32 = u32::MAX;
+
+/// A patch: a cluster of faces, a face, or a part of one.
+#[derive(Debug, Clone)]
+pub struct Node {
+    /// Node above; [`NONE`] for the root.
+    pub parent: u32,
+    /// First of the children, which are contiguous; [`NONE`] for a leaf.
+    pub child: u32,
+    /// How many children: 0, 2 (cluster) or 4 (element).
+    pub children: u8,
+    /// Is every face below in one plane and facing one way?
+    pub flat: bool,
+    /// Which element this is; [`NONE`] for a cluster.
+    pub element: u32,
+    /// First of the node's faces in [`Tree::faces`], and how many (1 for elements).
+    pub faces: (u32, u32),
+    /// Least corner of the bounding box.
+    pub low: DVec3,
+    /// Greatest corner of the bounding box.
+    pub high: DVec3,
+    /// Middle of the bounding box.
+    pub centre: DVec3,
+    /// Radius of a sphere about `centre` that holds the node.
+    pub radius: f64,
+    /// Surface area.
+    pub area: f64,
+    /// Area-weighted mean normal, unit length.
+    pub normal: DVec3,
+    /// Cosine of the half angle of a cone about `normal` that holds every normal below; -1: all directions.
+    pub cone: f64,
+}
+
+impl Node {
+    /// Has the node no children?
+    pub fn is_leaf(&self) -> bool {
+        self.children == 0
+    }
+
+    /// The same node with its box and sphere set around some points.
+    pub(super) fn around(self, points: &[DVec3]) -> Self {
+        let (low, high) = points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+        let centre = 0.5 * (low + high);
+        let radius = points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+        Self { low, high, centre, radius, ..self }
+    }
+
+    /// Indices of the children.
+    pub fn child_range(&self) -> std::ops::Range<u32> {
+        if self.is_leaf() { 0..0 } else { self.child..self.child + u32::from(self.children) }
+    }
+}
+
+/// The triangle of an element.
+#[derive(Debug, Clone, Copy)]
+pub struct Element {
+    /// Corners, counter-clockwise from the side it faces.
+    pub corners: [DVec3; 3],
+    /// Position in [`Tree::faces`] of the face it is part of.
+    pub face: u32,
+    /// Number of splits between the face and this element.
+    pub depth: u8,
+}
+
+impl Element {
+    /// A point by barycentric weights.
+    pub fn at(&self, w: [f64; 3]) -> DVec3 {
+        self.corners[0] * w[0] + self.corners[1] * w[1] + self.corners[2] * w[2]
+    }
+}
+
+/// A point of a node that stands for a share of its area.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// The point.
+    pub point: DVec3,
+    /// Unit normal there.
+    pub normal: DVec3,
+    /// Plane id of the face.
+    pub plane: u32,
+    /// Area that the sample stands for.
+    pub area: f64,
+}
+
+/// The hierarchy of one room.
+#[derive(Debug)]
+pub struct Tree {
+    /// All nodes; the root is node 0; children after parents.
+    pub nodes: Vec<Node>,
+    /// Triangles of the element nodes.
+    pub elements: Vec<Element>,
+    /// Faces in tree order: every cluster holds a contiguous range.
+    pub faces: Vec<Face>,
+    /// Node of each entry of `faces`.
+    pub face_node: Vec<u32>,
+    /// Plane id of each entry of `faces`.
+    pub face_plane: Vec<u32>,
+    /// Unit normal of each entry of `faces`.
+    pub face_normal: Vec<DVec3>,
+    /// Running sum of areas over `faces`, starting with 0: one longer than `faces`.
+    pub face_area: Vec<f64>,
+    /// For each triangle of the mesh, the entries of `faces` that are its front and its back.
+    pub entry: Vec<[u32; 2]>,
+}
+
+impl Tree {
+    /// Builds the clusters over all faces of `mesh`.
+    pub fn new(mesh: &Mesh) -> Self {
+        super::build::build(mesh)
+    }
+
+    /// A node by index.
+    pub fn node(&self, id: u32) -> &Node {
+        &self.nodes[id as usize]
+    }
+
+    /// The element of a node that is one.
+    pub fn element(&self, node: &Node) -> Option<&Element> {
+        self.elements.get(node.element as usize)
+    }
+
+    /// Splits a leaf element into four; does nothing for a node with children. Every child is similar to its parent.
+    pub fn subdivide(&mut self, id: u32) {
+        let node = self.node(id).clone();
+        if !node.is_leaf() || node.element == NONE {
+            return;
+        }
+        let Element { corners: [a, b, c], face, depth } = self.elements[node.element as usize];
+        let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
+        let first = self.nodes.len() as u32;
+        for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]] {
+            let element = self.elements.len() as u32;
+            self.elements.push(Element { corners, face, depth: depth + 1 });
+            let part = Node { parent: id, child: NONE, children: 0, element, area: 0.25 * node.area, ..node.clone() };
+            self.nodes.push(part.around(&corners));
+        }
+        let node = &mut self.nodes[id as usize];
+        node.child = first;
+        node.children = 4;
+    }
+
+    /// The leaf element that holds a point of a face, given by barycentric weights on the whole face.
+    pub fn leaf_at(&self, entry: u32, mut w: [f64; 3]) -> u32 {
+        let mut id = self.face_node[entry as usize];
+        while !self.node(id).is_leaf() {
+            // Children 0, 1, 2 hold the corners, child 3 the middle (turned around).
+            let k = match w.iter().position(|&x| x >= 0.5) {
+                Some(k) => {
+                    w = std::array::from_fn(|i| if i == k { 2.0 * w[i] - 1.0 } else { 2.0 * w[i] });
+                    k
+                }
+                None => {
+                    // Middle child [bc, ca, ab]: a weight w_a there lies 1 - 2 w_a from the opposite midpoint.
+                    w = w.map(|x| 1.0 - 2.0 * x);
+                    3
+                }
+            };
+            id = self.node(id).child + k as u32;
+        }
+        id
+    }
+
+    /// `count` points of a node, each standing for an equal share of its area, stratified over the faces of a cluster.
+    /// `u` shifts the pattern: a pair of numbers in [0, 1).
+    pub fn samples(&self, id: u32, count: usize, u: [f64; 2], out: &mut Vec<Sample>) {
+        let node = self.node(id);
+        out.clear();
+        let share = node.area / count as f64;
+        if let Some(element) = self.element(node) {
+            let (normal, plane) = (self.face_normal[element.face as usize], self.face_plane[element.face as usize]);
+            for k in 0..count {
+                let point = element.at(stratified(k, count, u));
+                out.push(Sample { point, normal, plane, area: share });
+            }
+            return;
+        }
+        let (first, n) = (node.faces.0 as usize, node.faces.1 as usize);
+        let areas = &self.face_area[first..=first + n];
+        for k in 0..count {
+            let target = areas[0] + (k as f64 + u[0]) * share;
+            // The entry whose area interval holds the target; clamped against rounding at the end.
+            let entry = first + (areas.partition_point(|&a| a <= target).max(1) - 1).min(n - 1);
+            let element = &self.elements[self.node(self.face_node[entry]).element as usize];
+            let point = element.at(stratified(k, count, u));
+            out.push(Sample { point, normal: self.face_normal[entry], plane: self.face_plane[entry], area: share });
+        }
+    }
+}
+
+/// Barycentric weights of point `k` of `count`: an R2 sequence (Roberts 2018) shifted by `u`, folded into the triangle.
+fn stratified(k: usize, count: usize, u: [f64; 2]) -> [f64; 3] {
+    if count == 1 {
+        return [1.0 / 3.0; 3];
+    }
+    // 1/p and 1/p^2 for the plastic number p = 1.3247...
+    let x = (u[0] + 0.754_877_666_246_692_8 * (k as f64 + 1.0)).fract();
+    let y = (u[1] + 0.569_840_290_998_053_3 * (k as f64 + 1.0)).fract();
+    barycentric([x, y])
+}
+
+/// Equal-area map of the unit square onto barycentric weights.
+pub(crate) fn barycentric([x, y]: [f64; 2]) -> [f64; 3] {
+    let root = x.sqrt();
+    [1.0 - root, root * (1.0 - y), root * y]
+}

@@ -1,0 +1,207 @@
+//! The exchange of light between two patches: `A_a F_ab = integral over a and b of V cos_a cos_b / (pi r^2)`.
+//!
+//! One end is sampled by points; towards the other end the point-to-polygon factor is exact (Lambert 1760) where that
+//! end is a face or a few of them. Two large clusters meet as points on both sides. Nothing is clamped: Lambert's
+//! formula lies in [0, 1] however near the polygon is.
+
+use super::visibility::{View, segment};
+use super::{Link, Room};
+use crate::geometry::{Segment, lambert_polygon};
+use crate::hierarchy::{Node, Sample, Tree};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// Up to this many faces a cluster is a set of polygons; beyond, a set of sample points.
+const POLYGONS: u32 = 4;
+/// Points that stand for a larger cluster.
+const CLUSTER_POINTS: usize = 8;
+/// Rays of a pair at first, and more where the first disagree.
+const RAYS: usize = 4;
+const MORE_RAYS: usize = 16;
+
+/// Reused memory of one thread, and what it did.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    pub(crate) a: Vec<Sample>,
+    pub(crate) b: Vec<Sample>,
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) weights: Vec<f64>,
+    pub(crate) blocked: Vec<bool>,
+    /// Rays cast.
+    pub rays: u64,
+}
+
+/// Can any light pass from a front of `a` to a front of `b`, as far as planes and normal cones tell?
+/// Never false for a pair that exchanges light.
+pub fn facing(tree: &Tree, a: &Node, b: &Node) -> bool {
+    in_front(tree, a, b) && in_front(tree, b, a)
+}
+
+/// Is any of `b` in front of any face of `a`?
+fn in_front(tree: &Tree, a: &Node, b: &Node) -> bool {
+    if a.flat {
+        let origin = tree.elements[tree.node(tree.face_node[a.faces.0 as usize]).element as usize].corners[0];
+        // Points nearer than rounding count as on the plane; light to them is nil.
+        let least = 1e-12 * (origin.length() + b.centre.length());
+        let above = |p: DVec3| a.normal.dot(p - origin) > least;
+        if b.faces.1 <= POLYGONS {
+            return polygons(tree, b).any(|(corners, _)| corners.into_iter().any(above));
+        }
+        let reach = (0.5 * (b.high - b.low)).dot(a.normal.abs()).min(b.radius);
+        return a.normal.dot(b.centre - origin) + reach > least;
+    }
+    let between = b.centre - a.centre;
+    let distance = between.length();
+    let reach = a.radius + b.radius;
+    if distance <= reach || a.cone <= 0.0 {
+        return true;
+    }
+    // Directions from a point of a to a point of b lie within asin(reach / distance) of `between`.
+    let angle = a.normal.angle_between(between) - (reach / distance).asin() - a.cone.acos();
+    angle < 0.5 * PI
+}
+
+/// The faces of a node as polygons with their normals.
+fn polygons<'a>(tree: &'a Tree, node: &Node) -> impl Iterator<Item = ([DVec3; 3], usize)> + use<'a> {
+    let element = tree.element(node).copied();
+    let (first, count) = (node.faces.0 as usize, node.faces.1 as usize);
+    (first..first + count).map(move |entry| {
+        let corners = element.map_or_else(|| tree.elements[tree.node(tree.face_node[entry]).element as usize].corners, |e| e.corners);
+        (corners, entry)
+    })
+}
+
+/// Factor from a point to a patch with nothing in the way, in [0, 1]: the share of the light leaving a small surface
+/// there that would reach the patch. `others` holds sample points of the patch if it is a large cluster.
+pub fn point_factor(tree: &Tree, s: &Sample, node: &Node, others: &[Sample]) -> f64 {
+    if node.faces.1 <= POLYGONS {
+        return polygons(tree, node)
+            .filter(|&(corners, entry)| {
+                tree.face_plane[entry] != s.plane && tree.face_normal[entry].dot(s.point - corners[0]) > 0.0
+            })
+            .map(|(corners, _)| lambert_polygon(s.point, s.normal, &corners))
+            .sum();
+    }
+    others.iter().map(|t| point_to_point(s, t) * t.area).sum::<f64>().min(1.0)
+}
+
+/// `cos cos / (pi r^2 + area)` towards a sample that stands for `area`: a disk seen from its axis, finite at r = 0.
+fn point_to_point(s: &Sample, t: &Sample) -> f64 {
+    let d = t.point - s.point;
+    let r2 = d.length_squared();
+    if r2 == 0.0 {
+        return 0.0;
+    }
+    let (c1, c2) = (s.normal.dot(d), -t.normal.dot(d));
+    if c1 <= 0.0 || c2 <= 0.0 { 0.0 } else { c1 * c2 / (r2 * (PI * r2 + t.area)) }
+}
+
+/// How many points the sampled end gets: one where the other end looks the same from everywhere, more when close.
+fn points_for(a: &Node, b: &Node) -> usize {
+    let gap = a.centre.distance(b.centre) / (a.radius + b.radius);
+    if gap > 6.0 {
+        1
+    } else if gap > 2.5 {
+        4
+    } else if gap > 1.3 {
+        7
+    } else {
+        16
+    }
+}
+
+/// Works out the link between two patches; none if they exchange nothing. `view` is what is known of the way between.
+pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch) -> Option<Link> {
+    let tree = room.tree;
+    let (na, nb) = (tree.node(a), tree.node(b));
+    // The smaller end is sampled, the larger is the polygon: the factor varies less over a small patch.
+    let simple = |n: &Node| n.faces.1 <= POLYGONS;
+    let a_sampled = match (simple(na), simple(nb)) {
+        (true, false) => false,
+        (false, true) => true,
+        _ => na.area <= nb.area,
+    };
+    let (s, t) = if a_sampled { (a, b) } else { (b, a) };
+    let (ns, nt) = (tree.node(s), tree.node(t));
+    let count = if simple(ns) { points_for(ns, nt) } else { CLUSTER_POINTS.max(points_for(ns, nt)) };
+    let shift = pattern(room.seed, a, b);
+    tree.samples(s, count, shift, &mut scratch.a);
+    if simple(nt) {
+        scratch.b.clear();
+    } else {
+        tree.samples(t, CLUSTER_POINTS, shift, &mut scratch.b);
+    }
+    let (mut open, mut least, mut most) = (0.0, f64::INFINITY, 0.0_f64);
+    for p in &scratch.a {
+        let f = point_factor(tree, p, nt, &scratch.b);
+        open += f * p.area;
+        least = least.min(f);
+        most = most.max(f);
+    }
+    if open <= 0.0 {
+        return None;
+    }
+    let mean = open / ns.area;
+    let size = ns.radius / ns.centre.distance(nt.centre).max(ns.radius + f64::MIN_POSITIVE);
+    // One point says nothing about variation: 1/r^2 over the patch's own size does.
+    let variation = if count == 1 { 2.0 * size } else { (0.5 * (most - least) / mean).min(4.0) };
+    let visible = if *view == View::Clear { 1.0 } else { sampled_visibility(room, s, t, shift, view, scratch) };
+    Some(Link {
+        a,
+        b,
+        exchange: (open * visible) as f32,
+        open_exchange: open as f32,
+        variation: variation as f32,
+        clear: *view == View::Clear,
+    })
+}
+
+/// Visible share by rays between points of both ends, each weighted by what it would carry.
+fn sampled_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], view: &View, scratch: &mut Scratch) -> f64 {
+    let mut seen = 0.0;
+    let mut total = 0.0;
+    for (round, count) in [RAYS, MORE_RAYS].into_iter().enumerate() {
+        let turn = 0.618_033_988_749_894_9 * (round + 1) as f64;
+        let (u, v) = ([(shift[0] + turn).fract(), shift[1]], [shift[1], (shift[0] + 2.0 * turn).fract()]);
+        room.tree.samples(s, count, u, &mut scratch.a);
+        room.tree.samples(t, count, v, &mut scratch.b);
+        scratch.segments.clear();
+        scratch.weights.clear();
+        for (k, p) in scratch.a.iter().enumerate() {
+            // Pair the points of both patterns crosswise, so that neighbours on one end are not neighbours on the other.
+            let q = &scratch.b[(k * 7 + 3) % count];
+            let weight = point_to_point(p, q);
+            if weight > 0.0 {
+                scratch.segments.push(segment(p, q));
+                scratch.weights.push(weight);
+            }
+        }
+        room.sight.blocked(&scratch.segments, view, &mut scratch.blocked);
+        scratch.rays += scratch.segments.len() as u64;
+        for (w, &blocked) in scratch.weights.iter().zip(&scratch.blocked) {
+            total += w;
+            if !blocked {
+                seen += w;
+            }
+        }
+        // All agree: take their word (a blocked minority of a few per cent is what refinement and the gather find).
+        if total > 0.0 && (seen == 0.0 || seen == total) {
+            break;
+        }
+    }
+    if total > 0.0 { seen / total } else { 1.0 }
+}
+
+/// A pair of numbers in [0, 1) that depends on the pair only.
+pub(crate) fn pattern(seed: u64, a: u32, b: u32) -> [f64; 2] {
+    let mut x = seed ^ (u64::from(a) << 32 | u64::from(b));
+    // The finaliser of splitmix64 (Steele, Lea and Flood 2014).
+    let mut next = || {
+        x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = x;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) >> 11
+    };
+    [next() as f64, next() as f64].map(|v| v / (1_u64 << 53) as f64)
+}

@@ -1,0 +1,50 @@
+//! Links: who exchanges light with whom, how much, and how well that is known.
+
+mod balance;
+mod kernel;
+mod refine;
+mod store;
+mod visibility;
+
+pub use balance::{Balance, balance};
+pub use kernel::{Scratch, evaluate, facing, point_factor};
+pub use refine::{Demand, Graph, refine};
+pub use store::LinkRows;
+pub use visibility::{Sight, View};
+
+use crate::hierarchy::Tree;
+
+/// A symmetric link between two patches: `area_a * F_ab = area_b * F_ba` (reciprocity by construction).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Link {
+    /// One end.
+    pub a: u32,
+    /// The other end.
+    pub b: u32,
+    /// `A_a F_ab` with visibility, in the file's units squared.
+    pub exchange: f32,
+    /// The same with nothing in the way.
+    pub open_exchange: f32,
+    /// Relative variation of the point-to-patch factor, half of (greatest - least) over the mean.
+    pub variation: f32,
+    /// Is it proved that nothing blocks?
+    pub clear: bool,
+}
+
+impl Link {
+    /// Visible share of the exchange, in [0, 1].
+    pub fn visibility(&self) -> f32 {
+        if self.open_exchange > 0.0 { (self.exchange / self.open_exchange).min(1.0) } else { 0.0 }
+    }
+}
+
+/// What links are made of: the patches and what may stand between them.
+#[derive(Clone, Copy)]
+pub struct Room<'a> {
+    /// The patches.
+    pub tree: &'a Tree,
+    /// What blocks rays.
+    pub sight: &'a Sight<'a>,
+    /// Mixed into every sampling pattern.
+    pub seed: u64,
+}

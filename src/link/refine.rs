@@ -1,0 +1,172 @@
+//! Hierarchical refinement: which links are good enough, and what the others become.
+//!
+//! A link is refined while the light it may misplace, weighted by how much of the room receives it, exceeds the
+//! threshold of the round (Hanrahan, Salzman and Aupperle 1991, section 4, with an error per link in place of the form
+//! factor alone). Links between the parts of a cluster are always opened. Every pass evaluates all new pairs in
+//! parallel and splits elements in order, so the result does not depend on the number of threads.
+
+use super::visibility::View;
+use super::{Link, Room, Scratch, Sight, evaluate, facing};
+use crate::hierarchy::{NONE, Node, Tree};
+use rayon::prelude::*;
+
+/// Deepest quartering of a face: side lengths shrink to 1/4096.
+const MAX_DEPTH: u8 = 12;
+/// Pairs a task evaluates: enough to pay for a task, few enough to share out.
+const CHUNK: usize = 64;
+
+/// What a link's error is worth, and how much is allowed.
+#[derive(Debug, Clone, Copy)]
+pub struct Demand<'a> {
+    /// Radiosity of every node, reflected and emitted, as a share of the adaptation white's.
+    pub bright: &'a [f32],
+    /// Area of all faces.
+    pub total_area: f64,
+    /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of the area.
+    pub threshold: f64,
+    /// Elements below this area are not split.
+    pub least_area: f64,
+}
+
+impl Demand<'_> {
+    /// Error that a link causes at its ends, as a share of white, weighted by receiving area; the worse end counts.
+    pub fn error(&self, tree: &Tree, link: &Link) -> f64 {
+        let visibility = f64::from(link.visibility());
+        // An unproved "hidden" is right to about one in the rays cast; "partly" misplaces light like a coin.
+        let doubt = if link.clear { 0.0 } else { (visibility * (1.0 - visibility)).sqrt().max(0.1) };
+        let misplaced = f64::from(link.open_exchange) * (f64::from(link.variation) * visibility + doubt);
+        let at = |receiver: u32, source: u32| {
+            let area = tree.node(receiver).area;
+            let bright = f64::from(self.bright.get(source as usize).copied().unwrap_or(0.0));
+            misplaced / area * bright * (area / self.total_area).sqrt()
+        };
+        at(link.a, link.b).max(at(link.b, link.a))
+    }
+}
+
+/// All links of a room.
+#[derive(Debug, Default)]
+pub struct Graph {
+    /// The links, in an order that depends on the input only.
+    pub links: Vec<Link>,
+}
+
+/// What one refinement did.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Refined {
+    /// Rays cast.
+    pub rays: u64,
+    /// Links evaluated.
+    pub evaluated: u64,
+    /// Links that wanted refinement when both ends were as small as allowed.
+    pub capped: u64,
+}
+
+impl Graph {
+    /// The pairs that every room starts with: the two halves of each cluster.
+    fn start(tree: &Tree) -> Vec<(u32, u32)> {
+        let halves = |n: &Node| (n.child, n.child + 1);
+        tree.nodes.iter().filter(|n| n.element == NONE && !n.flat).map(halves).collect()
+    }
+
+    /// Refines until no link exceeds the demand; the first call also makes the first links.
+    pub fn refine(&mut self, tree: &mut Tree, sight: &Sight, seed: u64, demand: &Demand) -> Refined {
+        let mut done = Refined::default();
+        let mut open: Vec<(Link, View)> = Vec::new();
+        if self.links.is_empty() {
+            let pairs: Vec<(u32, u32, u32)> = Self::start(tree).into_iter().map(|(a, b)| (a, b, 0)).collect();
+            let fresh = evaluate_all(&Room { tree, sight, seed }, &pairs, &[View::Crowded], &mut done);
+            self.sort_out(tree, demand, fresh, &mut open, &mut done);
+        } else {
+            let wants: Vec<bool> = self.links.par_iter().map(|l| demand.error(tree, l) > demand.threshold).collect();
+            let mut kept = Vec::with_capacity(self.links.len());
+            let mut split = Vec::new();
+            for (link, wants) in self.links.iter().zip(wants) {
+                if wants && splittable(tree, link, demand).is_some() {
+                    split.push(*link);
+                } else {
+                    kept.push(*link);
+                    done.capped += u64::from(wants);
+                }
+            }
+            self.links = kept;
+            open = split
+                .into_par_iter()
+                .map(|link| {
+                    let known = if link.clear { View::Clear } else { View::Crowded };
+                    let view = sight.view(tree, tree.node(link.a), tree.node(link.b), &known);
+                    (link, view)
+                })
+                .collect();
+        }
+        while !open.is_empty() {
+            let mut pairs = Vec::with_capacity(4 * open.len());
+            let mut views = Vec::with_capacity(open.len());
+            for (k, (link, view)) in open.into_iter().enumerate() {
+                // Only links that can be split are opened.
+                let Some((end, other)) = splittable(tree, &link, demand) else { continue };
+                tree.subdivide(end);
+                pairs.extend(tree.node(end).child_range().map(|child| (child, other, k as u32)));
+                views.push(view);
+            }
+            let fresh = evaluate_all(&Room { tree, sight, seed }, &pairs, &views, &mut done);
+            open = Vec::new();
+            self.sort_out(tree, demand, fresh, &mut open, &mut done);
+        }
+        done
+    }
+
+    /// Good links are kept, the others opened.
+    fn sort_out(&mut self, tree: &Tree, demand: &Demand, fresh: Vec<(Link, View)>, open: &mut Vec<(Link, View)>, done: &mut Refined) {
+        for (link, view) in fresh {
+            if demand.error(tree, &link) <= demand.threshold {
+                self.links.push(link);
+            } else if splittable(tree, &link, demand).is_some() {
+                open.push((link, view));
+            } else {
+                done.capped += 1;
+                self.links.push(link);
+            }
+        }
+    }
+}
+
+/// Which end of a link to split (the larger that can be), and the other end.
+fn splittable(tree: &Tree, link: &Link, demand: &Demand) -> Option<(u32, u32)> {
+    let can = |id: u32| {
+        let node = tree.node(id);
+        !node.is_leaf() || tree.element(node).is_some_and(|e| e.depth < MAX_DEPTH && node.area > demand.least_area)
+    };
+    let (a, b) = (link.a, link.b);
+    let larger_first = if tree.node(a).radius >= tree.node(b).radius { [(a, b), (b, a)] } else { [(b, a), (a, b)] };
+    larger_first.into_iter().find(|&(end, _)| can(end))
+}
+
+/// Evaluates pairs (a, b, index of what is known of their parents' view), in order.
+fn evaluate_all(room: &Room, pairs: &[(u32, u32, u32)], views: &[View], done: &mut Refined) -> Vec<(Link, View)> {
+    let parts: Vec<(Vec<(Link, View)>, u64)> = pairs
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            let mut scratch = Scratch::default();
+            let mut out = Vec::with_capacity(chunk.len());
+            for &(a, b, v) in chunk {
+                let (na, nb) = (room.tree.node(a), room.tree.node(b));
+                if !facing(room.tree, na, nb) {
+                    continue;
+                }
+                let view = room.sight.view(room.tree, na, nb, &views[v as usize]);
+                if let Some(link) = evaluate(room, a, b, &view, &mut scratch) {
+                    out.push((link, view));
+                }
+            }
+            (out, scratch.rays)
+        })
+        .collect();
+    done.evaluated += pairs.len() as u64;
+    let mut all = Vec::with_capacity(pairs.len());
+    for (part, rays) in parts {
+        done.rays += rays;
+        all.extend(part);
+    }
+    all
+}

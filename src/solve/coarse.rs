@@ -1,0 +1,340 @@
+//! A model of the room in a few hundred patches, to decide on wavelengths.
+//!
+//! The spectral error varies far less from place to place than light does, so the working partition is chosen on a cut
+//! of the hierarchy: the real links, summed between the patches of the cut (Galerkin), with mean reflectances. There the
+//! 64-leaf solution is affordable, and what a partition loses is *measured* on the model, an *estimate* for the room.
+
+use super::conjugate::System;
+use super::lanes::Lanes;
+use super::operator::Operator;
+use super::rows::{Rows, padded};
+use crate::color::difference::luv_jacobian;
+use crate::hierarchy::{NONE, Node, Tree};
+use crate::link::{Link, LinkRows};
+use crate::scene::LightSpectrum;
+use crate::spectrum::{LEAVES, Leaves, Partition};
+use glam::DVec3;
+
+/// Patches of the model at the most (fits the child count of its root).
+const PATCHES: usize = 192;
+/// The model is solved to this relative error: far below what is asked of wavelengths.
+const TOLERANCE: f64 = 1e-5;
+
+/// The model.
+pub struct Coarse {
+    tree: Tree,
+    links: LinkRows,
+    leaves: Vec<u32>,
+    factor: Vec<f32>,
+    /// Reflectance of each patch.
+    reflectance: Vec<Leaves>,
+    /// Exitance or first irradiance of each patch by light, as shape on the leaves.
+    emission: Vec<Vec<Leaves>>,
+    punctual: Vec<Vec<Leaves>>,
+}
+
+/// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
+pub trait Dense {
+    /// Reflectance of a leaf node.
+    fn reflectance(&self, leaf: u32) -> Leaves;
+    /// Exitance shape of a leaf node under a light; none if it emits nothing of that light.
+    fn emission(&self, leaf: u32, light: usize) -> Option<Leaves>;
+    /// Irradiance from punctual lights of one spectrum.
+    fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves>;
+}
+
+/// What a choice of cuts does.
+#[derive(Debug, Clone)]
+pub struct Choice {
+    /// One cut a light.
+    pub cuts: Vec<Partition>,
+    /// Area-weighted mean CIELUV difference of irradiance that they cause on the model.
+    pub error: f64,
+}
+
+impl Coarse {
+    /// Sums links and sources over a cut of `tree`.
+    pub fn new(tree: &Tree, links: &[Link], factor: &[f32], leaves: &[u32], dense: &dyn Dense, lights: usize) -> Self {
+        let group = cut(tree);
+        let count = group.iter().filter(|&&g| g != NONE).map(|&g| g as usize + 1).max().unwrap_or(0);
+        let mut area = vec![0.0; count];
+        let mut reflectance = vec![[0.0; LEAVES]; count];
+        let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
+        let mut punctual = emission.clone();
+        for &leaf in leaves {
+            let (g, a) = (group[leaf as usize] as usize, tree.node(leaf).area);
+            area[g] += a;
+            add(&mut reflectance[g], &dense.reflectance(leaf), a);
+            for light in 0..lights {
+                if let Some(e) = dense.emission(leaf, light) {
+                    add(&mut emission[light][g], &e, a);
+                }
+                if let Some(p) = dense.punctual(leaf, light) {
+                    add(&mut punctual[light][g], &p, a);
+                }
+            }
+        }
+        for (g, a) in area.iter().enumerate() {
+            let all = std::iter::once(&mut reflectance).chain(&mut emission).chain(&mut punctual);
+            for row in all.map(|rows| &mut rows[g]) {
+                for x in row.iter_mut() {
+                    *x /= a;
+                }
+            }
+        }
+        let matrix = exchanges(tree, links, factor, &group, count);
+        let mut pairs = Vec::new();
+        for a in 0..count {
+            for b in a..count {
+                let g = matrix[a * count + b];
+                if g > 0.0 {
+                    // A patch of the model may light itself; the row holds it twice, so half is stored.
+                    let g = if a == b { 0.5 * g } else { g };
+                    pairs.push(Link { a: a as u32 + 1, b: b as u32 + 1, exchange: g as f32, open_exchange: g as f32, variation: 0.0, clear: true });
+                }
+            }
+        }
+        Self {
+            tree: flat_tree(&area),
+            links: LinkRows::new(count + 1, &pairs),
+            leaves: (1..=count as u32).collect(),
+            factor: vec![1.0; count + 1],
+            reflectance,
+            emission,
+            punctual,
+        }
+    }
+
+    /// Irradiance of the model's patches on some lanes.
+    fn irradiance(&self, lanes: &Lanes) -> Rows {
+        match padded(lanes.len()) {
+            8 => self.solve::<8>(lanes),
+            16 => self.solve::<16>(lanes),
+            32 => self.solve::<32>(lanes),
+            _ => self.solve::<64>(lanes),
+        }
+    }
+
+    fn solve<const L: usize>(&self, lanes: &Lanes) -> Rows {
+        let count = self.leaves.len();
+        let (mut rho, mut e, mut p) = (Rows::zero(count, L), Rows::zero(count, L), Rows::zero(count, L));
+        let mut greatest = vec![0.0_f32; L];
+        for k in 0..count {
+            lanes.averages(&self.reflectance[k], rho.row_mut(k));
+            for (light, shapes) in self.emission.iter().enumerate() {
+                lanes.add_emission(light, &shapes[k], 1.0, e.row_mut(k));
+            }
+            for (light, shapes) in self.punctual.iter().enumerate() {
+                lanes.add_emission(light, &shapes[k], 1.0, p.row_mut(k));
+            }
+            for (g, r) in greatest.iter_mut().zip(rho.row(k)) {
+                *g = g.max(*r);
+            }
+        }
+        let operator = Operator { tree: &self.tree, links: &self.links, leaves: &self.leaves, factor: &self.factor };
+        let (mut nodes, mut gathered) = (Rows::zero(count + 1, L), Rows::zero(count + 1, L));
+        let mut first = Rows::zero(count, L);
+        operator.irradiance::<L>(&e, &mut nodes, &mut gathered, &mut first);
+        for k in 0..count {
+            for (x, p) in first.row_mut(k).iter_mut().zip(p.row(k)) {
+                *x += p;
+            }
+        }
+        let mut reflected = Rows::zero(count, L);
+        let system = System { operator, reflectance: &rho, greatest: &greatest };
+        system.solve::<L>(&first, &mut reflected, TOLERANCE);
+        let mut more = Rows::zero(count, L);
+        system.operator.irradiance::<L>(&reflected, &mut nodes, &mut gathered, &mut more);
+        for k in 0..count {
+            for (x, f) in more.row_mut(k).iter_mut().zip(first.row(k)) {
+                *x += f;
+            }
+        }
+        more
+    }
+
+    /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
+    /// padding would waste.
+    pub fn choose(&self, spectra: &[LightSpectrum], weights: &[Leaves; 3], white: [f64; 3], tolerance: f64) -> Choice {
+        let count = self.leaves.len();
+        let references: Vec<(Lanes, Rows)> = (0..spectra.len())
+            .map(|light| {
+                let lanes = Lanes::only(spectra, light, weights);
+                let rows = self.irradiance(&lanes);
+                (lanes, rows)
+            })
+            .collect();
+        let truth: Vec<[f64; 3]> = (0..count)
+            .map(|k| references.iter().fold([0.0; 3], |sum, (lanes, rows)| plus(sum, lanes.tristimulus(rows.row(k)))))
+            .collect();
+        let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
+        let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
+        let mut cuts = vec![Partition::ROOT; spectra.len()];
+        loop {
+            let lanes = Lanes::ratio(spectra, &cuts, weights);
+            let (error, worst) = self.loss(&lanes, &references, &jacobians, total);
+            let full = lanes.len() == padded(lanes.len());
+            let good = error <= tolerance;
+            // Below a hundredth of the tolerance, spare lanes would carry nothing.
+            if (good && (full || error < 0.01 * tolerance)) || worst.is_none() || lanes.lanes()[0].light.is_none() {
+                return Choice { cuts, error };
+            }
+            if let Some(lane) = worst {
+                let lane = lanes.lanes()[lane];
+                let light = lane.light.unwrap_or(0);
+                cuts[light] = cuts[light].split(lane.first).unwrap_or(cuts[light]);
+            }
+        }
+    }
+
+    /// Mean difference that the lanes cause, and the lane (of more than one leaf) that causes most.
+    fn loss(&self, lanes: &Lanes, references: &[(Lanes, Rows)], jacobians: &[[[f64; 3]; 3]], total: f64) -> (f64, Option<usize>) {
+        let rows = self.irradiance(lanes);
+        let mut harm = vec![0.0; lanes.len()];
+        let mut mean = 0.0;
+        for (k, jacobian) in jacobians.iter().enumerate() {
+            let area = self.tree.node(self.leaves[k]).area / total;
+            let mut all = [0.0; 3];
+            for (l, lane) in lanes.lanes().iter().enumerate() {
+                // Leaf lanes are exact.
+                let Some(light) = lane.light else { continue };
+                let (fine, reference) = &references[light];
+                let mut lost = [0.0; 3];
+                for leaf in lane.first..lane.first + lane.count {
+                    let difference = f64::from(reference.row(k)[leaf] - rows.row(k)[l]);
+                    lost = plus(lost, fine.xyz()[leaf].map(|w| w * difference));
+                }
+                harm[l] += area * length(jacobian, lost);
+                all = plus(all, lost);
+            }
+            mean += area * length(jacobian, all);
+        }
+        let worst = (0..harm.len())
+            .filter(|&l| lanes.lanes()[l].count > 1 && harm[l] > 0.0)
+            .max_by(|&a, &b| harm[a].total_cmp(&harm[b]));
+        (mean, worst)
+    }
+}
+
+fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+fn length(matrix: &[[f64; 3]; 3], v: [f64; 3]) -> f64 {
+    matrix.iter().map(|row| (row[0] * v[0] + row[1] * v[1] + row[2] * v[2]).powi(2)).sum::<f64>().sqrt()
+}
+
+fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
+    for (s, x) in sum.iter_mut().zip(x) {
+        *s += weight * x;
+    }
+}
+
+/// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node of the largest area is opened.
+fn cut(tree: &Tree) -> Vec<u32> {
+    let mut chosen = vec![0_u32];
+    let mut open = std::collections::BinaryHeap::new();
+    let key = |id: u32| (ordered(tree.node(id).area), std::cmp::Reverse(id));
+    open.push((key(0), 0_u32));
+    let mut count = 1;
+    let mut is_cut = vec![false; tree.nodes.len()];
+    while let Some((_, id)) = open.pop() {
+        let node = tree.node(id);
+        if node.is_leaf() || count + node.child_range().len() - 1 > PATCHES {
+            is_cut[id as usize] = true;
+            continue;
+        }
+        count += node.child_range().len() - 1;
+        for child in node.child_range() {
+            open.push((key(child), child));
+        }
+    }
+    chosen.clear();
+    let mut group = vec![NONE; tree.nodes.len()];
+    let mut next = 0;
+    for id in 0..tree.nodes.len() {
+        if is_cut[id] {
+            group[id] = next;
+            next += 1;
+        } else if id > 0 {
+            group[id] = group[tree.nodes[id].parent as usize];
+        }
+    }
+    group
+}
+
+/// Orders positive areas.
+fn ordered(area: f64) -> u64 {
+    area.to_bits()
+}
+
+/// Exchange between the patches of the model: links above the cut are shared out by area.
+fn exchanges(tree: &Tree, links: &[Link], factor: &[f32], group: &[u32], count: usize) -> Vec<f64> {
+    // Balance factors enter by their mean over a node's leaves.
+    let mut mean: Vec<f64> = factor.iter().map(|&f| f64::from(f)).collect();
+    let mut shares: Vec<Option<Vec<(u32, f64)>>> = vec![None; tree.nodes.len()];
+    for k in (0..tree.nodes.len()).rev() {
+        let node = &tree.nodes[k];
+        if !node.is_leaf() {
+            mean[k] = node.child_range().map(|c| mean[c as usize] * tree.node(c).area).sum::<f64>() / node.area;
+        }
+        if group[k] == NONE {
+            let mut list = Vec::new();
+            for c in node.child_range() {
+                let part = tree.node(c).area / node.area;
+                match &shares[c as usize] {
+                    Some(below) => list.extend(below.iter().map(|&(g, s)| (g, s * part))),
+                    None => list.push((group[c as usize], part)),
+                }
+            }
+            shares[k] = Some(list);
+        }
+    }
+    let mut matrix = vec![0.0; count * count];
+    for link in links.iter().filter(|l| l.exchange > 0.0) {
+        let exchange = f64::from(link.exchange) * mean[link.a as usize] * mean[link.b as usize];
+        let own = |id: u32| [(group[id as usize], 1.0)];
+        let (one_a, one_b) = (own(link.a), own(link.b));
+        let a = shares[link.a as usize].as_deref().unwrap_or(&one_a);
+        let b = shares[link.b as usize].as_deref().unwrap_or(&one_b);
+        for &(ga, sa) in a {
+            for &(gb, sb) in b {
+                let g = exchange * sa * sb;
+                matrix[ga as usize * count + gb as usize] += g;
+                matrix[gb as usize * count + ga as usize] += g;
+            }
+        }
+    }
+    matrix
+}
+
+/// A root with one child a patch.
+fn flat_tree(areas: &[f64]) -> Tree {
+    let node = |parent, area| Node {
+        parent,
+        child: NONE,
+        children: 0,
+        flat: false,
+        element: NONE,
+        faces: (0, 0),
+        low: DVec3::ZERO,
+        high: DVec3::ZERO,
+        centre: DVec3::ZERO,
+        radius: 0.0,
+        area,
+        normal: DVec3::Z,
+        cone: -1.0,
+    };
+    let mut nodes = vec![Node { child: 1, children: areas.len() as u8, ..node(NONE, areas.iter().sum()) }];
+    nodes.extend(areas.iter().map(|&a| node(0, a)));
+    Tree {
+        nodes,
+        elements: Vec::new(),
+        faces: Vec::new(),
+        face_node: Vec::new(),
+        face_plane: Vec::new(),
+        face_normal: Vec::new(),
+        face_area: Vec::new(),
+        entry: Vec::new(),
+    }
+}

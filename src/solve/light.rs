@@ -1,0 +1,108 @@
+//! A solution: what every patch reflects and emits, in rows, with what the gather and the oracle ask of it.
+
+use super::lanes::Lanes;
+use super::rows::Rows;
+use crate::hierarchy::Tree;
+use crate::link::Link;
+
+/// The light in a room after a round.
+#[derive(Debug, Clone, Default)]
+pub struct Light {
+    /// Reflected radiosity of every node (area mean), by lane.
+    pub reflected: Rows,
+    /// Exitance of every node (area mean), by lane.
+    pub emitted: Rows,
+    /// Irradiance of every leaf of the hierarchy, in order of `leaves`.
+    pub irradiance: Rows,
+    /// Leaves of the hierarchy, ascending.
+    pub leaves: Vec<u32>,
+    /// Brightness of what each node reflects, share of the white's.
+    pub bright_reflected: Vec<f32>,
+    /// Brightness of what each node emits.
+    pub bright_emitted: Vec<f32>,
+    /// Standard deviation of brightness over the leaves of a node.
+    pub spread: Vec<f32>,
+    /// Who is linked to whom.
+    pub neighbours: Neighbours,
+    /// Irradiance of the adaptation white, tristimulus.
+    pub white: [f64; 3],
+    /// Half the diagonal of the room.
+    pub half_size: f64,
+}
+
+impl Light {
+    /// Lanes in a row, padding included.
+    pub fn width(&self) -> usize {
+        self.reflected.width()
+    }
+
+    /// Works out brightness and its spread from the rows.
+    pub fn measure(&mut self, tree: &Tree, lanes: &Lanes) {
+        let white = self.white;
+        let scalar = |row: &[f32]| brightness(lanes.tristimulus(row), white) as f32;
+        let n = tree.nodes.len();
+        self.bright_reflected = (0..n).map(|k| scalar(self.reflected.row(k))).collect();
+        self.bright_emitted = (0..n).map(|k| scalar(self.emitted.row(k))).collect();
+        let both = |k: usize| f64::from(self.bright_reflected[k] + self.bright_emitted[k]);
+        let mut square: Vec<f64> = (0..n).map(|k| both(k) * both(k)).collect();
+        self.spread = vec![0.0; n];
+        for k in (0..n).rev() {
+            let node = &tree.nodes[k];
+            if node.is_leaf() {
+                continue;
+            }
+            square[k] = node.child_range().map(|c| square[c as usize] * tree.node(c).area).sum::<f64>() / node.area;
+            let mean = both(k);
+            // Differences below rounding of f32 rows are not spread.
+            let variance = square[k] - mean * mean;
+            self.spread[k] = if variance > 1e-12 * square[k] { variance.sqrt() as f32 } else { 0.0 };
+        }
+    }
+}
+
+/// One number for how bright a colour is beside the white: the mean of its three ratios, so that no colour counts nothing.
+pub fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
+    (0..3).map(|k| if white[k] > 0.0 { xyz[k] / white[k] } else { 0.0 }).sum::<f64>() / 3.0
+}
+
+/// For each node, the other ends of its links and whether the way is proved clear. Links found blocked are here too:
+/// a point may see what sixteen rays did not.
+#[derive(Debug, Clone, Default)]
+pub struct Neighbours {
+    start: Vec<u32>,
+    ends: Vec<(u32, bool)>,
+}
+
+impl Neighbours {
+    /// Sorts links into rows.
+    pub fn new(nodes: usize, links: &[Link]) -> Self {
+        let mut start = vec![0_u32; nodes + 1];
+        for link in links {
+            start[link.a as usize + 1] += 1;
+            start[link.b as usize + 1] += 1;
+        }
+        for k in 0..nodes {
+            start[k + 1] += start[k];
+        }
+        let mut next = start.clone();
+        let mut ends = vec![(0, false); start[nodes] as usize];
+        for link in links {
+            for (end, other) in [(link.a, link.b), (link.b, link.a)] {
+                ends[next[end as usize] as usize] = (other, link.clear);
+                next[end as usize] += 1;
+            }
+        }
+        Self { start, ends }
+    }
+
+    /// Other ends of a node's links.
+    pub fn row(&self, node: u32) -> &[(u32, bool)] {
+        let k = node as usize;
+        &self.ends[self.start[k] as usize..self.start[k + 1] as usize]
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        4 * self.start.len() + size_of::<(u32, bool)>() * self.ends.len()
+    }
+}

@@ -1,0 +1,377 @@
+//! The progressive solution: rounds of refine, balance, solve and estimate, each of which leaves a whole solution.
+//!
+//! [`Bake::step`] is the loop on one screen; everything it calls stands in a file of its own.
+
+mod coarse;
+mod conjugate;
+mod estimate;
+mod flux;
+pub mod lanes;
+pub mod light;
+mod operator;
+mod punctual;
+pub mod record;
+mod rows;
+mod sources;
+
+pub use record::{Round, Verdict};
+pub use rows::{Rows, padded};
+
+use crate::color::Observer;
+use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
+use crate::geometry::RayIndex;
+use crate::hierarchy::{Mesh, Tree};
+use crate::link::{Balance, Closed, Demand, Graph, LinkRows, Opaque, Sight, balance};
+use crate::scene::effects::Plan;
+use crate::scene::{PunctualLight, Scene};
+use crate::spectrum::{LEAVES, Leaves, Partition};
+use conjugate::{Convergence, System};
+use lanes::Lanes;
+use light::{Light, Neighbours, brightness};
+use operator::Operator;
+use rayon::prelude::*;
+use sources::{Painter, Sources};
+use std::time::Instant;
+
+/// How spectra are carried by the rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Representation {
+    /// A cut for each light spectrum, chosen under error control.
+    Adaptive,
+    /// All 64 leaves.
+    Dense,
+}
+
+/// What the user asks for.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Mean colour difference (CIEDE2000) at which to stop.
+    pub error: f64,
+    /// How spectra are carried.
+    pub representation: Representation,
+    /// Seed of every sampling pattern.
+    pub seed: u64,
+    /// Irradiance (tristimulus) of the adaptation white; none: twice the mean irradiance of the room.
+    pub white: Option<[f64; 3]>,
+    /// Rounds at the most.
+    pub rounds: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { error: 0.5, representation: Representation::Adaptive, seed: 0, white: None, rounds: 12 }
+    }
+}
+
+/// Threshold of the first round, share of white (see [`Demand::threshold`]); each round divides it.
+const FIRST_THRESHOLD: f64 = 0.02;
+/// What a round divides the threshold by: about twice the links, half the error.
+const THRESHOLD_STEP: f64 = 3.0;
+/// Elements are not split below this share of the area of all faces.
+const LEAST_AREA: f64 = 1e-7;
+/// The solve ends at this share of the asked-for error (relative): far below geometry and spectrum.
+const SOLVE_SHARE: f64 = 0.002;
+/// The working partition may cause this share of the asked-for error.
+const SPECTRUM_SHARE: f64 = 0.2;
+/// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
+const DE_PER_PERCENT: f64 = 0.35;
+
+/// A room being baked.
+pub struct Bake {
+    scene: Scene,
+    settings: Settings,
+    plan: Plan,
+    mesh: Mesh,
+    tree: Tree,
+    rays: RayIndex,
+    graph: Graph,
+    closed: Closed,
+    weights: [Leaves; 3],
+    lanes: Lanes,
+    spectrum_error: f64,
+    balance: Balance,
+    light: Light,
+    lamps: Vec<(PunctualLight, Vec<f32>)>,
+    probes: estimate::Probes,
+    rounds: Vec<Round>,
+    started: Instant,
+}
+
+impl Bake {
+    /// Prepares a room: welds it, builds the hierarchy and the ray index, and decides what to simulate.
+    pub fn new(scene: Scene, settings: Settings) -> Self {
+        let started = Instant::now();
+        let plan = Plan::of(&scene);
+        let mesh = Mesh::new(&scene);
+        let tree = Tree::new(&mesh);
+        let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+        let masked: Vec<bool> = mesh
+            .material
+            .iter()
+            .map(|&m| matches!(scene.materials[m as usize].alpha, crate::scene::Alpha::Mask { .. }))
+            .collect();
+        let rays = RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked);
+        let weights = Observer::cie1931().weights(&scene.grid);
+        let lanes = Lanes::dense(&scene.spectra, &weights);
+        let probes = estimate::Probes::new(&tree, settings.seed);
+        let mut bake = Self {
+            closed: Closed::No,
+            balance: Balance::default(),
+            light: Light::default(),
+            lamps: Vec::new(),
+            graph: Graph::default(),
+            rounds: Vec::new(),
+            spectrum_error: 0.0,
+            scene,
+            settings,
+            plan,
+            mesh,
+            tree,
+            rays,
+            weights,
+            lanes,
+            probes,
+            started,
+        };
+        bake.closed = bake.with_sight(|bake, sight| flux::closedness(&bake.mesh, &bake.tree, &bake.rays, sight, bake.settings.seed));
+        bake
+    }
+
+    /// One round: a finer hierarchy, its links, a solution, and what is known of its error.
+    pub fn step(&mut self) -> &Round {
+        let mut clock = record::Clock::start();
+        let round = self.rounds.len();
+        let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
+
+        let bright = self.brightness_of_nodes();
+        let demand = Demand {
+            bright: &bright,
+            total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
+            threshold,
+            least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
+        };
+        let mut tree = std::mem::take(&mut self.tree);
+        let mut graph = std::mem::take(&mut self.graph);
+        let seed = self.settings.seed;
+        let refined = self.with_sight(|bake, sight| {
+            punctual::refine(&mut tree, sight, &bake.scene, &bake.mesh, &demand, bake.light.white, &bake.weights);
+            graph.refine(&mut tree, sight, seed, &demand)
+        });
+        self.tree = tree;
+        self.graph = graph;
+        clock.lap("refine");
+
+        let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
+        self.balance = balance(&self.tree, &rows, self.closed);
+        clock.lap("balance");
+
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
+        let shadowed = self.with_sight(|bake, sight| punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh, bake.closed));
+        if round < 2 {
+            self.choose_lanes(&leaves, &shadowed);
+        }
+        clock.lap("spectrum");
+
+        let convergence = match padded(self.lanes.len()) {
+            8 => self.solve::<8>(&rows, &leaves, &shadowed),
+            16 => self.solve::<16>(&rows, &leaves, &shadowed),
+            32 => self.solve::<32>(&rows, &leaves, &shadowed),
+            _ => self.solve::<64>(&rows, &leaves, &shadowed),
+        };
+        clock.lap("solve");
+
+        let error = self.estimate(round, &convergence);
+        clock.lap("estimate");
+        let record = record::Round::new(self, round, threshold, &refined, &convergence, error, rows.bytes(), &clock);
+        self.rounds.push(record);
+        &self.rounds[round]
+    }
+}
+
+impl Bake {
+    /// Runs `f` with what blocks light in this room.
+    fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
+        let opaque = |triangle: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v]);
+        let opaque: Option<&Opaque> = if self.plan.alpha_masks() { Some(&opaque) } else { None };
+        f(self, &Sight { rays: &self.rays, opaque, occlusion: self.plan.occlusion() })
+    }
+
+    /// How bright every node is beside the white: from the last solution, or a guess before the first.
+    fn brightness_of_nodes(&mut self) -> Vec<f32> {
+        let nodes = self.tree.nodes.len();
+        if self.rounds.is_empty() {
+            let guess = flux::guess(&self.scene, &self.mesh, &self.tree, &self.weights);
+            self.light.white = self.settings.white.unwrap_or(guess.white);
+            return guess.bright;
+        }
+        let light = &self.light;
+        (0..nodes).map(|k| light.bright_reflected[k] + light.bright_emitted[k]).collect()
+    }
+
+    /// Chooses the working partition on a small model of the room.
+    fn choose_lanes(&mut self, leaves: &[u32], shadowed: &punctual::Shadowed) {
+        self.spectrum_error = 0.0;
+        if self.settings.representation == Representation::Dense || self.scene.spectra.is_empty() || self.tree.nodes.is_empty() {
+            self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
+            return;
+        }
+        let painter = Painter::new(&self.scene, &self.mesh);
+        let dense = sources::DenseSources::new(&painter, &self.tree, &self.scene, shadowed, leaves);
+        let model = coarse::Coarse::new(&self.tree, &self.graph.links, &self.balance.factor, leaves, &dense, self.scene.spectra.len());
+        let choice = model.choose(&self.scene.spectra, &self.weights, self.light.white, SPECTRUM_SHARE * self.settings.error);
+        self.lanes = Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights);
+        self.spectrum_error = choice.error;
+        // The lanes of an earlier round mean something else: the next solve starts afresh.
+        self.light.reflected = Rows::default();
+    }
+
+    /// Solves on the current links and measures the solution.
+    fn solve<const L: usize>(&mut self, rows: &LinkRows, leaves: &[u32], shadowed: &punctual::Shadowed) -> Convergence {
+        let painter = Painter::new(&self.scene, &self.mesh);
+        let Sources { reflectance, emission, greatest } = painter.paint(&self.tree, leaves, &self.lanes);
+        self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
+        let nodes = self.tree.nodes.len();
+        let operator = Operator { tree: &self.tree, links: rows, leaves, factor: &self.balance.factor };
+        let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
+        let mut first = Rows::zero(leaves.len(), L);
+        operator.irradiance::<L>(&emission, &mut means, &mut gathered, &mut first);
+        shadowed.add_to(&self.lamps, &mut first);
+        let mut reflected = self.guess::<L>(leaves);
+        let system = System { operator, reflectance: &reflectance, greatest: &greatest };
+        let tolerance = SOLVE_SHARE * self.settings.error / DE_PER_PERCENT * 0.01 * 100.0;
+        let convergence = if self.plan.interreflection() {
+            system.solve::<L>(&first, &mut reflected, tolerance.min(1e-3))
+        } else {
+            Convergence::default()
+        };
+        let mut irradiance = Rows::zero(leaves.len(), L);
+        system.operator.irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
+        for (h, f) in irradiance.all_mut::<L>().iter_mut().zip(first.all::<L>()) {
+            for l in 0..L {
+                h[l] += f[l];
+            }
+        }
+        if !self.plan.interreflection() {
+            reflected = Rows::zero(leaves.len(), L);
+            for ((r, h), rho) in reflected.all_mut::<L>().iter_mut().zip(irradiance.all::<L>()).zip(reflectance.all::<L>()) {
+                *r = std::array::from_fn(|l| h[l] * rho[l]);
+            }
+        }
+        self.light = Light {
+            reflected: self.on_nodes::<L>(&reflected, leaves),
+            emitted: self.on_nodes::<L>(&emission, leaves),
+            irradiance,
+            leaves: leaves.to_vec(),
+            neighbours: Neighbours::new(nodes, &self.graph.links),
+            white: self.light.white,
+            half_size: self.mesh.half_size,
+            ..Light::default()
+        };
+        self.light.white = self.settings.white.unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
+        self.light.measure(&self.tree, &self.lanes);
+        convergence
+    }
+
+    /// Area-weighted mean irradiance, tristimulus.
+    pub fn mean_irradiance(&self) -> [f64; 3] {
+        let (mut sum, mut area) = ([0.0; 3], 0.0);
+        for (k, &leaf) in self.light.leaves.iter().enumerate() {
+            let a = self.tree.node(leaf).area;
+            let xyz = self.lanes.tristimulus(self.light.irradiance.row(k));
+            sum = std::array::from_fn(|c| sum[c] + a * xyz[c]);
+            area += a;
+        }
+        sum.map(|x| if area > 0.0 { x / area } else { 0.0 })
+    }
+
+    /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.
+    fn guess<const L: usize>(&self, leaves: &[u32]) -> Rows {
+        let mut rows = Rows::zero(leaves.len(), L);
+        if self.light.reflected.width() == L {
+            let known = self.light.reflected.len();
+            for (row, &leaf) in rows.all_mut::<L>().iter_mut().zip(leaves) {
+                let mut id = leaf;
+                while id as usize >= known {
+                    id = self.tree.node(id).parent;
+                }
+                *row = self.light.reflected.all::<L>()[id as usize];
+            }
+        }
+        rows
+    }
+
+    /// Leaf rows on all nodes, by area.
+    fn on_nodes<const L: usize>(&self, by_leaf: &Rows, leaves: &[u32]) -> Rows {
+        let mut rows = Rows::zero(self.tree.nodes.len(), L);
+        for (row, &leaf) in by_leaf.all::<L>().iter().zip(leaves) {
+            rows.all_mut::<L>()[leaf as usize] = *row;
+        }
+        operator::pull::<L>(&self.tree, rows.all_mut::<L>());
+        rows
+    }
+
+    /// Gathers at receivers, in order.
+    pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
+        self.with_sight(|bake, sight| {
+            let gatherer = bake.gatherer(sight);
+            receivers.par_iter().map_init(Memory::default, |memory, r| gatherer.at(r, memory)).collect()
+        })
+    }
+
+    pub(crate) fn gatherer<'a>(&'a self, sight: &'a Sight<'a>) -> Gatherer<'a> {
+        Gatherer {
+            tree: &self.tree,
+            light: &self.light,
+            sight,
+            lamps: &self.lamps,
+            tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
+            closed: self.closed == Closed::Yes,
+        }
+    }
+
+    /// What the lanes stand for.
+    pub fn lanes(&self) -> &Lanes {
+        &self.lanes
+    }
+
+    /// The room.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The welded triangles.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// The hierarchy.
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// The solution of the last round.
+    pub fn light(&self) -> &Light {
+        &self.light
+    }
+
+    /// What runs and why.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Records of the rounds so far.
+    pub fn rounds(&self) -> &[Round] {
+        &self.rounds
+    }
+
+    /// Does light always meet a front?
+    pub fn closed(&self) -> Closed {
+        self.closed
+    }
+
+    /// What was asked for.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+}

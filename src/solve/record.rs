@@ -1,0 +1,211 @@
+//! What is written down after every round: the lines of the log.
+
+use super::Bake;
+use super::conjugate::Convergence;
+use super::estimate::Distance;
+use super::flux::Balance;
+use crate::link::Refined;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Version of the log's format. Raised when a field changes its meaning or goes.
+pub const LOG_VERSION: u32 = 1;
+
+/// Wall time of the phases of a round, seconds.
+#[derive(Debug, Clone)]
+pub struct Clock {
+    start: Instant,
+    last: Instant,
+    laps: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    /// Starts.
+    pub fn start() -> Self {
+        let now = Instant::now();
+        Self { start: now, last: now, laps: Vec::new() }
+    }
+
+    /// Ends a phase.
+    pub fn lap(&mut self, name: &'static str) {
+        let now = Instant::now();
+        self.laps.push((name, (now - self.last).as_secs_f64()));
+        self.last = now;
+    }
+
+    /// Phases in order.
+    pub fn laps(&self) -> &[(&'static str, f64)] {
+        &self.laps
+    }
+
+    fn total(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+}
+
+/// A figure and what it is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Figure {
+    /// The value; none if not known yet.
+    pub value: Option<f64>,
+    /// `bound`, `estimate` or `measured`.
+    pub kind: Kind,
+}
+
+/// What an error figure is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Cannot be exceeded.
+    Bound,
+    /// Our best guess.
+    Estimate,
+    /// Compared with the truth.
+    Measured,
+}
+
+/// Errors of a round by source; colour differences are means over random points of the room, under the adaptation white.
+#[derive(Debug, Clone, Serialize)]
+pub struct Errors {
+    /// All sources, CIEDE2000.
+    pub total_de2000: Figure,
+    /// All sources, CIELUV.
+    pub total_de_luv: Figure,
+    /// Root mean square relative error of illuminance.
+    pub total_relative: Figure,
+    /// Hierarchy, links, visibility: CIELUV.
+    pub geometry_de_luv: Figure,
+    /// Working partition: CIELUV.
+    pub spectrum_de_luv: Figure,
+    /// Unfinished solve: relative, in the norm of the solver.
+    pub convergence: Figure,
+    /// The same as CIELUV.
+    pub convergence_de_luv: Figure,
+    /// Root mean square error of tristimulus irradiance X, Y, Z by all sources, lm/m2.
+    pub total_xyz: Figure,
+}
+
+/// One round.
+#[derive(Debug, Clone, Serialize)]
+pub struct Round {
+    /// Always `round`.
+    pub record: &'static str,
+    /// Counted from 1.
+    pub round: usize,
+    /// Seconds since the room was read.
+    pub elapsed_s: f64,
+    /// Seconds in this round.
+    pub round_s: f64,
+    /// Seconds by phase.
+    pub phases_s: serde_json::Map<String, serde_json::Value>,
+    /// Greatest error a link keeps: share of white, weighted by the root of the receiver's share of area.
+    pub threshold: f64,
+    /// Visibility rays cast for links and punctual lights in this round.
+    pub rays: u64,
+    /// Links evaluated in this round.
+    pub links_evaluated: u64,
+    /// Links that wanted refinement when their ends were as small as allowed.
+    pub links_capped: u64,
+    /// Leaves of the hierarchy.
+    pub elements: usize,
+    /// All patches.
+    pub nodes: usize,
+    /// Links.
+    pub links: usize,
+    /// Links proved free of blockers.
+    pub links_clear: usize,
+    /// Intervals of the working partition (lanes), all lights together.
+    pub intervals_working: usize,
+    /// Mean number of intervals that patches need for themselves.
+    pub intervals_mean: f64,
+    /// Bytes in hierarchy, links and rows.
+    pub memory_bytes: usize,
+    /// Operator applications of the solve.
+    pub iterations: usize,
+    /// Errors by source.
+    pub error: Errors,
+    /// Where the light went.
+    pub flux: Balance,
+    /// Distance of row sums from 1 before balancing: area-weighted mean and greatest.
+    pub row_sum_defect: [f64; 2],
+    /// The same after.
+    pub row_sum_defect_after: [f64; 2],
+}
+
+/// The end of a bake.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The estimate meets the asked-for error.
+    Reached,
+    /// Time ran out.
+    OutOfTime,
+    /// The user stopped it.
+    Interrupted,
+    /// No more rounds allowed.
+    OutOfRounds,
+    /// Nothing left to refine: the error asked for is below what the caps allow.
+    Exhausted,
+}
+
+/// What a round measured, before it is written down.
+pub(super) struct Measured<'a> {
+    pub(super) threshold: f64,
+    pub(super) refined: &'a Refined,
+    pub(super) convergence: &'a Convergence,
+    pub(super) distance: Option<Distance>,
+    pub(super) flux: Balance,
+    pub(super) link_bytes: usize,
+    pub(super) rays: u64,
+    pub(super) clock: &'a Clock,
+}
+
+impl Round {
+    pub(super) fn new(bake: &Bake, m: Measured) -> Self {
+        let estimate = |value: Option<f64>| Figure { value, kind: Kind::Estimate };
+        let spectrum = bake.spectrum_error;
+        let convergence_de = m.convergence.bound * 100.0 * super::DE_PER_PERCENT;
+        // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
+        let all = |geometry: f64| (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt();
+        let white = bake.light.white;
+        let light = &bake.light;
+        Self {
+            record: "round",
+            round: bake.rounds.len() + 1,
+            elapsed_s: bake.started.elapsed().as_secs_f64(),
+            round_s: m.clock.total(),
+            phases_s: m.clock.laps().iter().map(|(name, s)| ((*name).to_owned(), (*s).into())).collect(),
+            threshold: m.threshold,
+            rays: m.rays,
+            links_evaluated: m.refined.evaluated,
+            links_capped: m.refined.capped,
+            elements: light.leaves.len(),
+            nodes: bake.tree.nodes.len(),
+            links: bake.graph.links.len(),
+            links_clear: bake.graph.links.iter().filter(|l| l.clear).count(),
+            intervals_working: bake.lanes.len(),
+            intervals_mean: bake.intervals_mean(),
+            memory_bytes: bake.tree.bytes()
+                + m.link_bytes
+                + size_of_val(bake.graph.links.as_slice())
+                + light.neighbours.bytes()
+                + light.reflected.bytes()
+                + light.emitted.bytes()
+                + light.irradiance.bytes(),
+            iterations: m.convergence.iterations,
+            error: Errors {
+                total_de2000: estimate(m.distance.map(|d| all(d.de2000))),
+                total_de_luv: estimate(m.distance.map(|d| all(d.de_luv))),
+                total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
+                geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),
+                spectrum_de_luv: estimate(Some(spectrum)),
+                convergence: Figure { value: Some(m.convergence.bound), kind: Kind::Bound },
+                convergence_de_luv: estimate(Some(convergence_de)),
+                total_xyz: estimate(m.distance.map(|d| d.relative * white.iter().sum::<f64>() / 6.0)),
+            },
+            flux: m.flux,
+            row_sum_defect: bake.balance.defect_before,
+            row_sum_defect_after: bake.balance.defect_after,
+        }
+    }
+}

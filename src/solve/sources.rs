@@ -1,0 +1,157 @@
+//! Reflectance and emission of patches, row by row, from the materials.
+
+use super::lanes::Lanes;
+use super::rows::{Rows, padded};
+use crate::color::upsample::Upsampler;
+use crate::hierarchy::{Element, Mesh, Tree};
+use crate::scene::{Emission, Material, Scene, Surface, Texture};
+use crate::spectrum::Leaves;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Patches that a task paints.
+const CHUNK: usize = 256;
+
+/// What the leaves of a hierarchy reflect and emit.
+#[derive(Debug, Clone)]
+pub struct Sources {
+    /// Reflectance by leaf.
+    pub reflectance: Rows,
+    /// Exitance by leaf: pi times radiance.
+    pub emission: Rows,
+    /// Greatest reflectance of each lane.
+    pub greatest: Vec<f32>,
+}
+
+/// Turns materials into rows.
+pub struct Painter<'a> {
+    scene: &'a Scene,
+    mesh: &'a Mesh,
+    upsampler: Upsampler,
+}
+
+impl<'a> Painter<'a> {
+    /// A painter for the materials of a scene.
+    pub fn new(scene: &'a Scene, mesh: &'a Mesh) -> Self {
+        Self { scene, mesh, upsampler: Upsampler::new(&scene.grid) }
+    }
+
+    /// Rows for the given leaves of `tree`.
+    pub fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
+        let width = padded(lanes.len());
+        // One row a material; painted materials are worked out patch by patch.
+        let plain: Vec<(Vec<f32>, Vec<f32>)> = self
+            .scene
+            .materials
+            .iter()
+            .map(|m| {
+                let (mut rho, mut emission) = (vec![0.0; width], vec![0.0; width]);
+                lanes.averages(&m.reflectance, &mut rho);
+                if let Some(e) = &m.emission {
+                    lanes.add_emission(e.light, &e.shape, PI, &mut emission);
+                }
+                (rho, emission)
+            })
+            .collect();
+        let rows: Vec<(Vec<f32>, Vec<f32>)> = leaves
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let (mut rho, mut emission) = (vec![0.0; chunk.len() * width], vec![0.0; chunk.len() * width]);
+                for (k, &leaf) in chunk.iter().enumerate() {
+                    let element = tree.elements[tree.node(leaf).element as usize];
+                    let triangle = tree.faces[element.face as usize].triangle as usize;
+                    let material = self.mesh.material[triangle] as usize;
+                    let span = k * width..(k + 1) * width;
+                    rho[span.clone()].copy_from_slice(&plain[material].0);
+                    emission[span.clone()].copy_from_slice(&plain[material].1);
+                    let m = &self.scene.materials[material];
+                    if let Some(color) = self.paint_of(m, triangle, &element) {
+                        lanes.averages(&self.clamped(color), &mut rho[span.clone()]);
+                    }
+                    if let Some((e, shape)) = self.glow_of(m, triangle, &element) {
+                        emission[span.clone()].fill(0.0);
+                        lanes.add_emission(e.light, &shape, PI * e.scale, &mut emission[span]);
+                    }
+                }
+                (rho, emission)
+            })
+            .collect();
+        let (mut reflectance, mut emission) = (Rows::zero(leaves.len(), width), Rows::zero(leaves.len(), width));
+        let mut greatest = vec![0.0_f32; width];
+        for (part, (rho, glow)) in rows.iter().enumerate() {
+            for (k, (rho, glow)) in rho.chunks(width).zip(glow.chunks(width)).enumerate() {
+                reflectance.row_mut(part * CHUNK + k).copy_from_slice(rho);
+                emission.row_mut(part * CHUNK + k).copy_from_slice(glow);
+                for (g, r) in greatest.iter_mut().zip(rho) {
+                    *g = g.max(*r);
+                }
+            }
+        }
+        Sources { reflectance, emission, greatest }
+    }
+
+    /// Albedo of a linear colour: bounded below 1, so that light ends.
+    fn clamped(&self, color: [f32; 3]) -> Leaves {
+        self.upsampler.reflectance_fast(color).map(|r| r.min(crate::scene::material::GREATEST_ALBEDO))
+    }
+
+    /// Mean linear base colour over an element, if it varies: factor times texture times vertex colours.
+    fn paint_of(&self, m: &Material, triangle: usize, element: &Element) -> Option<[f32; 3]> {
+        let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
+        let vertex_paint = m.vertex_paint && surface.colors.is_some();
+        if m.paint.is_none() && !vertex_paint {
+            return None;
+        }
+        let weights = self.corner_weights(triangle, element);
+        let mut color = m.base_color;
+        if let Some(texture) = &m.paint {
+            let texel = self.texel(texture, surface, triangle, &weights);
+            color = std::array::from_fn(|k| color[k] * texel[k]);
+        }
+        if let (true, Some(colors)) = (vertex_paint, &surface.colors) {
+            let corners = surface.triangles[self.mesh.origin[triangle].1 as usize];
+            // The mean over the element is the value in its middle: vertex colours are linear.
+            let middle: [f64; 3] = std::array::from_fn(|k| (weights[0][k] + weights[1][k] + weights[2][k]) / 3.0);
+            let mean: [f32; 3] = std::array::from_fn(|c| {
+                (0..3).map(|k| colors[corners[k] as usize][c] * middle[k] as f32).sum()
+            });
+            color = std::array::from_fn(|k| color[k] * mean[k]);
+        }
+        Some(color)
+    }
+
+    /// Emission and its shape over an element, if a texture shapes it.
+    fn glow_of<'m>(&self, m: &'m Material, triangle: usize, element: &Element) -> Option<(&'m Emission, Leaves)> {
+        let e = m.emission.as_ref()?;
+        let texture = e.texture.as_ref()?;
+        let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
+        let texel = self.texel(texture, surface, triangle, &self.corner_weights(triangle, element));
+        let color: [f32; 3] = std::array::from_fn(|k| e.color[k] * texel[k]);
+        Some((e, self.upsampler.reflectance_fast(color)))
+    }
+
+    fn texel(&self, texture: &Texture, surface: &Surface, triangle: usize, weights: &[[f64; 3]; 3]) -> [f32; 4] {
+        let Some(uvs) = surface.texcoords.get(texture.texcoord) else { return [1.0; 4] };
+        let corners = surface.triangles[self.mesh.origin[triangle].1 as usize].map(|v| uvs[v as usize]);
+        let uv = weights.map(|w| {
+            std::array::from_fn(|c| (0..3).map(|k| corners[k][c] * w[k] as f32).sum())
+        });
+        texture.average(&self.scene.images, uv)
+    }
+
+    /// Barycentric weights of an element's corners on its input triangle.
+    fn corner_weights(&self, triangle: usize, element: &Element) -> [[f64; 3]; 3] {
+        let [a, b, c] = self.mesh.triangles[triangle].map(|v| self.mesh.positions[v as usize]);
+        element.corners.map(|p| weights_of(p, a, b, c))
+    }
+}
+
+/// Barycentric weights of a point of a triangle's plane.
+pub(crate) fn weights_of(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
+    let normal = (b - a).cross(c - a);
+    let square = normal.length_squared();
+    let wb = (p - a).cross(c - a).dot(normal) / square;
+    let wc = (b - a).cross(p - a).dot(normal) / square;
+    [1.0 - wb - wc, wb, wc]
+}
