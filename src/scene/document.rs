@@ -1,18 +1,123 @@
 //! A glTF document, opened: container, JSON and buffers read and checked, materials and lights typed.
+//!
+//! `open` fails only where nothing can be read on: no file, no JSON, another version, a required extension that is not
+//! known. Everything else that is wrong is collected and comes out of [`Document::load_geometry`] together.
 
+use crate::error::{Error, Result};
 use crate::scene::Source;
+use crate::scene::buffers::{Buffers, Views};
+use crate::scene::check::Check;
+use crate::scene::compression;
+use crate::scene::container;
+use crate::scene::json;
+use crate::scene::nodes::{self, Placed};
+use crate::scene::raw;
 pub use crate::scene::raw::{AlphaMode, RawLight, RawLightKind, RawMaterial};
+use crate::scene::texture_info::Slots;
+use crate::scene::uri;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+const AGAIN: &str = "export the file again";
+
+/// Extensions that are read. The packed ones count only where their decoder is built in.
+const READ: [&str; 6] = [
+    "EXT_mesh_gpu_instancing",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Extensions that are not read, but leave a file without them whole: they add gloss, variants or metadata to surfaces
+/// that stay Lambertian here. A file that requires one is read with a warning.
+const HARMLESS: [&str; 13] = [
+    "KHR_animation_pointer",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_node_visibility",
+    "KHR_xmp_json_ld",
+];
 
 /// A document: everything read, nothing yet turned into geometry.
 #[derive(Debug)]
 pub struct Document {
     /// The JSON and the buffers.
     pub source: Source,
-    materials: Vec<RawMaterial>,
+    /// Extensions that the document uses and this program does not read, sorted.
+    pub unsupported: Vec<String>,
+    pub(crate) buffers: Buffers,
+    pub(crate) placed: Vec<Placed>,
+    pub(crate) slots: Slots,
+    pub(crate) materials: Vec<RawMaterial>,
+    pub(crate) check: Check,
     lights: Vec<RawLight>,
 }
 
 impl Document {
+    /// Opens a `.glb` or `.gltf` file (told apart by content) and the buffers beside it.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if there is no such file; [`Error::Input`] if it is not glTF 2.0 or requires an unknown extension.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
+        let file = path.display().to_string();
+        let bytes = uri::read_file(path)
+            .map_err(|why| Error::input(&file, why, "give a .glb or .gltf file"))?;
+        Self::from_bytes(path, &bytes)
+    }
+
+    /// A document from the bytes of its file; `path` is for messages, and what the document refers to is looked for
+    /// beside it.
+    ///
+    /// # Errors
+    /// As [`Document::open`].
+    pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let file = path.display().to_string();
+        let container = container::parse(&file, bytes)?;
+        let json = container.json;
+        let mut check = Check::new(&file);
+        for warning in container.warnings {
+            check.warn(format!("{file}: {warning}"));
+        }
+        version(&json, &mut check);
+        let unsupported = extensions(&json, &mut check);
+        if check.has_problems() {
+            return Err(Error::Input(check.into_parts().0));
+        }
+        let buffers = buffers(&json, folder(path), container.bin, &mut check);
+        let placed = nodes::walk(&json, &mut check);
+        let mut slots = Slots::default();
+        let materials = raw::materials(&json, &mut slots, &mut check);
+        let lights = raw::lights(&json, &placed, &mut check);
+        Ok(Self {
+            source: Source {
+                path: path.to_owned(),
+                json,
+                buffers: buffers.bytes.clone(),
+            },
+            unsupported,
+            buffers,
+            placed,
+            slots,
+            materials,
+            check,
+            lights,
+        })
+    }
+
     /// Materials in the document's order; after them glTF's default material if some primitive names none.
     /// `Surface::material` is an index in this list.
     pub fn raw_materials(&self) -> &[RawMaterial] {
@@ -23,4 +128,157 @@ impl Document {
     pub fn raw_lights(&self) -> &[RawLight] {
         &self.lights
     }
+}
+
+impl Source {
+    /// The bytes of an image of the document, as stored (PNG or JPEG as a rule), wherever they are: in a buffer, a data
+    /// URI or a file beside the document.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there is no such image or its bytes cannot be had.
+    pub fn image_bytes(&self, index: usize) -> Result<Vec<u8>> {
+        let mut check = Check::new(self.path.display().to_string());
+        let bytes = self.image_bytes_checked(index, &mut check);
+        bytes.ok_or_else(|| Error::Input(check.into_parts().0))
+    }
+
+    fn image_bytes_checked(&self, index: usize, check: &mut Check) -> Option<Vec<u8>> {
+        let item = json::referred(&self.json, "images", "image", index, "", check)?;
+        if item.map.contains_key("uri") {
+            let given = item.text("uri", check)?;
+            let read = uri::read(folder(&self.path), given);
+            let failed = |why| check.problem(&item.place, why, "put the image there");
+            return read.map_err(failed).ok().map(|(bytes, _)| bytes);
+        }
+        if !item.map.contains_key("bufferView") {
+            check.problem(&item.place, "has neither a URI nor a bufferView", AGAIN);
+            return None;
+        }
+        let view = item.index("bufferView", check)?;
+        let buffers = Buffers::sound(self.buffers.clone());
+        let span = Views::new(&self.json, &buffers).view(view, &item.place, check)?;
+        Some(span.bytes().to_vec())
+    }
+}
+
+fn folder(path: &Path) -> &Path {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    parent.unwrap_or(Path::new("."))
+}
+
+fn version(json: &Value, check: &mut Check) {
+    let asset = json.get("asset");
+    let text = |key: &str| asset.and_then(|a| a.get(key)).and_then(Value::as_str);
+    let next = "export as glTF 2.0";
+    match text("version") {
+        None => check.problem("", "has no 'asset' with a version, so it is not glTF", next),
+        Some(version) if version != "2" && !version.starts_with("2.") => {
+            let what = format!("is glTF {}, only 2.0 is read", json::short(version));
+            check.problem("", what, next);
+        }
+        Some(_) => {}
+    }
+    if let Some(least) = text("minVersion").filter(|&v| v != "2.0" && v != "2") {
+        let what = format!(
+            "needs a reader of glTF {}, this one reads 2.0",
+            json::short(least)
+        );
+        check.problem("", what, next);
+    }
+}
+
+/// Checks what the document requires; returns what it uses and is not read.
+fn extensions(json: &Value, check: &mut Check) -> Vec<String> {
+    let names = |key: &str| {
+        let list = json.get(key).and_then(Value::as_array);
+        let each = list.into_iter().flatten().filter_map(Value::as_str);
+        let mut names: Vec<&str> = each.collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    };
+    let read = |name: &&str| READ.contains(name) || compression::is_built_in(name);
+    let mut missing = names("extensionsRequired");
+    missing.retain(|name| !read(name) && !HARMLESS.contains(name));
+    if !missing.is_empty() {
+        let what = format!("requires what is not supported: {}", missing.join(", "));
+        let next = "export without these extensions";
+        check.problem("extensionsRequired", what, next);
+    }
+    let mut unsupported = names("extensionsUsed");
+    unsupported.extend(names("extensionsRequired"));
+    unsupported.sort_unstable();
+    unsupported.dedup();
+    unsupported.retain(|name| !read(name));
+    if !unsupported.is_empty() {
+        let list = unsupported.join(", ");
+        check.warn(format!("extensions that are not read: {list}"));
+    }
+    unsupported.into_iter().map(str::to_owned).collect()
+}
+
+/// Reads all buffers; a missing one is a problem.
+fn buffers(json: &Value, folder: &Path, bin: Option<&[u8]>, check: &mut Check) -> Buffers {
+    let used = json.get("extensionsUsed").and_then(Value::as_array);
+    let mut used = used.into_iter().flatten().filter_map(Value::as_str);
+    let placeholders = used.any(|name| compression::MESHOPT.contains(&name));
+    let mut buffers = Buffers {
+        bytes: Vec::new(),
+        sound: Vec::new(),
+    };
+    // Buffers of one file share its bytes: else a small document could ask for a large file many times.
+    let mut files: BTreeMap<&str, Arc<[u8]>> = BTreeMap::new();
+    for index in 0..json::len(json, "buffers") {
+        let read = buffer(json, index, folder, bin, placeholders, &mut files, check);
+        buffers.sound.push(read.is_some());
+        buffers.bytes.push(read.unwrap_or_else(|| Arc::from([])));
+    }
+    buffers
+}
+
+fn buffer<'a>(
+    json: &'a Value,
+    index: usize,
+    folder: &Path,
+    bin: Option<&[u8]>,
+    placeholders: bool,
+    files: &mut BTreeMap<&'a str, Arc<[u8]>>,
+    check: &mut Check,
+) -> Option<Arc<[u8]>> {
+    let Some(item) = json::item(json, "buffers", "buffer", index) else {
+        check.problem(&format!("buffer {index}"), "is not an object", AGAIN);
+        return None;
+    };
+    let Some(length) = item.index("byteLength", check) else {
+        check.problem(&item.place, "has no byteLength", AGAIN);
+        return None;
+    };
+    let bytes = if item.map.contains_key("uri") {
+        let given = item.text("uri", check)?;
+        match files.get(given) {
+            Some(known) => Arc::clone(known),
+            None => {
+                let failed = |why| check.problem(&item.place, why, "put the buffer there");
+                let (bytes, _) = uri::read(folder, given).map_err(failed).ok()?;
+                let bytes: Arc<[u8]> = bytes.into();
+                files.insert(given, Arc::clone(&bytes));
+                bytes
+            }
+        }
+    } else if let (0, Some(bin)) = (index, bin) {
+        Arc::from(bin)
+    } else if placeholders {
+        // EXT_meshopt_compression: stands for bytes that only packed views have. Whoever reads it plainly finds it empty.
+        return Some(Arc::from([]));
+    } else {
+        let what = "has no URI, and the file has no binary chunk for it";
+        check.problem(&item.place, what, AGAIN);
+        return None;
+    };
+    if bytes.len() < length {
+        let what = format!("claims {length} bytes, but has {}", bytes.len());
+        check.problem(&item.place, what, AGAIN);
+        return None;
+    }
+    Some(bytes)
 }

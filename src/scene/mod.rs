@@ -1,7 +1,23 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
+mod accessor;
+mod buffers;
+mod camera;
+mod check;
+mod compression;
+mod container;
 pub mod document;
+pub mod geometry;
+mod image;
+mod instances;
+mod json;
+mod nodes;
+mod primitive;
 mod raw;
+mod texture;
+mod texture_info;
+mod uri;
+mod world;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};

@@ -5,6 +5,10 @@
 //! spectra is decided elsewhere.
 
 use crate::scene::Texture;
+use crate::scene::check::Check;
+use crate::scene::json::{self, Item};
+use crate::scene::nodes::Placed;
+use crate::scene::texture_info::Slots;
 use glam::DMat4;
 use serde_json::Value;
 
@@ -108,4 +112,204 @@ pub enum RawLightKind {
     Spot,
     /// Parallel.
     Directional,
+}
+
+/// All materials of the document; after them the default one if some primitive names none.
+pub(crate) fn materials(json: &Value, slots: &mut Slots, check: &mut Check) -> Vec<RawMaterial> {
+    let mut materials = Vec::new();
+    for index in 0..json::len(json, "materials") {
+        if let Some(item) = json::item(json, "materials", "material", index) {
+            materials.push(material(json, index, &item, slots, check));
+        } else {
+            let place = format!("material {index}");
+            check.problem(&place, "is not an object", "export the file again");
+            // Keeps the indices in step.
+            materials.push(RawMaterial::default());
+        }
+    }
+    if some_primitive_has_none(json) {
+        materials.push(RawMaterial::default());
+    }
+    materials
+}
+
+fn some_primitive_has_none(json: &Value) -> bool {
+    let meshes = json.get("meshes").and_then(Value::as_array);
+    let primitives = meshes
+        .into_iter()
+        .flatten()
+        .filter_map(|mesh| mesh.get("primitives")?.as_array());
+    primitives.flatten().any(|p| p.get("material").is_none())
+}
+
+fn material(
+    json: &Value,
+    index: usize,
+    item: &Item<'_>,
+    slots: &mut Slots,
+    check: &mut Check,
+) -> RawMaterial {
+    let mut out = RawMaterial {
+        index: Some(index),
+        name: item.name().to_owned(),
+        double_sided: item.flag("doubleSided", check),
+        unlit: item.extension("KHR_materials_unlit", check).is_some(),
+        extras: item.map.get("extras").cloned(),
+        extensions: item.extension_names(),
+        ..RawMaterial::default()
+    };
+    if let Some(pbr) = item.child("pbrMetallicRoughness", check) {
+        if let Some(factor) = pbr.numbers::<4>("baseColorFactor", check) {
+            out.base_color_factor = factor.map(|x| unit(x, "baseColorFactor", item, check));
+        }
+        if let Some(metallic) = pbr.number("metallicFactor", check) {
+            out.metallic = unit(metallic, "metallicFactor", item, check);
+        }
+        let texture = pbr.child("baseColorTexture", check);
+        out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
+    }
+    let texture = item.child("emissiveTexture", check);
+    out.emissive_texture = texture.and_then(|t| slots.texture(json, &t, check));
+    emission(item, &mut out, check);
+    match item.text("alphaMode", check) {
+        None | Some("OPAQUE") => {}
+        Some("MASK") => out.alpha_mode = AlphaMode::Mask,
+        Some("BLEND") => out.alpha_mode = AlphaMode::Blend,
+        Some(other) => {
+            let what = format!("has the alphaMode '{}'", json::short(other));
+            let next = "use OPAQUE, MASK or BLEND";
+            check.problem(&item.place, what, next);
+        }
+    }
+    if let Some(cutoff) = item.number("alphaCutoff", check) {
+        out.alpha_cutoff = cutoff.max(0.0) as f32;
+    }
+    out
+}
+
+/// Emissive factor and strength. Exporters from before the extension wrote factors above 1; the excess is strength.
+fn emission(item: &Item<'_>, out: &mut RawMaterial, check: &mut Check) {
+    let strength = item.extension("KHR_materials_emissive_strength", check);
+    let strength = strength.and_then(|s| s.number("emissiveStrength", check));
+    let mut strength = strength.unwrap_or(1.0);
+    let mut factor = item
+        .numbers::<3>("emissiveFactor", check)
+        .unwrap_or_default();
+    if strength < 0.0 || factor.iter().any(|&x| x < 0.0) {
+        check.warn(format!(
+            "{}: negative emission is taken as none",
+            item.place
+        ));
+        strength = strength.max(0.0);
+        factor = factor.map(|x| x.max(0.0));
+    }
+    let most = factor.into_iter().fold(1.0, f64::max);
+    if most > 1.0 {
+        let text = "emissiveFactor is above 1; the excess is taken as emissive strength";
+        check.warn(format!("{}: {text}", item.place));
+    }
+    out.emissive_factor = factor.map(|x| (x / most) as f32);
+    out.emissive_strength = (strength * most) as f32;
+    if !out.emissive_strength.is_finite() {
+        check.problem(
+            &item.place,
+            "gives out more light than a number holds",
+            "lower it",
+        );
+    }
+}
+
+/// Brought into [0, 1], with a warning.
+fn unit(value: f64, key: &str, item: &Item<'_>, check: &mut Check) -> f32 {
+    if !(0.0..=1.0).contains(&value) {
+        check.warn(format!(
+            "{}: {key} {value} is brought into 0 to 1",
+            item.place
+        ));
+    }
+    value.clamp(0.0, 1.0) as f32
+}
+
+/// The punctual lights at the nodes of the scene.
+pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<RawLight> {
+    const NAME: &str = "KHR_lights_punctual";
+    let table = json.get("extensions").and_then(|e| e.get(NAME));
+    let nothing = Value::Null;
+    let table = table.unwrap_or(&nothing);
+    let mut lights = Vec::new();
+    for place in placed {
+        let Some(node) = json::item(json, "nodes", "node", place.node) else {
+            continue;
+        };
+        if !node.map.contains_key("extensions") {
+            continue;
+        }
+        let index = node
+            .extension(NAME, check)
+            .and_then(|e| e.index("light", check));
+        let Some(index) = index else { continue };
+        let item = json::referred(table, "lights", "light", index, &node.place, check);
+        let Some(item) = item else { continue };
+        lights.extend(light(&item, &node, place, check));
+    }
+    lights
+}
+
+fn light(item: &Item<'_>, node: &Item<'_>, placed: &Placed, check: &mut Check) -> Option<RawLight> {
+    let kind = match item.text("type", check) {
+        Some("point") => RawLightKind::Point,
+        Some("spot") => RawLightKind::Spot,
+        Some("directional") => RawLightKind::Directional,
+        other => {
+            let kind = json::short(other.unwrap_or(""));
+            check.warn(format!(
+                "{}: lights of type '{kind}' give no light here",
+                item.place
+            ));
+            return None;
+        }
+    };
+    let spot = item.child("spot", check);
+    let angle = |key: &str, otherwise: f64, check: &mut Check| {
+        let given = spot.as_ref().and_then(|s| s.number(key, check));
+        given.unwrap_or(otherwise)
+    };
+    let inner = angle("innerConeAngle", 0.0, check);
+    let outer = angle("outerConeAngle", std::f64::consts::FRAC_PI_4, check);
+    let straight = std::f64::consts::FRAC_PI_2 + 1e-6;
+    if kind == RawLightKind::Spot && !(0.0 <= inner && inner < outer && outer <= straight) {
+        let what = format!("has a cone from {inner} to {outer} radians");
+        let next = "keep 0 <= innerConeAngle < outerConeAngle <= pi / 2";
+        check.problem(&item.place, what, next);
+    }
+    let color = item.numbers::<3>("color", check).unwrap_or([1.0; 3]);
+    let intensity = item.number("intensity", check).unwrap_or(1.0);
+    let range = item.number("range", check);
+    if intensity < 0.0 || color.iter().any(|&x| x < 0.0) || range.is_some_and(|r| r <= 0.0) {
+        let what = "has a negative colour or intensity, or a range that is not positive";
+        check.problem(&item.place, what, "mend the light and export again");
+    }
+    let mut light = RawLight {
+        name: if item.name().is_empty() {
+            node.name()
+        } else {
+            item.name()
+        }
+        .to_owned(),
+        kind,
+        color: color.map(|x| x as f32),
+        intensity: intensity as f32,
+        range: range.map(|r| r as f32),
+        inner: inner as f32,
+        outer: outer as f32,
+        extras: item.map.get("extras").cloned(),
+        node: placed.node,
+        to_world: placed.to_world,
+    };
+    let sum = light.intensity + light.color.iter().sum::<f32>();
+    if !sum.is_finite() {
+        check.problem(&item.place, "is brighter than a number holds", "lower it");
+        light.intensity = 0.0;
+    }
+    Some(light)
 }

@@ -1,0 +1,113 @@
+//! Collects what is wrong with a room, so that everything is reported together.
+
+use crate::error::Problem;
+
+/// How many problems (and how many warnings) are listed one by one; the rest is counted.
+/// A broken file of a million nodes must not become a message of a million lines.
+const MAX_LISTED: usize = 50;
+
+/// Problems and warnings of one file.
+#[derive(Debug, Clone)]
+pub(crate) struct Check {
+    file: String,
+    problems: Vec<Problem>,
+    more_problems: usize,
+    warnings: Vec<String>,
+    more_warnings: usize,
+}
+
+impl Check {
+    /// Nothing wrong yet; `file` opens the place of every problem.
+    pub(crate) fn new(file: impl Into<String>) -> Self {
+        Self {
+            file: file.into(),
+            problems: Vec::new(),
+            more_problems: 0,
+            warnings: Vec::new(),
+            more_warnings: 0,
+        }
+    }
+
+    /// Something that the room cannot be used with.
+    pub(crate) fn problem(
+        &mut self,
+        place: &str,
+        what: impl Into<String>,
+        next: impl Into<String>,
+    ) {
+        let problem = Problem::new(self.at(place), what, next);
+        if self.problems.contains(&problem) {
+            return;
+        }
+        if self.problems.len() < MAX_LISTED {
+            self.problems.push(problem);
+        } else {
+            self.more_problems += 1;
+        }
+    }
+
+    /// Something that the user should know.
+    pub(crate) fn warn(&mut self, warning: impl Into<String>) {
+        let warning = warning.into();
+        if self.warnings.contains(&warning) {
+            return;
+        }
+        if self.warnings.len() < MAX_LISTED {
+            self.warnings.push(warning);
+        } else {
+            self.more_warnings += 1;
+        }
+    }
+
+    /// Is anything wrong?
+    pub(crate) fn has_problems(&self) -> bool {
+        !self.problems.is_empty()
+    }
+
+    /// Problems and warnings, each list closed by a count of what it left out.
+    pub(crate) fn into_parts(mut self) -> (Vec<Problem>, Vec<String>) {
+        if self.more_problems > 0 {
+            let what = format!("{} more problems", self.more_problems);
+            let place = self.file.clone();
+            self.problems.push(Problem::new(
+                place,
+                what,
+                "mend the ones above and try again",
+            ));
+        }
+        if self.more_warnings > 0 {
+            self.warnings
+                .push(format!("{} more warnings", self.more_warnings));
+        }
+        (self.problems, self.warnings)
+    }
+
+    fn at(&self, place: &str) -> String {
+        if place.is_empty() {
+            self.file.clone()
+        } else {
+            format!("{}: {place}", self.file)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_list_is_bounded_and_says_what_it_left_out() {
+        let mut check = Check::new("room.glb");
+        for i in 0..MAX_LISTED + 7 {
+            check.problem(&format!("node {i}"), "is bad", "mend it");
+            check.warn(format!("warning {i}"));
+            check.warn(format!("warning {i}"));
+        }
+        let (problems, warnings) = check.into_parts();
+        assert_eq!(problems.len(), MAX_LISTED + 1);
+        assert_eq!(problems[0].place, "room.glb: node 0");
+        assert!(problems[MAX_LISTED].what.starts_with("7 more"));
+        // A repeated warning past the limit cannot be told from a new one and is counted again.
+        assert_eq!(warnings[MAX_LISTED], "14 more warnings");
+    }
+}
