@@ -1,9 +1,9 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
 mod accessor;
-mod buffers;
+pub(crate) mod buffers;
 mod camera;
-mod check;
+pub(crate) mod check;
 mod compression;
 mod container;
 pub mod document;

@@ -49,7 +49,13 @@ impl Room {
     }
 
     /// Appends an accessor with its bytes; returns its index.
-    pub(crate) fn accessor(&mut self, bytes: &[u8], component: u32, kind: &str, count: usize) -> usize {
+    pub(crate) fn accessor(
+        &mut self,
+        bytes: &[u8],
+        component: u32,
+        kind: &str,
+        count: usize,
+    ) -> usize {
         let view = self.view(bytes);
         let accessor =
             json!({"bufferView": view, "componentType": component, "type": kind, "count": count});
