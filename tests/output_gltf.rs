@@ -372,3 +372,117 @@ fn a_broken_refined_mesh_is_refused() {
     surfaces[0].triangles[0][0] = 99;
     assert!(baked_glb(&scene, &surfaces, &Exposure::new(1.0)).is_err());
 }
+
+/// Moves the positions of a primitive into a meshopt stream, and leaves nothing in their old place.
+#[cfg(feature = "meshopt")]
+fn pack_positions(scene: &mut Scene, mesh: usize) {
+    let source = &mut scene.source;
+    let accessor = &source.json["meshes"][mesh]["primitives"][0]["attributes"]["POSITION"];
+    let view = source.json["accessors"][accessor.as_u64().unwrap() as usize]["bufferView"]
+        .as_u64()
+        .unwrap() as usize;
+    let start = source.json["bufferViews"][view]["byteOffset"]
+        .as_u64()
+        .unwrap() as usize;
+    let length = source.json["bufferViews"][view]["byteLength"]
+        .as_u64()
+        .unwrap() as usize;
+    let mut bytes = source.buffers[0].to_vec();
+    let number = |c: &[u8]| f32::from_le_bytes(c.try_into().unwrap());
+    let rows: Vec<[f32; 3]> = bytes[start..start + length]
+        .chunks(12)
+        .map(|row| [number(&row[..4]), number(&row[4..8]), number(&row[8..])])
+        .collect();
+    let packed = meshopt::encode_vertex_buffer(&rows).unwrap();
+    bytes[start..start + length].fill(0);
+    source.buffers[0] = bytes.into();
+    source.json["bufferViews"][view]["extensions"] = serde_json::json!({ "EXT_meshopt_compression": {
+        "buffer": source.buffers.len(), "byteLength": packed.len(), "byteStride": 12, "count": rows.len(),
+        "mode": "ATTRIBUTES" } });
+    source.buffers.push(packed.into());
+}
+
+#[cfg(feature = "meshopt")]
+#[test]
+fn packed_buffers_come_out_plain() {
+    let mut scene = room();
+    let plain = baked(&scene);
+    pack_positions(&mut scene, 0);
+    pack_positions(&mut scene, 2);
+    for key in ["extensionsUsed", "extensionsRequired"] {
+        scene.source.json[key]
+            .as_array_mut()
+            .unwrap()
+            .push("EXT_meshopt_compression".into());
+    }
+    let packed = baked(&scene);
+    assert_eq!(plain.json, packed.json);
+    assert_eq!(plain.blob, packed.blob);
+}
+
+#[test]
+fn external_images_come_inside_and_missing_ones_are_grey() {
+    let folder = tempfile::tempdir().unwrap();
+    let png = {
+        let scene = room();
+        scene.source.image_bytes(0).unwrap()
+    };
+    std::fs::write(folder.path().join("my tiles.png"), &png).unwrap();
+    let embedded = |uri: &str| {
+        let mut scene = room();
+        scene.source.path = folder.path().join("room.gltf");
+        scene.source.json["images"][0] = serde_json::json!({ "name": "checker", "uri": uri });
+        let glb = baked_glb(&scene, &refine(&scene, 1), &Exposure::new(1.0)).unwrap();
+        let read = read(&glb.bytes);
+        let image = read.gltf.images().next().unwrap();
+        let gltf::image::Source::View { view, mime_type } = image.source() else {
+            panic!("not inside")
+        };
+        assert_eq!(mime_type, "image/png");
+        (
+            read.blob[view.offset()..][..view.length()].to_vec(),
+            glb.warnings,
+        )
+    };
+    assert_eq!(embedded("my%20tiles.png"), (png, vec![]));
+    let (grey, warnings) = embedded("lost.png");
+    assert_eq!(
+        image::load_from_memory(&grey)
+            .unwrap()
+            .to_rgb8()
+            .get_pixel(0, 0)
+            .0,
+        [188; 3]
+    );
+    assert!(
+        warnings.len() == 1 && warnings[0].contains("lost.png"),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn poses_are_frozen_where_light_is_baked() {
+    let mut scene = room();
+    let json = &mut scene.source.json;
+    let position = json["meshes"][0]["primitives"][0]["attributes"]["POSITION"].clone();
+    for p in 0..2 {
+        json["meshes"][0]["primitives"][p]["targets"] =
+            serde_json::json!([{ "POSITION": position }]);
+    }
+    json["meshes"][0]["weights"] = serde_json::json!([0.0]);
+    json["skins"] = serde_json::json!([{ "joints": [0] }]);
+    json["nodes"][1]["skin"] = serde_json::json!(0);
+    json["nodes"][1]["weights"] = serde_json::json!([0.0]);
+    let channel = serde_json::json!({ "sampler": 0, "target": { "node": 1, "path": "weights" } });
+    json["animations"][0]["channels"]
+        .as_array_mut()
+        .unwrap()
+        .push(channel);
+    let read = baked(&scene);
+    let left = read.node("left");
+    assert!(left.skin().is_none() && left.weights().is_none());
+    let mesh = left.mesh().unwrap();
+    assert!(mesh.weights().is_none() && mesh.primitives().all(|p| p.morph_targets().len() == 0));
+    let animation = read.gltf.animations().next().unwrap();
+    assert_eq!(animation.channels().count(), 1);
+}

@@ -288,7 +288,7 @@ impl<'a> Audit<'a> {
                 *x *= (0..3).map(|k| colors[corners[k] as usize][c] * weights[k]).sum::<f32>();
             }
         }
-        self.upsampler.reflectance_fast(color).map(|x| x.min(crate::scene::material::GREATEST_ALBEDO))
+        self.upsampler.reflectance_fast(color).map(|x| x.min(crate::scene::GREATEST_ALBEDO))
     }
 
     fn texel(&self, texture: &Texture, triangle: usize, weights: [f32; 3]) -> [f32; 4] {

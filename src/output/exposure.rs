@@ -64,7 +64,7 @@ impl Exposure {
     }
 }
 
-/// (luminance of `light` times vertex paint in lm/m2, area in squared file units) of the surfaces picked by `pick`.
+/// (luminance of `light` in lm/m2, area in squared file units) of the surfaces picked by `pick`.
 fn readings(
     scene: &Scene,
     surfaces: &[BakedSurface],

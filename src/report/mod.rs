@@ -1,1 +1,14 @@
-//! To be written.
+//! What a person reads: the log, tables, charts.
+
+mod axis;
+pub mod bars;
+pub mod chart;
+pub mod log;
+mod svg;
+pub mod table;
+
+pub use axis::Scale;
+pub use bars::Bars;
+pub use chart::{Chart, Series};
+pub use log::Log;
+pub use table::{Align, Table};

@@ -2,9 +2,9 @@
 
 mod accessor;
 pub mod alpha;
-mod buffers;
+pub(crate) mod buffers;
 mod camera;
-mod check;
+pub(crate) mod check;
 mod compression;
 mod container;
 pub mod document;

@@ -93,7 +93,7 @@ impl<'a> Painter<'a> {
 
     /// Albedo of a linear colour: bounded below 1, so that light ends.
     fn clamped(&self, color: [f32; 3]) -> Leaves {
-        self.upsampler.reflectance_fast(color).map(|r| r.min(crate::scene::material::GREATEST_ALBEDO))
+        self.upsampler.reflectance_fast(color).map(|r| r.min(crate::scene::GREATEST_ALBEDO))
     }
 
     /// Mean linear base colour over an element, if it varies: factor times texture times vertex colours.

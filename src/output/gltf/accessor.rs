@@ -5,6 +5,8 @@
 
 use super::{extension, index, list};
 use crate::scene::Source;
+use crate::scene::buffers::{Buffers, Span, Views};
+use crate::scene::check::Check;
 use serde_json::Value;
 
 /// Vertex data as numbers: `components` values for each element.
@@ -75,101 +77,111 @@ fn component_width(component: u64) -> Option<usize> {
     }
 }
 
-/// The elements' bytes without gaps; none if they do not lie inside their buffer.
-///
-/// A view compressed with meshopt is read at the view's own place in its (decoded) buffer.
-pub(super) fn packed(
-    source: &Source,
-    view: usize,
-    offset: usize,
-    size: usize,
-    count: usize,
-) -> Option<Vec<u8>> {
-    let view = list(&source.json, "bufferViews").get(view)?;
-    let stride = match index(view, "byteStride") {
-        Some(stride) if stride >= size => stride,
-        Some(_) => return None,
-        None => size,
-    };
-    let bytes = view_bytes(source, view)?.get(offset..)?;
-    if count == 0 {
-        return Some(Vec::new());
-    }
-    let needed = (count - 1).checked_mul(stride)?.checked_add(size)?;
-    if needed > bytes.len() {
-        return None;
-    }
-    Some(
-        bytes
-            .chunks(stride)
-            .take(count)
-            .flat_map(|element| &element[..size])
-            .copied()
-            .collect(),
-    )
+/// The input's data.
+pub(super) struct Data<'a> {
+    source: &'a Source,
+    views: Views<'a>,
+    /// What is wrong was reported when the room was read; here it only makes a read come out as none.
+    check: Check,
 }
 
-/// The bytes of a buffer view.
-pub(super) fn view_bytes<'s>(source: &'s Source, view: &Value) -> Option<&'s [u8]> {
-    let buffer = source.buffers.get(index(view, "buffer")?)?;
-    let start = index(view, "byteOffset").unwrap_or(0);
-    buffer.get(start..start.checked_add(index(view, "byteLength")?)?)
-}
-
-/// Reads an accessor of exactly `count` scalars or vectors. None: another count, a matrix, or out of bounds.
-pub(super) fn read(source: &Source, accessor: usize, count: usize) -> Option<Table> {
-    let accessor = list(&source.json, "accessors").get(accessor)?;
-    let layout = Layout::of(accessor)?;
-    if index(accessor, "count")? != count || layout.components > 4 {
-        return None;
-    }
-    let mut values = match index(accessor, "bufferView") {
-        Some(view) => {
-            let offset = index(accessor, "byteOffset").unwrap_or(0);
-            numbers(&packed(source, view, offset, layout.size, count)?, layout)
-        }
-        None => vec![0.0; count.checked_mul(layout.components)?],
-    };
-    if let Some(sparse) = accessor.get("sparse") {
-        let (places, replaced) = sparse_parts(source, sparse, layout)?;
-        for (place, element) in places.iter().zip(replaced.chunks(layout.components)) {
-            let start = place.checked_mul(layout.components)?;
-            values
-                .get_mut(start..start + layout.components)?
-                .copy_from_slice(element);
-        }
-    }
-    Some(Table {
-        components: layout.components,
-        component: layout.component,
-        values,
-    })
-}
-
-/// (element numbers, their values) of a sparse accessor (section 3.6.2.3).
-fn sparse_parts(source: &Source, sparse: &Value, layout: Layout) -> Option<(Vec<usize>, Vec<f64>)> {
-    let count = index(sparse, "count")?;
-    let part = |part: &Value, size: usize| {
-        packed(
+impl<'a> Data<'a> {
+    /// `buffers` are the source's own.
+    pub(super) fn new(source: &'a Source, buffers: &'a Buffers) -> Self {
+        Self {
             source,
-            index(part, "bufferView")?,
-            index(part, "byteOffset").unwrap_or(0),
-            size,
-            count,
+            views: Views::new(&source.json, buffers),
+            check: Check::new(""),
+        }
+    }
+
+    /// A buffer view, unpacked.
+    pub(super) fn view(&mut self, view: usize) -> Option<Span> {
+        self.views.view(view, "", &mut self.check)
+    }
+
+    /// The bytes of `count` elements of `size` bytes without gaps; none if they do not lie inside their view.
+    pub(super) fn packed(
+        &mut self,
+        view: usize,
+        offset: usize,
+        size: usize,
+        count: usize,
+    ) -> Option<Vec<u8>> {
+        let view = self.view(view)?;
+        let stride = view.stride.unwrap_or(size);
+        let bytes = view.bytes().get(offset..)?;
+        if count == 0 {
+            return Some(Vec::new());
+        }
+        let needed = (count - 1).checked_mul(stride)?.checked_add(size)?;
+        if stride < size || needed > bytes.len() {
+            return None;
+        }
+        Some(
+            bytes
+                .chunks(stride)
+                .take(count)
+                .flat_map(|element| &element[..size])
+                .copied()
+                .collect(),
         )
-    };
-    let places = sparse.get("indices")?;
-    let component = places.get("componentType")?.as_u64()?;
-    let scalar = Layout {
-        component,
-        components: 1,
-        size: component_width(component)?,
-        normalized: false,
-    };
-    let places = numbers(&part(places, scalar.size)?, scalar);
-    let values = numbers(&part(sparse.get("values")?, layout.size)?, layout);
-    // Index types are unsigned integers, so the numbers are whole and not negative.
-    Some((places.into_iter().map(|p| p as usize).collect(), values))
+    }
+
+    /// Reads an accessor of exactly `count` scalars or vectors. None: another count, a matrix, or out of bounds.
+    pub(super) fn read(&mut self, accessor: usize, count: usize) -> Option<Table> {
+        let accessor = list(&self.source.json, "accessors").get(accessor)?;
+        let layout = Layout::of(accessor)?;
+        if index(accessor, "count")? != count || layout.components > 4 {
+            return None;
+        }
+        let mut values = match index(accessor, "bufferView") {
+            Some(view) => {
+                let offset = index(accessor, "byteOffset").unwrap_or(0);
+                numbers(&self.packed(view, offset, layout.size, count)?, layout)
+            }
+            None => vec![0.0; count.checked_mul(layout.components)?],
+        };
+        if let Some(sparse) = accessor.get("sparse") {
+            let (places, replaced) = self.sparse(sparse, layout)?;
+            for (place, element) in places.iter().zip(replaced.chunks(layout.components)) {
+                let start = place.checked_mul(layout.components)?;
+                values
+                    .get_mut(start..start.checked_add(layout.components)?)?
+                    .copy_from_slice(element);
+            }
+        }
+        Some(Table {
+            components: layout.components,
+            component: layout.component,
+            values,
+        })
+    }
+
+    /// (element numbers, their values) of a sparse accessor (section 3.6.2.3).
+    fn sparse(&mut self, sparse: &Value, layout: Layout) -> Option<(Vec<usize>, Vec<f64>)> {
+        let count = index(sparse, "count")?;
+        let mut part = |part: &Value, size: usize| {
+            self.packed(
+                index(part, "bufferView")?,
+                index(part, "byteOffset").unwrap_or(0),
+                size,
+                count,
+            )
+        };
+        let places = sparse.get("indices")?;
+        let component = places.get("componentType")?.as_u64()?;
+        let scalar = Layout {
+            component,
+            components: 1,
+            size: component_width(component)?,
+            normalized: false,
+        };
+        let places = numbers(&part(places, scalar.size)?, scalar);
+        let values = numbers(&part(sparse.get("values")?, layout.size)?, layout);
+        // Index types are unsigned integers, so the numbers are whole and not negative.
+        Some((places.into_iter().map(|p| p as usize).collect(), values))
+    }
 }
 
 fn numbers(bytes: &[u8], layout: Layout) -> Vec<f64> {
@@ -235,6 +247,11 @@ pub(super) fn is_quantized(source: &Source, name: &str, accessor: usize) -> bool
 mod tests {
     use super::*;
     use serde_json::json;
+
+    fn read(source: &Source, accessor: usize, count: usize) -> Option<Table> {
+        let buffers = Buffers::sound(source.buffers.clone());
+        Data::new(source, &buffers).read(accessor, count)
+    }
 
     fn source(json: Value, bytes: &[u8]) -> Source {
         Source {

@@ -3,9 +3,10 @@
 //! Input attributes are interpolated from the document's own data in f64; from the scene's world-space copy (brought
 //! back by the inverse transform) where the data sits in a Draco stream. Everything is written as f32.
 
-use super::{Writer, accessor, accessor::Table, index};
+use super::accessor::{self, Data, Table};
+use super::{Writer, index};
 use crate::error::{Error, Result};
-use crate::gather::BakedSurface;
+use crate::gather::{BakedSurface, BakedVertex};
 use crate::output::{exposure, refined};
 use crate::scene::{Alpha, Surface};
 use glam::{DMat3, DVec3};
@@ -19,7 +20,7 @@ impl Writer<'_> {
     pub(super) fn attributes(&mut self, primitive: &Value, baked: &BakedSurface) -> Result<Value> {
         let scene = self.scene;
         let surface = &scene.surfaces[baked.surface];
-        let input = Input::new(primitive, surface, &scene.source)?;
+        let input = Input::new(primitive, surface, &mut self.data)?;
         let mut out = Map::new();
 
         out.insert(
@@ -109,19 +110,14 @@ struct Input<'a> {
 }
 
 impl<'a> Input<'a> {
-    fn new(
-        primitive: &'a Value,
-        surface: &'a Surface,
-        source: &crate::scene::Source,
-    ) -> Result<Self> {
+    fn new(primitive: &'a Value, surface: &'a Surface, data: &mut Data) -> Result<Self> {
         let mut tables = Vec::new();
         if let Some(attributes) = primitive.get("attributes").and_then(Value::as_object)
             && !accessor::is_draco(primitive)
         {
             for name in attributes.keys() {
                 let count = surface.positions.len();
-                let table = index(&primitive["attributes"], name)
-                    .and_then(|a| accessor::read(source, a, count));
+                let table = index(&primitive["attributes"], name).and_then(|a| data.read(a, count));
                 tables.extend(table.map(|table| (name.clone(), table)));
             }
         }
@@ -203,7 +199,7 @@ impl<'a> Input<'a> {
 
     fn tangents(&self, baked: &BakedSurface, normals: &[[f32; 3]]) -> Option<Vec<[f32; 4]>> {
         let table = self.table("TANGENT").filter(|t| t.components == 4)?;
-        let tangent = |(vertex, normal): (&crate::gather::BakedVertex, &[f32; 3])| {
+        let tangent = |(vertex, normal): (&BakedVertex, &[f32; 3])| {
             // Opposite tangents cancel: any direction across the normal will do there.
             let across = || DVec3::from(normal.map(f64::from)).any_orthonormal_vector();
             let direction = self
@@ -223,41 +219,37 @@ impl<'a> Input<'a> {
         Some(baked.vertices.iter().zip(normals).map(tangent).collect())
     }
 
-    /// Interpolated data of `N` components; texture coordinates fall back on the scene's.
+    /// Interpolated data of `N` components; texture coordinates fall back on the scene's. Numbers that are none
+    /// become zero.
     fn rows<const N: usize>(&self, baked: &BakedSurface, name: &str) -> Option<Vec<[f32; N]>> {
         if let Some(table) = self.table(name).filter(|t| t.components == N) {
-            let row = |v: &crate::gather::BakedVertex| {
-                let corners = refined::corners(self.surface, v);
-                std::array::from_fn(|i| {
-                    (0..3)
-                        .map(|k| v.weights[k] * table.row(corners[k])[i])
-                        .sum::<f64>() as f32
-                })
-            };
-            return Some(baked.vertices.iter().map(row).collect());
+            return Some(self.mixed(baked, |corner, i| table.row(corner)[i]));
         }
         let set: usize = name.strip_prefix("TEXCOORD_")?.parse().ok()?;
-        let coordinates = self
-            .surface
-            .texcoords
-            .get(set)
-            .filter(|c| c.len() == self.surface.positions.len())?;
-        let row = |v: &crate::gather::BakedVertex| {
-            let corners = refined::corners(self.surface, v);
+        let set = self.surface.texcoords.get(set)?;
+        let fits = N == 2 && set.len() == self.surface.positions.len();
+        fits.then(|| self.mixed(baked, |corner, i| f64::from(set[corner][i])))
+    }
+
+    /// Component `i` of input vertex `c` is `value(c, i)`.
+    fn mixed<const N: usize>(
+        &self,
+        baked: &BakedSurface,
+        value: impl Fn(usize, usize) -> f64,
+    ) -> Vec<[f32; N]> {
+        let row = |vertex: &BakedVertex| {
+            let corners = refined::corners(self.surface, vertex);
+            let at = |k: usize, i: usize| vertex.weights[k] * value(corners[k], i);
             std::array::from_fn(|i| {
-                let at = |k: usize| {
-                    coordinates[corners[k]]
-                        .get(i)
-                        .map_or(0.0, |&c| v.weights[k] * f64::from(c))
-                };
-                (at(0) + at(1) + at(2)) as f32
+                let mean = (at(0, i) + at(1, i) + at(2, i)) as f32;
+                if mean.is_finite() { mean } else { 0.0 }
             })
         };
-        Some(baked.vertices.iter().map(row).collect())
+        baked.vertices.iter().map(row).collect()
     }
 
     /// First three components, interpolated.
-    fn blend(&self, table: &Table, vertex: &crate::gather::BakedVertex) -> DVec3 {
+    fn blend(&self, table: &Table, vertex: &BakedVertex) -> DVec3 {
         let corners = refined::corners(self.surface, vertex);
         let at = |k: usize| vertex.weights[k] * DVec3::from_slice(table.row(corners[k]));
         at(0) + at(1) + at(2)

@@ -2,13 +2,12 @@
 
 use super::{Writer, buffer::Use, list};
 use serde_json::{Value, json};
-use std::path::{Component, Path, PathBuf};
 
-/// Largest image file that is taken in, bytes.
-const LIMIT: u64 = 1 << 30;
+/// The sRGB bytes nearest to the linear 0.5 that a scene takes for an image it cannot read.
+const NEUTRAL: [u8; 4] = [188, 188, 188, 255];
 
 impl Writer<'_> {
-    /// Takes external images into the buffer. What cannot be read becomes one white pixel, with a warning.
+    /// Takes images from other files and data URIs into the buffer. What cannot be read becomes one grey pixel, with a warning.
     pub(super) fn images(&mut self) {
         let mut images = self
             .json
@@ -17,17 +16,13 @@ impl Writer<'_> {
             .cloned()
             .unwrap_or_default();
         for (i, image) in images.iter_mut().enumerate() {
-            let Some(uri) = image.get("uri").and_then(Value::as_str).map(str::to_owned) else {
-                continue;
-            };
-            if uri.starts_with("data:") {
+            if image.get("uri").is_none() {
                 continue;
             }
-            let bytes = external(&self.scene.source.path, &uri).unwrap_or_else(|| {
-                self.warnings.push(format!(
-                    "image {i} '{uri}' cannot be read; the baked room has a white pixel for it"
-                ));
-                png(&[[255; 4]], 1, 1)
+            let bytes = self.scene.source.image_bytes(i).unwrap_or_else(|problem| {
+                self.warnings
+                    .push(format!("{problem}; the baked room has a grey pixel for it"));
+                png(&[NEUTRAL], 1, 1)
             });
             image["mimeType"] = json!(mime(&bytes));
             image["bufferView"] = json!(self.bin.view(&bytes, Use::Data));
@@ -114,62 +109,5 @@ fn mime(bytes: &[u8]) -> &'static str {
             ..,
         ] => "image/webp",
         _ => "image/png",
-    }
-}
-
-/// The bytes of an image file below the room's folder; none for anything else.
-fn external(room: &Path, uri: &str) -> Option<Vec<u8>> {
-    let relative = PathBuf::from(percent_decoded(uri)?);
-    if uri.contains(':')
-        || !relative
-            .components()
-            .all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
-    {
-        return None;
-    }
-    let folder = room.parent()?;
-    let folder = if folder.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        folder
-    }
-    .canonicalize()
-    .ok()?;
-    let path = folder.join(relative).canonicalize().ok()?;
-    let facts = std::fs::metadata(&path).ok()?;
-    let fit = path.starts_with(&folder) && facts.is_file() && facts.len() <= LIMIT;
-    if fit { std::fs::read(path).ok() } else { None }
-}
-
-fn percent_decoded(uri: &str) -> Option<String> {
-    let mut bytes = Vec::with_capacity(uri.len());
-    let mut rest = uri.bytes();
-    while let Some(byte) = rest.next() {
-        let digit = |b: Option<u8>| b.and_then(|b| char::from(b).to_digit(16));
-        match byte {
-            b'%' => bytes.push((digit(rest.next())? * 16 + digit(rest.next())?) as u8),
-            _ => bytes.push(byte),
-        }
-    }
-    String::from_utf8(bytes).ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_files_below_the_room_are_read() {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("outside.png"), b"x").unwrap();
-        std::fs::create_dir_all(folder.path().join("room/my textures")).unwrap();
-        std::fs::write(folder.path().join("room/my textures/a.png"), b"a").unwrap();
-        let room = folder.path().join("room/room.gltf");
-        assert_eq!(external(&room, "my%20textures/a.png").unwrap(), b"a");
-        assert!(external(&room, "../outside.png").is_none());
-        assert!(external(&room, "%2e%2e/outside.png").is_none());
-        assert!(external(&room, "/etc/hostname").is_none());
-        assert!(external(&room, "file:///etc/hostname").is_none());
-        assert!(external(&room, "my textures").is_none());
     }
 }

@@ -3,8 +3,9 @@
 //!
 //! Data is copied without the gaps and neighbours of its old view, so nothing of the replaced meshes is dragged along.
 
-use super::accessor::{Layout, packed, view_bytes};
+use super::accessor::Layout;
 use super::{Writer, buffer::Use, extension, index, list};
+use crate::scene::buffers::Span;
 use serde_json::{Map, Value, json};
 
 /// Vertex strides are multiples of four (glTF 2.0, section 3.6.2.4).
@@ -41,14 +42,18 @@ impl Writer<'_> {
         let bytes = layout
             .zip(index(&accessor, "bufferView"))
             .and_then(|(layout, view)| {
-                packed(
-                    source,
+                self.data.packed(
                     view,
                     index(&accessor, "byteOffset").unwrap_or(0),
                     layout.size,
                     count,
                 )
             });
+        if bytes.is_none() && accessor.get("bufferView").is_some() {
+            self.warnings.push(format!(
+                "accessor {old} cannot be read; the baked room has zeros for it"
+            ));
+        }
         if let Some(object) = accessor.as_object_mut() {
             object.shift_remove("byteOffset");
             object.shift_remove("bufferView");
@@ -89,7 +94,7 @@ impl Writer<'_> {
             let part = &sparse[key];
             let offset = index(part, "byteOffset").unwrap_or(0);
             let bytes = index(part, "bufferView")
-                .and_then(|view| packed(&self.scene.source, view, offset, size, count))
+                .and_then(|view| self.data.packed(view, offset, size, count))
                 .unwrap_or_else(|| vec![0; count.min(1) * size]);
             sparse[key]["bufferView"] = json!(self.bin.view(&bytes, Use::Data));
             sparse[key]["byteOffset"] = json!(0);
@@ -175,8 +180,8 @@ impl Writer<'_> {
                 for (key, value) in object.iter_mut().filter(|(key, _)| *key != "extras") {
                     match value.as_u64().and_then(|v| usize::try_from(v).ok()) {
                         Some(old) if key == "bufferView" => {
-                            let view = list(&self.scene.source.json, "bufferViews").get(old);
-                            let bytes = view.and_then(|view| view_bytes(&self.scene.source, view));
+                            let view = self.data.view(old);
+                            let bytes = view.as_ref().map(Span::bytes);
                             *value = json!(self.bin.view(bytes.unwrap_or(&[0]), Use::Data));
                         }
                         _ => self.move_views(value),

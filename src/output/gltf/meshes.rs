@@ -189,7 +189,7 @@ impl Writer<'_> {
     }
 
     /// One node for each instance: its transform, without a mesh yet.
-    fn instances(&self, node: usize, instancing: &Value) -> Result<Vec<Value>> {
+    fn instances(&mut self, node: usize, instancing: &Value) -> Result<Vec<Value>> {
         let source = &self.scene.source;
         let name = source.json["nodes"][node]["name"]
             .as_str()
@@ -213,7 +213,7 @@ impl Writer<'_> {
             let Some(accessor) = index(attributes, key) else {
                 continue;
             };
-            match accessor::read(source, accessor, count) {
+            match self.data.read(accessor, count) {
                 Some(table) if table.components == components => tables.push((json_key, table)),
                 _ => {
                     return Err(Error::input(

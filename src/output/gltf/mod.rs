@@ -19,6 +19,8 @@ use super::{Exposure, refined};
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use crate::scene::Scene;
+use crate::scene::buffers::Buffers;
+use accessor::Data;
 use buffer::Bin;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -49,7 +51,8 @@ pub struct BakedGlb {
 /// The refined mesh is broken (internal fault), an instance transform cannot be read, or the result passes 4 GiB.
 pub fn baked_glb(scene: &Scene, surfaces: &[BakedSurface], look: &Exposure) -> Result<BakedGlb> {
     refined::check(scene, surfaces)?;
-    let mut writer = Writer::new(scene, surfaces, look);
+    let buffers = Buffers::sound(scene.source.buffers.clone());
+    let mut writer = Writer::new(scene, surfaces, look, &buffers);
     writer.raw_views();
     writer.images();
     writer.meshes()?;
@@ -60,12 +63,16 @@ pub fn baked_glb(scene: &Scene, surfaces: &[BakedSurface], look: &Exposure) -> R
     writer.finish()
 }
 
+/// The refined meshes of a mesh's primitives.
+type Primitives<'a> = BTreeMap<usize, Vec<&'a BakedSurface>>;
+
 /// The document under construction.
 struct Writer<'a> {
     scene: &'a Scene,
     look: &'a Exposure,
     /// The refined meshes by (node, instance), then primitive.
-    baked: BTreeMap<(usize, Option<usize>), BTreeMap<usize, Vec<&'a BakedSurface>>>,
+    baked: BTreeMap<(usize, Option<usize>), Primitives<'a>>,
+    data: Data<'a>,
     /// The new document; its accessors and buffer views are in `bin` until the end.
     json: Map<String, Value>,
     bin: Bin,
@@ -81,8 +88,13 @@ struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    fn new(scene: &'a Scene, surfaces: &'a [BakedSurface], look: &'a Exposure) -> Self {
-        let mut baked: BTreeMap<_, BTreeMap<usize, Vec<&BakedSurface>>> = BTreeMap::new();
+    fn new(
+        scene: &'a Scene,
+        surfaces: &'a [BakedSurface],
+        look: &'a Exposure,
+        buffers: &'a Buffers,
+    ) -> Self {
+        let mut baked: BTreeMap<_, Primitives> = BTreeMap::new();
         for refined in surfaces.iter().filter(|s| !s.triangles.is_empty()) {
             let surface = &scene.surfaces[refined.surface];
             let place = baked.entry((surface.node, surface.instance)).or_default();
@@ -92,6 +104,7 @@ impl<'a> Writer<'a> {
             scene,
             look,
             baked,
+            data: Data::new(&scene.source, buffers),
             json: scene.source.json.as_object().cloned().unwrap_or_default(),
             bin: Bin::default(),
             accessors: BTreeMap::new(),
