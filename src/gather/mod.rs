@@ -1,12 +1,18 @@
 //! What the light looks like at points and at the vertices of the refined mesh.
 
+mod bake;
 pub mod point;
+mod refined;
+
+pub use bake::{Baked, Probed};
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
 #[derive(Debug, Clone, Default)]
 pub struct BakedSurface {
     /// Index in `Scene::surfaces`.
     pub surface: usize,
+    /// Is this the back of a two-sided surface? Its triangles are turned, its normals point the other way.
+    pub back: bool,
     /// Vertices as points of input triangles: attributes are interpolated with these weights.
     pub vertices: Vec<BakedVertex>,
     /// Triangles, counter-clockwise from the front.

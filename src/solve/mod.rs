@@ -17,13 +17,14 @@ mod sources;
 
 pub use record::{Round, Verdict};
 pub use rows::{Rows, padded};
+pub(crate) use sources::weights_of;
 
 use crate::color::Observer;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
 use crate::hierarchy::{Mesh, Tree};
 use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance};
-use crate::scene::effects::Plan;
+use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
 use conjugate::{Convergence, System};
@@ -223,8 +224,8 @@ impl Bake {
     /// Runs `f` with what blocks light in this room.
     fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
         let opaque = |triangle: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v]);
-        let opaque: Option<&Opaque> = if self.plan.alpha_masks() { Some(&opaque) } else { None };
-        f(self, &Sight { rays: &self.rays, mesh: &self.mesh, opaque, occlusion: self.plan.occlusion() })
+        let opaque: Option<&Opaque> = if self.plan.runs(Kind::AlphaMasks) { Some(&opaque) } else { None };
+        f(self, &Sight { rays: &self.rays, mesh: &self.mesh, opaque, occlusion: self.plan.runs(Kind::Occlusion) })
     }
 
     /// How bright every node is beside the white: from the last solution, or a guess before the first.
@@ -323,7 +324,7 @@ impl Bake {
         let operator = Operator { tree: &self.tree, links: rows, leaves, areas: &self.areas, factor: &self.balance.factor };
         let mut reflected = self.guess::<L>(leaves);
         let system = System { operator, reflectance: &reflectance, greatest: &greatest };
-        let convergence = if self.plan.interreflection() {
+        let convergence = if self.plan.runs(Kind::Interreflection) {
             system.solve::<L>(&first, &mut reflected, SOLVE_SHARE * self.settings.error)
         } else {
             Convergence::default()
@@ -336,7 +337,7 @@ impl Bake {
                 h[l] += f[l];
             }
         }
-        if !self.plan.interreflection() {
+        if !self.plan.runs(Kind::Interreflection) {
             reflected = Rows::zero(leaves.len(), L);
             for ((r, h), rho) in reflected.all_mut::<L>().iter_mut().zip(irradiance.all::<L>()).zip(reflectance.all::<L>()) {
                 *r = std::array::from_fn(|l| h[l] * rho[l]);
@@ -434,6 +435,17 @@ impl Bake {
             let gatherer = bake.gatherer(sight);
             receivers.par_iter().map_init(Memory::default, |memory, r| gatherer.at(r, memory)).collect()
         })
+    }
+
+    /// Which receivers does something solid cover?
+    pub(crate) fn covered(&self, receivers: &[Receiver]) -> Vec<bool> {
+        if self.closed == Closed::Yes {
+            return vec![false; receivers.len()];
+        }
+        receivers
+            .par_iter()
+            .map(|r| flux::covered(&self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed))
+            .collect()
     }
 
     pub(crate) fn gatherer<'a>(&'a self, sight: &'a Sight<'a>) -> Gatherer<'a> {

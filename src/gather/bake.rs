@@ -1,0 +1,339 @@
+//! The light at the vertices of the refined mesh.
+
+use super::point::{Gathered, Receiver};
+use super::refined::{Refined, Vertex};
+use super::{BakedSurface, BakedVertex};
+use crate::color::{LinearSrgb, Upsampler, de2000};
+use crate::scene::Material;
+use crate::solve::Bake;
+use crate::spectrum::Leaves;
+use glam::DVec3;
+
+/// Faces are quartered this often for the output at the most.
+const DEEPEST: u8 = 7;
+/// Corners closer in colour than this (CIEDE2000) are taken to have nothing between them; as a multiple of the asked-for error.
+const ALIKE: f64 = 4.0;
+/// A triangle is quartered where the middle of an edge is further from the mean of its ends than this multiple of the
+/// asked-for error.
+const BENT: f64 = 2.0;
+/// Rounds of looking and quartering at the most.
+const PASSES: usize = 4;
+/// Vertices are drawn this far into the triangle they belong to: a point on an edge lies on the neighbouring wall too.
+const INSET: f64 = 2e-3;
+/// Vertices at the most; a pass that would exceed this is not begun.
+const MOST_VERTICES: usize = 6_000_000;
+
+/// The baked mesh and what it took.
+#[derive(Debug, Default)]
+pub struct Baked {
+    /// One entry a side of a surface.
+    pub surfaces: Vec<BakedSurface>,
+    /// Irradiance rows of all vertices, surface by surface, in order.
+    pub irradiance: Vec<Vec<[f32; 64]>>,
+    /// Vertices that something solid covers: they got their neighbours' light.
+    pub covered: usize,
+    /// Triangles that wanted quartering when the limits were met.
+    pub capped: usize,
+}
+
+/// What a vertex is known to get; none if it is covered.
+type Known = Option<Option<Box<[f32; 64]>>>;
+
+impl Bake {
+    /// Gathers at the vertices of the refined mesh. `progress` is told (done, of) in vertices of the present pass.
+    pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
+        let scene = self.scene();
+        let flat: Vec<bool> = scene.surfaces.iter().map(|s| s.normals.is_none()).collect();
+        let sides: Vec<bool> = scene.surfaces.iter().map(|s| scene.materials[s.material].sides == crate::scene::Sides::Both).collect();
+        let corners = |surface: usize, triangle: usize| scene.surfaces[surface].triangles[triangle];
+        let mut refined = Refined::new(self.mesh(), self.tree(), &corners, &flat, &sides, DEEPEST);
+        refined.level();
+        let mut known: Vec<Vec<Known>> = Vec::new();
+        let mut out = Baked::default();
+        self.complete(&refined, &mut known, progress);
+        for _ in 0..PASSES {
+            if refined.sheets.iter().map(|s| s.vertices.len()).sum::<usize>() > MOST_VERTICES {
+                out.capped += 1;
+                break;
+            }
+            // Where corners differ, look at the middles of the edges.
+            let suspects: Vec<(u32, u32)> = refined
+                .leaves()
+                .into_iter()
+                .filter(|&id| refined.depth(id) < DEEPEST && self.differ(&known[id.0 as usize], refined.corners(id).map(|c| c.vertex)))
+                .collect();
+            let looks: Vec<[u32; 3]> = suspects
+                .iter()
+                .map(|&id| {
+                    let c = refined.corners(id);
+                    [0, 1, 2].map(|k| refined.look(id, c[k], c[(k + 1) % 3]))
+                })
+                .collect();
+            self.complete(&refined, &mut known, progress);
+            let mut any = false;
+            for (&id, looks) in suspects.iter().zip(&looks) {
+                if self.bent(&known[id.0 as usize], refined.corners(id).map(|c| c.vertex), looks) {
+                    refined.split(id);
+                    any = true;
+                }
+            }
+            refined.level();
+            self.complete(&refined, &mut known, progress);
+            if !any {
+                break;
+            }
+        }
+        let triangles: Vec<Vec<[u32; 3]>> = (0..refined.sheets.len() as u32).map(|s| refined.triangles(s)).collect();
+        self.complete(&refined, &mut known, progress);
+        self.write_down(&refined, triangles, known, out)
+    }
+
+    /// Gathers at all vertices that are not known yet.
+    fn complete(&self, refined: &Refined, known: &mut Vec<Vec<Known>>, progress: &dyn Fn(usize, usize)) {
+        known.resize(refined.sheets.len(), Vec::new());
+        let mut wanted = Vec::new();
+        for (s, sheet) in refined.sheets.iter().enumerate() {
+            let from = known[s].len();
+            known[s].resize(sheet.vertices.len(), None);
+            wanted.extend((from..sheet.vertices.len()).map(|v| (s, v)));
+        }
+        // In parts, so that progress shows.
+        const PART: usize = 16_384;
+        for (part, chunk) in wanted.chunks(PART).enumerate() {
+            progress(part * PART, wanted.len());
+            let receivers: Vec<Receiver> =
+                chunk.iter().map(|&(s, v)| self.receiver(&refined.sheets[s].vertices[v], refined.sheets[s].surface, refined.sheets[s].back)).collect();
+            let covered = self.covered(&receivers);
+            for ((gathered, &(s, v)), covered) in self.gather(&receivers).into_iter().zip(chunk).zip(covered) {
+                let dark = gathered.seen < 1e-3 && gathered.direct.iter().all(|&x| x == 0.0);
+                known[s][v] = Some(if dark && covered { None } else { Some(Box::new(gathered.irradiance)) });
+            }
+        }
+        progress(wanted.len(), wanted.len());
+    }
+
+    /// The place of a vertex, drawn into its triangle, with its shading normal.
+    fn receiver(&self, vertex: &Vertex, surface: usize, back: bool) -> Receiver {
+        let (mesh, tree) = (self.mesh(), self.tree());
+        let surface = &self.scene().surfaces[surface];
+        let triangle = vertex.triangle as usize;
+        let inner = vertex.weights.map(|w| w * (1.0 - INSET) + INSET / 3.0);
+        let [a, b, c] = mesh.triangles[triangle].map(|v| mesh.positions[v as usize]);
+        let flat = if back { -mesh.normal[triangle] } else { mesh.normal[triangle] };
+        let normal = match &surface.normals {
+            Some(normals) => {
+                let corners = surface.triangles[mesh.origin[triangle].1 as usize];
+                let sum: DVec3 = (0..3).map(|k| normals[corners[k] as usize].as_dvec3() * vertex.weights[k]).sum();
+                let sum = if back { -sum } else { sum };
+                let shading = sum.normalize_or(flat);
+                // A shading normal that looks behind its own triangle is an error of the file.
+                if shading.dot(flat) > 0.0 { shading } else { flat }
+            }
+            None => flat,
+        };
+        let leaf = (vertex.entry != crate::hierarchy::NONE).then(|| {
+            // The hierarchy's back faces have their corners the other way round.
+            let w = if back { [inner[0], inner[2], inner[1]] } else { inner };
+            tree.leaf_at(vertex.entry, w)
+        });
+        let point = a * inner[0] + b * inner[1] + c * inner[2];
+        Receiver { point, normal, plane: mesh.plane[triangle], leaf, seed: u64::from(vertex.point) }
+    }
+
+    /// Difference of two irradiances on a white surface.
+    fn difference(&self, a: &[f32; 64], b: &[f32; 64]) -> f64 {
+        de2000(self.lanes().tristimulus(a), self.lanes().tristimulus(b), self.light().white)
+    }
+
+    fn differ(&self, known: &[Known], corners: [u32; 3]) -> bool {
+        let rows = corners.map(|v| known[v as usize].as_ref().and_then(|k| k.as_ref()));
+        (0..3).any(|k| match (rows[k], rows[(k + 1) % 3]) {
+            (Some(a), Some(b)) => self.difference(a, b) > ALIKE * self.settings().error,
+            (None, None) => false,
+            _ => true,
+        })
+    }
+
+    fn bent(&self, known: &[Known], corners: [u32; 3], looks: &[u32; 3]) -> bool {
+        let row = |v: u32| known[v as usize].as_ref().and_then(|k| k.as_ref());
+        (0..3).any(|k| match (row(corners[k]), row(corners[(k + 1) % 3]), row(looks[k])) {
+            (Some(a), Some(b), Some(m)) => {
+                let mean: [f32; 64] = std::array::from_fn(|l| 0.5 * (a[l] + b[l]));
+                self.difference(&mean, m) > BENT * self.settings().error
+            }
+            (None, None, None) => false,
+            // The edge of something that stands on the surface runs through.
+            _ => true,
+        })
+    }
+
+    /// Vertices with their colours, as the writers want them.
+    fn write_down(&self, refined: &Refined, triangles: Vec<Vec<[u32; 3]>>, known: Vec<Vec<Known>>, mut out: Baked) -> Baked {
+        let looks: Vec<Look> = {
+            let upsampler = Upsampler::new(&self.scene().grid);
+            self.scene().materials.iter().map(|m| Look::new(self, m, &upsampler)).collect()
+        };
+        for ((sheet, triangles), known) in refined.sheets.iter().zip(triangles).zip(known) {
+            let mut rows: Vec<Option<[f32; 64]>> = known.into_iter().map(|k| k.flatten().map(|b| *b)).collect();
+            out.covered += lend(&mut rows, &triangles);
+            // Vertices that were only looked at are left out.
+            let mut place = vec![u32::MAX; sheet.vertices.len()];
+            let mut surface = BakedSurface { surface: sheet.surface, back: sheet.back, ..BakedSurface::default() };
+            let mut spectra = Vec::new();
+            let look = &looks[self.scene().surfaces[sheet.surface].material];
+            for triangle in &triangles {
+                surface.triangles.push(triangle.map(|v| {
+                    if place[v as usize] == u32::MAX {
+                        place[v as usize] = surface.vertices.len() as u32;
+                        let row = rows[v as usize].unwrap_or([0.0; 64]);
+                        surface.vertices.push(self.vertex(&sheet.vertices[v as usize], sheet.back, &row, look));
+                        spectra.push(row);
+                    }
+                    place[v as usize]
+                }));
+            }
+            out.surfaces.push(surface);
+            out.irradiance.push(spectra);
+        }
+        out
+    }
+
+    fn vertex(&self, vertex: &Vertex, back: bool, row: &[f32; 64], look: &Look) -> BakedVertex {
+        let glow = match (look.emits, vertex.entry) {
+            (true, entry) if entry != crate::hierarchy::NONE => {
+                let w = if back { [vertex.weights[0], vertex.weights[2], vertex.weights[1]] } else { vertex.weights };
+                let leaf = self.tree().leaf_at(entry, w);
+                self.lanes().tristimulus(self.light().emitted.row(leaf as usize))
+            }
+            _ => [0.0; 3],
+        };
+        let sum = |weights: &[[f64; 3]]| {
+            let mut xyz = [0.0; 3];
+            for (x, w) in row.iter().zip(weights) {
+                xyz = std::array::from_fn(|c| xyz[c] + f64::from(*x) * w[c]);
+            }
+            xyz
+        };
+        let reflected = sum(&look.reflected);
+        let display = LinearSrgb::standard();
+        let unpainted = look.unpainted.unwrap_or([1.0; 3]);
+        let rgb = display.from_xyz(std::array::from_fn(|c| reflected[c] + glow[c]));
+        BakedVertex {
+            triangle: vertex.triangle - self.mesh().first_triangle[self.mesh().origin[vertex.triangle as usize].0 as usize],
+            weights: vertex.weights,
+            irradiance: self.lanes().tristimulus(row).map(|x| x as f32),
+            radiosity: std::array::from_fn(|c| (reflected[c] + glow[c]) as f32),
+            light: std::array::from_fn(|c| (rgb[c] / unpainted[c]) as f32),
+        }
+    }
+}
+
+/// How a material turns irradiance into what is seen.
+struct Look {
+    /// Tristimulus radiosity for a unit of each lane's irradiance.
+    reflected: Vec<[f64; 3]>,
+    /// Mean colour of the texture, which the display multiplies again.
+    unpainted: Option<[f64; 3]>,
+    emits: bool,
+}
+
+impl Look {
+    fn new(bake: &Bake, material: &Material, upsampler: &Upsampler) -> Self {
+        let mean = material.paint.as_ref().map(|texture| {
+            let image = &bake.scene().images[texture.image];
+            let n = image.pixels.len().max(1) as f64;
+            let sum = image.pixels.iter().fold([0.0; 3], |s: [f64; 3], p| std::array::from_fn(|c| s[c] + f64::from(p[c])));
+            sum.map(|x| (x / n).max(1e-3))
+        });
+        let reflectance: Leaves = match mean {
+            Some(mean) => {
+                let color = std::array::from_fn(|c| material.base_color[c] * mean[c] as f32);
+                upsampler.reflectance(color)
+            }
+            None => material.reflectance,
+        };
+        Self { reflected: bake.lanes().reflected(&reflectance), unpainted: mean, emits: material.emission.is_some() }
+    }
+}
+
+/// Gives covered vertices the mean of their neighbours, ring by ring; returns how many there were.
+fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> usize {
+    let mut used = vec![false; rows.len()];
+    for &v in triangles.iter().flatten() {
+        used[v as usize] = true;
+    }
+    let before = (0..rows.len()).filter(|&v| used[v] && rows[v].is_none()).count();
+    let mut left = before;
+    while left > 0 {
+        let mut sums: std::collections::BTreeMap<u32, ([f32; 64], f32)> = std::collections::BTreeMap::new();
+        for t in triangles {
+            for &v in t {
+                if rows[v as usize].is_none() {
+                    for &n in t {
+                        if let Some(row) = &rows[n as usize] {
+                            let sum = sums.entry(v).or_insert(([0.0; 64], 0.0));
+                            sum.1 += 1.0;
+                            for (s, x) in sum.0.iter_mut().zip(row) {
+                                *s += x;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        if sums.is_empty() {
+            break;
+        }
+        left -= sums.len();
+        for (v, (sum, n)) in sums {
+            rows[v as usize] = Some(sum.map(|x| x / n));
+        }
+    }
+    before
+}
+
+/// Light at any point, for probes.
+#[derive(Debug, Clone)]
+pub struct Probed {
+    /// Tristimulus irradiance; Y is lux.
+    pub xyz: [f64; 3],
+    /// Irradiance on the 64 leaves, W/m2/nm.
+    pub leaves: Leaves,
+}
+
+impl Bake {
+    /// Irradiance at points in world space with unit normals.
+    pub fn probe(&self, points: &[(DVec3, DVec3)]) -> Vec<Probed> {
+        let receivers: Vec<Receiver> = points
+            .iter()
+            .enumerate()
+            .map(|(k, &(point, normal))| self.place(point - self.mesh().centre, normal, k as u64))
+            .collect();
+        self.gather(&receivers)
+            .into_iter()
+            .map(|Gathered { irradiance, .. }| Probed { xyz: self.lanes().tristimulus(&irradiance), leaves: self.lanes().leaves(&irradiance) })
+            .collect()
+    }
+
+    /// Finds the face that a point lies on, if its normal agrees; a point in the air looks at the whole room.
+    fn place(&self, point: DVec3, normal: DVec3, seed: u64) -> Receiver {
+        let (mesh, tree) = (self.mesh(), self.tree());
+        let near = 1e-6 * mesh.half_size;
+        for (entry, face) in tree.faces.iter().enumerate() {
+            let n = tree.face_normal[entry];
+            if n.dot(normal) < 1.0 - 1e-6 {
+                continue;
+            }
+            let [a, b, c] = mesh.corners(*face);
+            if n.dot(point - a).abs() > near {
+                continue;
+            }
+            let w = crate::solve::weights_of(point, a, b, c);
+            if w.iter().all(|&x| x >= -1e-9) {
+                let leaf = tree.leaf_at(entry as u32, w.map(|x| x.max(0.0)));
+                return Receiver { point, normal, plane: tree.face_plane[entry], leaf: Some(leaf), seed };
+            }
+        }
+        Receiver { point, normal, plane: crate::geometry::NO_PLANE, leaf: None, seed }
+    }
+}
