@@ -83,7 +83,9 @@ pub fn encode(linear: f64) -> f64 {
     if linear <= KNEE {
         SLOPE * linear
     } else {
-        (1.0 + OFFSET) * linear.powf(1.0 / GAMMA) - OFFSET
+        // The published (1 + a) v - a, written so that 1 stays exactly 1.
+        let root = linear.powf(1.0 / GAMMA);
+        root + OFFSET * (root - 1.0)
     }
 }
 
