@@ -15,6 +15,25 @@
 //! | [`polygon`] | form factor from an element of surface to a polygon |
 //! | [`lanes`] | the same for eight pairs at once |
 //! | [`sampling`] | repeatable points on triangles and directions in a hemisphere |
+//!
+//! Measured with `cargo bench --bench rays` (21 November 2026, one core of an AMD EPYC of family 26 with AVX-512, best of 200 runs), in millions a
+//! second. Cornell box: 34 triangles, elements of up to 1 m in a room of 5.6 m, 28 % of the rays blocked. Canteen: 346 892 triangles, elements of up
+//! to 0.3 m in a room of 20 m by 12 m, 47 % blocked.
+//!
+//! | | Cornell box | canteen |
+//! |---|---|---|
+//! | 16 rays between two elements, `occluded_many` | 65 | 12 |
+//! | the same, `occluded` one by one | 26 | 7.2 |
+//! | the same, `obvhs` 0.4 CWBVH one by one, same triangle test | 15 | 3.8 |
+//! | 64 rays from a point to an element, `occluded_many` | 80 | 28 |
+//! | random pairs of points, `occluded_many` / `occluded` / `obvhs` | 33 / 27 / 10 | 6.2 / 6.6 / 3.0 |
+//! | 16 rays by the shaft's list, `occluded_by` | 290 | 160 |
+//! | nearest hit, `closest` | 15 | 3.9 |
+//! | shafts with their lists (at most 16), `blockers` | 1.4 | 0.29 |
+//! | exact visible part of the light from a point: shaft, list, clip, factor | 1.8 | |
+//! | form factors to a triangle, `lambert_points_x8` / `lambert_polygon` | 160 / 13 | |
+//!
+//! The canteen's index takes 86 bytes a triangle and 0.17 s to build, its planes 0.19 s.
 
 pub mod blockers;
 pub mod clip;

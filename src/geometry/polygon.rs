@@ -10,7 +10,7 @@ use glam::DVec3;
 /// A point nearer to a polygon's plane than this, of the distance to its farthest corner, is taken to lie in it: a few roundings.
 pub(crate) const IN_PLANE: f64 = 1e-14;
 
-/// Form factor in [0,1] from an element at `point` with unit normal `normal` to a planar polygon.
+/// Form factor, between 0 and 1, from an element at `point` with unit normal `normal` to a planar polygon.
 ///
 /// 0 for a point in the plane of the polygon: the formula itself gives 1 inside the polygon. A point that is in the plane only up to rounding
 /// is not recognised by its value; callers compare ids of planes.

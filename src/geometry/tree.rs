@@ -15,7 +15,7 @@ use wide::f32x8;
 /// Children of a node.
 pub(crate) const WIDTH: usize = 8;
 
-/// Padding of every box, of the scene's half size. Measured: 0 of 4 million lines aimed at edges and corners leak.
+/// Padding of every box, of the scene's half size. Measured: of 4 million segments aimed at edges and corners of a closed box, none leaks.
 pub(crate) const PAD: f32 = 1e-5;
 
 /// Set in [`Node::children`] for a leaf; the rest is the index of a block.
