@@ -3,9 +3,8 @@
 //! The loop of the paper's 3.4, made to end: it stops where a merge exceeds eps_max, see [`Overshoot`].
 //! What counts as size of an error is the [`Metric`]; which pairs may merge is [`Pairs`].
 
-use super::grid::LEAVES;
 use super::interval::{Cmf, Interval, Representative};
-use super::list::{List, add};
+use super::list::List;
 use super::product::Path;
 use super::tree::{CmfTree, node};
 
@@ -141,33 +140,33 @@ pub fn control<I: Interval>(
     settings: &Control,
 ) -> Operation {
     let (mut split, mut merged) = (false, false);
+    let mut error = list.error();
     loop {
-        let (error, radius) = (list.error(), list.radius());
-        let size = metric.size(error, radius);
+        let size = metric.size(error, list.radius());
         if size > settings.eps_max {
             let Some((first, n)) = worst(list, metric) else {
                 break;
             };
             list.split(first, path.children(n, cmf));
+            error = list.error();
             split = true;
         } else if size < settings.eps_min && list.partition().count() > settings.floor {
             if split && settings.overshoot == Overshoot::Keep {
                 return Operation::Fluctuation;
             }
-            let Some((first, whole)) = best_pair(list, cmf, metric, settings) else {
+            let Some(pair) = best_pair(list, error, cmf, metric, settings) else {
                 break;
             };
-            let rank = list.partition().rank(first);
-            let change = difference(list, rank, &whole);
-            if metric.size(add(error, change), radius) > settings.eps_max {
+            if metric.size(pair.error, list.radius()) > settings.eps_max {
                 // The paper's loop would split this very pair again, and so for ever.
                 if settings.overshoot == Overshoot::Keep {
-                    list.merge(first, whole);
+                    list.merge(pair.first, pair.whole);
                     return Operation::Fluctuation;
                 }
                 break;
             }
-            list.merge(first, whole);
+            list.merge(pair.first, pair.whole);
+            error = pair.error;
             merged = true;
         } else {
             break;
@@ -202,58 +201,68 @@ pub fn coarsen<I: Interval>(
     settings: &Control,
 ) -> usize {
     let mut merges = 0;
+    let mut error = list.error();
     while list.partition().count() > settings.floor {
-        let Some((first, whole)) = best_pair(list, cmf, metric, settings) else {
+        let Some(pair) = best_pair(list, error, cmf, metric, settings) else {
             break;
         };
-        let change = difference(list, list.partition().rank(first), &whole);
-        if metric.size(add(list.error(), change), list.radius()) > settings.eps_max {
+        if metric.size(pair.error, list.radius()) > settings.eps_max {
             break;
         }
-        list.merge(first, whole);
+        list.merge(pair.first, pair.whole);
+        error = pair.error;
         merges += 1;
     }
     merges
 }
 
-/// Change of the whole error when the pair at `rank` becomes `whole`.
-fn difference<I: Interval>(list: &List<I>, rank: usize, whole: &I) -> Cmf {
-    let (l, r, w) = (
-        list.intervals()[rank].error(),
-        list.intervals()[rank + 1].error(),
-        whole.error(),
-    );
-    std::array::from_fn(|a| w[a] - l[a] - r[a])
+/// A pair that may merge.
+struct Pair<I> {
+    /// Where its left half starts.
+    first: usize,
+    /// Both as one.
+    whole: I,
+    /// Error of the list after the merge.
+    error: Cmf,
 }
 
+/// The pair that the rule prefers; `error` is that of the list.
+#[inline]
 fn best_pair<I: Interval>(
     list: &List<I>,
+    error: Cmf,
     cmf: &CmfTree,
     metric: &Metric,
     settings: &Control,
-) -> Option<(usize, I)> {
+) -> Option<Pair<I>> {
     let partition = list.partition();
-    let mut pairs = partition.pairs();
-    let (error, radius) = (list.error(), list.radius());
-    let deepest = partition.iter().map(|(_, len)| len).min().unwrap_or(LEAVES);
+    let mut pairs = match settings.pairs {
+        Pairs::Deepest => partition.deepest_pairs(),
+        Pairs::Any => partition.pairs(),
+    };
     let mut found = None;
     let mut least = f64::INFINITY;
     while pairs != 0 {
         let first = pairs.trailing_zeros() as usize;
         pairs &= pairs - 1;
         let rank = partition.rank(first);
-        if settings.pairs == Pairs::Deepest && partition.len_at(first) != deepest {
-            continue;
-        }
+        let (left, right) = (&list.intervals()[rank], &list.intervals()[rank + 1]);
         let whole = list.merged(first, cmf, settings.representative);
+        let (l, r, w) = (left.error(), right.error(), whole.error());
+        let after = std::array::from_fn(|a| error[a] + w[a] - l[a] - r[a]);
         let key = match settings.pairs {
-            Pairs::Deepest => {
-                (list.intervals()[rank].value() - list.intervals()[rank + 1].value()).abs()
-            }
-            Pairs::Any => metric.size(add(error, difference(list, rank, &whole)), radius),
+            Pairs::Deepest => (left.value() - right.value()).abs(),
+            Pairs::Any => metric.size(after, list.radius()),
         };
         if key < least {
-            (found, least) = (Some((first, whole)), key);
+            (found, least) = (
+                Some(Pair {
+                    first,
+                    whole,
+                    error: after,
+                }),
+                key,
+            );
         }
     }
     found
