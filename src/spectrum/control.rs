@@ -32,10 +32,23 @@ impl Metric {
             }
         }
     }
+
+    /// Grows with [`Metric::size`] for a fixed radius, and needs no root.
+    #[inline]
+    fn rank(&self, error: Cmf, radius: Cmf) -> f64 {
+        match self {
+            Self::Xyz => square(std::array::from_fn(|a| error[a].abs() + radius[a])),
+            Self::Luv(j) => square(multiply(j, error)),
+        }
+    }
 }
 
 fn length(v: Cmf) -> f64 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+    square(v).sqrt()
+}
+
+fn square(v: Cmf) -> f64 {
+    v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
 }
 
 fn multiply(j: &[[f64; 3]; 3], v: Cmf) -> Cmf {
@@ -154,19 +167,19 @@ pub fn control<I: Interval>(
             if split && settings.overshoot == Overshoot::Keep {
                 return Operation::Fluctuation;
             }
-            let Some(pair) = best_pair(list, error, cmf, metric, settings) else {
+            let Some((first, after)) = best_pair(list, error, cmf, metric, settings) else {
                 break;
             };
-            if metric.size(pair.error, list.radius()) > settings.eps_max {
+            if metric.size(after, list.radius()) > settings.eps_max {
                 // The paper's loop would split this very pair again, and so for ever.
                 if settings.overshoot == Overshoot::Keep {
-                    list.merge(pair.first, pair.whole);
+                    list.merge(first, cmf, settings.representative);
                     return Operation::Fluctuation;
                 }
                 break;
             }
-            list.merge(pair.first, pair.whole);
-            error = pair.error;
+            list.merge(first, cmf, settings.representative);
+            error = after;
             merged = true;
         } else {
             break;
@@ -203,30 +216,22 @@ pub fn coarsen<I: Interval>(
     let mut merges = 0;
     let mut error = list.error();
     while list.partition().count() > settings.floor {
-        let Some(pair) = best_pair(list, error, cmf, metric, settings) else {
+        let Some((first, after)) = best_pair(list, error, cmf, metric, settings) else {
             break;
         };
-        if metric.size(pair.error, list.radius()) > settings.eps_max {
+        if metric.size(after, list.radius()) > settings.eps_max {
             break;
         }
-        list.merge(pair.first, pair.whole);
-        error = pair.error;
+        list.merge(first, cmf, settings.representative);
+        error = after;
         merges += 1;
     }
     merges
 }
 
-/// A pair that may merge.
-struct Pair<I> {
-    /// Where its left half starts.
-    first: usize,
-    /// Both as one.
-    whole: I,
-    /// Error of the list after the merge.
-    error: Cmf,
-}
-
-/// The pair that the rule prefers; `error` is that of the list.
+/// The pair that the rule prefers: where it starts, and the error of the list after the merge; `error` is that before.
+///
+/// Only the values of the pair are read, see [`CmfTree::merge_gain`]: nothing is merged to find out.
 #[inline]
 fn best_pair<I: Interval>(
     list: &List<I>,
@@ -234,35 +239,29 @@ fn best_pair<I: Interval>(
     cmf: &CmfTree,
     metric: &Metric,
     settings: &Control,
-) -> Option<Pair<I>> {
-    let partition = list.partition();
-    let mut pairs = match settings.pairs {
-        Pairs::Deepest => partition.deepest_pairs(),
-        Pairs::Any => partition.pairs(),
-    };
+) -> Option<(usize, Cmf)> {
+    let (partition, intervals, radius) = (list.partition(), list.intervals(), list.radius());
     let mut found = None;
     let mut least = f64::INFINITY;
-    while pairs != 0 {
-        let first = pairs.trailing_zeros() as usize;
-        pairs &= pairs - 1;
-        let rank = partition.rank(first);
-        let (left, right) = (&list.intervals()[rank], &list.intervals()[rank + 1]);
-        let whole = list.merged(first, cmf, settings.representative);
-        let (l, r, w) = (left.error(), right.error(), whole.error());
-        let after = std::array::from_fn(|a| error[a] + w[a] - l[a] - r[a]);
-        let key = match settings.pairs {
-            Pairs::Deepest => (left.value() - right.value()).abs(),
-            Pairs::Any => metric.size(after, list.radius()),
-        };
-        if key < least {
-            (found, least) = (
-                Some(Pair {
-                    first,
-                    whole,
-                    error: after,
-                }),
-                key,
-            );
+    for height in 0..6 {
+        let mut pairs = partition.pairs_of(height);
+        while pairs != 0 {
+            let first = pairs.trailing_zeros() as usize;
+            pairs &= pairs - 1;
+            let rank = partition.rank(first);
+            let difference = intervals[rank].value() - intervals[rank + 1].value();
+            let gain = cmf.merge_gain(node(first, 2 << height), settings.representative);
+            let after = std::array::from_fn(|a| error[a] + difference * gain[a]);
+            let key = match settings.pairs {
+                Pairs::Deepest => difference.abs(),
+                Pairs::Any => metric.rank(after, radius),
+            };
+            if key < least {
+                (found, least) = (Some((first, after)), key);
+            }
+        }
+        if found.is_some() && settings.pairs == Pairs::Deepest {
+            break;
         }
     }
     found

@@ -138,19 +138,9 @@ impl Partition {
         (0..6).fold(0, |all, height| all | self.pairs_of(height))
     }
 
-    /// Starts of the left halves of the sibling pairs of the shortest intervals; 0 for the root.
-    ///
-    /// The shortest intervals always come in pairs: a short interval whose sibling is halved is not the shortest.
-    pub fn deepest_pairs(self) -> u64 {
-        (0..6)
-            .map(|height| self.pairs_of(height))
-            .find(|pairs| *pairs != 0)
-            .unwrap_or(0)
-    }
-
     /// The pairs whose halves have 2^height leaves, height in 0..6.
     #[inline]
-    fn pairs_of(self, height: u32) -> u64 {
+    pub(super) fn pairs_of(self, height: u32) -> u64 {
         let (bits, len) = (self.0, 1u32 << height);
         // A start at k + len means that the parent over 2 len leaves is halved.
         let halved = bits & bits >> len & PARENTS[height as usize];
@@ -263,8 +253,6 @@ pub(crate) mod tests {
             for k in 0..64 {
                 let is_left = a.sibling(k).is_some_and(|sibling| sibling > k);
                 prop_assert_eq!(a.pairs() >> k & 1 == 1, is_left);
-                let shortest = a.iter().map(|(_, len)| len).min();
-                prop_assert_eq!(a.deepest_pairs() >> k & 1 == 1, is_left && Some(a.len_at(k)) == shortest);
                 if is_left {
                     prop_assert!(Partition::is_valid(a.merge(k).unwrap().bits()));
                 }
