@@ -4,7 +4,7 @@
 //! field by field it is documented on the row types of [`crate::spectrum::study`]. Shares are in percent.
 
 use crate::spectrum::study::table1::{Column, PRINTED, ROWS, mean_differences};
-use crate::spectrum::study::{Chart, LEVELS, Light, Reflectances, bounds, modes};
+use crate::spectrum::study::{Chart, LEVELS, Light, Reflectances, bounds, compare, modes, table2};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -25,6 +25,8 @@ struct Results {
     columns: [Column; 3],
     control: Vec<modes::Row>,
     bounds: Vec<bounds::Row>,
+    methods: Vec<compare::Row>,
+    table2: Vec<table2::Stage>,
 }
 
 /// Runs the tests and prints them.
@@ -71,6 +73,11 @@ fn measure(source: Reflectances) -> Results {
             .iter()
             .flat_map(|light| bounds::measure(&chart, light))
             .collect(),
+        methods: lights
+            .iter()
+            .flat_map(|light| compare::measure(&chart, light))
+            .collect(),
+        table2: table2::measure(&chart),
     }
 }
 
@@ -78,8 +85,10 @@ fn to_json(results: &Results) -> Value {
     let [c, d65, f2] = &results.columns;
     json!({
         "table1": { "C": c, "D65": d65, "F2": f2 },
+        "table2": { "printed_ms": printed_table2(), "stages": results.table2 },
         "control": results.control,
         "bounds": results.bounds,
+        "methods": results.methods,
     })
 }
 
@@ -87,8 +96,10 @@ fn to_text(results: &Results) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = table1(&mut text, &results.columns);
+    let _ = timings(&mut text, &results.table2);
     let _ = control(&mut text, &results.control);
     let _ = bound(&mut text, &results.bounds);
+    let _ = methods(&mut text, &results.methods);
     text
 }
 
@@ -210,4 +221,90 @@ fn bound(text: &mut String, rows: &[bounds::Row]) -> std::fmt::Result {
         )?;
     }
     writeln!(text)
+}
+
+fn printed_table2() -> Value {
+    let rows = table2::PRINTED_MS.iter().map(|(name, reference, adaptive)| json!({ "stage": name, "reference": reference, "adaptive": adaptive }));
+    rows.collect()
+}
+
+fn timings(text: &mut String, stages: &[table2::Stage]) -> std::fmt::Result {
+    writeln!(text, "Table 2: printed, ms for 13 824 products\n")?;
+    for (name, reference, adaptive) in table2::PRINTED_MS {
+        writeln!(text, "  {name:20}{reference:>10}{adaptive:>10}")?;
+    }
+    writeln!(
+        text,
+        "\nTable 2 today, ns a product (dense: 64 f32 in wide vectors; ratio above 1: adaptive is faster)\n"
+    )?;
+    writeln!(
+        text,
+        "  {:42}{:>10}{:>10}{:>8}",
+        "", "adaptive", "dense", "ratio"
+    )?;
+    let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2}"));
+    for s in stages {
+        writeln!(
+            text,
+            "  {:42}{:>10.2}{:>10}{:>8}",
+            s.stage,
+            s.adaptive_ns,
+            number(s.dense_ns),
+            number(s.ratio)
+        )?;
+    }
+    writeln!(text)
+}
+
+/// Means over the lights of dE*uv: mean (max) of each level.
+fn methods(text: &mut String, rows: &[compare::Row]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "Methods at equal numbers of terms: dE*uv mean (max) of tertiary reflections, mean (max) over the lights\n"
+    )?;
+    write!(text, "{:28}", "")?;
+    for n in compare::TERMS {
+        write!(text, "{:>17}", format!("n = {n}"))?;
+    }
+    writeln!(text, "{:>12}{:>9}", "product ns", "XYZ ns")?;
+    let mut names: Vec<&str> = Vec::new();
+    for row in rows {
+        if !names.contains(&row.method) {
+            names.push(row.method);
+        }
+    }
+    for name in names {
+        write!(text, "{name:28}")?;
+        let mut time = None;
+        for n in compare::TERMS {
+            let same: Vec<&compare::Row> = rows
+                .iter()
+                .filter(|r| r.method == name && r.terms == n)
+                .collect();
+            let mean = same.iter().map(|r| r.luv_mean[2]).sum::<f64>() / same.len() as f64;
+            let max = same.iter().map(|r| r.luv_max[2]).fold(0.0, f64::max);
+            write!(
+                text,
+                "{:>17}",
+                if same.is_empty() {
+                    "-".to_owned()
+                } else {
+                    format!("{mean:.2} ({max:.2})")
+                }
+            )?;
+            time = same
+                .iter()
+                .filter_map(|r| r.product_ns.zip(r.xyz_ns))
+                .reduce(|a, b| (a.0.min(b.0), a.1.min(b.1)))
+                .or(time);
+        }
+        match time {
+            Some((product, xyz)) => writeln!(text, "{product:>12.1}{xyz:>9.1}")?,
+            None => writeln!(text, "{:>12}{:>9}", "-", "-")?,
+        }
+    }
+    writeln!(
+        text,
+        "\nTimes are those of n = 16. Adaptive lists: see Table 2; each of their terms comes with three errors."
+    )
 }

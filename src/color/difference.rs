@@ -60,9 +60,10 @@ pub fn de2000(a: Xyz, b: Xyz, white: Xyz) -> f64 {
 /// the row of L* is not zero.
 pub fn luv_jacobian(xyz: Xyz, white: Xyz) -> [[f64; 3]; 3] {
     let ratio = xyz[1] / white[1];
-    let lightness = 116.0 * cube_root(ratio) - 16.0;
+    let root = cube_root(ratio);
+    let lightness = 116.0 * root - 16.0;
     let slope = if ratio > LINEAR_BELOW {
-        116.0 / 3.0 * ratio.cbrt() / ratio
+        116.0 / 3.0 * root / ratio
     } else {
         KAPPA
     } / white[1];

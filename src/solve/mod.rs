@@ -71,6 +71,8 @@ impl Default for Settings {
 const FIRST_THRESHOLD: f64 = 0.02;
 /// What a round divides the threshold by: about twice the links, half the error.
 const THRESHOLD_STEP: f64 = 3.0;
+/// Links keep less error than leaves, by this factor: there are many to a leaf.
+const LINK_SHARE: f64 = 8.0;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
@@ -163,7 +165,7 @@ impl Bake {
         let demand = Demand {
             bright: &bright,
             total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
-            threshold: threshold / std::env::var("LT").map_or(1.0, |x| x.parse().unwrap()),
+            threshold: threshold / LINK_SHARE,
             least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
         };
         let mut tree = std::mem::take(&mut self.tree);
@@ -221,6 +223,28 @@ impl Bake {
 }
 
 impl Bake {
+    /// Has the bake come to an end, and how? None: another round may help.
+    pub fn verdict(&self) -> Option<Verdict> {
+        let last = self.rounds.last()?;
+        if last.error.total_de2000.value.is_some_and(|e| e <= self.settings.error) {
+            return Some(Verdict::Reached);
+        }
+        if self.tree.nodes.is_empty() || self.scene.spectra.is_empty() {
+            return Some(Verdict::Reached);
+        }
+        (self.rounds.len() >= self.settings.rounds).then_some(Verdict::OutOfRounds)
+    }
+
+    /// Rounds until the end.
+    pub fn run(&mut self) -> Verdict {
+        loop {
+            if let Some(verdict) = self.verdict() {
+                return verdict;
+            }
+            self.step();
+        }
+    }
+
     /// Runs `f` with what blocks light in this room.
     fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
         let opaque = |triangle: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v]);
@@ -398,35 +422,6 @@ impl Bake {
         }
         operator::pull::<L>(&self.tree, &self.areas, rows.all_mut::<L>());
         rows
-    }
-
-    /// Experiment.
-    pub fn regather(&mut self) {
-        let leaves = self.light.leaves.clone();
-        let receivers: Vec<Receiver> = leaves
-            .iter()
-            .map(|&leaf| {
-                let e = self.tree.elements[self.tree.node(leaf).element as usize];
-                Receiver { point: e.at([1.0 / 3.0; 3]), normal: self.tree.face_normal[e.face as usize], plane: self.tree.face_plane[e.face as usize], leaf: Some(leaf), seed: u64::from(leaf) }
-            })
-            .collect();
-        let g: Vec<Gathered> = self.with_sight(|bake, sight| {
-            let gatherer = Gatherer { stored: std::env::var("STORED").is_ok(), tolerance: 1e9, ..bake.gatherer(sight) };
-            receivers.par_iter().map_init(Memory::default, |memory, r| gatherer.at(r, memory)).collect()
-        });
-        let painter = Painter::new(&self.scene, &self.mesh);
-        let sources = painter.paint(&self.tree, &leaves, &self.lanes);
-        let width = self.light.width();
-        let mut rows = Rows::zero(leaves.len(), width);
-        for (k, g) in g.iter().enumerate() {
-            for (l, x) in rows.row_mut(k).iter_mut().enumerate() {
-                *x = (g.irradiance[l] - g.direct[l] + self.direct.row(leaves[k]).get(l).copied().unwrap_or(0.0)) * sources.reflectance.row(k)[l];
-            }
-        }
-        self.light.reflected = match width { 8 => self.on_nodes::<8>(&rows, &leaves), 16 => self.on_nodes::<16>(&rows, &leaves), 32 => self.on_nodes::<32>(&rows, &leaves), _ => self.on_nodes::<64>(&rows, &leaves) };
-        let mut light = std::mem::take(&mut self.light);
-        light.measure(&self.tree, &self.lanes);
-        self.light = light;
     }
 
     /// Gathers at receivers, in order.

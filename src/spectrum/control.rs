@@ -3,9 +3,8 @@
 //! The loop of the paper's 3.4, made to end: it stops where a merge exceeds eps_max, see [`Overshoot`].
 //! What counts as size of an error is the [`Metric`]; which pairs may merge is [`Pairs`].
 
-use super::grid::LEAVES;
 use super::interval::{Cmf, Interval, Representative};
-use super::list::{List, add};
+use super::list::List;
 use super::product::Path;
 use super::tree::{CmfTree, node};
 
@@ -33,10 +32,23 @@ impl Metric {
             }
         }
     }
+
+    /// Grows with [`Metric::size`] for a fixed radius, and needs no root.
+    #[inline]
+    fn rank(&self, error: Cmf, radius: Cmf) -> f64 {
+        match self {
+            Self::Xyz => square(std::array::from_fn(|a| error[a].abs() + radius[a])),
+            Self::Luv(j) => square(multiply(j, error)),
+        }
+    }
 }
 
 fn length(v: Cmf) -> f64 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+    square(v).sqrt()
+}
+
+fn square(v: Cmf) -> f64 {
+    v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
 }
 
 fn multiply(j: &[[f64; 3]; 3], v: Cmf) -> Cmf {
@@ -141,33 +153,33 @@ pub fn control<I: Interval>(
     settings: &Control,
 ) -> Operation {
     let (mut split, mut merged) = (false, false);
+    let mut error = list.error();
     loop {
-        let (error, radius) = (list.error(), list.radius());
-        let size = metric.size(error, radius);
+        let size = metric.size(error, list.radius());
         if size > settings.eps_max {
             let Some((first, n)) = worst(list, metric) else {
                 break;
             };
             list.split(first, path.children(n, cmf));
+            error = list.error();
             split = true;
         } else if size < settings.eps_min && list.partition().count() > settings.floor {
             if split && settings.overshoot == Overshoot::Keep {
                 return Operation::Fluctuation;
             }
-            let Some((first, whole)) = best_pair(list, cmf, metric, settings) else {
+            let Some((first, after)) = best_pair(list, error, cmf, metric, settings) else {
                 break;
             };
-            let rank = list.partition().rank(first);
-            let change = difference(list, rank, &whole);
-            if metric.size(add(error, change), radius) > settings.eps_max {
+            if metric.size(after, list.radius()) > settings.eps_max {
                 // The paper's loop would split this very pair again, and so for ever.
                 if settings.overshoot == Overshoot::Keep {
-                    list.merge(first, whole);
+                    list.merge(first, cmf, settings.representative);
                     return Operation::Fluctuation;
                 }
                 break;
             }
-            list.merge(first, whole);
+            list.merge(first, cmf, settings.representative);
+            error = after;
             merged = true;
         } else {
             break;
@@ -202,58 +214,54 @@ pub fn coarsen<I: Interval>(
     settings: &Control,
 ) -> usize {
     let mut merges = 0;
+    let mut error = list.error();
     while list.partition().count() > settings.floor {
-        let Some((first, whole)) = best_pair(list, cmf, metric, settings) else {
+        let Some((first, after)) = best_pair(list, error, cmf, metric, settings) else {
             break;
         };
-        let change = difference(list, list.partition().rank(first), &whole);
-        if metric.size(add(list.error(), change), list.radius()) > settings.eps_max {
+        if metric.size(after, list.radius()) > settings.eps_max {
             break;
         }
-        list.merge(first, whole);
+        list.merge(first, cmf, settings.representative);
+        error = after;
         merges += 1;
     }
     merges
 }
 
-/// Change of the whole error when the pair at `rank` becomes `whole`.
-fn difference<I: Interval>(list: &List<I>, rank: usize, whole: &I) -> Cmf {
-    let (l, r, w) = (
-        list.intervals()[rank].error(),
-        list.intervals()[rank + 1].error(),
-        whole.error(),
-    );
-    std::array::from_fn(|a| w[a] - l[a] - r[a])
-}
-
+/// The pair that the rule prefers: where it starts, and the error of the list after the merge; `error` is that before.
+///
+/// Only the values of the pair are read, see [`CmfTree::merge_gain`]: nothing is merged to find out.
+#[inline]
 fn best_pair<I: Interval>(
     list: &List<I>,
+    error: Cmf,
     cmf: &CmfTree,
     metric: &Metric,
     settings: &Control,
-) -> Option<(usize, I)> {
-    let partition = list.partition();
-    let mut pairs = partition.pairs();
-    let (error, radius) = (list.error(), list.radius());
-    let deepest = partition.iter().map(|(_, len)| len).min().unwrap_or(LEAVES);
+) -> Option<(usize, Cmf)> {
+    let (partition, intervals, radius) = (list.partition(), list.intervals(), list.radius());
     let mut found = None;
     let mut least = f64::INFINITY;
-    while pairs != 0 {
-        let first = pairs.trailing_zeros() as usize;
-        pairs &= pairs - 1;
-        let rank = partition.rank(first);
-        if settings.pairs == Pairs::Deepest && partition.len_at(first) != deepest {
-            continue;
-        }
-        let whole = list.merged(first, cmf, settings.representative);
-        let key = match settings.pairs {
-            Pairs::Deepest => {
-                (list.intervals()[rank].value() - list.intervals()[rank + 1].value()).abs()
+    for height in 0..6 {
+        let mut pairs = partition.pairs_of(height);
+        while pairs != 0 {
+            let first = pairs.trailing_zeros() as usize;
+            pairs &= pairs - 1;
+            let rank = partition.rank(first);
+            let difference = intervals[rank].value() - intervals[rank + 1].value();
+            let gain = cmf.merge_gain(node(first, 2 << height), settings.representative);
+            let after = std::array::from_fn(|a| error[a] + difference * gain[a]);
+            let key = match settings.pairs {
+                Pairs::Deepest => difference.abs(),
+                Pairs::Any => metric.rank(after, radius),
+            };
+            if key < least {
+                (found, least) = (Some((first, after)), key);
             }
-            Pairs::Any => metric.size(add(error, difference(list, rank, &whole)), radius),
-        };
-        if key < least {
-            (found, least) = (Some((first, whole)), key);
+        }
+        if found.is_some() && settings.pairs == Pairs::Deepest {
+            break;
         }
     }
     found

@@ -28,9 +28,10 @@ pub trait Interval: Copy + Default + std::fmt::Debug {
     #[must_use]
     fn times(&self, reflectance: &Self, cmf: &Cmf) -> Self;
 
-    /// Both halves of an interval as one.
+    /// Both halves of an interval as one, whose value is `share` of the left and the rest of the right; `cmf` are the sums
+    /// over the halves.
     #[must_use]
-    fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], rule: Representative) -> Self;
+    fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], share: f64) -> Self;
 
     /// One half of an interval, whose own spectrum is not known beyond the record of the whole; `whole` and `half` are the
     /// sums of the colour matching functions. The errors of the two halves add up to that of the whole.
@@ -49,21 +50,6 @@ pub trait Interval: Copy + Default + std::fmt::Debug {
 
     /// How far the three errors may lie from their estimate; zero where that is not known.
     fn radius(&self) -> Cmf;
-}
-
-/// The value of two merged intervals.
-pub(super) fn representative(values: [f64; 2], cmf: [&Cmf; 2], rule: Representative) -> f64 {
-    let mean = 0.5 * (values[0] + values[1]);
-    if rule == Representative::Mean {
-        return mean;
-    }
-    let (mut above, mut below) = (0.0, 0.0);
-    for a in 0..3 {
-        let whole = cmf[0][a] + cmf[1][a];
-        above += whole * (cmf[0][a] * values[0] + cmf[1][a] * values[1]);
-        below += whole * whole;
-    }
-    if below > 0.0 { above / below } else { mean }
 }
 
 /// The paper's record: a value and three errors, the neglected term left out.
@@ -104,8 +90,8 @@ impl Interval for Estimate {
     }
 
     #[inline]
-    fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], rule: Representative) -> Self {
-        let value = representative([left.value, right.value], cmf, rule);
+    fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], share: f64) -> Self {
+        let value = right.value + share * (left.value - right.value);
         let (dl, dr) = (left.value - value, right.value - value);
         let error = std::array::from_fn(|a| {
             left.error[a] + right.error[a] + cmf[0][a] * dl + cmf[1][a] * dr
@@ -187,8 +173,8 @@ impl Interval for Moment {
     }
 
     #[inline]
-    fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], rule: Representative) -> Self {
-        Self(Estimate::merged(&left.0, &right.0, cmf, rule))
+    fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], share: f64) -> Self {
+        Self(Estimate::merged(&left.0, &right.0, cmf, share))
     }
 
     fn half(&self, whole: &Cmf, half: &Cmf) -> Self {

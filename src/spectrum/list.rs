@@ -168,30 +168,26 @@ impl<I: Interval> List<I> {
         self.radius = radius;
     }
 
-    /// What the sibling pair whose left half starts at `first` would be as one interval.
-    #[inline]
-    pub fn merged(&self, first: usize, cmf: &CmfTree, rule: Representative) -> I {
-        let (rank, n) = (
-            self.partition.rank(first),
-            node(first, self.partition.len_at(first)),
-        );
-        I::merged(
-            &self.intervals[rank],
-            &self.intervals[rank + 1],
-            [cmf.node(n), cmf.node(n + 1)],
-            rule,
-        )
-    }
-
-    /// Replaces the sibling pair whose left half starts at `first` by one interval; nothing happens if there is no such pair.
-    pub fn merge(&mut self, first: usize, whole: I) {
-        let (rank, count) = (self.partition.rank(first), self.partition.count());
-        let Some(coarser) = self.partition.merge(first) else {
-            return;
+    /// Makes the sibling pair whose left half starts at `first` one interval; false if there is no such pair.
+    pub fn merge(&mut self, first: usize, cmf: &CmfTree, rule: Representative) -> bool {
+        let Some(coarser) = self
+            .partition
+            .merge(first)
+            .filter(|coarser| coarser.starts(first))
+        else {
+            return false;
         };
-        self.intervals[rank] = whole;
-        self.intervals.copy_within(rank + 2..count, rank + 1);
+        let (rank, count) = (self.partition.rank(first), self.partition.count());
+        let n = node(first, self.partition.len_at(first));
+        let share = cmf.share(n / 2, rule);
+        let (left, right) = (self.intervals[rank], self.intervals[rank + 1]);
+        self.intervals[rank] = I::merged(&left, &right, [cmf.node(n), cmf.node(n + 1)], share);
+        // A loop, as a call to move some records costs more than the records do.
+        for i in rank + 2..count {
+            self.intervals[i - 1] = self.intervals[i];
+        }
         self.partition = coarser;
+        true
     }
 
     /// Checks what must hold of every list.

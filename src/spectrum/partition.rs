@@ -135,21 +135,34 @@ impl Partition {
 
     /// Starts of the left halves of all sibling pairs in the cut, as bits.
     pub fn pairs(self) -> u64 {
-        let mut pairs = 0;
-        let mut before = None;
-        for (first, len) in self.iter() {
-            // Two neighbours of one length are siblings if the left one starts at a multiple of twice that length.
-            if let Some((left, left_len)) = before
-                && left_len == len
-                && left % (2 * len) == 0
-            {
-                pairs |= 1u64 << left;
-            }
-            before = Some((first, len));
+        (0..6).fold(0, |all, height| all | self.pairs_of(height))
+    }
+
+    /// The pairs whose halves have 2^height leaves, height in 0..6.
+    #[inline]
+    pub(super) fn pairs_of(self, height: u32) -> u64 {
+        let (bits, len) = (self.0, 1u32 << height);
+        // A start at k + len means that the parent over 2 len leaves is halved.
+        let halved = bits & bits >> len & PARENTS[height as usize];
+        // An interval that is split has a start at its middle.
+        let middle = len / 2;
+        if middle == 0 {
+            halved
+        } else {
+            halved & !(bits >> middle) & !(bits >> (len + middle))
         }
-        pairs
     }
 }
+
+/// Multiples of 2, 4, ... 64 as bits: where the parents of intervals of 1, 2, ... 32 leaves start.
+const PARENTS: [u64; 6] = [
+    0x5555_5555_5555_5555,
+    0x1111_1111_1111_1111,
+    0x0101_0101_0101_0101,
+    0x0001_0001_0001_0001,
+    0x0000_0001_0000_0001,
+    1,
+];
 
 impl From<Partition> for u64 {
     fn from(cut: Partition) -> Self {
@@ -237,8 +250,12 @@ pub(crate) mod tests {
                 prop_assert_eq!(finer.sibling(leaf), Some(leaf + a.len_at(leaf) / 2));
                 prop_assert!(finer.pairs() >> leaf & 1 == 1);
             }
-            for k in (0..64).filter(|k| a.pairs() >> k & 1 == 1) {
-                prop_assert!(Partition::is_valid(a.merge(k).unwrap().bits()));
+            for k in 0..64 {
+                let is_left = a.sibling(k).is_some_and(|sibling| sibling > k);
+                prop_assert_eq!(a.pairs() >> k & 1 == 1, is_left);
+                if is_left {
+                    prop_assert!(Partition::is_valid(a.merge(k).unwrap().bits()));
+                }
             }
             prop_assert_eq!(Partition::covering(a.bits()), a);
         }

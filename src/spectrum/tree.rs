@@ -6,7 +6,7 @@
 //! The average of eq. 3 is the value that makes the sum of the squares of the three errors of eq. 2 least.
 
 use super::grid::{LEAVES, Leaves};
-use super::interval::{Cmf, Interval};
+use super::interval::{Cmf, Interval, Representative};
 use super::partition::Partition;
 
 /// Nodes of a tree in heap order; index 0 is not used.
@@ -33,6 +33,10 @@ pub fn span(node: usize) -> (usize, usize) {
 pub struct CmfTree {
     leaves: [Leaves; 3],
     nodes: [Cmf; NODES],
+    /// For each node with children: the left child's share in the value of both by eq. 3.
+    shares: [f64; LEAVES],
+    /// For each node with children: what a difference of 1 between the children's values adds to the errors when they merge.
+    gains: [Cmf; LEAVES],
 }
 
 impl CmfTree {
@@ -45,7 +49,52 @@ impl CmfTree {
         for n in (1..LEAVES).rev() {
             nodes[n] = std::array::from_fn(|a| nodes[2 * n][a] + nodes[2 * n + 1][a]);
         }
-        Self { leaves, nodes }
+        let mut this = Self {
+            leaves,
+            nodes,
+            shares: [0.5; LEAVES],
+            gains: [[0.0; 3]; LEAVES],
+        };
+        for n in 1..LEAVES {
+            this.shares[n] = this.projected_share(n);
+            this.gains[n] = this.gain(n, this.shares[n]);
+        }
+        this
+    }
+
+    /// Least squares in the three tristimulus values, as in eq. 3; half where all weights are zero.
+    fn projected_share(&self, n: usize) -> f64 {
+        let (mut left, mut whole) = (0.0, 0.0);
+        for a in 0..3 {
+            left += self.nodes[n][a] * self.nodes[2 * n][a];
+            whole += self.nodes[n][a] * self.nodes[n][a];
+        }
+        if whole > 0.0 { left / whole } else { 0.5 }
+    }
+
+    /// Change of the errors for a difference of 1, if the merged value takes `share` of the left one.
+    fn gain(&self, n: usize, share: f64) -> Cmf {
+        std::array::from_fn(|a| {
+            self.nodes[2 * n][a] * (1.0 - share) - self.nodes[2 * n + 1][a] * share
+        })
+    }
+
+    /// The left child's share in the value of a node (in 1..64) that takes the place of its children.
+    #[inline]
+    pub fn share(&self, node: usize, rule: Representative) -> f64 {
+        match rule {
+            Representative::Mean => 0.5,
+            Representative::Projection => self.shares[node],
+        }
+    }
+
+    /// What a merge into `node` (in 1..64) adds to the three errors, for a left value that is 1 above the right one.
+    #[inline]
+    pub fn merge_gain(&self, node: usize, rule: Representative) -> Cmf {
+        match rule {
+            Representative::Mean => self.gain(node, 0.5),
+            Representative::Projection => self.gains[node],
+        }
     }
 
     /// The same with a light as further weight: power times a_bar.

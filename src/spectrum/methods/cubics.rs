@@ -23,7 +23,7 @@ pub struct Cubics {
 impl Cubics {
     /// n / 4 pieces; none unless n is a multiple of 4 in 4..=64.
     pub fn new(cmf: &CmfTree, light: &Leaves, n: usize) -> Option<Self> {
-        if n == 0 || n % ORDER != 0 || n > LEAVES {
+        if n == 0 || !n.is_multiple_of(ORDER) || n > LEAVES {
             return None;
         }
         let pieces = n / ORDER;

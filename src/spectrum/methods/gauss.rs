@@ -16,7 +16,7 @@ const AC1C2: [[f64; 3]; 3] = [
 
 /// n nodes (at least 3) shared out over X, Y and Z; X, which has two humps, gets the first of a rest.
 pub fn gauss_xyz(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
-    let counts = [(n + 2) / 3, (n + 1) / 3, n / 3];
+    let counts = [n.div_ceil(3), (n + 1) / 3, n / 3];
     build(
         "Gauss XYZ",
         cmf,

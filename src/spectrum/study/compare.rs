@@ -77,7 +77,7 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
                 .map(|method| fixed(method.as_ref(), chart, light, &exact, n)),
         );
         for (name, samples) in adaptive_at_count(chart, light, n) {
-            let figures = samples.map(|differences| figures(differences));
+            let figures = samples.map(figures);
             rows.push(Row::new(light, name, n, figures, None));
         }
     }

@@ -3,8 +3,10 @@
 pub mod bounds;
 mod chart;
 pub mod compare;
+mod lanes;
 pub mod modes;
 pub mod table1;
+pub mod table2;
 mod walk;
 
 pub use chart::{Chart, Light, Reflectances};

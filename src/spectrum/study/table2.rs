@@ -1,0 +1,399 @@
+//! Table 2 (paper 4.2): time of the 13 824 tertiary products and their change to XYZ, dense and adaptive, today.
+//!
+//! Light D65, lists of the paper's control. Each of the 576 secondary spectra meets the 24 materials in one block, whose
+//! results stay in the first-level cache, for both sides. The dense side is 64 f32 in four vectors of 16. Least of
+//! several rounds, in ns a product. No thread.
+
+use super::chart::{Chart, Light};
+use super::lanes::{
+    Columns, Lane, Row, column_products, column_tristimulus, products, row, tristimulus,
+};
+use super::walk::{Extent, Start, walk};
+use crate::spectrum::{
+    Bounded, CmfTree, Control, Estimate, Interval, LEAVES, Leaves, List, Metric, Moment, Partition,
+    Path, Tree, control, represent,
+};
+use serde::Serialize;
+use std::hint::black_box;
+use std::time::Instant;
+use wide::{f32x8, f32x16};
+
+/// Rounds of which the fastest counts.
+const ROUNDS: usize = 15;
+
+/// One row: ns a product.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stage {
+    /// What is timed.
+    pub stage: &'static str,
+    /// Adaptive side, ns.
+    pub adaptive_ns: f64,
+    /// Dense side, ns; none where it has nothing to do.
+    pub dense_ns: Option<f64>,
+    /// Dense over adaptive: above 1 the adaptive side is faster.
+    pub ratio: Option<f64>,
+}
+
+/// The table as printed, for all 13 824 products, ms: name, reference, adaptive.
+pub const PRINTED_MS: [(&str, f64, f64); 4] = [
+    ("pre-processing", 0.0, 30.0),
+    ("product", 580.0, 590.0),
+    ("change to XYZ", 240.0, 30.0),
+    ("total", 820.0, 620.0),
+];
+
+/// The 576 secondary spectra, on both sides.
+struct Work<'a, I> {
+    start: Start<'a, I>,
+    chart: &'a Chart,
+    light: &'a Light,
+    /// Lists after control, and the two materials of each.
+    lists: Vec<(List<I>, [usize; 2])>,
+    dense: Vec<Leaves>,
+}
+
+impl<'a, I: Interval> Work<'a, I> {
+    fn new(chart: &'a Chart, light: &'a Light) -> Self {
+        let start = Start::<I>::new(chart, light);
+        let list = represent(
+            start.source(),
+            &chart.cmf,
+            &Metric::Xyz,
+            Control::PAPER.eps_max,
+        );
+        let (mut lists, mut dense) = (Vec::new(), Vec::new());
+        walk(
+            &start,
+            &list,
+            Extent::Part {
+                levels: 2,
+                stride: 1,
+            },
+            |list, path, exact| {
+                control(list, path, &chart.cmf, &Metric::Xyz, &Control::PAPER);
+                if path.reflections.len() == 2 {
+                    let count = chart.reflectances.len();
+                    lists.push((list.clone(), [lists.len() / count, lists.len() % count]));
+                    dense.push(*exact);
+                }
+            },
+        );
+        Self {
+            start,
+            chart,
+            light,
+            lists,
+            dense,
+        }
+    }
+
+    fn products(&self) -> f64 {
+        (self.lists.len() * self.chart.reflectances.len()) as f64
+    }
+
+    /// Least time of a pass over all products, ns a product.
+    fn time(&self, mut pass: impl FnMut()) -> f64 {
+        let mut least = f64::INFINITY;
+        for _ in 0..ROUNDS {
+            let begin = Instant::now();
+            pass();
+            least = least.min(begin.elapsed().as_secs_f64());
+        }
+        least * 1e9 / self.products()
+    }
+
+    /// Products alone, and products with XYZ, of spectra that are already vectors.
+    fn vectors<V: Lane, const N: usize>(&self, blocks: &[Block<V, N>]) -> [f64; 2] {
+        let mut out = vec![blocks[0].spectrum; self.chart.reflectances.len()];
+        let mut xyz = vec![[0.0; 3]; out.len()];
+        let alone = self.time(|| {
+            for block in blocks {
+                products(&block.spectrum, &block.materials, &mut out);
+                black_box(&mut out);
+            }
+        });
+        let both = self.time(|| {
+            for block in blocks {
+                products(&block.spectrum, &block.materials, &mut out);
+                tristimulus(black_box(&out), &block.weights, &mut xyz);
+                black_box(&mut xyz);
+            }
+        });
+        [alone, both].map(|ns| ns * self.lists.len() as f64 / blocks.len() as f64)
+    }
+
+    /// The same with the 24 products of a block side by side.
+    fn columns(&self, blocks: &[Side]) -> [f64; 2] {
+        let mut out = vec![[f32x8::ZERO; SIDE]; LEAVES];
+        let alone = self.time(|| {
+            for block in blocks {
+                column_products(
+                    &block.spectrum,
+                    &block.materials,
+                    &mut out[..block.spectrum.len()],
+                );
+                black_box(&mut out);
+            }
+        });
+        let both = self.time(|| {
+            for block in blocks {
+                let out = &mut out[..block.spectrum.len()];
+                column_products(&block.spectrum, &block.materials, out);
+                black_box(column_tristimulus(black_box(out), &block.weights));
+            }
+        });
+        [alone, both]
+    }
+
+    /// All lists as columns.
+    fn sides(&self) -> Vec<Side> {
+        let cmf = &self.chart.cmf;
+        let side = |(list, _): &(List<I>, _)| {
+            let nodes: Vec<usize> = list
+                .partition()
+                .iter()
+                .map(|(first, len)| crate::spectrum::node(first, len))
+                .collect();
+            let values: Vec<f64> = list.intervals().iter().map(|i| i.value()).collect();
+            let materials = nodes
+                .iter()
+                .map(|&n| {
+                    self.start
+                        .materials()
+                        .iter()
+                        .map(|r| r.node(n).value())
+                        .collect()
+                })
+                .collect();
+            Side::new(
+                &values,
+                materials,
+                nodes.iter().map(|&n| *cmf.node(n)).collect(),
+            )
+        };
+        self.lists.iter().map(side).collect()
+    }
+
+    fn dense_sides(&self) -> Vec<Side> {
+        let cmf = self.chart.cmf.leaves();
+        let side = |s: &Leaves| {
+            let materials = (0..LEAVES)
+                .map(|k| self.chart.reflectances.iter().map(|r| r[k]).collect())
+                .collect();
+            Side::new(
+                s,
+                materials,
+                (0..LEAVES)
+                    .map(|k| [cmf[0][k], cmf[1][k], cmf[2][k]])
+                    .collect(),
+            )
+        };
+        self.dense.iter().map(side).collect()
+    }
+
+    /// The lists of at most `most` and more than `least` intervals, as vectors of their values.
+    fn blocks<V: Lane, const N: usize>(&self, least: usize, most: usize) -> Vec<Block<V, N>> {
+        let fits = self
+            .lists
+            .iter()
+            .filter(|(list, _)| (least + 1..=most).contains(&list.partition().count()));
+        fits.map(|(list, _)| {
+            let values: Vec<f32> = list.intervals().iter().map(|i| i.value() as f32).collect();
+            let cut = list.partition();
+            Block {
+                spectrum: row(&values),
+                materials: self
+                    .start
+                    .materials()
+                    .iter()
+                    .map(|r| on_cut(r, cut))
+                    .collect(),
+                weights: std::array::from_fn(|a| weights_on(cut, &self.chart.cmf, a)),
+            }
+        })
+        .collect()
+    }
+
+    fn dense_blocks(&self) -> Vec<Block<f32x16, 4>> {
+        let narrow = |leaves: &Leaves| row(&leaves.map(|v| v as f32));
+        let materials: Vec<_> = self.chart.reflectances.iter().map(narrow).collect();
+        let weights = self.chart.cmf.leaves().each_ref().map(narrow);
+        self.dense
+            .iter()
+            .map(|s| Block {
+                spectrum: narrow(s),
+                materials: materials.clone(),
+                weights,
+            })
+            .collect()
+    }
+
+    /// Products of whole lists, with errors, from the trees; then `finish` on each.
+    fn lists(&self, mut finish: impl FnMut(&mut List<I>, &Path<'_, I>)) -> f64 {
+        let (cmf, materials) = (&self.chart.cmf, self.start.materials());
+        let mut out = List::black();
+        self.time(|| {
+            for (list, [i, j]) in &self.lists {
+                for material in materials {
+                    list.reflect(material, cmf, &mut out);
+                    finish(
+                        &mut out,
+                        &Path {
+                            source: self.start.source(),
+                            reflections: &[&materials[*i], &materials[*j], material],
+                        },
+                    );
+                    black_box(&mut out);
+                }
+            }
+        })
+    }
+}
+
+/// Vectors that hold the 24 materials side by side.
+const SIDE: usize = 3;
+
+/// A spectrum and all that it meets, on its cut, with the materials side by side.
+struct Side {
+    spectrum: Vec<f32x8>,
+    materials: Columns<f32x8, SIDE>,
+    weights: Vec<[f32x8; 3]>,
+}
+
+impl Side {
+    fn new(values: &[f64], materials: Vec<Vec<f64>>, weights: Vec<[f64; 3]>) -> Self {
+        let splat = |v: f64| f32x8::splat(v as f32);
+        let lanes =
+            |all: &Vec<f64>| row::<f32x8, SIDE>(&all.iter().map(|v| *v as f32).collect::<Vec<_>>());
+        Self {
+            spectrum: values.iter().copied().map(splat).collect(),
+            materials: materials.iter().map(lanes).collect(),
+            weights: weights.into_iter().map(|w| w.map(splat)).collect(),
+        }
+    }
+}
+
+/// A spectrum and all that it meets, on its cut.
+struct Block<V, const N: usize> {
+    spectrum: Row<V, N>,
+    materials: Vec<Row<V, N>>,
+    weights: [Row<V, N>; 3],
+}
+
+fn on_cut<I: Interval, V: Lane, const N: usize>(tree: &Tree<I>, cut: Partition) -> Row<V, N> {
+    let list = List::new(tree, cut);
+    row(&list
+        .intervals()
+        .iter()
+        .map(|i| i.value() as f32)
+        .collect::<Vec<_>>())
+}
+
+fn weights_on<V: Lane, const N: usize>(cut: Partition, cmf: &CmfTree, a: usize) -> Row<V, N> {
+    row(&cut
+        .iter()
+        .map(|(first, len)| cmf.node(crate::spectrum::node(first, len))[a] as f32)
+        .collect::<Vec<_>>())
+}
+
+/// Times everything.
+pub fn measure(chart: &Chart) -> Vec<Stage> {
+    let light = chart.light("D65");
+    let paper = Work::<Estimate>::new(chart, &light);
+    let stage = |stage, adaptive_ns: f64, dense: Option<f64>| Stage {
+        stage,
+        adaptive_ns,
+        dense_ns: dense,
+        ratio: dense.map(|d| d / adaptive_ns),
+    };
+
+    let preparation = paper.time(|| {
+        black_box(Start::<Estimate>::new(black_box(chart), &light));
+        black_box(CmfTree::new(*black_box(chart.cmf.leaves())));
+    });
+
+    // Lists of up to 8 intervals run in 8 lanes, longer ones in 16; the mean is over all lists.
+    let (short, long) = (
+        paper.blocks::<f32x8, 1>(0, 8),
+        paper.blocks::<f32x16, 1>(8, 16),
+    );
+    let share = |blocks: usize| blocks as f64 / (short.len() + long.len()) as f64;
+    let (a, b) = (
+        paper.vectors(&short),
+        if long.is_empty() {
+            [0.0; 2]
+        } else {
+            paper.vectors(&long)
+        },
+    );
+    let mixed = |k: usize| a[k] * share(short.len()) + b[k] * share(long.len());
+    let dense = paper.vectors(&paper.dense_blocks());
+    let (adaptive_columns, dense_columns) = (
+        paper.columns(&paper.sides()),
+        paper.columns(&paper.dense_sides()),
+    );
+
+    let with_errors = paper.lists(|_, _| ());
+    let controlled = paper.lists(|list, path| {
+        control(list, path, &chart.cmf, &Metric::Xyz, &Control::PAPER);
+    });
+    let whole = paper.lists(|list, path| {
+        control(list, path, &chart.cmf, &Metric::Xyz, &Control::PAPER);
+        black_box(list.xyz(&chart.cmf));
+    });
+    let estimated = perceptual::<Moment>(chart, &light);
+    let bounded = perceptual::<Bounded>(chart, &light);
+    vec![
+        stage("pre-processing", preparation, None),
+        stage("product on a given partition", mixed(0), Some(dense[0])),
+        stage(
+            "change to XYZ",
+            mixed(1) - mixed(0),
+            Some(dense[1] - dense[0]),
+        ),
+        stage(
+            "product and XYZ on a given partition",
+            mixed(1),
+            Some(dense[1]),
+        ),
+        stage(
+            "product, 24 side by side",
+            adaptive_columns[0],
+            Some(dense_columns[0]),
+        ),
+        stage(
+            "change to XYZ, 24 side by side",
+            adaptive_columns[1] - adaptive_columns[0],
+            Some(dense_columns[1] - dense_columns[0]),
+        ),
+        stage(
+            "product with errors, from the trees",
+            with_errors,
+            Some(dense[0]),
+        ),
+        stage("control overhead (paper)", controlled - with_errors, None),
+        stage(
+            "change to XYZ of a list",
+            whole - controlled,
+            Some(dense[1] - dense[0]),
+        ),
+        stage("total with control (paper)", whole, Some(dense[1])),
+        stage("total with control (perceptual)", estimated, Some(dense[1])),
+        stage(
+            "total with control (perceptual bound)",
+            bounded,
+            Some(dense[1]),
+        ),
+    ]
+}
+
+/// Product, perceptual control within dE*uv 1 and corrected XYZ.
+fn perceptual<I: Interval>(chart: &Chart, light: &Light) -> f64 {
+    let work = Work::<I>::new(chart, light);
+    work.lists(|list, path| {
+        let colour = list.corrected_xyz(&chart.cmf);
+        let metric = Metric::Luv(crate::color::luv_jacobian(colour, work.light.white));
+        control(list, path, &chart.cmf, &metric, &Control::within(1.0));
+        black_box(list.corrected_xyz(&chart.cmf));
+    })
+}
