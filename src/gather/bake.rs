@@ -20,6 +20,8 @@ const BENT: f64 = 2.0;
 const PASSES: usize = 4;
 /// Vertices are drawn this far into the triangle they belong to: a point on an edge lies on the neighbouring wall too.
 const INSET: f64 = 2e-3;
+/// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
+const PROBE_INSET: f64 = 1e-5;
 /// Vertices at the most; a pass that would exceed this is not begun.
 const MOST_VERTICES: usize = 6_000_000;
 
@@ -330,7 +332,16 @@ impl Bake {
             }
             let w = crate::solve::weights_of(point, a, b, c);
             if w.iter().all(|&x| x >= -1e-9) {
-                let leaf = tree.leaf_at(entry as u32, w.map(|x| x.max(0.0)));
+                let w = w.map(|x| x.max(0.0));
+                // On an edge the point would lie in the neighbouring wall too, and see past it.
+                let edge = w.iter().any(|&x| x < PROBE_INSET);
+                let (w, point) = if edge {
+                    let w = w.map(|x| x * (1.0 - 3.0 * PROBE_INSET) + PROBE_INSET);
+                    (w, a * w[0] + b * w[1] + c * w[2])
+                } else {
+                    (w, point)
+                };
+                let leaf = tree.leaf_at(entry as u32, w);
                 return Receiver { point, normal, plane: tree.face_plane[entry], leaf: Some(leaf), seed };
             }
         }
