@@ -4,5 +4,7 @@
 //! no form factors, no balance.
 
 mod path;
+mod report;
 
-pub use path::{Answer, Audit};
+pub use path::{Answer, Audit, BATCHES};
+pub use report::{HONEST, Honesty, Measured, Report, Seen, Spread};

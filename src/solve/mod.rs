@@ -12,6 +12,7 @@ pub mod light;
 mod operator;
 mod punctual;
 pub mod record;
+pub mod reference;
 mod rows;
 mod sources;
 
