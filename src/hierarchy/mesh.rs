@@ -6,7 +6,7 @@
 use crate::geometry::plane_ids;
 use crate::scene::{Scene, Sides};
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// One side of a triangle: what emits, reflects and receives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +70,8 @@ impl Mesh {
             first_triangle: vec![0],
         };
         let mut welded: HashMap<[u64; 3], u32> = HashMap::new();
+        // Sides that are there: corners in their order, the least first.
+        let mut known: HashSet<[u32; 3]> = HashSet::new();
         for (s, surface) in scene.surfaces.iter().enumerate() {
             let ids: Vec<u32> = surface
                 .positions
@@ -95,10 +97,14 @@ impl Mesh {
                 mesh.material.push(surface.material as u32);
                 mesh.normal.push(cross.normalize_or_zero());
                 mesh.area.push(0.5 * cross.length());
-                // A triangle without area blocks nothing and receives nothing; it stays in the output only.
+                // A triangle without area blocks nothing and receives nothing; it stays in the output only. So does one that
+                // is there already: light would meet the place twice.
                 if cross.length_squared() > 0.0 {
-                    mesh.faces.push(Face { triangle, back: false });
-                    if both {
+                    if known.insert(turned_to_least(corners)) {
+                        mesh.faces.push(Face { triangle, back: false });
+                    }
+                    let [a, b, c] = corners;
+                    if both && known.insert(turned_to_least([a, c, b])) {
                         mesh.faces.push(Face { triangle, back: true });
                     }
                 }
@@ -120,4 +126,12 @@ impl Mesh {
         let n = self.normal[face.triangle as usize];
         if face.back { -n } else { n }
     }
+}
+
+/// The same corners in the same sense, the least first: equal for equal sides.
+fn turned_to_least(mut corners: [u32; 3]) -> [u32; 3] {
+    while corners[0] > corners[1] || corners[0] > corners[2] {
+        corners.rotate_left(1);
+    }
+    corners
 }
