@@ -3,6 +3,7 @@
 pub mod bounds;
 mod chart;
 pub mod compare;
+pub mod cuts;
 mod lanes;
 pub mod modes;
 pub mod table1;
