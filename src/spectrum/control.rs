@@ -266,3 +266,89 @@ fn best_pair<I: Interval>(
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::{luv_jacobian, tristimulus};
+    use crate::spectrum::bound::tests::holds;
+    use crate::spectrum::partition::tests::any_cut;
+    use crate::spectrum::testing::{cmf, patch};
+    use crate::spectrum::{Bounded, Estimate, Leaves, Moment, Partition, Tree};
+    use proptest::prelude::*;
+
+    /// Limits of every kind: usual, crossed, out of reach, without end.
+    fn limits() -> impl Strategy<Value = [f64; 2]> {
+        let any = prop_oneof![Just(0.0), Just(-1.0), Just(f64::INFINITY), 1e-6..10.0f64];
+        prop::array::uniform2(any)
+    }
+
+    fn run<I: Interval>(
+        spectra: &[Leaves],
+        cut: Partition,
+        limits: [f64; 2],
+        rule: Control,
+    ) -> (List<I>, f64, Leaves) {
+        let cmf = cmf();
+        let trees: Vec<Tree<I>> = spectra.iter().map(|s| Tree::new(s, &cmf)).collect();
+        let materials: Vec<&Tree<I>> = trees[1..].iter().collect();
+        let (mut list, mut out) = (List::new(&trees[0], cut), List::black());
+        for material in &materials {
+            list.reflect(material, &cmf, &mut out);
+            std::mem::swap(&mut list, &mut out);
+        }
+        let path = Path {
+            source: &trees[0],
+            reflections: &materials,
+        };
+        let white = tristimulus(&spectra[0], cmf.leaves());
+        let metric = if rule.pairs == Pairs::Any && white[1] > 0.0 {
+            Metric::Luv(luv_jacobian(list.xyz(&cmf), white))
+        } else {
+            Metric::Xyz
+        };
+        let settings = Control {
+            eps_min: limits[0],
+            eps_max: limits[1],
+            ..rule
+        };
+        control(&mut list, &path, &cmf, &metric, &settings);
+        let size = metric.size(list.error(), list.radius());
+        (list, size, path.leaves())
+    }
+
+    proptest! {
+        #[test]
+        fn control_ends_within_its_limit(
+            spectra in prop::collection::vec(patch(), 1..5),
+            cut in any_cut(),
+            limits in limits(),
+        ) {
+            let within = Control::within(1.0);
+            let (list, size, _) = run::<Moment>(&spectra, cut, limits, within);
+            prop_assert_eq!(list.validate(), Ok(()));
+            // Leaves have no error: only rounding can keep the sum above a limit of 0.
+            prop_assert!(size <= limits[1].max(1e-9), "{size}");
+            let (list, size, exact) = run::<Bounded>(&spectra, cut, limits, within);
+            prop_assert_eq!(holds(&list, &exact, &cmf()), Ok(()));
+            prop_assert!(size <= limits[1].max(1e-9), "{size}");
+            // The paper's loop, whatever it is asked for, ends too.
+            let (list, _, _) = run::<Estimate>(&spectra, cut, limits, Control::PAPER);
+            prop_assert_eq!(list.validate(), Ok(()));
+        }
+
+        #[test]
+        fn the_ranking_of_pairs_is_the_outcome_of_their_merge(s in patch(), cut in any_cut()) {
+            let cmf = cmf();
+            let list = List::new(&Tree::<Moment>::new(&s, &cmf), cut);
+            for rule in [Representative::Mean, Representative::Projection] {
+                let settings = Control { representative: rule, ..Control::within(1.0) };
+                if let Some((first, after)) = best_pair(&list, list.error(), &cmf, &Metric::Xyz, &settings) {
+                    let mut merged = list.clone();
+                    prop_assert!(merged.merge(first, &cmf, rule));
+                    prop_assert!((0..3).all(|a| (merged.error()[a] - after[a]).abs() < 1e-12));
+                }
+            }
+        }
+    }
+}
