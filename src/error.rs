@@ -16,7 +16,11 @@ pub struct Problem {
 impl Problem {
     /// A problem at a place, with the way out.
     pub fn new(place: impl Into<String>, what: impl Into<String>, next: impl Into<String>) -> Self {
-        Self { place: place.into(), what: what.into(), next: next.into() }
+        Self {
+            place: place.into(),
+            what: what.into(),
+            next: next.into(),
+        }
     }
 }
 
@@ -47,13 +51,20 @@ pub enum Error {
 
 impl Error {
     /// One input problem.
-    pub fn input(place: impl Into<String>, what: impl Into<String>, next: impl Into<String>) -> Self {
+    pub fn input(
+        place: impl Into<String>,
+        what: impl Into<String>,
+        next: impl Into<String>,
+    ) -> Self {
         Self::Input(vec![Problem::new(place, what, next)])
     }
 
     /// A failed read or write of `path`.
     pub fn io(path: &std::path::Path, source: std::io::Error) -> Self {
-        Self::Io { path: path.display().to_string(), source }
+        Self::Io {
+            path: path.display().to_string(),
+            source,
+        }
     }
 
     /// The exit code of the command for this error.
