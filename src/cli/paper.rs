@@ -1,11 +1,11 @@
 //! `haarlight paper`: the tables of Rougeron and Péroche 1997, measured beside printed, and what lies beyond them.
 //!
-//! Results go to stdout. `--json` gives one object with `table1` (by light), `table2`, `control`, `bounds`, `methods`, `cuts`;
+//! Results go to stdout. `--json` gives one object with `table1` (by light), `table2`, `control`, `bounds`, `methods`, `cuts`, `covariances`;
 //! field by field it is documented on the row types of [`crate::spectrum::study`]. Shares are in percent.
 
 use crate::spectrum::study::table1::{Column, PRINTED, ROWS, mean_differences};
 use crate::spectrum::study::{
-    Chart, LEVELS, Light, Reflectances, bounds, compare, cuts, modes, table2,
+    Chart, LEVELS, Light, Reflectances, bounds, compare, covariance, cuts, modes, table2,
 };
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -30,6 +30,7 @@ struct Results {
     methods: Vec<compare::Row>,
     table2: Vec<table2::Stage>,
     cuts: Vec<cuts::Row>,
+    covariances: Vec<covariance::Row>,
 }
 
 /// Runs the tests and prints them.
@@ -85,6 +86,10 @@ fn measure(source: Reflectances) -> Results {
             .iter()
             .flat_map(|light| cuts::measure(&chart, light))
             .collect(),
+        covariances: lights
+            .iter()
+            .flat_map(|light| covariance::measure(&chart, light))
+            .collect(),
     }
 }
 
@@ -97,6 +102,7 @@ fn to_json(results: &Results) -> Value {
         "bounds": results.bounds,
         "methods": results.methods,
         "cuts": results.cuts,
+        "covariances": results.covariances,
     })
 }
 
@@ -109,6 +115,7 @@ fn to_text(results: &Results) -> String {
     let _ = bound(&mut text, &results.bounds);
     let _ = methods(&mut text, &results.methods);
     let _ = greedy(&mut text, &results.cuts);
+    let _ = covariances(&mut text, &results.covariances);
     text
 }
 
@@ -333,6 +340,31 @@ fn greedy(text: &mut String, rows: &[cuts::Row]) -> std::fmt::Result {
             text,
             "{:7}{:>10}{:>10.3}{:>10.3}{:>10.3}",
             r.light, r.intervals, r.split, r.merge, r.best
+        )?;
+    }
+    Ok(())
+}
+
+fn covariances(text: &mut String, rows: &[covariance::Row]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "\nRatio lists, error added back: means alone, and with the covariances of all pairs of reflectances (dE*uv)\n"
+    )?;
+    writeln!(
+        text,
+        "{:7}{:10}{:>10}{:>22}{:>22}",
+        "light", "level", "intervals", "means", "covariances"
+    )?;
+    let spread = |s: &modes::Spread| format!("{:.3} / {:.3} / {:.3}", s.mean, s.p95, s.max);
+    for r in rows {
+        writeln!(
+            text,
+            "{:7}{:10}{:>10.2}{:>22}{:>22}",
+            r.light,
+            r.level,
+            r.intervals_mean,
+            spread(&r.means),
+            spread(&r.covariances)
         )?;
     }
     Ok(())

@@ -48,7 +48,13 @@
 //! | perceptual control of the bound, error added back | .09 | .15 | .14 |
 //! | the same on the ratio to the light | .00 | .07 | .10 |
 //!
+//! The guarantee (no true error above eps_max, all products) needs 6.0 / 5.1 / 3.3 intervals on the ratio to the light, where
+//! the paper's control needs 8.8 / 7.1 / 5.0 and breaks eps_max in 33 / 14 / 7 % of the cases. The bound is 1.5 to 3.2 times
+//! the true error of the estimator in the median, 3 to 12 times at the 95th percentile.
+//!
 //! Greedy cuts are within 20 % of the best that a search finds: it is not the choice of intervals that is left to gain from.
+//! Covariances of all pairs of reflectances make secondary reflections exact and the mean error of tertiary ones 3 to 4
+//! times less, but their greatest error twice as large; they are not used.
 //!
 //! # Example
 //!

@@ -3,6 +3,7 @@
 pub mod bounds;
 mod chart;
 pub mod compare;
+pub mod covariance;
 pub mod cuts;
 mod lanes;
 pub mod modes;

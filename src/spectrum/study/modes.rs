@@ -116,7 +116,7 @@ pub fn measure(chart: &Chart, light: &Light, name: &str) -> Vec<Row> {
 }
 
 /// The same work with the light in the weights: lists hold the ratio to the light, which begins as 1 everywhere.
-fn ratio(chart: &Chart, light: &Light) -> (Chart, Light) {
+pub(super) fn ratio(chart: &Chart, light: &Light) -> (Chart, Light) {
     let under = Chart {
         cmf: chart.cmf.under(&light.power),
         reflectances: chart.reflectances.clone(),
