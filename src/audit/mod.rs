@@ -3,6 +3,8 @@
 //! It shares the scene, the welded triangles and the ray index with the solver, and nothing else: no links, no lanes,
 //! no form factors, no balance.
 
+mod compare;
 mod path;
 
+pub use compare::{Comparison, Mean, Spread, compare};
 pub use path::{Answer, Audit};

@@ -34,6 +34,8 @@ pub struct Baked {
     pub covered: usize,
     /// Triangles that wanted quartering when the limits were met.
     pub capped: usize,
+    /// Visibility rays cast.
+    pub rays: u64,
 }
 
 /// What a vertex is known to get; none if it is covered.
@@ -50,7 +52,7 @@ impl Bake {
         refined.level();
         let mut known: Vec<Vec<Known>> = Vec::new();
         let mut out = Baked::default();
-        self.complete(&refined, &mut known, progress);
+        out.rays += self.complete(&refined, &mut known, progress);
         for _ in 0..PASSES {
             if refined.sheets.iter().map(|s| s.vertices.len()).sum::<usize>() > MOST_VERTICES {
                 out.capped += 1;
@@ -69,7 +71,7 @@ impl Bake {
                     [0, 1, 2].map(|k| refined.look(id, c[k], c[(k + 1) % 3]))
                 })
                 .collect();
-            self.complete(&refined, &mut known, progress);
+            out.rays += self.complete(&refined, &mut known, progress);
             let mut any = false;
             for (&id, looks) in suspects.iter().zip(&looks) {
                 if self.bent(&known[id.0 as usize], refined.corners(id).map(|c| c.vertex), looks) {
@@ -78,18 +80,18 @@ impl Bake {
                 }
             }
             refined.level();
-            self.complete(&refined, &mut known, progress);
+            out.rays += self.complete(&refined, &mut known, progress);
             if !any {
                 break;
             }
         }
         let triangles: Vec<Vec<[u32; 3]>> = (0..refined.sheets.len() as u32).map(|s| refined.triangles(s)).collect();
-        self.complete(&refined, &mut known, progress);
+        out.rays += self.complete(&refined, &mut known, progress);
         self.write_down(&refined, triangles, known, out)
     }
 
-    /// Gathers at all vertices that are not known yet.
-    fn complete(&self, refined: &Refined, known: &mut Vec<Vec<Known>>, progress: &dyn Fn(usize, usize)) {
+    /// Gathers at all vertices that are not known yet; returns the rays cast.
+    fn complete(&self, refined: &Refined, known: &mut Vec<Vec<Known>>, progress: &dyn Fn(usize, usize)) -> u64 {
         known.resize(refined.sheets.len(), Vec::new());
         let mut wanted = Vec::new();
         for (s, sheet) in refined.sheets.iter().enumerate() {
@@ -99,17 +101,20 @@ impl Bake {
         }
         // In parts, so that progress shows.
         const PART: usize = 16_384;
+        let mut rays = 0;
         for (part, chunk) in wanted.chunks(PART).enumerate() {
             progress(part * PART, wanted.len());
             let receivers: Vec<Receiver> =
                 chunk.iter().map(|&(s, v)| self.receiver(&refined.sheets[s].vertices[v], refined.sheets[s].surface, refined.sheets[s].back)).collect();
             let covered = self.covered(&receivers);
             for ((gathered, &(s, v)), covered) in self.gather(&receivers).into_iter().zip(chunk).zip(covered) {
+                rays += gathered.rays;
                 let dark = gathered.seen < 1e-3 && gathered.direct.iter().all(|&x| x == 0.0);
                 known[s][v] = Some(if dark && covered { None } else { Some(Box::new(gathered.irradiance)) });
             }
         }
         progress(wanted.len(), wanted.len());
+        rays
     }
 
     /// The place of a vertex, drawn into its triangle, with its shading normal.
@@ -229,7 +234,9 @@ impl Bake {
 }
 
 /// How a material turns irradiance into what is seen.
-struct Look {
+pub(super) struct Look {
+    /// Reflectance on the leaves.
+    pub(super) reflectance: Leaves,
     /// Tristimulus radiosity for a unit of each lane's irradiance.
     reflected: Vec<[f64; 3]>,
     /// Mean colour of the texture, which the display multiplies again.
@@ -238,7 +245,7 @@ struct Look {
 }
 
 impl Look {
-    fn new(bake: &Bake, material: &Material, upsampler: &Upsampler) -> Self {
+    pub(super) fn new(bake: &Bake, material: &Material, upsampler: &Upsampler) -> Self {
         let mean = material.paint.as_ref().map(|texture| {
             let image = &bake.scene().images[texture.image];
             let n = image.pixels.len().max(1) as f64;
@@ -252,7 +259,7 @@ impl Look {
             }
             None => material.reflectance,
         };
-        Self { reflected: bake.lanes().reflected(&reflectance), unpainted: mean, emits: material.emission.is_some() }
+        Self { reflected: bake.lanes().reflected(&reflectance), reflectance, unpainted: mean, emits: material.emission.is_some() }
     }
 }
 

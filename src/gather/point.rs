@@ -48,6 +48,8 @@ pub struct Gathered {
     pub direct: [f32; 64],
     /// Sum of visible factors: 1 in a closed room.
     pub seen: f64,
+    /// Visibility rays cast for this point.
+    pub rays: u64,
 }
 
 /// Reused memory of one thread and its ray count.
@@ -81,7 +83,7 @@ pub struct Gatherer<'a> {
 impl Gatherer<'_> {
     /// Gathers what comes straight from lamps.
     pub fn direct(&self, to: &Receiver, memory: &mut Memory) -> [f32; 64] {
-        let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0 };
+        let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0, rays: 0 };
         let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
         memory.stack.clear();
         let mut above = to.leaf;
@@ -101,7 +103,8 @@ impl Gatherer<'_> {
 
     /// Gathers at a point.
     pub fn at(&self, to: &Receiver, memory: &mut Memory) -> Gathered {
-        let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0 };
+        let before = memory.rays;
+        let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0, rays: 0 };
         memory.stack.clear();
         match to.leaf {
             Some(leaf) => {
@@ -129,6 +132,7 @@ impl Gatherer<'_> {
             *x += d;
         }
         self.punctual(to, memory, &mut out);
+        out.rays = memory.rays - before;
         out
     }
 

@@ -113,6 +113,7 @@ pub struct Bake {
     direct: direct::Direct,
     probes: estimate::Probes,
     rounds: Vec<Round>,
+    watch: Option<record::Watch>,
     started: Instant,
 }
 
@@ -144,6 +145,7 @@ impl Bake {
             direct: direct::Direct::default(),
             graph: Graph::default(),
             rounds: Vec::new(),
+            watch: None,
             spectrum_error: 0.0,
             scene,
             settings,
@@ -162,7 +164,7 @@ impl Bake {
 
     /// One round: a finer hierarchy, its links, a solution, and what is known of its error.
     pub fn step(&mut self) -> &Round {
-        let mut clock = record::Clock::start();
+        let mut clock = record::Clock::start(self.watch.clone());
         let round = self.rounds.len();
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
@@ -240,6 +242,11 @@ impl Bake {
             return Some(Verdict::Reached);
         }
         (self.rounds.len() >= self.settings.rounds).then_some(Verdict::OutOfRounds)
+    }
+
+    /// Tells `watch` of every phase of a round that ends, by the name that it has in [`Round::phases_s`].
+    pub fn watch(&mut self, watch: record::Watch) {
+        self.watch = Some(watch);
     }
 
     /// Rounds until the end.

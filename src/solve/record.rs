@@ -11,19 +11,23 @@ use std::time::Instant;
 /// Version of the log's format. Raised when a field changes its meaning or goes.
 pub const LOG_VERSION: u32 = 1;
 
+/// Is told of every phase that ends.
+pub type Watch = std::sync::Arc<dyn Fn(&'static str) + Send + Sync>;
+
 /// Wall time of the phases of a round, seconds.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Clock {
     start: Instant,
     last: Instant,
     laps: Vec<(&'static str, f64)>,
+    watch: Option<Watch>,
 }
 
 impl Clock {
     /// Starts.
-    pub fn start() -> Self {
+    pub fn start(watch: Option<Watch>) -> Self {
         let now = Instant::now();
-        Self { start: now, last: now, laps: Vec::new() }
+        Self { start: now, last: now, laps: Vec::new(), watch }
     }
 
     /// Ends a phase.
@@ -31,6 +35,9 @@ impl Clock {
         let now = Instant::now();
         self.laps.push((name, (now - self.last).as_secs_f64()));
         self.last = now;
+        if let Some(watch) = &self.watch {
+            watch(name);
+        }
     }
 
     /// Phases in order.
