@@ -1,7 +1,7 @@
 //! Exposure: which radiosity shows as white, metered from the room.
 //!
 //! display = scale * radiosity, both linear, radiosity in lm/m2, display white = 1.
-//! The rule: of what does not shine itself, 99 % of what the cameras see and 97 % of the area that light reaches are shown
+//! The rule: of what does not shine itself, 99 % of what each camera sees and 97 % of the area that light reaches are shown
 //! unclipped, in each of the three channels. What is left over is spots beside lamps and tops of cupboards below them.
 //! Colours are scaled and never bent, so a coloured light (whose strongest channel is well above its luminance) gets a
 //! darker picture than a white one of equal luminance.
@@ -13,10 +13,10 @@ use super::camera::{self, View};
 use super::raster::{self, Hit, Refined};
 use super::refined;
 use crate::gather::{BakedSurface, BakedVertex};
-use crate::scene::{Scene, Surface};
+use crate::scene::{Camera, Scene, Surface};
 use glam::DVec3;
 
-/// Share of what the cameras see, lamps left out, that is shown unclipped. Higher: darker pictures, fewer clipped spots.
+/// Share of what each camera sees, lamps left out, that is shown unclipped. Higher: darker pictures, fewer clipped spots.
 const SEEN: f64 = 0.99;
 
 /// The same for the lit area, seen or not: the baked room is walked through. Lower than [`SEEN`], for the brightest
@@ -56,11 +56,13 @@ impl Exposure {
     /// Lamps are left out unless nothing else is lit. A black room gets a scale of 1.
     pub fn auto(scene: &Scene, surfaces: &[BakedSurface]) -> Self {
         let meshes = Refined { scene, surfaces };
+        let cameras = camera::cameras(scene);
         let level = |lamps| {
-            let seen = percentile(seen(&meshes, lamps), SEEN);
-            let area = percentile(areas(&meshes, lamps), AREA);
-            // Cameras that see nothing lit have no say.
-            area.map(|area| seen.map_or(area, |seen| seen.max(area)))
+            let seen = cameras
+                .iter()
+                .filter_map(|camera| percentile(seen(&meshes, camera, lamps), SEEN));
+            seen.chain(percentile(areas(&meshes, lamps), AREA))
+                .reduce(f64::max)
         };
         Self::new(
             level(false)
@@ -98,8 +100,8 @@ fn strongest(surface: &Surface, vertex_paint: bool, vertex: &BakedVertex) -> f64
     channels.map(|(l, p)| f64::from(l * p)).fold(0.0, f64::max)
 }
 
-/// One reading for each pixel of small pictures from all cameras.
-fn seen(meshes: &Refined, lamps: bool) -> Vec<(f64, f64)> {
+/// One reading for each pixel of a small picture.
+fn seen(meshes: &Refined, camera: &Camera, lamps: bool) -> Vec<(f64, f64)> {
     let [width, height] = TRIAL;
     let read = |hit: &Hit| {
         let (surface, corners) = meshes.at(hit);
@@ -108,15 +110,11 @@ fn seen(meshes: &Refined, lamps: bool) -> Vec<(f64, f64)> {
             |k: usize| hit.weights[k] * strongest(surface, material.vertex_paint, corners[k]);
         (material.emission.is_some() == lamps).then(|| (level(0) + level(1) + level(2), 1.0))
     };
-    let mut readings = Vec::new();
-    for camera in camera::cameras(meshes.scene) {
-        let view = View::new(meshes.scene, &camera, width, height);
-        let pixels = raster::draw(meshes, &view, TRIAL, 1, |row| {
-            row.iter().map(|hit| hit.as_ref().and_then(read)).collect()
-        });
-        readings.extend(pixels.into_iter().flatten());
-    }
-    readings
+    let view = View::new(meshes.scene, camera, width, height);
+    let pixels = raster::draw(meshes, &view, TRIAL, 1, |row| {
+        row.iter().map(|hit| hit.as_ref().and_then(read)).collect()
+    });
+    pixels.into_iter().flatten().collect()
 }
 
 /// One reading for each triangle, with its area in squared file units.
