@@ -17,8 +17,12 @@ const RAYS: [usize; 2] = [4, 32];
 const CLUSTER_POINTS: usize = 8;
 /// Faces of a cluster that are treated as polygons.
 const POLYGONS: u32 = 4;
+/// How many rays a link's visibility counts for.
+const PRIOR: f64 = 4.0;
 /// How often a lamp's triangle is quartered where its shadow boundary crosses it.
 const LAMP_DEPTH: u32 = 6;
+/// A lamp gets more than plain rays if it carries this many tolerances.
+const SHAFT_WORTH: f64 = 4.0;
 
 /// Where light is received.
 #[derive(Debug, Clone, Copy)]
@@ -74,8 +78,6 @@ pub struct Gatherer<'a> {
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
     pub closed: bool,
-    /// Take visibility from the links instead of looking again?
-    pub stored: bool,
 }
 
 impl Gatherer<'_> {
@@ -166,7 +168,7 @@ impl Gatherer<'_> {
             memory.stack.extend(node.child_range().map(|c| (c, way, v)));
             return;
         }
-        let visible = if clear { 1.0 } else if self.stored { f64::from(v) } else { self.visible(to, id, way, factor, factor * (reflected + emitted), emitted > 0.0, memory) };
+        let visible = if clear { 1.0 } else { self.visible(to, id, way, v, factor, factor * (reflected + emitted), emitted > 0.0, memory) };
         self.add(id, factor, visible, out);
     }
 
@@ -242,7 +244,7 @@ impl Gatherer<'_> {
 
     /// Visible share of a polygon patch. `carries` is what it would bring unblocked, share of white.
     #[expect(clippy::too_many_arguments, reason = "one caller")]
-    fn visible(&self, to: &Receiver, id: u32, way: Way, factor: f64, carries: f64, lamp: bool, memory: &mut Memory) -> f64 {
+    fn visible(&self, to: &Receiver, id: u32, way: Way, known: f32, factor: f64, carries: f64, lamp: bool, memory: &mut Memory) -> f64 {
         let node = self.tree.node(id);
         let Some(element) = self.tree.element(node) else { return 1.0 };
         let plane = self.tree.face_plane[element.face as usize];
@@ -252,7 +254,19 @@ impl Gatherer<'_> {
                 return (seen / factor).min(1.0);
             }
         }
-        if lamp {
+        // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
+        if lamp && carries > SHAFT_WORTH * self.tolerance {
+            match self.sight.view_from(to.point, to.normal, &element.corners, [to.plane, plane]) {
+                View::Clear => return 1.0,
+                View::Listed(list) => {
+                    if let Some(seen) = self.sight.visible_factor(to.point, to.normal, &element.corners, [to.plane, plane], &list) {
+                        return (seen / factor).min(1.0);
+                    }
+                }
+                View::Crowded => {}
+            }
+        }
+        if lamp && carries > SHAFT_WORTH * self.tolerance {
             return self.lamp_visible(to, element, plane, carries, memory);
         }
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
@@ -276,7 +290,13 @@ impl Gatherer<'_> {
         memory.rays += memory.segments.len() as u64;
         let total: f64 = memory.weights.iter().sum();
         let seen: f64 = memory.weights.iter().zip(&memory.blocked).filter(|(_, b)| !**b).map(|(w, _)| w).sum();
-        if total > 0.0 { seen / total } else { 0.0 }
+        if total <= 0.0 {
+            return 0.0;
+        }
+        // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
+        // blurs is bounded by the size of the receiving element. A lamp's shadow is not blurred.
+        let prior = if lamp || to.leaf.is_none() { 0.0 } else { PRIOR };
+        (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
     }
 
     /// Visible share of a lamp's triangle: quartered where rays disagree, until a quarter carries less than the tolerance.

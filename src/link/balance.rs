@@ -15,8 +15,9 @@ use crate::hierarchy::Tree;
 const TOLERANCE: f64 = 1e-6;
 /// Steps at the most; compact rooms take under 20.
 const STEPS: usize = 200;
-/// A leaf is corrected by this much at the most: a patch that sees next to nothing must not be blown up.
-const RANGE: [f64; 2] = [0.5, 2.0];
+/// A leaf is scaled up by this much at the most: a patch that sees next to nothing must not be blown up. Scaling down
+/// has no limit: rows above 1 would make light, and the solve diverge.
+const GREATEST: f64 = 2.0;
 
 /// Row factors and what the rows summed to before.
 #[derive(Debug, Clone, Default)]
@@ -45,7 +46,7 @@ pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> B
             if sums[k] <= 0.0 {
                 continue;
             }
-            let next = (factor[k] * (f64::from(target[k]) / sums[k]).sqrt()).clamp(RANGE[0], RANGE[1]);
+            let next = (factor[k] * (f64::from(target[k]) / sums[k]).sqrt()).min(GREATEST);
             worst = worst.max((next / factor[k] - 1.0).abs());
             factor[k] = next;
         }
@@ -57,7 +58,7 @@ pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> B
     Balance {
         defect_before,
         defect_after: defect(areas, &leaves, &sums, target),
-        limited: leaves.iter().filter(|&&k| RANGE.contains(&factor[k])).count(),
+        limited: leaves.iter().filter(|&&k| factor[k] == GREATEST).count(),
         factor: factor.into_iter().map(|f| f as f32).collect(),
     }
 }

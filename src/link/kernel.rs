@@ -108,8 +108,9 @@ fn gap(a: &Node, b: &Node) -> f64 {
     a.centre.distance(b.centre) / (a.radius + b.radius)
 }
 
-/// Works out the link between two patches; none if they exchange nothing. `view` is what is known of the way between.
-pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch) -> Option<Link> {
+/// Works out the link between two patches and the way between; none if they exchange nothing. `parents` is what is known
+/// of a pair that holds this one.
+pub fn evaluate(room: &Room, a: u32, b: u32, parents: &View, scratch: &mut Scratch) -> Option<(Link, View)> {
     let tree = room.tree;
     let (na, nb) = (tree.node(a), tree.node(b));
     // The smaller end is sampled, the larger is the polygon: the factor varies less over a small patch.
@@ -153,20 +154,36 @@ pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch)
     let size = ns.radius / ns.centre.distance(nt.centre).max(ns.radius + f64::MIN_POSITIVE);
     // One point says nothing about variation: 1/r^2 over the patch's own size does.
     let variation = if count == 1 { 2.0 * size } else { (0.5 * (most - least) / mean).min(4.0) };
-    let visible = match view {
-        View::Clear => 1.0,
-        View::Listed(list) if simple(nt) => clipped_visibility(room, s, t, shift, list, scratch)
-            .unwrap_or_else(|| sampled_visibility(room, s, t, shift, view, scratch)),
-        _ => sampled_visibility(room, s, t, shift, view, scratch),
+    let sight = room.sight;
+    // A look into the shaft costs as much as many rays where much stands about. It is worth that where it starts from a
+    // list, or where rays say that it may come out clear.
+    let mut view = View::Crowded;
+    let mut visible = None;
+    if *parents == View::Crowded && !sight.small() && sight.occlusion {
+        let rays = sampled_visibility(room, s, t, shift, &view, scratch);
+        if rays == 1.0 {
+            view = sight.view(tree, na, nb, parents);
+        }
+        visible = Some(rays);
+    } else {
+        view = sight.view(tree, na, nb, parents);
+    }
+    let visible = match (&view, visible) {
+        (View::Clear, _) => 1.0,
+        (View::Listed(list), _) if simple(nt) => clipped_visibility(room, s, t, shift, list, scratch)
+            .unwrap_or_else(|| sampled_visibility(room, s, t, shift, &view, scratch)),
+        (_, Some(rays)) => rays,
+        _ => sampled_visibility(room, s, t, shift, &view, scratch),
     };
-    Some(Link {
+    let link = Link {
         a,
         b,
         exchange: (open * visible) as f32,
         open_exchange: open as f32,
         variation: variation as f32,
-        way: if *view == View::Clear { Way::Clear } else { Way::Crowded },
-    })
+        way: if view == View::Clear { Way::Clear } else { Way::Crowded },
+    };
+    Some((link, view))
 }
 
 /// Unoccluded exchange of two small sets of faces.

@@ -20,6 +20,8 @@ const CHUNK: usize = 64;
 pub struct Demand<'a> {
     /// Radiosity of every node, reflected and emitted, as a share of the adaptation white's.
     pub bright: &'a [f32],
+    /// How much lightness a change of irradiance makes at every node: `(H / white)^(-2/3)`, as in CIELAB; 1 at the white.
+    pub keen: &'a [f32],
     /// Area of all faces.
     pub total_area: f64,
     /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of the area.
@@ -38,7 +40,8 @@ impl Demand<'_> {
         let at = |receiver: u32, source: u32| {
             let area = tree.node(receiver).area;
             let bright = f64::from(self.bright.get(source as usize).copied().unwrap_or(0.0));
-            misplaced / area * bright * (area / self.total_area).sqrt()
+            let keen = f64::from(self.keen.get(receiver as usize).copied().unwrap_or(1.0));
+            misplaced / area * bright * keen * (area / self.total_area).sqrt()
         };
         at(link.a, link.b).max(at(link.b, link.a))
     }
@@ -107,7 +110,7 @@ impl Graph {
                     let view = match link.way {
                         Way::Clear => View::Clear,
                         Way::Listed { .. } => View::Listed(blockers_of(&blockers, link.way).to_vec()),
-                        Way::Crowded => sight.view(tree, tree.node(link.a), tree.node(link.b), &View::Crowded),
+                        Way::Crowded => View::Crowded,
                     };
                     (link, view)
                 })
@@ -188,10 +191,7 @@ fn evaluate_all(room: &Room, pairs: &[(u32, u32, u32)], views: &[View], done: &m
                 if !facing(room.tree, na, nb) {
                     continue;
                 }
-                let view = room.sight.view(room.tree, na, nb, &views[v as usize]);
-                if let Some(link) = evaluate(room, a, b, &view, &mut scratch) {
-                    out.push((link, view));
-                }
+                out.extend(evaluate(room, a, b, &views[v as usize], &mut scratch));
             }
             (out, scratch.rays)
         })

@@ -6,6 +6,8 @@ use glam::DVec3;
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
 const LISTED: usize = 24;
+/// A room of this many triangles is small: a shaft costs no more than a handful of rays.
+const SMALL: usize = 256;
 /// A polygon seen past its blockers may fall into this many pieces before rays take over.
 const PIECES: usize = 48;
 
@@ -36,6 +38,11 @@ pub enum View {
 }
 
 impl Sight<'_> {
+    /// So few triangles that a look into any shaft is cheap?
+    pub fn small(&self) -> bool {
+        self.mesh.triangles.len() <= SMALL
+    }
+
     /// Looks into the shaft between two patches. `parents` is what is known of a pair that holds this one.
     pub fn view(&self, tree: &Tree, a: &Node, b: &Node, parents: &View) -> View {
         let candidates = match parents {
@@ -69,6 +76,17 @@ impl Sight<'_> {
             }
         }
         lambert_visible(point, normal, polygon, &corners[..count], PIECES)
+    }
+
+    /// What may block between a point and a polygon.
+    pub fn view_from(&self, at: DVec3, normal: DVec3, polygon: &[DVec3; 3], planes: [u32; 2]) -> View {
+        let point = Patch::Point { at, normal, plane: planes[0] };
+        let shaft = Shaft::between(&point, &Patch::Triangle { corners: *polygon, plane: planes[1] });
+        match self.rays.blockers(&shaft, None, LISTED) {
+            ShaftContents::Clear => View::Clear,
+            ShaftContents::Few(list) => View::Listed(list),
+            ShaftContents::Many => View::Crowded,
+        }
     }
 
     /// For each segment: is it blocked?

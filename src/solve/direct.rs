@@ -12,6 +12,8 @@ use rayon::prelude::*;
 const POINTS: [[f64; 3]; 3] = [[2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0]];
 /// Further points that are tried where some are covered.
 const MORE_POINTS: usize = 8;
+/// Error of a leaf's direct light, in what would split the leaf.
+const NOISE: f64 = 0.1;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
 
@@ -33,7 +35,7 @@ impl Direct {
 
     /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
     /// `weights` turn a row into brightness, share of white; `gather` gives none for a point that something covers.
-    pub(super) fn refine(&mut self, tree: &mut Tree, demand: &Demand, weights: &[f64], gather: &(impl Fn(&Tree, &Receiver, &mut Memory) -> Option<[f32; 64]> + Sync)) {
+    pub(super) fn refine(&mut self, tree: &mut Tree, demand: &Demand, weights: &[f64], gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync)) {
         let mut open: Vec<u32> = (0..tree.nodes.len() as u32).filter(|&k| tree.node(k).is_leaf()).collect();
         while !open.is_empty() {
             self.rows.resize(tree.nodes.len(), None);
@@ -44,7 +46,12 @@ impl Direct {
                 .par_chunks(CHUNK)
                 .map(|chunk| {
                     let mut memory = Memory::default();
-                    let all = chunk.iter().map(|&leaf| at_leaf(tree, leaf, width, weights, gather, &mut memory)).collect();
+                    let each = |&leaf: &u32| {
+                        // What would split the leaf is what it has to be told from.
+                        let share = (tree.node(leaf).area / demand.total_area).sqrt();
+                        at_leaf(tree, leaf, width, weights, NOISE * demand.threshold / share, gather, &mut memory)
+                    };
+                    let all = chunk.iter().map(each).collect();
                     (all, memory.rays)
                 })
                 .collect();
@@ -60,7 +67,8 @@ impl Direct {
             for leaf in open {
                 let node = tree.node(leaf);
                 let depth = tree.elements[node.element as usize].depth;
-                let error = f64::from(self.spread[leaf as usize]) * (node.area / demand.total_area).sqrt();
+                let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
+                let error = f64::from(self.spread[leaf as usize] * keen) * (node.area / demand.total_area).sqrt();
                 if error > demand.threshold && node.area > demand.least_area && depth < MAX_DEPTH {
                     tree.subdivide(leaf);
                     children.extend(tree.node(leaf).child_range());
@@ -72,12 +80,14 @@ impl Direct {
 }
 
 /// Mean row over the points of a leaf, and half the range of brightness.
+#[expect(clippy::too_many_arguments, reason = "one caller")]
 fn at_leaf(
     tree: &Tree,
     leaf: u32,
     width: usize,
     weights: &[f64],
-    gather: &(impl Fn(&Tree, &Receiver, &mut Memory) -> Option<[f32; 64]> + Sync),
+    tolerance: f64,
+    gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
     memory: &mut Memory,
 ) -> (Box<[f32]>, f32) {
     let element = &tree.elements[tree.node(leaf).element as usize];
@@ -98,7 +108,7 @@ fn at_leaf(
             leaf: Some(leaf),
             seed: u64::from(leaf) << 4 | k as u64,
         };
-        let Some(row) = gather(tree, &to, memory) else { continue };
+        let Some(row) = gather(tree, &to, tolerance, memory) else { continue };
         bare += 1;
         let mut bright = 0.0;
         for ((m, x), w) in mean.iter_mut().zip(row).zip(weights) {

@@ -71,14 +71,19 @@ impl Default for Settings {
 const FIRST_THRESHOLD: f64 = 0.02;
 /// What a round divides the threshold by: about twice the links, half the error.
 const THRESHOLD_STEP: f64 = 3.0;
-/// Links keep less error than leaves, by this factor: there are many to a leaf.
-const LINK_SHARE: f64 = 8.0;
+/// Darker than this share of white counts as this dark: nobody sees lightness below it.
+const DARKEST: f64 = 0.02;
+/// Links keep this much less error than the threshold: there are many to a leaf.
+const LINK_SHARE: f64 = 4.0;
+/// Direct light may vary over a leaf by this multiple of the threshold. From 1 to 16 the Cornell box's error at points
+/// changes by less than a tenth: what a leaf reflects is seen as a whole.
+const LEAF_SHARE: f64 = 4.0;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.004;
 /// The working partition may cause this share of the asked-for error.
-const SPECTRUM_SHARE: f64 = 0.2;
+const SPECTRUM_SHARE: f64 = 0.35;
 /// What one patch may misplace in a gather, share of the asked-for error.
 const GATHER_SHARE: f64 = 0.1;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
@@ -164,8 +169,10 @@ impl Bake {
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
         let bright = self.brightness_of_nodes();
+        let keen = self.keenness();
         let demand = Demand {
             bright: &bright,
+            keen: &keen,
             total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
             threshold: threshold / LINK_SHARE,
             least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
@@ -184,7 +191,7 @@ impl Bake {
         clock.lap("spectrum");
 
         let direct_rays = self.direct.rays;
-        let demand = Demand { threshold, ..demand };
+        let demand = Demand { threshold: threshold * LEAF_SHARE, ..demand };
         self.gather_direct(&demand);
         clock.lap("direct");
 
@@ -271,6 +278,26 @@ impl Bake {
         (0..nodes).map(|k| light.bright_reflected[k]).collect()
     }
 
+    /// How much lightness a change of irradiance makes at every node, from the last solution; 1 before the first.
+    fn keenness(&self) -> Vec<f32> {
+        if self.rounds.is_empty() {
+            return vec![1.0; self.tree.nodes.len()];
+        }
+        let mut keen = vec![0.0_f32; self.tree.nodes.len()];
+        for (k, &leaf) in self.light.leaves.iter().enumerate() {
+            let h = light::brightness(self.lanes.tristimulus(self.light.irradiance.row(k)), self.light.white);
+            keen[leaf as usize] = h.max(DARKEST).powf(-2.0 / 3.0) as f32;
+        }
+        for k in (0..keen.len()).rev() {
+            let node = &self.tree.nodes[k];
+            if !node.is_leaf() {
+                let sum: f64 = node.child_range().map(|c| f64::from(keen[c as usize]) * self.tree.node(c).area).sum();
+                keen[k] = (sum / node.area) as f32;
+            }
+        }
+        keen
+    }
+
     /// Chooses the working partition on a small model of the room.
     fn choose_lanes(&mut self) {
         self.spectrum_error = 0.0;
@@ -316,8 +343,8 @@ impl Bake {
         let mut tree = std::mem::take(&mut self.tree);
         let mut direct = std::mem::take(&mut self.direct);
         self.with_sight(|bake, sight| {
-            direct.refine(&mut tree, demand, &weights, &|tree, to, memory| {
-                let row = Gatherer { tree, ..bake.gatherer(sight) }.direct(to, memory);
+            direct.refine(&mut tree, demand, &weights, &|tree, to, tolerance, memory| {
+                let row = Gatherer { tree, tolerance, ..bake.gatherer(sight) }.direct(to, memory);
                 let dark = row.iter().all(|&x| x == 0.0);
                 let hidden = dark && bake.closed == Closed::No && flux::covered(&bake.mesh, tree, &bake.rays, to.point, to.normal, to.plane, to.seed);
                 (!hidden).then_some(row)
@@ -458,7 +485,6 @@ impl Bake {
             lamps: &self.lamps,
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
-            stored: false,
         }
     }
 
