@@ -107,7 +107,7 @@ pub fn compare(bake: &Bake, points: usize, seed: u64) -> Comparison {
     let white = bake.light().white;
     let mut paths = PATHS[0];
     loop {
-        let answers = audit.irradiance(&places, paths, seed);
+        let answers = audit.irradiance(&places, &vec![paths; places.len()], seed);
         let found = judge(&solved, &answers, &weights, white, paths);
         let spread = found.de2000;
         if paths >= PATHS[2]

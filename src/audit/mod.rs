@@ -5,6 +5,8 @@
 
 mod compare;
 mod path;
+mod report;
 
-pub use compare::{Comparison, Mean, Spread, compare};
-pub use path::{Answer, Audit};
+pub use compare::{Comparison, Mean, compare};
+pub use path::{Answer, Audit, BATCHES};
+pub use report::{HONEST, Honesty, Measured, Report, Seen, Spread};

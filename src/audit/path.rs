@@ -6,7 +6,7 @@
 
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
-use crate::geometry::sampling::{Pcg, cosine_direction, on_triangle, sequence02};
+use crate::geometry::sampling::{Pcg, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Face, Mesh};
 use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
@@ -79,17 +79,19 @@ impl<'a> Audit<'a> {
     }
 
     /// Irradiance at points (recentred) with unit normals; `planes` hold the plane id of the face a point lies on, or
-    /// [`NO_PLANE`]. `paths` a point.
-    pub fn irradiance(&self, points: &[(DVec3, DVec3, u32)], paths: usize, seed: u64) -> Vec<Answer> {
-        let each = paths.div_ceil(BATCHES);
+    /// [`NO_PLANE`]; `paths` how many paths each point gets. Points and batches have random streams of their own, so that
+    /// the answer does not depend on the number of threads.
+    pub fn irradiance(&self, points: &[(DVec3, DVec3, u32)], paths: &[usize], seed: u64) -> Vec<Answer> {
         points
             .par_iter()
+            .zip(paths)
             .enumerate()
-            .map(|(k, &(point, normal, plane))| {
+            .map(|(k, (&(point, normal, plane), paths))| {
+                let each = paths.div_ceil(BATCHES).max(1);
                 let start = Vertex { point, normal, plane };
                 let batches: Vec<Leaves> = (0..BATCHES)
                     .map(|batch| {
-                        let mut rng = Pcg::new(seed ^ ((k as u64) << 20) ^ ((batch as u64) << 56) ^ 0xa0d1_7000);
+                        let mut rng = Pcg::new(hash(hash(seed, k as u64), batch as u64));
                         let (shift_a, shift_b) = (rng_u64(&mut rng), rng_u64(&mut rng));
                         let mut sum = [0.0; LEAVES];
                         for path in 0..each {
@@ -149,7 +151,9 @@ impl<'a> Audit<'a> {
                 return;
             }
             if bounce >= SURE_BOUNCES {
-                let survive = greatest.min(0.98);
+                // Exactly what is left: a smaller chance would let weights grow without bound where albedos are near 1.
+                // Paths end, as no albedo exceeds 0.999.
+                let survive = greatest.min(1.0);
                 if rng.f64() >= survive {
                     return;
                 }

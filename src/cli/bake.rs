@@ -115,7 +115,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         write(&mut log, round)?;
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
-            let light = bake.baked(&|done, of| talk.progress("gathering", done, of));
+            let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
             seconds.gather = clock.elapsed().as_secs_f64();
             talk.phase("drawing");
             let files = snapshots.round(round.round, bake.scene(), &light.surfaces)?;

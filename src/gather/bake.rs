@@ -20,8 +20,12 @@ const BENT: f64 = 2.0;
 const PASSES: usize = 4;
 /// Vertices are drawn this far into the triangle they belong to: a point on an edge lies on the neighbouring wall too.
 const INSET: f64 = 2e-3;
+/// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
+const PROBE_INSET: f64 = 1e-5;
 /// Vertices at the most; a pass that would exceed this is not begun.
-const MOST_VERTICES: usize = 6_000_000;
+const MOST_VERTICES: usize = 2_000_000;
+/// Triangles with edges below this share of the room's half diagonal are not quartered for the output.
+const SHORTEST: f64 = 0.008;
 
 /// The baked mesh and what it took.
 #[derive(Debug, Default)]
@@ -44,6 +48,15 @@ type Known = Option<Option<Box<[f32; 64]>>>;
 impl Bake {
     /// Gathers at the vertices of the refined mesh. `progress` is told (done, of) in vertices of the present pass.
     pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
+        self.gathered(PASSES, progress)
+    }
+
+    /// The same on the solver's own elements, without looking for what lies between: for a picture on the way.
+    pub fn sketch(&self, progress: &dyn Fn(usize, usize)) -> Baked {
+        self.gathered(0, progress)
+    }
+
+    fn gathered(&self, passes: usize, progress: &dyn Fn(usize, usize)) -> Baked {
         let scene = self.scene();
         let flat: Vec<bool> = scene.surfaces.iter().map(|s| s.normals.is_none()).collect();
         let sides: Vec<bool> = scene.surfaces.iter().map(|s| scene.materials[s.material].sides == crate::scene::Sides::Both).collect();
@@ -53,7 +66,7 @@ impl Bake {
         let mut known: Vec<Vec<Known>> = Vec::new();
         let mut out = Baked::default();
         out.rays += self.complete(&refined, &mut known, progress);
-        for _ in 0..PASSES {
+        for _ in 0..passes {
             if refined.sheets.iter().map(|s| s.vertices.len()).sum::<usize>() > MOST_VERTICES {
                 out.capped += 1;
                 break;
@@ -62,7 +75,12 @@ impl Bake {
             let suspects: Vec<(u32, u32)> = refined
                 .leaves()
                 .into_iter()
-                .filter(|&id| refined.depth(id) < DEEPEST && self.differ(&known[id.0 as usize], refined.corners(id).map(|c| c.vertex)))
+                .filter(|&id| {
+                    let c = refined.corners(id).map(|c| refined.points[c.point as usize]);
+                    let longest = (0..3).map(|k| c[k].distance(c[(k + 1) % 3])).fold(0.0, f64::max);
+                    longest > SHORTEST * self.mesh().half_size && refined.depth(id) < DEEPEST
+                })
+                .filter(|&id| self.differ(&known[id.0 as usize], refined.corners(id).map(|c| c.vertex)))
                 .collect();
             let looks: Vec<[u32; 3]> = suspects
                 .iter()
@@ -337,7 +355,16 @@ impl Bake {
             }
             let w = crate::solve::weights_of(point, a, b, c);
             if w.iter().all(|&x| x >= -1e-9) {
-                let leaf = tree.leaf_at(entry as u32, w.map(|x| x.max(0.0)));
+                let w = w.map(|x| x.max(0.0));
+                // On an edge the point would lie in the neighbouring wall too, and see past it.
+                let edge = w.iter().any(|&x| x < PROBE_INSET);
+                let (w, point) = if edge {
+                    let w = w.map(|x| x * (1.0 - 3.0 * PROBE_INSET) + PROBE_INSET);
+                    (w, a * w[0] + b * w[1] + c * w[2])
+                } else {
+                    (w, point)
+                };
+                let leaf = tree.leaf_at(entry as u32, w);
                 return Receiver { point, normal, plane: tree.face_plane[entry], leaf: Some(leaf), seed };
             }
         }

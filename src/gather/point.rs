@@ -13,8 +13,10 @@ use glam::DVec3;
 
 /// Rays to a patch at least, and at the most.
 const RAYS: [usize; 2] = [4, 32];
-/// Points that stand for a far cluster.
-const CLUSTER_POINTS: usize = 8;
+/// Points that stand for a far cluster: one that carries little, and one that carries much.
+const CLUSTER_POINTS: [usize; 2] = [4, 8];
+/// A cluster nearer than this many of its radii is entered.
+const CLOSE: f64 = 1.5;
 /// Faces of a cluster that are treated as polygons.
 const POLYGONS: u32 = 4;
 /// How many rays a link's visibility counts for.
@@ -150,12 +152,14 @@ impl Gatherer<'_> {
             // Greatest factor the whole cluster could have, by its projected area.
             let gap = (distance - node.radius).max(0.0);
             let factor = node.area / (std::f64::consts::PI * gap * gap + node.area);
-            let far = distance > 4.0 * node.radius;
-            if !far || factor * (spread + 0.3 * (reflected + emitted)) > self.tolerance {
+            let near = distance < CLOSE * node.radius;
+            // Points find a cluster's light to about a third of its spread, and where lamps are in it, of its light.
+            if near || factor * (0.3 * spread + emitted) > self.tolerance {
                 memory.stack.extend(node.child_range().map(|c| (c, way, v)));
                 return;
             }
-            self.cluster(to, id, node, clear, memory, out);
+            let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
+            self.cluster(to, id, count, clear, memory, out);
             return;
         }
         let sample = Sample { point: to.point, normal: to.normal, plane: to.plane, area: 1.0 };
@@ -213,10 +217,9 @@ impl Gatherer<'_> {
     }
 
     /// A far cluster by points, each with its own ray.
-    fn cluster(&self, to: &Receiver, id: u32, node: &Node, clear: bool, memory: &mut Memory, out: &mut Gathered) {
+    fn cluster(&self, to: &Receiver, id: u32, count: usize, clear: bool, memory: &mut Memory, out: &mut Gathered) {
         let shift = crate::link::pattern(to.seed, id, 1);
-        self.tree.samples(id, CLUSTER_POINTS, shift, &mut memory.samples);
-        let _ = node;
+        self.tree.samples(id, count, shift, &mut memory.samples);
         memory.segments.clear();
         memory.weights.clear();
         for s in &memory.samples {

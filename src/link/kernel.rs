@@ -170,7 +170,9 @@ pub fn evaluate(room: &Room, a: u32, b: u32, parents: &View, scratch: &mut Scrat
     }
     let visible = match (&view, visible) {
         (View::Clear, _) => 1.0,
+        // Where a plane cuts one end, no point of it may lie in front of the other end; then the other end looks.
         (View::Listed(list), _) if simple(nt) => clipped_visibility(room, s, t, shift, list, scratch)
+            .or_else(|| if simple(ns) { clipped_visibility(room, t, s, shift, list, scratch) } else { None })
             .unwrap_or_else(|| sampled_visibility(room, s, t, shift, &view, scratch)),
         (_, Some(rays)) => rays,
         _ => sampled_visibility(room, s, t, shift, &view, scratch),
@@ -199,7 +201,8 @@ fn contours(tree: &Tree, a: &Node, b: &Node) -> f64 {
     sum
 }
 
-/// Visible share by points on one end that see exactly what is left of the polygons of the other.
+/// Visible share by points on one end that see exactly what is left of the polygons of the other. None if that takes too
+/// many pieces, or if no point is in front of the other end.
 fn clipped_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], list: &[u32], scratch: &mut Scratch) -> Option<f64> {
     let tree = room.tree;
     tree.samples(s, POINTS, shift, &mut scratch.a);
@@ -217,7 +220,7 @@ fn clipped_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], list: &[u32]
             }
         }
     }
-    Some(if total > 0.0 { (seen / total).min(1.0) } else { 1.0 })
+    (total > 0.0).then(|| (seen / total).min(1.0))
 }
 
 /// Visible share by rays between points of both ends, each weighted by what it would carry.
@@ -240,7 +243,9 @@ fn sampled_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], view: &View,
     scratch.rays += scratch.segments.len() as u64;
     let total: f64 = scratch.weights.iter().sum();
     let seen: f64 = scratch.weights.iter().zip(&scratch.blocked).filter(|(_, b)| !**b).map(|(w, _)| w).sum();
-    if total > 0.0 { seen / total } else { 1.0 }
+    // No ray runs from front to front: the pair meets at the horizon and carries next to nothing. Taking it as open would
+    // let light through walls.
+    if total > 0.0 { seen / total } else { 0.0 }
 }
 
 /// A pair of numbers in [0, 1) that depends on the pair only.

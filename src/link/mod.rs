@@ -10,6 +10,7 @@ mod visibility;
 pub(crate) use balance::row_sums;
 pub use balance::{Balance, balance};
 pub(crate) use kernel::pattern;
+pub use contour::exchange;
 pub use kernel::{Scratch, evaluate, facing, point_factor};
 pub use refine::{Demand, Graph, MAX_DEPTH, Refined, blockers_of};
 pub use store::LinkRows;

@@ -12,6 +12,7 @@ pub mod light;
 mod operator;
 mod punctual;
 pub mod record;
+pub mod reference;
 mod rows;
 mod sources;
 
@@ -78,6 +79,11 @@ const LINK_SHARE: f64 = 4.0;
 /// Direct light may vary over a leaf by this multiple of the threshold. From 1 to 16 the Cornell box's error at points
 /// changes by less than a tenth: what a leaf reflects is seen as a whole.
 const LEAF_SHARE: f64 = 4.0;
+/// A round that leaves this share of the error of the one before has stalled, if there are many links already.
+const STALLED: f64 = 0.9;
+const WORTH_STALLING: usize = 100_000;
+/// No further round beyond this many links: about 120 MB.
+const MOST_LINKS: usize = 2_500_000;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
@@ -241,7 +247,14 @@ impl Bake {
         if self.tree.nodes.is_empty() || self.scene.spectra.is_empty() {
             return Some(Verdict::Reached);
         }
-        (self.rounds.len() >= self.settings.rounds).then_some(Verdict::OutOfRounds)
+        if self.rounds.len() >= self.settings.rounds {
+            return Some(Verdict::OutOfRounds);
+        }
+        // Four times the links for next to nothing: what is left is the noise of visibility in the gather.
+        let estimate = |r: &Round| r.error.total_de2000.value;
+        let before = self.rounds.len().checked_sub(2).and_then(|k| estimate(&self.rounds[k]));
+        let stalled = before.zip(estimate(last)).is_some_and(|(before, now)| now > STALLED * before);
+        (last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING)).then_some(Verdict::Exhausted)
     }
 
     /// Tells `watch` of every phase of a round that ends, by the name that it has in [`Round::phases_s`].

@@ -151,7 +151,7 @@ pub enum Verdict {
     Interrupted,
     /// No more rounds allowed.
     OutOfRounds,
-    /// Nothing left to refine: the error asked for is below what the caps allow.
+    /// Refining no longer pays: the limit of links is met, or the error no longer falls.
     Exhausted,
 }
 

@@ -1,0 +1,423 @@
+//! A plain reference: every patch sees every patch, all leaves, one direct solve a leaf. Slow and right.
+//!
+//! `B_i = E_i + rho_i (P_i + sum_j F_ij B_j)` (Goral, Torrance, Greenberg and Battaile 1984), P the irradiance from
+//! punctual lights, W/m2/nm. `F_ij` is the mean over points of patch i of the exact point-to-polygon factor (Lambert
+//! 1760) times the share of rays to j that nothing blocks. `A_i F_ij` and `A_j F_ji` are made equal by their mean; rows are
+//! not balanced, [`Reference::row_sums`] tells what they miss. Solved by LU for every distinct set of reflectances.
+//!
+//! It shares triangles, Lambert's formula and the ray index with the solver: no hierarchy, no links, no lanes, no
+//! iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
+
+use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon};
+use crate::hierarchy::{Mesh, stratified};
+use crate::scene::effects::{Kind, Plan};
+use crate::scene::{LightKind, Scene};
+use crate::spectrum::{LEAVES, Leaves};
+use glam::DVec3;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Radon's rule of degree 5 on a triangle (1948; Abramowitz and Stegun 1964, 25.4.63): weight, and weights of corners.
+fn radon() -> [(f64, [f64; 3]); 7] {
+    let root = 15.0_f64.sqrt();
+    let corner = |w: f64, a: f64| {
+        let b = 1.0 - 2.0 * a;
+        [(w, [b, a, a]), (w, [a, b, a]), (w, [a, a, b])]
+    };
+    let near = corner((155.0 - root) / 1200.0, (6.0 - root) / 21.0);
+    let far = corner((155.0 + root) / 1200.0, (6.0 + root) / 21.0);
+    [
+        (9.0 / 40.0, [1.0 / 3.0; 3]),
+        near[0],
+        near[1],
+        near[2],
+        far[0],
+        far[1],
+        far[2],
+    ]
+}
+
+/// A flat triangular patch, one side.
+#[derive(Debug, Clone)]
+pub struct Patch {
+    /// Corners, counter-clockwise from the front; recentred as in [`Mesh`].
+    pub corners: [DVec3; 3],
+    /// Unit normal of the front.
+    pub normal: DVec3,
+    /// Plane id of its triangle.
+    pub plane: u32,
+    /// Area.
+    pub area: f64,
+    /// Albedo.
+    pub reflectance: Leaves,
+    /// Exitance, W/m2/nm.
+    pub exitance: Leaves,
+    /// Irradiance from punctual lights, W/m2/nm.
+    pub punctual: Leaves,
+}
+
+/// The patches of a room and who sees whom.
+#[derive(Debug)]
+pub struct Reference {
+    /// The patches: every side of every triangle of the scene, quartered alike.
+    pub patches: Vec<Patch>,
+    /// `F_ij`: share of the light leaving i that reaches j.
+    pub factors: DMatrix<f64>,
+}
+
+/// What leaves and meets the patches, W/m2/nm, in order of the patches.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Radiosity: emitted and reflected.
+    pub radiosity: Vec<Leaves>,
+    /// Irradiance.
+    pub irradiance: Vec<Leaves>,
+}
+
+/// What blocks the way in a room.
+struct Ways {
+    rays: RayIndex,
+    /// False: nothing can block.
+    blocks: bool,
+    /// Rays between a point and a polygon.
+    count: usize,
+}
+
+impl Ways {
+    /// Factor from a point to the visible part of a patch.
+    fn factor(&self, point: DVec3, normal: DVec3, plane: u32, to: &Patch) -> f64 {
+        if plane == to.plane || to.normal.dot(point - to.corners[0]) <= 0.0 {
+            return 0.0;
+        }
+        let open = lambert_polygon(point, normal, &to.corners);
+        if open <= 0.0 || !self.blocks {
+            return open;
+        }
+        let (mut seen, mut total) = (0.0, 0.0);
+        for k in 0..self.count {
+            let w = stratified(k, self.count, [0.5, 0.5]);
+            let q = to.corners[0] * w[0] + to.corners[1] * w[1] + to.corners[2] * w[2];
+            let d = q - point;
+            let (c1, c2, r2) = (normal.dot(d), -to.normal.dot(d), d.length_squared());
+            if c1 <= 0.0 || c2 <= 0.0 {
+                continue;
+            }
+            let weight = c1 * c2 / (r2 * r2);
+            total += weight;
+            if !self.blocked(point, q, [plane, to.plane]) {
+                seen += weight;
+            }
+        }
+        if total > 0.0 {
+            open * seen / total
+        } else {
+            open
+        }
+    }
+
+    fn blocked(&self, from: DVec3, to: DVec3, planes: [u32; 2]) -> bool {
+        self.blocks
+            && self.rays.occluded(&Segment {
+                from: from.as_vec3(),
+                to: to.as_vec3(),
+                planes,
+            })
+    }
+}
+
+impl Reference {
+    /// Quarters every triangle of `scene` `depth` times and works out all factors, with `rays` rays from a point to a
+    /// patch where something could block. Textures, vertex colours and holes are not looked at.
+    pub fn new(scene: &Scene, depth: u32, rays: usize) -> Self {
+        let mesh = Mesh::new(scene);
+        let ways = ways(scene, &mesh, rays);
+        let mut patches = patches(scene, &mesh, depth);
+        let lit: Vec<Leaves> = patches
+            .par_iter()
+            .map(|p| punctual(scene, &mesh, &ways, p))
+            .collect();
+        for (patch, lit) in patches.iter_mut().zip(lit) {
+            patch.punctual = lit;
+        }
+        let n = patches.len();
+        let rule = radon();
+        let rows: Vec<Vec<f64>> = patches
+            .par_iter()
+            .enumerate()
+            .map(|(i, from)| {
+                let mut row = vec![0.0; n];
+                for (j, to) in patches.iter().enumerate() {
+                    if i != j && from.plane != to.plane {
+                        row[j] = rule
+                            .iter()
+                            .map(|&(w, at)| {
+                                w * ways.factor(point(from, at), from.normal, from.plane, to)
+                            })
+                            .sum();
+                    }
+                }
+                row
+            })
+            .collect();
+        let factors = DMatrix::from_fn(n, n, |i, j| {
+            let (a, b) = (patches[i].area, patches[j].area);
+            0.5 * (rows[i][j] + rows[j][i] * b / a)
+        });
+        Self { patches, factors }
+    }
+
+    /// Sum of every patch's factors: 1 in a closed room, but for the rule's error.
+    pub fn row_sums(&self) -> Vec<f64> {
+        self.factors.row_iter().map(|row| row.sum()).collect()
+    }
+
+    /// Solves all leaves.
+    pub fn solve(&self) -> Solution {
+        let n = self.patches.len();
+        let mut radiosity = vec![[0.0; LEAVES]; n];
+        let mut solved = [false; LEAVES];
+        for leaf in 0..LEAVES {
+            if solved[leaf] {
+                continue;
+            }
+            let rho: Vec<f64> = self.patches.iter().map(|p| p.reflectance[leaf]).collect();
+            let alike: Vec<usize> = (leaf..LEAVES)
+                .filter(|&l| {
+                    self.patches
+                        .iter()
+                        .zip(&rho)
+                        .all(|(p, r)| p.reflectance[l] == *r)
+                })
+                .collect();
+            let right = DMatrix::from_fn(n, alike.len(), |i, k| {
+                self.patches[i].exitance[alike[k]] + rho[i] * self.patches[i].punctual[alike[k]]
+            });
+            let answer = solve(&self.factors, &rho, right);
+            for (k, &l) in alike.iter().enumerate() {
+                solved[l] = true;
+                for (i, row) in radiosity.iter_mut().enumerate() {
+                    row[l] = answer[(i, k)];
+                }
+            }
+        }
+        let sources = DMatrix::from_fn(n, LEAVES, |i, l| radiosity[i][l]);
+        let received = &self.factors * sources;
+        let irradiance = (0..n)
+            .map(|i| std::array::from_fn(|l| received[(i, l)] + self.patches[i].punctual[l]))
+            .collect();
+        Solution {
+            radiosity,
+            irradiance,
+        }
+    }
+
+    /// Irradiance at points of surfaces (world space, unit normals) from a solution, each patch as an exact polygon with
+    /// `rays` rays to it: an order better than the patch means.
+    pub fn gather(
+        &self,
+        scene: &Scene,
+        solution: &Solution,
+        points: &[(DVec3, DVec3)],
+        rays: usize,
+    ) -> Vec<Leaves> {
+        let mesh = Mesh::new(scene);
+        let ways = ways(scene, &mesh, rays);
+        points
+            .par_iter()
+            .map(|&(at, normal)| {
+                let at = at - mesh.centre;
+                let plane = plane_at(&mesh, &self.patches, at, normal);
+                let mut sum = [0.0; LEAVES];
+                for (patch, radiosity) in self.patches.iter().zip(&solution.radiosity) {
+                    let f = ways.factor(at, normal, plane, patch);
+                    if f > 0.0 {
+                        add(&mut sum, radiosity, f);
+                    }
+                }
+                add(
+                    &mut sum,
+                    &punctual_at(scene, &mesh, &ways, at, normal, plane),
+                    1.0,
+                );
+                sum
+            })
+            .collect()
+    }
+}
+
+/// Radiosities of `B = right + diag(rho) F B`, a column a right-hand side; by LU with partial pivots.
+///
+/// # Panics
+/// If the matrix is singular: a closed room of albedo 1.
+pub fn solve(factors: &DMatrix<f64>, rho: &[f64], right: DMatrix<f64>) -> DMatrix<f64> {
+    let n = rho.len();
+    let system = DMatrix::from_fn(n, n, |i, j| {
+        f64::from(u8::from(i == j)) - rho[i] * factors[(i, j)]
+    });
+    system
+        .lu()
+        .solve(&right)
+        .expect("albedos below 1 leave no row that is not dominated by its diagonal")
+}
+
+/// The same for one right-hand side.
+pub fn solve_one(factors: &DMatrix<f64>, rho: &[f64], emission: &[f64]) -> DVector<f64> {
+    let right = DMatrix::from_column_slice(emission.len(), 1, emission);
+    solve(factors, rho, right).column(0).into_owned()
+}
+
+fn ways(scene: &Scene, mesh: &Mesh, count: usize) -> Ways {
+    let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+    let solid = vec![false; mesh.triangles.len()];
+    Ways {
+        rays: RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &solid),
+        blocks: Plan::of(scene).runs(Kind::Occlusion),
+        count,
+    }
+}
+
+fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
+    for (s, x) in sum.iter_mut().zip(x) {
+        *s += weight * x;
+    }
+}
+
+fn point(patch: &Patch, w: [f64; 3]) -> DVec3 {
+    patch.corners[0] * w[0] + patch.corners[1] * w[1] + patch.corners[2] * w[2]
+}
+
+/// All sides of all triangles, quartered.
+fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
+    let mut out = Vec::new();
+    for &face in &mesh.faces {
+        let triangle = face.triangle as usize;
+        let material = &scene.materials[mesh.material[triangle] as usize];
+        let exitance = material.emission.as_ref().map_or([0.0; LEAVES], |e| {
+            let power = &scene.spectra[e.light].power;
+            std::array::from_fn(|l| PI * power[l] * e.shape[l])
+        });
+        let mut corners = vec![mesh.corners(face)];
+        for _ in 0..depth {
+            corners = corners
+                .into_iter()
+                .flat_map(|[a, b, c]| {
+                    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
+                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
+                })
+                .collect();
+        }
+        let area = mesh.area[triangle] / corners.len() as f64;
+        out.extend(corners.into_iter().map(|corners| Patch {
+            corners,
+            normal: mesh.face_normal(face),
+            plane: mesh.plane[triangle],
+            area,
+            reflectance: material.reflectance,
+            exitance,
+            punctual: [0.0; LEAVES],
+        }));
+    }
+    out
+}
+
+/// Plane id of the patch that holds a point; [`NO_PLANE`] in the air.
+fn plane_at(mesh: &Mesh, patches: &[Patch], at: DVec3, normal: DVec3) -> u32 {
+    let near = 1e-6 * mesh.half_size;
+    let holds = |p: &&Patch| {
+        let w = super::weights_of(at, p.corners[0], p.corners[1], p.corners[2]);
+        p.normal.dot(normal) > 1.0 - 1e-6
+            && p.normal.dot(at - p.corners[0]).abs() < near
+            && w.iter().all(|&x| x >= -1e-9)
+    };
+    patches.iter().find(holds).map_or(NO_PLANE, |p| p.plane)
+}
+
+/// Mean irradiance of a patch from punctual lights.
+fn punctual(scene: &Scene, mesh: &Mesh, ways: &Ways, patch: &Patch) -> Leaves {
+    let mut sum = [0.0; LEAVES];
+    for (w, at) in radon() {
+        add(
+            &mut sum,
+            &punctual_at(
+                scene,
+                mesh,
+                ways,
+                point(patch, at),
+                patch.normal,
+                patch.plane,
+            ),
+            w,
+        );
+    }
+    sum
+}
+
+/// Irradiance at a point from punctual lights: `I cos / r^2`.
+fn punctual_at(
+    scene: &Scene,
+    mesh: &Mesh,
+    ways: &Ways,
+    at: DVec3,
+    normal: DVec3,
+    plane: u32,
+) -> Leaves {
+    let mut sum = [0.0; LEAVES];
+    for light in &scene.lights {
+        let (toward, end) = match light.kind {
+            LightKind::Directional => (
+                -light.direction,
+                at - light.direction * (4.0 * mesh.half_size),
+            ),
+            LightKind::Point | LightKind::Spot { .. } => {
+                let end = light.position - mesh.centre;
+                ((end - at).normalize_or_zero(), end)
+            }
+        };
+        let spread = match light.kind {
+            LightKind::Directional => 1.0,
+            LightKind::Point => 1.0 / end.distance_squared(at),
+            LightKind::Spot { inner, outer } => {
+                let (cos, i, o) = (-light.direction.dot(toward), inner.cos(), outer.cos());
+                ((cos - o) / (i - o).max(1e-3)).clamp(0.0, 1.0).powi(2) / end.distance_squared(at)
+            }
+        };
+        let factor = normal.dot(toward) * spread;
+        if factor > 0.0 && factor.is_finite() && !ways.blocked(at, end, [plane, NO_PLANE]) {
+            let power = &scene.spectra[light.light].power;
+            for l in 0..LEAVES {
+                sum[l] += factor * power[l] * light.shape[l];
+            }
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exact for monomials up to degree 5: integral of x^a y^b over the unit triangle is a! b! / (a + b + 2)!.
+    #[test]
+    fn the_rule_is_of_degree_five() {
+        let factorial = |n: u32| (1..=n).map(f64::from).product::<f64>();
+        for a in 0..=5_u32 {
+            for b in 0..=5 - a {
+                let rule: f64 = radon()
+                    .iter()
+                    .map(|(w, at)| w * at[1].powi(a as i32) * at[2].powi(b as i32))
+                    .sum();
+                let exact = 2.0 * factorial(a) * factorial(b) / factorial(a + b + 2);
+                assert!((rule - exact).abs() < 1e-14, "{a} {b}: {rule} {exact}");
+            }
+        }
+    }
+
+    /// Two patches that see each other with F = 0.2, one emitting 1: B1 = 1 / (1 - (rho F)^2).
+    #[test]
+    fn two_patches() {
+        let factors = DMatrix::from_row_slice(2, 2, &[0.0, 0.2, 0.2, 0.0]);
+        let b = solve_one(&factors, &[0.5, 0.5], &[1.0, 0.0]);
+        assert!((b[0] - 1.0 / 0.99).abs() < 1e-15 && (b[1] - 0.1 / 0.99).abs() < 1e-15);
+    }
+}
