@@ -84,6 +84,33 @@ fn records(log: &[u8]) -> Vec<Value> {
         .collect()
 }
 
+/// Every field of a record stands in the documentation of the log, or is a documented field of a type there.
+fn documented(record: &Value) {
+    let sources = ["src/cli/log.rs", "src/audit/compare.rs"]
+        .map(|p| std::fs::read_to_string(root().join(p)).unwrap());
+    let text = sources.concat();
+    for (key, value) in record.as_object().unwrap() {
+        let known = |key: &str| {
+            text.contains(&format!("`{key}`")) || text.contains(&format!("pub {key}: "))
+        };
+        if let (Value::Object(parts), "error" | "flux" | "phases_s") = (value, key.as_str()) {
+            for part in parts.keys() {
+                let dotted = format!("`{key}.{part}`");
+                assert!(
+                    known(part) || known(&format!(".{part}")) || text.contains(&dotted),
+                    "{key}.{part}"
+                );
+            }
+        } else {
+            assert!(
+                key == "record" || known(key),
+                "{key} of {}",
+                record["record"]
+            );
+        }
+    }
+}
+
 #[test]
 fn a_bake_writes_everything_that_was_asked_for_and_nothing_else() {
     let desk = Desk::new(&["cornell"]);
@@ -135,6 +162,9 @@ fn a_bake_writes_everything_that_was_asked_for_and_nothing_else() {
     pictures.insert(0, "final-cornell.exr".into());
     assert_eq!(desk.files("pictures"), pictures);
 
+    for record in &records {
+        documented(record);
+    }
     let (plan, verdict) = (&records[0], records.last().unwrap());
     assert_eq!(plan["version"], 1);
     assert_eq!(plan["effects"][0]["name"], "interreflection");
