@@ -13,7 +13,12 @@ pub fn guarded(run: impl FnOnce() -> crate::Result<u8>) -> u8 {
         let place = info
             .location()
             .map(|l| format!(" ({}:{})", l.file(), l.line()));
-        let what = info.payload_as_str().unwrap_or("panic");
+        let payload = info.payload();
+        let what = payload
+            .downcast_ref::<&str>()
+            .copied()
+            .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+            .unwrap_or("panic");
         // The first panic is the cause; others follow from it.
         if let Ok(mut said) = heard.lock() {
             said.get_or_insert_with(|| format!("{what}{}", place.unwrap_or_default()));

@@ -35,7 +35,9 @@
 //! | `error.total_xyz` | lm/m2 | root mean square error of tristimulus irradiance |
 //! | `error.geometry_de_luv`, `.spectrum_de_luv`, `.convergence_de_luv` | dE*uv | by source |
 //! | `error.convergence` | 1 | of the solve, relative, in the solver's norm |
-//! | `flux` | | see [`Balance`](crate::solve::Round::flux): where the light went, worst band |
+//! | `flux.emitted_lm`, `.received_lm` | lm | given out by surfaces; what fronts receive straight from lamps of any kind |
+//! | `flux.absorbed_lm`, `.escaped_lm` | lm | absorbed by fronts; left the room or met a black back |
+//! | `flux.worst_band` | 1 | worst relative difference of received and absorbed + escaped light over all bands |
 //! | `row_sum_defect`, `row_sum_defect_after` | 1 | distance of row sums from what each leaf looks out on: mean by area and greatest, before and after balancing |
 //!
 //! After a round with `--snapshots`, `{"record": "snapshots", ...}` ([`SnapshotsRecord`]): `round`, `files`,
@@ -43,7 +45,7 @@
 //! light alone).
 //!
 //! With `--audit N`, `{"record": "audit", ...}` ([`AuditRecord`]): the fields of
-//! [`Comparison`](crate::audit::Comparison), then `estimate_de2000` (of the last round), `ratio` (estimate over measured
+//! [`Comparison`], then `estimate_de2000` (of the last round), `ratio` (estimate over measured
 //! error) and `honest` (is the ratio within 0.7 and 3? Both `null` if there is no estimate, the audit's own noise is too
 //! large to tell, or the error is below a tenth of what was asked for).
 //!
