@@ -14,15 +14,15 @@ use crate::spectrum::Leaves;
 use serde::Serialize;
 
 /// Paths a point in the first pass, the factor of the next, and the most.
-const PATHS: [usize; 3] = [2048, 4, 131_072];
+const PATHS: [usize; 3] = [2048, 4, 32_768];
 /// Paths are added until the noise is below this share of the measured error ...
 const QUIET: f64 = 0.35;
-/// ... or below this colour difference.
-const INVISIBLE: f64 = 0.02;
+/// ... or below this share of the error that the bake was asked for.
+const SMALL: f64 = 0.1;
 /// Standard errors in a 95 % confidence interval (normal distribution).
 const SIGMAS: f64 = 1.96;
 /// Illuminance below this share of the white's does not blow relative errors up.
-const FLOOR: f64 = 1e-3;
+const FLOOR: f64 = 0.01;
 
 /// A mean with its 95 % confidence interval over the points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -39,7 +39,10 @@ impl Mean {
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
         let half = SIGMAS * (variance / n).sqrt();
-        Self { mean, ci95: [mean - half, mean + half] }
+        Self {
+            mean,
+            ci95: [mean - half, mean + half],
+        }
     }
 }
 
@@ -68,7 +71,10 @@ pub struct Comparison {
     pub paths: usize,
     /// Colour difference of irradiance.
     pub de2000: Spread,
-    /// Relative difference of illuminance, (bake - audit) / audit: its mean shows a bias.
+    /// Difference of illuminance over the mean illuminance: is the room too bright or too dark as a whole?
+    pub bias: Mean,
+    /// Relative difference of illuminance point by point, (bake - audit) / audit; the divisor is 1 % of the white's at
+    /// least.
     pub relative: Mean,
     /// Root mean square of the same, noise included.
     pub relative_rms: f64,
@@ -87,8 +93,15 @@ pub struct Comparison {
 /// ```
 pub fn compare(bake: &Bake, points: usize, seed: u64) -> Comparison {
     let receivers = random_points(bake, points, seed);
-    let places: Vec<_> = receivers.iter().map(|r| (r.point, r.normal, r.plane)).collect();
-    let solved: Vec<[f64; 3]> = bake.gather(&receivers).iter().map(|g| bake.lanes().tristimulus(&g.irradiance)).collect();
+    let places: Vec<_> = receivers
+        .iter()
+        .map(|r| (r.point, r.normal, r.plane))
+        .collect();
+    let solved: Vec<[f64; 3]> = bake
+        .gather(&receivers)
+        .iter()
+        .map(|g| bake.lanes().tristimulus(&g.irradiance))
+        .collect();
     let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
     let weights = Observer::cie1931().weights(&bake.scene().grid);
     let white = bake.light().white;
@@ -97,7 +110,9 @@ pub fn compare(bake: &Bake, points: usize, seed: u64) -> Comparison {
         let answers = audit.irradiance(&places, paths, seed);
         let found = judge(&solved, &answers, &weights, white, paths);
         let spread = found.de2000;
-        if paths >= PATHS[2] || spread.noise <= (QUIET * spread.corrected).max(INVISIBLE) {
+        if paths >= PATHS[2]
+            || spread.noise <= (QUIET * spread.corrected).max(SMALL * bake.settings().error)
+        {
             return found;
         }
         paths *= PATHS[1];
@@ -107,12 +122,15 @@ pub fn compare(bake: &Bake, points: usize, seed: u64) -> Comparison {
 /// One point in each of `count` strata of equal area.
 fn random_points(bake: &Bake, count: usize, seed: u64) -> Vec<Receiver> {
     let tree = bake.tree();
-    let Some(root) = tree.nodes.first() else { return Vec::new() };
+    let Some(root) = tree.nodes.first() else {
+        return Vec::new();
+    };
     let mut rng = Pcg::new(seed ^ 0xaa0d_17ed);
     (0..count)
         .map(|k| {
             let target = (k as f64 + rng.f64()) / count as f64 * root.area;
-            let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
+            let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1)
+                .min(tree.faces.len() - 1);
             let weights = triangle_weights([rng.f64(), rng.f64()]);
             // The element of the whole face.
             let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
@@ -132,16 +150,26 @@ fn tristimulus(leaves: &Leaves, weights: &[Leaves; 3]) -> [f64; 3] {
     weights.map(|w| KM * leaves.iter().zip(&w).map(|(x, w)| x * w).sum::<f64>())
 }
 
-fn judge(solved: &[[f64; 3]], answers: &[Answer], weights: &[Leaves; 3], white: [f64; 3], paths: usize) -> Comparison {
+fn judge(
+    solved: &[[f64; 3]],
+    answers: &[Answer],
+    weights: &[Leaves; 3],
+    white: [f64; 3],
+    paths: usize,
+) -> Comparison {
     let mut differences = Vec::new();
-    let mut relative = Vec::new();
-    let mut noise = 0.0;
+    let (mut relative, mut absolute) = (Vec::new(), Vec::new());
+    let (mut noise, mut total) = (0.0, 0.0);
     for (ours, answer) in solved.iter().zip(answers) {
         let truth = tristimulus(&answer.mean, weights);
         differences.push(de2000(*ours, truth, white));
+        absolute.push(ours[1] - truth[1]);
+        total += truth[1];
         relative.push((ours[1] - truth[1]) / truth[1].max(FLOOR * white[1]));
         let half = |batches: &[Leaves]| {
-            let mean: Leaves = std::array::from_fn(|k| batches.iter().map(|b| b[k]).sum::<f64>() / batches.len() as f64);
+            let mean: Leaves = std::array::from_fn(|k| {
+                batches.iter().map(|b| b[k]).sum::<f64>() / batches.len() as f64
+            });
             tristimulus(&mean, weights)
         };
         let (first, second) = answer.batches.split_at(answer.batches.len() / 2);
@@ -151,7 +179,12 @@ fn judge(solved: &[[f64; 3]], answers: &[Answer], weights: &[Leaves; 3], white: 
     let noise = noise / n;
     let mean = Mean::of(&differences);
     differences.sort_by(f64::total_cmp);
-    let at = |share: f64| differences.get(((n - 1.0) * share).ceil() as usize).copied().unwrap_or(0.0);
+    let at = |share: f64| {
+        differences
+            .get(((n - 1.0) * share).ceil() as usize)
+            .copied()
+            .unwrap_or(0.0)
+    };
     Comparison {
         points: solved.len(),
         paths,
@@ -162,6 +195,12 @@ fn judge(solved: &[[f64; 3]], answers: &[Answer], weights: &[Leaves; 3], white: 
             p95: at(0.95),
             max: at(1.0),
         },
+        bias: Mean::of(
+            &absolute
+                .iter()
+                .map(|d| if total > 0.0 { d * n / total } else { 0.0 })
+                .collect::<Vec<_>>(),
+        ),
         relative: Mean::of(&relative),
         relative_rms: (relative.iter().map(|r| r * r).sum::<f64>() / n).sqrt(),
     }
@@ -178,17 +217,24 @@ mod tests {
         let flat: Leaves = [0.01; LEAVES];
         let truth = tristimulus(&flat, &weights);
         let white = truth.map(|x| 2.0 * x);
-        let answer = Answer { mean: flat, batches: vec![flat; 16] };
+        let answer = Answer {
+            mean: flat,
+            batches: vec![flat; 16],
+        };
         // Twenty points, one of which is 10 % too bright.
         let mut solved = vec![truth; 20];
         solved[7] = truth.map(|x| 1.1 * x);
         let found = judge(&solved, &vec![answer; 20], &weights, white, 64);
         let wrong = de2000(solved[7], truth, white);
         assert!(wrong > 2.0 && wrong < 5.0, "{wrong}");
-        assert_eq!((found.points, found.paths, found.de2000.max), (20, 64, wrong));
+        assert_eq!(
+            (found.points, found.paths, found.de2000.max),
+            (20, 64, wrong)
+        );
         assert!((found.de2000.mean.mean - wrong / 20.0).abs() < 1e-12);
         assert_eq!(found.de2000.noise, 0.0);
         assert!((found.relative.mean - 0.005).abs() < 1e-12);
+        assert!((found.bias.mean - 0.005).abs() < 1e-12);
         assert!((found.relative_rms - 0.1 / 20f64.sqrt()).abs() < 1e-12);
     }
 
@@ -200,7 +246,13 @@ mod tests {
         let white = truth.map(|x| 2.0 * x);
         // The halves lie 4 % apart: the mean is uncertain by 2 %. We are 5 % off.
         let batches = [vec![leaves(1.02); 8], vec![leaves(0.98); 8]].concat();
-        let answers = vec![Answer { mean: leaves(1.0), batches }; 50];
+        let answers = vec![
+            Answer {
+                mean: leaves(1.0),
+                batches
+            };
+            50
+        ];
         let solved = vec![truth.map(|x| 1.05 * x); 50];
         let spread = judge(&solved, &answers, &weights, white, 64).de2000;
         let ratio = spread.noise / spread.mean.mean;

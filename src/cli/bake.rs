@@ -4,7 +4,9 @@
 //! baked room is metered from its own light, whether or not pictures were taken: the same room gives the same bytes.
 
 use super::command::print;
-use super::log::{AuditRecord, End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
+use super::log::{
+    AuditRecord, End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code,
+};
 use super::options::{Common, Reading, Solving};
 use super::snapshots::Snapshots;
 use super::stop::Stop;
@@ -69,13 +71,25 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let stop = Stop::new(args.solving.time);
     stop.listen()?;
     let talk = Talk::new(common.quiet);
-    let output = args.output.clone().unwrap_or_else(|| args.room.with_extension("baked.glb"));
+    let output = args
+        .output
+        .clone()
+        .unwrap_or_else(|| args.room.with_extension("baked.glb"));
     talk.phase("reading");
-    let scene = load(&args.room, &args.reading, |parts| problems(args, &output, parts))?;
+    let scene = load(&args.room, &args.reading, |parts| {
+        problems(args, &output, parts)
+    })?;
     scene.warnings.iter().for_each(|w| talk.warn(w));
-    let mut seconds = Seconds { load: stop.elapsed_s(), ..Seconds::default() };
+    let mut seconds = Seconds {
+        load: stop.elapsed_s(),
+        ..Seconds::default()
+    };
 
-    let mut snapshots = args.snapshots.as_deref().map(|folder| Snapshots::new(folder, &scene)).transpose()?;
+    let mut snapshots = args
+        .snapshots
+        .as_deref()
+        .map(|folder| Snapshots::new(folder, &scene))
+        .transpose()?;
     let mut log = args.log.as_deref().map(Log::create).transpose()?;
     let mut outputs = Outputs {
         log: args.log.as_deref().map(text),
@@ -84,7 +98,13 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
 
     let clock = Instant::now();
     talk.phase("preparing");
-    let mut bake = prepare(scene, &args.solving, common, Representation::Adaptive, &talk);
+    let mut bake = prepare(
+        scene,
+        &args.solving,
+        common,
+        Representation::Adaptive,
+        &talk,
+    );
     write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
     seconds.prepare = clock.elapsed().as_secs_f64();
 
@@ -96,10 +116,14 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
             let light = bake.baked(&|done, of| talk.progress("gathering", done, of));
+            seconds.gather = clock.elapsed().as_secs_f64();
             talk.phase("drawing");
             let files = snapshots.round(round.round, bake.scene(), &light.surfaces)?;
             let exposure = snapshots.exposure(bake.scene(), &light.surfaces);
-            write(&mut log, &SnapshotsRecord::new(round.round, &files, exposure))?;
+            write(
+                &mut log,
+                &SnapshotsRecord::new(round.round, &files, exposure),
+            )?;
             outputs.pictures.extend(files);
             baked = Some(light);
             seconds.snapshots += clock.elapsed().as_secs_f64();
@@ -107,9 +131,19 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         Ok(())
     })?;
 
-    let clock = Instant::now();
-    let baked = baked.unwrap_or_else(|| bake.baked(&|done, of| talk.progress("gathering", done, of)));
-    seconds.gather = clock.elapsed().as_secs_f64();
+    let baked = match baked {
+        // The last picture's gather is the result's.
+        Some(baked) => {
+            seconds.snapshots -= seconds.gather;
+            baked
+        }
+        None => {
+            let clock = Instant::now();
+            let baked = bake.baked(&|done, of| talk.progress("gathering", done, of));
+            seconds.gather = clock.elapsed().as_secs_f64();
+            baked
+        }
+    };
 
     let clock = Instant::now();
     talk.phase("writing");
@@ -132,7 +166,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let audit = args.audit.map(|points| {
         talk.phase("auditing");
         let found = audit::compare(&bake, points, common.seed ^ AUDIT_SEED);
-        AuditRecord::new(found, bake.rounds().last())
+        AuditRecord::new(found, &bake)
     });
     if let Some(audit) = &audit {
         write(&mut log, audit)?;
@@ -140,22 +174,38 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     seconds.audit = clock.elapsed().as_secs_f64();
 
     seconds.total = stop.elapsed_s();
-    let end = End { bake: &bake, verdict, baked: &baked, glb: &glb, exposure, outputs, seconds };
+    let end = End {
+        bake: &bake,
+        verdict,
+        baked: &baked,
+        glb: &glb,
+        exposure,
+        outputs,
+        seconds,
+    };
     let record = VerdictRecord::new(end);
     write(&mut log, &record)?;
     talk.clear();
     talk.say(&format!("\n{}", summary::rounds(bake.rounds())));
     talk.say(&summary::verdict(&record, audit.as_ref()));
     if args.json {
-        let line = serde_json::to_string(&record).map_err(|problem| Error::Internal(format!("verdict: {problem}")))?;
+        let line = serde_json::to_string(&record)
+            .map_err(|problem| Error::Internal(format!("verdict: {problem}")))?;
         print(&(line + "\n"))?;
     }
     Ok(exit_code(verdict))
 }
 
 /// Reads a room; its problems and those that `others` finds (given the files the room is made of) come together.
-pub(super) fn load(room: &Path, reading: &Reading, others: impl FnOnce(&[PathBuf]) -> Vec<Problem>) -> Result<Scene> {
-    let options = Options { grid: reading.range.grid(), spectra: reading.spectra.clone() };
+pub(super) fn load(
+    room: &Path,
+    reading: &Reading,
+    others: impl FnOnce(&[PathBuf]) -> Vec<Problem>,
+) -> Result<Scene> {
+    let options = Options {
+        grid: reading.range.grid(),
+        spectra: reading.spectra.clone(),
+    };
     match Scene::load(room, &options) {
         Ok(scene) => match others(&paths::parts(&scene)) {
             none if none.is_empty() => Ok(scene),
@@ -166,7 +216,11 @@ pub(super) fn load(room: &Path, reading: &Reading, others: impl FnOnce(&[PathBuf
             Err(Error::Input(problems))
         }
         Err(Error::Io { path, source }) => {
-            let mut problems = vec![Problem::new(path, source.to_string(), "name a file that can be read")];
+            let mut problems = vec![Problem::new(
+                path,
+                source.to_string(),
+                "name a file that can be read",
+            )];
             problems.extend(others(&[]));
             Err(Error::Input(problems))
         }
@@ -175,11 +229,24 @@ pub(super) fn load(room: &Path, reading: &Reading, others: impl FnOnce(&[PathBuf
 }
 
 /// The bake of a scene, which tells `talk` of its phases.
-pub(super) fn prepare(scene: Scene, solving: &Solving, common: &Common, representation: Representation, talk: &Talk) -> Bake {
-    let settings = Settings { error: solving.error, representation, seed: common.seed, ..Settings::default() };
+pub(super) fn prepare(
+    scene: Scene,
+    solving: &Solving,
+    common: &Common,
+    representation: Representation,
+    talk: &Talk,
+) -> Bake {
+    let settings = Settings {
+        error: solving.error,
+        representation,
+        seed: common.seed,
+        ..Settings::default()
+    };
     let mut bake = Bake::new(scene, settings);
     let bar = talk.watch();
-    bake.watch(Arc::new(move |phase| bar.set_message(format!("{phase} done"))));
+    bake.watch(Arc::new(move |phase| {
+        bar.set_message(format!("{phase} done"))
+    }));
     bake
 }
 
@@ -193,11 +260,26 @@ fn problems(args: &BakeArgs, output: &Path, parts: &[PathBuf]) -> Vec<Problem> {
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));
     inputs.extend(parts.iter().map(PathBuf::as_path));
     let mut problems = paths::problems(&outputs, &inputs);
-    if !output.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb")) {
-        problems.push(Problem::new(format!("-o {}", output.display()), "the baked room is a .glb", "end its name in .glb"));
+    if !output
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("glb"))
+    {
+        problems.push(Problem::new(
+            format!("-o {}", output.display()),
+            "the baked room is a .glb",
+            "end its name in .glb",
+        ));
     }
-    if let Some(folder) = args.snapshots.as_deref().filter(|f| f.exists() && !f.is_dir()) {
-        problems.push(Problem::new(format!("--snapshots {}", folder.display()), "is a file", "name a folder"));
+    if let Some(folder) = args
+        .snapshots
+        .as_deref()
+        .filter(|f| f.exists() && !f.is_dir())
+    {
+        problems.push(Problem::new(
+            format!("--snapshots {}", folder.display()),
+            "is a file",
+            "name a folder",
+        ));
     }
     problems
 }

@@ -63,7 +63,9 @@ pub(super) fn print(text: &str) -> Result<()> {
     use std::io::{ErrorKind, Write};
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(problem) if problem.kind() != ErrorKind::BrokenPipe => Err(Error::io("standard output".as_ref(), problem)),
+        Err(problem) if problem.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::io("standard output".as_ref(), problem))
+        }
         _ => Ok(()),
     }
 }

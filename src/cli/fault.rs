@@ -10,7 +10,9 @@ pub fn guarded(run: impl FnOnce() -> crate::Result<u8>) -> u8 {
     let heard = Arc::clone(&said);
     let before = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
-        let place = info.location().map(|l| format!(" ({}:{})", l.file(), l.line()));
+        let place = info
+            .location()
+            .map(|l| format!(" ({}:{})", l.file(), l.line()));
         let what = info.payload_as_str().unwrap_or("panic");
         // The first panic is the cause; others follow from it.
         if let Ok(mut said) = heard.lock() {
@@ -42,9 +44,15 @@ mod tests {
     #[test]
     fn every_end_has_its_code() {
         assert_eq!(guarded(|| Ok(1)), 1);
-        assert_eq!(guarded(|| Err(Error::input("room.glb", "is empty", "export it again"))), 2);
+        assert_eq!(
+            guarded(|| Err(Error::input("room.glb", "is empty", "export it again"))),
+            2
+        );
         assert_eq!(guarded(|| Err(Error::Internal("lost".into()))), 3);
         assert_eq!(guarded(|| panic!("lost")), 3);
-        assert_eq!(guarded(|| rayon::join(|| panic!("lost in a thread"), || Ok(0)).1), 3);
+        assert_eq!(
+            guarded(|| rayon::join(|| panic!("lost in a thread"), || Ok(0)).1),
+            3
+        );
     }
 }

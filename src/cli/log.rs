@@ -44,8 +44,8 @@
 //!
 //! With `--audit N`, `{"record": "audit", ...}` ([`AuditRecord`]): the fields of
 //! [`Comparison`](crate::audit::Comparison), then `estimate_de2000` (of the last round), `ratio` (estimate over measured
-//! error) and `honest` (is the ratio within 0.7 and 3? `null` if there is no estimate, or the audit's own noise is
-//! too large to tell).
+//! error) and `honest` (is the ratio within 0.7 and 3? Both `null` if there is no estimate, the audit's own noise is too
+//! large to tell, or the error is below a tenth of what was asked for).
 //!
 //! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
 
@@ -55,15 +55,17 @@ use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
 use crate::solve::record::{Figure, Kind, LOG_VERSION};
-use crate::solve::{Bake, Representation, Round, Verdict};
+use crate::solve::{Bake, Representation, Verdict};
 use serde::Serialize;
 
 /// Name and version of the program.
 pub const PROGRAM: &str = concat!("haarlight ", env!("CARGO_PKG_VERSION"));
 /// An estimate between these multiples of the measured error is honest.
 const HONEST: [f64; 2] = [0.7, 3.0];
-/// With noise above this share of the measured error an audit does not judge.
+/// With noise above this share of the measured error an audit does not judge ...
 const NOISY: f64 = 0.7;
+/// ... nor below this share of the error asked for: nobody asked for more.
+const SMALL: f64 = 0.1;
 
 /// What was asked for.
 #[derive(Debug, Clone, Serialize)]
@@ -151,7 +153,12 @@ pub struct SnapshotsRecord<'a> {
 impl<'a> SnapshotsRecord<'a> {
     /// The record.
     pub fn new(round: usize, files: &'a [String], exposure: Exposure) -> Self {
-        Self { record: "snapshots", round, files, exposure }
+        Self {
+            record: "snapshots",
+            round,
+            files,
+            exposure,
+        }
     }
 }
 
@@ -172,10 +179,14 @@ pub struct AuditRecord {
 
 impl AuditRecord {
     /// Compares a measured error with the estimate of the last round.
-    pub fn new(comparison: Comparison, last: Option<&Round>) -> Self {
-        let estimate = last.and_then(|r| r.error.total_de2000.value);
+    pub fn new(comparison: Comparison, bake: &Bake) -> Self {
+        let estimate = bake
+            .rounds()
+            .last()
+            .and_then(|r| r.error.total_de2000.value);
         let measured = comparison.de2000.corrected;
-        let clear = comparison.de2000.noise < NOISY * measured;
+        let clear =
+            comparison.de2000.noise < NOISY * measured && measured > SMALL * bake.settings().error;
         let ratio = estimate.filter(|_| clear).map(|e| e / measured);
         Self {
             record: "audit",
@@ -213,7 +224,7 @@ pub struct Seconds {
     pub solve: f64,
     /// Gather at the vertices of the output.
     pub gather: f64,
-    /// Pictures of rounds, their gathers included.
+    /// Pictures of rounds, and the gathers for all but the last of them.
     pub snapshots: f64,
     /// Monte Carlo.
     pub audit: f64,
@@ -281,11 +292,23 @@ pub(super) struct End<'a> {
 impl VerdictRecord {
     pub(super) fn new(end: End) -> Self {
         let rounds = end.bake.rounds();
-        let links_s: f64 = rounds.iter().filter_map(|r| r.phases_s.get("links")?.as_f64()).sum();
+        let links_s: f64 = rounds
+            .iter()
+            .filter_map(|r| r.phases_s.get("links")?.as_f64())
+            .sum();
         let links: u64 = rounds.iter().map(|r| r.links_evaluated).sum();
         let rays = rounds.iter().map(|r| r.rays).sum::<u64>() + end.baked.rays;
-        let rate = |count: u64, seconds: f64| if seconds > 0.0 { count as f64 / seconds } else { 0.0 };
-        let unknown = Figure { value: None, kind: Kind::Estimate };
+        let rate = |count: u64, seconds: f64| {
+            if seconds > 0.0 {
+                count as f64 / seconds
+            } else {
+                0.0
+            }
+        };
+        let unknown = Figure {
+            value: None,
+            kind: Kind::Estimate,
+        };
         Self {
             record: "verdict",
             version: LOG_VERSION,

@@ -109,7 +109,9 @@ mod tests {
         let range: Range = "380..700".parse().unwrap();
         assert_eq!(range.grid(), Grid::paper());
         assert_eq!(Range::default().grid(), Grid::default());
-        for bad in ["380", "380-780", "780..380", "NaN..780", "300..780", "380..400", "a..b"] {
+        for bad in [
+            "380", "380-780", "780..380", "NaN..780", "300..780", "380..400", "a..b",
+        ] {
             assert!(bad.parse::<Range>().is_err(), "{bad}");
         }
     }

@@ -11,7 +11,11 @@ pub(super) fn problems(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Vec<Probl
     let mut seen: Vec<(PathBuf, &str)> = Vec::new();
     for &(option, path) in outputs {
         let mut wrong = |what: String, next: &str| {
-            problems.push(Problem::new(format!("{option} {}", path.display()), what, next));
+            problems.push(Problem::new(
+                format!("{option} {}", path.display()),
+                what,
+                next,
+            ));
         };
         if path.is_dir() {
             wrong("is a folder".into(), "name a file");
@@ -21,7 +25,10 @@ pub(super) fn problems(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Vec<Probl
             wrong("its folder is not there".into(), "make the folder first");
             continue;
         };
-        if inputs.iter().any(|input| whole(input).as_ref() == Some(&place)) {
+        if inputs
+            .iter()
+            .any(|input| whole(input).as_ref() == Some(&place))
+        {
             wrong("would overwrite an input".into(), "give another name");
         } else if let Some((_, other)) = seen.iter().find(|(p, _)| *p == place) {
             wrong(format!("is the file of {other} too"), "give another name");
@@ -54,17 +61,29 @@ fn whole(path: &Path) -> Option<PathBuf> {
     }
     let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
-    folder.is_dir().then(|| folder.join(path.file_name().unwrap_or_default()))
+    folder
+        .is_dir()
+        .then(|| folder.join(path.file_name().unwrap_or_default()))
 }
 
 /// A name without anything that a file system or shell could take amiss.
 pub(super) fn file_name(name: &str) -> String {
     let clean: String = name
         .chars()
-        .map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '-' })
+        .map(|c| {
+            if c.is_alphanumeric() || "-_".contains(c) {
+                c
+            } else {
+                '-'
+            }
+        })
         .take(60)
         .collect();
-    if clean.trim_matches('-').is_empty() { "camera".into() } else { clean }
+    if clean.trim_matches('-').is_empty() {
+        "camera".into()
+    } else {
+        clean
+    }
 }
 
 /// File names for things with these names, no two alike (also where case does not count).
@@ -95,11 +114,22 @@ mod tests {
         let (room, roundabout) = (at("room.glb"), at("./room.glb"));
         let (a, b, nowhere) = (at("a"), at("./a"), at("no/a"));
         let found = problems(
-            &[("-o", &roundabout), ("--npz", &a), ("--log", &b), ("--x", folder.path()), ("--y", &nowhere)],
+            &[
+                ("-o", &roundabout),
+                ("--npz", &a),
+                ("--log", &b),
+                ("--x", folder.path()),
+                ("--y", &nowhere),
+            ],
             &[&room],
         );
         let texts: Vec<String> = found.iter().map(ToString::to_string).collect();
-        for (text, part) in texts.iter().zip(["overwrite", "is the file of --npz", "is a folder", "not there"]) {
+        for (text, part) in texts.iter().zip([
+            "overwrite",
+            "is the file of --npz",
+            "is a folder",
+            "not there",
+        ]) {
             assert!(text.contains(part), "{texts:#?}");
         }
         assert_eq!(texts.len(), 4);
@@ -110,6 +140,9 @@ mod tests {
     fn camera_names_become_file_names() {
         let names = ["Küche 1", "../x", "", "///", "cam", "Cam"];
         let files = file_names(names.into_iter());
-        assert_eq!(files, ["Küche-1", "---x", "camera", "camera-2", "cam", "Cam-2"]);
+        assert_eq!(
+            files,
+            ["Küche-1", "---x", "camera", "camera-2", "cam", "Cam-2"]
+        );
     }
 }

@@ -35,33 +35,57 @@ impl Points {
     /// There is no such file, or it is none.
     pub fn open(path: &Path) -> Result<Self> {
         // A device or pipe might never end.
-        if std::fs::metadata(path).map_err(|e| Error::io(path, e))?.is_file() {
+        if std::fs::metadata(path)
+            .map_err(|e| Error::io(path, e))?
+            .is_file()
+        {
             let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-            return Ok(Self::parse(&String::from_utf8_lossy(&bytes), &path.display().to_string()));
+            return Ok(Self::parse(
+                &String::from_utf8_lossy(&bytes),
+                &path.display().to_string(),
+            ));
         }
-        Err(Error::input(path.display().to_string(), "is not a file", "name a CSV file"))
+        Err(Error::input(
+            path.display().to_string(),
+            "is not a file",
+            "name a CSV file",
+        ))
     }
 
     /// Reads the text of a CSV; `place` names it in problems.
     pub fn parse(text: &str, place: &str) -> Self {
         let mut out = Self::default();
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+        let mut lines = text
+            .lines()
+            .enumerate()
+            .filter(|(_, line)| !line.trim().is_empty());
         let next = "begin with the line x,y,z,nx,ny,nz";
         let Some((_, header)) = lines.next() else {
             out.problems.push(Problem::new(place, "is empty", next));
             return out;
         };
-        let names: Vec<String> = header.split(',').map(|name| name.trim().trim_matches('"').to_lowercase()).collect();
+        let names: Vec<String> = header
+            .split(',')
+            .map(|name| name.trim().trim_matches('"').to_lowercase())
+            .collect();
         let columns = COLUMNS.map(|wanted| names.iter().position(|name| name == wanted));
-        let missing: Vec<&str> = COLUMNS.into_iter().zip(columns).filter(|(_, c)| c.is_none()).map(|(name, _)| name).collect();
+        let missing: Vec<&str> = COLUMNS
+            .into_iter()
+            .zip(columns)
+            .filter(|(_, c)| c.is_none())
+            .map(|(name, _)| name)
+            .collect();
         if !missing.is_empty() {
             let what = format!("line 1 lacks the columns {}", missing.join(", "));
             out.problems.push(Problem::new(place, what, next));
             return out;
         }
         let columns = columns.map(Option::unwrap_or_default);
-        out.ignored = names.into_iter().filter(|n| !COLUMNS.contains(&n.as_str())).collect();
+        out.ignored = names
+            .into_iter()
+            .filter(|n| !COLUMNS.contains(&n.as_str()))
+            .collect();
         let mut wrong = 0;
         for (number, line) in lines {
             match point(line, columns) {
@@ -70,27 +94,38 @@ impl Points {
                     wrong += 1;
                     if wrong <= LISTED {
                         let place = format!("{place}: line {}", number + 1);
-                        out.problems.push(Problem::new(place, what, "correct or remove the line"));
+                        out.problems
+                            .push(Problem::new(place, what, "correct or remove the line"));
                     }
                 }
             }
         }
         if wrong > LISTED {
             let what = format!("{} more lines are wrong", wrong - LISTED);
-            out.problems.push(Problem::new(place, what, "correct or remove them"));
+            out.problems
+                .push(Problem::new(place, what, "correct or remove them"));
         }
         if out.points.is_empty() && wrong == 0 {
-            out.problems.push(Problem::new(place, "has no points", "add a line for each point"));
+            out.problems.push(Problem::new(
+                place,
+                "has no points",
+                "add a line for each point",
+            ));
         }
         out
     }
 }
 
 fn point(line: &str, columns: [usize; 6]) -> std::result::Result<Point, String> {
-    let cells: Vec<&str> = line.split(',').map(|c| c.trim().trim_matches('"')).collect();
+    let cells: Vec<&str> = line
+        .split(',')
+        .map(|c| c.trim().trim_matches('"'))
+        .collect();
     let mut values = [0.0; 6];
     for ((value, column), name) in values.iter_mut().zip(columns).zip(COLUMNS) {
-        let cell = cells.get(column).ok_or_else(|| format!("there is no {name}"))?;
+        let cell = cells
+            .get(column)
+            .ok_or_else(|| format!("there is no {name}"))?;
         *value = match cell.parse::<f64>() {
             Ok(number) if number.is_finite() => number,
             _ => {
@@ -103,7 +138,10 @@ fn point(line: &str, columns: [usize; 6]) -> std::result::Result<Point, String> 
     let normal = DVec3::new(nx, ny, nz);
     // Scaled first: squares of very large or small numbers leave the range of f64.
     let normal = (normal / normal.abs().max_element()).try_normalize();
-    Ok((DVec3::new(x, y, z), normal.ok_or("the normal has no length")?))
+    Ok((
+        DVec3::new(x, y, z),
+        normal.ok_or("the normal has no length")?,
+    ))
 }
 
 #[cfg(test)]
@@ -139,9 +177,17 @@ mod tests {
 
     #[test]
     fn files_without_points_are_refused() {
-        for (text, part) in [("", "is empty"), ("x,y,z,nx\n", "lacks the columns ny, nz"), ("x,y,z,nx,ny,nz\n", "no points")] {
+        for (text, part) in [
+            ("", "is empty"),
+            ("x,y,z,nx\n", "lacks the columns ny, nz"),
+            ("x,y,z,nx,ny,nz\n", "no points"),
+        ] {
             let read = Points::parse(text, "p.csv");
-            assert!(read.problems[0].to_string().contains(part), "{:?}", read.problems);
+            assert!(
+                read.problems[0].to_string().contains(part),
+                "{:?}",
+                read.problems
+            );
         }
         let many = "x,y,z,nx,ny,nz\n".to_owned() + &"?\n".repeat(1000);
         let read = Points::parse(&many, "p.csv");

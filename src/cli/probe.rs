@@ -64,19 +64,35 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let talk = Talk::new(common.quiet);
     let mut read = match Points::open(&args.points) {
         Ok(read) => read,
-        Err(Error::Input(problems)) => Points { problems, ..Points::default() },
+        Err(Error::Input(problems)) => Points {
+            problems,
+            ..Points::default()
+        },
         Err(problem) => Points {
-            problems: vec![Problem::new("--points", problem.to_string(), "name a file that can be read")],
+            problems: vec![Problem::new(
+                "--points",
+                problem.to_string(),
+                "name a file that can be read",
+            )],
             ..Points::default()
         },
     };
     let wrong = std::mem::take(&mut read.problems);
-    let scene = load(&args.room, &args.reading, |parts| problems(args, parts, wrong))?;
+    let scene = load(&args.room, &args.reading, |parts| {
+        problems(args, parts, wrong)
+    })?;
     scene.warnings.iter().for_each(|w| talk.warn(w));
     if !read.ignored.is_empty() {
-        talk.warn(&format!("columns of the points that are not read: {}", read.ignored.join(", ")));
+        talk.warn(&format!(
+            "columns of the points that are not read: {}",
+            read.ignored.join(", ")
+        ));
     }
-    let representation = if args.bands { Representation::Dense } else { Representation::Adaptive };
+    let representation = if args.bands {
+        Representation::Dense
+    } else {
+        Representation::Adaptive
+    };
     let mut bake = prepare(scene, &args.solving, common, representation, &talk);
     let verdict = stop.run(&mut bake, &talk, |_, _| Ok(()))?;
     talk.phase("probing");
@@ -84,10 +100,20 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     talk.clear();
 
     let columns = columns(args.bands, &bake.scene().grid);
-    let rows: Vec<Vec<f64>> = read.points.iter().zip(&probed).map(|(p, light)| row(p, light, args.bands)).collect();
+    let rows: Vec<Vec<f64>> = read
+        .points
+        .iter()
+        .zip(&probed)
+        .map(|(p, light)| row(p, light, args.bands))
+        .collect();
     let csv = || {
-        let lines = rows.iter().map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
-        std::iter::once(columns.join(",")).chain(lines).map(|line| line + "\n").collect::<String>()
+        let lines = rows
+            .iter()
+            .map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
+        std::iter::once(columns.join(","))
+            .chain(lines)
+            .map(|line| line + "\n")
+            .collect::<String>()
     };
     if let Some(path) = &args.output {
         file::write_atomic(path, Some(&args.room), |w| w.write_all(csv().as_bytes()))?;
@@ -111,7 +137,12 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
 
 /// Problems of the points and the output.
 fn problems(args: &ProbeArgs, parts: &[PathBuf], mut problems: Vec<Problem>) -> Vec<Problem> {
-    let outputs: Vec<_> = args.output.as_deref().map(|path| ("-o", path)).into_iter().collect();
+    let outputs: Vec<_> = args
+        .output
+        .as_deref()
+        .map(|path| ("-o", path))
+        .into_iter()
+        .collect();
     let beside = args.room.with_extension("spectra.json");
     let mut inputs = vec![args.room.as_path(), &args.points];
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));
@@ -121,7 +152,11 @@ fn problems(args: &ProbeArgs, parts: &[PathBuf], mut problems: Vec<Problem>) -> 
 }
 
 fn columns(bands: bool, grid: &Grid) -> Vec<String> {
-    let mut columns: Vec<String> = COLUMNS.into_iter().chain(["E_X", "E_Y", "E_Z"]).map(String::from).collect();
+    let mut columns: Vec<String> = COLUMNS
+        .into_iter()
+        .chain(["E_X", "E_Y", "E_Z"])
+        .map(String::from)
+        .collect();
     if bands {
         columns.extend((0..LEAVES).map(|leaf| format!("E_{}", grid.left(leaf))));
     }
@@ -146,6 +181,9 @@ mod tests {
         assert_eq!(names.len(), 9 + 64);
         assert_eq!(names[9..11], ["E_380", "E_386.25"]);
         assert_eq!(columns(true, &Grid::paper())[72], "E_695");
-        assert_eq!(columns(false, &Grid::default()).join(","), "x,y,z,nx,ny,nz,E_X,E_Y,E_Z");
+        assert_eq!(
+            columns(false, &Grid::default()).join(","),
+            "x,y,z,nx,ny,nz,E_X,E_Y,E_Z"
+        );
     }
 }

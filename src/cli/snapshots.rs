@@ -37,11 +37,18 @@ impl Snapshots {
 
     /// The exposure of all pictures: metered when first asked for.
     pub(super) fn exposure(&mut self, scene: &Scene, surfaces: &[BakedSurface]) -> Exposure {
-        *self.exposure.get_or_insert_with(|| Exposure::auto(scene, surfaces))
+        *self
+            .exposure
+            .get_or_insert_with(|| Exposure::auto(scene, surfaces))
     }
 
     /// Pictures of a round; the paths.
-    pub(super) fn round(&mut self, round: usize, scene: &Scene, surfaces: &[BakedSurface]) -> Result<Vec<String>> {
+    pub(super) fn round(
+        &mut self,
+        round: usize,
+        scene: &Scene,
+        surfaces: &[BakedSurface],
+    ) -> Result<Vec<String>> {
         let look = self.exposure(scene, surfaces);
         self.each(&format!("round-{round:02}"), "png", scene, |camera| {
             Picture::draw(scene, surfaces, camera, &look, format(camera))?.to_png()
@@ -52,11 +59,23 @@ impl Snapshots {
     pub(super) fn last(&mut self, scene: &Scene, surfaces: &[BakedSurface]) -> Result<Vec<String>> {
         let look = self.exposure(scene, surfaces);
         self.each("final", "exr", scene, |camera| {
-            exr::to_exr(&Picture::draw(scene, surfaces, camera, &look, format(camera))?)
+            exr::to_exr(&Picture::draw(
+                scene,
+                surfaces,
+                camera,
+                &look,
+                format(camera),
+            )?)
         })
     }
 
-    fn each(&self, start: &str, end: &str, scene: &Scene, draw: impl Fn(&Camera) -> Result<Vec<u8>>) -> Result<Vec<String>> {
+    fn each(
+        &self,
+        start: &str,
+        end: &str,
+        scene: &Scene,
+        draw: impl Fn(&Camera) -> Result<Vec<u8>>,
+    ) -> Result<Vec<String>> {
         let mut paths = Vec::new();
         for (name, camera) in &self.cameras {
             let path = self.folder.join(format!("{start}-{name}.{end}"));
@@ -91,7 +110,12 @@ mod tests {
 
     #[test]
     fn pictures_have_the_proportions_of_their_camera() {
-        let camera = |aspect| Camera { name: String::new(), to_world: DMat4::IDENTITY, projection: Projection::Perspective(1.0), aspect };
+        let camera = |aspect| Camera {
+            name: String::new(),
+            to_world: DMat4::IDENTITY,
+            projection: Projection::Perspective(1.0),
+            aspect,
+        };
         let size = |aspect| {
             let f = format(&camera(aspect));
             (f.width, f.height)

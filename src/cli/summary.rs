@@ -7,7 +7,18 @@ use crate::solve::{Round, Verdict};
 /// Rounds as a table.
 pub(super) fn rounds(rounds: &[Round]) -> String {
     use Align::Right;
-    let titles = ["round", "dE00", "geometry", "spectrum", "solve", "elements", "links", "intervals", "rays", "s"];
+    let titles = [
+        "round",
+        "dE00",
+        "geometry",
+        "spectrum",
+        "solve",
+        "elements",
+        "links",
+        "intervals",
+        "rays",
+        "s",
+    ];
     let mut table = Table::new(titles.map(|title| (title, Right)));
     let error = |value: Option<f64>| value.map_or("-".into(), |v| format!("{v:.3}"));
     for r in rounds {
@@ -24,12 +35,18 @@ pub(super) fn rounds(rounds: &[Round]) -> String {
             format!("{:.2}", r.round_s),
         ]);
     }
-    format!("{}(dE00: mean CIEDE2000, all sources; by source: dE*uv; estimates)", table.terminal())
+    format!(
+        "{}(dE00: mean CIEDE2000, all sources; by source: dE*uv; estimates)",
+        table.terminal()
+    )
 }
 
 /// The verdict in a few lines.
 pub(super) fn verdict(v: &VerdictRecord, audit: Option<&AuditRecord>) -> String {
-    let error = v.error_de2000.value.map_or("not known".into(), |e| format!("{e:.3}"));
+    let error = v
+        .error_de2000
+        .value
+        .map_or("not known".into(), |e| format!("{e:.3}"));
     let end = match v.verdict {
         Verdict::Reached => "reached",
         Verdict::OutOfTime => "not reached: out of time",
@@ -38,7 +55,10 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&AuditRecord>) -> String 
         Verdict::Exhausted => "not reached: nothing left to refine",
     };
     let mut lines = vec![
-        format!("estimated error: dE00 {error}, asked for {}: {end}", v.asked_de2000),
+        format!(
+            "estimated error: dE00 {error}, asked for {}: {end}",
+            v.asked_de2000
+        ),
         format!(
             "{} vertices ({} covered, {} clipped), {} triangles; {:.0} rays/s, {:.0} links/s",
             v.vertices, v.covered, v.clipped, v.triangles, v.rays_per_s, v.links_per_s
@@ -56,7 +76,10 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&AuditRecord>) -> String 
         ),
     ];
     if v.capped > 0 {
-        lines.push(format!("{} triangles wanted to be finer than is allowed", v.capped));
+        lines.push(format!(
+            "{} triangles wanted to be finer than is allowed",
+            v.capped
+        ));
     }
     if let Some(audit) = audit {
         let c = &audit.comparison;
@@ -65,10 +88,10 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&AuditRecord>) -> String 
             Some(false) => "the estimate was NOT honest",
             None => "no judgement on the estimate",
         };
-        let [low, high] = c.relative.ci95.map(|x| 100.0 * x);
+        let [low, high] = c.bias.ci95.map(|x| 100.0 * x);
         lines.push(format!(
             "measured error at {} points: dE00 mean {:.3} (noise {:.3}), 95 % below {:.2}, max {:.2}; illuminance {:+.2} % ({low:.2} .. {high:.2}); {honest}",
-            c.points, c.de2000.corrected, c.de2000.noise, c.de2000.p95, c.de2000.max, 100.0 * c.relative.mean
+            c.points, c.de2000.corrected, c.de2000.noise, c.de2000.p95, c.de2000.max, 100.0 * c.bias.mean
         ));
     }
     lines.push(format!("written: {}", v.outputs.glb));

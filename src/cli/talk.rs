@@ -62,7 +62,8 @@ impl Talk {
             return;
         }
         if done == 0
-            && let Ok(style) = ProgressStyle::with_template("  {msg} [{bar:30}] {pos} of {len} {elapsed}")
+            && let Ok(style) =
+                ProgressStyle::with_template("  {msg} [{bar:30}] {pos} of {len} {elapsed}")
         {
             self.bar.set_style(style);
             self.bar.set_message(name.to_owned());

@@ -314,11 +314,14 @@ impl Bake {
         let dense = sources::DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
         let model = coarse::Coarse::new(&self.tree, &self.graph.links, &factor, &self.areas, &leaves, &dense, self.scene.spectra.len());
         let choice = model.choose(&self.scene.spectra, &self.weights, self.light.white, SPECTRUM_SHARE * self.settings.error);
-        self.lanes = Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights);
+        let lanes = Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights);
         self.spectrum_error = choice.error;
-        // The lanes of an earlier round mean something else: the next solve starts afresh.
-        self.light.reflected = Rows::default();
-        self.direct = direct::Direct::default();
+        if lanes.lanes() != self.lanes.lanes() {
+            // The lanes of an earlier round mean something else: the next solve starts afresh.
+            self.light.reflected = Rows::default();
+            self.direct = direct::Direct::default();
+        }
+        self.lanes = lanes;
     }
 
     /// Learns how new leaves look out; returns the rays cast.
