@@ -97,9 +97,15 @@ impl Mesh {
                 mesh.area.push(0.5 * cross.length());
                 // A triangle without area blocks nothing and receives nothing; it stays in the output only.
                 if cross.length_squared() > 0.0 {
-                    mesh.faces.push(Face { triangle, back: false });
+                    mesh.faces.push(Face {
+                        triangle,
+                        back: false,
+                    });
                     if both {
-                        mesh.faces.push(Face { triangle, back: true });
+                        mesh.faces.push(Face {
+                            triangle,
+                            back: true,
+                        });
                     }
                 }
             }

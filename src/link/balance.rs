@@ -35,7 +35,9 @@ pub struct Balance {
 /// Balances the rows of a hierarchy; `target` holds what the row of each leaf node must sum to, in [0, 1].
 /// `areas` are the areas of all nodes that take part.
 pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> Balance {
-    let leaves: Vec<usize> = (0..tree.nodes.len()).filter(|&k| tree.nodes[k].is_leaf()).collect();
+    let leaves: Vec<usize> = (0..tree.nodes.len())
+        .filter(|&k| tree.nodes[k].is_leaf())
+        .collect();
     let mut factor = vec![1.0_f64; tree.nodes.len()];
     let mut sums = row_sums(tree, rows, areas, &factor);
     let defect_before = defect(areas, &leaves, &sums, target);
@@ -75,8 +77,16 @@ pub(crate) fn row_sums(tree: &Tree, rows: &LinkRows, areas: &[f64], factor: &[f6
     }
     let mut sums = vec![0.0; nodes.len()];
     for k in 0..nodes.len() {
-        let own: f64 = rows.row(k).iter().map(|&(source, g)| f64::from(g) * mean[source as usize]).sum();
-        let above = if k == 0 { 0.0 } else { sums[nodes[k].parent as usize] };
+        let own: f64 = rows
+            .row(k)
+            .iter()
+            .map(|&(source, g)| f64::from(g) * mean[source as usize])
+            .sum();
+        let above = if k == 0 {
+            0.0
+        } else {
+            sums[nodes[k].parent as usize]
+        };
         sums[k] = above + own / areas[k];
     }
     for (k, sum) in sums.iter_mut().enumerate() {

@@ -9,7 +9,11 @@ use crate::link::{Demand, MAX_DEPTH};
 use rayon::prelude::*;
 
 /// Points of a leaf: the rule of Strang and Fix (1973) that is exact for quadratic functions.
-const POINTS: [[f64; 3]; 3] = [[2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0]];
+const POINTS: [[f64; 3]; 3] = [
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+];
 /// Further points that are tried where some are covered.
 const MORE_POINTS: usize = 8;
 /// Error of a leaf's direct light, in what would split the leaf.
@@ -35,12 +39,24 @@ impl Direct {
 
     /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
     /// `weights` turn a row into brightness, share of white; `gather` gives none for a point that something covers.
-    pub(super) fn refine(&mut self, tree: &mut Tree, demand: &Demand, weights: &[f64], gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync)) {
-        let mut open: Vec<u32> = (0..tree.nodes.len() as u32).filter(|&k| tree.node(k).is_leaf()).collect();
+    pub(super) fn refine(
+        &mut self,
+        tree: &mut Tree,
+        demand: &Demand,
+        weights: &[f64],
+        gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
+    ) {
+        let mut open: Vec<u32> = (0..tree.nodes.len() as u32)
+            .filter(|&k| tree.node(k).is_leaf())
+            .collect();
         while !open.is_empty() {
             self.rows.resize(tree.nodes.len(), None);
             self.spread.resize(tree.nodes.len(), 0.0);
-            let fresh: Vec<u32> = open.iter().copied().filter(|&k| self.rows[k as usize].is_none()).collect();
+            let fresh: Vec<u32> = open
+                .iter()
+                .copied()
+                .filter(|&k| self.rows[k as usize].is_none())
+                .collect();
             let width = weights.len();
             let parts: Vec<(Vec<(Box<[f32]>, f32)>, u64)> = fresh
                 .par_chunks(CHUNK)
@@ -49,7 +65,15 @@ impl Direct {
                     let each = |&leaf: &u32| {
                         // What would split the leaf is what it has to be told from.
                         let share = (tree.node(leaf).area / demand.total_area).sqrt();
-                        at_leaf(tree, leaf, width, weights, NOISE * demand.threshold / share, gather, &mut memory)
+                        at_leaf(
+                            tree,
+                            leaf,
+                            width,
+                            weights,
+                            NOISE * demand.threshold / share,
+                            gather,
+                            &mut memory,
+                        )
                     };
                     let all = chunk.iter().map(each).collect();
                     (all, memory.rays)
@@ -68,7 +92,8 @@ impl Direct {
                 let node = tree.node(leaf);
                 let depth = tree.elements[node.element as usize].depth;
                 let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
-                let error = f64::from(self.spread[leaf as usize] * keen) * (node.area / demand.total_area).sqrt();
+                let error = f64::from(self.spread[leaf as usize] * keen)
+                    * (node.area / demand.total_area).sqrt();
                 if error > demand.threshold && node.area > demand.least_area && depth < MAX_DEPTH {
                     tree.subdivide(leaf);
                     children.extend(tree.node(leaf).child_range());
@@ -108,7 +133,9 @@ fn at_leaf(
             leaf: Some(leaf),
             seed: u64::from(leaf) << 4 | k as u64,
         };
-        let Some(row) = gather(tree, &to, tolerance, memory) else { continue };
+        let Some(row) = gather(tree, &to, tolerance, memory) else {
+            continue;
+        };
         bare += 1;
         let mut bright = 0.0;
         for ((m, x), w) in mean.iter_mut().zip(row).zip(weights) {

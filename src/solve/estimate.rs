@@ -40,13 +40,22 @@ impl Probes {
         if let Some(root) = tree.nodes.first() {
             for k in 0..POINTS {
                 let target = (k as f64 + rng.f64()) / POINTS as f64 * root.area;
-                let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
+                let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1)
+                    .min(tree.faces.len() - 1);
                 let weights = triangle_weights([rng.f64(), rng.f64()]);
                 let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
-                points.push((entry as u32, weights, element.at(weights), tree.face_normal[entry]));
+                points.push((
+                    entry as u32,
+                    weights,
+                    element.at(weights),
+                    tree.face_normal[entry],
+                ));
             }
         }
-        Self { points, last: Vec::new() }
+        Self {
+            points,
+            last: Vec::new(),
+        }
     }
 
     /// The points as receivers in the present hierarchy.
@@ -73,7 +82,12 @@ impl Probes {
             Distance {
                 de2000: SHARE * pairs().map(|(a, b)| de2000(*a, *b, white)).sum::<f64>() / n,
                 de_luv: SHARE * pairs().map(|(a, b)| de_luv(*a, *b, white)).sum::<f64>() / n,
-                relative: SHARE * (pairs().map(|(a, b)| ((a[1] - b[1]) / (0.5 * (a[1] + b[1])).max(floor)).powi(2)).sum::<f64>() / n).sqrt(),
+                relative: SHARE
+                    * (pairs()
+                        .map(|(a, b)| ((a[1] - b[1]) / (0.5 * (a[1] + b[1])).max(floor)).powi(2))
+                        .sum::<f64>()
+                        / n)
+                        .sqrt(),
             }
         });
         self.last = now;

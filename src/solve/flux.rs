@@ -33,7 +33,9 @@ pub enum Closed {
 
 /// Casts rays from the fronts of all faces: the room is closed if every one meets the front of something.
 pub fn closedness(mesh: &Mesh, tree: &Tree, rays: &RayIndex, sight: &Sight, seed: u64) -> Closed {
-    let Some(root) = tree.nodes.first() else { return Closed::No };
+    let Some(root) = tree.nodes.first() else {
+        return Closed::No;
+    };
     if sight.opaque.is_some() {
         // Holes lead somewhere else.
         return Closed::No;
@@ -41,7 +43,8 @@ pub fn closedness(mesh: &Mesh, tree: &Tree, rays: &RayIndex, sight: &Sight, seed
     let mut rng = Pcg::new(seed ^ 0x00c1_05ed);
     for _ in 0..ESCAPE_RAYS {
         let target = rng.f64() * root.area;
-        let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
+        let entry =
+            (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
         let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
         let from = element.at(triangle_weights([rng.f64(), rng.f64()]));
         let direction = cosine_direction(tree.face_normal[entry], [rng.f64(), rng.f64()]);
@@ -61,7 +64,14 @@ enum Meets {
     Nothing,
 }
 
-fn meets(mesh: &Mesh, tree: &Tree, rays: &RayIndex, from: DVec3, direction: DVec3, plane: u32) -> Meets {
+fn meets(
+    mesh: &Mesh,
+    tree: &Tree,
+    rays: &RayIndex,
+    from: DVec3,
+    direction: DVec3,
+    plane: u32,
+) -> Meets {
     let reach = (4.0 * mesh.half_size) as f32;
     match rays.closest(from.as_vec3(), direction.as_vec3(), reach, plane) {
         None => Meets::Nothing,
@@ -71,8 +81,25 @@ fn meets(mesh: &Mesh, tree: &Tree, rays: &RayIndex, from: DVec3, direction: DVec
 }
 
 /// Is a point of a surface covered by something solid that stands on it or ends there? Then it sees backs only.
-pub fn covered(mesh: &Mesh, tree: &Tree, rays: &RayIndex, point: DVec3, normal: DVec3, plane: u32, seed: u64) -> bool {
-    (0..COVER_RAYS).all(|k| meets(mesh, tree, rays, point, cosine_direction(normal, sequence02(k, seed)), plane) == Meets::Back)
+pub fn covered(
+    mesh: &Mesh,
+    tree: &Tree,
+    rays: &RayIndex,
+    point: DVec3,
+    normal: DVec3,
+    plane: u32,
+    seed: u64,
+) -> bool {
+    (0..COVER_RAYS).all(|k| {
+        meets(
+            mesh,
+            tree,
+            rays,
+            point,
+            cosine_direction(normal, sequence02(k, seed)),
+            plane,
+        ) == Meets::Back
+    })
 }
 
 /// How leaves look out: what their rows must sum to, and how much of their area looks out at all.
@@ -86,7 +113,14 @@ pub struct Outlook {
 
 impl Outlook {
     /// Looks out of new leaves. A leaf below one whose rays all met fronts is not looked at again. Returns the rays cast.
-    pub fn extend(&mut self, mesh: &Mesh, tree: &Tree, rays: &RayIndex, closed: Closed, seed: u64) -> u64 {
+    pub fn extend(
+        &mut self,
+        mesh: &Mesh,
+        tree: &Tree,
+        rays: &RayIndex,
+        closed: Closed,
+        seed: u64,
+    ) -> u64 {
         let old = self.target.len();
         self.target.resize(tree.nodes.len(), f32::NAN);
         self.bare.resize(tree.nodes.len(), f32::NAN);
@@ -123,14 +157,25 @@ impl Outlook {
                     for i in 0..count as u32 {
                         let from = element.at(triangle_weights(sequence02(i, at)));
                         let direction = cosine_direction(node.normal, sequence02(i, to));
-                        match meets(mesh, tree, rays, from, direction, tree.face_plane[element.face as usize]) {
+                        match meets(
+                            mesh,
+                            tree,
+                            rays,
+                            from,
+                            direction,
+                            tree.face_plane[element.face as usize],
+                        ) {
                             Meets::Front => fronts += 1,
                             Meets::Back => backs += 1,
                             Meets::Nothing => {}
                         }
                     }
                     let bare = (count - backs) as f64 / count as f64;
-                    let target = if backs < count { fronts as f64 / (count - backs) as f64 } else { 0.0 };
+                    let target = if backs < count {
+                        fronts as f64 / (count - backs) as f64
+                    } else {
+                        0.0
+                    };
                     (target as f32, bare as f32, count as u64)
                 })
             })
@@ -185,7 +230,14 @@ pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> 
     let albedo: Vec<f64> = scene
         .materials
         .iter()
-        .map(|m| m.reflectance.iter().zip(&weights[1]).map(|(r, w)| r * w).sum::<f64>() / whole)
+        .map(|m| {
+            m.reflectance
+                .iter()
+                .zip(&weights[1])
+                .map(|(r, w)| r * w)
+                .sum::<f64>()
+                / whole
+        })
         .collect();
     let material = |k: usize| mesh.material[tree.faces[k].triangle as usize] as usize;
     let area = |k: usize| mesh.area[tree.faces[k].triangle as usize];
@@ -204,8 +256,18 @@ pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> 
         flux = std::array::from_fn(|c| flux[c] + solid * xyz[c]);
     }
     // Open rooms lose light: half counts as lost before more is known, so that the guess stays finite.
-    let mean = if total > 0.0 { (mean / total).min(0.9) } else { 0.0 };
-    let white = flux.map(|f| if total > 0.0 { 2.0 * f / (total * (1.0 - mean)) } else { 0.0 });
+    let mean = if total > 0.0 {
+        (mean / total).min(0.9)
+    } else {
+        0.0
+    };
+    let white = flux.map(|f| {
+        if total > 0.0 {
+            2.0 * f / (total * (1.0 - mean))
+        } else {
+            0.0
+        }
+    });
     let mut bright = vec![0.0_f32; tree.nodes.len()];
     for k in (0..tree.nodes.len()).rev() {
         let node = &tree.nodes[k];
@@ -213,7 +275,10 @@ pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> 
             let m = material(node.faces.0 as usize);
             (0.5 * albedo[m]) as f32
         } else {
-            node.child_range().map(|c| f64::from(bright[c as usize]) * tree.node(c).area).sum::<f64>() as f32 / node.area as f32
+            node.child_range()
+                .map(|c| f64::from(bright[c as usize]) * tree.node(c).area)
+                .sum::<f64>() as f32
+                / node.area as f32
         };
     }
     Guess { white, bright }
@@ -236,14 +301,27 @@ pub struct Balance {
 
 /// Sums the flux of a solution in f64: rows by leaf, `sums` the balanced row sums by node, `punctual` the irradiance
 /// from punctual lights by leaf.
-pub(super) fn flux(areas: &[f64], lanes: &super::lanes::Lanes, leaves: &[u32], rows: &FluxRows, sums: &[f64]) -> Balance {
+pub(super) fn flux(
+    areas: &[f64],
+    lanes: &super::lanes::Lanes,
+    leaves: &[u32],
+    rows: &FluxRows,
+    sums: &[f64],
+) -> Balance {
     let n = lanes.len();
-    let (mut emitted, mut received, mut absorbed, mut escaped) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let (mut emitted, mut received, mut absorbed, mut escaped) =
+        (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     for (k, &leaf) in leaves.iter().enumerate() {
         let area = areas[leaf as usize];
         for l in 0..n {
             let get = |r: &super::Rows| f64::from(r.row(k)[l]);
-            let (e, r, h, f, rho) = (get(rows.emission), get(rows.reflected), get(rows.irradiance), get(rows.first), get(rows.reflectance));
+            let (e, r, h, f, rho) = (
+                get(rows.emission),
+                get(rows.reflected),
+                get(rows.irradiance),
+                get(rows.first),
+                get(rows.reflectance),
+            );
             emitted[l] += area * e;
             received[l] += area * f;
             absorbed[l] += area * (1.0 - rho) * h;
@@ -255,7 +333,13 @@ pub(super) fn flux(areas: &[f64], lanes: &super::lanes::Lanes, leaves: &[u32], r
         .map(|l| ((absorbed[l] + escaped[l]) / received[l] - 1.0).abs())
         .fold(0.0, f64::max);
     let lumens = |x: &[f64]| x.iter().zip(lanes.xyz()).map(|(x, w)| x * w[1]).sum();
-    Balance { emitted_lm: lumens(&emitted), received_lm: lumens(&received), absorbed_lm: lumens(&absorbed), escaped_lm: lumens(&escaped), worst_band: worst }
+    Balance {
+        emitted_lm: lumens(&emitted),
+        received_lm: lumens(&received),
+        absorbed_lm: lumens(&absorbed),
+        escaped_lm: lumens(&escaped),
+        worst_band: worst,
+    }
 }
 
 /// Rows by leaf that the flux is summed from.

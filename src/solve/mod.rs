@@ -64,7 +64,13 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { error: 0.5, representation: Representation::Adaptive, seed: 0, white: None, rounds: 12 }
+        Self {
+            error: 0.5,
+            representation: Representation::Adaptive,
+            seed: 0,
+            white: None,
+            rounds: 12,
+        }
     }
 }
 
@@ -134,7 +140,12 @@ impl Bake {
         let masked: Vec<bool> = mesh
             .material
             .iter()
-            .map(|&m| matches!(scene.materials[m as usize].alpha, crate::scene::Alpha::Mask { .. }))
+            .map(|&m| {
+                matches!(
+                    scene.materials[m as usize].alpha,
+                    crate::scene::Alpha::Mask { .. }
+                )
+            })
             .collect();
         let rays = RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked);
         let weights = Observer::cie1931().weights(&scene.grid);
@@ -164,7 +175,15 @@ impl Bake {
             probes,
             started,
         };
-        bake.closed = bake.with_sight(|bake, sight| flux::closedness(&bake.mesh, &bake.tree, &bake.rays, sight, bake.settings.seed));
+        bake.closed = bake.with_sight(|bake, sight| {
+            flux::closedness(
+                &bake.mesh,
+                &bake.tree,
+                &bake.rays,
+                sight,
+                bake.settings.seed,
+            )
+        });
         bake
     }
 
@@ -197,11 +216,16 @@ impl Bake {
         clock.lap("spectrum");
 
         let direct_rays = self.direct.rays;
-        let demand = Demand { threshold: threshold * LEAF_SHARE, ..demand };
+        let demand = Demand {
+            threshold: threshold * LEAF_SHARE,
+            ..demand
+        };
         self.gather_direct(&demand);
         clock.lap("direct");
 
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
+            .filter(|&k| self.tree.node(k).is_leaf())
+            .collect();
         let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
         let escape_rays = self.look_out();
         self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
@@ -216,7 +240,11 @@ impl Bake {
         clock.lap("solve");
 
         let receivers = self.probes.receivers(&self.tree, round);
-        let seen: Vec<[f64; 3]> = self.gather(&receivers).iter().map(|g| self.lanes.tristimulus(&g.irradiance)).collect();
+        let seen: Vec<[f64; 3]> = self
+            .gather(&receivers)
+            .iter()
+            .map(|g| self.lanes.tristimulus(&g.irradiance))
+            .collect();
         let distance = self.probes.compare(seen, self.light.white);
         clock.lap("estimate");
         let record = Round::new(
@@ -241,7 +269,12 @@ impl Bake {
     /// Has the bake come to an end, and how? None: another round may help.
     pub fn verdict(&self) -> Option<Verdict> {
         let last = self.rounds.last()?;
-        if last.error.total_de2000.value.is_some_and(|e| e <= self.settings.error) {
+        if last
+            .error
+            .total_de2000
+            .value
+            .is_some_and(|e| e <= self.settings.error)
+        {
             return Some(Verdict::Reached);
         }
         if self.tree.nodes.is_empty() || self.scene.spectra.is_empty() {
@@ -252,9 +285,16 @@ impl Bake {
         }
         // Four times the links for next to nothing: what is left is the noise of visibility in the gather.
         let estimate = |r: &Round| r.error.total_de2000.value;
-        let before = self.rounds.len().checked_sub(2).and_then(|k| estimate(&self.rounds[k]));
-        let stalled = before.zip(estimate(last)).is_some_and(|(before, now)| now > STALLED * before);
-        (last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING)).then_some(Verdict::Exhausted)
+        let before = self
+            .rounds
+            .len()
+            .checked_sub(2)
+            .and_then(|k| estimate(&self.rounds[k]));
+        let stalled = before
+            .zip(estimate(last))
+            .is_some_and(|(before, now)| now > STALLED * before);
+        (last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING))
+            .then_some(Verdict::Exhausted)
     }
 
     /// Tells `watch` of every phase of a round that ends, by the name that it has in [`Round::phases_s`].
@@ -274,9 +314,23 @@ impl Bake {
 
     /// Runs `f` with what blocks light in this room.
     fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
-        let opaque = |triangle: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v]);
-        let opaque: Option<&Opaque> = if self.plan.runs(Kind::AlphaMasks) { Some(&opaque) } else { None };
-        f(self, &Sight { rays: &self.rays, mesh: &self.mesh, opaque, occlusion: self.plan.runs(Kind::Occlusion) })
+        let opaque = |triangle: u32, u: f32, v: f32| {
+            !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v])
+        };
+        let opaque: Option<&Opaque> = if self.plan.runs(Kind::AlphaMasks) {
+            Some(&opaque)
+        } else {
+            None
+        };
+        f(
+            self,
+            &Sight {
+                rays: &self.rays,
+                mesh: &self.mesh,
+                opaque,
+                occlusion: self.plan.runs(Kind::Occlusion),
+            },
+        )
     }
 
     /// How bright every node is beside the white: from the last solution, or a guess before the first.
@@ -298,13 +352,19 @@ impl Bake {
         }
         let mut keen = vec![0.0_f32; self.tree.nodes.len()];
         for (k, &leaf) in self.light.leaves.iter().enumerate() {
-            let h = light::brightness(self.lanes.tristimulus(self.light.irradiance.row(k)), self.light.white);
+            let h = light::brightness(
+                self.lanes.tristimulus(self.light.irradiance.row(k)),
+                self.light.white,
+            );
             keen[leaf as usize] = h.max(DARKEST).powf(-2.0 / 3.0) as f32;
         }
         for k in (0..keen.len()).rev() {
             let node = &self.tree.nodes[k];
             if !node.is_leaf() {
-                let sum: f64 = node.child_range().map(|c| f64::from(keen[c as usize]) * self.tree.node(c).area).sum();
+                let sum: f64 = node
+                    .child_range()
+                    .map(|c| f64::from(keen[c as usize]) * self.tree.node(c).area)
+                    .sum();
                 keen[k] = (sum / node.area) as f32;
             }
         }
@@ -314,19 +374,39 @@ impl Bake {
     /// Chooses the working partition on a small model of the room.
     fn choose_lanes(&mut self) {
         self.spectrum_error = 0.0;
-        if self.settings.representation == Representation::Dense || self.scene.spectra.is_empty() || self.tree.nodes.is_empty() {
+        if self.settings.representation == Representation::Dense
+            || self.scene.spectra.is_empty()
+            || self.tree.nodes.is_empty()
+        {
             self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
             return;
         }
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
-        let shadowed = self.with_sight(|bake, sight| punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh));
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
+            .filter(|&k| self.tree.node(k).is_leaf())
+            .collect();
+        let shadowed = self.with_sight(|bake, sight| {
+            punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh)
+        });
         let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
         self.look_out();
         let factor = balance(&self.tree, &rows, &self.areas, &self.outlook.target).factor;
         let painter = Painter::new(&self.scene, &self.mesh);
         let dense = sources::DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
-        let model = coarse::Coarse::new(&self.tree, &self.graph.links, &factor, &self.areas, &leaves, &dense, self.scene.spectra.len());
-        let choice = model.choose(&self.scene.spectra, &self.weights, self.light.white, SPECTRUM_SHARE * self.settings.error);
+        let model = coarse::Coarse::new(
+            &self.tree,
+            &self.graph.links,
+            &factor,
+            &self.areas,
+            &leaves,
+            &dense,
+            self.scene.spectra.len(),
+        );
+        let choice = model.choose(
+            &self.scene.spectra,
+            &self.weights,
+            self.light.white,
+            SPECTRUM_SHARE * self.settings.error,
+        );
         let lanes = Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights);
         self.spectrum_error = choice.error;
         if lanes.lanes() != self.lanes.lanes() {
@@ -339,7 +419,13 @@ impl Bake {
 
     /// Learns how new leaves look out; returns the rays cast.
     fn look_out(&mut self) -> u64 {
-        let rays = self.outlook.extend(&self.mesh, &self.tree, &self.rays, self.closed, self.settings.seed);
+        let rays = self.outlook.extend(
+            &self.mesh,
+            &self.tree,
+            &self.rays,
+            self.closed,
+            self.settings.seed,
+        );
         self.areas = self.outlook.areas(&self.tree);
         rays
     }
@@ -355,16 +441,35 @@ impl Bake {
         }
         self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
         let white = self.light.white;
-        let weights: Vec<f64> = self.lanes.xyz().iter().map(|&xyz| light::brightness(xyz, white)).collect();
+        let weights: Vec<f64> = self
+            .lanes
+            .xyz()
+            .iter()
+            .map(|&xyz| light::brightness(xyz, white))
+            .collect();
         let mut tree = std::mem::take(&mut self.tree);
         let mut direct = std::mem::take(&mut self.direct);
         self.with_sight(|bake, sight| {
-            direct.refine(&mut tree, demand, &weights, &|tree, to, tolerance, memory| {
-                let row = Gatherer { tree, tolerance, ..bake.gatherer(sight) }.direct(to, memory);
-                let dark = row.iter().all(|&x| x == 0.0);
-                let hidden = dark && bake.closed == Closed::No && flux::covered(&bake.mesh, tree, &bake.rays, to.point, to.normal, to.plane, to.seed);
-                (!hidden).then_some(row)
-            });
+            direct.refine(
+                &mut tree,
+                demand,
+                &weights,
+                &|tree, to, tolerance, memory| {
+                    let row = Gatherer {
+                        tree,
+                        tolerance,
+                        ..bake.gatherer(sight)
+                    }
+                    .direct(to, memory);
+                    let dark = row.iter().all(|&x| x == 0.0);
+                    let hidden = dark
+                        && bake.closed == Closed::No
+                        && flux::covered(
+                            &bake.mesh, tree, &bake.rays, to.point, to.normal, to.plane, to.seed,
+                        );
+                    (!hidden).then_some(row)
+                },
+            );
         });
         self.tree = tree;
         self.direct = direct;
@@ -372,32 +477,55 @@ impl Bake {
 
     /// Puts emission and links in place for a gather.
     fn place_emission<const L: usize>(&mut self) {
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
+            .filter(|&k| self.tree.node(k).is_leaf())
+            .collect();
         let painter = Painter::new(&self.scene, &self.mesh);
         let emission = painter.paint(&self.tree, &leaves, &self.lanes).emission;
         self.look_out();
         self.light.emitted = self.on_nodes::<L>(&emission, &leaves);
         self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
         self.light.half_size = self.mesh.half_size;
-        self.previous = std::mem::replace(&mut self.light.reflected, Rows::zero(self.tree.nodes.len(), L));
+        self.previous = std::mem::replace(
+            &mut self.light.reflected,
+            Rows::zero(self.tree.nodes.len(), L),
+        );
         let mut light = std::mem::take(&mut self.light);
         light.measure(&self.tree, &self.lanes);
         self.light = light;
     }
 
     /// Solves on the current links and measures the solution.
-    fn solve<const L: usize>(&mut self, rows: &LinkRows, leaves: &[u32]) -> (Convergence, flux::Balance) {
+    fn solve<const L: usize>(
+        &mut self,
+        rows: &LinkRows,
+        leaves: &[u32],
+    ) -> (Convergence, flux::Balance) {
         let painter = Painter::new(&self.scene, &self.mesh);
-        let Sources { reflectance, emission, greatest } = painter.paint(&self.tree, leaves, &self.lanes);
+        let Sources {
+            reflectance,
+            emission,
+            greatest,
+        } = painter.paint(&self.tree, leaves, &self.lanes);
         let nodes = self.tree.nodes.len();
         let mut first = Rows::zero(leaves.len(), L);
         for (k, &leaf) in leaves.iter().enumerate() {
             let row = self.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
         }
-        let operator = Operator { tree: &self.tree, links: rows, leaves, areas: &self.areas, factor: &self.balance.factor };
+        let operator = Operator {
+            tree: &self.tree,
+            links: rows,
+            leaves,
+            areas: &self.areas,
+            factor: &self.balance.factor,
+        };
         let mut reflected = self.guess::<L>(leaves);
-        let system = System { operator, reflectance: &reflectance, greatest: &greatest };
+        let system = System {
+            operator,
+            reflectance: &reflectance,
+            greatest: &greatest,
+        };
         let convergence = if self.plan.runs(Kind::Interreflection) {
             system.solve::<L>(&first, &mut reflected, SOLVE_SHARE * self.settings.error)
         } else {
@@ -405,7 +533,9 @@ impl Bake {
         };
         let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
         let mut irradiance = Rows::zero(leaves.len(), L);
-        system.operator.irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
+        system
+            .operator
+            .irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
         for (h, f) in irradiance.all_mut::<L>().iter_mut().zip(first.all::<L>()) {
             for l in 0..L {
                 h[l] += f[l];
@@ -413,13 +543,24 @@ impl Bake {
         }
         if !self.plan.runs(Kind::Interreflection) {
             reflected = Rows::zero(leaves.len(), L);
-            for ((r, h), rho) in reflected.all_mut::<L>().iter_mut().zip(irradiance.all::<L>()).zip(reflectance.all::<L>()) {
+            for ((r, h), rho) in reflected
+                .all_mut::<L>()
+                .iter_mut()
+                .zip(irradiance.all::<L>())
+                .zip(reflectance.all::<L>())
+            {
                 *r = std::array::from_fn(|l| h[l] * rho[l]);
             }
         }
         let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
         let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
-        let fluxes = flux::FluxRows { emission: &emission, reflected: &reflected, irradiance: &irradiance, first: &first, reflectance: &reflectance };
+        let fluxes = flux::FluxRows {
+            emission: &emission,
+            reflected: &reflected,
+            irradiance: &irradiance,
+            first: &first,
+            reflectance: &reflectance,
+        };
         let flux = flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums);
         self.light = Light {
             reflected: self.on_nodes::<L>(&reflected, leaves),
@@ -431,7 +572,10 @@ impl Bake {
             half_size: self.mesh.half_size,
             ..Light::default()
         };
-        self.light.white = self.settings.white.unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
+        self.light.white = self
+            .settings
+            .white
+            .unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
         self.light.measure(&self.tree, &self.lanes);
         (convergence, flux)
     }
@@ -478,7 +622,10 @@ impl Bake {
     pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
         self.with_sight(|bake, sight| {
             let gatherer = bake.gatherer(sight);
-            receivers.par_iter().map_init(Memory::default, |memory, r| gatherer.at(r, memory)).collect()
+            receivers
+                .par_iter()
+                .map_init(Memory::default, |memory, r| gatherer.at(r, memory))
+                .collect()
         })
     }
 
@@ -489,7 +636,11 @@ impl Bake {
         }
         receivers
             .par_iter()
-            .map(|r| flux::covered(&self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed))
+            .map(|r| {
+                flux::covered(
+                    &self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed,
+                )
+            })
             .collect()
     }
 

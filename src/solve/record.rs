@@ -27,7 +27,12 @@ impl Clock {
     /// Starts.
     pub fn start(watch: Option<Watch>) -> Self {
         let now = Instant::now();
-        Self { start: now, last: now, laps: Vec::new(), watch }
+        Self {
+            start: now,
+            last: now,
+            laps: Vec::new(),
+            watch,
+        }
     }
 
     /// Ends a phase.
@@ -169,11 +174,16 @@ pub(super) struct Measured<'a> {
 
 impl Round {
     pub(super) fn new(bake: &Bake, m: Measured) -> Self {
-        let estimate = |value: Option<f64>| Figure { value, kind: Kind::Estimate };
+        let estimate = |value: Option<f64>| Figure {
+            value,
+            kind: Kind::Estimate,
+        };
         let spectrum = bake.spectrum_error;
         let convergence_de = m.convergence.bound * 100.0 * super::DE_PER_PERCENT;
         // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
-        let all = |geometry: f64| (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt();
+        let all = |geometry: f64| {
+            (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt()
+        };
         let white = bake.light.white;
         let light = &bake.light;
         Self {
@@ -181,7 +191,12 @@ impl Round {
             round: bake.rounds.len() + 1,
             elapsed_s: bake.started.elapsed().as_secs_f64(),
             round_s: m.clock.total(),
-            phases_s: m.clock.laps().iter().map(|(name, s)| ((*name).to_owned(), (*s).into())).collect(),
+            phases_s: m
+                .clock
+                .laps()
+                .iter()
+                .map(|(name, s)| ((*name).to_owned(), (*s).into()))
+                .collect(),
             threshold: m.threshold,
             rays: m.rays,
             links_evaluated: m.refined.evaluated,
@@ -189,7 +204,12 @@ impl Round {
             elements: light.leaves.len(),
             nodes: bake.tree.nodes.len(),
             links: bake.graph.links.len(),
-            links_clear: bake.graph.links.iter().filter(|l| l.way == Way::Clear).count(),
+            links_clear: bake
+                .graph
+                .links
+                .iter()
+                .filter(|l| l.way == Way::Clear)
+                .count(),
             intervals_working: bake.lanes.len(),
             intervals_mean: bake.intervals_mean(),
             memory_bytes: bake.tree.bytes()
@@ -206,9 +226,15 @@ impl Round {
                 total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
                 geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),
                 spectrum_de_luv: estimate(Some(spectrum)),
-                convergence: Figure { value: Some(m.convergence.bound), kind: Kind::Bound },
+                convergence: Figure {
+                    value: Some(m.convergence.bound),
+                    kind: Kind::Bound,
+                },
                 convergence_de_luv: estimate(Some(convergence_de)),
-                total_xyz: estimate(m.distance.map(|d| d.relative * white.iter().sum::<f64>() / 6.0)),
+                total_xyz: estimate(
+                    m.distance
+                        .map(|d| d.relative * white.iter().sum::<f64>() / 6.0),
+                ),
             },
             flux: m.flux,
             row_sum_defect: bake.balance.defect_before,
