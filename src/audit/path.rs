@@ -310,7 +310,7 @@ impl<'a> Audit<'a> {
                 };
                 (spot * at.normal.dot(d) / (r2 * r2.sqrt()), position)
             };
-            if !(factor > 0.0) {
+            if factor.is_nan() || factor <= 0.0 {
                 continue;
             }
             let segment = Segment {

@@ -23,7 +23,7 @@ const BATCH: usize = 3;
 const TOLERANCE: f64 = 1e-4;
 
 /// The model.
-pub struct Coarse {
+pub(super) struct Coarse {
     tree: Tree,
     links: LinkRows,
     leaves: Vec<u32>,
@@ -37,7 +37,7 @@ pub struct Coarse {
 }
 
 /// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
-pub trait Dense {
+pub(super) trait Dense {
     /// Reflectance of a leaf node.
     fn reflectance(&self, leaf: u32) -> Leaves;
     /// Exitance shape of a leaf node under a light; none if it emits nothing of that light.
@@ -48,7 +48,7 @@ pub trait Dense {
 
 /// What a choice of cuts does.
 #[derive(Debug, Clone)]
-pub struct Choice {
+pub(super) struct Choice {
     /// One cut a light.
     pub cuts: Vec<Partition>,
     /// Area-weighted mean CIELUV difference of irradiance that they cause on the model.
@@ -57,7 +57,7 @@ pub struct Choice {
 
 impl Coarse {
     /// Sums links and sources over a cut of `tree`.
-    pub fn new(
+    pub(super) fn new(
         tree: &Tree,
         links: &[Link],
         factor: &[f32],
@@ -199,7 +199,7 @@ impl Coarse {
 
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
     /// padding would waste.
-    pub fn choose(
+    pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
         weights: &[Leaves; 3],

@@ -8,13 +8,13 @@ use super::rows::Rows;
 use rayon::prelude::*;
 
 /// Iterations at the most. Corridors of albedo .99 take about 20.
-pub const MAX_ITERATIONS: usize = 400;
+pub(super) const MAX_ITERATIONS: usize = 400;
 /// Rows a partial sum covers; fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 1024;
 
 /// How a solve went.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Convergence {
+pub(super) struct Convergence {
     /// Operator applications.
     pub iterations: usize,
     /// Greatest relative residual of a lane.
@@ -25,7 +25,7 @@ pub struct Convergence {
 
 /// The system `(1 - K) y = b`.
 #[derive(Debug)]
-pub struct System<'a> {
+pub(super) struct System<'a> {
     /// Pull, gather, push.
     pub operator: Operator<'a>,
     /// Reflectance of each leaf.
@@ -36,7 +36,7 @@ pub struct System<'a> {
 
 impl System<'_> {
     /// Reflected radiosity of the leaves (by leaf) from the irradiance of the first bounce, starting from a guess.
-    pub fn solve<const L: usize>(
+    pub(super) fn solve<const L: usize>(
         &self,
         first: &Rows,
         reflected: &mut Rows,

@@ -14,12 +14,18 @@ const POINTS: [[f64; 3]; 3] = [
     [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
     [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
 ];
+const MIDDLE: [[f64; 3]; 1] = [[1.0 / 3.0; 3]];
+/// Leaves below this share of all area are looked at from one point.
+const TINY: f64 = 1e-5;
 /// Further points that are tried where some are covered.
 const MORE_POINTS: usize = 8;
 /// Error of a leaf's direct light, in what would split the leaf.
 const NOISE: f64 = 0.1;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
+
+/// Mean row over a leaf and half the range of brightness over its points.
+type AtLeaf = (Box<[f32]>, f32);
 
 /// Direct irradiance of nodes that are or were leaves.
 #[derive(Debug, Clone, Default)]
@@ -58,7 +64,7 @@ impl Direct {
                 .filter(|&k| self.rows[k as usize].is_none())
                 .collect();
             let width = weights.len();
-            let parts: Vec<(Vec<(Box<[f32]>, f32)>, u64)> = fresh
+            let parts: Vec<(Vec<AtLeaf>, u64)> = fresh
                 .par_chunks(CHUNK)
                 .map(|chunk| {
                     let mut memory = Memory::default();
@@ -71,6 +77,7 @@ impl Direct {
                             width,
                             weights,
                             NOISE * demand.threshold / share,
+                            share * share < TINY,
                             gather,
                             &mut memory,
                         )
@@ -112,18 +119,22 @@ fn at_leaf(
     width: usize,
     weights: &[f64],
     tolerance: f64,
+    tiny: bool,
     gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
     memory: &mut Memory,
-) -> (Box<[f32]>, f32) {
+) -> AtLeaf {
     let element = &tree.elements[tree.node(leaf).element as usize];
     let entry = element.face as usize;
     let mut mean = vec![0.0_f32; width].into_boxed_slice();
     let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
     let mut bare = 0;
+    // A face that is next to nothing of the room is looked at once: it is never split, and its pattern is not seen.
+    let wanted = if tiny { 1 } else { POINTS.len() };
+    let first = if tiny { &MIDDLE } else { &POINTS[..] };
     // The points of the rule; where one is covered, others until three are found or the leaf counts as covered.
     let more = (0..MORE_POINTS).map(|k| stratified(k, MORE_POINTS, [0.5, 0.5]));
-    for (k, at) in POINTS.into_iter().chain(more).enumerate() {
-        if bare == POINTS.len() {
+    for (k, at) in first.iter().copied().chain(more).enumerate() {
+        if bare == wanted {
             break;
         }
         let to = Receiver {

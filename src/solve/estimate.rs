@@ -35,7 +35,7 @@ pub(super) struct Distance {
 impl Probes {
     /// Random points, by area.
     pub(super) fn new(tree: &Tree, seed: u64) -> Self {
-        let mut rng = Pcg::new(seed ^ 0x9b0b_e5);
+        let mut rng = Pcg::new(seed ^ 0x009b_0be5);
         let mut points = Vec::new();
         if let Some(root) = tree.nodes.first() {
             for k in 0..POINTS {

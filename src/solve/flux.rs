@@ -32,7 +32,13 @@ pub enum Closed {
 }
 
 /// Casts rays from the fronts of all faces: the room is closed if every one meets the front of something.
-pub fn closedness(mesh: &Mesh, tree: &Tree, rays: &RayIndex, sight: &Sight, seed: u64) -> Closed {
+pub(super) fn closedness(
+    mesh: &Mesh,
+    tree: &Tree,
+    rays: &RayIndex,
+    sight: &Sight,
+    seed: u64,
+) -> Closed {
     let Some(root) = tree.nodes.first() else {
         return Closed::No;
     };
@@ -81,7 +87,7 @@ fn meets(
 }
 
 /// Is a point of a surface covered by something solid that stands on it or ends there? Then it sees backs only.
-pub fn covered(
+pub(super) fn covered(
     mesh: &Mesh,
     tree: &Tree,
     rays: &RayIndex,
@@ -104,7 +110,7 @@ pub fn covered(
 
 /// How leaves look out: what their rows must sum to, and how much of their area looks out at all.
 #[derive(Debug, Clone, Default)]
-pub struct Outlook {
+pub(super) struct Outlook {
     /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
     pub target: Vec<f32>,
     /// For each node that is a leaf: share of its area that is not covered by something solid. NaN elsewhere.
@@ -113,7 +119,7 @@ pub struct Outlook {
 
 impl Outlook {
     /// Looks out of new leaves. A leaf below one whose rays all met fronts is not looked at again. Returns the rays cast.
-    pub fn extend(
+    pub(super) fn extend(
         &mut self,
         mesh: &Mesh,
         tree: &Tree,
@@ -189,7 +195,7 @@ impl Outlook {
     }
 
     /// Area of every node that looks out; never quite zero, so that nothing is divided by zero.
-    pub fn areas(&self, tree: &Tree) -> Vec<f64> {
+    pub(super) fn areas(&self, tree: &Tree) -> Vec<f64> {
         let mut areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
         for k in (0..areas.len()).rev() {
             let node = &tree.nodes[k];
@@ -204,7 +210,7 @@ impl Outlook {
 }
 
 /// What is known before the first solution.
-pub struct Guess {
+pub(super) struct Guess {
     /// Irradiance of the adaptation white: twice the mean irradiance.
     pub white: [f64; 3],
     /// Brightness of every node, share of white.
@@ -212,7 +218,7 @@ pub struct Guess {
 }
 
 /// Light spread evenly over all faces: `H = flux / (A (1 - mean albedo))`.
-pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
+pub(super) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
     let lanes = super::lanes::Lanes::dense(&scene.spectra, weights);
     let mut row = [0.0_f32; 64];
     let glow: Vec<[f64; 3]> = scene

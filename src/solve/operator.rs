@@ -14,7 +14,7 @@ const CHUNK: usize = 256;
 
 /// What the operator needs to know of the patches.
 #[derive(Debug)]
-pub struct Operator<'a> {
+pub(super) struct Operator<'a> {
     /// The hierarchy.
     pub tree: &'a Tree,
     /// The links.
@@ -30,7 +30,7 @@ pub struct Operator<'a> {
 impl Operator<'_> {
     /// Irradiance on the leaves (by leaf) from radiosity on the leaves (by leaf), both balanced.
     /// `nodes` and `gathered` are scratch with a row a node; `nodes` holds every patch's mean radiosity afterwards.
-    pub fn irradiance<const L: usize>(
+    pub(super) fn irradiance<const L: usize>(
         &self,
         radiosity: &Rows,
         nodes: &mut Rows,
@@ -72,7 +72,7 @@ impl Operator<'_> {
 }
 
 /// Area-weighted means from the leaves to the root.
-pub fn pull<const L: usize>(tree: &Tree, areas: &[f64], rows: &mut [[f32; L]]) {
+pub(super) fn pull<const L: usize>(tree: &Tree, areas: &[f64], rows: &mut [[f32; L]]) {
     for (k, node) in tree.nodes.iter().enumerate().rev() {
         if node.is_leaf() {
             continue;

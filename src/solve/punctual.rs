@@ -14,9 +14,12 @@ const POINTS: usize = 4;
 /// Elements that a task looks at.
 const CHUNK: usize = 64;
 
+/// Lights that reach a leaf, and the mean factor of each.
+type Factors = Vec<(u32, f32)>;
+
 /// For each leaf, the lights that reach it and the mean factor from intensity to irradiance.
 #[derive(Debug, Clone, Default)]
-pub struct Shadowed {
+pub(super) struct Shadowed {
     /// (light, factor) lists by leaf.
     pub by_leaf: Vec<Vec<(u32, f32)>>,
     /// Rays cast.
@@ -24,7 +27,7 @@ pub struct Shadowed {
 }
 
 /// Lights of the scene, recentred, with their rows.
-pub fn lamps(scene: &Scene, mesh: &Mesh, lanes: &Lanes) -> Vec<(PunctualLight, Vec<f32>)> {
+pub(super) fn lamps(scene: &Scene, mesh: &Mesh, lanes: &Lanes) -> Vec<(PunctualLight, Vec<f32>)> {
     scene
         .lights
         .iter()
@@ -121,7 +124,13 @@ fn at_samples(
 }
 
 /// Mean factors for all leaves.
-pub fn factors(tree: &Tree, leaves: &[u32], sight: &Sight, scene: &Scene, mesh: &Mesh) -> Shadowed {
+pub(super) fn factors(
+    tree: &Tree,
+    leaves: &[u32],
+    sight: &Sight,
+    scene: &Scene,
+    mesh: &Mesh,
+) -> Shadowed {
     let lights = recentred(scene, mesh);
     if lights.is_empty() {
         return Shadowed {
@@ -129,7 +138,7 @@ pub fn factors(tree: &Tree, leaves: &[u32], sight: &Sight, scene: &Scene, mesh: 
             rays: 0,
         };
     }
-    let parts: Vec<(Vec<Vec<(u32, f32)>>, u64)> = leaves
+    let parts: Vec<(Vec<Factors>, u64)> = leaves
         .par_chunks(CHUNK)
         .map(|chunk| {
             let mut rays = 0;
@@ -156,7 +165,7 @@ pub fn factors(tree: &Tree, leaves: &[u32], sight: &Sight, scene: &Scene, mesh: 
 }
 
 /// Integral of a light's angular distribution, so that flux is intensity times this; none for directional light.
-pub fn solid_angle(kind: LightKind) -> Option<f64> {
+pub(super) fn solid_angle(kind: LightKind) -> Option<f64> {
     match kind {
         LightKind::Point => Some(4.0 * PI),
         // 2 pi integral over the cosine of ((c - c_o) / (c_i - c_o))^2 between the angles, and of 1 inside.

@@ -15,7 +15,7 @@ const CHUNK: usize = 256;
 
 /// What the leaves of a hierarchy reflect and emit.
 #[derive(Debug, Clone)]
-pub struct Sources {
+pub(super) struct Sources {
     /// Reflectance by leaf.
     pub reflectance: Rows,
     /// Exitance by leaf: pi times radiance.
@@ -25,7 +25,7 @@ pub struct Sources {
 }
 
 /// Turns materials into rows.
-pub struct Painter<'a> {
+pub(super) struct Painter<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
     upsampler: Upsampler,
@@ -33,7 +33,7 @@ pub struct Painter<'a> {
 
 impl<'a> Painter<'a> {
     /// A painter for the materials of a scene.
-    pub fn new(scene: &'a Scene, mesh: &'a Mesh) -> Self {
+    pub(super) fn new(scene: &'a Scene, mesh: &'a Mesh) -> Self {
         Self {
             scene,
             mesh,
@@ -42,7 +42,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Rows for the given leaves of `tree`.
-    pub fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
+    pub(super) fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
         let width = padded(lanes.len());
         // One row a material; painted materials are worked out patch by patch.
         let plain: Vec<(Vec<f32>, Vec<f32>)> = self

@@ -93,7 +93,7 @@ fn export(scene: &Scene, count: usize) -> Result<serde_json::Value> {
         .map(|&(p, n, t)| (p - mesh.centre, n, mesh.plane[t]))
         .collect();
     let audit: Vec<[f64; 3]> = Audit::new(scene, &mesh, &rays)
-        .irradiance(&starts, PATHS, SEED)
+        .irradiance(&starts, &vec![PATHS; starts.len()], SEED)
         .iter()
         .map(|answer| [0, 1, 2].map(|c| answer.linear(&weights[c]).0))
         .collect();
