@@ -3,7 +3,8 @@
 //! The path tracer's own noise must not count as error of the bake. With observed difference o and standard error s of a
 //! point's answer, `E[o^2] = d^2 + s^2`; the figures are made of `sqrt(max(0, o^2 - s^2))`, and a root mean square of
 //! `sqrt(max(0, mean(o^2 - s^2)))`, which is unbiased. Intervals are of 95 %: means by the spread over the points, order
-//! statistics by moving every point by 2 s. Points that something solid covers are left out and counted.
+//! statistics by moving every point by 2 s. Where d is far below s the mean of those roots is 0.4 s, not 0; the lower end
+//! of its interval is lowered by as much. Points that something solid covers are left out and counted.
 //!
 //! Colour differences are CIEDE2000 of a white surface's light under the bake's adaptation white.
 
@@ -22,6 +23,10 @@ const PILOT: usize = 512;
 const NOISE_SHARE: f64 = 0.25;
 /// Illuminances below this share of the white's count as this: the relative error of darkness means nothing.
 const DARK: f64 = 1e-4;
+/// What noise alone shows as, share of its standard error: the mean of `sqrt(max(0, z^2 - 1))` over a normal z.
+const NOISE_SHOWS: f64 = 0.4;
+/// Estimates and errors below this share of the asked-for one are not told apart.
+const NEGLIGIBLE: f64 = 0.02;
 /// Two-sided normal quantile of 95 %.
 const NORMAL_95: f64 = 1.96;
 /// An estimate is honest between these multiples of the measured error.
@@ -167,17 +172,31 @@ impl Report {
             .rounds()
             .last()
             .and_then(|r| r.error.total_de2000.value);
-        Self::of(seen, covered, paths, seed, estimate)
+        Self::of(
+            seen,
+            covered,
+            paths,
+            seed,
+            estimate,
+            NEGLIGIBLE * bake.settings().error,
+        )
     }
 
-    fn of(seen: Vec<Seen>, covered: usize, paths: u64, seed: u64, estimate: Option<f64>) -> Self {
+    fn of(
+        seen: Vec<Seen>,
+        covered: usize,
+        paths: u64,
+        seed: u64,
+        estimate: Option<f64>,
+        negligible: f64,
+    ) -> Self {
         let colour: Vec<[f64; 2]> = seen.iter().map(|s| s.de2000).collect();
         let relative: Vec<[f64; 2]> = seen.iter().map(|s| s.relative).collect();
         let de2000 = spread(&colour);
         let honesty = match estimate {
             None => Honesty::NoEstimate,
-            Some(e) if e < HONEST[0] * de2000.mean.low => Honesty::TooLow,
-            Some(e) if e > HONEST[1] * de2000.mean.high => Honesty::TooHigh,
+            Some(e) if e.max(negligible) < HONEST[0] * de2000.mean.low => Honesty::TooLow,
+            Some(e) if e > HONEST[1] * de2000.mean.high.max(negligible) => Honesty::TooHigh,
             Some(_) => Honesty::Honest,
         };
         Self {
@@ -259,6 +278,7 @@ fn spread(errors: &[[f64; 2]]) -> Spread {
             .map(|[o, s]| (o.abs() + shift * s).max(0.0))
             .collect()
     };
+    let noise = errors.iter().map(|[_, s]| s).sum::<f64>() / errors.len().max(1) as f64;
     let order = |share: f64| Measured {
         value: percentile(value.clone(), share),
         low: percentile(at(-2.0), share),
@@ -272,7 +292,7 @@ fn spread(errors: &[[f64; 2]]) -> Spread {
     );
     let root = |x: f64| x.max(0.0).sqrt();
     Spread {
-        mean: mean_of(&value).above_zero(),
+        mean: mean_of(&value).lowered(NOISE_SHOWS * noise),
         rms: Measured {
             value: root(squares.value),
             low: root(squares.low),
@@ -284,9 +304,10 @@ fn spread(errors: &[[f64; 2]]) -> Spread {
 }
 
 impl Measured {
-    fn above_zero(self) -> Self {
+    /// The same with its lower end lowered, to 0 at the most.
+    fn lowered(self, by: f64) -> Self {
         Self {
-            low: self.low.max(0.0),
+            low: (self.low - by).max(0.0),
             ..self
         }
     }

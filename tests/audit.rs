@@ -1,0 +1,378 @@
+//! The path tracer against closed forms, by a chi-squared criterion; the report that is made of it.
+
+#[path = "common/built.rs"]
+mod built;
+
+use built::{Room, sphere};
+use glam::{DVec3, dvec3};
+use haarlight::audit::{Audit, BATCHES, Honesty, Report};
+use haarlight::color::{KM, Observer};
+use haarlight::geometry::lambert_polygon;
+use haarlight::geometry::sampling::{Pcg, on_triangle};
+use haarlight::scene::{Options, Scene};
+use haarlight::solve::{Bake, Settings};
+use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use std::path::Path;
+
+/// Points of a test: enough for a chi-squared sum that tells 1 % from nothing.
+const POINTS: usize = 100;
+
+fn luminous() -> Leaves {
+    Observer::cie1931().weights(&Grid::default())[1].map(|y| KM * y)
+}
+
+/// A room ready to trace in; nothing is solved.
+fn traced(scene: Scene) -> Bake {
+    Bake::new(scene, Settings::default())
+}
+
+/// Random points by area on the faces that `keep` takes by their normal (recentred, with normal and plane).
+fn points(bake: &Bake, keep: impl Fn(DVec3) -> bool, seed: u64) -> Vec<(DVec3, DVec3, u32)> {
+    let mesh = bake.mesh();
+    let kept: Vec<_> = mesh
+        .faces
+        .iter()
+        .filter(|f| keep(mesh.face_normal(**f)))
+        .collect();
+    let total: f64 = kept.iter().map(|f| mesh.area[f.triangle as usize]).sum();
+    let mut rng = Pcg::new(seed);
+    (0..POINTS)
+        .map(|_| {
+            let mut target = rng.f64() * total;
+            let face = kept
+                .iter()
+                .find(|f| {
+                    target -= mesh.area[f.triangle as usize];
+                    target < 0.0
+                })
+                .unwrap_or(&kept[0]);
+            let at = on_triangle(&mesh.corners(**face), [rng.f64(), rng.f64()]);
+            (
+                at,
+                mesh.face_normal(**face),
+                mesh.plane[face.triangle as usize],
+            )
+        })
+        .collect()
+}
+
+/// Sum of squared deviations in standard errors of all points, from a truth in lx that is scaled by `scale`.
+fn chi_squared(
+    bake: &Bake,
+    places: &[(DVec3, DVec3, u32)],
+    paths: usize,
+    truth: &[f64],
+) -> impl Fn(f64) -> f64 {
+    let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
+    let weights = luminous();
+    let pairs: Vec<(f64, f64, f64)> = audit
+        .irradiance(places, &vec![paths; places.len()], 11)
+        .iter()
+        .zip(truth)
+        .map(|(answer, truth)| {
+            let (mean, error) = answer.linear(&weights);
+            (mean, error, *truth)
+        })
+        .collect();
+    move |scale| {
+        pairs
+            .iter()
+            .map(|(mean, error, truth)| ((mean - scale * truth) / error).powi(2))
+            .sum()
+    }
+}
+
+/// Squares of Student's t with `BATCHES - 1` degrees of freedom: mean nu / (nu - 2), variance
+/// 2 nu^2 (nu - 1) / ((nu - 2)^2 (nu - 4)). The sum over all points must lie within 4 standard deviations; a truth that is
+/// `told` too large must not.
+fn accept(chi: impl Fn(f64) -> f64, told: f64) {
+    let nu = BATCHES as f64 - 1.0;
+    let mean = POINTS as f64 * nu / (nu - 2.0);
+    let deviation =
+        (POINTS as f64 * 2.0 * nu * nu * (nu - 1.0) / ((nu - 2.0).powi(2) * (nu - 4.0))).sqrt();
+    let off = |scale: f64| (chi(scale) - mean) / deviation;
+    println!(
+        "{:+.2} deviations; told off {:+.1}",
+        off(1.0),
+        off(1.0 + told)
+    );
+    assert!(off(1.0).abs() < 4.0, "{}", off(1.0));
+    assert!(off(1.0 + told) > 4.0, "the test sees no error of {told}");
+}
+
+/// H = E0 / (1 - rho) everywhere.
+#[test]
+fn furnace() {
+    for (rho, paths, told) in [(0.5, 1024, 0.02), (0.99, 512, 0.1)] {
+        let mut room = Room::new();
+        let wall = room.lamp(rho, 100.0);
+        room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 4.0), [wall; 6]);
+        let bake = traced(room.scene());
+        let places = points(&bake, |_| true, 1);
+        let truth = vec![100.0 / (1.0 - rho); POINTS];
+        accept(chi_squared(&bake, &places, paths, &truth), told);
+    }
+}
+
+/// CIE 171, 5.6: direct light of a uniform floor on walls and ceiling, exact by Lambert's polygon.
+#[test]
+fn case_5_6() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cie171-5.6.glb");
+    let bake = traced(Scene::load(path, &Options::default()).unwrap());
+    let places = points(&bake, |n| n.y < 0.5, 2);
+    let c = bake.mesh().centre;
+    let floor = [
+        dvec3(0.0, 0.0, 0.0),
+        dvec3(4.0, 0.0, 0.0),
+        dvec3(4.0, 0.0, -4.0),
+        dvec3(0.0, 0.0, -4.0),
+    ]
+    .map(|p| p - c);
+    let truth: Vec<f64> = places
+        .iter()
+        .map(|&(p, n, _)| 1000.0 * lambert_polygon(p, n, &floor))
+        .collect();
+    accept(chi_squared(&bake, &places, 512, &truth), 0.01);
+}
+
+/// CIE 171, 5.7: with something in the way; truth by cutting the lamp where the box hides it.
+#[test]
+fn case_5_7() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cie171-5.7.glb");
+    let bake = traced(Scene::load(path, &Options::default()).unwrap());
+    let c = bake.mesh().centre;
+    // The box reaches from wall to wall: its shadow on the lit wall is a strip, cut by the line of sight over its edges.
+    let mut places = Vec::new();
+    let mut truth = Vec::new();
+    let mut rng = Pcg::new(3);
+    let plane = bake
+        .mesh()
+        .normal
+        .iter()
+        .zip(&bake.mesh().plane)
+        .zip(&bake.mesh().triangles)
+        .find(|((n, _), t)| n.z < -0.5 && (bake.mesh().positions[t[0] as usize] + c).z > -1e-6)
+        .map(|((_, plane), _)| *plane)
+        .unwrap();
+    while places.len() < POINTS {
+        let p = dvec3(4.0 * rng.f64(), 3.0 * rng.f64(), 0.0);
+        // From height h at z = 0 over the edges at height 1, z = -2.5 and -2.7, to the wall at z = -4.
+        let seen_from = [2.5, 2.7].map(|d| p.y + (1.0 - p.y) * 4.0 / d);
+        // Looking down over the box, what lies above both lines; looking up from below, the steeper line counts.
+        let least = seen_from[0].max(seen_from[1]).clamp(0.0, 3.0);
+        // From above, the foot of the wall stands behind the box: nothing below the lines is seen.
+        let lamp = [
+            dvec3(0.0, least, -4.0),
+            dvec3(4.0, least, -4.0),
+            dvec3(4.0, 3.0, -4.0),
+            dvec3(0.0, 3.0, -4.0),
+        ];
+        truth.push(1000.0 * lambert_polygon(p, DVec3::NEG_Z, &lamp));
+        places.push((p - c, DVec3::NEG_Z, plane));
+    }
+    accept(chi_squared(&bake, &places, 1024, &truth), 0.02);
+}
+
+/// CIE 171, 5.8: mean E = Phi / (96 (1 - rho)), leaf by leaf, over random points.
+#[test]
+fn case_5_8() {
+    let reflectance: Leaves = std::array::from_fn(|l| 0.05 + 0.85 * l as f64 / (LEAVES - 1) as f64);
+    let mut room = Room::new();
+    let wall = room.spectral_paint(reflectance);
+    room.hollow(DVec3::ZERO, DVec3::splat(4.0), [wall; 6]);
+    room.point(DVec3::splat(2.0), 10_000.0);
+    let bake = traced(room.scene());
+    let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
+    let power = bake.scene().spectra[0].power;
+    // Eight draws of points: their spread holds that of the points and that of the paths.
+    let draws: Vec<Leaves> = (0..8)
+        .map(|k| {
+            let places = points(&bake, |_| true, 40 + k);
+            let answers = audit.irradiance(&places, &vec![64; POINTS], k);
+            std::array::from_fn(|l| answers.iter().map(|a| a.mean[l]).sum::<f64>() / POINTS as f64)
+        })
+        .collect();
+    for leaf in [0, 20, 40, 63] {
+        let want = 10_000.0 * power[leaf] / 96.0 / (1.0 - reflectance[leaf]);
+        let mean = draws.iter().map(|d| d[leaf]).sum::<f64>() / 8.0;
+        let error =
+            (draws.iter().map(|d| (d[leaf] - mean).powi(2)).sum::<f64>() / 7.0 / 8.0).sqrt();
+        println!(
+            "leaf {leaf}: {:+.2} errors of {:.2} %",
+            (mean - want) / error,
+            100.0 * error / want
+        );
+        // Student's t of 7 degrees of freedom exceeds 5.4 once in a thousand.
+        assert!(
+            (mean - want).abs() < 5.4 * error,
+            "leaf {leaf}: {mean} +- {error}, not {want}"
+        );
+        assert!(error < 0.02 * want);
+    }
+}
+
+/// A sphere of triangles, a cap of it glowing, black: exact by the polygons of the cap. With albedo the first reflection
+/// is as even as the sphere is round.
+#[test]
+fn sphere_interior() {
+    for rho in [0.0, 0.6] {
+        let mut room = Room::new();
+        let (wall, lamp) = (room.paint(rho), room.lamp(rho, 1000.0));
+        let (positions, triangles) = sphere(DVec3::ZERO, 1.0, 4);
+        let (mut glowing, mut dark) = (Vec::new(), Vec::new());
+        let (mut area, mut lit) = (0.0, 0.0);
+        for t in triangles {
+            let [a, b, c] = t.map(|v| positions[v as usize]);
+            let s = 0.5 * (b - a).cross(c - a).length();
+            area += s;
+            let turned = [t[0], t[2], t[1]];
+            if a.y + b.y + c.y > 2.1 {
+                lit += s;
+                glowing.push(turned);
+            } else {
+                dark.push(turned);
+            }
+        }
+        let cap: Vec<[DVec3; 3]> = glowing
+            .iter()
+            .map(|t| t.map(|v| positions[v as usize]))
+            .collect();
+        room.mesh(positions.clone(), glowing, lamp);
+        room.mesh(positions, dark, wall);
+        let bake = traced(room.scene());
+        let places = points(&bake, |n| n.y > -0.5, 5);
+        let reflected = 1000.0 * lit / area * rho / (1.0 - rho);
+        let truth: Vec<f64> = places
+            .iter()
+            .map(|&(p, n, _)| {
+                let direct: f64 = cap
+                    .iter()
+                    .map(|t| lambert_polygon(p + bake.mesh().centre, n, t))
+                    .sum();
+                1000.0 * direct + reflected
+            })
+            .collect();
+        accept(chi_squared(&bake, &places, 512, &truth), 0.02);
+    }
+}
+
+/// A room with furniture and two kinds of lamp for the report.
+fn furnished() -> Scene {
+    let mut room = Room::new();
+    let (wall, grey, glow) = (room.paint(0.7), room.paint(0.3), room.lamp(0.5, 3000.0));
+    room.hollow(
+        DVec3::ZERO,
+        dvec3(4.0, 2.5, 3.0),
+        [wall, wall, grey, wall, wall, wall],
+    );
+    room.block(dvec3(1.0, 0.0, 1.0), dvec3(1.8, 0.8, 1.7), grey);
+    room.quad(dvec3(2.0, 2.4, 1.0), DVec3::X, DVec3::Z, glow);
+    room.point(dvec3(3.2, 1.2, 0.7), 500.0);
+    room.scene()
+}
+
+/// The report sees an error that was put in, says so, and is the same at any number of threads.
+#[test]
+fn the_report_is_the_same_at_any_number_of_threads() {
+    let mut bake = Bake::new(furnished(), Settings::default());
+    bake.step();
+    bake.step();
+    let report = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| serde_json::to_string(&Report::new(&bake, 40, 2048, 9)).unwrap())
+    };
+    let one = report(1);
+    assert_eq!(one, report(2));
+    assert_eq!(one, report(8));
+    assert!(one.contains("\"record\":\"audit\""));
+}
+
+#[test]
+fn the_report_measures_what_finer_rounds_improve() {
+    let mut bake = Bake::new(
+        furnished(),
+        Settings {
+            error: 0.05,
+            ..Settings::default()
+        },
+    );
+    bake.step();
+    let first = Report::new(&bake, 60, 4096, 9);
+    assert_eq!(first.honesty, Honesty::NoEstimate);
+    assert_eq!(first.estimate_de2000, None);
+    assert!(first.points + first.covered == 60 && first.covered < 10);
+    for _ in 0..3 {
+        bake.step();
+    }
+    let last = Report::new(&bake, 60, 4096, 9);
+    println!("{:?} then {:?}", first.de2000, last.de2000);
+    assert!(last.de2000.mean.value < first.de2000.mean.value);
+    for spread in [last.de2000, last.relative] {
+        for m in [spread.mean, spread.rms, spread.p95, spread.max] {
+            assert!(m.low <= m.value && m.value <= m.high, "{m:?}");
+        }
+        assert!(spread.mean.value <= spread.p95.value && spread.p95.value <= spread.max.value);
+    }
+}
+
+/// In a furnace the bake is right to the last digits: the audit must not take its own noise for an error.
+#[test]
+fn the_report_finds_nothing_where_nothing_is_wrong() {
+    let mut room = Room::new();
+    let wall = room.lamp(0.5, 100.0);
+    room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 4.0), [wall; 6]);
+    let mut bake = Bake::new(room.scene(), Settings::default());
+    bake.run();
+    let report = Report::new(&bake, 100, 4096, 3);
+    println!("{report:?}");
+    assert!(report.relative.rms.low < 1e-3, "{:?}", report.relative);
+    assert!(
+        report.bias.low < 0.0 && report.bias.high > 0.0,
+        "{:?}",
+        report.bias
+    );
+    assert_eq!(report.covered, 0);
+}
+
+/// The solver's estimate against the measured error on the rooms of `scenes/`, after every round.
+#[test]
+#[ignore = "estimates are 2 to 4 times too low; also a minute of path tracing, prints the calibration"]
+fn calibration_of_the_estimate() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut names: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .filter(|p| p.extension().is_some_and(|e| e == "glb"))
+        .collect();
+    names.sort();
+    let mut dishonest = 0;
+    for path in names {
+        let scene = Scene::load(&path, &Options::default()).unwrap();
+        let mut bake = Bake::new(scene, Settings::default());
+        while bake.verdict().is_none() {
+            bake.step();
+            let report = Report::new(&bake, 200, 8192, 1);
+            let de = report.de2000;
+            println!(
+                "{:24} round {} estimate {:6.3?} measured {:6.3} ({:.3}..{:.3}) p95 {:6.3} max {:6.3} noise {:.3} rel rms {:6.2} % bias {:+6.2} % {:?}",
+                path.file_stem().unwrap().to_string_lossy(),
+                bake.rounds().len(),
+                report.estimate_de2000.unwrap_or(f64::NAN),
+                de.mean.value,
+                de.mean.low,
+                de.mean.high,
+                de.p95.value,
+                de.max.value,
+                report.noise_de2000,
+                100.0 * report.relative.rms.value,
+                100.0 * report.bias.value,
+                report.honesty
+            );
+            dishonest += usize::from(matches!(report.honesty, Honesty::TooLow | Honesty::TooHigh));
+        }
+    }
+    assert_eq!(dishonest, 0, "estimates off");
+}
