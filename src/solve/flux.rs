@@ -301,7 +301,8 @@ pub struct Balance {
     pub absorbed_lm: f64,
     /// Luminous flux that left the room or met a black back, lm: by row sums below 1.
     pub escaped_lm: f64,
-    /// Worst relative difference of emitted and absorbed + escaped over all bands that carry light.
+    /// Worst relative difference of received and absorbed + escaped over all bands that carry light: what the solve
+    /// itself lost. Emitted and received differ by what direct light misses the room.
     pub worst_band: f64,
 }
 

@@ -9,6 +9,7 @@ mod estimate;
 mod flux;
 pub mod lanes;
 pub mod light;
+mod lists;
 mod operator;
 mod punctual;
 pub mod record;
@@ -16,6 +17,7 @@ pub mod reference;
 mod rows;
 mod sources;
 
+pub use lists::PatchList;
 pub use record::{Round, Verdict};
 pub use rows::{Rows, padded};
 pub(crate) use sources::weights_of;
@@ -90,6 +92,8 @@ const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
 /// No further round beyond this many links: about 120 MB.
 const MOST_LINKS: usize = 2_500_000;
+/// Leaves whose lists are looked at after a round.
+const LISTED_LEAVES: usize = 4096;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
@@ -655,9 +659,35 @@ impl Bake {
         }
     }
 
-    /// Mean number of intervals that a patch needs.
+    /// Mean number of intervals that a patch needs, over evenly chosen leaves.
     fn intervals_mean(&self) -> f64 {
-        self.lanes.len() as f64
+        let lists = self.lists(self.light.leaves.len().div_ceil(LISTED_LEAVES).max(1));
+        let sum: usize = lists.iter().map(PatchList::intervals).sum();
+        if lists.is_empty() {
+            0.0
+        } else {
+            sum as f64 / lists.len() as f64
+        }
+    }
+
+    /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
+    /// [`Light::leaves`]; empty where the rows hold the 64 leaves.
+    pub fn lists(&self, step: usize) -> Vec<PatchList> {
+        if self.lanes.lanes().iter().any(|lane| lane.light.is_none()) {
+            return Vec::new();
+        }
+        let limit = SPECTRUM_SHARE * self.settings.error;
+        let lister = lists::Lister::new(
+            &self.lanes,
+            &self.scene.spectra,
+            &self.weights,
+            self.light.white,
+            limit,
+        );
+        let rows: Vec<usize> = (0..self.light.leaves.len()).step_by(step.max(1)).collect();
+        rows.into_par_iter()
+            .map(|k| lister.list(self.light.irradiance.row(k)))
+            .collect()
     }
 
     /// What the lanes stand for.
