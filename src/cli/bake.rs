@@ -24,6 +24,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+/// Phases of a round, in order.
+const PHASES: [&str; 6] = [
+    "links", "spectrum", "direct", "balance", "solve", "estimate",
+];
 /// Distinguishes the audit's random numbers from the solver's.
 const AUDIT_SEED: u64 = 0x5eed_a0d1;
 
@@ -244,8 +248,10 @@ pub(super) fn prepare(
     };
     let mut bake = Bake::new(scene, settings);
     let bar = talk.watch();
-    bake.watch(Arc::new(move |phase| {
-        bar.set_message(format!("{phase} done"))
+    bake.watch(Arc::new(move |ended| {
+        let place = PHASES.iter().position(|phase| *phase == ended);
+        let next = place.and_then(|k| PHASES.get(k + 1)).unwrap_or(&"");
+        bar.set_message(*next);
     }));
     bake
 }

@@ -41,14 +41,16 @@ impl Talk {
 
     /// A phase of unknown length begins.
     pub fn phase(&self, name: &str) {
-        self.watch().set_message(name.to_owned());
+        let bar = self.watch();
+        bar.set_prefix(name.to_owned());
+        bar.set_message("");
     }
 
     /// The spinner, to be handed to whoever knows the phases.
     pub fn watch(&self) -> ProgressBar {
         if !self.bar.is_hidden() {
             // The templates are constants: they parse.
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix} {msg} {elapsed}") {
                 self.bar.set_style(style);
             }
             self.bar.enable_steady_tick(TICK);
