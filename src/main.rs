@@ -1,23 +1,11 @@
-//! The `haarlight` command.
+//! The `haarlight` command: parse, run, exit code.
 
 use clap::Parser;
-use haarlight::cli::paper;
+use haarlight::cli::{Cli, guarded, run};
 use std::process::ExitCode;
 
-#[derive(Parser)]
-#[command(version, about)]
-enum Command {
-    /// The paper's tables, measured beside printed.
-    Paper(paper::PaperArgs),
-}
-
 fn main() -> ExitCode {
-    let Command::Paper(args) = Command::parse();
-    match paper::run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("haarlight: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
+    // Ends the program by itself: 0 after --help, 2 after a mistake on the command line.
+    let cli = Cli::parse();
+    ExitCode::from(guarded(|| run(&cli)))
 }

@@ -232,6 +232,52 @@ fn materials_become_unlit_and_keep_their_paint() {
 }
 
 #[test]
+fn the_back_of_a_two_sided_surface_is_a_primitive_of_its_own() {
+    let mut scene = room();
+    scene.source.json["materials"][0]["doubleSided"] = serde_json::json!(true);
+    scene.materials[0].sides = haarlight::scene::Sides::Both;
+    // The floor of the plain node and of the mirrored one, with their backs behind them.
+    let mut surfaces = refine(&scene, 3);
+    let backs: Vec<_> = [0, 2]
+        .map(|floor| output_room::back(&surfaces[floor], 1.0))
+        .into();
+    surfaces.extend(backs.clone());
+    let glb = baked_glb(&scene, &surfaces, &Exposure::new(1e-3)).unwrap();
+    let read = read(&glb.bytes);
+    for (node, back) in ["left", "right"].into_iter().zip(&backs) {
+        let mesh = read.node(node).mesh().unwrap();
+        // Floor, its back, wall.
+        let primitives: Vec<_> = mesh.primitives().collect();
+        assert_eq!(primitives.len(), 3);
+        let (floor, under) = (&primitives[0], &primitives[1]);
+        assert!(!floor.material().double_sided() && floor.material().unlit());
+        assert_eq!(floor.material().index(), under.material().index());
+        let reader = under.reader(|_| Some(&read.blob));
+        assert!(
+            reader
+                .read_normals()
+                .unwrap()
+                .all(|n| n == [0.0, -1.0, 0.0])
+        );
+        // The texture still runs the same way: cross(normal, tangent) * hand is what it was on the front.
+        let bitangent = |primitive: &gltf::Primitive| {
+            let reader = primitive.reader(|_| Some(&read.blob));
+            let normal = reader.read_normals().unwrap().next().unwrap();
+            let [x, y, z, hand] = reader.read_tangents().unwrap().next().unwrap();
+            glam::Vec3::from(normal).cross(glam::vec3(x, y, z)) * hand
+        };
+        assert_eq!(bitangent(under), bitangent(floor));
+        let (positions, triangles) = read.world(&[node], 1);
+        assert_eq!(triangles, back.triangles);
+        for [a, b, c] in triangles.iter().map(|t| t.map(|v| positions[v as usize])) {
+            assert!((b - a).cross(c - a).y < 0.0, "{node}: faces down");
+        }
+        let mut colors = reader.read_colors(0).unwrap().into_rgb_f32();
+        assert!(colors.all(|c| c.iter().all(|c| (c - 3.141_593e-3).abs() < 1e-8)));
+    }
+}
+
+#[test]
 fn a_texture_that_the_light_was_not_divided_by_goes() {
     let mut scene = room();
     scene.materials[0].paint = None;

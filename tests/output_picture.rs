@@ -66,12 +66,14 @@ fn lit(
     let mut surfaces = output_room::refined(scene, n);
     for baked in &mut surfaces {
         let surface = &scene.surfaces[baked.surface];
-        for vertex in &mut baked.vertices {
-            let (p, normal) = (
-                refined::position(surface, vertex),
-                refined::normal(surface, vertex),
-            );
-            vertex.light = light(surface, p, normal).map(|c| c as f32);
+        let lights: Vec<[f64; 3]> = (baked.vertices.iter())
+            .map(|v| {
+                let normal = refined::normal(surface, baked, v);
+                light(surface, refined::position(surface, v), normal)
+            })
+            .collect();
+        for (vertex, light) in baked.vertices.iter_mut().zip(lights) {
+            vertex.light = light.map(|c| c as f32);
             vertex.radiosity = vertex.light;
         }
     }
@@ -171,24 +173,28 @@ fn shared_edges_leave_no_gap() {
 }
 
 #[test]
-fn back_faces_are_drawn_only_for_two_sided_surfaces() {
+fn each_side_shows_its_own_light() {
     let mut scene = empty();
     add(
         &mut scene,
         1,
         [DVec3::new(-4.0, -3.0, 0.0), DVec3::X * 8.0, DVec3::Y * 6.0],
     );
-    let surfaces = lit(&scene, 2, |_, _, _| [1.0; 3]);
-    let draw = |scene: &Scene, z: f64| {
+    let mut surfaces = lit(&scene, 2, |_, _, _| [PI; 3]);
+    let draw = |scene: &Scene, surfaces: &[BakedSurface], z: f64| {
         let camera = eye(DVec3::new(0.0, 0.0, z), DVec3::ZERO, 0.5);
-        Picture::draw(scene, &surfaces, &camera, &Exposure::new(1.0), SMALL)
-            .unwrap()
-            .pixels[64 * 24 + 32]
-            .coverage
+        let picture = Picture::draw(scene, surfaces, &camera, &Exposure::new(0.1), SMALL).unwrap();
+        let pixel = picture.pixels[64 * 24 + 32];
+        (pixel.coverage * pixel.rgb[1]).round()
     };
-    assert_eq!((draw(&scene, 5.0), draw(&scene, -5.0)), (1.0, 0.0));
-    scene.materials[1].sides = Sides::Both;
-    assert_eq!((draw(&scene, 5.0), draw(&scene, -5.0)), (1.0, 1.0));
+    let both =
+        |surfaces: &[BakedSurface]| (draw(&scene, surfaces, 5.0), draw(&scene, surfaces, -5.0));
+    assert_eq!(both(&surfaces), (1.0, 0.0));
+    surfaces.push(output_room::back(&surfaces[0], 3.0));
+    assert_eq!(both(&surfaces), (1.0, 3.0));
+    // The order of the sheets does not matter.
+    surfaces.reverse();
+    assert_eq!(both(&surfaces), (1.0, 3.0));
 }
 
 #[test]
@@ -245,21 +251,41 @@ fn paint_multiplies_light() {
 }
 
 #[test]
-fn exposure_meters_the_room_without_its_lamps() {
+fn exposure_meters_what_the_camera_sees_without_lamps() {
     let mut scene = empty();
-    add(
-        &mut scene,
-        1,
-        [DVec3::ZERO, DVec3::X * 10.0, DVec3::Y * 10.0],
-    );
+    let wall = [DVec3::ZERO, DVec3::X * 10.0, DVec3::Y * 10.0];
+    add(&mut scene, 1, wall);
     add(&mut scene, 2, [DVec3::Z, DVec3::X, DVec3::Y]);
-    // Radiosity rises from 0 to 1000 along x, so 96 % of the area lie below 960.
-    let surfaces = lit(&scene, 100, |s, p, _| {
-        [if s.material == 2 { 1e6 } else { 100.0 * p.x }; 3]
-    });
-    let look = Exposure::auto(&scene, &surfaces);
-    assert!((look.scale * 960.0 - 0.9).abs() < 0.01, "{look:?}");
+    // The strongest channel rises from 0 to 1000 along x.
+    let light = |s: &Surface, p: DVec3| {
+        let lamp = s.material == 2;
+        [1.0, 0.5, 0.2].map(|c| if lamp { 1e6 } else { c * 100.0 * p.x })
+    };
+    let camera = |x: f64| Camera {
+        projection: Projection::Orthographic(3.75),
+        ..eye(DVec3::new(x, 5.0, 20.0), DVec3::new(x, 5.0, 0.0), 1.0)
+    };
+    let auto = |scene: &Scene| {
+        let surfaces = lit(
+            scene,
+            100,
+            |s, p, _| if p.z < 0.0 { [0.0; 3] } else { light(s, p) },
+        );
+        Exposure::auto(scene, &surfaces)
+    };
+    // All of the wall's width is in sight: 99 % lie below 990.
+    scene.cameras = vec![camera(5.0)];
+    let look = auto(&scene);
+    assert!((look.scale * 990.0 - 1.0).abs() < 0.01, "{look:?}");
     assert!((look.white_luminance() * PI * look.scale - 1.0).abs() < 1e-12);
+    // The brighter half is out of sight: 97 % of the area decide.
+    scene.cameras = vec![camera(0.0)];
+    let look = auto(&scene);
+    assert!((look.scale * 970.0 - 1.0).abs() < 0.01, "{look:?}");
+    // A large wall that no light reaches changes nothing.
+    let unlit = [DVec3::NEG_Z, DVec3::X * 100.0, DVec3::Y * 100.0];
+    add(&mut scene, 1, unlit);
+    assert!((auto(&scene).scale / look.scale - 1.0).abs() < 1e-9);
     let dark = lit(&scene, 1, |_, _, _| [0.0; 3]);
     assert_eq!(Exposure::auto(&scene, &dark).scale, 1.0);
 }

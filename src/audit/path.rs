@@ -47,7 +47,12 @@ impl Answer {
         let dot = |x: &Leaves| x.iter().zip(weights).map(|(x, w)| x * w).sum::<f64>();
         let mean = dot(&self.mean);
         let n = self.batches.len() as f64;
-        let variance = self.batches.iter().map(|b| (dot(b) - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+        let variance = self
+            .batches
+            .iter()
+            .map(|b| (dot(b) - mean).powi(2))
+            .sum::<f64>()
+            / (n - 1.0).max(1.0);
         (mean, (variance / n).sqrt())
     }
 }
@@ -67,35 +72,63 @@ impl<'a> Audit<'a> {
         for &face in &mesh.faces {
             let material = &scene.materials[mesh.material[face.triangle as usize] as usize];
             if let Some(e) = &material.emission {
-                let power: f64 = e.shape.iter().zip(&scene.spectra[e.light].power).map(|(s, p)| s * p).sum();
+                let power: f64 = e
+                    .shape
+                    .iter()
+                    .zip(&scene.spectra[e.light].power)
+                    .map(|(s, p)| s * p)
+                    .sum();
                 if power > 0.0 {
                     total += power * mesh.area[face.triangle as usize];
                     lamps.push((face, total));
                 }
             }
         }
-        let masked = scene.materials.iter().any(|m| matches!(m.alpha, Alpha::Mask { .. }));
-        Self { scene, mesh, rays, upsampler: Upsampler::new(&scene.grid), lamps, total, masked }
+        let masked = scene
+            .materials
+            .iter()
+            .any(|m| matches!(m.alpha, Alpha::Mask { .. }));
+        Self {
+            scene,
+            mesh,
+            rays,
+            upsampler: Upsampler::new(&scene.grid),
+            lamps,
+            total,
+            masked,
+        }
     }
 
     /// Irradiance at points (recentred) with unit normals; `planes` hold the plane id of the face a point lies on, or
     /// [`NO_PLANE`]; `paths` how many paths each point gets. Points and batches have random streams of their own, so that
     /// the answer does not depend on the number of threads.
-    pub fn irradiance(&self, points: &[(DVec3, DVec3, u32)], paths: &[usize], seed: u64) -> Vec<Answer> {
+    pub fn irradiance(
+        &self,
+        points: &[(DVec3, DVec3, u32)],
+        paths: &[usize],
+        seed: u64,
+    ) -> Vec<Answer> {
         points
             .par_iter()
             .zip(paths)
             .enumerate()
             .map(|(k, (&(point, normal, plane), paths))| {
                 let each = paths.div_ceil(BATCHES).max(1);
-                let start = Vertex { point, normal, plane };
+                let start = Vertex {
+                    point,
+                    normal,
+                    plane,
+                };
                 let batches: Vec<Leaves> = (0..BATCHES)
                     .map(|batch| {
                         let mut rng = Pcg::new(hash(hash(seed, k as u64), batch as u64));
                         let (shift_a, shift_b) = (rng_u64(&mut rng), rng_u64(&mut rng));
                         let mut sum = [0.0; LEAVES];
                         for path in 0..each {
-                            let first = [sequence02(path as u32, shift_a), sequence02(path as u32, shift_b)];
+                            let first = [
+                                sequence02(path as u32, shift_a),
+                                sequence02(path as u32, shift_b),
+                            ];
                             self.path(&start, first, &mut rng, &mut sum);
                         }
                         sum.map(|x| x / each as f64)
@@ -121,16 +154,24 @@ impl<'a> Audit<'a> {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
             self.punctual(&at, &throughput, sum);
             let direction = cosine_direction(at.normal, toward_any);
-            let Some(hit) = self.closest(at.point, direction, at.plane) else { return };
+            let Some(hit) = self.closest(at.point, direction, at.plane) else {
+                return;
+            };
             let triangle = hit.triangle as usize;
             let material = &self.scene.materials[self.mesh.material[triangle] as usize];
             if hit.from_behind && material.sides == Sides::Front {
                 return;
             }
-            let normal = if hit.from_behind { -self.mesh.normal[triangle] } else { self.mesh.normal[triangle] };
+            let normal = if hit.from_behind {
+                -self.mesh.normal[triangle]
+            } else {
+                self.mesh.normal[triangle]
+            };
             let weights = [1.0 - hit.uv[0] - hit.uv[1], hit.uv[0], hit.uv[1]];
             let corners = self.mesh.triangles[triangle].map(|v| self.mesh.positions[v as usize]);
-            let point = corners[0] * f64::from(weights[0]) + corners[1] * f64::from(weights[1]) + corners[2] * f64::from(weights[2]);
+            let point = corners[0] * f64::from(weights[0])
+                + corners[1] * f64::from(weights[1])
+                + corners[2] * f64::from(weights[2]);
             if let Some(radiance) = self.radiance(triangle, weights) {
                 let d = point - at.point;
                 let r2 = d.length_squared();
@@ -161,7 +202,11 @@ impl<'a> Audit<'a> {
                     *t /= survive;
                 }
             }
-            at = Vertex { point, normal, plane: self.mesh.plane[triangle] };
+            at = Vertex {
+                point,
+                normal,
+                plane: self.mesh.plane[triangle],
+            };
             toward_lamp = [rng.f64(), rng.f64()];
             toward_any = [rng.f64(), rng.f64()];
         }
@@ -170,30 +215,58 @@ impl<'a> Audit<'a> {
     /// Density per area with which a lamp's triangle is chosen.
     fn chance(&self, triangle: usize) -> f64 {
         let material = &self.scene.materials[self.mesh.material[triangle] as usize];
-        let Some(e) = &material.emission else { return 0.0 };
-        let power: f64 = e.shape.iter().zip(&self.scene.spectra[e.light].power).map(|(s, p)| s * p).sum();
-        if self.total > 0.0 { power / self.total } else { 0.0 }
+        let Some(e) = &material.emission else {
+            return 0.0;
+        };
+        let power: f64 = e
+            .shape
+            .iter()
+            .zip(&self.scene.spectra[e.light].power)
+            .map(|(s, p)| s * p)
+            .sum();
+        if self.total > 0.0 {
+            power / self.total
+        } else {
+            0.0
+        }
     }
 
     /// Light straight from a point on a lamp.
-    fn lamp_sample(&self, at: &Vertex, square: [f64; 2], rng: &mut Pcg, throughput: &Leaves, sum: &mut Leaves) {
+    fn lamp_sample(
+        &self,
+        at: &Vertex,
+        square: [f64; 2],
+        rng: &mut Pcg,
+        throughput: &Leaves,
+        sum: &mut Leaves,
+    ) {
         if self.lamps.is_empty() {
             return;
         }
         let target = rng.f64() * self.total;
-        let index = self.lamps.partition_point(|&(_, upto)| upto <= target).min(self.lamps.len() - 1);
+        let index = self
+            .lamps
+            .partition_point(|&(_, upto)| upto <= target)
+            .min(self.lamps.len() - 1);
         let face = self.lamps[index].0;
         let corners = self.mesh.corners(face);
         let q = on_triangle(&corners, square);
         let d = q - at.point;
         let r2 = d.length_squared();
         let r = r2.sqrt();
-        let (c1, c2) = (at.normal.dot(d) / r, -self.mesh.face_normal(face).dot(d) / r);
+        let (c1, c2) = (
+            at.normal.dot(d) / r,
+            -self.mesh.face_normal(face).dot(d) / r,
+        );
         let triangle = face.triangle as usize;
         if !(c1 > 0.0 && c2 > 0.0) || self.mesh.plane[triangle] == at.plane {
             return;
         }
-        let segment = Segment { from: at.point.as_vec3(), to: q.as_vec3(), planes: [at.plane, self.mesh.plane[triangle]] };
+        let segment = Segment {
+            from: at.point.as_vec3(),
+            to: q.as_vec3(),
+            planes: [at.plane, self.mesh.plane[triangle]],
+        };
         if self.blocked(&segment) {
             return;
         }
@@ -201,7 +274,11 @@ impl<'a> Audit<'a> {
         let n = (b - a).cross(c - a);
         let wb = (q - a).cross(c - a).dot(n) / n.length_squared();
         let wc = (b - a).cross(q - a).dot(n) / n.length_squared();
-        let Some(radiance) = self.radiance(triangle, [(1.0 - wb - wc) as f32, wb as f32, wc as f32]) else { return };
+        let Some(radiance) =
+            self.radiance(triangle, [(1.0 - wb - wc) as f32, wb as f32, wc as f32])
+        else {
+            return;
+        };
         // A two-sided lamp is in the list once for each side: the density of a point is that of its own side.
         let by_area = self.chance(triangle) * r2 / c2;
         let by_direction = c1 / PI;
@@ -215,23 +292,32 @@ impl<'a> Audit<'a> {
         for light in &self.scene.lights {
             let position = light.position - self.mesh.centre;
             let (factor, end) = if light.kind == LightKind::Directional {
-                (-at.normal.dot(light.direction), at.point - light.direction * (4.0 * self.mesh.half_size))
+                (
+                    -at.normal.dot(light.direction),
+                    at.point - light.direction * (4.0 * self.mesh.half_size),
+                )
             } else {
                 let d = position - at.point;
                 let r2 = d.length_squared();
                 let spot = match light.kind {
                     LightKind::Spot { inner, outer } => {
                         let along = -light.direction.dot(d) / r2.sqrt();
-                        ((along - outer.cos()) / (inner.cos() - outer.cos()).max(1e-3)).clamp(0.0, 1.0).powi(2)
+                        ((along - outer.cos()) / (inner.cos() - outer.cos()).max(1e-3))
+                            .clamp(0.0, 1.0)
+                            .powi(2)
                     }
                     _ => 1.0,
                 };
                 (spot * at.normal.dot(d) / (r2 * r2.sqrt()), position)
             };
-            if !(factor > 0.0) {
+            if factor.is_nan() || factor <= 0.0 {
                 continue;
             }
-            let segment = Segment { from: at.point.as_vec3(), to: end.as_vec3(), planes: [at.plane, NO_PLANE] };
+            let segment = Segment {
+                from: at.point.as_vec3(),
+                to: end.as_vec3(),
+                planes: [at.plane, NO_PLANE],
+            };
             if self.blocked(&segment) {
                 continue;
             }
@@ -245,15 +331,26 @@ impl<'a> Audit<'a> {
     fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<crate::geometry::Hit> {
         let reach = (4.0 * self.mesh.half_size) as f32;
         if self.masked {
-            let opaque = |t: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v]);
-            return self.rays.closest_with(from.as_vec3(), direction.as_vec3(), reach, plane, &opaque);
+            let opaque = |t: u32, u: f32, v: f32| {
+                !crate::scene::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
+            };
+            return self.rays.closest_with(
+                from.as_vec3(),
+                direction.as_vec3(),
+                reach,
+                plane,
+                &opaque,
+            );
         }
-        self.rays.closest(from.as_vec3(), direction.as_vec3(), reach, plane)
+        self.rays
+            .closest(from.as_vec3(), direction.as_vec3(), reach, plane)
     }
 
     fn blocked(&self, segment: &Segment) -> bool {
         if self.masked {
-            let opaque = |t: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v]);
+            let opaque = |t: u32, u: f32, v: f32| {
+                !crate::scene::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
+            };
             return self.rays.occluded_with(segment, &opaque);
         }
         self.rays.occluded(segment)
@@ -261,7 +358,9 @@ impl<'a> Audit<'a> {
 
     /// Emitted radiance at a point of a triangle, W/m2/sr/nm.
     fn radiance(&self, triangle: usize, weights: [f32; 3]) -> Option<Leaves> {
-        let e = self.scene.materials[self.mesh.material[triangle] as usize].emission.as_ref()?;
+        let e = self.scene.materials[self.mesh.material[triangle] as usize]
+            .emission
+            .as_ref()?;
         let power = &self.scene.spectra[e.light].power;
         let shape = match &e.texture {
             Some(texture) => {
@@ -289,18 +388,28 @@ impl<'a> Audit<'a> {
         if let Some(colors) = colors {
             let corners = surface.triangles[self.mesh.origin[triangle].1 as usize];
             for (c, x) in color.iter_mut().enumerate() {
-                *x *= (0..3).map(|k| colors[corners[k] as usize][c] * weights[k]).sum::<f32>();
+                *x *= (0..3)
+                    .map(|k| colors[corners[k] as usize][c] * weights[k])
+                    .sum::<f32>();
             }
         }
-        self.upsampler.reflectance_fast(color).map(|x| x.min(crate::scene::GREATEST_ALBEDO))
+        self.upsampler
+            .reflectance_fast(color)
+            .map(|x| x.min(crate::scene::GREATEST_ALBEDO))
     }
 
     fn texel(&self, texture: &Texture, triangle: usize, weights: [f32; 3]) -> [f32; 4] {
         let (surface, local) = self.mesh.origin[triangle];
         let surface = &self.scene.surfaces[surface as usize];
-        let Some(uvs) = surface.texcoords.get(texture.texcoord) else { return [1.0; 4] };
+        let Some(uvs) = surface.texcoords.get(texture.texcoord) else {
+            return [1.0; 4];
+        };
         let corners = surface.triangles[local as usize];
-        let uv = std::array::from_fn(|c| (0..3).map(|k| uvs[corners[k] as usize][c] * weights[k]).sum());
+        let uv = std::array::from_fn(|c| {
+            (0..3)
+                .map(|k| uvs[corners[k] as usize][c] * weights[k])
+                .sum()
+        });
         texture.sample(&self.scene.images, uv)
     }
 }

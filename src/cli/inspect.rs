@@ -1,4 +1,4 @@
-//! `haarlight inspect ROOM [--json] [--spectra FILE]`: what the program sees in a room.
+//! `haarlight inspect ROOM [--json] [--spectra FILE] [--range 380..780]`: what the program sees in a room.
 //!
 //! Prints triangles, areas, whether the room is closed, lamps with lumens, materials with albedo (Y under D65) and where
 //! their spectrum comes from, the plan of effects, and warnings. Nothing is solved.
@@ -7,12 +7,12 @@
 //! `unsupported` are the extensions that are not read (the page has them among its warnings);
 //! the fields of `facts` are those of [`Facts`], with units in their names.
 
+use super::options::Reading;
 use crate::error::{Error, Result};
 use crate::scene::document::Document;
 use crate::scene::effects::Plan;
 use crate::scene::facts::{Facts, LightFact};
 use crate::scene::{Options, Scene};
-use crate::spectrum::Grid;
 use serde_json::json;
 use std::io::Write;
 use std::path::PathBuf;
@@ -28,23 +28,23 @@ pub struct InspectArgs {
     /// Print one JSON object.
     #[arg(long)]
     pub json: bool,
-    /// Spectra of materials and lights (default: ROOM's name with .spectra.json, if it is there).
-    #[arg(long, value_name = "FILE")]
-    pub spectra: Option<PathBuf>,
+    /// What to read.
+    #[command(flatten)]
+    pub reading: Reading,
 }
 
 /// Reads the room and prints what is in it.
 ///
 /// # Errors
 /// As [`Scene::load`]; [`Error::Io`] if `out` cannot be written to.
-pub fn run(args: &InspectArgs, grid: Grid, out: &mut impl Write) -> Result<()> {
+pub fn run(args: &InspectArgs, out: &mut impl Write) -> Result<()> {
     let document = Document::open(&args.room)?;
     let unsupported = document.unsupported.clone();
     let scene = Scene::from_document(
         document,
         &Options {
-            grid,
-            spectra: args.spectra.clone(),
+            grid: args.reading.range.grid(),
+            spectra: args.reading.spectra.clone(),
         },
     )?;
     let facts = Facts::of(&scene);
@@ -197,9 +197,8 @@ mod tests {
             &InspectArgs {
                 room,
                 json,
-                spectra: None,
+                reading: Reading::default(),
             },
-            Grid::default(),
             &mut out,
         )
         .unwrap();

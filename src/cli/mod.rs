@@ -1,4 +1,32 @@
 //! The commands, one a file.
+//!
+//! | file | what |
+//! |---|---|
+//! | `command` | the command line as a whole, exit codes |
+//! | `options` | options that commands share |
+//! | `bake`, `inspect`, `probe`, `paper` | the commands |
+//! | `log` | the log of a bake, field by field |
+//! | `snapshots` | pictures of the rounds |
+//! | `points` | the CSV of points for `probe` |
+//! | `stop` | Ctrl-C and `--time` |
+//! | `paths` | checks on output files |
+//! | `talk` | lines and bars on stderr |
+//! | `fault` | panics become exit code 3 |
 
+pub mod bake;
+mod command;
+mod fault;
 pub mod inspect;
+pub mod log;
+pub mod options;
 pub mod paper;
+mod paths;
+pub mod points;
+pub mod probe;
+mod snapshots;
+pub mod stop;
+mod summary;
+pub mod talk;
+
+pub use command::{Cli, Command, run};
+pub use fault::guarded;

@@ -1,10 +1,12 @@
 //! `haarlight paper`: the tables of Rougeron and Péroche 1997, measured beside printed, and what lies beyond them.
 //!
-//! Results go to stdout. `--json` gives one object with `table1` (by light), `table2`, `control`, `bounds`, `methods`;
+//! Results go to stdout. `--json` gives one object with `table1` (by light), `table2`, `control`, `bounds`, `methods`, `cuts`, `covariances`;
 //! field by field it is documented on the row types of [`crate::spectrum::study`]. Shares are in percent.
 
 use crate::spectrum::study::table1::{Column, PRINTED, ROWS, mean_differences};
-use crate::spectrum::study::{Chart, LEVELS, Light, Reflectances, bounds, compare, modes, table2};
+use crate::spectrum::study::{
+    Chart, LEVELS, Light, Reflectances, bounds, compare, covariance, cuts, modes, table2,
+};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -27,6 +29,8 @@ struct Results {
     bounds: Vec<bounds::Row>,
     methods: Vec<compare::Row>,
     table2: Vec<table2::Stage>,
+    cuts: Vec<cuts::Row>,
+    covariances: Vec<covariance::Row>,
 }
 
 /// Runs the tests and prints them.
@@ -78,6 +82,14 @@ fn measure(source: Reflectances) -> Results {
             .flat_map(|light| compare::measure(&chart, light))
             .collect(),
         table2: table2::measure(&chart),
+        cuts: lights
+            .iter()
+            .flat_map(|light| cuts::measure(&chart, light))
+            .collect(),
+        covariances: lights
+            .iter()
+            .flat_map(|light| covariance::measure(&chart, light))
+            .collect(),
     }
 }
 
@@ -89,6 +101,8 @@ fn to_json(results: &Results) -> Value {
         "control": results.control,
         "bounds": results.bounds,
         "methods": results.methods,
+        "cuts": results.cuts,
+        "covariances": results.covariances,
     })
 }
 
@@ -100,6 +114,8 @@ fn to_text(results: &Results) -> String {
     let _ = control(&mut text, &results.control);
     let _ = bound(&mut text, &results.bounds);
     let _ = methods(&mut text, &results.methods);
+    let _ = greedy(&mut text, &results.cuts);
+    let _ = covariances(&mut text, &results.covariances);
     text
 }
 
@@ -169,7 +185,7 @@ fn control(text: &mut String, rows: &[modes::Row]) -> std::fmt::Result {
     )?;
     writeln!(
         text,
-        "{:13}{:18}{:10}{:>7}{:>10}{:>9}{:>22}{:>22}{:>22}{:>22}",
+        "{:13}{:25}{:10}{:>7}{:>10}{:>9}{:>22}{:>22}{:>22}{:>22}",
         "light",
         "control",
         "level",
@@ -185,7 +201,7 @@ fn control(text: &mut String, rows: &[modes::Row]) -> std::fmt::Result {
     for r in rows {
         write!(
             text,
-            "{:13}{:18}{:10}{:>7.3}{:>10.2}{:>9.2}",
+            "{:13}{:25}{:10}{:>7.3}{:>10.2}{:>9.2}",
             r.light, r.mode, r.level, r.limit, r.intervals_mean, r.above_eps_max
         )?;
         for s in [&r.luv, &r.de2000, &r.corrected_luv, &r.corrected_de2000] {
@@ -307,4 +323,49 @@ fn methods(text: &mut String, rows: &[compare::Row]) -> std::fmt::Result {
         text,
         "\nTimes are those of n = 16. Adaptive lists: see Table 2; each of their terms comes with three errors."
     )
+}
+
+fn greedy(text: &mut String, rows: &[cuts::Row]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "\nGreedy cuts against the best known (secondary reflections, mean dE*uv, no correction)\n"
+    )?;
+    writeln!(
+        text,
+        "{:7}{:>10}{:>10}{:>10}{:>10}",
+        "light", "intervals", "halving", "merging", "best"
+    )?;
+    for r in rows {
+        writeln!(
+            text,
+            "{:7}{:>10}{:>10.3}{:>10.3}{:>10.3}",
+            r.light, r.intervals, r.split, r.merge, r.best
+        )?;
+    }
+    Ok(())
+}
+
+fn covariances(text: &mut String, rows: &[covariance::Row]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "\nRatio lists, error added back: means alone, and with the covariances of all pairs of reflectances (dE*uv)\n"
+    )?;
+    writeln!(
+        text,
+        "{:7}{:10}{:>10}{:>22}{:>22}",
+        "light", "level", "intervals", "means", "covariances"
+    )?;
+    let spread = |s: &modes::Spread| format!("{:.3} / {:.3} / {:.3}", s.mean, s.p95, s.max);
+    for r in rows {
+        writeln!(
+            text,
+            "{:7}{:10}{:>10.2}{:>22}{:>22}",
+            r.light,
+            r.level,
+            r.intervals_mean,
+            spread(&r.means),
+            spread(&r.covariances)
+        )?;
+    }
+    Ok(())
 }

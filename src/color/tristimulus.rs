@@ -26,6 +26,15 @@ mod tests {
     use crate::spectrum::Grid;
 
     #[test]
+    fn k_of_d65_is_the_published_one() {
+        // 100 / K for D65 scaled to 100 at 560 nm: 10566.864 (as in public spectral renderers, 360-830 nm).
+        let grid = Grid::new(360.0, 830.0);
+        let d65 = grid.means(&named("cie/D65").unwrap().table, Outside::Zero);
+        let k = normalization(&d65, &Observer::cie1931().weights(&grid));
+        assert!((1.0 / k / 10_566.864 - 1.0).abs() < 1e-4, "{}", 1.0 / k);
+    }
+
+    #[test]
     fn a_source_counts_as_one() {
         let grid = Grid::paper();
         let weights = Observer::cie1931().samples(&grid);

@@ -23,7 +23,9 @@ const INSET: f64 = 2e-3;
 /// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
 const PROBE_INSET: f64 = 1e-5;
 /// Vertices at the most; a pass that would exceed this is not begun.
-const MOST_VERTICES: usize = 6_000_000;
+const MOST_VERTICES: usize = 2_000_000;
+/// Triangles with edges below this share of the room's half diagonal are not quartered for the output.
+const SHORTEST: f64 = 0.008;
 
 /// The baked mesh and what it took.
 #[derive(Debug, Default)]
@@ -36,6 +38,8 @@ pub struct Baked {
     pub covered: usize,
     /// Triangles that wanted quartering when the limits were met.
     pub capped: usize,
+    /// Visibility rays cast.
+    pub rays: u64,
 }
 
 /// What a vertex is known to get; none if it is covered.
@@ -44,17 +48,36 @@ type Known = Option<Option<Box<[f32; 64]>>>;
 impl Bake {
     /// Gathers at the vertices of the refined mesh. `progress` is told (done, of) in vertices of the present pass.
     pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
+        self.gathered(PASSES, progress)
+    }
+
+    /// The same on the solver's own elements, without looking for what lies between: for a picture on the way.
+    pub fn sketch(&self, progress: &dyn Fn(usize, usize)) -> Baked {
+        self.gathered(0, progress)
+    }
+
+    fn gathered(&self, passes: usize, progress: &dyn Fn(usize, usize)) -> Baked {
         let scene = self.scene();
         let flat: Vec<bool> = scene.surfaces.iter().map(|s| s.normals.is_none()).collect();
-        let sides: Vec<bool> = scene.surfaces.iter().map(|s| scene.materials[s.material].sides == crate::scene::Sides::Both).collect();
+        let sides: Vec<bool> = scene
+            .surfaces
+            .iter()
+            .map(|s| scene.materials[s.material].sides == crate::scene::Sides::Both)
+            .collect();
         let corners = |surface: usize, triangle: usize| scene.surfaces[surface].triangles[triangle];
         let mut refined = Refined::new(self.mesh(), self.tree(), &corners, &flat, &sides, DEEPEST);
         refined.level();
         let mut known: Vec<Vec<Known>> = Vec::new();
         let mut out = Baked::default();
-        self.complete(&refined, &mut known, progress);
-        for _ in 0..PASSES {
-            if refined.sheets.iter().map(|s| s.vertices.len()).sum::<usize>() > MOST_VERTICES {
+        out.rays += self.complete(&refined, &mut known, progress);
+        for _ in 0..passes {
+            if refined
+                .sheets
+                .iter()
+                .map(|s| s.vertices.len())
+                .sum::<usize>()
+                > MOST_VERTICES
+            {
                 out.capped += 1;
                 break;
             }
@@ -62,7 +85,18 @@ impl Bake {
             let suspects: Vec<(u32, u32)> = refined
                 .leaves()
                 .into_iter()
-                .filter(|&id| refined.depth(id) < DEEPEST && self.differ(&known[id.0 as usize], refined.corners(id).map(|c| c.vertex)))
+                .filter(|&id| {
+                    let c = refined
+                        .corners(id)
+                        .map(|c| refined.points[c.point as usize]);
+                    let longest = (0..3)
+                        .map(|k| c[k].distance(c[(k + 1) % 3]))
+                        .fold(0.0, f64::max);
+                    longest > SHORTEST * self.mesh().half_size && refined.depth(id) < DEEPEST
+                })
+                .filter(|&id| {
+                    self.differ(&known[id.0 as usize], refined.corners(id).map(|c| c.vertex))
+                })
                 .collect();
             let looks: Vec<[u32; 3]> = suspects
                 .iter()
@@ -71,27 +105,38 @@ impl Bake {
                     [0, 1, 2].map(|k| refined.look(id, c[k], c[(k + 1) % 3]))
                 })
                 .collect();
-            self.complete(&refined, &mut known, progress);
+            out.rays += self.complete(&refined, &mut known, progress);
             let mut any = false;
             for (&id, looks) in suspects.iter().zip(&looks) {
-                if self.bent(&known[id.0 as usize], refined.corners(id).map(|c| c.vertex), looks) {
+                if self.bent(
+                    &known[id.0 as usize],
+                    refined.corners(id).map(|c| c.vertex),
+                    looks,
+                ) {
                     refined.split(id);
                     any = true;
                 }
             }
             refined.level();
-            self.complete(&refined, &mut known, progress);
+            out.rays += self.complete(&refined, &mut known, progress);
             if !any {
                 break;
             }
         }
-        let triangles: Vec<Vec<[u32; 3]>> = (0..refined.sheets.len() as u32).map(|s| refined.triangles(s)).collect();
-        self.complete(&refined, &mut known, progress);
+        let triangles: Vec<Vec<[u32; 3]>> = (0..refined.sheets.len() as u32)
+            .map(|s| refined.triangles(s))
+            .collect();
+        out.rays += self.complete(&refined, &mut known, progress);
         self.write_down(&refined, triangles, known, out)
     }
 
-    /// Gathers at all vertices that are not known yet.
-    fn complete(&self, refined: &Refined, known: &mut Vec<Vec<Known>>, progress: &dyn Fn(usize, usize)) {
+    /// Gathers at all vertices that are not known yet; returns the rays cast.
+    fn complete(
+        &self,
+        refined: &Refined,
+        known: &mut Vec<Vec<Known>>,
+        progress: &dyn Fn(usize, usize),
+    ) -> u64 {
         known.resize(refined.sheets.len(), Vec::new());
         let mut wanted = Vec::new();
         for (s, sheet) in refined.sheets.iter().enumerate() {
@@ -101,17 +146,34 @@ impl Bake {
         }
         // In parts, so that progress shows.
         const PART: usize = 16_384;
+        let mut rays = 0;
         for (part, chunk) in wanted.chunks(PART).enumerate() {
             progress(part * PART, wanted.len());
-            let receivers: Vec<Receiver> =
-                chunk.iter().map(|&(s, v)| self.receiver(&refined.sheets[s].vertices[v], refined.sheets[s].surface, refined.sheets[s].back)).collect();
+            let receivers: Vec<Receiver> = chunk
+                .iter()
+                .map(|&(s, v)| {
+                    self.receiver(
+                        &refined.sheets[s].vertices[v],
+                        refined.sheets[s].surface,
+                        refined.sheets[s].back,
+                    )
+                })
+                .collect();
             let covered = self.covered(&receivers);
-            for ((gathered, &(s, v)), covered) in self.gather(&receivers).into_iter().zip(chunk).zip(covered) {
+            for ((gathered, &(s, v)), covered) in
+                self.gather(&receivers).into_iter().zip(chunk).zip(covered)
+            {
+                rays += gathered.rays;
                 let dark = gathered.seen < 1e-3 && gathered.direct.iter().all(|&x| x == 0.0);
-                known[s][v] = Some(if dark && covered { None } else { Some(Box::new(gathered.irradiance)) });
+                known[s][v] = Some(if dark && covered {
+                    None
+                } else {
+                    Some(Box::new(gathered.irradiance))
+                });
             }
         }
         progress(wanted.len(), wanted.len());
+        rays
     }
 
     /// The place of a vertex, drawn into its triangle, with its shading normal.
@@ -121,30 +183,54 @@ impl Bake {
         let triangle = vertex.triangle as usize;
         let inner = vertex.weights.map(|w| w * (1.0 - INSET) + INSET / 3.0);
         let [a, b, c] = mesh.triangles[triangle].map(|v| mesh.positions[v as usize]);
-        let flat = if back { -mesh.normal[triangle] } else { mesh.normal[triangle] };
+        let flat = if back {
+            -mesh.normal[triangle]
+        } else {
+            mesh.normal[triangle]
+        };
         let normal = match &surface.normals {
             Some(normals) => {
                 let corners = surface.triangles[mesh.origin[triangle].1 as usize];
-                let sum: DVec3 = (0..3).map(|k| normals[corners[k] as usize].as_dvec3() * vertex.weights[k]).sum();
+                let sum: DVec3 = (0..3)
+                    .map(|k| normals[corners[k] as usize].as_dvec3() * vertex.weights[k])
+                    .sum();
                 let sum = if back { -sum } else { sum };
                 let shading = sum.normalize_or(flat);
                 // A shading normal that looks behind its own triangle is an error of the file.
-                if shading.dot(flat) > 0.0 { shading } else { flat }
+                if shading.dot(flat) > 0.0 {
+                    shading
+                } else {
+                    flat
+                }
             }
             None => flat,
         };
         let leaf = (vertex.entry != crate::hierarchy::NONE).then(|| {
             // The hierarchy's back faces have their corners the other way round.
-            let w = if back { [inner[0], inner[2], inner[1]] } else { inner };
+            let w = if back {
+                [inner[0], inner[2], inner[1]]
+            } else {
+                inner
+            };
             tree.leaf_at(vertex.entry, w)
         });
         let point = a * inner[0] + b * inner[1] + c * inner[2];
-        Receiver { point, normal, plane: mesh.plane[triangle], leaf, seed: u64::from(vertex.point) }
+        Receiver {
+            point,
+            normal,
+            plane: mesh.plane[triangle],
+            leaf,
+            seed: u64::from(vertex.point),
+        }
     }
 
     /// Difference of two irradiances on a white surface.
     fn difference(&self, a: &[f32; 64], b: &[f32; 64]) -> f64 {
-        de2000(self.lanes().tristimulus(a), self.lanes().tristimulus(b), self.light().white)
+        de2000(
+            self.lanes().tristimulus(a),
+            self.lanes().tristimulus(b),
+            self.light().white,
+        )
     }
 
     fn differ(&self, known: &[Known], corners: [u32; 3]) -> bool {
@@ -158,29 +244,46 @@ impl Bake {
 
     fn bent(&self, known: &[Known], corners: [u32; 3], looks: &[u32; 3]) -> bool {
         let row = |v: u32| known[v as usize].as_ref().and_then(|k| k.as_ref());
-        (0..3).any(|k| match (row(corners[k]), row(corners[(k + 1) % 3]), row(looks[k])) {
-            (Some(a), Some(b), Some(m)) => {
-                let mean: [f32; 64] = std::array::from_fn(|l| 0.5 * (a[l] + b[l]));
-                self.difference(&mean, m) > BENT * self.settings().error
-            }
-            (None, None, None) => false,
-            // The edge of something that stands on the surface runs through.
-            _ => true,
-        })
+        (0..3).any(
+            |k| match (row(corners[k]), row(corners[(k + 1) % 3]), row(looks[k])) {
+                (Some(a), Some(b), Some(m)) => {
+                    let mean: [f32; 64] = std::array::from_fn(|l| 0.5 * (a[l] + b[l]));
+                    self.difference(&mean, m) > BENT * self.settings().error
+                }
+                (None, None, None) => false,
+                // The edge of something that stands on the surface runs through.
+                _ => true,
+            },
+        )
     }
 
     /// Vertices with their colours, as the writers want them.
-    fn write_down(&self, refined: &Refined, triangles: Vec<Vec<[u32; 3]>>, known: Vec<Vec<Known>>, mut out: Baked) -> Baked {
+    fn write_down(
+        &self,
+        refined: &Refined,
+        triangles: Vec<Vec<[u32; 3]>>,
+        known: Vec<Vec<Known>>,
+        mut out: Baked,
+    ) -> Baked {
         let looks: Vec<Look> = {
             let upsampler = Upsampler::new(&self.scene().grid);
-            self.scene().materials.iter().map(|m| Look::new(self, m, &upsampler)).collect()
+            self.scene()
+                .materials
+                .iter()
+                .map(|m| Look::new(self, m, &upsampler))
+                .collect()
         };
         for ((sheet, triangles), known) in refined.sheets.iter().zip(triangles).zip(known) {
-            let mut rows: Vec<Option<[f32; 64]>> = known.into_iter().map(|k| k.flatten().map(|b| *b)).collect();
+            let mut rows: Vec<Option<[f32; 64]>> =
+                known.into_iter().map(|k| k.flatten().map(|b| *b)).collect();
             out.covered += lend(&mut rows, &triangles);
             // Vertices that were only looked at are left out.
             let mut place = vec![u32::MAX; sheet.vertices.len()];
-            let mut surface = BakedSurface { surface: sheet.surface, back: sheet.back, ..BakedSurface::default() };
+            let mut surface = BakedSurface {
+                surface: sheet.surface,
+                back: sheet.back,
+                ..BakedSurface::default()
+            };
             let mut spectra = Vec::new();
             let look = &looks[self.scene().surfaces[sheet.surface].material];
             for triangle in &triangles {
@@ -188,7 +291,12 @@ impl Bake {
                     if place[v as usize] == u32::MAX {
                         place[v as usize] = surface.vertices.len() as u32;
                         let row = rows[v as usize].unwrap_or([0.0; 64]);
-                        surface.vertices.push(self.vertex(&sheet.vertices[v as usize], sheet.back, &row, look));
+                        surface.vertices.push(self.vertex(
+                            &sheet.vertices[v as usize],
+                            sheet.back,
+                            &row,
+                            look,
+                        ));
                         spectra.push(row);
                     }
                     place[v as usize]
@@ -203,9 +311,14 @@ impl Bake {
     fn vertex(&self, vertex: &Vertex, back: bool, row: &[f32; 64], look: &Look) -> BakedVertex {
         let glow = match (look.emits, vertex.entry) {
             (true, entry) if entry != crate::hierarchy::NONE => {
-                let w = if back { [vertex.weights[0], vertex.weights[2], vertex.weights[1]] } else { vertex.weights };
+                let w = if back {
+                    [vertex.weights[0], vertex.weights[2], vertex.weights[1]]
+                } else {
+                    vertex.weights
+                };
                 let leaf = self.tree().leaf_at(entry, w);
-                self.lanes().tristimulus(self.light().emitted.row(leaf as usize))
+                self.lanes()
+                    .tristimulus(self.light().emitted.row(leaf as usize))
             }
             _ => [0.0; 3],
         };
@@ -221,7 +334,9 @@ impl Bake {
         let unpainted = look.unpainted.unwrap_or([1.0; 3]);
         let rgb = display.from_xyz(std::array::from_fn(|c| reflected[c] + glow[c]));
         BakedVertex {
-            triangle: vertex.triangle - self.mesh().first_triangle[self.mesh().origin[vertex.triangle as usize].0 as usize],
+            triangle: vertex.triangle
+                - self.mesh().first_triangle
+                    [self.mesh().origin[vertex.triangle as usize].0 as usize],
             weights: vertex.weights,
             irradiance: self.lanes().tristimulus(row).map(|x| x as f32),
             radiosity: std::array::from_fn(|c| (reflected[c] + glow[c]) as f32),
@@ -231,7 +346,9 @@ impl Bake {
 }
 
 /// How a material turns irradiance into what is seen.
-struct Look {
+pub(super) struct Look {
+    /// Reflectance on the leaves.
+    pub(super) reflectance: Leaves,
     /// Tristimulus radiosity for a unit of each lane's irradiance.
     reflected: Vec<[f64; 3]>,
     /// Mean colour of the texture, which the display multiplies again.
@@ -240,11 +357,13 @@ struct Look {
 }
 
 impl Look {
-    fn new(bake: &Bake, material: &Material, upsampler: &Upsampler) -> Self {
+    pub(super) fn new(bake: &Bake, material: &Material, upsampler: &Upsampler) -> Self {
         let mean = material.paint.as_ref().map(|texture| {
             let image = &bake.scene().images[texture.image];
             let n = image.pixels.len().max(1) as f64;
-            let sum = image.pixels.iter().fold([0.0; 3], |s: [f64; 3], p| std::array::from_fn(|c| s[c] + f64::from(p[c])));
+            let sum = image.pixels.iter().fold([0.0; 3], |s: [f64; 3], p| {
+                std::array::from_fn(|c| s[c] + f64::from(p[c]))
+            });
             sum.map(|x| (x / n).max(1e-3))
         });
         let reflectance: Leaves = match mean {
@@ -254,7 +373,12 @@ impl Look {
             }
             None => material.reflectance,
         };
-        Self { reflected: bake.lanes().reflected(&reflectance), unpainted: mean, emits: material.emission.is_some() }
+        Self {
+            reflected: bake.lanes().reflected(&reflectance),
+            reflectance,
+            unpainted: mean,
+            emits: material.emission.is_some(),
+        }
     }
 }
 
@@ -264,10 +388,13 @@ fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> usize {
     for &v in triangles.iter().flatten() {
         used[v as usize] = true;
     }
-    let before = (0..rows.len()).filter(|&v| used[v] && rows[v].is_none()).count();
+    let before = (0..rows.len())
+        .filter(|&v| used[v] && rows[v].is_none())
+        .count();
     let mut left = before;
     while left > 0 {
-        let mut sums: std::collections::BTreeMap<u32, ([f32; 64], f32)> = std::collections::BTreeMap::new();
+        let mut sums: std::collections::BTreeMap<u32, ([f32; 64], f32)> =
+            std::collections::BTreeMap::new();
         for t in triangles {
             for &v in t {
                 if rows[v as usize].is_none() {
@@ -313,7 +440,10 @@ impl Bake {
             .collect();
         self.gather(&receivers)
             .into_iter()
-            .map(|Gathered { irradiance, .. }| Probed { xyz: self.lanes().tristimulus(&irradiance), leaves: self.lanes().leaves(&irradiance) })
+            .map(|Gathered { irradiance, .. }| Probed {
+                xyz: self.lanes().tristimulus(&irradiance),
+                leaves: self.lanes().leaves(&irradiance),
+            })
             .collect()
     }
 
@@ -342,9 +472,21 @@ impl Bake {
                     (w, point)
                 };
                 let leaf = tree.leaf_at(entry as u32, w);
-                return Receiver { point, normal, plane: tree.face_plane[entry], leaf: Some(leaf), seed };
+                return Receiver {
+                    point,
+                    normal,
+                    plane: tree.face_plane[entry],
+                    leaf: Some(leaf),
+                    seed,
+                };
             }
         }
-        Receiver { point, normal, plane: crate::geometry::NO_PLANE, leaf: None, seed }
+        Receiver {
+            point,
+            normal,
+            plane: crate::geometry::NO_PLANE,
+            leaf: None,
+            seed,
+        }
     }
 }

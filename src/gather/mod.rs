@@ -3,6 +3,7 @@
 mod bake;
 pub mod point;
 mod refined;
+mod spectra;
 
 pub use bake::{Baked, Probed};
 

@@ -13,12 +13,18 @@ use glam::DVec3;
 
 /// Rays to a patch at least, and at the most.
 const RAYS: [usize; 2] = [4, 32];
-/// Points that stand for a far cluster.
-const CLUSTER_POINTS: usize = 8;
+/// Points that stand for a far cluster: one that carries little, and one that carries much.
+const CLUSTER_POINTS: [usize; 2] = [4, 8];
+/// A cluster nearer than this many of its radii is entered.
+const CLOSE: f64 = 1.5;
 /// Faces of a cluster that are treated as polygons.
 const POLYGONS: u32 = 4;
+/// How many rays a link's visibility counts for.
+const PRIOR: f64 = 4.0;
 /// How often a lamp's triangle is quartered where its shadow boundary crosses it.
 const LAMP_DEPTH: u32 = 6;
+/// A lamp gets more than plain rays if it carries this many tolerances.
+const SHAFT_WORTH: f64 = 4.0;
 
 /// Where light is received.
 #[derive(Debug, Clone, Copy)]
@@ -44,6 +50,8 @@ pub struct Gathered {
     pub direct: [f32; 64],
     /// Sum of visible factors: 1 in a closed room.
     pub seen: f64,
+    /// Visibility rays cast for this point.
+    pub rays: u64,
 }
 
 /// Reused memory of one thread and its ray count.
@@ -72,14 +80,17 @@ pub struct Gatherer<'a> {
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
     pub closed: bool,
-    /// Take visibility from the links instead of looking again?
-    pub stored: bool,
 }
 
 impl Gatherer<'_> {
     /// Gathers what comes straight from lamps.
     pub fn direct(&self, to: &Receiver, memory: &mut Memory) -> [f32; 64] {
-        let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0 };
+        let mut out = Gathered {
+            irradiance: [0.0; 64],
+            direct: [0.0; 64],
+            seen: 0.0,
+            rays: 0,
+        };
         let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
         memory.stack.clear();
         let mut above = to.leaf;
@@ -99,7 +110,13 @@ impl Gatherer<'_> {
 
     /// Gathers at a point.
     pub fn at(&self, to: &Receiver, memory: &mut Memory) -> Gathered {
-        let mut out = Gathered { irradiance: [0.0; 64], direct: [0.0; 64], seen: 0.0 };
+        let before = memory.rays;
+        let mut out = Gathered {
+            irradiance: [0.0; 64],
+            direct: [0.0; 64],
+            seen: 0.0,
+            rays: 0,
+        };
         memory.stack.clear();
         match to.leaf {
             Some(leaf) => {
@@ -127,42 +144,79 @@ impl Gatherer<'_> {
             *x += d;
         }
         self.punctual(to, memory, &mut out);
+        out.rays = memory.rays - before;
         out
     }
 
-    fn visit(&self, to: &Receiver, id: u32, way: Way, v: f32, memory: &mut Memory, out: &mut Gathered) {
+    fn visit(
+        &self,
+        to: &Receiver,
+        id: u32,
+        way: Way,
+        v: f32,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
         let node = self.tree.node(id);
         let clear = way == Way::Clear || !self.sight.occlusion;
         if !self.can_see(to, node) {
             return;
         }
         let k = id as usize;
-        let (reflected, emitted) = (f64::from(self.light.bright_reflected[k]), f64::from(self.light.bright_emitted[k]));
+        let (reflected, emitted) = (
+            f64::from(self.light.bright_reflected[k]),
+            f64::from(self.light.bright_emitted[k]),
+        );
         let spread = f64::from(self.light.spread[k]);
         let distance = (node.centre - to.point).length();
         if node.faces.1 > POLYGONS {
             // Greatest factor the whole cluster could have, by its projected area.
             let gap = (distance - node.radius).max(0.0);
             let factor = node.area / (std::f64::consts::PI * gap * gap + node.area);
-            let far = distance > 4.0 * node.radius;
-            if !far || factor * (spread + 0.3 * (reflected + emitted)) > self.tolerance {
+            let near = distance < CLOSE * node.radius;
+            // Points find a cluster's light to about a third of its spread, and where lamps are in it, of its light.
+            if near || factor * (0.3 * spread + emitted) > self.tolerance {
                 memory.stack.extend(node.child_range().map(|c| (c, way, v)));
                 return;
             }
-            self.cluster(to, id, node, clear, memory, out);
+            let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
+            self.cluster(to, id, count, clear, memory, out);
             return;
         }
-        let sample = Sample { point: to.point, normal: to.normal, plane: to.plane, area: 1.0 };
+        let sample = Sample {
+            point: to.point,
+            normal: to.normal,
+            plane: to.plane,
+            area: 1.0,
+        };
         let factor = point_factor(self.tree, &sample, node, &[]);
         if factor <= 0.0 {
             return;
         }
-        let size = if clear { (node.radius / distance.max(1e-300)).min(1.0) } else { 1.0 };
-        if self.has_parts(node) && (node.element == NONE || factor * spread * size > self.tolerance) {
+        let size = if clear {
+            (node.radius / distance.max(1e-300)).min(1.0)
+        } else {
+            1.0
+        };
+        if self.has_parts(node) && (node.element == NONE || factor * spread * size > self.tolerance)
+        {
             memory.stack.extend(node.child_range().map(|c| (c, way, v)));
             return;
         }
-        let visible = if clear { 1.0 } else if self.stored { f64::from(v) } else { self.visible(to, id, way, factor, factor * (reflected + emitted), emitted > 0.0, memory) };
+        let visible = if clear {
+            1.0
+        } else {
+            self.visible(
+                to,
+                id,
+                way,
+                v,
+                factor,
+                factor * (reflected + emitted),
+                emitted > 0.0,
+                memory,
+            )
+        };
         self.add(id, factor, visible, out);
     }
 
@@ -177,11 +231,17 @@ impl Gatherer<'_> {
         out.seen += factor * visible;
         let k = id as usize;
         let width = self.light.width();
-        for (x, r) in out.irradiance[..width].iter_mut().zip(self.light.reflected.row(k)) {
+        for (x, r) in out.irradiance[..width]
+            .iter_mut()
+            .zip(self.light.reflected.row(k))
+        {
             *x += seen * r;
         }
         if self.light.bright_emitted[k] > 0.0 {
-            for (x, e) in out.direct[..width].iter_mut().zip(self.light.emitted.row(k)) {
+            for (x, e) in out.direct[..width]
+                .iter_mut()
+                .zip(self.light.emitted.row(k))
+            {
                 *x += seen * e;
             }
         }
@@ -190,27 +250,39 @@ impl Gatherer<'_> {
     /// Could any of the patch be in front of the receiver, and the receiver in front of any of the patch?
     fn can_see(&self, to: &Receiver, node: &Node) -> bool {
         let from = node.centre - to.point;
-        let reach = (0.5 * (node.high - node.low)).dot(to.normal.abs()).min(node.radius);
+        let reach = (0.5 * (node.high - node.low))
+            .dot(to.normal.abs())
+            .min(node.radius);
         if to.normal.dot(from) + reach <= 0.0 {
             return false;
         }
         if node.flat {
             let entry = node.faces.0 as usize;
-            return self.tree.face_plane[entry] != to.plane && -node.normal.dot(from) + (0.5 * (node.high - node.low)).dot(node.normal.abs()) > 0.0;
+            return self.tree.face_plane[entry] != to.plane
+                && -node.normal.dot(from) + (0.5 * (node.high - node.low)).dot(node.normal.abs())
+                    > 0.0;
         }
         let distance = from.length();
         if distance <= node.radius || node.cone <= 0.0 {
             return true;
         }
-        let angle = node.normal.angle_between(-from) - (node.radius / distance).asin() - node.cone.acos();
+        let angle =
+            node.normal.angle_between(-from) - (node.radius / distance).asin() - node.cone.acos();
         angle < 0.5 * std::f64::consts::PI
     }
 
     /// A far cluster by points, each with its own ray.
-    fn cluster(&self, to: &Receiver, id: u32, node: &Node, clear: bool, memory: &mut Memory, out: &mut Gathered) {
+    fn cluster(
+        &self,
+        to: &Receiver,
+        id: u32,
+        count: usize,
+        clear: bool,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
         let shift = crate::link::pattern(to.seed, id, 1);
-        self.tree.samples(id, CLUSTER_POINTS, shift, &mut memory.samples);
-        let _ = node;
+        self.tree.samples(id, count, shift, &mut memory.samples);
         memory.segments.clear();
         memory.weights.clear();
         for s in &memory.samples {
@@ -218,8 +290,14 @@ impl Gatherer<'_> {
             let r2 = d.length_squared();
             let (c1, c2) = (to.normal.dot(d), -s.normal.dot(d));
             if c1 > 0.0 && c2 > 0.0 && s.plane != to.plane {
-                memory.weights.push(c1 * c2 / (r2 * (std::f64::consts::PI * r2 + s.area)) * s.area);
-                memory.segments.push(Segment { from: to.point.as_vec3(), to: s.point.as_vec3(), planes: [to.plane, s.plane] });
+                memory
+                    .weights
+                    .push(c1 * c2 / (r2 * (std::f64::consts::PI * r2 + s.area)) * s.area);
+                memory.segments.push(Segment {
+                    from: to.point.as_vec3(),
+                    to: s.point.as_vec3(),
+                    planes: [to.plane, s.plane],
+                });
             }
         }
         let factor: f64 = memory.weights.iter().sum();
@@ -228,9 +306,15 @@ impl Gatherer<'_> {
         }
         let mut visible = 1.0;
         if !clear && self.sight.occlusion {
-            self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            self.sight
+                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
-            let open = memory.weights.iter().zip(&memory.blocked).filter(|(_, b)| !**b).map(|(w, _)| w);
+            let open = memory
+                .weights
+                .iter()
+                .zip(&memory.blocked)
+                .filter(|(_, b)| !**b)
+                .map(|(w, _)| w);
             visible = open.sum::<f64>() / factor;
         }
         self.add(id, factor, visible, out);
@@ -238,17 +322,56 @@ impl Gatherer<'_> {
 
     /// Visible share of a polygon patch. `carries` is what it would bring unblocked, share of white.
     #[expect(clippy::too_many_arguments, reason = "one caller")]
-    fn visible(&self, to: &Receiver, id: u32, way: Way, factor: f64, carries: f64, lamp: bool, memory: &mut Memory) -> f64 {
+    fn visible(
+        &self,
+        to: &Receiver,
+        id: u32,
+        way: Way,
+        known: f32,
+        factor: f64,
+        carries: f64,
+        lamp: bool,
+        memory: &mut Memory,
+    ) -> f64 {
         let node = self.tree.node(id);
-        let Some(element) = self.tree.element(node) else { return 1.0 };
+        let Some(element) = self.tree.element(node) else {
+            return 1.0;
+        };
         let plane = self.tree.face_plane[element.face as usize];
         if let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);
-            if let Some(seen) = self.sight.visible_factor(to.point, to.normal, &element.corners, [to.plane, plane], list) {
+            if let Some(seen) = self.sight.visible_factor(
+                to.point,
+                to.normal,
+                &element.corners,
+                [to.plane, plane],
+                list,
+            ) {
                 return (seen / factor).min(1.0);
             }
         }
-        if lamp {
+        // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
+        if lamp && carries > SHAFT_WORTH * self.tolerance {
+            match self
+                .sight
+                .view_from(to.point, to.normal, &element.corners, [to.plane, plane])
+            {
+                View::Clear => return 1.0,
+                View::Listed(list) => {
+                    if let Some(seen) = self.sight.visible_factor(
+                        to.point,
+                        to.normal,
+                        &element.corners,
+                        [to.plane, plane],
+                        &list,
+                    ) {
+                        return (seen / factor).min(1.0);
+                    }
+                }
+                View::Crowded => {}
+            }
+        }
+        if lamp && carries > SHAFT_WORTH * self.tolerance {
             return self.lamp_visible(to, element, plane, carries, memory);
         }
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
@@ -265,18 +388,46 @@ impl Gatherer<'_> {
             let (c1, c2) = (to.normal.dot(d), -normal.dot(d));
             if c1 > 0.0 && c2 > 0.0 && r2 > 0.0 {
                 memory.weights.push(c1 * c2 / (r2 * r2));
-                memory.segments.push(Segment { from: to.point.as_vec3(), to: p.as_vec3(), planes: [to.plane, plane] });
+                memory.segments.push(Segment {
+                    from: to.point.as_vec3(),
+                    to: p.as_vec3(),
+                    planes: [to.plane, plane],
+                });
             }
         }
-        self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+        self.sight
+            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
         memory.rays += memory.segments.len() as u64;
         let total: f64 = memory.weights.iter().sum();
-        let seen: f64 = memory.weights.iter().zip(&memory.blocked).filter(|(_, b)| !**b).map(|(w, _)| w).sum();
-        if total > 0.0 { seen / total } else { 0.0 }
+        let seen: f64 = memory
+            .weights
+            .iter()
+            .zip(&memory.blocked)
+            .filter(|(_, b)| !**b)
+            .map(|(w, _)| w)
+            .sum();
+        if total <= 0.0 {
+            return 0.0;
+        }
+        // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
+        // blurs is bounded by the size of the receiving element. A lamp's shadow is not blurred.
+        let prior = if lamp || to.leaf.is_none() {
+            0.0
+        } else {
+            PRIOR
+        };
+        (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
     }
 
     /// Visible share of a lamp's triangle: quartered where rays disagree, until a quarter carries less than the tolerance.
-    fn lamp_visible(&self, to: &Receiver, element: &Element, plane: u32, carries: f64, memory: &mut Memory) -> f64 {
+    fn lamp_visible(
+        &self,
+        to: &Receiver,
+        element: &Element,
+        plane: u32,
+        carries: f64,
+        memory: &mut Memory,
+    ) -> f64 {
         let mut seen = 0.0;
         let mut total = 0.0;
         let mut open = vec![(element.corners, 0_u32)];
@@ -288,18 +439,32 @@ impl Gatherer<'_> {
             let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
             memory.segments.clear();
             // Corners drawn a little inwards: a ray along the very edge says nothing about the inside.
-            for p in [middle, corners[0].lerp(middle, 0.15), corners[1].lerp(middle, 0.15), corners[2].lerp(middle, 0.15)] {
-                memory.segments.push(Segment { from: to.point.as_vec3(), to: p.as_vec3(), planes: [to.plane, plane] });
+            for p in [
+                middle,
+                corners[0].lerp(middle, 0.15),
+                corners[1].lerp(middle, 0.15),
+                corners[2].lerp(middle, 0.15),
+            ] {
+                memory.segments.push(Segment {
+                    from: to.point.as_vec3(),
+                    to: p.as_vec3(),
+                    planes: [to.plane, plane],
+                });
             }
-            self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            self.sight
+                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
             memory.rays += 4;
             let blocked = memory.blocked.iter().filter(|b| **b).count();
             let share = carries * 0.25_f64.powi(depth as i32);
             let mixed = blocked != 0 && blocked != 4;
-            if depth < LAMP_DEPTH && ((mixed && share > self.tolerance) || share > 64.0 * self.tolerance) {
+            if depth < LAMP_DEPTH
+                && ((mixed && share > self.tolerance) || share > 64.0 * self.tolerance)
+            {
                 let [a, b, c] = corners;
                 let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
-                open.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]].map(|t| (t, depth + 1)));
+                open.extend(
+                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]].map(|t| (t, depth + 1)),
+                );
                 continue;
             }
             total += factor;
@@ -317,8 +482,13 @@ impl Gatherer<'_> {
             };
             if self.sight.occlusion {
                 memory.segments.clear();
-                memory.segments.push(Segment { from: to.point.as_vec3(), to: end.as_vec3(), planes: [to.plane, u32::MAX] });
-                self.sight.blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+                memory.segments.push(Segment {
+                    from: to.point.as_vec3(),
+                    to: end.as_vec3(),
+                    planes: [to.plane, u32::MAX],
+                });
+                self.sight
+                    .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
                 memory.rays += 1;
                 if memory.blocked[0] {
                     continue;
@@ -333,7 +503,11 @@ impl Gatherer<'_> {
 }
 
 /// What turns a punctual light's intensity into irradiance at a receiver, and where the ray to it ends.
-pub fn punctual_factor(lamp: &PunctualLight, to: &Receiver, half_size: f64) -> Option<(f64, DVec3)> {
+pub fn punctual_factor(
+    lamp: &PunctualLight,
+    to: &Receiver,
+    half_size: f64,
+) -> Option<(f64, DVec3)> {
     if lamp.kind == LightKind::Directional {
         let cosine = -to.normal.dot(lamp.direction);
         return (cosine > 0.0).then(|| (cosine, to.point - lamp.direction * (4.0 * half_size)));

@@ -65,37 +65,76 @@ fn key(a: u32, b: u32) -> (u32, u32) {
 impl Refined {
     /// Starts from the elements of the hierarchy. `flat[s]`: does surface `s` have no shading normals of its own? Then its
     /// vertices are not shared across planes.
-    pub(super) fn new(mesh: &Mesh, tree: &Tree, corners_of: &dyn Fn(usize, usize) -> [u32; 3], flat: &[bool], two_sided: &[bool], deepest: u8) -> Self {
-        let mut refined = Self { points: mesh.positions.clone(), sheets: Vec::new(), middle: HashMap::new() };
+    pub(super) fn new(
+        mesh: &Mesh,
+        tree: &Tree,
+        corners_of: &dyn Fn(usize, usize) -> [u32; 3],
+        flat: &[bool],
+        two_sided: &[bool],
+        deepest: u8,
+    ) -> Self {
+        let mut refined = Self {
+            points: mesh.positions.clone(),
+            sheets: Vec::new(),
+            middle: HashMap::new(),
+        };
         for surface in 0..flat.len() {
             for back in [false, true] {
                 if back && !two_sided[surface] {
                     continue;
                 }
-                let mut sheet = Sheet { surface, back, ..Sheet::default() };
+                let mut sheet = Sheet {
+                    surface,
+                    back,
+                    ..Sheet::default()
+                };
                 let mut known: HashMap<(u32, u32), u32> = HashMap::new();
                 for triangle in mesh.first_triangle[surface]..mesh.first_triangle[surface + 1] {
                     let entry = tree.entry[triangle as usize][usize::from(back)];
                     let local = mesh.origin[triangle as usize].1 as usize;
                     let names = corners_of(surface, local);
-                    let group = if flat[surface] { mesh.plane[triangle as usize] } else { u32::MAX };
+                    let group = if flat[surface] {
+                        mesh.plane[triangle as usize]
+                    } else {
+                        u32::MAX
+                    };
                     let mut corners: [Corner; 3] = std::array::from_fn(|k| {
                         let point = mesh.triangles[triangle as usize][k];
                         let mut weights = [0.0; 3];
                         weights[k] = 1.0;
                         let vertex = *known.entry((names[k], group)).or_insert_with(|| {
-                            sheet.vertices.push(Vertex { point, triangle, weights, entry });
+                            sheet.vertices.push(Vertex {
+                                point,
+                                triangle,
+                                weights,
+                                entry,
+                            });
                             sheet.vertices.len() as u32 - 1
                         });
-                        Corner { point, vertex, weights }
+                        Corner {
+                            point,
+                            vertex,
+                            weights,
+                        }
                     });
                     if back {
                         corners.swap(1, 2);
                     }
                     let cell = sheet.cells.len() as u32;
-                    sheet.cells.push(Cell { corners, of: (triangle, entry), child: NONE, depth: 0 });
+                    sheet.cells.push(Cell {
+                        corners,
+                        of: (triangle, entry),
+                        child: NONE,
+                        depth: 0,
+                    });
                     if entry != NONE {
-                        refined.follow(&mut sheet, tree, cell, tree.face_node[entry as usize], deepest);
+                        refined.follow(
+                            &mut sheet,
+                            tree,
+                            cell,
+                            tree.face_node[entry as usize],
+                            deepest,
+                        );
                     }
                 }
                 refined.sheets.push(sheet);
@@ -119,11 +158,25 @@ impl Refined {
 
     /// Splits a cell at the middles of its edges; children in the order of [`Tree::subdivide`].
     fn quarter(&mut self, sheet: &mut Sheet, cell: u32) {
-        let Cell { corners: [a, b, c], of, depth, .. } = sheet.cells[cell as usize];
-        let (ab, bc, ca) = (self.between(sheet, of, a, b), self.between(sheet, of, b, c), self.between(sheet, of, c, a));
+        let Cell {
+            corners: [a, b, c],
+            of,
+            depth,
+            ..
+        } = sheet.cells[cell as usize];
+        let (ab, bc, ca) = (
+            self.between(sheet, of, a, b),
+            self.between(sheet, of, b, c),
+            self.between(sheet, of, c, a),
+        );
         sheet.cells[cell as usize].child = sheet.cells.len() as u32;
         for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]] {
-            sheet.cells.push(Cell { corners, of, child: NONE, depth: depth + 1 });
+            sheet.cells.push(Cell {
+                corners,
+                of,
+                child: NONE,
+                depth: depth + 1,
+            });
         }
     }
 
@@ -134,7 +187,11 @@ impl Refined {
             points.push(0.5 * (points[a.point as usize] + points[b.point as usize]));
             points.len() as u32 - 1
         });
-        Corner { point, vertex: sheet.between(of, a, b, point), weights: halfway(a, b) }
+        Corner {
+            point,
+            vertex: sheet.between(of, a, b, point),
+            weights: halfway(a, b),
+        }
     }
 
     /// Quarters cells until neighbours differ by one level at the most.
@@ -164,9 +221,9 @@ impl Refined {
     fn too_coarse(&self, corners: [Corner; 3]) -> bool {
         (0..3).any(|k| {
             let (a, b) = (corners[k].point, corners[(k + 1) % 3].point);
-            self.middle
-                .get(&key(a, b))
-                .is_some_and(|&m| self.middle.contains_key(&key(a, m)) || self.middle.contains_key(&key(m, b)))
+            self.middle.get(&key(a, b)).is_some_and(|&m| {
+                self.middle.contains_key(&key(a, m)) || self.middle.contains_key(&key(m, b))
+            })
         })
     }
 
@@ -174,7 +231,11 @@ impl Refined {
     pub(super) fn leaves(&self) -> Vec<(u32, u32)> {
         let mut all = Vec::new();
         for (s, sheet) in self.sheets.iter().enumerate() {
-            all.extend((0..sheet.cells.len()).filter(|&k| sheet.cells[k].child == NONE).map(|k| (s as u32, k as u32)));
+            all.extend(
+                (0..sheet.cells.len())
+                    .filter(|&k| sheet.cells[k].child == NONE)
+                    .map(|k| (s as u32, k as u32)),
+            );
         }
         all
     }
@@ -201,7 +262,8 @@ impl Refined {
         let known = self.middle.get(&key(a.point, b.point)).copied();
         // A point of its own, not entered as the edge's middle: nobody is forced to use it.
         let point = known.unwrap_or_else(|| {
-            self.points.push(0.5 * (self.points[a.point as usize] + self.points[b.point as usize]));
+            self.points
+                .push(0.5 * (self.points[a.point as usize] + self.points[b.point as usize]));
             self.points.len() as u32 - 1
         });
         let of = self.sheets[sheet as usize].cells[cell as usize].of;
@@ -220,7 +282,9 @@ impl Refined {
             let [a, b, c] = corners.map(|x| x.vertex);
             let middle: [Option<u32>; 3] = std::array::from_fn(|e| {
                 let (p, q) = (corners[e], corners[(e + 1) % 3]);
-                self.middle.get(&key(p.point, q.point)).map(|&m| taken.between(of, p, q, m))
+                self.middle
+                    .get(&key(p.point, q.point))
+                    .map(|&m| taken.between(of, p, q, m))
             });
             match middle {
                 [None, None, None] => out.push([a, b, c]),
@@ -230,7 +294,9 @@ impl Refined {
                 [Some(ab), Some(bc), None] => out.extend([[ab, b, bc], [a, ab, bc], [a, bc, c]]),
                 [None, Some(bc), Some(ca)] => out.extend([[bc, c, ca], [b, bc, ca], [b, ca, a]]),
                 [Some(ab), None, Some(ca)] => out.extend([[ca, a, ab], [c, ca, ab], [c, ab, b]]),
-                [Some(ab), Some(bc), Some(ca)] => out.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]),
+                [Some(ab), Some(bc), Some(ca)] => {
+                    out.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]])
+                }
             }
         }
         self.sheets[sheet as usize] = taken;
@@ -246,7 +312,12 @@ impl Sheet {
             return known;
         }
         let id = self.vertices.len() as u32;
-        self.vertices.push(Vertex { point, triangle, weights: halfway(a, b), entry });
+        self.vertices.push(Vertex {
+            point,
+            triangle,
+            weights: halfway(a, b),
+            entry,
+        });
         self.middle.insert(key(a.vertex, b.vertex), id);
         id
     }

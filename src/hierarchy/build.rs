@@ -32,7 +32,13 @@ struct Bounds {
 }
 
 impl Bounds {
-    const EMPTY: Self = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, normal: DVec3::ZERO, area: 0.0, count: 0 };
+    const EMPTY: Self = Self {
+        low: DVec3::INFINITY,
+        high: DVec3::NEG_INFINITY,
+        normal: DVec3::ZERO,
+        area: 0.0,
+        count: 0,
+    };
 
     fn add(&mut self, item: &Item) {
         self.low = self.low.min(item.low);
@@ -57,7 +63,11 @@ impl Bounds {
         let d = (self.high - self.low).max(DVec3::ZERO);
         let surface = d.x * d.y + d.y * d.z + d.z * d.x;
         // 1 where all normals agree, 0 where they cancel: spread 0..1; a flat cluster still has a cost by its size.
-        let agreement = if self.area > 0.0 { self.normal.length() / self.area } else { 1.0 };
+        let agreement = if self.area > 0.0 {
+            self.normal.length() / self.area
+        } else {
+            1.0
+        };
         self.area * surface * (0.02 + (1.0 - agreement))
     }
 }
@@ -73,7 +83,15 @@ pub(super) fn build(mesh: &Mesh) -> Tree {
             let high = corners[0].max(corners[1]).max(corners[2]);
             let t = face.triangle as usize;
             let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-            Item { face: k as u32, centre, low, high, normal: mesh.face_normal(face), area: mesh.area[t], plane: mesh.plane[t] }
+            Item {
+                face: k as u32,
+                centre,
+                low,
+                high,
+                normal: mesh.face_normal(face),
+                area: mesh.area[t],
+                plane: mesh.plane[t],
+            }
         })
         .collect();
     let mut tree = Tree {
@@ -93,7 +111,10 @@ pub(super) fn build(mesh: &Mesh) -> Tree {
     // A stack instead of recursion: depth is bounded by the number of faces only.
     let mut open = vec![0_u32];
     while let Some(id) = open.pop() {
-        let (first, count) = (tree.node(id).faces.0 as usize, tree.node(id).faces.1 as usize);
+        let (first, count) = (
+            tree.node(id).faces.0 as usize,
+            tree.node(id).faces.1 as usize,
+        );
         if count == 1 {
             continue;
         }
@@ -141,8 +162,19 @@ fn placeholder(parent: u32, first: usize, count: usize) -> Node {
 fn split(items: &mut [Item]) -> usize {
     let mut best = (f64::INFINITY, 0, 0.0);
     for axis in 0..6 {
-        let key = |item: &Item| if axis < 3 { item.centre[axis] } else { item.normal[axis - 3] };
-        let (low, high) = items.iter().map(key).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let key = |item: &Item| {
+            if axis < 3 {
+                item.centre[axis]
+            } else {
+                item.normal[axis - 3]
+            }
+        };
+        let (low, high) = items
+            .iter()
+            .map(key)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+                (l.min(x), h.max(x))
+            });
         if high - low <= 1e-9 * (low.abs() + high.abs()) {
             continue;
         }
@@ -172,7 +204,11 @@ fn split(items: &mut [Item]) -> usize {
     if cost.is_finite() {
         let mut first = 0;
         for k in 0..items.len() {
-            let x = if axis < 3 { items[k].centre[axis] } else { items[k].normal[axis - 3] };
+            let x = if axis < 3 {
+                items[k].centre[axis]
+            } else {
+                items[k].normal[axis - 3]
+            };
             if x < at {
                 items.swap(first, k);
                 first += 1;
@@ -189,35 +225,76 @@ fn split(items: &mut [Item]) -> usize {
 /// Boxes, areas, normals and cones from the bottom up; element nodes for the faces.
 fn finish(mesh: &Mesh, tree: &mut Tree) {
     for id in (0..tree.nodes.len()).rev() {
-        let (first, count) = (tree.nodes[id].faces.0 as usize, tree.nodes[id].faces.1 as usize);
+        let (first, count) = (
+            tree.nodes[id].faces.0 as usize,
+            tree.nodes[id].faces.1 as usize,
+        );
         if count == 1 {
             let corners = mesh.corners(tree.faces[first]);
             let element = tree.elements.len() as u32;
-            tree.elements.push(Element { corners, face: first as u32, depth: 0 });
+            tree.elements.push(Element {
+                corners,
+                face: first as u32,
+                depth: 0,
+            });
             tree.face_node[first] = id as u32;
             let normal = tree.face_normal[first];
             let area = tree.face_area[first + 1] - tree.face_area[first];
             // The prefix sum loses digits for small faces; the mesh has the area itself.
-            let area = if area > 0.0 { mesh.area[tree.faces[first].triangle as usize] } else { f64::MIN_POSITIVE };
-            let node = Node { element, normal, cone: 1.0, area, flat: true, ..tree.nodes[id].clone() };
+            let area = if area > 0.0 {
+                mesh.area[tree.faces[first].triangle as usize]
+            } else {
+                f64::MIN_POSITIVE
+            };
+            let node = Node {
+                element,
+                normal,
+                cone: 1.0,
+                area,
+                flat: true,
+                ..tree.nodes[id].clone()
+            };
             tree.nodes[id] = node.around(&corners);
             continue;
         }
-        let (a, b) = (tree.node(tree.nodes[id].child).clone(), tree.node(tree.nodes[id].child + 1).clone());
+        let (a, b) = (
+            tree.node(tree.nodes[id].child).clone(),
+            tree.node(tree.nodes[id].child + 1).clone(),
+        );
         let area = a.area + b.area;
         let normal = (a.normal * a.area + b.normal * b.area).normalize_or(DVec3::Z);
         let half_angle = |n: &Node| normal.angle_between(n.normal) + n.cone.clamp(-1.0, 1.0).acos();
         let angle = half_angle(&a).max(half_angle(&b));
         let flat = a.flat && b.flat && a.normal.dot(b.normal) > 0.0 && {
             let plane = tree.face_plane[first];
-            tree.face_plane[a.faces.0 as usize] == plane && tree.face_plane[b.faces.0 as usize] == plane
+            tree.face_plane[a.faces.0 as usize] == plane
+                && tree.face_plane[b.faces.0 as usize] == plane
         };
-        let cone = if flat { 1.0 } else if angle >= std::f64::consts::PI { -1.0 } else { angle.cos() };
+        let cone = if flat {
+            1.0
+        } else if angle >= std::f64::consts::PI {
+            -1.0
+        } else {
+            angle.cos()
+        };
         let (low, high) = (a.low.min(b.low), a.high.max(b.high));
         let centre = 0.5 * (low + high);
-        let radius = [&a, &b].map(|c| c.centre.distance(centre) + c.radius).into_iter().fold(0.0, f64::max);
+        let radius = [&a, &b]
+            .map(|c| c.centre.distance(centre) + c.radius)
+            .into_iter()
+            .fold(0.0, f64::max);
         let radius = radius.min(0.5 * low.distance(high));
         let node = &mut tree.nodes[id];
-        *node = Node { low, high, centre, radius, normal, cone, area, flat, ..node.clone() };
+        *node = Node {
+            low,
+            high,
+            centre,
+            radius,
+            normal,
+            cone,
+            area,
+            flat,
+            ..node.clone()
+        };
     }
 }

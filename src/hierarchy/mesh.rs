@@ -101,11 +101,17 @@ impl Mesh {
                 // is there already: light would meet the place twice.
                 if cross.length_squared() > 0.0 {
                     if known.insert(turned_to_least(corners)) {
-                        mesh.faces.push(Face { triangle, back: false });
+                        mesh.faces.push(Face {
+                            triangle,
+                            back: false,
+                        });
                     }
                     let [a, b, c] = corners;
                     if both && known.insert(turned_to_least([a, c, b])) {
-                        mesh.faces.push(Face { triangle, back: true });
+                        mesh.faces.push(Face {
+                            triangle,
+                            back: true,
+                        });
                     }
                 }
             }

@@ -50,15 +50,32 @@ impl Node {
 
     /// The same node with its box and sphere set around some points.
     pub(super) fn around(self, points: &[DVec3]) -> Self {
-        let (low, high) = points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+        let (low, high) = points
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
+                (l.min(*p), h.max(*p))
+            });
         let centre = 0.5 * (low + high);
-        let radius = points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
-        Self { low, high, centre, radius, ..self }
+        let radius = points
+            .iter()
+            .map(|p| p.distance(centre))
+            .fold(0.0, f64::max);
+        Self {
+            low,
+            high,
+            centre,
+            radius,
+            ..self
+        }
     }
 
     /// Indices of the children.
     pub fn child_range(&self) -> std::ops::Range<u32> {
-        if self.is_leaf() { 0..0 } else { self.child..self.child + u32::from(self.children) }
+        if self.is_leaf() {
+            0..0
+        } else {
+            self.child..self.child + u32::from(self.children)
+        }
     }
 }
 
@@ -122,7 +139,9 @@ impl Tree {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.nodes.len() * size_of::<Node>() + self.elements.len() * size_of::<Element>() + self.faces.len() * 64
+        self.nodes.len() * size_of::<Node>()
+            + self.elements.len() * size_of::<Element>()
+            + self.faces.len() * 64
     }
 
     /// A node by index.
@@ -141,13 +160,28 @@ impl Tree {
         if !node.is_leaf() || node.element == NONE {
             return;
         }
-        let Element { corners: [a, b, c], face, depth } = self.elements[node.element as usize];
+        let Element {
+            corners: [a, b, c],
+            face,
+            depth,
+        } = self.elements[node.element as usize];
         let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
         let first = self.nodes.len() as u32;
         for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]] {
             let element = self.elements.len() as u32;
-            self.elements.push(Element { corners, face, depth: depth + 1 });
-            let part = Node { parent: id, child: NONE, children: 0, element, area: 0.25 * node.area, ..node.clone() };
+            self.elements.push(Element {
+                corners,
+                face,
+                depth: depth + 1,
+            });
+            let part = Node {
+                parent: id,
+                child: NONE,
+                children: 0,
+                element,
+                area: 0.25 * node.area,
+                ..node.clone()
+            };
             self.nodes.push(part.around(&corners));
         }
         let node = &mut self.nodes[id as usize];
@@ -183,10 +217,18 @@ impl Tree {
         out.clear();
         let share = node.area / count as f64;
         if let Some(element) = self.element(node) {
-            let (normal, plane) = (self.face_normal[element.face as usize], self.face_plane[element.face as usize]);
+            let (normal, plane) = (
+                self.face_normal[element.face as usize],
+                self.face_plane[element.face as usize],
+            );
             for k in 0..count {
                 let point = element.at(stratified(k, count, u));
-                out.push(Sample { point, normal, plane, area: share });
+                out.push(Sample {
+                    point,
+                    normal,
+                    plane,
+                    area: share,
+                });
             }
             return;
         }
@@ -198,7 +240,12 @@ impl Tree {
             let entry = first + (areas.partition_point(|&a| a <= target).max(1) - 1).min(n - 1);
             let element = &self.elements[self.node(self.face_node[entry]).element as usize];
             let point = element.at(stratified(k, count, u));
-            out.push(Sample { point, normal: self.face_normal[entry], plane: self.face_plane[entry], area: share });
+            out.push(Sample {
+                point,
+                normal: self.face_normal[entry],
+                plane: self.face_plane[entry],
+                area: share,
+            });
         }
     }
 }

@@ -7,7 +7,10 @@ impl Tree {
     pub fn validate(&self) -> Result<(), String> {
         for (id, node) in self.nodes.iter().enumerate() {
             if !(node.area > 0.0 && node.radius.is_finite() && node.normal.is_finite()) {
-                return Err(format!("node {id}: area {}, radius {}, normal {}", node.area, node.radius, node.normal));
+                return Err(format!(
+                    "node {id}: area {}, radius {}, normal {}",
+                    node.area, node.radius, node.normal
+                ));
             }
             let mut area = 0.0;
             for child in node.child_range() {
@@ -22,7 +25,10 @@ impl Tree {
                 area += c.area;
             }
             if !node.is_leaf() && (area - node.area).abs() > 1e-9 * node.area {
-                return Err(format!("node {id}: area {} but children have {area}", node.area));
+                return Err(format!(
+                    "node {id}: area {} but children have {area}",
+                    node.area
+                ));
             }
         }
         Ok(())

@@ -15,8 +15,9 @@ use crate::hierarchy::Tree;
 const TOLERANCE: f64 = 1e-6;
 /// Steps at the most; compact rooms take under 20.
 const STEPS: usize = 200;
-/// A leaf is corrected by this much at the most: a patch that sees next to nothing must not be blown up.
-const RANGE: [f64; 2] = [0.5, 2.0];
+/// A leaf is scaled up by this much at the most: a patch that sees next to nothing must not be blown up. Scaling down
+/// has no limit: rows above 1 would make light, and the solve diverge.
+const GREATEST: f64 = 2.0;
 
 /// Row factors and what the rows summed to before.
 #[derive(Debug, Clone, Default)]
@@ -34,7 +35,9 @@ pub struct Balance {
 /// Balances the rows of a hierarchy; `target` holds what the row of each leaf node must sum to, in [0, 1].
 /// `areas` are the areas of all nodes that take part.
 pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> Balance {
-    let leaves: Vec<usize> = (0..tree.nodes.len()).filter(|&k| tree.nodes[k].is_leaf()).collect();
+    let leaves: Vec<usize> = (0..tree.nodes.len())
+        .filter(|&k| tree.nodes[k].is_leaf())
+        .collect();
     let mut factor = vec![1.0_f64; tree.nodes.len()];
     let mut sums = row_sums(tree, rows, areas, &factor);
     let defect_before = defect(areas, &leaves, &sums, target);
@@ -45,7 +48,7 @@ pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> B
             if sums[k] <= 0.0 {
                 continue;
             }
-            let next = (factor[k] * (f64::from(target[k]) / sums[k]).sqrt()).clamp(RANGE[0], RANGE[1]);
+            let next = (factor[k] * (f64::from(target[k]) / sums[k]).sqrt()).min(GREATEST);
             worst = worst.max((next / factor[k] - 1.0).abs());
             factor[k] = next;
         }
@@ -57,7 +60,7 @@ pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> B
     Balance {
         defect_before,
         defect_after: defect(areas, &leaves, &sums, target),
-        limited: leaves.iter().filter(|&&k| RANGE.contains(&factor[k])).count(),
+        limited: leaves.iter().filter(|&&k| factor[k] == GREATEST).count(),
         factor: factor.into_iter().map(|f| f as f32).collect(),
     }
 }
@@ -74,8 +77,16 @@ pub(crate) fn row_sums(tree: &Tree, rows: &LinkRows, areas: &[f64], factor: &[f6
     }
     let mut sums = vec![0.0; nodes.len()];
     for k in 0..nodes.len() {
-        let own: f64 = rows.row(k).iter().map(|&(source, g)| f64::from(g) * mean[source as usize]).sum();
-        let above = if k == 0 { 0.0 } else { sums[nodes[k].parent as usize] };
+        let own: f64 = rows
+            .row(k)
+            .iter()
+            .map(|&(source, g)| f64::from(g) * mean[source as usize])
+            .sum();
+        let above = if k == 0 {
+            0.0
+        } else {
+            sums[nodes[k].parent as usize]
+        };
         sums[k] = above + own / areas[k];
     }
     for (k, sum) in sums.iter_mut().enumerate() {

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 /// Points and weights of the 6-point Gauss-Legendre rule on [0, 1] (Abramowitz and Stegun 1964, table 25.4).
 const GAUSS: [(f64, f64); 6] = [
-    (0.033_765_242_898_423_986, 0.085_662_246_189_585_17),
+    (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
     (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
     (0.380_690_406_958_401_55, 0.233_956_967_286_345_52),
     (0.619_309_593_041_598_5, 0.233_956_967_286_345_52),
@@ -58,14 +58,22 @@ fn mean_log(p: DVec3, q: DVec3, r: DVec3, s: DVec3) -> f64 {
     if let Some(mean) = mean_log_parallel(p, q, r, s) {
         return mean;
     }
-    let common = [(p, q, r, s), (p, q, s, r), (q, p, r, s), (q, p, s, r)].into_iter().find(|c| c.0 == c.2);
+    let common = [(p, q, r, s), (p, q, s, r), (q, p, r, s), (q, p, s, r)]
+        .into_iter()
+        .find(|c| c.0 == c.2);
     if let Some((corner, a, _, b)) = common {
         return 0.5 * (mean_log_from(a, corner, b) + mean_log_from(b, corner, a) - 1.0);
     }
     // Gauss points on the shorter edge: over it the integral changes less.
-    let ((p, q), (r, s)) =
-        if p.distance_squared(q) <= r.distance_squared(s) { ((p, q), (r, s)) } else { ((r, s), (p, q)) };
-    GAUSS.iter().map(|&(t, weight)| weight * mean_log_from(p.lerp(q, t), r, s)).sum()
+    let ((p, q), (r, s)) = if p.distance_squared(q) <= r.distance_squared(s) {
+        ((p, q), (r, s))
+    } else {
+        ((r, s), (p, q))
+    };
+    GAUSS
+        .iter()
+        .map(|&(t, weight)| weight * mean_log_from(p.lerp(q, t), r, s))
+        .sum()
 }
 
 /// The same for parallel edges, whose double integral is elementary; none for others.
@@ -93,7 +101,8 @@ fn second_primitive(u: f64, h: f64) -> f64 {
     if square == 0.0 {
         return 0.0;
     }
-    0.25 * (u * u - h * h) * square.ln() - 0.75 * u * u + if h > 0.0 { h * u * (u / h).atan() } else { 0.0 }
+    0.25 * (u * u - h * h) * square.ln() - 0.75 * u * u
+        + if h > 0.0 { h * u * (u / h).atan() } else { 0.0 }
 }
 
 /// Mean of `ln |x - y|` over y on rs.
@@ -124,7 +133,12 @@ fn front(polygon: &[DVec3; 3], other: &[DVec3; 3]) -> arrayvec::Polygon {
     let normal = (other[1] - other[0]).cross(other[2] - other[0]);
     let height = polygon.map(|p| normal.dot(p - other[0]));
     // Corners within rounding of the plane lie on it: neighbours must not lose a sliver to noise.
-    let noise = 1e-12 * normal.length() * polygon.iter().map(|p| (*p - other[0]).length()).fold(0.0, f64::max);
+    let noise = 1e-12
+        * normal.length()
+        * polygon
+            .iter()
+            .map(|p| (*p - other[0]).length())
+            .fold(0.0, f64::max);
     let mut out = arrayvec::Polygon::default();
     for k in 0..3 {
         let (p, q) = (polygon[k], polygon[(k + 1) % 3]);
@@ -199,7 +213,9 @@ mod tests {
     fn squares_face_to_face_and_at_an_edge() {
         let floor = [v(0., 0., 0.), v(1., 0., 0.), v(1., 1., 0.), v(0., 1., 0.)];
         let ceiling = |h| [v(0., 0., h), v(0., 1., h), v(1., 1., h), v(1., 0., h)];
-        let close = |got: f64, want: f64, tolerance: f64| assert!((got / want - 1.0).abs() < tolerance, "{got} {want}");
+        let close = |got: f64, want: f64, tolerance: f64| {
+            assert!((got / want - 1.0).abs() < tolerance, "{got} {want}")
+        };
         close(squares(floor, ceiling(1.0)), 0.199_824_895_698_387, 1e-6);
         close(squares(floor, ceiling(10.0)), 0.003_162_056_838_755, 1e-6);
         close(squares(floor, ceiling(0.1)), 0.826_994_522_397, 1e-4);
@@ -212,9 +228,22 @@ mod tests {
     fn mean_logarithms() {
         let plain = |p: DVec3, q: DVec3, r: DVec3, s: DVec3| -> f64 {
             // Composite Gauss: 40 parts of 6 points.
-            let nodes: Vec<(f64, f64)> =
-                (0..40).flat_map(|k| GAUSS.iter().map(move |&(t, w)| ((f64::from(k) + t) / 40.0, w / 40.0))).collect();
-            nodes.iter().map(|&(t, a)| nodes.iter().map(|&(u, b)| a * b * p.lerp(q, t).distance(r.lerp(s, u)).ln()).sum::<f64>()).sum()
+            let nodes: Vec<(f64, f64)> = (0..40)
+                .flat_map(|k| {
+                    GAUSS
+                        .iter()
+                        .map(move |&(t, w)| ((f64::from(k) + t) / 40.0, w / 40.0))
+                })
+                .collect();
+            nodes
+                .iter()
+                .map(|&(t, a)| {
+                    nodes
+                        .iter()
+                        .map(|&(u, b)| a * b * p.lerp(q, t).distance(r.lerp(s, u)).ln())
+                        .sum::<f64>()
+                })
+                .sum()
         };
         let o = DVec3::ZERO;
         for (p, q, r, s, tolerance) in [
@@ -228,20 +257,35 @@ mod tests {
             (o, v(1., 0., 0.), v(0.7, 0., 0.), v(-0.1, 0., 0.), 2e-2),
         ] {
             let (fast, slow) = (mean_log(p, q, r, s), plain(p, q, r, s));
-            assert!((fast - slow).abs() < tolerance, "{p} {q} {r} {s}: {fast} {slow}");
+            assert!(
+                (fast - slow).abs() < tolerance,
+                "{p} {q} {r} {s}: {fast} {slow}"
+            );
         }
         // One edge with itself: ln L - 3/2.
-        assert_eq!(mean_log(o, v(2., 0., 0.), v(2., 0., 0.), o), 2.0_f64.ln() - 1.5);
+        assert_eq!(
+            mean_log(o, v(2., 0., 0.), v(2., 0., 0.), o),
+            2.0_f64.ln() - 1.5
+        );
     }
 
     /// Each face of a regular tetrahedron sees the others alike: 1/3.
     #[test]
     fn tetrahedron() {
-        let c = [v(1., 1., 1.), v(1., -1., -1.), v(-1., 1., -1.), v(-1., -1., 1.)];
+        let c = [
+            v(1., 1., 1.),
+            v(1., -1., -1.),
+            v(-1., 1., -1.),
+            v(-1., -1., 1.),
+        ];
         let area = 0.5 * (c[1] - c[0]).cross(c[2] - c[0]).length();
         let inward = |i: usize, j: usize, k: usize| {
             let flip = (c[j] - c[i]).cross(c[k] - c[i]).dot(c[i]) > 0.0;
-            if flip { [c[i], c[k], c[j]] } else { [c[i], c[j], c[k]] }
+            if flip {
+                [c[i], c[k], c[j]]
+            } else {
+                [c[i], c[j], c[k]]
+            }
         };
         let f = exchange(&inward(0, 1, 2), &inward(0, 1, 3)) / area;
         assert!((f - 1.0 / 3.0).abs() < 1e-5, "{f}");
@@ -251,8 +295,18 @@ mod tests {
     #[test]
     fn clipped_at_the_horizon() {
         let floor = [v(0., 0., 0.), v(1., 0., 0.), v(1., 1., 0.), v(0., 1., 0.)];
-        let whole = [v(-1., 0., -1.), v(-1., 1., -1.), v(-1., 1., 1.), v(-1., 0., 1.)];
-        let half = [v(-1., 0., 0.), v(-1., 1., 0.), v(-1., 1., 1.), v(-1., 0., 1.)];
+        let whole = [
+            v(-1., 0., -1.),
+            v(-1., 1., -1.),
+            v(-1., 1., 1.),
+            v(-1., 0., 1.),
+        ];
+        let half = [
+            v(-1., 0., 0.),
+            v(-1., 1., 0.),
+            v(-1., 1., 1.),
+            v(-1., 0., 1.),
+        ];
         assert!((squares(floor, whole) - squares(floor, half)).abs() < 1e-4 * squares(floor, half));
     }
 }

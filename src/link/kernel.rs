@@ -4,8 +4,8 @@
 //! end is a face or a few of them. Two large clusters meet as points on both sides. Nothing is clamped: Lambert's
 //! formula lies in [0, 1] however near the polygon is.
 
-use super::visibility::{View, segment};
 use super::contour::exchange;
+use super::visibility::{View, segment};
 use super::{Link, Room, Way};
 use crate::geometry::{Segment, lambert_polygon};
 use crate::hierarchy::{Node, Sample, Tree};
@@ -47,7 +47,8 @@ pub fn facing(tree: &Tree, a: &Node, b: &Node) -> bool {
 /// Is any of `b` in front of any face of `a`?
 fn in_front(tree: &Tree, a: &Node, b: &Node) -> bool {
     if a.flat {
-        let origin = tree.elements[tree.node(tree.face_node[a.faces.0 as usize]).element as usize].corners[0];
+        let origin = tree.elements[tree.node(tree.face_node[a.faces.0 as usize]).element as usize]
+            .corners[0];
         // Points nearer than rounding count as on the plane; light to them is nil.
         let least = 1e-12 * (origin.length() + b.centre.length());
         let above = |p: DVec3| a.normal.dot(p - origin) > least;
@@ -69,11 +70,17 @@ fn in_front(tree: &Tree, a: &Node, b: &Node) -> bool {
 }
 
 /// The faces of a node as polygons with their normals.
-fn polygons<'a>(tree: &'a Tree, node: &Node) -> impl Iterator<Item = ([DVec3; 3], usize)> + use<'a> {
+fn polygons<'a>(
+    tree: &'a Tree,
+    node: &Node,
+) -> impl Iterator<Item = ([DVec3; 3], usize)> + use<'a> {
     let element = tree.element(node).copied();
     let (first, count) = (node.faces.0 as usize, node.faces.1 as usize);
     (first..first + count).map(move |entry| {
-        let corners = element.map_or_else(|| tree.elements[tree.node(tree.face_node[entry]).element as usize].corners, |e| e.corners);
+        let corners = element.map_or_else(
+            || tree.elements[tree.node(tree.face_node[entry]).element as usize].corners,
+            |e| e.corners,
+        );
         (corners, entry)
     })
 }
@@ -84,12 +91,17 @@ pub fn point_factor(tree: &Tree, s: &Sample, node: &Node, others: &[Sample]) -> 
     if node.faces.1 <= POLYGONS {
         return polygons(tree, node)
             .filter(|&(corners, entry)| {
-                tree.face_plane[entry] != s.plane && tree.face_normal[entry].dot(s.point - corners[0]) > 0.0
+                tree.face_plane[entry] != s.plane
+                    && tree.face_normal[entry].dot(s.point - corners[0]) > 0.0
             })
             .map(|(corners, _)| lambert_polygon(s.point, s.normal, &corners))
             .sum();
     }
-    others.iter().map(|t| point_to_point(s, t) * t.area).sum::<f64>().min(1.0)
+    others
+        .iter()
+        .map(|t| point_to_point(s, t) * t.area)
+        .sum::<f64>()
+        .min(1.0)
 }
 
 /// `cos cos / (pi r^2 + area)` towards a sample that stands for `area`: a disk seen from its axis, finite at r = 0.
@@ -100,7 +112,11 @@ fn point_to_point(s: &Sample, t: &Sample) -> f64 {
         return 0.0;
     }
     let (c1, c2) = (s.normal.dot(d), -t.normal.dot(d));
-    if c1 <= 0.0 || c2 <= 0.0 { 0.0 } else { c1 * c2 / (r2 * (PI * r2 + t.area)) }
+    if c1 <= 0.0 || c2 <= 0.0 {
+        0.0
+    } else {
+        c1 * c2 / (r2 * (PI * r2 + t.area))
+    }
 }
 
 /// Distance of two nodes' centres in sums of their radii.
@@ -108,8 +124,15 @@ fn gap(a: &Node, b: &Node) -> f64 {
     a.centre.distance(b.centre) / (a.radius + b.radius)
 }
 
-/// Works out the link between two patches; none if they exchange nothing. `view` is what is known of the way between.
-pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch) -> Option<Link> {
+/// Works out the link between two patches and the way between; none if they exchange nothing. `parents` is what is known
+/// of a pair that holds this one.
+pub fn evaluate(
+    room: &Room,
+    a: u32,
+    b: u32,
+    parents: &View,
+    scratch: &mut Scratch,
+) -> Option<(Link, View)> {
     let tree = room.tree;
     let (na, nb) = (tree.node(a), tree.node(b));
     // The smaller end is sampled, the larger is the polygon: the factor varies less over a small patch.
@@ -123,7 +146,11 @@ pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch)
     let (ns, nt) = (tree.node(s), tree.node(t));
     let gap = gap(ns, nt);
     let count = if !simple(ns) {
-        if gap > NEAR { CLUSTER_POINTS } else { 2 * CLUSTER_POINTS }
+        if gap > NEAR {
+            CLUSTER_POINTS
+        } else {
+            2 * CLUSTER_POINTS
+        }
     } else if gap > FAR {
         1
     } else {
@@ -150,25 +177,60 @@ pub fn evaluate(room: &Room, a: u32, b: u32, view: &View, scratch: &mut Scratch)
         return None;
     }
     let mean = open / ns.area;
-    let size = ns.radius / ns.centre.distance(nt.centre).max(ns.radius + f64::MIN_POSITIVE);
+    let size = ns.radius
+        / ns.centre
+            .distance(nt.centre)
+            .max(ns.radius + f64::MIN_POSITIVE);
     // One point says nothing about variation: 1/r^2 over the patch's own size does.
-    let variation = if count == 1 { 2.0 * size } else { (0.5 * (most - least) / mean).min(4.0) };
-    let visible = match view {
-        View::Clear => 1.0,
-        // Where a plane cuts one end, no point of it may lie in front of the other end; then the other end looks.
-        View::Listed(list) if simple(nt) => clipped_visibility(room, s, t, shift, list, scratch)
-            .or_else(|| if simple(ns) { clipped_visibility(room, t, s, shift, list, scratch) } else { None })
-            .unwrap_or_else(|| sampled_visibility(room, s, t, shift, view, scratch)),
-        _ => sampled_visibility(room, s, t, shift, view, scratch),
+    let variation = if count == 1 {
+        2.0 * size
+    } else {
+        (0.5 * (most - least) / mean).min(4.0)
     };
-    Some(Link {
+    let sight = room.sight;
+    // A look into the shaft costs as much as many rays where much stands about. It is worth that where it starts from a
+    // list, or where rays say that it may come out clear.
+    let mut view = View::Crowded;
+    let mut visible = None;
+    if *parents == View::Crowded && !sight.small() && sight.occlusion {
+        let rays = sampled_visibility(room, s, t, shift, &view, scratch);
+        if rays == 1.0 {
+            view = sight.view(tree, na, nb, parents);
+        }
+        visible = Some(rays);
+    } else {
+        view = sight.view(tree, na, nb, parents);
+    }
+    let visible = match (&view, visible) {
+        (View::Clear, _) => 1.0,
+        // Where a plane cuts one end, no point of it may lie in front of the other end; then the other end looks.
+        (View::Listed(list), _) if simple(nt) => {
+            clipped_visibility(room, s, t, shift, list, scratch)
+                .or_else(|| {
+                    if simple(ns) {
+                        clipped_visibility(room, t, s, shift, list, scratch)
+                    } else {
+                        None
+                    }
+                })
+                .unwrap_or_else(|| sampled_visibility(room, s, t, shift, &view, scratch))
+        }
+        (_, Some(rays)) => rays,
+        _ => sampled_visibility(room, s, t, shift, &view, scratch),
+    };
+    let link = Link {
         a,
         b,
         exchange: (open * visible) as f32,
         open_exchange: open as f32,
         variation: variation as f32,
-        way: if *view == View::Clear { Way::Clear } else { Way::Crowded },
-    })
+        way: if view == View::Clear {
+            Way::Clear
+        } else {
+            Way::Crowded
+        },
+    };
+    Some((link, view))
 }
 
 /// Unoccluded exchange of two small sets of faces.
@@ -186,7 +248,14 @@ fn contours(tree: &Tree, a: &Node, b: &Node) -> f64 {
 
 /// Visible share by points on one end that see exactly what is left of the polygons of the other. None if that takes too
 /// many pieces, or if no point is in front of the other end.
-fn clipped_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], list: &[u32], scratch: &mut Scratch) -> Option<f64> {
+fn clipped_visibility(
+    room: &Room,
+    s: u32,
+    t: u32,
+    shift: [f64; 2],
+    list: &[u32],
+    scratch: &mut Scratch,
+) -> Option<f64> {
     let tree = room.tree;
     tree.samples(s, POINTS, shift, &mut scratch.a);
     let (mut seen, mut total) = (0.0, 0.0);
@@ -199,7 +268,13 @@ fn clipped_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], list: &[u32]
             let open = lambert_polygon(p.point, p.normal, &corners);
             if open > 0.0 {
                 total += open;
-                seen += room.sight.visible_factor(p.point, p.normal, &corners, [p.plane, plane], list)?;
+                seen += room.sight.visible_factor(
+                    p.point,
+                    p.normal,
+                    &corners,
+                    [p.plane, plane],
+                    list,
+                )?;
             }
         }
     }
@@ -207,8 +282,18 @@ fn clipped_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], list: &[u32]
 }
 
 /// Visible share by rays between points of both ends, each weighted by what it would carry.
-fn sampled_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], view: &View, scratch: &mut Scratch) -> f64 {
-    let (u, v) = (shift, [shift[1], (shift[0] + 0.618_033_988_749_894_9).fract()]);
+fn sampled_visibility(
+    room: &Room,
+    s: u32,
+    t: u32,
+    shift: [f64; 2],
+    view: &View,
+    scratch: &mut Scratch,
+) -> f64 {
+    let (u, v) = (
+        shift,
+        [shift[1], (shift[0] + 0.618_033_988_749_894_9).fract()],
+    );
     room.tree.samples(s, RAYS, u, &mut scratch.a);
     room.tree.samples(t, RAYS, v, &mut scratch.b);
     scratch.segments.clear();
@@ -222,10 +307,17 @@ fn sampled_visibility(room: &Room, s: u32, t: u32, shift: [f64; 2], view: &View,
             scratch.weights.push(weight);
         }
     }
-    room.sight.blocked(&scratch.segments, view, &mut scratch.blocked);
+    room.sight
+        .blocked(&scratch.segments, view, &mut scratch.blocked);
     scratch.rays += scratch.segments.len() as u64;
     let total: f64 = scratch.weights.iter().sum();
-    let seen: f64 = scratch.weights.iter().zip(&scratch.blocked).filter(|(_, b)| !**b).map(|(w, _)| w).sum();
+    let seen: f64 = scratch
+        .weights
+        .iter()
+        .zip(&scratch.blocked)
+        .filter(|(_, b)| !**b)
+        .map(|(w, _)| w)
+        .sum();
     // No ray runs from front to front: the pair meets at the horizon and carries next to nothing. Taking it as open would
     // let light through walls.
     if total > 0.0 { seen / total } else { 0.0 }

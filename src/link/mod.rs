@@ -9,8 +9,8 @@ mod visibility;
 
 pub(crate) use balance::row_sums;
 pub use balance::{Balance, balance};
-pub(crate) use kernel::pattern;
 pub use contour::exchange;
+pub(crate) use kernel::pattern;
 pub use kernel::{Scratch, evaluate, facing, point_factor};
 pub use refine::{Demand, Graph, MAX_DEPTH, Refined, blockers_of};
 pub use store::LinkRows;
@@ -38,7 +38,11 @@ pub struct Link {
 impl Link {
     /// Visible share of the exchange, in [0, 1].
     pub fn visibility(&self) -> f32 {
-        if self.open_exchange > 0.0 { (self.exchange / self.open_exchange).min(1.0) } else { 0.0 }
+        if self.open_exchange > 0.0 {
+            (self.exchange / self.open_exchange).min(1.0)
+        } else {
+            0.0
+        }
     }
 }
 

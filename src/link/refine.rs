@@ -20,6 +20,8 @@ const CHUNK: usize = 64;
 pub struct Demand<'a> {
     /// Radiosity of every node, reflected and emitted, as a share of the adaptation white's.
     pub bright: &'a [f32],
+    /// How much lightness a change of irradiance makes at every node: `(H / white)^(-2/3)`, as in CIELAB; 1 at the white.
+    pub keen: &'a [f32],
     /// Area of all faces.
     pub total_area: f64,
     /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of the area.
@@ -33,12 +35,18 @@ impl Demand<'_> {
     pub fn error(&self, tree: &Tree, link: &Link) -> f64 {
         let visibility = f64::from(link.visibility());
         // An unproved "hidden" is right to about one in the rays cast; "partly" misplaces light like a coin.
-        let doubt = if link.way == Way::Clear { 0.0 } else { (visibility * (1.0 - visibility)).sqrt().max(0.1) };
-        let misplaced = f64::from(link.open_exchange) * (f64::from(link.variation) * visibility + doubt);
+        let doubt = if link.way == Way::Clear {
+            0.0
+        } else {
+            (visibility * (1.0 - visibility)).sqrt().max(0.1)
+        };
+        let misplaced =
+            f64::from(link.open_exchange) * (f64::from(link.variation) * visibility + doubt);
         let at = |receiver: u32, source: u32| {
             let area = tree.node(receiver).area;
             let bright = f64::from(self.bright.get(source as usize).copied().unwrap_or(0.0));
-            misplaced / area * bright * (area / self.total_area).sqrt()
+            let keen = f64::from(self.keen.get(receiver as usize).copied().unwrap_or(1.0));
+            misplaced / area * bright * keen * (area / self.total_area).sqrt()
         };
         at(link.a, link.b).max(at(link.b, link.a))
     }
@@ -68,19 +76,41 @@ impl Graph {
     /// The pairs that every room starts with: the two halves of each cluster.
     fn start(tree: &Tree) -> Vec<(u32, u32)> {
         let halves = |n: &Node| (n.child, n.child + 1);
-        tree.nodes.iter().filter(|n| n.element == NONE && !n.flat).map(halves).collect()
+        tree.nodes
+            .iter()
+            .filter(|n| n.element == NONE && !n.flat)
+            .map(halves)
+            .collect()
     }
 
     /// Refines until no link exceeds the demand; the first call also makes the first links.
-    pub fn refine(&mut self, tree: &mut Tree, sight: &Sight, seed: u64, demand: &Demand) -> Refined {
+    pub fn refine(
+        &mut self,
+        tree: &mut Tree,
+        sight: &Sight,
+        seed: u64,
+        demand: &Demand,
+    ) -> Refined {
         let mut done = Refined::default();
         let mut open: Vec<(Link, View)> = Vec::new();
         if self.links.is_empty() {
-            let pairs: Vec<(u32, u32, u32)> = Self::start(tree).into_iter().map(|(a, b)| (a, b, 0)).collect();
-            let fresh = evaluate_all(&Room { tree, sight, seed }, &pairs, &[View::Crowded], &mut done);
+            let pairs: Vec<(u32, u32, u32)> = Self::start(tree)
+                .into_iter()
+                .map(|(a, b)| (a, b, 0))
+                .collect();
+            let fresh = evaluate_all(
+                &Room { tree, sight, seed },
+                &pairs,
+                &[View::Crowded],
+                &mut done,
+            );
             self.sort_out(tree, demand, fresh, &mut open, &mut done);
         } else {
-            let wants: Vec<bool> = self.links.par_iter().map(|l| demand.error(tree, l) > demand.threshold).collect();
+            let wants: Vec<bool> = self
+                .links
+                .par_iter()
+                .map(|l| demand.error(tree, l) > demand.threshold)
+                .collect();
             let mut kept = Vec::with_capacity(self.links.len());
             let mut split = Vec::new();
             for (link, wants) in self.links.iter().zip(wants) {
@@ -106,8 +136,10 @@ impl Graph {
                 .map(|link| {
                     let view = match link.way {
                         Way::Clear => View::Clear,
-                        Way::Listed { .. } => View::Listed(blockers_of(&blockers, link.way).to_vec()),
-                        Way::Crowded => sight.view(tree, tree.node(link.a), tree.node(link.b), &View::Crowded),
+                        Way::Listed { .. } => {
+                            View::Listed(blockers_of(&blockers, link.way).to_vec())
+                        }
+                        Way::Crowded => View::Crowded,
                     };
                     (link, view)
                 })
@@ -118,9 +150,15 @@ impl Graph {
             let mut views = Vec::with_capacity(open.len());
             for (k, (link, view)) in open.into_iter().enumerate() {
                 // Only links that can be split are opened.
-                let Some((end, other)) = splittable(tree, &link, demand) else { continue };
+                let Some((end, other)) = splittable(tree, &link, demand) else {
+                    continue;
+                };
                 tree.subdivide(end);
-                pairs.extend(tree.node(end).child_range().map(|child| (child, other, k as u32)));
+                pairs.extend(
+                    tree.node(end)
+                        .child_range()
+                        .map(|child| (child, other, k as u32)),
+                );
                 views.push(view);
             }
             let fresh = evaluate_all(&Room { tree, sight, seed }, &pairs, &views, &mut done);
@@ -131,7 +169,14 @@ impl Graph {
     }
 
     /// Good links are kept, the others opened.
-    fn sort_out(&mut self, tree: &Tree, demand: &Demand, fresh: Vec<(Link, View)>, open: &mut Vec<(Link, View)>, done: &mut Refined) {
+    fn sort_out(
+        &mut self,
+        tree: &Tree,
+        demand: &Demand,
+        fresh: Vec<(Link, View)>,
+        open: &mut Vec<(Link, View)>,
+        done: &mut Refined,
+    ) {
         for (link, view) in fresh {
             let good = demand.error(tree, &link) <= demand.threshold;
             if !good && splittable(tree, &link, demand).is_some() {
@@ -150,7 +195,10 @@ impl Graph {
             View::Listed(list) => {
                 let start = self.blockers.len() as u32;
                 self.blockers.extend(list);
-                Way::Listed { start, count: list.len() as u8 }
+                Way::Listed {
+                    start,
+                    count: list.len() as u8,
+                }
             }
         };
         self.links.push(Link { way, ..link });
@@ -160,7 +208,9 @@ impl Graph {
 /// The triangles that a way lists.
 pub fn blockers_of(blockers: &[u32], way: Way) -> &[u32] {
     match way {
-        Way::Listed { start, count } => &blockers[start as usize..start as usize + usize::from(count)],
+        Way::Listed { start, count } => {
+            &blockers[start as usize..start as usize + usize::from(count)]
+        }
         Way::Clear | Way::Crowded => &[],
     }
 }
@@ -169,15 +219,27 @@ pub fn blockers_of(blockers: &[u32], way: Way) -> &[u32] {
 fn splittable(tree: &Tree, link: &Link, demand: &Demand) -> Option<(u32, u32)> {
     let can = |id: u32| {
         let node = tree.node(id);
-        !node.is_leaf() || tree.element(node).is_some_and(|e| e.depth < MAX_DEPTH && node.area > demand.least_area)
+        !node.is_leaf()
+            || tree
+                .element(node)
+                .is_some_and(|e| e.depth < MAX_DEPTH && node.area > demand.least_area)
     };
     let (a, b) = (link.a, link.b);
-    let larger_first = if tree.node(a).radius >= tree.node(b).radius { [(a, b), (b, a)] } else { [(b, a), (a, b)] };
+    let larger_first = if tree.node(a).radius >= tree.node(b).radius {
+        [(a, b), (b, a)]
+    } else {
+        [(b, a), (a, b)]
+    };
     larger_first.into_iter().find(|&(end, _)| can(end))
 }
 
 /// Evaluates pairs (a, b, index of what is known of their parents' view), in order.
-fn evaluate_all(room: &Room, pairs: &[(u32, u32, u32)], views: &[View], done: &mut Refined) -> Vec<(Link, View)> {
+fn evaluate_all(
+    room: &Room,
+    pairs: &[(u32, u32, u32)],
+    views: &[View],
+    done: &mut Refined,
+) -> Vec<(Link, View)> {
     let parts: Vec<(Vec<(Link, View)>, u64)> = pairs
         .par_chunks(CHUNK)
         .map(|chunk| {
@@ -188,10 +250,7 @@ fn evaluate_all(room: &Room, pairs: &[(u32, u32, u32)], views: &[View], done: &m
                 if !facing(room.tree, na, nb) {
                     continue;
                 }
-                let view = room.sight.view(room.tree, na, nb, &views[v as usize]);
-                if let Some(link) = evaluate(room, a, b, &view, &mut scratch) {
-                    out.push((link, view));
-                }
+                out.extend(evaluate(room, a, b, &views[v as usize], &mut scratch));
             }
             (out, scratch.rays)
         })

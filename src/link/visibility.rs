@@ -6,6 +6,8 @@ use glam::DVec3;
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
 const LISTED: usize = 24;
+/// A room of this many triangles is small: a shaft costs no more than a handful of rays.
+const SMALL: usize = 256;
 /// A polygon seen past its blockers may fall into this many pieces before rays take over.
 const PIECES: usize = 48;
 
@@ -36,6 +38,11 @@ pub enum View {
 }
 
 impl Sight<'_> {
+    /// So few triangles that a look into any shaft is cheap?
+    pub fn small(&self) -> bool {
+        self.mesh.triangles.len() <= SMALL
+    }
+
     /// Looks into the shaft between two patches. `parents` is what is known of a pair that holds this one.
     pub fn view(&self, tree: &Tree, a: &Node, b: &Node, parents: &View) -> View {
         let candidates = match parents {
@@ -56,7 +63,14 @@ impl Sight<'_> {
 
     /// Factor from a point to the visible part of a polygon past the listed triangles, exactly; none where that takes
     /// too many pieces or a blocker has holes. `planes`: of the point and of the polygon, which do not block.
-    pub fn visible_factor(&self, point: DVec3, normal: DVec3, polygon: &[DVec3; 3], planes: [u32; 2], list: &[u32]) -> Option<f64> {
+    pub fn visible_factor(
+        &self,
+        point: DVec3,
+        normal: DVec3,
+        polygon: &[DVec3; 3],
+        planes: [u32; 2],
+        list: &[u32],
+    ) -> Option<f64> {
         if self.opaque.is_some() {
             return None;
         }
@@ -64,11 +78,39 @@ impl Sight<'_> {
         let mut count = 0;
         for &triangle in list {
             if !planes.contains(&self.mesh.plane[triangle as usize]) {
-                corners[count] = self.mesh.triangles[triangle as usize].map(|v| self.mesh.positions[v as usize]);
+                corners[count] =
+                    self.mesh.triangles[triangle as usize].map(|v| self.mesh.positions[v as usize]);
                 count += 1;
             }
         }
         lambert_visible(point, normal, polygon, &corners[..count], PIECES)
+    }
+
+    /// What may block between a point and a polygon.
+    pub fn view_from(
+        &self,
+        at: DVec3,
+        normal: DVec3,
+        polygon: &[DVec3; 3],
+        planes: [u32; 2],
+    ) -> View {
+        let point = Patch::Point {
+            at,
+            normal,
+            plane: planes[0],
+        };
+        let shaft = Shaft::between(
+            &point,
+            &Patch::Triangle {
+                corners: *polygon,
+                plane: planes[1],
+            },
+        );
+        match self.rays.blockers(&shaft, None, LISTED) {
+            ShaftContents::Clear => View::Clear,
+            ShaftContents::Few(list) => View::Listed(list),
+            ShaftContents::Many => View::Crowded,
+        }
     }
 
     /// For each segment: is it blocked?
@@ -77,8 +119,12 @@ impl Sight<'_> {
         out.resize(segments.len(), false);
         match (view, self.opaque) {
             (View::Clear, _) => {}
-            (View::Listed(list), Some(opaque)) => self.rays.occluded_by(list, segments, out, &opaque),
-            (View::Listed(list), None) => self.rays.occluded_by(list, segments, out, &|_, _, _| true),
+            (View::Listed(list), Some(opaque)) => {
+                self.rays.occluded_by(list, segments, out, &opaque)
+            }
+            (View::Listed(list), None) => {
+                self.rays.occluded_by(list, segments, out, &|_, _, _| true)
+            }
             (View::Crowded, Some(opaque)) => self.rays.occluded_many_with(segments, out, &opaque),
             (View::Crowded, None) => self.rays.occluded_many(segments, out),
         }
@@ -87,13 +133,23 @@ impl Sight<'_> {
 
 /// The segment between two sample points.
 pub(super) fn segment(s: &Sample, t: &Sample) -> Segment {
-    Segment { from: s.point.as_vec3(), to: t.point.as_vec3(), planes: [s.plane, t.plane] }
+    Segment {
+        from: s.point.as_vec3(),
+        to: t.point.as_vec3(),
+        planes: [s.plane, t.plane],
+    }
 }
 
 /// A node as the end of a shaft.
 fn patch(tree: &Tree, node: &Node) -> Patch {
     match tree.element(node) {
-        Some(e) => Patch::Triangle { corners: e.corners, plane: tree.face_plane[e.face as usize] },
-        None => Patch::Box { low: node.low, high: node.high },
+        Some(e) => Patch::Triangle {
+            corners: e.corners,
+            plane: tree.face_plane[e.face as usize],
+        },
+        None => Patch::Box {
+            low: node.low,
+            high: node.high,
+        },
     }
 }

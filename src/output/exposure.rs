@@ -1,19 +1,34 @@
 //! Exposure: which radiosity shows as white, metered from the room.
 //!
 //! display = scale * radiosity, both linear, radiosity in lm/m2, display white = 1.
+//! The rule: of what does not shine itself, 99 % of what each camera sees and 97 % of the area that light reaches are shown
+//! unclipped, in each of the three channels. What is left over is spots beside lamps and tops of cupboards below them.
+//! Colours are scaled and never bent, so a coloured light (whose strongest channel is well above its luminance) gets a
+//! darker picture than a white one of equal luminance.
 //! The meter reads `light` (radiosity over the paint's texture) and not the radiosity itself: `light` is what COLOR_0
 //! holds, which glTF confines to [0, 1], so a dark texture must not push it out of range. It is the incident-light
 //! metering of photography: a dark wooden room comes out dark.
 
+use super::camera::{self, View};
+use super::raster::{self, Hit, Refined};
 use super::refined;
-use crate::gather::BakedSurface;
-use crate::scene::Scene;
+use crate::gather::{BakedSurface, BakedVertex};
+use crate::scene::{Camera, Scene, Surface};
+use glam::DVec3;
 
-/// Share of the lamp-free area that stays below [`METERED_LEVEL`]. Higher: darker pictures, fewer clipped spots by lamps.
-const PERCENTILE: f64 = 0.96;
+/// Share of what each camera sees, lamps left out, that is shown unclipped. Higher: darker pictures, fewer clipped spots.
+const SEEN: f64 = 0.99;
 
-/// Display level that the percentile is brought to; the headroom keeps the brightest wall off pure white.
-const METERED_LEVEL: f64 = 0.9;
+/// The same for the lit area, seen or not: the baked room is walked through. Lower than [`SEEN`], for the brightest
+/// places of a room are small and near the ceiling, where nobody looks.
+const AREA: f64 = 0.97;
+
+/// Size of the trial pictures that are metered.
+const TRIAL: [usize; 2] = [160, 120];
+
+/// Area whose reading is below this share of the brightest is unlit: backs of walls, floors under furniture. A room
+/// would be metered by what no light reaches if it counted.
+const UNLIT: f64 = 1e-4;
 
 /// Luminance weights of linear sRGB (IEC 61966-2-1, ITU-R BT.709 primaries).
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
@@ -36,71 +51,94 @@ impl Exposure {
         1.0 / (self.scale * std::f64::consts::PI)
     }
 
-    /// Meters the room: the 96th percentile by area of what does not shine itself is shown at 0.9.
+    /// Meters the room: see the module's words.
     ///
-    /// Lamps are left out unless there is nothing else. A black room gets a scale of 1.
+    /// Lamps are left out unless nothing else is lit. A black room gets a scale of 1.
     pub fn auto(scene: &Scene, surfaces: &[BakedSurface]) -> Self {
-        let mut readings = readings(scene, surfaces, |emits| !emits);
-        if readings.is_empty() {
-            readings = self::readings(scene, surfaces, |_| true);
-        }
-        // Stable, so that equal readings are summed in one order on every machine.
-        readings.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let total: f64 = readings.iter().map(|r| r.1).sum();
-        let mut below = 0.0;
-        let reading = readings.iter().find(|r| {
-            below += r.1;
-            below >= PERCENTILE * total
-        });
-        // Darkness up to the percentile (a spot in a black hall): meter the brightest point instead.
-        let level = reading
-            .or(readings.last())
-            .map(|r| r.0)
-            .filter(|&level| level > 0.0);
-        match level.or(readings.last().map(|r| r.0)) {
-            Some(level) if level > 0.0 => Self::new(METERED_LEVEL / level),
-            _ => Self::new(1.0),
-        }
+        let meshes = Refined { scene, surfaces };
+        let cameras = camera::cameras(scene);
+        let level = |lamps| {
+            let seen = cameras
+                .iter()
+                .filter_map(|camera| percentile(seen(&meshes, camera, lamps), SEEN));
+            seen.chain(percentile(areas(&meshes, lamps), AREA))
+                .reduce(f64::max)
+        };
+        Self::new(
+            level(false)
+                .or(level(true))
+                .map_or(1.0, |level| 1.0 / level),
+        )
     }
 }
 
-/// (luminance of `light` in lm/m2, area in squared file units) of the surfaces picked by `pick`.
-fn readings(
-    scene: &Scene,
-    surfaces: &[BakedSurface],
-    pick: impl Fn(bool) -> bool,
-) -> Vec<(f64, f64)> {
+/// The level that a share of the weight of all lit (level, weight) stays below; none if all is dark.
+fn percentile(mut readings: Vec<(f64, f64)>, share: f64) -> Option<f64> {
+    readings.retain(|r| r.0 > 0.0 && r.0.is_finite());
+    // Stable, so that equal readings are summed in one order on every machine.
+    readings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let brightest = readings.last()?.0;
+    let lit = &readings[readings.partition_point(|r| r.0 <= UNLIT * brightest)..];
+    let total: f64 = lit.iter().map(|r| r.1).sum();
+    let mut below = 0.0;
+    let level = lit.iter().find(|r| {
+        below += r.1;
+        below >= share * total
+    });
+    // Rounding may leave the last reading out of the sum.
+    level.or(lit.last()).map(|r| r.0)
+}
+
+/// Strongest channel of what COLOR_0 holds before exposure, lm/m2.
+fn strongest(surface: &Surface, vertex_paint: bool, vertex: &BakedVertex) -> f64 {
+    let paint = if vertex_paint {
+        refined::vertex_color(surface, vertex)
+    } else {
+        [1.0; 4]
+    };
+    let channels = vertex.light.into_iter().zip(paint);
+    channels.map(|(l, p)| f64::from(l * p)).fold(0.0, f64::max)
+}
+
+/// One reading for each pixel of a small picture.
+fn seen(meshes: &Refined, camera: &Camera, lamps: bool) -> Vec<(f64, f64)> {
+    let [width, height] = TRIAL;
+    let read = |hit: &Hit| {
+        let (surface, corners) = meshes.at(hit);
+        let material = &meshes.scene.materials[surface.material];
+        let level =
+            |k: usize| hit.weights[k] * strongest(surface, material.vertex_paint, corners[k]);
+        (material.emission.is_some() == lamps).then(|| (level(0) + level(1) + level(2), 1.0))
+    };
+    let view = View::new(meshes.scene, camera, width, height);
+    let pixels = raster::draw(meshes, &view, TRIAL, 1, |row| {
+        row.iter().map(|hit| hit.as_ref().and_then(read)).collect()
+    });
+    pixels.into_iter().flatten().collect()
+}
+
+/// One reading for each triangle, with its area in squared file units.
+fn areas(meshes: &Refined, lamps: bool) -> Vec<(f64, f64)> {
     let mut readings = Vec::new();
-    for baked in surfaces {
-        let Some(surface) = scene.surfaces.get(baked.surface) else {
-            continue;
-        };
-        if !scene
-            .materials
-            .get(surface.material)
-            .is_some_and(|m| pick(m.emission.is_some()))
-        {
+    for baked in meshes.surfaces {
+        let surface = &meshes.scene.surfaces[baked.surface];
+        let material = &meshes.scene.materials[surface.material];
+        if material.emission.is_some() != lamps {
             continue;
         }
-        for triangle in &baked.triangles {
-            let corners = triangle.map(|v| &baked.vertices[v as usize]);
-            let [a, b, c] = corners.map(|v| refined::position(surface, v));
-            let area = 0.5 * (b - a).cross(c - a).length();
-            let level = corners.iter().map(|v| luminance(v.light)).sum::<f64>() / 3.0;
-            if area > 0.0 && level.is_finite() {
-                readings.push((level, area));
-            }
+        let levels: Vec<f64> = (baked.vertices.iter())
+            .map(|v| strongest(surface, material.vertex_paint, v))
+            .collect();
+        let places: Vec<DVec3> = (baked.vertices.iter())
+            .map(|v| refined::position(surface, v))
+            .collect();
+        for corners in baked.triangles.iter().map(|t| t.map(|v| v as usize)) {
+            let [a, b, c] = corners.map(|v| places[v]);
+            let level = corners.iter().map(|&v| levels[v]).sum::<f64>() / 3.0;
+            readings.push((level, 0.5 * (b - a).cross(c - a).length()));
         }
     }
     readings
-}
-
-/// Luminance of a linear sRGB colour, in its own unit.
-pub(crate) fn luminance(rgb: [f32; 3]) -> f64 {
-    rgb.iter()
-        .zip(LUMINANCE)
-        .map(|(&c, w)| f64::from(c) * w)
-        .sum()
 }
 
 /// The nearest colour of the same luminance and hue inside [0, 1]: mixed with its grey until it fits; white if brighter.

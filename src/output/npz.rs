@@ -168,7 +168,7 @@ pub fn write_baked(
         let first = owners.len() as u32;
         for vertex in &baked.vertices {
             positions.extend(refined::position(surface, vertex).to_array());
-            normals.extend(refined::normal(surface, vertex).as_vec3().to_array());
+            normals.extend(refined::normal(surface, baked, vertex).as_vec3().to_array());
             xyz.extend(vertex.radiosity);
             owners.push(baked.surface as u32);
         }

@@ -6,7 +6,7 @@
 //! perspective-correct; what is behind the eye drops out by sign. Samples exactly on an edge follow the top-left rule
 //! (e_i of neighbours are exact negatives), so triangles that share an edge neither overlap nor leave a gap.
 //!
-//! Back faces of one-sided surfaces are not drawn. The nearest sample wins, the first triangle of equals.
+//! Back faces are not drawn: the back of a two-sided surface is a sheet of its own, with its own light. The nearest sample wins, the first triangle of equals.
 //! Bands of rows are drawn in parallel; the result does not depend on their order.
 
 use super::camera::View;
@@ -352,9 +352,9 @@ impl Meshes for Refined<'_> {
         baked.triangles[triangle].map(|v| refined::position(surface, &baked.vertices[v as usize]))
     }
 
-    fn two_sided(&self, mesh: usize) -> bool {
-        let surface = &self.scene.surfaces[self.surfaces[mesh].surface];
-        self.scene.materials[surface.material].sides == Sides::Both
+    fn two_sided(&self, _: usize) -> bool {
+        // Each side is a sheet of its own.
+        false
     }
 
     fn has_holes(&self, mesh: usize) -> bool {

@@ -75,8 +75,9 @@ pub fn position(surface: &Surface, vertex: &BakedVertex) -> DVec3 {
     u * a + v * b + w * c
 }
 
-/// Shading normal in world space, unit length: the interpolated one, else the input triangle's.
-pub fn normal(surface: &Surface, vertex: &BakedVertex) -> DVec3 {
+/// Shading normal in world space, unit length, out of the side that the sheet shows: the interpolated one, else the
+/// input triangle's.
+pub fn normal(surface: &Surface, baked: &BakedSurface, vertex: &BakedVertex) -> DVec3 {
     let corners = corners(surface, vertex);
     let [a, b, c] = corners.map(|c| surface.positions[c]);
     let flat = (b - a).cross(c - a);
@@ -86,10 +87,11 @@ pub fn normal(surface: &Surface, vertex: &BakedVertex) -> DVec3 {
             .map(|k| vertex.weights[k] * normal(corners[k]))
             .sum::<DVec3>()
     });
-    smooth
+    let front = smooth
         .and_then(DVec3::try_normalize)
         .or(flat.try_normalize())
-        .unwrap_or(DVec3::Y)
+        .unwrap_or(DVec3::Y);
+    if baked.back { -front } else { front }
 }
 
 /// Interpolates four-component vertex data; vertices beyond its end count as `missing`.

@@ -7,7 +7,14 @@ use crate::hierarchy::Mesh;
 pub fn is_hole(scene: &Scene, mesh: &Mesh, triangle: u32, weights: [f32; 3]) -> bool {
     let (surface, local) = mesh.origin[triangle as usize];
     let surface = &scene.surfaces[surface as usize];
-    let Alpha::Mask { cutoff, factor, texture } = &scene.materials[surface.material].alpha else { return false };
+    let Alpha::Mask {
+        cutoff,
+        factor,
+        texture,
+    } = &scene.materials[surface.material].alpha
+    else {
+        return false;
+    };
     let corners = surface.triangles[local as usize].map(|v| v as usize);
     let mut alpha = *factor;
     if let Some(texture) = texture
@@ -17,7 +24,9 @@ pub fn is_hole(scene: &Scene, mesh: &Mesh, triangle: u32, weights: [f32; 3]) -> 
         alpha *= texture.sample(&scene.images, uv)[3];
     }
     if let Some(colors) = &surface.colors {
-        alpha *= (0..3).map(|k| colors[corners[k]][3] * weights[k]).sum::<f32>();
+        alpha *= (0..3)
+            .map(|k| colors[corners[k]][3] * weights[k])
+            .sum::<f32>();
     }
     alpha < *cutoff
 }

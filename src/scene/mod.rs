@@ -24,7 +24,7 @@ mod raw;
 mod spectra_file;
 mod texture;
 mod texture_info;
-mod uri;
+pub(crate) mod uri;
 mod world;
 
 pub use load::Options;

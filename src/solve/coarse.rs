@@ -17,11 +17,13 @@ use glam::DVec3;
 
 /// Patches of the model at the most (fits the child count of its root).
 const PATCHES: usize = 192;
+/// One lane in this many is split at a time.
+const BATCH: usize = 3;
 /// The model is solved to this relative error: far below what is asked of wavelengths.
-const TOLERANCE: f64 = 1e-5;
+const TOLERANCE: f64 = 1e-4;
 
 /// The model.
-pub struct Coarse {
+pub(super) struct Coarse {
     tree: Tree,
     links: LinkRows,
     leaves: Vec<u32>,
@@ -35,7 +37,7 @@ pub struct Coarse {
 }
 
 /// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
-pub trait Dense {
+pub(super) trait Dense {
     /// Reflectance of a leaf node.
     fn reflectance(&self, leaf: u32) -> Leaves;
     /// Exitance shape of a leaf node under a light; none if it emits nothing of that light.
@@ -46,7 +48,7 @@ pub trait Dense {
 
 /// What a choice of cuts does.
 #[derive(Debug, Clone)]
-pub struct Choice {
+pub(super) struct Choice {
     /// One cut a light.
     pub cuts: Vec<Partition>,
     /// Area-weighted mean CIELUV difference of irradiance that they cause on the model.
@@ -55,9 +57,22 @@ pub struct Choice {
 
 impl Coarse {
     /// Sums links and sources over a cut of `tree`.
-    pub fn new(tree: &Tree, links: &[Link], factor: &[f32], areas: &[f64], leaves: &[u32], dense: &dyn Dense, lights: usize) -> Self {
+    pub(super) fn new(
+        tree: &Tree,
+        links: &[Link],
+        factor: &[f32],
+        areas: &[f64],
+        leaves: &[u32],
+        dense: &dyn Dense,
+        lights: usize,
+    ) -> Self {
         let group = cut(tree);
-        let count = group.iter().filter(|&&g| g != NONE).map(|&g| g as usize + 1).max().unwrap_or(0);
+        let count = group
+            .iter()
+            .filter(|&&g| g != NONE)
+            .map(|&g| g as usize + 1)
+            .max()
+            .unwrap_or(0);
         let mut area = vec![0.0; count];
         let mut reflectance = vec![[0.0; LEAVES]; count];
         let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
@@ -76,7 +91,9 @@ impl Coarse {
             }
         }
         for (g, a) in area.iter().enumerate() {
-            let all = std::iter::once(&mut reflectance).chain(&mut emission).chain(&mut punctual);
+            let all = std::iter::once(&mut reflectance)
+                .chain(&mut emission)
+                .chain(&mut punctual);
             for row in all.map(|rows| &mut rows[g]) {
                 for x in row.iter_mut() {
                     *x /= a;
@@ -91,7 +108,14 @@ impl Coarse {
                 if g > 0.0 {
                     // A patch of the model may light itself; the row holds it twice, so half is stored.
                     let g = if a == b { 0.5 * g } else { g };
-                    pairs.push(Link { a: a as u32 + 1, b: b as u32 + 1, exchange: g as f32, open_exchange: g as f32, variation: 0.0, way: Way::Clear });
+                    pairs.push(Link {
+                        a: a as u32 + 1,
+                        b: b as u32 + 1,
+                        exchange: g as f32,
+                        open_exchange: g as f32,
+                        variation: 0.0,
+                        way: Way::Clear,
+                    });
                 }
             }
         }
@@ -100,7 +124,9 @@ impl Coarse {
             links: LinkRows::new(count + 1, &pairs),
             leaves: (1..=count as u32).collect(),
             factor: vec![1.0; count + 1],
-            areas: std::iter::once(area.iter().sum()).chain(area.iter().copied()).collect(),
+            areas: std::iter::once(area.iter().sum())
+                .chain(area.iter().copied())
+                .collect(),
             reflectance,
             emission,
             punctual,
@@ -119,7 +145,11 @@ impl Coarse {
 
     fn solve<const L: usize>(&self, lanes: &Lanes) -> Rows {
         let count = self.leaves.len();
-        let (mut rho, mut e, mut p) = (Rows::zero(count, L), Rows::zero(count, L), Rows::zero(count, L));
+        let (mut rho, mut e, mut p) = (
+            Rows::zero(count, L),
+            Rows::zero(count, L),
+            Rows::zero(count, L),
+        );
         let mut greatest = vec![0.0_f32; L];
         for k in 0..count {
             lanes.averages(&self.reflectance[k], rho.row_mut(k));
@@ -133,7 +163,13 @@ impl Coarse {
                 *g = g.max(*r);
             }
         }
-        let operator = Operator { tree: &self.tree, links: &self.links, leaves: &self.leaves, areas: &self.areas, factor: &self.factor };
+        let operator = Operator {
+            tree: &self.tree,
+            links: &self.links,
+            leaves: &self.leaves,
+            areas: &self.areas,
+            factor: &self.factor,
+        };
         let (mut nodes, mut gathered) = (Rows::zero(count + 1, L), Rows::zero(count + 1, L));
         let mut first = Rows::zero(count, L);
         operator.irradiance::<L>(&e, &mut nodes, &mut gathered, &mut first);
@@ -143,10 +179,16 @@ impl Coarse {
             }
         }
         let mut reflected = Rows::zero(count, L);
-        let system = System { operator, reflectance: &rho, greatest: &greatest };
+        let system = System {
+            operator,
+            reflectance: &rho,
+            greatest: &greatest,
+        };
         system.solve::<L>(&first, &mut reflected, TOLERANCE);
         let mut more = Rows::zero(count, L);
-        system.operator.irradiance::<L>(&reflected, &mut nodes, &mut gathered, &mut more);
+        system
+            .operator
+            .irradiance::<L>(&reflected, &mut nodes, &mut gathered, &mut more);
         for k in 0..count {
             for (x, f) in more.row_mut(k).iter_mut().zip(first.row(k)) {
                 *x += f;
@@ -157,7 +199,13 @@ impl Coarse {
 
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
     /// padding would waste.
-    pub fn choose(&self, spectra: &[LightSpectrum], weights: &[Leaves; 3], white: [f64; 3], tolerance: f64) -> Choice {
+    pub(super) fn choose(
+        &self,
+        spectra: &[LightSpectrum],
+        weights: &[Leaves; 3],
+        white: [f64; 3],
+        tolerance: f64,
+    ) -> Choice {
         let count = self.leaves.len();
         let references: Vec<(Lanes, Rows)> = (0..spectra.len())
             .map(|light| {
@@ -167,30 +215,51 @@ impl Coarse {
             })
             .collect();
         let truth: Vec<[f64; 3]> = (0..count)
-            .map(|k| references.iter().fold([0.0; 3], |sum, (lanes, rows)| plus(sum, lanes.tristimulus(rows.row(k)))))
+            .map(|k| {
+                references.iter().fold([0.0; 3], |sum, (lanes, rows)| {
+                    plus(sum, lanes.tristimulus(rows.row(k)))
+                })
+            })
             .collect();
         let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
         let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
         let mut cuts = vec![Partition::ROOT; spectra.len()];
         loop {
             let lanes = Lanes::ratio(spectra, &cuts, weights);
-            let (error, worst) = self.loss(&lanes, &references, &jacobians, total);
+            let (error, mut worst) = self.loss(&lanes, &references, &jacobians, total);
             let full = lanes.len() == padded(lanes.len());
             let good = error <= tolerance;
             // Below a hundredth of the tolerance, spare lanes would carry nothing.
-            if (good && (full || error < 0.01 * tolerance)) || worst.is_none() || lanes.lanes()[0].light.is_none() {
+            if (good && (full || error < 0.01 * tolerance))
+                || worst.is_empty()
+                || lanes.lanes()[0].light.is_none()
+            {
                 return Choice { cuts, error };
             }
-            if let Some(lane) = worst {
-                let lane = lanes.lanes()[lane];
-                let light = lane.light.unwrap_or(0);
-                cuts[light] = cuts[light].split(lane.first).unwrap_or(cuts[light]);
+            // Several at once: a split costs a solve, and 4, 8, 16 lanes are what rows hold. When padding is being
+            // filled, no more than fit.
+            let room = if good {
+                padded(lanes.len()) - lanes.len()
+            } else {
+                lanes.len().div_ceil(BATCH)
+            };
+            worst.truncate(room.max(1));
+            for lane in worst.into_iter().map(|l| lanes.lanes()[l]) {
+                if let Some(light) = lane.light {
+                    cuts[light] = cuts[light].split(lane.first).unwrap_or(cuts[light]);
+                }
             }
         }
     }
 
-    /// Mean difference that the lanes cause, and the lane (of more than one leaf) that causes most.
-    fn loss(&self, lanes: &Lanes, references: &[(Lanes, Rows)], jacobians: &[[[f64; 3]; 3]], total: f64) -> (f64, Option<usize>) {
+    /// Mean difference that the lanes cause, and the lanes (of more than one leaf) by what they cause, the worst first.
+    fn loss(
+        &self,
+        lanes: &Lanes,
+        references: &[(Lanes, Rows)],
+        jacobians: &[[[f64; 3]; 3]],
+        total: f64,
+    ) -> (f64, Vec<usize>) {
         let rows = self.irradiance(lanes);
         let mut harm = vec![0.0; lanes.len()];
         let mut mean = 0.0;
@@ -211,9 +280,10 @@ impl Coarse {
             }
             mean += area * length(jacobian, all);
         }
-        let worst = (0..harm.len())
+        let mut worst: Vec<usize> = (0..harm.len())
             .filter(|&l| lanes.lanes()[l].count > 1 && harm[l] > 0.0)
-            .max_by(|&a, &b| harm[a].total_cmp(&harm[b]));
+            .collect();
+        worst.sort_by(|&a, &b| harm[b].total_cmp(&harm[a]));
         (mean, worst)
     }
 }
@@ -223,7 +293,11 @@ fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 fn length(matrix: &[[f64; 3]; 3], v: [f64; 3]) -> f64 {
-    matrix.iter().map(|row| (row[0] * v[0] + row[1] * v[1] + row[2] * v[2]).powi(2)).sum::<f64>().sqrt()
+    matrix
+        .iter()
+        .map(|row| (row[0] * v[0] + row[1] * v[1] + row[2] * v[2]).powi(2))
+        .sum::<f64>()
+        .sqrt()
 }
 
 fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
@@ -278,7 +352,11 @@ fn exchanges(tree: &Tree, links: &[Link], factor: &[f32], group: &[u32], count: 
     for k in (0..tree.nodes.len()).rev() {
         let node = &tree.nodes[k];
         if !node.is_leaf() {
-            mean[k] = node.child_range().map(|c| mean[c as usize] * tree.node(c).area).sum::<f64>() / node.area;
+            mean[k] = node
+                .child_range()
+                .map(|c| mean[c as usize] * tree.node(c).area)
+                .sum::<f64>()
+                / node.area;
         }
         if group[k] == NONE {
             let mut list = Vec::new();
@@ -327,7 +405,11 @@ fn flat_tree(areas: &[f64]) -> Tree {
         normal: DVec3::Z,
         cone: -1.0,
     };
-    let mut nodes = vec![Node { child: 1, children: areas.len() as u8, ..node(NONE, areas.iter().sum()) }];
+    let mut nodes = vec![Node {
+        child: 1,
+        children: areas.len() as u8,
+        ..node(NONE, areas.iter().sum())
+    }];
     nodes.extend(areas.iter().map(|&a| node(0, a)));
     Tree {
         nodes,

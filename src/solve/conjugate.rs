@@ -8,13 +8,13 @@ use super::rows::Rows;
 use rayon::prelude::*;
 
 /// Iterations at the most. Corridors of albedo .99 take about 20.
-pub const MAX_ITERATIONS: usize = 400;
+pub(super) const MAX_ITERATIONS: usize = 400;
 /// Rows a partial sum covers; fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 1024;
 
 /// How a solve went.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Convergence {
+pub(super) struct Convergence {
     /// Operator applications.
     pub iterations: usize,
     /// Greatest relative residual of a lane.
@@ -25,7 +25,7 @@ pub struct Convergence {
 
 /// The system `(1 - K) y = b`.
 #[derive(Debug)]
-pub struct System<'a> {
+pub(super) struct System<'a> {
     /// Pull, gather, push.
     pub operator: Operator<'a>,
     /// Reflectance of each leaf.
@@ -36,12 +36,22 @@ pub struct System<'a> {
 
 impl System<'_> {
     /// Reflected radiosity of the leaves (by leaf) from the irradiance of the first bounce, starting from a guess.
-    pub fn solve<const L: usize>(&self, first: &Rows, reflected: &mut Rows, tolerance: f64) -> Convergence {
+    pub(super) fn solve<const L: usize>(
+        &self,
+        first: &Rows,
+        reflected: &mut Rows,
+        tolerance: f64,
+    ) -> Convergence {
         let (tree, areas) = (self.operator.tree, self.operator.areas);
         let leaves = self.operator.leaves;
         let count = leaves.len();
         let mut root = Rows::zero(count, L);
-        for ((root, rho), &leaf) in root.all_mut::<L>().iter_mut().zip(self.reflectance.all::<L>()).zip(leaves) {
+        for ((root, rho), &leaf) in root
+            .all_mut::<L>()
+            .iter_mut()
+            .zip(self.reflectance.all::<L>())
+            .zip(leaves)
+        {
             let area = areas[leaf as usize] as f32;
             *root = rho.map(|x| (x * area).sqrt());
         }
@@ -51,22 +61,42 @@ impl System<'_> {
             gathered: Rows::zero(tree.nodes.len(), L),
         };
         let mut b = Rows::zero(count, L);
-        for ((b, h), r) in b.all_mut::<L>().iter_mut().zip(first.all::<L>()).zip(root.all::<L>()) {
+        for ((b, h), r) in b
+            .all_mut::<L>()
+            .iter_mut()
+            .zip(first.all::<L>())
+            .zip(root.all::<L>())
+        {
             *b = std::array::from_fn(|l| h[l] * r[l]);
         }
         // y from the guess; 0 where nothing is reflected.
         let mut y = Rows::zero(count, L);
-        for (((y, guess), r), &leaf) in
-            y.all_mut::<L>().iter_mut().zip(reflected.all::<L>()).zip(root.all::<L>()).zip(leaves)
+        for (((y, guess), r), &leaf) in y
+            .all_mut::<L>()
+            .iter_mut()
+            .zip(reflected.all::<L>())
+            .zip(root.all::<L>())
+            .zip(leaves)
         {
             let area = areas[leaf as usize] as f32;
-            *y = std::array::from_fn(|l| if r[l] > 0.0 { guess[l] * area / r[l] } else { 0.0 });
+            *y = std::array::from_fn(|l| {
+                if r[l] > 0.0 {
+                    guess[l] * area / r[l]
+                } else {
+                    0.0
+                }
+            });
         }
         let norm = dot::<L>(&b, &b).map(|x| x.max(f64::MIN_POSITIVE));
         let mut applied = Rows::zero(count, L);
         self.apply::<L>(&y, &root, &mut work, &mut applied);
         let mut residual = Rows::zero(count, L);
-        for ((r, b), a) in residual.all_mut::<L>().iter_mut().zip(b.all::<L>()).zip(applied.all::<L>()) {
+        for ((r, b), a) in residual
+            .all_mut::<L>()
+            .iter_mut()
+            .zip(b.all::<L>())
+            .zip(applied.all::<L>())
+        {
             *r = std::array::from_fn(|l| b[l] - a[l]);
         }
         let mut direction = residual.clone();
@@ -78,7 +108,9 @@ impl System<'_> {
             for l in 0..L {
                 let relative = (rr[l] / norm[l]).sqrt();
                 done.residual = done.residual.max(relative);
-                done.bound = done.bound.max(relative / (1.0 - f64::from(self.greatest[l])));
+                done.bound = done
+                    .bound
+                    .max(relative / (1.0 - f64::from(self.greatest[l])));
             }
             if done.bound <= tolerance || done.iterations >= MAX_ITERATIONS {
                 break;
@@ -86,24 +118,48 @@ impl System<'_> {
             self.apply::<L>(&direction, &root, &mut work, &mut applied);
             done.iterations += 1;
             let curvature = dot::<L>(&direction, &applied);
-            let alpha: [f32; L] = std::array::from_fn(|l| if curvature[l] > 0.0 { (rr[l] / curvature[l]) as f32 } else { 0.0 });
+            let alpha: [f32; L] = std::array::from_fn(|l| {
+                if curvature[l] > 0.0 {
+                    (rr[l] / curvature[l]) as f32
+                } else {
+                    0.0
+                }
+            });
             step::<L>(&mut y, &direction, alpha);
             step::<L>(&mut residual, &applied, alpha.map(|a| -a));
             let next = dot::<L>(&residual, &residual);
-            let beta: [f32; L] = std::array::from_fn(|l| if rr[l] > 0.0 { (next[l] / rr[l]) as f32 } else { 0.0 });
+            let beta: [f32; L] = std::array::from_fn(|l| {
+                if rr[l] > 0.0 {
+                    (next[l] / rr[l]) as f32
+                } else {
+                    0.0
+                }
+            });
             for (d, r) in direction.all_mut::<L>().iter_mut().zip(residual.all::<L>()) {
                 *d = std::array::from_fn(|l| r[l] + beta[l] * d[l]);
             }
             // Rounding ends progress: what is left is f32, not the method.
             if next.iter().zip(&norm).all(|(n, b)| *n <= 1e-14 * b) {
                 rr = next;
-                done.residual = rr.iter().zip(&norm).map(|(r, b)| (r / b).sqrt()).fold(0.0, f64::max);
-                done.bound = (0..L).map(|l| (rr[l] / norm[l]).sqrt() / (1.0 - f64::from(self.greatest[l]))).fold(0.0, f64::max);
+                done.residual = rr
+                    .iter()
+                    .zip(&norm)
+                    .map(|(r, b)| (r / b).sqrt())
+                    .fold(0.0, f64::max);
+                done.bound = (0..L)
+                    .map(|l| (rr[l] / norm[l]).sqrt() / (1.0 - f64::from(self.greatest[l])))
+                    .fold(0.0, f64::max);
                 break;
             }
             rr = next;
         }
-        for (((out, y), r), &leaf) in reflected.all_mut::<L>().iter_mut().zip(y.all::<L>()).zip(root.all::<L>()).zip(leaves) {
+        for (((out, y), r), &leaf) in reflected
+            .all_mut::<L>()
+            .iter_mut()
+            .zip(y.all::<L>())
+            .zip(root.all::<L>())
+            .zip(leaves)
+        {
             let inverse = (1.0 / areas[leaf as usize]) as f32;
             *out = std::array::from_fn(|l| y[l] * r[l] * inverse);
         }
@@ -113,13 +169,24 @@ impl System<'_> {
     /// `(1 - K) y`.
     fn apply<const L: usize>(&self, y: &Rows, root: &Rows, work: &mut Work, out: &mut Rows) {
         let areas = self.operator.areas;
-        let rows = work.radiosity.all_mut::<L>().iter_mut().zip(y.all::<L>()).zip(root.all::<L>());
+        let rows = work
+            .radiosity
+            .all_mut::<L>()
+            .iter_mut()
+            .zip(y.all::<L>())
+            .zip(root.all::<L>());
         for (((b, y), r), &leaf) in rows.zip(self.operator.leaves) {
             let inverse = (1.0 / areas[leaf as usize]) as f32;
             *b = std::array::from_fn(|l| y[l] * r[l] * inverse);
         }
-        self.operator.irradiance::<L>(&work.radiosity, &mut work.nodes, &mut work.gathered, out);
-        for ((o, y), r) in out.all_mut::<L>().iter_mut().zip(y.all::<L>()).zip(root.all::<L>()) {
+        self.operator
+            .irradiance::<L>(&work.radiosity, &mut work.nodes, &mut work.gathered, out);
+        for ((o, y), r) in out
+            .all_mut::<L>()
+            .iter_mut()
+            .zip(y.all::<L>())
+            .zip(root.all::<L>())
+        {
             *o = std::array::from_fn(|l| y[l] - r[l] * o[l]);
         }
     }
@@ -157,5 +224,7 @@ fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
             sum
         })
         .collect();
-    parts.iter().fold([0.0; L], |acc, part| std::array::from_fn(|l| acc[l] + part[l]))
+    parts.iter().fold([0.0; L], |acc, part| {
+        std::array::from_fn(|l| acc[l] + part[l])
+    })
 }

@@ -9,11 +9,23 @@ use crate::link::{Demand, MAX_DEPTH};
 use rayon::prelude::*;
 
 /// Points of a leaf: the rule of Strang and Fix (1973) that is exact for quadratic functions.
-const POINTS: [[f64; 3]; 3] = [[2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0]];
+const POINTS: [[f64; 3]; 3] = [
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+];
+const MIDDLE: [[f64; 3]; 1] = [[1.0 / 3.0; 3]];
+/// Leaves below this share of all area are looked at from one point.
+const TINY: f64 = 1e-5;
 /// Further points that are tried where some are covered.
 const MORE_POINTS: usize = 8;
+/// Error of a leaf's direct light, in what would split the leaf.
+const NOISE: f64 = 0.1;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
+
+/// Mean row over a leaf and half the range of brightness over its points.
+type AtLeaf = (Box<[f32]>, f32);
 
 /// Direct irradiance of nodes that are or were leaves.
 #[derive(Debug, Clone, Default)]
@@ -33,18 +45,44 @@ impl Direct {
 
     /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
     /// `weights` turn a row into brightness, share of white; `gather` gives none for a point that something covers.
-    pub(super) fn refine(&mut self, tree: &mut Tree, demand: &Demand, weights: &[f64], gather: &(impl Fn(&Tree, &Receiver, &mut Memory) -> Option<[f32; 64]> + Sync)) {
-        let mut open: Vec<u32> = (0..tree.nodes.len() as u32).filter(|&k| tree.node(k).is_leaf()).collect();
+    pub(super) fn refine(
+        &mut self,
+        tree: &mut Tree,
+        demand: &Demand,
+        weights: &[f64],
+        gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
+    ) {
+        let mut open: Vec<u32> = (0..tree.nodes.len() as u32)
+            .filter(|&k| tree.node(k).is_leaf())
+            .collect();
         while !open.is_empty() {
             self.rows.resize(tree.nodes.len(), None);
             self.spread.resize(tree.nodes.len(), 0.0);
-            let fresh: Vec<u32> = open.iter().copied().filter(|&k| self.rows[k as usize].is_none()).collect();
+            let fresh: Vec<u32> = open
+                .iter()
+                .copied()
+                .filter(|&k| self.rows[k as usize].is_none())
+                .collect();
             let width = weights.len();
-            let parts: Vec<(Vec<(Box<[f32]>, f32)>, u64)> = fresh
+            let parts: Vec<(Vec<AtLeaf>, u64)> = fresh
                 .par_chunks(CHUNK)
                 .map(|chunk| {
                     let mut memory = Memory::default();
-                    let all = chunk.iter().map(|&leaf| at_leaf(tree, leaf, width, weights, gather, &mut memory)).collect();
+                    let each = |&leaf: &u32| {
+                        // What would split the leaf is what it has to be told from.
+                        let share = (tree.node(leaf).area / demand.total_area).sqrt();
+                        at_leaf(
+                            tree,
+                            leaf,
+                            width,
+                            weights,
+                            NOISE * demand.threshold / share,
+                            share * share < TINY,
+                            gather,
+                            &mut memory,
+                        )
+                    };
+                    let all = chunk.iter().map(each).collect();
                     (all, memory.rays)
                 })
                 .collect();
@@ -60,7 +98,9 @@ impl Direct {
             for leaf in open {
                 let node = tree.node(leaf);
                 let depth = tree.elements[node.element as usize].depth;
-                let error = f64::from(self.spread[leaf as usize]) * (node.area / demand.total_area).sqrt();
+                let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
+                let error = f64::from(self.spread[leaf as usize] * keen)
+                    * (node.area / demand.total_area).sqrt();
                 if error > demand.threshold && node.area > demand.least_area && depth < MAX_DEPTH {
                     tree.subdivide(leaf);
                     children.extend(tree.node(leaf).child_range());
@@ -72,23 +112,29 @@ impl Direct {
 }
 
 /// Mean row over the points of a leaf, and half the range of brightness.
+#[expect(clippy::too_many_arguments, reason = "one caller")]
 fn at_leaf(
     tree: &Tree,
     leaf: u32,
     width: usize,
     weights: &[f64],
-    gather: &(impl Fn(&Tree, &Receiver, &mut Memory) -> Option<[f32; 64]> + Sync),
+    tolerance: f64,
+    tiny: bool,
+    gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
     memory: &mut Memory,
-) -> (Box<[f32]>, f32) {
+) -> AtLeaf {
     let element = &tree.elements[tree.node(leaf).element as usize];
     let entry = element.face as usize;
     let mut mean = vec![0.0_f32; width].into_boxed_slice();
     let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
     let mut bare = 0;
+    // A face that is next to nothing of the room is looked at once: it is never split, and its pattern is not seen.
+    let wanted = if tiny { 1 } else { POINTS.len() };
+    let first = if tiny { &MIDDLE } else { &POINTS[..] };
     // The points of the rule; where one is covered, others until three are found or the leaf counts as covered.
     let more = (0..MORE_POINTS).map(|k| stratified(k, MORE_POINTS, [0.5, 0.5]));
-    for (k, at) in POINTS.into_iter().chain(more).enumerate() {
-        if bare == POINTS.len() {
+    for (k, at) in first.iter().copied().chain(more).enumerate() {
+        if bare == wanted {
             break;
         }
         let to = Receiver {
@@ -98,7 +144,9 @@ fn at_leaf(
             leaf: Some(leaf),
             seed: u64::from(leaf) << 4 | k as u64,
         };
-        let Some(row) = gather(tree, &to, memory) else { continue };
+        let Some(row) = gather(tree, &to, tolerance, memory) else {
+            continue;
+        };
         bare += 1;
         let mut bright = 0.0;
         for ((m, x), w) in mean.iter_mut().zip(row).zip(weights) {

@@ -32,8 +32,16 @@ pub enum Closed {
 }
 
 /// Casts rays from the fronts of all faces: the room is closed if every one meets the front of something.
-pub fn closedness(mesh: &Mesh, tree: &Tree, rays: &RayIndex, sight: &Sight, seed: u64) -> Closed {
-    let Some(root) = tree.nodes.first() else { return Closed::No };
+pub(super) fn closedness(
+    mesh: &Mesh,
+    tree: &Tree,
+    rays: &RayIndex,
+    sight: &Sight,
+    seed: u64,
+) -> Closed {
+    let Some(root) = tree.nodes.first() else {
+        return Closed::No;
+    };
     if sight.opaque.is_some() {
         // Holes lead somewhere else.
         return Closed::No;
@@ -41,7 +49,8 @@ pub fn closedness(mesh: &Mesh, tree: &Tree, rays: &RayIndex, sight: &Sight, seed
     let mut rng = Pcg::new(seed ^ 0x00c1_05ed);
     for _ in 0..ESCAPE_RAYS {
         let target = rng.f64() * root.area;
-        let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
+        let entry =
+            (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
         let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
         let from = element.at(triangle_weights([rng.f64(), rng.f64()]));
         let direction = cosine_direction(tree.face_normal[entry], [rng.f64(), rng.f64()]);
@@ -61,7 +70,14 @@ enum Meets {
     Nothing,
 }
 
-fn meets(mesh: &Mesh, tree: &Tree, rays: &RayIndex, from: DVec3, direction: DVec3, plane: u32) -> Meets {
+fn meets(
+    mesh: &Mesh,
+    tree: &Tree,
+    rays: &RayIndex,
+    from: DVec3,
+    direction: DVec3,
+    plane: u32,
+) -> Meets {
     let reach = (4.0 * mesh.half_size) as f32;
     match rays.closest(from.as_vec3(), direction.as_vec3(), reach, plane) {
         None => Meets::Nothing,
@@ -71,13 +87,30 @@ fn meets(mesh: &Mesh, tree: &Tree, rays: &RayIndex, from: DVec3, direction: DVec
 }
 
 /// Is a point of a surface covered by something solid that stands on it or ends there? Then it sees backs only.
-pub fn covered(mesh: &Mesh, tree: &Tree, rays: &RayIndex, point: DVec3, normal: DVec3, plane: u32, seed: u64) -> bool {
-    (0..COVER_RAYS).all(|k| meets(mesh, tree, rays, point, cosine_direction(normal, sequence02(k, seed)), plane) == Meets::Back)
+pub(super) fn covered(
+    mesh: &Mesh,
+    tree: &Tree,
+    rays: &RayIndex,
+    point: DVec3,
+    normal: DVec3,
+    plane: u32,
+    seed: u64,
+) -> bool {
+    (0..COVER_RAYS).all(|k| {
+        meets(
+            mesh,
+            tree,
+            rays,
+            point,
+            cosine_direction(normal, sequence02(k, seed)),
+            plane,
+        ) == Meets::Back
+    })
 }
 
 /// How leaves look out: what their rows must sum to, and how much of their area looks out at all.
 #[derive(Debug, Clone, Default)]
-pub struct Outlook {
+pub(super) struct Outlook {
     /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
     pub target: Vec<f32>,
     /// For each node that is a leaf: share of its area that is not covered by something solid. NaN elsewhere.
@@ -86,7 +119,14 @@ pub struct Outlook {
 
 impl Outlook {
     /// Looks out of new leaves. A leaf below one whose rays all met fronts is not looked at again. Returns the rays cast.
-    pub fn extend(&mut self, mesh: &Mesh, tree: &Tree, rays: &RayIndex, closed: Closed, seed: u64) -> u64 {
+    pub(super) fn extend(
+        &mut self,
+        mesh: &Mesh,
+        tree: &Tree,
+        rays: &RayIndex,
+        closed: Closed,
+        seed: u64,
+    ) -> u64 {
         let old = self.target.len();
         self.target.resize(tree.nodes.len(), f32::NAN);
         self.bare.resize(tree.nodes.len(), f32::NAN);
@@ -123,14 +163,25 @@ impl Outlook {
                     for i in 0..count as u32 {
                         let from = element.at(triangle_weights(sequence02(i, at)));
                         let direction = cosine_direction(node.normal, sequence02(i, to));
-                        match meets(mesh, tree, rays, from, direction, tree.face_plane[element.face as usize]) {
+                        match meets(
+                            mesh,
+                            tree,
+                            rays,
+                            from,
+                            direction,
+                            tree.face_plane[element.face as usize],
+                        ) {
                             Meets::Front => fronts += 1,
                             Meets::Back => backs += 1,
                             Meets::Nothing => {}
                         }
                     }
                     let bare = (count - backs) as f64 / count as f64;
-                    let target = if backs < count { fronts as f64 / (count - backs) as f64 } else { 0.0 };
+                    let target = if backs < count {
+                        fronts as f64 / (count - backs) as f64
+                    } else {
+                        0.0
+                    };
                     (target as f32, bare as f32, count as u64)
                 })
             })
@@ -144,7 +195,7 @@ impl Outlook {
     }
 
     /// Area of every node that looks out; never quite zero, so that nothing is divided by zero.
-    pub fn areas(&self, tree: &Tree) -> Vec<f64> {
+    pub(super) fn areas(&self, tree: &Tree) -> Vec<f64> {
         let mut areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
         for k in (0..areas.len()).rev() {
             let node = &tree.nodes[k];
@@ -159,7 +210,7 @@ impl Outlook {
 }
 
 /// What is known before the first solution.
-pub struct Guess {
+pub(super) struct Guess {
     /// Irradiance of the adaptation white: twice the mean irradiance.
     pub white: [f64; 3],
     /// Brightness of every node, share of white.
@@ -167,7 +218,7 @@ pub struct Guess {
 }
 
 /// Light spread evenly over all faces: `H = flux / (A (1 - mean albedo))`.
-pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
+pub(super) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
     let lanes = super::lanes::Lanes::dense(&scene.spectra, weights);
     let mut row = [0.0_f32; 64];
     let glow: Vec<[f64; 3]> = scene
@@ -185,7 +236,14 @@ pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> 
     let albedo: Vec<f64> = scene
         .materials
         .iter()
-        .map(|m| m.reflectance.iter().zip(&weights[1]).map(|(r, w)| r * w).sum::<f64>() / whole)
+        .map(|m| {
+            m.reflectance
+                .iter()
+                .zip(&weights[1])
+                .map(|(r, w)| r * w)
+                .sum::<f64>()
+                / whole
+        })
         .collect();
     let material = |k: usize| mesh.material[tree.faces[k].triangle as usize] as usize;
     let area = |k: usize| mesh.area[tree.faces[k].triangle as usize];
@@ -204,8 +262,18 @@ pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> 
         flux = std::array::from_fn(|c| flux[c] + solid * xyz[c]);
     }
     // Open rooms lose light: half counts as lost before more is known, so that the guess stays finite.
-    let mean = if total > 0.0 { (mean / total).min(0.9) } else { 0.0 };
-    let white = flux.map(|f| if total > 0.0 { 2.0 * f / (total * (1.0 - mean)) } else { 0.0 });
+    let mean = if total > 0.0 {
+        (mean / total).min(0.9)
+    } else {
+        0.0
+    };
+    let white = flux.map(|f| {
+        if total > 0.0 {
+            2.0 * f / (total * (1.0 - mean))
+        } else {
+            0.0
+        }
+    });
     let mut bright = vec![0.0_f32; tree.nodes.len()];
     for k in (0..tree.nodes.len()).rev() {
         let node = &tree.nodes[k];
@@ -213,7 +281,10 @@ pub fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> 
             let m = material(node.faces.0 as usize);
             (0.5 * albedo[m]) as f32
         } else {
-            node.child_range().map(|c| f64::from(bright[c as usize]) * tree.node(c).area).sum::<f64>() as f32 / node.area as f32
+            node.child_range()
+                .map(|c| f64::from(bright[c as usize]) * tree.node(c).area)
+                .sum::<f64>() as f32
+                / node.area as f32
         };
     }
     Guess { white, bright }
@@ -230,20 +301,34 @@ pub struct Balance {
     pub absorbed_lm: f64,
     /// Luminous flux that left the room or met a black back, lm: by row sums below 1.
     pub escaped_lm: f64,
-    /// Worst relative difference of emitted and absorbed + escaped over all bands that carry light.
+    /// Worst relative difference of received and absorbed + escaped over all bands that carry light: what the solve
+    /// itself lost. Emitted and received differ by what direct light misses the room.
     pub worst_band: f64,
 }
 
 /// Sums the flux of a solution in f64: rows by leaf, `sums` the balanced row sums by node, `punctual` the irradiance
 /// from punctual lights by leaf.
-pub(super) fn flux(areas: &[f64], lanes: &super::lanes::Lanes, leaves: &[u32], rows: &FluxRows, sums: &[f64]) -> Balance {
+pub(super) fn flux(
+    areas: &[f64],
+    lanes: &super::lanes::Lanes,
+    leaves: &[u32],
+    rows: &FluxRows,
+    sums: &[f64],
+) -> Balance {
     let n = lanes.len();
-    let (mut emitted, mut received, mut absorbed, mut escaped) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let (mut emitted, mut received, mut absorbed, mut escaped) =
+        (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     for (k, &leaf) in leaves.iter().enumerate() {
         let area = areas[leaf as usize];
         for l in 0..n {
             let get = |r: &super::Rows| f64::from(r.row(k)[l]);
-            let (e, r, h, f, rho) = (get(rows.emission), get(rows.reflected), get(rows.irradiance), get(rows.first), get(rows.reflectance));
+            let (e, r, h, f, rho) = (
+                get(rows.emission),
+                get(rows.reflected),
+                get(rows.irradiance),
+                get(rows.first),
+                get(rows.reflectance),
+            );
             emitted[l] += area * e;
             received[l] += area * f;
             absorbed[l] += area * (1.0 - rho) * h;
@@ -255,7 +340,13 @@ pub(super) fn flux(areas: &[f64], lanes: &super::lanes::Lanes, leaves: &[u32], r
         .map(|l| ((absorbed[l] + escaped[l]) / received[l] - 1.0).abs())
         .fold(0.0, f64::max);
     let lumens = |x: &[f64]| x.iter().zip(lanes.xyz()).map(|(x, w)| x * w[1]).sum();
-    Balance { emitted_lm: lumens(&emitted), received_lm: lumens(&received), absorbed_lm: lumens(&absorbed), escaped_lm: lumens(&escaped), worst_band: worst }
+    Balance {
+        emitted_lm: lumens(&emitted),
+        received_lm: lumens(&received),
+        absorbed_lm: lumens(&absorbed),
+        escaped_lm: lumens(&escaped),
+        worst_band: worst,
+    }
 }
 
 /// Rows by leaf that the flux is summed from.

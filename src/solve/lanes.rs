@@ -42,20 +42,32 @@ impl Lanes {
             return Self::dense(spectra, weights);
         }
         let lanes = cuts.iter().enumerate().flat_map(|(light, cut)| {
-            cut.iter().map(move |(first, count)| Lane { light: Some(light), first, count })
+            cut.iter().map(move |(first, count)| Lane {
+                light: Some(light),
+                first,
+                count,
+            })
         });
         Self::with(lanes.collect(), spectra, weights)
     }
 
     /// The ratio to one light on every leaf; other lights are left out.
     pub fn only(spectra: &[LightSpectrum], light: usize, weights: &[Leaves; 3]) -> Self {
-        let lanes = (0..LEAVES).map(|first| Lane { light: Some(light), first, count: 1 });
+        let lanes = (0..LEAVES).map(|first| Lane {
+            light: Some(light),
+            first,
+            count: 1,
+        });
         Self::with(lanes.collect(), spectra, weights)
     }
 
     /// The 64 leaves, all lights together.
     pub fn dense(spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
-        let lanes = (0..LEAVES).map(|first| Lane { light: None, first, count: 1 });
+        let lanes = (0..LEAVES).map(|first| Lane {
+            light: None,
+            first,
+            count: 1,
+        });
         Self::with(lanes.collect(), spectra, weights)
     }
 
@@ -65,10 +77,20 @@ impl Lanes {
             .iter()
             .map(|lane| {
                 let leaves = lane.first..lane.first + lane.count;
-                weights.map(|w| KM * leaves.clone().map(|k| w[k] * lane.light.map_or(1.0, |l| power[l][k])).sum::<f64>())
+                weights.map(|w| {
+                    KM * leaves
+                        .clone()
+                        .map(|k| w[k] * lane.light.map_or(1.0, |l| power[l][k]))
+                        .sum::<f64>()
+                })
             })
             .collect();
-        Self { lanes, xyz, power, weights: *weights }
+        Self {
+            lanes,
+            xyz,
+            power,
+            weights: *weights,
+        }
     }
 
     /// Number of lanes in use.
@@ -100,7 +122,9 @@ impl Lanes {
 
     fn average(&self, f: &Leaves, lane: &Lane) -> f64 {
         let leaves = lane.first..lane.first + lane.count;
-        let Some(light) = lane.light else { return f[lane.first] };
+        let Some(light) = lane.light else {
+            return f[lane.first];
+        };
         let first = f[lane.first];
         // Exactly flat stays exactly flat: a grey room must not pick up rounding.
         if leaves.clone().all(|k| f[k] == first) {
@@ -117,7 +141,11 @@ impl Lanes {
             over += whole * part;
             under += whole * whole;
         }
-        if under > 0.0 { over / under } else { leaves.map(|k| f[k]).sum::<f64>() / lane.count as f64 }
+        if under > 0.0 {
+            over / under
+        } else {
+            leaves.map(|k| f[k]).sum::<f64>() / lane.count as f64
+        }
     }
 
     /// Adds an emission of `light` with a shape (see [`crate::scene::Emission`]).
@@ -149,7 +177,12 @@ impl Lanes {
             .map(|lane| {
                 let leaves = lane.first..lane.first + lane.count;
                 self.weights.map(|w| {
-                    KM * leaves.clone().map(|k| reflectance[k] * w[k] * lane.light.map_or(1.0, |l| self.power[l][k])).sum::<f64>()
+                    KM * leaves
+                        .clone()
+                        .map(|k| {
+                            reflectance[k] * w[k] * lane.light.map_or(1.0, |l| self.power[l][k])
+                        })
+                        .sum::<f64>()
                 })
             })
             .collect()

@@ -51,18 +51,35 @@ impl Light {
             if node.is_leaf() {
                 continue;
             }
-            square[k] = node.child_range().map(|c| square[c as usize] * tree.node(c).area).sum::<f64>() / node.area;
+            square[k] = node
+                .child_range()
+                .map(|c| square[c as usize] * tree.node(c).area)
+                .sum::<f64>()
+                / node.area;
             let mean = both(k);
             // Differences below rounding of f32 rows are not spread.
             let variance = square[k] - mean * mean;
-            self.spread[k] = if variance > 1e-12 * square[k] { variance.sqrt() as f32 } else { 0.0 };
+            self.spread[k] = if variance > 1e-12 * square[k] {
+                variance.sqrt() as f32
+            } else {
+                0.0
+            };
         }
     }
 }
 
 /// One number for how bright a colour is beside the white: the mean of its three ratios, so that no colour counts nothing.
 pub fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
-    (0..3).map(|k| if white[k] > 0.0 { xyz[k] / white[k] } else { 0.0 }).sum::<f64>() / 3.0
+    (0..3)
+        .map(|k| {
+            if white[k] > 0.0 {
+                xyz[k] / white[k]
+            } else {
+                0.0
+            }
+        })
+        .sum::<f64>()
+        / 3.0
 }
 
 /// For each node, the other ends of its links and what may stand between. Links found blocked are here too:
@@ -95,7 +112,11 @@ impl Neighbours {
                 next[end as usize] += 1;
             }
         }
-        Self { start, ends, blockers: graph.blockers.clone() }
+        Self {
+            start,
+            ends,
+            blockers: graph.blockers.clone(),
+        }
     }
 
     /// Other ends of a node's links.
@@ -110,6 +131,8 @@ impl Neighbours {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        4 * self.start.len() + size_of::<(u32, Way, f32)>() * self.ends.len() + 4 * self.blockers.len()
+        4 * self.start.len()
+            + size_of::<(u32, Way, f32)>() * self.ends.len()
+            + 4 * self.blockers.len()
     }
 }

@@ -9,6 +9,7 @@ mod estimate;
 mod flux;
 pub mod lanes;
 pub mod light;
+mod lists;
 mod operator;
 mod punctual;
 pub mod record;
@@ -16,6 +17,7 @@ pub mod reference;
 mod rows;
 mod sources;
 
+pub use lists::PatchList;
 pub use record::{Round, Verdict};
 pub use rows::{Rows, padded};
 pub(crate) use sources::weights_of;
@@ -64,7 +66,13 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { error: 0.5, representation: Representation::Adaptive, seed: 0, white: None, rounds: 12 }
+        Self {
+            error: 0.5,
+            representation: Representation::Adaptive,
+            seed: 0,
+            white: None,
+            rounds: 12,
+        }
     }
 }
 
@@ -72,14 +80,26 @@ impl Default for Settings {
 const FIRST_THRESHOLD: f64 = 0.02;
 /// What a round divides the threshold by: about twice the links, half the error.
 const THRESHOLD_STEP: f64 = 3.0;
-/// Links keep less error than leaves, by this factor: there are many to a leaf.
-const LINK_SHARE: f64 = 8.0;
+/// Darker than this share of white counts as this dark: nobody sees lightness below it.
+const DARKEST: f64 = 0.02;
+/// Links keep this much less error than the threshold: there are many to a leaf.
+const LINK_SHARE: f64 = 4.0;
+/// Direct light may vary over a leaf by this multiple of the threshold. From 1 to 16 the Cornell box's error at points
+/// changes by less than a tenth: what a leaf reflects is seen as a whole.
+const LEAF_SHARE: f64 = 4.0;
+/// A round that leaves this share of the error of the one before has stalled, if there are many links already.
+const STALLED: f64 = 0.9;
+const WORTH_STALLING: usize = 100_000;
+/// No further round beyond this many links: about 120 MB.
+const MOST_LINKS: usize = 2_500_000;
+/// Leaves whose lists are looked at after a round.
+const LISTED_LEAVES: usize = 4096;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.004;
 /// The working partition may cause this share of the asked-for error.
-const SPECTRUM_SHARE: f64 = 0.2;
+const SPECTRUM_SHARE: f64 = 0.35;
 /// What one patch may misplace in a gather, share of the asked-for error.
 const GATHER_SHARE: f64 = 0.1;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
@@ -109,6 +129,7 @@ pub struct Bake {
     direct: direct::Direct,
     probes: estimate::Probes,
     rounds: Vec<Round>,
+    watch: Option<record::Watch>,
     started: Instant,
 }
 
@@ -123,7 +144,12 @@ impl Bake {
         let masked: Vec<bool> = mesh
             .material
             .iter()
-            .map(|&m| matches!(scene.materials[m as usize].alpha, crate::scene::Alpha::Mask { .. }))
+            .map(|&m| {
+                matches!(
+                    scene.materials[m as usize].alpha,
+                    crate::scene::Alpha::Mask { .. }
+                )
+            })
             .collect();
         let rays = RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked);
         let weights = Observer::cie1931().weights(&scene.grid);
@@ -140,6 +166,7 @@ impl Bake {
             direct: direct::Direct::default(),
             graph: Graph::default(),
             rounds: Vec::new(),
+            watch: None,
             spectrum_error: 0.0,
             scene,
             settings,
@@ -152,19 +179,29 @@ impl Bake {
             probes,
             started,
         };
-        bake.closed = bake.with_sight(|bake, sight| flux::closedness(&bake.mesh, &bake.tree, &bake.rays, sight, bake.settings.seed));
+        bake.closed = bake.with_sight(|bake, sight| {
+            flux::closedness(
+                &bake.mesh,
+                &bake.tree,
+                &bake.rays,
+                sight,
+                bake.settings.seed,
+            )
+        });
         bake
     }
 
     /// One round: a finer hierarchy, its links, a solution, and what is known of its error.
     pub fn step(&mut self) -> &Round {
-        let mut clock = record::Clock::start();
+        let mut clock = record::Clock::start(self.watch.clone());
         let round = self.rounds.len();
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
         let bright = self.brightness_of_nodes();
+        let keen = self.keenness();
         let demand = Demand {
             bright: &bright,
+            keen: &keen,
             total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
             threshold: threshold / LINK_SHARE,
             least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
@@ -183,11 +220,16 @@ impl Bake {
         clock.lap("spectrum");
 
         let direct_rays = self.direct.rays;
-        let demand = Demand { threshold, ..demand };
+        let demand = Demand {
+            threshold: threshold * LEAF_SHARE,
+            ..demand
+        };
         self.gather_direct(&demand);
         clock.lap("direct");
 
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
+            .filter(|&k| self.tree.node(k).is_leaf())
+            .collect();
         let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
         let escape_rays = self.look_out();
         self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
@@ -202,7 +244,11 @@ impl Bake {
         clock.lap("solve");
 
         let receivers = self.probes.receivers(&self.tree, round);
-        let seen: Vec<[f64; 3]> = self.gather(&receivers).iter().map(|g| self.lanes.tristimulus(&g.irradiance)).collect();
+        let seen: Vec<[f64; 3]> = self
+            .gather(&receivers)
+            .iter()
+            .map(|g| self.lanes.tristimulus(&g.irradiance))
+            .collect();
         let distance = self.probes.compare(seen, self.light.white);
         clock.lap("estimate");
         let record = Round::new(
@@ -227,13 +273,37 @@ impl Bake {
     /// Has the bake come to an end, and how? None: another round may help.
     pub fn verdict(&self) -> Option<Verdict> {
         let last = self.rounds.last()?;
-        if last.error.total_de2000.value.is_some_and(|e| e <= self.settings.error) {
+        if last
+            .error
+            .total_de2000
+            .value
+            .is_some_and(|e| e <= self.settings.error)
+        {
             return Some(Verdict::Reached);
         }
         if self.tree.nodes.is_empty() || self.scene.spectra.is_empty() {
             return Some(Verdict::Reached);
         }
-        (self.rounds.len() >= self.settings.rounds).then_some(Verdict::OutOfRounds)
+        if self.rounds.len() >= self.settings.rounds {
+            return Some(Verdict::OutOfRounds);
+        }
+        // Four times the links for next to nothing: what is left is the noise of visibility in the gather.
+        let estimate = |r: &Round| r.error.total_de2000.value;
+        let before = self
+            .rounds
+            .len()
+            .checked_sub(2)
+            .and_then(|k| estimate(&self.rounds[k]));
+        let stalled = before
+            .zip(estimate(last))
+            .is_some_and(|(before, now)| now > STALLED * before);
+        (last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING))
+            .then_some(Verdict::Exhausted)
+    }
+
+    /// Tells `watch` of every phase of a round that ends, by the name that it has in [`Round::phases_s`].
+    pub fn watch(&mut self, watch: record::Watch) {
+        self.watch = Some(watch);
     }
 
     /// Rounds until the end.
@@ -248,9 +318,23 @@ impl Bake {
 
     /// Runs `f` with what blocks light in this room.
     fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
-        let opaque = |triangle: u32, u: f32, v: f32| !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v]);
-        let opaque: Option<&Opaque> = if self.plan.runs(Kind::AlphaMasks) { Some(&opaque) } else { None };
-        f(self, &Sight { rays: &self.rays, mesh: &self.mesh, opaque, occlusion: self.plan.runs(Kind::Occlusion) })
+        let opaque = |triangle: u32, u: f32, v: f32| {
+            !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v])
+        };
+        let opaque: Option<&Opaque> = if self.plan.runs(Kind::AlphaMasks) {
+            Some(&opaque)
+        } else {
+            None
+        };
+        f(
+            self,
+            &Sight {
+                rays: &self.rays,
+                mesh: &self.mesh,
+                opaque,
+                occlusion: self.plan.runs(Kind::Occlusion),
+            },
+        )
     }
 
     /// How bright every node is beside the white: from the last solution, or a guess before the first.
@@ -265,32 +349,87 @@ impl Bake {
         (0..nodes).map(|k| light.bright_reflected[k]).collect()
     }
 
+    /// How much lightness a change of irradiance makes at every node, from the last solution; 1 before the first.
+    fn keenness(&self) -> Vec<f32> {
+        if self.rounds.is_empty() {
+            return vec![1.0; self.tree.nodes.len()];
+        }
+        let mut keen = vec![0.0_f32; self.tree.nodes.len()];
+        for (k, &leaf) in self.light.leaves.iter().enumerate() {
+            let h = light::brightness(
+                self.lanes.tristimulus(self.light.irradiance.row(k)),
+                self.light.white,
+            );
+            keen[leaf as usize] = h.max(DARKEST).powf(-2.0 / 3.0) as f32;
+        }
+        for k in (0..keen.len()).rev() {
+            let node = &self.tree.nodes[k];
+            if !node.is_leaf() {
+                let sum: f64 = node
+                    .child_range()
+                    .map(|c| f64::from(keen[c as usize]) * self.tree.node(c).area)
+                    .sum();
+                keen[k] = (sum / node.area) as f32;
+            }
+        }
+        keen
+    }
+
     /// Chooses the working partition on a small model of the room.
     fn choose_lanes(&mut self) {
         self.spectrum_error = 0.0;
-        if self.settings.representation == Representation::Dense || self.scene.spectra.is_empty() || self.tree.nodes.is_empty() {
+        if self.settings.representation == Representation::Dense
+            || self.scene.spectra.is_empty()
+            || self.tree.nodes.is_empty()
+        {
             self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
             return;
         }
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
-        let shadowed = self.with_sight(|bake, sight| punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh));
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
+            .filter(|&k| self.tree.node(k).is_leaf())
+            .collect();
+        let shadowed = self.with_sight(|bake, sight| {
+            punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh)
+        });
         let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
         self.look_out();
         let factor = balance(&self.tree, &rows, &self.areas, &self.outlook.target).factor;
         let painter = Painter::new(&self.scene, &self.mesh);
         let dense = sources::DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
-        let model = coarse::Coarse::new(&self.tree, &self.graph.links, &factor, &self.areas, &leaves, &dense, self.scene.spectra.len());
-        let choice = model.choose(&self.scene.spectra, &self.weights, self.light.white, SPECTRUM_SHARE * self.settings.error);
-        self.lanes = Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights);
+        let model = coarse::Coarse::new(
+            &self.tree,
+            &self.graph.links,
+            &factor,
+            &self.areas,
+            &leaves,
+            &dense,
+            self.scene.spectra.len(),
+        );
+        let choice = model.choose(
+            &self.scene.spectra,
+            &self.weights,
+            self.light.white,
+            SPECTRUM_SHARE * self.settings.error,
+        );
+        let lanes = Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights);
         self.spectrum_error = choice.error;
-        // The lanes of an earlier round mean something else: the next solve starts afresh.
-        self.light.reflected = Rows::default();
-        self.direct = direct::Direct::default();
+        if lanes.lanes() != self.lanes.lanes() {
+            // The lanes of an earlier round mean something else: the next solve starts afresh.
+            self.light.reflected = Rows::default();
+            self.direct = direct::Direct::default();
+        }
+        self.lanes = lanes;
     }
 
     /// Learns how new leaves look out; returns the rays cast.
     fn look_out(&mut self) -> u64 {
-        let rays = self.outlook.extend(&self.mesh, &self.tree, &self.rays, self.closed, self.settings.seed);
+        let rays = self.outlook.extend(
+            &self.mesh,
+            &self.tree,
+            &self.rays,
+            self.closed,
+            self.settings.seed,
+        );
         self.areas = self.outlook.areas(&self.tree);
         rays
     }
@@ -306,16 +445,35 @@ impl Bake {
         }
         self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
         let white = self.light.white;
-        let weights: Vec<f64> = self.lanes.xyz().iter().map(|&xyz| light::brightness(xyz, white)).collect();
+        let weights: Vec<f64> = self
+            .lanes
+            .xyz()
+            .iter()
+            .map(|&xyz| light::brightness(xyz, white))
+            .collect();
         let mut tree = std::mem::take(&mut self.tree);
         let mut direct = std::mem::take(&mut self.direct);
         self.with_sight(|bake, sight| {
-            direct.refine(&mut tree, demand, &weights, &|tree, to, memory| {
-                let row = Gatherer { tree, ..bake.gatherer(sight) }.direct(to, memory);
-                let dark = row.iter().all(|&x| x == 0.0);
-                let hidden = dark && bake.closed == Closed::No && flux::covered(&bake.mesh, tree, &bake.rays, to.point, to.normal, to.plane, to.seed);
-                (!hidden).then_some(row)
-            });
+            direct.refine(
+                &mut tree,
+                demand,
+                &weights,
+                &|tree, to, tolerance, memory| {
+                    let row = Gatherer {
+                        tree,
+                        tolerance,
+                        ..bake.gatherer(sight)
+                    }
+                    .direct(to, memory);
+                    let dark = row.iter().all(|&x| x == 0.0);
+                    let hidden = dark
+                        && bake.closed == Closed::No
+                        && flux::covered(
+                            &bake.mesh, tree, &bake.rays, to.point, to.normal, to.plane, to.seed,
+                        );
+                    (!hidden).then_some(row)
+                },
+            );
         });
         self.tree = tree;
         self.direct = direct;
@@ -323,32 +481,55 @@ impl Bake {
 
     /// Puts emission and links in place for a gather.
     fn place_emission<const L: usize>(&mut self) {
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32).filter(|&k| self.tree.node(k).is_leaf()).collect();
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
+            .filter(|&k| self.tree.node(k).is_leaf())
+            .collect();
         let painter = Painter::new(&self.scene, &self.mesh);
         let emission = painter.paint(&self.tree, &leaves, &self.lanes).emission;
         self.look_out();
         self.light.emitted = self.on_nodes::<L>(&emission, &leaves);
         self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
         self.light.half_size = self.mesh.half_size;
-        self.previous = std::mem::replace(&mut self.light.reflected, Rows::zero(self.tree.nodes.len(), L));
+        self.previous = std::mem::replace(
+            &mut self.light.reflected,
+            Rows::zero(self.tree.nodes.len(), L),
+        );
         let mut light = std::mem::take(&mut self.light);
         light.measure(&self.tree, &self.lanes);
         self.light = light;
     }
 
     /// Solves on the current links and measures the solution.
-    fn solve<const L: usize>(&mut self, rows: &LinkRows, leaves: &[u32]) -> (Convergence, flux::Balance) {
+    fn solve<const L: usize>(
+        &mut self,
+        rows: &LinkRows,
+        leaves: &[u32],
+    ) -> (Convergence, flux::Balance) {
         let painter = Painter::new(&self.scene, &self.mesh);
-        let Sources { reflectance, emission, greatest } = painter.paint(&self.tree, leaves, &self.lanes);
+        let Sources {
+            reflectance,
+            emission,
+            greatest,
+        } = painter.paint(&self.tree, leaves, &self.lanes);
         let nodes = self.tree.nodes.len();
         let mut first = Rows::zero(leaves.len(), L);
         for (k, &leaf) in leaves.iter().enumerate() {
             let row = self.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
         }
-        let operator = Operator { tree: &self.tree, links: rows, leaves, areas: &self.areas, factor: &self.balance.factor };
+        let operator = Operator {
+            tree: &self.tree,
+            links: rows,
+            leaves,
+            areas: &self.areas,
+            factor: &self.balance.factor,
+        };
         let mut reflected = self.guess::<L>(leaves);
-        let system = System { operator, reflectance: &reflectance, greatest: &greatest };
+        let system = System {
+            operator,
+            reflectance: &reflectance,
+            greatest: &greatest,
+        };
         let convergence = if self.plan.runs(Kind::Interreflection) {
             system.solve::<L>(&first, &mut reflected, SOLVE_SHARE * self.settings.error)
         } else {
@@ -356,7 +537,9 @@ impl Bake {
         };
         let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
         let mut irradiance = Rows::zero(leaves.len(), L);
-        system.operator.irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
+        system
+            .operator
+            .irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
         for (h, f) in irradiance.all_mut::<L>().iter_mut().zip(first.all::<L>()) {
             for l in 0..L {
                 h[l] += f[l];
@@ -364,13 +547,24 @@ impl Bake {
         }
         if !self.plan.runs(Kind::Interreflection) {
             reflected = Rows::zero(leaves.len(), L);
-            for ((r, h), rho) in reflected.all_mut::<L>().iter_mut().zip(irradiance.all::<L>()).zip(reflectance.all::<L>()) {
+            for ((r, h), rho) in reflected
+                .all_mut::<L>()
+                .iter_mut()
+                .zip(irradiance.all::<L>())
+                .zip(reflectance.all::<L>())
+            {
                 *r = std::array::from_fn(|l| h[l] * rho[l]);
             }
         }
         let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
         let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
-        let fluxes = flux::FluxRows { emission: &emission, reflected: &reflected, irradiance: &irradiance, first: &first, reflectance: &reflectance };
+        let fluxes = flux::FluxRows {
+            emission: &emission,
+            reflected: &reflected,
+            irradiance: &irradiance,
+            first: &first,
+            reflectance: &reflectance,
+        };
         let flux = flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums);
         self.light = Light {
             reflected: self.on_nodes::<L>(&reflected, leaves),
@@ -382,7 +576,10 @@ impl Bake {
             half_size: self.mesh.half_size,
             ..Light::default()
         };
-        self.light.white = self.settings.white.unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
+        self.light.white = self
+            .settings
+            .white
+            .unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
         self.light.measure(&self.tree, &self.lanes);
         (convergence, flux)
     }
@@ -429,7 +626,10 @@ impl Bake {
     pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
         self.with_sight(|bake, sight| {
             let gatherer = bake.gatherer(sight);
-            receivers.par_iter().map_init(Memory::default, |memory, r| gatherer.at(r, memory)).collect()
+            receivers
+                .par_iter()
+                .map_init(Memory::default, |memory, r| gatherer.at(r, memory))
+                .collect()
         })
     }
 
@@ -440,7 +640,11 @@ impl Bake {
         }
         receivers
             .par_iter()
-            .map(|r| flux::covered(&self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed))
+            .map(|r| {
+                flux::covered(
+                    &self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed,
+                )
+            })
             .collect()
     }
 
@@ -452,13 +656,38 @@ impl Bake {
             lamps: &self.lamps,
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
-            stored: false,
         }
     }
 
-    /// Mean number of intervals that a patch needs.
+    /// Mean number of intervals that a patch needs, over evenly chosen leaves.
     fn intervals_mean(&self) -> f64 {
-        self.lanes.len() as f64
+        let lists = self.lists(self.light.leaves.len().div_ceil(LISTED_LEAVES).max(1));
+        let sum: usize = lists.iter().map(PatchList::intervals).sum();
+        if lists.is_empty() {
+            0.0
+        } else {
+            sum as f64 / lists.len() as f64
+        }
+    }
+
+    /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
+    /// [`Light::leaves`]; empty where the rows hold the 64 leaves.
+    pub fn lists(&self, step: usize) -> Vec<PatchList> {
+        if self.lanes.lanes().iter().any(|lane| lane.light.is_none()) {
+            return Vec::new();
+        }
+        let limit = SPECTRUM_SHARE * self.settings.error;
+        let lister = lists::Lister::new(
+            &self.lanes,
+            &self.scene.spectra,
+            &self.weights,
+            self.light.white,
+            limit,
+        );
+        let rows: Vec<usize> = (0..self.light.leaves.len()).step_by(step.max(1)).collect();
+        rows.into_par_iter()
+            .map(|k| lister.list(self.light.irradiance.row(k)))
+            .collect()
     }
 
     /// What the lanes stand for.

@@ -14,7 +14,7 @@ const CHUNK: usize = 256;
 
 /// What the operator needs to know of the patches.
 #[derive(Debug)]
-pub struct Operator<'a> {
+pub(super) struct Operator<'a> {
     /// The hierarchy.
     pub tree: &'a Tree,
     /// The links.
@@ -30,7 +30,13 @@ pub struct Operator<'a> {
 impl Operator<'_> {
     /// Irradiance on the leaves (by leaf) from radiosity on the leaves (by leaf), both balanced.
     /// `nodes` and `gathered` are scratch with a row a node; `nodes` holds every patch's mean radiosity afterwards.
-    pub fn irradiance<const L: usize>(&self, radiosity: &Rows, nodes: &mut Rows, gathered: &mut Rows, out: &mut Rows) {
+    pub(super) fn irradiance<const L: usize>(
+        &self,
+        radiosity: &Rows,
+        nodes: &mut Rows,
+        gathered: &mut Rows,
+        out: &mut Rows,
+    ) {
         let (from, mean) = (radiosity.all::<L>(), nodes.all_mut::<L>());
         for (row, &leaf) in from.iter().zip(self.leaves) {
             let d = self.factor[leaf as usize];
@@ -38,20 +44,24 @@ impl Operator<'_> {
         }
         pull(self.tree, self.areas, mean);
         let mean = nodes.all::<L>();
-        gathered.all_mut::<L>().par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
-            for (k, row) in rows.iter_mut().enumerate() {
-                let node = chunk * CHUNK + k;
-                let mut sum = [0.0_f32; L];
-                for &(source, exchange) in self.links.row(node) {
-                    let b = &mean[source as usize];
-                    for lane in 0..L {
-                        sum[lane] += exchange * b[lane];
+        gathered
+            .all_mut::<L>()
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .for_each(|(chunk, rows)| {
+                for (k, row) in rows.iter_mut().enumerate() {
+                    let node = chunk * CHUNK + k;
+                    let mut sum = [0.0_f32; L];
+                    for &(source, exchange) in self.links.row(node) {
+                        let b = &mean[source as usize];
+                        for lane in 0..L {
+                            sum[lane] += exchange * b[lane];
+                        }
                     }
+                    let inverse = (1.0 / self.areas[node]) as f32;
+                    *row = sum.map(|x| x * inverse);
                 }
-                let inverse = (1.0 / self.areas[node]) as f32;
-                *row = sum.map(|x| x * inverse);
-            }
-        });
+            });
         push(self.tree, gathered.all_mut::<L>());
         let gathered = gathered.all::<L>();
         for (row, &leaf) in out.all_mut::<L>().iter_mut().zip(self.leaves) {
@@ -62,7 +72,7 @@ impl Operator<'_> {
 }
 
 /// Area-weighted means from the leaves to the root.
-pub fn pull<const L: usize>(tree: &Tree, areas: &[f64], rows: &mut [[f32; L]]) {
+pub(super) fn pull<const L: usize>(tree: &Tree, areas: &[f64], rows: &mut [[f32; L]]) {
     for (k, node) in tree.nodes.iter().enumerate().rev() {
         if node.is_leaf() {
             continue;

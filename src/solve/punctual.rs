@@ -14,9 +14,12 @@ const POINTS: usize = 4;
 /// Elements that a task looks at.
 const CHUNK: usize = 64;
 
+/// Lights that reach a leaf, and the mean factor of each.
+type Factors = Vec<(u32, f32)>;
+
 /// For each leaf, the lights that reach it and the mean factor from intensity to irradiance.
 #[derive(Debug, Clone, Default)]
-pub struct Shadowed {
+pub(super) struct Shadowed {
     /// (light, factor) lists by leaf.
     pub by_leaf: Vec<Vec<(u32, f32)>>,
     /// Rays cast.
@@ -24,32 +27,62 @@ pub struct Shadowed {
 }
 
 /// Lights of the scene, recentred, with their rows.
-pub fn lamps(scene: &Scene, mesh: &Mesh, lanes: &Lanes) -> Vec<(PunctualLight, Vec<f32>)> {
+pub(super) fn lamps(scene: &Scene, mesh: &Mesh, lanes: &Lanes) -> Vec<(PunctualLight, Vec<f32>)> {
     scene
         .lights
         .iter()
         .map(|light| {
             let mut row = vec![0.0; lanes.len()];
             lanes.add_emission(light.light, &light.shape, 1.0, &mut row);
-            (PunctualLight { position: light.position - mesh.centre, ..light.clone() }, row)
+            (
+                PunctualLight {
+                    position: light.position - mesh.centre,
+                    ..light.clone()
+                },
+                row,
+            )
         })
         .collect()
 }
 
 /// Lights of the scene, recentred.
 fn recentred(scene: &Scene, mesh: &Mesh) -> Vec<PunctualLight> {
-    scene.lights.iter().map(|l| PunctualLight { position: l.position - mesh.centre, ..l.clone() }).collect()
+    scene
+        .lights
+        .iter()
+        .map(|l| PunctualLight {
+            position: l.position - mesh.centre,
+            ..l.clone()
+        })
+        .collect()
 }
 
 /// Factor of each light at each sample of a leaf; 0 in shadow.
-fn at_samples(tree: &Tree, leaf: u32, lights: &[PunctualLight], sight: &Sight, half_size: f64, rays: &mut u64) -> Vec<[f64; POINTS]> {
+fn at_samples(
+    tree: &Tree,
+    leaf: u32,
+    lights: &[PunctualLight],
+    sight: &Sight,
+    half_size: f64,
+    rays: &mut u64,
+) -> Vec<[f64; POINTS]> {
     let mut samples: Vec<Sample> = Vec::with_capacity(POINTS);
     let corners = tree.elements[tree.node(leaf).element as usize].corners;
     let entry = tree.elements[tree.node(leaf).element as usize].face as usize;
     let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
     // Middle and the corners of a triangle of equal second moments: exact for quadratic variation.
-    for p in [middle, corners[0].lerp(middle, 0.4), corners[1].lerp(middle, 0.4), corners[2].lerp(middle, 0.4)] {
-        samples.push(Sample { point: p, normal: tree.face_normal[entry], plane: tree.face_plane[entry], area: 0.0 });
+    for p in [
+        middle,
+        corners[0].lerp(middle, 0.4),
+        corners[1].lerp(middle, 0.4),
+        corners[2].lerp(middle, 0.4),
+    ] {
+        samples.push(Sample {
+            point: p,
+            normal: tree.face_normal[entry],
+            plane: tree.face_plane[entry],
+            area: 0.0,
+        });
     }
     let mut blocked = Vec::new();
     lights
@@ -59,10 +92,20 @@ fn at_samples(tree: &Tree, leaf: u32, lights: &[PunctualLight], sight: &Sight, h
             let mut segments = Vec::with_capacity(POINTS);
             let mut which = Vec::with_capacity(POINTS);
             for (k, s) in samples.iter().enumerate() {
-                let to = Receiver { point: s.point, normal: s.normal, plane: s.plane, leaf: None, seed: 0 };
+                let to = Receiver {
+                    point: s.point,
+                    normal: s.normal,
+                    plane: s.plane,
+                    leaf: None,
+                    seed: 0,
+                };
                 if let Some((factor, end)) = punctual_factor(light, &to, half_size) {
                     factors[k] = factor;
-                    segments.push(Segment { from: s.point.as_vec3(), to: end.as_vec3(), planes: [s.plane, u32::MAX] });
+                    segments.push(Segment {
+                        from: s.point.as_vec3(),
+                        to: end.as_vec3(),
+                        planes: [s.plane, u32::MAX],
+                    });
                     which.push(k);
                 }
             }
@@ -81,12 +124,21 @@ fn at_samples(tree: &Tree, leaf: u32, lights: &[PunctualLight], sight: &Sight, h
 }
 
 /// Mean factors for all leaves.
-pub fn factors(tree: &Tree, leaves: &[u32], sight: &Sight, scene: &Scene, mesh: &Mesh) -> Shadowed {
+pub(super) fn factors(
+    tree: &Tree,
+    leaves: &[u32],
+    sight: &Sight,
+    scene: &Scene,
+    mesh: &Mesh,
+) -> Shadowed {
     let lights = recentred(scene, mesh);
     if lights.is_empty() {
-        return Shadowed { by_leaf: vec![Vec::new(); leaves.len()], rays: 0 };
+        return Shadowed {
+            by_leaf: vec![Vec::new(); leaves.len()],
+            rays: 0,
+        };
     }
-    let parts: Vec<(Vec<Vec<(u32, f32)>>, u64)> = leaves
+    let parts: Vec<(Vec<Factors>, u64)> = leaves
         .par_chunks(CHUNK)
         .map(|chunk| {
             let mut rays = 0;
@@ -113,11 +165,13 @@ pub fn factors(tree: &Tree, leaves: &[u32], sight: &Sight, scene: &Scene, mesh: 
 }
 
 /// Integral of a light's angular distribution, so that flux is intensity times this; none for directional light.
-pub fn solid_angle(kind: LightKind) -> Option<f64> {
+pub(super) fn solid_angle(kind: LightKind) -> Option<f64> {
     match kind {
         LightKind::Point => Some(4.0 * PI),
         // 2 pi integral over the cosine of ((c - c_o) / (c_i - c_o))^2 between the angles, and of 1 inside.
-        LightKind::Spot { inner, outer } => Some(2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0)),
+        LightKind::Spot { inner, outer } => {
+            Some(2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0))
+        }
         LightKind::Directional => None,
     }
 }

@@ -11,19 +11,28 @@ use std::time::Instant;
 /// Version of the log's format. Raised when a field changes its meaning or goes.
 pub const LOG_VERSION: u32 = 1;
 
+/// Is told of every phase that ends.
+pub type Watch = std::sync::Arc<dyn Fn(&'static str) + Send + Sync>;
+
 /// Wall time of the phases of a round, seconds.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Clock {
     start: Instant,
     last: Instant,
     laps: Vec<(&'static str, f64)>,
+    watch: Option<Watch>,
 }
 
 impl Clock {
     /// Starts.
-    pub fn start() -> Self {
+    pub fn start(watch: Option<Watch>) -> Self {
         let now = Instant::now();
-        Self { start: now, last: now, laps: Vec::new() }
+        Self {
+            start: now,
+            last: now,
+            laps: Vec::new(),
+            watch,
+        }
     }
 
     /// Ends a phase.
@@ -31,6 +40,9 @@ impl Clock {
         let now = Instant::now();
         self.laps.push((name, (now - self.last).as_secs_f64()));
         self.last = now;
+        if let Some(watch) = &self.watch {
+            watch(name);
+        }
     }
 
     /// Phases in order.
@@ -144,7 +156,7 @@ pub enum Verdict {
     Interrupted,
     /// No more rounds allowed.
     OutOfRounds,
-    /// Nothing left to refine: the error asked for is below what the caps allow.
+    /// Refining no longer pays: the limit of links is met, or the error no longer falls.
     Exhausted,
 }
 
@@ -162,11 +174,16 @@ pub(super) struct Measured<'a> {
 
 impl Round {
     pub(super) fn new(bake: &Bake, m: Measured) -> Self {
-        let estimate = |value: Option<f64>| Figure { value, kind: Kind::Estimate };
+        let estimate = |value: Option<f64>| Figure {
+            value,
+            kind: Kind::Estimate,
+        };
         let spectrum = bake.spectrum_error;
         let convergence_de = m.convergence.bound * 100.0 * super::DE_PER_PERCENT;
         // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
-        let all = |geometry: f64| (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt();
+        let all = |geometry: f64| {
+            (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt()
+        };
         let white = bake.light.white;
         let light = &bake.light;
         Self {
@@ -174,7 +191,12 @@ impl Round {
             round: bake.rounds.len() + 1,
             elapsed_s: bake.started.elapsed().as_secs_f64(),
             round_s: m.clock.total(),
-            phases_s: m.clock.laps().iter().map(|(name, s)| ((*name).to_owned(), (*s).into())).collect(),
+            phases_s: m
+                .clock
+                .laps()
+                .iter()
+                .map(|(name, s)| ((*name).to_owned(), (*s).into()))
+                .collect(),
             threshold: m.threshold,
             rays: m.rays,
             links_evaluated: m.refined.evaluated,
@@ -182,7 +204,12 @@ impl Round {
             elements: light.leaves.len(),
             nodes: bake.tree.nodes.len(),
             links: bake.graph.links.len(),
-            links_clear: bake.graph.links.iter().filter(|l| l.way == Way::Clear).count(),
+            links_clear: bake
+                .graph
+                .links
+                .iter()
+                .filter(|l| l.way == Way::Clear)
+                .count(),
             intervals_working: bake.lanes.len(),
             intervals_mean: bake.intervals_mean(),
             memory_bytes: bake.tree.bytes()
@@ -199,9 +226,15 @@ impl Round {
                 total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
                 geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),
                 spectrum_de_luv: estimate(Some(spectrum)),
-                convergence: Figure { value: Some(m.convergence.bound), kind: Kind::Bound },
+                convergence: Figure {
+                    value: Some(m.convergence.bound),
+                    kind: Kind::Bound,
+                },
                 convergence_de_luv: estimate(Some(convergence_de)),
-                total_xyz: estimate(m.distance.map(|d| d.relative * white.iter().sum::<f64>() / 6.0)),
+                total_xyz: estimate(
+                    m.distance
+                        .map(|d| d.relative * white.iter().sum::<f64>() / 6.0),
+                ),
             },
             flux: m.flux,
             row_sum_defect: bake.balance.defect_before,

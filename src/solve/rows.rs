@@ -24,7 +24,11 @@ impl Rows {
     /// Zeroed rows.
     pub fn zero(rows: usize, width: usize) -> Self {
         debug_assert!(matches!(width, 8 | 16 | 32 | 64));
-        Self { lines: vec![Line([0.0; 16]); (rows * width).div_ceil(16)], rows, width }
+        Self {
+            lines: vec![Line([0.0; 16]); (rows * width).div_ceil(16)],
+            rows,
+            width,
+        }
     }
 
     /// Number of rows.
@@ -49,19 +53,24 @@ impl Rows {
 
     /// One row.
     pub fn row_mut(&mut self, k: usize) -> &mut [f32] {
-        &mut bytemuck::cast_slice_mut::<Line, f32>(&mut self.lines)[k * self.width..(k + 1) * self.width]
+        &mut bytemuck::cast_slice_mut::<Line, f32>(&mut self.lines)
+            [k * self.width..(k + 1) * self.width]
     }
 
     /// All rows as arrays. `L` must be the width.
     pub fn all<const L: usize>(&self) -> &[[f32; L]] {
         debug_assert_eq!(L, self.width);
-        &bytemuck::cast_slice::<Line, f32>(&self.lines).as_chunks::<L>().0[..self.rows]
+        &bytemuck::cast_slice::<Line, f32>(&self.lines)
+            .as_chunks::<L>()
+            .0[..self.rows]
     }
 
     /// All rows as arrays. `L` must be the width.
     pub fn all_mut<const L: usize>(&mut self) -> &mut [[f32; L]] {
         debug_assert_eq!(L, self.width);
-        &mut bytemuck::cast_slice_mut::<Line, f32>(&mut self.lines).as_chunks_mut::<L>().0[..self.rows]
+        &mut bytemuck::cast_slice_mut::<Line, f32>(&mut self.lines)
+            .as_chunks_mut::<L>()
+            .0[..self.rows]
     }
 
     /// Bytes held.
@@ -76,7 +85,10 @@ mod tests {
 
     #[test]
     fn rows_are_separate_and_padded() {
-        assert_eq!([1, 8, 9, 16, 17, 33, 64].map(padded), [8, 8, 16, 16, 32, 64, 64]);
+        assert_eq!(
+            [1, 8, 9, 16, 17, 33, 64].map(padded),
+            [8, 8, 16, 16, 32, 64, 64]
+        );
         let mut rows = Rows::zero(3, 8);
         rows.row_mut(1)[7] = 2.0;
         assert_eq!(rows.all::<8>()[1][7], 2.0);

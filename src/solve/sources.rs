@@ -15,7 +15,7 @@ const CHUNK: usize = 256;
 
 /// What the leaves of a hierarchy reflect and emit.
 #[derive(Debug, Clone)]
-pub struct Sources {
+pub(super) struct Sources {
     /// Reflectance by leaf.
     pub reflectance: Rows,
     /// Exitance by leaf: pi times radiance.
@@ -25,7 +25,7 @@ pub struct Sources {
 }
 
 /// Turns materials into rows.
-pub struct Painter<'a> {
+pub(super) struct Painter<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
     upsampler: Upsampler,
@@ -33,12 +33,16 @@ pub struct Painter<'a> {
 
 impl<'a> Painter<'a> {
     /// A painter for the materials of a scene.
-    pub fn new(scene: &'a Scene, mesh: &'a Mesh) -> Self {
-        Self { scene, mesh, upsampler: Upsampler::new(&scene.grid) }
+    pub(super) fn new(scene: &'a Scene, mesh: &'a Mesh) -> Self {
+        Self {
+            scene,
+            mesh,
+            upsampler: Upsampler::new(&scene.grid),
+        }
     }
 
     /// Rows for the given leaves of `tree`.
-    pub fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
+    pub(super) fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
         let width = padded(lanes.len());
         // One row a material; painted materials are worked out patch by patch.
         let plain: Vec<(Vec<f32>, Vec<f32>)> = self
@@ -57,7 +61,10 @@ impl<'a> Painter<'a> {
         let rows: Vec<(Vec<f32>, Vec<f32>)> = leaves
             .par_chunks(CHUNK)
             .map(|chunk| {
-                let (mut rho, mut emission) = (vec![0.0; chunk.len() * width], vec![0.0; chunk.len() * width]);
+                let (mut rho, mut emission) = (
+                    vec![0.0; chunk.len() * width],
+                    vec![0.0; chunk.len() * width],
+                );
                 for (k, &leaf) in chunk.iter().enumerate() {
                     let element = tree.elements[tree.node(leaf).element as usize];
                     let triangle = tree.faces[element.face as usize].triangle as usize;
@@ -77,7 +84,10 @@ impl<'a> Painter<'a> {
                 (rho, emission)
             })
             .collect();
-        let (mut reflectance, mut emission) = (Rows::zero(leaves.len(), width), Rows::zero(leaves.len(), width));
+        let (mut reflectance, mut emission) = (
+            Rows::zero(leaves.len(), width),
+            Rows::zero(leaves.len(), width),
+        );
         let mut greatest = vec![0.0_f32; width];
         for (part, (rho, glow)) in rows.iter().enumerate() {
             for (k, (rho, glow)) in rho.chunks(width).zip(glow.chunks(width)).enumerate() {
@@ -88,12 +98,18 @@ impl<'a> Painter<'a> {
                 }
             }
         }
-        Sources { reflectance, emission, greatest }
+        Sources {
+            reflectance,
+            emission,
+            greatest,
+        }
     }
 
     /// Albedo of a linear colour: bounded below 1, so that light ends.
     fn clamped(&self, color: [f32; 3]) -> Leaves {
-        self.upsampler.reflectance_fast(color).map(|r| r.min(crate::scene::GREATEST_ALBEDO))
+        self.upsampler
+            .reflectance_fast(color)
+            .map(|r| r.min(crate::scene::GREATEST_ALBEDO))
     }
 
     /// Mean linear base colour over an element, if it varies: factor times texture times vertex colours.
@@ -112,9 +128,12 @@ impl<'a> Painter<'a> {
         if let (true, Some(colors)) = (vertex_paint, &surface.colors) {
             let corners = surface.triangles[self.mesh.origin[triangle].1 as usize];
             // The mean over the element is the value in its middle: vertex colours are linear.
-            let middle: [f64; 3] = std::array::from_fn(|k| (weights[0][k] + weights[1][k] + weights[2][k]) / 3.0);
+            let middle: [f64; 3] =
+                std::array::from_fn(|k| (weights[0][k] + weights[1][k] + weights[2][k]) / 3.0);
             let mean: [f32; 3] = std::array::from_fn(|c| {
-                (0..3).map(|k| colors[corners[k] as usize][c] * middle[k] as f32).sum()
+                (0..3)
+                    .map(|k| colors[corners[k] as usize][c] * middle[k] as f32)
+                    .sum()
             });
             color = std::array::from_fn(|k| color[k] * mean[k]);
         }
@@ -122,21 +141,39 @@ impl<'a> Painter<'a> {
     }
 
     /// Emission and its shape over an element, if a texture shapes it.
-    fn glow_of<'m>(&self, m: &'m Material, triangle: usize, element: &Element) -> Option<(&'m Emission, Leaves)> {
+    fn glow_of<'m>(
+        &self,
+        m: &'m Material,
+        triangle: usize,
+        element: &Element,
+    ) -> Option<(&'m Emission, Leaves)> {
         let e = m.emission.as_ref()?;
         let texture = e.texture.as_ref()?;
         let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
-        let texel = self.texel(texture, surface, triangle, &self.corner_weights(triangle, element));
+        let texel = self.texel(
+            texture,
+            surface,
+            triangle,
+            &self.corner_weights(triangle, element),
+        );
         let color: [f32; 3] = std::array::from_fn(|k| e.color[k] * texel[k]);
         Some((e, self.upsampler.reflectance_fast(color)))
     }
 
-    fn texel(&self, texture: &Texture, surface: &Surface, triangle: usize, weights: &[[f64; 3]; 3]) -> [f32; 4] {
-        let Some(uvs) = surface.texcoords.get(texture.texcoord) else { return [1.0; 4] };
-        let corners = surface.triangles[self.mesh.origin[triangle].1 as usize].map(|v| uvs[v as usize]);
-        let uv = weights.map(|w| {
-            std::array::from_fn(|c| (0..3).map(|k| corners[k][c] * w[k] as f32).sum())
-        });
+    fn texel(
+        &self,
+        texture: &Texture,
+        surface: &Surface,
+        triangle: usize,
+        weights: &[[f64; 3]; 3],
+    ) -> [f32; 4] {
+        let Some(uvs) = surface.texcoords.get(texture.texcoord) else {
+            return [1.0; 4];
+        };
+        let corners =
+            surface.triangles[self.mesh.origin[triangle].1 as usize].map(|v| uvs[v as usize]);
+        let uv = weights
+            .map(|w| std::array::from_fn(|c| (0..3).map(|k| corners[k][c] * w[k] as f32).sum()));
         texture.average(&self.scene.images, uv)
     }
 
@@ -166,18 +203,32 @@ pub(super) struct DenseSources<'a> {
 }
 
 impl<'a> DenseSources<'a> {
-    pub(super) fn new(painter: &'a Painter<'a>, tree: &'a Tree, shadowed: &'a super::punctual::Shadowed, leaves: &[u32]) -> Self {
+    pub(super) fn new(
+        painter: &'a Painter<'a>,
+        tree: &'a Tree,
+        shadowed: &'a super::punctual::Shadowed,
+        leaves: &[u32],
+    ) -> Self {
         let mut place = vec![u32::MAX; tree.nodes.len()];
         for (k, &leaf) in leaves.iter().enumerate() {
             place[leaf as usize] = k as u32;
         }
-        Self { painter, tree, shadowed, place }
+        Self {
+            painter,
+            tree,
+            shadowed,
+            place,
+        }
     }
 
     fn of(&self, leaf: u32) -> (&'a Material, usize, Element) {
         let element = self.tree.elements[self.tree.node(leaf).element as usize];
         let triangle = self.tree.faces[element.face as usize].triangle as usize;
-        (&self.painter.scene.materials[self.painter.mesh.material[triangle] as usize], triangle, element)
+        (
+            &self.painter.scene.materials[self.painter.mesh.material[triangle] as usize],
+            triangle,
+            element,
+        )
     }
 }
 

@@ -33,24 +33,34 @@ impl Metric {
         }
     }
 
-    /// Grows with [`Metric::size`] for a fixed radius, and needs no root.
+    /// The square of [`Metric::size`], mostly without a root (as in the paper's program, 3.1.3).
     #[inline]
-    fn rank(&self, error: Cmf, radius: Cmf) -> f64 {
+    fn squared(&self, error: Cmf, radius: Cmf) -> f64 {
         match self {
             Self::Xyz => square(std::array::from_fn(|a| error[a].abs() + radius[a])),
-            Self::Luv(j) => square(multiply(j, error)),
+            Self::Luv(j) if radius == [0.0; 3] => square(multiply(j, error)),
+            Self::Luv(_) => self.size(error, radius).powi(2),
         }
+    }
+
+    /// Is the size above a limit? A limit below 0 is below every size.
+    #[inline]
+    fn exceeds(&self, limit: f64, error: Cmf, radius: Cmf) -> bool {
+        limit < 0.0 || self.squared(error, radius) > limit * limit
     }
 }
 
+#[inline]
 fn length(v: Cmf) -> f64 {
     square(v).sqrt()
 }
 
+#[inline]
 fn square(v: Cmf) -> f64 {
     v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
 }
 
+#[inline]
 fn multiply(j: &[[f64; 3]; 3], v: Cmf) -> Cmf {
     std::array::from_fn(|r| j[r][0] * v[0] + j[r][1] * v[1] + j[r][2] * v[2])
 }
@@ -133,7 +143,7 @@ pub(super) fn worst<I: Interval>(list: &List<I>, metric: &Metric) -> Option<(usi
     let mut found = None;
     let mut greatest = -1.0;
     for (interval, (first, len)) in list.intervals().iter().zip(list.partition().iter()) {
-        let size = metric.size(interval.error(), interval.radius());
+        let size = metric.squared(interval.error(), interval.radius());
         if len > 1 && size > greatest {
             (found, greatest) = (Some((first, node(first, len))), size);
         }
@@ -155,22 +165,24 @@ pub fn control<I: Interval>(
     let (mut split, mut merged) = (false, false);
     let mut error = list.error();
     loop {
-        let size = metric.size(error, list.radius());
-        if size > settings.eps_max {
+        let radius = list.radius();
+        if metric.exceeds(settings.eps_max, error, radius) {
             let Some((first, n)) = worst(list, metric) else {
                 break;
             };
             list.split(first, path.children(n, cmf));
             error = list.error();
             split = true;
-        } else if size < settings.eps_min && list.partition().count() > settings.floor {
+        } else if list.partition().count() > settings.floor
+            && !metric.exceeds(settings.eps_min, error, radius)
+        {
             if split && settings.overshoot == Overshoot::Keep {
                 return Operation::Fluctuation;
             }
             let Some((first, after)) = best_pair(list, error, cmf, metric, settings) else {
                 break;
             };
-            if metric.size(after, list.radius()) > settings.eps_max {
+            if metric.exceeds(settings.eps_max, after, list.radius()) {
                 // The paper's loop would split this very pair again, and so for ever.
                 if settings.overshoot == Overshoot::Keep {
                     list.merge(first, cmf, settings.representative);
@@ -219,7 +231,7 @@ pub fn coarsen<I: Interval>(
         let Some((first, after)) = best_pair(list, error, cmf, metric, settings) else {
             break;
         };
-        if metric.size(after, list.radius()) > settings.eps_max {
+        if metric.exceeds(settings.eps_max, after, list.radius()) {
             break;
         }
         list.merge(first, cmf, settings.representative);
@@ -254,7 +266,7 @@ fn best_pair<I: Interval>(
             let after = std::array::from_fn(|a| error[a] + difference * gain[a]);
             let key = match settings.pairs {
                 Pairs::Deepest => difference.abs(),
-                Pairs::Any => metric.rank(after, radius),
+                Pairs::Any => metric.squared(after, radius),
             };
             if key < least {
                 (found, least) = (Some((first, after)), key);
@@ -265,4 +277,90 @@ fn best_pair<I: Interval>(
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::{luv_jacobian, tristimulus};
+    use crate::spectrum::bound::tests::holds;
+    use crate::spectrum::partition::tests::any_cut;
+    use crate::spectrum::testing::{cmf, patch};
+    use crate::spectrum::{Bounded, Estimate, Leaves, Moment, Partition, Tree};
+    use proptest::prelude::*;
+
+    /// Limits of every kind: usual, crossed, out of reach, without end.
+    fn limits() -> impl Strategy<Value = [f64; 2]> {
+        let any = prop_oneof![Just(0.0), Just(-1.0), Just(f64::INFINITY), 1e-6..10.0f64];
+        prop::array::uniform2(any)
+    }
+
+    fn run<I: Interval>(
+        spectra: &[Leaves],
+        cut: Partition,
+        limits: [f64; 2],
+        rule: Control,
+    ) -> (List<I>, f64, Leaves) {
+        let cmf = cmf();
+        let trees: Vec<Tree<I>> = spectra.iter().map(|s| Tree::new(s, &cmf)).collect();
+        let materials: Vec<&Tree<I>> = trees[1..].iter().collect();
+        let (mut list, mut out) = (List::new(&trees[0], cut), List::black());
+        for material in &materials {
+            list.reflect(material, &cmf, &mut out);
+            std::mem::swap(&mut list, &mut out);
+        }
+        let path = Path {
+            source: &trees[0],
+            reflections: &materials,
+        };
+        let white = tristimulus(&spectra[0], cmf.leaves());
+        let metric = if rule.pairs == Pairs::Any && white[1] > 0.0 {
+            Metric::Luv(luv_jacobian(list.xyz(&cmf), white))
+        } else {
+            Metric::Xyz
+        };
+        let settings = Control {
+            eps_min: limits[0],
+            eps_max: limits[1],
+            ..rule
+        };
+        control(&mut list, &path, &cmf, &metric, &settings);
+        let size = metric.size(list.error(), list.radius());
+        (list, size, path.leaves())
+    }
+
+    proptest! {
+        #[test]
+        fn control_ends_within_its_limit(
+            spectra in prop::collection::vec(patch(), 1..5),
+            cut in any_cut(),
+            limits in limits(),
+        ) {
+            let within = Control::within(1.0);
+            let (list, size, _) = run::<Moment>(&spectra, cut, limits, within);
+            prop_assert_eq!(list.validate(), Ok(()));
+            // Leaves have no error: only rounding can keep the sum above a limit of 0.
+            prop_assert!(size <= limits[1].max(1e-9), "{size}");
+            let (list, size, exact) = run::<Bounded>(&spectra, cut, limits, within);
+            prop_assert_eq!(holds(&list, &exact, &cmf()), Ok(()));
+            prop_assert!(size <= limits[1].max(1e-9), "{size}");
+            // The paper's loop, whatever it is asked for, ends too.
+            let (list, _, _) = run::<Estimate>(&spectra, cut, limits, Control::PAPER);
+            prop_assert_eq!(list.validate(), Ok(()));
+        }
+
+        #[test]
+        fn the_ranking_of_pairs_is_the_outcome_of_their_merge(s in patch(), cut in any_cut()) {
+            let cmf = cmf();
+            let list = List::new(&Tree::<Moment>::new(&s, &cmf), cut);
+            for rule in [Representative::Mean, Representative::Projection] {
+                let settings = Control { representative: rule, ..Control::within(1.0) };
+                if let Some((first, after)) = best_pair(&list, list.error(), &cmf, &Metric::Xyz, &settings) {
+                    let mut merged = list.clone();
+                    prop_assert!(merged.merge(first, &cmf, rule));
+                    prop_assert!((0..3).all(|a| (merged.error()[a] - after[a]).abs() < 1e-12));
+                }
+            }
+        }
+    }
 }

@@ -169,6 +169,7 @@ impl<I: Interval> List<I> {
     }
 
     /// Makes the sibling pair whose left half starts at `first` one interval; false if there is no such pair.
+    #[inline]
     pub fn merge(&mut self, first: usize, cmf: &CmfTree, rule: Representative) -> bool {
         let Some(coarser) = self
             .partition

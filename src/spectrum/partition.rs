@@ -56,11 +56,13 @@ impl Partition {
     }
 
     /// The bits.
+    #[inline]
     pub fn bits(self) -> u64 {
         self.0
     }
 
     /// Number of intervals, in 1..=64.
+    #[inline]
     pub fn count(self) -> usize {
         self.0.count_ones() as usize
     }
@@ -83,16 +85,19 @@ impl Partition {
     }
 
     /// Does an interval start at this leaf (in 0..64)?
+    #[inline]
     pub fn starts(self, leaf: usize) -> bool {
         self.0 >> leaf & 1 == 1
     }
 
     /// Index of the interval that starts at `leaf`, which must be the start of one.
+    #[inline]
     pub fn rank(self, leaf: usize) -> usize {
         (self.0 & ((1 << leaf) - 1)).count_ones() as usize
     }
 
     /// Number of leaves of the interval that starts at `leaf`.
+    #[inline]
     pub fn len_at(self, leaf: usize) -> usize {
         // `>> 1` first: a shift by 64 would overflow for the last leaf.
         let after = self.0 >> leaf >> 1;
@@ -100,11 +105,13 @@ impl Partition {
     }
 
     /// Intervals as (first leaf, number of leaves), in order of wavelength.
+    #[inline]
     pub fn iter(self) -> Intervals {
         Intervals(self.0)
     }
 
     /// The cut with the interval at `leaf` halved; none if it is one leaf or no interval starts there.
+    #[inline]
     pub fn split(self, leaf: usize) -> Option<Self> {
         if leaf >= 64 || !self.starts(leaf) {
             return None;
@@ -115,6 +122,7 @@ impl Partition {
 
     /// The start of the interval that forms, with the one at `leaf`, the whole of their parent; none if there is no such
     /// interval in the cut (the sibling is split further, or the cut is the root).
+    #[inline]
     pub fn sibling(self, leaf: usize) -> Option<usize> {
         if leaf >= 64 || !self.starts(leaf) {
             return None;
@@ -128,12 +136,14 @@ impl Partition {
     }
 
     /// The cut with the interval at `leaf` and its sibling made one; none if the sibling is not in the cut.
+    #[inline]
     pub fn merge(self, leaf: usize) -> Option<Self> {
         let sibling = self.sibling(leaf)?;
         Some(Self(self.0 & !(1 << leaf.max(sibling))))
     }
 
     /// Starts of the left halves of all sibling pairs in the cut, as bits.
+    #[inline]
     pub fn pairs(self) -> u64 {
         (0..6).fold(0, |all, height| all | self.pairs_of(height))
     }
@@ -185,6 +195,7 @@ pub struct Intervals(u64);
 impl Iterator for Intervals {
     type Item = (usize, usize);
 
+    #[inline]
     fn next(&mut self) -> Option<(usize, usize)> {
         if self.0 == 0 {
             return None;

@@ -73,6 +73,7 @@ impl CmfTree {
     }
 
     /// Change of the errors for a difference of 1, if the merged value takes `share` of the left one.
+    #[inline]
     fn gain(&self, n: usize, share: f64) -> Cmf {
         std::array::from_fn(|a| {
             self.nodes[2 * n][a] * (1.0 - share) - self.nodes[2 * n + 1][a] * share

@@ -392,3 +392,17 @@ pub fn refined(scene: &Scene, n: u32) -> Vec<BakedSurface> {
         })
         .collect()
 }
+
+/// The back of a sheet, with its own even light.
+pub fn back(front: &BakedSurface, light: f64) -> BakedSurface {
+    let mut back = front.clone();
+    back.back = true;
+    for triangle in &mut back.triangles {
+        triangle.swap(1, 2);
+    }
+    for vertex in &mut back.vertices {
+        vertex.light = [(light * std::f64::consts::PI) as f32; 3];
+        vertex.radiosity = vertex.light;
+    }
+    back
+}

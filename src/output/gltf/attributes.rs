@@ -191,7 +191,8 @@ impl<'a> Input<'a> {
         }
         let normal = |v| {
             let smooth = local.and_then(|table| self.blend(table, v).try_normalize());
-            let world = || (back * refined::normal(self.surface, v)).normalize_or(DVec3::Y);
+            let smooth = smooth.map(|n| if baked.back { -n } else { n });
+            let world = || (back * refined::normal(self.surface, baked, v)).normalize_or(DVec3::Y);
             smooth.unwrap_or_else(world).as_vec3().to_array()
         };
         Some(baked.vertices.iter().map(normal).collect())
@@ -214,7 +215,9 @@ impl<'a> Input<'a> {
             );
             let hand = table.row(refined::corners(self.surface, vertex)[nearest])[3];
             let [x, y, z] = direction.as_vec3().to_array();
-            [x, y, z, if hand < 0.0 { -1.0 } else { 1.0 }]
+            // The bitangent, normal x tangent * hand, runs along the texture and stays; the back's normal is turned.
+            let left = (hand < 0.0) != baked.back;
+            [x, y, z, if left { -1.0 } else { 1.0 }]
         };
         Some(baked.vertices.iter().zip(normals).map(tangent).collect())
     }

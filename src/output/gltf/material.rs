@@ -2,6 +2,7 @@
 //!
 //! The light in COLOR_0 already holds the base colour factor, the emission, and the measured reflectance where there
 //! is one; only a texture that the light was divided by stays in the base colour. Alpha keeps working as in the input.
+//! Nothing is `doubleSided`: each side is a primitive of its own.
 
 use super::{Writer, extension, index, list};
 use crate::scene::Alpha;
@@ -96,6 +97,10 @@ impl Writer<'_> {
             }
         }
         json["pbrMetallicRoughness"] = pbr;
+        // The back of a two-sided surface is a primitive of its own, with its own light.
+        if let Some(json) = json.as_object_mut() {
+            json.shift_remove("doubleSided");
+        }
         let mut extensions = json
             .get("extensions")
             .and_then(Value::as_object)

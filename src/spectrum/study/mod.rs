@@ -3,6 +3,8 @@
 pub mod bounds;
 mod chart;
 pub mod compare;
+pub mod covariance;
+pub mod cuts;
 mod lanes;
 pub mod modes;
 pub mod table1;

@@ -1,14 +1,16 @@
 //! The open questions as modes of one loop: what controls the error, and what that buys at equal interval count.
 //!
 //! Modes: the paper's control; the guarantee (the bound, not the estimate, must be at most eps_max); perceptual control
-//! (Jacobian of XYZ -> L*u*v* at the current colour, any sibling pair); perceptual control of the bound. All are measured
+//! (Jacobian of XYZ -> L*u*v* at the current colour, any sibling pair); perceptual control of the bound; and the last three
+//! on the ratio to the light, which is in the weights of eq. 3, so that its lines cost no interval. All are measured
 //! twice: with the list's tristimulus values, and with the estimated error added back ("corrected").
 
 use super::chart::{Chart, Light};
 use super::walk::{Extent, LEVELS, Sample, Start, sample, walk};
 use crate::color::{Xyz, luv_jacobian};
 use crate::spectrum::{
-    Bounded, Control, Estimate, Interval, List, Metric, Moment, Operation, Path, control, represent,
+    Bounded, Control, Estimate, Interval, LEAVES, List, Metric, Moment, Operation, Path, control,
+    represent,
 };
 use serde::Serialize;
 
@@ -99,7 +101,33 @@ pub fn measure(chart: &Chart, light: &Light, name: &str) -> Vec<Row> {
     record("perceptual", limits, samples);
     let (limits, samples) = at_equal_count::<Bounded>(chart, light, wanted, 1, &luv);
     record("perceptual bound", limits, samples);
+
+    let (under, one) = ratio(chart, light);
+    record(
+        "guarantee, ratio",
+        [eps; 3],
+        fixed::<Bounded>(&under, &one, eps, &Control::within(eps)),
+    );
+    let (limits, samples) = at_equal_count::<Moment>(&under, &one, wanted, 1, &luv);
+    record("perceptual, ratio", limits, samples);
+    let (limits, samples) = at_equal_count::<Bounded>(&under, &one, wanted, 1, &luv);
+    record("perceptual bound, ratio", limits, samples);
     rows
+}
+
+/// The same work with the light in the weights: lists hold the ratio to the light, which begins as 1 everywhere.
+pub(super) fn ratio(chart: &Chart, light: &Light) -> (Chart, Light) {
+    let under = Chart {
+        cmf: chart.cmf.under(&light.power),
+        reflectances: chart.reflectances.clone(),
+    };
+    (
+        under,
+        Light {
+            power: [1.0; LEAVES],
+            ..light.clone()
+        },
+    )
 }
 
 /// The tests with one limit in XYZ for all levels.

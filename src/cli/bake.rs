@@ -1,0 +1,316 @@
+//! `haarlight bake ROOM`: the room back with its light baked in, pictures and a log on the way.
+//!
+//! Rounds until the error asked for, `--time` or Ctrl-C; what there is then is written out whole. The exposure of the
+//! baked room is metered from its own light, whether or not pictures were taken: the same room gives the same bytes.
+
+use super::command::print;
+use super::log::{
+    AuditRecord, End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code,
+};
+use super::options::{Common, Reading, Solving};
+use super::snapshots::Snapshots;
+use super::stop::Stop;
+use super::talk::Talk;
+use super::{paths, summary};
+use crate::audit;
+use crate::error::{Error, Problem, Result};
+use crate::gather::Baked;
+use crate::output::{Exposure, baked_glb, file, npz};
+use crate::report::Log;
+use crate::scene::{Options, Scene};
+use crate::solve::{Bake, Representation, Settings};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Phases of a round, in order.
+const PHASES: [&str; 6] = [
+    "links", "spectrum", "direct", "balance", "solve", "estimate",
+];
+/// Distinguishes the audit's random numbers from the solver's.
+const AUDIT_SEED: u64 = 0x5eed_a0d1;
+
+/// Arguments of `bake`.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  haarlight bake room.glb
+  haarlight bake room.gltf -o lit.glb --error 0.3 --spectra measured.spectra.json
+  haarlight bake room.glb --snapshots pictures --log bake.jsonl --audit 200")]
+pub struct BakeArgs {
+    /// The room, .glb or .gltf.
+    pub room: PathBuf,
+    /// The baked room [default: ROOM's name with .baked.glb, beside it].
+    #[arg(short, long, value_name = "OUT.glb")]
+    pub output: Option<PathBuf>,
+    /// What to read.
+    #[command(flatten)]
+    pub reading: Reading,
+    /// When to stop.
+    #[command(flatten)]
+    pub solving: Solving,
+    /// JSON lines: plan, rounds, verdict.
+    #[arg(long, value_name = "FILE")]
+    pub log: Option<PathBuf>,
+    /// A PNG from each camera after every round, and an EXR of the result.
+    #[arg(long, value_name = "DIR")]
+    pub snapshots: Option<PathBuf>,
+    /// Positions, normals and spectra of all vertices for NumPy.
+    #[arg(long, value_name = "FILE")]
+    pub npz: Option<PathBuf>,
+    /// Measure the error at N random points by Monte Carlo.
+    #[arg(long, value_name = "N")]
+    pub audit: Option<usize>,
+    /// Print the verdict as one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Bakes; the exit code.
+///
+/// # Errors
+/// As [`Scene::load`]; outputs that would overwrite an input or each other; files that cannot be written.
+pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
+    let stop = Stop::new(args.solving.time);
+    stop.listen()?;
+    let talk = Talk::new(common.quiet);
+    let output = args
+        .output
+        .clone()
+        .unwrap_or_else(|| args.room.with_extension("baked.glb"));
+    talk.phase("reading");
+    let scene = load(&args.room, &args.reading, |parts| {
+        problems(args, &output, parts)
+    })?;
+    scene.warnings.iter().for_each(|w| talk.warn(w));
+    let mut seconds = Seconds {
+        load: stop.elapsed_s(),
+        ..Seconds::default()
+    };
+
+    let mut snapshots = args
+        .snapshots
+        .as_deref()
+        .map(|folder| Snapshots::new(folder, &scene))
+        .transpose()?;
+    let mut log = args.log.as_deref().map(Log::create).transpose()?;
+    let mut outputs = Outputs {
+        log: args.log.as_deref().map(text),
+        ..Outputs::default()
+    };
+
+    let clock = Instant::now();
+    talk.phase("preparing");
+    let mut bake = prepare(
+        scene,
+        &args.solving,
+        common,
+        Representation::Adaptive,
+        &talk,
+    );
+    write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
+    seconds.prepare = clock.elapsed().as_secs_f64();
+
+    // Of the last round, if a picture was taken of it.
+    let mut baked: Option<Baked> = None;
+    let verdict = stop.run(&mut bake, &talk, |bake, round| {
+        seconds.solve += round.round_s;
+        write(&mut log, round)?;
+        if let Some(snapshots) = &mut snapshots {
+            let clock = Instant::now();
+            let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
+            seconds.gather = clock.elapsed().as_secs_f64();
+            talk.phase("drawing");
+            let files = snapshots.round(round.round, bake.scene(), &light.surfaces)?;
+            let exposure = snapshots.exposure(bake.scene(), &light.surfaces);
+            write(
+                &mut log,
+                &SnapshotsRecord::new(round.round, &files, exposure),
+            )?;
+            outputs.pictures.extend(files);
+            baked = Some(light);
+            seconds.snapshots += clock.elapsed().as_secs_f64();
+        }
+        Ok(())
+    })?;
+
+    let baked = match baked {
+        // The last picture's gather is the result's.
+        Some(baked) => {
+            seconds.snapshots -= seconds.gather;
+            baked
+        }
+        None => {
+            let clock = Instant::now();
+            let baked = bake.baked(&|done, of| talk.progress("gathering", done, of));
+            seconds.gather = clock.elapsed().as_secs_f64();
+            baked
+        }
+    };
+
+    let clock = Instant::now();
+    talk.phase("writing");
+    let (scene, room) = (bake.scene(), Some(args.room.as_path()));
+    let exposure = Exposure::auto(scene, &baked.surfaces);
+    let glb = baked_glb(scene, &baked.surfaces, &exposure)?;
+    glb.warnings.iter().for_each(|w| talk.warn(w));
+    file::write_atomic(&output, room, |w| w.write_all(&glb.bytes))?;
+    outputs.glb = text(&output);
+    if let Some(path) = &args.npz {
+        write_npz(path, &args.room, &bake, &baked)?;
+        outputs.npz = Some(text(path));
+    }
+    if let Some(snapshots) = &mut snapshots {
+        outputs.exr = snapshots.last(scene, &baked.surfaces)?;
+    }
+    seconds.write = clock.elapsed().as_secs_f64();
+
+    let clock = Instant::now();
+    let audit = args.audit.map(|points| {
+        talk.phase("auditing");
+        let found = audit::compare(&bake, points, common.seed ^ AUDIT_SEED);
+        AuditRecord::new(found, &bake)
+    });
+    if let Some(audit) = &audit {
+        write(&mut log, audit)?;
+    }
+    seconds.audit = clock.elapsed().as_secs_f64();
+
+    seconds.total = stop.elapsed_s();
+    let end = End {
+        bake: &bake,
+        verdict,
+        baked: &baked,
+        glb: &glb,
+        exposure,
+        outputs,
+        seconds,
+    };
+    let record = VerdictRecord::new(end);
+    write(&mut log, &record)?;
+    talk.clear();
+    talk.say(&format!("\n{}", summary::rounds(bake.rounds())));
+    talk.say(&summary::verdict(&record, audit.as_ref()));
+    if args.json {
+        let line = serde_json::to_string(&record)
+            .map_err(|problem| Error::Internal(format!("verdict: {problem}")))?;
+        print(&(line + "\n"))?;
+    }
+    Ok(exit_code(verdict))
+}
+
+/// Reads a room; its problems and those that `others` finds (given the files the room is made of) come together.
+pub(super) fn load(
+    room: &Path,
+    reading: &Reading,
+    others: impl FnOnce(&[PathBuf]) -> Vec<Problem>,
+) -> Result<Scene> {
+    let options = Options {
+        grid: reading.range.grid(),
+        spectra: reading.spectra.clone(),
+    };
+    match Scene::load(room, &options) {
+        Ok(scene) => match others(&paths::parts(&scene)) {
+            none if none.is_empty() => Ok(scene),
+            problems => Err(Error::Input(problems)),
+        },
+        Err(Error::Input(mut problems)) => {
+            problems.extend(others(&[]));
+            Err(Error::Input(problems))
+        }
+        Err(Error::Io { path, source }) => {
+            let mut problems = vec![Problem::new(
+                path,
+                source.to_string(),
+                "name a file that can be read",
+            )];
+            problems.extend(others(&[]));
+            Err(Error::Input(problems))
+        }
+        Err(fault) => Err(fault),
+    }
+}
+
+/// The bake of a scene, which tells `talk` of its phases.
+pub(super) fn prepare(
+    scene: Scene,
+    solving: &Solving,
+    common: &Common,
+    representation: Representation,
+    talk: &Talk,
+) -> Bake {
+    let settings = Settings {
+        error: solving.error,
+        representation,
+        seed: common.seed,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(scene, settings);
+    let bar = talk.watch();
+    bake.watch(Arc::new(move |ended| {
+        let place = PHASES.iter().position(|phase| *phase == ended);
+        let next = place.and_then(|k| PHASES.get(k + 1)).unwrap_or(&"");
+        bar.set_message(*next);
+    }));
+    bake
+}
+
+/// What is wrong with the output files.
+fn problems(args: &BakeArgs, output: &Path, parts: &[PathBuf]) -> Vec<Problem> {
+    let mut outputs = vec![("-o", output)];
+    outputs.extend(args.npz.as_deref().map(|path| ("--npz", path)));
+    outputs.extend(args.log.as_deref().map(|path| ("--log", path)));
+    let mut inputs = vec![args.room.as_path()];
+    let beside = args.room.with_extension("spectra.json");
+    inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));
+    inputs.extend(parts.iter().map(PathBuf::as_path));
+    let mut problems = paths::problems(&outputs, &inputs);
+    if !output
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("glb"))
+    {
+        problems.push(Problem::new(
+            format!("-o {}", output.display()),
+            "the baked room is a .glb",
+            "end its name in .glb",
+        ));
+    }
+    if let Some(folder) = args
+        .snapshots
+        .as_deref()
+        .filter(|f| f.exists() && !f.is_dir())
+    {
+        problems.push(Problem::new(
+            format!("--snapshots {}", folder.display()),
+            "is a file",
+            "name a folder",
+        ));
+    }
+    problems
+}
+
+fn write(log: &mut Option<Log<File>>, record: &impl serde::Serialize) -> Result<()> {
+    log.as_mut().map_or(Ok(()), |log| log.write(record))
+}
+
+fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()> {
+    let spectra = bake.radiosity_spectra(baked);
+    // The writer's own error says more than what the system makes of it.
+    let mut problem = None;
+    let written = file::write_atomic(path, Some(room), |w| {
+        npz::write_baked(w, bake.scene(), &baked.surfaces, &spectra).map_err(|e| {
+            let text = e.to_string();
+            problem = Some(e);
+            std::io::Error::other(text)
+        })
+    });
+    match problem {
+        Some(Error::Internal(what)) => Err(Error::Internal(what)),
+        _ => written,
+    }
+}
+
+fn text(path: &Path) -> String {
+    path.display().to_string()
+}

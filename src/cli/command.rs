@@ -1,0 +1,82 @@
+//! The command line as a whole.
+
+use super::options::Common;
+use super::{bake, inspect, paper, probe};
+use crate::error::{Error, Result};
+
+const EXAMPLES: &str = "\
+Examples:
+  haarlight bake room.glb                          writes room.baked.glb, exit code 0 once dE00 <= 0.5
+  haarlight bake room.glb --error 1 --time 60 --snapshots pictures --log bake.jsonl
+  haarlight inspect room.glb                       what is in the room, and what would be simulated
+  haarlight probe room.glb --points desk.csv       lux at points (columns x,y,z,nx,ny,nz)
+
+Exit codes: 0 done, 1 stopped before the asked-for error was reached, 2 bad input, 3 a fault of the program.
+Results go to stdout or files, talk to stderr.";
+
+/// Bakes light into glTF rooms in full spectrum, and says how wrong it still is.
+#[derive(Debug, clap::Parser)]
+#[command(name = "haarlight", version, after_help = EXAMPLES)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Options of all commands.
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// The commands.
+#[derive(Debug, clap::Subcommand)]
+pub enum Command {
+    /// Write the room back with its light baked in.
+    Bake(bake::BakeArgs),
+    /// Print what the program sees in a room. Nothing is solved.
+    Inspect(inspect::InspectArgs),
+    /// Irradiance at given points and normals: lux sensors.
+    Probe(probe::ProbeArgs),
+    /// The paper's tables, measured beside printed.
+    Paper(paper::PaperArgs),
+}
+
+/// Does what was asked for; the exit code.
+///
+/// # Errors
+/// Bad input, files that cannot be read or written, faults of our own.
+pub fn run(cli: &Cli) -> Result<u8> {
+    if let Some(threads) = cli.common.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.get())
+            .build_global()
+            .map_err(|problem| Error::Internal(format!("threads: {problem}")))?;
+    }
+    match &cli.command {
+        Command::Bake(args) => bake::run(args, &cli.common),
+        Command::Inspect(args) => inspect::run(args, &mut std::io::stdout()).map(|()| 0),
+        Command::Probe(args) => probe::run(args, &cli.common),
+        Command::Paper(args) => paper::run(args).map(|()| 0),
+    }
+}
+
+/// Writes a result to stdout. A reader that has had enough (`| head`) is no error.
+pub(super) fn print(text: &str) -> Result<()> {
+    use std::io::{ErrorKind, Write};
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(problem) if problem.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::io("standard output".as_ref(), problem))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+}

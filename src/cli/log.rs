@@ -1,0 +1,342 @@
+//! The log of a bake (`--log FILE`): JSON lines, one record a line, each written out at once.
+//!
+//! Figures of error are objects `{"value": ..., "kind": ...}` with kind `bound` (cannot be exceeded), `estimate` or
+//! `measured` (compared with an independent answer). Numbers that are not known (or not finite) are `null`. Colour
+//! differences are means over random points of the room's surfaces, by area, of the irradiance they get, under the
+//! adaptation white. Seconds are wall time.
+//!
+//! First `{"record": "plan", ...}` ([`PlanRecord`]):
+//!
+//! | field | what |
+//! |---|---|
+//! | `version` | of this format: 1. Raised when a field changes its meaning or goes; new fields do not raise it |
+//! | `program` | name and version of the program |
+//! | `effects` | list of `name`, `runs`, `lacking` (asked for by the scene and not in the program), `reason` |
+//! | `facts` | the room: see [`Facts`], units in the names |
+//! | `settings` | see [`SettingsRecord`] |
+//! | `warnings` | what the user should know of the room, sentences |
+//!
+//! Then for each round `{"record": "round", ...}` ([`Round`](crate::solve::Round)):
+//!
+//! | field | unit | what |
+//! |---|---|---|
+//! | `round` | | number, from 1 |
+//! | `elapsed_s` | s | since the room was read |
+//! | `round_s`, `phases_s` | s | of this round, and by phase: `links`, `spectrum`, `direct`, `balance`, `solve`, `estimate` |
+//! | `threshold` | share of white | greatest error that a link keeps, weighted by the root of the receiver's share of area |
+//! | `rays` | | visibility rays cast in this round for links, direct light and openness |
+//! | `links_evaluated`, `links_capped` | | links looked at; those that wanted refinement but had the least size |
+//! | `elements`, `nodes`, `links`, `links_clear` | | leaves of the hierarchy, all patches, links, links proved free of blockers |
+//! | `intervals_working`, `intervals_mean` | | wavelength intervals of the working partition (all lights), and mean over patches |
+//! | `memory_bytes` | B | hierarchy, links and rows |
+//! | `iterations` | | operator applications of the solve |
+//! | `error.total_de2000`, `.total_de_luv` | dE00, dE*uv | all sources; `null` in the first round, as two are compared |
+//! | `error.total_relative` | 1 | root mean square relative error of illuminance |
+//! | `error.total_xyz` | lm/m2 | root mean square error of tristimulus irradiance |
+//! | `error.geometry_de_luv`, `.spectrum_de_luv`, `.convergence_de_luv` | dE*uv | by source |
+//! | `error.convergence` | 1 | of the solve, relative, in the solver's norm |
+//! | `flux.emitted_lm`, `.received_lm` | lm | given out by surfaces; what fronts receive straight from lamps of any kind |
+//! | `flux.absorbed_lm`, `.escaped_lm` | lm | absorbed by fronts; left the room or met a black back |
+//! | `flux.worst_band` | 1 | worst relative difference of received and absorbed + escaped light over all bands |
+//! | `row_sum_defect`, `row_sum_defect_after` | 1 | distance of row sums from what each leaf looks out on: mean by area and greatest, before and after balancing |
+//!
+//! After a round with `--snapshots`, `{"record": "snapshots", ...}` ([`SnapshotsRecord`]): `round`, `files`,
+//! `exposure.scale` (display value for each lm/m2; metered in the first round and kept, so that pictures differ by their
+//! light alone).
+//!
+//! With `--audit N`, `{"record": "audit", ...}` ([`AuditRecord`]): the fields of
+//! [`Comparison`], then `estimate_de2000` (of the last round), `ratio` (estimate over measured
+//! error) and `honest` (is the ratio within 0.7 and 3? Both `null` if there is no estimate, the audit's own noise is too
+//! large to tell, or the error is below a tenth of what was asked for).
+//!
+//! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
+
+use crate::audit::Comparison;
+use crate::gather::Baked;
+use crate::output::{BakedGlb, Exposure};
+use crate::scene::effects::Plan;
+use crate::scene::facts::Facts;
+use crate::solve::record::{Figure, Kind, LOG_VERSION};
+use crate::solve::{Bake, Representation, Verdict};
+use serde::Serialize;
+
+/// Name and version of the program.
+pub const PROGRAM: &str = concat!("haarlight ", env!("CARGO_PKG_VERSION"));
+/// An estimate between these multiples of the measured error is honest.
+const HONEST: [f64; 2] = [0.7, 3.0];
+/// With noise above this share of the measured error an audit does not judge ...
+const NOISY: f64 = 0.7;
+/// ... nor below this share of the error asked for: nobody asked for more.
+const SMALL: f64 = 0.1;
+
+/// What was asked for.
+#[derive(Debug, Clone, Serialize)]
+pub struct SettingsRecord {
+    /// Mean CIEDE2000 at which to stop.
+    pub error_de2000: f64,
+    /// Limit of time, s.
+    pub time_s: Option<f64>,
+    /// Rounds at the most.
+    pub rounds: usize,
+    /// `adaptive` or `dense`.
+    pub representation: Representation,
+    /// First and last wavelength, nm.
+    pub range_nm: [f64; 2],
+    /// Tristimulus irradiance of the adaptation white, lm/m2; none: twice the mean irradiance of the room.
+    pub white: Option<[f64; 3]>,
+    /// Seed of all sampling patterns.
+    pub seed: u64,
+    /// Threads.
+    pub threads: usize,
+}
+
+impl SettingsRecord {
+    /// The settings of a bake.
+    pub fn of(bake: &Bake, time_s: Option<f64>) -> Self {
+        let (settings, grid) = (bake.settings(), &bake.scene().grid);
+        Self {
+            error_de2000: settings.error,
+            time_s,
+            rounds: settings.rounds,
+            representation: settings.representation,
+            range_nm: [grid.start(), grid.end()],
+            white: settings.white,
+            seed: settings.seed,
+            threads: rayon::current_num_threads(),
+        }
+    }
+}
+
+/// The first line.
+#[derive(Debug, Clone, Serialize)]
+pub struct PlanRecord<'a> {
+    record: &'static str,
+    /// Version of the format.
+    pub version: u32,
+    /// Name and version of the program.
+    pub program: &'static str,
+    /// What runs, what does not, and why.
+    pub effects: &'a Plan,
+    /// The room.
+    pub facts: Facts,
+    /// What was asked for.
+    pub settings: SettingsRecord,
+    /// Warnings about the room.
+    pub warnings: &'a [String],
+}
+
+impl<'a> PlanRecord<'a> {
+    /// The record of a bake that begins.
+    pub fn new(bake: &'a Bake, time_s: Option<f64>) -> Self {
+        Self {
+            record: "plan",
+            version: LOG_VERSION,
+            program: PROGRAM,
+            effects: bake.plan(),
+            facts: Facts::of(bake.scene()),
+            settings: SettingsRecord::of(bake, time_s),
+            warnings: &bake.scene().warnings,
+        }
+    }
+}
+
+/// Pictures of a round.
+#[derive(Debug, Clone, Serialize)]
+pub struct SnapshotsRecord<'a> {
+    record: &'static str,
+    /// Number of the round.
+    pub round: usize,
+    /// Paths.
+    pub files: &'a [String],
+    /// Exposure of all pictures of the run.
+    pub exposure: Exposure,
+}
+
+impl<'a> SnapshotsRecord<'a> {
+    /// The record.
+    pub fn new(round: usize, files: &'a [String], exposure: Exposure) -> Self {
+        Self {
+            record: "snapshots",
+            round,
+            files,
+            exposure,
+        }
+    }
+}
+
+/// The error measured, beside the estimate.
+#[derive(Debug, Clone, Serialize)]
+pub struct AuditRecord {
+    record: &'static str,
+    /// What was measured.
+    #[serde(flatten)]
+    pub comparison: Comparison,
+    /// Total of the last round, CIEDE2000.
+    pub estimate_de2000: Option<f64>,
+    /// Estimate over measured error.
+    pub ratio: Option<f64>,
+    /// Is it within 0.7 and 3?
+    pub honest: Option<bool>,
+}
+
+impl AuditRecord {
+    /// Compares a measured error with the estimate of the last round.
+    pub fn new(comparison: Comparison, bake: &Bake) -> Self {
+        let estimate = bake
+            .rounds()
+            .last()
+            .and_then(|r| r.error.total_de2000.value);
+        let measured = comparison.de2000.corrected;
+        let clear =
+            comparison.de2000.noise < NOISY * measured && measured > SMALL * bake.settings().error;
+        let ratio = estimate.filter(|_| clear).map(|e| e / measured);
+        Self {
+            record: "audit",
+            comparison,
+            estimate_de2000: estimate,
+            ratio,
+            honest: ratio.map(|r| (HONEST[0]..=HONEST[1]).contains(&r)),
+        }
+    }
+}
+
+/// Files written.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Outputs {
+    /// The baked room.
+    pub glb: String,
+    /// Arrays.
+    pub npz: Option<String>,
+    /// The log.
+    pub log: Option<String>,
+    /// Pictures of all rounds.
+    pub pictures: Vec<String>,
+    /// High dynamic range pictures of the result.
+    pub exr: Vec<String>,
+}
+
+/// Seconds of the parts of a bake, wall time.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Seconds {
+    /// Reading the room.
+    pub load: f64,
+    /// Hierarchy and ray index.
+    pub prepare: f64,
+    /// Rounds.
+    pub solve: f64,
+    /// Gather at the vertices of the output.
+    pub gather: f64,
+    /// Pictures of rounds, and the gathers for all but the last of them.
+    pub snapshots: f64,
+    /// Monte Carlo.
+    pub audit: f64,
+    /// Encoding and writing.
+    pub write: f64,
+    /// From the start of the command to the verdict.
+    pub total: f64,
+}
+
+/// The last line.
+#[derive(Debug, Clone, Serialize)]
+pub struct VerdictRecord {
+    record: &'static str,
+    /// Version of the format.
+    pub version: u32,
+    /// `reached`, `out_of_time`, `interrupted`, `out_of_rounds` or `exhausted`.
+    pub verdict: Verdict,
+    /// Exit code of the command: 0 if the error was reached, else 1.
+    pub exit_code: u8,
+    /// Rounds done.
+    pub rounds: usize,
+    /// Mean CIEDE2000 asked for.
+    pub asked_de2000: f64,
+    /// Total of the last round, CIEDE2000.
+    pub error_de2000: Figure,
+    /// Files.
+    pub outputs: Outputs,
+    /// Vertices written.
+    pub vertices: usize,
+    /// Triangles written.
+    pub triangles: usize,
+    /// Vertices that something solid covers: they got their neighbours' light.
+    pub covered: usize,
+    /// Triangles that wanted quartering when the limits were met.
+    pub capped: usize,
+    /// Vertices whose COLOR_0 had to be clipped into [0, 1].
+    pub clipped: usize,
+    /// Exposure of COLOR_0: display value for each lm/m2.
+    pub exposure: Exposure,
+    /// Tristimulus irradiance of the adaptation white, lm/m2.
+    pub white: [f64; 3],
+    /// Visibility rays of all rounds and of the gather.
+    pub rays: u64,
+    /// Rays a second, in rounds and gather.
+    pub rays_per_s: f64,
+    /// Links evaluated a second, in the phase that makes them.
+    pub links_per_s: f64,
+    /// Seconds by part.
+    pub seconds: Seconds,
+    /// What could not be carried over to the output.
+    pub warnings: Vec<String>,
+}
+
+/// Everything that the last line tells of.
+pub(super) struct End<'a> {
+    pub(super) bake: &'a Bake,
+    pub(super) verdict: Verdict,
+    pub(super) baked: &'a Baked,
+    pub(super) glb: &'a BakedGlb,
+    pub(super) exposure: Exposure,
+    pub(super) outputs: Outputs,
+    pub(super) seconds: Seconds,
+}
+
+impl VerdictRecord {
+    pub(super) fn new(end: End) -> Self {
+        let rounds = end.bake.rounds();
+        let links_s: f64 = rounds
+            .iter()
+            .filter_map(|r| r.phases_s.get("links")?.as_f64())
+            .sum();
+        let links: u64 = rounds.iter().map(|r| r.links_evaluated).sum();
+        let rays = rounds.iter().map(|r| r.rays).sum::<u64>() + end.baked.rays;
+        let rate = |count: u64, seconds: f64| {
+            if seconds > 0.0 {
+                count as f64 / seconds
+            } else {
+                0.0
+            }
+        };
+        let unknown = Figure {
+            value: None,
+            kind: Kind::Estimate,
+        };
+        Self {
+            record: "verdict",
+            version: LOG_VERSION,
+            verdict: end.verdict,
+            exit_code: exit_code(end.verdict),
+            rounds: rounds.len(),
+            asked_de2000: end.bake.settings().error,
+            error_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
+            outputs: end.outputs,
+            vertices: end.glb.vertices,
+            triangles: end.glb.triangles,
+            covered: end.baked.covered,
+            capped: end.baked.capped,
+            clipped: end.glb.clipped,
+            exposure: end.exposure,
+            white: end.bake.light().white,
+            rays,
+            rays_per_s: rate(rays, end.seconds.solve + end.seconds.gather),
+            links_per_s: rate(links, links_s),
+            seconds: end.seconds,
+            warnings: end.glb.warnings.clone(),
+        }
+    }
+}
+
+/// 0 if the error was reached, 1 if the bake stopped before.
+pub fn exit_code(verdict: Verdict) -> u8 {
+    u8::from(verdict != Verdict::Reached)
+}

@@ -1,0 +1,126 @@
+//! Options that several commands share, as typed and as meant.
+
+use crate::spectrum::{Grid, LEAVES};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Shortest and longest wavelength that the observer's table knows, nm (CIE 018:2019, table 6).
+const KNOWN_NM: [f64; 2] = [360.0, 830.0];
+/// Narrowest leaf, nm: the step of the finest tables.
+const LEAST_LEAF_NM: f64 = 1.0;
+
+/// Options of all commands.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct Common {
+    /// Threads to work with; the result does not depend on it [default: all cores].
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Seed of all sampling patterns.
+    #[arg(long, global = true, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Say nothing but errors.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+}
+
+/// Options of the commands that read a room.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct Reading {
+    /// Spectra of materials and lights [default: ROOM's name with .spectra.json, if it is there].
+    #[arg(long, value_name = "FILE")]
+    pub spectra: Option<PathBuf>,
+    /// Wavelengths to work on, nm; 64 leaves divide them.
+    #[arg(long, value_name = "FROM..TO", default_value = "380..780")]
+    pub range: Range,
+}
+
+/// Options of the commands that solve.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct Solving {
+    /// Mean colour difference (CIEDE2000) at which to stop.
+    #[arg(long, value_name = "DE", default_value_t = 0.5, value_parser = positive)]
+    pub error: f64,
+    /// Begin no round that would end after this many seconds [default: no limit]. The first round is always done;
+    /// the final gather and the writing of files come on top.
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub time: Option<f64>,
+}
+
+/// A range of wavelengths, typed as `380..780`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// First and last wavelength, nm.
+    pub nm: [f64; 2],
+}
+
+impl Default for Range {
+    fn default() -> Self {
+        let grid = Grid::default();
+        Self {
+            nm: [grid.start(), grid.end()],
+        }
+    }
+}
+
+impl Range {
+    /// The 64 leaves on this range.
+    pub fn grid(self) -> Grid {
+        Grid::new(self.nm[0], self.nm[1])
+    }
+}
+
+impl FromStr for Range {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let ends = text
+            .split_once("..")
+            .and_then(|(from, to)| Some([from.trim().parse().ok()?, to.trim().parse().ok()?]));
+        let Some([from, to]) = ends else {
+            return Err("a range of wavelengths looks like 380..780".into());
+        };
+        let [least, most] = KNOWN_NM;
+        let widest = LEAVES as f64 * LEAST_LEAF_NM;
+        // Written so that NaN fails.
+        if !(from >= least && to <= most && to - from >= widest) {
+            return Err(format!(
+                "wavelengths lie in {least}..{most} nm, and 64 leaves of 1 nm or more need {widest} nm"
+            ));
+        }
+        Ok(Self { nm: [from, to] })
+    }
+}
+
+/// A finite number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("a number above zero is wanted".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_checked() {
+        let range: Range = "380..700".parse().unwrap();
+        assert_eq!(range.grid(), Grid::paper());
+        assert_eq!(Range::default().grid(), Grid::default());
+        for bad in [
+            "380", "380-780", "780..380", "NaN..780", "300..780", "380..400", "a..b",
+        ] {
+            assert!(bad.parse::<Range>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn only_numbers_above_zero_are_positive() {
+        assert_eq!(positive("0.5"), Ok(0.5));
+        for bad in ["0", "-1", "NaN", "inf", "x"] {
+            assert!(positive(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! `haarlight probe ROOM --points POINTS.csv`: irradiance at points, by the same gather as the bake's.
+//!
+//! The CSV out has a line a point, in the order of the points:
+//! `x,y,z,nx,ny,nz,E_X,E_Y,E_Z` (unit normal; tristimulus irradiance with Km = 683 lm/W, so that E_Y is lux), with
+//! `--bands` also `E_380 ...`, one column for each of the 64 leaves by its left edge in nm, W/m2/nm, from a solution on
+//! all leaves. `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
+//! "columns": [names], "rows": [[numbers]]}`.
+
+use super::bake::{load, prepare};
+use super::command::print;
+use super::log::exit_code;
+use super::options::{Common, Reading, Solving};
+use super::paths;
+use super::points::{COLUMNS, Point, Points};
+use super::stop::Stop;
+use super::talk::Talk;
+use crate::error::{Error, Problem, Result};
+use crate::gather::Probed;
+use crate::output::file;
+use crate::solve::Representation;
+use crate::spectrum::{Grid, LEAVES};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Version of the JSON form.
+const VERSION: u32 = 1;
+
+/// Arguments of `probe`.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Example:
+  printf 'x,y,z,nx,ny,nz\\n0.2,0.1,-0.2,0,1,0\\n' > points.csv
+  haarlight probe room.glb --points points.csv --bands -o light.csv")]
+pub struct ProbeArgs {
+    /// The room, .glb or .gltf.
+    pub room: PathBuf,
+    /// CSV with columns x,y,z,nx,ny,nz in glTF space.
+    #[arg(long, value_name = "POINTS.csv")]
+    pub points: PathBuf,
+    /// The CSV to write [default: stdout].
+    #[arg(short, long, value_name = "OUT.csv")]
+    pub output: Option<PathBuf>,
+    /// Irradiance on the 64 leaves as well.
+    #[arg(long)]
+    pub bands: bool,
+    /// What to read.
+    #[command(flatten)]
+    pub reading: Reading,
+    /// When to stop.
+    #[command(flatten)]
+    pub solving: Solving,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Solves and probes; the exit code.
+///
+/// # Errors
+/// Problems of the room and of the points, together; an output that cannot be written.
+pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
+    let stop = Stop::new(args.solving.time);
+    stop.listen()?;
+    let talk = Talk::new(common.quiet);
+    let mut read = match Points::open(&args.points) {
+        Ok(read) => read,
+        Err(Error::Input(problems)) => Points {
+            problems,
+            ..Points::default()
+        },
+        Err(problem) => Points {
+            problems: vec![Problem::new(
+                "--points",
+                problem.to_string(),
+                "name a file that can be read",
+            )],
+            ..Points::default()
+        },
+    };
+    let wrong = std::mem::take(&mut read.problems);
+    let scene = load(&args.room, &args.reading, |parts| {
+        problems(args, parts, wrong)
+    })?;
+    scene.warnings.iter().for_each(|w| talk.warn(w));
+    if !read.ignored.is_empty() {
+        talk.warn(&format!(
+            "columns of the points that are not read: {}",
+            read.ignored.join(", ")
+        ));
+    }
+    let representation = if args.bands {
+        Representation::Dense
+    } else {
+        Representation::Adaptive
+    };
+    let mut bake = prepare(scene, &args.solving, common, representation, &talk);
+    let verdict = stop.run(&mut bake, &talk, |_, _| Ok(()))?;
+    talk.phase("probing");
+    let probed = bake.probe(&read.points);
+    talk.clear();
+
+    let columns = columns(args.bands, &bake.scene().grid);
+    let rows: Vec<Vec<f64>> = read
+        .points
+        .iter()
+        .zip(&probed)
+        .map(|(p, light)| row(p, light, args.bands))
+        .collect();
+    let csv = || {
+        let lines = rows
+            .iter()
+            .map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
+        std::iter::once(columns.join(","))
+            .chain(lines)
+            .map(|line| line + "\n")
+            .collect::<String>()
+    };
+    if let Some(path) = &args.output {
+        file::write_atomic(path, Some(&args.room), |w| w.write_all(csv().as_bytes()))?;
+    }
+    if args.json {
+        let error = bake.rounds().last().map(|r| r.error.total_de2000);
+        let all = json!({
+            "version": VERSION,
+            "verdict": verdict,
+            "rounds": bake.rounds().len(),
+            "error_de2000": error,
+            "columns": columns,
+            "rows": rows,
+        });
+        print(&format!("{all}\n"))?;
+    } else if args.output.is_none() {
+        print(&csv())?;
+    }
+    Ok(exit_code(verdict))
+}
+
+/// Problems of the points and the output.
+fn problems(args: &ProbeArgs, parts: &[PathBuf], mut problems: Vec<Problem>) -> Vec<Problem> {
+    let outputs: Vec<_> = args
+        .output
+        .as_deref()
+        .map(|path| ("-o", path))
+        .into_iter()
+        .collect();
+    let beside = args.room.with_extension("spectra.json");
+    let mut inputs = vec![args.room.as_path(), &args.points];
+    inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));
+    inputs.extend(parts.iter().map(PathBuf::as_path));
+    problems.extend(paths::problems(&outputs, &inputs));
+    problems
+}
+
+fn columns(bands: bool, grid: &Grid) -> Vec<String> {
+    let mut columns: Vec<String> = COLUMNS
+        .into_iter()
+        .chain(["E_X", "E_Y", "E_Z"])
+        .map(String::from)
+        .collect();
+    if bands {
+        columns.extend((0..LEAVES).map(|leaf| format!("E_{}", grid.left(leaf))));
+    }
+    columns
+}
+
+fn row((point, normal): &Point, light: &Probed, bands: bool) -> Vec<f64> {
+    let mut row = [point.to_array(), normal.to_array(), light.xyz].concat();
+    if bands {
+        row.extend(light.leaves);
+    }
+    row
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_are_named_by_their_left_edge() {
+        let names = columns(true, &Grid::default());
+        assert_eq!(names.len(), 9 + 64);
+        assert_eq!(names[9..11], ["E_380", "E_386.25"]);
+        assert_eq!(columns(true, &Grid::paper())[72], "E_695");
+        assert_eq!(
+            columns(false, &Grid::default()).join(","),
+            "x,y,z,nx,ny,nz,E_X,E_Y,E_Z"
+        );
+    }
+}

@@ -1,0 +1,99 @@
+//! The table at the end of a bake: what each round cost and how wrong it left the room.
+
+use super::log::{AuditRecord, VerdictRecord};
+use crate::report::{Align, Table};
+use crate::solve::{Round, Verdict};
+
+/// Rounds as a table.
+pub(super) fn rounds(rounds: &[Round]) -> String {
+    use Align::Right;
+    let titles = [
+        "round",
+        "dE00",
+        "geometry",
+        "spectrum",
+        "solve",
+        "elements",
+        "links",
+        "intervals",
+        "rays",
+        "s",
+    ];
+    let mut table = Table::new(titles.map(|title| (title, Right)));
+    let error = |value: Option<f64>| value.map_or("-".into(), |v| format!("{v:.3}"));
+    for r in rounds {
+        table.row([
+            r.round.to_string(),
+            error(r.error.total_de2000.value),
+            error(r.error.geometry_de_luv.value),
+            error(r.error.spectrum_de_luv.value),
+            error(r.error.convergence_de_luv.value),
+            r.elements.to_string(),
+            r.links.to_string(),
+            r.intervals_working.to_string(),
+            r.rays.to_string(),
+            format!("{:.2}", r.round_s),
+        ]);
+    }
+    format!(
+        "{}(dE00: mean CIEDE2000, all sources; by source: dE*uv; estimates)",
+        table.terminal()
+    )
+}
+
+/// The verdict in a few lines.
+pub(super) fn verdict(v: &VerdictRecord, audit: Option<&AuditRecord>) -> String {
+    let error = v
+        .error_de2000
+        .value
+        .map_or("not known".into(), |e| format!("{e:.3}"));
+    let end = match v.verdict {
+        Verdict::Reached => "reached",
+        Verdict::OutOfTime => "not reached: out of time",
+        Verdict::Interrupted => "not reached: interrupted",
+        Verdict::OutOfRounds => "not reached: no more rounds allowed",
+        Verdict::Exhausted => "not reached: nothing left to refine",
+    };
+    let mut lines = vec![
+        format!(
+            "estimated error: dE00 {error}, asked for {}: {end}",
+            v.asked_de2000
+        ),
+        format!(
+            "{} vertices ({} covered, {} clipped), {} triangles; {:.0} rays/s, {:.0} links/s",
+            v.vertices, v.covered, v.clipped, v.triangles, v.rays_per_s, v.links_per_s
+        ),
+        format!(
+            "{:.2} s: load {:.2}, prepare {:.2}, solve {:.2}, snapshots {:.2}, gather {:.2}, audit {:.2}, write {:.2}",
+            v.seconds.total,
+            v.seconds.load,
+            v.seconds.prepare,
+            v.seconds.solve,
+            v.seconds.snapshots,
+            v.seconds.gather,
+            v.seconds.audit,
+            v.seconds.write
+        ),
+    ];
+    if v.capped > 0 {
+        lines.push(format!(
+            "{} triangles wanted to be finer than is allowed",
+            v.capped
+        ));
+    }
+    if let Some(audit) = audit {
+        let c = &audit.comparison;
+        let honest = match audit.honest {
+            Some(true) => "the estimate was honest",
+            Some(false) => "the estimate was NOT honest",
+            None => "no judgement on the estimate",
+        };
+        let [low, high] = c.bias.ci95.map(|x| 100.0 * x);
+        lines.push(format!(
+            "measured error at {} points: dE00 mean {:.3} (noise {:.3}), 95 % below {:.2}, max {:.2}; illuminance {:+.2} % ({low:.2} .. {high:.2}); {honest}",
+            c.points, c.de2000.corrected, c.de2000.noise, c.de2000.p95, c.de2000.max, 100.0 * c.bias.mean
+        ));
+    }
+    lines.push(format!("written: {}", v.outputs.glb));
+    lines.join("\n")
+}

@@ -1,0 +1,77 @@
+//! Spectra at the vertices of the refined mesh: `B(leaf) = rho(leaf) H(leaf) + pi L(leaf)`, W/m2/nm.
+//!
+//! The reflectance is the one behind [`BakedVertex::radiosity`](super::BakedVertex::radiosity): a paint texture enters
+//! with its mean colour. An emissive texture is looked up at the vertex.
+
+use super::bake::{Baked, Look};
+use super::{BakedSurface, BakedVertex};
+use crate::color::Upsampler;
+use crate::output::refined;
+use crate::scene::{Material, Surface};
+use crate::solve::Bake;
+use crate::spectrum::{LEAVES, Leaves};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+impl Bake {
+    /// Radiosity on the 64 leaves at every vertex, W/m2/nm, surface by surface, own emission included.
+    pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
+        let scene = self.scene();
+        let upsampler = Upsampler::new(&scene.grid);
+        let looks: Vec<Look> = scene
+            .materials
+            .iter()
+            .map(|m| Look::new(self, m, &upsampler))
+            .collect();
+        let surface = |(baked, rows): (&BakedSurface, &Vec<[f32; LEAVES]>)| {
+            let surface = &scene.surfaces[baked.surface];
+            let (material, look) = (&scene.materials[surface.material], &looks[surface.material]);
+            let vertex = |(vertex, row): (&BakedVertex, &[f32; LEAVES])| {
+                let irradiance = self.lanes().leaves(row);
+                let radiance = self.radiance(surface, material, vertex, &upsampler);
+                std::array::from_fn(|k| {
+                    (look.reflectance[k] * irradiance[k] + PI * radiance[k]) as f32
+                })
+            };
+            baked.vertices.par_iter().zip(rows).map(vertex).collect()
+        };
+        baked
+            .surfaces
+            .iter()
+            .zip(&baked.irradiance)
+            .map(surface)
+            .collect()
+    }
+
+    /// Emitted radiance at a vertex, W/m2/sr/nm.
+    fn radiance(
+        &self,
+        surface: &Surface,
+        material: &Material,
+        vertex: &BakedVertex,
+        upsampler: &Upsampler,
+    ) -> Leaves {
+        let Some(emission) = &material.emission else {
+            return [0.0; LEAVES];
+        };
+        let uvs = emission
+            .texture
+            .as_ref()
+            .and_then(|t| Some((t, surface.texcoords.get(t.texcoord)?)));
+        let shape = match uvs {
+            Some((texture, uvs)) => {
+                let corners = refined::corners(surface, vertex);
+                let uv = std::array::from_fn(|i| {
+                    (0..3)
+                        .map(|k| uvs[corners[k]][i] * vertex.weights[k] as f32)
+                        .sum()
+                });
+                let [r, g, b, _] = texture.sample(&self.scene().images, uv);
+                emission.shape_at([r, g, b], upsampler)
+            }
+            None => emission.shape,
+        };
+        let power = &self.scene().spectra[emission.light].power;
+        std::array::from_fn(|k| shape[k] * power[k])
+    }
+}

@@ -1,0 +1,189 @@
+//! Only the effects that a scene calls for are paid for: shown by counters, never by time.
+
+use glam::DVec3;
+use haarlight::scene::effects::{Kind, Plan};
+use haarlight::scene::{Options, Scene};
+use haarlight::solve::{Bake, Representation, Settings};
+use std::path::Path;
+
+fn room(name: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenes")
+        .join(name);
+    Scene::load(path, &Options::default()).unwrap()
+}
+
+fn baked(scene: Scene, representation: Representation) -> Bake {
+    let mut bake = Bake::new(
+        scene,
+        Settings {
+            error: 1.0,
+            representation,
+            rounds: 3,
+            ..Settings::default()
+        },
+    );
+    bake.run();
+    bake
+}
+
+/// Points in the air and on walls of a room around the middle.
+fn points(bake: &Bake) -> Vec<(DVec3, DVec3)> {
+    let mesh = bake.mesh();
+    let on_walls = mesh.triangles.iter().zip(&mesh.normal).map(|(t, n)| {
+        let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
+        (mesh.centre + 0.5 * a + 0.3 * b + 0.2 * c, *n)
+    });
+    let in_the_air = [DVec3::X, DVec3::Y, DVec3::NEG_Z].map(|n| (mesh.centre + 0.1 * n, n));
+    on_walls.chain(in_the_air).collect()
+}
+
+/// A grey room takes one band, and that band tells all 64.
+///
+/// Both solve the same system but from different first guesses; what is asked for is small enough that what the solver
+/// leaves undone (a share of it) is below the rounding of f32 sums.
+#[test]
+fn a_grey_room_takes_one_band() {
+    let solve = |scene: Scene, representation| {
+        let mut bake = Bake::new(
+            scene,
+            Settings {
+                error: 1e-3,
+                representation,
+                rounds: 2,
+                ..Settings::default()
+            },
+        );
+        bake.run();
+        bake
+    };
+    // The Cornell box under F2, its walls painted grey: shadows, and a lamp of lines.
+    let grey_box = || {
+        let mut scene = room("cornell-f2.glb");
+        for (k, material) in scene.materials.iter_mut().enumerate() {
+            material.reflectance = [0.2 + 0.15 * k as f64; 64];
+        }
+        scene
+    };
+    let rooms: [(&str, &dyn Fn() -> Scene); 3] = [
+        ("furnace", &|| room("furnace.glb")),
+        ("cube", &|| room("cie171-5.8.glb")),
+        ("grey box", &grey_box),
+    ];
+    for (name, scene) in rooms {
+        assert!(!Plan::of(&scene()).runs(Kind::Colour), "{name}");
+        let one = solve(scene(), Representation::Adaptive);
+        let all = solve(scene(), Representation::Dense);
+        for round in one.rounds() {
+            assert_eq!(round.intervals_working, 1, "{name}");
+        }
+        assert_eq!(all.rounds().last().unwrap().intervals_working, 64);
+        let points = points(&one);
+        for (k, (a, b)) in one
+            .probe(&points)
+            .iter()
+            .zip(all.probe(&points))
+            .enumerate()
+        {
+            for (a, b) in a
+                .xyz
+                .iter()
+                .chain(&a.leaves)
+                .zip(b.xyz.iter().chain(&b.leaves))
+            {
+                // Rows are f32 (6e-8); sums run over some hundred terms, iterations over some ten.
+                assert!(
+                    (a - b).abs() <= 1e-5 * b.abs(),
+                    "{name}, point {k}: {a} {b}"
+                );
+            }
+        }
+    }
+}
+
+/// Colour costs more than one band: the counter of the test above does count.
+#[test]
+fn a_coloured_room_takes_more() {
+    let bake = baked(room("cornell.glb"), Representation::Adaptive);
+    assert!(bake.plan().runs(Kind::Colour));
+    assert!(bake.rounds().iter().all(|r| r.intervals_working > 1));
+}
+
+/// Nothing can block in a convex empty room: no visibility ray for links, direct light, gather or probes.
+#[test]
+fn a_convex_room_casts_no_ray() {
+    for name in [
+        "convex.glb",
+        "furnace.glb",
+        "cie171-5.4.glb",
+        "cie171-5.8.glb",
+    ] {
+        let bake = baked(room(name), Representation::Adaptive);
+        assert!(!bake.plan().runs(Kind::Occlusion), "{name}");
+        assert_eq!(
+            bake.rounds().iter().map(|r| r.rays).sum::<u64>(),
+            0,
+            "{name}"
+        );
+        assert_eq!(bake.baked(&|_, _| {}).rays, 0, "{name}");
+    }
+    let bake = baked(room("two-rooms.glb"), Representation::Adaptive);
+    assert!(bake.rounds().iter().all(|r| r.rays > 0));
+    assert!(bake.baked(&|_, _| {}).rays > 0);
+}
+
+/// Black walls pass nothing on: nothing is iterated.
+#[test]
+fn black_walls_take_no_iteration() {
+    for name in [
+        "cie171-5.3.glb",
+        "cie171-5.4.glb",
+        "cie171-5.6.glb",
+        "cie171-5.7.glb",
+    ] {
+        let bake = baked(room(name), Representation::Adaptive);
+        assert!(!bake.plan().runs(Kind::Interreflection), "{name}");
+        for round in bake.rounds() {
+            assert_eq!(round.iterations, 0, "{name}");
+            assert!(round.flux.absorbed_lm > 0.0, "{name} is lit");
+        }
+    }
+    let bake = baked(room("cie171-5.8.glb"), Representation::Adaptive);
+    assert!(bake.rounds().iter().all(|r| r.iterations > 0));
+}
+
+/// Where no material has a texture there is no image, and so nothing that could be sampled.
+#[test]
+fn a_room_without_textures_has_none_to_sample() {
+    for name in ["cornell.glb", "two-rooms.glb", "convex.glb"] {
+        let scene = room(name);
+        assert!(
+            !Plan::of(&scene).runs(Kind::Textures) && scene.images.is_empty(),
+            "{name}"
+        );
+        let textured = scene
+            .materials
+            .iter()
+            .any(|m| m.paint.is_some() || m.emission.as_ref().is_some_and(|e| e.texture.is_some()));
+        assert!(!textured, "{name}");
+    }
+    let scene = room("furnished.glb");
+    assert!(Plan::of(&scene).runs(Kind::Textures) && !scene.images.is_empty());
+}
+
+/// One light spectrum keeps one cut of one tree; two keep two.
+#[test]
+fn one_light_spectrum_keeps_one_tree() {
+    let lights = |name: &str| {
+        let bake = baked(room(name), Representation::Adaptive);
+        let mut lights: Vec<_> = bake.lanes().lanes().iter().map(|l| l.light).collect();
+        // Each light's intervals stand together and tile the 64 leaves once.
+        for light in bake.lanes().lanes().chunk_by(|a, b| a.light == b.light) {
+            assert_eq!(light.iter().map(|l| l.count).sum::<usize>(), 64, "{name}");
+        }
+        lights.dedup();
+        (lights, bake.plan().runs(Kind::LightSpectra))
+    };
+    assert_eq!(lights("cornell.glb"), (vec![Some(0)], false));
+    assert_eq!(lights("two-rooms.glb"), (vec![Some(0), Some(1)], true));
+}
