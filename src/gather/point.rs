@@ -290,9 +290,10 @@ impl Gatherer<'_> {
             let r2 = d.length_squared();
             let (c1, c2) = (to.normal.dot(d), -s.normal.dot(d));
             if c1 > 0.0 && c2 > 0.0 && s.plane != to.plane {
+                // Random points of a cluster that is far: without bias, and never near enough to blow up.
                 memory
                     .weights
-                    .push(c1 * c2 / (r2 * (std::f64::consts::PI * r2 + s.area)) * s.area);
+                    .push(c1 * c2 / (std::f64::consts::PI * r2 * r2) * s.area);
                 memory.segments.push(Segment {
                     from: to.point.as_vec3(),
                     to: s.point.as_vec3(),

@@ -104,7 +104,7 @@ pub fn point_factor(tree: &Tree, s: &Sample, node: &Node, others: &[Sample]) -> 
         .min(1.0)
 }
 
-/// `cos cos / (pi r^2 + area)` towards a sample that stands for `area`: a disk seen from its axis, finite at r = 0.
+/// `cos cos / max(pi r^2, area)` towards a random sample that stands for `area`: without bias where it is far, at most 1/area near.
 fn point_to_point(s: &Sample, t: &Sample) -> f64 {
     let d = t.point - s.point;
     let r2 = d.length_squared();
@@ -115,7 +115,7 @@ fn point_to_point(s: &Sample, t: &Sample) -> f64 {
     if c1 <= 0.0 || c2 <= 0.0 {
         0.0
     } else {
-        c1 * c2 / (r2 * (PI * r2 + t.area))
+        c1 * c2 / (r2 * (PI * r2).max(t.area))
     }
 }
 
