@@ -346,6 +346,10 @@ fn calibration_of_the_estimate() {
         .unwrap()
         .map(|e| e.unwrap().path())
         .filter(|p| p.extension().is_some_and(|e| e == "glb"))
+        .filter(|p| {
+            std::env::var("ROOM").is_ok_and(|r| p.to_string_lossy().contains(&r))
+                || std::env::var("ROOM").is_err()
+        })
         .collect();
     names.sort();
     let mut dishonest = 0;

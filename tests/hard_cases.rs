@@ -536,13 +536,7 @@ fn ten_thousand_point_lights() {
         let (i, j) = (f64::from(k % 100), f64::from(k / 100));
         room.point(dvec3(0.05 + 0.1 * i, 2.5, 0.05 + 0.1 * j), 1.0);
     }
-    let bake = baked_with(
-        room.scene(),
-        Settings {
-            error: 2.0,
-            ..Settings::default()
-        },
-    );
+    let bake = baked(room.scene());
     let last = bake.rounds().last().unwrap();
     near(last.flux.absorbed_lm, 10_000.0, 1e-2);
 }
