@@ -192,8 +192,8 @@ fn the_solver_agrees_in_every_leaf() {
     bake.run();
     let mut square = 0.0;
     for (probed, truth) in bake.probe(&points).iter().zip(&truth) {
-        for leaf in 0..LEAVES {
-            let off = probed.leaves[leaf] / truth[leaf] - 1.0;
+        for (got, want) in probed.leaves.iter().zip(truth) {
+            let off = got / want - 1.0;
             square += off * off;
         }
     }
