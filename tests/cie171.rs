@@ -263,9 +263,9 @@ fn case_5_8_at_points() {
     let mut bake = Bake::new(scene, Settings::default());
     bake.run();
     for ((probed, truth), (p, _)) in bake.probe(&points).iter().zip(&truth).zip(&points) {
-        for (got, want) in probed.leaves.iter().zip(truth) {
+        for (leaf, (got, want)) in probed.leaves.iter().zip(truth).enumerate() {
             let off = got / want - 1.0;
-            assert!(off.abs() < POINT, "{p}: {off:e}");
+            assert!(off.abs() < POINT, "{p} leaf {leaf}: {off:e}");
         }
     }
 }

@@ -19,6 +19,8 @@ const CLUSTER_POINTS: [usize; 2] = [4, 8];
 const CLOSE: f64 = 1.5;
 /// Faces of a cluster that are treated as polygons.
 const POLYGONS: u32 = 4;
+/// A patch that carries less than this many tolerances is as visible as its link found: no ray of its own.
+const SLIGHT: f64 = 0.1;
 /// How many rays a link's visibility counts for.
 const PRIOR: f64 = 4.0;
 /// How often a lamp's triangle is quartered where its shadow boundary crosses it.
@@ -54,6 +56,18 @@ pub struct Gathered {
     pub rays: u64,
 }
 
+impl Gathered {
+    /// No light, nothing seen.
+    pub(crate) fn dark() -> Self {
+        Self {
+            irradiance: [0.0; 64],
+            direct: [0.0; 64],
+            seen: 0.0,
+            rays: 0,
+        }
+    }
+}
+
 /// Reused memory of one thread and its ray count.
 #[derive(Debug, Default)]
 pub struct Memory {
@@ -85,12 +99,7 @@ pub struct Gatherer<'a> {
 impl Gatherer<'_> {
     /// Gathers what comes straight from lamps.
     pub fn direct(&self, to: &Receiver, memory: &mut Memory) -> [f32; 64] {
-        let mut out = Gathered {
-            irradiance: [0.0; 64],
-            direct: [0.0; 64],
-            seen: 0.0,
-            rays: 0,
-        };
+        let mut out = Gathered::dark();
         let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
         memory.stack.clear();
         let mut above = to.leaf;
@@ -111,12 +120,7 @@ impl Gatherer<'_> {
     /// Gathers at a point.
     pub fn at(&self, to: &Receiver, memory: &mut Memory) -> Gathered {
         let before = memory.rays;
-        let mut out = Gathered {
-            irradiance: [0.0; 64],
-            direct: [0.0; 64],
-            seen: 0.0,
-            rays: 0,
-        };
+        let mut out = Gathered::dark();
         memory.stack.clear();
         match to.leaf {
             Some(leaf) => {
@@ -180,7 +184,13 @@ impl Gatherer<'_> {
                 return;
             }
             let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
-            self.cluster(to, id, count, clear, memory, out);
+            let slight = factor * reflected < SLIGHT * self.tolerance && to.leaf.is_some();
+            let known = if clear {
+                Some(1.0)
+            } else {
+                slight.then_some(v)
+            };
+            self.cluster(to, id, count, known, memory, out);
             return;
         }
         let sample = Sample {
@@ -277,7 +287,7 @@ impl Gatherer<'_> {
         to: &Receiver,
         id: u32,
         count: usize,
-        clear: bool,
+        known: Option<f32>,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
@@ -305,8 +315,8 @@ impl Gatherer<'_> {
         if factor <= 0.0 {
             return;
         }
-        let mut visible = 1.0;
-        if !clear && self.sight.occlusion {
+        let mut visible = f64::from(known.unwrap_or(1.0));
+        if known.is_none() && self.sight.occlusion {
             self.sight
                 .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
@@ -338,6 +348,9 @@ impl Gatherer<'_> {
         let Some(element) = self.tree.element(node) else {
             return 1.0;
         };
+        if !lamp && to.leaf.is_some() && carries < SLIGHT * self.tolerance {
+            return f64::from(known);
+        }
         let plane = self.tree.face_plane[element.face as usize];
         if let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);

@@ -90,8 +90,8 @@ const LEAF_SHARE: f64 = 4.0;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already.
 const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
-/// No further round beyond this many links: about 120 MB.
-const MOST_LINKS: usize = 2_500_000;
+/// No round that would make more links than this, at four times those of the last: about 200 MB.
+const MOST_LINKS: usize = 4_000_000;
 /// Leaves whose lists are looked at after a round.
 const LISTED_LEAVES: usize = 4096;
 /// Elements are not split below this share of the area of all faces.
@@ -297,7 +297,7 @@ impl Bake {
         let stalled = before
             .zip(estimate(last))
             .is_some_and(|(before, now)| now > STALLED * before);
-        (last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING))
+        (4 * last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING))
             .then_some(Verdict::Exhausted)
     }
 
@@ -624,6 +624,10 @@ impl Bake {
 
     /// Gathers at receivers, in order.
     pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
+        if self.light.width() == 0 || self.light.white == [0.0; 3] {
+            // A room without light: nothing to look for.
+            return vec![Gathered::dark(); receivers.len()];
+        }
         self.with_sight(|bake, sight| {
             let gatherer = bake.gatherer(sight);
             receivers

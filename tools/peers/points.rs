@@ -9,7 +9,7 @@
 use anyhow::{Context, Result};
 use glam::DVec3;
 use haarlight::audit::Audit;
-use haarlight::color::Observer;
+use haarlight::color::{KM, Observer};
 use haarlight::geometry::RayIndex;
 use haarlight::geometry::sampling::{Pcg, on_triangle};
 use haarlight::hierarchy::Mesh;
@@ -80,7 +80,10 @@ fn export(scene: &Scene, count: usize) -> Result<serde_json::Value> {
                 "two_sided": m.sides == Sides::Both, "textured": m.paint.is_some() })
         })
         .collect();
-    let weights = Observer::cie1931().weights(&scene.grid);
+    // W/m2/nm on a leaf to lx.
+    let weights = Observer::cie1931()
+        .weights(&scene.grid)
+        .map(|w| w.map(|x| KM * x));
     let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
     let rays = RayIndex::build(
         &positions,
