@@ -214,14 +214,12 @@ fn white_furnace_leak_test() {
 
 /// White inside.
 #[test]
-#[ignore = "1.4e-6 of the outside light gets in: clusters hold inner and outer walls together"]
 fn white_furnace_leak_test_of_a_white_room() {
     no_leak(0.9, false);
 }
 
 /// The same with an outer skin of its own, 0.1 m away.
 #[test]
-#[ignore = "1.1e-3 of the outside light gets in: clusters hold inner and outer walls together"]
 fn white_furnace_leak_test_of_thick_walls() {
     no_leak(0.0, true);
     no_leak(0.9, true);

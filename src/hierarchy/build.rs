@@ -19,6 +19,7 @@ struct Item {
     normal: DVec3,
     area: f64,
     plane: u32,
+    space: u32,
 }
 
 /// A box, a sum of normals, an area: enough for the cost.
@@ -72,7 +73,7 @@ impl Bounds {
     }
 }
 
-pub(super) fn build(mesh: &Mesh) -> Tree {
+pub(super) fn build(mesh: &Mesh, spaces: &[u32]) -> Tree {
     let mut items: Vec<Item> = mesh
         .faces
         .iter()
@@ -91,9 +92,12 @@ pub(super) fn build(mesh: &Mesh) -> Tree {
                 normal: mesh.face_normal(face),
                 area: mesh.area[t],
                 plane: mesh.plane[t],
+                space: spaces[k],
             }
         })
         .collect();
+    // Spaces first; within one, in the order of the file.
+    items.sort_by_key(|item| item.space);
     let mut tree = Tree {
         nodes: Vec::with_capacity(2 * items.len()),
         elements: Vec::with_capacity(items.len()),
@@ -118,7 +122,8 @@ pub(super) fn build(mesh: &Mesh) -> Tree {
         if count == 1 {
             continue;
         }
-        let half = split(&mut items[first..first + count]);
+        let part = &mut items[first..first + count];
+        let half = between_spaces(part).unwrap_or_else(|| split(part));
         let child = tree.nodes.len() as u32;
         tree.nodes.push(placeholder(id, first, half));
         tree.nodes.push(placeholder(id, first + half, count - half));
@@ -156,6 +161,19 @@ fn placeholder(parent: u32, first: usize, count: usize) -> Node {
         normal: DVec3::ZERO,
         cone: -1.0,
     }
+}
+
+/// Where to part items, in order of their spaces, of more than one space: between two of them, near the middle.
+fn between_spaces(items: &[Item]) -> Option<usize> {
+    let (first, last) = (items.first()?.space, items.last()?.space);
+    if first == last {
+        return None;
+    }
+    let middle = items[items.len() / 2].space;
+    // Before the middle's space, or after it where that is the first of all.
+    let before = items.partition_point(|item| item.space < middle);
+    let after = items.partition_point(|item| item.space <= middle);
+    Some(if before > 0 { before } else { after })
 }
 
 /// Reorders `items` into two parts and returns the size of the first.

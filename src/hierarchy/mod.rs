@@ -2,9 +2,11 @@
 
 mod build;
 mod mesh;
+mod spaces;
 mod tree;
 mod validate;
 
 pub use mesh::{Face, Mesh};
+pub use spaces::spaces;
 pub(crate) use tree::stratified;
 pub use tree::{Element, NONE, Node, Sample, Tree};

@@ -132,9 +132,10 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// Builds the clusters over all faces of `mesh`.
-    pub fn new(mesh: &Mesh) -> Self {
-        super::build::build(mesh)
+    /// Builds the clusters over all faces of `mesh`; only the topmost hold faces of more than one of the `spaces`, which
+    /// name the space of each face.
+    pub fn new(mesh: &Mesh, spaces: &[u32]) -> Self {
+        super::build::build(mesh, spaces)
     }
 
     /// Bytes held.

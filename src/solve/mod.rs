@@ -25,7 +25,7 @@ pub(crate) use sources::weights_of;
 use crate::color::Observer;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
-use crate::hierarchy::{Mesh, Tree};
+use crate::hierarchy::{Mesh, Tree, spaces};
 use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
@@ -139,7 +139,6 @@ impl Bake {
         let started = Instant::now();
         let plan = Plan::of(&scene);
         let mesh = Mesh::new(&scene);
-        let tree = Tree::new(&mesh);
         let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
         let masked: Vec<bool> = mesh
             .material
@@ -152,6 +151,12 @@ impl Bake {
             })
             .collect();
         let rays = RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked);
+        let spaces = if plan.runs(Kind::Occlusion) {
+            spaces(&mesh, &rays, settings.seed)
+        } else {
+            vec![0; mesh.faces.len()]
+        };
+        let tree = Tree::new(&mesh, &spaces);
         let weights = Observer::cie1931().weights(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
         let probes = estimate::Probes::new(&tree, settings.seed);
