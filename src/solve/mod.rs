@@ -92,6 +92,8 @@ const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
 /// No round that would make more links than this, at four times those of the last: about 200 MB.
 const MOST_LINKS: usize = 4_000_000;
+/// Rooms of this many faces choose their lanes once.
+const MANY_FACES: usize = 50_000;
 /// Leaves whose lists are looked at after a round.
 const LISTED_LEAVES: usize = 4096;
 /// Elements are not split below this share of the area of all faces.
@@ -219,7 +221,9 @@ impl Bake {
         self.graph = graph;
         clock.lap("links");
 
-        if round < 2 {
+        // The first links are coarse: look again once there are more. A room of many faces is not coarse even then, and
+        // new lanes would ask for all direct light anew.
+        if round == 0 || (round == 1 && self.tree.faces.len() < MANY_FACES) {
             self.choose_lanes();
         }
         clock.lap("spectrum");

@@ -11,6 +11,8 @@ use std::f64::consts::PI;
 
 /// Points of an element that a light is looked at from.
 const POINTS: usize = 4;
+/// Leaves below this share of all area do not count for the choice of lanes.
+const SLIGHT: f64 = 1e-5;
 /// Elements that a task looks at.
 const CHUNK: usize = 64;
 
@@ -138,6 +140,7 @@ pub(super) fn factors(
             rays: 0,
         };
     }
+    let total = tree.nodes.first().map_or(0.0, |n| n.area);
     let parts: Vec<(Vec<Factors>, u64)> = leaves
         .par_chunks(CHUNK)
         .map(|chunk| {
@@ -145,6 +148,9 @@ pub(super) fn factors(
             let lists = chunk
                 .iter()
                 .map(|&leaf| {
+                    if tree.node(leaf).area < SLIGHT * total {
+                        return Vec::new();
+                    }
                     at_samples(tree, leaf, &lights, sight, mesh.half_size, &mut rays)
                         .iter()
                         .enumerate()
