@@ -154,7 +154,6 @@ fn flux_balance_of_a_closed_room() {
 
 /// And what is given out arrives.
 #[test]
-#[ignore = "received -.32 % by the quadrature over large leaves"]
 fn received_flux_of_a_closed_room() {
     let bake = baked(furnished());
     near(bake.rounds().last().unwrap().flux.received_lm, 7000.0, 2e-3);

@@ -5,7 +5,7 @@ use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02, triangle_weights};
 use crate::hierarchy::{Mesh, NONE, Tree};
 use crate::link::Sight;
-use crate::scene::Scene;
+use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -31,21 +31,23 @@ pub enum Closed {
     No,
 }
 
-/// Casts rays from the fronts of all faces: the room is closed if every one meets the front of something.
+/// Casts rays from the fronts of all faces: the room is closed if every one meets the front of something. The second
+/// answer leaves out points that something solid covers, such as the floor below a box.
 pub(super) fn closedness(
     mesh: &Mesh,
     tree: &Tree,
     rays: &RayIndex,
     sight: &Sight,
     seed: u64,
-) -> Closed {
+) -> [Closed; 2] {
     let Some(root) = tree.nodes.first() else {
-        return Closed::No;
+        return [Closed::No; 2];
     };
     if sight.opaque.is_some() {
         // Holes lead somewhere else.
-        return Closed::No;
+        return [Closed::No; 2];
     }
+    let mut all = Closed::Yes;
     let mut rng = Pcg::new(seed ^ 0x00c1_05ed);
     for _ in 0..ESCAPE_RAYS {
         let target = rng.f64() * root.area;
@@ -54,11 +56,14 @@ pub(super) fn closedness(
         let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
         let from = element.at(triangle_weights([rng.f64(), rng.f64()]));
         let direction = cosine_direction(tree.face_normal[entry], [rng.f64(), rng.f64()]);
-        if meets(mesh, tree, rays, from, direction, tree.face_plane[entry]) != Meets::Front {
-            return Closed::No;
+        let (normal, plane) = (tree.face_normal[entry], tree.face_plane[entry]);
+        match meets(mesh, tree, rays, from, direction, plane) {
+            Meets::Front => {}
+            Meets::Back if covered(mesh, tree, rays, from, normal, plane, seed) => all = Closed::No,
+            Meets::Back | Meets::Nothing => return [Closed::No; 2],
         }
     }
-    Closed::Yes
+    [all, Closed::Yes]
 }
 
 /// What a ray from a surface meets.
@@ -288,6 +293,56 @@ pub(super) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         };
     }
     Guess { white, bright }
+}
+
+/// A closed room's direct light is off by the quadrature over leaves only; beyond this share something else is wrong
+/// (a lamp inside something solid), and nothing is scaled.
+const GREATEST_LOSS: f64 = 0.1;
+
+/// Scales direct light on the leaves of a closed room, lane by lane, so that the fronts receive exactly what the lamps
+/// give out: what rows of links are balanced for, for lamps.
+pub(super) fn conserve(
+    first: &mut super::Rows,
+    emission: &super::Rows,
+    lamps: &[(PunctualLight, Vec<f32>)],
+    areas: &[f64],
+    leaves: &[u32],
+) {
+    let width = first.width();
+    let (mut given, mut received) = (vec![0.0; width], vec![0.0; width]);
+    for (light, row) in lamps {
+        let Some(solid) = super::punctual::solid_angle(light.kind) else {
+            // How much parallel light enters is not known.
+            return;
+        };
+        for (given, intensity) in given.iter_mut().zip(row) {
+            *given += solid * f64::from(*intensity);
+        }
+    }
+    for (k, &leaf) in leaves.iter().enumerate() {
+        let area = areas[leaf as usize];
+        for l in 0..width {
+            given[l] += area * f64::from(emission.row(k)[l]);
+            received[l] += area * f64::from(first.row(k)[l]);
+        }
+    }
+    let scale: Vec<f32> = given
+        .iter()
+        .zip(&received)
+        .map(|(given, received)| {
+            let ratio = given / received;
+            if (ratio - 1.0).abs() < GREATEST_LOSS {
+                ratio as f32
+            } else {
+                1.0
+            }
+        })
+        .collect();
+    for k in 0..leaves.len() {
+        for (x, s) in first.row_mut(k).iter_mut().zip(&scale) {
+            *x *= s;
+        }
+    }
 }
 
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.

@@ -117,6 +117,8 @@ pub struct Bake {
     rays: RayIndex,
     graph: Graph,
     closed: Closed,
+    /// The same for what is not covered by something solid.
+    sealed: Closed,
     weights: [Leaves; 3],
     lanes: Lanes,
     spectrum_error: f64,
@@ -164,6 +166,7 @@ impl Bake {
         let probes = estimate::Probes::new(&tree, settings.seed);
         let mut bake = Self {
             closed: Closed::No,
+            sealed: Closed::No,
             outlook: flux::Outlook::default(),
             areas: Vec::new(),
             balance: Balance::default(),
@@ -186,7 +189,7 @@ impl Bake {
             probes,
             started,
         };
-        bake.closed = bake.with_sight(|bake, sight| {
+        [bake.closed, bake.sealed] = bake.with_sight(|bake, sight| {
             flux::closedness(
                 &bake.mesh,
                 &bake.tree,
@@ -525,6 +528,9 @@ impl Bake {
         for (k, &leaf) in leaves.iter().enumerate() {
             let row = self.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
+        }
+        if self.sealed == Closed::Yes {
+            flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
         }
         let operator = Operator {
             tree: &self.tree,
