@@ -17,6 +17,9 @@ use glam::Vec3;
 /// neighbour's plane by a few roundings of its coordinates (2^-24), and must not be hidden by it.
 pub const END_GAP: f32 = 1e-6;
 
+/// Hits in one plane whose distances differ by less than this share are in one place: a few roundings.
+const TOGETHER: f32 = 8.0 * f32::EPSILON;
+
 /// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
@@ -287,29 +290,42 @@ impl RayIndex {
                 if plane == ignore_plane && plane != NO_PLANE {
                     continue;
                 }
-                // Equal distances go to the lower id, whatever the order of the tree.
+                // Equal distances go to the lower id, whatever the order of the tree; but a sheet made of two faces back
+                // to back is met at the one that faces the ray.
                 let nearer = best.is_none_or(|(t0, b, l, _)| {
-                    (t[lane], block.ids[lane]) < (t0, self.tree.blocks[b].ids[l])
+                    let other = &self.tree.blocks[b];
+                    let together = plane == other.planes[l]
+                        && plane != NO_PLANE
+                        && (t[lane] - t0).abs() <= TOGETHER * t0;
+                    if together && behind(block, lane, direction) != behind(other, l, direction) {
+                        return !behind(block, lane, direction);
+                    }
+                    (t[lane], block.ids[lane]) < (t0, other.ids[l])
                 });
                 if nearer
                     && (block.masked >> lane & 1 == 0 || opaque(block.ids[lane], u[lane], v[lane]))
                 {
                     best = Some((t[lane], number, lane, [u[lane], v[lane]]));
-                    line.range[1] = line.range[1].min(t[lane] * (1.0 + 2.0 * f32::EPSILON));
+                    line.range[1] = line.range[1].min(t[lane] * (1.0 + TOGETHER));
                 }
             }
         }
         best.map(|(t, number, lane, uv)| {
             let block = &self.tree.blocks[number];
-            let [a, b, c] = block.corner_lane(lane).map(Vec3::from);
             Hit {
                 t,
                 triangle: block.ids[lane],
                 uv,
-                from_behind: (b - a).cross(c - a).dot(direction) > 0.0,
+                from_behind: behind(block, lane, direction),
             }
         })
     }
+}
+
+/// Does a ray meet the back of a triangle of the block?
+fn behind(block: &Block, lane: usize, direction: Vec3) -> bool {
+    let [a, b, c] = block.corner_lane(lane).map(Vec3::from);
+    (b - a).cross(c - a).dot(direction) > 0.0
 }
 
 /// Does a triangle of the block hide the segment?
@@ -346,6 +362,36 @@ mod tests {
     use super::*;
     use crate::geometry::sampling::{Pcg, cosine_direction, sequence02, sphere_direction};
     use glam::DVec3;
+
+    /// Two squares in one place that look opposite ways, cut along different diagonals: each ray meets a front.
+    #[test]
+    fn sheets_of_two_faces_show_a_front_to_both_sides() {
+        let corners = [
+            Vec3::new(0.1, 0.3, 0.0),
+            Vec3::new(1.2, 0.3, 0.0),
+            Vec3::new(1.2, 1.1, 0.0),
+            Vec3::new(0.1, 1.1, 0.0),
+        ];
+        let positions: Vec<Vec3> = corners
+            .iter()
+            .map(|c| Vec3::new(c.x, c.y, 0.3 * c.x + 0.7 * c.y))
+            .collect();
+        for triangles in [
+            vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+            vec![[0, 3, 1], [1, 3, 2], [0, 1, 2], [0, 2, 3]],
+        ] {
+            let index = RayIndex::build(&positions, &triangles, &[0; 4], &[false; 4]);
+            let mut random = Pcg::new(3);
+            for k in 0..1000 {
+                let from =
+                    point(&mut random) + Vec3::new(0.6, 0.7, if k % 2 == 0 { 3.0 } else { -3.0 });
+                let to = Vec3::new(0.2 + 0.9 * random.f32(), 0.4 + 0.6 * random.f32(), 0.0);
+                let to = Vec3::new(to.x, to.y, 0.3 * to.x + 0.7 * to.y);
+                let hit = index.closest(from, to - from, 2.0, NO_PLANE).unwrap();
+                assert!(!hit.from_behind, "{from} {to}: {hit:?}");
+            }
+        }
+    }
 
     fn point(random: &mut Pcg) -> Vec3 {
         Vec3::new(random.f32(), random.f32(), random.f32()) * 2.0 - 1.0
