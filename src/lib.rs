@@ -1,4 +1,30 @@
 //! Bakes light into glTF rooms in full spectrum, by progressive hierarchical radiosity.
+//!
+//! ```
+//! use haarlight::scene::{Options, Scene};
+//! use haarlight::solve::{Bake, Settings, Verdict};
+//! use glam::DVec3;
+//!
+//! let room = Scene::load("scenes/convex.glb", &Options::default())?;
+//! let mut bake = Bake::new(room, Settings { error: 2.0, ..Settings::default() });
+//! // Every step leaves a whole solution and a record of what it cost and how wrong it still is.
+//! assert_eq!(bake.run(), Verdict::Reached);
+//! let centre = bake.mesh().centre;
+//! let lux = bake.probe(&[(centre, DVec3::Y)])[0].xyz[1];
+//! assert!(lux > 0.0);
+//! # Ok::<(), haarlight::Error>(())
+//! ```
+//!
+//! The chain: [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`solve`] -> [`gather`] ->
+//! [`output`] and [`report`], with [`audit`] beside it. A module uses what stands to its left.
+//!
+//! | Rougeron and Peroche 1997 | module |
+//! |---|---|
+//! | 2 other methods | [`spectrum::methods`] |
+//! | 3.1 trees, source | [`spectrum`]: `tree`, `source` |
+//! | 3.2 product, refine, merge | [`spectrum`]: `product`, `control` |
+//! | 4 tests | [`cli::paper`] |
+//! | 5 the neglected term | [`spectrum`]: `bound`, `sum` |
 
 pub mod audit;
 pub mod cli;

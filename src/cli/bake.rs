@@ -112,15 +112,12 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
     seconds.prepare = clock.elapsed().as_secs_f64();
 
-    // Of the last round, if a picture was taken of it.
-    let mut baked: Option<Baked> = None;
     let verdict = stop.run(&mut bake, &talk, |bake, round| {
         seconds.solve += round.round_s;
         write(&mut log, round)?;
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
             let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
-            seconds.gather = clock.elapsed().as_secs_f64();
             talk.phase("drawing");
             let files = snapshots.round(round.round, bake.scene(), &light.surfaces)?;
             let exposure = snapshots.exposure(bake.scene(), &light.surfaces);
@@ -129,25 +126,15 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
                 &SnapshotsRecord::new(round.round, &files, exposure),
             )?;
             outputs.pictures.extend(files);
-            baked = Some(light);
             seconds.snapshots += clock.elapsed().as_secs_f64();
         }
         Ok(())
     })?;
 
-    let baked = match baked {
-        // The last picture's gather is the result's.
-        Some(baked) => {
-            seconds.snapshots -= seconds.gather;
-            baked
-        }
-        None => {
-            let clock = Instant::now();
-            let baked = bake.baked(&|done, of| talk.progress("gathering", done, of));
-            seconds.gather = clock.elapsed().as_secs_f64();
-            baked
-        }
-    };
+    // Pictures on the way are sketches; the result is looked at more closely.
+    let clock = Instant::now();
+    let baked = bake.baked(&|done, of| talk.progress("gathering", done, of));
+    seconds.gather = clock.elapsed().as_secs_f64();
 
     let clock = Instant::now();
     talk.phase("writing");

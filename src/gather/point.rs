@@ -184,7 +184,9 @@ impl Gatherer<'_> {
                 return;
             }
             let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
-            let slight = factor * reflected < SLIGHT * self.tolerance && to.leaf.is_some();
+            let slight = factor * reflected < SLIGHT * self.tolerance
+                && to.leaf.is_some()
+                && !self.sight.small();
             let known = if clear {
                 Some(1.0)
             } else {
@@ -348,7 +350,7 @@ impl Gatherer<'_> {
         let Some(element) = self.tree.element(node) else {
             return 1.0;
         };
-        if !lamp && to.leaf.is_some() && carries < SLIGHT * self.tolerance {
+        if !lamp && to.leaf.is_some() && !self.sight.small() && carries < SLIGHT * self.tolerance {
             return f64::from(known);
         }
         let plane = self.tree.face_plane[element.face as usize];
@@ -420,7 +422,8 @@ impl Gatherer<'_> {
             .filter(|(_, b)| !**b)
             .map(|(w, _)| w)
             .sum();
-        if total <= 0.0 {
+        // Where no ray gets through, nothing does: what other parts of the element see must not leak in.
+        if seen <= 0.0 {
             return 0.0;
         }
         // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it

@@ -83,10 +83,12 @@ const THRESHOLD_STEP: f64 = 3.0;
 /// Darker than this share of white counts as this dark: nobody sees lightness below it.
 const DARKEST: f64 = 0.02;
 /// Links keep this much less error than the threshold: there are many to a leaf.
-const LINK_SHARE: f64 = 4.0;
+const LINK_SHARE: [f64; 2] = [8.0, 4.0];
 /// Direct light may vary over a leaf by this multiple of the threshold. From 1 to 16 the Cornell box's error at points
 /// changes by less than a tenth: what a leaf reflects is seen as a whole.
-const LEAF_SHARE: f64 = 4.0;
+const LEAF_SHARE: [f64; 2] = [1.0, 4.0];
+/// The second figures hold for rooms of this many faces and more: leaves are faces there, and small anyway.
+const FURNISHED: usize = 4096;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already.
 const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
@@ -208,12 +210,13 @@ impl Bake {
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
         let bright = self.brightness_of_nodes();
+        let furnished = usize::from(self.tree.faces.len() >= FURNISHED);
         let keen = self.keenness();
         let demand = Demand {
             bright: &bright,
             keen: &keen,
             total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
-            threshold: threshold / LINK_SHARE,
+            threshold: threshold / LINK_SHARE[furnished],
             least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
         };
         let mut tree = std::mem::take(&mut self.tree);
@@ -233,7 +236,7 @@ impl Bake {
 
         let direct_rays = self.direct.rays;
         let demand = Demand {
-            threshold: threshold * LEAF_SHARE,
+            threshold: threshold * LEAF_SHARE[furnished],
             ..demand
         };
         self.gather_direct(&demand);
