@@ -458,7 +458,6 @@ fn light_through_a_narrow_gap() {
 
 /// A sheet across a room, lamp on one side: the other side is exactly dark, in the solution and at the vertices.
 #[test]
-#[ignore = "2e-4 of the bright side's light on the dark side: walls that the sheet crosses are not cut along it"]
 fn thin_wall_with_a_bright_and_a_dark_side() {
     let mut room = Room::new();
     let (wall, lamp, sheet) = (room.paint(0.8), room.lamp(0.5, 1e5), room.paint(0.8));
