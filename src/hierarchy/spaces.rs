@@ -5,7 +5,7 @@
 //! light cannot pass between. They may leave a space in parts, which only makes the cluster tree a little worse.
 //!
 //! A triangle that others meet takes part in its parts ([`super::cut`]): those that belong to different spaces must not
-//! share a patch. Parts that no ray joins to anything lie under or in something solid and belong nowhere.
+//! share a patch. Parts whose rays meet black backs for the most part lie under or in something solid, and belong nowhere.
 
 use super::cut::Cut;
 use super::mesh::Mesh;
@@ -25,6 +25,8 @@ const NONE: u32 = u32::MAX;
 /// Rays leave a part this share of the way from its border to its middle, and those that meet one nearer to its border
 /// than this share of the scene's half size tell nothing: single precision might take them through a wall.
 const CLEAR_OF_BORDER: [f64; 2] = [0.02, 1e-5];
+/// Parts narrower than this share of the scene's half size send no rays, for the same reason.
+const NARROW: f64 = 1e-4;
 
 /// Spaces, and what must be cut for their sake.
 #[derive(Debug, Clone)]
@@ -43,8 +45,13 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
     let mut above: Vec<u32> = (0..count as u32).collect();
     let takes_part = |k: u32| {
         let whole = |face| rooms.cut_of[mesh.faces[face as usize].triangle as usize] == NONE;
-        k as usize >= faces || whole(k)
+        match (k as usize).checked_sub(faces) {
+            None => whole(k),
+            Some(part) => !rooms.narrow(part),
+        }
     };
+    // How many rays of parts met fronts, less those that met backs.
+    let mut fronts = vec![0_i32; count - faces];
     let mut open: Vec<u32> = (0..count as u32).filter(|&k| takes_part(k)).collect();
     for pass in 0..PASSES {
         let wanted = if pass == 0 {
@@ -52,16 +59,24 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
         } else {
             RAYS
         };
-        let met: Vec<(u32, u32)> = open
+        let met: Vec<(u32, Meets)> = open
             .par_iter()
             .flat_map_iter(|&id| {
                 let seed = hash(hash(seed, pass), u64::from(id));
                 let rooms = &rooms;
-                (0..wanted).filter_map(move |k| Some((id, rooms.meet(id, k, seed)?)))
+                (0..wanted).map(move |k| (id, rooms.meet(id, k, seed)))
             })
             .collect();
-        for (a, b) in met {
-            join(&mut above, a, b);
+        for (a, meets) in met {
+            let part = (a as usize).checked_sub(faces);
+            match meets {
+                Meets::Front(b) => {
+                    join(&mut above, a, b);
+                    part.into_iter().for_each(|part| fronts[part] += 1);
+                }
+                Meets::Back => part.into_iter().for_each(|part| fronts[part] -= 1),
+                Meets::Nothing => {}
+            }
         }
         let largest = largest(&mut above);
         open.retain(|&k| find(&mut above, k) != largest);
@@ -71,20 +86,16 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
     }
     // A face in parts belongs where the first of them does that belongs anywhere.
     let roots: Vec<u32> = (0..count as u32).map(|k| find(&mut above, k)).collect();
-    let mut sizes = vec![0_u32; count];
-    for &root in &roots {
-        sizes[root as usize] += 1;
-    }
     let mut parted = Vec::new();
     for (c, part) in rooms.parts.iter().enumerate() {
         let mut apart = false;
         for side in (0..2).filter(|&side| part.first[side] != NONE) {
             let first = part.first[side] as usize;
-            let mut somewhere = roots[first..first + part.polygons.len()]
-                .iter()
-                .filter(|&&root| sizes[root as usize] > 1);
-            if let Some(&root) = somewhere.next() {
-                apart |= somewhere.any(|&other| other != root);
+            let mut somewhere = (first..first + part.polygons.len())
+                .filter(|&id| fronts[id - faces] > 0)
+                .map(|id| roots[id]);
+            if let Some(root) = somewhere.next() {
+                apart |= somewhere.any(|other| other != root);
                 let face = rooms.sides[part.triangle as usize][side];
                 join(&mut above, face, root);
             }
@@ -99,6 +110,16 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
         of_face: numbered(above),
         parted,
     }
+}
+
+/// What a ray meets.
+enum Meets {
+    /// A face or part.
+    Front(u32),
+    /// The black back of something.
+    Back,
+    /// Nothing, or a place too near to the border of a part to tell.
+    Nothing,
 }
 
 /// A cut triangle: its parts in space, and the id of the first of them on each side.
@@ -158,8 +179,22 @@ impl<'a> Rooms<'a> {
         self.mesh.faces.len() + self.which.len()
     }
 
-    /// The face or part that ray `k` of a face or part meets.
-    fn meet(&self, id: u32, k: u32, seed: u64) -> Option<u32> {
+    /// Is a part too narrow to send rays from?
+    fn narrow(&self, part: usize) -> bool {
+        let (cut, polygon, _) = self.which[part];
+        let corners = &self.parts[cut as usize].polygons[polygon as usize];
+        let (mut area, mut border) = (DVec3::ZERO, 0.0);
+        for (k, &a) in corners.iter().enumerate() {
+            let b = corners[(k + 1) % corners.len()];
+            area += 0.5 * (a - corners[0]).cross(b - corners[0]);
+            border += a.distance(b);
+        }
+        // Twice the area over the border: half the width of a strip, the radius of a circle.
+        2.0 * area.length() < NARROW * self.mesh.half_size * border
+    }
+
+    /// What ray `k` of a face or part meets.
+    fn meet(&self, id: u32, k: u32, seed: u64) -> Meets {
         let mesh = self.mesh;
         let (triangle, back, from) = match mesh.faces.get(id as usize) {
             Some(&face) => {
@@ -177,20 +212,24 @@ impl<'a> Rooms<'a> {
         let direction = cosine_direction(normal, sequence02(k, !seed));
         let reach = (4.0 * mesh.half_size) as f32;
         let plane = mesh.plane[triangle as usize];
-        let hit = self
-            .rays
-            .closest(from.as_vec3(), direction.as_vec3(), reach, plane)?;
+        let (from32, direction32) = (from.as_vec3(), direction.as_vec3());
+        let Some(hit) = self.rays.closest(from32, direction32, reach, plane) else {
+            return Meets::Nothing;
+        };
         let (triangle, side) = (hit.triangle as usize, usize::from(hit.from_behind));
+        if self.sides[triangle][side] == NONE {
+            return Meets::Back;
+        }
         if self.cut_of[triangle] == NONE {
-            return Some(self.sides[triangle][side]).filter(|&other| other != NONE);
+            return Meets::Front(self.sides[triangle][side]);
         }
         let part = &self.parts[self.cut_of[triangle] as usize];
         let at = from + direction * f64::from(hit.t);
-        let polygon = part
-            .polygons
-            .iter()
-            .position(|p| self.holds(p, part.triangle, at))?;
-        (part.first[side] != NONE).then(|| part.first[side] + polygon as u32)
+        let mut polygons = part.polygons.iter();
+        match polygons.position(|p| self.holds(p, part.triangle, at)) {
+            Some(polygon) => Meets::Front(part.first[side] + polygon as u32),
+            None => Meets::Nothing,
+        }
     }
 
     /// Does a point of a triangle's plane lie inside a polygon on it, clear of its border?
