@@ -28,7 +28,7 @@ use crate::color::Observer;
 use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
-use crate::hierarchy::{Mesh, Tree, spaces};
+use crate::hierarchy::{Mesh, Tree, cuts, spaces};
 use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
@@ -123,6 +123,22 @@ fn by_rays(sight: &Sight) -> bool {
     sight.occlusion && !sight.small()
 }
 
+/// What blocks rays in a scene.
+fn index(scene: &Scene, mesh: &Mesh) -> RayIndex {
+    let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+    let masked: Vec<bool> = mesh
+        .material
+        .iter()
+        .map(|&m| {
+            matches!(
+                scene.materials[m as usize].alpha,
+                crate::scene::Alpha::Mask { .. }
+            )
+        })
+        .collect();
+    RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked)
+}
+
 /// A room being baked.
 pub struct Bake {
     scene: Scene,
@@ -159,21 +175,18 @@ impl Bake {
     pub fn new(scene: Scene, settings: Settings) -> Self {
         let started = Instant::now();
         let plan = Plan::of(&scene);
-        let mesh = Mesh::new(&scene);
-        let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
-        let masked: Vec<bool> = mesh
-            .material
-            .iter()
-            .map(|&m| {
-                matches!(
-                    scene.materials[m as usize].alpha,
-                    crate::scene::Alpha::Mask { .. }
-                )
-            })
-            .collect();
-        let rays = RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked);
+        let mut mesh = Mesh::new(&scene);
+        let mut rays = index(&scene, &mesh);
         let spaces = if plan.runs(Kind::Occlusion) {
-            spaces(&mesh, &rays, settings.seed)
+            let cuts = cuts(&mesh, &rays);
+            let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
+            if !found.parted.is_empty() {
+                let parted: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
+                mesh = mesh.cut(&parted);
+                rays = index(&scene, &mesh);
+                found = spaces(&mesh, &rays, &[], settings.seed);
+            }
+            found.of_face
         } else {
             vec![0; mesh.faces.len()]
         };
