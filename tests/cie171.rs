@@ -9,9 +9,10 @@ mod built;
 use built::Room;
 use glam::{DVec3, dvec3};
 use haarlight::scene::{Options, Scene};
-use haarlight::solve::reference::Reference;
+use haarlight::solve::reference::{Reference, Solution};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::LEAVES;
+use nalgebra::DVector;
 use std::path::Path;
 
 /// Greatest error of a point and of a mean.
@@ -307,40 +308,124 @@ fn case_5_8_direct_part() {
     }
 }
 
-/// The report's E_ind is a mean; points have no closed form but their direct part: the plain reference stands in.
-fn points_of_case_5_8(settings: Settings) {
-    let rho = 0.8;
-    let scene = cube(|room| room.paint(rho));
-    let reference = Reference::new(&scene, 3, 1);
-    let solution = reference.solve();
-    let points: Vec<(DVec3, DVec3)> = [(2.0, 2.0), (1.0, 1.0), (0.5, 2.0), (0.3, 0.3), (3.6, 2.9)]
+/// Points of the floor: the middle, on the way to a corner, near an edge, anywhere, in a corner.
+fn floor_points() -> Vec<(DVec3, DVec3)> {
+    [(2.0, 2.0), (1.0, 1.0), (0.5, 2.0), (3.6, 2.9), (0.3, 0.3)]
         .iter()
         .map(|&(x, z)| (dvec3(x, 0.0, z), DVec3::Y))
-        .collect();
-    let truth = reference.gather(&scene, &solution, &points, 1);
-    let mut bake = Bake::new(scene, settings);
-    bake.run();
-    for ((probed, truth), (p, _)) in bake.probe(&points).iter().zip(&truth).zip(&points) {
-        for (leaf, (got, want)) in probed.leaves.iter().zip(truth).enumerate() {
-            let off = got / want - 1.0;
-            assert!(off.abs() < POINT, "{p} leaf {leaf}: {off:e}");
-        }
+        .collect()
+}
+
+/// The report's E_ind is a mean; points have no closed form but their direct part. The plain reference stands in, with the
+/// error of its patches, which falls with the square of their size, taken out (Richardson 1911).
+struct TruthOfCase58 {
+    scene: Scene,
+    references: [Reference; 2],
+}
+
+impl TruthOfCase58 {
+    fn new() -> Self {
+        let scene = cube(|room| room.paint(0.5));
+        let references = [3, 4].map(|depth| Reference::new(&scene, depth, 1));
+        Self { scene, references }
+    }
+
+    /// Irradiance at the points, W/m2/nm, if every leaf has its own albedo. Patches are of one size, so that their factors
+    /// are symmetric and conjugate gradients find the radiosities.
+    fn at(&self, rho: f64) -> Vec<[f64; LEAVES]> {
+        let [coarse, fine] = self.references.each_ref().map(|reference| {
+            let first = DVector::from_iterator(
+                reference.patches.len(),
+                reference.patches.iter().map(|p| rho * p.punctual[30]),
+            );
+            let mut radiosity = first.clone();
+            let apply = |x: &DVector<f64>| x - rho * (&reference.factors * x);
+            let mut residual = &first - apply(&radiosity);
+            let mut direction = residual.clone();
+            while residual.norm() > 1e-9 * first.norm() {
+                let applied = apply(&direction);
+                let square = residual.norm_squared();
+                let step = square / direction.dot(&applied);
+                radiosity += step * &direction;
+                residual -= step * applied;
+                direction = &residual + residual.norm_squared() / square * direction;
+            }
+            // The light has equal energy: what holds for one leaf holds for all.
+            let rows: Vec<[f64; LEAVES]> = radiosity.iter().map(|&b| [b; LEAVES]).collect();
+            let solution = Solution {
+                irradiance: rows.clone(),
+                radiosity: rows,
+            };
+            reference.gather(&self.scene, &solution, &floor_points(), 1)
+        });
+        let pairs = fine.iter().zip(&coarse);
+        pairs
+            .map(|(f, c)| std::array::from_fn(|l| f[l] + (f[l] - c[l]) / 3.0))
+            .collect()
     }
 }
 
-#[test]
-#[ignore = "-1.4 % at the face centre, +2.7 % in a corner, at albedo .8"]
-fn case_5_8_at_points() {
-    points_of_case_5_8(Settings::default());
+/// Worst error at the first `count` points, at some leaves; `truth` by leaf.
+fn worst_of_case_5_8(
+    bake: &mut Bake,
+    count: usize,
+    leaves: &[usize],
+    truth: impl Fn(usize) -> Vec<[f64; LEAVES]>,
+) -> f64 {
+    bake.run();
+    let probed = bake.probe(&floor_points()[..count]);
+    let off = leaves.iter().flat_map(|&leaf| {
+        let pairs = probed.iter().zip(truth(leaf));
+        pairs
+            .map(|(probed, truth)| probed.leaves[leaf] / truth[leaf] - 1.0)
+            .collect::<Vec<_>>()
+    });
+    off.fold(0.0, |w: f64, x| if x.abs() > w.abs() { x } else { w })
 }
 
-/// With a lower error than the default's.
-#[test]
-fn case_5_8_at_points_when_asked() {
-    points_of_case_5_8(Settings {
-        error: 0.05,
+/// What the points are asked to be right to: mean CIEDE2000.
+fn fine() -> Settings {
+    Settings {
+        error: 0.02,
         ..Settings::default()
+    }
+}
+
+/// At single points, for every albedo and band by band.
+#[test]
+fn case_5_8_at_points() {
+    let truth = TruthOfCase58::new();
+    let away = floor_points().len() - 1;
+    for rho in [0.05, 0.3, 0.5, 0.8, 0.9, 0.95] {
+        let at = truth.at(rho);
+        let mut bake = Bake::new(cube(|room| room.paint(rho)), fine());
+        let worst = worst_of_case_5_8(&mut bake, away, &[30], |_| at.clone());
+        println!("rho {rho}: worst point {:+.3} %", 100.0 * worst);
+        assert!(worst.abs() < POINT, "rho {rho}: {worst:e}");
+    }
+    let reflectance: [f64; LEAVES] =
+        std::array::from_fn(|l| 0.475 - 0.425 * (l as f64 / 63.0 * 9.0).cos());
+    let mut bake = Bake::new(cube(|room| room.spectral_paint(reflectance)), fine());
+    let worst = worst_of_case_5_8(&mut bake, away, &[3, 20, 30, 41, 60], |leaf| {
+        truth.at(reflectance[leaf])
     });
+    println!("spectral: worst point and band {:+.3} %", 100.0 * worst);
+    assert!(worst.abs() < POINT, "{worst:e}");
+}
+
+/// 0.3 m from two walls, where each sees the other at its brightest gradient.
+#[test]
+#[ignore = "+.55 % at albedo .5, whatever the error asked for: rows of leaves next to edges are too bright by 1 %"]
+fn case_5_8_in_a_corner() {
+    let truth = TruthOfCase58::new();
+    for rho in [0.3, 0.5, 0.8, 0.95] {
+        let at = truth.at(rho);
+        let mut bake = Bake::new(cube(|room| room.paint(rho)), fine());
+        let all = floor_points().len();
+        let worst = worst_of_case_5_8(&mut bake, all, &[30], |_| at.clone());
+        println!("rho {rho}: {:+.3} % in a corner", 100.0 * worst);
+        assert!(worst.abs() < POINT, "rho {rho}: {worst:e}");
+    }
 }
 
 /// Wavelength by wavelength: E(l) = Phi(l) / (96 (1 - rho(l))).

@@ -368,6 +368,7 @@ impl Gatherer<'_> {
             )
         };
         self.add(id, factor, visible, out);
+        self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
     }
 
     /// Are the children of a node known to the solution? Elements split after it are not.
