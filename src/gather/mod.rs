@@ -4,6 +4,7 @@ mod bake;
 pub mod hemisphere;
 pub mod point;
 mod refined;
+mod slope;
 mod spectra;
 
 pub use bake::{Baked, Probed};
