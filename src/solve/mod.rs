@@ -142,6 +142,15 @@ const GATHER_SHARE: f64 = 0.1;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 const DE_PER_PERCENT: f64 = 0.35;
 
+/// What a gather is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Care {
+    /// The result.
+    Full,
+    /// A picture on the way.
+    Sketch,
+}
+
 /// Do leaves and points of this room look for themselves? In a room of few triangles exact clipping is better.
 fn by_rays(sight: &Sight) -> bool {
     sight.occlusion && !sight.small()
@@ -778,22 +787,26 @@ impl Bake {
 
     /// Gathers at receivers, in order.
     pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
+        self.gather_with(receivers, Care::Full)
+    }
+
+    /// Gathers with care, or just for a picture.
+    pub(crate) fn gather_with(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
         if self.light.width() == 0 || self.light.white == [0.0; 3] {
             // A room without light: nothing to look for.
             return vec![Gathered::dark(); receivers.len()];
         }
         self.with_sight(|bake, sight| {
-            let gatherer = bake.gatherer(sight);
+            let sketched = Hemisphere::sketch();
+            let mut gatherer = bake.gatherer(sight);
+            if let (Care::Sketch, Some(hemisphere)) = (care, &mut gatherer.hemisphere) {
+                *hemisphere = &sketched;
+            }
             receivers
                 .par_iter()
                 .map_init(Memory::default, |memory, r| gatherer.at(r, memory))
                 .collect()
         })
-    }
-
-    /// Area of a leaf that nothing solid covers, m2.
-    pub(crate) fn bare_area(&self, leaf: u32) -> f64 {
-        self.areas[leaf as usize]
     }
 
     /// Which receivers does something solid cover?
