@@ -200,7 +200,7 @@ struct Work {
 }
 
 /// `x += alpha p`, lane by lane.
-fn step<const L: usize>(x: &mut Rows, p: &Rows, alpha: [f32; L]) {
+pub(super) fn step<const L: usize>(x: &mut Rows, p: &Rows, alpha: [f32; L]) {
     for (x, p) in x.all_mut::<L>().iter_mut().zip(p.all::<L>()) {
         for l in 0..L {
             x[l] += alpha[l] * p[l];
@@ -209,7 +209,7 @@ fn step<const L: usize>(x: &mut Rows, p: &Rows, alpha: [f32; L]) {
 }
 
 /// Inner products lane by lane, f64, summed in fixed chunks.
-fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
+pub(super) fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
     let parts: Vec<[f64; L]> = x
         .all::<L>()
         .par_chunks(CHUNK)

@@ -2,6 +2,8 @@
 //!
 //! [`Bake::step`] is the loop on one screen; everything it calls stands in a file of its own.
 
+mod bounded;
+mod choice;
 mod coarse;
 mod conjugate;
 mod direct;
@@ -10,15 +12,18 @@ mod flux;
 pub mod lanes;
 pub mod light;
 mod lists;
+mod mixed;
 mod operator;
 mod punctual;
 pub mod record;
 pub mod reference;
+mod representation;
 mod rows;
 mod sources;
 
 pub use lists::PatchList;
 pub use record::{Round, Verdict};
+pub use representation::Representation;
 pub use rows::{Rows, padded};
 pub(crate) use sources::weights_of;
 
@@ -38,16 +43,6 @@ use operator::Operator;
 use rayon::prelude::*;
 use sources::{Painter, Sources};
 use std::time::Instant;
-
-/// How spectra are carried by the rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Representation {
-    /// A cut for each light spectrum, chosen under error control.
-    Adaptive,
-    /// All 64 leaves.
-    Dense,
-}
 
 /// What the user asks for.
 #[derive(Debug, Clone)]
@@ -123,7 +118,8 @@ pub struct Bake {
     sealed: Closed,
     weights: [Leaves; 3],
     lanes: Lanes,
-    spectrum_error: f64,
+    /// Colour difference (CIELUV) that the lanes cause, as far as it is known.
+    spectrum_error: Option<f64>,
     outlook: flux::Outlook,
     /// Area of each node that is not covered.
     areas: Vec<f64>,
@@ -179,7 +175,7 @@ impl Bake {
             graph: Graph::default(),
             rounds: Vec::new(),
             watch: None,
-            spectrum_error: 0.0,
+            spectrum_error: None,
             scene,
             settings,
             plan,
@@ -390,52 +386,6 @@ impl Bake {
         keen
     }
 
-    /// Chooses the working partition on a small model of the room.
-    fn choose_lanes(&mut self) {
-        self.spectrum_error = 0.0;
-        if self.settings.representation == Representation::Dense
-            || self.scene.spectra.is_empty()
-            || self.tree.nodes.is_empty()
-        {
-            self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
-            return;
-        }
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
-            .filter(|&k| self.tree.node(k).is_leaf())
-            .collect();
-        let shadowed = self.with_sight(|bake, sight| {
-            punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh)
-        });
-        let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
-        self.look_out();
-        let factor = balance(&self.tree, &rows, &self.areas, &self.outlook.target).factor;
-        let painter = Painter::new(&self.scene, &self.mesh);
-        let dense = sources::DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
-        let model = coarse::Coarse::new(
-            &self.tree,
-            &self.graph.links,
-            &factor,
-            &self.areas,
-            &leaves,
-            &dense,
-            self.scene.spectra.len(),
-        );
-        let choice = model.choose(
-            &self.scene.spectra,
-            &self.weights,
-            self.light.white,
-            SPECTRUM_SHARE * self.settings.error,
-        );
-        let lanes = Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights);
-        self.spectrum_error = choice.error;
-        if lanes.lanes() != self.lanes.lanes() {
-            // The lanes of an earlier round mean something else: the next solve starts afresh.
-            self.light.reflected = Rows::default();
-            self.direct = direct::Direct::default();
-        }
-        self.lanes = lanes;
-    }
-
     /// Learns how new leaves look out; returns the rays cast.
     fn look_out(&mut self) -> u64 {
         let rays = self.outlook.extend(
@@ -522,7 +472,7 @@ impl Bake {
     ) -> (Convergence, flux::Balance) {
         let painter = Painter::new(&self.scene, &self.mesh);
         let Sources {
-            reflectance,
+            mut reflectance,
             emission,
             greatest,
         } = painter.paint(&self.tree, leaves, &self.lanes);
@@ -548,10 +498,15 @@ impl Bake {
             reflectance: &reflectance,
             greatest: &greatest,
         };
-        let convergence = if self.plan.runs(Kind::Interreflection) {
-            system.solve::<L>(&first, &mut reflected, SOLVE_SHARE * self.settings.error)
-        } else {
-            Convergence::default()
+        let mixed = self
+            .lanes
+            .is_mixed()
+            .then(|| painter.mixed(&self.tree, leaves, &self.lanes));
+        let tolerance = SOLVE_SHARE * self.settings.error;
+        let convergence = match &mixed {
+            _ if !self.plan.runs(Kind::Interreflection) => Convergence::default(),
+            Some(mixed) => mixed.solve::<L>(&system.operator, &first, &mut reflected, tolerance),
+            None => system.solve::<L>(&first, &mut reflected, tolerance),
         };
         let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
         let mut irradiance = Rows::zero(leaves.len(), L);
@@ -572,6 +527,20 @@ impl Bake {
                 .zip(reflectance.all::<L>())
             {
                 *r = std::array::from_fn(|l| h[l] * rho[l]);
+            }
+        }
+        if let Some(mixed) = &mixed {
+            // Seen lane by lane, albedo is what came back of what came in.
+            if !self.plan.runs(Kind::Interreflection) {
+                reflected = mixed.reflect::<L>(&irradiance);
+            }
+            for ((rho, r), h) in reflectance
+                .all_mut::<L>()
+                .iter_mut()
+                .zip(reflected.all::<L>())
+                .zip(irradiance.all::<L>())
+            {
+                *rho = std::array::from_fn(|l| if h[l] == 0.0 { 0.0 } else { r[l] / h[l] });
             }
         }
         let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
@@ -695,7 +664,7 @@ impl Bake {
     /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
     /// [`Light::leaves`]; empty where the rows hold the 64 leaves.
     pub fn lists(&self, step: usize) -> Vec<PatchList> {
-        if self.lanes.lanes().iter().any(|lane| lane.light.is_none()) {
+        if !self.lanes.is_ratio() {
             return Vec::new();
         }
         let limit = SPECTRUM_SHARE * self.settings.error;
