@@ -9,4 +9,4 @@ mod report;
 
 pub use compare::{Comparison, Mean, compare};
 pub use path::{Answer, Audit, BATCHES};
-pub use report::{HONEST, Honesty, Measured, Report, Seen, Spread};
+pub use report::{HONEST, Honesty, Measured, Report, Seen, Spread, Truth};

@@ -121,65 +121,8 @@ impl Report {
     /// Compares a bake with the path tracer at `points` random points, by area; `most_paths` paths a point at the most.
     /// The same numbers for the same seed at any number of threads.
     pub fn new(bake: &Bake, points: usize, most_paths: usize, seed: u64) -> Self {
-        let (receivers, covered) = receivers(bake, points, seed);
-        let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
-        let places: Vec<(DVec3, DVec3, u32)> = receivers
-            .iter()
-            .map(|r| (r.point, r.normal, r.plane))
-            .collect();
-        let weights = Observer::cie1931()
-            .weights(&bake.scene().grid)
-            .map(|w| w.map(|x| KM * x));
-        let white = bake.light().white;
         let goal = NOISE_SHARE * bake.settings().error;
-        let pilot = audit.irradiance(
-            &places,
-            &vec![PILOT.min(most_paths); places.len()],
-            seed ^ 0x9110,
-        );
-        // The pilot only decides on numbers of paths: using it in the answer too would prefer lucky points.
-        let wanted: Vec<usize> = pilot
-            .iter()
-            .map(|answer| {
-                let noise = noise(answer, &weights, white) / goal;
-                ((PILOT as f64 * noise * noise) as usize).clamp(PILOT, most_paths.max(1))
-            })
-            .collect();
-        let answers = audit.irradiance(&places, &wanted, seed);
-        let gathered = bake.gather(&receivers);
-        let seen: Vec<Seen> = receivers
-            .iter()
-            .zip(&gathered)
-            .zip(&answers)
-            .map(|((r, g), answer)| {
-                let baked = bake.lanes().tristimulus(&g.irradiance);
-                let traced = tristimulus(&answer.mean, &weights);
-                let (y, s) = answer.linear(&weights[1]);
-                let scale = y.max(DARK * white[1]).max(f64::MIN_POSITIVE);
-                Seen {
-                    point: r.point + bake.mesh().centre,
-                    normal: r.normal,
-                    baked,
-                    traced,
-                    de2000: [de2000(baked, traced, white), noise(answer, &weights, white)],
-                    relative: [(baked[1] - y) / scale, s / scale],
-                }
-            })
-            .collect();
-        let paths = (PILOT.min(most_paths) * places.len()) as u64
-            + wanted.iter().map(|&n| n as u64).sum::<u64>();
-        let estimate = bake
-            .rounds()
-            .last()
-            .and_then(|r| r.error.total_de2000.value);
-        Self::of(
-            seen,
-            covered,
-            paths,
-            seed,
-            estimate,
-            NEGLIGIBLE * bake.settings().error,
-        )
+        Truth::new(bake, points, goal, most_paths, seed).report(bake)
     }
 
     fn of(
@@ -216,8 +159,143 @@ impl Report {
     }
 }
 
+/// What the path tracer says at points of a room: traced once, compared with any number of bakes of the same room.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    places: Vec<Place>,
+    answers: Vec<Answer>,
+    covered: usize,
+    paths: u64,
+    seed: u64,
+}
+
+/// A random point of a face.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    /// Number of the face in the hierarchy, and weights of its corners.
+    entry: u32,
+    weights: [f64; 3],
+    seed: u64,
+}
+
+impl Truth {
+    /// Traces at `points` random points of the room of a bake, by area, until the standard error of each is about `goal`
+    /// (CIEDE2000 under the bake's white); `most_paths` paths a point at the most.
+    pub fn new(bake: &Bake, points: usize, goal: f64, most_paths: usize, seed: u64) -> Self {
+        let (places, covered) = places(bake, points, seed);
+        let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
+        let sites: Vec<(DVec3, DVec3, u32)> = places
+            .iter()
+            .map(|place| {
+                let r = place.receiver(bake);
+                (r.point, r.normal, r.plane)
+            })
+            .collect();
+        let weights = weights(bake);
+        let white = bake.light().white;
+        let pilot = audit.irradiance(
+            &sites,
+            &vec![PILOT.min(most_paths); sites.len()],
+            seed ^ 0x9110,
+        );
+        // The pilot only decides on numbers of paths: using it in the answer too would prefer lucky points.
+        let wanted: Vec<usize> = pilot
+            .iter()
+            .map(|answer| {
+                let noise = noise(answer, &weights, white) / goal;
+                ((PILOT as f64 * noise * noise) as usize).clamp(PILOT, most_paths.max(1))
+            })
+            .collect();
+        let answers = audit.irradiance(&sites, &wanted, seed);
+        let paths = (PILOT.min(most_paths) * sites.len()) as u64
+            + wanted.iter().map(|&n| n as u64).sum::<u64>();
+        Self {
+            places,
+            answers,
+            covered,
+            paths,
+            seed,
+        }
+    }
+
+    /// Mean tristimulus irradiance over the points, lx for Y.
+    pub fn mean(&self, bake: &Bake) -> [f64; 3] {
+        let weights = weights(bake);
+        let n = self.answers.len().max(1) as f64;
+        self.answers.iter().fold([0.0; 3], |sum, answer| {
+            let xyz = tristimulus(&answer.mean, &weights);
+            std::array::from_fn(|c| sum[c] + xyz[c] / n)
+        })
+    }
+
+    /// The points in the hierarchy of a bake of the same room.
+    pub fn receivers(&self, bake: &Bake) -> Vec<Receiver> {
+        self.places.iter().map(|p| p.receiver(bake)).collect()
+    }
+
+    /// Compares a bake of the same room.
+    pub fn report(&self, bake: &Bake) -> Report {
+        let receivers = self.receivers(bake);
+        let gathered = bake.gather(&receivers);
+        let (weights, white) = (weights(bake), bake.light().white);
+        let seen: Vec<Seen> = receivers
+            .iter()
+            .zip(&gathered)
+            .zip(&self.answers)
+            .map(|((r, g), answer)| {
+                let baked = bake.lanes().tristimulus(&g.irradiance);
+                let traced = tristimulus(&answer.mean, &weights);
+                let (y, s) = answer.linear(&weights[1]);
+                let scale = y.max(DARK * white[1]).max(f64::MIN_POSITIVE);
+                Seen {
+                    point: r.point + bake.mesh().centre,
+                    normal: r.normal,
+                    baked,
+                    traced,
+                    de2000: [de2000(baked, traced, white), noise(answer, &weights, white)],
+                    relative: [(baked[1] - y) / scale, s / scale],
+                }
+            })
+            .collect();
+        let estimate = bake
+            .rounds()
+            .last()
+            .and_then(|r| r.error.total_de2000.value);
+        Report::of(
+            seen,
+            self.covered,
+            self.paths,
+            self.seed,
+            estimate,
+            NEGLIGIBLE * bake.settings().error,
+        )
+    }
+}
+
+impl Place {
+    fn receiver(&self, bake: &Bake) -> Receiver {
+        let tree = bake.tree();
+        let entry = self.entry as usize;
+        let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
+        Receiver {
+            point: element.at(self.weights),
+            normal: tree.face_normal[entry],
+            plane: tree.face_plane[entry],
+            leaf: Some(tree.leaf_at(self.entry, self.weights)),
+            seed: self.seed,
+        }
+    }
+}
+
+/// Lumens a watt of the leaves, by tristimulus value.
+fn weights(bake: &Bake) -> [Leaves; 3] {
+    Observer::cie1931()
+        .weights(&bake.scene().grid)
+        .map(|w| w.map(|x| KM * x))
+}
+
 /// Random points by area, one stratum each, those that are not covered; and how many are.
-fn receivers(bake: &Bake, points: usize, seed: u64) -> (Vec<Receiver>, usize) {
+fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
     let tree = bake.tree();
     let mut rng = Pcg::new(seed ^ 0x00a0_d177);
     let mut all = Vec::with_capacity(points);
@@ -226,26 +304,18 @@ fn receivers(bake: &Bake, points: usize, seed: u64) -> (Vec<Receiver>, usize) {
             let target = (k as f64 + rng.f64()) / points as f64 * root.area;
             let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1)
                 .min(tree.faces.len() - 1);
-            let weights = triangle_weights([rng.f64(), rng.f64()]);
-            let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
-            all.push(Receiver {
-                point: element.at(weights),
-                normal: tree.face_normal[entry],
-                plane: tree.face_plane[entry],
-                leaf: Some(tree.leaf_at(entry as u32, weights)),
+            all.push(Place {
+                entry: entry as u32,
+                weights: triangle_weights([rng.f64(), rng.f64()]),
                 seed: crate::geometry::sampling::hash(seed, k as u64),
             });
         }
     }
-    let covered = bake.covered(&all);
-    let bare: Vec<Receiver> = all
-        .iter()
-        .zip(&covered)
-        .filter(|(_, c)| !**c)
-        .map(|(r, _)| *r)
-        .collect();
-    let count = all.len() - bare.len();
-    (bare, count)
+    let receivers: Vec<Receiver> = all.iter().map(|p| p.receiver(bake)).collect();
+    let covered = bake.covered(&receivers);
+    let count = covered.iter().filter(|c| **c).count();
+    let bare = all.into_iter().zip(&covered).filter(|(_, c)| !**c);
+    (bare.map(|(p, _)| p).collect(), count)
 }
 
 fn tristimulus(leaves: &Leaves, weights: &[Leaves; 3]) -> [f64; 3] {

@@ -15,7 +15,7 @@ use crate::spectrum::{Bounded, CmfTree, Interval, LEAVES, Leaves, Metric, Partit
 /// Bounces at the most.
 const BOUNCES: usize = 400;
 /// The tail of the series may be this share of the greatest ratio.
-const TAIL: f64 = 1e-4;
+const TAIL: f64 = 1e-6;
 
 /// What the model's patches are made of, under one light.
 struct Lit {

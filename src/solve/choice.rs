@@ -37,7 +37,8 @@ impl Bake {
         self.spectrum_error = None;
         let (spectra, weights) = (&self.scene.spectra, &self.weights);
         let none = spectra.is_empty() || self.tree.nodes.is_empty();
-        let tolerance = SPECTRUM_SHARE * self.settings.error;
+        let share = SPECTRUM_SHARE * self.settings.error;
+        let tolerance = self.settings.spectrum.unwrap_or(share);
         match self.settings.representation {
             Representation::Uniform(n) if !none => Lanes::uniform(spectra, n.into(), weights),
             Representation::Rgb if !none => {

@@ -9,6 +9,7 @@ mod conjugate;
 mod direct;
 mod estimate;
 mod flux;
+mod held;
 pub mod lanes;
 pub mod light;
 mod lists;
@@ -36,7 +37,9 @@ use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
 use conjugate::{Convergence, System};
+use direct::Direct;
 pub use flux::Closed;
+pub use held::Held;
 use lanes::Lanes;
 use light::{Light, Neighbours};
 use operator::Operator;
@@ -51,6 +54,8 @@ pub struct Settings {
     pub error: f64,
     /// How spectra are carried.
     pub representation: Representation,
+    /// Mean colour difference (CIELUV) that adaptive lanes may cause; none: a share of `error`.
+    pub spectrum: Option<f64>,
     /// Seed of every sampling pattern.
     pub seed: u64,
     /// Irradiance (tristimulus) of the adaptation white; none: twice the mean irradiance of the room.
@@ -64,6 +69,7 @@ impl Default for Settings {
         Self {
             error: 0.5,
             representation: Representation::Adaptive,
+            spectrum: None,
             seed: 0,
             white: None,
             rounds: 12,
