@@ -138,6 +138,7 @@ impl Coarse {
     /// Irradiance of the model's patches on some lanes.
     fn irradiance(&self, lanes: &Lanes) -> Rows {
         match padded(lanes.len()) {
+            4 => self.solve::<4>(lanes),
             8 => self.solve::<8>(lanes),
             16 => self.solve::<16>(lanes),
             32 => self.solve::<32>(lanes),
@@ -165,13 +166,13 @@ impl Coarse {
                 *g = g.max(*r);
             }
         }
-        let operator = Operator {
-            tree: &self.tree,
-            links: &self.links,
-            leaves: &self.leaves,
-            areas: &self.areas,
-            factor: &self.factor,
-        };
+        let operator = Operator::new(
+            &self.tree,
+            &self.links,
+            &self.leaves,
+            &self.areas,
+            &self.factor,
+        );
         let (mut nodes, mut gathered) = (Rows::zero(count + 1, L), Rows::zero(count + 1, L));
         let mut first = Rows::zero(count, L);
         operator.irradiance::<L>(&e, &mut nodes, &mut gathered, &mut first);

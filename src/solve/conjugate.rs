@@ -217,9 +217,7 @@ pub(super) fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
         .map(|(x, y)| {
             let mut sum = [0.0; L];
             for (x, y) in x.iter().zip(y) {
-                for l in 0..L {
-                    sum[l] += f64::from(x[l]) * f64::from(y[l]);
-                }
+                add_products(&mut sum, x, y);
             }
             sum
         })
@@ -227,4 +225,12 @@ pub(super) fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
     parts.iter().fold([0.0; L], |acc, part| {
         std::array::from_fn(|l| acc[l] + part[l])
     })
+}
+
+/// `sum += x y`. Slices of a length that the compiler does not know: of arrays it makes single numbers.
+#[inline(never)]
+fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
+    for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
+        *s += f64::from(*x) * f64::from(*y);
+    }
 }

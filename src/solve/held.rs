@@ -51,6 +51,7 @@ impl Bake {
         self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
         self.settings.error = CONVERGED;
         let (convergence, _) = match padded(self.lanes.len()) {
+            4 => self.solve::<4>(&rows, &leaves),
             8 => self.solve::<8>(&rows, &leaves),
             16 => self.solve::<16>(&rows, &leaves),
             32 => self.solve::<32>(&rows, &leaves),

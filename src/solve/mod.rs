@@ -43,7 +43,7 @@ pub use flux::Closed;
 pub use held::Held;
 use lanes::Lanes;
 use light::{Light, Neighbours};
-use operator::Operator;
+pub use operator::Operator;
 use rayon::prelude::*;
 use sources::{Painter, Sources};
 use std::time::Instant;
@@ -257,6 +257,7 @@ impl Bake {
         clock.lap("balance");
 
         let solved = match padded(self.lanes.len()) {
+            4 => self.solve::<4>(&rows, &leaves),
             8 => self.solve::<8>(&rows, &leaves),
             16 => self.solve::<16>(&rows, &leaves),
             32 => self.solve::<32>(&rows, &leaves),
@@ -413,6 +414,7 @@ impl Bake {
     fn gather_direct(&mut self, demand: &Demand) {
         let width = padded(self.lanes.len());
         match width {
+            4 => self.place_emission::<4>(),
             8 => self.place_emission::<8>(),
             16 => self.place_emission::<16>(),
             32 => self.place_emission::<32>(),
@@ -495,13 +497,7 @@ impl Bake {
         if self.sealed == Closed::Yes {
             flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
         }
-        let operator = Operator {
-            tree: &self.tree,
-            links: rows,
-            leaves,
-            areas: &self.areas,
-            factor: &self.balance.factor,
-        };
+        let operator = Operator::new(&self.tree, rows, leaves, &self.areas, &self.balance.factor);
         let mut reflected = self.guess::<L>(leaves);
         let system = System {
             operator,
