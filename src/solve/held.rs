@@ -41,6 +41,7 @@ impl Bake {
             total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
             threshold,
             least_area: f64::INFINITY,
+            hidden: true,
         });
         let started = Instant::now();
         let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)

@@ -7,6 +7,7 @@
 use super::conjugate::{Convergence, MAX_ITERATIONS, dot, step};
 use super::lanes::Lanes;
 use super::operator::Operator;
+use super::rays::RaySystem;
 use super::rows::Rows;
 use crate::spectrum::Leaves;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -150,5 +151,34 @@ impl Mixed {
         }
         *reflected = scaled(self.times::<L>(&self.root, &y), -1);
         done
+    }
+
+    /// The same where leaves look for themselves: plain sweeps, since no lane has a flux of its own to keep. Reflected
+    /// radiosity, and irradiance by it.
+    pub(super) fn solve_by_rays<const L: usize>(
+        &self,
+        system: &RaySystem,
+        first: &Rows,
+        reflected: &mut Rows,
+        tolerance: f64,
+    ) -> (Convergence, Rows) {
+        let mut nodes = Rows::zero(system.tree.nodes.len(), L);
+        let mut seen = Rows::zero(reflected.len(), L);
+        let mut done = Convergence::default();
+        loop {
+            system.receive::<L>(reflected, &mut nodes, &mut seen);
+            let mut all = seen.clone();
+            step::<L>(&mut all, first, [1.0; L]);
+            let mut change = self.reflect::<L>(&all);
+            step::<L>(&mut change, reflected, [-1.0; L]);
+            step::<L>(reflected, &change, [1.0; L]);
+            done.iterations += 1;
+            let length = |x: &Rows| dot::<L>(x, x).iter().sum::<f64>().sqrt();
+            done.residual = length(&change) / length(reflected).max(f64::MIN_POSITIVE);
+            done.bound = done.residual * self.greatest / (1.0 - self.greatest);
+            if done.bound <= tolerance || done.iterations >= MAX_ITERATIONS {
+                return (done, seen);
+            }
+        }
     }
 }

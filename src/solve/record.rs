@@ -216,6 +216,7 @@ impl Round {
             intervals_mean: bake.intervals_mean(),
             memory_bytes: bake.tree.bytes()
                 + m.link_bytes
+                + bake.outlook.bytes()
                 + size_of_val(bake.graph.links.as_slice())
                 + light.neighbours.bytes()
                 + light.reflected.bytes()
