@@ -28,7 +28,10 @@ impl Bake {
         if !lanes.same_meaning(&self.lanes) {
             // The lanes of an earlier round mean something else: the next solve starts afresh.
             self.light.reflected = Rows::default();
-            self.direct = direct::Direct::default();
+            match lanes.places_in(&self.lanes) {
+                Some(places) if lamps_are_flat(&self.scene) => self.direct.relabel(&places),
+                _ => self.direct = direct::Direct::default(),
+            }
         }
         self.lanes = lanes;
     }
@@ -56,7 +59,8 @@ impl Bake {
             Representation::Adaptive if !none => {
                 let model = self.model(coarse::PATCHES);
                 let (spectra, weights) = (&self.scene.spectra, &self.weights);
-                let choice = model.choose(spectra, weights, self.light.white, tolerance);
+                let known = self.lanes.cuts();
+                let choice = model.choose(spectra, weights, self.light.white, tolerance, known);
                 self.spectrum_error = Some(choice.error);
                 Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights)
             }
@@ -98,6 +102,14 @@ impl Bake {
             patches,
         )
     }
+}
+
+/// Does every lamp shine with just its light's spectrum? Its direct light is then one number a light, on any cut.
+fn lamps_are_flat(scene: &Scene) -> bool {
+    let flat = |shape: &Leaves| shape.iter().all(|&x| x == shape[0]);
+    let mut emissions = scene.materials.iter().filter_map(|m| m.emission.as_ref());
+    emissions.all(|e| e.texture.is_none() && flat(&e.shape))
+        && scene.lights.iter().all(|l| flat(&l.shape))
 }
 
 /// Different reflectances of a scene in order of its materials.

@@ -201,13 +201,14 @@ impl Coarse {
     }
 
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
-    /// padding would waste.
+    /// padding would waste. `known` cuts are kept if they are good enough.
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
         weights: &[Leaves; 3],
         white: [f64; 3],
         tolerance: f64,
+        known: Option<Vec<Partition>>,
     ) -> Choice {
         let count = self.leaves.len();
         let references: Vec<(Lanes, Rows)> = (0..spectra.len())
@@ -226,6 +227,13 @@ impl Coarse {
             .collect();
         let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
         let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
+        if let Some(cuts) = known {
+            let lanes = Lanes::ratio(spectra, &cuts, weights);
+            let (error, _) = self.loss(&lanes, &references, &jacobians, total);
+            if error <= tolerance {
+                return Choice { cuts, error };
+            }
+        }
         let mut cuts = vec![Partition::ROOT; spectra.len()];
         loop {
             let lanes = Lanes::ratio(spectra, &cuts, weights);

@@ -3,6 +3,7 @@
 //! What lanes do to colours is seen by itself here: beside a solution on all 64 leaves of the same links, with direct
 //! light gathered at the same points of the same leaves.
 
+use super::lanes::Lanes;
 use super::{Bake, Direct, Representation, padded};
 use crate::link::{Demand, LinkRows, balance};
 use std::time::Instant;
@@ -32,6 +33,8 @@ impl Bake {
         let white = self.light.white;
         let started = Instant::now();
         (self.settings.representation, self.settings.error) = (representation, error);
+        // Nothing is kept of the lanes before: what was good enough for another error would be taken again.
+        self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
         self.choose_lanes();
         let chosen = started.elapsed();
         self.direct = Direct::default();

@@ -196,6 +196,34 @@ impl Lanes {
         !self.lanes().is_empty() && self.lanes().iter().all(|lane| lane.light.is_some())
     }
 
+    /// The cut of each light, if each lane holds the ratio to one light on a dyadic interval.
+    pub fn cuts(&self) -> Option<Vec<Partition>> {
+        if !self.is_ratio() {
+            return None;
+        }
+        (0..self.power.len())
+            .map(|light| {
+                let own = self.lanes().iter().filter(|l| l.light == Some(light));
+                Partition::new(own.fold(0_u64, |bits, lane| bits | 1 << lane.first))
+            })
+            .collect()
+    }
+
+    /// For each lane, the lane of `other` that holds the ratio to the same light on its first leaf; none unless both
+    /// hold ratios.
+    pub fn places_in(&self, other: &Self) -> Option<Vec<usize>> {
+        if !(self.is_ratio() && other.is_ratio()) {
+            return None;
+        }
+        let holds = |a: &Lane, b: &Lane| {
+            a.light == b.light && (b.first..b.first + b.count).contains(&a.first)
+        };
+        self.lanes()
+            .iter()
+            .map(|a| other.lanes().iter().position(|b| holds(a, b)))
+            .collect()
+    }
+
     /// Do lanes reflect into each other?
     pub fn is_mixed(&self) -> bool {
         matches!(self.base, Base::Vectors(_))
