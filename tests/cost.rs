@@ -49,6 +49,9 @@ fn found(runs: &[HeldRun], representation: Representation, asked: f64) -> HeldRu
 /// a hair. Nothing here is told apart below this, CIELUV.
 const HAIR: f64 = 0.01;
 
+/// What lanes may cause, share of the error asked for.
+const SHARE: f64 = 0.2;
+
 #[test]
 fn every_way_keeps_what_it_claims_under_line_spectra() {
     for lamp in ["cie/F2", "cie/F11", "cie/A"] {
@@ -59,12 +62,12 @@ fn every_way_keeps_what_it_claims_under_line_spectra() {
                 Representation::Adaptive => {
                     let believed = run.believed.unwrap();
                     assert!(run.de_luv <= 1.33 * believed + HAIR, "{lamp}: {run:?}");
-                    assert!(believed <= 0.35 * run.asked, "{lamp}: {run:?}");
+                    assert!(believed <= SHARE * run.asked, "{lamp}: {run:?}");
                 }
                 Representation::Guaranteed => {
                     let believed = run.believed.unwrap();
                     assert!(run.de_luv <= believed + HAIR, "{lamp}: {run:?}");
-                    assert!(believed <= 0.35 * run.asked, "{lamp}: {run:?}");
+                    assert!(believed <= SHARE * run.asked, "{lamp}: {run:?}");
                 }
                 Representation::Dense => assert_eq!(run.de_luv, 0.0),
                 _ => {}

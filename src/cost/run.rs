@@ -4,7 +4,7 @@
 //! counted. `memory` is what hierarchy, links and rows hold, without the room itself and its ray index.
 
 use super::clock;
-use crate::audit::{Measured, Truth};
+use crate::audit::{Measured, Reference, Report};
 use crate::scene::Scene;
 use crate::solve::{Bake, Representation, Round, Settings};
 use serde::Serialize;
@@ -71,7 +71,7 @@ fn ends<S: serde::Serializer>(m: &Measured, serializer: S) -> Result<S::Ok, S::E
 
 impl Run {
     /// Bakes `scene` and compares. `white` is the irradiance of the adaptation white.
-    pub fn new(scene: Scene, task: Task, truth: &Truth, white: [f64; 3], seed: u64) -> Self {
+    pub fn new(scene: Scene, task: Task, truth: &Reference, white: [f64; 3], seed: u64) -> Self {
         let (cpu, wall) = (clock::seconds(), Instant::now());
         let laps = Arc::new(Mutex::new((cpu, Vec::<(&'static str, f64)>::new())));
         let lap = {
@@ -95,7 +95,7 @@ impl Run {
         let baked = bake.baked(&|_, _| {});
         lap("vertices");
         let (cpu_s, wall_s) = (clock::seconds() - cpu, wall.elapsed().as_secs_f64());
-        let report = truth.report(&bake);
+        let report = Report::against(&bake, truth);
         let last = bake.rounds().last();
         let laps = laps.lock().unwrap_or_else(|e| e.into_inner());
         Self {

@@ -3,12 +3,10 @@
 use super::held::{HeldRun, held};
 use super::knob::{Balance, Pair, balance, pairs};
 use super::run::{Run, Task, settings};
-use crate::audit::Truth;
+use crate::audit::Reference;
 use crate::scene::Scene;
 use crate::solve::{Bake, Representation};
 
-/// The reference's standard error at a point is brought to this share of the least error asked for.
-const NOISE_SHARE: f64 = 0.25;
 /// Paths a point at the most.
 const MOST_PATHS: usize = 65_536;
 /// Distinguishes the reference's random numbers from the solver's.
@@ -90,14 +88,12 @@ impl Sweep {
         };
         let mut first = Bake::new(scene.clone(), settings(adaptive(least), None, self.seed));
         first.step();
-        let truth = Truth::new(
-            &first,
-            self.points,
-            NOISE_SHARE * least,
-            MOST_PATHS,
-            self.seed ^ TRUTH_SEED,
-        );
-        let white = truth.mean(&first).map(|x| 2.0 * x);
+        // Its noise is brought to a share of what `first` was asked for: the least error of all.
+        let truth = Reference::new(&first, self.points, MOST_PATHS, self.seed ^ TRUTH_SEED);
+        let n = truth.truth.len().max(1) as f64;
+        let white = truth.truth.iter().fold([0.0; 3], |sum, xyz| {
+            std::array::from_fn(|c| sum[c] + 2.0 * xyz[c] / n)
+        });
         drop(first);
 
         // Repeats go through all tasks, so that what disturbs the machine for a while disturbs no task alone.

@@ -191,8 +191,9 @@ impl Bake {
         let normal = match &surface.normals {
             Some(normals) => {
                 let corners = surface.triangles[mesh.origin[triangle].1 as usize];
+                let weights = mesh.on_origin(triangle, vertex.weights);
                 let sum: DVec3 = (0..3)
-                    .map(|k| normals[corners[k] as usize].as_dvec3() * vertex.weights[k])
+                    .map(|k| normals[corners[k] as usize].as_dvec3() * weights[k])
                     .sum();
                 let sum = if back { -sum } else { sum };
                 let shading = sum.normalize_or(flat);
@@ -335,10 +336,10 @@ impl Bake {
         let unpainted = look.unpainted.unwrap_or([1.0; 3]);
         let rgb = display.from_xyz(std::array::from_fn(|c| reflected[c] + glow[c]));
         BakedVertex {
-            triangle: vertex.triangle
-                - self.mesh().first_triangle
-                    [self.mesh().origin[vertex.triangle as usize].0 as usize],
-            weights: vertex.weights,
+            triangle: self.mesh().origin[vertex.triangle as usize].1,
+            weights: self
+                .mesh()
+                .on_origin(vertex.triangle as usize, vertex.weights),
             irradiance: self.lanes().tristimulus(row).map(|x| x as f32),
             radiosity: std::array::from_fn(|c| (reflected[c] + glow[c]) as f32),
             light: std::array::from_fn(|c| (rgb[c] / unpainted[c]) as f32),

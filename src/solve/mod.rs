@@ -34,7 +34,7 @@ use crate::color::Observer;
 use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
-use crate::hierarchy::{Mesh, Tree, spaces};
+use crate::hierarchy::{Mesh, Tree, cuts, spaces};
 use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
@@ -112,8 +112,9 @@ const LISTED_LEAVES: usize = 4096;
 const LEAST_AREA: f64 = 1e-7;
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.004;
-/// The working partition may cause this share of the asked-for error.
-const SPECTRUM_SHARE: f64 = 0.35;
+/// The working partition may cause this share of the asked-for error. In the Cornell box under F2, .05 to .35 cost the
+/// same time within 2 %, and .35 left a third more error at 2 than .05.
+const SPECTRUM_SHARE: f64 = 0.2;
 /// What one patch may misplace in a gather, share of the asked-for error.
 const GATHER_SHARE: f64 = 0.1;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
@@ -122,6 +123,22 @@ const DE_PER_PERCENT: f64 = 0.35;
 /// Do leaves and points of this room look for themselves? In a room of few triangles exact clipping is better.
 fn by_rays(sight: &Sight) -> bool {
     sight.occlusion && !sight.small()
+}
+
+/// What blocks rays in a scene.
+fn index(scene: &Scene, mesh: &Mesh) -> RayIndex {
+    let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+    let masked: Vec<bool> = mesh
+        .material
+        .iter()
+        .map(|&m| {
+            matches!(
+                scene.materials[m as usize].alpha,
+                crate::scene::Alpha::Mask { .. }
+            )
+        })
+        .collect();
+    RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked)
 }
 
 /// A room being baked.
@@ -161,21 +178,18 @@ impl Bake {
     pub fn new(scene: Scene, settings: Settings) -> Self {
         let started = Instant::now();
         let plan = Plan::of(&scene);
-        let mesh = Mesh::new(&scene);
-        let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
-        let masked: Vec<bool> = mesh
-            .material
-            .iter()
-            .map(|&m| {
-                matches!(
-                    scene.materials[m as usize].alpha,
-                    crate::scene::Alpha::Mask { .. }
-                )
-            })
-            .collect();
-        let rays = RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked);
+        let mut mesh = Mesh::new(&scene);
+        let mut rays = index(&scene, &mesh);
         let spaces = if plan.runs(Kind::Occlusion) {
-            spaces(&mesh, &rays, settings.seed)
+            let cuts = cuts(&mesh, &rays);
+            let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
+            if !found.parted.is_empty() {
+                let parted: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
+                mesh = mesh.cut(&parted);
+                rays = index(&scene, &mesh);
+                found = spaces(&mesh, &rays, &[], settings.seed);
+            }
+            found.of_face
         } else {
             vec![0; mesh.faces.len()]
         };
