@@ -7,6 +7,7 @@
 
 use super::polygon::lambert_polygon;
 use glam::DVec3;
+use std::cell::RefCell;
 
 /// Pieces thinner than this are nothing, of the distance from the point to the farthest corner.
 const THIN: f64 = 1e-12;
@@ -29,29 +30,134 @@ pub fn visible_part(
     blockers: &[[DVec3; 3]],
     cap: usize,
 ) -> Option<Vec<Vec<DVec3>>> {
-    let reach = polygon
-        .iter()
-        .map(|q| q.distance(point))
-        .fold(0.0, f64::max);
-    let thin = THIN * reach;
-    let mut pieces = vec![polygon.to_vec()];
-    let mut left = Vec::new();
-    for blocker in blockers {
-        let Some(shadow) = Shadow::new(point, blocker, thin) else {
-            continue;
-        };
-        for piece in pieces.drain(..) {
-            shadow.subtract(piece, thin, &mut left);
-            if left.len() > cap {
-                return None;
+    let mut clipper = Clipper::default();
+    clipper
+        .clip(point, polygon, blockers, cap)
+        .then(|| clipper.pieces.iter().map(<[DVec3]>::to_vec).collect())
+}
+
+/// Convex polygons in one stretch of memory.
+#[derive(Debug, Default)]
+struct Pieces {
+    corners: Vec<DVec3>,
+    ends: Vec<usize>,
+}
+
+impl Pieces {
+    fn clear(&mut self) {
+        self.corners.clear();
+        self.ends.clear();
+    }
+
+    fn push(&mut self, piece: &[DVec3]) {
+        self.corners.extend_from_slice(piece);
+        self.ends.push(self.corners.len());
+    }
+
+    fn truncate(&mut self, count: usize) {
+        self.ends.truncate(count);
+        self.corners
+            .truncate(self.ends.last().copied().unwrap_or(0));
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts
+            .zip(&self.ends)
+            .map(|(start, &end)| &self.corners[start..end])
+    }
+}
+
+/// Reused memory: what is left of a polygon, and room to cut.
+#[derive(Debug, Default)]
+struct Clipper {
+    pieces: Pieces,
+    left: Pieces,
+    rest: Vec<DVec3>,
+    inside: Vec<DVec3>,
+    outside: Vec<DVec3>,
+}
+
+thread_local! {
+    /// The clipper of this thread: cutting takes less time than asking for memory.
+    static CLIPPER: RefCell<Clipper> = RefCell::default();
+}
+
+impl Clipper {
+    /// Leaves in `pieces` what the point sees of the polygon. False when that would take more than `cap` pieces.
+    fn clip(
+        &mut self,
+        point: DVec3,
+        polygon: &[DVec3],
+        blockers: &[[DVec3; 3]],
+        cap: usize,
+    ) -> bool {
+        let reach = polygon
+            .iter()
+            .map(|q| q.distance(point))
+            .fold(0.0, f64::max);
+        let thin = THIN * reach;
+        self.pieces.clear();
+        self.pieces.push(polygon);
+        for blocker in blockers {
+            if misses(point, polygon, blocker) {
+                continue;
+            }
+            let Some(shadow) = Shadow::new(point, blocker, thin) else {
+                continue;
+            };
+            let pieces = std::mem::take(&mut self.pieces);
+            self.left.clear();
+            for piece in pieces.iter() {
+                self.subtract(&shadow, piece, thin);
+                if self.left.ends.len() > cap {
+                    return false;
+                }
+            }
+            self.pieces = std::mem::replace(&mut self.left, pieces);
+            if self.pieces.ends.is_empty() {
+                break;
             }
         }
-        std::mem::swap(&mut pieces, &mut left);
-        if pieces.is_empty() {
-            break;
+        true
+    }
+
+    /// Pushes to `left` what is left of a piece.
+    fn subtract(&mut self, shadow: &Shadow, piece: &[DVec3], thin: f64) {
+        let first = self.left.ends.len();
+        self.rest.clear();
+        self.rest.extend_from_slice(piece);
+        for side in &shadow.sides {
+            side.flipped().keep(&self.rest, thin, &mut self.outside);
+            if !self.outside.is_empty() {
+                self.left.push(&self.outside);
+            }
+            side.keep(&self.rest, thin, &mut self.inside);
+            std::mem::swap(&mut self.rest, &mut self.inside);
+            if self.rest.is_empty() {
+                // Not touched by the shadow: better whole.
+                self.left.truncate(first);
+                self.left.push(piece);
+                return;
+            }
         }
     }
-    Some(pieces)
+}
+
+/// Does a whole polygon lie on one outer side of a triangle's shadow, as far as signs tell? False for a triangle seen
+/// edge-on. A test without roots or divisions, for the most part of all blockers.
+fn misses(point: DVec3, polygon: &[DVec3], triangle: &[DVec3; 3]) -> bool {
+    let [a, b, c] = triangle.map(|corner| corner - point);
+    let normal = (b - a).cross(c - a);
+    let way = normal.dot(a);
+    let beyond = |plane: DVec3, least: f64| {
+        let side = |q: &DVec3| way * (plane.dot(*q - point) - least);
+        polygon.iter().all(|q| side(q) <= 0.0)
+    };
+    beyond(normal, way)
+        || [(a, b), (b, c), (c, a)]
+            .iter()
+            .any(|(p, q)| beyond(p.cross(*q), 0.0))
 }
 
 /// Form factor from an element to the visible part of a convex polygon; None when it takes more than `cap` pieces.
@@ -65,11 +171,14 @@ pub fn lambert_visible(
     if blockers.is_empty() {
         return Some(lambert_polygon(point, normal, polygon));
     }
-    let pieces = visible_part(point, polygon, blockers, cap)?;
-    let sum: f64 = pieces
-        .iter()
-        .map(|piece| lambert_polygon(point, normal, piece))
-        .sum();
+    let sum = CLIPPER.with_borrow_mut(|clipper| {
+        clipper.clip(point, polygon, blockers, cap).then(|| {
+            let pieces = clipper.pieces.iter();
+            pieces
+                .map(|piece| lambert_polygon(point, normal, piece))
+                .sum::<f64>()
+        })
+    })?;
     // Comparing costs another factor, and slivers are never large.
     if sum < SLIVER {
         let whole = lambert_polygon(point, normal, polygon);
@@ -161,28 +270,6 @@ impl Shadow {
                 through(c, a)?,
             ],
         })
-    }
-
-    /// Pushes what is left of a piece.
-    fn subtract(&self, piece: Vec<DVec3>, thin: f64, left: &mut Vec<Vec<DVec3>>) {
-        let mut rest = piece.clone();
-        let mut inside = Vec::new();
-        let first = left.len();
-        for side in &self.sides {
-            let mut outside = Vec::new();
-            side.flipped().keep(&rest, thin, &mut outside);
-            if !outside.is_empty() {
-                left.push(outside);
-            }
-            side.keep(&rest, thin, &mut inside);
-            std::mem::swap(&mut rest, &mut inside);
-            if rest.is_empty() {
-                // Not touched by the shadow: better whole.
-                left.truncate(first);
-                left.push(piece);
-                return;
-            }
-        }
     }
 }
 
