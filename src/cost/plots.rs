@@ -112,9 +112,12 @@ fn phases(study: &Study, room: &str) -> String {
     .to_svg()
 }
 
+/// Is it of a kind?
+type Is = fn(Representation) -> bool;
+
 /// Geometry held: numbers that hold a spectrum against what that does to colours.
 fn intervals(study: &Study, room: &str) -> String {
-    let kinds: [(&str, fn(Representation) -> bool); 6] = [
+    let kinds: [(&str, Is); 6] = [
         ("adaptive (default)", |r| r == Representation::Adaptive),
         ("adaptive, guaranteed", |r| r == Representation::Guaranteed),
         ("the paper's control", |r| r == Representation::Paper),

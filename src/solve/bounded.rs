@@ -200,8 +200,8 @@ impl Coarse {
         for row in &mut all {
             for (x, &n) in row.iter_mut().zip(&nodes) {
                 let sums = lit.cmf.node(n);
-                for a in 0..3 {
-                    x.radius[a] += tail * sums[a];
+                for (radius, sum) in x.radius.iter_mut().zip(sums) {
+                    *radius += tail * sum;
                 }
             }
         }

@@ -21,6 +21,8 @@ pub(super) const PATCHES: usize = 192;
 const BATCH: usize = 3;
 /// The model is solved to this relative error: far below what is asked of wavelengths.
 const TOLERANCE: f64 = 1e-4;
+/// What that leaves undone and rounding may look like a colour difference of this size, CIELUV: no lane is split for less.
+const UNSEEN: f64 = 1e-3;
 
 /// The model.
 pub(super) struct Coarse {
@@ -227,6 +229,7 @@ impl Coarse {
             .collect();
         let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
         let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
+        let tolerance = tolerance.max(UNSEEN);
         if let Some(cuts) = known {
             let lanes = Lanes::ratio(spectra, &cuts, weights);
             let (error, _) = self.loss(&lanes, &references, &jacobians, total);

@@ -34,8 +34,8 @@ enum Base {
     Intervals(Vec<Lane>),
     /// Linear sRGB: what each leaf of a reflectance adds to it under D65, and each leaf of a radiosity.
     Rgb {
-        paint: [Leaves; 3],
-        light: [Leaves; 3],
+        paint: Box<[Leaves; 3]>,
+        light: Box<[Leaves; 3]>,
     },
     /// Coordinates in an orthonormal basis.
     Vectors(Vec<Leaves>),
@@ -130,7 +130,10 @@ impl Lanes {
         let xyz = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
             .map(|rgb| display.to_xyz(rgb).map(|x| KM * x));
         Self {
-            base: Base::Rgb { paint, light },
+            base: Base::Rgb {
+                paint: Box::new(paint),
+                light: Box::new(light),
+            },
             xyz: xyz.to_vec(),
             power: spectra.iter().map(|s| s.power).collect(),
             weights: *weights,
@@ -249,7 +252,7 @@ impl Lanes {
                 }
             }
             Base::Rgb { paint, .. } => {
-                for (out, w) in out.iter_mut().zip(paint) {
+                for (out, w) in out.iter_mut().zip(paint.iter()) {
                     *out = dot(f, w).clamp(0.0, GREATEST_ALBEDO) as f32;
                 }
             }
@@ -319,7 +322,7 @@ impl Lanes {
             }
             Base::Rgb { light: rows, .. } => {
                 let all = radiosity();
-                for (out, w) in out.iter_mut().zip(rows) {
+                for (out, w) in out.iter_mut().zip(rows.iter()) {
                     *out += dot(&all, w) as f32;
                 }
             }

@@ -19,6 +19,8 @@ use wide::{f32x4, f32x8, f32x16};
 
 /// Nodes that a task gathers; fixed, so that results do not depend on the number of threads.
 const CHUNK: usize = 256;
+/// Sums that go on side by side.
+const SUMS: usize = 4;
 
 /// What the operator needs to know of the patches.
 #[derive(Debug)]
@@ -111,17 +113,17 @@ impl<'a> Operator<'a> {
         gathered: &mut Rows,
         out: &mut Rows,
     ) {
-        // Lanes of a vector, vectors of a row, sums side by side.
+        // Lanes of a vector, vectors of a row. Every width sums in the same order: a lane is the same number in all.
         match L {
-            4 => self.pass::<f32x4, 1, 4>(radiosity, nodes, gathered, out),
-            8 => self.pass::<f32x8, 1, 4>(radiosity, nodes, gathered, out),
-            16 => self.pass::<f32x16, 1, 4>(radiosity, nodes, gathered, out),
-            32 => self.pass::<f32x16, 2, 2>(radiosity, nodes, gathered, out),
-            _ => self.pass::<f32x16, 4, 1>(radiosity, nodes, gathered, out),
+            4 => self.pass::<f32x4, 1>(radiosity, nodes, gathered, out),
+            8 => self.pass::<f32x8, 1>(radiosity, nodes, gathered, out),
+            16 => self.pass::<f32x16, 1>(radiosity, nodes, gathered, out),
+            32 => self.pass::<f32x16, 2>(radiosity, nodes, gathered, out),
+            _ => self.pass::<f32x16, 4>(radiosity, nodes, gathered, out),
         }
     }
 
-    fn pass<V: Vector, const N: usize, const S: usize>(
+    fn pass<V: Vector, const N: usize>(
         &self,
         radiosity: &Rows,
         nodes: &mut Rows,
@@ -141,7 +143,7 @@ impl<'a> Operator<'a> {
             .for_each(|(chunk, rows)| {
                 for (k, row) in rows.iter_mut().enumerate() {
                     let node = chunk * CHUNK + k;
-                    let sum = gather::<V, N, S>(self.links.row(node), mean);
+                    let sum = gather::<V, N>(self.links.row(node), mean);
                     *row = scaled(&sum, self.shape.inverse[node]);
                 }
             });
@@ -152,8 +154,12 @@ impl<'a> Operator<'a> {
     fn pull<V: Vector, const N: usize>(&self, rows: &mut [[V; N]]) {
         for &[node, first, end] in self.shape.inner.iter().rev() {
             let mut mean = [V::zeroed(); N];
-            for child in first as usize..end as usize {
-                add(&mut mean, self.shape.share[child], &rows[child]);
+            let children = first as usize..end as usize;
+            for (row, share) in rows[children.clone()]
+                .iter()
+                .zip(&self.shape.share[children])
+            {
+                add(&mut mean, *share, row);
             }
             rows[node as usize] = mean;
         }
@@ -169,8 +175,8 @@ impl<'a> Operator<'a> {
         }
         for &[node, first, end] in &shape.inner {
             let above = rows[node as usize];
-            for child in first as usize..end as usize {
-                let row = &mut rows[child];
+            let children = first as usize..end as usize;
+            for (row, child) in rows[children.clone()].iter_mut().zip(children) {
                 add(row, 1.0, &above);
                 if shape.place[child] != NONE {
                     out[shape.place[child] as usize] = scaled(row, self.factor[child]);
@@ -203,14 +209,11 @@ fn add<V: Vector, const N: usize>(sum: &mut [V; N], factor: f32, row: &[V; N]) {
     }
 }
 
-/// `sum of exchange * row` over the links of a node, in S sums.
+/// `sum of exchange * row` over the links of a node, in several sums.
 #[inline(always)]
-fn gather<V: Vector, const N: usize, const S: usize>(
-    links: &[(u32, f32)],
-    rows: &[[V; N]],
-) -> [V; N] {
-    let mut sums = [[V::zeroed(); N]; S];
-    let (several, rest) = links.as_chunks::<S>();
+fn gather<V: Vector, const N: usize>(links: &[(u32, f32)], rows: &[[V; N]]) -> [V; N] {
+    let mut sums = [[V::zeroed(); N]; SUMS];
+    let (several, rest) = links.as_chunks::<SUMS>();
     for some in several {
         for (sum, &(source, exchange)) in sums.iter_mut().zip(some) {
             add(sum, exchange, &rows[source as usize]);
