@@ -62,6 +62,10 @@ pub struct BakeArgs {
     /// Measure the error at N random points by Monte Carlo.
     #[arg(long, value_name = "N")]
     pub audit: Option<usize>,
+    /// How spectra are carried: perceptual, guaranteed (bounds instead of estimates), paper, uniform:N,
+    /// characteristic:N, dense (all 64 leaves) or rgb.
+    #[arg(long, value_name = "HOW", default_value_t, hide_short_help = true)]
+    pub spectrum: Representation,
     /// Print the verdict as one JSON object.
     #[arg(long)]
     pub json: bool,
@@ -102,13 +106,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
 
     let clock = Instant::now();
     talk.phase("preparing");
-    let mut bake = prepare(
-        scene,
-        &args.solving,
-        common,
-        Representation::Adaptive,
-        &talk,
-    );
+    let mut bake = prepare(scene, &args.solving, common, args.spectrum, &talk);
     write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
     seconds.prepare = clock.elapsed().as_secs_f64();
 
@@ -117,7 +115,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         write(&mut log, round)?;
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
-            let light = bake.sketch();
+            let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
             talk.phase("drawing");
             let files = snapshots.round(round.round, bake.scene(), &light.surfaces)?;
             let exposure = snapshots.exposure(bake.scene(), &light.surfaces);

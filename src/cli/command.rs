@@ -1,7 +1,7 @@
 //! The command line as a whole.
 
 use super::options::Common;
-use super::{bake, inspect, paper, probe};
+use super::{bake, cost, inspect, paper, probe};
 use crate::error::{Error, Result};
 
 const EXAMPLES: &str = "\
@@ -35,6 +35,8 @@ pub enum Command {
     Inspect(inspect::InspectArgs),
     /// Irradiance at given points and normals: lux sensors.
     Probe(probe::ProbeArgs),
+    /// What accuracy costs on a room: measured error against time.
+    Cost(cost::CostArgs),
     /// The paper's tables, measured beside printed.
     Paper(paper::PaperArgs),
 }
@@ -54,6 +56,7 @@ pub fn run(cli: &Cli) -> Result<u8> {
         Command::Bake(args) => bake::run(args, &cli.common),
         Command::Inspect(args) => inspect::run(args, &mut std::io::stdout()).map(|()| 0),
         Command::Probe(args) => probe::run(args, &cli.common),
+        Command::Cost(args) => cost::run(args, &cli.common),
         Command::Paper(args) => paper::run(args).map(|()| 0),
     }
 }
