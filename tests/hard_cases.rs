@@ -6,9 +6,12 @@ mod built;
 
 use built::Room;
 use glam::{DVec3, dvec3};
+use haarlight::data::{Outside, Table};
 use haarlight::scene::{LightKind, Scene};
 use haarlight::solve::{Bake, Settings, Verdict};
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::{
+    CmfTree, Control, Estimate, Grid, LEAVES, List, Metric, Partition, Path, Tree, control,
+};
 
 /// Bakes with default settings and checks what must hold of any room.
 fn baked(scene: Scene) -> Bake {
@@ -365,6 +368,86 @@ fn line_spectra() {
     near(bake.mean_irradiance()[1], want, 2e-3);
 }
 
+/// A line on the very edge of a band, a tenth of a nanometre wide: none of it is lost, at either end of the grid neither.
+#[test]
+fn lines_on_band_edges() {
+    let grid = Grid::default();
+    for leaf in [0, 1, 16, 32, 63, 64] {
+        let edge = grid.start() + leaf as f64 * grid.width();
+        let table =
+            Table::new(vec![edge - 0.05, edge, edge + 0.05], vec![0.0, 1000.0, 0.0]).unwrap();
+        let means = grid.means(&table, Outside::Zero);
+        let energy: f64 = means.iter().map(|x| x * grid.width()).sum();
+        // At an end half of the line lies outside.
+        let inside = if leaf % 64 == 0 { 0.5 } else { 1.0 };
+        near(energy, 50.0 * inside, 1e-12);
+        let lit: Vec<usize> = (0..LEAVES).filter(|&l| means[l] > 0.0).collect();
+        let wanted: Vec<usize> = (0..LEAVES)
+            .filter(|&l| l + 1 == leaf || l == leaf)
+            .collect();
+        assert_eq!(lit, wanted, "edge {leaf}");
+        // The room gets all of it, whatever lanes the solver chooses.
+        let mut room = Room::new();
+        let line = room.spectrum("line", means);
+        let wall = room.spectral_paint(std::array::from_fn(|l| 0.3 + 0.3 * (l % 2) as f64));
+        let lamp = room.paint(0.5);
+        room.glow(lamp, line, 1000.0);
+        room.hollow(
+            DVec3::ZERO,
+            dvec3(4.0, 3.0, 4.0),
+            [wall, wall, wall, lamp, wall, wall],
+        );
+        let bake = baked(room.scene());
+        near(
+            bake.rounds().last().unwrap().flux.absorbed_lm,
+            16_000.0,
+            1e-3,
+        );
+    }
+}
+
+/// A lower limit at or above the upper one, limits of nothing, and none that are numbers: the loop of the spectra ends.
+#[test]
+fn spectral_limits_that_exclude_each_other() {
+    let cmf = CmfTree::new(haarlight::color::Observer::cie1931().weights(&Grid::default()));
+    let light: [f64; LEAVES] = std::array::from_fn(|l| 1.0 + (l as f64 * 0.7).sin());
+    let paint: [f64; LEAVES] = std::array::from_fn(|l| 0.5 + 0.4 * (l as f64 * 0.3).cos());
+    let (light, paint) = (
+        Tree::<Estimate>::new(&light, &cmf),
+        Tree::<Estimate>::new(&paint, &cmf),
+    );
+    for settings in [Control::PAPER, Control::within(1.0)] {
+        for [eps_min, eps_max] in [
+            [1e-3, 1e-3],
+            [1.0, 1e-6],
+            [1e300, 0.0],
+            [0.0, 0.0],
+            [f64::INFINITY, f64::NEG_INFINITY],
+            [f64::NAN, f64::NAN],
+            [-1.0, -2.0],
+        ] {
+            let path = Path {
+                source: &light,
+                reflections: &[&paint, &paint],
+            };
+            let mut list = List::new(&light, Partition::uniform(3));
+            for _ in 0..2 {
+                let mut out = List::black();
+                list.reflect(&paint, &cmf, &mut out);
+                list = out;
+            }
+            let settings = Control {
+                eps_min,
+                eps_max,
+                ..settings
+            };
+            control(&mut list, &path, &cmf, &Metric::Xyz, &settings);
+            assert_eq!(list.validate(), Ok(()), "{eps_min} {eps_max}");
+            assert!(list.xyz(&cmf).iter().all(|x| x.is_finite() && *x > 0.0));
+        }
+    }
+}
+
 /// Light of one leaf in the deep blue, beside a lamp that does not have it.
 #[test]
 fn nearly_monochromatic_light() {
@@ -525,10 +608,6 @@ fn wall_of_two_faces() {
             room.quad(dvec3(2.1, 0.0, 0.0), v, u, sheet);
             room.quad(dvec3(2.1 + thickness, 0.0, 0.0), u, v, sheet);
         });
-        println!(
-            "thickness {thickness}: {} triangles",
-            bake.mesh().triangles.len()
-        );
         dark_beyond(&bake, |_| 2.1 + thickness);
     }
 }

@@ -279,3 +279,127 @@ fn the_solver_agrees_behind_a_screen() {
     println!("rms {rms:e} of {offs:?}");
     assert!(rms < 1e-2, "{rms:e}");
 }
+
+/// The order of the solver: round by round against the reference (its own error taken out after Richardson 1911). Elements
+/// are refined where it matters, so their mean edge stands for the resolution.
+#[test]
+fn the_order_of_the_solver() {
+    let scene = || {
+        let mut room = Room::new();
+        let (glow, wall) = (room.lamp(0.5, 1000.0), room.paint(0.5));
+        room.hollow(
+            DVec3::ZERO,
+            DVec3::splat(2.0),
+            [glow, wall, wall, wall, wall, wall],
+        );
+        room.scene()
+    };
+    let points = inner_points(DVec3::ZERO, DVec3::splat(2.0));
+    let [coarse, fine] = [2, 3].map(|depth| {
+        let reference = Reference::new(&scene(), depth, 1);
+        let solution = reference.solve();
+        let rows = reference.gather(&scene(), &solution, &points, 1);
+        rows.iter().map(lux).collect::<Vec<_>>()
+    });
+    let pairs = fine.iter().zip(&coarse);
+    let truth: Vec<f64> = pairs.map(|(f, c)| f + (f - c) / 3.0).collect();
+    let mut bake = Bake::new(
+        scene(),
+        Settings {
+            error: 0.01,
+            ..Settings::default()
+        },
+    );
+    println!("round leaves  edge/m  links    RMS    order  mean of leaves");
+    let mut rows: Vec<[f64; 2]> = Vec::new();
+    for _ in 0..6 {
+        bake.step();
+        let leaves = &bake.light().leaves;
+        let edge = (2.0 * 24.0 / leaves.len() as f64).sqrt();
+        let probed = bake.probe(&points);
+        let squares = probed.iter().zip(&truth).map(|(p, t)| {
+            let off = p.xyz[1] / t - 1.0;
+            off * off
+        });
+        let rms = (squares.sum::<f64>() / points.len() as f64).sqrt();
+        // Flux 4000 lm into 24 m2 of albedo .5: exact whatever the resolution.
+        let mean = bake.mean_irradiance()[1] / (4000.0 / 24.0 / 0.5) - 1.0;
+        let order = rows
+            .last()
+            .map(|[h, e]: &[f64; 2]| (e / rms).ln() / (h / edge).ln());
+        println!(
+            "{:5} {:6} {edge:7.3} {:6} {rms:9.1e} {:5} {mean:+.1e}",
+            bake.rounds().len(),
+            leaves.len(),
+            bake.rounds().last().unwrap().links,
+            order.map_or(String::new(), |o| format!("{o:.1}")),
+        );
+        assert!(mean.abs() < 1e-5, "{mean:e}");
+        rows.push([edge, rms]);
+    }
+    let ([h, first], [least, last]) = (rows[0], rows[5]);
+    let order = (first / last).ln() / (h / least).ln();
+    println!("order from first to last: {order:.2}");
+    // The first round starts low, so the order is that of the slow end: rows of leaves along edges.
+    assert!(order > 0.5, "{order}");
+    assert!(rows.windows(2).all(|w| w[1][1] < w[0][1]), "{rows:?}");
+    assert!(last < 4e-4, "{last:e}");
+}
+
+/// Adaptive rows, rows of 64 leaves and the reference: each pair lies as near as the estimates of both claim.
+#[test]
+fn adaptive_dense_and_reference_agree() {
+    let reference = Reference::new(&painted_box(), 3, 1);
+    let points = inner_points(DVec3::ZERO, dvec3(3.0, 2.0, 4.0));
+    let truth = reference.gather(&painted_box(), &reference.solve(), &points, 1);
+    let weights = Observer::cie1931()
+        .weights(&Grid::default())
+        .map(|w| w.map(|x| KM * x));
+    let xyz = |leaves: &Leaves| {
+        weights
+            .each_ref()
+            .map(|w| leaves.iter().zip(w).map(|(x, w)| x * w).sum::<f64>())
+    };
+    let exact: Vec<[f64; 3]> = truth.iter().map(xyz).collect();
+    let bakes = [Representation::Adaptive, Representation::Dense].map(|representation| {
+        let mut bake = Bake::new(
+            painted_box(),
+            Settings {
+                representation,
+                error: 0.25,
+                ..Settings::default()
+            },
+        );
+        bake.run();
+        bake
+    });
+    let white = bakes[1].light().white;
+    let distance = |a: &[[f64; 3]], b: &[[f64; 3]]| {
+        let pairs = a.iter().zip(b);
+        let sum: f64 = pairs
+            .map(|(a, b)| haarlight::color::de2000(*a, *b, white))
+            .sum();
+        sum / a.len() as f64
+    };
+    let claim = |bake: &Bake| {
+        let last = bake.rounds().last().unwrap();
+        last.error.total_de2000.value.unwrap() / 0.7
+    };
+    let seen = bakes.each_ref().map(|bake| {
+        bake.probe(&points)
+            .iter()
+            .map(|p| p.xyz)
+            .collect::<Vec<_>>()
+    });
+    let (adaptive, dense) = (claim(&bakes[0]), claim(&bakes[1]));
+    let found = [
+        (distance(&seen[0], &exact), adaptive),
+        (distance(&seen[1], &exact), dense),
+        (distance(&seen[0], &seen[1]), adaptive + dense),
+    ];
+    println!("adaptive to reference, dense to reference, adaptive to dense: {found:.4?}");
+    for (off, claimed) in found {
+        assert!(off <= claimed, "{found:?}");
+    }
+    assert!(bakes[0].lanes().len() < bakes[1].lanes().len());
+}

@@ -10,7 +10,9 @@ use crate::geometry::lambert_polygon;
 use glam::DVec3;
 
 /// A leaf is quartered this often at the most.
-const DEEPEST: u32 = 4;
+const DEEPEST: u32 = 3;
+/// Less than this share of white is never looked for, however small an error is asked for.
+const LEAST: f64 = 1e-6;
 
 impl Gatherer<'_> {
     /// Adds what the slope of the radiosity of leaf `id` brings, if that may exceed `limit` (share of white). `factor` is the
@@ -24,6 +26,7 @@ impl Gatherer<'_> {
         limit: f64,
         out: &mut Gathered,
     ) {
+        let limit = limit.max(LEAST);
         let node = self.tree.node(id);
         let Some(element) = self.tree.element(node).filter(|e| e.depth > 0) else {
             return;

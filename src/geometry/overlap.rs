@@ -21,11 +21,12 @@ impl RayIndex {
             }
             let node = &self.tree.nodes[id as usize];
             let sides = node.bounds.map(|side| side.map(|lanes| lanes.to_array()));
-            for lane in 0..node.count as usize {
+            let children = &node.children[..node.count as usize];
+            for (lane, &child) in children.iter().enumerate() {
                 if (0..3).all(|axis| {
                     sides[0][axis][lane] <= high[axis] && sides[1][axis][lane] >= low[axis]
                 }) {
-                    open.push(node.children[lane]);
+                    open.push(child);
                 }
             }
         }

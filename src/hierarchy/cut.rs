@@ -347,7 +347,7 @@ impl Mesh {
         self.positions.clone_from(&old.positions);
         self.first_triangle.clear();
         let mut welded: HashMap<((u32, u32), u64), u32> = HashMap::new();
-        for t in 0..count {
+        for (t, &sides) in sides.iter().enumerate() {
             while self.first_triangle.len() <= old.origin[t].0 as usize {
                 self.first_triangle.push(self.triangles.len() as u32);
             }
@@ -358,7 +358,7 @@ impl Mesh {
                 Some(&cut) => cut.clone(),
                 None if touched && old.area[t] > 0.0 => Cut::whole(t as u32),
                 None => {
-                    self.copy(&old, t, vertices, WHOLE, sides[t]);
+                    self.copy(&old, t, vertices, WHOLE, sides);
                     continue;
                 }
             };
@@ -404,7 +404,7 @@ impl Mesh {
             for corners in cut.triangles(&plane) {
                 let id = self.within.len() as u32;
                 self.within.push(corners.map(|k| cut.points[k as usize]));
-                self.copy(&old, t, corners.map(|k| ids[k as usize]), id, sides[t]);
+                self.copy(&old, t, corners.map(|k| ids[k as usize]), id, sides);
             }
         }
         while self.first_triangle.len() < old.first_triangle.len() {

@@ -24,6 +24,8 @@ pub(super) struct Probes {
     /// Face entry, weights on the face, point and normal.
     points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
     last: Vec<[f64; 3]>,
+    /// Have two rounds been compared?
+    compared: bool,
 }
 
 /// Distance between two rounds, turned into error.
@@ -58,6 +60,7 @@ impl Probes {
         Self {
             points,
             last: Vec::new(),
+            compared: false,
         }
     }
 
@@ -83,7 +86,13 @@ impl Probes {
         white: [f64; 3],
         by_rays: bool,
     ) -> Option<Distance> {
-        let share = if by_rays { SHARE_OF_RAYS } else { SHARE };
+        // The first two rounds are coarse alike: what they share is not noise of rays.
+        let share = if by_rays && self.compared {
+            SHARE_OF_RAYS
+        } else {
+            SHARE
+        };
+        self.compared = !self.last.is_empty();
         let result = (!self.last.is_empty()).then(|| {
             let n = now.len() as f64;
             let pairs = || self.last.iter().zip(&now);
