@@ -40,5 +40,6 @@ pub mod report;
 pub mod scene;
 pub mod solve;
 pub mod spectrum;
+pub mod store;
 
 pub use error::{Error, Problem, Result};

@@ -1,0 +1,17 @@
+//! What is kept between runs: one container, and what makes it safe to trust.
+//!
+//! | file | what |
+//! |---|---|
+//! | `hash` | XXH64 |
+//! | `codec` | numbers and lists as bytes, and back without trust |
+//! | `container` | magic, kind, version, checksum |
+//! | `fingerprint` | what a room is made of, part by part, as hashes |
+
+pub mod codec;
+pub mod container;
+pub mod fingerprint;
+pub mod hash;
+
+pub use codec::{Broken, Decoder, Encoder};
+pub use container::{Kind, read, write};
+pub use fingerprint::Fingerprint;
