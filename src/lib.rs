@@ -43,3 +43,6 @@ pub mod spectrum;
 pub mod store;
 
 pub use error::{Error, Problem, Result};
+
+/// Name and version of the program.
+pub const PROGRAM: &str = concat!("haarlight ", env!("CARGO_PKG_VERSION"));

@@ -62,6 +62,9 @@ pub struct BakeArgs {
     /// Measure the error at N random points by Monte Carlo.
     #[arg(long, value_name = "N")]
     pub audit: Option<usize>,
+    /// Keep the state of the bake here after every round; if the file is there already, go on from it.
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
     /// Print the verdict as one JSON object.
     #[arg(long)]
     pub json: bool,
@@ -110,11 +113,22 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         &talk,
     );
     write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
+    if let Some(path) = args.checkpoint.as_deref().filter(|path| path.exists()) {
+        bake.resume(path)?;
+        for round in bake.rounds() {
+            write(&mut log, round)?;
+        }
+        let rounds = bake.rounds().len();
+        talk.say(&format!("going on after round {rounds} of {}", text(path)));
+    }
     seconds.prepare = clock.elapsed().as_secs_f64();
 
     let verdict = stop.run(&mut bake, &talk, |bake, round| {
         seconds.solve += round.round_s;
         write(&mut log, round)?;
+        if let Some(path) = &args.checkpoint {
+            bake.save(path)?;
+        }
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
             let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
@@ -248,6 +262,11 @@ fn problems(args: &BakeArgs, output: &Path, parts: &[PathBuf]) -> Vec<Problem> {
     let mut outputs = vec![("-o", output)];
     outputs.extend(args.npz.as_deref().map(|path| ("--npz", path)));
     outputs.extend(args.log.as_deref().map(|path| ("--log", path)));
+    outputs.extend(
+        args.checkpoint
+            .as_deref()
+            .map(|path| ("--checkpoint", path)),
+    );
     let mut inputs = vec![args.room.as_path()];
     let beside = args.room.with_extension("spectra.json");
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));

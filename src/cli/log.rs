@@ -51,6 +51,7 @@
 //!
 //! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
 
+use crate::PROGRAM;
 use crate::audit::Comparison;
 use crate::gather::Baked;
 use crate::output::{BakedGlb, Exposure};
@@ -60,8 +61,6 @@ use crate::solve::record::{Figure, Kind, LOG_VERSION};
 use crate::solve::{Bake, Representation, Verdict};
 use serde::Serialize;
 
-/// Name and version of the program.
-pub const PROGRAM: &str = concat!("haarlight ", env!("CARGO_PKG_VERSION"));
 /// An estimate between these multiples of the measured error is honest.
 const HONEST: [f64; 2] = [0.7, 3.0];
 /// With noise above this share of the measured error an audit does not judge ...

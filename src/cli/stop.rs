@@ -54,6 +54,11 @@ impl Stop {
         self.started.elapsed().as_secs_f64()
     }
 
+    /// Should a bake that has done rounds do no further one?
+    fn late(&self, rounds: &[Round]) -> Option<Verdict> {
+        (!rounds.is_empty()).then(|| self.verdict(rounds)).flatten()
+    }
+
     /// Should no further round begin?
     fn verdict(&self, rounds: &[Round]) -> Option<Verdict> {
         if self.interrupted.load(Ordering::SeqCst) {
@@ -67,7 +72,7 @@ impl Stop {
     }
 
     /// Steps a bake to its end; `each` is told of every round. The first round is always done, so that there is a whole
-    /// solution.
+    /// solution; a bake that was resumed has one.
     ///
     /// # Errors
     /// What `each` returns.
@@ -77,6 +82,9 @@ impl Stop {
         talk: &Talk,
         mut each: impl FnMut(&Bake, &Round) -> Result<()>,
     ) -> Result<Verdict> {
+        if let Some(verdict) = bake.verdict().or_else(|| self.late(bake.rounds())) {
+            return Ok(verdict);
+        }
         loop {
             let number = bake.rounds().len() + 1;
             talk.phase(&format!("round {number}"));

@@ -47,6 +47,32 @@ pub(super) struct Direct {
 }
 
 impl Direct {
+    /// What is known of `leaves`, as it was before it was written down: a row of `width` lanes and a spread each.
+    pub(super) fn known(
+        leaves: &[u32],
+        nodes: usize,
+        width: usize,
+        rows: &[f32],
+        spread: &[f32],
+        rays: u64,
+    ) -> Self {
+        let mut known = Self {
+            rows: vec![None; nodes],
+            spread: vec![0.0; nodes],
+            rays,
+        };
+        for (k, &leaf) in leaves.iter().enumerate() {
+            known.rows[leaf as usize] = Some(rows[k * width..(k + 1) * width].into());
+            known.spread[leaf as usize] = spread[k];
+        }
+        known
+    }
+
+    /// Half the range of brightness over a leaf's points.
+    pub(super) fn spread(&self, leaf: u32) -> f32 {
+        self.spread[leaf as usize]
+    }
+
     /// Direct irradiance of a leaf by lane.
     pub(super) fn row(&self, leaf: u32) -> &[f32] {
         self.rows[leaf as usize].as_deref().unwrap_or(&[])

@@ -20,8 +20,8 @@ const SHARE: f64 = 1.5;
 /// Watched points and what was seen there last.
 pub(super) struct Probes {
     /// Face entry, weights on the face, point and normal.
-    points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
-    last: Vec<[f64; 3]>,
+    pub(super) points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
+    pub(super) last: Vec<[f64; 3]>,
 }
 
 /// Distance between two rounds, turned into error.

@@ -5,7 +5,7 @@ use super::conjugate::Convergence;
 use super::estimate::Distance;
 use super::flux::Balance;
 use crate::link::{Refined, Way};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Version of the log's format. Raised when a field changes its meaning or goes.
@@ -56,7 +56,7 @@ impl Clock {
 }
 
 /// A figure and what it is.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
     /// The value; none if not known yet.
     pub value: Option<f64>,
@@ -65,7 +65,7 @@ pub struct Figure {
 }
 
 /// What an error figure is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// Cannot be exceeded.
@@ -77,7 +77,7 @@ pub enum Kind {
 }
 
 /// Errors of a round by source; colour differences are means over random points of the room, under the adaptation white.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Errors {
     /// All sources, CIEDE2000.
     pub total_de2000: Figure,
@@ -97,10 +97,15 @@ pub struct Errors {
     pub total_xyz: Figure,
 }
 
+fn round() -> &'static str {
+    "round"
+}
+
 /// One round.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Round {
     /// Always `round`.
+    #[serde(skip_deserializing, default = "round")]
     pub record: &'static str,
     /// Counted from 1.
     pub round: usize,

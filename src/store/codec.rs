@@ -234,6 +234,11 @@ impl<'a> Decoder<'a> {
         String::from_utf8(bytes.to_vec()).map_err(|_| Broken::new("a text is not UTF-8"))
     }
 
+    /// Leaves the rest unread.
+    pub fn skip(&mut self) {
+        self.rest = &[];
+    }
+
     /// Nothing may be left.
     ///
     /// # Errors
