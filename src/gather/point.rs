@@ -4,12 +4,14 @@
 //! (its children take its place) while that could misplace more than the tolerance; a lamp is entered until it is even.
 //! Ways that a link proved clear cost no ray; others get rays in number with what they carry.
 
-use crate::geometry::{Segment, lambert_polygon};
+use super::hemisphere::{BEAM, Hemisphere};
+use crate::geometry::sampling::tangents;
+use crate::geometry::{Hit, Segment, lambert_polygon};
 use crate::hierarchy::{Element, NONE, Node, Sample, Tree};
-use crate::link::{Sight, View, Way, blockers_of, point_factor};
+use crate::link::{Sight, View, Way, blockers_of, pattern, point_factor};
 use crate::scene::{LightKind, PunctualLight};
 use crate::solve::light::Light;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// Rays to a patch at least, and at the most.
 const RAYS: [usize; 2] = [4, 32];
@@ -27,6 +29,9 @@ const PRIOR: f64 = 4.0;
 const LAMP_DEPTH: u32 = 6;
 /// A lamp gets more than plain rays if it carries this many tolerances.
 const SHAFT_WORTH: f64 = 4.0;
+
+/// A patch so bright that one ray of the hemisphere would carry more than this many tolerances is gathered by its link.
+const GLARE: f64 = 4.0;
 
 /// Where light is received.
 #[derive(Debug, Clone, Copy)]
@@ -72,12 +77,29 @@ impl Gathered {
 #[derive(Debug, Default)]
 pub struct Memory {
     stack: Vec<(u32, Way, f32)>,
+    open: Vec<(u32, Way, f32)>,
+    /// Epoch in which each node was last gathered as a patch: rays that end on it bring nothing more.
+    taken: Vec<u32>,
+    epoch: u32,
     samples: Vec<Sample>,
     segments: Vec<Segment>,
     weights: Vec<f64>,
     blocked: Vec<bool>,
     /// Rays cast.
     pub rays: u64,
+}
+
+impl Memory {
+    /// Another point: nothing is taken yet.
+    fn begin(&mut self, nodes: usize) {
+        self.open.clear();
+        self.stack.clear();
+        self.epoch = self.epoch.wrapping_add(1);
+        if self.taken.len() != nodes || self.epoch == 0 {
+            self.taken = vec![0; nodes];
+            self.epoch = 1;
+        }
+    }
 }
 
 /// Everything a gather looks at.
@@ -94,6 +116,8 @@ pub struct Gatherer<'a> {
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
     pub closed: bool,
+    /// Directions for indirect light where rays find patches sooner than links do; none: by links.
+    pub hemisphere: Option<&'a Hemisphere>,
 }
 
 impl Gatherer<'_> {
@@ -121,6 +145,11 @@ impl Gatherer<'_> {
     pub fn at(&self, to: &Receiver, memory: &mut Memory) -> Gathered {
         let before = memory.rays;
         let mut out = Gathered::dark();
+        if let Some(hemisphere) = self.hemisphere {
+            self.sweep(to, hemisphere, memory, &mut out);
+            out.rays = memory.rays - before;
+            return out;
+        }
         memory.stack.clear();
         match to.leaf {
             Some(leaf) => {
@@ -152,6 +181,114 @@ impl Gatherer<'_> {
         out
     }
 
+    /// Lamps and what is as bright by links, all else by rays.
+    fn sweep(
+        &self,
+        to: &Receiver,
+        hemisphere: &Hemisphere,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
+        memory.begin(self.tree.nodes.len());
+        let mut above = to.leaf;
+        if above.is_none() && !self.tree.nodes.is_empty() {
+            memory.open.push((0, Way::Crowded, 0.5));
+        }
+        while let Some(id) = above {
+            memory.open.extend(self.light.neighbours.row(id));
+            above = Some(self.tree.node(id).parent).filter(|&p| p != NONE);
+        }
+        // A ray must not carry more than this.
+        let most = GLARE * self.tolerance * hemisphere.len() as f64;
+        while let Some((id, way, v)) = memory.open.pop() {
+            let k = id as usize;
+            let emitted = f64::from(self.light.bright_emitted[k]);
+            let brightest = f64::from(self.light.brightest[k]);
+            let node = self.tree.node(id);
+            let plain = node.faces.1 <= POLYGONS;
+            let exact = plain && way == Way::Clear && !self.has_parts(node);
+            if !(emitted > 0.0 || brightest > most || exact) || !self.can_see(to, node) {
+                continue;
+            }
+            if emitted <= 0.0 && !exact && self.bound(to, node) * brightest < self.tolerance {
+                continue;
+            }
+            let whole = plain
+                && (emitted > 0.0 || exact || f64::from(self.light.bright_reflected[k]) > most);
+            let slight = emitted > 0.0 && self.bound(to, node) * emitted < 0.1 * self.tolerance;
+            if whole || slight || !self.has_parts(node) {
+                memory.taken[k] = memory.epoch;
+                memory.stack.push((id, way, v));
+                while let Some((id, way, v)) = memory.stack.pop() {
+                    self.visit(to, id, way, v, memory, out);
+                }
+            } else {
+                memory.open.extend(node.child_range().map(|c| (c, way, v)));
+            }
+        }
+        for (x, d) in out.irradiance.iter_mut().zip(&out.direct) {
+            *x += d;
+        }
+        self.punctual(to, memory, out);
+        let share = 1.0 / hemisphere.len() as f32;
+        // Another seed turns the pattern.
+        let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
+        let [x, y] = tangents(to.normal);
+        let [x, y] = [x * cos + y * sin, y * cos - x * sin];
+        let mut hits = [None; BEAM];
+        let mut directions = [Vec3::ZERO; BEAM];
+        let width = self.light.width();
+        for beam in hemisphere.beams() {
+            for (out, d) in directions.iter_mut().zip(beam) {
+                *out = (x * d.x + y * d.y + to.normal * d.z).as_vec3();
+            }
+            self.sight
+                .meet(to.point.as_vec3(), &directions, to.plane, &mut hits);
+            memory.rays += BEAM as u64;
+            for hit in hits.iter().flatten() {
+                let Some(leaf) = self.met(hit) else { continue };
+                let mut id = leaf;
+                while id != NONE && memory.taken[id as usize] != memory.epoch {
+                    id = self.tree.node(id).parent;
+                }
+                if id != NONE {
+                    continue;
+                }
+                out.seen += f64::from(share);
+                let row = self.light.reflected.row(leaf as usize);
+                for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
+                    *x += share * r;
+                }
+            }
+        }
+    }
+
+    /// The smallest patch of the solution at a hit; none on a back that has no face.
+    fn met(&self, hit: &Hit) -> Option<u32> {
+        let entry = self.tree.entry[hit.triangle as usize][usize::from(hit.from_behind)];
+        if entry == NONE {
+            return None;
+        }
+        let [u, v] = hit.uv.map(f64::from);
+        let first = 1.0 - u - v;
+        let weights = if hit.from_behind {
+            [first, v, u]
+        } else {
+            [first, u, v]
+        };
+        let mut leaf = self.tree.leaf_at(entry, weights);
+        while leaf as usize >= self.light.bright_emitted.len() {
+            leaf = self.tree.node(leaf).parent;
+        }
+        Some(leaf)
+    }
+
+    /// Greatest factor that a patch could have, by its projected area.
+    fn bound(&self, to: &Receiver, node: &Node) -> f64 {
+        let gap = ((node.centre - to.point).length() - node.radius).max(0.0);
+        node.area / (std::f64::consts::PI * gap * gap + node.area)
+    }
+
     fn visit(
         &self,
         to: &Receiver,
@@ -174,9 +311,7 @@ impl Gatherer<'_> {
         let spread = f64::from(self.light.spread[k]);
         let distance = (node.centre - to.point).length();
         if node.faces.1 > POLYGONS {
-            // Greatest factor the whole cluster could have, by its projected area.
-            let gap = (distance - node.radius).max(0.0);
-            let factor = node.area / (std::f64::consts::PI * gap * gap + node.area);
+            let factor = self.bound(to, node);
             let near = distance < CLOSE * node.radius;
             // Points find a cluster's light to about a third of its spread, and where lamps are in it, of its light.
             if near || factor * (0.3 * spread + emitted) > self.tolerance {
@@ -293,7 +428,7 @@ impl Gatherer<'_> {
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        let shift = crate::link::pattern(to.seed, id, 1);
+        let shift = pattern(to.seed, id, 1);
         self.tree.samples(id, count, shift, &mut memory.samples);
         memory.segments.clear();
         memory.weights.clear();
@@ -393,7 +528,7 @@ impl Gatherer<'_> {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
         let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
         let count = wanted.clamp(RAYS[0], RAYS[1]);
-        let shift = crate::link::pattern(to.seed, id, 2);
+        let shift = pattern(to.seed, id, 2);
         let normal = node.normal;
         memory.segments.clear();
         memory.weights.clear();

@@ -259,7 +259,7 @@ impl RayIndex {
         }
         let mut line = Shear::new(from, direction, [self.gap / direction.length(), t_max]);
         let slabs = Slabs::new(from, direction);
-        let mut best: Option<(f32, usize, usize, [f32; 2])> = None;
+        let mut best: Option<Nearest> = None;
         let mut stack = Stack::new((0.0f32, 0u32));
         while let Some((near, entry)) = stack.pop() {
             if near > line.range[1] {
@@ -290,35 +290,76 @@ impl RayIndex {
                 if plane == ignore_plane && plane != NO_PLANE {
                     continue;
                 }
-                // Equal distances go to the lower id, whatever the order of the tree; but a sheet made of two faces back
-                // to back is met at the one that faces the ray.
-                let nearer = best.is_none_or(|(t0, b, l, _)| {
-                    let other = &self.tree.blocks[b];
-                    let together = plane == other.planes[l]
-                        && plane != NO_PLANE
-                        && (t[lane] - t0).abs() <= TOGETHER * t0;
-                    if together && behind(block, lane, direction) != behind(other, l, direction) {
-                        return !behind(block, lane, direction);
-                    }
-                    (t[lane], block.ids[lane]) < (t0, other.ids[l])
-                });
-                if nearer
+                let found = Nearest {
+                    t: t[lane],
+                    block: number,
+                    place: lane,
+                    uv: [u[lane], v[lane]],
+                };
+                if self.is_nearer(&found, best.as_ref(), direction)
                     && (block.masked >> lane & 1 == 0 || opaque(block.ids[lane], u[lane], v[lane]))
                 {
-                    best = Some((t[lane], number, lane, [u[lane], v[lane]]));
-                    line.range[1] = line.range[1].min(t[lane] * (1.0 + TOGETHER));
+                    line.range[1] = line.range[1].min(found.end());
+                    best = Some(found);
                 }
             }
         }
-        best.map(|(t, number, lane, uv)| {
-            let block = &self.tree.blocks[number];
-            Hit {
-                t,
-                triangle: block.ids[lane],
-                uv,
-                from_behind: behind(block, lane, direction),
+        best.map(|n| self.hit(&n, direction))
+    }
+
+    /// Does `found` come before the nearest hit so far? Equal distances go to the lower id, whatever the order of the
+    /// tree; but a sheet made of two faces back to back is met at the one that faces the ray.
+    #[inline(always)]
+    pub(super) fn is_nearer(
+        &self,
+        found: &Nearest,
+        best: Option<&Nearest>,
+        direction: Vec3,
+    ) -> bool {
+        let Some(best) = best else { return true };
+        let (one, other) = (
+            &self.tree.blocks[found.block],
+            &self.tree.blocks[best.block],
+        );
+        let plane = one.planes[found.place];
+        let together = plane == other.planes[best.place]
+            && plane != NO_PLANE
+            && (found.t - best.t).abs() <= TOGETHER * best.t;
+        if together {
+            let turned = behind(one, found.place, direction);
+            if turned != behind(other, best.place, direction) {
+                return !turned;
             }
-        })
+        }
+        (found.t, one.ids[found.place]) < (best.t, other.ids[best.place])
+    }
+
+    /// What the caller is told of the nearest hit.
+    pub(super) fn hit(&self, nearest: &Nearest, direction: Vec3) -> Hit {
+        let block = &self.tree.blocks[nearest.block];
+        Hit {
+            t: nearest.t,
+            triangle: block.ids[nearest.place],
+            uv: nearest.uv,
+            from_behind: behind(block, nearest.place, direction),
+        }
+    }
+}
+
+/// The nearest hit of a ray so far.
+#[derive(Clone, Copy)]
+pub(super) struct Nearest {
+    pub(super) t: f32,
+    pub(super) block: usize,
+    pub(super) place: usize,
+    pub(super) uv: [f32; 2],
+}
+
+impl Nearest {
+    /// Hits up to here may still take its place.
+    #[inline(always)]
+    pub(super) fn end(&self) -> f32 {
+        self.t * (1.0 + TOGETHER)
     }
 }
 
@@ -514,6 +555,42 @@ mod tests {
                 assert!(at.distance(from + direction * hit.t) < 1e-5);
                 assert_eq!(hit.from_behind, (b - a).cross(c - a).dot(direction) > 0.0);
             }
+        }
+    }
+
+    #[test]
+    fn beams_hit_what_single_rays_hit() {
+        let mut random = Pcg::new(5);
+        for count in [5, 30, 2_000] {
+            let (positions, triangles) = clutter(count, 0.3, &mut random);
+            let planes: Vec<u32> = (0..count).collect();
+            let masked: Vec<bool> = (0..count).map(|k| k % 3 == 0).collect();
+            let opaque = |triangle: u32, u: f32, v: f32| {
+                (triangle + (u * 8.0) as u32 + (v * 8.0) as u32).is_multiple_of(2)
+            };
+            let index = RayIndex::build(&positions, &triangles, &planes, &masked);
+            let mut hits = 0;
+            for k in 0..600 {
+                let from = point(&mut random) * 1.5;
+                let axis = point(&mut random);
+                let spread = [0.1, 0.5, 3.0][k % 3];
+                let directions: Vec<Vec3> = (0..1 + k % 16)
+                    .map(|_| (axis + spread * point(&mut random)).normalize())
+                    .collect();
+                let ignored = random.below(count);
+                let mut out = vec![None; directions.len()];
+                index.closest_many_with(from, &directions, ignored, &mut out, &opaque);
+                for (hit, &d) in out.iter().zip(&directions) {
+                    let single = index.closest_with(from, d, f32::INFINITY, ignored, &opaque);
+                    assert_eq!(hit.map(|h| h.triangle), single.map(|h| h.triangle));
+                    if let (Some(a), Some(b)) = (hit, single) {
+                        assert!((a.t - b.t).abs() < 1e-4 * (1.0 + b.t), "{a:?} {b:?}");
+                        assert_eq!(a.from_behind, b.from_behind);
+                        hits += 1;
+                    }
+                }
+            }
+            assert!(hits > 10, "{hits} of {count}");
         }
     }
 

@@ -8,6 +8,7 @@
 //! | `tree`, `walk` | the eight-wide tree over the triangles |
 //! | [`index`] | [`RayIndex`]: is a segment blocked, what does a ray hit |
 //! | `packet` | sixteen segments at once |
+//! | `beam` | what up to sixteen rays from one point hit first |
 //! | [`shaft`] | the space between two patches |
 //! | [`blockers`] | which triangles of the index reach into a shaft |
 //! | [`hidden`] | is a pair hidden as a whole |
@@ -35,6 +36,7 @@
 //!
 //! The canteen's index takes 86 bytes a triangle and 0.17 s to build, its planes 0.19 s.
 
+mod beam;
 pub mod blockers;
 pub mod clip;
 pub mod hidden;

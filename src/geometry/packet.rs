@@ -8,7 +8,7 @@
 use super::index::RayIndex;
 use super::segment::{NO_PLANE, Segment};
 use super::tree::{LEAF, Node};
-use super::triangle::{Block, PACKET, meet_lines};
+use super::triangle::{Block, Edges, PACKET, meet_lines};
 use super::walk::{LEAST_COMPONENT, Stack};
 use glam::Vec3;
 use wide::{f32x8, f32x16, u32x16};
@@ -98,7 +98,7 @@ impl Packet {
 
     /// None of no segments. Free lanes repeat the first.
     #[inline(always)]
-    fn new(index: &RayIndex, segments: &[Segment]) -> Option<Self> {
+    pub(super) fn new(index: &RayIndex, segments: &[Segment]) -> Option<Self> {
         let first = segments.first()?;
         let count = segments.len().min(PACKET);
         let mut rows = [row(first); PACKET];
@@ -236,8 +236,23 @@ impl Packet {
     /// A bit for each segment that meets the box of one child.
     #[inline(always)]
     fn enter(&self, node: &Node, child: usize) -> u32 {
+        let (near, far) = self.slabs(node, child, f32x16::ONE);
+        near.simd_le(far).to_bitmask()
+    }
+
+    /// The same for segments that end at their nearest hit, and where the first enters.
+    #[inline(always)]
+    pub(super) fn enter_near(&self, node: &Node, child: usize) -> (f32, u32) {
+        let (near, far) = self.slabs(node, child, self.range[1]);
+        let met = near.simd_le(far);
+        (range_of(met.select(near, f32x16::ONE))[0], met.to_bitmask())
+    }
+
+    /// Where the segments enter and leave the box of one child.
+    #[inline(always)]
+    fn slabs(&self, node: &Node, child: usize, end: f32x16) -> (f32x16, f32x16) {
         let mut near = f32x16::ZERO;
-        let mut far = f32x16::ONE;
+        let mut far = end;
         for axis in 0..3 {
             let low = f32x16::splat(node.bounds[0][axis].as_array()[child]);
             let high = f32x16::splat(node.bounds[1][axis].as_array()[child]);
@@ -246,7 +261,66 @@ impl Packet {
             near = near.fast_max(a.fast_min(b));
             far = far.fast_min(a.fast_max(b));
         }
-        near.simd_le(far).to_bitmask()
+        (near, far)
+    }
+
+    /// The lanes that hold a segment.
+    pub(super) fn open(&self) -> u32 {
+        self.open
+    }
+
+    /// A bit for each child whose box some segment might meet.
+    #[inline(always)]
+    pub(super) fn boxes(&self, node: &Node) -> u32 {
+        self.bundle.enter(node)
+    }
+
+    /// A bit for each triangle of a block that some segment might meet.
+    #[inline(always)]
+    pub(super) fn straddled(&self, block: &Block) -> u32 {
+        self.bundle.straddles(block)
+    }
+
+    /// Ends a segment at `t`.
+    #[inline(always)]
+    pub(super) fn shorten(&mut self, lane: usize, t: f32) {
+        let end = &mut self.range[1].as_mut_array()[lane];
+        *end = end.min(t);
+    }
+
+    /// Where the longest segment ends. Free lanes repeat the first and never end: they count as long as it.
+    #[inline(always)]
+    pub(super) fn farthest(&self) -> f32 {
+        let ends = self.range[1].as_array();
+        let count = 32 - self.open.leading_zeros() as usize;
+        ends[..count].iter().fold(0.0, |a, &b| a.max(b))
+    }
+
+    /// A bit for each segment of `lanes` that meets one triangle of the block in its range, masks aside, and where.
+    #[inline(always)]
+    pub(super) fn meet(&self, block: &Block, place: usize, lanes: u32) -> (u32, Edges<f32x16>) {
+        let corners = block.corner_lane(place);
+        let [a, b, c] = corners;
+        let corners = match &self.turn {
+            &Turn::Same([x, y, z]) => [
+                splat([a[x], a[y], a[z]]),
+                splat([b[x], b[y], b[z]]),
+                splat([c[x], c[y], c[z]]),
+            ],
+            mixed => [
+                mixed.lanes(splat(a)),
+                mixed.lanes(splat(b)),
+                mixed.lanes(splat(c)),
+            ],
+        };
+        let (met, e) = meet_lines(corners, self.origin, self.slope, self.range);
+        let mut met = met & lanes;
+        let plane = block.planes[place];
+        if met != 0 && plane != NO_PLANE {
+            let id = u32x16::splat(plane);
+            met &= !(self.planes[0].simd_eq(id) | self.planes[1].simd_eq(id)).to_bitmask();
+        }
+        (met, e)
     }
 
     /// A bit for each segment of `lanes` that a triangle of the block blocks.
@@ -276,30 +350,7 @@ impl Packet {
         lanes: u32,
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
-        let corners = block.corner_lane(place);
-        let [a, b, c] = corners;
-        let corners = match &self.turn {
-            &Turn::Same([x, y, z]) => [
-                splat([a[x], a[y], a[z]]),
-                splat([b[x], b[y], b[z]]),
-                splat([c[x], c[y], c[z]]),
-            ],
-            mixed => [
-                mixed.lanes(splat(a)),
-                mixed.lanes(splat(b)),
-                mixed.lanes(splat(c)),
-            ],
-        };
-        let (met, e) = meet_lines(corners, self.origin, self.slope, self.range);
-        let mut met = met & lanes;
-        if met == 0 {
-            return 0;
-        }
-        let plane = block.planes[place];
-        if plane != NO_PLANE {
-            let id = u32x16::splat(plane);
-            met &= !(self.planes[0].simd_eq(id) | self.planes[1].simd_eq(id)).to_bitmask();
-        }
+        let (mut met, e) = self.meet(block, place, lanes);
         if block.masked >> place & 1 == 0 {
             return met;
         }

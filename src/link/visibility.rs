@@ -1,8 +1,8 @@
 //! Is the way between two patches clear? Exactly where the shaft between them is empty, by rays elsewhere.
 
-use crate::geometry::{Patch, RayIndex, Segment, Shaft, ShaftContents, lambert_visible};
+use crate::geometry::{Hit, Patch, RayIndex, Segment, Shaft, ShaftContents, lambert_visible};
 use crate::hierarchy::{Mesh, Node, Sample, Tree};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
 const LISTED: usize = 24;
@@ -110,6 +110,18 @@ impl Sight<'_> {
             ShaftContents::Clear => View::Clear,
             ShaftContents::Few(list) => View::Listed(list),
             ShaftContents::Many => View::Crowded,
+        }
+    }
+
+    /// What rays from one point, up to sixteen, meet first; triangles of `plane` are looked through.
+    pub fn meet(&self, from: Vec3, directions: &[Vec3], plane: u32, out: &mut [Option<Hit>]) {
+        match self.opaque {
+            Some(opaque) => self
+                .rays
+                .closest_many_with(from, directions, plane, out, &opaque),
+            None => self
+                .rays
+                .closest_many_with(from, directions, plane, out, &|_, _, _| true),
         }
     }
 

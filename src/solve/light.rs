@@ -20,6 +20,8 @@ pub struct Light {
     pub bright_reflected: Vec<f32>,
     /// Brightness of what each node emits.
     pub bright_emitted: Vec<f32>,
+    /// Greatest brightness of what any leaf below each node reflects.
+    pub brightest: Vec<f32>,
     /// Standard deviation of brightness over the leaves of a node.
     pub spread: Vec<f32>,
     /// Who is linked to whom.
@@ -43,6 +45,13 @@ impl Light {
         let n = tree.nodes.len();
         self.bright_reflected = (0..n).map(|k| scalar(self.reflected.row(k))).collect();
         self.bright_emitted = (0..n).map(|k| scalar(self.emitted.row(k))).collect();
+        self.brightest = self.bright_reflected.clone();
+        for k in (0..n).rev() {
+            let below = tree.nodes[k]
+                .child_range()
+                .map(|c| self.brightest[c as usize]);
+            self.brightest[k] = below.fold(self.brightest[k], f32::max);
+        }
         let both = |k: usize| f64::from(self.bright_reflected[k] + self.bright_emitted[k]);
         let mut square: Vec<f64> = (0..n).map(|k| both(k) * both(k)).collect();
         self.spread = vec![0.0; n];

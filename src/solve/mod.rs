@@ -24,6 +24,7 @@ pub use rows::{Rows, padded};
 pub(crate) use sources::weights_of;
 
 use crate::color::Observer;
+use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
 use crate::hierarchy::{Mesh, Tree, spaces};
@@ -135,6 +136,7 @@ pub struct Bake {
     lamps: Vec<(PunctualLight, Vec<f32>)>,
     direct: direct::Direct,
     probes: estimate::Probes,
+    hemisphere: Hemisphere,
     rounds: Vec<Round>,
     watch: Option<record::Watch>,
     started: Instant,
@@ -166,6 +168,7 @@ impl Bake {
         let tree = Tree::new(&mesh, &spaces);
         let weights = Observer::cie1931().weights(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
+        let hemisphere = Hemisphere::for_error(settings.error);
         let probes = estimate::Probes::new(&tree, settings.seed);
         let mut bake = Self {
             closed: Closed::No,
@@ -190,6 +193,7 @@ impl Bake {
             weights,
             lanes,
             probes,
+            hemisphere,
             started,
         };
         [bake.closed, bake.sealed] = bake.with_sight(|bake, sight| {
@@ -679,6 +683,7 @@ impl Bake {
             lamps: &self.lamps,
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
+            hemisphere: (sight.occlusion && !sight.small()).then_some(&self.hemisphere),
         }
     }
 

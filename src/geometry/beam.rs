@@ -1,0 +1,122 @@
+//! Up to sixteen rays from one point through the tree at once: what does each meet first?
+//!
+//! The walk of `packet`, nearest boxes first; every ray ends at the nearest hit so far, and a box that starts behind the
+//! farthest of these ends is passed by. Rays that leave a point in a narrow beam share most of their way.
+
+use super::index::{Hit, Nearest, RayIndex};
+use super::packet::Packet;
+use super::segment::{NO_PLANE, Segment};
+use super::tree::{LEAF, WIDTH};
+use super::triangle::PACKET;
+use super::walk::Stack;
+use glam::Vec3;
+
+impl RayIndex {
+    /// What rays from one point hit first: as [`RayIndex::closest`] with no limit for each of up to sixteen unit
+    /// `directions`. Fast where the directions lie close together.
+    ///
+    /// # Panics
+    /// When the slices differ in length or hold more than sixteen.
+    pub fn closest_many_with(
+        &self,
+        from: Vec3,
+        directions: &[Vec3],
+        ignore_plane: u32,
+        out: &mut [Option<Hit>],
+        opaque: &impl Fn(u32, f32, f32) -> bool,
+    ) {
+        assert!(directions.len() == out.len() && out.len() <= PACKET);
+        out.fill(None);
+        if self.tree.nodes.is_empty() || directions.is_empty() {
+            return;
+        }
+        // Beyond everything, wherever the point is.
+        let [low, high] = self.tree.bounds;
+        let far = 1.01 * (from - low).abs().max((from - high).abs()).length() + self.gap;
+        let mut segments = [Segment {
+            from,
+            to: from,
+            planes: [ignore_plane, NO_PLANE],
+        }; PACKET];
+        for (segment, &direction) in segments.iter_mut().zip(directions) {
+            segment.to = from + far * direction;
+        }
+        let Some(mut packet) = Packet::new(self, &segments[..directions.len()]) else {
+            return;
+        };
+        let mut nearest = [None::<Nearest>; PACKET];
+        let mut stack = Stack::new((0.0_f32, 0_u32, packet.open()));
+        let mut farthest = 1.0_f32;
+        while let Some((near, entry, lanes)) = stack.pop() {
+            if near > farthest {
+                continue;
+            }
+            if entry & LEAF != 0 {
+                let number = (entry & !LEAF) as usize;
+                let block = &self.tree.blocks[number];
+                let mut places = packet.straddled(block);
+                let mut shortened = false;
+                while places != 0 {
+                    let place = places.trailing_zeros() as usize;
+                    places &= places - 1;
+                    let (mut met, e) = packet.meet(block, place, lanes);
+                    while met != 0 {
+                        let lane = met.trailing_zeros() as usize;
+                        met &= met - 1;
+                        let det = e.det.as_array()[lane];
+                        let found = Nearest {
+                            t: e.height.as_array()[lane] / det,
+                            block: number,
+                            place,
+                            uv: [e.v.as_array()[lane] / det, e.w.as_array()[lane] / det],
+                        };
+                        if self.is_nearer(&found, nearest[lane].as_ref(), directions[lane])
+                            && (block.masked >> place & 1 == 0
+                                || opaque(block.ids[place], found.uv[0], found.uv[1]))
+                        {
+                            packet.shorten(lane, found.end());
+                            nearest[lane] = Some(found);
+                            shortened = true;
+                        }
+                    }
+                }
+                if shortened {
+                    farthest = packet.farthest();
+                }
+                continue;
+            }
+            let node = &self.tree.nodes[entry as usize];
+            let mut sorted = [(0.0_f32, 0_u32, 0_u32); WIDTH];
+            let mut count = 0;
+            let mut boxes = packet.boxes(node);
+            while boxes != 0 {
+                let child = boxes.trailing_zeros() as usize;
+                boxes &= boxes - 1;
+                let (near, through) = packet.enter_near(node, child);
+                let through = through & lanes;
+                if through == 0 {
+                    continue;
+                }
+                let mut place = count;
+                while place > 0 && sorted[place - 1].0 < near {
+                    sorted[place] = sorted[place - 1];
+                    place -= 1;
+                }
+                sorted[place] = (near, node.children[child], through);
+                count += 1;
+            }
+            for &entry in &sorted[..count] {
+                stack.push(entry);
+            }
+        }
+        for ((out, nearest), &direction) in out.iter_mut().zip(nearest).zip(directions) {
+            *out = nearest.map(|n| {
+                let hit = self.hit(&n, direction);
+                Hit {
+                    t: hit.t * far,
+                    ..hit
+                }
+            });
+        }
+    }
+}
