@@ -37,7 +37,9 @@ const AUDIT_SEED: u64 = 0x5eed_a0d1;
 Examples:
   haarlight bake room.glb
   haarlight bake room.gltf -o lit.glb --error 0.3 --spectra measured.spectra.json
-  haarlight bake room.glb --snapshots pictures --log bake.jsonl --audit 200")]
+  haarlight bake room.glb --snapshots pictures --log bake.jsonl --audit 200
+  haarlight bake room.glb --checkpoint room.state      stop it at any time; the same command goes on
+  haarlight bake room.glb --cache room.cache           then change lamps or paints: haarlight relight room.glb")]
 pub struct BakeArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,
@@ -65,6 +67,12 @@ pub struct BakeArgs {
     /// Keep the state of the bake here after every round; if the file is there already, go on from it.
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
+    /// Keep here what `haarlight relight` needs to change lamps and paints without casting a ray.
+    #[arg(long, value_name = "FILE")]
+    pub cache: Option<PathBuf>,
+    /// The cache may take this much, MB.
+    #[arg(long, value_name = "MB", default_value_t = 2048)]
+    pub cache_limit: u64,
     /// Print the verdict as one JSON object.
     #[arg(long)]
     pub json: bool,
@@ -112,6 +120,9 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         Representation::Adaptive,
         &talk,
     );
+    if args.cache.is_some() {
+        bake.keep();
+    }
     write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
     if let Some(path) = args.checkpoint.as_deref().filter(|path| path.exists()) {
         bake.resume(path)?;
@@ -161,6 +172,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     if let Some(path) = &args.npz {
         write_npz(path, &args.room, &bake, &baked)?;
         outputs.npz = Some(text(path));
+    }
+    if let Some(path) = &args.cache {
+        let size = bake.write_cache(&baked, path, args.cache_limit << 20)?;
+        talk.say(&format!("cache: {}, {} MB", text(path), size >> 20));
+        outputs.cache = Some(text(path));
     }
     if let Some(snapshots) = &mut snapshots {
         outputs.exr = snapshots.last(scene, &baked.surfaces)?;
@@ -267,6 +283,7 @@ fn problems(args: &BakeArgs, output: &Path, parts: &[PathBuf]) -> Vec<Problem> {
             .as_deref()
             .map(|path| ("--checkpoint", path)),
     );
+    outputs.extend(args.cache.as_deref().map(|path| ("--cache", path)));
     let mut inputs = vec![args.room.as_path()];
     let beside = args.room.with_extension("spectra.json");
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));
@@ -300,7 +317,7 @@ fn write(log: &mut Option<Log<File>>, record: &impl serde::Serialize) -> Result<
     log.as_mut().map_or(Ok(()), |log| log.write(record))
 }
 
-fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()> {
+pub(super) fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()> {
     let spectra = bake.radiosity_spectra(baked);
     // The writer's own error says more than what the system makes of it.
     let mut problem = None;
@@ -317,6 +334,6 @@ fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()>
     }
 }
 
-fn text(path: &Path) -> String {
+pub(super) fn text(path: &Path) -> String {
     path.display().to_string()
 }

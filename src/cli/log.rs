@@ -208,6 +208,8 @@ pub struct Outputs {
     pub npz: Option<String>,
     /// The log.
     pub log: Option<String>,
+    /// What relighting needs.
+    pub cache: Option<String>,
     /// Pictures of all rounds.
     pub pictures: Vec<String>,
     /// High dynamic range pictures of the result.

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `command` | the command line as a whole, exit codes |
 //! | `options` | options that commands share |
-//! | `bake`, `inspect`, `probe`, `paper` | the commands |
+//! | `bake`, `relight`, `inspect`, `probe`, `paper` | the commands |
 //! | `log` | the log of a bake, field by field |
 //! | `snapshots` | pictures of the rounds |
 //! | `points` | the CSV of points for `probe` |
@@ -23,6 +23,7 @@ pub mod paper;
 mod paths;
 pub mod points;
 pub mod probe;
+pub mod relight;
 mod snapshots;
 pub mod stop;
 mod summary;

@@ -15,7 +15,7 @@ use crate::hierarchy::{NONE, Tree};
 use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
-use crate::store::{Broken, Decoder, Encoder, Fingerprint, Kind, container};
+use crate::store::{Broken, Decoder, Encoder, Fingerprint, Kind, Packs, container};
 use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -54,7 +54,9 @@ impl Bake {
                 from.skip();
                 return Ok(());
             }
-            self.decode_state(from)?;
+            let traces = self.decode_state(from)?;
+            self.direct.keep(&self.light.leaves, &traces);
+            self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
             let seen: Vec<[f64; 3]> = from.get_all()?;
             if !seen.is_empty() && seen.len() != self.probes.points.len() {
                 return Err(Broken::new("has another number of watched points"));
@@ -82,6 +84,7 @@ impl Bake {
     fn fingerprint(&self) -> Fingerprint {
         let mut print = Fingerprint::default();
         print.set_text("program", crate::PROGRAM);
+        print.set("--cache", &[u8::from(self.keep)]);
         print.set("error asked for", &[self.settings.error]);
         print.set("seed", &[self.settings.seed]);
         let representation = format!("{:?}", self.settings.representation);
@@ -135,12 +138,13 @@ impl Bake {
         )?;
         out.put_list(leaves.len(), leaves.iter().map(|&k| self.direct.spread(k)))?;
         out.put(self.direct.rays)?;
+        Packs::encode(leaves.iter().map(|&k| self.direct.trace(k)), out)?;
         let rounds = serde_json::to_string(&self.rounds).map_err(io::Error::other)?;
         out.put_text(&rounds)
     }
 
-    /// Takes them up.
-    pub(super) fn decode_state(&mut self, from: &mut Decoder) -> Read<()> {
+    /// Takes them up; where the direct light of each leaf comes from, if that was kept.
+    pub(super) fn decode_state(&mut self, from: &mut Decoder) -> Read<Packs> {
         for id in from.get_all::<u32>()? {
             split(&mut self.tree, id)?;
         }
@@ -180,6 +184,10 @@ impl Bake {
         let rays = from.get()?;
         self.direct =
             direct::Direct::known(&leaves, nodes, self.lanes.len(), &known, &spread, rays);
+        let traces = Packs::decode(from)?;
+        if traces.len() != count {
+            return Err(Broken::new("has another number of leaves"));
+        }
         self.rounds = serde_json::from_str(&from.get_text()?)
             .map_err(|problem| Broken::new(format!("has records that do not read: {problem}")))?;
         self.light = Light {
@@ -194,7 +202,7 @@ impl Bake {
             32 => self.light_up::<32>(&reflected),
             _ => self.light_up::<64>(&reflected),
         }
-        Ok(())
+        Ok(traces)
     }
 
     /// The last solution from what the leaves reflect.
@@ -206,7 +214,6 @@ impl Bake {
             .emission;
         light.reflected = self.on_nodes::<L>(reflected, &light.leaves);
         light.emitted = self.on_nodes::<L>(&emission, &light.leaves);
-        light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
         light.half_size = self.mesh.half_size;
         light.measure(&self.tree, &self.lanes);
         self.light = light;

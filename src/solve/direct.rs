@@ -4,8 +4,10 @@
 //! carry reflected light, which is smooth. What a leaf got stays known for the rounds after.
 
 use crate::gather::point::{Memory, Receiver};
+use crate::gather::trace::Trace;
 use crate::hierarchy::{Tree, stratified};
 use crate::link::{Demand, MAX_DEPTH};
+use crate::store::Packs;
 use rayon::prelude::*;
 
 /// Points of a leaf, each with its weight: exact for polynomials of degree 4 (Cowper 1973; Dunavant 1985, table II, p = 4).
@@ -33,8 +35,8 @@ const NOISE: f64 = 0.1;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
 
-/// Mean row over a leaf and half the range of brightness over its points.
-type AtLeaf = (Box<[f32]>, f32);
+/// Mean row over a leaf, half the range of brightness over its points, and where the light comes from, if that is kept.
+type AtLeaf = (Box<[f32]>, f32, Option<Box<[u8]>>);
 
 /// Direct irradiance of nodes that are or were leaves.
 #[derive(Debug, Clone, Default)]
@@ -42,6 +44,8 @@ pub(super) struct Direct {
     rows: Vec<Option<Box<[f32]>>>,
     /// Half the range of brightness over a leaf's points.
     spread: Vec<f32>,
+    /// Where each leaf's light comes from; empty unless it is kept.
+    traces: Vec<Option<Box<[u8]>>>,
     /// Rays cast so far.
     pub(super) rays: u64,
 }
@@ -59,6 +63,7 @@ impl Direct {
         let mut known = Self {
             rows: vec![None; nodes],
             spread: vec![0.0; nodes],
+            traces: Vec::new(),
             rays,
         };
         for (k, &leaf) in leaves.iter().enumerate() {
@@ -66,6 +71,21 @@ impl Direct {
             known.spread[leaf as usize] = spread[k];
         }
         known
+    }
+
+    /// Where the light of leaves comes from, as it was before it was written down.
+    pub(super) fn keep(&mut self, leaves: &[u32], traces: &Packs) {
+        for (k, &leaf) in leaves.iter().enumerate() {
+            if let Some(trace) = traces.get(k) {
+                self.traces.resize(self.rows.len(), None);
+                self.traces[leaf as usize] = Some(trace.into());
+            }
+        }
+    }
+
+    /// Where a leaf's light comes from (see `gather::trace`), if that is kept.
+    pub(super) fn trace(&self, leaf: u32) -> Option<&[u8]> {
+        self.traces.get(leaf as usize)?.as_deref()
     }
 
     /// Half the range of brightness over a leaf's points.
@@ -124,9 +144,13 @@ impl Direct {
             let mut next = fresh.iter();
             for (part, rays) in parts {
                 self.rays += rays;
-                for ((row, spread), &leaf) in part.into_iter().zip(next.by_ref()) {
+                for ((row, spread, trace), &leaf) in part.into_iter().zip(next.by_ref()) {
                     self.rows[leaf as usize] = Some(row);
                     self.spread[leaf as usize] = spread;
+                    if trace.is_some() {
+                        self.traces.resize(tree.nodes.len(), None);
+                        self.traces[leaf as usize] = trace;
+                    }
                 }
             }
             let mut children = Vec::new();
@@ -174,6 +198,7 @@ fn at_leaf(
         )
     });
     let mut total = 0.0_f32;
+    let mut kept: Option<Trace> = None;
     for (k, (at, weight)) in first.iter().copied().chain(more).enumerate() {
         if bare == wanted {
             break;
@@ -190,6 +215,10 @@ fn at_leaf(
         };
         bare += 1;
         total += weight as f32;
+        if let Some(trace) = memory.trace.take() {
+            kept.get_or_insert_with(Trace::new)
+                .absorb(&trace, weight as f32);
+        }
         let mut bright = 0.0;
         for ((m, x), w) in mean.iter_mut().zip(row).zip(weights) {
             *m += weight as f32 * x;
@@ -203,5 +232,9 @@ fn at_leaf(
             *m /= total;
         }
     }
-    (mean, (0.5 * (most - least).max(0.0)) as f32)
+    (
+        mean,
+        (0.5 * (most - least).max(0.0)) as f32,
+        kept.map(|trace| trace.times(1.0 / total).pack()),
+    )
 }

@@ -15,11 +15,13 @@ mod operator;
 mod punctual;
 pub mod record;
 pub mod reference;
+mod relight;
 mod rows;
 mod sources;
 
 pub use lists::PatchList;
 pub use record::{Round, Verdict};
+pub use relight::{Relighter, Relit, RelitRecord};
 pub use rows::{Rows, padded};
 pub(crate) use sources::weights_of;
 
@@ -42,7 +44,7 @@ use sources::{Painter, Sources};
 use std::time::Instant;
 
 /// How spectra are carried by the rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Representation {
     /// A cut for each light spectrum, chosen under error control.
@@ -52,7 +54,7 @@ pub enum Representation {
 }
 
 /// What the user asks for.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Settings {
     /// Mean colour difference (CIEDE2000) at which to stop.
     pub error: f64,
@@ -139,31 +141,51 @@ pub struct Bake {
     hemisphere: Hemisphere,
     rounds: Vec<Round>,
     watch: Option<record::Watch>,
+    /// Is it kept where light comes from, for relighting?
+    keep: bool,
+    /// Space of each face, see [`spaces`].
+    spaces: Vec<u32>,
     started: Instant,
+}
+
+/// The index of all triangles of a room.
+fn ray_index(scene: &Scene, mesh: &Mesh) -> RayIndex {
+    let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+    let masked: Vec<bool> = mesh
+        .material
+        .iter()
+        .map(|&m| {
+            matches!(
+                scene.materials[m as usize].alpha,
+                crate::scene::Alpha::Mask { .. }
+            )
+        })
+        .collect();
+    RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked)
 }
 
 impl Bake {
     /// Prepares a room: welds it, builds the hierarchy and the ray index, and decides what to simulate.
     pub fn new(scene: Scene, settings: Settings) -> Self {
+        Self::with(scene, settings, None)
+    }
+
+    /// The same where rays have told already which faces share a space, and what is closed.
+    fn with(scene: Scene, settings: Settings, known: Option<relight::Known>) -> Self {
         let started = Instant::now();
         let plan = Plan::of(&scene);
         let mesh = Mesh::new(&scene);
-        let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
-        let masked: Vec<bool> = mesh
-            .material
-            .iter()
-            .map(|&m| {
-                matches!(
-                    scene.materials[m as usize].alpha,
-                    crate::scene::Alpha::Mask { .. }
-                )
-            })
-            .collect();
-        let rays = RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked);
-        let spaces = if plan.runs(Kind::Occlusion) {
-            spaces(&mesh, &rays, settings.seed)
-        } else {
-            vec![0; mesh.faces.len()]
+        let rays = match known {
+            Some(_) => RayIndex::build(&[], &[], &[], &[]),
+            None => ray_index(&scene, &mesh),
+        };
+        let (spaces, closed) = match known {
+            Some(mut known) => {
+                known.spaces.resize(mesh.faces.len(), 0);
+                (known.spaces, Some(known.closed))
+            }
+            None if plan.runs(Kind::Occlusion) => (spaces(&mesh, &rays, settings.seed), None),
+            None => (vec![0; mesh.faces.len()], None),
         };
         let tree = Tree::new(&mesh, &spaces);
         let weights = Observer::cie1931().weights(&scene.grid);
@@ -183,6 +205,7 @@ impl Bake {
             graph: Graph::default(),
             rounds: Vec::new(),
             watch: None,
+            keep: false,
             spectrum_error: 0.0,
             scene,
             settings,
@@ -194,8 +217,13 @@ impl Bake {
             lanes,
             probes,
             hemisphere,
+            spaces,
             started,
         };
+        if let Some(closed) = closed {
+            [bake.closed, bake.sealed] = closed;
+            return bake;
+        }
         [bake.closed, bake.sealed] = bake.with_sight(|bake, sight| {
             flux::closedness(
                 &bake.mesh,
@@ -397,12 +425,7 @@ impl Bake {
 
     /// Chooses the working partition on a small model of the room.
     fn choose_lanes(&mut self) {
-        self.spectrum_error = 0.0;
-        if self.settings.representation == Representation::Dense
-            || self.scene.spectra.is_empty()
-            || self.tree.nodes.is_empty()
-        {
-            self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
+        if self.stays_dense() {
             return;
         }
         let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
@@ -414,14 +437,31 @@ impl Bake {
         let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
         self.look_out();
         let factor = balance(&self.tree, &rows, &self.areas, &self.outlook.target).factor;
+        self.choose_lanes_for(&leaves, &shadowed, &factor);
+    }
+
+    /// Takes the 64 leaves where there is nothing to choose.
+    fn stays_dense(&mut self) -> bool {
+        self.spectrum_error = 0.0;
+        let dense = self.settings.representation == Representation::Dense
+            || self.scene.spectra.is_empty()
+            || self.tree.nodes.is_empty();
+        if dense {
+            self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
+        }
+        dense
+    }
+
+    /// Chooses the working partition, given what punctual lights bring to the leaves, and the balance.
+    fn choose_lanes_for(&mut self, leaves: &[u32], shadowed: &punctual::Shadowed, factor: &[f32]) {
         let painter = Painter::new(&self.scene, &self.mesh);
-        let dense = sources::DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
+        let dense = sources::DenseSources::new(&painter, &self.tree, shadowed, leaves);
         let model = coarse::Coarse::new(
             &self.tree,
             &self.graph.links,
-            &factor,
+            factor,
             &self.areas,
-            &leaves,
+            leaves,
             &dense,
             self.scene.spectra.len(),
         );
@@ -655,7 +695,7 @@ impl Bake {
             let gatherer = bake.gatherer(sight);
             receivers
                 .par_iter()
-                .map_init(Memory::default, |memory, r| gatherer.at(r, memory))
+                .map_init(Memory::default, |memory, r| gatherer.at(r, memory).pack())
                 .collect()
         })
     }
@@ -684,6 +724,7 @@ impl Bake {
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
             hemisphere: (sight.occlusion && !sight.small()).then_some(&self.hemisphere),
+            keep: self.keep,
         }
     }
 
@@ -716,6 +757,11 @@ impl Bake {
         rows.into_par_iter()
             .map(|k| lister.list(self.light.irradiance.row(k)))
             .collect()
+    }
+
+    /// Punctual lights, recentred, with their rows.
+    pub(crate) fn lamps(&self) -> &[(PunctualLight, Vec<f32>)] {
+        &self.lamps
     }
 
     /// What the lanes stand for.

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `hash` | XXH64 |
 //! | `codec` | numbers and lists as bytes, and back without trust |
+//! | `packs` | many short pieces in one |
 //! | `container` | magic, kind, version, checksum |
 //! | `fingerprint` | what a room is made of, part by part, as hashes |
 
@@ -11,7 +12,9 @@ pub mod codec;
 pub mod container;
 pub mod fingerprint;
 pub mod hash;
+pub mod packs;
 
 pub use codec::{Broken, Decoder, Encoder};
 pub use container::{Kind, read, write};
 pub use fingerprint::Fingerprint;
+pub use packs::Packs;
