@@ -54,7 +54,13 @@ impl Bake {
                 from.skip();
                 return Ok(());
             }
-            let traces = self.decode_state(from)?;
+            let (reflected, traces) = self.decode_state(from)?;
+            match reflected.width() {
+                8 => self.light_up::<8>(&reflected),
+                16 => self.light_up::<16>(&reflected),
+                32 => self.light_up::<32>(&reflected),
+                _ => self.light_up::<64>(&reflected),
+            }
             self.direct.keep(&self.light.leaves, &traces);
             self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
             let seen: Vec<[f64; 3]> = from.get_all()?;
@@ -139,13 +145,20 @@ impl Bake {
         out.put_list(leaves.len(), leaves.iter().map(|&k| self.direct.spread(k)))?;
         out.put(self.direct.rays)?;
         Packs::encode(leaves.iter().map(|&k| self.direct.trace(k)), out)?;
+        for round in &self.watched {
+            Packs::encode(round.iter().map(Option::as_deref), out)?;
+        }
         let rounds = serde_json::to_string(&self.rounds).map_err(io::Error::other)?;
         out.put_text(&rounds)
     }
 
-    /// Takes them up; where the direct light of each leaf comes from, if that was kept.
-    pub(super) fn decode_state(&mut self, from: &mut Decoder) -> Read<Packs> {
-        for id in from.get_all::<u32>()? {
+    /// Takes them up, except for what is behind `light.irradiance` and `light.leaves`: what the leaves reflect, and where
+    /// the direct light of each leaf comes from, if that was kept.
+    pub(super) fn decode_state(&mut self, from: &mut Decoder) -> Read<(Rows, Packs)> {
+        let splits = from.get_list::<u32>()?;
+        self.tree.nodes.reserve(4 * splits.len());
+        self.tree.elements.reserve(4 * splits.len());
+        for id in splits {
             split(&mut self.tree, id)?;
         }
         let nodes = self.tree.nodes.len();
@@ -185,6 +198,12 @@ impl Bake {
         self.direct =
             direct::Direct::known(&leaves, nodes, self.lanes.len(), &known, &spread, rays);
         let traces = Packs::decode(from)?;
+        for round in &mut self.watched {
+            let packs = Packs::decode(from)?;
+            *round = (0..packs.len())
+                .map(|k| packs.get(k).map(Box::from))
+                .collect();
+        }
         if traces.len() != count {
             return Err(Broken::new("has another number of leaves"));
         }
@@ -196,13 +215,7 @@ impl Bake {
             white,
             ..Light::default()
         };
-        match width {
-            8 => self.light_up::<8>(&reflected),
-            16 => self.light_up::<16>(&reflected),
-            32 => self.light_up::<32>(&reflected),
-            _ => self.light_up::<64>(&reflected),
-        }
-        Ok(traces)
+        Ok((reflected, traces))
     }
 
     /// The last solution from what the leaves reflect.
@@ -273,18 +286,19 @@ fn encode_graph(graph: &Graph, out: &mut Encoder) -> io::Result<()> {
 }
 
 fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Graph> {
-    let ends: Vec<[u32; 2]> = from.get_all()?;
-    let figures: Vec<[f32; 3]> = from.get_exactly(ends.len())?;
-    let ways: Vec<u16> = from.get_exactly(ends.len())?;
-    let mut starts = from.get_all::<u32>()?.into_iter();
+    let ends = from.get_list::<[u32; 2]>()?;
+    let figures = from.get_list::<[f32; 3]>()?;
+    let ways = from.get_list::<u16>()?;
+    if figures.len() != ends.len() || ways.len() != ends.len() {
+        return Err(Broken::new("has links in parts that do not fit"));
+    }
+    let mut starts = from.get_list::<u32>()?;
     let blockers: Vec<u32> = from.get_all()?;
     if blockers.iter().any(|&t| t as usize >= triangles) {
         return Err(Broken::new("lists a triangle that does not exist"));
     }
     let mut links = Vec::with_capacity(ends.len());
-    for (([a, b], [exchange, open_exchange, variation]), way) in
-        ends.into_iter().zip(figures).zip(ways)
-    {
+    for (([a, b], [exchange, open_exchange, variation]), way) in ends.zip(figures).zip(ways) {
         if a as usize >= nodes || b as usize >= nodes {
             return Err(Broken::new("links a patch that does not exist"));
         }
@@ -330,10 +344,15 @@ fn lane_of([light, first, count]: [u32; 3], lights: usize) -> Read<lanes::Lane> 
 }
 
 fn rows(from: &mut Decoder, count: usize, width: usize) -> Read<Rows> {
-    let flat: Vec<f32> = from.get_exactly(count * width)?;
+    let mut flat = from.get_list::<f32>()?;
+    if flat.len() != count * width {
+        return Err(Broken::new("has rows that do not fit"));
+    }
     let mut rows = Rows::zero(count, width);
-    for (k, row) in flat.chunks_exact(width).enumerate() {
-        rows.row_mut(k).copy_from_slice(row);
+    for k in 0..count {
+        for x in rows.row_mut(k) {
+            *x = flat.next().unwrap_or(0.0);
+        }
     }
     Ok(rows)
 }

@@ -88,6 +88,17 @@ impl Direct {
         self.traces.get(leaf as usize)?.as_deref()
     }
 
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        let rows = self.rows.iter().flatten().map(|row| size_of_val(&**row));
+        let traces = self.traces.iter().flatten().map(|trace| trace.len());
+        size_of_val(self.rows.as_slice())
+            + size_of_val(self.traces.as_slice())
+            + size_of_val(self.spread.as_slice())
+            + rows.sum::<usize>()
+            + traces.sum::<usize>()
+    }
+
     /// Half the range of brightness over a leaf's points.
     pub(super) fn spread(&self, leaf: u32) -> f32 {
         self.spread[leaf as usize]
@@ -96,6 +107,14 @@ impl Direct {
     /// Direct irradiance of a leaf by lane.
     pub(super) fn row(&self, leaf: u32) -> &[f32] {
         self.rows[leaf as usize].as_deref().unwrap_or(&[])
+    }
+
+    /// What was a leaf and is none any more asks for no memory.
+    fn forget(&mut self, node: usize) {
+        self.rows[node] = None;
+        if let Some(trace) = self.traces.get_mut(node) {
+            *trace = None;
+        }
     }
 
     /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
@@ -110,6 +129,11 @@ impl Direct {
         let mut open: Vec<u32> = (0..tree.nodes.len() as u32)
             .filter(|&k| tree.node(k).is_leaf())
             .collect();
+        for k in 0..self.rows.len() {
+            if !tree.nodes[k].is_leaf() {
+                self.forget(k);
+            }
+        }
         while !open.is_empty() {
             self.rows.resize(tree.nodes.len(), None);
             self.spread.resize(tree.nodes.len(), 0.0);
@@ -162,6 +186,7 @@ impl Direct {
                     * (node.area / demand.total_area).sqrt();
                 if error > demand.threshold && node.area > demand.least_area && depth < MAX_DEPTH {
                     tree.subdivide(leaf);
+                    self.forget(leaf as usize);
                     children.extend(tree.node(leaf).child_range());
                 }
             }

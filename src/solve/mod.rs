@@ -8,6 +8,7 @@ mod conjugate;
 mod direct;
 mod estimate;
 mod flux;
+pub mod forecast;
 pub mod lanes;
 pub mod light;
 mod lists;
@@ -143,6 +144,8 @@ pub struct Bake {
     watch: Option<record::Watch>,
     /// Is it kept where light comes from, for relighting?
     keep: bool,
+    /// Where the light of the watched points came from in the last two rounds, if that is kept.
+    watched: [Vec<Option<Box<[u8]>>>; 2],
     /// Space of each face, see [`spaces`].
     spaces: Vec<u32>,
     started: Instant,
@@ -206,6 +209,7 @@ impl Bake {
             rounds: Vec::new(),
             watch: None,
             keep: false,
+            watched: Default::default(),
             spectrum_error: 0.0,
             scene,
             settings,
@@ -292,8 +296,12 @@ impl Bake {
         clock.lap("solve");
 
         let receivers = self.probes.receivers(&self.tree, round);
-        let seen: Vec<[f64; 3]> = self
-            .gather(&receivers)
+        let mut gathered = self.gather(&receivers);
+        if self.keep {
+            let traces = gathered.iter_mut().map(|g| g.packed.take()).collect();
+            self.watched = [std::mem::take(&mut self.watched[1]), traces];
+        }
+        let seen: Vec<[f64; 3]> = gathered
             .iter()
             .map(|g| self.lanes.tristimulus(&g.irradiance))
             .collect();

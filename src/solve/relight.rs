@@ -14,6 +14,7 @@ use super::light::Neighbours;
 use super::{
     Bake, Closed, DE_PER_PERCENT, Painter, Rows, Settings, direct, flux, padded, punctual,
 };
+use crate::color::de2000;
 use crate::error::{Error, Result};
 use crate::gather::{Baked, Kept, trace};
 use crate::link::LinkRows;
@@ -49,7 +50,8 @@ pub struct Relighter {
     /// Half the range of direct light over each leaf, under the light of the bake.
     spread: Vec<f32>,
     kept: Vec<Kept>,
-    /// The estimate of the bake.
+    /// What the bake estimated for geometry, over what its last two rounds differ by at the watched points with the same
+    /// light on the patches.
     geometry: Option<f64>,
 }
 
@@ -73,8 +75,9 @@ pub struct RelitRecord {
     pub intervals_working: usize,
     /// Operator applications of the solve.
     pub iterations: usize,
-    /// Mean colour difference (CIEDE2000), an estimate: geometry as the bake estimated it under its own light, wavelengths
-    /// and the solve as they are now.
+    /// Mean colour difference (CIEDE2000), an estimate: geometry as the bake estimated it, times how much more (or less)
+    /// the gathers of its last two rounds differ under this light than under its own; wavelengths and the solve as they
+    /// are now.
     pub error_de2000: super::record::Figure,
     /// Where the light went.
     pub flux: flux::Balance,
@@ -120,6 +123,9 @@ impl Bake {
             ));
         }
         let guess = flux::guess(&self.scene, &self.mesh, &self.tree, &self.weights).white;
+        let distance = self
+            .watched_distance()
+            .map_err(|Broken(what)| Error::Internal(what))?;
         let settings = serde_json::to_string(&self.settings)
             .map_err(|problem| Error::Internal(format!("settings: {problem}")))?;
         container::write(path, Kind::Cache, |out| {
@@ -129,6 +135,7 @@ impl Bake {
             out.put_all(&self.spaces)?;
             out.put([self.closed, self.sealed].map(|c| u8::from(c == Closed::Yes)))?;
             out.put(guess)?;
+            out.put(distance.unwrap_or(0.0))?;
             out.put_all(&lit(&self.scene))?;
             self.encode_state(out)?;
             out.put(baked.surfaces.len() as u64)?;
@@ -137,6 +144,42 @@ impl Bake {
             }
             Ok(())
         })
+    }
+
+    /// Mean colour difference between what the traces of the last two rounds give at the watched points under the present
+    /// light; none before there are two.
+    fn watched_distance(&self) -> Read<Option<f64>> {
+        let seen = |round: &[Option<Box<[u8]>>]| -> Read<Vec<[f64; 3]>> {
+            round
+                .iter()
+                .map(|packed| {
+                    let packed = packed.as_deref().unwrap_or(&[]);
+                    let (light, lamps) = (&self.light, &self.lamps);
+                    Ok(match self.light.width() {
+                        8 => self
+                            .lanes
+                            .tristimulus(&trace::replay::<8>(packed, light, lamps)?),
+                        16 => self
+                            .lanes
+                            .tristimulus(&trace::replay::<16>(packed, light, lamps)?),
+                        32 => self
+                            .lanes
+                            .tristimulus(&trace::replay::<32>(packed, light, lamps)?),
+                        _ => self
+                            .lanes
+                            .tristimulus(&trace::replay::<64>(packed, light, lamps)?),
+                    })
+                })
+                .collect()
+        };
+        let [before, last] = &self.watched;
+        if before.is_empty() || before.len() != last.len() {
+            return Ok(None);
+        }
+        let (a, b) = (seen(before)?, seen(last)?);
+        let pairs = a.iter().zip(&b);
+        let sum: f64 = pairs.map(|(a, b)| de2000(*a, *b, self.light.white)).sum();
+        Ok(Some(sum / a.len() as f64))
     }
 
     /// About how many bytes a cache takes.
@@ -217,8 +260,16 @@ impl Relighter {
         let mut bake = Bake::with(scene, settings, Some(known));
         bake.keep = true;
         let guess: [f64; 3] = from.get()?;
+        let distance: f64 = from.get()?;
         let lit = from.get_exactly(bake.scene.surfaces.len())?;
-        let leaves = bake.decode_state(from)?;
+        let (reflected, leaves) = bake.decode_state(from)?;
+        // Only where the next solve starts.
+        bake.light.reflected = match reflected.width() {
+            8 => bake.on_nodes::<8>(&reflected, &bake.light.leaves),
+            16 => bake.on_nodes::<16>(&reflected, &bake.light.leaves),
+            32 => bake.on_nodes::<32>(&reflected, &bake.light.leaves),
+            _ => bake.on_nodes::<64>(&reflected, &bake.light.leaves),
+        };
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
             kept.push(Kept::decode(&bake.scene, from)?);
@@ -233,11 +284,9 @@ impl Relighter {
                     1.0
                 }
             }),
-            geometry: bake
-                .rounds
-                .last()
-                .and_then(|r| r.error.total_de2000.value.map(|e| (e, r)))
-                .map(|(e, r)| without(e, r)),
+            geometry: (bake.rounds.last())
+                .and_then(|r| Some(without(r.error.total_de2000.value?, r) / distance))
+                .filter(|_| distance > 0.0),
             shape,
             lit,
             paint,
@@ -292,7 +341,9 @@ impl Relighter {
         let clock = Instant::now();
         let baked = self.bake.relit(&self.kept)?;
         let bake = &self.bake;
-        let error = self.geometry.map(|geometry| {
+        let distance = bake.watched_distance()?;
+        let error = self.geometry.zip(distance).map(|(share, distance)| {
+            let geometry = share * distance;
             let solve = convergence.bound * 100.0 * DE_PER_PERCENT;
             (geometry.powi(2) + bake.spectrum_error.powi(2) + solve.powi(2)).sqrt()
         });
@@ -356,7 +407,9 @@ impl Relighter {
         bake.light.emitted = bake.on_nodes::<L>(&emission, &leaves);
         bake.previous = std::mem::replace(&mut bake.light.reflected, Rows::zero(nodes, L));
         let mut light = std::mem::take(&mut bake.light);
-        light.measure(&bake.tree, &bake.lanes);
+        light.bright_emitted = (0..nodes)
+            .map(|k| f32::from(u8::from(light.emitted.row(k).iter().any(|&x| x > 0.0))))
+            .collect();
         let lanes = bake.lanes.len();
         let lit: Vec<Vec<f32>> = (0..leaves.len())
             .collect::<Vec<usize>>()

@@ -5,6 +5,8 @@
 
 use super::hash::Hasher;
 use std::io::{self, Write};
+use std::ops::Range;
+use std::sync::Arc;
 
 /// What is wrong with bytes that were to be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -165,13 +167,41 @@ impl<'a> Encoder<'a> {
 /// Reads what an [`Encoder`] wrote.
 #[derive(Debug, Clone)]
 pub struct Decoder<'a> {
-    rest: &'a [u8],
+    bytes: &'a [u8],
+    /// Where reading has come to.
+    at: usize,
+    /// The owner of `bytes` and of what follows them.
+    owner: Option<Arc<Vec<u8>>>,
+}
+
+/// Bytes of a file that is kept in memory whole: nothing is copied.
+#[derive(Debug, Clone)]
+pub struct Piece {
+    owner: Arc<Vec<u8>>,
+    range: Range<usize>,
+}
+
+impl Piece {
+    /// The bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.owner[self.range.clone()]
+    }
 }
 
 impl<'a> Decoder<'a> {
     /// Reads from `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes }
+        Self {
+            bytes,
+            at: 0,
+            owner: None,
+        }
+    }
+
+    /// Remembers who owns the bytes; they must be its first.
+    pub(super) fn owned_by(mut self, owner: &Arc<Vec<u8>>) -> Self {
+        self.owner = Some(Arc::clone(owner));
+        self
     }
 
     /// The next bytes.
@@ -179,12 +209,30 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// There are fewer, here and below.
     pub fn raw(&mut self, count: usize) -> Read<&'a [u8]> {
-        let (taken, rest) = self
-            .rest
-            .split_at_checked(count)
+        let rest = self.bytes.get(self.at..).unwrap_or(&[]);
+        let taken = rest
+            .get(..count)
             .ok_or_else(|| Broken::new("ends too early"))?;
-        self.rest = rest;
+        self.at += count;
         Ok(taken)
+    }
+
+    /// A list of bytes, not copied where the owner is known.
+    ///
+    /// # Errors
+    /// As [`Decoder::raw`].
+    pub fn get_piece(&mut self) -> Read<Piece> {
+        let bytes = self.bytes_of_list(1)?;
+        Ok(match &self.owner {
+            Some(owner) => Piece {
+                owner: Arc::clone(owner),
+                range: self.at - bytes.len()..self.at,
+            },
+            None => Piece {
+                owner: Arc::new(bytes.to_vec()),
+                range: 0..bytes.len(),
+            },
+        })
     }
 
     /// One number.
@@ -200,8 +248,16 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// As [`Decoder::raw`].
     pub fn get_all<T: Plain>(&mut self) -> Read<Vec<T>> {
+        Ok(self.get_list()?.collect())
+    }
+
+    /// A list that is not put into memory.
+    ///
+    /// # Errors
+    /// As [`Decoder::raw`].
+    pub fn get_list<T: Plain>(&mut self) -> Read<impl ExactSizeIterator<Item = T> + use<'a, T>> {
         let bytes = self.bytes_of_list(T::SIZE)?;
-        Ok(bytes.chunks_exact(T::SIZE).map(T::load).collect())
+        Ok(bytes.chunks_exact(T::SIZE).map(T::load))
     }
 
     /// A list that must have this length.
@@ -236,7 +292,7 @@ impl<'a> Decoder<'a> {
 
     /// Leaves the rest unread.
     pub fn skip(&mut self) {
-        self.rest = &[];
+        self.at = self.bytes.len();
     }
 
     /// Nothing may be left.
@@ -244,7 +300,7 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// Something is.
     pub fn end(&self) -> Read<()> {
-        if self.rest.is_empty() {
+        if self.at == self.bytes.len() {
             Ok(())
         } else {
             Err(Broken::new("has bytes after its end"))

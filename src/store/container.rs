@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::output::file;
 use std::io;
 use std::path::Path;
+use std::sync::Arc;
 
 const MAGIC: [u8; 8] = *b"\x89haarlt\n";
 const HEADER: usize = 16;
@@ -98,7 +99,8 @@ pub fn body(bytes: &[u8], kind: Kind) -> Read<Decoder<'_>> {
         return Err(Broken::new(format!("is a {name} cut short")));
     }
     let (front, sum) = bytes.split_at(bytes.len() - CHECKSUM);
-    let mut header = Decoder::new(&front[MAGIC.len()..]);
+    let mut header = Decoder::new(front);
+    header.raw(MAGIC.len())?;
     if header.raw(4)? != kind.tag() {
         return Err(Broken::new(format!("holds something else than a {name}")));
     }
@@ -121,7 +123,9 @@ pub fn body(bytes: &[u8], kind: Kind) -> Read<Decoder<'_>> {
 /// [`Error::Io`] if the file cannot be read; [`Error::Input`] for what [`body`] or `decode` finds.
 pub fn read<T>(path: &Path, kind: Kind, decode: impl FnOnce(&mut Decoder) -> Read<T>) -> Result<T> {
     let bytes = std::fs::read(path).map_err(|problem| Error::io(path, problem))?;
-    let decoded = body(&bytes, kind).and_then(|mut body| {
+    let bytes = Arc::new(bytes);
+    let decoded = body(&bytes, kind).and_then(|body| {
+        let mut body = body.owned_by(&bytes);
         let decoded = decode(&mut body)?;
         body.end()?;
         Ok(decoded)

@@ -1,18 +1,18 @@
 //! Many short pieces of bytes in one: their ends, and all bytes after each other. 4 bytes a piece beside its own.
 
-use super::codec::{Broken, Decoder, Encoder, Read};
+use super::codec::{Broken, Decoder, Encoder, Piece, Read};
 use std::io;
 
 /// The length of a piece that is not there.
 const MISSING: u32 = u32::MAX;
 
 /// Pieces that may be missing.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Packs {
     /// Where each begins.
     starts: Vec<usize>,
     lengths: Vec<u32>,
-    bytes: Vec<u8>,
+    bytes: Piece,
 }
 
 impl Packs {
@@ -46,7 +46,7 @@ impl Packs {
     /// [`Broken`]: there are fewer bytes than pieces need, or more.
     pub fn decode(from: &mut Decoder) -> Read<Self> {
         let lengths: Vec<u32> = from.get_all()?;
-        let bytes: Vec<u8> = from.get_all()?;
+        let bytes = from.get_piece()?;
         let mut starts = Vec::with_capacity(lengths.len());
         let mut end = 0;
         for &length in &lengths {
@@ -57,7 +57,7 @@ impl Packs {
                 length as usize
             };
         }
-        if end != bytes.len() {
+        if end != bytes.bytes().len() {
             return Err(Broken::new("has pieces that do not fit"));
         }
         Ok(Self {
@@ -80,7 +80,7 @@ impl Packs {
     /// A piece, if it is there.
     pub fn get(&self, k: usize) -> Option<&[u8]> {
         let (start, length) = (self.starts[k], self.lengths[k]);
-        (length != MISSING).then(|| &self.bytes[start..start + length as usize])
+        (length != MISSING).then(|| &self.bytes.bytes()[start..start + length as usize])
     }
 }
 
