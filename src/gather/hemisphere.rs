@@ -9,7 +9,7 @@ use crate::geometry::sampling::sequence02;
 use glam::DVec3;
 
 /// Directions in a beam.
-pub(super) const BEAM: usize = 16;
+pub(crate) const BEAM: usize = 16;
 /// Directions at the least, and at the most.
 const COUNT: [usize; 2] = [64, 4096];
 /// Directions at an asked-for colour difference of [`AT`]; their error falls with the power 3/4 of their number.
@@ -31,7 +31,7 @@ impl Hemisphere {
     }
 
     /// `count` directions, a power of two from 16.
-    fn new(count: usize) -> Self {
+    pub(crate) fn new(count: usize) -> Self {
         let beams = count / BEAM;
         // Cells of the unit square, as square as can be; each holds one beam.
         let columns = 1 << (beams.ilog2().div_ceil(2));
@@ -56,7 +56,7 @@ impl Hemisphere {
     }
 
     /// The beams.
-    pub(super) fn beams(&self) -> impl Iterator<Item = &[DVec3]> {
+    pub(crate) fn beams(&self) -> impl Iterator<Item = &[DVec3]> {
         self.directions.chunks(BEAM)
     }
 }

@@ -262,6 +262,7 @@ impl Gatherer<'_> {
         let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
         let [x, y] = tangents(to.normal);
         let [x, y] = [x * cos + y * sin, y * cos - x * sin];
+        let from = [to.point.as_vec3(); BEAM];
         let mut hits = [None; BEAM];
         let mut directions = [Vec3::ZERO; BEAM];
         let width = self.light.width();
@@ -269,8 +270,7 @@ impl Gatherer<'_> {
             for (out, d) in directions.iter_mut().zip(beam) {
                 *out = (x * d.x + y * d.y + to.normal * d.z).as_vec3();
             }
-            self.sight
-                .meet(to.point.as_vec3(), &directions, to.plane, &mut hits);
+            self.sight.meet(&from, &directions, to.plane, &mut hits);
             memory.rays += BEAM as u64;
             for hit in hits.iter().flatten() {
                 let Some(leaf) = self.met(hit) else { continue };
@@ -350,8 +350,8 @@ impl Gatherer<'_> {
             }
             let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
             let slight = factor * reflected < SLIGHT * self.tolerance
-                && to.leaf.is_some()
-                && !self.sight.small();
+                && emitted <= 0.0
+                && self.trusts_links(to);
             let known = if clear {
                 Some(1.0)
             } else {
@@ -395,6 +395,11 @@ impl Gatherer<'_> {
             )
         };
         self.add(id, factor, visible, out);
+    }
+
+    /// Is what links know of visibility good enough for what carries little? Where nothing else is known it must be.
+    fn trusts_links(&self, to: &Receiver) -> bool {
+        to.leaf.is_some() && !self.sight.small() && self.hemisphere.is_none()
     }
 
     /// Are the children of a node known to the solution? Elements split after it are not.
@@ -518,7 +523,7 @@ impl Gatherer<'_> {
         let Some(element) = self.tree.element(node) else {
             return 1.0;
         };
-        if !lamp && to.leaf.is_some() && !self.sight.small() && carries < SLIGHT * self.tolerance {
+        if !lamp && self.trusts_links(to) && carries < SLIGHT * self.tolerance {
             return f64::from(known);
         }
         let plane = self.tree.face_plane[element.face as usize];
@@ -596,7 +601,7 @@ impl Gatherer<'_> {
         }
         // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
         // blurs is bounded by the size of the receiving element. A lamp's shadow is not blurred.
-        let prior = if lamp || to.leaf.is_none() {
+        let prior = if lamp || to.leaf.is_none() || self.hemisphere.is_some() {
             0.0
         } else {
             PRIOR

@@ -1,4 +1,4 @@
-//! Up to sixteen rays from one point through the tree at once: what does each meet first?
+//! Up to sixteen rays through the tree at once: what does each meet first?
 //!
 //! The walk of `packet`, nearest boxes first; every ray ends at the nearest hit so far, and a box that starts behind the
 //! farthest of these ends is passed by. Rays that leave a point in a narrow beam share most of their way.
@@ -12,34 +12,39 @@ use super::walk::Stack;
 use glam::Vec3;
 
 impl RayIndex {
-    /// What rays from one point hit first: as [`RayIndex::closest`] with no limit for each of up to sixteen unit
-    /// `directions`. Fast where the directions lie close together.
+    /// What rays hit first: as [`RayIndex::closest`] with no limit for each of up to sixteen starts and unit `directions`.
+    /// Fast where starts and directions lie close together.
     ///
     /// # Panics
     /// When the slices differ in length or hold more than sixteen.
     pub fn closest_many_with(
         &self,
-        from: Vec3,
+        from: &[Vec3],
         directions: &[Vec3],
         ignore_plane: u32,
         out: &mut [Option<Hit>],
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) {
-        assert!(directions.len() == out.len() && out.len() <= PACKET);
+        assert!(
+            directions.len() == out.len() && from.len() == out.len() && out.len() <= PACKET,
+            "a start, a direction and an answer for each of up to sixteen rays"
+        );
         out.fill(None);
         if self.tree.nodes.is_empty() || directions.is_empty() {
             return;
         }
-        // Beyond everything, wherever the point is.
+        // Beyond everything, wherever the rays start.
         let [low, high] = self.tree.bounds;
-        let far = 1.01 * (from - low).abs().max((from - high).abs()).length() + self.gap;
+        let mut far = [0.0_f32; PACKET];
         let mut segments = [Segment {
-            from,
-            to: from,
+            from: from[0],
+            to: from[0],
             planes: [ignore_plane, NO_PLANE],
         }; PACKET];
-        for (segment, &direction) in segments.iter_mut().zip(directions) {
-            segment.to = from + far * direction;
+        for (k, (&from, &direction)) in from.iter().zip(directions).enumerate() {
+            far[k] = 1.01 * (from - low).abs().max((from - high).abs()).length() + self.gap;
+            segments[k].from = from;
+            segments[k].to = from + far[k] * direction;
         }
         let Some(mut packet) = Packet::new(self, &segments[..directions.len()]) else {
             return;
@@ -109,11 +114,11 @@ impl RayIndex {
                 stack.push(entry);
             }
         }
-        for ((out, nearest), &direction) in out.iter_mut().zip(nearest).zip(directions) {
-            *out = nearest.map(|n| {
-                let hit = self.hit(&n, direction);
+        for (k, out) in out.iter_mut().enumerate() {
+            *out = nearest[k].map(|n| {
+                let hit = self.hit(&n, directions[k]);
                 Hit {
-                    t: hit.t * far,
+                    t: hit.t * far[k],
                     ..hit
                 }
             });

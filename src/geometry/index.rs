@@ -571,16 +571,20 @@ mod tests {
             let index = RayIndex::build(&positions, &triangles, &planes, &masked);
             let mut hits = 0;
             for k in 0..600 {
-                let from = point(&mut random) * 1.5;
+                let around = point(&mut random) * 1.5;
                 let axis = point(&mut random);
                 let spread = [0.1, 0.5, 3.0][k % 3];
                 let directions: Vec<Vec3> = (0..1 + k % 16)
                     .map(|_| (axis + spread * point(&mut random)).normalize())
                     .collect();
+                let from: Vec<Vec3> = directions
+                    .iter()
+                    .map(|_| around + [0.0, 0.01][k % 2] * point(&mut random))
+                    .collect();
                 let ignored = random.below(count);
                 let mut out = vec![None; directions.len()];
-                index.closest_many_with(from, &directions, ignored, &mut out, &opaque);
-                for (hit, &d) in out.iter().zip(&directions) {
+                index.closest_many_with(&from, &directions, ignored, &mut out, &opaque);
+                for ((hit, &d), &from) in out.iter().zip(&directions).zip(&from) {
                     let single = index.closest_with(from, d, f32::INFINITY, ignored, &opaque);
                     assert_eq!(hit.map(|h| h.triangle), single.map(|h| h.triangle));
                     if let (Some(a), Some(b)) = (hit, single) {

@@ -170,11 +170,23 @@ pub fn evaluate(
         least = least.min(f);
         most = most.max(f);
     }
-    if simple(ns) && simple(nt) && gap < NEAR {
+    if simple(ns) && simple(nt) && (gap < NEAR || open <= 0.0) {
         open = contours(tree, ns, nt);
+        if open <= 0.0 {
+            return None;
+        }
     }
     if open <= 0.0 {
-        return None;
+        // No two points of these clusters face each other; others may, and a lamp among them must not get lost.
+        let link = Link {
+            a,
+            b,
+            exchange: 0.0,
+            open_exchange: 0.0,
+            variation: 0.0,
+            way: Way::Crowded,
+        };
+        return Some((link, View::Crowded));
     }
     let mean = open / ns.area;
     let size = ns.radius

@@ -28,6 +28,8 @@ pub struct Demand<'a> {
     pub threshold: f64,
     /// Elements below this area are not split.
     pub least_area: f64,
+    /// Does light go where the links say? Where leaves look for themselves, links need not know what hides their ends.
+    pub hidden: bool,
 }
 
 impl Demand<'_> {
@@ -35,7 +37,7 @@ impl Demand<'_> {
     pub fn error(&self, tree: &Tree, link: &Link) -> f64 {
         let visibility = f64::from(link.visibility());
         // An unproved "hidden" is right to about one in the rays cast; "partly" misplaces light like a coin.
-        let doubt = if link.way == Way::Clear {
+        let doubt = if link.way == Way::Clear || !self.hidden {
             0.0
         } else {
             (visibility * (1.0 - visibility)).sqrt().max(0.1)

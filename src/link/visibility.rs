@@ -113,8 +113,8 @@ impl Sight<'_> {
         }
     }
 
-    /// What rays from one point, up to sixteen, meet first; triangles of `plane` are looked through.
-    pub fn meet(&self, from: Vec3, directions: &[Vec3], plane: u32, out: &mut [Option<Hit>]) {
+    /// What up to sixteen rays meet first; triangles of `plane` are looked through.
+    pub fn meet(&self, from: &[Vec3], directions: &[Vec3], plane: u32, out: &mut [Option<Hit>]) {
         match self.opaque {
             Some(opaque) => self
                 .rays

@@ -1,14 +1,16 @@
 //! A bake between two rounds, written down and taken up again.
 //!
 //! Kept is what cannot be had back from the room without rays: which elements were split (in order, so that the
-//! hierarchy grows again node by node), the links with their blockers, the lanes, how leaves look out, balance, light and
-//! direct light of the leaves, what the watched points saw, and the records. A bake that is resumed ends with the same
+//! hierarchy grows again node by node), the links with their blockers, the lanes, how leaves look out and where their rays
+//! end, balance, light and direct light of the leaves, what the watched points saw, and the records. A bake that is resumed ends with the same
 //! bytes as one that was never stopped; so a checkpoint is refused unless the room, the settings and the program are the
 //! same, with what changed.
 //!
-//! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node, `4 (2 padded lanes + lanes) + 4` a leaf.
+//! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (20 and 8 a ray where leaves look for
+//! themselves), `4 (2 padded lanes + lanes) + 4` a leaf.
 
 use super::light::{Light, Neighbours};
+use super::outlook::Outlook;
 use super::{Bake, Lanes, Rows, direct, lanes, padded, punctual};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
@@ -55,12 +57,7 @@ impl Bake {
                 return Ok(());
             }
             let (reflected, traces) = self.decode_state(from)?;
-            match reflected.width() {
-                8 => self.light_up::<8>(&reflected),
-                16 => self.light_up::<16>(&reflected),
-                32 => self.light_up::<32>(&reflected),
-                _ => self.light_up::<64>(&reflected),
-            }
+            self.light_up(&reflected);
             self.direct.keep(&self.light.leaves, &traces);
             self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
             let seen: Vec<[f64; 3]> = from.get_all()?;
@@ -119,8 +116,7 @@ impl Bake {
         )?;
         out.put(self.spectrum_error)?;
         out.put(self.light.white)?;
-        out.put_all(&self.outlook.target)?;
-        out.put_all(&self.outlook.bare)?;
+        self.outlook.encode(out)?;
         out.put_all(&self.balance.factor)?;
         out.put([self.balance.defect_before, self.balance.defect_after])?;
         out.put(self.balance.limited as u64)?;
@@ -175,9 +171,14 @@ impl Bake {
         self.lanes = Lanes::with(lanes, &self.scene.spectra, &self.weights);
         self.spectrum_error = from.get()?;
         let white = from.get()?;
-        self.outlook.target = from.get_exactly(nodes)?;
-        self.outlook.bare = from.get_exactly(nodes)?;
-        let factor = from.get_exactly(nodes)?;
+        self.outlook = Outlook::decode(&self.tree, from)?;
+        let factor: Vec<f32> = from.get_all()?;
+        // Where leaves look for themselves nothing is balanced.
+        let by_rays = self.with_sight(|_, sight| super::by_rays(sight));
+        let wanted = if by_rays { 0 } else { nodes };
+        if factor.len() != wanted || self.outlook.looks() != by_rays {
+            return Err(Broken::new("does not know what its leaves see"));
+        }
         let [defect_before, defect_after] = from.get()?;
         self.balance = Balance {
             factor,
@@ -219,7 +220,16 @@ impl Bake {
     }
 
     /// The last solution from what the leaves reflect.
-    fn light_up<const L: usize>(&mut self, reflected: &Rows) {
+    pub(super) fn light_up(&mut self, reflected: &Rows) {
+        match reflected.width() {
+            8 => self.light_up_lanes::<8>(reflected),
+            16 => self.light_up_lanes::<16>(reflected),
+            32 => self.light_up_lanes::<32>(reflected),
+            _ => self.light_up_lanes::<64>(reflected),
+        }
+    }
+
+    fn light_up_lanes<const L: usize>(&mut self, reflected: &Rows) {
         let mut light = std::mem::take(&mut self.light);
         let painter = super::Painter::new(&self.scene, &self.mesh);
         let emission = painter

@@ -2,24 +2,17 @@
 //! `emitted = absorbed + escaped` (any geometry, any wavelength).
 
 use crate::geometry::RayIndex;
-use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02, triangle_weights};
+use crate::geometry::sampling::{Pcg, cosine_direction, sequence02, triangle_weights};
 use crate::hierarchy::{Mesh, NONE, Tree};
 use crate::link::Sight;
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// Rays that test whether a room is closed.
 const ESCAPE_RAYS: usize = 8192;
-/// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, at least, and at the most.
-const LEAF_RAYS: [usize; 3] = [48, 8, 128];
 /// Rays that tell whether a point is covered.
 const COVER_RAYS: u32 = 4;
-/// Least share of a leaf's area that counts as bare.
-const LEAST_BARE: f64 = 1e-3;
-/// Leaves that a task looks at.
-const CHUNK: usize = 64;
 
 /// Can light leave the room, or be lost on a black back?
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -68,14 +61,14 @@ pub(super) fn closedness(
 
 /// What a ray from a surface meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Meets {
+pub(super) enum Meets {
     Front,
     /// The black back of a one-sided surface: the ray started inside something solid.
     Back,
     Nothing,
 }
 
-fn meets(
+pub(super) fn meets(
     mesh: &Mesh,
     tree: &Tree,
     rays: &RayIndex,
@@ -111,107 +104,6 @@ pub(super) fn covered(
             plane,
         ) == Meets::Back
     })
-}
-
-/// How leaves look out: what their rows must sum to, and how much of their area looks out at all.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Outlook {
-    /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
-    pub target: Vec<f32>,
-    /// For each node that is a leaf: share of its area that is not covered by something solid. NaN elsewhere.
-    pub bare: Vec<f32>,
-}
-
-impl Outlook {
-    /// Looks out of new leaves. A leaf below one whose rays all met fronts is not looked at again. Returns the rays cast.
-    pub(super) fn extend(
-        &mut self,
-        mesh: &Mesh,
-        tree: &Tree,
-        rays: &RayIndex,
-        closed: Closed,
-        seed: u64,
-    ) -> u64 {
-        let old = self.target.len();
-        self.target.resize(tree.nodes.len(), f32::NAN);
-        self.bare.resize(tree.nodes.len(), f32::NAN);
-        if closed == Closed::Yes {
-            self.target[old..].fill(1.0);
-            self.bare[old..].fill(1.0);
-            return 0;
-        }
-        let mut open = Vec::new();
-        for k in 0..tree.nodes.len() {
-            let node = &tree.nodes[k];
-            if !node.is_leaf() || !self.target[k].is_nan() {
-                continue;
-            }
-            let above = node.parent as usize;
-            if node.parent != NONE && self.target[above] == 1.0 && self.bare[above] == 1.0 {
-                (self.target[k], self.bare[k]) = (1.0, 1.0);
-            } else {
-                open.push(k);
-            }
-        }
-        let leaves = tree.nodes.iter().filter(|n| n.is_leaf()).count();
-        let mean = tree.nodes.first().map_or(0.0, |n| n.area) / leaves.max(1) as f64;
-        let found: Vec<(f32, f32, u64)> = open
-            .par_chunks(CHUNK)
-            .flat_map_iter(|chunk| {
-                chunk.iter().map(|&k| {
-                    let node = &tree.nodes[k];
-                    let element = &tree.elements[node.element as usize];
-                    let wanted = (LEAF_RAYS[0] as f64 * (node.area / mean)).ceil() as usize;
-                    let count = wanted.clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
-                    let (at, to) = (hash(seed, k as u64), hash(seed ^ 1, k as u64));
-                    let (mut fronts, mut backs) = (0, 0);
-                    for i in 0..count as u32 {
-                        let from = element.at(triangle_weights(sequence02(i, at)));
-                        let direction = cosine_direction(node.normal, sequence02(i, to));
-                        match meets(
-                            mesh,
-                            tree,
-                            rays,
-                            from,
-                            direction,
-                            tree.face_plane[element.face as usize],
-                        ) {
-                            Meets::Front => fronts += 1,
-                            Meets::Back => backs += 1,
-                            Meets::Nothing => {}
-                        }
-                    }
-                    let bare = (count - backs) as f64 / count as f64;
-                    let target = if backs < count {
-                        fronts as f64 / (count - backs) as f64
-                    } else {
-                        0.0
-                    };
-                    (target as f32, bare as f32, count as u64)
-                })
-            })
-            .collect();
-        let mut cast = 0;
-        for (k, (target, bare, count)) in open.into_iter().zip(found) {
-            (self.target[k], self.bare[k]) = (target, bare);
-            cast += count;
-        }
-        cast
-    }
-
-    /// Area of every node that looks out; never quite zero, so that nothing is divided by zero.
-    pub(super) fn areas(&self, tree: &Tree) -> Vec<f64> {
-        let mut areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
-        for k in (0..areas.len()).rev() {
-            let node = &tree.nodes[k];
-            areas[k] = if node.is_leaf() {
-                node.area * f64::from(self.bare[k]).max(LEAST_BARE)
-            } else {
-                node.child_range().map(|c| areas[c as usize]).sum()
-            };
-        }
-        areas
-    }
 }
 
 /// What is known before the first solution.

@@ -13,7 +13,9 @@ pub mod lanes;
 pub mod light;
 mod lists;
 mod operator;
+mod outlook;
 mod punctual;
+mod rays;
 pub mod record;
 pub mod reference;
 mod relight;
@@ -31,7 +33,7 @@ use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
 use crate::hierarchy::{Mesh, Tree, spaces};
-use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance};
+use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
@@ -40,7 +42,9 @@ pub use flux::Closed;
 use lanes::Lanes;
 use light::{Light, Neighbours};
 use operator::Operator;
+use outlook::Outlook;
 use rayon::prelude::*;
+use rays::RaySystem;
 use sources::{Painter, Sources};
 use std::time::Instant;
 
@@ -89,6 +93,8 @@ const THRESHOLD_STEP: f64 = 3.0;
 const DARKEST: f64 = 0.02;
 /// Links keep this much less error than the threshold: there are many to a leaf.
 const LINK_SHARE: [f64; 2] = [8.0, 4.0];
+/// Where leaves look for themselves, links only lead to lamps and say where the hierarchy is too coarse.
+const ROUGH: f64 = 1.0;
 /// Direct light may vary over a leaf by this multiple of the threshold. From 1 to 16 the Cornell box's error at points
 /// changes by less than a tenth: what a leaf reflects is seen as a whole.
 const LEAF_SHARE: [f64; 2] = [1.0, 4.0];
@@ -101,6 +107,8 @@ const WORTH_STALLING: usize = 100_000;
 const MOST_LINKS: usize = 4_000_000;
 /// Rooms of this many faces choose their lanes once.
 const MANY_FACES: usize = 50_000;
+/// Levels that a round splits leaves by where reflected light varies.
+const LEVELS: usize = 4;
 /// Leaves whose lists are looked at after a round.
 const LISTED_LEAVES: usize = 4096;
 /// Elements are not split below this share of the area of all faces.
@@ -113,6 +121,11 @@ const SPECTRUM_SHARE: f64 = 0.35;
 const GATHER_SHARE: f64 = 0.1;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 const DE_PER_PERCENT: f64 = 0.35;
+
+/// Do leaves and points of this room look for themselves? In a room of few triangles exact clipping is better.
+fn by_rays(sight: &Sight) -> bool {
+    sight.occlusion && !sight.small()
+}
 
 /// A room being baked.
 pub struct Bake {
@@ -129,7 +142,7 @@ pub struct Bake {
     weights: [Leaves; 3],
     lanes: Lanes,
     spectrum_error: f64,
-    outlook: flux::Outlook,
+    outlook: Outlook,
     /// Area of each node that is not covered.
     areas: Vec<f64>,
     balance: Balance,
@@ -198,7 +211,7 @@ impl Bake {
         let mut bake = Self {
             closed: Closed::No,
             sealed: Closed::No,
-            outlook: flux::Outlook::default(),
+            outlook: Outlook::default(),
             areas: Vec::new(),
             balance: Balance::default(),
             light: Light::default(),
@@ -247,14 +260,21 @@ impl Bake {
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
         let bright = self.brightness_of_nodes();
+        let by_rays = self.with_sight(|_, sight| by_rays(sight));
         let furnished = usize::from(self.tree.faces.len() >= FURNISHED);
         let keen = self.keenness();
         let demand = Demand {
             bright: &bright,
             keen: &keen,
             total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
-            threshold: threshold / LINK_SHARE[furnished],
+            threshold: threshold
+                * if by_rays {
+                    ROUGH
+                } else {
+                    1.0 / LINK_SHARE[furnished]
+                },
             least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
+            hidden: !by_rays,
         };
         let mut tree = std::mem::take(&mut self.tree);
         let mut graph = std::mem::take(&mut self.graph);
@@ -271,6 +291,10 @@ impl Bake {
         }
         clock.lap("spectrum");
 
+        let mut escape_rays = self.split_where_light_varies(&Demand {
+            threshold: threshold * LEAF_SHARE[furnished],
+            ..demand
+        });
         let direct_rays = self.direct.rays;
         let demand = Demand {
             threshold: threshold * LEAF_SHARE[furnished],
@@ -283,8 +307,11 @@ impl Bake {
             .filter(|&k| self.tree.node(k).is_leaf())
             .collect();
         let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
-        let escape_rays = self.look_out();
-        self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
+        escape_rays += self.look_out();
+        // Rays need no balance: their rows sum to what they must as they are.
+        if !by_rays {
+            self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
+        }
         clock.lap("balance");
 
         let solved = match padded(self.lanes.len()) {
@@ -491,14 +518,60 @@ impl Bake {
 
     /// Learns how new leaves look out; returns the rays cast.
     fn look_out(&mut self) -> u64 {
-        let rays = self.outlook.extend(
-            &self.mesh,
-            &self.tree,
-            &self.rays,
-            self.closed,
-            self.settings.seed,
-        );
+        let mut outlook = std::mem::take(&mut self.outlook);
+        let seed = self.settings.seed;
+        let rays = self.with_sight(|bake, sight| {
+            if by_rays(sight) {
+                outlook.look(&bake.tree, sight, &bake.hemisphere, seed)
+            } else {
+                outlook.extend(&bake.mesh, &bake.tree, &bake.rays, bake.closed, seed)
+            }
+        });
+        self.outlook = outlook;
         self.areas = self.outlook.areas(&self.tree);
+        rays
+    }
+
+    /// Splits leaves that look for themselves and see reflected light vary, and lets the parts look; the rays cast.
+    fn split_where_light_varies(&mut self, demand: &Demand) -> u64 {
+        if self.rounds.is_empty() || !self.with_sight(|_, sight| by_rays(sight)) {
+            return 0;
+        }
+        let mut rays = 0;
+        for _ in 0..LEVELS {
+            rays += self.look_out();
+            let known = self.light.bright_reflected.len();
+            let nodes = self.tree.nodes.len() as u32;
+            // Parts of a patch that was a leaf in the last solution are as bright as it.
+            let mut bright = self.light.bright_reflected.clone();
+            for k in known..nodes as usize {
+                bright.push(bright[self.tree.nodes[k].parent as usize]);
+            }
+            let mut keen = demand.keen.to_vec();
+            for k in keen.len()..nodes as usize {
+                keen.push(keen[self.tree.nodes[k].parent as usize]);
+            }
+            let seed = self.settings.seed;
+            let split: Vec<u32> = (0..nodes)
+                .into_par_iter()
+                .filter(|&k| {
+                    let node = self.tree.node(k);
+                    node.is_leaf()
+                        && node.area > demand.least_area
+                        && self.tree.elements[node.element as usize].depth < MAX_DEPTH
+                        && self.outlook.variation(k, &bright, seed)
+                            * f64::from(keen[k as usize])
+                            * (node.area / demand.total_area).sqrt()
+                            > demand.threshold
+                })
+                .collect();
+            for &leaf in &split {
+                self.tree.subdivide(leaf);
+            }
+            if split.is_empty() {
+                break;
+            }
+        }
         rays
     }
 
@@ -588,29 +661,52 @@ impl Bake {
         if self.sealed == Closed::Yes {
             flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
         }
-        let operator = Operator {
-            tree: &self.tree,
-            links: rows,
-            leaves,
-            areas: &self.areas,
-            factor: &self.balance.factor,
-        };
         let mut reflected = self.guess::<L>(leaves);
-        let system = System {
-            operator,
-            reflectance: &reflectance,
-            greatest: &greatest,
-        };
-        let convergence = if self.plan.runs(Kind::Interreflection) {
-            system.solve::<L>(&first, &mut reflected, SOLVE_SHARE * self.settings.error)
+        let tolerance = SOLVE_SHARE * self.settings.error;
+        let runs = self.plan.runs(Kind::Interreflection);
+        let (convergence, mut irradiance, sums) = if self.with_sight(|_, sight| by_rays(sight)) {
+            let system = RaySystem {
+                tree: &self.tree,
+                outlook: &self.outlook,
+                leaves,
+                areas: &self.areas,
+                reflectance: &reflectance,
+                greatest: &greatest,
+            };
+            let sums = self.outlook.target.iter().map(|&t| f64::from(t)).collect();
+            if runs {
+                let (convergence, seen) = system.solve::<L>(&first, &mut reflected, tolerance);
+                (convergence, seen, sums)
+            } else {
+                (Convergence::default(), Rows::zero(leaves.len(), L), sums)
+            }
         } else {
-            Convergence::default()
+            let operator = Operator {
+                tree: &self.tree,
+                links: rows,
+                leaves,
+                areas: &self.areas,
+                factor: &self.balance.factor,
+            };
+            let system = System {
+                operator,
+                reflectance: &reflectance,
+                greatest: &greatest,
+            };
+            let convergence = if runs {
+                system.solve::<L>(&first, &mut reflected, tolerance)
+            } else {
+                Convergence::default()
+            };
+            let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
+            let mut irradiance = Rows::zero(leaves.len(), L);
+            system
+                .operator
+                .irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
+            let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
+            let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
+            (convergence, irradiance, sums)
         };
-        let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
-        let mut irradiance = Rows::zero(leaves.len(), L);
-        system
-            .operator
-            .irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
         for (h, f) in irradiance.all_mut::<L>().iter_mut().zip(first.all::<L>()) {
             for l in 0..L {
                 h[l] += f[l];
@@ -627,8 +723,6 @@ impl Bake {
                 *r = std::array::from_fn(|l| h[l] * rho[l]);
             }
         }
-        let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
-        let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
         let fluxes = flux::FluxRows {
             emission: &emission,
             reflected: &reflected,
@@ -731,7 +825,7 @@ impl Bake {
             lamps: &self.lamps,
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
-            hemisphere: (sight.occlusion && !sight.small()).then_some(&self.hemisphere),
+            hemisphere: by_rays(sight).then_some(&self.hemisphere),
             keep: self.keep,
         }
     }

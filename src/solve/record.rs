@@ -227,8 +227,7 @@ impl Round {
             + bake.direct.bytes()
             + size_of_val(bake.areas.as_slice())
             + size_of_val(bake.balance.factor.as_slice())
-            + size_of_val(bake.outlook.target.as_slice())
-            + size_of_val(bake.outlook.bare.as_slice());
+            + bake.outlook.bytes();
         Self {
             record: "round",
             round: bake.rounds.len() + 1,

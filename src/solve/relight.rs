@@ -17,7 +17,7 @@ use super::{
 use crate::color::de2000;
 use crate::error::{Error, Result};
 use crate::gather::{Baked, Kept, trace};
-use crate::link::LinkRows;
+use crate::link::{LinkRows, balance};
 use crate::scene::Scene;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
@@ -45,7 +45,11 @@ pub struct Relighter {
     paint: Fingerprint,
     /// White of the last solution over the guess for its lamps and paints, X, Y, Z.
     guess: [f64; 3],
-    links: LinkRows,
+    /// Rows of links, once they were asked for.
+    links: Option<LinkRows>,
+    /// Of the present light.
+    solved: Convergence,
+    flux: flux::Balance,
     leaves: Packs,
     /// Half the range of direct light over each leaf, under the light of the bake.
     spread: Vec<f32>,
@@ -207,6 +211,7 @@ impl Bake {
                 .sum::<usize>()
             + rows
             + 12 * self.tree.nodes.len()
+            + self.outlook.bytes()
             + 22 * self.graph.links.len()
             + 4 * self.graph.blockers.len()
             + 4 * self.spaces.len()) as u64
@@ -263,19 +268,12 @@ impl Relighter {
         let distance: f64 = from.get()?;
         let lit = from.get_exactly(bake.scene.surfaces.len())?;
         let (reflected, leaves) = bake.decode_state(from)?;
-        // Only where the next solve starts.
-        bake.light.reflected = match reflected.width() {
-            8 => bake.on_nodes::<8>(&reflected, &bake.light.leaves),
-            16 => bake.on_nodes::<16>(&reflected, &bake.light.leaves),
-            32 => bake.on_nodes::<32>(&reflected, &bake.light.leaves),
-            _ => bake.on_nodes::<64>(&reflected, &bake.light.leaves),
-        };
+        bake.light_up(&reflected);
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
             kept.push(Kept::decode(&bake.scene, from)?);
         }
         let white = bake.light.white;
-        let links = LinkRows::new(bake.tree.nodes.len(), &bake.graph.links);
         Ok(Self {
             guess: std::array::from_fn(|c| {
                 if guess[c] > 0.0 {
@@ -290,7 +288,14 @@ impl Relighter {
             shape,
             lit,
             paint,
-            links,
+            links: None,
+            solved: Convergence {
+                bound: (bake.rounds.last())
+                    .and_then(|r| r.error.convergence.value)
+                    .unwrap_or(0.0),
+                ..Convergence::default()
+            },
+            flux: bake.rounds.last().map(|r| r.flux).unwrap_or_default(),
             spread: (bake.light.leaves.iter())
                 .map(|&leaf| bake.direct.spread(leaf))
                 .collect(),
@@ -333,11 +338,14 @@ impl Relighter {
         }
         let lanes_s = clock.elapsed().as_secs_f64();
         let (convergence, flux, [direct_s, solve_s]) = match padded(self.bake.lanes.len()) {
-            8 => self.solve::<8>(),
-            16 => self.solve::<16>(),
-            32 => self.solve::<32>(),
-            _ => self.solve::<64>(),
-        }?;
+            // The light is there already.
+            _ if !changed => (self.solved, self.flux, [0.0; 2]),
+            8 => self.solve::<8>()?,
+            16 => self.solve::<16>()?,
+            32 => self.solve::<32>()?,
+            _ => self.solve::<64>()?,
+        };
+        (self.solved, self.flux) = (convergence, flux);
         let clock = Instant::now();
         let baked = self.bake.relit(&self.kept)?;
         let bake = &self.bake;
@@ -352,7 +360,7 @@ impl Relighter {
                 record: "relit",
                 changed,
                 intervals_working: bake.lanes.len(),
-                iterations: convergence.iterations,
+                iterations: if changed { convergence.iterations } else { 0 },
                 error_de2000: super::record::Figure {
                     value: error,
                     kind: super::record::Kind::Estimate,
@@ -386,6 +394,12 @@ impl Relighter {
                 .collect::<Read<Vec<_>>>()?,
             rays: 0,
         };
+        if bake.balance.factor.is_empty() {
+            // Where leaves look for themselves, only the model needs a balance.
+            let links = rows(&mut self.links, bake);
+            bake.balance.factor =
+                balance(&bake.tree, links, &bake.areas, &bake.outlook.target).factor;
+        }
         let leaves = std::mem::take(&mut bake.light.leaves);
         let factor = std::mem::take(&mut bake.balance.factor);
         bake.choose_lanes_for(&leaves, &shadowed, &factor);
@@ -440,11 +454,12 @@ impl Relighter {
         // Nobody asks for neighbours without casting rays.
         light.neighbours = Neighbours::default();
         bake.light = light;
+        let links = rows(&mut self.links, bake);
         let graph = std::mem::take(&mut bake.graph);
-        let (convergence, flux) = bake.solve::<L>(&self.links, &leaves);
+        let (convergence, flux) = bake.solve::<L>(links, &leaves);
         bake.graph = graph;
+        let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
         for c in 0..3 {
-            let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
             if guess[c] > 0.0 {
                 self.guess[c] = bake.light.white[c] / guess[c];
             }
@@ -464,6 +479,11 @@ impl Relighter {
         self.bake.light.neighbours = Neighbours::new(nodes, &self.bake.graph);
         self.bake
     }
+}
+
+/// Links in rows.
+fn rows<'a>(links: &'a mut Option<LinkRows>, bake: &Bake) -> &'a LinkRows {
+    links.get_or_insert_with(|| LinkRows::new(bake.tree.nodes.len(), &bake.graph.links))
 }
 
 /// For each surface: does it give out light?

@@ -1,0 +1,389 @@
+//! How leaves look out: what their rows must sum to, how much of their area looks out at all, and, in rooms where much
+//! stands about, what they see.
+//!
+//! There most links are partly hidden, and what a link finds out with a few rays it spreads over all the leaves below its
+//! ends: dark corners get light that belongs elsewhere. So the leaves look for themselves: `n` rays with density
+//! cos / pi from points of a leaf, and the mean of what they meet, `H = 1/n sum B(k)`, is its irradiance by reflected
+//! light. Rays of a leaf stay what they are from round to round; what they meet is looked up anew.
+
+use super::flux::{Closed, Meets, meets};
+use super::rows::Rows;
+use crate::gather::hemisphere::{BEAM, Hemisphere};
+use crate::geometry::RayIndex;
+use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
+use crate::hierarchy::{Mesh, NONE, Tree};
+use crate::link::Sight;
+use crate::store::codec::Read;
+use crate::store::{Broken, Decoder, Encoder};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, at least, and at the most.
+const LEAF_RAYS: [usize; 3] = [48, 8, 128];
+/// Rays of a leaf that looks for itself: share of a point's for a leaf of mean area, and the least.
+const LOOKING: (f64, usize) = (0.25, BEAM);
+/// Least share of a leaf's area that counts as bare.
+const LEAST_BARE: f64 = 1e-3;
+/// Leaves that a task looks at; fixed, so that results do not depend on the number of threads.
+const CHUNK: usize = 64;
+/// Rays that tell whether a point is covered.
+const COVER_RAYS: usize = 4;
+/// In place of a face: the ray left the room or met a black back; it started at a covered point.
+const NOTHING: u32 = u32::MAX;
+const COVERED: u32 = u32::MAX - 1;
+
+/// Where a ray ended.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    /// Entry of the face, or [`NOTHING`], or [`COVERED`].
+    entry: u32,
+    /// Weights of the second and third corner, in 1/65536.
+    at: [u16; 2],
+}
+
+impl End {
+    fn at(entry: u32) -> Self {
+        Self { entry, at: [0; 2] }
+    }
+}
+
+/// How the leaves of a hierarchy look out.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Outlook {
+    /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
+    pub target: Vec<f32>,
+    /// For each node that is a leaf: share of its area that is not covered by something solid. NaN elsewhere.
+    pub bare: Vec<f32>,
+    /// Where the rays of leaves ended, leaf after leaf.
+    ends: Vec<End>,
+    /// First end of each node's rays, and how many there are.
+    range: Vec<(u32, u32)>,
+    /// The leaf of the present hierarchy at each end; [`NONE`] where there is none.
+    met: Vec<u32>,
+}
+
+impl Outlook {
+    /// Looks out of new leaves. A leaf below one whose rays all met fronts is not looked at again. Returns the rays cast.
+    pub(super) fn extend(
+        &mut self,
+        mesh: &Mesh,
+        tree: &Tree,
+        rays: &RayIndex,
+        closed: Closed,
+        seed: u64,
+    ) -> u64 {
+        let old = self.target.len();
+        self.target.resize(tree.nodes.len(), f32::NAN);
+        self.bare.resize(tree.nodes.len(), f32::NAN);
+        if closed == Closed::Yes {
+            self.target[old..].fill(1.0);
+            self.bare[old..].fill(1.0);
+            return 0;
+        }
+        let mut open = Vec::new();
+        for k in 0..tree.nodes.len() {
+            let node = &tree.nodes[k];
+            if !node.is_leaf() || !self.target[k].is_nan() {
+                continue;
+            }
+            let above = node.parent as usize;
+            if node.parent != NONE && self.target[above] == 1.0 && self.bare[above] == 1.0 {
+                (self.target[k], self.bare[k]) = (1.0, 1.0);
+            } else {
+                open.push(k);
+            }
+        }
+        let leaves = tree.nodes.iter().filter(|n| n.is_leaf()).count();
+        let mean = tree.nodes.first().map_or(0.0, |n| n.area) / leaves.max(1) as f64;
+        let found: Vec<(f32, f32, u64)> = open
+            .par_chunks(CHUNK)
+            .flat_map_iter(|chunk| {
+                chunk.iter().map(|&k| {
+                    let node = &tree.nodes[k];
+                    let element = &tree.elements[node.element as usize];
+                    let wanted = (LEAF_RAYS[0] as f64 * (node.area / mean)).ceil() as usize;
+                    let count = wanted.clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
+                    let (at, to) = (hash(seed, k as u64), hash(seed ^ 1, k as u64));
+                    let (mut fronts, mut backs) = (0, 0);
+                    for i in 0..count as u32 {
+                        let from = element.at(triangle_weights(sequence02(i, at)));
+                        let direction = cosine_direction(node.normal, sequence02(i, to));
+                        match meets(
+                            mesh,
+                            tree,
+                            rays,
+                            from,
+                            direction,
+                            tree.face_plane[element.face as usize],
+                        ) {
+                            Meets::Front => fronts += 1,
+                            Meets::Back => backs += 1,
+                            Meets::Nothing => {}
+                        }
+                    }
+                    let bare = (count - backs) as f64 / count as f64;
+                    let target = if backs < count {
+                        fronts as f64 / (count - backs) as f64
+                    } else {
+                        0.0
+                    };
+                    (target as f32, bare as f32, count as u64)
+                })
+            })
+            .collect();
+        let mut cast = 0;
+        for (k, (target, bare, count)) in open.into_iter().zip(found) {
+            (self.target[k], self.bare[k]) = (target, bare);
+            cast += count;
+        }
+        cast
+    }
+
+    /// Lets new leaves look for themselves, and looks up where the rays of all of them end in the present hierarchy.
+    /// Returns the rays cast.
+    pub(super) fn look(
+        &mut self,
+        tree: &Tree,
+        sight: &Sight,
+        hemisphere: &Hemisphere,
+        seed: u64,
+    ) -> u64 {
+        self.target.resize(tree.nodes.len(), f32::NAN);
+        self.bare.resize(tree.nodes.len(), f32::NAN);
+        self.range.resize(tree.nodes.len(), (0, 0));
+        let new: Vec<u32> = (0..tree.nodes.len() as u32)
+            .filter(|&k| tree.node(k).is_leaf() && self.range[k as usize].1 == 0)
+            .collect();
+        let leaves = tree.nodes.iter().filter(|n| n.is_leaf()).count();
+        let mean = tree.nodes.first().map_or(0.0, |n| n.area) / leaves.max(1) as f64;
+        let patterns: Vec<Hemisphere> = (0..)
+            .map(|k| LOOKING.1 << k)
+            .take_while(|&n| n <= hemisphere.len())
+            .map(Hemisphere::new)
+            .collect();
+        let usual = LOOKING.0 * hemisphere.len() as f64 / mean;
+        let parts: Vec<Vec<Vec<End>>> = new
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let each = |&leaf: &u32| {
+                    let wanted = usual * tree.node(leaf).area;
+                    let pattern = patterns
+                        .iter()
+                        .find(|p| p.len() as f64 >= wanted)
+                        .unwrap_or(hemisphere);
+                    look_from(tree, leaf, sight, pattern, seed)
+                };
+                chunk.iter().map(each).collect()
+            })
+            .collect();
+        let mut cast = 0;
+        for (ends, &leaf) in parts.into_iter().flatten().zip(&new) {
+            let k = leaf as usize;
+            let count = |what| ends.iter().filter(|e| e.entry == what).count();
+            let (covered, misses) = (count(COVERED), count(NOTHING));
+            let bare = ends.len() - covered;
+            self.bare[k] = bare as f32 / ends.len() as f32;
+            self.target[k] = (bare - misses) as f32 / bare.max(1) as f32;
+            self.range[k] = (self.ends.len() as u32, ends.len() as u32);
+            cast += ends.len() as u64;
+            self.ends.extend(ends);
+        }
+        self.find(tree);
+        cast
+    }
+
+    /// Looks up which leaf stands at each end.
+    fn find(&mut self, tree: &Tree) {
+        self.met = self
+            .ends
+            .par_iter()
+            .map(|end| {
+                if end.entry >= COVERED {
+                    return NONE;
+                }
+                let [v, w] = end.at.map(|x| f64::from(x) / 65536.0);
+                tree.leaf_at(end.entry, [1.0 - v - w, v, w])
+            })
+            .collect();
+    }
+
+    /// Have leaves looked for themselves?
+    pub(super) fn looks(&self) -> bool {
+        !self.range.is_empty()
+    }
+
+    /// Writes it down.
+    pub(super) fn encode(&self, out: &mut Encoder) -> std::io::Result<()> {
+        out.put_all(&self.target)?;
+        out.put_all(&self.bare)?;
+        out.put_list(self.ends.len(), self.ends.iter().map(|end| end.entry))?;
+        out.put_list(self.ends.len(), self.ends.iter().map(|end| end.at))?;
+        out.put_list(self.range.len(), self.range.iter().map(|r| [r.0, r.1]))
+    }
+
+    /// Reads it back, for the hierarchy that it was made for.
+    pub(super) fn decode(tree: &Tree, from: &mut Decoder) -> Read<Self> {
+        let nodes = tree.nodes.len();
+        let target = from.get_exactly(nodes)?;
+        let bare = from.get_exactly(nodes)?;
+        let entries = from.get_list::<u32>()?;
+        let places = from.get_list::<[u16; 2]>()?;
+        let ranges = from.get_list::<[u32; 2]>()?;
+        let count = entries.len();
+        if places.len() != count || !(ranges.len() == 0 || ranges.len() == nodes) {
+            return Err(Broken::new("has rays in parts that do not fit"));
+        }
+        let range: Vec<(u32, u32)> = ranges.map(|[first, n]| (first, n)).collect();
+        let ends: Vec<End> = entries
+            .zip(places)
+            .map(|(entry, at)| End { entry, at })
+            .collect();
+        let there = |entry: u32| entry >= COVERED || (entry as usize) < tree.faces.len();
+        let within = |&(first, n): &(u32, u32)| u64::from(first) + u64::from(n) <= count as u64;
+        if !ends.iter().all(|end| there(end.entry)) || !range.iter().all(within) {
+            return Err(Broken::new("has rays that end nowhere"));
+        }
+        let mut outlook = Self {
+            target,
+            bare,
+            ends,
+            range,
+            met: Vec::new(),
+        };
+        outlook.find(tree);
+        Ok(outlook)
+    }
+
+    /// Mean of what each leaf's rays meet, `nodes` being the radiosity of every patch: by leaf.
+    pub(super) fn irradiance<const L: usize>(&self, leaves: &[u32], nodes: &Rows, out: &mut Rows) {
+        let nodes = nodes.all::<L>();
+        out.all_mut::<L>()
+            .par_chunks_mut(CHUNK)
+            .zip(leaves.par_chunks(CHUNK))
+            .for_each(|(out, leaves)| {
+                for (row, &leaf) in out.iter_mut().zip(leaves) {
+                    let (start, count) = self.range[leaf as usize];
+                    let mut sum = [0.0_f32; L];
+                    for &met in &self.met[start as usize..(start + count) as usize] {
+                        if met != NONE {
+                            for (s, x) in sum.iter_mut().zip(&nodes[met as usize]) {
+                                *s += x;
+                            }
+                        }
+                    }
+                    let bare = (self.bare[leaf as usize] * count as f32).max(1.0);
+                    *row = sum.map(|x| x / bare);
+                }
+            });
+    }
+
+    /// How much reflected light varies over a leaf: the standard deviation between its four quarters that the noise of
+    /// their rays does not explain, `bright` being that of every patch.
+    pub(super) fn variation(&self, leaf: u32, bright: &[f32], seed: u64) -> f64 {
+        let (first, count) = self.range[leaf as usize];
+        let at = hash(seed, u64::from(leaf));
+        let mut sums = [[0.0_f64; 3]; 4];
+        for k in 0..count as usize {
+            let end = first as usize + k;
+            if self.ends[end].entry == COVERED {
+                continue;
+            }
+            let b = match self.met[end] {
+                NONE => 0.0,
+                met => f64::from(bright[met as usize]),
+            };
+            let quarter = start(k, at).iter().position(|&w| w >= 0.5).unwrap_or(3);
+            let sum = &mut sums[quarter];
+            *sum = [sum[0] + 1.0, sum[1] + b, sum[2] + b * b];
+        }
+        let (mut n, mut mean, mut square, mut noise) = (0.0, 0.0, 0.0, 0.0);
+        for [count, sum, squares] in sums.into_iter().filter(|s| s[0] >= 2.0) {
+            let m = sum / count;
+            n += 1.0;
+            mean += m;
+            square += m * m;
+            noise += (squares / count - m * m).max(0.0) / (count - 1.0);
+        }
+        if n < 2.0 {
+            return 0.0;
+        }
+        let between = (square - mean * mean / n) / (n - 1.0);
+        (between - noise / n).max(0.0).sqrt()
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        (size_of::<End>() + 4) * self.ends.len() + 8 * (self.range.len() + self.target.len())
+    }
+
+    /// Area of every node that looks out; never quite zero, so that nothing is divided by zero.
+    pub(super) fn areas(&self, tree: &Tree) -> Vec<f64> {
+        let mut areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
+        for k in (0..areas.len()).rev() {
+            let node = &tree.nodes[k];
+            areas[k] = if node.is_leaf() {
+                node.area * f64::from(self.bare[k]).max(LEAST_BARE)
+            } else {
+                node.child_range().map(|c| areas[c as usize]).sum()
+            };
+        }
+        areas
+    }
+}
+
+/// Casts the rays of a leaf: a turned pattern of directions, from points all over it.
+fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: u64) -> Vec<End> {
+    let node = tree.node(leaf);
+    let element = &tree.elements[node.element as usize];
+    let plane = tree.face_plane[element.face as usize];
+    let (at, turn) = (hash(seed, u64::from(leaf)), hash(seed ^ 1, u64::from(leaf)));
+    let (sin, cos) = (std::f64::consts::TAU * sequence02(0, turn)[0]).sin_cos();
+    let [x, y] = tangents(node.normal);
+    let [x, y] = [x * cos + y * sin, y * cos - x * sin];
+    let mut ends = Vec::with_capacity(pattern.len());
+    let mut hits = [None; BEAM];
+    let (mut from, mut directions) = ([Vec3::ZERO; BEAM], [Vec3::ZERO; BEAM]);
+    for beam in pattern.beams() {
+        for (k, d) in beam.iter().enumerate() {
+            directions[k] = (x * d.x + y * d.y + node.normal * d.z).as_vec3();
+            from[k] = element.at(start(ends.len() + k, at)).as_vec3();
+        }
+        sight.meet(&from, &directions, plane, &mut hits);
+        for (k, hit) in hits.iter().enumerate() {
+            ends.push(match hit {
+                None => End::at(NOTHING),
+                Some(hit) => {
+                    let entry = tree.entry[hit.triangle as usize][usize::from(hit.from_behind)];
+                    let [u, v] = hit.uv.map(|x| (x * 65536.0).clamp(0.0, 65535.0) as u16);
+                    match entry {
+                        NONE if is_covered(tree, sight, from[k], node.normal, plane) => {
+                            End::at(COVERED)
+                        }
+                        NONE => End::at(NOTHING),
+                        entry => End {
+                            entry,
+                            at: if hit.from_behind { [v, u] } else { [u, v] },
+                        },
+                    }
+                }
+            });
+        }
+    }
+    ends
+}
+
+/// Does everything that a point sees turn its black back on it? Then something solid stands on the point, or holds it.
+fn is_covered(tree: &Tree, sight: &Sight, from: Vec3, normal: DVec3, plane: u32) -> bool {
+    let mut hits = [None; COVER_RAYS];
+    let directions: [Vec3; COVER_RAYS] =
+        std::array::from_fn(|k| cosine_direction(normal, sequence02(k as u32, 0)).as_vec3());
+    sight.meet(&[from; COVER_RAYS], &directions, plane, &mut hits);
+    hits.iter().all(|hit| {
+        hit.is_some_and(|h| tree.entry[h.triangle as usize][usize::from(h.from_behind)] == NONE)
+    })
+}
+
+/// Weights of the point of a leaf that ray `k` starts from.
+fn start(k: usize, shift: u64) -> [f64; 3] {
+    triangle_weights(sequence02(k as u32, shift))
+}

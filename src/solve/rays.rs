@@ -1,0 +1,121 @@
+//! The solution where leaves look for themselves: `R = rho (H0 + K R)`, `K` the mean over what the rays of a leaf meet.
+//!
+//! Plain sweeps (Jacobi) shrink every error by the albedo. Two factors a lane and sweep help: one makes the leaves receive
+//! just what the others send them (rays know that to a fraction of a percent only), the other scales the whole solution so
+//! that no light is missing: the slowest mode of a bright room is all of it together.
+
+use super::conjugate::Convergence;
+use super::operator::pull;
+use super::outlook::Outlook;
+use super::rows::Rows;
+use crate::hierarchy::Tree;
+
+/// Sweeps at the most.
+const SWEEPS: usize = 400;
+/// The scale of one sweep stays within this factor.
+const GREATEST_SCALE: f64 = 2.0;
+
+/// What a solve by rays works on.
+pub(super) struct RaySystem<'a> {
+    pub(super) tree: &'a Tree,
+    pub(super) outlook: &'a Outlook,
+    pub(super) leaves: &'a [u32],
+    /// Bare area by node.
+    pub(super) areas: &'a [f64],
+    /// By leaf.
+    pub(super) reflectance: &'a Rows,
+    /// Greatest reflectance of each lane.
+    pub(super) greatest: &'a [f32],
+}
+
+impl RaySystem<'_> {
+    /// Reflected radiosity (from a guess) and irradiance by reflected light, both by leaf.
+    pub(super) fn solve<const L: usize>(
+        &self,
+        first: &Rows,
+        reflected: &mut Rows,
+        tolerance: f64,
+    ) -> (Convergence, Rows) {
+        let mut nodes = Rows::zero(self.tree.nodes.len(), L);
+        let mut seen = Rows::zero(self.leaves.len(), L);
+        let mut done = Convergence::default();
+        let area = |k: usize| self.areas[self.leaves[k] as usize];
+        let target = |k: usize| f64::from(self.outlook.target[self.leaves[k] as usize]);
+        loop {
+            self.receive::<L>(reflected, &mut nodes, &mut seen);
+            // What is sent to fronts, received, reflected, and what should be: the sums of one sweep.
+            let (mut sent, mut received) = ([0.0; L], [0.0; L]);
+            let (mut now, mut once, mut again) = ([0.0; L], [0.0; L], [0.0; L]);
+            let rows = || {
+                reflected
+                    .all::<L>()
+                    .iter()
+                    .zip(seen.all::<L>())
+                    .zip(first.all::<L>().iter().zip(self.reflectance.all::<L>()))
+                    .enumerate()
+            };
+            for (k, ((r, h), (f, rho))) in rows() {
+                let (a, t) = (area(k), target(k));
+                for l in 0..L {
+                    sent[l] += a * t * f64::from(r[l]);
+                    received[l] += a * f64::from(h[l]);
+                    now[l] += a * f64::from(r[l]);
+                    once[l] += a * f64::from(rho[l] * f[l]);
+                    again[l] += a * f64::from(rho[l] * h[l]);
+                }
+            }
+            let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 1.0 };
+            let fair: [f64; L] = std::array::from_fn(|l| ratio(sent[l], received[l]));
+            let scale: [f64; L] = std::array::from_fn(|l| {
+                ratio(once[l], now[l] - fair[l] * again[l])
+                    .clamp(1.0 / GREATEST_SCALE, GREATEST_SCALE)
+            });
+            let factor: [f32; L] = std::array::from_fn(|l| (fair[l] * scale[l]) as f32);
+            for h in seen.all_mut::<L>() {
+                *h = std::array::from_fn(|l| h[l] * factor[l]);
+            }
+            let (mut change, mut total) = ([0.0; L], [0.0; L]);
+            for (k, (((r, h), f), rho)) in reflected
+                .all_mut::<L>()
+                .iter_mut()
+                .zip(seen.all::<L>())
+                .zip(first.all::<L>())
+                .zip(self.reflectance.all::<L>())
+                .enumerate()
+            {
+                let a = area(k);
+                for l in 0..L {
+                    let next = rho[l] * (f[l] + h[l]);
+                    change[l] += a * f64::from((next - r[l]).abs());
+                    total[l] += a * f64::from(next);
+                    r[l] = next;
+                }
+            }
+            done.iterations += 1;
+            (done.residual, done.bound) = (0.0, 0.0);
+            for l in 0..L {
+                let relative = if total[l] > 0.0 {
+                    change[l] / total[l]
+                } else {
+                    0.0
+                };
+                let rho = f64::from(self.greatest[l]);
+                done.residual = done.residual.max(relative);
+                done.bound = done.bound.max(relative * rho / (1.0 - rho));
+            }
+            if done.bound <= tolerance || done.iterations >= SWEEPS {
+                return (done, seen);
+            }
+        }
+    }
+
+    /// What leaves receive of reflected light.
+    fn receive<const L: usize>(&self, reflected: &Rows, nodes: &mut Rows, seen: &mut Rows) {
+        let all = nodes.all_mut::<L>();
+        for (row, &leaf) in reflected.all::<L>().iter().zip(self.leaves) {
+            all[leaf as usize] = *row;
+        }
+        pull::<L>(self.tree, self.areas, all);
+        self.outlook.irradiance::<L>(self.leaves, nodes, seen);
+    }
+}
