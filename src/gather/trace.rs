@@ -274,7 +274,7 @@ mod tests {
                 for (l, x) in expected.iter_mut().enumerate() {
                     let k = id as usize;
                     *x += f64::from(w * scale * light.reflected.row(k)[l]);
-                    if k % 3 > 0 {
+                    if light.bright_emitted[k] > 0.0 {
                         *x += f64::from(w * light.emitted.row(k)[l]);
                     }
                 }

@@ -275,13 +275,7 @@ impl Relighter {
         }
         let white = bake.light.white;
         Ok(Self {
-            guess: std::array::from_fn(|c| {
-                if guess[c] > 0.0 {
-                    white[c] / guess[c]
-                } else {
-                    1.0
-                }
-            }),
+            guess: over(white, guess, [1.0; 3]),
             geometry: (bake.rounds.last())
                 .and_then(|r| Some(without(r.error.total_de2000.value?, r) / distance))
                 .filter(|_| distance > 0.0),
@@ -459,11 +453,7 @@ impl Relighter {
         let (convergence, flux) = bake.solve::<L>(links, &leaves);
         bake.graph = graph;
         let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
-        for c in 0..3 {
-            if guess[c] > 0.0 {
-                self.guess[c] = bake.light.white[c] / guess[c];
-            }
-        }
+        self.guess = over(bake.light.white, guess, self.guess);
         Ok((convergence, flux, [direct_s, clock.elapsed().as_secs_f64()]))
     }
 
@@ -479,6 +469,17 @@ impl Relighter {
         self.bake.light.neighbours = Neighbours::new(nodes, &self.bake.graph);
         self.bake
     }
+}
+
+/// White over guess, channel by channel; `otherwise` where nothing was guessed.
+fn over(white: [f64; 3], guess: [f64; 3], otherwise: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        if guess[c] > 0.0 {
+            white[c] / guess[c]
+        } else {
+            otherwise[c]
+        }
+    })
 }
 
 /// Links in rows.
