@@ -173,10 +173,16 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         write_npz(path, &args.room, &bake, &baked)?;
         outputs.npz = Some(text(path));
     }
+    // A cache that cannot be written is told of when all else is done.
+    let mut uncached = None;
     if let Some(path) = &args.cache {
-        let size = bake.write_cache(&baked, path, args.cache_limit << 20)?;
-        talk.say(&format!("cache: {}, {} MB", text(path), size >> 20));
-        outputs.cache = Some(text(path));
+        match bake.write_cache(&baked, path, args.cache_limit << 20) {
+            Ok(size) => {
+                talk.say(&format!("cache: {}, {:.1} MB", text(path), megabytes(size)));
+                outputs.cache = Some(text(path));
+            }
+            Err(error) => uncached = Some(error),
+        }
     }
     if let Some(snapshots) = &mut snapshots {
         outputs.exr = snapshots.last(scene, &baked.surfaces)?;
@@ -214,7 +220,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
             .map_err(|problem| Error::Internal(format!("verdict: {problem}")))?;
         print(&(line + "\n"))?;
     }
-    Ok(exit_code(verdict))
+    uncached.map_or(Ok(exit_code(verdict)), Err)
+}
+
+fn megabytes(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
 }
 
 /// Reads a room; its problems and those that `others` finds (given the files the room is made of) come together.

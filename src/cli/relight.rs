@@ -1,4 +1,17 @@
 //! `haarlight relight ROOM`: the room under other lamps and paints, from what `bake --cache` kept; no ray is cast.
+//!
+//! `--json` prints one object:
+//!
+//! | field | unit | what |
+//! |---|---|---|
+//! | `record`, `version` | | `relit`; version of the log's format |
+//! | `changed` | | did lamps or paints change since the bake? |
+//! | `intervals_working`, `iterations` | | wavelength intervals of the working partition; operator applications of the solve |
+//! | `error_de2000` | dE00 | estimate: see [`RelitRecord`] |
+//! | `flux` | lm | as in the log of a bake, see [`log`](super::log) |
+//! | `lanes_s`, `direct_s`, `solve_s`, `gather_s` | s | choice of intervals, direct light of the leaves, solve, light of the vertices |
+//! | `load_s`, `open_s`, `write_s`, `total_s` | s | reading the room, the cache, writing, all together |
+//! | `glb`, `vertices`, `triangles`, `exposure`, `white` | | as in the verdict of a bake |
 
 use super::bake::{load, text, write_npz};
 use super::command::print;
@@ -7,6 +20,7 @@ use super::paths;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::output::{Exposure, baked_glb, file};
+use crate::solve::record::LOG_VERSION;
 use crate::solve::{Relighter, RelitRecord};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -44,6 +58,7 @@ pub struct RelightArgs {
 struct Line<'a> {
     #[serde(flatten)]
     record: &'a RelitRecord,
+    version: u32,
     /// The relit room.
     glb: String,
     vertices: usize,
@@ -92,6 +107,7 @@ pub fn run(args: &RelightArgs, common: &Common) -> Result<u8> {
     }
     let line = Line {
         record: &relit.record,
+        version: LOG_VERSION,
         glb: text(&output),
         vertices: glb.vertices,
         triangles: glb.triangles,
