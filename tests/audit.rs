@@ -5,7 +5,7 @@ mod built;
 
 use built::{Room, sphere};
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Audit, BATCHES, Honesty, Report};
+use haarlight::audit::{Audit, BATCHES, Honesty, Reference, Report};
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::lambert_polygon;
 use haarlight::geometry::sampling::{Pcg, on_triangle};
@@ -316,6 +316,38 @@ fn the_report_measures_what_finer_rounds_improve() {
         }
         assert!(spread.mean.value <= spread.p95.value && spread.p95.value <= spread.max.value);
     }
+}
+
+/// One reference serves several bakes of a room, in any state, and changes nothing about the outcome.
+#[test]
+fn a_reference_serves_several_bakes() {
+    let bake = |error: f64, rounds: usize| {
+        let mut bake = Bake::new(
+            furnished(),
+            Settings {
+                error,
+                ..Settings::default()
+            },
+        );
+        for _ in 0..rounds {
+            bake.step();
+        }
+        bake
+    };
+    // Made before any round, by a bake that is asked for the same error.
+    let reference = Reference::new(&bake(0.5, 0), 30, 2048, 5);
+    assert_eq!(reference.points.len() + reference.covered, 30);
+    let all = 0..reference.points.len();
+    let interval: f64 = all.map(|k| reference.interval(k)).sum();
+    assert!(interval < 0.1 * reference.truth.iter().map(|t| t[1]).sum::<f64>());
+    let text = |report: Report| serde_json::to_string(&report).unwrap();
+    let (coarse, fine) = (bake(0.5, 1), bake(0.5, 3));
+    for bake in [&coarse, &fine] {
+        let held = Report::against(bake, &reference);
+        assert_eq!(text(held), text(Report::new(bake, 30, 2048, 5)));
+    }
+    let error = |bake: &Bake| Report::against(bake, &reference).relative.rms.value;
+    assert!(error(&fine) < error(&coarse));
 }
 
 /// In a furnace the bake is right to the last digits: the audit must not take its own noise for an error.

@@ -86,7 +86,7 @@ fn records(log: &[u8]) -> Vec<Value> {
 
 /// Every field of a record stands in the documentation of the log, or is a documented field of a type there.
 fn documented(record: &Value) {
-    let sources = ["src/cli/log.rs", "src/audit/compare.rs"]
+    let sources = ["src/cli/log.rs", "src/audit/report.rs"]
         .map(|p| std::fs::read_to_string(root().join(p)).unwrap());
     let text = sources.concat();
     for (key, value) in record.as_object().unwrap() {
@@ -181,8 +181,18 @@ fn a_bake_writes_everything_that_was_asked_for_and_nothing_else() {
     assert!(round["error"]["total_de2000"]["value"].as_f64().unwrap() <= 2.0);
     assert!(round["phases_s"]["links"].as_f64().unwrap() >= 0.0);
     let audit = &records[2 * rounds + 1];
-    assert_eq!(audit["points"], 8);
-    let [low, high] = [0, 1].map(|k| audit["bias"]["ci95"][k].as_f64().unwrap());
+    assert_eq!(
+        audit["points"].as_u64().unwrap() + audit["covered"].as_u64().unwrap(),
+        8
+    );
+    let [low, high] = ["low", "high"].map(|k| audit["bias"][k].as_f64().unwrap());
+    let mean = &audit["de2000"]["mean"];
+    assert!(mean["low"].as_f64().unwrap() <= mean["high"].as_f64().unwrap());
+    assert_eq!(
+        audit["estimate_de2000"],
+        round["error"]["total_de2000"]["value"]
+    );
+    assert!(["honest", "too_low", "too_high"].contains(&audit["honesty"].as_str().unwrap()));
     assert!(low < high && high < 0.3 && low > -0.3, "{audit}");
     assert_eq!(verdict["verdict"], "reached");
     assert_eq!(verdict["exit_code"], 0);

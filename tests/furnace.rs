@@ -163,7 +163,6 @@ fn received_flux_of_a_closed_room() {
 /// Inside a sphere every point sees every other by the same factor: H = mean(E) / (1 - mean(rho)), whatever E and rho.
 /// Triangles are not a sphere: their error falls with the square of the edge.
 #[test]
-#[ignore = "mean irradiance is .7 to .8 % low at the default error"]
 fn inside_a_sphere() {
     let mut worst = Vec::new();
     for depth in [2, 3] {
@@ -209,7 +208,6 @@ fn inside_a_sphere() {
 
 /// Light outside a closed opaque room: nothing at all gets in, whatever the paint inside.
 #[test]
-#[ignore = "a trace of outside light gets in through links of partly visible clusters"]
 fn white_furnace_leak_test() {
     no_leak(0.0, false);
 }

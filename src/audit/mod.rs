@@ -3,10 +3,12 @@
 //! It shares the scene, the welded triangles and the ray index with the solver, and nothing else: no links, no lanes,
 //! no form factors, no balance.
 
-mod compare;
 mod path;
+mod reference;
 mod report;
+mod spread;
 
-pub use compare::{Comparison, Mean, compare};
 pub use path::{Answer, Audit, BATCHES};
-pub use report::{HONEST, Honesty, Measured, Report, Seen, Spread};
+pub use reference::{Place, Reference};
+pub use report::{HONEST, Honesty, Report, Seen};
+pub use spread::{Measured, Spread};

@@ -361,6 +361,7 @@ impl<'a> Audit<'a> {
         let e = self.scene.materials[self.mesh.material[triangle] as usize]
             .emission
             .as_ref()?;
+        let weights = self.mesh.on_origin_f32(triangle, weights);
         let power = &self.scene.spectra[e.light].power;
         let shape = match &e.texture {
             Some(texture) => {
@@ -380,6 +381,7 @@ impl<'a> Audit<'a> {
         if material.paint.is_none() && colors.is_none() {
             return material.reflectance;
         }
+        let weights = self.mesh.on_origin_f32(triangle, weights);
         let mut color = material.base_color;
         if let Some(texture) = &material.paint {
             let texel = self.texel(texture, triangle, weights);

@@ -1,60 +1,21 @@
 //! How wrong a bake is, *measured*: its light against the path tracer's at random points of its surfaces.
 //!
-//! The path tracer's own noise must not count as error of the bake. With observed difference o and standard error s of a
-//! point's answer, `E[o^2] = d^2 + s^2`; the figures are made of `sqrt(max(0, o^2 - s^2))`, and a root mean square of
-//! `sqrt(max(0, mean(o^2 - s^2)))`, which is unbiased. Intervals are of 95 %: means by the spread over the points, order
-//! statistics by moving every point by 2 s. Where d is far below s the mean of those roots is 0.4 s, not 0; the lower end
-//! of its interval is lowered by as much. Points that something solid covers are left out and counted.
-//!
-//! Colour differences are CIEDE2000 of a white surface's light under the bake's adaptation white.
+//! The path tracer's own noise does not count as error of the bake (see [`Spread`]). Colour differences are CIEDE2000 of
+//! a white surface's light under the bake's adaptation white.
 
-use super::path::{Answer, Audit};
-use crate::color::{KM, Observer, de2000};
-use crate::gather::point::Receiver;
-use crate::geometry::sampling::{Pcg, triangle_weights};
+use super::reference::Reference;
+use super::spread::{Measured, Spread};
+use crate::color::de2000;
 use crate::solve::Bake;
-use crate::spectrum::Leaves;
 use glam::DVec3;
 use serde::Serialize;
 
-/// Paths of a point that tell how many more it takes.
-const PILOT: usize = 512;
-/// The audit's standard error at a point is brought to this share of the asked-for colour difference.
-const NOISE_SHARE: f64 = 0.25;
 /// Illuminances below this share of the white's count as this: the relative error of darkness means nothing.
 const DARK: f64 = 1e-4;
-/// What noise alone shows as, share of its standard error: the mean of `sqrt(max(0, z^2 - 1))` over a normal z.
-const NOISE_SHOWS: f64 = 0.4;
 /// Estimates and errors below this share of the asked-for one are not told apart.
 const NEGLIGIBLE: f64 = 0.02;
-/// Two-sided normal quantile of 95 %.
-const NORMAL_95: f64 = 1.96;
 /// An estimate is honest between these multiples of the measured error.
 pub const HONEST: [f64; 2] = [0.7, 3.0];
-
-/// A measured figure with its interval of 95 %.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Measured {
-    /// Best figure.
-    pub value: f64,
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-}
-
-/// Mean, 95th percentile and greatest of a measured error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spread {
-    /// Mean.
-    pub mean: Measured,
-    /// Root of the mean square.
-    pub rms: Measured,
-    /// Value that 95 % of the points do not exceed.
-    pub p95: Measured,
-    /// Greatest.
-    pub max: Measured,
-}
 
 /// Was the solver's estimate honest?
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -120,218 +81,77 @@ pub struct Seen {
 impl Report {
     /// Compares a bake with the path tracer at `points` random points, by area; `most_paths` paths a point at the most.
     /// The same numbers for the same seed at any number of threads.
+    ///
+    /// ```
+    /// use haarlight::{audit, scene::{Options, Scene}, solve::{Bake, Settings}};
+    /// let room = Scene::load("scenes/convex.glb", &Options::default())?;
+    /// let mut bake = Bake::new(room, Settings { error: 1.0, ..Settings::default() });
+    /// bake.run();
+    /// let report = audit::Report::new(&bake, 16, 4096, 1);
+    /// assert!(report.de2000.mean.value < 3.0);
+    /// # Ok::<(), haarlight::Error>(())
+    /// ```
     pub fn new(bake: &Bake, points: usize, most_paths: usize, seed: u64) -> Self {
-        let (receivers, covered) = receivers(bake, points, seed);
-        let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
-        let places: Vec<(DVec3, DVec3, u32)> = receivers
-            .iter()
-            .map(|r| (r.point, r.normal, r.plane))
-            .collect();
-        let weights = Observer::cie1931()
-            .weights(&bake.scene().grid)
-            .map(|w| w.map(|x| KM * x));
+        Self::against(bake, &Reference::new(bake, points, most_paths, seed))
+    }
+
+    /// Compares a bake with a reference of the same room.
+    pub fn against(bake: &Bake, reference: &Reference) -> Self {
         let white = bake.light().white;
-        let goal = NOISE_SHARE * bake.settings().error;
-        let pilot = audit.irradiance(
-            &places,
-            &vec![PILOT.min(most_paths); places.len()],
-            seed ^ 0x9110,
-        );
-        // The pilot only decides on numbers of paths: using it in the answer too would prefer lucky points.
-        let wanted: Vec<usize> = pilot
+        let gathered = bake.gather(&reference.receivers(bake));
+        let seen: Vec<Seen> = gathered
             .iter()
-            .map(|answer| {
-                let noise = noise(answer, &weights, white) / goal;
-                ((PILOT as f64 * noise * noise) as usize).clamp(PILOT, most_paths.max(1))
-            })
-            .collect();
-        let answers = audit.irradiance(&places, &wanted, seed);
-        let gathered = bake.gather(&receivers);
-        let seen: Vec<Seen> = receivers
-            .iter()
-            .zip(&gathered)
-            .zip(&answers)
-            .map(|((r, g), answer)| {
-                let baked = bake.lanes().tristimulus(&g.irradiance);
-                let traced = tristimulus(&answer.mean, &weights);
-                let (y, s) = answer.linear(&weights[1]);
-                let scale = y.max(DARK * white[1]).max(f64::MIN_POSITIVE);
+            .enumerate()
+            .map(|(k, gathered)| {
+                let (place, traced) = (&reference.points[k], reference.truth[k]);
+                let baked = bake.lanes().tristimulus(&gathered.irradiance);
+                let scale = traced[1].max(DARK * white[1]).max(f64::MIN_POSITIVE);
                 Seen {
-                    point: r.point + bake.mesh().centre,
-                    normal: r.normal,
+                    point: place.point,
+                    normal: place.normal,
                     baked,
                     traced,
-                    de2000: [de2000(baked, traced, white), noise(answer, &weights, white)],
-                    relative: [(baked[1] - y) / scale, s / scale],
+                    de2000: [
+                        de2000(baked, traced, white),
+                        reference.noise_de2000(k, white),
+                    ],
+                    relative: [
+                        (baked[1] - traced[1]) / scale,
+                        reference.standard_error(k) / scale,
+                    ],
                 }
             })
             .collect();
-        let paths = (PILOT.min(most_paths) * places.len()) as u64
-            + wanted.iter().map(|&n| n as u64).sum::<u64>();
-        let estimate = bake
-            .rounds()
-            .last()
-            .and_then(|r| r.error.total_de2000.value);
-        Self::of(
-            seen,
-            covered,
-            paths,
-            seed,
-            estimate,
-            NEGLIGIBLE * bake.settings().error,
-        )
-    }
-
-    fn of(
-        seen: Vec<Seen>,
-        covered: usize,
-        paths: u64,
-        seed: u64,
-        estimate: Option<f64>,
-        negligible: f64,
-    ) -> Self {
         let colour: Vec<[f64; 2]> = seen.iter().map(|s| s.de2000).collect();
         let relative: Vec<[f64; 2]> = seen.iter().map(|s| s.relative).collect();
-        let de2000 = spread(&colour);
-        let honesty = match estimate {
-            None => Honesty::NoEstimate,
-            Some(e) if e.max(negligible) < HONEST[0] * de2000.mean.low => Honesty::TooLow,
-            Some(e) if e > HONEST[1] * de2000.mean.high.max(negligible) => Honesty::TooHigh,
-            Some(_) => Honesty::Honest,
-        };
+        let signed: Vec<f64> = relative.iter().map(|r| r[0]).collect();
+        let de2000 = Spread::of(&colour);
+        let last = bake.rounds().last();
+        let estimate = last.and_then(|r| r.error.total_de2000.value);
         Self {
             record: "audit",
             points: seen.len(),
-            covered,
-            paths,
-            seed,
-            de2000,
-            relative: spread(&relative),
-            bias: mean_of(&relative.iter().map(|r| r[0]).collect::<Vec<_>>()),
+            covered: reference.covered,
+            paths: reference.paths,
+            seed: reference.seed,
+            relative: Spread::of(&relative),
+            bias: Measured::mean(&signed),
             noise_de2000: colour.iter().map(|c| c[1]).sum::<f64>() / colour.len().max(1) as f64,
             estimate_de2000: estimate,
-            honesty,
+            honesty: judge(estimate, &de2000.mean, NEGLIGIBLE * bake.settings().error),
+            de2000,
             seen,
         }
     }
 }
 
-/// Random points by area, one stratum each, those that are not covered; and how many are.
-fn receivers(bake: &Bake, points: usize, seed: u64) -> (Vec<Receiver>, usize) {
-    let tree = bake.tree();
-    let mut rng = Pcg::new(seed ^ 0x00a0_d177);
-    let mut all = Vec::with_capacity(points);
-    if let Some(root) = tree.nodes.first() {
-        for k in 0..points {
-            let target = (k as f64 + rng.f64()) / points as f64 * root.area;
-            let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1)
-                .min(tree.faces.len() - 1);
-            let weights = triangle_weights([rng.f64(), rng.f64()]);
-            let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
-            all.push(Receiver {
-                point: element.at(weights),
-                normal: tree.face_normal[entry],
-                plane: tree.face_plane[entry],
-                leaf: Some(tree.leaf_at(entry as u32, weights)),
-                seed: crate::geometry::sampling::hash(seed, k as u64),
-            });
-        }
+fn judge(estimate: Option<f64>, measured: &Measured, negligible: f64) -> Honesty {
+    match estimate {
+        None => Honesty::NoEstimate,
+        Some(e) if e.max(negligible) < HONEST[0] * measured.low => Honesty::TooLow,
+        Some(e) if e > HONEST[1] * measured.high.max(negligible) => Honesty::TooHigh,
+        Some(_) => Honesty::Honest,
     }
-    let covered = bake.covered(&all);
-    let bare: Vec<Receiver> = all
-        .iter()
-        .zip(&covered)
-        .filter(|(_, c)| !**c)
-        .map(|(r, _)| *r)
-        .collect();
-    let count = all.len() - bare.len();
-    (bare, count)
-}
-
-fn tristimulus(leaves: &Leaves, weights: &[Leaves; 3]) -> [f64; 3] {
-    weights
-        .each_ref()
-        .map(|w| leaves.iter().zip(w).map(|(x, w)| x * w).sum())
-}
-
-/// Standard error of an answer as a colour difference: the differences of its batches from their mean.
-fn noise(answer: &Answer, weights: &[Leaves; 3], white: [f64; 3]) -> f64 {
-    let mean = tristimulus(&answer.mean, weights);
-    let n = answer.batches.len() as f64;
-    let squares: f64 = answer
-        .batches
-        .iter()
-        .map(|b| de2000(tristimulus(b, weights), mean, white).powi(2))
-        .sum();
-    (squares / (n * (n - 1.0).max(1.0))).sqrt()
-}
-
-/// Figures of errors `[observed, standard error]`.
-fn spread(errors: &[[f64; 2]]) -> Spread {
-    let value: Vec<f64> = errors
-        .iter()
-        .map(|[o, s]| (o * o - s * s).max(0.0).sqrt())
-        .collect();
-    let at = |shift: f64| -> Vec<f64> {
-        errors
-            .iter()
-            .map(|[o, s]| (o.abs() + shift * s).max(0.0))
-            .collect()
-    };
-    let noise = errors.iter().map(|[_, s]| s).sum::<f64>() / errors.len().max(1) as f64;
-    let order = |share: f64| Measured {
-        value: percentile(value.clone(), share),
-        low: percentile(at(-2.0), share),
-        high: percentile(at(2.0), share),
-    };
-    let squares = mean_of(
-        &errors
-            .iter()
-            .map(|[o, s]| o * o - s * s)
-            .collect::<Vec<_>>(),
-    );
-    let root = |x: f64| x.max(0.0).sqrt();
-    Spread {
-        mean: mean_of(&value).lowered(NOISE_SHOWS * noise),
-        rms: Measured {
-            value: root(squares.value),
-            low: root(squares.low),
-            high: root(squares.high),
-        },
-        p95: order(0.95),
-        max: order(1.0),
-    }
-}
-
-impl Measured {
-    /// The same with its lower end lowered, to 0 at the most.
-    fn lowered(self, by: f64) -> Self {
-        Self {
-            low: (self.low - by).max(0.0),
-            ..self
-        }
-    }
-}
-
-fn mean_of(x: &[f64]) -> Measured {
-    let n = x.len().max(1) as f64;
-    let value = x.iter().sum::<f64>() / n;
-    let variance = x.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    let half = NORMAL_95 * (variance / n).sqrt();
-    Measured {
-        value,
-        low: value - half,
-        high: value + half,
-    }
-}
-
-/// The value that a share of the values does not exceed; 0 of none.
-fn percentile(mut x: Vec<f64>, share: f64) -> f64 {
-    x.sort_by(f64::total_cmp);
-    let rank = (share * x.len() as f64).ceil() as usize;
-    x.get(rank.clamp(1, x.len().max(1)) - 1)
-        .copied()
-        .unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -339,24 +159,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_is_not_counted_as_error() {
-        // True errors of 0 and of 0.5 seen through noise of standard deviation 0.2.
-        let mut rng = Pcg::new(7);
-        let mut normal = move || (0..12).map(|_| rng.f64()).sum::<f64>() - 6.0;
-        for truth in [0.0, 0.5] {
-            let errors: Vec<[f64; 2]> = (0..4000).map(|_| [truth + 0.2 * normal(), 0.2]).collect();
-            let s = spread(&errors);
-            assert!((s.rms.value - truth).abs() < 0.03, "{truth}: {s:?}");
-            assert!(s.rms.low <= truth && truth <= s.rms.high, "{truth}: {s:?}");
-            let naive = (errors.iter().map(|e| e[0] * e[0]).sum::<f64>() / 4000.0).sqrt();
-            assert!(naive > truth + 0.03);
+    fn estimates_are_judged_as_far_as_the_interval_tells() {
+        let measured = Measured {
+            value: 1.0,
+            low: 0.9,
+            high: 1.2,
+        };
+        for (estimate, honesty) in [
+            (None, Honesty::NoEstimate),
+            (Some(0.62), Honesty::TooLow),
+            (Some(0.64), Honesty::Honest),
+            (Some(3.5), Honesty::Honest),
+            (Some(3.7), Honesty::TooHigh),
+        ] {
+            assert_eq!(judge(estimate, &measured, 0.01), honesty, "{estimate:?}");
         }
-    }
-
-    #[test]
-    fn order_statistics() {
-        assert_eq!(percentile((1..=100).map(f64::from).collect(), 0.95), 95.0);
-        assert_eq!(percentile(vec![3.0, 1.0, 2.0], 1.0), 3.0);
-        assert_eq!(percentile(vec![], 0.95), 0.0);
+        // Both are as good as nothing.
+        let nothing = Measured {
+            value: 1e-9,
+            low: 0.0,
+            high: 1e-8,
+        };
+        assert_eq!(judge(Some(0.01), &nothing, 0.01), Honesty::Honest);
     }
 }

@@ -4,15 +4,13 @@
 //! baked room is metered from its own light, whether or not pictures were taken: the same room gives the same bytes.
 
 use super::command::print;
-use super::log::{
-    AuditRecord, End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code,
-};
+use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
 use super::options::{Common, Reading, Solving};
 use super::snapshots::Snapshots;
 use super::stop::Stop;
 use super::talk::Talk;
 use super::{paths, summary};
-use crate::audit;
+use crate::audit::Report;
 use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
 use crate::output::{Exposure, baked_glb, file, npz};
@@ -30,6 +28,8 @@ const PHASES: [&str; 6] = [
 ];
 /// Distinguishes the audit's random numbers from the solver's.
 const AUDIT_SEED: u64 = 0x5eed_a0d1;
+/// Paths a point of the audit at the most.
+const AUDIT_PATHS: usize = 65_536;
 
 /// Arguments of `bake`.
 #[derive(Debug, Clone, clap::Args)]
@@ -192,8 +192,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let clock = Instant::now();
     let audit = args.audit.map(|points| {
         talk.phase("auditing");
-        let found = audit::compare(&bake, points, common.seed ^ AUDIT_SEED);
-        AuditRecord::new(found, &bake)
+        Report::new(&bake, points, AUDIT_PATHS, common.seed ^ AUDIT_SEED)
     });
     if let Some(audit) = &audit {
         write(&mut log, audit)?;

@@ -48,15 +48,22 @@
 //! `exposure.scale` (display value for each lm/m2; metered in the first round and kept, so that pictures differ by their
 //! light alone).
 //!
-//! With `--audit N`, `{"record": "audit", ...}` ([`AuditRecord`]): the fields of
-//! [`Comparison`], then `estimate_de2000` (of the last round), `ratio` (estimate over measured
-//! error) and `honest` (is the ratio within 0.7 and 3? Both `null` if there is no estimate, the audit's own noise is too
-//! large to tell, or the error is below a tenth of what was asked for).
+//! With `--audit N`, `{"record": "audit", ...}` ([`Report`](crate::audit::Report)):
+//!
+//! | field | unit | what |
+//! |---|---|---|
+//! | `points`, `covered` | | random points compared; those left out, as something solid covers them |
+//! | `paths`, `seed` | | paths traced in all; seed of points and paths |
+//! | `de2000` | dE00 | colour difference of irradiance: `mean`, `rms`, `p95`, `max`, each with `value`, `low`, `high` (interval of 95 %), the audit's noise taken out |
+//! | `relative` | 1 | error of illuminance without sign, the same |
+//! | `bias` | 1 | mean error of illuminance with sign, bake less truth: `value`, `low`, `high` |
+//! | `noise_de2000` | dE00 | mean standard error of the audit itself |
+//! | `estimate_de2000` | dE00 | what the last round estimated |
+//! | `honesty` | | `honest`: estimate within 0.7 and 3 times `de2000.mean`, as far as its interval tells; `too_low`, `too_high`, `no_estimate` |
 //!
 //! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
 
 use crate::PROGRAM;
-use crate::audit::Comparison;
 use crate::gather::Baked;
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
@@ -64,13 +71,6 @@ use crate::scene::facts::Facts;
 use crate::solve::record::{Figure, Kind, LOG_VERSION};
 use crate::solve::{Bake, Representation, Verdict};
 use serde::Serialize;
-
-/// An estimate between these multiples of the measured error is honest.
-const HONEST: [f64; 2] = [0.7, 3.0];
-/// With noise above this share of the measured error an audit does not judge ...
-const NOISY: f64 = 0.7;
-/// ... nor below this share of the error asked for: nobody asked for more.
-const SMALL: f64 = 0.1;
 
 /// What was asked for.
 #[derive(Debug, Clone, Serialize)]
@@ -163,42 +163,6 @@ impl<'a> SnapshotsRecord<'a> {
             round,
             files,
             exposure,
-        }
-    }
-}
-
-/// The error measured, beside the estimate.
-#[derive(Debug, Clone, Serialize)]
-pub struct AuditRecord {
-    record: &'static str,
-    /// What was measured.
-    #[serde(flatten)]
-    pub comparison: Comparison,
-    /// Total of the last round, CIEDE2000.
-    pub estimate_de2000: Option<f64>,
-    /// Estimate over measured error.
-    pub ratio: Option<f64>,
-    /// Is it within 0.7 and 3?
-    pub honest: Option<bool>,
-}
-
-impl AuditRecord {
-    /// Compares a measured error with the estimate of the last round.
-    pub fn new(comparison: Comparison, bake: &Bake) -> Self {
-        let estimate = bake
-            .rounds()
-            .last()
-            .and_then(|r| r.error.total_de2000.value);
-        let measured = comparison.de2000.corrected;
-        let clear =
-            comparison.de2000.noise < NOISY * measured && measured > SMALL * bake.settings().error;
-        let ratio = estimate.filter(|_| clear).map(|e| e / measured);
-        Self {
-            record: "audit",
-            comparison,
-            estimate_de2000: estimate,
-            ratio,
-            honest: ratio.map(|r| (HONEST[0]..=HONEST[1]).contains(&r)),
         }
     }
 }

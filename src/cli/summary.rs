@@ -1,6 +1,7 @@
 //! The table at the end of a bake: what each round cost and how wrong it left the room.
 
-use super::log::{AuditRecord, VerdictRecord};
+use super::log::VerdictRecord;
+use crate::audit::{Honesty, Report};
 use crate::report::{Align, Table};
 use crate::solve::{Round, Verdict};
 
@@ -42,7 +43,7 @@ pub(super) fn rounds(rounds: &[Round]) -> String {
 }
 
 /// The verdict in a few lines.
-pub(super) fn verdict(v: &VerdictRecord, audit: Option<&AuditRecord>) -> String {
+pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
     let error = v
         .error_de2000
         .value
@@ -82,16 +83,24 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&AuditRecord>) -> String 
         ));
     }
     if let Some(audit) = audit {
-        let c = &audit.comparison;
-        let honest = match audit.honest {
-            Some(true) => "the estimate was honest",
-            Some(false) => "the estimate was NOT honest",
-            None => "no judgement on the estimate",
+        let honest = match audit.honesty {
+            Honesty::Honest => "the estimate was honest",
+            Honesty::TooLow => "the estimate was TOO LOW",
+            Honesty::TooHigh => "the estimate was too high",
+            Honesty::NoEstimate => "there was no estimate",
         };
-        let [low, high] = c.bias.ci95.map(|x| 100.0 * x);
+        let (de, bias) = (&audit.de2000, audit.bias);
         lines.push(format!(
-            "measured error at {} points: dE00 mean {:.3} (noise {:.3}), 95 % below {:.2}, max {:.2}; illuminance {:+.2} % ({low:.2} .. {high:.2}); {honest}",
-            c.points, c.de2000.corrected, c.de2000.noise, c.de2000.p95, c.de2000.max, 100.0 * c.bias.mean
+            "measured error at {} points: dE00 mean {:.3} ({:.3} .. {:.3}), 95 % below {:.2}, max {:.2}; illuminance {:+.2} % ({:.2} .. {:.2}); {honest}",
+            audit.points,
+            de.mean.value,
+            de.mean.low,
+            de.mean.high,
+            de.p95.value,
+            de.max.value,
+            100.0 * bias.value,
+            100.0 * bias.low,
+            100.0 * bias.high
         ));
     }
     lines.push(format!("written: {}", v.outputs.glb));

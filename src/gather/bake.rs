@@ -2,6 +2,7 @@
 
 use super::point::{Gathered, Receiver};
 use super::refined::{Refined, Vertex};
+use super::relit::KeptVertex;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler, de2000};
 use crate::scene::Material;
@@ -34,8 +35,8 @@ pub struct Baked {
     pub surfaces: Vec<BakedSurface>,
     /// Irradiance rows of all vertices, surface by surface, in order.
     pub irradiance: Vec<Vec<[f32; 64]>>,
-    /// Where the light of all vertices comes from, in the same order, if that is kept; none for covered vertices.
-    pub(crate) traces: Vec<Vec<Option<Box<[u8]>>>>,
+    /// The vertices in the same order with where their light comes from, if that is kept.
+    pub(crate) kept: Vec<Vec<KeptVertex>>,
     /// Vertices that something solid covers: they got their neighbours' light.
     pub covered: usize,
     /// Triangles that wanted quartering when the limits were met.
@@ -203,8 +204,9 @@ impl Bake {
         let normal = match &surface.normals {
             Some(normals) => {
                 let corners = surface.triangles[mesh.origin[triangle].1 as usize];
+                let weights = mesh.on_origin(triangle, vertex.weights);
                 let sum: DVec3 = (0..3)
-                    .map(|k| normals[corners[k] as usize].as_dvec3() * vertex.weights[k])
+                    .map(|k| normals[corners[k] as usize].as_dvec3() * weights[k])
                     .sum();
                 let sum = if back { -sum } else { sum };
                 let shading = sum.normalize_or(flat);
@@ -316,14 +318,23 @@ impl Bake {
                             look,
                         ));
                         spectra.push(row);
-                        kept.push(traces[v as usize].take());
+                        if self.keeps() {
+                            let Vertex {
+                                triangle, weights, ..
+                            } = sheet.vertices[v as usize];
+                            kept.push(KeptVertex {
+                                triangle,
+                                weights,
+                                trace: traces[v as usize].take(),
+                            });
+                        }
                     }
                     place[v as usize]
                 }));
             }
             out.surfaces.push(surface);
             out.irradiance.push(spectra);
-            out.traces.push(kept);
+            out.kept.push(kept);
         }
         out
     }
@@ -360,10 +371,10 @@ impl Bake {
         let unpainted = look.unpainted.unwrap_or([1.0; 3]);
         let rgb = display.from_xyz(std::array::from_fn(|c| reflected[c] + glow[c]));
         BakedVertex {
-            triangle: vertex.triangle
-                - self.mesh().first_triangle
-                    [self.mesh().origin[vertex.triangle as usize].0 as usize],
-            weights: vertex.weights,
+            triangle: self.mesh().origin[vertex.triangle as usize].1,
+            weights: self
+                .mesh()
+                .on_origin(vertex.triangle as usize, vertex.weights),
             irradiance: self.lanes().tristimulus(row).map(|x| x as f32),
             radiosity: std::array::from_fn(|c| (reflected[c] + glow[c]) as f32),
             light: std::array::from_fn(|c| (rgb[c] / unpainted[c]) as f32),

@@ -88,7 +88,7 @@ impl Refined {
                     back,
                     ..Sheet::default()
                 };
-                let mut known: HashMap<(u32, u32), u32> = HashMap::new();
+                let mut known: HashMap<(u64, u32), u32> = HashMap::new();
                 for triangle in mesh.first_triangle[surface]..mesh.first_triangle[surface + 1] {
                     let entry = tree.entry[triangle as usize][usize::from(back)];
                     let local = mesh.origin[triangle as usize].1 as usize;
@@ -102,7 +102,12 @@ impl Refined {
                         let point = mesh.triangles[triangle as usize][k];
                         let mut weights = [0.0; 3];
                         weights[k] = 1.0;
-                        let vertex = *known.entry((names[k], group)).or_insert_with(|| {
+                        let name = match mesh.input_corner(triangle as usize, k) {
+                            Some(corner) => u64::from(names[corner]),
+                            // A point where triangles were cut belongs to its input triangle alone: attributes may jump.
+                            None => u64::from(local as u32 + 1) << 32 | u64::from(point),
+                        };
+                        let vertex = *known.entry((name, group)).or_insert_with(|| {
                             sheet.vertices.push(Vertex {
                                 point,
                                 triangle,

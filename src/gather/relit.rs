@@ -5,8 +5,7 @@ use super::bake::{Baked, Look, lend};
 use super::refined::Vertex;
 use super::{BakedSurface, trace};
 use crate::color::Upsampler;
-use crate::hierarchy::NONE;
-use crate::scene::Scene;
+use crate::hierarchy::{Mesh, NONE};
 use crate::solve::{Bake, padded};
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Packs};
@@ -16,12 +15,20 @@ use std::io;
 /// Vertices that a task lights.
 const CHUNK: usize = 256;
 
+/// A vertex of the output on the mesh, with where its light comes from; none if something covers it.
+#[derive(Debug)]
+pub(crate) struct KeptVertex {
+    pub(crate) triangle: u32,
+    pub(crate) weights: [f64; 3],
+    pub(crate) trace: Option<Box<[u8]>>,
+}
+
 /// One side of a surface: mesh and traces.
 #[derive(Debug)]
 pub(crate) struct Kept {
     surface: usize,
     back: bool,
-    /// Input triangle of each vertex, and weights of its corners.
+    /// Triangle of the mesh of each vertex, and weights of its corners.
     vertices: Vec<(u32, [f64; 3])>,
     triangles: Vec<[u32; 3]>,
     /// None for vertices that something covers.
@@ -32,29 +39,30 @@ impl Kept {
     /// Writes a surface down.
     pub(crate) fn encode(
         surface: &BakedSurface,
-        traces: &[Option<Box<[u8]>>],
+        kept: &[KeptVertex],
         out: &mut Encoder,
     ) -> io::Result<()> {
         out.put([surface.surface as u64, u64::from(surface.back)])?;
-        let vertices = &surface.vertices;
-        out.put_list(vertices.len(), vertices.iter().map(|v| v.triangle))?;
-        out.put_list(vertices.len(), vertices.iter().map(|v| v.weights))?;
+        out.put_list(kept.len(), kept.iter().map(|v| v.triangle))?;
+        out.put_list(kept.len(), kept.iter().map(|v| v.weights))?;
         out.put_all(&surface.triangles)?;
-        Packs::encode(traces.iter().map(Option::as_deref), out)
+        Packs::encode(kept.iter().map(|v| v.trace.as_deref()), out)
     }
 
     /// Reads it back.
-    pub(crate) fn decode(scene: &Scene, from: &mut Decoder) -> Read<Self> {
+    pub(crate) fn decode(mesh: &Mesh, from: &mut Decoder) -> Read<Self> {
         let [surface, back] = from.get::<[u64; 2]>()?;
-        let of = usize::try_from(surface)
-            .ok()
-            .and_then(|k| scene.surfaces.get(k))
-            .ok_or_else(|| Broken::new("has a surface that the room has not"))?;
         let origins: Vec<u32> = from.get_all()?;
         let weights: Vec<[f64; 3]> = from.get_exactly(origins.len())?;
         let triangles: Vec<[u32; 3]> = from.get_all()?;
         let traces = Packs::decode(from)?;
-        let fits = origins.iter().all(|&t| (t as usize) < of.triangles.len())
+        let there = |&t: &u32| {
+            let origin = mesh.origin.get(t as usize);
+            origin.is_some_and(|o| u64::from(o.0) == surface)
+        };
+        let surfaces = mesh.first_triangle.len().saturating_sub(1);
+        let fits = surface < surfaces as u64
+            && origins.iter().all(there)
             && triangles
                 .iter()
                 .flatten()
@@ -109,21 +117,19 @@ impl Bake {
             out.covered += lend(&mut rows, &kept.triangles);
             let rows: Vec<[f32; 64]> = rows.into_iter().map(|r| r.unwrap_or([0.0; 64])).collect();
             let look = &looks[self.scene().surfaces[kept.surface].material];
-            let first = self.mesh().first_triangle[kept.surface];
-            let vertices = kept
-                .vertices
-                .par_iter()
-                .zip(&rows)
-                .map(|(&(local, weights), row)| {
-                    let triangle = first + local;
-                    let vertex = Vertex {
-                        point: NONE,
-                        triangle,
-                        weights,
-                        entry: self.tree().entry[triangle as usize][usize::from(kept.back)],
-                    };
-                    self.vertex(&vertex, kept.back, row, look)
-                });
+            let vertices =
+                kept.vertices
+                    .par_iter()
+                    .zip(&rows)
+                    .map(|(&(triangle, weights), row)| {
+                        let vertex = Vertex {
+                            point: NONE,
+                            triangle,
+                            weights,
+                            entry: self.tree().entry[triangle as usize][usize::from(kept.back)],
+                        };
+                        self.vertex(&vertex, kept.back, row, look)
+                    });
             out.surfaces.push(BakedSurface {
                 surface: kept.surface,
                 back: kept.back,
@@ -131,7 +137,6 @@ impl Bake {
                 triangles: kept.triangles.clone(),
             });
             out.irradiance.push(rows);
-            out.traces.push(Vec::new());
         }
         Ok(out)
     }

@@ -15,6 +15,10 @@ const THIN: f64 = 1e-12;
 /// what is hidden must be exactly dark.
 const SLIVER: f64 = 1e-9;
 
+/// So does a factor below the first figure (the factor of a sliver is a difference of angles) that is less than the second of the whole
+/// polygon's.
+const ROUNDING: [f64; 2] = [1e-13, 1e-3];
+
 /// The visible part of a convex polygon from a point, as convex pieces (none when all is hidden), `blockers` being the triangles that may
 /// stand between. None when it would take more than `cap` pieces.
 ///
@@ -67,8 +71,11 @@ pub fn lambert_visible(
         .map(|piece| lambert_polygon(point, normal, piece))
         .sum();
     // Comparing costs another factor, and slivers are never large.
-    if sum < SLIVER && sum < SLIVER * lambert_polygon(point, normal, polygon) {
-        return Some(0.0);
+    if sum < SLIVER {
+        let whole = lambert_polygon(point, normal, polygon);
+        if sum < SLIVER * whole || (sum < ROUNDING[0] && sum < ROUNDING[1] * whole) {
+            return Some(0.0);
+        }
     }
     Some(sum.min(1.0))
 }

@@ -7,6 +7,7 @@
 //! | `triangle` | the watertight segment-triangle test, for one triangle, 8 triangles or 16 segments |
 //! | `tree`, `walk` | the eight-wide tree over the triangles |
 //! | [`index`] | [`RayIndex`]: is a segment blocked, what does a ray hit |
+//! | `overlap` | which triangles may touch a box |
 //! | `packet` | sixteen segments at once |
 //! | `beam` | what up to sixteen rays from one point hit first |
 //! | [`shaft`] | the space between two patches |
@@ -42,6 +43,7 @@ pub mod clip;
 pub mod hidden;
 pub mod index;
 pub mod lanes;
+mod overlap;
 mod packet;
 pub mod plane;
 pub mod polygon;

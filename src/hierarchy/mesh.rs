@@ -3,6 +3,7 @@
 //! Positions are recentred on the middle of the scene, f64, in the file's units. Welding joins vertices at equal
 //! positions, so that neighbours know each other across surfaces.
 
+use super::cut::WHOLE;
 use crate::geometry::plane_ids;
 use crate::scene::{Scene, Sides};
 use glam::DVec3;
@@ -42,6 +43,10 @@ pub struct Mesh {
     pub faces: Vec<Face>,
     /// First triangle of each surface, then the end: triangles of a surface stand together, in its own order.
     pub first_triangle: Vec<u32>,
+    /// For each triangle that is a part of its origin, its entry in `within`.
+    pub(super) part: Vec<u32>,
+    /// Corners of parts, as weights of the corners of the origin.
+    pub(super) within: Vec<[[f64; 3]; 3]>,
 }
 
 impl Mesh {
@@ -59,15 +64,7 @@ impl Mesh {
         let mut mesh = Self {
             centre,
             half_size: 0.5 * (high - low).length(),
-            positions: Vec::new(),
-            triangles: Vec::new(),
-            origin: Vec::new(),
-            material: Vec::new(),
-            plane: Vec::new(),
-            normal: Vec::new(),
-            area: Vec::new(),
-            faces: Vec::new(),
-            first_triangle: vec![0],
+            ..Self::empty()
         };
         let mut welded: HashMap<[u64; 3], u32> = HashMap::new();
         // Sides that are there: corners in their order, the least first.
@@ -118,7 +115,55 @@ impl Mesh {
             mesh.first_triangle.push(mesh.triangles.len() as u32);
         }
         mesh.plane = plane_ids(&mesh.positions, &mesh.triangles);
+        mesh.part = vec![WHOLE; mesh.triangles.len()];
         mesh
+    }
+
+    pub(super) fn empty() -> Self {
+        Self {
+            centre: DVec3::ZERO,
+            half_size: 0.0,
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            origin: Vec::new(),
+            material: Vec::new(),
+            plane: Vec::new(),
+            normal: Vec::new(),
+            area: Vec::new(),
+            faces: Vec::new(),
+            first_triangle: vec![0],
+            part: Vec::new(),
+            within: Vec::new(),
+        }
+    }
+
+    /// Barycentric weights on the input triangle, from those on a triangle of the mesh.
+    pub fn on_origin(&self, triangle: usize, weights: [f64; 3]) -> [f64; 3] {
+        match self.within.get(self.part[triangle] as usize) {
+            None => weights,
+            Some(corners) => std::array::from_fn(|k| {
+                // Two products at the most where a point lies on an edge of the input: their order does not matter.
+                corners.iter().zip(weights).map(|(c, w)| c[k] * w).sum()
+            }),
+        }
+    }
+
+    /// The corner of the input triangle that corner `k` of a triangle of the mesh is.
+    pub fn input_corner(&self, triangle: usize, k: usize) -> Option<usize> {
+        match self.within.get(self.part[triangle] as usize) {
+            None => Some(k),
+            Some(corners) => corners[k].iter().position(|&w| w == 1.0),
+        }
+    }
+
+    /// The same in single precision, for textures.
+    pub fn on_origin_f32(&self, triangle: usize, weights: [f32; 3]) -> [f32; 3] {
+        match self.part[triangle] {
+            WHOLE => weights,
+            _ => self
+                .on_origin(triangle, weights.map(f64::from))
+                .map(|w| w as f32),
+        }
     }
 
     /// Corners of a face, counter-clockwise seen from that side.

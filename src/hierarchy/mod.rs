@@ -1,12 +1,14 @@
 //! From triangles to the tree that links attach to: faces at the bottom of a cluster tree, elements below them.
 
 mod build;
+mod cut;
 mod mesh;
 mod spaces;
 mod tree;
 mod validate;
 
+pub use cut::{Cut, cuts};
 pub use mesh::{Face, Mesh};
-pub use spaces::spaces;
+pub use spaces::{Spaces, spaces};
 pub(crate) use tree::stratified;
 pub use tree::{Element, NONE, Node, Sample, Tree};

@@ -22,6 +22,8 @@ const FAR: f64 = 8.0;
 const NEAR: f64 = 2.5;
 /// Points that look past a short list of blockers.
 const POINTS: usize = 6;
+/// A visible share below this is rounding.
+const SLIVER: f64 = 1e-9;
 /// Rays of a pair. Their number does not depend on what they find: stopping when the first agree would make hidden
 /// pairs too dark and open ones too bright.
 const RAYS: usize = 8;
@@ -290,7 +292,13 @@ fn clipped_visibility(
             }
         }
     }
-    (total > 0.0).then(|| (seen / total).min(1.0))
+    // Rounding leaves slivers of polygons that are seen edge-on: what is hidden must be exactly dark.
+    let share = if seen < SLIVER * total {
+        0.0
+    } else {
+        seen / total
+    };
+    (total > 0.0).then(|| share.min(1.0))
 }
 
 /// Visible share by rays between points of both ends, each weighted by what it would carry.

@@ -15,6 +15,7 @@ pub fn is_hole(scene: &Scene, mesh: &Mesh, triangle: u32, weights: [f32; 3]) -> 
     else {
         return false;
     };
+    let weights = mesh.on_origin_f32(triangle as usize, weights);
     let corners = surface.triangles[local as usize].map(|v| v as usize);
     let mut alpha = *factor;
     if let Some(texture) = texture

@@ -32,7 +32,7 @@ use crate::color::Observer;
 use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
-use crate::hierarchy::{Mesh, Tree, spaces};
+use crate::hierarchy::{Mesh, Tree, cuts, spaces};
 use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
@@ -127,6 +127,22 @@ fn by_rays(sight: &Sight) -> bool {
     sight.occlusion && !sight.small()
 }
 
+/// What blocks rays in a scene.
+fn index(scene: &Scene, mesh: &Mesh) -> RayIndex {
+    let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+    let masked: Vec<bool> = mesh
+        .material
+        .iter()
+        .map(|&m| {
+            matches!(
+                scene.materials[m as usize].alpha,
+                crate::scene::Alpha::Mask { .. }
+            )
+        })
+        .collect();
+    RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked)
+}
+
 /// A room being baked.
 pub struct Bake {
     scene: Scene,
@@ -159,25 +175,20 @@ pub struct Bake {
     keep: bool,
     /// Where the light of the watched points came from in the last two rounds, if that is kept.
     watched: [Vec<Option<Box<[u8]>>>; 2],
-    /// Space of each face, see [`spaces`].
+    /// Space of each face, and which cuts were made for them, see [`spaces`].
     spaces: Vec<u32>,
+    parted: Vec<u32>,
     started: Instant,
 }
 
-/// The index of all triangles of a room.
-fn ray_index(scene: &Scene, mesh: &Mesh) -> RayIndex {
-    let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
-    let masked: Vec<bool> = mesh
-        .material
+/// Cuts a mesh as it was cut before: the search casts no ray.
+fn recut(scene: &Scene, mesh: Mesh, parted: &[u32]) -> Mesh {
+    let cuts = cuts(&mesh, &index(scene, &mesh));
+    let some: Vec<_> = parted
         .iter()
-        .map(|&m| {
-            matches!(
-                scene.materials[m as usize].alpha,
-                crate::scene::Alpha::Mask { .. }
-            )
-        })
+        .filter_map(|&k| cuts.get(k as usize).cloned())
         .collect();
-    RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked)
+    mesh.cut(&some)
 }
 
 impl Bake {
@@ -190,20 +201,35 @@ impl Bake {
     fn with(scene: Scene, settings: Settings, known: Option<relight::Known>) -> Self {
         let started = Instant::now();
         let plan = Plan::of(&scene);
-        let mesh = Mesh::new(&scene);
-        let rays = match known {
-            Some(_) => RayIndex::build(&[], &[], &[], &[]),
-            None => ray_index(&scene, &mesh),
-        };
-        let (spaces, closed) = match known {
-            Some(mut known) => {
-                known.spaces.resize(mesh.faces.len(), 0);
-                (known.spaces, Some(known.closed))
+        let mut mesh = Mesh::new(&scene);
+        let (mut spaces_of_faces, mut parted) = (vec![0; mesh.faces.len()], Vec::new());
+        let (mut rays, mut closed) = (RayIndex::build(&[], &[], &[], &[]), None);
+        match known {
+            Some(known) => {
+                if !known.parted.is_empty() {
+                    mesh = recut(&scene, mesh, &known.parted);
+                }
+                spaces_of_faces = known.spaces;
+                spaces_of_faces.resize(mesh.faces.len(), 0);
+                (parted, closed) = (known.parted, Some(known.closed));
             }
-            None if plan.runs(Kind::Occlusion) => (spaces(&mesh, &rays, settings.seed), None),
-            None => (vec![0; mesh.faces.len()], None),
-        };
-        let tree = Tree::new(&mesh, &spaces);
+            None => {
+                rays = index(&scene, &mesh);
+                if plan.runs(Kind::Occlusion) {
+                    let cuts = cuts(&mesh, &rays);
+                    let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
+                    if !found.parted.is_empty() {
+                        parted = found.parted.iter().map(|&k| k as u32).collect();
+                        let some: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
+                        mesh = mesh.cut(&some);
+                        rays = index(&scene, &mesh);
+                        found = spaces(&mesh, &rays, &[], settings.seed);
+                    }
+                    spaces_of_faces = found.of_face;
+                }
+            }
+        }
+        let tree = Tree::new(&mesh, &spaces_of_faces);
         let weights = Observer::cie1931().weights(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
         let hemisphere = Hemisphere::for_error(settings.error);
@@ -234,7 +260,8 @@ impl Bake {
             lanes,
             probes,
             hemisphere,
-            spaces,
+            spaces: spaces_of_faces,
+            parted,
             started,
         };
         if let Some(closed) = closed {

@@ -31,6 +31,8 @@ const CHUNK: usize = 256;
 /// What rays have told of a room before the first round.
 pub(super) struct Known {
     pub(super) spaces: Vec<u32>,
+    /// Which cuts of triangles were made for their sake.
+    pub(super) parted: Vec<u32>,
     /// Of the room, and without what is covered.
     pub(super) closed: [Closed; 2],
 }
@@ -111,7 +113,7 @@ impl Bake {
     /// # Errors
     /// The cache would be larger than `limit` bytes; the file cannot be written; a bake that did not [`Bake::keep`].
     pub fn write_cache(&self, baked: &Baked, path: &Path, limit: u64) -> Result<u64> {
-        if !self.keep || baked.traces.len() != baked.surfaces.len() {
+        if !self.keep || baked.kept.len() != baked.surfaces.len() {
             return Err(Error::Internal("a bake that kept nothing".into()));
         }
         let size = self.cache_bytes(baked);
@@ -137,14 +139,15 @@ impl Bake {
             Fingerprint::paint(&self.scene).encode(out)?;
             out.put_text(&settings)?;
             out.put_all(&self.spaces)?;
+            out.put_all(&self.parted)?;
             out.put([self.closed, self.sealed].map(|c| u8::from(c == Closed::Yes)))?;
             out.put(guess)?;
             out.put(distance.unwrap_or(0.0))?;
             out.put_all(&lit(&self.scene))?;
             self.encode_state(out)?;
             out.put(baked.surfaces.len() as u64)?;
-            for (surface, traces) in baked.surfaces.iter().zip(&baked.traces) {
-                Kept::encode(surface, traces, out)?;
+            for (surface, kept) in baked.surfaces.iter().zip(&baked.kept) {
+                Kept::encode(surface, kept, out)?;
             }
             Ok(())
         })
@@ -193,12 +196,9 @@ impl Bake {
             .iter()
             .map(|&leaf| self.direct.trace(leaf).map_or(0, <[u8]>::len))
             .sum();
-        let vertices: usize = baked.traces.iter().map(Vec::len).sum();
-        let of_vertices: usize = baked
-            .traces
-            .iter()
-            .flatten()
-            .map(|t| t.as_ref().map_or(0, |t| t.len()))
+        let vertices: usize = baked.kept.iter().map(Vec::len).sum();
+        let of_vertices: usize = (baked.kept.iter().flatten())
+            .map(|v| v.trace.as_ref().map_or(0, |t| t.len()))
             .sum();
         let rows = leaves.len() * (8 * self.light.width() + 4 * self.lanes.len() + 16);
         (of_leaves
@@ -257,11 +257,15 @@ impl Relighter {
         let paint = Fingerprint::decode(from)?;
         let settings: Settings = serde_json::from_str(&from.get_text()?)
             .map_err(|problem| Broken::new(format!("has settings that do not read: {problem}")))?;
-        let spaces: Vec<u32> = from.get_all()?;
+        let (spaces, parted) = (from.get_all()?, from.get_all()?);
         let closed = from
             .get::<[u8; 2]>()?
             .map(|c| if c == 1 { Closed::Yes } else { Closed::No });
-        let known = Known { spaces, closed };
+        let known = Known {
+            spaces,
+            parted,
+            closed,
+        };
         let mut bake = Bake::with(scene, settings, Some(known));
         bake.keep = true;
         let guess: [f64; 3] = from.get()?;
@@ -271,7 +275,7 @@ impl Relighter {
         bake.light_up(&reflected);
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
-            kept.push(Kept::decode(&bake.scene, from)?);
+            kept.push(Kept::decode(&bake.mesh, from)?);
         }
         let white = bake.light.white;
         Ok(Self {
@@ -464,7 +468,7 @@ impl Relighter {
 
     /// The bake, able to cast rays again: for probes and audits.
     pub fn into_bake(mut self) -> Bake {
-        self.bake.rays = super::ray_index(&self.bake.scene, &self.bake.mesh);
+        self.bake.rays = super::index(&self.bake.scene, &self.bake.mesh);
         let nodes = self.bake.tree.nodes.len();
         self.bake.light.neighbours = Neighbours::new(nodes, &self.bake.graph);
         self.bake

@@ -180,7 +180,8 @@ impl<'a> Painter<'a> {
     /// Barycentric weights of an element's corners on its input triangle.
     fn corner_weights(&self, triangle: usize, element: &Element) -> [[f64; 3]; 3] {
         let [a, b, c] = self.mesh.triangles[triangle].map(|v| self.mesh.positions[v as usize]);
-        element.corners.map(|p| weights_of(p, a, b, c))
+        let on_origin = |w| self.mesh.on_origin(triangle, w);
+        element.corners.map(|p| on_origin(weights_of(p, a, b, c)))
     }
 }
 

@@ -1,0 +1,187 @@
+//! The path tracer's answer at random points of a room, to which any number of bakes of that room can be held.
+//!
+//! Points lie on all faces, one in each of N strata of equal area; those that something solid covers are left out and
+//! counted. A pilot of few paths tells how many each point takes; it decides on numbers only, as using it in the answer
+//! would prefer lucky points. Figures are tristimulus irradiance, lm/m2; Y is lux.
+
+use super::path::{Answer, Audit, BATCHES};
+use crate::color::{KM, Observer, de2000};
+use crate::gather::point::Receiver;
+use crate::geometry::sampling::{Pcg, hash, triangle_weights};
+use crate::hierarchy::Face;
+use crate::solve::Bake;
+use crate::spectrum::Leaves;
+use glam::DVec3;
+
+/// Paths of a point that tell how many more it takes.
+const PILOT: usize = 512;
+/// The standard error at a point is brought to this share of the colour difference that the bake is asked for.
+const NOISE_SHARE: f64 = 0.25;
+
+/// A point of a face.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// The face.
+    pub face: Face,
+    /// Barycentric weights of the corners of the face.
+    pub weights: [f64; 3],
+    /// The point, world space.
+    pub point: DVec3,
+    /// Unit normal of the face.
+    pub normal: DVec3,
+}
+
+/// What the path tracer says at points of a room.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    /// The points.
+    pub points: Vec<Place>,
+    /// Irradiance at each point, lm/m2.
+    pub truth: Vec<[f64; 3]>,
+    /// The same by independent batches, of which `truth` is the mean.
+    pub batches: Vec<[[f64; 3]; BATCHES]>,
+    /// Random points that were left out, as something solid covers them.
+    pub covered: usize,
+    /// Paths traced, the pilot's too.
+    pub paths: u64,
+    /// Seed of points and paths.
+    pub seed: u64,
+}
+
+impl Reference {
+    /// Traces at `points` random points by area, at most `most_paths` paths a point (and a pilot): as many as bring the
+    /// standard error to a quarter of the error that `bake` is asked for. Of the bake only the room, its triangles and
+    /// its rays are used, whatever rounds it has done. The same numbers for the same seed at any number of threads.
+    pub fn new(bake: &Bake, points: usize, most_paths: usize, seed: u64) -> Self {
+        let (places, covered) = places(bake, points, seed);
+        let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
+        let mesh = bake.mesh();
+        let starts: Vec<(DVec3, DVec3, u32)> = places
+            .iter()
+            .map(|p| {
+                let plane = mesh.plane[p.face.triangle as usize];
+                (p.point - mesh.centre, p.normal, plane)
+            })
+            .collect();
+        let weights = Observer::cie1931()
+            .weights(&bake.scene().grid)
+            .map(|w| w.map(|x| KM * x));
+        let trace = |paths: &[usize], seed: u64| -> Vec<[[f64; 3]; BATCHES]> {
+            let answers = audit.irradiance(&starts, paths, seed);
+            answers.iter().map(|a| tristimulus(a, &weights)).collect()
+        };
+        let few = vec![PILOT.min(most_paths); starts.len()];
+        let pilot = trace(&few, seed ^ 0x9110);
+        let white = bake.settings().white.unwrap_or_else(|| {
+            let n = pilot.len().max(1) as f64;
+            let all = pilot.iter().map(mean);
+            all.fold([0.0; 3], |w, x| [0, 1, 2].map(|c| w[c] + 2.0 * x[c] / n))
+        });
+        let goal = NOISE_SHARE * bake.settings().error;
+        let wanted: Vec<usize> = pilot
+            .iter()
+            .map(|batches| {
+                let noise = noise(batches, white) / goal;
+                ((PILOT as f64 * noise * noise) as usize)
+                    .max(PILOT)
+                    .min(most_paths.max(1))
+            })
+            .collect();
+        let batches = trace(&wanted, seed);
+        Self {
+            truth: batches.iter().map(mean).collect(),
+            points: places,
+            batches,
+            covered,
+            paths: few.iter().chain(&wanted).map(|&n| n as u64).sum(),
+            seed,
+        }
+    }
+
+    /// Where a bake of the same room receives light at the points.
+    pub(super) fn receivers(&self, bake: &Bake) -> Vec<Receiver> {
+        let all = self.points.iter().enumerate();
+        all.map(|(k, place)| receiver(bake, place, hash(self.seed, k as u64)))
+            .collect()
+    }
+
+    /// Standard error of point `k` as a colour difference (CIEDE2000 under a white).
+    pub fn noise_de2000(&self, k: usize, white: [f64; 3]) -> f64 {
+        noise(&self.batches[k], white)
+    }
+
+    /// Half the interval of 95 % of the illuminance at point `k`, lx: Student's t of 15 degrees of freedom.
+    pub fn interval(&self, k: usize) -> f64 {
+        2.131 * self.standard_error(k)
+    }
+
+    /// Standard error of the illuminance at point `k`, lx.
+    pub(super) fn standard_error(&self, k: usize) -> f64 {
+        let n = BATCHES as f64;
+        let squares = self.batches[k]
+            .iter()
+            .map(|b| (b[1] - self.truth[k][1]).powi(2));
+        (squares.sum::<f64>() / (n * (n - 1.0))).sqrt()
+    }
+}
+
+/// Random points by area, one stratum each, those that are not covered; and how many are.
+fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
+    let tree = bake.tree();
+    let mut rng = Pcg::new(seed ^ 0x00a0_d177);
+    let mut all = Vec::with_capacity(points);
+    if let Some(root) = tree.nodes.first() {
+        for k in 0..points {
+            let target = (k as f64 + rng.f64()) / points as f64 * root.area;
+            let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1)
+                .min(tree.faces.len() - 1);
+            let weights = triangle_weights([rng.f64(), rng.f64()]);
+            let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
+            all.push(Place {
+                face: tree.faces[entry],
+                weights,
+                point: element.at(weights) + bake.mesh().centre,
+                normal: tree.face_normal[entry],
+            });
+        }
+    }
+    let receivers: Vec<Receiver> = all.iter().map(|place| receiver(bake, place, 0)).collect();
+    let mut covered = bake.covered(&receivers).into_iter();
+    let before = all.len();
+    all.retain(|_| covered.next() != Some(true));
+    let count = before - all.len();
+    (all, count)
+}
+
+fn receiver(bake: &Bake, place: &Place, seed: u64) -> Receiver {
+    let (tree, triangle) = (bake.tree(), place.face.triangle as usize);
+    let entry = tree.entry[triangle][usize::from(place.face.back)];
+    Receiver {
+        point: place.point - bake.mesh().centre,
+        normal: place.normal,
+        plane: bake.mesh().plane[triangle],
+        leaf: Some(tree.leaf_at(entry, place.weights)),
+        seed,
+    }
+}
+
+/// Irradiance of the batches of an answer.
+fn tristimulus(answer: &Answer, weights: &[Leaves; 3]) -> [[f64; 3]; BATCHES] {
+    let xyz = |leaves: &Leaves| {
+        weights
+            .each_ref()
+            .map(|w| leaves.iter().zip(w).map(|(x, w)| x * w).sum())
+    };
+    std::array::from_fn(|b| xyz(&answer.batches[b]))
+}
+
+fn mean(batches: &[[f64; 3]; BATCHES]) -> [f64; 3] {
+    [0, 1, 2].map(|c| batches.iter().map(|b| b[c]).sum::<f64>() / BATCHES as f64)
+}
+
+/// Standard error of an answer as a colour difference: the differences of its batches from their mean.
+fn noise(batches: &[[f64; 3]; BATCHES], white: [f64; 3]) -> f64 {
+    let (mean, n) = (mean(batches), BATCHES as f64);
+    let squares = batches.iter().map(|&b| de2000(b, mean, white).powi(2));
+    (squares.sum::<f64>() / (n * (n - 1.0))).sqrt()
+}
