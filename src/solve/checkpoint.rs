@@ -36,7 +36,7 @@ impl Bake {
         let print = self.fingerprint();
         container::write(path, Kind::Checkpoint, |out| {
             print.encode(out)?;
-            self.encode_state(out)?;
+            self.encode_state(true, &self.balance.factor, out)?;
             out.put_all(&self.probes.last)?;
             out.put(self.elapsed().as_secs_f64())
         })
@@ -56,7 +56,7 @@ impl Bake {
                 from.skip();
                 return Ok(());
             }
-            let (reflected, traces) = self.decode_state(from)?;
+            let (reflected, traces) = self.decode_state(true, from)?;
             self.light_up(&reflected);
             self.direct.keep(&self.light.leaves, &traces);
             self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
@@ -102,8 +102,13 @@ impl Bake {
         self.started.elapsed()
     }
 
-    /// Writes hierarchy, links and the last solution.
-    pub(super) fn encode_state(&self, out: &mut Encoder) -> io::Result<()> {
+    /// Writes hierarchy, links and the last solution; `whole`: with what further rounds need.
+    pub(super) fn encode_state(
+        &self,
+        whole: bool,
+        factor: &[f32],
+        out: &mut Encoder,
+    ) -> io::Result<()> {
         out.put_all(&splits(&self.tree))?;
         encode_graph(&self.graph, out)?;
         let lanes = self.lanes.lanes();
@@ -116,8 +121,8 @@ impl Bake {
         )?;
         out.put(self.spectrum_error)?;
         out.put(self.light.white)?;
-        self.outlook.encode(out)?;
-        out.put_all(&self.balance.factor)?;
+        self.outlook.encode(whole, out)?;
+        out.put_all(factor)?;
         out.put([self.balance.defect_before, self.balance.defect_after])?;
         out.put(self.balance.limited as u64)?;
         let leaves = &self.light.leaves;
@@ -150,7 +155,7 @@ impl Bake {
 
     /// Takes them up, except for what is behind `light.irradiance` and `light.leaves`: what the leaves reflect, and where
     /// the direct light of each leaf comes from, if that was kept.
-    pub(super) fn decode_state(&mut self, from: &mut Decoder) -> Read<(Rows, Packs)> {
+    pub(super) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
         let splits = from.get_list::<u32>()?;
         self.tree.nodes.reserve(4 * splits.len());
         self.tree.elements.reserve(4 * splits.len());
@@ -171,11 +176,11 @@ impl Bake {
         self.lanes = Lanes::with(lanes, &self.scene.spectra, &self.weights);
         self.spectrum_error = from.get()?;
         let white = from.get()?;
-        self.outlook = Outlook::decode(&self.tree, from)?;
+        self.outlook = Outlook::decode(&self.tree, whole, from)?;
         let factor: Vec<f32> = from.get_all()?;
         // Where leaves look for themselves nothing is balanced.
         let by_rays = self.with_sight(|_, sight| super::by_rays(sight));
-        let wanted = if by_rays { 0 } else { nodes };
+        let wanted = if by_rays && whole { 0 } else { nodes };
         if factor.len() != wanted || self.outlook.looks() != by_rays {
             return Err(Broken::new("does not know what its leaves see"));
         }

@@ -212,45 +212,58 @@ impl Outlook {
         !self.range.is_empty()
     }
 
-    /// Writes it down.
-    pub(super) fn encode(&self, out: &mut Encoder) -> std::io::Result<()> {
+    /// Writes it down: where the rays end, or only the leaves that they met, which is half as much and enough as long as
+    /// no leaf is split.
+    pub(super) fn encode(&self, whole: bool, out: &mut Encoder) -> std::io::Result<()> {
         out.put_all(&self.target)?;
         out.put_all(&self.bare)?;
-        out.put_list(self.ends.len(), self.ends.iter().map(|end| end.entry))?;
-        out.put_list(self.ends.len(), self.ends.iter().map(|end| end.at))?;
-        out.put_list(self.range.len(), self.range.iter().map(|r| [r.0, r.1]))
+        out.put_list(self.range.len(), self.range.iter().map(|r| [r.0, r.1]))?;
+        if whole {
+            out.put_list(self.ends.len(), self.ends.iter().map(|end| end.entry))?;
+            out.put_list(self.ends.len(), self.ends.iter().map(|end| end.at))
+        } else {
+            out.put_all(&self.met)
+        }
     }
 
     /// Reads it back, for the hierarchy that it was made for.
-    pub(super) fn decode(tree: &Tree, from: &mut Decoder) -> Read<Self> {
+    pub(super) fn decode(tree: &Tree, whole: bool, from: &mut Decoder) -> Read<Self> {
         let nodes = tree.nodes.len();
-        let target = from.get_exactly(nodes)?;
-        let bare = from.get_exactly(nodes)?;
-        let entries = from.get_list::<u32>()?;
-        let places = from.get_list::<[u16; 2]>()?;
+        let mut outlook = Self {
+            target: from.get_exactly(nodes)?,
+            bare: from.get_exactly(nodes)?,
+            ..Self::default()
+        };
         let ranges = from.get_list::<[u32; 2]>()?;
-        let count = entries.len();
-        if places.len() != count || !(ranges.len() == 0 || ranges.len() == nodes) {
+        if !(ranges.len() == 0 || ranges.len() == nodes) {
             return Err(Broken::new("has rays in parts that do not fit"));
         }
-        let range: Vec<(u32, u32)> = ranges.map(|[first, n]| (first, n)).collect();
-        let ends: Vec<End> = entries
-            .zip(places)
-            .map(|(entry, at)| End { entry, at })
-            .collect();
-        let there = |entry: u32| entry >= COVERED || (entry as usize) < tree.faces.len();
-        let within = |&(first, n): &(u32, u32)| u64::from(first) + u64::from(n) <= count as u64;
-        if !ends.iter().all(|end| there(end.entry)) || !range.iter().all(within) {
-            return Err(Broken::new("has rays that end nowhere"));
+        outlook.range = ranges.map(|[first, n]| (first, n)).collect();
+        if whole {
+            let entries = from.get_list::<u32>()?;
+            let places = from.get_list::<[u16; 2]>()?;
+            if places.len() != entries.len() {
+                return Err(Broken::new("has rays in parts that do not fit"));
+            }
+            let ends = entries.zip(places).map(|(entry, at)| End { entry, at });
+            outlook.ends = ends.collect();
+            let there = |e: &End| e.entry >= COVERED || (e.entry as usize) < tree.faces.len();
+            if !outlook.ends.iter().all(there) {
+                return Err(Broken::new("has rays that end nowhere"));
+            }
+            outlook.find(tree);
+        } else {
+            outlook.met = from.get_all()?;
+            let there = |&k: &u32| k == NONE || (k as usize) < nodes;
+            if !outlook.met.iter().all(there) {
+                return Err(Broken::new("has rays that end nowhere"));
+            }
         }
-        let mut outlook = Self {
-            target,
-            bare,
-            ends,
-            range,
-            met: Vec::new(),
-        };
-        outlook.find(tree);
+        let count = outlook.met.len() as u64;
+        let within = |&(first, n): &(u32, u32)| u64::from(first) + u64::from(n) <= count;
+        if !outlook.range.iter().all(within) {
+            return Err(Broken::new("has rays in parts that do not fit"));
+        }
         Ok(outlook)
     }
 

@@ -3,14 +3,15 @@
 //! A cache holds a finished bake (see `checkpoint`) and where every leaf and every vertex of the output gets its light
 //! from (see `gather::trace`). Light is linear in lamps and, given the solution, in paints: direct light of the leaves is
 //! one sparse product, the solve starts from the old solution, and the light of the vertices is another product. No ray
-//! is cast: there is not even a ray index until [`Relighter::into_bake`]. What was refined for the old light stays as fine as it was: shadows of a lamp that was dark beside the others
+//! is cast: there is not even a ray index. What was refined for the old light stays as fine as it was: shadows of a lamp that was dark beside the others
 //! are as coarse as they were worth then.
 //!
 //! A cache belongs to a shape: surfaces, sides, holes, places of lights. Where that changed it is refused with what
 //! changed; so is a room in which a surface gives out light that did not (lamps may go out).
 
 use super::conjugate::Convergence;
-use super::light::Neighbours;
+use super::lanes::Lanes;
+use super::light::{Light, Neighbours};
 use super::{
     Bake, Closed, DE_PER_PERCENT, Painter, Rows, Settings, direct, flux, padded, punctual,
 };
@@ -19,6 +20,7 @@ use crate::error::{Error, Result};
 use crate::gather::{Baked, Kept, trace};
 use crate::link::{LinkRows, balance};
 use crate::scene::Scene;
+use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
 use rayon::prelude::*;
@@ -132,6 +134,13 @@ impl Bake {
         let distance = self
             .watched_distance()
             .map_err(|Broken(what)| Error::Internal(what))?;
+        // Where leaves look for themselves, only the choice of lanes needs a balance.
+        let factor = if self.balance.factor.is_empty() {
+            let links = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
+            balance(&self.tree, &links, &self.areas, &self.outlook.target).factor
+        } else {
+            self.balance.factor.clone()
+        };
         let settings = serde_json::to_string(&self.settings)
             .map_err(|problem| Error::Internal(format!("settings: {problem}")))?;
         container::write(path, Kind::Cache, |out| {
@@ -144,7 +153,7 @@ impl Bake {
             out.put(guess)?;
             out.put(distance.unwrap_or(0.0))?;
             out.put_all(&lit(&self.scene))?;
-            self.encode_state(out)?;
+            self.encode_state(false, &factor, out)?;
             out.put(baked.surfaces.len() as u64)?;
             for (surface, kept) in baked.surfaces.iter().zip(&baked.kept) {
                 Kept::encode(surface, kept, out)?;
@@ -271,7 +280,7 @@ impl Relighter {
         let guess: [f64; 3] = from.get()?;
         let distance: f64 = from.get()?;
         let lit = from.get_exactly(bake.scene.surfaces.len())?;
-        let (reflected, leaves) = bake.decode_state(from)?;
+        let (reflected, leaves) = bake.decode_state(false, from)?;
         bake.light_up(&reflected);
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
@@ -392,12 +401,6 @@ impl Relighter {
                 .collect::<Read<Vec<_>>>()?,
             rays: 0,
         };
-        if bake.balance.factor.is_empty() {
-            // Where leaves look for themselves, only the model needs a balance.
-            let links = rows(&mut self.links, bake);
-            bake.balance.factor =
-                balance(&bake.tree, links, &bake.areas, &bake.outlook.target).factor;
-        }
         let leaves = std::mem::take(&mut bake.light.leaves);
         let factor = std::mem::take(&mut bake.balance.factor);
         bake.choose_lanes_for(&leaves, &shadowed, &factor);
@@ -461,17 +464,29 @@ impl Relighter {
         Ok((convergence, flux, [direct_s, clock.elapsed().as_secs_f64()]))
     }
 
-    /// The bake behind it: solution, lanes, records of the rounds.
-    pub fn bake(&self) -> &Bake {
+    /// The bake behind it. It has no rays: nothing may be gathered at new points.
+    pub(crate) fn bake(&self) -> &Bake {
         &self.bake
     }
 
-    /// The bake, able to cast rays again: for probes and audits.
-    pub fn into_bake(mut self) -> Bake {
-        self.bake.rays = super::index(&self.bake.scene, &self.bake.mesh);
-        let nodes = self.bake.tree.nodes.len();
-        self.bake.light.neighbours = Neighbours::new(nodes, &self.bake.graph);
-        self.bake
+    /// The room as it is lit now.
+    pub fn scene(&self) -> &Scene {
+        &self.bake.scene
+    }
+
+    /// What the lanes of the present light stand for.
+    pub fn lanes(&self) -> &Lanes {
+        &self.bake.lanes
+    }
+
+    /// The present light on the patches.
+    pub fn light(&self) -> &Light {
+        &self.bake.light
+    }
+
+    /// Radiosity on the 64 leaves at every vertex of a relit mesh, see [`Bake::radiosity_spectra`].
+    pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
+        self.bake.radiosity_spectra(baked)
     }
 }
 
