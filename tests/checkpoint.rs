@@ -44,7 +44,7 @@ fn state(bake: &Bake) -> (Vec<String>, Vec<u8>) {
 /// Both output files.
 fn files(bake: &Bake) -> [Vec<u8>; 2] {
     let scene = bake.scene();
-    let baked = bake.sketch(&|_, _| {});
+    let baked = bake.sketch();
     let look = Exposure::auto(scene, &baked.surfaces);
     let mut arrays = Vec::new();
     let spectra = bake.radiosity_spectra(&baked);

@@ -154,6 +154,35 @@ fn the_baked_mesh_fits_along_a_cut() {
     assert!(edges.values().all(|&n| n == 0), "cracks");
 }
 
+/// The spaces of a room, its cuts and its light do not depend on the number of threads.
+#[test]
+fn cuts_are_the_same_at_any_number_of_threads() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let mut room = Room::new();
+            let (wall, lamp) = (room.paint(0.5), room.lamp(0.5, 1000.0));
+            room.two_sided(wall);
+            room.hollow(
+                DVec3::ZERO,
+                dvec3(4.0, 3.0, 5.0),
+                [lamp, wall, wall, wall, wall, wall],
+            );
+            let slant = dvec3(0.7, 0.0, 5.0);
+            room.quad(dvec3(1.3, 0.0, 0.0), 3.0 * DVec3::Y, slant, wall);
+            room.quad(dvec3(2.3, 0.0, 0.0), 3.0 * DVec3::Y, slant, wall);
+            room.block(dvec3(3.0, -0.2, 1.0), dvec3(3.5, 1.0, 2.0), wall);
+            let mut bake = Bake::new(room.scene(), Settings::default());
+            bake.run();
+            let baked = bake.baked(&|_, _| {});
+            let text = format!("{:?} {:?}", bake.mesh().triangles, baked.irradiance);
+            (text, bake.tree().nodes.len())
+        })
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(8));
+}
+
 /// Blocks on a floor stand in one space with it: nothing is cut for them.
 #[test]
 fn what_stands_in_one_space_stays_whole() {

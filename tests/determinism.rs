@@ -127,3 +127,86 @@ fn another_seed_gives_another_pattern() {
     assert_ne!(a, b);
     assert!((a[1] / b[1] - 1.0).abs() < 0.02, "{a:?} {b:?}");
 }
+
+/// What the program writes for a room: the baked room, its arrays, its pictures, and its log without what a clock wrote.
+fn by_the_program(room: &str, options: &[&str]) -> Vec<Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    let source = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenes")
+        .join(room);
+    let mut arguments = vec!["bake", source.to_str().unwrap()];
+    arguments.extend([
+        "-o",
+        "out.glb",
+        "--error",
+        "2",
+        "--npz",
+        "out.npz",
+        "--log",
+        "log.jsonl",
+        "--snapshots",
+        "pictures",
+        "--audit",
+        "5",
+    ]);
+    arguments.extend(options);
+    let out = std::process::Command::new(env!("CARGO_BIN_EXE_haarlight"))
+        .args(&arguments)
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{arguments:?}: {said}");
+    assert_eq!(options.contains(&"-q"), said.is_empty(), "{said}");
+    let mut files: Vec<_> = ["out.glb", "out.npz"]
+        .iter()
+        .map(|name| folder.path().join(name))
+        .collect();
+    let pictures = std::fs::read_dir(folder.path().join("pictures")).unwrap();
+    files.extend(pictures.map(|e| e.unwrap().path()));
+    files.sort();
+    assert!(files.len() > 4, "{files:?}");
+    let mut all: Vec<Vec<u8>> = files.iter().map(|f| std::fs::read(f).unwrap()).collect();
+    let log = std::fs::read_to_string(folder.path().join("log.jsonl")).unwrap();
+    all.extend(log.lines().map(|line| {
+        let mut record: Value = serde_json::from_str(line).unwrap();
+        untimed(&mut record);
+        record.to_string().into_bytes()
+    }));
+    all
+}
+
+/// Removes what depends on the clock, and the number of threads.
+fn untimed(value: &mut Value) {
+    match value {
+        Value::Object(fields) => {
+            fields.retain(|name, _| {
+                !name.ends_with("_s")
+                    && !name.ends_with("_per_s")
+                    && name != "seconds"
+                    && name != "threads"
+            });
+            fields.values_mut().for_each(untimed);
+        }
+        Value::Array(list) => list.iter_mut().for_each(untimed),
+        _ => {}
+    }
+}
+
+/// Through the program: 1, 2 and 8 threads, a second run, with and without progress on the terminal.
+#[test]
+fn the_program_writes_the_same_bytes() {
+    let one = by_the_program("cornell.glb", &["--threads", "1"]);
+    for options in [
+        &["--threads", "2"][..],
+        &["--threads", "8"],
+        &["--threads", "1"],
+        &["--threads", "8", "-q"],
+    ] {
+        let other = by_the_program("cornell.glb", options);
+        assert_eq!(one.len(), other.len(), "{options:?}");
+        for (k, (a, b)) in one.iter().zip(&other).enumerate() {
+            assert!(a == b, "{options:?}: file or line {k} differs");
+        }
+    }
+}

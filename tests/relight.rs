@@ -27,7 +27,7 @@ fn settings(error: f64, rounds: usize) -> Settings {
     }
 }
 
-/// A cache of a bake on the solver's own elements, and the bake.
+/// A cache of a bake, and the bake.
 struct Cached {
     _folder: tempfile::TempDir,
     path: PathBuf,
@@ -42,7 +42,7 @@ impl Cached {
         let mut bake = Bake::new(scene, settings);
         bake.keep();
         bake.run();
-        let baked = bake.sketch(&|_, _| {});
+        let baked = bake.baked(&|_, _| {});
         let size = bake.write_cache(&baked, &path, u64::MAX).unwrap();
         assert_eq!(size, std::fs::metadata(&path).unwrap().len());
         Self {
@@ -318,7 +318,7 @@ fn another_shape_is_refused_with_what_changed() {
     // A bake that was not told to keep anything has no cache.
     let mut bake = Bake::new(room("convex.glb"), settings(9.0, 1));
     bake.step();
-    let baked = bake.sketch(&|_, _| {});
+    let baked = bake.baked(&|_, _| {});
     assert!(bake.write_cache(&baked, &at, u64::MAX).is_err());
 }
 
@@ -339,7 +339,7 @@ fn a_resumed_bake_writes_the_same_cache() {
     resumed.resume(&at("state")).unwrap();
     resumed.run();
     for (bake, name) in [(&whole, "a"), (&resumed, "b")] {
-        let baked = bake.sketch(&|_, _| {});
+        let baked = bake.baked(&|_, _| {});
         bake.write_cache(&baked, &at(name), u64::MAX).unwrap();
     }
     let light = |name: &str| {

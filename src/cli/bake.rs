@@ -142,7 +142,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         }
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
-            let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
+            let light = bake.sketch();
             talk.phase("drawing");
             let files = snapshots.round(round.round, bake.scene(), &light.surfaces)?;
             let exposure = snapshots.exposure(bake.scene(), &light.surfaces);

@@ -58,29 +58,11 @@ struct Seen {
 impl Bake {
     /// Gathers at the vertices of the refined mesh. `progress` is told (done, of) in vertices of the present pass.
     pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
-        self.gathered(PASSES, progress)
-    }
-
-    /// The same on the solver's own elements, without looking for what lies between: for a picture on the way.
-    pub fn sketch(&self, progress: &dyn Fn(usize, usize)) -> Baked {
-        self.gathered(0, progress)
-    }
-
-    fn gathered(&self, passes: usize, progress: &dyn Fn(usize, usize)) -> Baked {
-        let scene = self.scene();
-        let flat: Vec<bool> = scene.surfaces.iter().map(|s| s.normals.is_none()).collect();
-        let sides: Vec<bool> = scene
-            .surfaces
-            .iter()
-            .map(|s| scene.materials[s.material].sides == crate::scene::Sides::Both)
-            .collect();
-        let corners = |surface: usize, triangle: usize| scene.surfaces[surface].triangles[triangle];
-        let mut refined = Refined::new(self.mesh(), self.tree(), &corners, &flat, &sides, DEEPEST);
-        refined.level();
+        let mut refined = self.elements();
         let mut known: Vec<Vec<Known>> = Vec::new();
         let mut out = Baked::default();
         out.rays += self.complete(&refined, &mut known, progress);
-        for _ in 0..passes {
+        for _ in 0..PASSES {
             if refined
                 .sheets
                 .iter()
@@ -138,6 +120,86 @@ impl Bake {
             .collect();
         out.rays += self.complete(&refined, &mut known, progress);
         self.write_down(&refined, triangles, known, out)
+    }
+
+    /// The solution as it stands, for a picture on the way: every vertex gets the mean of the elements around it. No light
+    /// is gathered for it.
+    pub fn sketch(&self) -> Baked {
+        let mut refined = self.elements();
+        let tree = self.tree();
+        let light = self.light();
+        let mut row_of = vec![u32::MAX; tree.nodes.len()];
+        for (row, &leaf) in light.leaves.iter().enumerate() {
+            row_of[leaf as usize] = row as u32;
+        }
+        let triangles: Vec<Vec<[u32; 3]>> = (0..refined.sheets.len() as u32)
+            .map(|s| refined.triangles(s))
+            .collect();
+        let mut sums: Vec<Vec<([f32; 64], f32)>> = refined
+            .sheets
+            .iter()
+            .map(|s| vec![([0.0; 64], 0.0); s.vertices.len()])
+            .collect();
+        for id in refined.leaves() {
+            let entry = refined.entry(id);
+            let Some(leaf) = (entry != crate::hierarchy::NONE).then(|| {
+                let corners = refined.corners(id);
+                let mean: [f64; 3] = std::array::from_fn(|k| {
+                    corners.iter().map(|c| c.weights()[k]).sum::<f64>() / 3.0
+                });
+                let back = refined.sheets[id.0 as usize].back;
+                tree.leaf_at(
+                    entry,
+                    if back {
+                        [mean[0], mean[2], mean[1]]
+                    } else {
+                        mean
+                    },
+                )
+            }) else {
+                continue;
+            };
+            let row = row_of[leaf as usize];
+            let weight = self.bare_area(leaf) as f32;
+            if row == u32::MAX {
+                continue;
+            }
+            for corner in refined.corners(id) {
+                let (sum, total) = &mut sums[id.0 as usize][corner.vertex as usize];
+                for (s, x) in sum.iter_mut().zip(light.irradiance.row(row as usize)) {
+                    *s += weight * x;
+                }
+                *total += weight;
+            }
+        }
+        let known = sums
+            .into_iter()
+            .map(|sheet| {
+                let mean = |(sum, total): ([f32; 64], f32)| {
+                    Some((total > 0.0).then(|| Seen {
+                        row: Box::new(sum.map(|x| x / total)),
+                        trace: None,
+                    }))
+                };
+                sheet.into_iter().map(mean).collect()
+            })
+            .collect();
+        self.write_down(&refined, triangles, known, Baked::default())
+    }
+
+    /// The mesh of the solver's elements, crack-free.
+    fn elements(&self) -> Refined {
+        let scene = self.scene();
+        let flat: Vec<bool> = scene.surfaces.iter().map(|s| s.normals.is_none()).collect();
+        let sides: Vec<bool> = scene
+            .surfaces
+            .iter()
+            .map(|s| scene.materials[s.material].sides == crate::scene::Sides::Both)
+            .collect();
+        let corners = |surface: usize, triangle: usize| scene.surfaces[surface].triangles[triangle];
+        let mut refined = Refined::new(self.mesh(), self.tree(), &corners, &flat, &sides, DEEPEST);
+        refined.level();
+        refined
     }
 
     /// Gathers at all vertices that are not known yet; returns the rays cast.

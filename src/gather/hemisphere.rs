@@ -13,7 +13,7 @@ pub(crate) const BEAM: usize = 16;
 /// Directions at the least, and at the most.
 const COUNT: [usize; 2] = [64, 4096];
 /// Directions at an asked-for colour difference of [`AT`]; their error falls with the power 3/4 of their number.
-const USUAL: f64 = 256.0;
+const USUAL: f64 = 512.0;
 const AT: f64 = 0.5;
 
 /// A set of directions about +z, beam by beam.

@@ -5,6 +5,7 @@ pub mod hemisphere;
 pub mod point;
 mod refined;
 mod relit;
+mod slope;
 mod spectra;
 pub(crate) mod trace;
 

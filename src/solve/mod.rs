@@ -91,15 +91,39 @@ const FIRST_THRESHOLD: f64 = 0.02;
 const THRESHOLD_STEP: f64 = 3.0;
 /// Darker than this share of white counts as this dark: nobody sees lightness below it.
 const DARKEST: f64 = 0.02;
-/// Links keep this much less error than the threshold: there are many to a leaf.
-const LINK_SHARE: [f64; 2] = [8.0, 4.0];
-/// Where leaves look for themselves, links only lead to lamps and say where the hierarchy is too coarse.
-const ROUGH: f64 = 1.0;
-/// Direct light may vary over a leaf by this multiple of the threshold. From 1 to 16 the Cornell box's error at points
-/// changes by less than a tenth: what a leaf reflects is seen as a whole.
-const LEAF_SHARE: [f64; 2] = [1.0, 4.0];
-/// The second figures hold for rooms of this many faces and more: leaves are faces there, and small anyway.
-const FURNISHED: usize = 4096;
+/// How finely a room of one kind is divided, as multiples of the round's threshold.
+struct Shares {
+    /// What a link may misplace.
+    link: f64,
+    /// By how much direct light may vary over a leaf.
+    direct: f64,
+    /// By how much reflected light may vary over a leaf that looks for itself.
+    reflected: f64,
+}
+
+/// Rooms of few faces: there are many links to a leaf. Up to 16, the share for direct light changes the Cornell box's
+/// error at points by less than a tenth: what a leaf reflects is seen as a whole.
+const EMPTY: Shares = Shares {
+    link: 0.125,
+    direct: 1.0,
+    reflected: 0.0,
+};
+/// Rooms of at least [`MANY_LEAVES`] faces, nothing hidden: leaves are faces, and small anyway.
+const TESSELLATED: Shares = Shares {
+    link: 0.25,
+    direct: 4.0,
+    reflected: 0.0,
+};
+const MANY_LEAVES: usize = 4096;
+/// Where leaves look for themselves links only lead to lamps and say where the hierarchy is too coarse, and points see
+/// reflected light through rays that end on many leaves.
+const FURNISHED: Shares = Shares {
+    link: 0.4,
+    direct: 5.0,
+    reflected: 1.4,
+};
+/// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
+const LEAST_ROUNDS: usize = 3;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already.
 const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
@@ -288,18 +312,19 @@ impl Bake {
 
         let bright = self.brightness_of_nodes();
         let by_rays = self.with_sight(|_, sight| by_rays(sight));
-        let furnished = usize::from(self.tree.faces.len() >= FURNISHED);
+        let shares = if by_rays {
+            FURNISHED
+        } else if self.tree.faces.len() >= MANY_LEAVES {
+            TESSELLATED
+        } else {
+            EMPTY
+        };
         let keen = self.keenness();
         let demand = Demand {
             bright: &bright,
             keen: &keen,
             total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
-            threshold: threshold
-                * if by_rays {
-                    ROUGH
-                } else {
-                    1.0 / LINK_SHARE[furnished]
-                },
+            threshold: threshold * shares.link,
             least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
             hidden: !by_rays,
         };
@@ -319,12 +344,12 @@ impl Bake {
         clock.lap("spectrum");
 
         let mut escape_rays = self.split_where_light_varies(&Demand {
-            threshold: threshold * LEAF_SHARE[furnished],
+            threshold: threshold * shares.reflected,
             ..demand
         });
         let direct_rays = self.direct.rays;
         let demand = Demand {
-            threshold: threshold * LEAF_SHARE[furnished],
+            threshold: threshold * shares.direct,
             ..demand
         };
         self.gather_direct(&demand);
@@ -359,7 +384,7 @@ impl Bake {
             .iter()
             .map(|g| self.lanes.tristimulus(&g.irradiance))
             .collect();
-        let distance = self.probes.compare(seen, self.light.white);
+        let distance = self.probes.compare(seen, self.light.white, by_rays);
         clock.lap("estimate");
         let record = Round::new(
             self,
@@ -383,12 +408,12 @@ impl Bake {
     /// Has the bake come to an end, and how? None: another round may help.
     pub fn verdict(&self) -> Option<Verdict> {
         let last = self.rounds.last()?;
-        if last
+        let met = last
             .error
             .total_de2000
             .value
-            .is_some_and(|e| e <= self.settings.error)
-        {
+            .is_some_and(|e| e <= self.settings.error);
+        if met && self.rounds.len() >= LEAST_ROUNDS {
             return Some(Verdict::Reached);
         }
         if self.tree.nodes.is_empty() || self.scene.spectra.is_empty() {
@@ -827,6 +852,11 @@ impl Bake {
                 .map_init(Memory::default, |memory, r| gatherer.at(r, memory).pack())
                 .collect()
         })
+    }
+
+    /// Area of a leaf that nothing solid covers, m2.
+    pub(crate) fn bare_area(&self, leaf: u32) -> f64 {
+        self.areas[leaf as usize]
     }
 
     /// Which receivers does something solid cover?
