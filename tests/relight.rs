@@ -234,7 +234,7 @@ fn lamps_go_out_in_a_furnished_room() {
 fn light_adds_up() {
     let dense = Settings {
         representation: Representation::Dense,
-        ..settings(3.0, 2)
+        ..settings(1.0, 2)
     };
     let cached = Cached::new(room("furnished.glb"), dense);
     let mut relighter = Relighter::open(&cached.path, room("furnished.glb")).unwrap();
@@ -259,8 +259,8 @@ fn light_adds_up() {
     let window = under(&|name| f64::from(u8::from(name == "sky")));
     let others = under(&|name| f64::from(u8::from(name != "sky")));
     let mean = all.iter().map(|xyz| xyz[1]).sum::<f64>() / all.len() as f64;
-    // Each solve ends at its own relative error.
-    let near = |a: f64, b: f64| (a - b).abs() < 5e-3 * a.max(0.1 * mean);
+    // Each of the two solves behind a sum ends at a relative error of .004 times the error asked for.
+    let near = |a: f64, b: f64| (a - b).abs() < 2.0 * 4e-3 * a.max(0.1 * mean);
     for k in 0..all.len() {
         for c in 0..3 {
             assert!(

@@ -3,8 +3,8 @@
 //! A cache holds a finished bake (see `checkpoint`) and where every leaf and every vertex of the output gets its light
 //! from (see `gather::trace`). Light is linear in lamps and, given the solution, in paints: direct light of the leaves is
 //! one sparse product, the solve starts from the old solution, and the light of the vertices is another product. No ray
-//! is cast: there is not even a ray index. What was refined for the old light stays as fine as it was: shadows of a lamp that was dark beside the others
-//! are as coarse as they were worth then.
+//! is cast: there is not even a ray index. What was refined for the old light stays as fine as it was: shadows of a lamp
+//! that was dark beside the others are as coarse as they were worth then.
 //!
 //! A cache belongs to a shape: surfaces, sides, holes, places of lights. Where that changed it is refused with what
 //! changed; so is a room in which a surface gives out light that did not (lamps may go out).
