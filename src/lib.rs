@@ -16,7 +16,7 @@
 //! ```
 //!
 //! The chain: [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`solve`] -> [`gather`] ->
-//! [`output`] and [`report`], with [`audit`] beside it. A module uses what stands to its left.
+//! [`output`] and [`report`], with [`audit`] beside it and [`cost`] behind. A module uses what stands to its left.
 //!
 //! | Rougeron and Peroche 1997 | module |
 //! |---|---|
@@ -29,6 +29,7 @@
 pub mod audit;
 pub mod cli;
 pub mod color;
+pub mod cost;
 pub mod data;
 pub mod error;
 pub mod gather;

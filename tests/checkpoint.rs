@@ -44,7 +44,7 @@ fn state(bake: &Bake) -> (Vec<String>, Vec<u8>) {
 /// Both output files.
 fn files(bake: &Bake) -> [Vec<u8>; 2] {
     let scene = bake.scene();
-    let baked = bake.sketch();
+    let baked = bake.sketch(&|_, _| {});
     let look = Exposure::auto(scene, &baked.surfaces);
     let mut arrays = Vec::new();
     let spectra = bake.radiosity_spectra(&baked);
@@ -96,6 +96,27 @@ fn a_resumed_bake_ends_with_the_same_bytes() {
                 assert!(a[..a.len() - 16] == b[..b.len() - 16], "{name}: again");
             }
         }
+    }
+}
+
+/// However spectra are carried.
+#[test]
+fn every_representation_is_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c");
+    for how in ["dense", "rgb", "characteristic:5", "uniform:6", "paper"] {
+        let settings = Settings {
+            representation: how.parse().unwrap(),
+            ..settings(1.0, 2)
+        };
+        let mut whole = Bake::new(room("cornell.glb"), settings.clone());
+        whole.step();
+        whole.save(&path).unwrap();
+        whole.step();
+        let mut resumed = Bake::new(room("cornell.glb"), settings);
+        resumed.resume(&path).unwrap();
+        resumed.step();
+        assert!(state(&whole) == state(&resumed), "{how}");
     }
 }
 

@@ -73,6 +73,10 @@ pub struct BakeArgs {
     /// The cache may take this much, MB.
     #[arg(long, value_name = "MB", default_value_t = 2048)]
     pub cache_limit: u64,
+    /// How spectra are carried: perceptual, guaranteed (bounds instead of estimates), paper, uniform:N,
+    /// characteristic:N, dense (all 64 leaves) or rgb.
+    #[arg(long, value_name = "HOW", default_value_t, hide_short_help = true)]
+    pub spectrum: Representation,
     /// Print the verdict as one JSON object.
     #[arg(long)]
     pub json: bool,
@@ -113,13 +117,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
 
     let clock = Instant::now();
     talk.phase("preparing");
-    let mut bake = prepare(
-        scene,
-        &args.solving,
-        common,
-        Representation::Adaptive,
-        &talk,
-    );
+    let mut bake = prepare(scene, &args.solving, common, args.spectrum, &talk);
     if args.cache.is_some() {
         bake.keep();
     }
@@ -142,7 +140,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         }
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
-            let light = bake.sketch();
+            let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
             talk.phase("drawing");
             let files = snapshots.round(round.round, bake.scene(), &light.surfaces)?;
             let exposure = snapshots.exposure(bake.scene(), &light.surfaces);

@@ -1,7 +1,7 @@
 //! The command line as a whole.
 
 use super::options::Common;
-use super::{bake, inspect, paper, probe, relight};
+use super::{bake, cost, inspect, paper, probe, relight};
 use crate::error::{Error, Result};
 
 const EXAMPLES: &str = "\
@@ -37,6 +37,8 @@ pub enum Command {
     Inspect(inspect::InspectArgs),
     /// Irradiance at given points and normals: lux sensors.
     Probe(probe::ProbeArgs),
+    /// What accuracy costs on a room: measured error against time.
+    Cost(cost::CostArgs),
     /// The paper's tables, measured beside printed.
     Paper(paper::PaperArgs),
 }
@@ -57,6 +59,7 @@ pub fn run(cli: &Cli) -> Result<u8> {
         Command::Relight(args) => relight::run(args, &cli.common),
         Command::Inspect(args) => inspect::run(args, &mut std::io::stdout()).map(|()| 0),
         Command::Probe(args) => probe::run(args, &cli.common),
+        Command::Cost(args) => cost::run(args, &cli.common),
         Command::Paper(args) => paper::run(args).map(|()| 0),
     }
 }

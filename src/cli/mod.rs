@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `command` | the command line as a whole, exit codes |
 //! | `options` | options that commands share |
-//! | `bake`, `relight`, `inspect`, `probe`, `paper` | the commands |
+//! | `bake`, `relight`, `inspect`, `probe`, `cost`, `paper` | the commands |
 //! | `log` | the log of a bake, field by field |
 //! | `snapshots` | pictures of the rounds |
 //! | `points` | the CSV of points for `probe` |
@@ -15,6 +15,7 @@
 
 pub mod bake;
 mod command;
+pub mod cost;
 mod fault;
 pub mod inspect;
 pub mod log;

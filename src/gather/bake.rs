@@ -6,7 +6,7 @@ use super::relit::KeptVertex;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler, de2000};
 use crate::scene::Material;
-use crate::solve::Bake;
+use crate::solve::{Bake, Care};
 use crate::spectrum::Leaves;
 use glam::DVec3;
 
@@ -61,7 +61,7 @@ impl Bake {
         let mut refined = self.elements();
         let mut known: Vec<Vec<Known>> = Vec::new();
         let mut out = Baked::default();
-        out.rays += self.complete(&refined, &mut known, progress);
+        out.rays += self.complete(&refined, &mut known, Care::Full, progress);
         for _ in 0..PASSES {
             if refined
                 .sheets
@@ -97,7 +97,7 @@ impl Bake {
                     [0, 1, 2].map(|k| refined.look(id, c[k], c[(k + 1) % 3]))
                 })
                 .collect();
-            out.rays += self.complete(&refined, &mut known, progress);
+            out.rays += self.complete(&refined, &mut known, Care::Full, progress);
             let mut any = false;
             for (&id, looks) in suspects.iter().zip(&looks) {
                 if self.bent(
@@ -110,7 +110,7 @@ impl Bake {
                 }
             }
             refined.level();
-            out.rays += self.complete(&refined, &mut known, progress);
+            out.rays += self.complete(&refined, &mut known, Care::Full, progress);
             if !any {
                 break;
             }
@@ -118,73 +118,23 @@ impl Bake {
         let triangles: Vec<Vec<[u32; 3]>> = (0..refined.sheets.len() as u32)
             .map(|s| refined.triangles(s))
             .collect();
-        out.rays += self.complete(&refined, &mut known, progress);
+        out.rays += self.complete(&refined, &mut known, Care::Full, progress);
         self.write_down(&refined, triangles, known, out)
     }
 
-    /// The solution as it stands, for a picture on the way: every vertex gets the mean of the elements around it. No light
-    /// is gathered for it.
-    pub fn sketch(&self) -> Baked {
+    /// The same on the solver's own elements, without looking for what lies between and with few rays: for a picture on
+    /// the way.
+    pub fn sketch(&self, progress: &dyn Fn(usize, usize)) -> Baked {
         let mut refined = self.elements();
-        let tree = self.tree();
-        let light = self.light();
-        let mut row_of = vec![u32::MAX; tree.nodes.len()];
-        for (row, &leaf) in light.leaves.iter().enumerate() {
-            row_of[leaf as usize] = row as u32;
-        }
-        let triangles: Vec<Vec<[u32; 3]>> = (0..refined.sheets.len() as u32)
+        let triangles = (0..refined.sheets.len() as u32)
             .map(|s| refined.triangles(s))
             .collect();
-        let mut sums: Vec<Vec<([f32; 64], f32)>> = refined
-            .sheets
-            .iter()
-            .map(|s| vec![([0.0; 64], 0.0); s.vertices.len()])
-            .collect();
-        for id in refined.leaves() {
-            let entry = refined.entry(id);
-            let Some(leaf) = (entry != crate::hierarchy::NONE).then(|| {
-                let corners = refined.corners(id);
-                let mean: [f64; 3] = std::array::from_fn(|k| {
-                    corners.iter().map(|c| c.weights()[k]).sum::<f64>() / 3.0
-                });
-                let back = refined.sheets[id.0 as usize].back;
-                tree.leaf_at(
-                    entry,
-                    if back {
-                        [mean[0], mean[2], mean[1]]
-                    } else {
-                        mean
-                    },
-                )
-            }) else {
-                continue;
-            };
-            let row = row_of[leaf as usize];
-            let weight = self.bare_area(leaf) as f32;
-            if row == u32::MAX {
-                continue;
-            }
-            for corner in refined.corners(id) {
-                let (sum, total) = &mut sums[id.0 as usize][corner.vertex as usize];
-                for (s, x) in sum.iter_mut().zip(light.irradiance.row(row as usize)) {
-                    *s += weight * x;
-                }
-                *total += weight;
-            }
-        }
-        let known = sums
-            .into_iter()
-            .map(|sheet| {
-                let mean = |(sum, total): ([f32; 64], f32)| {
-                    Some((total > 0.0).then(|| Seen {
-                        row: Box::new(sum.map(|x| x / total)),
-                        trace: None,
-                    }))
-                };
-                sheet.into_iter().map(mean).collect()
-            })
-            .collect();
-        self.write_down(&refined, triangles, known, Baked::default())
+        let mut known = Vec::new();
+        let out = Baked {
+            rays: self.complete(&refined, &mut known, Care::Sketch, progress),
+            ..Baked::default()
+        };
+        self.write_down(&refined, triangles, known, out)
     }
 
     /// The mesh of the solver's elements, crack-free.
@@ -207,6 +157,7 @@ impl Bake {
         &self,
         refined: &Refined,
         known: &mut Vec<Vec<Known>>,
+        care: Care,
         progress: &dyn Fn(usize, usize),
     ) -> u64 {
         known.resize(refined.sheets.len(), Vec::new());
@@ -232,8 +183,11 @@ impl Bake {
                 })
                 .collect();
             let covered = self.covered(&receivers);
-            for ((gathered, &(s, v)), covered) in
-                self.gather(&receivers).into_iter().zip(chunk).zip(covered)
+            for ((gathered, &(s, v)), covered) in self
+                .gather_with(&receivers, care)
+                .into_iter()
+                .zip(chunk)
+                .zip(covered)
             {
                 rays += gathered.rays;
                 let dark = gathered.seen < 1e-3 && gathered.direct.iter().all(|&x| x == 0.0);

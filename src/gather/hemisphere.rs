@@ -30,6 +30,11 @@ impl Hemisphere {
         Self::new(count.clamp(COUNT[0], COUNT[1]))
     }
 
+    /// The fewest.
+    pub(crate) fn sketch() -> Self {
+        Self::new(COUNT[0])
+    }
+
     /// `count` directions, a power of two from 16.
     pub(crate) fn new(count: usize) -> Self {
         let beams = count / BEAM;

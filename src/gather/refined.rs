@@ -17,12 +17,6 @@ pub(super) struct Corner {
     weights: [f64; 3],
 }
 
-impl Corner {
-    pub(super) fn weights(&self) -> [f64; 3] {
-        self.weights
-    }
-}
-
 /// A vertex of a sheet.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vertex {
@@ -253,11 +247,6 @@ impl Refined {
 
     pub(super) fn corners(&self, (sheet, cell): (u32, u32)) -> [Corner; 3] {
         self.sheets[sheet as usize].cells[cell as usize].corners
-    }
-
-    /// Entry in the hierarchy of the input triangle that a cell is part of.
-    pub(super) fn entry(&self, (sheet, cell): (u32, u32)) -> u32 {
-        self.sheets[sheet as usize].cells[cell as usize].of.1
     }
 
     pub(super) fn depth(&self, (sheet, cell): (u32, u32)) -> u8 {

@@ -42,7 +42,7 @@ pub struct Chart {
     pub x_scale: Scale,
     /// Spread along y.
     pub y_scale: Scale,
-    /// The lines; seven colours and four marks are told apart.
+    /// The lines; eight colours and four marks are told apart.
     pub series: Vec<Series>,
 }
 

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 
 /// Colours of series, told apart by colour-blind readers too: M. Okabe and K. Ito, Color Universal Design (2008),
-/// without the yellow that is lost on white.
-pub(super) const COLORS: [&str; 7] = [
-    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000",
+/// without the yellow that is lost on white; a grey is the eighth.
+pub(super) const COLORS: [&str; 8] = [
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#a6a6a6",
 ];
 
 /// Ink of text.

@@ -37,7 +37,7 @@ use std::sync::Arc;
 /// A room, read and checked.
 ///
 /// Positions are in the file's units (metres in glTF), world space, right-handed, +Y up.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Scene {
     /// The document as read: written back by the output with the light added.
     pub source: Source,

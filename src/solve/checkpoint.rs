@@ -11,7 +11,7 @@
 
 use super::light::{Light, Neighbours};
 use super::outlook::Outlook;
-use super::{Bake, Lanes, Rows, direct, lanes, padded, punctual};
+use super::{Bake, Lanes, Representation, Rows, direct, lanes, padded, punctual};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
@@ -92,6 +92,10 @@ impl Bake {
         print.set("seed", &[self.settings.seed]);
         let representation = format!("{:?}", self.settings.representation);
         print.set_text("representation", &representation);
+        print.set(
+            "share of spectra",
+            &[self.settings.spectrum.unwrap_or(f64::NAN)],
+        );
         print.set("white", &self.settings.white.unwrap_or([f64::NAN; 3]));
         print.extend(Fingerprint::shape(&self.scene));
         print.extend(Fingerprint::paint(&self.scene));
@@ -111,15 +115,16 @@ impl Bake {
     ) -> io::Result<()> {
         out.put_all(&splits(&self.tree))?;
         encode_graph(&self.graph, out)?;
-        let lanes = self.lanes.lanes();
+        // Lanes that are no intervals follow from the room.
+        let intervals = self.lanes.lanes();
         out.put_list(
-            lanes.len(),
-            lanes.iter().map(|l| {
+            intervals.len(),
+            intervals.iter().map(|l| {
                 let light = l.light.map_or(u32::MAX, |light| light as u32);
                 [light, l.first as u32, l.count as u32]
             }),
         )?;
-        out.put(self.spectrum_error)?;
+        out.put(self.spectrum_error.unwrap_or(f64::NAN))?;
         out.put(self.light.white)?;
         self.outlook.encode(whole, out)?;
         out.put_all(factor)?;
@@ -138,7 +143,7 @@ impl Bake {
             (0..leaves.len()).flat_map(|k| irradiance.row(k).iter().copied()),
         )?;
         out.put_list(
-            leaves.len() * lanes.len(),
+            leaves.len() * self.lanes.len(),
             leaves
                 .iter()
                 .flat_map(|&k| self.direct.row(k).iter().copied()),
@@ -170,11 +175,18 @@ impl Bake {
             .into_iter()
             .map(|lane| lane_of(lane, lights))
             .collect::<Read<Vec<lanes::Lane>>>()?;
-        if lanes.is_empty() || lanes.len() > LEAVES {
+        if lanes.len() > LEAVES {
             return Err(Broken::new("has an impossible number of lanes"));
         }
-        self.lanes = Lanes::with(lanes, &self.scene.spectra, &self.weights);
-        self.spectrum_error = from.get()?;
+        self.lanes = match self.settings.representation {
+            Representation::Rgb | Representation::Characteristic(_) if lanes.is_empty() => {
+                self.chosen_lanes()
+            }
+            _ if lanes.is_empty() => return Err(Broken::new("has no lanes")),
+            _ => Lanes::with(lanes, &self.scene.spectra, &self.weights),
+        };
+        let error: f64 = from.get()?;
+        self.spectrum_error = (!error.is_nan()).then_some(error);
         let white = from.get()?;
         self.outlook = Outlook::decode(&self.tree, whole, from)?;
         let factor: Vec<f32> = from.get_all()?;

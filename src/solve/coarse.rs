@@ -16,7 +16,7 @@ use crate::spectrum::{LEAVES, Leaves, Partition};
 use glam::DVec3;
 
 /// Patches of the model at the most (fits the child count of its root).
-const PATCHES: usize = 192;
+pub(super) const PATCHES: usize = 192;
 /// One lane in this many is split at a time.
 const BATCH: usize = 3;
 /// The model is solved to this relative error: far below what is asked of wavelengths.
@@ -25,15 +25,15 @@ const TOLERANCE: f64 = 1e-4;
 /// The model.
 pub(super) struct Coarse {
     tree: Tree,
-    links: LinkRows,
-    leaves: Vec<u32>,
+    pub(super) links: LinkRows,
+    pub(super) leaves: Vec<u32>,
     factor: Vec<f32>,
-    areas: Vec<f64>,
+    pub(super) areas: Vec<f64>,
     /// Reflectance of each patch.
-    reflectance: Vec<Leaves>,
+    pub(super) reflectance: Vec<Leaves>,
     /// Exitance or first irradiance of each patch by light, as shape on the leaves.
-    emission: Vec<Vec<Leaves>>,
-    punctual: Vec<Vec<Leaves>>,
+    pub(super) emission: Vec<Vec<Leaves>>,
+    pub(super) punctual: Vec<Vec<Leaves>>,
 }
 
 /// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
@@ -56,7 +56,8 @@ pub(super) struct Choice {
 }
 
 impl Coarse {
-    /// Sums links and sources over a cut of `tree`.
+    /// Sums links and sources over a cut of `tree` into so many patches at the most.
+    #[expect(clippy::too_many_arguments, reason = "one caller")]
     pub(super) fn new(
         tree: &Tree,
         links: &[Link],
@@ -65,8 +66,9 @@ impl Coarse {
         leaves: &[u32],
         dense: &dyn Dense,
         lights: usize,
+        patches: usize,
     ) -> Self {
-        let group = cut(tree);
+        let group = cut(tree, patches);
         let count = group
             .iter()
             .filter(|&&g| g != NONE)
@@ -136,6 +138,7 @@ impl Coarse {
     /// Irradiance of the model's patches on some lanes.
     fn irradiance(&self, lanes: &Lanes) -> Rows {
         match padded(lanes.len()) {
+            4 => self.solve::<4>(lanes),
             8 => self.solve::<8>(lanes),
             16 => self.solve::<16>(lanes),
             32 => self.solve::<32>(lanes),
@@ -163,13 +166,13 @@ impl Coarse {
                 *g = g.max(*r);
             }
         }
-        let operator = Operator {
-            tree: &self.tree,
-            links: &self.links,
-            leaves: &self.leaves,
-            areas: &self.areas,
-            factor: &self.factor,
-        };
+        let operator = Operator::new(
+            &self.tree,
+            &self.links,
+            &self.leaves,
+            &self.areas,
+            &self.factor,
+        );
         let (mut nodes, mut gathered) = (Rows::zero(count + 1, L), Rows::zero(count + 1, L));
         let mut first = Rows::zero(count, L);
         operator.irradiance::<L>(&e, &mut nodes, &mut gathered, &mut first);
@@ -198,13 +201,14 @@ impl Coarse {
     }
 
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
-    /// padding would waste.
+    /// padding would waste. `known` cuts are kept if they are good enough.
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
         weights: &[Leaves; 3],
         white: [f64; 3],
         tolerance: f64,
+        known: Option<Vec<Partition>>,
     ) -> Choice {
         let count = self.leaves.len();
         let references: Vec<(Lanes, Rows)> = (0..spectra.len())
@@ -223,6 +227,13 @@ impl Coarse {
             .collect();
         let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
         let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
+        if let Some(cuts) = known {
+            let lanes = Lanes::ratio(spectra, &cuts, weights);
+            let (error, _) = self.loss(&lanes, &references, &jacobians, total);
+            if error <= tolerance {
+                return Choice { cuts, error };
+            }
+        }
         let mut cuts = vec![Partition::ROOT; spectra.len()];
         loop {
             let lanes = Lanes::ratio(spectra, &cuts, weights);
@@ -288,6 +299,14 @@ impl Coarse {
     }
 }
 
+/// Splits a share of the intervals (light, first leaf) that stand first, several at once: each step costs a solve.
+pub(super) fn split_worst(cuts: &mut [Partition], worst: Vec<(usize, usize)>, count: usize) {
+    let most = count.div_ceil(BATCH).max(1);
+    for (light, first) in worst.into_iter().take(most) {
+        cuts[light] = cuts[light].split(first).unwrap_or(cuts[light]);
+    }
+}
+
 fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
@@ -307,7 +326,7 @@ fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
 }
 
 /// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node of the largest area is opened.
-fn cut(tree: &Tree) -> Vec<u32> {
+fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut chosen = vec![0_u32];
     let mut open = std::collections::BinaryHeap::new();
     let key = |id: u32| (ordered(tree.node(id).area), std::cmp::Reverse(id));
@@ -316,7 +335,7 @@ fn cut(tree: &Tree) -> Vec<u32> {
     let mut is_cut = vec![false; tree.nodes.len()];
     while let Some((_, id)) = open.pop() {
         let node = tree.node(id);
-        if node.is_leaf() || count + node.child_range().len() - 1 > PATCHES {
+        if node.is_leaf() || count + node.child_range().len() - 1 > patches {
             is_cut[id as usize] = true;
             continue;
         }

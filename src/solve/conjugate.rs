@@ -200,7 +200,7 @@ struct Work {
 }
 
 /// `x += alpha p`, lane by lane.
-fn step<const L: usize>(x: &mut Rows, p: &Rows, alpha: [f32; L]) {
+pub(super) fn step<const L: usize>(x: &mut Rows, p: &Rows, alpha: [f32; L]) {
     for (x, p) in x.all_mut::<L>().iter_mut().zip(p.all::<L>()) {
         for l in 0..L {
             x[l] += alpha[l] * p[l];
@@ -209,7 +209,7 @@ fn step<const L: usize>(x: &mut Rows, p: &Rows, alpha: [f32; L]) {
 }
 
 /// Inner products lane by lane, f64, summed in fixed chunks.
-fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
+pub(super) fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
     let parts: Vec<[f64; L]> = x
         .all::<L>()
         .par_chunks(CHUNK)
@@ -217,9 +217,7 @@ fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
         .map(|(x, y)| {
             let mut sum = [0.0; L];
             for (x, y) in x.iter().zip(y) {
-                for l in 0..L {
-                    sum[l] += f64::from(x[l]) * f64::from(y[l]);
-                }
+                add_products(&mut sum, x, y);
             }
             sum
         })
@@ -227,4 +225,12 @@ fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
     parts.iter().fold([0.0; L], |acc, part| {
         std::array::from_fn(|l| acc[l] + part[l])
     })
+}
+
+/// `sum += x y`. Slices of a length that the compiler does not know: of arrays it makes single numbers.
+#[inline(never)]
+fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
+    for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
+        *s += f64::from(*x) * f64::from(*y);
+    }
 }

@@ -117,6 +117,13 @@ impl Direct {
         }
     }
 
+    /// Rows on other lanes: each new lane takes what the lane at its place held.
+    pub(super) fn relabel(&mut self, places: &[usize]) {
+        for row in self.rows.iter_mut().flatten() {
+            *row = places.iter().map(|&k| row[k]).collect();
+        }
+    }
+
     /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
     /// `weights` turn a row into brightness, share of white; `gather` gives none for a point that something covers.
     pub(super) fn refine(

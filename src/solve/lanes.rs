@@ -5,12 +5,16 @@
 //! grey room needs one lane a light, whatever its lines, and a first reflection keeps its tristimulus values.
 //! Where all lights together would need more than 64 lanes, the rows hold the 64 leaves themselves.
 //!
+//! Other ways to hold spectra are here to be compared with: radiosity itself on intervals (the paper's way), linear
+//! sRGB, and coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
+//!
 //! Units: ratio lanes are numbers that multiply S (W/m2/nm of radiosity per unit of `LightSpectrum::power`);
-//! leaf lanes are W/m2/nm.
+//! absolute lanes are W/m2/nm; lanes of linear sRGB are W/m2 weighted by the observer, (1, 1, 1) has Y = 1 / KM lm/m2.
 
-use crate::color::KM;
-use crate::scene::LightSpectrum;
+use crate::color::{KM, LinearSrgb, Upsampler};
+use crate::scene::{GREATEST_ALBEDO, LightSpectrum};
 use crate::spectrum::{LEAVES, Leaves, Partition};
+use nalgebra::Matrix3;
 
 /// One lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,10 +27,24 @@ pub struct Lane {
     pub count: usize,
 }
 
+/// What lanes hold.
+#[derive(Debug, Clone, PartialEq)]
+enum Base {
+    /// Values on intervals.
+    Intervals(Vec<Lane>),
+    /// Linear sRGB: what each leaf of a reflectance adds to it under D65, and each leaf of a radiosity.
+    Rgb {
+        paint: [Leaves; 3],
+        light: [Leaves; 3],
+    },
+    /// Coordinates in an orthonormal basis.
+    Vectors(Vec<Leaves>),
+}
+
 /// The lanes of all rows.
 #[derive(Debug, Clone)]
 pub struct Lanes {
-    lanes: Vec<Lane>,
+    base: Base,
     /// Tristimulus value of a lane at 1: `Km integral of S abar`, or of `abar` alone.
     xyz: Vec<[f64; 3]>,
     power: Vec<Leaves>,
@@ -63,12 +81,74 @@ impl Lanes {
 
     /// The 64 leaves, all lights together.
     pub fn dense(spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
-        let lanes = (0..LEAVES).map(|first| Lane {
+        Self::absolute(spectra, Partition::LEAVES, weights)
+    }
+
+    /// Radiosity itself on the intervals of a cut, all lights together.
+    pub fn absolute(spectra: &[LightSpectrum], cut: Partition, weights: &[Leaves; 3]) -> Self {
+        let lanes = cut.iter().map(|(first, count)| Lane {
             light: None,
             first,
-            count: 1,
+            count,
         });
         Self::with(lanes.collect(), spectra, weights)
+    }
+
+    /// The ratio to each light on `bands` intervals of equal width as far as leaves allow; falls back to
+    /// [`Lanes::dense`] beyond 64 lanes.
+    pub fn uniform(spectra: &[LightSpectrum], bands: usize, weights: &[Leaves; 3]) -> Self {
+        let bands = bands.clamp(1, LEAVES);
+        if bands * spectra.len() > LEAVES {
+            return Self::dense(spectra, weights);
+        }
+        let edge = |k: usize| k * LEAVES / bands;
+        let lanes = (0..spectra.len()).flat_map(|light| {
+            (0..bands).map(move |k| Lane {
+                light: Some(light),
+                first: edge(k),
+                count: edge(k + 1) - edge(k),
+            })
+        });
+        Self::with(lanes.collect(), spectra, weights)
+    }
+
+    /// Linear sRGB: reflectances by their colour under D65, lamps by theirs. Three numbers, and no way back.
+    pub fn rgb(spectra: &[LightSpectrum], upsampler: &Upsampler, weights: &[Leaves; 3]) -> Self {
+        let one = |leaf: usize| -> Leaves { std::array::from_fn(|k| f64::from(k == leaf)) };
+        let display = LinearSrgb::standard();
+        let (mut paint, mut light) = ([[0.0; LEAVES]; 3], [[0.0; LEAVES]; 3]);
+        for leaf in 0..LEAVES {
+            let colours = [
+                upsampler.rgb(&one(leaf)),
+                display.from_xyz(weights.each_ref().map(|w| w[leaf])),
+            ];
+            for c in 0..3 {
+                paint[c][leaf] = colours[0][c];
+                light[c][leaf] = colours[1][c];
+            }
+        }
+        let xyz = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            .map(|rgb| display.to_xyz(rgb).map(|x| KM * x));
+        Self {
+            base: Base::Rgb { paint, light },
+            xyz: xyz.to_vec(),
+            power: spectra.iter().map(|s| s.power).collect(),
+            weights: *weights,
+        }
+    }
+
+    /// Coordinates in an orthonormal basis. Lanes do not reflect one by one then: see [`Lanes::matrix`].
+    pub fn vectors(spectra: &[LightSpectrum], basis: Vec<Leaves>, weights: &[Leaves; 3]) -> Self {
+        let xyz = basis
+            .iter()
+            .map(|e| weights.each_ref().map(|w| KM * dot(e, w)))
+            .collect();
+        Self {
+            base: Base::Vectors(basis),
+            xyz,
+            power: spectra.iter().map(|s| s.power).collect(),
+            weights: *weights,
+        }
     }
 
     /// These lanes.
@@ -78,7 +158,7 @@ impl Lanes {
             .iter()
             .map(|lane| {
                 let leaves = lane.first..lane.first + lane.count;
-                weights.map(|w| {
+                weights.each_ref().map(|w| {
                     KM * leaves
                         .clone()
                         .map(|k| w[k] * lane.light.map_or(1.0, |l| power[l][k]))
@@ -87,7 +167,7 @@ impl Lanes {
             })
             .collect();
         Self {
-            lanes,
+            base: Base::Intervals(lanes),
             xyz,
             power,
             weights: *weights,
@@ -96,17 +176,63 @@ impl Lanes {
 
     /// Number of lanes in use.
     pub fn len(&self) -> usize {
-        self.lanes.len()
+        self.xyz.len()
     }
 
     /// No lane at all (a room without light)?
     pub fn is_empty(&self) -> bool {
-        self.lanes.is_empty()
+        self.xyz.is_empty()
     }
 
-    /// The lanes.
+    /// The intervals that lanes stand for; none where lanes are no intervals (sRGB, a basis).
     pub fn lanes(&self) -> &[Lane] {
-        &self.lanes
+        match &self.base {
+            Base::Intervals(lanes) => lanes,
+            _ => &[],
+        }
+    }
+
+    /// Does each lane hold the ratio to one light?
+    pub fn is_ratio(&self) -> bool {
+        !self.lanes().is_empty() && self.lanes().iter().all(|lane| lane.light.is_some())
+    }
+
+    /// The cut of each light, if each lane holds the ratio to one light on a dyadic interval.
+    pub fn cuts(&self) -> Option<Vec<Partition>> {
+        if !self.is_ratio() {
+            return None;
+        }
+        (0..self.power.len())
+            .map(|light| {
+                let own = self.lanes().iter().filter(|l| l.light == Some(light));
+                Partition::new(own.fold(0_u64, |bits, lane| bits | 1 << lane.first))
+            })
+            .collect()
+    }
+
+    /// For each lane, the lane of `other` that holds the ratio to the same light on its first leaf; none unless both
+    /// hold ratios.
+    pub fn places_in(&self, other: &Self) -> Option<Vec<usize>> {
+        if !(self.is_ratio() && other.is_ratio()) {
+            return None;
+        }
+        let holds = |a: &Lane, b: &Lane| {
+            a.light == b.light && (b.first..b.first + b.count).contains(&a.first)
+        };
+        self.lanes()
+            .iter()
+            .map(|a| other.lanes().iter().position(|b| holds(a, b)))
+            .collect()
+    }
+
+    /// Do lanes reflect into each other?
+    pub fn is_mixed(&self) -> bool {
+        matches!(self.base, Base::Vectors(_))
+    }
+
+    /// Do lanes mean the same as in `other`?
+    pub fn same_meaning(&self, other: &Self) -> bool {
+        self.base == other.base
     }
 
     /// Tristimulus value of each lane at 1 (lm/m2 for radiosity).
@@ -114,18 +240,41 @@ impl Lanes {
         &self.xyz
     }
 
-    /// What each lane holds of a smooth factor (a reflectance, a lamp's shape): eq. 3 under the lane's light.
+    /// What each lane holds of a smooth factor (a reflectance, a lamp's shape): eq. 3 under the lane's light. Where
+    /// lanes mix this says nothing; [`Lanes::matrix`] does.
     pub fn averages(&self, f: &Leaves, out: &mut [f32]) {
-        for (out, lane) in out.iter_mut().zip(&self.lanes) {
-            *out = self.average(f, lane) as f32;
+        match &self.base {
+            Base::Intervals(lanes) => {
+                for (out, lane) in out.iter_mut().zip(lanes) {
+                    *out = self.average(f, lane) as f32;
+                }
+            }
+            Base::Rgb { paint, .. } => {
+                for (out, w) in out.iter_mut().zip(paint) {
+                    *out = dot(f, w).clamp(0.0, GREATEST_ALBEDO) as f32;
+                }
+            }
+            Base::Vectors(_) => {}
         }
+    }
+
+    /// Reflection where lanes mix: `R_ij = sum over leaves of rho E_i E_j`, row by row (paper 2.2.2). Symmetric, its
+    /// eigenvalues lie in the range of rho.
+    pub fn matrix(&self, reflectance: &Leaves) -> Vec<f64> {
+        let Base::Vectors(basis) = &self.base else {
+            return Vec::new();
+        };
+        let through = |i: &Leaves, j: &Leaves| -> f64 {
+            (0..LEAVES).map(|k| reflectance[k] * i[k] * j[k]).sum()
+        };
+        basis
+            .iter()
+            .flat_map(|i| basis.iter().map(move |j| through(i, j)))
+            .collect()
     }
 
     fn average(&self, f: &Leaves, lane: &Lane) -> f64 {
         let leaves = lane.first..lane.first + lane.count;
-        let Some(light) = lane.light else {
-            return f[lane.first];
-        };
         let first = f[lane.first];
         // Exactly flat stays exactly flat: a grey room must not pick up rounding.
         if leaves.clone().all(|k| f[k] == first) {
@@ -135,7 +284,7 @@ impl Lanes {
         for w in &self.weights {
             let (mut whole, mut part) = (0.0, 0.0);
             for k in leaves.clone() {
-                let weight = w[k] * self.power[light][k];
+                let weight = w[k] * lane.light.map_or(1.0, |l| self.power[l][k]);
                 whole += weight;
                 part += weight * f[k];
             }
@@ -151,11 +300,35 @@ impl Lanes {
 
     /// Adds an emission of `light` with a shape (see [`crate::scene::Emission`]).
     pub fn add_emission(&self, light: usize, shape: &Leaves, scale: f64, out: &mut [f32]) {
-        for (out, lane) in out.iter_mut().zip(&self.lanes) {
-            match lane.light {
-                Some(l) if l == light => *out += (scale * self.average(shape, lane)) as f32,
-                Some(_) => {}
-                None => *out += (scale * self.power[light][lane.first] * shape[lane.first]) as f32,
+        let radiosity =
+            || -> Leaves { std::array::from_fn(|k| scale * self.power[light][k] * shape[k]) };
+        match &self.base {
+            Base::Intervals(lanes) => {
+                let absolute = lanes
+                    .iter()
+                    .any(|lane| lane.light.is_none())
+                    .then(radiosity);
+                for (out, lane) in out.iter_mut().zip(lanes) {
+                    match (lane.light, &absolute) {
+                        (Some(l), _) if l == light => {
+                            *out += (scale * self.average(shape, lane)) as f32;
+                        }
+                        (None, Some(all)) => *out += self.average(all, lane) as f32,
+                        _ => {}
+                    }
+                }
+            }
+            Base::Rgb { light: rows, .. } => {
+                let all = radiosity();
+                for (out, w) in out.iter_mut().zip(rows) {
+                    *out += dot(&all, w) as f32;
+                }
+            }
+            Base::Vectors(basis) => {
+                let all = radiosity();
+                for (out, e) in out.iter_mut().zip(basis) {
+                    *out += dot(&all, e) as f32;
+                }
             }
         }
     }
@@ -171,32 +344,163 @@ impl Lanes {
         sum
     }
 
-    /// Tristimulus values of a row after one more reflection, with the reflectance at full resolution.
+    /// Tristimulus values of a row after one more reflection, with the reflectance at full resolution as far as lanes
+    /// know of it.
     pub fn reflected(&self, reflectance: &Leaves) -> Vec<[f64; 3]> {
-        self.lanes
-            .iter()
-            .map(|lane| {
-                let leaves = lane.first..lane.first + lane.count;
-                self.weights.map(|w| {
-                    KM * leaves
-                        .clone()
-                        .map(|k| {
-                            reflectance[k] * w[k] * lane.light.map_or(1.0, |l| self.power[l][k])
-                        })
-                        .sum::<f64>()
-                })
+        let through = |spectrum: &dyn Fn(usize) -> f64| {
+            self.weights.each_ref().map(|w| {
+                KM * (0..LEAVES)
+                    .map(|k| reflectance[k] * w[k] * spectrum(k))
+                    .sum::<f64>()
             })
-            .collect()
+        };
+        match &self.base {
+            Base::Intervals(lanes) => lanes
+                .iter()
+                .map(|lane| through(&|k| self.shape(lane, k)))
+                .collect(),
+            Base::Rgb { .. } => {
+                let mut rho = [0.0; 3];
+                self.averages(reflectance, &mut rho);
+                self.xyz
+                    .iter()
+                    .zip(rho)
+                    .map(|(xyz, rho)| xyz.map(|x| x * f64::from(rho)))
+                    .collect()
+            }
+            Base::Vectors(basis) => basis.iter().map(|e| through(&|k| e[k])).collect(),
+        }
     }
 
-    /// The 64 leaf values of a row, W/m2/nm.
+    /// What an interval lane at 1 stands for on a leaf.
+    fn shape(&self, lane: &Lane, leaf: usize) -> f64 {
+        if (lane.first..lane.first + lane.count).contains(&leaf) {
+            lane.light.map_or(1.0, |l| self.power[l][leaf])
+        } else {
+            0.0
+        }
+    }
+
+    /// The 64 leaf values of a row, W/m2/nm. Of linear sRGB the shortest spectrum of that colour: one of many.
     pub fn leaves(&self, row: &[f32]) -> Leaves {
         let mut out = [0.0; LEAVES];
-        for (x, lane) in row.iter().zip(&self.lanes) {
-            for (k, out) in out.iter_mut().enumerate().skip(lane.first).take(lane.count) {
-                *out += f64::from(*x) * lane.light.map_or(1.0, |l| self.power[l][k]);
+        match &self.base {
+            Base::Intervals(lanes) => {
+                for (x, lane) in row.iter().zip(lanes) {
+                    for (k, out) in out.iter_mut().enumerate().skip(lane.first).take(lane.count) {
+                        *out += f64::from(*x) * lane.light.map_or(1.0, |l| self.power[l][k]);
+                    }
+                }
+            }
+            Base::Rgb { .. } => {
+                let w = &self.weights;
+                let products = Matrix3::from_fn(|a, b| KM * dot(&w[a], &w[b]));
+                let xyz = self.tristimulus(row);
+                if let Some(inverse) = products.try_inverse() {
+                    let c = inverse * nalgebra::Vector3::from(xyz);
+                    out = std::array::from_fn(|k| (0..3).map(|a| c[a] * w[a][k]).sum());
+                }
+            }
+            Base::Vectors(basis) => {
+                for (x, e) in row.iter().zip(basis) {
+                    for (out, e) in out.iter_mut().zip(e) {
+                        *out += f64::from(*x) * e;
+                    }
+                }
             }
         }
         out
+    }
+}
+
+fn dot(a: &Leaves, b: &Leaves) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::Observer;
+    use crate::data::{Outside, named};
+    use crate::spectrum::Grid;
+
+    fn light(name: &str) -> LightSpectrum {
+        let power = Grid::default().means(&named(name).unwrap().table, Outside::Zero);
+        LightSpectrum {
+            name: name.into(),
+            power,
+        }
+    }
+
+    /// Every way to hold spectra gives back the colour of the lamp, whatever its lines, but the paper's on a coarse cut.
+    #[test]
+    fn lamps_keep_their_colour() {
+        let weights = Observer::cie1931().weights(&Grid::default());
+        let upsampler = Upsampler::new(&Grid::default());
+        let spectra = [light("cie/F2"), light("cie/A")];
+        let unit = |l: &LightSpectrum| {
+            let length = dot(&l.power, &l.power).sqrt();
+            l.power.map(|x| x / length)
+        };
+        let first = unit(&spectra[0]);
+        let part = dot(&first, &spectra[1].power);
+        let rest: Leaves = std::array::from_fn(|k| spectra[1].power[k] - part * first[k]);
+        let length = dot(&rest, &rest).sqrt();
+        let all = [
+            Lanes::ratio(
+                &spectra,
+                &[Partition::ROOT, Partition::uniform(2)],
+                &weights,
+            ),
+            Lanes::uniform(&spectra, 7, &weights),
+            Lanes::dense(&spectra, &weights),
+            Lanes::rgb(&spectra, &upsampler, &weights),
+            Lanes::vectors(&spectra, vec![first, rest.map(|x| x / length)], &weights),
+        ];
+        for (k, spectrum) in spectra.iter().enumerate() {
+            let exact = weights.map(|w| KM * dot(&w, &spectrum.power));
+            for lanes in &all {
+                let mut row = vec![0.0; lanes.len()];
+                lanes.add_emission(k, &[1.0; LEAVES], 1.0, &mut row);
+                let close = |xyz: [f64; 3]| (0..3).all(|c| (xyz[c] / exact[c] - 1.0).abs() < 1e-5);
+                assert!(close(lanes.tristimulus(&row)), "{lanes:?}");
+                let leaves = lanes.leaves(&row);
+                assert!(close(weights.map(|w| KM * dot(&w, &leaves))), "{lanes:?}");
+            }
+        }
+    }
+
+    /// A grey wall reflects grey, a wall of linear sRGB colour c under D65 gives c.
+    #[test]
+    fn srgb_reflects_as_its_definition_says() {
+        let grid = Grid::default();
+        let weights = Observer::cie1931().weights(&grid);
+        let upsampler = Upsampler::new(&grid);
+        let lanes = Lanes::rgb(&[light("cie/D65")], &upsampler, &weights);
+        let mut row = [0.0; 3];
+        lanes.averages(&[0.5; LEAVES], &mut row);
+        assert!(row.iter().all(|x| (x - 0.5).abs() < 1e-6), "{row:?}");
+        let brick = upsampler.reflectance([0.45, 0.12, 0.08]);
+        lanes.averages(&brick, &mut row);
+        let [r, g, b] = row;
+        assert!((r - 0.45).abs() < 1e-4 && (g - 0.12).abs() < 1e-4 && (b - 0.08).abs() < 1e-4);
+    }
+
+    /// Reflection in a basis is exact for what the basis holds.
+    #[test]
+    fn a_whole_basis_reflects_exactly() {
+        let weights = Observer::cie1931().weights(&Grid::default());
+        let basis: Vec<Leaves> = (0..LEAVES)
+            .map(|i| std::array::from_fn(|k| f64::from(i == k)))
+            .collect();
+        let lanes = Lanes::vectors(&[light("cie/A")], basis, &weights);
+        let rho: Leaves = std::array::from_fn(|k| 0.01 * k as f64);
+        let matrix = lanes.matrix(&rho);
+        for i in 0..LEAVES {
+            for j in 0..LEAVES {
+                let expected = if i == j { rho[i] } else { 0.0 };
+                assert!((matrix[i * LEAVES + j] - expected).abs() < 1e-15);
+            }
+        }
     }
 }

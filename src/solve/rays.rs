@@ -110,7 +110,12 @@ impl RaySystem<'_> {
     }
 
     /// What leaves receive of reflected light.
-    fn receive<const L: usize>(&self, reflected: &Rows, nodes: &mut Rows, seen: &mut Rows) {
+    pub(super) fn receive<const L: usize>(
+        &self,
+        reflected: &Rows,
+        nodes: &mut Rows,
+        seen: &mut Rows,
+    ) {
         let all = nodes.all_mut::<L>();
         for (row, &leaf) in reflected.all::<L>().iter().zip(self.leaves) {
             all[leaf as usize] = *row;

@@ -1,6 +1,7 @@
 //! What is written down after every round: the lines of the log.
 
 use super::Bake;
+use super::Representation;
 use super::conjugate::Convergence;
 use super::estimate::Distance;
 use super::flux::Balance;
@@ -88,7 +89,8 @@ pub struct Errors {
     pub total_relative: Figure,
     /// Hierarchy, links, visibility: CIELUV.
     pub geometry_de_luv: Figure,
-    /// Working partition: CIELUV.
+    /// Working partition: CIELUV; none where nothing is known (uniform intervals, sRGB and the like). A bound under
+    /// guaranteed control.
     pub spectrum_de_luv: Figure,
     /// Unfinished solve: relative, in the norm of the solver.
     pub convergence: Figure,
@@ -200,7 +202,7 @@ impl Round {
             value,
             kind: Kind::Estimate,
         };
-        let spectrum = bake.spectrum_error;
+        let spectrum = bake.spectrum_error.unwrap_or(0.0);
         let convergence_de = m.convergence.bound * 100.0 * super::DE_PER_PERCENT;
         // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
         let all = |geometry: f64| {
@@ -266,7 +268,13 @@ impl Round {
                 total_de_luv: estimate(m.distance.map(|d| all(d.de_luv))),
                 total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
                 geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),
-                spectrum_de_luv: estimate(Some(spectrum)),
+                spectrum_de_luv: Figure {
+                    value: bake.spectrum_error,
+                    kind: match bake.settings.representation {
+                        Representation::Guaranteed => Kind::Bound,
+                        _ => Kind::Estimate,
+                    },
+                },
                 convergence: Figure {
                     value: Some(m.convergence.bound),
                     kind: Kind::Bound,

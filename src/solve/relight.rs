@@ -360,7 +360,7 @@ impl Relighter {
         let error = self.geometry.zip(distance).map(|(share, distance)| {
             let geometry = share * distance;
             let solve = convergence.bound * 100.0 * DE_PER_PERCENT;
-            (geometry.powi(2) + bake.spectrum_error.powi(2) + solve.powi(2)).sqrt()
+            (geometry.powi(2) + bake.spectrum_error.unwrap_or(0.0).powi(2) + solve.powi(2)).sqrt()
         });
         Ok(Relit {
             record: RelitRecord {
@@ -388,9 +388,6 @@ impl Relighter {
         let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
         let white = std::array::from_fn(|c| self.guess[c] * guess[c]);
         bake.light.white = bake.settings.white.unwrap_or(white);
-        if bake.stays_dense() {
-            return Ok(());
-        }
         let (nodes, lights) = (bake.tree.nodes.len(), bake.scene.lights.len());
         let shadowed = punctual::Shadowed {
             by_leaf: (0..self.leaves.len())
@@ -401,11 +398,9 @@ impl Relighter {
                 .collect::<Read<Vec<_>>>()?,
             rays: 0,
         };
-        let leaves = std::mem::take(&mut bake.light.leaves);
-        let factor = std::mem::take(&mut bake.balance.factor);
-        bake.choose_lanes_for(&leaves, &shadowed, &factor);
-        bake.light.leaves = leaves;
-        bake.balance.factor = factor;
+        bake.frozen = Some((shadowed, bake.balance.factor.clone()));
+        bake.choose_lanes();
+        bake.frozen = None;
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 #[repr(C, align(64))]
 struct Line([f32; 16]);
 
-/// A table of rows. Row lengths are 8, 16, 32 or 64; unused lanes hold zero.
+/// A table of rows. Row lengths are 4, 8, 16, 32 or 64; unused lanes hold zero.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Rows {
     lines: Vec<Line>,
@@ -15,15 +15,15 @@ pub struct Rows {
     width: usize,
 }
 
-/// Row length for a number of lanes: the next of 8, 16, 32, 64. 16 aligned lanes are faster than 10 or 12 packed ones.
+/// Row length for a number of lanes: the next of 4, 8, 16, 32, 64. 16 aligned lanes are faster than 10 or 12 packed ones.
 pub fn padded(lanes: usize) -> usize {
-    lanes.next_power_of_two().clamp(8, 64)
+    lanes.next_power_of_two().clamp(4, 64)
 }
 
 impl Rows {
     /// Zeroed rows.
     pub fn zero(rows: usize, width: usize) -> Self {
-        debug_assert!(matches!(width, 8 | 16 | 32 | 64));
+        debug_assert!(matches!(width, 4 | 8 | 16 | 32 | 64));
         Self {
             lines: vec![Line([0.0; 16]); (rows * width).div_ceil(16)],
             rows,
@@ -73,6 +73,22 @@ impl Rows {
             .0[..self.rows]
     }
 
+    /// All rows as vectors V, N a row. V and N make up the width; rows start on multiples of V's size.
+    pub(super) fn vectors<V: Pod, const N: usize>(&self) -> &[[V; N]] {
+        debug_assert_eq!(size_of::<[V; N]>(), self.width * size_of::<f32>());
+        &bytemuck::cast_slice::<Line, V>(&self.lines)
+            .as_chunks::<N>()
+            .0[..self.rows]
+    }
+
+    /// All rows as vectors V, N a row.
+    pub(super) fn vectors_mut<V: Pod, const N: usize>(&mut self) -> &mut [[V; N]] {
+        debug_assert_eq!(size_of::<[V; N]>(), self.width * size_of::<f32>());
+        &mut bytemuck::cast_slice_mut::<Line, V>(&mut self.lines)
+            .as_chunks_mut::<N>()
+            .0[..self.rows]
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.lines.len() * size_of::<Line>()
@@ -86,8 +102,8 @@ mod tests {
     #[test]
     fn rows_are_separate_and_padded() {
         assert_eq!(
-            [1, 8, 9, 16, 17, 33, 64].map(padded),
-            [8, 8, 16, 16, 32, 64, 64]
+            [1, 5, 8, 9, 16, 17, 33, 64].map(padded),
+            [4, 8, 8, 16, 16, 32, 64, 64]
         );
         let mut rows = Rows::zero(3, 8);
         rows.row_mut(1)[7] = 2.0;

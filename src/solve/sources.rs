@@ -1,6 +1,7 @@
 //! Reflectance and emission of patches, row by row, from the materials.
 
 use super::lanes::Lanes;
+use super::mixed::Mixed;
 use super::rows::{Rows, padded};
 use crate::color::Upsampler;
 use crate::hierarchy::{Element, Mesh, Tree};
@@ -103,6 +104,26 @@ impl<'a> Painter<'a> {
             emission,
             greatest,
         }
+    }
+
+    /// The matrices of the given leaves, where lanes reflect into each other.
+    pub(super) fn mixed(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Mixed {
+        let mut paints: Vec<Leaves> = self.scene.materials.iter().map(|m| m.reflectance).collect();
+        let mut of = Vec::with_capacity(leaves.len());
+        for &leaf in leaves {
+            let element = tree.elements[tree.node(leaf).element as usize];
+            let triangle = tree.faces[element.face as usize].triangle as usize;
+            let material = self.mesh.material[triangle];
+            let m = &self.scene.materials[material as usize];
+            of.push(match self.paint_of(m, triangle, &element) {
+                Some(color) => {
+                    paints.push(self.clamped(color));
+                    paints.len() as u32 - 1
+                }
+                None => material,
+            });
+        }
+        Mixed::new(&paints, of, lanes, padded(lanes.len()))
     }
 
     /// Albedo of a linear colour: bounded below 1, so that light ends.

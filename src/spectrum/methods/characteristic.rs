@@ -8,6 +8,33 @@ use crate::color::Xyz;
 use crate::spectrum::{CmfTree, LEAVES, Leaves};
 use nalgebra::{SMatrix, SymmetricEigen};
 
+/// m orthonormal vectors (in 1..=64) for lights and the reflectances of a scene, that of the greatest eigenvalue first.
+pub fn basis(lights: &[Leaves], reflectances: &[Leaves], m: usize) -> Vec<Leaves> {
+    let mut moments = SMatrix::<f64, LEAVES, LEAVES>::zeros();
+    let mut add = |spectrum: &Leaves| {
+        let v = SMatrix::<f64, LEAVES, 1>::from_fn(|k, _| spectrum[k]);
+        moments.ger(1.0, &v, &v, 1.0);
+    };
+    for light in lights {
+        add(light);
+        for first in reflectances {
+            let once: Leaves = std::array::from_fn(|k| light[k] * first[k]);
+            add(&once);
+            for second in reflectances {
+                add(&std::array::from_fn(|k| once[k] * second[k]));
+            }
+        }
+    }
+    let eigen = SymmetricEigen::new(moments);
+    let mut order: Vec<usize> = (0..LEAVES).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    order
+        .iter()
+        .take(m)
+        .map(|&i| std::array::from_fn(|k| eigen.eigenvectors[(k, i)]))
+        .collect()
+}
+
 /// Spectra as coordinates in a trained basis.
 #[derive(Debug, Clone)]
 pub struct Characteristic {
@@ -19,26 +46,7 @@ pub struct Characteristic {
 impl Characteristic {
     /// m vectors (in 1..=64) for a light and the reflectances of a scene.
     pub fn new(cmf: &CmfTree, light: &Leaves, reflectances: &[Leaves], m: usize) -> Self {
-        let mut moments = SMatrix::<f64, LEAVES, LEAVES>::zeros();
-        let mut add = |spectrum: &Leaves| {
-            let v = SMatrix::<f64, LEAVES, 1>::from_fn(|k, _| spectrum[k]);
-            moments.ger(1.0, &v, &v, 1.0);
-        };
-        add(light);
-        for first in reflectances {
-            let once: Leaves = std::array::from_fn(|k| light[k] * first[k]);
-            add(&once);
-            for second in reflectances {
-                add(&std::array::from_fn(|k| once[k] * second[k]));
-            }
-        }
-        let eigen = SymmetricEigen::new(moments);
-        let mut order: Vec<usize> = (0..LEAVES).collect();
-        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-        let basis: Vec<Leaves> = order[..m]
-            .iter()
-            .map(|&i| std::array::from_fn(|k| eigen.eigenvectors[(k, i)]))
-            .collect();
+        let basis = basis(&[*light], reflectances, m);
         let dot = |a: &Leaves, b: &Leaves| (0..LEAVES).map(|k| a[k] * b[k]).sum::<f64>();
         let coordinates = basis.iter().map(|e| dot(e, light)).collect();
         let weights = basis

@@ -19,7 +19,7 @@ mod pointwise;
 mod sampling;
 mod segments;
 
-pub use characteristic::Characteristic;
+pub use characteristic::{Characteristic, basis};
 pub use cubics::Cubics;
 pub use gauss::{gauss_ac1c2, gauss_shared, gauss_xyz};
 pub use pointwise::Pointwise;

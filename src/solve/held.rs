@@ -1,0 +1,86 @@
+//! The same links, other lanes: a solution in which nothing differs from the last round but how spectra are carried.
+//!
+//! What lanes do to colours is seen by itself here: beside a solution on all 64 leaves of the same links, with direct
+//! light gathered at the same points of the same leaves.
+
+use super::lanes::Lanes;
+use super::{Bake, Direct, Representation, padded};
+use crate::link::{Demand, LinkRows, balance};
+use std::time::Instant;
+
+/// Held solutions are brought to the error that a bake would be brought to if it were asked for this little.
+const CONVERGED: f64 = 0.01;
+
+/// A solution on held links.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// Lanes in use.
+    pub lanes: usize,
+    /// What the choice of lanes believes to cost, mean CIELUV; none where nothing is known.
+    pub spectrum_de_luv: Option<f64>,
+    /// Operator applications.
+    pub iterations: usize,
+    /// Choice of lanes and solve, without direct light, s.
+    pub seconds: f64,
+}
+
+impl Bake {
+    /// Solves again on the links and leaves of the last round. `error` is what the choice of lanes is made for; the solve
+    /// itself goes far beyond it. [`Bake::light`] and [`Bake::lanes`] are of this solution afterwards; none before the
+    /// first round.
+    pub fn hold(&mut self, representation: Representation, error: f64) -> Option<Held> {
+        let threshold = self.rounds.last()?.threshold;
+        let white = self.light.white;
+        let started = Instant::now();
+        (self.settings.representation, self.settings.error) = (representation, error);
+        // Nothing is kept of the lanes before: what was good enough for another error would be taken again.
+        self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
+        self.choose_lanes();
+        let chosen = started.elapsed();
+        self.direct = Direct::default();
+        self.gather_direct(&Demand {
+            bright: &[],
+            keen: &[],
+            total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
+            threshold,
+            least_area: f64::INFINITY,
+            hidden: true,
+        });
+        let started = Instant::now();
+        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
+            .filter(|&k| self.tree.node(k).is_leaf())
+            .collect();
+        let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
+        self.look_out();
+        self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
+        self.settings.error = CONVERGED;
+        let (convergence, _) = match padded(self.lanes.len()) {
+            4 => self.solve::<4>(&rows, &leaves),
+            8 => self.solve::<8>(&rows, &leaves),
+            16 => self.solve::<16>(&rows, &leaves),
+            32 => self.solve::<32>(&rows, &leaves),
+            _ => self.solve::<64>(&rows, &leaves),
+        };
+        self.settings.error = error;
+        self.light.white = white;
+        Some(Held {
+            lanes: self.lanes.len(),
+            spectrum_de_luv: self.spectrum_error,
+            iterations: convergence.iterations,
+            seconds: (chosen + started.elapsed()).as_secs_f64(),
+        })
+    }
+
+    /// Tristimulus irradiance of the leaves of the hierarchy, lx for Y, each with its area.
+    pub fn leaf_colours(&self) -> Vec<([f64; 3], f64)> {
+        self.light
+            .leaves
+            .iter()
+            .enumerate()
+            .map(|(k, &leaf)| {
+                let xyz = self.lanes.tristimulus(self.light.irradiance.row(k));
+                (xyz, self.areas[leaf as usize])
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,220 @@
+//! What each way to carry spectra claims, held against the 64 leaves on the same links; and the sweep as a command.
+
+use haarlight::cost::{HeldRun, Knob, Sweep, choose, held};
+use haarlight::data::{Outside, named};
+use haarlight::scene::{Options, Scene};
+use haarlight::solve::{Bake, Representation, Settings};
+use std::path::Path;
+use std::process::Command;
+
+fn room(name: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenes")
+        .join(name);
+    Scene::load(path, &Options::default()).unwrap()
+}
+
+/// The Cornell box under another lamp.
+fn cornell(lamp: &str) -> Scene {
+    let mut scene = room("cornell-f2.glb");
+    let power = scene.grid.means(&named(lamp).unwrap().table, Outside::Zero);
+    for light in &mut scene.spectra {
+        light.power = power;
+    }
+    scene
+}
+
+/// Two rounds, then all ways on their links.
+fn all_ways(scene: Scene) -> Vec<HeldRun> {
+    let mut bake = Bake::new(
+        scene,
+        Settings {
+            rounds: 2,
+            ..Settings::default()
+        },
+    );
+    bake.run();
+    let white = bake.light().white;
+    held(&mut bake, white)
+}
+
+fn found(runs: &[HeldRun], representation: Representation, asked: f64) -> HeldRun {
+    *runs
+        .iter()
+        .find(|r| r.representation == representation && r.asked == asked)
+        .unwrap()
+}
+
+/// Direct light is gathered anew for every solution: whether a lamp is entered depends on brightness, and so on lanes, by
+/// a hair. Nothing here is told apart below this, CIELUV.
+const HAIR: f64 = 0.01;
+
+/// What lanes may cause, share of the error asked for.
+const SHARE: f64 = 0.2;
+
+#[test]
+fn every_way_keeps_what_it_claims_under_line_spectra() {
+    for lamp in ["cie/F2", "cie/F11", "cie/A"] {
+        let runs = all_ways(cornell(lamp));
+        for run in &runs {
+            match run.representation {
+                // An estimate, made on a model of the room: a third more is allowed for what the model lacks.
+                Representation::Adaptive => {
+                    let believed = run.believed.unwrap();
+                    assert!(run.de_luv <= 1.33 * believed + HAIR, "{lamp}: {run:?}");
+                    assert!(believed <= SHARE * run.asked, "{lamp}: {run:?}");
+                }
+                Representation::Guaranteed => {
+                    let believed = run.believed.unwrap();
+                    assert!(run.de_luv <= believed + HAIR, "{lamp}: {run:?}");
+                    assert!(believed <= SHARE * run.asked, "{lamp}: {run:?}");
+                }
+                Representation::Dense => assert_eq!(run.de_luv, 0.0),
+                _ => {}
+            }
+        }
+        // More numbers, less error: across a factor of four.
+        for way in [Representation::Uniform, Representation::Characteristic] {
+            let few = found(&runs, way(4), 0.0);
+            let many = found(&runs, way(16), 0.0);
+            assert!(
+                many.de_luv < 0.5 * few.de_luv + HAIR,
+                "{lamp}: {few:?} {many:?}"
+            );
+        }
+    }
+}
+
+/// All 64 intervals, or all 64 vectors, are the 64 leaves in another form.
+#[test]
+fn whole_sets_are_exact() {
+    let mut bake = Bake::new(
+        room("cornell-f2.glb"),
+        Settings {
+            rounds: 2,
+            ..Settings::default()
+        },
+    );
+    bake.run();
+    let white = bake.light().white;
+    bake.hold(Representation::Dense, 0.5).unwrap();
+    let truth = bake.leaf_colours();
+    for way in [
+        Representation::Uniform(64),
+        Representation::Characteristic(64),
+    ] {
+        bake.hold(way, 0.5).unwrap();
+        let mean = bake
+            .leaf_colours()
+            .iter()
+            .zip(&truth)
+            .map(|(is, ought)| haarlight::color::de_luv(is.0, ought.0, white))
+            .sum::<f64>()
+            / truth.len() as f64;
+        assert!(mean < HAIR, "{way}: {mean}");
+    }
+}
+
+/// The case for spectra: three numbers are wrong by more than the eye forgives, and no refinement helps. Measured: 1.96 on
+/// average and 5.7 at worst under F2, 1.37 and 4.0 under F11.
+#[test]
+fn srgb_is_wrong_under_lamps_of_lines() {
+    for (lamp, least) in [("cie/F2", [1.5, 4.5]), ("cie/F11", [1.1, 3.0])] {
+        let runs = all_ways(cornell(lamp));
+        let rgb = found(&runs, Representation::Rgb, 0.0);
+        let ours = found(&runs, Representation::Adaptive, 0.5);
+        assert!(
+            rgb.de2000 > least[0] && rgb.greatest > least[1],
+            "{lamp}: {rgb:?}"
+        );
+        assert!(ours.de2000 < 0.1 * rgb.de2000, "{lamp}: {ours:?}");
+    }
+}
+
+#[test]
+fn a_grey_room_takes_one_number_however_it_is_asked() {
+    let scene = || {
+        let mut scene = room("cornell-f2.glb");
+        for material in &mut scene.materials {
+            material.reflectance = [0.5; 64];
+        }
+        scene
+    };
+    for run in all_ways(scene()) {
+        match run.representation {
+            Representation::Adaptive | Representation::Guaranteed => {
+                assert_eq!(run.lanes, 1, "{run:?}");
+            }
+            _ => {}
+        }
+        // One vector: the lamp itself. The paper's absolute intervals have to follow its lines.
+        if run.representation != Representation::Paper {
+            assert!(run.de_luv < HAIR, "{run:?}");
+        }
+    }
+}
+
+#[test]
+fn a_sweep_chooses_the_cheapest_within_the_goal() {
+    let sweep = Sweep {
+        errors: vec![4.0, 1.0],
+        representations: vec![Representation::Adaptive, Representation::Rgb],
+        points: 40,
+        repeats: 1,
+        knob: Knob::LeftOut,
+        seed: 0,
+    };
+    let study = sweep.run(&room("cornell-f2.glb"), &|_, _, _| {});
+    assert_eq!(study.runs.len(), 4);
+    for run in &study.runs {
+        let phases: f64 = run.phases_s.iter().map(|p| p.1).sum();
+        assert!(phases <= run.cpu_s && phases > 0.5 * run.cpu_s, "{run:?}");
+    }
+    let within = |goal: f64| choose(&study, goal).run.unwrap();
+    let least = |goal: f64| {
+        study
+            .runs
+            .iter()
+            .filter(|r| r.de2000.value <= goal)
+            .map(|r| r.cpu_s)
+            .fold(f64::INFINITY, f64::min)
+    };
+    // Spectra that know their error may cost a little more than those that do not.
+    for goal in [1.2, 3.0] {
+        assert!(within(goal).cpu_s <= 1.15 * least(goal), "{goal}");
+        assert!(within(goal).de2000.value <= goal);
+    }
+    // Out of reach: the most accurate, and it is said.
+    let none = choose(&study, 1e-6);
+    assert!(none.why[0].starts_with("No bake came within"), "{none:?}");
+}
+
+#[test]
+fn the_command_writes_tables_and_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("cost");
+    let done = Command::new(env!("CARGO_BIN_EXE_haarlight"))
+        .args(["cost", "scenes/cornell-f2.glb", "--errors", "4", "--quiet"])
+        .args(["--representations", "adaptive,rgb", "--points", "10"])
+        .args(["--repeats", "1", "--knob", "-o"])
+        .arg(&out)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(done.status.success(), "{done:?}");
+    let text = String::from_utf8(done.stdout).unwrap();
+    assert!(text.contains("Choice: `--error 4`"), "{text}");
+    let csv = std::fs::read_to_string(out.join("cost.csv")).unwrap();
+    let columns: Vec<usize> = csv.lines().map(|l| l.split(',').count()).collect();
+    assert!(
+        columns.len() >= 3 && columns.iter().all(|c| *c == columns[0]),
+        "{csv}"
+    );
+    let page = std::fs::read_to_string(out.join("cost.md")).unwrap();
+    for picture in ["error-time", "phases", "intervals", "memory"] {
+        let svg = std::fs::read_to_string(out.join(format!("{picture}.svg"))).unwrap();
+        assert!(svg.contains("<polyline") || svg.contains("<circle") || svg.contains("<rect"));
+        assert!(page.contains(&format!("({picture}.svg)")));
+    }
+    assert!(page.contains("## One knob"));
+}
