@@ -85,6 +85,7 @@ impl Bake {
     /// The kept mesh under the present light.
     pub(crate) fn relit(&self, kept: &[Kept]) -> Read<Baked> {
         match padded(self.lanes().len()) {
+            4 => self.relit_lanes::<4>(kept),
             8 => self.relit_lanes::<8>(kept),
             16 => self.relit_lanes::<16>(kept),
             32 => self.relit_lanes::<32>(kept),

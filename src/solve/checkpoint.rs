@@ -239,6 +239,7 @@ impl Bake {
     /// The last solution from what the leaves reflect.
     pub(super) fn light_up(&mut self, reflected: &Rows) {
         match reflected.width() {
+            4 => self.light_up_lanes::<4>(reflected),
             8 => self.light_up_lanes::<8>(reflected),
             16 => self.light_up_lanes::<16>(reflected),
             32 => self.light_up_lanes::<32>(reflected),

@@ -172,6 +172,9 @@ impl Bake {
                     let packed = packed.as_deref().unwrap_or(&[]);
                     let (light, lamps) = (&self.light, &self.lamps);
                     Ok(match self.light.width() {
+                        4 => self
+                            .lanes
+                            .tristimulus(&trace::replay::<4>(packed, light, lamps)?),
                         8 => self
                             .lanes
                             .tristimulus(&trace::replay::<8>(packed, light, lamps)?),
@@ -347,6 +350,7 @@ impl Relighter {
         let (convergence, flux, [direct_s, solve_s]) = match padded(self.bake.lanes.len()) {
             // The light is there already.
             _ if !changed => (self.solved, self.flux, [0.0; 2]),
+            4 => self.solve::<4>()?,
             8 => self.solve::<8>()?,
             16 => self.solve::<16>()?,
             32 => self.solve::<32>()?,
