@@ -41,5 +41,9 @@ pub mod report;
 pub mod scene;
 pub mod solve;
 pub mod spectrum;
+pub mod store;
 
 pub use error::{Error, Problem, Result};
+
+/// Name and version of the program.
+pub const PROGRAM: &str = concat!("haarlight ", env!("CARGO_PKG_VERSION"));

@@ -295,7 +295,7 @@ fn means_by_the_command() {
         let last: serde_json::Value = rounds
             .map(|line| serde_json::from_str(line).unwrap())
             .filter(|record: &serde_json::Value| record["record"] == "round")
-            .last()
+            .next_back()
             .unwrap();
         let absorbed = last["flux"]["absorbed_lm"].as_f64().unwrap();
         mean_is(absorbed / area / (1.0 - rho), mean);

@@ -289,7 +289,7 @@ fn ctrl_c_ends_after_the_round_with_everything_written() {
         "bake",
         "cornell.glb",
         "--error",
-        "0.02",
+        "0.05",
         "--log",
         "log",
         "--json",

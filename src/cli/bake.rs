@@ -37,7 +37,9 @@ const AUDIT_PATHS: usize = 65_536;
 Examples:
   haarlight bake room.glb
   haarlight bake room.gltf -o lit.glb --error 0.3 --spectra measured.spectra.json
-  haarlight bake room.glb --snapshots pictures --log bake.jsonl --audit 200")]
+  haarlight bake room.glb --snapshots pictures --log bake.jsonl --audit 200
+  haarlight bake room.glb --checkpoint room.state      stop it at any time; the same command goes on
+  haarlight bake room.glb --cache room.cache           then change lamps or paints: haarlight relight room.glb")]
 pub struct BakeArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,
@@ -62,6 +64,15 @@ pub struct BakeArgs {
     /// Measure the error at N random points by Monte Carlo.
     #[arg(long, value_name = "N")]
     pub audit: Option<usize>,
+    /// Keep the state of the bake here after every round; if the file is there already, go on from it.
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// Keep here what `haarlight relight` needs to change lamps and paints without casting a ray.
+    #[arg(long, value_name = "FILE")]
+    pub cache: Option<PathBuf>,
+    /// The cache may take this much, MB.
+    #[arg(long, value_name = "MB", default_value_t = 2048)]
+    pub cache_limit: u64,
     /// How spectra are carried: perceptual, guaranteed (bounds instead of estimates), paper, uniform:N,
     /// characteristic:N, dense (all 64 leaves) or rgb.
     #[arg(long, value_name = "HOW", default_value_t, hide_short_help = true)]
@@ -107,12 +118,26 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let clock = Instant::now();
     talk.phase("preparing");
     let mut bake = prepare(scene, &args.solving, common, args.spectrum, &talk);
+    if args.cache.is_some() {
+        bake.keep();
+    }
     write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
+    if let Some(path) = args.checkpoint.as_deref().filter(|path| path.exists()) {
+        bake.resume(path)?;
+        for round in bake.rounds() {
+            write(&mut log, round)?;
+        }
+        let rounds = bake.rounds().len();
+        talk.say(&format!("going on after round {rounds} of {}", text(path)));
+    }
     seconds.prepare = clock.elapsed().as_secs_f64();
 
     let verdict = stop.run(&mut bake, &talk, |bake, round| {
         seconds.solve += round.round_s;
         write(&mut log, round)?;
+        if let Some(path) = &args.checkpoint {
+            bake.save(path)?;
+        }
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
             let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
@@ -145,6 +170,17 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     if let Some(path) = &args.npz {
         write_npz(path, &args.room, &bake, &baked)?;
         outputs.npz = Some(text(path));
+    }
+    // A cache that cannot be written is told of when all else is done.
+    let mut uncached = None;
+    if let Some(path) = &args.cache {
+        match bake.write_cache(&baked, path, args.cache_limit << 20) {
+            Ok(size) => {
+                talk.say(&format!("cache: {}, {:.1} MB", text(path), megabytes(size)));
+                outputs.cache = Some(text(path));
+            }
+            Err(error) => uncached = Some(error),
+        }
     }
     if let Some(snapshots) = &mut snapshots {
         outputs.exr = snapshots.last(scene, &baked.surfaces)?;
@@ -181,7 +217,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
             .map_err(|problem| Error::Internal(format!("verdict: {problem}")))?;
         print(&(line + "\n"))?;
     }
-    Ok(exit_code(verdict))
+    uncached.map_or(Ok(exit_code(verdict)), Err)
+}
+
+fn megabytes(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
 }
 
 /// Reads a room; its problems and those that `others` finds (given the files the room is made of) come together.
@@ -245,6 +285,12 @@ fn problems(args: &BakeArgs, output: &Path, parts: &[PathBuf]) -> Vec<Problem> {
     let mut outputs = vec![("-o", output)];
     outputs.extend(args.npz.as_deref().map(|path| ("--npz", path)));
     outputs.extend(args.log.as_deref().map(|path| ("--log", path)));
+    outputs.extend(
+        args.checkpoint
+            .as_deref()
+            .map(|path| ("--checkpoint", path)),
+    );
+    outputs.extend(args.cache.as_deref().map(|path| ("--cache", path)));
     let mut inputs = vec![args.room.as_path()];
     let beside = args.room.with_extension("spectra.json");
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));
@@ -278,7 +324,7 @@ fn write(log: &mut Option<Log<File>>, record: &impl serde::Serialize) -> Result<
     log.as_mut().map_or(Ok(()), |log| log.write(record))
 }
 
-fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()> {
+pub(super) fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()> {
     let spectra = bake.radiosity_spectra(baked);
     // The writer's own error says more than what the system makes of it.
     let mut problem = None;
@@ -295,6 +341,6 @@ fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()>
     }
 }
 
-fn text(path: &Path) -> String {
+pub(super) fn text(path: &Path) -> String {
     path.display().to_string()
 }

@@ -1,7 +1,7 @@
 //! The command line as a whole.
 
 use super::options::Common;
-use super::{bake, cost, inspect, paper, probe};
+use super::{bake, cost, inspect, paper, probe, relight};
 use crate::error::{Error, Result};
 
 const EXAMPLES: &str = "\
@@ -31,6 +31,8 @@ pub struct Cli {
 pub enum Command {
     /// Write the room back with its light baked in.
     Bake(bake::BakeArgs),
+    /// Write the room back under other lamps and paints, from what a bake kept.
+    Relight(relight::RelightArgs),
     /// Print what the program sees in a room. Nothing is solved.
     Inspect(inspect::InspectArgs),
     /// Irradiance at given points and normals: lux sensors.
@@ -54,6 +56,7 @@ pub fn run(cli: &Cli) -> Result<u8> {
     }
     match &cli.command {
         Command::Bake(args) => bake::run(args, &cli.common),
+        Command::Relight(args) => relight::run(args, &cli.common),
         Command::Inspect(args) => inspect::run(args, &mut std::io::stdout()).map(|()| 0),
         Command::Probe(args) => probe::run(args, &cli.common),
         Command::Cost(args) => cost::run(args, &cli.common),

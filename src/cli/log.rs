@@ -23,12 +23,16 @@
 //! | `round` | | number, from 1 |
 //! | `elapsed_s` | s | since the room was read |
 //! | `round_s`, `phases_s` | s | of this round, and by phase: `links`, `spectrum`, `direct`, `balance`, `solve`, `estimate` |
+//! | `next_round_s`, `remaining_s` | s | expected for the next round, and for all rounds to the asked-for error (see [`forecast`](crate::solve::forecast)); the latter `null` if the error is not known or no longer falls |
+//! | `remaining_rounds` | | expected rounds to the asked-for error, `null` likewise |
 //! | `threshold` | share of white | greatest error that a link keeps, weighted by the root of the receiver's share of area |
 //! | `rays` | | visibility rays cast in this round for links, direct light and openness |
 //! | `links_evaluated`, `links_capped` | | links looked at; those that wanted refinement but had the least size |
 //! | `elements`, `nodes`, `links`, `links_clear` | | leaves of the hierarchy, all patches, links, links proved free of blockers |
 //! | `intervals_working`, `intervals_mean` | | wavelength intervals of the working partition (all lights), and mean over patches |
 //! | `memory_bytes` | B | hierarchy, links and rows |
+//! | `bytes_per_link` | B | of these, for each link: 28 for itself, 4 for each blocker, 16 in the rows of the solve and 32 in those of the gather |
+//! | `bytes_per_element` | B | of these, for each leaf of the hierarchy: patches, rows of light, direct light |
 //! | `iterations` | | operator applications of the solve |
 //! | `error.total_de2000`, `.total_de_luv` | dE00, dE*uv | all sources; `null` in the first round, as two are compared |
 //! | `error.total_relative` | 1 | root mean square relative error of illuminance |
@@ -59,6 +63,7 @@
 //!
 //! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
 
+use crate::PROGRAM;
 use crate::gather::Baked;
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
@@ -67,8 +72,6 @@ use crate::solve::record::{Figure, Kind, LOG_VERSION};
 use crate::solve::{Bake, Representation, Verdict};
 use serde::Serialize;
 
-/// Name and version of the program.
-pub const PROGRAM: &str = concat!("haarlight ", env!("CARGO_PKG_VERSION"));
 /// What was asked for.
 #[derive(Debug, Clone, Serialize)]
 pub struct SettingsRecord {
@@ -173,6 +176,8 @@ pub struct Outputs {
     pub npz: Option<String>,
     /// The log.
     pub log: Option<String>,
+    /// What relighting needs.
+    pub cache: Option<String>,
     /// Pictures of all rounds.
     pub pictures: Vec<String>,
     /// High dynamic range pictures of the result.

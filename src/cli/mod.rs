@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `command` | the command line as a whole, exit codes |
 //! | `options` | options that commands share |
-//! | `bake`, `inspect`, `probe`, `cost`, `paper` | the commands |
+//! | `bake`, `relight`, `inspect`, `probe`, `cost`, `paper` | the commands |
 //! | `log` | the log of a bake, field by field |
 //! | `snapshots` | pictures of the rounds |
 //! | `points` | the CSV of points for `probe` |
@@ -24,6 +24,7 @@ pub mod paper;
 mod paths;
 pub mod points;
 pub mod probe;
+pub mod relight;
 mod snapshots;
 pub mod stop;
 mod summary;

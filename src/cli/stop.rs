@@ -12,8 +12,6 @@ use std::time::Instant;
 
 /// What the second Ctrl-C exits with.
 const KILLED: i32 = 130;
-/// Growth of the time of a round that is expected after the first; later it is measured.
-const GROWTH: f64 = 2.5;
 
 /// What may end a bake before its error is reached.
 #[derive(Debug, Clone)]
@@ -54,20 +52,23 @@ impl Stop {
         self.started.elapsed().as_secs_f64()
     }
 
+    /// Should a bake that has done rounds do no further one?
+    fn late(&self, rounds: &[Round]) -> Option<Verdict> {
+        (!rounds.is_empty()).then(|| self.verdict(rounds)).flatten()
+    }
+
     /// Should no further round begin?
     fn verdict(&self, rounds: &[Round]) -> Option<Verdict> {
         if self.interrupted.load(Ordering::SeqCst) {
             return Some(Verdict::Interrupted);
         }
-        let seconds: Vec<f64> = rounds.iter().map(|r| r.round_s).collect();
-        let late = self
-            .time
-            .is_some_and(|time| self.elapsed_s() + next_round(&seconds) > time);
+        let next = rounds.last().map_or(0.0, |r| r.next_round_s);
+        let late = self.time.is_some_and(|time| self.elapsed_s() + next > time);
         late.then_some(Verdict::OutOfTime)
     }
 
     /// Steps a bake to its end; `each` is told of every round. The first round is always done, so that there is a whole
-    /// solution.
+    /// solution; a bake that was resumed has one.
     ///
     /// # Errors
     /// What `each` returns.
@@ -77,9 +78,14 @@ impl Stop {
         talk: &Talk,
         mut each: impl FnMut(&Bake, &Round) -> Result<()>,
     ) -> Result<Verdict> {
+        if let Some(verdict) = bake.verdict().or_else(|| self.late(bake.rounds())) {
+            return Ok(verdict);
+        }
         loop {
             let number = bake.rounds().len() + 1;
-            talk.phase(&format!("round {number}"));
+            let left = bake.rounds().last().and_then(ahead);
+            let left = left.map_or(String::new(), |left| format!(" ({left})"));
+            talk.phase(&format!("round {number}{left}"));
             let round = bake.step().clone();
             talk.say(&line(&round));
             each(bake, &round)?;
@@ -91,39 +97,32 @@ impl Stop {
     }
 }
 
-/// Expected seconds of the next round.
-fn next_round(seconds: &[f64]) -> f64 {
-    match seconds {
-        [] => 0.0,
-        [only] => only * GROWTH,
-        // A round that was faster than the one before tells nothing about the next.
-        [.., before, last] => last * (last / before.max(1e-9)).clamp(1.0, 2.0 * GROWTH),
-    }
-}
-
 /// A round in one line.
 fn line(round: &Round) -> String {
     let error = match round.error.total_de2000.value {
         Some(error) => format!("dE00 {error:.2} (estimate)"),
         None => "no estimate yet".into(),
     };
+    let left = ahead(round).map_or(String::new(), |left| format!("; {left}"));
     format!(
-        "round {}: {error}, {} elements, {} links, {} intervals, {:.1} s",
+        "round {}: {error}, {} elements, {} links, {} intervals, {:.1} s{left}",
         round.round, round.elements, round.links, round.intervals_working, round.round_s
     )
+}
+
+/// What is expected to be left, in words; none if nothing is, or if nobody knows.
+fn ahead(round: &Round) -> Option<String> {
+    let rounds = round.remaining_rounds.filter(|&rounds| rounds > 0)?;
+    let many = if rounds == 1 { "" } else { "s" };
+    Some(format!(
+        "about {:.1} s in {rounds} round{many} to go",
+        round.remaining_s?
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_next_round_is_expected_to_grow_as_the_last_did() {
-        assert_eq!(next_round(&[]), 0.0);
-        assert_eq!(next_round(&[2.0]), 5.0);
-        assert_eq!(next_round(&[1.0, 3.0]), 9.0);
-        assert_eq!(next_round(&[3.0, 1.0]), 1.0);
-    }
 
     #[test]
     fn an_interrupt_goes_before_the_time() {

@@ -2,6 +2,7 @@
 
 use super::point::{Gathered, Receiver};
 use super::refined::{Refined, Vertex};
+use super::relit::KeptVertex;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler, de2000};
 use crate::scene::Material;
@@ -34,6 +35,8 @@ pub struct Baked {
     pub surfaces: Vec<BakedSurface>,
     /// Irradiance rows of all vertices, surface by surface, in order.
     pub irradiance: Vec<Vec<[f32; 64]>>,
+    /// The vertices in the same order with where their light comes from, if that is kept.
+    pub(crate) kept: Vec<Vec<KeptVertex>>,
     /// Vertices that something solid covers: they got their neighbours' light.
     pub covered: usize,
     /// Triangles that wanted quartering when the limits were met.
@@ -43,7 +46,14 @@ pub struct Baked {
 }
 
 /// What a vertex is known to get; none if it is covered.
-type Known = Option<Option<Box<[f32; 64]>>>;
+type Known = Option<Option<Seen>>;
+
+/// What a vertex gets, and where it comes from, if that is kept.
+#[derive(Clone)]
+struct Seen {
+    row: Box<[f32; 64]>,
+    trace: Option<Box<[u8]>>,
+}
 
 impl Bake {
     /// Gathers at the vertices of the refined mesh. `progress` is told (done, of) in vertices of the present pass.
@@ -184,7 +194,10 @@ impl Bake {
                 known[s][v] = Some(if dark && covered {
                     None
                 } else {
-                    Some(Box::new(gathered.irradiance))
+                    Some(Seen {
+                        row: Box::new(gathered.irradiance),
+                        trace: gathered.packed,
+                    })
                 });
             }
         }
@@ -252,7 +265,7 @@ impl Bake {
     }
 
     fn differ(&self, known: &[Known], corners: [u32; 3]) -> bool {
-        let rows = corners.map(|v| known[v as usize].as_ref().and_then(|k| k.as_ref()));
+        let rows = corners.map(|v| row(known, v));
         (0..3).any(|k| match (rows[k], rows[(k + 1) % 3]) {
             (Some(a), Some(b)) => self.difference(a, b) > ALIKE * self.settings().error,
             (None, None) => false,
@@ -261,7 +274,7 @@ impl Bake {
     }
 
     fn bent(&self, known: &[Known], corners: [u32; 3], looks: &[u32; 3]) -> bool {
-        let row = |v: u32| known[v as usize].as_ref().and_then(|k| k.as_ref());
+        let row = |v: u32| row(known, v);
         (0..3).any(
             |k| match (row(corners[k]), row(corners[(k + 1) % 3]), row(looks[k])) {
                 (Some(a), Some(b), Some(m)) => {
@@ -292,8 +305,13 @@ impl Bake {
                 .collect()
         };
         for ((sheet, triangles), known) in refined.sheets.iter().zip(triangles).zip(known) {
-            let mut rows: Vec<Option<[f32; 64]>> =
-                known.into_iter().map(|k| k.flatten().map(|b| *b)).collect();
+            let (mut rows, mut traces): (Vec<_>, Vec<_>) = known
+                .into_iter()
+                .map(|k| match k.flatten() {
+                    Some(seen) => (Some(*seen.row), seen.trace),
+                    None => (None, None),
+                })
+                .unzip();
             out.covered += lend(&mut rows, &triangles);
             // Vertices that were only looked at are left out.
             let mut place = vec![u32::MAX; sheet.vertices.len()];
@@ -302,7 +320,7 @@ impl Bake {
                 back: sheet.back,
                 ..BakedSurface::default()
             };
-            let mut spectra = Vec::new();
+            let (mut spectra, mut kept) = (Vec::new(), Vec::new());
             let look = &looks[self.scene().surfaces[sheet.surface].material];
             for triangle in &triangles {
                 surface.triangles.push(triangle.map(|v| {
@@ -316,17 +334,34 @@ impl Bake {
                             look,
                         ));
                         spectra.push(row);
+                        if self.keeps() {
+                            let Vertex {
+                                triangle, weights, ..
+                            } = sheet.vertices[v as usize];
+                            kept.push(KeptVertex {
+                                triangle,
+                                weights,
+                                trace: traces[v as usize].take(),
+                            });
+                        }
                     }
                     place[v as usize]
                 }));
             }
             out.surfaces.push(surface);
             out.irradiance.push(spectra);
+            out.kept.push(kept);
         }
         out
     }
 
-    fn vertex(&self, vertex: &Vertex, back: bool, row: &[f32; 64], look: &Look) -> BakedVertex {
+    pub(super) fn vertex(
+        &self,
+        vertex: &Vertex,
+        back: bool,
+        row: &[f32; 64],
+        look: &Look,
+    ) -> BakedVertex {
         let glow = match (look.emits, vertex.entry) {
             (true, entry) if entry != crate::hierarchy::NONE => {
                 let w = if back {
@@ -361,6 +396,11 @@ impl Bake {
             light: std::array::from_fn(|c| (rgb[c] / unpainted[c]) as f32),
         }
     }
+}
+
+fn row(known: &[Known], vertex: u32) -> Option<&[f32; 64]> {
+    let seen = known[vertex as usize].as_ref()?.as_ref()?;
+    Some(&seen.row)
 }
 
 /// How a material turns irradiance into what is seen.
@@ -401,7 +441,7 @@ impl Look {
 }
 
 /// Gives covered vertices the mean of their neighbours, ring by ring; returns how many there were.
-fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> usize {
+pub(super) fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> usize {
     let mut used = vec![false; rows.len()];
     for &v in triangles.iter().flatten() {
         used[v as usize] = true;

@@ -4,10 +4,13 @@ mod bake;
 pub mod hemisphere;
 pub mod point;
 mod refined;
+mod relit;
 mod slope;
 mod spectra;
+pub(crate) mod trace;
 
 pub use bake::{Baked, Probed};
+pub(crate) use relit::Kept;
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
 #[derive(Debug, Clone, Default)]

@@ -5,6 +5,7 @@
 //! Ways that a link proved clear cost no ray; others get rays in number with what they carry.
 
 use super::hemisphere::{BEAM, Hemisphere};
+use super::trace::Trace;
 use crate::geometry::sampling::tangents;
 use crate::geometry::{Hit, Segment, lambert_polygon};
 use crate::hierarchy::{Element, NONE, Node, Sample, Tree};
@@ -62,6 +63,9 @@ pub struct Gathered {
     pub seen: f64,
     /// Visibility rays cast for this point.
     pub rays: u64,
+    /// Where it comes from, where that is kept; at last packed.
+    pub(crate) trace: Option<Trace>,
+    pub(crate) packed: Option<Box<[u8]>>,
 }
 
 impl Gathered {
@@ -72,7 +76,15 @@ impl Gathered {
             direct: [0.0; 64],
             seen: 0.0,
             rays: 0,
+            trace: None,
+            packed: None,
         }
+    }
+
+    /// Packs the trace.
+    pub(crate) fn pack(mut self) -> Self {
+        self.packed = self.trace.take().map(Trace::pack);
+        self
     }
 }
 
@@ -90,6 +102,8 @@ pub struct Memory {
     blocked: Vec<bool>,
     /// Rays cast.
     pub rays: u64,
+    /// Where the direct light of the last point comes from, where that is kept.
+    pub(crate) trace: Option<Trace>,
 }
 
 impl Memory {
@@ -121,12 +135,21 @@ pub struct Gatherer<'a> {
     pub closed: bool,
     /// Directions for indirect light where rays find patches sooner than links do; none: by links.
     pub hemisphere: Option<&'a Hemisphere>,
+    /// Is it kept where light comes from?
+    pub(crate) keep: bool,
 }
 
 impl Gatherer<'_> {
+    fn start(&self) -> Gathered {
+        Gathered {
+            trace: self.keep.then(Trace::new),
+            ..Gathered::dark()
+        }
+    }
+
     /// Gathers what comes straight from lamps.
     pub fn direct(&self, to: &Receiver, memory: &mut Memory) -> [f32; 64] {
-        let mut out = Gathered::dark();
+        let mut out = self.start();
         let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
         memory.stack.clear();
         let mut above = to.leaf;
@@ -141,13 +164,14 @@ impl Gatherer<'_> {
             }
         }
         self.punctual(to, memory, &mut out);
+        memory.trace = out.trace;
         out.direct
     }
 
     /// Gathers at a point.
     pub fn at(&self, to: &Receiver, memory: &mut Memory) -> Gathered {
         let before = memory.rays;
-        let mut out = Gathered::dark();
+        let mut out = self.start();
         if let Some(hemisphere) = self.hemisphere {
             self.sweep(to, hemisphere, memory, &mut out);
             out.rays = memory.rays - before;
@@ -174,6 +198,9 @@ impl Gatherer<'_> {
             let scale = (1.0 / out.seen) as f32;
             for x in &mut out.irradiance {
                 *x *= scale;
+            }
+            if let Some(trace) = &mut out.trace {
+                trace.scale(scale);
             }
         }
         for (x, d) in out.irradiance.iter_mut().zip(&out.direct) {
@@ -258,6 +285,9 @@ impl Gatherer<'_> {
                     continue;
                 }
                 out.seen += f64::from(share);
+                if let Some(trace) = &mut out.trace {
+                    trace.hit(leaf, share);
+                }
                 let row = self.light.reflected.row(leaf as usize);
                 for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
                     *x += share * r;
@@ -385,6 +415,9 @@ impl Gatherer<'_> {
     fn add(&self, id: u32, factor: f64, visible: f64, out: &mut Gathered) {
         let seen = (factor * visible) as f32;
         out.seen += factor * visible;
+        if let Some(trace) = &mut out.trace {
+            trace.patch(id, seen);
+        }
         let k = id as usize;
         let width = self.light.width();
         for (x, r) in out.irradiance[..width]
@@ -636,7 +669,7 @@ impl Gatherer<'_> {
 
     /// Light of punctual lights, one ray each.
     fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
-        for (lamp, row) in self.lamps {
+        for (k, (lamp, row)) in self.lamps.iter().enumerate() {
             let (factor, end) = match punctual_factor(lamp, to, self.light.half_size) {
                 Some(x) => x,
                 None => continue,
@@ -654,6 +687,9 @@ impl Gatherer<'_> {
                 if memory.blocked[0] {
                     continue;
                 }
+            }
+            if let Some(trace) = &mut out.trace {
+                trace.lamp(k, factor as f32);
             }
             for ((x, d), r) in out.irradiance.iter_mut().zip(&mut out.direct).zip(row) {
                 *x += factor as f32 * r;

@@ -36,7 +36,7 @@ impl Bake {
         self.lanes = lanes;
     }
 
-    fn chosen_lanes(&mut self) -> Lanes {
+    pub(super) fn chosen_lanes(&mut self) -> Lanes {
         self.spectrum_error = None;
         let (spectra, weights) = (&self.scene.spectra, &self.weights);
         let none = spectra.is_empty() || self.tree.nodes.is_empty();
@@ -83,12 +83,18 @@ impl Bake {
         let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
             .filter(|&k| self.tree.node(k).is_leaf())
             .collect();
-        let shadowed = self.with_sight(|bake, sight| {
-            punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh)
-        });
-        let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
-        self.look_out();
-        let factor = balance(&self.tree, &rows, &self.areas, &self.outlook.target).factor;
+        let (shadowed, factor) = match self.frozen.take() {
+            Some(known) => known,
+            None => {
+                let shadowed = self.with_sight(|bake, sight| {
+                    punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh)
+                });
+                let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
+                self.look_out();
+                let balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
+                (shadowed, balance.factor)
+            }
+        };
         let painter = Painter::new(&self.scene, &self.mesh);
         let dense = DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
         coarse::Coarse::new(

@@ -4,8 +4,10 @@
 //! carry reflected light, which is smooth. What a leaf got stays known for the rounds after.
 
 use crate::gather::point::{Memory, Receiver};
+use crate::gather::trace::Trace;
 use crate::hierarchy::{Tree, stratified};
 use crate::link::{Demand, MAX_DEPTH};
+use crate::store::Packs;
 use rayon::prelude::*;
 
 /// Points of a leaf, each with its weight: exact for polynomials of degree 4 (Cowper 1973; Dunavant 1985, table II, p = 4).
@@ -33,8 +35,8 @@ const NOISE: f64 = 0.1;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
 
-/// Mean row over a leaf and half the range of brightness over its points.
-type AtLeaf = (Box<[f32]>, f32);
+/// Mean row over a leaf, half the range of brightness over its points, and where the light comes from, if that is kept.
+type AtLeaf = (Box<[f32]>, f32, Option<Box<[u8]>>);
 
 /// Direct irradiance of nodes that are or were leaves.
 #[derive(Debug, Clone, Default)]
@@ -42,14 +44,77 @@ pub(super) struct Direct {
     rows: Vec<Option<Box<[f32]>>>,
     /// Half the range of brightness over a leaf's points.
     spread: Vec<f32>,
+    /// Where each leaf's light comes from; empty unless it is kept.
+    traces: Vec<Option<Box<[u8]>>>,
     /// Rays cast so far.
     pub(super) rays: u64,
 }
 
 impl Direct {
+    /// What is known of `leaves`, as it was before it was written down: a row of `width` lanes and a spread each.
+    pub(super) fn known(
+        leaves: &[u32],
+        nodes: usize,
+        width: usize,
+        rows: &[f32],
+        spread: &[f32],
+        rays: u64,
+    ) -> Self {
+        let mut known = Self {
+            rows: vec![None; nodes],
+            spread: vec![0.0; nodes],
+            traces: Vec::new(),
+            rays,
+        };
+        for (k, &leaf) in leaves.iter().enumerate() {
+            known.rows[leaf as usize] = Some(rows[k * width..(k + 1) * width].into());
+            known.spread[leaf as usize] = spread[k];
+        }
+        known
+    }
+
+    /// Where the light of leaves comes from, as it was before it was written down.
+    pub(super) fn keep(&mut self, leaves: &[u32], traces: &Packs) {
+        for (k, &leaf) in leaves.iter().enumerate() {
+            if let Some(trace) = traces.get(k) {
+                self.traces.resize(self.rows.len(), None);
+                self.traces[leaf as usize] = Some(trace.into());
+            }
+        }
+    }
+
+    /// Where a leaf's light comes from (see `gather::trace`), if that is kept.
+    pub(super) fn trace(&self, leaf: u32) -> Option<&[u8]> {
+        self.traces.get(leaf as usize)?.as_deref()
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        let rows = self.rows.iter().flatten().map(|row| size_of_val(&**row));
+        let traces = self.traces.iter().flatten().map(|trace| trace.len());
+        size_of_val(self.rows.as_slice())
+            + size_of_val(self.traces.as_slice())
+            + size_of_val(self.spread.as_slice())
+            + rows.sum::<usize>()
+            + traces.sum::<usize>()
+    }
+
+    /// Half the range of brightness over a leaf's points.
+    pub(super) fn spread(&self, leaf: u32) -> f32 {
+        self.spread[leaf as usize]
+    }
+
     /// Direct irradiance of a leaf by lane.
     pub(super) fn row(&self, leaf: u32) -> &[f32] {
         self.rows[leaf as usize].as_deref().unwrap_or(&[])
+    }
+
+    /// What was a leaf and is none any more asks for no memory.
+    fn forget(&mut self, node: usize) {
+        self.rows[node] = None;
+        if let Some(trace) = self.traces.get_mut(node) {
+            *trace = None;
+        }
     }
 
     /// Rows on other lanes: each new lane takes what the lane at its place held.
@@ -71,6 +136,11 @@ impl Direct {
         let mut open: Vec<u32> = (0..tree.nodes.len() as u32)
             .filter(|&k| tree.node(k).is_leaf())
             .collect();
+        for k in 0..self.rows.len() {
+            if !tree.nodes[k].is_leaf() {
+                self.forget(k);
+            }
+        }
         while !open.is_empty() {
             self.rows.resize(tree.nodes.len(), None);
             self.spread.resize(tree.nodes.len(), 0.0);
@@ -105,9 +175,13 @@ impl Direct {
             let mut next = fresh.iter();
             for (part, rays) in parts {
                 self.rays += rays;
-                for ((row, spread), &leaf) in part.into_iter().zip(next.by_ref()) {
+                for ((row, spread, trace), &leaf) in part.into_iter().zip(next.by_ref()) {
                     self.rows[leaf as usize] = Some(row);
                     self.spread[leaf as usize] = spread;
+                    if trace.is_some() {
+                        self.traces.resize(tree.nodes.len(), None);
+                        self.traces[leaf as usize] = trace;
+                    }
                 }
             }
             let mut children = Vec::new();
@@ -119,6 +193,7 @@ impl Direct {
                     * (node.area / demand.total_area).sqrt();
                 if error > demand.threshold && node.area > demand.least_area && depth < MAX_DEPTH {
                     tree.subdivide(leaf);
+                    self.forget(leaf as usize);
                     children.extend(tree.node(leaf).child_range());
                 }
             }
@@ -155,6 +230,7 @@ fn at_leaf(
         )
     });
     let mut total = 0.0_f32;
+    let mut kept: Option<Trace> = None;
     for (k, (at, weight)) in first.iter().copied().chain(more).enumerate() {
         if bare == wanted {
             break;
@@ -171,6 +247,10 @@ fn at_leaf(
         };
         bare += 1;
         total += weight as f32;
+        if let Some(trace) = memory.trace.take() {
+            kept.get_or_insert_with(Trace::new)
+                .absorb(&trace, weight as f32);
+        }
         let mut bright = 0.0;
         for ((m, x), w) in mean.iter_mut().zip(row).zip(weights) {
             *m += weight as f32 * x;
@@ -184,5 +264,9 @@ fn at_leaf(
             *m /= total;
         }
     }
-    (mean, (0.5 * (most - least).max(0.0)) as f32)
+    (
+        mean,
+        (0.5 * (most - least).max(0.0)) as f32,
+        kept.map(|trace| trace.times(1.0 / total).pack()),
+    )
 }

@@ -22,10 +22,8 @@ const SHARE_OF_RAYS: f64 = 0.95;
 /// Watched points and what was seen there last.
 pub(super) struct Probes {
     /// Face entry, weights on the face, point and normal.
-    points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
-    last: Vec<[f64; 3]>,
-    /// Have two rounds been compared?
-    compared: bool,
+    pub(super) points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
+    pub(super) last: Vec<[f64; 3]>,
 }
 
 /// Distance between two rounds, turned into error.
@@ -60,7 +58,6 @@ impl Probes {
         Self {
             points,
             last: Vec::new(),
-            compared: false,
         }
     }
 
@@ -79,20 +76,15 @@ impl Probes {
             .collect()
     }
 
-    /// Takes what is seen now; returns the estimated error, none after the first round.
+    /// Takes what is seen now; returns the estimated error, none after the first round. `fresh_rays`: did the points look
+    /// through rays of their own in this round and the one before?
     pub(super) fn compare(
         &mut self,
         now: Vec<[f64; 3]>,
         white: [f64; 3],
-        by_rays: bool,
+        fresh_rays: bool,
     ) -> Option<Distance> {
-        // The first two rounds are coarse alike: what they share is not noise of rays.
-        let share = if by_rays && self.compared {
-            SHARE_OF_RAYS
-        } else {
-            SHARE
-        };
-        self.compared = !self.last.is_empty();
+        let share = if fresh_rays { SHARE_OF_RAYS } else { SHARE };
         let result = (!self.last.is_empty()).then(|| {
             let n = now.len() as f64;
             let pairs = || self.last.iter().zip(&now);

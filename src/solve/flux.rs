@@ -238,7 +238,7 @@ pub(super) fn conserve(
 }
 
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.
-#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Balance {
     /// Luminous flux given out by surfaces, lm.
     pub emitted_lm: f64,

@@ -154,7 +154,8 @@ impl Lanes {
         }
     }
 
-    fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
+    /// These lanes.
+    pub(super) fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
         let power: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
         let xyz = lanes
             .iter()

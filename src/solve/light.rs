@@ -38,6 +38,20 @@ impl Light {
         self.reflected.width()
     }
 
+    /// Bytes held, links' other ends aside.
+    pub fn bytes(&self) -> usize {
+        let scalars = [
+            &self.bright_reflected,
+            &self.bright_emitted,
+            &self.brightest,
+            &self.spread,
+        ];
+        let rows = [&self.reflected, &self.emitted, &self.irradiance];
+        rows.iter().map(|rows| rows.bytes()).sum::<usize>()
+            + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
+            + 4 * self.leaves.len()
+    }
+
     /// Works out brightness and its spread from the rows.
     pub fn measure(&mut self, tree: &Tree, lanes: &Lanes) {
         let white = self.white;

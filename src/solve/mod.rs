@@ -3,12 +3,14 @@
 //! [`Bake::step`] is the loop on one screen; everything it calls stands in a file of its own.
 
 mod bounded;
+mod checkpoint;
 mod choice;
 mod coarse;
 mod conjugate;
 mod direct;
 mod estimate;
 mod flux;
+pub mod forecast;
 mod held;
 pub mod lanes;
 pub mod light;
@@ -20,12 +22,14 @@ mod punctual;
 mod rays;
 pub mod record;
 pub mod reference;
+mod relight;
 mod representation;
 mod rows;
 mod sources;
 
 pub use lists::PatchList;
 pub use record::{Round, Verdict};
+pub use relight::{Relighter, Relit, RelitRecord};
 pub use representation::Representation;
 pub use rows::{Rows, padded};
 pub(crate) use sources::weights_of;
@@ -53,7 +57,7 @@ use sources::{Painter, Sources};
 use std::time::Instant;
 
 /// What the user asks for.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Settings {
     /// Mean colour difference (CIEDE2000) at which to stop.
     pub error: f64,
@@ -203,30 +207,67 @@ pub struct Bake {
     hemisphere: Hemisphere,
     rounds: Vec<Round>,
     watch: Option<record::Watch>,
+    /// Is it kept where light comes from, for relighting?
+    keep: bool,
+    /// Where the light of the watched points came from in the last two rounds, if that is kept.
+    watched: [Vec<Option<Box<[u8]>>>; 2],
+    /// What the choice of lanes may take for granted when lamps and paints change: shadows of punctual lights, balance.
+    frozen: Option<(punctual::Shadowed, Vec<f32>)>,
+    /// Space of each face, and which cuts were made for them, see [`spaces`].
+    spaces: Vec<u32>,
+    parted: Vec<u32>,
     started: Instant,
+}
+
+/// Cuts a mesh as it was cut before: the search casts no ray.
+fn recut(scene: &Scene, mesh: Mesh, parted: &[u32]) -> Mesh {
+    let cuts = cuts(&mesh, &index(scene, &mesh));
+    let some: Vec<_> = parted
+        .iter()
+        .filter_map(|&k| cuts.get(k as usize).cloned())
+        .collect();
+    mesh.cut(&some)
 }
 
 impl Bake {
     /// Prepares a room: welds it, builds the hierarchy and the ray index, and decides what to simulate.
     pub fn new(scene: Scene, settings: Settings) -> Self {
+        Self::with(scene, settings, None)
+    }
+
+    /// The same where rays have told already which faces share a space, and what is closed.
+    fn with(scene: Scene, settings: Settings, known: Option<relight::Known>) -> Self {
         let started = Instant::now();
         let plan = Plan::of(&scene);
         let mut mesh = Mesh::new(&scene);
-        let mut rays = index(&scene, &mesh);
-        let spaces = if plan.runs(Kind::Occlusion) {
-            let cuts = cuts(&mesh, &rays);
-            let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
-            if !found.parted.is_empty() {
-                let parted: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
-                mesh = mesh.cut(&parted);
-                rays = index(&scene, &mesh);
-                found = spaces(&mesh, &rays, &[], settings.seed);
+        let (mut spaces_of_faces, mut parted) = (vec![0; mesh.faces.len()], Vec::new());
+        let (mut rays, mut closed) = (RayIndex::build(&[], &[], &[], &[]), None);
+        match known {
+            Some(known) => {
+                if !known.parted.is_empty() {
+                    mesh = recut(&scene, mesh, &known.parted);
+                }
+                spaces_of_faces = known.spaces;
+                spaces_of_faces.resize(mesh.faces.len(), 0);
+                (parted, closed) = (known.parted, Some(known.closed));
             }
-            found.of_face
-        } else {
-            vec![0; mesh.faces.len()]
-        };
-        let tree = Tree::new(&mesh, &spaces);
+            None => {
+                rays = index(&scene, &mesh);
+                if plan.runs(Kind::Occlusion) {
+                    let cuts = cuts(&mesh, &rays);
+                    let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
+                    if !found.parted.is_empty() {
+                        parted = found.parted.iter().map(|&k| k as u32).collect();
+                        let some: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
+                        mesh = mesh.cut(&some);
+                        rays = index(&scene, &mesh);
+                        found = spaces(&mesh, &rays, &[], settings.seed);
+                    }
+                    spaces_of_faces = found.of_face;
+                }
+            }
+        }
+        let tree = Tree::new(&mesh, &spaces_of_faces);
         let weights = Observer::cie1931().weights(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
         let hemisphere = Hemisphere::for_error(settings.error);
@@ -244,6 +285,9 @@ impl Bake {
             graph: Graph::default(),
             rounds: Vec::new(),
             watch: None,
+            keep: false,
+            watched: Default::default(),
+            frozen: None,
             spectrum_error: None,
             scene,
             settings,
@@ -255,8 +299,14 @@ impl Bake {
             lanes,
             probes,
             hemisphere,
+            spaces: spaces_of_faces,
+            parted,
             started,
         };
+        if let Some(closed) = closed {
+            [bake.closed, bake.sealed] = closed;
+            return bake;
+        }
         [bake.closed, bake.sealed] = bake.with_sight(|bake, sight| {
             flux::closedness(
                 &bake.mesh,
@@ -341,12 +391,18 @@ impl Bake {
         clock.lap("solve");
 
         let receivers = self.probes.receivers(&self.tree, round);
-        let seen: Vec<[f64; 3]> = self
-            .gather(&receivers)
+        let mut gathered = self.gather(&receivers);
+        if self.keep {
+            let traces = gathered.iter_mut().map(|g| g.packed.take()).collect();
+            self.watched = [std::mem::take(&mut self.watched[1]), traces];
+        }
+        let seen: Vec<[f64; 3]> = gathered
             .iter()
             .map(|g| self.lanes.tristimulus(&g.irradiance))
             .collect();
-        let distance = self.probes.compare(seen, self.light.white, by_rays);
+        // The first two rounds are coarse alike: what they share is not noise of rays.
+        let fresh_rays = by_rays && round > 1;
+        let distance = self.probes.compare(seen, self.light.white, fresh_rays);
         clock.lap("estimate");
         let record = Round::new(
             self,
@@ -782,7 +838,7 @@ impl Bake {
             }
             receivers
                 .par_iter()
-                .map_init(Memory::default, |memory, r| gatherer.at(r, memory))
+                .map_init(Memory::default, |memory, r| gatherer.at(r, memory).pack())
                 .collect()
         })
     }
@@ -811,6 +867,7 @@ impl Bake {
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
             hemisphere: by_rays(sight).then_some(&self.hemisphere),
+            keep: self.keep,
         }
     }
 
@@ -843,6 +900,11 @@ impl Bake {
         rows.into_par_iter()
             .map(|k| lister.list(self.light.irradiance.row(k)))
             .collect()
+    }
+
+    /// Punctual lights, recentred, with their rows.
+    pub(crate) fn lamps(&self) -> &[(PunctualLight, Vec<f32>)] {
+        &self.lamps
     }
 
     /// What the lanes stand for.

@@ -13,6 +13,8 @@ use crate::geometry::RayIndex;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{Mesh, NONE, Tree};
 use crate::link::Sight;
+use crate::store::codec::Read;
+use crate::store::{Broken, Decoder, Encoder};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -186,6 +188,12 @@ impl Outlook {
             cast += ends.len() as u64;
             self.ends.extend(ends);
         }
+        self.find(tree);
+        cast
+    }
+
+    /// Looks up which leaf stands at each end.
+    fn find(&mut self, tree: &Tree) {
         self.met = self
             .ends
             .par_iter()
@@ -197,7 +205,66 @@ impl Outlook {
                 tree.leaf_at(end.entry, [1.0 - v - w, v, w])
             })
             .collect();
-        cast
+    }
+
+    /// Have leaves looked for themselves?
+    pub(super) fn looks(&self) -> bool {
+        !self.range.is_empty()
+    }
+
+    /// Writes it down: where the rays end, or only the leaves that they met, which is half as much and enough as long as
+    /// no leaf is split.
+    pub(super) fn encode(&self, whole: bool, out: &mut Encoder) -> std::io::Result<()> {
+        out.put_all(&self.target)?;
+        out.put_all(&self.bare)?;
+        out.put_list(self.range.len(), self.range.iter().map(|r| [r.0, r.1]))?;
+        if whole {
+            out.put_list(self.ends.len(), self.ends.iter().map(|end| end.entry))?;
+            out.put_list(self.ends.len(), self.ends.iter().map(|end| end.at))
+        } else {
+            out.put_all(&self.met)
+        }
+    }
+
+    /// Reads it back, for the hierarchy that it was made for.
+    pub(super) fn decode(tree: &Tree, whole: bool, from: &mut Decoder) -> Read<Self> {
+        let nodes = tree.nodes.len();
+        let mut outlook = Self {
+            target: from.get_exactly(nodes)?,
+            bare: from.get_exactly(nodes)?,
+            ..Self::default()
+        };
+        let ranges = from.get_list::<[u32; 2]>()?;
+        if !(ranges.len() == 0 || ranges.len() == nodes) {
+            return Err(Broken::new("has rays in parts that do not fit"));
+        }
+        outlook.range = ranges.map(|[first, n]| (first, n)).collect();
+        if whole {
+            let entries = from.get_list::<u32>()?;
+            let places = from.get_list::<[u16; 2]>()?;
+            if places.len() != entries.len() {
+                return Err(Broken::new("has rays in parts that do not fit"));
+            }
+            let ends = entries.zip(places).map(|(entry, at)| End { entry, at });
+            outlook.ends = ends.collect();
+            let there = |e: &End| e.entry >= COVERED || (e.entry as usize) < tree.faces.len();
+            if !outlook.ends.iter().all(there) {
+                return Err(Broken::new("has rays that end nowhere"));
+            }
+            outlook.find(tree);
+        } else {
+            outlook.met = from.get_all()?;
+            let there = |&k: &u32| k == NONE || (k as usize) < nodes;
+            if !outlook.met.iter().all(there) {
+                return Err(Broken::new("has rays that end nowhere"));
+            }
+        }
+        let count = outlook.met.len() as u64;
+        let within = |&(first, n): &(u32, u32)| u64::from(first) + u64::from(n) <= count;
+        if !outlook.range.iter().all(within) {
+            return Err(Broken::new("has rays in parts that do not fit"));
+        }
+        Ok(outlook)
     }
 
     /// Mean of what each leaf's rays meet, `nodes` being the radiosity of every patch: by leaf.
@@ -259,7 +326,7 @@ impl Outlook {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        (size_of::<End>() + 4) * self.ends.len() + 16 * self.range.len()
+        (size_of::<End>() + 4) * self.ends.len() + 8 * (self.range.len() + self.target.len())
     }
 
     /// Area of every node that looks out; never quite zero, so that nothing is divided by zero.

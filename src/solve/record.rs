@@ -5,8 +5,9 @@ use super::Representation;
 use super::conjugate::Convergence;
 use super::estimate::Distance;
 use super::flux::Balance;
+use super::forecast::{forecast, next_round};
 use crate::link::{Refined, Way};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Version of the log's format. Raised when a field changes its meaning or goes.
@@ -57,7 +58,7 @@ impl Clock {
 }
 
 /// A figure and what it is.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
     /// The value; none if not known yet.
     pub value: Option<f64>,
@@ -66,7 +67,7 @@ pub struct Figure {
 }
 
 /// What an error figure is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// Cannot be exceeded.
@@ -78,7 +79,7 @@ pub enum Kind {
 }
 
 /// Errors of a round by source; colour differences are means over random points of the room, under the adaptation white.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Errors {
     /// All sources, CIEDE2000.
     pub total_de2000: Figure,
@@ -99,10 +100,15 @@ pub struct Errors {
     pub total_xyz: Figure,
 }
 
+fn round() -> &'static str {
+    "round"
+}
+
 /// One round.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Round {
     /// Always `round`.
+    #[serde(skip_deserializing, default = "round")]
     pub record: &'static str,
     /// Counted from 1.
     pub round: usize,
@@ -110,6 +116,16 @@ pub struct Round {
     pub elapsed_s: f64,
     /// Seconds in this round.
     pub round_s: f64,
+    /// Expected seconds of the next round, from the growth so far.
+    #[serde(default)]
+    pub next_round_s: f64,
+    /// Expected rounds to the asked-for error, an estimate from the errors so far; none if it is not known or the error
+    /// no longer falls.
+    #[serde(default)]
+    pub remaining_rounds: Option<usize>,
+    /// Expected seconds of these rounds (the gather for the output comes on top).
+    #[serde(default)]
+    pub remaining_s: Option<f64>,
     /// Seconds by phase.
     pub phases_s: serde_json::Map<String, serde_json::Value>,
     /// Greatest error a link keeps: share of white, weighted by the root of the receiver's share of area.
@@ -134,6 +150,12 @@ pub struct Round {
     pub intervals_mean: f64,
     /// Bytes in hierarchy, links and rows.
     pub memory_bytes: usize,
+    /// Of which for each link: the link with its blockers, two entries of its rows, two for the gather.
+    #[serde(default)]
+    pub bytes_per_link: f64,
+    /// Of which for each element: its patches, their rows and direct light.
+    #[serde(default)]
+    pub bytes_per_element: f64,
     /// Operator applications of the solve.
     pub iterations: usize,
     /// Errors by source.
@@ -188,11 +210,34 @@ impl Round {
         };
         let white = bake.light.white;
         let light = &bake.light;
+        let seconds = m.clock.total();
+        let error = m.distance.map(|d| all(d.de2000));
+        let before = bake.rounds.iter();
+        let curve: Vec<(f64, Option<f64>)> = before
+            .map(|r| (r.round_s, r.error.total_de2000.value))
+            .chain([(seconds, error)])
+            .collect();
+        let times: Vec<f64> = curve.iter().map(|c| c.0).collect();
+        let ahead = forecast(&curve, bake.settings.error);
+        let per = |bytes: usize, count: usize| bytes as f64 / count.max(1) as f64;
+        let of_links = m.link_bytes
+            + size_of_val(bake.graph.links.as_slice())
+            + size_of_val(bake.graph.blockers.as_slice())
+            + light.neighbours.bytes();
+        let of_elements = bake.tree.bytes()
+            + light.bytes()
+            + bake.direct.bytes()
+            + size_of_val(bake.areas.as_slice())
+            + size_of_val(bake.balance.factor.as_slice())
+            + bake.outlook.bytes();
         Self {
             record: "round",
             round: bake.rounds.len() + 1,
             elapsed_s: bake.started.elapsed().as_secs_f64(),
-            round_s: m.clock.total(),
+            round_s: seconds,
+            next_round_s: next_round(&times),
+            remaining_rounds: ahead.map(|a| a.rounds),
+            remaining_s: ahead.map(|a| a.seconds),
             phases_s: m
                 .clock
                 .laps()
@@ -214,17 +259,12 @@ impl Round {
                 .count(),
             intervals_working: bake.lanes.len(),
             intervals_mean: bake.intervals_mean(),
-            memory_bytes: bake.tree.bytes()
-                + m.link_bytes
-                + bake.outlook.bytes()
-                + size_of_val(bake.graph.links.as_slice())
-                + light.neighbours.bytes()
-                + light.reflected.bytes()
-                + light.emitted.bytes()
-                + light.irradiance.bytes(),
+            memory_bytes: of_links + of_elements,
+            bytes_per_link: per(of_links, bake.graph.links.len()),
+            bytes_per_element: per(of_elements, light.leaves.len()),
             iterations: m.convergence.iterations,
             error: Errors {
-                total_de2000: estimate(m.distance.map(|d| all(d.de2000))),
+                total_de2000: estimate(error),
                 total_de_luv: estimate(m.distance.map(|d| all(d.de_luv))),
                 total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
                 geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),

@@ -1,0 +1,386 @@
+//! A bake between two rounds, written down and taken up again.
+//!
+//! Kept is what cannot be had back from the room without rays: which elements were split (in order, so that the
+//! hierarchy grows again node by node), the links with their blockers, the lanes, how leaves look out and where their rays
+//! end, balance, light and direct light of the leaves, what the watched points saw, and the records. A bake that is resumed ends with the same
+//! bytes as one that was never stopped; so a checkpoint is refused unless the room, the settings and the program are the
+//! same, with what changed.
+//!
+//! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (20 and 8 a ray where leaves look for
+//! themselves), `4 (2 padded lanes + lanes) + 4` a leaf.
+
+use super::light::{Light, Neighbours};
+use super::outlook::Outlook;
+use super::{Bake, Lanes, Representation, Rows, direct, lanes, padded, punctual};
+use crate::error::{Error, Result};
+use crate::hierarchy::{NONE, Tree};
+use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
+use crate::spectrum::LEAVES;
+use crate::store::codec::Read;
+use crate::store::{Broken, Decoder, Encoder, Fingerprint, Kind, Packs, container};
+use std::io;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Ways in a file: clear, crowded, and then lists by their length.
+const CLEAR: u16 = 0;
+const CROWDED: u16 = 1;
+const LISTED: u16 = 2;
+
+impl Bake {
+    /// Writes a checkpoint; its size in bytes.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<u64> {
+        let print = self.fingerprint();
+        container::write(path, Kind::Checkpoint, |out| {
+            print.encode(out)?;
+            self.encode_state(true, &self.balance.factor, out)?;
+            out.put_all(&self.probes.last)?;
+            out.put(self.elapsed().as_secs_f64())
+        })
+    }
+
+    /// Takes up a checkpoint: this bake, which has done no round, goes on where that one stood.
+    ///
+    /// # Errors
+    /// The file cannot be read, is none of ours, is damaged, or belongs to another room or other settings.
+    pub fn resume(&mut self, path: &Path) -> Result<()> {
+        let now = self.fingerprint();
+        let mut changed = None;
+        container::read(path, Kind::Checkpoint, |from| {
+            changed = Fingerprint::decode(from)?.change(&now);
+            if changed.is_some() {
+                // What follows belongs to something else.
+                from.skip();
+                return Ok(());
+            }
+            let (reflected, traces) = self.decode_state(true, from)?;
+            self.light_up(&reflected);
+            self.direct.keep(&self.light.leaves, &traces);
+            self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
+            let seen: Vec<[f64; 3]> = from.get_all()?;
+            if !seen.is_empty() && seen.len() != self.probes.points.len() {
+                return Err(Broken::new("has another number of watched points"));
+            }
+            self.probes.last = seen;
+            let elapsed: f64 = from.get()?;
+            let elapsed = Duration::try_from_secs_f64(elapsed)
+                .map_err(|_| Broken::new("has been worked on for no time"))?;
+            if let Some(started) = Instant::now().checked_sub(elapsed) {
+                self.started = started;
+            }
+            Ok(())
+        })?;
+        match changed {
+            None => Ok(()),
+            Some(what) => Err(Error::input(
+                path.display().to_string(),
+                format!("belongs to another bake: {what}"),
+                Kind::Checkpoint.next(),
+            )),
+        }
+    }
+
+    /// Everything that the outcome depends on.
+    fn fingerprint(&self) -> Fingerprint {
+        let mut print = Fingerprint::default();
+        print.set_text("program", crate::PROGRAM);
+        print.set("--cache", &[u8::from(self.keep)]);
+        print.set("error asked for", &[self.settings.error]);
+        print.set("seed", &[self.settings.seed]);
+        let representation = format!("{:?}", self.settings.representation);
+        print.set_text("representation", &representation);
+        print.set(
+            "share of spectra",
+            &[self.settings.spectrum.unwrap_or(f64::NAN)],
+        );
+        print.set("white", &self.settings.white.unwrap_or([f64::NAN; 3]));
+        print.extend(Fingerprint::shape(&self.scene));
+        print.extend(Fingerprint::paint(&self.scene));
+        print
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.started.elapsed()
+    }
+
+    /// Writes hierarchy, links and the last solution; `whole`: with what further rounds need.
+    pub(super) fn encode_state(
+        &self,
+        whole: bool,
+        factor: &[f32],
+        out: &mut Encoder,
+    ) -> io::Result<()> {
+        out.put_all(&splits(&self.tree))?;
+        encode_graph(&self.graph, out)?;
+        // Lanes that are no intervals follow from the room.
+        let intervals = self.lanes.lanes();
+        out.put_list(
+            intervals.len(),
+            intervals.iter().map(|l| {
+                let light = l.light.map_or(u32::MAX, |light| light as u32);
+                [light, l.first as u32, l.count as u32]
+            }),
+        )?;
+        out.put(self.spectrum_error.unwrap_or(f64::NAN))?;
+        out.put(self.light.white)?;
+        self.outlook.encode(whole, out)?;
+        out.put_all(factor)?;
+        out.put([self.balance.defect_before, self.balance.defect_after])?;
+        out.put(self.balance.limited as u64)?;
+        let leaves = &self.light.leaves;
+        let (reflected, irradiance) = (&self.light.reflected, &self.light.irradiance);
+        out.put_list(
+            leaves.len() * reflected.width(),
+            leaves
+                .iter()
+                .flat_map(|&k| reflected.row(k as usize).iter().copied()),
+        )?;
+        out.put_list(
+            leaves.len() * irradiance.width(),
+            (0..leaves.len()).flat_map(|k| irradiance.row(k).iter().copied()),
+        )?;
+        out.put_list(
+            leaves.len() * self.lanes.len(),
+            leaves
+                .iter()
+                .flat_map(|&k| self.direct.row(k).iter().copied()),
+        )?;
+        out.put_list(leaves.len(), leaves.iter().map(|&k| self.direct.spread(k)))?;
+        out.put(self.direct.rays)?;
+        Packs::encode(leaves.iter().map(|&k| self.direct.trace(k)), out)?;
+        for round in &self.watched {
+            Packs::encode(round.iter().map(Option::as_deref), out)?;
+        }
+        let rounds = serde_json::to_string(&self.rounds).map_err(io::Error::other)?;
+        out.put_text(&rounds)
+    }
+
+    /// Takes them up, except for what is behind `light.irradiance` and `light.leaves`: what the leaves reflect, and where
+    /// the direct light of each leaf comes from, if that was kept.
+    pub(super) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
+        let splits = from.get_list::<u32>()?;
+        self.tree.nodes.reserve(4 * splits.len());
+        self.tree.elements.reserve(4 * splits.len());
+        for id in splits {
+            split(&mut self.tree, id)?;
+        }
+        let nodes = self.tree.nodes.len();
+        self.graph = decode_graph(nodes, self.mesh.triangles.len(), from)?;
+        let lights = self.scene.spectra.len();
+        let lanes = from
+            .get_all::<[u32; 3]>()?
+            .into_iter()
+            .map(|lane| lane_of(lane, lights))
+            .collect::<Read<Vec<lanes::Lane>>>()?;
+        if lanes.len() > LEAVES {
+            return Err(Broken::new("has an impossible number of lanes"));
+        }
+        self.lanes = match self.settings.representation {
+            Representation::Rgb | Representation::Characteristic(_) if lanes.is_empty() => {
+                self.chosen_lanes()
+            }
+            _ if lanes.is_empty() => return Err(Broken::new("has no lanes")),
+            _ => Lanes::with(lanes, &self.scene.spectra, &self.weights),
+        };
+        let error: f64 = from.get()?;
+        self.spectrum_error = (!error.is_nan()).then_some(error);
+        let white = from.get()?;
+        self.outlook = Outlook::decode(&self.tree, whole, from)?;
+        let factor: Vec<f32> = from.get_all()?;
+        // Where leaves look for themselves nothing is balanced.
+        let by_rays = self.with_sight(|_, sight| super::by_rays(sight));
+        let wanted = if by_rays && whole { 0 } else { nodes };
+        if factor.len() != wanted || self.outlook.looks() != by_rays {
+            return Err(Broken::new("does not know what its leaves see"));
+        }
+        let [defect_before, defect_after] = from.get()?;
+        self.balance = Balance {
+            factor,
+            defect_before,
+            defect_after,
+            limited: from.get::<u64>()? as usize,
+        };
+        self.areas = self.outlook.areas(&self.tree);
+        let leaves: Vec<u32> = (0..nodes as u32)
+            .filter(|&k| self.tree.node(k).is_leaf())
+            .collect();
+        let (count, width) = (leaves.len(), padded(self.lanes.len()));
+        let reflected = rows(from, count, width)?;
+        let irradiance = rows(from, count, width)?;
+        let known: Vec<f32> = from.get_exactly(count * self.lanes.len())?;
+        let spread: Vec<f32> = from.get_exactly(count)?;
+        let rays = from.get()?;
+        self.direct =
+            direct::Direct::known(&leaves, nodes, self.lanes.len(), &known, &spread, rays);
+        let traces = Packs::decode(from)?;
+        for round in &mut self.watched {
+            let packs = Packs::decode(from)?;
+            *round = (0..packs.len())
+                .map(|k| packs.get(k).map(Box::from))
+                .collect();
+        }
+        if traces.len() != count {
+            return Err(Broken::new("has another number of leaves"));
+        }
+        self.rounds = serde_json::from_str(&from.get_text()?)
+            .map_err(|problem| Broken::new(format!("has records that do not read: {problem}")))?;
+        self.light = Light {
+            irradiance,
+            leaves,
+            white,
+            ..Light::default()
+        };
+        Ok((reflected, traces))
+    }
+
+    /// The last solution from what the leaves reflect.
+    pub(super) fn light_up(&mut self, reflected: &Rows) {
+        match reflected.width() {
+            4 => self.light_up_lanes::<4>(reflected),
+            8 => self.light_up_lanes::<8>(reflected),
+            16 => self.light_up_lanes::<16>(reflected),
+            32 => self.light_up_lanes::<32>(reflected),
+            _ => self.light_up_lanes::<64>(reflected),
+        }
+    }
+
+    fn light_up_lanes<const L: usize>(&mut self, reflected: &Rows) {
+        let mut light = std::mem::take(&mut self.light);
+        let painter = super::Painter::new(&self.scene, &self.mesh);
+        let emission = painter
+            .paint(&self.tree, &light.leaves, &self.lanes)
+            .emission;
+        light.reflected = self.on_nodes::<L>(reflected, &light.leaves);
+        light.emitted = self.on_nodes::<L>(&emission, &light.leaves);
+        light.half_size = self.mesh.half_size;
+        light.measure(&self.tree, &self.lanes);
+        self.light = light;
+        self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
+    }
+}
+
+/// Elements that were split, in the order in which it happened.
+fn splits(tree: &Tree) -> Vec<u32> {
+    let mut split: Vec<u32> = (0..tree.nodes.len() as u32)
+        .filter(|&k| tree.node(k).element != NONE && !tree.node(k).is_leaf())
+        .collect();
+    split.sort_unstable_by_key(|&k| tree.node(k).child);
+    split
+}
+
+fn split(tree: &mut Tree, id: u32) -> Read<()> {
+    let possible = tree.nodes.get(id as usize).is_some_and(|node| {
+        node.is_leaf()
+            && tree
+                .element(node)
+                .is_some_and(|element| element.depth < MAX_DEPTH)
+    });
+    if !possible {
+        return Err(Broken::new("splits an element that cannot be split"));
+    }
+    tree.subdivide(id);
+    Ok(())
+}
+
+fn encode_graph(graph: &Graph, out: &mut Encoder) -> io::Result<()> {
+    let links = &graph.links;
+    out.put_list(links.len(), links.iter().map(|l| [l.a, l.b]))?;
+    out.put_list(
+        links.len(),
+        links
+            .iter()
+            .map(|l| [l.exchange, l.open_exchange, l.variation]),
+    )?;
+    out.put_list(
+        links.len(),
+        links.iter().map(|l| match l.way {
+            Way::Clear => CLEAR,
+            Way::Crowded => CROWDED,
+            Way::Listed { count, .. } => LISTED + u16::from(count),
+        }),
+    )?;
+    let starts: Vec<u32> = links
+        .iter()
+        .filter_map(|l| match l.way {
+            Way::Listed { start, .. } => Some(start),
+            _ => None,
+        })
+        .collect();
+    out.put_all(&starts)?;
+    out.put_all(&graph.blockers)
+}
+
+fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Graph> {
+    let ends = from.get_list::<[u32; 2]>()?;
+    let figures = from.get_list::<[f32; 3]>()?;
+    let ways = from.get_list::<u16>()?;
+    if figures.len() != ends.len() || ways.len() != ends.len() {
+        return Err(Broken::new("has links in parts that do not fit"));
+    }
+    let mut starts = from.get_list::<u32>()?;
+    let blockers: Vec<u32> = from.get_all()?;
+    if blockers.iter().any(|&t| t as usize >= triangles) {
+        return Err(Broken::new("lists a triangle that does not exist"));
+    }
+    let mut links = Vec::with_capacity(ends.len());
+    for (([a, b], [exchange, open_exchange, variation]), way) in ends.zip(figures).zip(ways) {
+        if a as usize >= nodes || b as usize >= nodes {
+            return Err(Broken::new("links a patch that does not exist"));
+        }
+        let way = match way {
+            CLEAR => Way::Clear,
+            CROWDED => Way::Crowded,
+            listed => {
+                let count = u8::try_from(listed - LISTED).ok();
+                let list = starts.next().zip(count);
+                let there = |&(start, count): &(u32, u8)| {
+                    start as usize + usize::from(count) <= blockers.len()
+                };
+                let (start, count) = list
+                    .filter(there)
+                    .ok_or_else(|| Broken::new("lists blockers that are not there"))?;
+                Way::Listed { start, count }
+            }
+        };
+        links.push(Link {
+            a,
+            b,
+            exchange,
+            open_exchange,
+            variation,
+            way,
+        });
+    }
+    Ok(Graph { links, blockers })
+}
+
+fn lane_of([light, first, count]: [u32; 3], lights: usize) -> Read<lanes::Lane> {
+    let (first, count) = (first as usize, count as usize);
+    let light = (light != u32::MAX).then_some(light as usize);
+    if light.is_some_and(|l| l >= lights) || count == 0 || first >= LEAVES || count > LEAVES - first
+    {
+        return Err(Broken::new("has an impossible lane"));
+    }
+    Ok(lanes::Lane {
+        light,
+        first,
+        count,
+    })
+}
+
+fn rows(from: &mut Decoder, count: usize, width: usize) -> Read<Rows> {
+    let mut flat = from.get_list::<f32>()?;
+    if flat.len() != count * width {
+        return Err(Broken::new("has rows that do not fit"));
+    }
+    let mut rows = Rows::zero(count, width);
+    for k in 0..count {
+        for x in rows.row_mut(k) {
+            *x = flat.next().unwrap_or(0.0);
+        }
+    }
+    Ok(rows)
+}

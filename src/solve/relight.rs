@@ -1,0 +1,531 @@
+//! The same room under other lamps and paints: links, form factors and visibility are kept, only the light is solved anew.
+//!
+//! A cache holds a finished bake (see `checkpoint`) and where every leaf and every vertex of the output gets its light
+//! from (see `gather::trace`). Light is linear in lamps and, given the solution, in paints: direct light of the leaves is
+//! one sparse product, the solve starts from the old solution, and the light of the vertices is another product. No ray
+//! is cast: there is not even a ray index. What was refined for the old light stays as fine as it was: shadows of a lamp
+//! that was dark beside the others are as coarse as they were worth then.
+//!
+//! A cache belongs to a shape: surfaces, sides, holes, places of lights. Where that changed it is refused with what
+//! changed; so is a room in which a surface gives out light that did not (lamps may go out).
+
+use super::conjugate::Convergence;
+use super::lanes::Lanes;
+use super::light::{Light, Neighbours};
+use super::{
+    Bake, Closed, DE_PER_PERCENT, Painter, Rows, Settings, direct, flux, padded, punctual,
+};
+use crate::color::de2000;
+use crate::error::{Error, Result};
+use crate::gather::{Baked, Kept, trace};
+use crate::link::{LinkRows, balance};
+use crate::scene::Scene;
+use crate::spectrum::LEAVES;
+use crate::store::codec::Read;
+use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
+use rayon::prelude::*;
+use std::path::Path;
+use std::time::Instant;
+
+/// Leaves that a task lights.
+const CHUNK: usize = 256;
+
+/// What rays have told of a room before the first round.
+pub(super) struct Known {
+    pub(super) spaces: Vec<u32>,
+    /// Which cuts of triangles were made for their sake.
+    pub(super) parted: Vec<u32>,
+    /// Of the room, and without what is covered.
+    pub(super) closed: [Closed; 2],
+}
+
+/// A finished bake whose lamps and paints may change.
+pub struct Relighter {
+    bake: Bake,
+    shape: Fingerprint,
+    /// Which surfaces gave out light.
+    lit: Vec<u8>,
+    /// Of the room that the present lanes were chosen for.
+    paint: Fingerprint,
+    /// White of the last solution over the guess for its lamps and paints, X, Y, Z.
+    guess: [f64; 3],
+    /// Rows of links, once they were asked for.
+    links: Option<LinkRows>,
+    /// Of the present light.
+    solved: Convergence,
+    flux: flux::Balance,
+    leaves: Packs,
+    /// Half the range of direct light over each leaf, under the light of the bake.
+    spread: Vec<f32>,
+    kept: Vec<Kept>,
+    /// What the bake estimated for geometry, over what its last two rounds differ by at the watched points with the same
+    /// light on the patches.
+    geometry: Option<f64>,
+}
+
+/// A relit room.
+#[derive(Debug)]
+pub struct Relit {
+    /// The output mesh with its new light.
+    pub baked: Baked,
+    /// What it took.
+    pub record: RelitRecord,
+}
+
+/// What relighting took and how wrong it may be.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct RelitRecord {
+    /// Always `relit`.
+    pub record: &'static str,
+    /// Did lamps or paints change?
+    pub changed: bool,
+    /// Wavelength intervals of the working partition, all lights together.
+    pub intervals_working: usize,
+    /// Operator applications of the solve.
+    pub iterations: usize,
+    /// Mean colour difference (CIEDE2000), an estimate: geometry as the bake estimated it, times how much more (or less)
+    /// the gathers of its last two rounds differ under this light than under its own; wavelengths and the solve as they
+    /// are now.
+    pub error_de2000: super::record::Figure,
+    /// Where the light went.
+    pub flux: flux::Balance,
+    /// Seconds: choice of lanes, direct light, solve, light of the vertices.
+    pub lanes_s: f64,
+    /// Direct light of the leaves.
+    pub direct_s: f64,
+    /// The solve.
+    pub solve_s: f64,
+    /// Light of the vertices.
+    pub gather_s: f64,
+}
+
+impl Bake {
+    /// Keeps where light comes from, for [`Bake::write_cache`]. To be called before the first round.
+    pub fn keep(&mut self) {
+        self.keep = true;
+    }
+
+    /// Is it kept where light comes from?
+    pub fn keeps(&self) -> bool {
+        self.keep
+    }
+
+    /// Writes what relighting needs beside the baked mesh; the size in bytes.
+    ///
+    /// # Errors
+    /// The cache would be larger than `limit` bytes; the file cannot be written; a bake that did not [`Bake::keep`].
+    pub fn write_cache(&self, baked: &Baked, path: &Path, limit: u64) -> Result<u64> {
+        if !self.keep || baked.kept.len() != baked.surfaces.len() {
+            return Err(Error::Internal("a bake that kept nothing".into()));
+        }
+        let size = self.cache_bytes(baked);
+        if size > limit {
+            return Err(Error::input(
+                path.display().to_string(),
+                format!(
+                    "the cache would take {} MB, and {} MB are allowed",
+                    size >> 20,
+                    limit >> 20
+                ),
+                "raise --cache-limit, or ask for a larger --error",
+            ));
+        }
+        let guess = flux::guess(&self.scene, &self.mesh, &self.tree, &self.weights).white;
+        let distance = self
+            .watched_distance()
+            .map_err(|Broken(what)| Error::Internal(what))?;
+        // Where leaves look for themselves, only the choice of lanes needs a balance.
+        let factor = if self.balance.factor.is_empty() {
+            let links = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
+            balance(&self.tree, &links, &self.areas, &self.outlook.target).factor
+        } else {
+            self.balance.factor.clone()
+        };
+        let settings = serde_json::to_string(&self.settings)
+            .map_err(|problem| Error::Internal(format!("settings: {problem}")))?;
+        container::write(path, Kind::Cache, |out| {
+            Fingerprint::shape(&self.scene).encode(out)?;
+            Fingerprint::paint(&self.scene).encode(out)?;
+            out.put_text(&settings)?;
+            out.put_all(&self.spaces)?;
+            out.put_all(&self.parted)?;
+            out.put([self.closed, self.sealed].map(|c| u8::from(c == Closed::Yes)))?;
+            out.put(guess)?;
+            out.put(distance.unwrap_or(0.0))?;
+            out.put_all(&lit(&self.scene))?;
+            self.encode_state(false, &factor, out)?;
+            out.put(baked.surfaces.len() as u64)?;
+            for (surface, kept) in baked.surfaces.iter().zip(&baked.kept) {
+                Kept::encode(surface, kept, out)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Mean colour difference between what the traces of the last two rounds give at the watched points under the present
+    /// light; none before there are two.
+    fn watched_distance(&self) -> Read<Option<f64>> {
+        let seen = |round: &[Option<Box<[u8]>>]| -> Read<Vec<[f64; 3]>> {
+            round
+                .iter()
+                .map(|packed| {
+                    let packed = packed.as_deref().unwrap_or(&[]);
+                    let (light, lamps) = (&self.light, &self.lamps);
+                    Ok(match self.light.width() {
+                        4 => self
+                            .lanes
+                            .tristimulus(&trace::replay::<4>(packed, light, lamps)?),
+                        8 => self
+                            .lanes
+                            .tristimulus(&trace::replay::<8>(packed, light, lamps)?),
+                        16 => self
+                            .lanes
+                            .tristimulus(&trace::replay::<16>(packed, light, lamps)?),
+                        32 => self
+                            .lanes
+                            .tristimulus(&trace::replay::<32>(packed, light, lamps)?),
+                        _ => self
+                            .lanes
+                            .tristimulus(&trace::replay::<64>(packed, light, lamps)?),
+                    })
+                })
+                .collect()
+        };
+        let [before, last] = &self.watched;
+        if before.is_empty() || before.len() != last.len() {
+            return Ok(None);
+        }
+        let (a, b) = (seen(before)?, seen(last)?);
+        let pairs = a.iter().zip(&b);
+        let sum: f64 = pairs.map(|(a, b)| de2000(*a, *b, self.light.white)).sum();
+        Ok(Some(sum / a.len() as f64))
+    }
+
+    /// About how many bytes a cache takes.
+    pub fn cache_bytes(&self, baked: &Baked) -> u64 {
+        let leaves = &self.light.leaves;
+        let of_leaves: usize = leaves
+            .iter()
+            .map(|&leaf| self.direct.trace(leaf).map_or(0, <[u8]>::len))
+            .sum();
+        let vertices: usize = baked.kept.iter().map(Vec::len).sum();
+        let of_vertices: usize = (baked.kept.iter().flatten())
+            .map(|v| v.trace.as_ref().map_or(0, |t| t.len()))
+            .sum();
+        let rows = leaves.len() * (8 * self.light.width() + 4 * self.lanes.len() + 16);
+        (of_leaves
+            + of_vertices
+            + 32 * vertices
+            + 12 * baked
+                .surfaces
+                .iter()
+                .map(|s| s.triangles.len())
+                .sum::<usize>()
+            + rows
+            + 12 * self.tree.nodes.len()
+            + self.outlook.bytes()
+            + 22 * self.graph.links.len()
+            + 4 * self.graph.blockers.len()
+            + 4 * self.spaces.len()) as u64
+    }
+}
+
+impl Relighter {
+    /// Opens the cache of a room, which may have other lamps and paints by now.
+    ///
+    /// # Errors
+    /// The file cannot be read, is none of ours, is damaged, or belongs to a room of another shape.
+    pub fn open(cache: &Path, scene: Scene) -> Result<Self> {
+        let now = Fingerprint::shape(&scene);
+        let mut opened = Err(None);
+        container::read(cache, Kind::Cache, |from| {
+            opened = match Fingerprint::decode(from)?.change(&now) {
+                None => Ok(Self::decode(scene, now, from)?),
+                Some(what) => {
+                    // What follows belongs to something else.
+                    from.skip();
+                    Err(Some(what))
+                }
+            };
+            Ok(())
+        })?;
+        let place = cache.display().to_string();
+        let opened = opened.map_err(|what| refused(&place, &what.unwrap_or_default()))?;
+        match opened.kindled(&opened.bake.scene) {
+            None => Ok(opened),
+            Some(what) => Err(refused(&place, &what)),
+        }
+    }
+
+    /// A surface that gives out light and did not: nobody looked for its shadows.
+    fn kindled(&self, scene: &Scene) -> Option<String> {
+        let now = lit(scene);
+        let new = (0..now.len()).find(|&k| now[k] > self.lit[k])?;
+        let name = &scene.surfaces[new].name;
+        Some(format!("surface {name} gives out light and did not"))
+    }
+
+    fn decode(scene: Scene, shape: Fingerprint, from: &mut Decoder) -> Read<Self> {
+        let paint = Fingerprint::decode(from)?;
+        let settings: Settings = serde_json::from_str(&from.get_text()?)
+            .map_err(|problem| Broken::new(format!("has settings that do not read: {problem}")))?;
+        let (spaces, parted) = (from.get_all()?, from.get_all()?);
+        let closed = from
+            .get::<[u8; 2]>()?
+            .map(|c| if c == 1 { Closed::Yes } else { Closed::No });
+        let known = Known {
+            spaces,
+            parted,
+            closed,
+        };
+        let mut bake = Bake::with(scene, settings, Some(known));
+        bake.keep = true;
+        let guess: [f64; 3] = from.get()?;
+        let distance: f64 = from.get()?;
+        let lit = from.get_exactly(bake.scene.surfaces.len())?;
+        let (reflected, leaves) = bake.decode_state(false, from)?;
+        bake.light_up(&reflected);
+        let mut kept = Vec::new();
+        for _ in 0..from.get::<u64>()? {
+            kept.push(Kept::decode(&bake.mesh, from)?);
+        }
+        let white = bake.light.white;
+        Ok(Self {
+            guess: over(white, guess, [1.0; 3]),
+            geometry: (bake.rounds.last())
+                .and_then(|r| Some(without(r.error.total_de2000.value?, r) / distance))
+                .filter(|_| distance > 0.0),
+            shape,
+            lit,
+            paint,
+            links: None,
+            solved: Convergence {
+                bound: (bake.rounds.last())
+                    .and_then(|r| r.error.convergence.value)
+                    .unwrap_or(0.0),
+                ..Convergence::default()
+            },
+            flux: bake.rounds.last().map(|r| r.flux).unwrap_or_default(),
+            spread: (bake.light.leaves.iter())
+                .map(|&leaf| bake.direct.spread(leaf))
+                .collect(),
+            leaves,
+            kept,
+            bake,
+        })
+    }
+
+    /// The room, to be relit under other lamps and paints.
+    ///
+    /// # Errors
+    /// Its shape is another.
+    pub fn change(&mut self, scene: Scene) -> Result<()> {
+        let changed = self.shape.change(&Fingerprint::shape(&scene));
+        if let Some(what) = changed.or_else(|| self.kindled(&scene)) {
+            return Err(refused(&scene.source.path.display().to_string(), &what));
+        }
+        self.bake.scene = scene;
+        self.bake.plan = crate::scene::effects::Plan::of(&self.bake.scene);
+        Ok(())
+    }
+
+    /// Light for the lamps and paints that the room has now.
+    ///
+    /// # Errors
+    /// The cache is damaged in a way that its checksum does not show.
+    pub fn relight(&mut self) -> Result<Relit> {
+        self.relit()
+            .map_err(|Broken(what)| Error::input("the cache", what, Kind::Cache.next()))
+    }
+
+    fn relit(&mut self) -> Read<Relit> {
+        let clock = Instant::now();
+        let paint = Fingerprint::paint(&self.bake.scene);
+        let changed = paint.change(&self.paint).is_some();
+        if changed {
+            self.choose_lanes()?;
+            self.paint = paint;
+        }
+        let lanes_s = clock.elapsed().as_secs_f64();
+        let (convergence, flux, [direct_s, solve_s]) = match padded(self.bake.lanes.len()) {
+            // The light is there already.
+            _ if !changed => (self.solved, self.flux, [0.0; 2]),
+            4 => self.solve::<4>()?,
+            8 => self.solve::<8>()?,
+            16 => self.solve::<16>()?,
+            32 => self.solve::<32>()?,
+            _ => self.solve::<64>()?,
+        };
+        (self.solved, self.flux) = (convergence, flux);
+        let clock = Instant::now();
+        let baked = self.bake.relit(&self.kept)?;
+        let bake = &self.bake;
+        let distance = bake.watched_distance()?;
+        let error = self.geometry.zip(distance).map(|(share, distance)| {
+            let geometry = share * distance;
+            let solve = convergence.bound * 100.0 * DE_PER_PERCENT;
+            (geometry.powi(2) + bake.spectrum_error.unwrap_or(0.0).powi(2) + solve.powi(2)).sqrt()
+        });
+        Ok(Relit {
+            record: RelitRecord {
+                record: "relit",
+                changed,
+                intervals_working: bake.lanes.len(),
+                iterations: if changed { convergence.iterations } else { 0 },
+                error_de2000: super::record::Figure {
+                    value: error,
+                    kind: super::record::Kind::Estimate,
+                },
+                flux,
+                lanes_s,
+                direct_s,
+                solve_s,
+                gather_s: clock.elapsed().as_secs_f64(),
+            },
+            baked,
+        })
+    }
+
+    /// Lanes for the present lamps and paints.
+    fn choose_lanes(&mut self) -> Read<()> {
+        let bake = &mut self.bake;
+        let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
+        let white = std::array::from_fn(|c| self.guess[c] * guess[c]);
+        bake.light.white = bake.settings.white.unwrap_or(white);
+        let (nodes, lights) = (bake.tree.nodes.len(), bake.scene.lights.len());
+        let shadowed = punctual::Shadowed {
+            by_leaf: (0..self.leaves.len())
+                .map(|k| match self.leaves.get(k) {
+                    Some(packed) => trace::lamps_of(packed, nodes, lights),
+                    None => Ok(Vec::new()),
+                })
+                .collect::<Read<Vec<_>>>()?,
+            rays: 0,
+        };
+        bake.frozen = Some((shadowed, bake.balance.factor.clone()));
+        bake.choose_lanes();
+        bake.frozen = None;
+        Ok(())
+    }
+
+    /// Direct light by the kept weights, and the solve on the kept links.
+    fn solve<const L: usize>(&mut self) -> Read<(Convergence, flux::Balance, [f64; 2])> {
+        let clock = Instant::now();
+        let bake = &mut self.bake;
+        let leaves = bake.light.leaves.clone();
+        let nodes = bake.tree.nodes.len();
+        bake.lamps = punctual::lamps(&bake.scene, &bake.mesh, &bake.lanes);
+        let emission = Painter::new(&bake.scene, &bake.mesh)
+            .paint(&bake.tree, &leaves, &bake.lanes)
+            .emission;
+        bake.light.emitted = bake.on_nodes::<L>(&emission, &leaves);
+        bake.previous = std::mem::replace(&mut bake.light.reflected, Rows::zero(nodes, L));
+        let mut light = std::mem::take(&mut bake.light);
+        light.bright_emitted = (0..nodes)
+            .map(|k| f32::from(u8::from(light.emitted.row(k).iter().any(|&x| x > 0.0))))
+            .collect();
+        let lanes = bake.lanes.len();
+        let lit: Vec<Vec<f32>> = (0..leaves.len())
+            .collect::<Vec<usize>>()
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let mut rows = Vec::with_capacity(chunk.len() * lanes);
+                for &k in chunk {
+                    let row = match self.leaves.get(k) {
+                        Some(packed) => trace::replay::<L>(packed, &light, &bake.lamps)?,
+                        None => [0.0; L],
+                    };
+                    rows.extend_from_slice(&row[..lanes]);
+                }
+                Ok(rows)
+            })
+            .collect::<Read<_>>()?;
+        bake.direct = direct::Direct::known(
+            &leaves,
+            nodes,
+            lanes,
+            &lit.concat(),
+            &self.spread,
+            bake.direct.rays,
+        );
+        let direct_s = clock.elapsed().as_secs_f64();
+
+        let clock = Instant::now();
+        // Nobody asks for neighbours without casting rays.
+        light.neighbours = Neighbours::default();
+        bake.light = light;
+        let links = rows(&mut self.links, bake);
+        let graph = std::mem::take(&mut bake.graph);
+        let (convergence, flux) = bake.solve::<L>(links, &leaves);
+        bake.graph = graph;
+        let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
+        self.guess = over(bake.light.white, guess, self.guess);
+        Ok((convergence, flux, [direct_s, clock.elapsed().as_secs_f64()]))
+    }
+
+    /// The bake behind it. It has no rays: nothing may be gathered at new points.
+    pub(crate) fn bake(&self) -> &Bake {
+        &self.bake
+    }
+
+    /// The room as it is lit now.
+    pub fn scene(&self) -> &Scene {
+        &self.bake.scene
+    }
+
+    /// What the lanes of the present light stand for.
+    pub fn lanes(&self) -> &Lanes {
+        &self.bake.lanes
+    }
+
+    /// The present light on the patches.
+    pub fn light(&self) -> &Light {
+        &self.bake.light
+    }
+
+    /// Radiosity on the 64 leaves at every vertex of a relit mesh, see [`Bake::radiosity_spectra`].
+    pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
+        self.bake.radiosity_spectra(baked)
+    }
+}
+
+/// White over guess, channel by channel; `otherwise` where nothing was guessed.
+fn over(white: [f64; 3], guess: [f64; 3], otherwise: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        if guess[c] > 0.0 {
+            white[c] / guess[c]
+        } else {
+            otherwise[c]
+        }
+    })
+}
+
+/// Links in rows.
+fn rows<'a>(links: &'a mut Option<LinkRows>, bake: &Bake) -> &'a LinkRows {
+    links.get_or_insert_with(|| LinkRows::new(bake.tree.nodes.len(), &bake.graph.links))
+}
+
+/// For each surface: does it give out light?
+fn lit(scene: &Scene) -> Vec<u8> {
+    let emits = |material: usize| scene.materials[material].emission.is_some();
+    scene
+        .surfaces
+        .iter()
+        .map(|s| u8::from(emits(s.material)))
+        .collect()
+}
+
+/// Estimate of a round without its wavelengths and its solve, which are known anew.
+fn without(total: f64, round: &super::Round) -> f64 {
+    let parts = [round.error.spectrum_de_luv, round.error.convergence_de_luv]
+        .map(|f| f.value.unwrap_or(0.0).powi(2));
+    (total * total - parts[0] - parts[1]).max(0.0).sqrt()
+}
+
+fn refused(place: &str, what: &str) -> Error {
+    Error::input(
+        place,
+        format!("the cache belongs to a room of another shape: {what}"),
+        Kind::Cache.next(),
+    )
+}

@@ -1,0 +1,341 @@
+//! What a room is made of, part by part, as hashes: is it the same room, and if not, what changed?
+//!
+//! Two lists: *shape* is what decides who sees whom (surfaces in world space with their normals, sides and holes, places
+//! and cones of lights); *paint* is everything else that decides the light
+//! (reflectances, textures, spectra, powers, wavelengths). Names are kept for messages only: a part that was renamed
+//! is the same part.
+
+use super::codec::{Decoder, Encoder, Plain, Read};
+use super::hash::Hasher;
+use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
+use std::collections::BTreeMap;
+use std::io;
+
+/// Changes that a message names; the others are counted.
+const NAMED: usize = 4;
+
+/// The parts of something and their hashes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Fingerprint {
+    parts: Vec<(String, u64)>,
+}
+
+/// A hash of plain numbers.
+#[derive(Default)]
+struct Mix(Hasher);
+
+impl Mix {
+    fn add<T: Plain>(&mut self, x: T) -> &mut Self {
+        self.all(&[x])
+    }
+
+    fn all<T: Plain>(&mut self, list: &[T]) -> &mut Self {
+        let mut buffer = [0; 4096];
+        let each = buffer.len() / T::SIZE;
+        for part in list.chunks(each) {
+            for (x, to) in part.iter().zip(buffer.chunks_exact_mut(T::SIZE)) {
+                x.store(to);
+            }
+            self.0.update(&buffer[..part.len() * T::SIZE]);
+        }
+        // Lists that follow each other must not run together.
+        self.0.update(&(list.len() as u64).to_le_bytes());
+        self
+    }
+
+    fn text(&mut self, text: &str) -> &mut Self {
+        self.all(text.as_bytes())
+    }
+
+    fn texture(&mut self, texture: &Texture, images: &[u64]) -> &mut Self {
+        let wrap = texture.wrap.map(|w| w as u8);
+        self.add(images[texture.image])
+            .add(texture.texcoord as u64)
+            .add(texture.transform)
+            .add(wrap)
+    }
+}
+
+impl Fingerprint {
+    /// What decides who sees whom.
+    pub fn shape(scene: &Scene) -> Self {
+        let mut print = Self::default();
+        let images = images(scene);
+        for surface in &scene.surfaces {
+            let material = &scene.materials[surface.material];
+            let mut mix = Mix::default();
+            let positions: Vec<[f64; 3]> = surface.positions.iter().map(|p| p.to_array()).collect();
+            mix.all(&positions).all(&surface.triangles);
+            if let Some(normals) = &surface.normals {
+                let normals: Vec<[f32; 3]> = normals.iter().map(|n| n.to_array()).collect();
+                mix.all(&normals);
+            }
+            mix.add(u8::from(material.sides == Sides::Both));
+            if let Alpha::Mask {
+                cutoff,
+                factor,
+                texture,
+            } = &material.alpha
+            {
+                mix.add([*cutoff, *factor]);
+                let alpha = surface.colors.iter().flatten().map(|c| c[3]);
+                mix.all(&alpha.collect::<Vec<f32>>());
+                if let Some(texture) = texture {
+                    mix.texture(texture, &images);
+                    if let Some(uvs) = surface.texcoords.get(texture.texcoord) {
+                        mix.all(uvs);
+                    }
+                }
+            }
+            print.add(format!("surface {}", surface.name), &mix);
+        }
+        for light in &scene.lights {
+            let mut mix = Mix::default();
+            let kind = match light.kind {
+                LightKind::Point => [0.0; 3],
+                LightKind::Spot { inner, outer } => [1.0, inner, outer],
+                LightKind::Directional => [2.0, 0.0, 0.0],
+            };
+            mix.add(kind).add(light.direction.to_array());
+            if light.kind != LightKind::Directional {
+                mix.add(light.position.to_array());
+            }
+            print.add(format!("place of light '{}'", light.name), &mix);
+        }
+        print
+    }
+
+    /// What else decides the light.
+    pub fn paint(scene: &Scene) -> Self {
+        let mut print = Self::default();
+        let images = images(scene);
+        print.set("wavelengths", &[scene.grid.start(), scene.grid.end()]);
+        for spectrum in &scene.spectra {
+            print.set(&format!("spectrum '{}'", spectrum.name), &spectrum.power);
+        }
+        for m in &scene.materials {
+            let mut mix = Mix::default();
+            mix.add(m.reflectance)
+                .add(m.base_color)
+                .add(u8::from(m.vertex_paint));
+            if let Some(texture) = &m.paint {
+                mix.texture(texture, &images);
+            }
+            if let Some(e) = &m.emission {
+                mix.add(e.light as u64)
+                    .add(e.shape)
+                    .add(e.color)
+                    .add(e.scale);
+                if let Some(texture) = &e.texture {
+                    mix.texture(texture, &images);
+                }
+            }
+            print.add(format!("material '{}'", m.name), &mix);
+        }
+        for light in &scene.lights {
+            let mut mix = Mix::default();
+            mix.add(light.light as u64).add(light.shape);
+            print.add(format!("light '{}'", light.name), &mix);
+        }
+        for surface in &scene.surfaces {
+            let mut mix = Mix::default();
+            mix.add(surface.material as u64);
+            for uvs in &surface.texcoords {
+                mix.all(uvs);
+            }
+            if let Some(colors) = &surface.colors {
+                mix.all(colors);
+            }
+            print.add(format!("paint of surface {}", surface.name), &mix);
+        }
+        print
+    }
+
+    /// Adds a part made of numbers.
+    pub fn set<T: Plain>(&mut self, name: &str, numbers: &[T]) {
+        let mut mix = Mix::default();
+        mix.all(numbers);
+        self.add(name.to_owned(), &mix);
+    }
+
+    /// Adds a part made of text.
+    pub fn set_text(&mut self, name: &str, text: &str) {
+        let mut mix = Mix::default();
+        mix.text(text);
+        self.add(name.to_owned(), &mix);
+    }
+
+    /// Adds all parts of another.
+    pub fn extend(&mut self, other: Self) {
+        self.parts.extend(other.parts);
+    }
+
+    fn add(&mut self, name: String, mix: &Mix) {
+        self.parts.push((name, mix.0.finish()));
+    }
+
+    /// What is different in `now`, in words; none if it is the same.
+    pub fn change(&self, now: &Self) -> Option<String> {
+        let hashes = |print: &Self| print.parts.iter().map(|p| p.1).collect::<Vec<u64>>();
+        if hashes(self) == hashes(now) {
+            return None;
+        }
+        let (before, after) = (self.by_name(), now.by_name());
+        let mut changes: Vec<String> = Vec::new();
+        for (name, hash) in &after {
+            match before.get(name) {
+                None => changes.push(format!("{name} is new")),
+                Some(old) if old != hash => changes.push(format!("{name} changed")),
+                Some(_) => {}
+            }
+        }
+        let gone = before.keys().filter(|name| !after.contains_key(*name));
+        changes.extend(gone.map(|name| format!("{name} is gone")));
+        if changes.is_empty() {
+            changes.push("the order of its parts changed".into());
+        }
+        let more = changes.len().saturating_sub(NAMED);
+        changes.truncate(NAMED);
+        let mut text = changes.join(", ");
+        if more > 0 {
+            text.push_str(&format!(" and {more} more"));
+        }
+        Some(text)
+    }
+
+    /// Hashes by name; parts of one name are numbered.
+    fn by_name(&self) -> BTreeMap<String, u64> {
+        let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut all = BTreeMap::new();
+        for (name, hash) in &self.parts {
+            let n = count.entry(name).or_default();
+            *n += 1;
+            let name = if *n == 1 {
+                name.clone()
+            } else {
+                format!("{name} ({n})")
+            };
+            all.insert(name, *hash);
+        }
+        all
+    }
+
+    /// Writes it down.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn encode(&self, out: &mut Encoder) -> io::Result<()> {
+        out.put(self.parts.len() as u64)?;
+        for (name, hash) in &self.parts {
+            out.put_text(name)?;
+            out.put(*hash)?;
+        }
+        Ok(())
+    }
+
+    /// Reads it back.
+    ///
+    /// # Errors
+    /// [`Broken`](super::Broken).
+    pub fn decode(from: &mut Decoder) -> Read<Self> {
+        let count: u64 = from.get()?;
+        let mut parts = Vec::new();
+        for _ in 0..count {
+            parts.push((from.get_text()?, from.get()?));
+        }
+        Ok(Self { parts })
+    }
+}
+
+/// A hash of each image.
+fn images(scene: &Scene) -> Vec<u64> {
+    scene
+        .images
+        .iter()
+        .map(|image| {
+            let mut mix = Mix::default();
+            mix.add([image.width as u64, image.height as u64])
+                .all(&image.pixels);
+            mix.0.finish()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Options;
+    use proptest::prelude::*;
+
+    fn room() -> Scene {
+        Scene::load("scenes/furnished.glb", &Options::default()).unwrap()
+    }
+
+    #[test]
+    fn shape_and_paint_are_told_apart() {
+        let (shape, paint) = (Fingerprint::shape(&room()), Fingerprint::paint(&room()));
+        assert_eq!(shape.change(&Fingerprint::shape(&room())), None);
+        let seen = |scene: &Scene| {
+            (
+                shape.change(&Fingerprint::shape(scene)),
+                paint.change(&Fingerprint::paint(scene)),
+            )
+        };
+
+        let mut moved = room();
+        moved.surfaces[3].positions[0].x += 1e-9;
+        let (what, nothing) = seen(&moved);
+        assert!(what.unwrap().contains(&moved.surfaces[3].name));
+        assert_eq!(nothing, None);
+
+        let mut painted = room();
+        painted.materials[1].reflectance[30] += 1e-6;
+        painted.lights[0].shape[3] *= 2.0;
+        let (nothing, what) = seen(&painted);
+        assert_eq!(nothing, None);
+        let name = &painted.materials[1].name;
+        assert_eq!(
+            what.unwrap(),
+            format!(
+                "light '{}' changed, material '{name}' changed",
+                painted.lights[0].name
+            )
+        );
+
+        let mut turned = room();
+        turned.lights[1].direction = glam::DVec3::X;
+        let (what, nothing) = seen(&turned);
+        assert!(what.unwrap().contains(&turned.lights[1].name));
+        assert_eq!(nothing, None);
+
+        let mut fewer = room();
+        let gone = fewer.surfaces.pop().unwrap();
+        assert!(
+            seen(&fewer)
+                .0
+                .unwrap()
+                .contains(&format!("surface {} is gone", gone.name))
+        );
+
+        let mut texel = room();
+        texel.images[0].pixels[7][1] += 0.25;
+        assert!(seen(&texel).1.is_some());
+
+        let mut renamed = room();
+        renamed.surfaces[0].name = "other".into();
+        assert_eq!(seen(&renamed), (None, None));
+    }
+
+    proptest! {
+        #[test]
+        fn it_survives_being_written(names in prop::collection::vec(("\\PC{0,8}", any::<u64>()), 0..9)) {
+            let mut print = Fingerprint::default();
+            for (name, number) in &names {
+                print.set(name, &[*number]);
+            }
+            let mut bytes = Vec::new();
+            print.encode(&mut Encoder::new(&mut bytes)).unwrap();
+            prop_assert_eq!(Fingerprint::decode(&mut Decoder::new(&bytes)).unwrap(), print);
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! What is kept between runs: one container, and what makes it safe to trust.
+//!
+//! | file | what |
+//! |---|---|
+//! | `hash` | XXH64 |
+//! | `codec` | numbers and lists as bytes, and back without trust |
+//! | `packs` | many short pieces in one |
+//! | `container` | magic, kind, version, checksum |
+//! | `fingerprint` | what a room is made of, part by part, as hashes |
+
+pub mod codec;
+pub mod container;
+pub mod fingerprint;
+pub mod hash;
+pub mod packs;
+
+pub use codec::{Broken, Decoder, Encoder};
+pub use container::{Kind, read, write};
+pub use fingerprint::Fingerprint;
+pub use packs::Packs;

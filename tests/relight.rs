@@ -1,0 +1,469 @@
+//! Relighting: the same as a fresh bake within the errors that both state, without a ray; other shapes are refused.
+
+use glam::DVec3;
+use haarlight::color::de2000;
+use haarlight::gather::{Baked, BakedVertex};
+use haarlight::scene::{Options, Scene};
+use haarlight::solve::{Bake, Relighter, Relit, Representation, Settings};
+use haarlight::store::hash;
+use proptest::prelude::*;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::LazyLock;
+
+fn scenes() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")
+}
+
+fn room(name: &str) -> Scene {
+    Scene::load(scenes().join(name), &Options::default()).unwrap()
+}
+
+fn settings(error: f64, rounds: usize) -> Settings {
+    Settings {
+        error,
+        rounds,
+        ..Settings::default()
+    }
+}
+
+/// A cache of a bake, and the bake.
+struct Cached {
+    _folder: tempfile::TempDir,
+    path: PathBuf,
+    bake: Bake,
+    baked: Baked,
+}
+
+impl Cached {
+    fn new(scene: Scene, settings: Settings) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cache");
+        let mut bake = Bake::new(scene, settings);
+        bake.keep();
+        bake.run();
+        let baked = bake.baked(&|_, _| {});
+        let size = bake.write_cache(&baked, &path, u64::MAX).unwrap();
+        assert_eq!(size, std::fs::metadata(&path).unwrap().len());
+        Self {
+            _folder: folder,
+            path,
+            bake,
+            baked,
+        }
+    }
+
+    fn relit(&self, scene: Scene) -> (Relighter, Relit) {
+        let mut relighter = Relighter::open(&self.path, scene).unwrap();
+        let relit = relighter.relight().unwrap();
+        (relighter, relit)
+    }
+}
+
+/// Tristimulus irradiance of all vertices.
+fn irradiance(baked: &Baked) -> Vec<[f64; 3]> {
+    let vertices = baked.surfaces.iter().flat_map(|s| &s.vertices);
+    vertices.map(|v| v.irradiance.map(f64::from)).collect()
+}
+
+/// Mean colour difference by area, as errors are stated, of `relit` and what a fresh bake gathers at every `step`-th vertex.
+fn difference(fresh: &Bake, relit: &Baked, step: usize) -> f64 {
+    let white = fresh.light().white;
+    let (mut points, mut seen, mut areas) = (Vec::new(), Vec::new(), Vec::new());
+    for surface in &relit.surfaces {
+        let input = &fresh.scene().surfaces[surface.surface];
+        // Shading normals are the file's: probes know flat faces.
+        if surface.back || input.normals.is_some() {
+            continue;
+        }
+        let at = |vertex: &BakedVertex, inset: f64| -> DVec3 {
+            let corners = input.triangles[vertex.triangle as usize];
+            let corners = corners.map(|v| input.positions[v as usize]);
+            let inner = vertex.weights.map(|w| w * (1.0 - inset) + inset / 3.0);
+            (0..3).map(|k| corners[k] * inner[k]).sum()
+        };
+        let mut around = vec![0.0; surface.vertices.len()];
+        for triangle in &surface.triangles {
+            let [a, b, c] = triangle.map(|v| at(&surface.vertices[v as usize], 0.0));
+            for &v in triangle {
+                around[v as usize] += (b - a).cross(c - a).length() / 6.0;
+            }
+        }
+        for (vertex, area) in surface.vertices.iter().zip(around).step_by(step) {
+            // As far inside as the gather goes.
+            let [a, b, c] =
+                input.triangles[vertex.triangle as usize].map(|v| input.positions[v as usize]);
+            let normal = (b - a).cross(c - a).normalize();
+            points.push((at(vertex, 2e-3), normal));
+            seen.push(vertex.irradiance.map(f64::from));
+            areas.push(area);
+        }
+    }
+    assert!(points.len() > 100, "{}", points.len());
+    let fresh = fresh.probe(&points);
+    let (mut sum, mut total) = (0.0, 0.0);
+    for ((a, b), area) in fresh.iter().zip(&seen).zip(&areas) {
+        // Below something that stands on it, a vertex takes its neighbours' light, and a probe finds none.
+        if a.xyz[1] > 1e-3 * white[1] {
+            sum += area * de2000(a.xyz, *b, white);
+            total += area;
+        }
+    }
+    sum / total
+}
+
+fn estimate(bake: &Bake) -> f64 {
+    bake.rounds()
+        .last()
+        .unwrap()
+        .error
+        .total_de2000
+        .value
+        .unwrap()
+}
+
+/// Nothing changed: the bake to rounding, on the same mesh. There is no ray index, so a ray would see everything.
+#[test]
+fn without_a_change_the_bake_comes_out() {
+    for (name, settings) in [
+        ("cornell.glb", settings(1.0, 9)),
+        ("cornell-closed.glb", settings(2.0, 9)),
+        ("two-rooms.glb", settings(2.0, 9)),
+        ("furnished.glb", settings(3.0, 2)),
+    ] {
+        let cached = Cached::new(room(name), settings);
+        let (relighter, relit) = cached.relit(room(name));
+        assert!(!relit.record.changed);
+        assert_eq!(relighter.lanes().lanes(), cached.bake.lanes().lanes());
+        assert_eq!(relit.baked.surfaces.len(), cached.baked.surfaces.len());
+        for (a, b) in relit.baked.surfaces.iter().zip(&cached.baked.surfaces) {
+            assert_eq!(a.triangles, b.triangles);
+            assert_eq!((a.surface, a.back), (b.surface, b.back));
+            for (a, b) in a.vertices.iter().zip(&b.vertices) {
+                assert_eq!((a.triangle, a.weights), (b.triangle, b.weights));
+                for (a, b) in [(a.irradiance, b.irradiance), (a.radiosity, b.radiosity)] {
+                    for c in 0..3 {
+                        let gap = (a[c] - b[c]).abs();
+                        assert!(gap <= 2e-5 * b[1].max(1e-3), "{name}: {a:?} {b:?}");
+                    }
+                }
+            }
+        }
+        assert_eq!(relit.baked.covered, cached.baked.covered);
+        let difference = relit.record.error_de2000.value.unwrap() / estimate(&cached.bake);
+        assert!((difference - 1.0).abs() < 0.05, "{difference}");
+    }
+}
+
+/// Other lamps and other paints: what a fresh bake finds, within what both say that they may err.
+#[test]
+fn other_lamps_and_paints_give_what_a_fresh_bake_gives() {
+    // Under a lamp with lines, and one wall in the complementary colour.
+    let changed = || {
+        let mut scene = room("cornell.glb");
+        let lamp = room("cornell-f2.glb").spectra[0].clone();
+        scene.spectra[0] = lamp;
+        let wall = scene.materials.iter().position(|m| m.name == "red");
+        let wall = wall.expect("the Cornell box has a red wall");
+        for r in &mut scene.materials[wall].reflectance {
+            *r = 0.7 - *r;
+        }
+        scene
+    };
+    let cached = Cached::new(room("cornell.glb"), settings(1.0, 9));
+    let (relighter, relit) = cached.relit(changed());
+    assert!(relit.record.changed);
+    let mut fresh = Bake::new(changed(), settings(1.0, 9));
+    fresh.run();
+    let stated = relit.record.error_de2000.value.unwrap();
+    let measured = difference(&fresh, &relit.baked, 1);
+    let same = difference(&cached.bake, &cached.baked, 1);
+    println!(
+        "measured {measured}, stated {stated}, {} {same}",
+        estimate(&fresh)
+    );
+    assert!(
+        measured < stated.hypot(estimate(&fresh)),
+        "{measured} {stated}"
+    );
+    // It is another light: the old one is far off.
+    assert!(difference(&fresh, &cached.baked, 1) > 5.0 * measured);
+    let white = relighter.light().white;
+    for (a, b) in white.iter().zip(fresh.light().white) {
+        assert!((a / b - 1.0).abs() < 0.01, "{a} {b}");
+    }
+}
+
+/// In the furnished room the window and the panel go out; walls are painted, the bulb is made ten times as strong.
+#[test]
+fn lamps_go_out_in_a_furnished_room() {
+    let changed = || {
+        let mut scene = room("furnished.glb");
+        for material in &mut scene.materials {
+            match material.name.as_str() {
+                "sky" | "panel" => material.emission = None,
+                "plaster" => material.reflectance = material.reflectance.map(|r| 0.5 * r),
+                "bulb" => {
+                    let emission = material.emission.as_mut().unwrap();
+                    emission.shape = emission.shape.map(|x| 10.0 * x);
+                }
+                _ => {}
+            }
+        }
+        scene
+    };
+    let cached = Cached::new(room("furnished.glb"), settings(3.0, 3));
+    let (_, relit) = cached.relit(changed());
+    let mut fresh = Bake::new(changed(), settings(3.0, 3));
+    fresh.run();
+    let stated = relit.record.error_de2000.value.unwrap();
+    let measured = difference(&fresh, &relit.baked, 1);
+    println!(
+        "furnished: measured {measured}, stated {stated} and {}",
+        estimate(&fresh)
+    );
+    assert!(
+        measured < stated.hypot(estimate(&fresh)),
+        "{measured} {stated}"
+    );
+    assert!(difference(&fresh, &cached.baked, 1) > 3.0 * measured);
+}
+
+/// Light adds up: the room under all lamps is the sum of the rooms under one lamp each; twice the power is twice the light.
+#[test]
+fn light_adds_up() {
+    let dense = Settings {
+        representation: Representation::Dense,
+        ..settings(1.0, 2)
+    };
+    let cached = Cached::new(room("furnished.glb"), dense);
+    let mut relighter = Relighter::open(&cached.path, room("furnished.glb")).unwrap();
+    let mut under = |keep: &dyn Fn(&str) -> f64| {
+        let mut scene = room("furnished.glb");
+        for material in &mut scene.materials {
+            let power = keep(&material.name);
+            if let Some(e) = &mut material.emission {
+                e.shape = e.shape.map(|x| power * x);
+                e.scale *= power;
+            }
+        }
+        for light in &mut scene.lights {
+            let power = keep(&light.name);
+            light.shape = light.shape.map(|x| power * x);
+        }
+        relighter.change(scene).unwrap();
+        irradiance(&relighter.relight().unwrap().baked)
+    };
+    let all = under(&|_| 1.0);
+    let twice = under(&|_| 2.0);
+    let window = under(&|name| f64::from(u8::from(name == "sky")));
+    let others = under(&|name| f64::from(u8::from(name != "sky")));
+    let mean = all.iter().map(|xyz| xyz[1]).sum::<f64>() / all.len() as f64;
+    // Each of the two solves behind a sum ends at a relative error of .004 times the error asked for.
+    let near = |a: f64, b: f64| (a - b).abs() < 2.0 * 4e-3 * a.max(0.1 * mean);
+    for k in 0..all.len() {
+        for c in 0..3 {
+            assert!(
+                near(2.0 * all[k][c], twice[k][c]),
+                "{:?} {:?}",
+                all[k],
+                twice[k]
+            );
+            let sum = window[k][c] + others[k][c];
+            assert!(near(all[k][c], sum), "{:?} {sum}", all[k]);
+        }
+    }
+}
+
+#[test]
+fn another_shape_is_refused_with_what_changed() {
+    let cached = Cached::new(room("furnished.glb"), settings(9.0, 1));
+    let refused = |scene: Scene| {
+        let error = Relighter::open(&cached.path, scene).err().unwrap();
+        assert_eq!(error.exit_code(), 2);
+        let mut open = Relighter::open(&cached.path, room("furnished.glb")).unwrap();
+        assert!(open.change(room("convex.glb")).is_err());
+        error.to_string()
+    };
+    let mut moved = room("furnished.glb");
+    moved.surfaces[4].positions[2].z += 0.01;
+    let name = moved.surfaces[4].name.clone();
+    let text = refused(moved);
+    assert!(text.contains(&format!("surface {name} changed")), "{text}");
+    assert!(text.contains("bake the room again with --cache"), "{text}");
+    let mut lamp = room("furnished.glb");
+    lamp.lights[0].position.x += 0.5;
+    let text = refused(lamp);
+    assert!(text.contains("place of light"), "{text}");
+    let mut glowing = room("furnished.glb");
+    let glow = glowing.materials.iter().find_map(|m| m.emission.clone());
+    let oak = glowing
+        .materials
+        .iter()
+        .position(|m| m.name == "oak")
+        .unwrap();
+    glowing.materials[oak].emission = glow;
+    let text = refused(glowing);
+    assert!(text.contains("gives out light and did not"), "{text}");
+    let text = refused(room("convex.glb"));
+    assert!(text.contains("another shape"), "{text}");
+    // A cache that would be too large is refused before it is written.
+    let at = cached.path.with_extension("other");
+    let error = cached
+        .bake
+        .write_cache(&cached.baked, &at, 1000)
+        .unwrap_err();
+    assert!(error.to_string().contains("--cache-limit"), "{error}");
+    assert!(!at.exists());
+    // A bake that was not told to keep anything has no cache.
+    let mut bake = Bake::new(room("convex.glb"), settings(9.0, 1));
+    bake.step();
+    let baked = bake.baked(&|_, _| {});
+    assert!(bake.write_cache(&baked, &at, u64::MAX).is_err());
+}
+
+/// A bake that went on from a checkpoint keeps all it needs.
+#[test]
+fn a_resumed_bake_writes_the_same_cache() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut whole = Bake::new(room("two-rooms.glb"), settings(2.0, 3));
+    whole.keep();
+    whole.step();
+    whole.save(&at("state")).unwrap();
+    whole.run();
+    let mut resumed = Bake::new(room("two-rooms.glb"), settings(2.0, 3));
+    let text = resumed.resume(&at("state")).unwrap_err().to_string();
+    assert!(text.contains("--cache changed"), "{text}");
+    resumed.keep();
+    resumed.resume(&at("state")).unwrap();
+    resumed.run();
+    for (bake, name) in [(&whole, "a"), (&resumed, "b")] {
+        let baked = bake.baked(&|_, _| {});
+        bake.write_cache(&baked, &at(name), u64::MAX).unwrap();
+    }
+    let light = |name: &str| {
+        let mut relighter = Relighter::open(&at(name), room("two-rooms.glb")).unwrap();
+        irradiance(&relighter.relight().unwrap().baked)
+    };
+    assert_eq!(light("a"), light("b"));
+}
+
+static SMALL: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let cached = Cached::new(room("two-rooms.glb"), settings(5.0, 2));
+    std::fs::read(&cached.path).unwrap()
+});
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, rng_seed: proptest::test_runner::RngSeed::Fixed(6), failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever stands in a file, even under a right checksum, is taken or refused, and never a fault.
+    #[test]
+    fn garbled_caches_do_no_harm(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<[u8; 8]>(), 1_usize..9), 1..4),
+        cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
+        early in any::<bool>(),
+    ) {
+        let mut bytes = SMALL.clone();
+        bytes.truncate(bytes.len() - 8);
+        for (at, with, count) in changes {
+            let at = at.index(if early { 4096 } else { bytes.len() });
+            for (k, x) in with.iter().take(count).enumerate() {
+                if let Some(byte) = bytes.get_mut(at + k) {
+                    *byte = *x;
+                }
+            }
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        bytes.extend(hash::of(&bytes).to_le_bytes());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c");
+        std::fs::write(&path, &bytes).unwrap();
+        let done = Relighter::open(&path, room("two-rooms.glb")).and_then(|mut r| r.relight());
+        if let Err(error) = done {
+            prop_assert_eq!(error.exit_code(), 2);
+        }
+    }
+}
+
+/// The command: names by default, the same file back, and polite refusals.
+#[test]
+fn the_command_relights() {
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["cornell.glb", "cornell.spectra.json"] {
+        std::fs::copy(scenes().join(file), folder.path().join(file)).unwrap();
+    }
+    let run = |args: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_haarlight"))
+            .args(args)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), said, output.stdout)
+    };
+    let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    let (code, said, _) = run(&["relight", "cornell.glb"]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("there is no cache"), "{said}");
+    let baking = [
+        "bake",
+        "cornell.glb",
+        "--error",
+        "2",
+        "--cache",
+        "cornell.cache",
+    ];
+    let (code, said, _) = run(&baking);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("MB"), "{said}");
+    let baked = read("cornell.baked.glb");
+    let (code, said, out) = run(&["relight", "cornell.glb", "--json", "-o", "same.glb"]);
+    assert_eq!(code, Some(0), "{said}");
+    let line: serde_json::Value = serde_json::from_slice(&out).unwrap();
+    assert_eq!(line["changed"], false);
+    assert_eq!(read("same.glb").len(), baked.len());
+    // A lamp of half the power: half the light, and an exposure that makes up for it.
+    let spectra = String::from_utf8(read("cornell.spectra.json")).unwrap();
+    let mut spectra: serde_json::Value = serde_json::from_str(&spectra).unwrap();
+    let lamp = spectra["materials"]
+        .as_object_mut()
+        .unwrap()
+        .values_mut()
+        .find(|m| m.get("emission").is_some())
+        .unwrap();
+    let name = lamp["emission"]["name"].as_str().unwrap_or("").to_owned();
+    lamp["emission"] = serde_json::json!({"name": "cie/F2", "luminance_cd_m2": 100.0});
+    assert_ne!(name, "cie/F2");
+    std::fs::write(folder.path().join("evening.json"), spectra.to_string()).unwrap();
+    let args = [
+        "relight",
+        "cornell.glb",
+        "--spectra",
+        "evening.json",
+        "--json",
+    ];
+    let (code, said, out) = run(&args);
+    assert_eq!(code, Some(0), "{said}");
+    let line: serde_json::Value = serde_json::from_slice(&out).unwrap();
+    assert_eq!(line["changed"], true);
+    assert!(read("cornell.baked.glb") != baked);
+    // Another room, an input as the output, and a file that is no cache.
+    std::fs::copy(
+        scenes().join("convex.glb"),
+        folder.path().join("convex.glb"),
+    )
+    .unwrap();
+    let (code, said, _) = run(&["relight", "convex.glb", "--cache", "cornell.cache"]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("another shape"), "{said}");
+    let (code, said, _) = run(&["relight", "cornell.glb", "--npz", "cornell.cache"]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("overwrite an input"), "{said}");
+    std::fs::write(folder.path().join("cornell.cache"), b"PK").unwrap();
+    let (code, said, _) = run(&["relight", "cornell.glb"]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("no cache of this program"), "{said}");
+}
