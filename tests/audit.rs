@@ -413,6 +413,8 @@ fn calibration_of_the_estimate() {
         .unwrap()
         .map(|e| e.unwrap().path())
         .filter(|p| p.extension().is_some_and(|e| e == "glb"))
+        // What a bake has left there is no room of ours.
+        .filter(|p| !p.to_string_lossy().ends_with(".baked.glb"))
         .collect();
     paths.sort();
     let wrong: Vec<String> = paths

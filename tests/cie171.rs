@@ -294,8 +294,7 @@ fn means_by_the_command() {
         let rounds = text.lines().filter(|line| line.contains("\"round\""));
         let last: serde_json::Value = rounds
             .map(|line| serde_json::from_str(line).unwrap())
-            .filter(|record: &serde_json::Value| record["record"] == "round")
-            .next_back()
+            .rfind(|record: &serde_json::Value| record["record"] == "round")
             .unwrap();
         let absorbed = last["flux"]["absorbed_lm"].as_f64().unwrap();
         mean_is(absorbed / area / (1.0 - rho), mean);

@@ -16,7 +16,7 @@ const DEEPEST: u8 = 7;
 const ALIKE: f64 = 4.0;
 /// A triangle is quartered where the middle of an edge is further from the mean of its ends than this multiple of the
 /// asked-for error.
-const BENT: f64 = 2.0;
+const BENT: f64 = 1.5;
 /// Rounds of looking and quartering at the most.
 const PASSES: usize = 4;
 /// Vertices are drawn this far into the triangle they belong to: a point on an edge lies on the neighbouring wall too.
@@ -250,7 +250,7 @@ impl Bake {
             normal,
             plane: mesh.plane[triangle],
             leaf,
-            // One pattern for all: neighbours err alike, and that does not show.
+            // One pattern of rays for all: neighbours err alike, and that does not show.
             seed: 0,
         }
     }
