@@ -160,6 +160,7 @@ fn a_bake_writes_everything_that_was_asked_for_and_nothing_else() {
         .map(|k| format!("round-{k:02}-cornell.png"))
         .collect();
     pictures.insert(0, "final-cornell.exr".into());
+    pictures.insert(1, "final-cornell.png".into());
     assert_eq!(desk.files("pictures"), pictures);
 
     for record in &records {

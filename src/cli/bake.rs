@@ -55,7 +55,7 @@ pub struct BakeArgs {
     /// JSON lines: plan, rounds, verdict.
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
-    /// A PNG from each camera after every round, and an EXR of the result.
+    /// A PNG from each camera after every round and of the result, and an EXR of the result.
     #[arg(long, value_name = "DIR")]
     pub snapshots: Option<PathBuf>,
     /// Positions, normals and spectra of all vertices for NumPy.
@@ -142,7 +142,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
             let clock = Instant::now();
             let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
             talk.phase("drawing");
-            let files = snapshots.round(round.round, bake.scene(), &light.surfaces)?;
+            let files = snapshots.pictures(
+                &format!("round-{:02}", round.round),
+                bake.scene(),
+                &light.surfaces,
+            )?;
             let exposure = snapshots.exposure(bake.scene(), &light.surfaces);
             write(
                 &mut log,
@@ -183,7 +187,10 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         }
     }
     if let Some(snapshots) = &mut snapshots {
-        outputs.exr = snapshots.last(scene, &baked.surfaces)?;
+        outputs
+            .pictures
+            .extend(snapshots.pictures("final", scene, &baked.surfaces)?);
+        outputs.exr = snapshots.exr(scene, &baked.surfaces)?;
     }
     seconds.write = clock.elapsed().as_secs_f64();
 

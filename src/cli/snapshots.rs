@@ -42,21 +42,21 @@ impl Snapshots {
             .get_or_insert_with(|| Exposure::auto(scene, surfaces))
     }
 
-    /// Pictures of a round; the paths.
-    pub(super) fn round(
+    /// Pictures of a round, or of the `final` mesh; the paths.
+    pub(super) fn pictures(
         &mut self,
-        round: usize,
+        start: &str,
         scene: &Scene,
         surfaces: &[BakedSurface],
     ) -> Result<Vec<String>> {
         let look = self.exposure(scene, surfaces);
-        self.each(&format!("round-{round:02}"), "png", scene, |camera| {
+        self.each(start, "png", scene, |camera| {
             Picture::draw(scene, surfaces, camera, &look, format(camera))?.to_png()
         })
     }
 
-    /// The EXRs; the paths.
-    pub(super) fn last(&mut self, scene: &Scene, surfaces: &[BakedSurface]) -> Result<Vec<String>> {
+    /// The EXRs of the final mesh; the paths.
+    pub(super) fn exr(&mut self, scene: &Scene, surfaces: &[BakedSurface]) -> Result<Vec<String>> {
         let look = self.exposure(scene, surfaces);
         self.each("final", "exr", scene, |camera| {
             exr::to_exr(&Picture::draw(
