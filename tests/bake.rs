@@ -139,3 +139,46 @@ fn a_dark_room_is_done_at_once() {
         files(&bake, &baked);
     }
 }
+
+/// Vertex colours paint the radiosity of the output too, in the mesh and in the spectra.
+#[test]
+fn vertex_colours_are_in_the_radiosity() {
+    let mut scene = room("convex.glb");
+    let painted = (0..scene.surfaces.len())
+        .find(|&k| {
+            scene.materials[scene.surfaces[k].material]
+                .emission
+                .is_none()
+        })
+        .unwrap();
+    let count = scene.surfaces[painted].positions.len();
+    let material = scene.surfaces[painted].material;
+    let color = [0.5_f32, 0.25, 0.125];
+    scene.materials[material].base_color = [0.8; 3];
+    scene.materials[material].vertex_paint = true;
+    scene.surfaces[painted].colors = Some(vec![[color[0], color[1], color[2], 1.0]; count]);
+    let grid = scene.grid;
+    let mut bake = Bake::new(scene, settings(2.0));
+    bake.run();
+    let baked = bake.baked(&|_, _| ());
+    let spectra = bake.radiosity_spectra(&baked);
+    let wanted = haarlight::color::Upsampler::new(&grid).reflectance(color.map(|c| 0.8 * c));
+    let weights = Observer::cie1931().weights(&grid);
+    for (k, sheet) in baked.surfaces.iter().enumerate() {
+        if sheet.surface != painted {
+            continue;
+        }
+        for (v, vertex) in sheet.vertices.iter().enumerate() {
+            let irradiance = bake.lanes().leaves(&baked.irradiance[k][v]);
+            let y: f64 = (0..64)
+                .map(|l| KM * weights[1][l] * wanted[l] * irradiance[l])
+                .sum();
+            let close = |x: f64| (x / y - 1.0).abs() < 0.02;
+            assert!(close(f64::from(vertex.radiosity[1])), "{vertex:?} {y}");
+            let sum: f64 = (0..64)
+                .map(|l| KM * weights[1][l] * f64::from(spectra[k][v][l]))
+                .sum();
+            assert!(close(sum), "{sum} {y}");
+        }
+    }
+}

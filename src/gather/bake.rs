@@ -5,7 +5,8 @@ use super::refined::{Refined, Vertex};
 use super::relit::KeptVertex;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler, de2000};
-use crate::scene::Material;
+use crate::output::refined as refined_mesh;
+use crate::scene::{Material, Surface};
 use crate::solve::{Bake, Care};
 use crate::spectrum::Leaves;
 use glam::DVec3;
@@ -23,6 +24,8 @@ const PASSES: usize = 4;
 const INSET: f64 = 2e-3;
 /// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
 const PROBE_INSET: f64 = 1e-5;
+/// A vertex that sees more black backs than this, share of its rays, lies inside something.
+const MOSTLY: f64 = 0.5;
 /// Vertices at the most; a pass that would exceed this is not begun.
 const MOST_VERTICES: usize = 2_000_000;
 /// Triangles with edges below this share of the room's half diagonal are not quartered for the output.
@@ -191,7 +194,8 @@ impl Bake {
             {
                 rays += gathered.rays;
                 let dark = gathered.seen < 1e-3 && gathered.direct.iter().all(|&x| x == 0.0);
-                known[s][v] = Some(if dark && covered {
+                let hidden = (dark && covered) || gathered.backs > MOSTLY;
+                known[s][v] = Some(if hidden {
                     None
                 } else {
                     Some(Seen {
@@ -296,14 +300,13 @@ impl Bake {
         known: Vec<Vec<Known>>,
         mut out: Baked,
     ) -> Baked {
-        let looks: Vec<Look> = {
-            let upsampler = Upsampler::new(&self.scene().grid);
-            self.scene()
-                .materials
-                .iter()
-                .map(|m| Look::new(self, m, &upsampler))
-                .collect()
-        };
+        let upsampler = Upsampler::new(&self.scene().grid);
+        let looks: Vec<Look> = self
+            .scene()
+            .materials
+            .iter()
+            .map(|m| Look::new(self, m, &upsampler))
+            .collect();
         for ((sheet, triangles), known) in refined.sheets.iter().zip(triangles).zip(known) {
             let (mut rows, mut traces): (Vec<_>, Vec<_>) = known
                 .into_iter()
@@ -386,15 +389,21 @@ impl Bake {
         let display = LinearSrgb::standard();
         let unpainted = look.unpainted.unwrap_or([1.0; 3]);
         let rgb = display.from_xyz(std::array::from_fn(|c| reflected[c] + glow[c]));
-        BakedVertex {
-            triangle: self.mesh().origin[vertex.triangle as usize].1,
+        let (surface, triangle) = self.mesh().origin[vertex.triangle as usize];
+        let mut out = BakedVertex {
+            triangle,
             weights: self
                 .mesh()
                 .on_origin(vertex.triangle as usize, vertex.weights),
             irradiance: self.lanes().tristimulus(row).map(|x| x as f32),
             radiosity: std::array::from_fn(|c| (reflected[c] + glow[c]) as f32),
             light: std::array::from_fn(|c| (rgb[c] / unpainted[c]) as f32),
+        };
+        if let Some(paint) = look.painted(&self.scene().surfaces[surface as usize], &out) {
+            let reflected = sum(&self.lanes().reflected(&paint));
+            out.radiosity = std::array::from_fn(|c| (reflected[c] + glow[c]) as f32);
         }
+        out
     }
 }
 
@@ -404,9 +413,12 @@ fn row(known: &[Known], vertex: u32) -> Option<&[f32; 64]> {
 }
 
 /// How a material turns irradiance into what is seen.
-pub(super) struct Look {
-    /// Reflectance on the leaves.
-    pub(super) reflectance: Leaves,
+pub(super) struct Look<'a> {
+    /// Reflectance on the leaves, vertex colours apart.
+    reflectance: Leaves,
+    /// Base colour with the texture's mean, where vertex colours multiply it.
+    base: Option<[f32; 3]>,
+    upsampler: &'a Upsampler,
     /// Tristimulus radiosity for a unit of each lane's irradiance.
     reflected: Vec<[f64; 3]>,
     /// Mean colour of the texture, which the display multiplies again.
@@ -414,8 +426,8 @@ pub(super) struct Look {
     emits: bool,
 }
 
-impl Look {
-    pub(super) fn new(bake: &Bake, material: &Material, upsampler: &Upsampler) -> Self {
+impl<'a> Look<'a> {
+    pub(super) fn new(bake: &Bake, material: &Material, upsampler: &'a Upsampler) -> Self {
         let mean = material.paint.as_ref().map(|texture| {
             let image = &bake.scene().images[texture.image];
             let n = image.pixels.len().max(1) as f64;
@@ -424,19 +436,34 @@ impl Look {
             });
             sum.map(|x| (x / n).max(1e-3))
         });
-        let reflectance: Leaves = match mean {
-            Some(mean) => {
-                let color = std::array::from_fn(|c| material.base_color[c] * mean[c] as f32);
-                upsampler.reflectance(color)
-            }
+        let color: [f32; 3] = std::array::from_fn(|c| {
+            material.base_color[c] * mean.map_or(1.0, |mean| mean[c] as f32)
+        });
+        let reflectance = match mean {
+            Some(_) => upsampler.reflectance(color),
             None => material.reflectance,
         };
         Self {
             reflected: bake.lanes().reflected(&reflectance),
             reflectance,
+            base: material.vertex_paint.then_some(color),
+            upsampler,
             unpainted: mean,
             emits: material.emission.is_some(),
         }
+    }
+
+    /// Reflectance at a vertex that vertex colours paint; none elsewhere.
+    fn painted(&self, surface: &Surface, vertex: &BakedVertex) -> Option<Leaves> {
+        let base = self.base.filter(|_| surface.colors.is_some())?;
+        let color = refined_mesh::vertex_color(surface, vertex);
+        let color = std::array::from_fn(|c| base[c] * color[c]);
+        Some(self.upsampler.reflectance_fast(color))
+    }
+
+    /// Reflectance at a vertex.
+    pub(super) fn reflectance_at(&self, surface: &Surface, vertex: &BakedVertex) -> Leaves {
+        self.painted(surface, vertex).unwrap_or(self.reflectance)
     }
 }
 

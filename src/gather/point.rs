@@ -61,6 +61,8 @@ pub struct Gathered {
     pub direct: [f32; 64],
     /// Sum of visible factors: 1 in a closed room.
     pub seen: f64,
+    /// Share of the rays over the hemisphere that met a black back; 0 where light is gathered by links.
+    pub backs: f64,
     /// Visibility rays cast for this point.
     pub rays: u64,
     /// Where it comes from, where that is kept; at last packed.
@@ -75,6 +77,7 @@ impl Gathered {
             irradiance: [0.0; 64],
             direct: [0.0; 64],
             seen: 0.0,
+            backs: 0.0,
             rays: 0,
             trace: None,
             packed: None,
@@ -276,7 +279,10 @@ impl Gatherer<'_> {
             self.sight.meet(&from, &directions, to.plane, &mut hits);
             memory.rays += BEAM as u64;
             for hit in hits.iter().flatten() {
-                let Some(leaf) = self.met(hit) else { continue };
+                let Some(leaf) = self.met(hit) else {
+                    out.backs += f64::from(share);
+                    continue;
+                };
                 let mut id = leaf;
                 while id != NONE && memory.taken[id as usize] != memory.epoch {
                     id = self.tree.node(id).parent;

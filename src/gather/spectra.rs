@@ -29,9 +29,8 @@ impl Bake {
             let vertex = |(vertex, row): (&BakedVertex, &[f32; LEAVES])| {
                 let irradiance = self.lanes().leaves(row);
                 let radiance = self.radiance(surface, material, vertex, &upsampler);
-                std::array::from_fn(|k| {
-                    (look.reflectance[k] * irradiance[k] + PI * radiance[k]) as f32
-                })
+                let reflectance = look.reflectance_at(surface, vertex);
+                std::array::from_fn(|k| (reflectance[k] * irradiance[k] + PI * radiance[k]) as f32)
             };
             baked.vertices.par_iter().zip(rows).map(vertex).collect()
         };
