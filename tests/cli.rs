@@ -200,7 +200,7 @@ fn a_bake_writes_everything_that_was_asked_for_and_nothing_else() {
     assert_eq!(verdict["outputs"]["glb"], "cornell.baked.glb");
     assert_eq!(
         verdict["outputs"]["pictures"].as_array().unwrap().len(),
-        rounds
+        rounds + 1
     );
     assert!(verdict["vertices"].as_u64().unwrap() > 100);
     assert!(
