@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use haarlight::color::de2000;
-use haarlight::gather::{Baked, BakedVertex};
+use haarlight::gather::{Baked, BakedVertex, MOSTLY};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Relighter, Relit, Representation, Settings};
 use haarlight::store::hash;
@@ -104,7 +104,7 @@ fn difference(fresh: &Bake, relit: &Baked, step: usize) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     for ((a, b), area) in fresh.iter().zip(&seen).zip(&areas) {
         // Below something that stands on it, a vertex takes its neighbours' light, and a probe finds none.
-        if a.xyz[1] > 1e-3 * white[1] {
+        if a.xyz[1] > 1e-3 * white[1] && a.backs <= MOSTLY {
             sum += area * de2000(a.xyz, *b, white);
             total += area;
         }

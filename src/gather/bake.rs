@@ -25,7 +25,7 @@ const INSET: f64 = 2e-3;
 /// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
 const PROBE_INSET: f64 = 1e-5;
 /// A vertex that sees more black backs than this, share of its rays, lies inside something.
-const MOSTLY: f64 = 0.5;
+pub const MOSTLY: f64 = 0.75;
 /// Vertices at the most; a pass that would exceed this is not begun.
 const MOST_VERTICES: usize = 2_000_000;
 /// Triangles with edges below this share of the room's half diagonal are not quartered for the output.
@@ -513,6 +513,8 @@ pub struct Probed {
     pub xyz: [f64; 3],
     /// Irradiance on the 64 leaves, W/m2/nm.
     pub leaves: Leaves,
+    /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`] a vertex there counts as covered.
+    pub backs: f64,
 }
 
 impl Bake {
@@ -525,10 +527,15 @@ impl Bake {
             .collect();
         self.gather(&receivers)
             .into_iter()
-            .map(|Gathered { irradiance, .. }| Probed {
-                xyz: self.lanes().tristimulus(&irradiance),
-                leaves: self.lanes().leaves(&irradiance),
-            })
+            .map(
+                |Gathered {
+                     irradiance, backs, ..
+                 }| Probed {
+                    backs,
+                    xyz: self.lanes().tristimulus(&irradiance),
+                    leaves: self.lanes().leaves(&irradiance),
+                },
+            )
             .collect()
     }
 

@@ -9,7 +9,7 @@ mod slope;
 mod spectra;
 pub(crate) mod trace;
 
-pub use bake::{Baked, Probed};
+pub use bake::{Baked, MOSTLY, Probed};
 pub(crate) use relit::Kept;
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
