@@ -133,8 +133,7 @@ fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
     if let Some(root) = tree.nodes.first() {
         for k in 0..points {
             let target = (k as f64 + rng.f64()) / points as f64 * root.area;
-            let entry = (tree.face_area.partition_point(|&a| a <= target).max(1) - 1)
-                .min(tree.faces.len() - 1);
+            let entry = tree.entry_at(target);
             let weights = triangle_weights([rng.f64(), rng.f64()]);
             let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
             all.push(Place {

@@ -303,16 +303,7 @@ fn problems(args: &BakeArgs, output: &Path, parts: &[PathBuf]) -> Vec<Problem> {
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));
     inputs.extend(parts.iter().map(PathBuf::as_path));
     let mut problems = paths::problems(&outputs, &inputs);
-    if !output
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("glb"))
-    {
-        problems.push(Problem::new(
-            format!("-o {}", output.display()),
-            "the baked room is a .glb",
-            "end its name in .glb",
-        ));
-    }
+    problems.extend(paths::not_glb(output, "baked"));
     if let Some(folder) = args
         .snapshots
         .as_deref()

@@ -5,6 +5,20 @@ use crate::scene::Scene;
 use crate::scene::uri::{self, Place};
 use std::path::{Path, PathBuf};
 
+/// What is wrong with the name of the room that a command writes; `which`: baked, relit.
+pub(super) fn not_glb(output: &Path, which: &str) -> Option<Problem> {
+    let ends_well = output
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("glb"));
+    (!ends_well).then(|| {
+        Problem::new(
+            format!("-o {}", output.display()),
+            format!("the {which} room is a .glb"),
+            "end its name in .glb",
+        )
+    })
+}
+
 /// What is wrong with the files that a command is to write; each comes with the option that names it.
 pub(super) fn problems(outputs: &[(&str, &Path)], inputs: &[&Path]) -> Vec<Problem> {
     let mut problems = Vec::new();

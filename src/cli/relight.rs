@@ -167,16 +167,7 @@ fn problems(args: &RelightArgs, output: &Path, cache: &Path, parts: &[PathBuf]) 
     let mut inputs = vec![args.room.as_path(), spectra, cache];
     inputs.extend(parts.iter().map(PathBuf::as_path));
     let mut problems = paths::problems(&outputs, &inputs);
-    if !output
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("glb"))
-    {
-        problems.push(Problem::new(
-            format!("-o {}", output.display()),
-            "the relit room is a .glb",
-            "end its name in .glb",
-        ));
-    }
+    problems.extend(paths::not_glb(output, "relit"));
     if !cache.is_file() {
         problems.push(Problem::new(
             cache.display().to_string(),

@@ -185,16 +185,18 @@ impl Bake {
                     )
                 })
                 .collect();
-            let covered = self.covered(&receivers);
-            for ((gathered, &(s, v)), covered) in self
-                .gather_with(&receivers, care)
+            let gathered = self.gather_with(&receivers, care);
+            let dark = |g: &Gathered| g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
+            let in_doubt: Vec<Receiver> = receivers
                 .into_iter()
-                .zip(chunk)
-                .zip(covered)
-            {
+                .zip(&gathered)
+                .filter_map(|(r, g)| dark(g).then_some(r))
+                .collect();
+            let mut covered = self.covered(&in_doubt).into_iter();
+            for (gathered, &(s, v)) in gathered.into_iter().zip(chunk) {
                 rays += gathered.rays;
-                let dark = gathered.seen < 1e-3 && gathered.direct.iter().all(|&x| x == 0.0);
-                let hidden = (dark && covered) || gathered.backs > MOSTLY;
+                let covered = dark(&gathered) && covered.next() == Some(true);
+                let hidden = covered || gathered.backs > MOSTLY;
                 known[s][v] = Some(if hidden {
                     None
                 } else {
@@ -292,6 +294,12 @@ impl Bake {
         )
     }
 
+    /// How each material of the scene turns irradiance into what is seen.
+    pub(super) fn looks<'a>(&self, upsampler: &'a Upsampler) -> Vec<Look<'a>> {
+        let materials = self.scene().materials.iter();
+        materials.map(|m| Look::new(self, m, upsampler)).collect()
+    }
+
     /// Vertices with their colours, as the writers want them.
     fn write_down(
         &self,
@@ -301,12 +309,7 @@ impl Bake {
         mut out: Baked,
     ) -> Baked {
         let upsampler = Upsampler::new(&self.scene().grid);
-        let looks: Vec<Look> = self
-            .scene()
-            .materials
-            .iter()
-            .map(|m| Look::new(self, m, &upsampler))
-            .collect();
+        let looks = self.looks(&upsampler);
         for ((sheet, triangles), known) in refined.sheets.iter().zip(triangles).zip(known) {
             let (mut rows, mut traces): (Vec<_>, Vec<_>) = known
                 .into_iter()
@@ -427,7 +430,7 @@ pub(super) struct Look<'a> {
 }
 
 impl<'a> Look<'a> {
-    pub(super) fn new(bake: &Bake, material: &Material, upsampler: &'a Upsampler) -> Self {
+    fn new(bake: &Bake, material: &Material, upsampler: &'a Upsampler) -> Self {
         let mean = material.paint.as_ref().map(|texture| {
             let image = &bake.scene().images[texture.image];
             let n = image.pixels.len().max(1) as f64;

@@ -25,8 +25,6 @@ const POLYGONS: u32 = 4;
 /// A clear patch may misplace this share of the tolerance: what many of them misplace goes the same way (the middle of a wall
 /// is brighter than its edges, and nearer), and to enter one costs no ray. With 1 the light in a white cube is .7 % low.
 const CLEAR_SHARE: f64 = 0.05;
-/// A patch that carries less than this many tolerances is as visible as its link found: no ray of its own.
-const SLIGHT: f64 = 0.1;
 /// How many rays a link's visibility counts for.
 const PRIOR: f64 = 4.0;
 /// How often a lamp's triangle is quartered where its shadow boundary crosses it.
@@ -358,15 +356,7 @@ impl Gatherer<'_> {
                 return;
             }
             let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
-            let slight = factor * reflected < SLIGHT * self.tolerance
-                && emitted <= 0.0
-                && self.trusts_links(to);
-            let known = if clear {
-                Some(1.0)
-            } else {
-                slight.then_some(v)
-            };
-            self.cluster(to, id, count, known, memory, out);
+            self.cluster(to, id, count, clear, memory, out);
             return;
         }
         let sample = Sample {
@@ -405,11 +395,6 @@ impl Gatherer<'_> {
         };
         self.add(id, factor, visible, out);
         self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
-    }
-
-    /// Is what links know of visibility good enough for what carries little? Where nothing else is known it must be.
-    fn trusts_links(&self, to: &Receiver) -> bool {
-        to.leaf.is_some() && !self.sight.small() && self.hemisphere.is_none()
     }
 
     /// Are the children of a node known to the solution? Elements split after it are not.
@@ -472,7 +457,7 @@ impl Gatherer<'_> {
         to: &Receiver,
         id: u32,
         count: usize,
-        known: Option<f32>,
+        clear: bool,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
@@ -500,8 +485,8 @@ impl Gatherer<'_> {
         if factor <= 0.0 {
             return;
         }
-        let mut visible = f64::from(known.unwrap_or(1.0));
-        if known.is_none() && self.sight.occlusion {
+        let mut visible = 1.0;
+        if !clear {
             self.sight
                 .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
@@ -533,9 +518,6 @@ impl Gatherer<'_> {
         let Some(element) = self.tree.element(node) else {
             return 1.0;
         };
-        if !lamp && self.trusts_links(to) && carries < SLIGHT * self.tolerance {
-            return f64::from(known);
-        }
         let plane = self.tree.face_plane[element.face as usize];
         if let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);

@@ -1,7 +1,7 @@
 //! The output mesh kept with where its light comes from, and its light under other lamps and paints:
 //! one sparse product, no ray.
 
-use super::bake::{Baked, Look, lend};
+use super::bake::{Baked, lend};
 use super::refined::Vertex;
 use super::{BakedSurface, trace};
 use crate::color::Upsampler;
@@ -95,12 +95,7 @@ impl Bake {
 
     fn relit_lanes<const L: usize>(&self, kept: &[Kept]) -> Read<Baked> {
         let upsampler = Upsampler::new(&self.scene().grid);
-        let looks: Vec<Look> = self
-            .scene()
-            .materials
-            .iter()
-            .map(|m| Look::new(self, m, &upsampler))
-            .collect();
+        let looks = self.looks(&upsampler);
         let mut out = Baked::default();
         for kept in kept {
             let count = kept.vertices.len();

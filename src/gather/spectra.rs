@@ -3,7 +3,7 @@
 //! The reflectance is the one behind [`BakedVertex::radiosity`](super::BakedVertex::radiosity): a paint texture enters
 //! with its mean colour. An emissive texture is looked up at the vertex.
 
-use super::bake::{Baked, Look};
+use super::bake::Baked;
 use super::{BakedSurface, BakedVertex};
 use crate::color::Upsampler;
 use crate::output::refined;
@@ -18,11 +18,7 @@ impl Bake {
     pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
         let scene = self.scene();
         let upsampler = Upsampler::new(&scene.grid);
-        let looks: Vec<Look> = scene
-            .materials
-            .iter()
-            .map(|m| Look::new(self, m, &upsampler))
-            .collect();
+        let looks = self.looks(&upsampler);
         let surface = |(baked, rows): (&BakedSurface, &Vec<[f32; LEAVES]>)| {
             let surface = &scene.surfaces[baked.surface];
             let (material, look) = (&scene.materials[surface.material], &looks[surface.material]);

@@ -150,6 +150,17 @@ impl Tree {
         &self.nodes[id as usize]
     }
 
+    /// Nodes without children, ascending.
+    pub fn leaves(&self) -> impl Iterator<Item = u32> {
+        (0..self.nodes.len() as u32).filter(|&k| self.node(k).is_leaf())
+    }
+
+    /// Entry of the face at which the running sum of areas, over all faces, passes `area`; clamped against rounding at
+    /// the end.
+    pub fn entry_at(&self, area: f64) -> usize {
+        (self.face_area.partition_point(|&a| a <= area).max(1) - 1).min(self.faces.len() - 1)
+    }
+
     /// The element of a node that is one.
     pub fn element(&self, node: &Node) -> Option<&Element> {
         self.elements.get(node.element as usize)

@@ -191,7 +191,7 @@ impl Bake {
         self.outlook = Outlook::decode(&self.tree, whole, from)?;
         let factor: Vec<f32> = from.get_all()?;
         // Where leaves look for themselves nothing is balanced.
-        let by_rays = self.with_sight(|_, sight| super::by_rays(sight));
+        let by_rays = self.by_rays();
         let wanted = if by_rays && whole { 0 } else { nodes };
         if factor.len() != wanted || self.outlook.looks() != by_rays {
             return Err(Broken::new("does not know what its leaves see"));
@@ -204,9 +204,7 @@ impl Bake {
             limited: from.get::<u64>()? as usize,
         };
         self.areas = self.outlook.areas(&self.tree);
-        let leaves: Vec<u32> = (0..nodes as u32)
-            .filter(|&k| self.tree.node(k).is_leaf())
-            .collect();
+        let leaves: Vec<u32> = self.tree.leaves().collect();
         let (count, width) = (leaves.len(), padded(self.lanes.len()));
         let reflected = rows(from, count, width)?;
         let irradiance = rows(from, count, width)?;

@@ -80,9 +80,7 @@ impl Bake {
 
     /// The model of the room on its present links.
     fn model(&mut self, patches: usize) -> coarse::Coarse {
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
-            .filter(|&k| self.tree.node(k).is_leaf())
-            .collect();
+        let leaves: Vec<u32> = self.tree.leaves().collect();
         let (shadowed, factor) = match self.frozen.take() {
             Some(known) => known,
             None => {

@@ -133,9 +133,7 @@ impl Direct {
         weights: &[f64],
         gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
     ) {
-        let mut open: Vec<u32> = (0..tree.nodes.len() as u32)
-            .filter(|&k| tree.node(k).is_leaf())
-            .collect();
+        let mut open: Vec<u32> = tree.leaves().collect();
         for k in 0..self.rows.len() {
             if !tree.nodes[k].is_leaf() {
                 self.forget(k);

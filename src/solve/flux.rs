@@ -44,8 +44,7 @@ pub(super) fn closedness(
     let mut rng = Pcg::new(seed ^ 0x00c1_05ed);
     for _ in 0..ESCAPE_RAYS {
         let target = rng.f64() * root.area;
-        let entry =
-            (tree.face_area.partition_point(|&a| a <= target).max(1) - 1).min(tree.faces.len() - 1);
+        let entry = tree.entry_at(target);
         let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
         let from = element.at(triangle_weights([rng.f64(), rng.f64()]));
         let direction = cosine_direction(tree.face_normal[entry], [rng.f64(), rng.f64()]);

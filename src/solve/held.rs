@@ -47,9 +47,7 @@ impl Bake {
             hidden: true,
         });
         let started = Instant::now();
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
-            .filter(|&k| self.tree.node(k).is_leaf())
-            .collect();
+        let leaves: Vec<u32> = self.tree.leaves().collect();
         let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
         self.look_out();
         self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);

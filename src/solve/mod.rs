@@ -326,7 +326,7 @@ impl Bake {
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
         let bright = self.brightness_of_nodes();
-        let by_rays = self.with_sight(|_, sight| by_rays(sight));
+        let by_rays = self.by_rays();
         let shares = if by_rays {
             FURNISHED
         } else if self.tree.faces.len() >= MANY_LEAVES {
@@ -370,9 +370,7 @@ impl Bake {
         self.gather_direct(&demand);
         clock.lap("direct");
 
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
-            .filter(|&k| self.tree.node(k).is_leaf())
-            .collect();
+        let leaves: Vec<u32> = self.tree.leaves().collect();
         let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
         escape_rays += self.look_out();
         // Rays need no balance: their rows sum to what they must as they are.
@@ -469,6 +467,11 @@ impl Bake {
         }
     }
 
+    /// Do leaves and points of this room look for themselves?
+    fn by_rays(&self) -> bool {
+        self.with_sight(|_, sight| by_rays(sight))
+    }
+
     /// Runs `f` with what blocks light in this room.
     fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
         let opaque = |triangle: u32, u: f32, v: f32| {
@@ -546,7 +549,7 @@ impl Bake {
 
     /// Splits leaves that look for themselves and see reflected light vary, and lets the parts look; the rays cast.
     fn split_where_light_varies(&mut self, demand: &Demand) -> u64 {
-        if self.rounds.is_empty() || !self.with_sight(|_, sight| by_rays(sight)) {
+        if self.rounds.is_empty() || !self.by_rays() {
             return 0;
         }
         let mut rays = 0;
@@ -635,9 +638,7 @@ impl Bake {
 
     /// Puts emission and links in place for a gather.
     fn place_emission<const L: usize>(&mut self) {
-        let leaves: Vec<u32> = (0..self.tree.nodes.len() as u32)
-            .filter(|&k| self.tree.node(k).is_leaf())
-            .collect();
+        let leaves: Vec<u32> = self.tree.leaves().collect();
         let painter = Painter::new(&self.scene, &self.mesh);
         let emission = painter.paint(&self.tree, &leaves, &self.lanes).emission;
         self.look_out();
@@ -681,7 +682,7 @@ impl Bake {
         let mut reflected = self.guess::<L>(leaves);
         let tolerance = SOLVE_SHARE * self.settings.error;
         let runs = self.plan.runs(Kind::Interreflection);
-        let (convergence, mut irradiance, sums) = if self.with_sight(|_, sight| by_rays(sight)) {
+        let (convergence, mut irradiance, sums) = if self.by_rays() {
             let system = RaySystem {
                 tree: &self.tree,
                 outlook: &self.outlook,

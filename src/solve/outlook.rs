@@ -148,6 +148,10 @@ impl Outlook {
         hemisphere: &Hemisphere,
         seed: u64,
     ) -> u64 {
+        if self.range.len() == tree.nodes.len() {
+            // A hierarchy only grows: this one has been looked out of.
+            return 0;
+        }
         self.target.resize(tree.nodes.len(), f32::NAN);
         self.bare.resize(tree.nodes.len(), f32::NAN);
         self.range.resize(tree.nodes.len(), (0, 0));
