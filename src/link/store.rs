@@ -41,7 +41,12 @@ impl LinkRows {
 
     /// The row of a node: sources and exchanges.
     pub fn row(&self, node: usize) -> &[(u32, f32)] {
-        &self.entries[self.start[node] as usize..self.start[node + 1] as usize]
+        &self.entries[self.range(node)]
+    }
+
+    /// Where the row of a node stands among all entries.
+    pub fn range(&self, node: usize) -> std::ops::Range<usize> {
+        self.start[node] as usize..self.start[node + 1] as usize
     }
 
     /// Number of nodes.

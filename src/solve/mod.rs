@@ -14,6 +14,7 @@ pub mod forecast;
 mod held;
 pub mod lanes;
 pub mod light;
+mod linear;
 mod lists;
 mod mixed;
 mod operator;
@@ -539,7 +540,7 @@ impl Bake {
             if by_rays(sight) {
                 outlook.look(&bake.tree, sight, &bake.hemisphere, seed)
             } else {
-                outlook.extend(&bake.mesh, &bake.tree, &bake.rays, bake.closed, seed)
+                outlook.extend(&bake.tree, sight, bake.closed, seed)
             }
         });
         self.outlook = outlook;
@@ -679,6 +680,27 @@ impl Bake {
             .lanes
             .is_mixed()
             .then(|| painter.mixed(&self.tree, leaves, &self.lanes));
+        let plus = |a: &Rows, b: &Rows| {
+            let mut sum = a.clone();
+            for (a, b) in sum.all_mut::<L>().iter_mut().zip(b.all::<L>()) {
+                *a = std::array::from_fn(|l| a[l] + b[l]);
+            }
+            sum
+        };
+        let reflect = |irradiance: &Rows| match &mixed {
+            Some(mixed) => mixed.reflect::<L>(irradiance),
+            None => {
+                let mut reflected = irradiance.clone();
+                for (r, rho) in reflected
+                    .all_mut::<L>()
+                    .iter_mut()
+                    .zip(reflectance.all::<L>())
+                {
+                    *r = std::array::from_fn(|l| r[l] * rho[l]);
+                }
+                reflected
+            }
+        };
         let mut reflected = self.guess::<L>(leaves);
         let tolerance = SOLVE_SHARE * self.settings.error;
         let runs = self.plan.runs(Kind::Interreflection);
@@ -722,31 +744,29 @@ impl Bake {
             system
                 .operator
                 .irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
+            if runs {
+                let slopes = linear::Slopes::new(
+                    &self.tree,
+                    rows,
+                    &self.areas,
+                    leaves,
+                    &self.outlook.target,
+                );
+                for _ in 0..linear::PASSES {
+                    irradiance = slopes.irradiance::<L>(&reflected);
+                    reflected = reflect(&plus(&irradiance, &first));
+                }
+            }
             let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
             let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
             (convergence, irradiance, sums)
         };
-        for (h, f) in irradiance.all_mut::<L>().iter_mut().zip(first.all::<L>()) {
-            for l in 0..L {
-                h[l] += f[l];
-            }
-        }
+        irradiance = plus(&irradiance, &first);
         if !runs {
-            reflected = Rows::zero(leaves.len(), L);
-            for ((r, h), rho) in reflected
-                .all_mut::<L>()
-                .iter_mut()
-                .zip(irradiance.all::<L>())
-                .zip(reflectance.all::<L>())
-            {
-                *r = std::array::from_fn(|l| h[l] * rho[l]);
-            }
+            reflected = reflect(&irradiance);
         }
-        if let Some(mixed) = &mixed {
+        if mixed.is_some() {
             // Seen lane by lane, albedo is what came back of what came in.
-            if !runs {
-                reflected = mixed.reflect::<L>(&irradiance);
-            }
             for ((rho, r), h) in reflectance
                 .all_mut::<L>()
                 .iter_mut()
@@ -816,7 +836,7 @@ impl Bake {
         for (row, &leaf) in by_leaf.all::<L>().iter().zip(leaves) {
             rows.all_mut::<L>()[leaf as usize] = *row;
         }
-        operator::pull::<L>(&self.tree, &self.areas, rows.all_mut::<L>());
+        operator::pull::<f32, L>(&self.tree, &self.areas, rows.all_mut::<L>());
         rows
     }
 

@@ -186,23 +186,24 @@ impl<'a> Operator<'a> {
     }
 }
 
-/// A vector of f32.
-trait Vector:
+/// A vector of f32, or one.
+pub(super) trait Vector:
     Pod + Zeroable + Send + Sync + Add<Output = Self> + Mul<Output = Self> + From<f32>
 {
 }
+impl Vector for f32 {}
 impl Vector for f32x4 {}
 impl Vector for f32x8 {}
 impl Vector for f32x16 {}
 
 #[inline(always)]
-fn scaled<V: Vector, const N: usize>(row: &[V; N], by: f32) -> [V; N] {
+pub(super) fn scaled<V: Vector, const N: usize>(row: &[V; N], by: f32) -> [V; N] {
     let by = V::from(by);
     row.map(|x| x * by)
 }
 
 #[inline(always)]
-fn add<V: Vector, const N: usize>(sum: &mut [V; N], factor: f32, row: &[V; N]) {
+pub(super) fn add<V: Vector, const N: usize>(sum: &mut [V; N], factor: f32, row: &[V; N]) {
     let factor = V::from(factor);
     for (s, x) in sum.iter_mut().zip(row) {
         *s = *s + factor * *x;
@@ -230,17 +231,14 @@ fn gather<V: Vector, const N: usize>(links: &[(u32, f32)], rows: &[[V; N]]) -> [
 }
 
 /// Area-weighted means from the leaves to the root.
-pub(super) fn pull<const L: usize>(tree: &Tree, areas: &[f64], rows: &mut [[f32; L]]) {
+pub(super) fn pull<V: Vector, const N: usize>(tree: &Tree, areas: &[f64], rows: &mut [[V; N]]) {
     for (k, node) in tree.nodes.iter().enumerate().rev() {
         if node.is_leaf() {
             continue;
         }
-        let mut mean = [0.0_f32; L];
-        for child in node.child_range() {
-            let share = (areas[child as usize] / areas[k]) as f32;
-            for (m, x) in mean.iter_mut().zip(&rows[child as usize]) {
-                *m += share * x;
-            }
+        let mut mean = [V::zeroed(); N];
+        for child in node.child_range().map(|c| c as usize) {
+            add(&mut mean, (areas[child] / areas[k]) as f32, &rows[child]);
         }
         rows[k] = mean;
     }

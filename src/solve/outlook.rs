@@ -6,12 +6,12 @@
 //! cos / pi from points of a leaf, and the mean of what they meet, `H = 1/n sum B(k)`, is its irradiance by reflected
 //! light. Rays of a leaf stay what they are from round to round; what they meet is looked up anew.
 
-use super::flux::{Closed, Meets, meets};
+use super::flux::Closed;
 use super::rows::Rows;
 use crate::gather::hemisphere::{BEAM, Hemisphere};
-use crate::geometry::RayIndex;
+use crate::geometry::Hit;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
-use crate::hierarchy::{Mesh, NONE, Tree};
+use crate::hierarchy::{NONE, Tree};
 use crate::link::Sight;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder};
@@ -19,7 +19,9 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, at least, and at the most.
-const LEAF_RAYS: [usize; 3] = [48, 8, 128];
+const LEAF_RAYS: [usize; 3] = [64, 32, 1024];
+/// A patch of which so many rays all met fronts is taken to be closed in.
+const CERTAIN: usize = 1024;
 /// Rays of a leaf that looks for itself: share of a point's for a leaf of mean area, and the least.
 const LOOKING: (f64, usize) = (0.25, BEAM);
 /// Least share of a leaf's area that counts as bare.
@@ -54,6 +56,8 @@ pub(super) struct Outlook {
     pub target: Vec<f32>,
     /// For each node that is a leaf: share of its area that is not covered by something solid. NaN elsewhere.
     pub bare: Vec<f32>,
+    /// For each node: is it as good as certain that all its light meets fronts?
+    certain: Vec<bool>,
     /// Where the rays of leaves ended, leaf after leaf.
     ends: Vec<End>,
     /// First end of each node's rays, and how many there are.
@@ -63,15 +67,9 @@ pub(super) struct Outlook {
 }
 
 impl Outlook {
-    /// Looks out of new leaves. A leaf below one whose rays all met fronts is not looked at again. Returns the rays cast.
-    pub(super) fn extend(
-        &mut self,
-        mesh: &Mesh,
-        tree: &Tree,
-        rays: &RayIndex,
-        closed: Closed,
-        seed: u64,
-    ) -> u64 {
+    /// Looks out of new leaves. A leaf below one of which very many rays all met fronts is not looked at again. Returns
+    /// the rays cast.
+    pub(super) fn extend(&mut self, tree: &Tree, sight: &Sight, closed: Closed, seed: u64) -> u64 {
         let old = self.target.len();
         self.target.resize(tree.nodes.len(), f32::NAN);
         self.bare.resize(tree.nodes.len(), f32::NAN);
@@ -80,61 +78,38 @@ impl Outlook {
             self.bare[old..].fill(1.0);
             return 0;
         }
+        self.certain.resize(tree.nodes.len(), false);
         let mut open = Vec::new();
         for k in 0..tree.nodes.len() {
             let node = &tree.nodes[k];
             if !node.is_leaf() || !self.target[k].is_nan() {
                 continue;
             }
-            let above = node.parent as usize;
-            if node.parent != NONE && self.target[above] == 1.0 && self.bare[above] == 1.0 {
-                (self.target[k], self.bare[k]) = (1.0, 1.0);
+            if node.parent != NONE && self.certain[node.parent as usize] {
+                (self.target[k], self.bare[k], self.certain[k]) = (1.0, 1.0, true);
             } else {
                 open.push(k);
             }
         }
         let leaves = tree.nodes.iter().filter(|n| n.is_leaf()).count();
         let mean = tree.nodes.first().map_or(0.0, |n| n.area) / leaves.max(1) as f64;
-        let found: Vec<(f32, f32, u64)> = open
+        let found: Vec<[usize; 3]> = open
             .par_chunks(CHUNK)
             .flat_map_iter(|chunk| {
                 chunk.iter().map(|&k| {
-                    let node = &tree.nodes[k];
-                    let element = &tree.elements[node.element as usize];
-                    let wanted = (LEAF_RAYS[0] as f64 * (node.area / mean)).ceil() as usize;
-                    let count = wanted.clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
-                    let (at, to) = (hash(seed, k as u64), hash(seed ^ 1, k as u64));
-                    let (mut fronts, mut backs) = (0, 0);
-                    for i in 0..count as u32 {
-                        let from = element.at(triangle_weights(sequence02(i, at)));
-                        let direction = cosine_direction(node.normal, sequence02(i, to));
-                        match meets(
-                            mesh,
-                            tree,
-                            rays,
-                            from,
-                            direction,
-                            tree.face_plane[element.face as usize],
-                        ) {
-                            Meets::Front => fronts += 1,
-                            Meets::Back => backs += 1,
-                            Meets::Nothing => {}
-                        }
-                    }
-                    let bare = (count - backs) as f64 / count as f64;
-                    let target = if backs < count {
-                        fronts as f64 / (count - backs) as f64
-                    } else {
-                        0.0
-                    };
-                    (target as f32, bare as f32, count as u64)
+                    let wanted = LEAF_RAYS[0] as f64 * (tree.nodes[k].area / mean);
+                    let wanted = (wanted as usize).clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
+                    escape_from(tree, k, sight, wanted.next_multiple_of(BEAM), seed)
                 })
             })
             .collect();
         let mut cast = 0;
-        for (k, (target, bare, count)) in open.into_iter().zip(found) {
-            (self.target[k], self.bare[k]) = (target, bare);
-            cast += count;
+        for (k, [count, misses, covered]) in open.into_iter().zip(found) {
+            let bare = count - covered;
+            self.bare[k] = bare as f32 / count as f32;
+            self.target[k] = (bare - misses) as f32 / bare.max(1) as f32;
+            self.certain[k] = misses + covered == 0 && count >= CERTAIN;
+            cast += count as u64;
         }
         cast
     }
@@ -221,6 +196,10 @@ impl Outlook {
     pub(super) fn encode(&self, whole: bool, out: &mut Encoder) -> std::io::Result<()> {
         out.put_all(&self.target)?;
         out.put_all(&self.bare)?;
+        out.put_list(
+            self.certain.len(),
+            self.certain.iter().map(|&c| u8::from(c)),
+        )?;
         out.put_list(self.range.len(), self.range.iter().map(|r| [r.0, r.1]))?;
         if whole {
             out.put_list(self.ends.len(), self.ends.iter().map(|end| end.entry))?;
@@ -236,8 +215,12 @@ impl Outlook {
         let mut outlook = Self {
             target: from.get_exactly(nodes)?,
             bare: from.get_exactly(nodes)?,
+            certain: from.get_list::<u8>()?.map(|c| c == 1).collect(),
             ..Self::default()
         };
+        if !(outlook.certain.is_empty() || outlook.certain.len() == nodes) {
+            return Err(Broken::new("has patches that do not fit"));
+        }
         let ranges = from.get_list::<[u32; 2]>()?;
         if !(ranges.len() == 0 || ranges.len() == nodes) {
             return Err(Broken::new("has rays in parts that do not fit"));
@@ -346,6 +329,36 @@ impl Outlook {
         }
         areas
     }
+}
+
+/// Casts `count` rays out of a leaf. How many there were, how many missed all fronts, how many started where something
+/// covers the leaf.
+fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64) -> [usize; 3] {
+    let node = &tree.nodes[leaf];
+    let element = &tree.elements[node.element as usize];
+    let plane = tree.face_plane[element.face as usize];
+    let (at, to) = (hash(seed, leaf as u64), hash(seed ^ 1, leaf as u64));
+    let (mut misses, mut covered) = (0, 0);
+    let mut hits = [None; BEAM];
+    let (mut from, mut directions) = ([Vec3::ZERO; BEAM], [Vec3::ZERO; BEAM]);
+    for beam in (0..count).step_by(BEAM) {
+        for k in 0..BEAM {
+            from[k] = element.at(start(beam + k, at)).as_vec3();
+            let u = sequence02((beam + k) as u32, to);
+            directions[k] = cosine_direction(node.normal, u).as_vec3();
+        }
+        sight.meet(&from, &directions, plane, &mut hits);
+        for (hit, from) in hits.iter().zip(from) {
+            let front =
+                |h: &Hit| tree.entry[h.triangle as usize][usize::from(h.from_behind)] != NONE;
+            match hit {
+                Some(hit) if front(hit) => {}
+                Some(_) if is_covered(tree, sight, from, node.normal, plane) => covered += 1,
+                _ => misses += 1,
+            }
+        }
+    }
+    [count, misses, covered]
 }
 
 /// Casts the rays of a leaf: a turned pattern of directions, from points all over it.

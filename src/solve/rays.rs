@@ -120,7 +120,7 @@ impl RaySystem<'_> {
         for (row, &leaf) in reflected.all::<L>().iter().zip(self.leaves) {
             all[leaf as usize] = *row;
         }
-        pull::<L>(self.tree, self.areas, all);
+        pull::<f32, L>(self.tree, self.areas, all);
         self.outlook.irradiance::<L>(self.leaves, nodes, seen);
     }
 }
