@@ -26,6 +26,7 @@ mod relight;
 mod representation;
 mod rows;
 mod sources;
+mod two_grid;
 
 pub use lists::PatchList;
 pub use record::{Round, Verdict};
@@ -213,10 +214,21 @@ pub struct Bake {
     watched: [Vec<Option<Box<[u8]>>>; 2],
     /// What the choice of lanes may take for granted when lamps and paints change: shadows of punctual lights, balance.
     frozen: Option<(punctual::Shadowed, Vec<f32>)>,
+    /// Few patches that stand for the room in a solve by rays.
+    two_grid: Option<two_grid::TwoGrid>,
     /// Space of each face, and which cuts were made for them, see [`spaces`].
     spaces: Vec<u32>,
     parted: Vec<u32>,
     started: Instant,
+}
+
+/// What a solve starts from, by leaf.
+struct Given {
+    sources: Sources,
+    /// Direct irradiance.
+    first: Rows,
+    /// A guess of what is reflected.
+    reflected: Rows,
 }
 
 /// Cuts a mesh as it was cut before: the search casts no ray.
@@ -288,6 +300,7 @@ impl Bake {
             keep: false,
             watched: Default::default(),
             frozen: None,
+            two_grid: None,
             spectrum_error: None,
             scene,
             settings,
@@ -661,25 +674,44 @@ impl Bake {
         leaves: &[u32],
     ) -> (Convergence, flux::Balance) {
         let painter = Painter::new(&self.scene, &self.mesh);
-        let Sources {
-            mut reflectance,
-            emission,
-            greatest,
-        } = painter.paint(&self.tree, leaves, &self.lanes);
-        let nodes = self.tree.nodes.len();
         let mut first = Rows::zero(leaves.len(), L);
         for (k, &leaf) in leaves.iter().enumerate() {
             let row = self.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
         }
+        let given = Given {
+            sources: painter.paint(&self.tree, leaves, &self.lanes),
+            first,
+            reflected: self.guess::<L>(leaves),
+        };
+        self.solve_with::<L>(rows, leaves, given)
+    }
+
+    /// The same with what it starts from.
+    fn solve_with<const L: usize>(
+        &mut self,
+        rows: &LinkRows,
+        leaves: &[u32],
+        given: Given,
+    ) -> (Convergence, flux::Balance) {
+        let Given {
+            sources:
+                Sources {
+                    mut reflectance,
+                    emission,
+                    greatest,
+                },
+            mut first,
+            mut reflected,
+        } = given;
+        let nodes = self.tree.nodes.len();
         if self.sealed == Closed::Yes {
             flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
         }
         let mixed = self
             .lanes
             .is_mixed()
-            .then(|| painter.mixed(&self.tree, leaves, &self.lanes));
-        let mut reflected = self.guess::<L>(leaves);
+            .then(|| Painter::new(&self.scene, &self.mesh).mixed(&self.tree, leaves, &self.lanes));
         let tolerance = SOLVE_SHARE * self.settings.error;
         let runs = self.plan.runs(Kind::Interreflection);
         let (convergence, mut irradiance, sums) = if self.by_rays() {
@@ -690,6 +722,7 @@ impl Bake {
                 areas: &self.areas,
                 reflectance: &reflectance,
                 greatest: &greatest,
+                two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
             };
             let sums = self.outlook.target.iter().map(|&t| f64::from(t)).collect();
             let (convergence, seen) = match &mixed {

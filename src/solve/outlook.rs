@@ -279,19 +279,25 @@ impl Outlook {
             .zip(leaves.par_chunks(CHUNK))
             .for_each(|(out, leaves)| {
                 for (row, &leaf) in out.iter_mut().zip(leaves) {
-                    let (start, count) = self.range[leaf as usize];
+                    let (met, bare) = self.met(leaf);
                     let mut sum = [0.0_f32; L];
-                    for &met in &self.met[start as usize..(start + count) as usize] {
+                    for &met in met {
                         if met != NONE {
                             for (s, x) in sum.iter_mut().zip(&nodes[met as usize]) {
                                 *s += x;
                             }
                         }
                     }
-                    let bare = (self.bare[leaf as usize] * count as f32).max(1.0);
                     *row = sum.map(|x| x / bare);
                 }
             });
+    }
+
+    /// What the rays of a leaf met ([`NONE`]: nothing), and what the sum over them is divided by for their mean.
+    pub(super) fn met(&self, leaf: u32) -> (&[u32], f32) {
+        let (start, count) = self.range[leaf as usize];
+        let met = &self.met[start as usize..(start + count) as usize];
+        (met, (self.bare[leaf as usize] * count as f32).max(1.0))
     }
 
     /// How much reflected light varies over a leaf: the standard deviation between its four quarters that the noise of
