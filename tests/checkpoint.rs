@@ -3,7 +3,7 @@
 use haarlight::output::{Exposure, baked_glb, npz};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
-use haarlight::store::hash;
+use haarlight::store::container;
 use proptest::prelude::*;
 use std::path::Path;
 use std::process::Command;
@@ -198,8 +198,10 @@ proptest! {
         if let Some(cut) = cut {
             bytes.truncate(cut.index(bytes.len()));
         }
-        let sum = hash::of(&bytes);
         if signed {
+            bytes.extend([0; 8]);
+            let sum = container::checksum(&bytes);
+            bytes.truncate(bytes.len() - 8);
             bytes.extend(sum.to_le_bytes());
         }
         let folder = tempfile::tempdir().unwrap();

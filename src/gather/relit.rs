@@ -159,3 +159,28 @@ fn lend_some(rows: &mut [[f32; 64]], triangles: &[[u32; 3]]) -> usize {
     }
     count
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Lent to where it is needed is lent to all.
+        #[test]
+        fn some_neighbours_lend_what_all_do(
+            lit in prop::collection::vec(prop::option::of(0.0_f32..9.0), 12),
+            triangles in prop::collection::vec([0_u32..12, 0_u32..12, 0_u32..12], 0..16),
+        ) {
+            let mut all: Vec<Option<[f32; 64]>> = lit.iter().map(|x| x.map(|x| [x; 64])).collect();
+            let mut some: Vec<[f32; 64]> = all.iter().map(|x| x.unwrap_or([f32::NAN; 64])).collect();
+            prop_assert_eq!(lend(&mut all, &triangles), lend_some(&mut some, &triangles));
+            for (k, (all, some)) in all.iter().zip(&some).enumerate() {
+                // What no triangle uses is of no use.
+                if triangles.iter().flatten().any(|&v| v as usize == k) {
+                    prop_assert_eq!(all.unwrap_or([0.0; 64]), *some);
+                }
+            }
+        }
+    }
+}

@@ -293,6 +293,24 @@ impl Outlook {
             });
     }
 
+    /// An outlook of leaves (ascending nodes) that met these.
+    #[cfg(test)]
+    pub(super) fn of(nodes: usize, leaves: &[u32], seen: &[Vec<u32>]) -> Self {
+        let mut outlook = Self {
+            target: vec![f32::NAN; nodes],
+            bare: vec![f32::NAN; nodes],
+            range: vec![(0, 0); nodes],
+            ..Self::default()
+        };
+        for (&leaf, seen) in leaves.iter().zip(seen) {
+            let k = leaf as usize;
+            (outlook.target[k], outlook.bare[k]) = (1.0, 1.0);
+            outlook.range[k] = (outlook.met.len() as u32, seen.len() as u32);
+            outlook.met.extend(seen);
+        }
+        outlook
+    }
+
     /// What the rays of a leaf met ([`NONE`]: nothing), and what the sum over them is divided by for their mean.
     pub(super) fn met(&self, leaf: u32) -> (&[u32], f32) {
         let (start, count) = self.range[leaf as usize];

@@ -168,3 +168,109 @@ fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
     }
     patch
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::rays::RaySystem;
+    use super::*;
+    use crate::geometry::sampling::Pcg;
+    use crate::hierarchy::Node;
+
+    const CLUSTERS: u32 = 40;
+    const LEAVES: u32 = 30;
+    const RAYS: usize = 64;
+
+    /// A root, clusters, and leaves below these.
+    fn tree() -> Tree {
+        let mut tree = Tree::default();
+        let mut push = |parent: u32, child: u32, children: u32, area: f64| {
+            tree.nodes.push(Node {
+                parent,
+                child: if children > 0 { child } else { NONE },
+                children: children as u8,
+                flat: parent != NONE,
+                element: NONE,
+                faces: (0, 0),
+                low: glam::DVec3::ZERO,
+                high: glam::DVec3::ZERO,
+                centre: glam::DVec3::ZERO,
+                radius: 0.0,
+                area,
+                normal: glam::DVec3::Z,
+                cone: -1.0,
+            });
+        };
+        push(NONE, 1, CLUSTERS, f64::from(CLUSTERS * LEAVES));
+        for k in 0..CLUSTERS {
+            push(0, 1 + CLUSTERS + k * LEAVES, LEAVES, f64::from(LEAVES));
+        }
+        for k in 0..CLUSTERS * LEAVES {
+            push(1 + k / LEAVES, NONE, 0, 1.0);
+        }
+        tree
+    }
+
+    /// Clusters see themselves and their neighbours in a row: light goes slowly through such a room.
+    #[test]
+    fn sweeps_and_few_patches_find_what_sweeps_find() {
+        const L: usize = 4;
+        let tree = tree();
+        let nodes = tree.nodes.len();
+        let leaves: Vec<u32> = (1 + CLUSTERS..nodes as u32).collect();
+        let mut random = Pcg::new(3);
+        let mut below = |n: u32| random.below(n);
+        let seen: Vec<Vec<u32>> = (0..leaves.len() as u32)
+            .map(|k| {
+                let own = k / LEAVES;
+                let some = (0..RAYS).map(|_| {
+                    let other = (own + below(3)).saturating_sub(1).min(CLUSTERS - 1);
+                    1 + CLUSTERS + other * LEAVES + below(LEAVES)
+                });
+                some.collect()
+            })
+            .collect();
+        let outlook = Outlook::of(nodes, &leaves, &seen);
+        let areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
+        let (mut reflectance, mut first) =
+            (Rows::zero(leaves.len(), L), Rows::zero(leaves.len(), L));
+        for k in 0..leaves.len() {
+            for l in 0..L {
+                reflectance.row_mut(k)[l] = [0.3, 0.6, 0.9, 0.95][l];
+                first.row_mut(k)[l] = if k < 100 { 1.0 + below(5) as f32 } else { 0.0 };
+            }
+        }
+        let grid = TwoGrid::new(&tree, &outlook, &leaves, &areas);
+        // The patches' rays sum to 1.
+        for row in &grid.seen {
+            let sum: f32 = row.iter().map(|x| x.1).sum();
+            assert!((sum - 1.0).abs() < 1e-5, "{sum}");
+        }
+        let xyz = [[1.0; 3]; L];
+        let solved = |two_grid| {
+            let system = RaySystem {
+                tree: &tree,
+                outlook: &outlook,
+                leaves: &leaves,
+                areas: &areas,
+                reflectance: &reflectance,
+                greatest: &[0.3, 0.6, 0.9, 0.95],
+                two_grid,
+            };
+            let mut reflected = Rows::zero(leaves.len(), L);
+            let (done, _) = system.solve::<L>(&first, &mut reflected, 1e-5);
+            (done, reflected)
+        };
+        let (plain, expected) = solved(None);
+        let (done, reflected) = solved(Some((&grid, &xyz[..])));
+        assert!(done.iterations * 3 < plain.iterations, "{done:?} {plain:?}");
+        for l in 0..L {
+            let rows = (0..leaves.len()).map(|k| (reflected.row(k)[l], expected.row(k)[l]));
+            let (mut gap, mut all) = (0.0, 0.0);
+            for (a, b) in rows {
+                gap += f64::from((a - b).abs());
+                all += f64::from(b);
+            }
+            assert!(gap < 1e-4 * all, "{l}: {gap} {all}");
+        }
+    }
+}

@@ -273,7 +273,7 @@ mod tests {
         fn damage_is_found(list in prop::collection::vec(any::<u32>(), 0..40), at in any::<usize>(), with in 1_u8.., cut in any::<usize>(), more in 1_usize..9) {
             let (_folder, path) = file(&list);
             let whole = std::fs::read(&path).unwrap();
-            prop_assert_eq!(checksum(&whole).to_le_bytes(), whole[whole.len() - 8..]);
+            prop_assert_eq!(&checksum(&whole).to_le_bytes()[..], &whole[whole.len() - 8..]);
             let taken = |bytes: &[u8]| {
                 std::fs::write(&path, bytes).unwrap();
                 read(&path, Kind::Cache, |from| from.get_all::<u32>()).is_ok()

@@ -109,7 +109,7 @@ impl Packs {
         let first = k * Self::BLOCK;
         let lengths = &self.lengths[first..(first + Self::BLOCK).min(self.lengths.len())];
         let mut rest: &'b [u8] = buffer;
-        Ok(lengths.to_vec().into_iter().map(move |length| {
+        Ok(lengths.iter().map(move |&length| {
             (length != MISSING).then(|| {
                 let (piece, after) = rest.split_at(length as usize);
                 rest = after;
