@@ -96,7 +96,7 @@ impl Bake {
         let looks = self.looks(&upsampler);
         let mut out = Baked::default();
         for kept in kept {
-            let mut rows = vec![[0.0; 64]; kept.vertices.len()];
+            let mut rows: Vec<[f32; 64]> = bytemuck::zeroed_vec(kept.vertices.len());
             kept.traces.for_each(&mut rows, |packed, row| {
                 match packed {
                     Some(packed) => {

@@ -229,6 +229,8 @@ struct Given {
     first: Rows,
     /// A guess of what is reflected.
     reflected: Rows,
+    /// What every node emits, if that is known.
+    emitted: Option<Rows>,
 }
 
 /// Cuts a mesh as it was cut before: the search casts no ray.
@@ -683,6 +685,7 @@ impl Bake {
             sources: painter.paint(&self.tree, leaves, &self.lanes),
             first,
             reflected: self.guess::<L>(leaves),
+            emitted: None,
         };
         self.solve_with::<L>(rows, leaves, given)
     }
@@ -703,6 +706,7 @@ impl Bake {
                 },
             mut first,
             mut reflected,
+            emitted,
         } = given;
         let nodes = self.tree.nodes.len();
         if self.sealed == Closed::Yes {
@@ -799,7 +803,7 @@ impl Bake {
         let flux = flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums);
         self.light = Light {
             reflected: self.on_nodes::<L>(&reflected, leaves),
-            emitted: self.on_nodes::<L>(&emission, leaves),
+            emitted: emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves)),
             irradiance,
             leaves: leaves.to_vec(),
             neighbours: Neighbours::new(nodes, &self.graph),

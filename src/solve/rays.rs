@@ -15,9 +15,8 @@ use crate::hierarchy::Tree;
 const SWEEPS: usize = 400;
 /// The scale of one sweep stays within this factor.
 const GREATEST_SCALE: f64 = 2.0;
-/// Few patches keep the mean error small first, and leave more than their share of it in corners where much light is
-/// trapped: they solve to this part of the tolerance.
-const CORNERS: f64 = 0.25;
+/// Changes that shrink more slowly from sweep to sweep count as shrinking so.
+const SLOWEST: f64 = 0.95;
 /// After a correction that left more than this share of the change, a sweep goes without: what few patches cannot tell
 /// apart must not build up.
 const WORTH_CORRECTING: f64 = 0.5;
@@ -50,17 +49,11 @@ impl RaySystem<'_> {
         let mut done = Convergence::default();
         let area = |k: usize| self.areas[self.leaves[k] as usize];
         let target = |k: usize| f64::from(self.outlook.target[self.leaves[k] as usize]);
-        let mean_reflectance = self.two_grid.map(|(grid, _)| {
-            let mut sums = grid.sums::<L>();
-            for (k, rho) in self.reflectance.all::<L>().iter().enumerate() {
-                grid.add::<L>(k, area(k), rho, &mut sums);
-            }
-            grid.means::<L>(&sums)
-        });
-        let tolerance = match self.two_grid {
-            Some(_) => CORNERS * tolerance,
-            None => tolerance,
-        };
+        let mean_reflectance = self
+            .two_grid
+            .map(|(grid, _)| grid.means::<L>(&self.sums::<L>(grid, self.reflectance)));
+        let patches = self.two_grid.map_or(0, |(grid, _)| grid.len());
+        let mut steps = vec![[0.0; 3]; patches];
         let mut corrected = false;
         loop {
             self.receive::<L>(reflected, &mut nodes, &mut seen);
@@ -124,7 +117,17 @@ impl RaySystem<'_> {
                 None => self.worst(&change, &total),
                 Some((_, xyz)) => self.seen(&change, &total, xyz),
             };
-            if done.bound <= tolerance || done.iterations >= SWEEPS {
+            let mut settled = done.bound <= tolerance;
+            if let (Some((grid, xyz)), Some(moved)) = (self.two_grid, &moved) {
+                // The mean error is small first; light that is trapped somewhere settles last.
+                let earlier = std::mem::replace(&mut steps, grid.seen::<L>(moved, xyz));
+                settled = settled && {
+                    let all = grid.seen::<L>(&self.sums::<L>(grid, reflected), xyz);
+                    let ratio = (done.residual / before).min(SLOWEST);
+                    grid.left(&earlier, &steps, &all, ratio) <= tolerance
+                };
+            }
+            if settled || done.iterations >= SWEEPS {
                 return (done, seen);
             }
             corrected = !(corrected && done.residual > WORTH_CORRECTING * before);
@@ -136,6 +139,15 @@ impl RaySystem<'_> {
                 grid.correct::<L>(&change, rho, &fair, self.reflectance, reflected);
             }
         }
+    }
+
+    /// Rows by leaf, times areas, summed over patches.
+    fn sums<const L: usize>(&self, grid: &TwoGrid, rows: &Rows) -> Vec<[f64; L]> {
+        let mut sums = grid.sums::<L>();
+        for (k, (row, &leaf)) in rows.all::<L>().iter().zip(self.leaves).enumerate() {
+            grid.add::<L>(k, self.areas[leaf as usize], row, &mut sums);
+        }
+        sums
     }
 
     /// Relative change of the worst lane, and how large its error may still be.

@@ -440,6 +440,7 @@ impl Relighter {
             }
             Ok(())
         })?;
+        let emitted = Some(std::mem::take(&mut light.emitted));
         bake.light = light;
         let direct_s = clock.elapsed().as_secs_f64();
 
@@ -460,6 +461,7 @@ impl Relighter {
             sources,
             first,
             reflected,
+            emitted,
         };
         let (convergence, flux) = bake.solve_with::<L>(links, &leaves, given);
         bake.graph = graph;

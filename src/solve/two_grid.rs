@@ -14,10 +14,13 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Patches of the cut at the most.
-const PATCHES: usize = 512;
+const PATCHES: usize = 2560;
 /// Sweeps over the cut at the most, and the relative change after which no more are worth while: the cut errs by more.
 const SWEEPS: usize = 100;
 const ENOUGH: f64 = 0.02;
+
+/// A patch that reflects less than this share of the mean counts as one that reflects so much.
+const DARK: f64 = 0.05;
 
 /// The cut, and who sees whom on it.
 pub(super) struct TwoGrid {
@@ -61,6 +64,11 @@ impl TwoGrid {
         Self { patch, areas, seen }
     }
 
+    /// How many patches.
+    pub(super) fn len(&self) -> usize {
+        self.areas.len()
+    }
+
     /// A sum for each patch, of nothing yet.
     pub(super) fn sums<const L: usize>(&self) -> Vec<[f64; L]> {
         vec![[0.0; L]; self.areas.len()]
@@ -87,6 +95,47 @@ impl TwoGrid {
             *mean = sum.map(|s| (s / area) as f32);
         }
         means
+    }
+
+    /// Tristimulus values of sums over patches.
+    pub(super) fn seen<const L: usize>(
+        &self,
+        sums: &[[f64; L]],
+        xyz: &[[f64; 3]],
+    ) -> Vec<[f64; 3]> {
+        let seen = |row: &[f64; L]| {
+            let lanes = row.iter().zip(xyz);
+            lanes.fold([0.0; 3], |sum, (x, xyz)| {
+                std::array::from_fn(|c| sum[c] + x * xyz[c])
+            })
+        };
+        sums.par_iter().map(seen).collect()
+    }
+
+    /// Greatest relative error that is left in any patch, if its changes go on to shrink by `ratio` a sweep. `before` and
+    /// `change` are those of the last two sweeps (one may pass through zero), `all` is what patches reflect.
+    pub(super) fn left(
+        &self,
+        before: &[[f64; 3]],
+        change: &[[f64; 3]],
+        all: &[[f64; 3]],
+        ratio: f64,
+    ) -> f64 {
+        let area: f64 = self.areas.iter().sum();
+        let mut greatest = 0.0_f64;
+        for c in 0..3 {
+            let mean = all.iter().map(|x| x[c]).sum::<f64>() / area;
+            for ((before, change), (all, area)) in
+                before.iter().zip(change).zip(all.iter().zip(&self.areas))
+            {
+                let change = change[c].abs().max(ratio * before[c].abs());
+                let whole = all[c].max(DARK * mean * area);
+                if whole > 0.0 {
+                    greatest = greatest.max(change / whole);
+                }
+            }
+        }
+        greatest * ratio / (1.0 - ratio)
     }
 
     /// Adds to what leaves reflect what the error after a sweep sends them. `change` is the mean change by the sweep,
