@@ -12,12 +12,15 @@ use crate::hierarchy::{NONE, Tree};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use wide::f32x16;
 
 /// Patches of the cut at the most.
 const PATCHES: usize = 2560;
 /// Sweeps over the cut at the most, and the relative change after which no more are worth while: the cut errs by more.
 const SWEEPS: usize = 100;
-const ENOUGH: f64 = 0.02;
+const ENOUGH: f32 = 0.02;
+/// Lanes that are solved together.
+const BLOCK: usize = 16;
 
 /// A patch that reflects less than this share of the mean counts as one that reflects so much.
 const DARK: f64 = 0.05;
@@ -148,31 +151,19 @@ impl TwoGrid {
         reflectance: &Rows,
         reflected: &mut Rows,
     ) {
-        let mut error = change.clone();
-        let mut sent = Rows::zero(self.areas.len(), L);
-        for _ in 0..SWEEPS {
-            let (mut moved, mut total) = ([0.0_f64; L], [0.0_f64; L]);
-            for (k, row) in self.seen.iter().enumerate() {
-                let mut sum = [0.0_f32; L];
-                let from = error.all::<L>();
-                for &(source, share) in row {
-                    for (s, x) in sum.iter_mut().zip(&from[source as usize]) {
-                        *s += share * x;
-                    }
-                }
-                let (d, rho) = (&change.all::<L>()[k], &mean_reflectance.all::<L>()[k]);
-                let e = &mut error.all_mut::<L>()[k];
-                let u = &mut sent.all_mut::<L>()[k];
-                for l in 0..L {
-                    u[l] = fair[l] * sum[l];
-                    let next = d[l] + rho[l] * u[l];
-                    moved[l] += self.areas[k] * f64::from((next - e[l]).abs());
-                    total[l] += self.areas[k] * f64::from(next.abs());
-                    e[l] = next;
-                }
-            }
-            if (0..L).all(|l| moved[l] <= ENOUGH * total[l]) {
-                break;
+        let blocks: Vec<Vec<f32x16>> = (0..L.div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|b| {
+                let part = |rows: &Rows| -> Vec<f32x16> {
+                    rows.all::<L>().iter().map(|row| block(row, b)).collect()
+                };
+                self.sent(&part(change), &part(mean_reflectance), block(fair, b))
+            })
+            .collect();
+        let mut sent = Rows::zero(self.len(), L);
+        for (k, row) in sent.all_mut::<L>().iter_mut().enumerate() {
+            for (to, block) in row.chunks_mut(BLOCK).zip(&blocks) {
+                to.copy_from_slice(&block[k].to_array()[..to.len()]);
             }
         }
         let sent = sent.all::<L>();
@@ -188,6 +179,49 @@ impl TwoGrid {
                 }
             });
     }
+}
+
+impl TwoGrid {
+    /// What patches send each other of the error, some lanes of it: sweeps in place.
+    fn sent(&self, change: &[f32x16], reflectance: &[f32x16], fair: f32x16) -> Vec<f32x16> {
+        let mut error = change.to_vec();
+        let mut sent = vec![f32x16::ZERO; error.len()];
+        for _ in 0..SWEEPS {
+            let (mut moved, mut total) = (f32x16::ZERO, f32x16::ZERO);
+            for (k, row) in self.seen.iter().enumerate() {
+                // Several sums: none waits for another.
+                let mut sums = [f32x16::ZERO; 4];
+                for some in row.chunks(sums.len()) {
+                    for (sum, &(source, share)) in sums.iter_mut().zip(some) {
+                        *sum += f32x16::splat(share) * error[source as usize];
+                    }
+                }
+                let [a, b, c, d] = sums;
+                sent[k] = fair * ((a + b) + (c + d));
+                let next = change[k] + reflectance[k] * sent[k];
+                let area = f32x16::splat(self.areas[k] as f32);
+                moved += area * (next - error[k]).abs();
+                total += area * next.abs();
+                error[k] = next;
+            }
+            let lanes = moved.to_array().into_iter().zip(total.to_array());
+            if lanes
+                .into_iter()
+                .all(|(moved, total)| moved <= ENOUGH * total)
+            {
+                break;
+            }
+        }
+        sent
+    }
+}
+
+/// Lanes of a block; those beyond the last are zero.
+fn block(row: &[f32], b: usize) -> f32x16 {
+    let lanes = &row[b * BLOCK..row.len().min((b + 1) * BLOCK)];
+    let mut all = [0.0; BLOCK];
+    all[..lanes.len()].copy_from_slice(lanes);
+    f32x16::from(all)
 }
 
 /// Patch of each node at and below the cut; [`NONE`] above. Clusters of several planes are opened first, then what is
