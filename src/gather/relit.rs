@@ -12,9 +12,6 @@ use crate::store::{Broken, Decoder, Encoder, Packs};
 use rayon::prelude::*;
 use std::io;
 
-/// Vertices that a task lights.
-const CHUNK: usize = 256;
-
 /// A vertex of the output on the mesh, with where its light comes from; none if something covers it.
 #[derive(Debug)]
 pub(crate) struct KeptVertex {
@@ -46,7 +43,8 @@ impl Kept {
         out.put_list(kept.len(), kept.iter().map(|v| v.triangle))?;
         out.put_list(kept.len(), kept.iter().map(|v| v.weights))?;
         out.put_all(&surface.triangles)?;
-        Packs::encode(kept.iter().map(|v| v.trace.as_deref()), out)
+        let traces: Vec<_> = kept.iter().map(|v| v.trace.as_deref()).collect();
+        Packs::encode(&traces, out)
     }
 
     /// Reads it back.
@@ -98,20 +96,18 @@ impl Bake {
         let looks = self.looks(&upsampler);
         let mut out = Baked::default();
         for kept in kept {
-            let count = kept.vertices.len();
-            let parts: Vec<Vec<Option<[f32; 64]>>> = (0..count)
-                .collect::<Vec<usize>>()
-                .par_chunks(CHUNK)
-                .map(|chunk| {
-                    chunk
-                        .iter()
-                        .map(|&k| self.row::<L>(kept.traces.get(k)))
-                        .collect()
-                })
-                .collect::<Read<_>>()?;
-            let mut rows = parts.concat();
-            out.covered += lend(&mut rows, &kept.triangles);
-            let rows: Vec<[f32; 64]> = rows.into_iter().map(|r| r.unwrap_or([0.0; 64])).collect();
+            let mut rows: Vec<[f32; 64]> = bytemuck::zeroed_vec(kept.vertices.len());
+            kept.traces.for_each(&mut rows, |packed, row| {
+                match packed {
+                    Some(packed) => {
+                        let lit = trace::replay::<L>(packed, self.light(), self.lamps())?;
+                        row[..L].copy_from_slice(&lit);
+                    }
+                    None => row[0] = f32::NAN,
+                }
+                Ok(())
+            })?;
+            out.covered += lend_some(&mut rows, &kept.triangles);
             let look = &looks[self.scene().surfaces[kept.surface].material];
             let vertices =
                 kept.vertices
@@ -136,14 +132,55 @@ impl Bake {
         }
         Ok(out)
     }
+}
 
-    fn row<const L: usize>(&self, packed: Option<&[u8]>) -> Read<Option<[f32; 64]>> {
-        let Some(packed) = packed else {
-            return Ok(None);
-        };
-        let lit = trace::replay::<L>(packed, self.light(), self.lamps())?;
-        let mut row = [0.0; 64];
-        row[..L].copy_from_slice(&lit);
-        Ok(Some(row))
+/// Gives covered vertices (NaN) the light of their neighbours; returns how many there were.
+fn lend_some(rows: &mut [[f32; 64]], triangles: &[[u32; 3]]) -> usize {
+    // Only where something is covered: the rest lends nothing.
+    let covered = |v: u32| rows[v as usize][0].is_nan();
+    let around = triangles.iter().filter(|t| t.iter().any(|&v| covered(v)));
+    let around: Vec<[u32; 3]> = around.copied().collect();
+    let mut all: Vec<u32> = around.iter().flatten().copied().collect();
+    all.sort_unstable();
+    all.dedup();
+    let place = |v: u32| all.partition_point(|&other| other < v) as u32;
+    let triangles: Vec<[u32; 3]> = around.iter().map(|t| t.map(place)).collect();
+    let lent = all.iter().map(|&v| {
+        let row = rows[v as usize];
+        (!row[0].is_nan()).then_some(row)
+    });
+    let mut lent: Vec<Option<[f32; 64]>> = lent.collect();
+    let count = lend(&mut lent, &triangles);
+    for (&v, row) in all.iter().zip(lent) {
+        rows[v as usize] = row.unwrap_or([0.0; 64]);
+    }
+    for row in rows.iter_mut().filter(|row| row[0].is_nan()) {
+        row[0] = 0.0;
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Lent to where it is needed is lent to all.
+        #[test]
+        fn some_neighbours_lend_what_all_do(
+            lit in prop::collection::vec(prop::option::of(0.0_f32..9.0), 12),
+            triangles in prop::collection::vec([0_u32..12, 0_u32..12, 0_u32..12], 0..16),
+        ) {
+            let mut all: Vec<Option<[f32; 64]>> = lit.iter().map(|x| x.map(|x| [x; 64])).collect();
+            let mut some: Vec<[f32; 64]> = all.iter().map(|x| x.unwrap_or([f32::NAN; 64])).collect();
+            prop_assert_eq!(lend(&mut all, &triangles), lend_some(&mut some, &triangles));
+            for (k, (all, some)) in all.iter().zip(&some).enumerate() {
+                // What no triangle uses is of no use.
+                if triangles.iter().flatten().any(|&v| v as usize == k) {
+                    prop_assert_eq!(all.unwrap_or([0.0; 64]), *some);
+                }
+            }
+        }
     }
 }

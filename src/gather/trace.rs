@@ -165,7 +165,7 @@ fn broken() -> Broken {
     Broken::new("has weights that do not read")
 }
 
-/// Irradiance of a packed trace under a light, `L` lanes wide; a trace without rays needs no reflected rows.
+/// Irradiance of a packed trace under a light, `L` lanes wide. Where nothing is reflected yet `light.reflected` may be empty.
 ///
 /// # Errors
 /// [`Broken`]: the bytes are no trace of this room.
@@ -174,14 +174,17 @@ pub(crate) fn replay<const L: usize>(
     light: &Light,
     lamps: &[(PunctualLight, Vec<f32>)],
 ) -> Read<[f32; L]> {
-    let reflected = light.reflected.all::<L>();
+    let (reflected, emitted) = (light.reflected.all::<L>(), light.emitted.all::<L>());
+    let dark = reflected.is_empty();
     let mut from = Packed { rest: packed };
     let scale = from.float()?;
     let (mut bounced, mut straight) = ([0.0_f32; L], [0.0_f32; L]);
-    from.weights(reflected.len(), |id, w| {
-        add(&mut bounced, &reflected[id], w);
+    from.weights(emitted.len(), |id, w| {
+        if !dark {
+            add(&mut bounced, &reflected[id], w);
+        }
         if light.bright_emitted[id] > 0.0 {
-            add(&mut straight, &light.emitted.all::<L>()[id], w);
+            add(&mut straight, &emitted[id], w);
         }
     })?;
     from.weights(lamps.len(), |lamp, w| {
@@ -189,8 +192,10 @@ pub(crate) fn replay<const L: usize>(
             *x += w * r;
         }
     })?;
-    from.weights(reflected.len(), |id, w| {
-        add(&mut bounced, &reflected[id], w);
+    from.weights(emitted.len(), |id, w| {
+        if !dark {
+            add(&mut bounced, &reflected[id], w);
+        }
     })?;
     let share = from.float()?;
     let mut met = [0.0_f32; L];
@@ -199,8 +204,12 @@ pub(crate) fn replay<const L: usize>(
         let word = from.number()?;
         id += word >> 1;
         let count = if word & 1 == 1 { from.number()? } else { 1 };
-        let row = usize::try_from(id).ok().and_then(|k| reflected.get(k));
-        add(&mut met, row.ok_or_else(broken)?, count as f32);
+        if id >= emitted.len() as u64 {
+            return Err(broken());
+        }
+        if !dark {
+            add(&mut met, &reflected[id as usize], count as f32);
+        }
     }
     if !from.rest.is_empty() {
         return Err(broken());
@@ -313,11 +322,19 @@ mod tests {
             for (got, want) in got.iter().zip(expected) {
                 prop_assert!((f64::from(*got) - want).abs() <= 0.02 + 1e-5 * want.abs(), "{got} {want}");
             }
+            // Nothing reflected: what comes from lamps alone.
+            let unlit = Light { reflected: Rows::zero(NODES, 8), ..light.clone() };
+            let unknown = Light { reflected: Rows::zero(0, 8), ..light.clone() };
+            prop_assert_eq!(replay::<8>(&packed, &unlit, &all), replay::<8>(&packed, &unknown, &all));
             let factors = lamps_of(&packed, NODES, 3).unwrap();
             let sum: f32 = factors.iter().map(|f| f.1).sum();
             prop_assert!((sum - lamps.iter().map(|l| l.1).sum::<f32>()).abs() < 1e-5);
             // A room with fewer patches, or a part of the trace, is refused.
-            let fewer = Light { reflected: Rows::zero(1, 8), ..light.clone() };
+            let fewer = Light {
+                reflected: Rows::zero(1, 8),
+                emitted: Rows::zero(1, 8),
+                ..light.clone()
+            };
             let both = patches.iter().chain(&slopes).map(|p| p.0);
             let beyond = both.chain(hits.iter().copied()).any(|k| k > 0);
             prop_assert_eq!(replay::<8>(&packed, &fewer, &all).is_err(), beyond);

@@ -7,7 +7,8 @@
 //! same, with what changed.
 //!
 //! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (20 and 8 a ray where leaves look for
-//! themselves), `4 (2 padded lanes + lanes) + 4` a leaf.
+//! themselves), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 a ray and `4 padded lanes` a leaf:
+//! the rest follows from where light comes from.
 
 use super::light::{Light, Neighbours};
 use super::outlook::Outlook;
@@ -58,7 +59,7 @@ impl Bake {
             }
             let (reflected, traces) = self.decode_state(true, from)?;
             self.light_up(&reflected);
-            self.direct.keep(&self.light.leaves, &traces);
+            self.direct.keep(&self.light.leaves, traces.to_vec()?);
             self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
             let seen: Vec<[f64; 3]> = from.get_all()?;
             if !seen.is_empty() && seen.len() != self.probes.points.len() {
@@ -138,28 +139,32 @@ impl Bake {
                 .iter()
                 .flat_map(|&k| reflected.row(k as usize).iter().copied()),
         )?;
-        out.put_list(
-            leaves.len() * irradiance.width(),
-            (0..leaves.len()).flat_map(|k| irradiance.row(k).iter().copied()),
-        )?;
-        out.put_list(
-            leaves.len() * self.lanes.len(),
-            leaves
-                .iter()
-                .flat_map(|&k| self.direct.row(k).iter().copied()),
-        )?;
-        out.put_list(leaves.len(), leaves.iter().map(|&k| self.direct.spread(k)))?;
+        if whole {
+            out.put_list(
+                leaves.len() * irradiance.width(),
+                (0..leaves.len()).flat_map(|k| irradiance.row(k).iter().copied()),
+            )?;
+            out.put_list(
+                leaves.len() * self.lanes.len(),
+                leaves
+                    .iter()
+                    .flat_map(|&k| self.direct.row(k).iter().copied()),
+            )?;
+            out.put_list(leaves.len(), leaves.iter().map(|&k| self.direct.spread(k)))?;
+        }
         out.put(self.direct.rays)?;
-        Packs::encode(leaves.iter().map(|&k| self.direct.trace(k)), out)?;
+        let traces: Vec<_> = leaves.iter().map(|&k| self.direct.trace(k)).collect();
+        Packs::encode(&traces, out)?;
         for round in &self.watched {
-            Packs::encode(round.iter().map(Option::as_deref), out)?;
+            let traces: Vec<_> = round.iter().map(Option::as_deref).collect();
+            Packs::encode(&traces, out)?;
         }
         let rounds = serde_json::to_string(&self.rounds).map_err(io::Error::other)?;
         out.put_text(&rounds)
     }
 
-    /// Takes them up, except for what is behind `light.irradiance` and `light.leaves`: what the leaves reflect, and where
-    /// the direct light of each leaf comes from, if that was kept.
+    /// Takes them up, except for what is behind `light.irradiance` (if `whole`) and `light.leaves`: what the leaves reflect,
+    /// and where the direct light of each leaf comes from, if that was kept.
     pub(super) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
         let splits = from.get_list::<u32>()?;
         self.tree.nodes.reserve(4 * splits.len());
@@ -207,18 +212,18 @@ impl Bake {
         let leaves: Vec<u32> = self.tree.leaves().collect();
         let (count, width) = (leaves.len(), padded(self.lanes.len()));
         let reflected = rows(from, count, width)?;
-        let irradiance = rows(from, count, width)?;
-        let known: Vec<f32> = from.get_exactly(count * self.lanes.len())?;
-        let spread: Vec<f32> = from.get_exactly(count)?;
-        let rays = from.get()?;
-        self.direct =
-            direct::Direct::known(&leaves, nodes, self.lanes.len(), &known, &spread, rays);
+        let mut irradiance = Rows::default();
+        if whole {
+            irradiance = rows(from, count, width)?;
+            let lanes = self.lanes.len();
+            let known: Vec<f32> = from.get_exactly(count * lanes)?;
+            let spread: Vec<f32> = from.get_exactly(count)?;
+            self.direct = direct::Direct::known(&leaves, nodes, lanes, &known, &spread);
+        }
+        self.direct.rays = from.get()?;
         let traces = Packs::decode(from)?;
         for round in &mut self.watched {
-            let packs = Packs::decode(from)?;
-            *round = (0..packs.len())
-                .map(|k| packs.get(k).map(Box::from))
-                .collect();
+            *round = Packs::decode(from)?.to_vec()?;
         }
         if traces.len() != count {
             return Err(Broken::new("has another number of leaves"));

@@ -329,7 +329,7 @@ fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
 }
 
 /// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node of the largest area is opened.
-fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
+pub(super) fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut chosen = vec![0_u32];
     let mut open = std::collections::BinaryHeap::new();
     let key = |id: u32| (ordered(tree.node(id).area), std::cmp::Reverse(id));

@@ -7,7 +7,6 @@ use crate::gather::point::{Memory, Receiver};
 use crate::gather::trace::Trace;
 use crate::hierarchy::{Tree, stratified};
 use crate::link::{Demand, MAX_DEPTH};
-use crate::store::Packs;
 use rayon::prelude::*;
 
 /// Points of a leaf, each with its weight: exact for polynomials of degree 4 (Cowper 1973; Dunavant 1985, table II, p = 4).
@@ -58,13 +57,11 @@ impl Direct {
         width: usize,
         rows: &[f32],
         spread: &[f32],
-        rays: u64,
     ) -> Self {
         let mut known = Self {
             rows: vec![None; nodes],
             spread: vec![0.0; nodes],
-            traces: Vec::new(),
-            rays,
+            ..Self::default()
         };
         for (k, &leaf) in leaves.iter().enumerate() {
             known.rows[leaf as usize] = Some(rows[k * width..(k + 1) * width].into());
@@ -74,11 +71,11 @@ impl Direct {
     }
 
     /// Where the light of leaves comes from, as it was before it was written down.
-    pub(super) fn keep(&mut self, leaves: &[u32], traces: &Packs) {
-        for (k, &leaf) in leaves.iter().enumerate() {
-            if let Some(trace) = traces.get(k) {
+    pub(super) fn keep(&mut self, leaves: &[u32], traces: Vec<Option<Box<[u8]>>>) {
+        for (trace, &leaf) in traces.into_iter().zip(leaves) {
+            if trace.is_some() {
                 self.traces.resize(self.rows.len(), None);
-                self.traces[leaf as usize] = Some(trace.into());
+                self.traces[leaf as usize] = trace;
             }
         }
     }

@@ -4,6 +4,7 @@ use super::lanes::Lanes;
 use super::rows::Rows;
 use crate::hierarchy::Tree;
 use crate::link::{Graph, Way};
+use rayon::prelude::*;
 
 /// The light in a room after a round.
 #[derive(Debug, Clone, Default)]
@@ -57,8 +58,12 @@ impl Light {
         let white = self.white;
         let scalar = |row: &[f32]| brightness(lanes.tristimulus(row), white) as f32;
         let n = tree.nodes.len();
-        self.bright_reflected = (0..n).map(|k| scalar(self.reflected.row(k))).collect();
-        self.bright_emitted = (0..n).map(|k| scalar(self.emitted.row(k))).collect();
+        let each = |rows: &Rows| -> Vec<f32> {
+            let all = (0..n).into_par_iter();
+            all.map(|k| scalar(rows.row(k))).collect()
+        };
+        self.bright_reflected = each(&self.reflected);
+        self.bright_emitted = each(&self.emitted);
         self.brightest = self.bright_reflected.clone();
         for k in (0..n).rev() {
             let below = tree.nodes[k]

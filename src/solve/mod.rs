@@ -27,6 +27,7 @@ mod relight;
 mod representation;
 mod rows;
 mod sources;
+mod two_grid;
 
 pub use lists::PatchList;
 pub use record::{Round, Verdict};
@@ -214,10 +215,23 @@ pub struct Bake {
     watched: [Vec<Option<Box<[u8]>>>; 2],
     /// What the choice of lanes may take for granted when lamps and paints change: shadows of punctual lights, balance.
     frozen: Option<(punctual::Shadowed, Vec<f32>)>,
+    /// Few patches that stand for the room in a solve by rays.
+    two_grid: Option<two_grid::TwoGrid>,
     /// Space of each face, and which cuts were made for them, see [`spaces`].
     spaces: Vec<u32>,
     parted: Vec<u32>,
     started: Instant,
+}
+
+/// What a solve starts from, by leaf.
+struct Given {
+    sources: Sources,
+    /// Direct irradiance.
+    first: Rows,
+    /// A guess of what is reflected.
+    reflected: Rows,
+    /// What every node emits, if that is known.
+    emitted: Option<Rows>,
 }
 
 /// Cuts a mesh as it was cut before: the search casts no ray.
@@ -289,6 +303,7 @@ impl Bake {
             keep: false,
             watched: Default::default(),
             frozen: None,
+            two_grid: None,
             spectrum_error: None,
             scene,
             settings,
@@ -662,24 +677,46 @@ impl Bake {
         leaves: &[u32],
     ) -> (Convergence, flux::Balance) {
         let painter = Painter::new(&self.scene, &self.mesh);
-        let Sources {
-            mut reflectance,
-            emission,
-            greatest,
-        } = painter.paint(&self.tree, leaves, &self.lanes);
-        let nodes = self.tree.nodes.len();
         let mut first = Rows::zero(leaves.len(), L);
         for (k, &leaf) in leaves.iter().enumerate() {
             let row = self.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
         }
+        let given = Given {
+            sources: painter.paint(&self.tree, leaves, &self.lanes),
+            first,
+            reflected: self.guess::<L>(leaves),
+            emitted: None,
+        };
+        self.solve_with::<L>(rows, leaves, given)
+    }
+
+    /// The same with what it starts from.
+    fn solve_with<const L: usize>(
+        &mut self,
+        rows: &LinkRows,
+        leaves: &[u32],
+        given: Given,
+    ) -> (Convergence, flux::Balance) {
+        let Given {
+            sources:
+                Sources {
+                    mut reflectance,
+                    emission,
+                    greatest,
+                },
+            mut first,
+            mut reflected,
+            emitted,
+        } = given;
+        let nodes = self.tree.nodes.len();
         if self.sealed == Closed::Yes {
             flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
         }
         let mixed = self
             .lanes
             .is_mixed()
-            .then(|| painter.mixed(&self.tree, leaves, &self.lanes));
+            .then(|| Painter::new(&self.scene, &self.mesh).mixed(&self.tree, leaves, &self.lanes));
         let plus = |a: &Rows, b: &Rows| {
             let mut sum = a.clone();
             for (a, b) in sum.all_mut::<L>().iter_mut().zip(b.all::<L>()) {
@@ -701,7 +738,6 @@ impl Bake {
                 reflected
             }
         };
-        let mut reflected = self.guess::<L>(leaves);
         let tolerance = SOLVE_SHARE * self.settings.error;
         let runs = self.plan.runs(Kind::Interreflection);
         let (convergence, mut irradiance, sums) = if self.by_rays() {
@@ -712,6 +748,7 @@ impl Bake {
                 areas: &self.areas,
                 reflectance: &reflectance,
                 greatest: &greatest,
+                two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
             };
             let sums = self.outlook.target.iter().map(|&t| f64::from(t)).collect();
             let (convergence, seen) = match &mixed {
@@ -739,11 +776,7 @@ impl Bake {
                 }
                 None => system.solve::<L>(&first, &mut reflected, tolerance),
             };
-            let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
             let mut irradiance = Rows::zero(leaves.len(), L);
-            system
-                .operator
-                .irradiance::<L>(&reflected, &mut means, &mut gathered, &mut irradiance);
             if runs {
                 let slopes = linear::Slopes::new(
                     &self.tree,
@@ -786,7 +819,7 @@ impl Bake {
         let flux = flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums);
         self.light = Light {
             reflected: self.on_nodes::<L>(&reflected, leaves),
-            emitted: self.on_nodes::<L>(&emission, leaves),
+            emitted: emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves)),
             irradiance,
             leaves: leaves.to_vec(),
             neighbours: Neighbours::new(nodes, &self.graph),

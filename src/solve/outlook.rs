@@ -262,19 +262,43 @@ impl Outlook {
             .zip(leaves.par_chunks(CHUNK))
             .for_each(|(out, leaves)| {
                 for (row, &leaf) in out.iter_mut().zip(leaves) {
-                    let (start, count) = self.range[leaf as usize];
+                    let (met, bare) = self.met(leaf);
                     let mut sum = [0.0_f32; L];
-                    for &met in &self.met[start as usize..(start + count) as usize] {
+                    for &met in met {
                         if met != NONE {
                             for (s, x) in sum.iter_mut().zip(&nodes[met as usize]) {
                                 *s += x;
                             }
                         }
                     }
-                    let bare = (self.bare[leaf as usize] * count as f32).max(1.0);
                     *row = sum.map(|x| x / bare);
                 }
             });
+    }
+
+    /// An outlook of leaves (ascending nodes) that met these.
+    #[cfg(test)]
+    pub(super) fn of(nodes: usize, leaves: &[u32], seen: &[Vec<u32>]) -> Self {
+        let mut outlook = Self {
+            target: vec![f32::NAN; nodes],
+            bare: vec![f32::NAN; nodes],
+            range: vec![(0, 0); nodes],
+            ..Self::default()
+        };
+        for (&leaf, seen) in leaves.iter().zip(seen) {
+            let k = leaf as usize;
+            (outlook.target[k], outlook.bare[k]) = (1.0, 1.0);
+            outlook.range[k] = (outlook.met.len() as u32, seen.len() as u32);
+            outlook.met.extend(seen);
+        }
+        outlook
+    }
+
+    /// What the rays of a leaf met ([`NONE`]: nothing), and what the sum over them is divided by for their mean.
+    pub(super) fn met(&self, leaf: u32) -> (&[u32], f32) {
+        let (start, count) = self.range[leaf as usize];
+        let met = &self.met[start as usize..(start + count) as usize];
+        (met, (self.bare[leaf as usize] * count as f32).max(1.0))
     }
 
     /// How much reflected light varies over a leaf: the standard deviation between its four quarters that the noise of

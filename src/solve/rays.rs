@@ -8,12 +8,18 @@ use super::conjugate::Convergence;
 use super::operator::pull;
 use super::outlook::Outlook;
 use super::rows::Rows;
+use super::two_grid::TwoGrid;
 use crate::hierarchy::Tree;
 
 /// Sweeps at the most.
 const SWEEPS: usize = 400;
 /// The scale of one sweep stays within this factor.
 const GREATEST_SCALE: f64 = 2.0;
+/// Changes that shrink more slowly from sweep to sweep count as shrinking so.
+const SLOWEST: f64 = 0.95;
+/// After a correction that left more than this share of the change, a sweep goes without: what few patches cannot tell
+/// apart must not build up.
+const WORTH_CORRECTING: f64 = 0.5;
 
 /// What a solve by rays works on.
 pub(super) struct RaySystem<'a> {
@@ -26,6 +32,8 @@ pub(super) struct RaySystem<'a> {
     pub(super) reflectance: &'a Rows,
     /// Greatest reflectance of each lane.
     pub(super) greatest: &'a [f32],
+    /// Few patches that stand for the room, and tristimulus values of each lane.
+    pub(super) two_grid: Option<(&'a TwoGrid, &'a [[f64; 3]])>,
 }
 
 impl RaySystem<'_> {
@@ -41,6 +49,12 @@ impl RaySystem<'_> {
         let mut done = Convergence::default();
         let area = |k: usize| self.areas[self.leaves[k] as usize];
         let target = |k: usize| f64::from(self.outlook.target[self.leaves[k] as usize]);
+        let mean_reflectance = self
+            .two_grid
+            .map(|(grid, _)| grid.means::<L>(&self.sums::<L>(grid, self.reflectance)));
+        let patches = self.two_grid.map_or(0, |(grid, _)| grid.len());
+        let mut steps = vec![[0.0; 3]; patches];
+        let mut corrected = false;
         loop {
             self.receive::<L>(reflected, &mut nodes, &mut seen);
             // What is sent to fronts, received, reflected, and what should be: the sums of one sweep.
@@ -75,6 +89,7 @@ impl RaySystem<'_> {
                 *h = std::array::from_fn(|l| h[l] * factor[l]);
             }
             let (mut change, mut total) = ([0.0; L], [0.0; L]);
+            let mut moved = self.two_grid.map(|(grid, _)| grid.sums::<L>());
             for (k, (((r, h), f), rho)) in reflected
                 .all_mut::<L>()
                 .iter_mut()
@@ -84,29 +99,86 @@ impl RaySystem<'_> {
                 .enumerate()
             {
                 let a = area(k);
-                for l in 0..L {
-                    let next = rho[l] * (f[l] + h[l]);
-                    change[l] += a * f64::from((next - r[l]).abs());
-                    total[l] += a * f64::from(next);
-                    r[l] = next;
+                let next: [f32; L] = std::array::from_fn(|l| rho[l] * (f[l] + h[l]));
+                if let (Some((grid, _)), Some(moved)) = (self.two_grid, &mut moved) {
+                    // From the scaled solution, which misses no light as a whole.
+                    let d = std::array::from_fn(|l| next[l] - scale[l] as f32 * r[l]);
+                    grid.add::<L>(k, a, &d, moved);
                 }
+                for l in 0..L {
+                    change[l] += a * f64::from((next[l] - r[l]).abs());
+                    total[l] += a * f64::from(next[l]);
+                }
+                *r = next;
             }
             done.iterations += 1;
-            (done.residual, done.bound) = (0.0, 0.0);
-            for l in 0..L {
-                let relative = if total[l] > 0.0 {
-                    change[l] / total[l]
-                } else {
-                    0.0
+            let before = done.residual;
+            (done.residual, done.bound) = match self.two_grid {
+                None => self.worst(&change, &total),
+                Some((_, xyz)) => self.seen(&change, &total, xyz),
+            };
+            let mut settled = done.bound <= tolerance;
+            if let (Some((grid, xyz)), Some(moved)) = (self.two_grid, &moved) {
+                // The mean error is small first; light that is trapped somewhere settles last.
+                let earlier = std::mem::replace(&mut steps, grid.seen::<L>(moved, xyz));
+                settled = settled && {
+                    let all = grid.seen::<L>(&self.sums::<L>(grid, reflected), xyz);
+                    let ratio = (done.residual / before).min(SLOWEST);
+                    grid.left(&earlier, &steps, &all, ratio) <= tolerance
                 };
-                let rho = f64::from(self.greatest[l]);
-                done.residual = done.residual.max(relative);
-                done.bound = done.bound.max(relative * rho / (1.0 - rho));
             }
-            if done.bound <= tolerance || done.iterations >= SWEEPS {
+            if settled || done.iterations >= SWEEPS {
                 return (done, seen);
             }
+            corrected = !(corrected && done.residual > WORTH_CORRECTING * before);
+            if let (Some((grid, _)), Some(rho), Some(moved), true) =
+                (self.two_grid, &mean_reflectance, moved, corrected)
+            {
+                let fair = fair.map(|x| x as f32);
+                let change = grid.means::<L>(&moved);
+                grid.correct::<L>(&change, rho, &fair, self.reflectance, reflected);
+            }
         }
+    }
+
+    /// Rows by leaf, times areas, summed over patches.
+    fn sums<const L: usize>(&self, grid: &TwoGrid, rows: &Rows) -> Vec<[f64; L]> {
+        let mut sums = grid.sums::<L>();
+        for (k, (row, &leaf)) in rows.all::<L>().iter().zip(self.leaves).enumerate() {
+            grid.add::<L>(k, self.areas[leaf as usize], row, &mut sums);
+        }
+        sums
+    }
+
+    /// Relative change of the worst lane, and how large its error may still be.
+    fn worst(&self, change: &[f64], total: &[f64]) -> (f64, f64) {
+        let (mut residual, mut bound) = (0.0_f64, 0.0_f64);
+        for ((change, total), rho) in change.iter().zip(total).zip(self.greatest) {
+            let relative = if *total > 0.0 { change / total } else { 0.0 };
+            let rho = f64::from(*rho);
+            residual = residual.max(relative);
+            bound = bound.max(relative * rho / (1.0 - rho));
+        }
+        (residual, bound)
+    }
+
+    /// The same of the worst of X, Y and Z.
+    fn seen(&self, change: &[f64], total: &[f64], xyz: &[[f64; 3]]) -> (f64, f64) {
+        let (mut residual, mut bound) = (0.0_f64, 0.0_f64);
+        for c in 0..3 {
+            let (mut moved, mut left, mut all) = (0.0, 0.0, 0.0);
+            for (l, xyz) in xyz.iter().enumerate() {
+                let (weight, rho) = (xyz[c].abs(), f64::from(self.greatest[l]));
+                moved += weight * change[l];
+                left += weight * change[l] * rho / (1.0 - rho);
+                all += weight * total[l];
+            }
+            if all > 0.0 {
+                residual = residual.max(moved / all);
+                bound = bound.max(left / all);
+            }
+        }
+        (residual, bound)
     }
 
     /// What leaves receive of reflected light.

@@ -11,10 +11,9 @@
 
 use super::conjugate::Convergence;
 use super::lanes::Lanes;
-use super::light::{Light, Neighbours};
-use super::{
-    Bake, Closed, DE_PER_PERCENT, Painter, Rows, Settings, direct, flux, padded, punctual,
-};
+use super::light::Light;
+use super::two_grid::TwoGrid;
+use super::{Bake, Closed, DE_PER_PERCENT, Given, Painter, Rows, Settings, flux, padded, punctual};
 use crate::color::de2000;
 use crate::error::{Error, Result};
 use crate::gather::{Baked, Kept, trace};
@@ -23,12 +22,8 @@ use crate::scene::Scene;
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
-use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
-
-/// Leaves that a task lights.
-const CHUNK: usize = 256;
 
 /// What rays have told of a room before the first round.
 pub(super) struct Known {
@@ -49,14 +44,14 @@ pub struct Relighter {
     paint: Fingerprint,
     /// White of the last solution over the guess for its lamps and paints, X, Y, Z.
     guess: [f64; 3],
+    /// What the leaves reflect by the bake, until it was asked for.
+    start: Option<Rows>,
     /// Rows of links, once they were asked for.
     links: Option<LinkRows>,
     /// Of the present light.
     solved: Convergence,
     flux: flux::Balance,
     leaves: Packs,
-    /// Half the range of direct light over each leaf, under the light of the bake.
-    spread: Vec<f32>,
     kept: Vec<Kept>,
     /// What the bake estimated for geometry, over what its last two rounds differ by at the watched points with the same
     /// light on the patches.
@@ -212,7 +207,7 @@ impl Bake {
         let of_vertices: usize = (baked.kept.iter().flatten())
             .map(|v| v.trace.as_ref().map_or(0, |t| t.len()))
             .sum();
-        let rows = leaves.len() * (8 * self.light.width() + 4 * self.lanes.len() + 16);
+        let rows = leaves.len() * (4 * self.light.width() + 8);
         (of_leaves
             + of_vertices
             + 32 * vertices
@@ -284,7 +279,6 @@ impl Relighter {
         let distance: f64 = from.get()?;
         let lit = from.get_exactly(bake.scene.surfaces.len())?;
         let (reflected, leaves) = bake.decode_state(false, from)?;
-        bake.light_up(&reflected);
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
             kept.push(Kept::decode(&bake.mesh, from)?);
@@ -298,6 +292,7 @@ impl Relighter {
             shape,
             lit,
             paint,
+            start: Some(reflected),
             links: None,
             solved: Convergence {
                 bound: (bake.rounds.last())
@@ -306,9 +301,6 @@ impl Relighter {
                 ..Convergence::default()
             },
             flux: bake.rounds.last().map(|r| r.flux).unwrap_or_default(),
-            spread: (bake.light.leaves.iter())
-                .map(|&leaf| bake.direct.spread(leaf))
-                .collect(),
             leaves,
             kept,
             bake,
@@ -345,6 +337,8 @@ impl Relighter {
         if changed {
             self.choose_lanes()?;
             self.paint = paint;
+        } else if let Some(reflected) = self.start.take() {
+            self.bake.light_up(&reflected);
         }
         let lanes_s = clock.elapsed().as_secs_f64();
         let (convergence, flux, [direct_s, solve_s]) = match padded(self.bake.lanes.len()) {
@@ -393,18 +387,23 @@ impl Relighter {
         let white = std::array::from_fn(|c| self.guess[c] * guess[c]);
         bake.light.white = bake.settings.white.unwrap_or(white);
         let (nodes, lights) = (bake.tree.nodes.len(), bake.scene.lights.len());
-        let shadowed = punctual::Shadowed {
-            by_leaf: (0..self.leaves.len())
-                .map(|k| match self.leaves.get(k) {
-                    Some(packed) => trace::lamps_of(packed, nodes, lights),
-                    None => Ok(Vec::new()),
-                })
-                .collect::<Read<Vec<_>>>()?,
-            rays: 0,
-        };
+        let mut by_leaf = vec![Vec::new(); self.leaves.len()];
+        if lights > 0 {
+            self.leaves.for_each(&mut by_leaf, |packed, list| {
+                if let Some(packed) = packed {
+                    *list = trace::lamps_of(packed, nodes, lights)?;
+                }
+                Ok(())
+            })?;
+        }
+        let shadowed = punctual::Shadowed { by_leaf, rays: 0 };
         bake.frozen = Some((shadowed, bake.balance.factor.clone()));
+        let before = bake.lanes.clone();
         bake.choose_lanes();
         bake.frozen = None;
+        if !bake.lanes.same_meaning(&before) {
+            self.start = None;
+        }
         Ok(())
     }
 
@@ -413,50 +412,58 @@ impl Relighter {
         let clock = Instant::now();
         let bake = &mut self.bake;
         let leaves = bake.light.leaves.clone();
-        let nodes = bake.tree.nodes.len();
         bake.lamps = punctual::lamps(&bake.scene, &bake.mesh, &bake.lanes);
-        let emission = Painter::new(&bake.scene, &bake.mesh)
-            .paint(&bake.tree, &leaves, &bake.lanes)
-            .emission;
-        bake.light.emitted = bake.on_nodes::<L>(&emission, &leaves);
-        bake.previous = std::mem::replace(&mut bake.light.reflected, Rows::zero(nodes, L));
+        let painter = Painter::new(&bake.scene, &bake.mesh);
+        let sources = painter.paint(&bake.tree, &leaves, &bake.lanes);
         let mut light = std::mem::take(&mut bake.light);
-        light.bright_emitted = (0..nodes)
-            .map(|k| f32::from(u8::from(light.emitted.row(k).iter().any(|&x| x > 0.0))))
-            .collect();
-        let lanes = bake.lanes.len();
-        let lit: Vec<Vec<f32>> = (0..leaves.len())
-            .collect::<Vec<usize>>()
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                let mut rows = Vec::with_capacity(chunk.len() * lanes);
-                for &k in chunk {
-                    let row = match self.leaves.get(k) {
-                        Some(packed) => trace::replay::<L>(packed, &light, &bake.lamps)?,
-                        None => [0.0; L],
-                    };
-                    rows.extend_from_slice(&row[..lanes]);
+        let reflected = match self.start.take() {
+            Some(rows) => rows,
+            None => {
+                let mut rows = Rows::zero(leaves.len(), L);
+                if light.reflected.width() == L {
+                    for (row, &leaf) in rows.all_mut::<L>().iter_mut().zip(&leaves) {
+                        *row = light.reflected.all::<L>()[leaf as usize];
+                    }
                 }
-                Ok(rows)
-            })
-            .collect::<Read<_>>()?;
-        bake.direct = direct::Direct::known(
-            &leaves,
-            nodes,
-            lanes,
-            &lit.concat(),
-            &self.spread,
-            bake.direct.rays,
-        );
+                rows
+            }
+        };
+        // What leaves get straight from lamps asks for nothing that is reflected.
+        light.reflected = Rows::zero(0, L);
+        light.emitted = bake.on_nodes::<L>(&sources.emission, &leaves);
+        let shines = |row: &[f32; L]| f32::from(u8::from(row.iter().any(|&x| x > 0.0)));
+        light.bright_emitted = light.emitted.all::<L>().iter().map(shines).collect();
+        let mut first = Rows::zero(leaves.len(), L);
+        self.leaves.for_each(first.all_mut::<L>(), |packed, row| {
+            if let Some(packed) = packed {
+                *row = trace::replay::<L>(packed, &light, &bake.lamps)?;
+            }
+            Ok(())
+        })?;
+        let emitted = Some(std::mem::take(&mut light.emitted));
+        bake.light = light;
         let direct_s = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
+        let looks = bake.outlook.looks();
+        if looks && bake.two_grid.is_none() {
+            let (tree, outlook) = (&bake.tree, &bake.outlook);
+            bake.two_grid = Some(TwoGrid::new(tree, outlook, &leaves, &bake.areas));
+        }
+        // Where leaves look for themselves a solve asks for no links.
+        let links = self.links.get_or_insert_with(|| {
+            let links = if looks { &[] } else { &bake.graph.links[..] };
+            LinkRows::new(bake.tree.nodes.len(), links)
+        });
         // Nobody asks for neighbours without casting rays.
-        light.neighbours = Neighbours::default();
-        bake.light = light;
-        let links = rows(&mut self.links, bake);
         let graph = std::mem::take(&mut bake.graph);
-        let (convergence, flux) = bake.solve::<L>(links, &leaves);
+        let given = Given {
+            sources,
+            first,
+            reflected,
+            emitted,
+        };
+        let (convergence, flux) = bake.solve_with::<L>(links, &leaves, given);
         bake.graph = graph;
         let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
         self.guess = over(bake.light.white, guess, self.guess);
@@ -478,7 +485,8 @@ impl Relighter {
         &self.bake.lanes
     }
 
-    /// The present light on the patches.
+    /// The present light on the patches, from the first [`Relighter::relight`] on. Of a room that was not changed since its
+    /// bake it tells no irradiance.
     pub fn light(&self) -> &Light {
         &self.bake.light
     }
@@ -498,11 +506,6 @@ fn over(white: [f64; 3], guess: [f64; 3], otherwise: [f64; 3]) -> [f64; 3] {
             otherwise[c]
         }
     })
-}
-
-/// Links in rows.
-fn rows<'a>(links: &'a mut Option<LinkRows>, bake: &Bake) -> &'a LinkRows {
-    links.get_or_insert_with(|| LinkRows::new(bake.tree.nodes.len(), &bake.graph.links))
 }
 
 /// For each surface: does it give out light?

@@ -1,6 +1,7 @@
 //! Rows of bands: one contiguous, 64-byte aligned row of f32 a patch, all patches on one working partition.
 
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 
 /// A cache line of lanes; only its alignment matters.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -25,7 +26,8 @@ impl Rows {
     pub fn zero(rows: usize, width: usize) -> Self {
         debug_assert!(matches!(width, 4 | 8 | 16 | 32 | 64));
         Self {
-            lines: vec![Line([0.0; 16]); (rows * width).div_ceil(16)],
+            // Zero by the system, which touches no memory before it is used.
+            lines: bytemuck::zeroed_vec((rows * width).div_ceil(16)),
             rows,
             width,
         }
@@ -71,6 +73,16 @@ impl Rows {
         &mut bytemuck::cast_slice_mut::<Line, f32>(&mut self.lines)
             .as_chunks_mut::<L>()
             .0[..self.rows]
+    }
+
+    /// Parts of `rows` rows each, the last may have fewer.
+    pub(super) fn parts_mut(
+        &mut self,
+        rows: usize,
+    ) -> impl IndexedParallelIterator<Item = &mut [f32]> {
+        let used = self.rows * self.width;
+        bytemuck::cast_slice_mut::<Line, f32>(&mut self.lines)[..used]
+            .par_chunks_mut(rows * self.width)
     }
 
     /// All rows as vectors V, N a row. V and N make up the width; rows start on multiples of V's size.

@@ -59,46 +59,41 @@ impl<'a> Painter<'a> {
                 (rho, emission)
             })
             .collect();
-        let rows: Vec<(Vec<f32>, Vec<f32>)> = leaves
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                let (mut rho, mut emission) = (
-                    vec![0.0; chunk.len() * width],
-                    vec![0.0; chunk.len() * width],
-                );
-                for (k, &leaf) in chunk.iter().enumerate() {
-                    let element = tree.elements[tree.node(leaf).element as usize];
-                    let triangle = tree.faces[element.face as usize].triangle as usize;
-                    let material = self.mesh.material[triangle] as usize;
-                    let span = k * width..(k + 1) * width;
-                    rho[span.clone()].copy_from_slice(&plain[material].0);
-                    emission[span.clone()].copy_from_slice(&plain[material].1);
-                    let m = &self.scene.materials[material];
-                    if let Some(color) = self.paint_of(m, triangle, &element) {
-                        lanes.averages(&self.clamped(color), &mut rho[span.clone()]);
-                    }
-                    if let Some((e, shape)) = self.glow_of(m, triangle, &element) {
-                        emission[span.clone()].fill(0.0);
-                        lanes.add_emission(e.light, &shape, PI * e.scale, &mut emission[span]);
-                    }
-                }
-                (rho, emission)
-            })
-            .collect();
         let (mut reflectance, mut emission) = (
             Rows::zero(leaves.len(), width),
             Rows::zero(leaves.len(), width),
         );
-        let mut greatest = vec![0.0_f32; width];
-        for (part, (rho, glow)) in rows.iter().enumerate() {
-            for (k, (rho, glow)) in rho.chunks(width).zip(glow.chunks(width)).enumerate() {
-                reflectance.row_mut(part * CHUNK + k).copy_from_slice(rho);
-                emission.row_mut(part * CHUNK + k).copy_from_slice(glow);
-                for (g, r) in greatest.iter_mut().zip(rho) {
-                    *g = g.max(*r);
+        let greatest = reflectance
+            .parts_mut(CHUNK)
+            .zip(emission.parts_mut(CHUNK))
+            .zip(leaves.par_chunks(CHUNK))
+            .map(|((rho, emission), leaves)| {
+                let mut greatest = vec![0.0_f32; width];
+                let rows = rho.chunks_mut(width).zip(emission.chunks_mut(width));
+                for ((rho, emission), &leaf) in rows.zip(leaves) {
+                    let element = tree.elements[tree.node(leaf).element as usize];
+                    let triangle = tree.faces[element.face as usize].triangle as usize;
+                    let material = self.mesh.material[triangle] as usize;
+                    rho.copy_from_slice(&plain[material].0);
+                    emission.copy_from_slice(&plain[material].1);
+                    let m = &self.scene.materials[material];
+                    if let Some(color) = self.paint_of(m, triangle, &element) {
+                        lanes.averages(&self.clamped(color), rho);
+                    }
+                    if let Some((e, shape)) = self.glow_of(m, triangle, &element) {
+                        emission.fill(0.0);
+                        lanes.add_emission(e.light, &shape, PI * e.scale, emission);
+                    }
+                    for (g, r) in greatest.iter_mut().zip(rho) {
+                        *g = g.max(*r);
+                    }
                 }
-            }
-        }
+                greatest
+            })
+            .reduce(
+                || vec![0.0_f32; width],
+                |a, b| a.iter().zip(&b).map(|(a, b)| a.max(*b)).collect(),
+            );
         Sources {
             reflectance,
             emission,

@@ -1,11 +1,12 @@
 //! Numbers, lists and texts as bytes: little-endian, lists with their length (u64) in front.
 //!
 //! Reading trusts nothing: a length is compared with the bytes that are there before anything is set aside for it, and
-//! every failure is a [`Broken`], never a panic.
+//! every failure is a [`Broken`], never a panic. What is large and read piece by piece stands *aside*: bytes of the file that
+//! neither the reader holds nor the checksum covers.
 
 use super::hash::Hasher;
+use std::fs::File;
 use std::io::{self, Write};
-use std::ops::Range;
 use std::sync::Arc;
 
 /// What is wrong with bytes that were to be read.
@@ -74,6 +75,8 @@ pub struct Encoder<'a> {
     hash: Hasher,
     /// Bytes so far.
     written: u64,
+    /// Start and length of what stands aside.
+    asides: Vec<[u64; 2]>,
 }
 
 impl<'a> Encoder<'a> {
@@ -83,6 +86,7 @@ impl<'a> Encoder<'a> {
             out,
             hash: Hasher::default(),
             written: 0,
+            asides: Vec::new(),
         }
     }
 
@@ -153,11 +157,28 @@ impl<'a> Encoder<'a> {
         self.put_all(text.as_bytes())
     }
 
-    /// Ends with the checksum of everything; how many bytes there are.
+    /// Bytes that stand aside: `write` writes them and says how many they are.
+    ///
+    /// # Errors
+    /// As [`Encoder::raw`].
+    pub fn aside(
+        &mut self,
+        write: impl FnOnce(&mut dyn Write) -> io::Result<u64>,
+    ) -> io::Result<()> {
+        let length = write(self.out)?;
+        self.asides.push([self.written, length]);
+        self.written += length;
+        Ok(())
+    }
+
+    /// Ends with what stands aside and the checksum of everything else; how many bytes there are.
     ///
     /// # Errors
     /// As [`Encoder::raw`].
     pub fn finish(mut self) -> io::Result<u64> {
+        let asides = std::mem::take(&mut self.asides);
+        self.put_each(asides.iter().copied())?;
+        self.put(asides.len() as u64)?;
         let sum = self.hash.finish();
         self.put(sum)?;
         Ok(self.written)
@@ -165,27 +186,66 @@ impl<'a> Encoder<'a> {
 }
 
 /// Reads what an [`Encoder`] wrote.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Decoder<'a> {
     bytes: &'a [u8],
     /// Where reading has come to.
     at: usize,
-    /// The owner of `bytes` and of what follows them.
-    owner: Option<Arc<Vec<u8>>>,
+    /// The file, and what stands aside in it and was not asked for.
+    file: Option<Arc<File>>,
+    asides: std::vec::IntoIter<[u64; 2]>,
 }
 
-/// Bytes of a file that is kept in memory whole: nothing is copied.
-#[derive(Debug, Clone)]
-pub struct Piece {
-    owner: Arc<Vec<u8>>,
-    range: Range<usize>,
+/// Bytes that stay in the file.
+#[derive(Debug)]
+pub struct Aside {
+    file: Arc<File>,
+    start: u64,
+    length: u64,
 }
 
-impl Piece {
-    /// The bytes.
-    pub fn bytes(&self) -> &[u8] {
-        &self.owner[self.range.clone()]
+impl Aside {
+    /// How many bytes.
+    #[expect(clippy::len_without_is_empty, reason = "a length in bytes")]
+    pub fn len(&self) -> u64 {
+        self.length
     }
+
+    /// Reads bytes from `start` on.
+    ///
+    /// # Errors
+    /// [`Broken`]: there are fewer, or the file cannot be read.
+    pub fn read(&self, start: u64, to: &mut [u8]) -> Read<()> {
+        if start
+            .checked_add(to.len() as u64)
+            .is_none_or(|end| end > self.length)
+        {
+            return Err(Broken::new("ends too early"));
+        }
+        read_at(&self.file, self.start + start, to)
+            .map_err(|problem| Broken::new(format!("cannot be read: {problem}")))
+    }
+}
+
+/// Reads without moving the file's place: several threads may.
+#[cfg(unix)]
+fn read_at(file: &File, start: u64, to: &mut [u8]) -> io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, to, start)
+}
+
+/// Reads at a place of its own: several threads may.
+#[cfg(windows)]
+fn read_at(file: &File, mut start: u64, mut to: &mut [u8]) -> io::Result<()> {
+    while !to.is_empty() {
+        match std::os::windows::fs::FileExt::seek_read(file, to, start)? {
+            0 => return Err(io::ErrorKind::UnexpectedEof.into()),
+            n => {
+                start += n as u64;
+                to = &mut to[n..];
+            }
+        }
+    }
+    Ok(())
 }
 
 impl<'a> Decoder<'a> {
@@ -194,13 +254,15 @@ impl<'a> Decoder<'a> {
         Self {
             bytes,
             at: 0,
-            owner: None,
+            file: None,
+            asides: Vec::new().into_iter(),
         }
     }
 
-    /// Remembers who owns the bytes; they must be its first.
-    pub(super) fn owned_by(mut self, owner: &Arc<Vec<u8>>) -> Self {
-        self.owner = Some(Arc::clone(owner));
+    /// Reads from `bytes` that stood in a file beside others.
+    pub(super) fn beside(mut self, file: Arc<File>, asides: Vec<[u64; 2]>) -> Self {
+        self.file = Some(file);
+        self.asides = asides.into_iter();
         self
     }
 
@@ -217,22 +279,19 @@ impl<'a> Decoder<'a> {
         Ok(taken)
     }
 
-    /// A list of bytes, not copied where the owner is known.
+    /// The next bytes that stand aside.
     ///
     /// # Errors
-    /// As [`Decoder::raw`].
-    pub fn get_piece(&mut self) -> Read<Piece> {
-        let bytes = self.bytes_of_list(1)?;
-        Ok(match &self.owner {
-            Some(owner) => Piece {
-                owner: Arc::clone(owner),
-                range: self.at - bytes.len()..self.at,
-            },
-            None => Piece {
-                owner: Arc::new(bytes.to_vec()),
-                range: 0..bytes.len(),
-            },
-        })
+    /// There are no more.
+    pub fn get_aside(&mut self) -> Read<Aside> {
+        match (&self.file, self.asides.next()) {
+            (Some(file), Some([start, length])) => Ok(Aside {
+                file: Arc::clone(file),
+                start,
+                length,
+            }),
+            _ => Err(Broken::new("ends too early")),
+        }
     }
 
     /// One number.
@@ -293,6 +352,7 @@ impl<'a> Decoder<'a> {
     /// Leaves the rest unread.
     pub fn skip(&mut self) {
         self.at = self.bytes.len();
+        self.asides = Vec::new().into_iter();
     }
 
     /// Nothing may be left.
@@ -300,7 +360,7 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// Something is.
     pub fn end(&self) -> Read<()> {
-        if self.at == self.bytes.len() {
+        if self.at == self.bytes.len() && self.asides.len() == 0 {
             Ok(())
         } else {
             Err(Broken::new("has bytes after its end"))
@@ -333,7 +393,8 @@ mod tests {
             prop_assert_eq!(back.get_text().unwrap(), text);
             prop_assert_eq!(back.get::<f32>().unwrap(), -1.5);
             prop_assert_eq!(back.get_all::<[u32; 3]>().unwrap(), pairs);
-            back.get::<u64>().unwrap();
+            // Nothing stands aside, and the checksum.
+            prop_assert_eq!(back.get::<[u64; 2]>().unwrap()[0], 0);
             back.end().unwrap();
         }
     }

@@ -6,22 +6,28 @@
 //! | 4 | kind: `ckpt` (checkpoint) or `rows` (cache for relighting) |
 //! | 4 | version of the kind, u32 |
 //! | .. | body, see [`Encoder`] |
-//! | 8 | XXH64 of everything before |
+//! | 16 each | start and length of what stands aside, in order: it is read when it is asked for |
+//! | 8 | how many of these there are |
+//! | 8 | XXH64 of everything before but what stands aside, which has checksums of its own |
 //!
 //! All numbers are little-endian. A file that is cut short, garbled, of another kind or version is refused with a
 //! [`Problem`](crate::Problem) that says what to do.
 
-use super::codec::{Broken, Decoder, Encoder, Read};
+use super::codec::{Broken, Decoder, Encoder, Plain, Read};
 use super::hash;
 use crate::error::{Error, Result};
 use crate::output::file;
-use std::io;
+use std::fs::File;
+use std::io::{self, Read as _, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
 const MAGIC: [u8; 8] = *b"\x89haarlt\n";
 const HEADER: usize = 16;
-const CHECKSUM: usize = 8;
+/// Number of asides, and checksum.
+const FOOTER: usize = 16;
+/// Start and length of an aside.
+const PLACE: usize = 16;
 
 /// What a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +49,7 @@ impl Kind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint | Self::Cache => 1,
+            Self::Checkpoint | Self::Cache => 2,
         }
     }
 
@@ -86,50 +92,137 @@ pub fn write(
     Ok(size)
 }
 
-/// The body of a file's bytes.
-///
-/// # Errors
-/// [`Broken`]: foreign, of another kind or version, cut short or garbled.
-pub fn body(bytes: &[u8], kind: Kind) -> Read<Decoder<'_>> {
+/// What is wrong with a header, if anything is.
+fn check(header: &[u8], kind: Kind) -> Read<()> {
     let name = kind.name();
-    if !bytes.starts_with(&MAGIC) {
+    if !header.starts_with(&MAGIC) {
         return Err(Broken::new(format!("is no {name} of this program")));
     }
-    if bytes.len() < HEADER + CHECKSUM {
-        return Err(Broken::new(format!("is a {name} cut short")));
-    }
-    let (front, sum) = bytes.split_at(bytes.len() - CHECKSUM);
-    let mut header = Decoder::new(front);
-    header.raw(MAGIC.len())?;
-    if header.raw(4)? != kind.tag() {
+    let mut rest = Decoder::new(&header[MAGIC.len()..]);
+    if rest.raw(4).map_err(|_| short(kind))? != kind.tag() {
         return Err(Broken::new(format!("holds something else than a {name}")));
     }
-    let version: u32 = header.get()?;
+    let version: u32 = rest.get().map_err(|_| short(kind))?;
     if version != kind.version() {
         return Err(Broken::new(format!(
             "is a {name} of version {version}, this program knows version {}",
             kind.version()
         )));
     }
-    if hash::of(front).to_le_bytes() != sum {
-        return Err(Broken::new(format!("is a {name} cut short or damaged")));
+    Ok(())
+}
+
+fn short(kind: Kind) -> Broken {
+    Broken::new(format!("is a {} cut short or damaged", kind.name()))
+}
+
+/// What a file holds.
+struct Opened {
+    file: File,
+    /// All but what stands aside, from the header to the number of asides.
+    bytes: Vec<u8>,
+    asides: Vec<[u64; 2]>,
+}
+
+/// Reads all but what stands aside.
+fn open(path: &Path, kind: Kind) -> io::Result<Read<Opened>> {
+    let mut file = File::open(path)?;
+    let size = file.metadata()?.len();
+    let mut bytes = Vec::new();
+    (&file).take(HEADER as u64).read_to_end(&mut bytes)?;
+    if let Err(broken) = check(&bytes, kind) {
+        return Ok(Err(broken));
     }
-    Ok(header)
+    // The end, as many bytes from the last as asked for.
+    let last = |count: u64| -> io::Result<Option<Vec<u8>>> {
+        let mut last = Vec::new();
+        let Some(start) = size.checked_sub(count).filter(|&at| at >= HEADER as u64) else {
+            return Ok(None);
+        };
+        (&file).seek(SeekFrom::Start(start))?;
+        (&file).take(count).read_to_end(&mut last)?;
+        Ok((last.len() as u64 == count).then_some(last))
+    };
+    let Some(footer) = last(FOOTER as u64)? else {
+        return Ok(Err(short(kind)));
+    };
+    let [count, sum] = Plain::load(&footer);
+    let places = u64::checked_mul(count, PLACE as u64).and_then(|n| n.checked_add(FOOTER as u64));
+    let Some(places) = places.filter(|&n| n <= size) else {
+        return Ok(Err(short(kind)));
+    };
+    let Some(last) = last(places)? else {
+        return Ok(Err(short(kind)));
+    };
+    let end = size - places;
+    let asides: Vec<[u64; 2]> = last[..last.len() - FOOTER]
+        .chunks_exact(PLACE)
+        .map(Plain::load)
+        .collect();
+    let mut at = HEADER as u64;
+    for &[start, length] in &asides {
+        let after = start
+            .checked_add(length)
+            .filter(|&after| start >= at && after <= end);
+        let Some(after) = after else {
+            return Ok(Err(short(kind)));
+        };
+        file.seek(SeekFrom::Start(at))?;
+        (&file).take(start - at).read_to_end(&mut bytes)?;
+        at = after;
+    }
+    file.seek(SeekFrom::Start(at))?;
+    (&file).take(end - at).read_to_end(&mut bytes)?;
+    let body = bytes.len();
+    bytes.extend(&last[..last.len() - size_of::<u64>()]);
+    if hash::of(&bytes) != sum {
+        return Ok(Err(short(kind)));
+    }
+    bytes.truncate(body);
+    Ok(Ok(Opened {
+        file,
+        bytes,
+        asides,
+    }))
+}
+
+/// The checksum that should stand at the end of a file of these bytes, as far as they are one.
+pub fn checksum(bytes: &[u8]) -> u64 {
+    let front = &bytes[..bytes.len().saturating_sub(size_of::<u64>())];
+    let mut sum = hash::Hasher::default();
+    let mut at = 0;
+    if let Some((before, count)) = front.split_last_chunk::<8>() {
+        let count = usize::try_from(u64::from_le_bytes(*count)).unwrap_or(usize::MAX);
+        let places = before.len().saturating_sub(count.saturating_mul(PLACE));
+        for place in before[places..].chunks_exact(PLACE) {
+            let [start, length] = <[u64; 2]>::load(place).map(|x| x as usize);
+            sum.update(front.get(at..start).unwrap_or(&[]));
+            at = start.saturating_add(length).min(front.len());
+        }
+    }
+    sum.update(&front[at..]);
+    sum.finish()
 }
 
 /// Reads a file through `decode`, which must use all of it.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read; [`Error::Input`] for what [`body`] or `decode` finds.
+/// [`Error::Io`] if the file cannot be read; [`Error::Input`] for a file that is foreign, of another kind or version, cut
+/// short or garbled, and for what `decode` finds.
 pub fn read<T>(path: &Path, kind: Kind, decode: impl FnOnce(&mut Decoder) -> Read<T>) -> Result<T> {
-    let bytes = std::fs::read(path).map_err(|problem| Error::io(path, problem))?;
-    let bytes = Arc::new(bytes);
-    let decoded = body(&bytes, kind).and_then(|body| {
-        let mut body = body.owned_by(&bytes);
-        let decoded = decode(&mut body)?;
-        body.end()?;
-        Ok(decoded)
-    });
+    let opened = open(path, kind).map_err(|problem| Error::io(path, problem))?;
+    let decoded = opened.and_then(
+        |Opened {
+             file,
+             bytes,
+             asides,
+         }| {
+            let mut body = Decoder::new(&bytes[HEADER..]).beside(Arc::new(file), asides);
+            let decoded = decode(&mut body)?;
+            body.end()?;
+            Ok(decoded)
+        },
+    );
     decoded.map_err(|Broken(what)| Error::input(path.display().to_string(), what, kind.next()))
 }
 
@@ -178,20 +271,21 @@ mod tests {
         /// Any change, cut or addition is found.
         #[test]
         fn damage_is_found(list in prop::collection::vec(any::<u32>(), 0..40), at in any::<usize>(), with in 1_u8.., cut in any::<usize>(), more in 1_usize..9) {
-            let mut whole = Vec::new();
-            let mut out = Encoder::new(&mut whole);
-            out.raw(&MAGIC).unwrap();
-            out.raw(&Kind::Cache.tag()).unwrap();
-            out.put(Kind::Cache.version()).unwrap();
-            out.put_all(&list).unwrap();
-            out.finish().unwrap();
-            prop_assert!(body(&whole, Kind::Cache).is_ok());
+            let (_folder, path) = file(&list);
+            let whole = std::fs::read(&path).unwrap();
+            prop_assert_eq!(&checksum(&whole).to_le_bytes()[..], &whole[whole.len() - 8..]);
+            let taken = |bytes: &[u8]| {
+                std::fs::write(&path, bytes).unwrap();
+                read(&path, Kind::Cache, |from| from.get_all::<u32>()).is_ok()
+            };
+            prop_assert!(taken(&whole));
             let mut garbled = whole.clone();
             garbled[at % whole.len()] ^= with;
-            prop_assert!(body(&garbled, Kind::Cache).is_err());
-            prop_assert!(body(&whole[..cut % whole.len()], Kind::Cache).is_err());
-            whole.resize(whole.len() + more, 0);
-            prop_assert!(body(&whole, Kind::Cache).is_err());
+            prop_assert!(!taken(&garbled));
+            prop_assert!(!taken(&whole[..cut % whole.len()]));
+            garbled.clone_from(&whole);
+            garbled.resize(whole.len() + more, 0);
+            prop_assert!(!taken(&garbled));
         }
     }
 }

@@ -4,8 +4,8 @@
 //! |---|---|
 //! | `hash` | XXH64 |
 //! | `codec` | numbers and lists as bytes, and back without trust |
-//! | `packs` | many short pieces in one |
-//! | `container` | magic, kind, version, checksum |
+//! | `packs` | many short pieces, read when they are asked for |
+//! | `container` | magic, kind, version, what stands aside, checksum |
 //! | `fingerprint` | what a room is made of, part by part, as hashes |
 
 pub mod codec;
