@@ -20,27 +20,13 @@ const MANY: f64 = 12.0;
 /// Rows a partial sum covers; fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 1024;
 
-/// When to take the coarse step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Coarse {
-    Never,
-    WherePaying,
-    Always,
-}
-
-impl Coarse {
-    /// Is it worth building, given the greatest albedo and the bounds of the error so far?
-    fn pays(self, greatest: f64, bounds: &[f64], tolerance: f64) -> bool {
-        match self {
-            Self::Never => false,
-            Self::Always => true,
-            Self::WherePaying if greatest >= BRIGHT => true,
-            Self::WherePaying => bounds.get(LOOK).is_some_and(|now| {
-                let rate = (now / bounds[0]).ln() / LOOK as f64;
-                rate >= 0.0 || (tolerance / now).ln() / rate > MANY
-            }),
-        }
-    }
+/// Is the coarse step worth building, given the greatest albedo and the bounds of the error so far?
+fn pays(greatest: f64, bounds: &[f64], tolerance: f64) -> bool {
+    let slow = |now: &f64| {
+        let rate = (now / bounds[0]).ln() / LOOK as f64;
+        rate >= 0.0 || (tolerance / now).ln() / rate > MANY
+    };
+    greatest >= BRIGHT || bounds.get(LOOK).is_some_and(slow)
 }
 
 /// How a solve went.
@@ -73,15 +59,19 @@ impl System<'_> {
         reflected: &mut Rows,
         tolerance: f64,
     ) -> Convergence {
-        self.solve_with::<L>(first, reflected, tolerance, Coarse::WherePaying)
+        let greatest = self.greatest.iter().fold(0.0, |a, &b| f64::from(b).max(a));
+        self.solve_with::<L>(first, reflected, tolerance, |bounds| {
+            pays(greatest, bounds, tolerance)
+        })
     }
 
+    /// The same with the coarse step as soon as `pays` finds it worth it, from the bounds before each iteration.
     fn solve_with<const L: usize>(
         &self,
         first: &Rows,
         reflected: &mut Rows,
         tolerance: f64,
-        coarse: Coarse,
+        pays: impl Fn(&[f64]) -> bool,
     ) -> Convergence {
         let (tree, areas) = (self.operator.tree, self.operator.areas);
         let leaves = self.operator.leaves;
@@ -148,7 +138,6 @@ impl System<'_> {
         let mut rz = rr;
         let mut done = Convergence::default();
         let mut bounds = Vec::new();
-        let greatest = self.greatest.iter().fold(0.0, |a, &b| f64::from(b).max(a));
         loop {
             done.residual = 0.0;
             done.bound = 0.0;
@@ -165,7 +154,7 @@ impl System<'_> {
                 break;
             }
             bounds.push(done.bound);
-            if aggregates.is_none() && coarse.pays(greatest, &bounds, tolerance) {
+            if aggregates.is_none() && pays(&bounds) {
                 let new =
                     Aggregates::new::<L>(&self.operator, self.reflectance, &root, &mut work.nodes);
                 new.precondition::<L>(&root, &residual, &mut conditioned);
@@ -358,7 +347,7 @@ mod tests {
     }
 
     /// Solves with light on the first leaf only; lane 3 is black, in lane 2 every other leaf is.
-    fn solved(coarse: Coarse) -> (Rows, Convergence) {
+    fn solved(coarse: bool) -> (Rows, Convergence) {
         let (tree, areas, leaves, links) = chains();
         let rows = LinkRows::new(tree.nodes.len(), &links);
         let factor = vec![1.0; tree.nodes.len()];
@@ -376,14 +365,14 @@ mod tests {
         first.row_mut(0).fill(1.0);
         first.row_mut(1).fill(1.0);
         let mut reflected = Rows::zero(leaves.len(), 4);
-        let done = system.solve_with::<4>(&first, &mut reflected, 1e-4, coarse);
+        let done = system.solve_with::<4>(&first, &mut reflected, 1e-4, |_| coarse);
         (reflected, done)
     }
 
     #[test]
     fn the_coarse_step_finds_the_same_solution_in_fewer_iterations() {
-        let (plain, slow) = solved(Coarse::Never);
-        let (quick, fast) = solved(Coarse::Always);
+        let (plain, slow) = solved(false);
+        let (quick, fast) = solved(true);
         for (p, q) in plain.all::<4>().iter().zip(quick.all::<4>()) {
             for l in 0..4 {
                 assert!(
@@ -403,7 +392,7 @@ mod tests {
 
     #[test]
     fn what_no_light_reaches_stays_exactly_dark() {
-        let (rows, _) = solved(Coarse::Always);
+        let (rows, _) = solved(true);
         let half = rows.len() / 2;
         for row in &rows.all::<4>()[half..] {
             assert_eq!(*row, [0.0; 4]);
