@@ -251,7 +251,7 @@ impl Bake {
         let emission = painter
             .paint(&self.tree, &light.leaves, &self.lanes)
             .emission;
-        light.reflected = self.reflected_on_nodes::<L>(reflected, &light.leaves);
+        light.reflected = self.on_nodes::<L>(reflected, &light.leaves);
         light.emitted = self.on_nodes::<L>(&emission, &light.leaves);
         light.half_size = self.mesh.half_size;
         light.measure(&self.tree, &self.lanes);

@@ -135,8 +135,6 @@ const MOST_LINKS: usize = 4_000_000;
 const MANY_FACES: usize = 50_000;
 /// Levels that a round splits leaves by where reflected light varies.
 const LEVELS: usize = 4;
-/// Less than this share of a patch that is not covered says nothing of its light.
-const HARDLY_BARE: f64 = 0.1;
 /// Leaves whose lists are looked at after a round.
 const LISTED_LEAVES: usize = 4096;
 /// Elements are not split below this share of the area of all faces.
@@ -768,7 +766,7 @@ impl Bake {
         };
         let flux = flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums);
         self.light = Light {
-            reflected: self.reflected_on_nodes::<L>(&reflected, leaves),
+            reflected: self.on_nodes::<L>(&reflected, leaves),
             emitted: self.on_nodes::<L>(&emission, leaves),
             irradiance,
             leaves: leaves.to_vec(),
@@ -820,22 +818,6 @@ impl Bake {
             rows.all_mut::<L>()[leaf as usize] = *row;
         }
         operator::pull::<L>(&self.tree, &self.areas, rows.all_mut::<L>());
-        rows
-    }
-
-    /// The same for reflected light. What little shows of a leaf that is all but covered is as bright as what its parent
-    /// shows: no ray of its own tells, and who looks at it from the edge of what stands there sees hardly anything else.
-    fn reflected_on_nodes<const L: usize>(&self, by_leaf: &Rows, leaves: &[u32]) -> Rows {
-        let mut rows = self.on_nodes::<L>(by_leaf, leaves);
-        let all = rows.all_mut::<L>();
-        for (id, node) in self.tree.nodes.iter().enumerate() {
-            let parent = node.parent as usize;
-            // Never from another face: that may lie elsewhere.
-            let part = id > 0 && self.tree.nodes[parent].element != crate::hierarchy::NONE;
-            if part && self.areas[id] < HARDLY_BARE * node.area {
-                all[id] = all[parent];
-            }
-        }
         rows
     }
 
