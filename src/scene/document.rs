@@ -111,6 +111,7 @@ impl Document {
             check.warn(format!("{file}: {warning}"));
         }
         version(&json, &mut check);
+        baked(&json, &mut check);
         let unsupported = extensions(&json, &mut check);
         if check.has_problems() {
             return Err(Error::Input(check.into_parts().0));
@@ -202,6 +203,17 @@ fn version(json: &Value, check: &mut Check) {
             json::short(least)
         );
         check.problem("", what, next);
+    }
+}
+
+/// Says so if the room is our own output: its vertex colours are light, and taken as paint all the same.
+fn baked(json: &Value, check: &mut Check) {
+    let exposure = json.pointer("/asset/extras/haarlight/exposure");
+    if exposure.is_some_and(Value::is_object) {
+        check.warn(
+            "this room holds baked light already: its vertex colours, which are light, count as paint; \
+             bake the room that it was made from",
+        );
     }
 }
 

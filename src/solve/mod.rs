@@ -2,6 +2,7 @@
 //!
 //! [`Bake::step`] is the loop on one screen; everything it calls stands in a file of its own.
 
+mod aggregates;
 mod bounded;
 mod checkpoint;
 mod choice;

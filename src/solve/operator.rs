@@ -28,13 +28,13 @@ pub struct Operator<'a> {
     /// The hierarchy.
     pub(super) tree: &'a Tree,
     /// The links.
-    links: &'a LinkRows,
+    pub(super) links: &'a LinkRows,
     /// Leaves of the hierarchy, ascending.
     pub(super) leaves: &'a [u32],
     /// Area of each node that takes part.
     pub(super) areas: &'a [f64],
     /// Balance factors by node.
-    factor: &'a [f32],
+    pub(super) factor: &'a [f32],
     shape: Shape,
 }
 
