@@ -328,7 +328,7 @@ impl Operator<'_> {
         };
         let mean = scratch.all_mut::<L>();
         fill(mean, &seen_above);
-        super::operator::pull::<L>(tree, areas, mean);
+        super::operator::pull::<f32, L>(tree, areas, mean);
         let shares = Shares::new::<L>(tree, areas, parts, mean);
         fill(mean, &own);
         let mean: &[[f32; L]] = mean;

@@ -52,6 +52,7 @@ pub use flux::Closed;
 pub use held::Held;
 use lanes::Lanes;
 use light::{Light, Neighbours};
+use mixed::Mixed;
 pub use operator::Operator;
 use outlook::Outlook;
 use rayon::prelude::*;
@@ -777,22 +778,34 @@ impl Bake {
                 }
                 None => system.solve::<L>(&first, &mut reflected, tolerance),
             };
+            let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
+            let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
             let mut irradiance = Rows::zero(leaves.len(), L);
             if runs {
-                let slopes = linear::Slopes::new(
-                    &self.tree,
-                    rows,
-                    &self.areas,
-                    leaves,
-                    &self.outlook.target,
-                );
+                let slopes = linear::Slopes::new(&self.tree, rows, &self.areas, leaves, &sums);
+                let bounced = reflect(&first);
                 for _ in 0..linear::PASSES {
                     irradiance = slopes.irradiance::<L>(&reflected);
+                    let again = reflect(&irradiance);
+                    let [over, without] = slopes.balance::<L>(&irradiance, &bounced, &again);
+                    if mixed.is_some() {
+                        // Lanes are no bands: it is each of the 64 leaves that keeps its energy.
+                        let leaves_of = |sum: [f64; L]| self.lanes.leaves(&sum.map(|x| x as f32));
+                        let (over, without) = (leaves_of(over), leaves_of(without));
+                        let scale = std::array::from_fn(|k| linear::amplitude(over[k], without[k]));
+                        let whole = vec![0; leaves.len()];
+                        irradiance =
+                            Mixed::new(&[scale], whole, &self.lanes, L).reflect::<L>(&irradiance);
+                    } else {
+                        for row in irradiance.all_mut::<L>() {
+                            for (l, x) in row.iter_mut().enumerate() {
+                                *x *= linear::amplitude(over[l], without[l]) as f32;
+                            }
+                        }
+                    }
                     reflected = reflect(&plus(&irradiance, &first));
                 }
             }
-            let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
-            let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
             (convergence, irradiance, sums)
         };
         irradiance = plus(&irradiance, &first);
