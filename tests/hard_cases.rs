@@ -764,3 +764,37 @@ fn no_cycle_of_refining() {
         assert!(pair[1].threshold < pair[0].threshold);
     }
 }
+
+/// A small lamp in a white ceiling over a floor, both of many faces: each face of the floor is so small that it may err, but
+/// not all alike.
+#[test]
+fn direct_light_of_many_small_faces() {
+    let mut room = Room::new();
+    let (white, lamp) = (room.paint(0.9), room.lamp(0.9, 1000.0));
+    for i in 0..60 {
+        for k in 0..60 {
+            let at = dvec3(f64::from(i) / 60.0, 0.0, f64::from(k) / 60.0);
+            room.quad(at, DVec3::Z / 60.0, DVec3::X / 60.0, white);
+        }
+    }
+    for i in 0..8 {
+        for k in 0..8 {
+            let at = dvec3(f64::from(i) / 8.0, 1.0, f64::from(k) / 8.0);
+            let material = if (i, k) == (1, 2) { lamp } else { white };
+            room.quad(at, DVec3::X / 8.0, DVec3::Z / 8.0, material);
+        }
+    }
+    let bake = baked(room.scene());
+    // The share of the lamp's light that meets the floor: exact from a point of the lamp, 16 by 16 points.
+    let floor = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)].map(|(x, z)| dvec3(x, 0.0, z));
+    let share: f64 = (0..256)
+        .map(|k| {
+            let at = |k: usize| (k as f64 + 0.5) / 128.0;
+            let point = dvec3(0.125 + at(k % 16), 1.0, 0.25 + at(k / 16));
+            haarlight::geometry::lambert_polygon(point, DVec3::NEG_Y, &floor) / 256.0
+        })
+        .sum();
+    let flux = bake.rounds().last().unwrap().flux;
+    let found = flux.received_lm / flux.emitted_lm;
+    assert!((found / share - 1.0).abs() < 5e-3, "{found} {share}");
+}

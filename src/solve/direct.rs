@@ -122,12 +122,14 @@ impl Direct {
     }
 
     /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
-    /// `weights` turn a row into brightness, share of white; `gather` gives none for a point that something covers.
+    /// No patch may misplace more than `coarsest` (share of white) of a leaf's light, however small the leaf: all small
+    /// leaves would err alike. `weights` turn a row into brightness, share of white; `gather` gives none for a point that something covers.
     pub(super) fn refine(
         &mut self,
         tree: &mut Tree,
         demand: &Demand,
         weights: &[f64],
+        coarsest: f64,
         gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
     ) {
         let mut open: Vec<u32> = tree.leaves().collect();
@@ -157,7 +159,7 @@ impl Direct {
                             leaf,
                             width,
                             weights,
-                            NOISE * demand.threshold / share,
+                            (NOISE * demand.threshold / share).min(coarsest),
                             share * share < TINY,
                             gather,
                             &mut memory,
