@@ -439,3 +439,63 @@ fn calibration_on_rooms_of_other_tools() {
         .collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
+
+/// The Cornell box away from edges: below 1 % by default and .3 % when asked, and colour differences of .5 and .2. The
+/// path tracer's own noise is taken off (errors of independent estimates add in squares).
+#[test]
+fn the_cornell_box_has_no_plateau() {
+    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
+    let bake = |error: f64| {
+        let scene = Scene::load(&room, &Options::default()).unwrap();
+        let settings = Settings {
+            error,
+            ..Settings::default()
+        };
+        Bake::new(scene, settings)
+    };
+    let reference = Reference::new(&bake(0.5), 200, 1 << 15, 3);
+    for (error, least, colour) in [(0.5, 0.01, 0.5), (0.1, 0.003, 0.2)] {
+        let mut bake = bake(error);
+        bake.run();
+        let mesh = bake.mesh();
+        // An edge is where two faces of different planes meet: near it the points of the audit are left out.
+        let near_edge = |point: DVec3| {
+            (0..mesh.triangles.len()).any(|t| {
+                let [a, b, c] = mesh.triangles[t].map(|v| mesh.positions[v as usize]);
+                let normal = mesh.normal[t];
+                let height = (point - mesh.centre - a).dot(normal);
+                let inside = |p: DVec3, q: DVec3| {
+                    let out = (q - p).cross(normal).normalize_or_zero();
+                    out.dot(point - mesh.centre - p) < 0.01
+                };
+                height.abs() > 1e-6
+                    && height.abs() < 0.01
+                    && inside(a, b)
+                    && inside(b, c)
+                    && inside(c, a)
+            })
+        };
+        let report = Report::against(&bake, &reference);
+        let away: Vec<_> = (report.seen.iter())
+            .filter(|s| !near_edge(s.point))
+            .collect();
+        assert!(away.len() > 120, "{}", away.len());
+        let mean = |f: &dyn Fn(&haarlight::audit::Seen) -> f64| {
+            away.iter().map(|s| f(s)).sum::<f64>() / away.len() as f64
+        };
+        let noise = mean(&|s| s.relative[1].powi(2));
+        let rms = (mean(&|s| s.relative[0].powi(2)) - noise).max(0.0).sqrt();
+        let de = report.de2000.mean;
+        println!(
+            "--error {error}: {:.3} % RMS at {} points (noise {:.3} %), dE00 {:.3} ({:.3} .. {:.3})",
+            100.0 * rms,
+            away.len(),
+            100.0 * noise.sqrt(),
+            de.value,
+            de.low,
+            de.high
+        );
+        assert!(rms < least, "{rms}");
+        assert!(de.low < colour, "{de:?}");
+    }
+}
