@@ -456,6 +456,7 @@ fn case_5_8_at_points() {
         std::array::from_fn(|l| 0.475 - 0.425 * (l as f64 / 63.0 * 9.0).cos());
     // Lanes for the eye merge bands: for each band by itself there are the 64 leaves.
     let settings = Settings {
+        error: 0.25,
         representation: Representation::Dense,
         ..Settings::default()
     };

@@ -24,7 +24,7 @@ const CLOSE: f64 = 1.5;
 const POLYGONS: u32 = 4;
 /// A clear patch may misplace this share of the tolerance: what many of them misplace goes the same way (the middle of a wall
 /// is brighter than its edges, and nearer), and to enter one costs no ray. With 1 the light in a white cube is .7 % low.
-const CLEAR_SHARE: f64 = 0.03;
+const CLEAR_SHARE: f64 = 0.05;
 /// How many rays a link's visibility counts for.
 const PRIOR: f64 = 4.0;
 /// How often a lamp's triangle is quartered where its shadow boundary crosses it.

@@ -18,8 +18,6 @@ use crate::spectrum::{
 const PAPER_DE_LUV: f64 = 0.29;
 /// Materials whose first and second reflections the paper's control looks at, and that train a basis.
 const MATERIALS: usize = 32;
-/// Patches of the model in the first round, if there is a second choice.
-const FIRST_PATCHES: usize = 48;
 /// Patches of the model on which bounds are worked out: they take a dozen numbers a lane and a hundred bounces.
 const BOUNDED_PATCHES: usize = 48;
 
@@ -59,13 +57,7 @@ impl Bake {
                 Lanes::vectors(spectra, basis, weights)
             }
             Representation::Adaptive if !none => {
-                // The first links are coarse, and where lanes are chosen again few patches do to begin with.
-                let first = self.rounds.is_empty() && self.tree.faces.len() < super::MANY_FACES;
-                let model = self.model(if first {
-                    FIRST_PATCHES
-                } else {
-                    coarse::PATCHES
-                });
+                let model = self.model(coarse::PATCHES);
                 let (spectra, weights) = (&self.scene.spectra, &self.weights);
                 let known = self.lanes.cuts();
                 let choice = model.choose(spectra, weights, self.light.white, tolerance, known);

@@ -30,7 +30,7 @@ const POINTS: usize = 8;
 /// Shares are kept as multiples of one over this.
 const FINE: f64 = 8192.0;
 /// A row is scaled up by this much at the most: a patch that sees next to nothing must not be blown up.
-const GREATEST: f32 = 8.0;
+const GREATEST: f32 = 2.0;
 
 /// Shares of a link's ends, less 1, in units of 1 / [`FINE`]: at two corners of the receiver and two of the source. The
 /// third makes the sum 0; all are 0 where an end has no parts.

@@ -127,8 +127,6 @@ const FURNISHED: Shares = Shares {
     direct: 5.0,
     reflected: 1.4,
 };
-/// In rooms of so few triangles each is cut wherever another meets it, and not only where that parts spaces.
-const FEW_TRIANGLES: usize = 256;
 /// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
 const LEAST_ROUNDS: usize = 3;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already.
@@ -278,11 +276,6 @@ impl Bake {
                 if plan.runs(Kind::Occlusion) {
                     let cuts = cuts(&mesh, &rays);
                     let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
-                    if mesh.triangles.len() <= FEW_TRIANGLES {
-                        // A patch that something stands on shows what is left of it as one: dark wedges along the
-                        // contact.
-                        found.parted = (0..cuts.len()).collect();
-                    }
                     if !found.parted.is_empty() {
                         parted = found.parted.iter().map(|&k| k as u32).collect();
                         let some: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
