@@ -7,7 +7,6 @@
 //!
 //! `cargo bench --bench rows [-- test]`
 
-use glam::DVec3;
 use haarlight::geometry::sampling::hash;
 use haarlight::hierarchy::{NONE, Node, Tree};
 use haarlight::link::{Link, LinkRows, Way};
@@ -27,23 +26,8 @@ const SIZES: [(usize, u32); 3] = [(8, 4), (3, 7), (30, 7)];
 fn tree(top: usize, depth: u32) -> Tree {
     let leaf_area = 1.0;
     let area = |below: u32| leaf_area * 4.0_f64.powi(below as i32);
-    let node = |parent: u32, area: f64| Node {
-        parent,
-        child: NONE,
-        children: 0,
-        flat: false,
-        element: NONE,
-        faces: (0, 0),
-        low: DVec3::ZERO,
-        high: DVec3::ZERO,
-        centre: DVec3::ZERO,
-        radius: 0.0,
-        area,
-        normal: DVec3::Z,
-        cone: -1.0,
-    };
     let mut tree = Tree {
-        nodes: vec![node(NONE, top as f64 * area(depth))],
+        nodes: vec![Node::bare(NONE, top as f64 * area(depth))],
         ..Tree::default()
     };
     let mut row = vec![0_u32];
@@ -58,7 +42,7 @@ fn tree(top: usize, depth: u32) -> Tree {
             ) = (first, children as u8);
             for _ in 0..children {
                 next.push(tree.nodes.len() as u32);
-                tree.nodes.push(node(parent, area(depth - level)));
+                tree.nodes.push(Node::bare(parent, area(depth - level)));
             }
         }
         row = next;

@@ -147,19 +147,8 @@ pub(super) fn build(mesh: &Mesh, spaces: &[u32]) -> Tree {
 
 fn placeholder(parent: u32, first: usize, count: usize) -> Node {
     Node {
-        parent,
-        child: NONE,
-        children: 0,
-        flat: false,
-        element: NONE,
         faces: (first as u32, count as u32),
-        low: DVec3::ZERO,
-        high: DVec3::ZERO,
-        centre: DVec3::ZERO,
-        radius: 0.0,
-        area: 0.0,
-        normal: DVec3::ZERO,
-        cone: -1.0,
+        ..Node::bare(parent, 0.0)
     }
 }
 

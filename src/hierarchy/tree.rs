@@ -43,6 +43,25 @@ pub struct Node {
 }
 
 impl Node {
+    /// A leaf of some area that is nowhere in particular and no element.
+    pub fn bare(parent: u32, area: f64) -> Self {
+        Self {
+            parent,
+            child: NONE,
+            children: 0,
+            flat: false,
+            element: NONE,
+            faces: (0, 0),
+            low: DVec3::ZERO,
+            high: DVec3::ZERO,
+            centre: DVec3::ZERO,
+            radius: 0.0,
+            area,
+            normal: DVec3::ZERO,
+            cone: -1.0,
+        }
+    }
+
     /// Has the node no children?
     pub fn is_leaf(&self) -> bool {
         self.children == 0
@@ -199,6 +218,15 @@ impl Tree {
         let node = &mut self.nodes[id as usize];
         node.child = first;
         node.children = 4;
+    }
+
+    /// Gives every node without a number ([`NONE`]) that of the nearest node above that has one.
+    pub fn inherit(&self, number: &mut [u32]) {
+        for id in 1..number.len() {
+            if number[id] == NONE {
+                number[id] = number[self.nodes[id].parent as usize];
+            }
+        }
     }
 
     /// The leaf element that holds a point of a face, given by barycentric weights on the whole face.

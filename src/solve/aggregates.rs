@@ -18,7 +18,8 @@
 //!
 //! Aggregates hold only leaves that exchange light, over whatever detours: what is dark stays exactly dark.
 
-use super::operator::Operator;
+use super::conjugate::add_products;
+use super::operator::{Operator, pull};
 use super::rows::Rows;
 use crate::hierarchy::{NONE, Tree};
 use crate::link::LinkRows;
@@ -148,14 +149,6 @@ impl Aggregates {
     }
 }
 
-/// `sum += x y`, of slices: of arrays the compiler makes single numbers.
-#[inline(never)]
-fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
-    for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
-        *s += f64::from(*x) * f64::from(*y);
-    }
-}
-
 /// The hierarchy shared out among aggregates: each holds some nodes of a cut, close together.
 pub(super) struct Parts {
     /// How many aggregates.
@@ -214,11 +207,7 @@ impl Parts {
                 of[id as usize] = k as u32;
             }
         }
-        for id in 1..of.len() {
-            if of[id] == NONE {
-                of[id] = of[tree.nodes[id].parent as usize];
-            }
-        }
+        tree.inherit(&mut of);
         Self {
             count: parts.len(),
             above,
@@ -317,21 +306,15 @@ impl Operator<'_> {
         scratch: &mut Rows,
     ) -> Vec<f64> {
         let (tree, areas) = (self.tree, self.areas);
-        // What a leaf reflects of irradiance 1, as its own links see it and as those of the nodes above do.
-        let own = |leaf: u32| self.factor[leaf as usize];
-        let seen_above = |leaf: u32| self.factor[leaf as usize];
-        let fill = |rows: &mut [[f32; L]], factor: &dyn Fn(u32) -> f32| {
-            for (rho, &leaf) in reflectance.all::<L>().iter().zip(self.leaves) {
-                let f = factor(leaf);
-                rows[leaf as usize] = rho.map(|x| f * x);
-            }
-        };
+        // What a leaf reflects of irradiance 1, balanced.
         let mean = scratch.all_mut::<L>();
-        fill(mean, &seen_above);
-        super::operator::pull::<f32, L>(tree, areas, mean);
-        let shares = Shares::new::<L>(tree, areas, parts, mean);
-        fill(mean, &own);
+        for (rho, &leaf) in reflectance.all::<L>().iter().zip(self.leaves) {
+            let factor = self.factor[leaf as usize];
+            mean[leaf as usize] = rho.map(|x| factor * x);
+        }
+        pull::<f32, L>(tree, areas, mean);
         let mean: &[[f32; L]] = mean;
+        let shares = Shares::new::<L>(tree, areas, parts, mean);
         let size = parts.count * L;
         let mut members = vec![Vec::new(); parts.count];
         for (id, &of) in parts.of.iter().enumerate() {

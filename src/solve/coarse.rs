@@ -13,7 +13,6 @@ use crate::hierarchy::{NONE, Node, Tree};
 use crate::link::{Link, LinkRows, Way};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{LEAVES, Leaves, Partition};
-use glam::DVec3;
 
 /// Patches of the model at the most (fits the child count of its root).
 pub(super) const PATCHES: usize = 192;
@@ -330,7 +329,6 @@ fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
 
 /// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node of the largest area is opened.
 pub(super) fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
-    let mut chosen = vec![0_u32];
     let mut open = std::collections::BinaryHeap::new();
     let key = |id: u32| (ordered(tree.node(id).area), std::cmp::Reverse(id));
     open.push((key(0), 0_u32));
@@ -347,7 +345,6 @@ pub(super) fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
             open.push((key(child), child));
         }
     }
-    chosen.clear();
     let mut group = vec![NONE; tree.nodes.len()];
     let mut next = 0;
     for id in 0..tree.nodes.len() {
@@ -412,27 +409,12 @@ fn exchanges(tree: &Tree, links: &[Link], factor: &[f32], group: &[u32], count: 
 
 /// A root with one child a patch.
 fn flat_tree(areas: &[f64]) -> Tree {
-    let node = |parent, area| Node {
-        parent,
-        child: NONE,
-        children: 0,
-        flat: false,
-        element: NONE,
-        faces: (0, 0),
-        low: DVec3::ZERO,
-        high: DVec3::ZERO,
-        centre: DVec3::ZERO,
-        radius: 0.0,
-        area,
-        normal: DVec3::Z,
-        cone: -1.0,
-    };
     let mut nodes = vec![Node {
         child: 1,
         children: areas.len() as u8,
-        ..node(NONE, areas.iter().sum())
+        ..Node::bare(NONE, areas.iter().sum())
     }];
-    nodes.extend(areas.iter().map(|&a| node(0, a)));
+    nodes.extend(areas.iter().map(|&a| Node::bare(0, a)));
     Tree {
         nodes,
         elements: Vec::new(),

@@ -270,7 +270,7 @@ pub(super) fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
 
 /// `sum += x y`. Slices of a length that the compiler does not know: of arrays it makes single numbers.
 #[inline(never)]
-fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
+pub(super) fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
     for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
         *s += f64::from(*x) * f64::from(*y);
     }
@@ -297,19 +297,11 @@ mod tests {
             (f64::from(k - first) + 0.5) * f64::from(area(k))
         };
         let nodes = (0..count).map(|k| Node {
-            parent: if k == 0 { NONE } else { (k - 1) / 2 },
             child: if k < first_leaf { 2 * k + 1 } else { NONE },
             children: if k < first_leaf { 2 } else { 0 },
-            flat: false,
-            element: NONE,
-            faces: (0, 0),
-            low: glam::DVec3::ZERO,
-            high: glam::DVec3::ZERO,
             centre: glam::DVec3::X * place(k),
             radius: f64::from(area(k)),
-            area: f64::from(area(k)),
-            normal: glam::DVec3::Z,
-            cone: -1.0,
+            ..Node::bare(if k == 0 { NONE } else { (k - 1) / 2 }, f64::from(area(k)))
         });
         let tree = Tree {
             nodes: nodes.collect(),

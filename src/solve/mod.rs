@@ -801,10 +801,10 @@ impl Bake {
                         irradiance =
                             Mixed::new(&[scale], whole, &self.lanes, L).reflect::<L>(&irradiance);
                     } else {
+                        let scale: [f32; L] =
+                            std::array::from_fn(|l| linear::amplitude(over[l], without[l]) as f32);
                         for row in irradiance.all_mut::<L>() {
-                            for (l, x) in row.iter_mut().enumerate() {
-                                *x *= linear::amplitude(over[l], without[l]) as f32;
-                            }
+                            *row = std::array::from_fn(|l| row[l] * scale[l]);
                         }
                     }
                     reflected = reflect(&plus(&irradiance, &first));

@@ -254,21 +254,8 @@ mod tests {
     fn tree(parents: &[u32]) -> (Tree, Vec<f64>, Vec<u32>) {
         let mut tree = Tree::default();
         for (k, &parent) in parents.iter().enumerate() {
-            tree.nodes.push(crate::hierarchy::Node {
-                parent,
-                child: NONE,
-                children: 0,
-                flat: false,
-                element: NONE,
-                faces: (0, 0),
-                low: glam::DVec3::ZERO,
-                high: glam::DVec3::ZERO,
-                centre: glam::DVec3::ZERO,
-                radius: 0.0,
-                area: 1.0 + (k % 2) as f64,
-                normal: glam::DVec3::Z,
-                cone: -1.0,
-            });
+            let area = 1.0 + (k % 2) as f64;
+            tree.nodes.push(crate::hierarchy::Node::bare(parent, area));
             if let Some(p) = tree.nodes.get_mut(parent as usize) {
                 p.child = p.child.min(k as u32);
                 p.children += 1;

@@ -91,8 +91,7 @@ impl Outlook {
                 open.push(k);
             }
         }
-        let leaves = tree.nodes.iter().filter(|n| n.is_leaf()).count();
-        let mean = tree.nodes.first().map_or(0.0, |n| n.area) / leaves.max(1) as f64;
+        let mean = mean_area(tree);
         let found: Vec<[usize; 3]> = open
             .par_chunks(CHUNK)
             .flat_map_iter(|chunk| {
@@ -133,8 +132,7 @@ impl Outlook {
         let new: Vec<u32> = (0..tree.nodes.len() as u32)
             .filter(|&k| tree.node(k).is_leaf() && self.range[k as usize].1 == 0)
             .collect();
-        let leaves = tree.nodes.iter().filter(|n| n.is_leaf()).count();
-        let mean = tree.nodes.first().map_or(0.0, |n| n.area) / leaves.max(1) as f64;
+        let mean = mean_area(tree);
         let patterns: Vec<Hemisphere> = (0..)
             .map(|k| LOOKING.1 << k)
             .take_while(|&n| n <= hemisphere.len())
@@ -355,6 +353,16 @@ impl Outlook {
     }
 }
 
+/// Mean area of the leaves.
+fn mean_area(tree: &Tree) -> f64 {
+    tree.nodes.first().map_or(0.0, |n| n.area) / tree.leaves().count().max(1) as f64
+}
+
+/// The face that a ray met, as its entry; [`NONE`] for a black back.
+fn face_met(tree: &Tree, hit: &Hit) -> u32 {
+    tree.entry[hit.triangle as usize][usize::from(hit.from_behind)]
+}
+
 /// Casts `count` rays out of a leaf. How many there were, how many missed all fronts, how many started where something
 /// covers the leaf.
 fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64) -> [usize; 3] {
@@ -373,10 +381,8 @@ fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64)
         }
         sight.meet(&from, &directions, plane, &mut hits);
         for (hit, from) in hits.iter().zip(from) {
-            let front =
-                |h: &Hit| tree.entry[h.triangle as usize][usize::from(h.from_behind)] != NONE;
             match hit {
-                Some(hit) if front(hit) => {}
+                Some(hit) if face_met(tree, hit) != NONE => {}
                 Some(_) if is_covered(tree, sight, from, node.normal, plane) => covered += 1,
                 _ => misses += 1,
             }
@@ -407,7 +413,7 @@ fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: 
             ends.push(match hit {
                 None => End::at(NOTHING),
                 Some(hit) => {
-                    let entry = tree.entry[hit.triangle as usize][usize::from(hit.from_behind)];
+                    let entry = face_met(tree, hit);
                     let [u, v] = hit.uv.map(|x| (x * 65536.0).clamp(0.0, 65535.0) as u16);
                     match entry {
                         NONE if is_covered(tree, sight, from[k], node.normal, plane) => {
@@ -432,9 +438,8 @@ fn is_covered(tree: &Tree, sight: &Sight, from: Vec3, normal: DVec3, plane: u32)
     let directions: [Vec3; COVER_RAYS] =
         std::array::from_fn(|k| cosine_direction(normal, sequence02(k as u32, 0)).as_vec3());
     sight.meet(&[from; COVER_RAYS], &directions, plane, &mut hits);
-    hits.iter().all(|hit| {
-        hit.is_some_and(|h| tree.entry[h.triangle as usize][usize::from(h.from_behind)] == NONE)
-    })
+    hits.iter()
+        .all(|hit| hit.is_some_and(|hit| face_met(tree, &hit) == NONE))
 }
 
 /// Weights of the point of a leaf that ray `k` starts from.

@@ -244,11 +244,7 @@ fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
             open.extend(children.map(|child| (key(child), child)));
         }
     }
-    for id in 1..patch.len() {
-        if patch[id] == NONE {
-            patch[id] = patch[tree.nodes[id].parent as usize];
-        }
-    }
+    tree.inherit(&mut patch);
     patch
 }
 
@@ -268,19 +264,10 @@ mod tests {
         let mut tree = Tree::default();
         let mut push = |parent: u32, child: u32, children: u32, area: f64| {
             tree.nodes.push(Node {
-                parent,
                 child: if children > 0 { child } else { NONE },
                 children: children as u8,
                 flat: parent != NONE,
-                element: NONE,
-                faces: (0, 0),
-                low: glam::DVec3::ZERO,
-                high: glam::DVec3::ZERO,
-                centre: glam::DVec3::ZERO,
-                radius: 0.0,
-                area,
-                normal: glam::DVec3::Z,
-                cone: -1.0,
+                ..Node::bare(parent, area)
             });
         };
         push(NONE, 1, CLUSTERS, f64::from(CLUSTERS * LEAVES));
