@@ -1,16 +1,19 @@
 //! What does one gather sweep cost on rows of 8 and of 16 lanes, beside all 64 leaves and beside RGB (rows of 4)?
 //!
-//! The operator of the solve (pull, gather over the links, push) on one thread, on complete trees of 2 k, 50 k and 500 k
-//! leaves with 30 links at each. Links are symmetric; leaves with a common parent look at the same parts of the room, in
-//! part at the same patches: so do those of a refined hierarchy. All widths run the same code on the same links. Passes
-//! of all widths alternate, and the fastest of each counts, so that ratios hold on a machine that is busy.
+//! The operator of the solve (pull, gather over the links, push) on one thread, on about 2 k, 50 k and 500 k leaves, twice:
+//! the convex room refined to so many, with the links that it then has; and complete trees with 30 links at each leaf, as
+//! scattered as links can be. There leaves with a common parent look at the same parts of the room, in part at the same
+//! patches. All widths run the same code on the same links. Passes of all widths alternate, and the fastest of each counts,
+//! so that ratios hold on a machine that is busy.
 //!
 //! `cargo bench --bench rows [-- test]`
 
 use haarlight::geometry::sampling::hash;
 use haarlight::hierarchy::{NONE, Node, Tree};
-use haarlight::link::{Link, LinkRows, Way};
-use haarlight::solve::{Operator, Rows};
+use haarlight::link::{Demand, Graph, Link, LinkRows, Sight, Way};
+use haarlight::scene::{Options, Scene};
+use haarlight::solve::{Bake, Operator, Rows, Settings};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Links of a leaf; each stands in two rows.
@@ -111,6 +114,78 @@ impl<const L: usize> Table<L> {
     }
 }
 
+/// Leaves and links of a convex room, refined until it has so many leaves.
+fn room(leaves: usize) -> (Tree, Vec<Link>) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
+    let scene = Scene::load(&path, &Options::default()).expect("a room of our own");
+    let bake = Bake::new(scene, Settings::default());
+    let sight = Sight {
+        rays: bake.rays(),
+        mesh: bake.mesh(),
+        opaque: None,
+        occlusion: false,
+    };
+    let mut tree = Tree::new(bake.mesh(), &vec![0; bake.mesh().faces.len()]);
+    let mut graph = Graph::default();
+    // As if all were white and evenly lit.
+    let even = vec![1.0_f32; 4 * leaves];
+    let mut threshold = 1e-2;
+    while tree.leaves().count() < leaves {
+        let demand = Demand {
+            bright: &even,
+            keen: &even,
+            total_area: tree.nodes[0].area,
+            threshold,
+            least_area: 0.0,
+            hidden: true,
+        };
+        graph.refine(&mut tree, &sight, 0, &demand);
+        threshold *= 0.7;
+    }
+    (tree, graph.links)
+}
+
+/// Times all widths on some links and prints a line.
+fn measure(what: &str, tree: &Tree, links: &[Link], short: bool) {
+    let leaves: Vec<u32> = tree.leaves().collect();
+    let rows = LinkRows::new(tree.nodes.len(), links);
+    let areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
+    let factor = vec![1.0; tree.nodes.len()];
+    let operator = Operator::new(tree, &rows, &leaves, &areas, &factor);
+    let n = tree.nodes.len();
+    let mut rgb = Table::<4>::new(n, leaves.len());
+    let mut eight = Table::<8>::new(n, leaves.len());
+    let mut sixteen = Table::<16>::new(n, leaves.len());
+    let mut half = Table::<32>::new(n, leaves.len());
+    let mut dense = Table::<64>::new(n, leaves.len());
+    let start = Instant::now();
+    loop {
+        rgb.pass(&operator);
+        eight.pass(&operator);
+        sixteen.pass(&operator);
+        half.pass(&operator);
+        dense.pass(&operator);
+        if short || start.elapsed() > BUDGET {
+            break;
+        }
+    }
+    let ns = |s: f64| 1e9 * s / rows.len() as f64;
+    println!(
+        "{what:<9} {:>6} {:>9} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} | {:>5.2} {:>5.2} {:>6.2} {:>6.2}",
+        leaves.len(),
+        rows.len(),
+        ns(rgb.best),
+        ns(eight.best),
+        ns(sixteen.best),
+        ns(half.best),
+        ns(dense.best),
+        dense.best / sixteen.best,
+        dense.best / eight.best,
+        eight.best / rgb.best,
+        sixteen.best / rgb.best
+    );
+}
+
 fn main() {
     // `cargo test --benches` asks for one short look.
     let short = std::env::args().any(|a| a == "--test" || a == "test");
@@ -119,50 +194,18 @@ fn main() {
     println!(
         "one gather sweep, one thread, ns a link and direction; ratios to 64 leaves and to RGB"
     );
-    println!("leaves     links    RGB      8     16     32     64 | 64:16  64:8  8:RGB 16:RGB");
+    println!(
+        "links     leaves   entries    RGB      8     16     32     64 | 64:16  64:8  8:RGB 16:RGB"
+    );
     for (top, depth) in SIZES {
-        let tree = tree(top, depth);
-        let leaves: Vec<u32> = (0..tree.nodes.len() as u32)
-            .filter(|&k| tree.node(k).is_leaf())
-            .collect();
-        let links = links(&leaves);
-        let rows = LinkRows::new(tree.nodes.len(), &links);
-        let areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
-        let factor = vec![1.0; tree.nodes.len()];
-        let operator = Operator::new(&tree, &rows, &leaves, &areas, &factor);
-        let n = tree.nodes.len();
-        let mut rgb = Table::<4>::new(n, leaves.len());
-        let mut eight = Table::<8>::new(n, leaves.len());
-        let mut sixteen = Table::<16>::new(n, leaves.len());
-        let mut half = Table::<32>::new(n, leaves.len());
-        let mut dense = Table::<64>::new(n, leaves.len());
-        let start = Instant::now();
-        pool.install(|| {
-            loop {
-                rgb.pass(&operator);
-                eight.pass(&operator);
-                sixteen.pass(&operator);
-                half.pass(&operator);
-                dense.pass(&operator);
-                if short || start.elapsed() > BUDGET {
-                    break;
-                }
-            }
-        });
-        let ns = |s: f64| 1e9 * s / rows.len() as f64;
-        println!(
-            "{:>6} {:>9} {:>6.2} {:>6.2} {:>6.2} {:>6.2} {:>6.2} | {:>5.2} {:>5.2} {:>6.2} {:>6.2}",
-            leaves.len(),
-            rows.len(),
-            ns(rgb.best),
-            ns(eight.best),
-            ns(sixteen.best),
-            ns(half.best),
-            ns(dense.best),
-            dense.best / sixteen.best,
-            dense.best / eight.best,
-            eight.best / rgb.best,
-            sixteen.best / rgb.best
-        );
+        let scattered = tree(top, depth);
+        let leaves: Vec<u32> = scattered.leaves().collect();
+        let wild = links(&leaves);
+        pool.install(|| measure("scattered", &scattered, &wild, short));
+        if short && leaves.len() > 100_000 {
+            continue;
+        }
+        let (refined, own) = room(leaves.len());
+        pool.install(|| measure("a room's", &refined, &own, short));
     }
 }

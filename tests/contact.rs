@@ -13,7 +13,8 @@ const PATHS: usize = 4096;
 /// Height of the reference points, share of the room's half diagonal.
 const HEIGHT: f64 = 1e-3;
 
-/// Where light is least known, the mean deviation is 12 % of the mean light.
+/// Where light is least known, the mean deviation is 5 % of the mean light, 2 % of it noise of the paths. On a floor that is not
+/// cut along the blocks it was 12 %: dark wedges.
 #[test]
 fn blocks_on_the_floor() {
     let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
@@ -55,5 +56,5 @@ fn blocks_on_the_floor() {
         .collect();
     let sum: f64 = truth.iter().sum();
     let off: f64 = truth.iter().zip(&lux).map(|(t, l)| (t - l).abs()).sum();
-    assert!(off < 0.15 * sum, "{}", off / sum);
+    assert!(off < 0.08 * sum, "{}", off / sum);
 }

@@ -15,6 +15,7 @@
 //! | [`hidden`] | is a pair hidden as a whole |
 //! | [`clip`] | the visible part of a polygon from a point |
 //! | [`polygon`] | form factor from an element of surface to a polygon |
+//! | [`nearest`] | the point of a triangle that is nearest to some point |
 //! | [`lanes`] | the same for eight pairs at once |
 //! | [`sampling`] | repeatable points on triangles and directions in a hemisphere |
 //!
@@ -43,6 +44,7 @@ pub mod clip;
 pub mod hidden;
 pub mod index;
 pub mod lanes;
+pub mod nearest;
 mod overlap;
 mod packet;
 pub mod plane;
@@ -58,6 +60,7 @@ pub use blockers::ShaftContents;
 pub use clip::{lambert_visible, visible_part};
 pub use index::{Hit, RayIndex};
 pub use lanes::{lambert_points_x8, lambert_triangles_x8};
+pub use nearest::nearest_point;
 pub use plane::plane_ids;
 pub use polygon::lambert_polygon;
 pub use segment::{NO_PLANE, Segment};

@@ -17,7 +17,7 @@ const TOLERANCE: f64 = 1e-6;
 const STEPS: usize = 200;
 /// A leaf is scaled up by this much at the most: a patch that sees next to nothing must not be blown up. Scaling down
 /// has no limit: rows above 1 would make light, and the solve diverge.
-const GREATEST: f64 = 2.0;
+const GREATEST: f64 = 4.0;
 
 /// Row factors and what the rows summed to before.
 #[derive(Debug, Clone, Default)]

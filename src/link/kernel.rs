@@ -7,7 +7,7 @@
 use super::contour::exchange;
 use super::visibility::{View, segment};
 use super::{Link, Room, Way};
-use crate::geometry::{Segment, lambert_polygon};
+use crate::geometry::{Segment, lambert_polygon, nearest_point};
 use crate::hierarchy::{Node, Sample, Tree};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -22,6 +22,8 @@ const FAR: f64 = 8.0;
 const NEAR: f64 = 2.5;
 /// Points that look past a short list of blockers.
 const POINTS: usize = 6;
+/// More than this a link's variation is not said to be.
+const MOST_VARIATION: f64 = 4.0;
 /// A visible share below this is rounding.
 const SLIVER: f64 = 1e-9;
 /// Rays of a pair. Their number does not depend on what they find: stopping when the first agree would make hidden
@@ -199,7 +201,14 @@ pub fn evaluate(
     let variation = if count == 1 {
         2.0 * size
     } else {
-        (0.5 * (most - least) / mean).min(4.0)
+        (0.5 * (most - least) / mean).min(MOST_VARIATION)
+    };
+    // The smaller end says nothing about a larger one that it shines on here and there: a lamp close below a ceiling.
+    let variation = if simple(ns) && simple(nt) && gap < NEAR {
+        let mean = open / nt.area;
+        variation.max(variation_over(tree, t, ns, mean, shift, &mut scratch.b))
+    } else {
+        variation
     };
     let sight = room.sight;
     // A look into the shaft costs as much as many rays where much stands about. It is worth that where it starts from a
@@ -245,6 +254,38 @@ pub fn evaluate(
         },
     };
     Some((link, view))
+}
+
+/// Relative variation over node `on` of the factor towards node `to`, of known mean, both of a few faces: at the point nearest
+/// to the other end and at points that know nothing of it.
+fn variation_over(
+    tree: &Tree,
+    on: u32,
+    to: &Node,
+    mean: f64,
+    shift: [f64; 2],
+    samples: &mut Vec<Sample>,
+) -> f64 {
+    tree.samples(on, 3, shift, samples);
+    let nearest = polygons(tree, tree.node(on))
+        .map(|(corners, entry)| (nearest_point(&corners, to.centre), entry))
+        .min_by(|(p, _), (q, _)| {
+            let distance = |x: &DVec3| x.distance_squared(to.centre);
+            distance(p).total_cmp(&distance(q))
+        });
+    samples.extend(nearest.map(|(point, entry)| Sample {
+        point,
+        normal: tree.face_normal[entry],
+        plane: tree.face_plane[entry],
+        area: 0.0,
+    }));
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    for s in samples {
+        let f = point_factor(tree, s, to, &[]);
+        least = least.min(f);
+        most = most.max(f);
+    }
+    (0.5 * (most - least) / mean).min(MOST_VARIATION)
 }
 
 /// Unoccluded exchange of two small sets of faces.

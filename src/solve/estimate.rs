@@ -16,6 +16,9 @@ const POINTS: usize = 160;
 /// Error of a round as a share of its distance to the round before. Measured against the audit at default error:
 /// Cornell box 1.5, two rooms 1.4, convex room 2.3.
 const SHARE: f64 = 1.5;
+/// The same after the second round. The first is so coarse that its error is most of the distance: the second was left with
+/// .5 of it in Cornell boxes, .25 to .85 elsewhere.
+const SHARE_OF_FIRST: f64 = 0.75;
 /// The same where points look for themselves. Their rays are new every round: errors of two rounds have little in common.
 const SHARE_OF_RAYS: f64 = 0.95;
 
@@ -75,15 +78,22 @@ impl Probes {
             .collect()
     }
 
-    /// Takes what is seen now; returns the estimated error, none after the first round. `fresh_rays`: did the points look
-    /// through rays of their own in this round and the one before?
+    /// Takes what is seen now in round `round` (from 0); returns the estimated error, none after the first round.
+    /// `by_rays`: do points look for themselves?
     pub(super) fn compare(
         &mut self,
         now: Vec<[f64; 3]>,
         white: [f64; 3],
-        fresh_rays: bool,
+        round: usize,
+        by_rays: bool,
     ) -> Option<Distance> {
-        let share = if fresh_rays { SHARE_OF_RAYS } else { SHARE };
+        let share = match (by_rays, round) {
+            // The first two rounds are coarse alike: what they share is not noise of rays.
+            (true, 0 | 1) => SHARE,
+            (true, _) => SHARE_OF_RAYS,
+            (false, 0 | 1) => SHARE_OF_FIRST,
+            (false, _) => SHARE,
+        };
         let result = (!self.last.is_empty()).then(|| {
             let n = now.len() as f64;
             let pairs = || self.last.iter().zip(&now);

@@ -127,6 +127,8 @@ const FURNISHED: Shares = Shares {
     direct: 5.0,
     reflected: 1.4,
 };
+/// In rooms of so few triangles each is cut wherever another meets it, and not only where that parts spaces.
+const FEW_TRIANGLES: usize = 256;
 /// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
 const LEAST_ROUNDS: usize = 3;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already.
@@ -276,6 +278,11 @@ impl Bake {
                 if plan.runs(Kind::Occlusion) {
                     let cuts = cuts(&mesh, &rays);
                     let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
+                    if mesh.triangles.len() <= FEW_TRIANGLES {
+                        // A patch that something stands on shows what is left of it as one: dark wedges along the
+                        // contact.
+                        found.parted = (0..cuts.len()).collect();
+                    }
                     if !found.parted.is_empty() {
                         parted = found.parted.iter().map(|&k| k as u32).collect();
                         let some: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
@@ -419,9 +426,8 @@ impl Bake {
             .iter()
             .map(|g| self.lanes.tristimulus(&g.irradiance))
             .collect();
-        // The first two rounds are coarse alike: what they share is not noise of rays.
-        let fresh_rays = by_rays && round > 1;
-        let distance = self.probes.compare(seen, self.light.white, fresh_rays);
+        let white = self.light.white;
+        let distance = self.probes.compare(seen, white, round, by_rays);
         clock.lap("estimate");
         let record = Round::new(
             self,
