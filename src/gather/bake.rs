@@ -308,8 +308,7 @@ impl Bake {
         known: Vec<Vec<Known>>,
         mut out: Baked,
     ) -> Baked {
-        let upsampler = Upsampler::new(&self.scene().grid);
-        let looks = self.looks(&upsampler);
+        let looks = self.looks(self.upsampler());
         for ((sheet, triangles), known) in refined.sheets.iter().zip(triangles).zip(known) {
             let (mut rows, mut traces): (Vec<_>, Vec<_>) = known
                 .into_iter()

@@ -4,7 +4,6 @@
 use super::bake::{Baked, lend};
 use super::refined::Vertex;
 use super::{BakedSurface, trace};
-use crate::color::Upsampler;
 use crate::hierarchy::{Mesh, NONE};
 use crate::solve::{Bake, padded};
 use crate::store::codec::Read;
@@ -92,8 +91,7 @@ impl Bake {
     }
 
     fn relit_lanes<const L: usize>(&self, kept: &[Kept]) -> Read<Baked> {
-        let upsampler = Upsampler::new(&self.scene().grid);
-        let looks = self.looks(&upsampler);
+        let looks = self.looks(self.upsampler());
         let mut out = Baked::default();
         for kept in kept {
             let mut rows: Vec<[f32; 64]> = bytemuck::zeroed_vec(kept.vertices.len());

@@ -17,14 +17,14 @@ impl Bake {
     /// Radiosity on the 64 leaves at every vertex, W/m2/nm, surface by surface, own emission included.
     pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
         let scene = self.scene();
-        let upsampler = Upsampler::new(&scene.grid);
-        let looks = self.looks(&upsampler);
+        let upsampler = self.upsampler();
+        let looks = self.looks(upsampler);
         let surface = |(baked, rows): (&BakedSurface, &Vec<[f32; LEAVES]>)| {
             let surface = &scene.surfaces[baked.surface];
             let (material, look) = (&scene.materials[surface.material], &looks[surface.material]);
             let vertex = |(vertex, row): (&BakedVertex, &[f32; LEAVES])| {
                 let irradiance = self.lanes().leaves(row);
-                let radiance = self.radiance(surface, material, vertex, &upsampler);
+                let radiance = self.radiance(surface, material, vertex, upsampler);
                 let reflectance = look.reflectance_at(surface, vertex);
                 std::array::from_fn(|k| (reflectance[k] * irradiance[k] + PI * radiance[k]) as f32)
             };

@@ -6,7 +6,7 @@
 use super::lanes::Lanes;
 use super::sources::{DenseSources, Painter};
 use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
-use crate::color::{Upsampler, normalization};
+use crate::color::normalization;
 use crate::link::{LinkRows, balance};
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;
@@ -44,9 +44,7 @@ impl Bake {
         let tolerance = self.settings.spectrum.unwrap_or(share);
         match self.settings.representation {
             Representation::Uniform(n) if !none => Lanes::uniform(spectra, n.into(), weights),
-            Representation::Rgb if !none => {
-                Lanes::rgb(spectra, &Upsampler::new(&self.scene.grid), weights)
-            }
+            Representation::Rgb if !none => Lanes::rgb(spectra, &self.upsampler, weights),
             Representation::Paper if !none => {
                 let cut = paper_cut(&self.scene, weights, tolerance);
                 Lanes::absolute(spectra, cut, weights)
@@ -93,7 +91,7 @@ impl Bake {
                 (shadowed, balance.factor)
             }
         };
-        let painter = Painter::new(&self.scene, &self.mesh);
+        let painter = Painter::new(&self.scene, &self.mesh, &self.upsampler);
         let dense = DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
         coarse::Coarse::new(
             &self.tree,

@@ -37,7 +37,7 @@ pub use representation::Representation;
 pub use rows::{Rows, padded};
 pub(crate) use sources::weights_of;
 
-use crate::color::Observer;
+use crate::color::{Observer, Upsampler};
 use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
@@ -200,6 +200,8 @@ pub struct Bake {
     /// The same for what is not covered by something solid.
     sealed: Closed,
     weights: [Leaves; 3],
+    /// Colours of textures as spectra: its table is made once.
+    upsampler: Upsampler,
     lanes: Lanes,
     /// Colour difference (CIELUV) that the lanes cause, as far as it is known.
     spectrum_error: Option<f64>,
@@ -296,6 +298,7 @@ impl Bake {
         }
         let tree = Tree::new(&mesh, &spaces_of_faces);
         let weights = Observer::cie1931().weights(&scene.grid);
+        let upsampler = Upsampler::new(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
         let hemisphere = Hemisphere::for_error(settings.error);
         let probes = estimate::Probes::new(&tree, settings.seed);
@@ -324,6 +327,7 @@ impl Bake {
             tree,
             rays,
             weights,
+            upsampler,
             lanes,
             probes,
             hemisphere,
@@ -667,7 +671,7 @@ impl Bake {
     /// Puts emission and links in place for a gather.
     fn place_emission<const L: usize>(&mut self) {
         let leaves: Vec<u32> = self.tree.leaves().collect();
-        let painter = Painter::new(&self.scene, &self.mesh);
+        let painter = Painter::new(&self.scene, &self.mesh, &self.upsampler);
         let emission = painter.paint(&self.tree, &leaves, &self.lanes).emission;
         self.look_out();
         self.light.emitted = self.on_nodes::<L>(&emission, &leaves);
@@ -688,7 +692,7 @@ impl Bake {
         rows: &LinkRows,
         leaves: &[u32],
     ) -> (Convergence, flux::Balance) {
-        let painter = Painter::new(&self.scene, &self.mesh);
+        let painter = Painter::new(&self.scene, &self.mesh, &self.upsampler);
         let mut first = Rows::zero(leaves.len(), L);
         for (k, &leaf) in leaves.iter().enumerate() {
             let row = self.direct.row(leaf);
@@ -725,10 +729,13 @@ impl Bake {
         if self.sealed == Closed::Yes {
             flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
         }
-        let mixed = self
-            .lanes
-            .is_mixed()
-            .then(|| Painter::new(&self.scene, &self.mesh).mixed(&self.tree, leaves, &self.lanes));
+        let mixed = self.lanes.is_mixed().then(|| {
+            Painter::new(&self.scene, &self.mesh, &self.upsampler).mixed(
+                &self.tree,
+                leaves,
+                &self.lanes,
+            )
+        });
         let plus = |a: &Rows, b: &Rows| {
             let mut sum = a.clone();
             for (a, b) in sum.all_mut::<L>().iter_mut().zip(b.all::<L>()) {
@@ -998,6 +1005,10 @@ impl Bake {
     /// The welded triangles.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
+    }
+
+    pub(crate) fn upsampler(&self) -> &Upsampler {
+        &self.upsampler
     }
 
     /// The hierarchy.

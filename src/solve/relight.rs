@@ -413,7 +413,7 @@ impl Relighter {
         let bake = &mut self.bake;
         let leaves = bake.light.leaves.clone();
         bake.lamps = punctual::lamps(&bake.scene, &bake.mesh, &bake.lanes);
-        let painter = Painter::new(&bake.scene, &bake.mesh);
+        let painter = Painter::new(&bake.scene, &bake.mesh, &bake.upsampler);
         let sources = painter.paint(&bake.tree, &leaves, &bake.lanes);
         let mut light = std::mem::take(&mut bake.light);
         let reflected = match self.start.take() {

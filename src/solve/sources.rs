@@ -29,16 +29,16 @@ pub(super) struct Sources {
 pub(super) struct Painter<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
-    upsampler: Upsampler,
+    upsampler: &'a Upsampler,
 }
 
 impl<'a> Painter<'a> {
     /// A painter for the materials of a scene.
-    pub(super) fn new(scene: &'a Scene, mesh: &'a Mesh) -> Self {
+    pub(super) fn new(scene: &'a Scene, mesh: &'a Mesh, upsampler: &'a Upsampler) -> Self {
         Self {
             scene,
             mesh,
-            upsampler: Upsampler::new(&scene.grid),
+            upsampler,
         }
     }
 
