@@ -46,6 +46,8 @@ impl Demand<'_> {
             f64::from(link.open_exchange) * (f64::from(link.variation) * visibility + doubt);
         let at = |receiver: u32, source: u32| {
             let area = tree.node(receiver).area;
+            // Patches made in this round are dark to it: it goes one level deeper. With the brightness of what is above them
+            // the Cornell box takes half as long again to the same error.
             let bright = f64::from(self.bright.get(source as usize).copied().unwrap_or(0.0));
             let keen = f64::from(self.keen.get(receiver as usize).copied().unwrap_or(1.0));
             misplaced / area * bright * keen * (area / self.total_area).sqrt()
