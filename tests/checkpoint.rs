@@ -44,7 +44,10 @@ fn state(bake: &Bake) -> (Vec<String>, Vec<u8>) {
 /// Both output files.
 fn files(bake: &Bake) -> [Vec<u8>; 2] {
     let scene = bake.scene();
-    let baked = bake.sketch(&|_, _| {});
+    let all: Vec<Vec<bool>> = (scene.surfaces.iter())
+        .map(|s| vec![true; s.triangles.len()])
+        .collect();
+    let baked = bake.sketch(&all, &|_, _| {});
     let look = Exposure::auto(scene, &baked.surfaces);
     let mut arrays = Vec::new();
     let spectra = bake.radiosity_spectra(&baked);

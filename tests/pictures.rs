@@ -1,6 +1,7 @@
 //! Baked rooms, looked at as a person would: no seams, no black or glaring spots, smooth walls, sensible exposure.
 
 use haarlight::gather::{Baked, BakedSurface};
+use haarlight::output::picture::seen;
 use haarlight::output::{Exposure, Format, Picture, camera, refined};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
@@ -126,4 +127,28 @@ fn exposure_keeps_the_room_below_white_and_off_black() {
         let best = medians.iter().copied().fold(0.0, f64::max);
         assert!((0.15..0.75).contains(&best), "{name}: {medians:?}");
     }
+}
+
+/// Pictures on the way ask for light only where they show something, and look the same.
+#[test]
+fn a_sketch_of_what_is_seen_makes_the_same_picture() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two-rooms.glb");
+    let scene = Scene::load(path, &Options::default()).unwrap();
+    let mut bake = Bake::new(scene, Settings::default());
+    bake.step();
+    let scene = bake.scene();
+    let camera = &camera::cameras(scene)[0];
+    let seen = seen(scene, &[(camera, FORMAT)]);
+    let all: Vec<Vec<bool>> = seen.iter().map(|s| vec![true; s.len()]).collect();
+    let [whole, part] = [&all, &seen].map(|seen| bake.sketch(seen, &|_, _| {}));
+    assert!(2 * part.rays < whole.rays, "{} {}", part.rays, whole.rays);
+    let look = Exposure::auto(scene, &whole.surfaces);
+    let draw = |b: &Baked| Picture::draw(scene, &b.surfaces, camera, &look, FORMAT).unwrap();
+    assert_eq!(draw(&whole), draw(&part));
+    // The rest is lit as well: by the leaves.
+    let dark = |b: &Baked| {
+        let vertices = b.surfaces.iter().flat_map(|s| &s.vertices);
+        vertices.filter(|v| v.irradiance[1] <= 0.0).count()
+    };
+    assert!(dark(&part) <= dark(&whole));
 }

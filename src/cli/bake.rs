@@ -140,7 +140,8 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         }
         if let Some(snapshots) = &mut snapshots {
             let clock = Instant::now();
-            let light = bake.sketch(&|done, of| talk.progress("gathering", done, of));
+            let seen = snapshots.seen(bake.scene());
+            let light = bake.sketch(&seen, &|done, of| talk.progress("gathering", done, of));
             talk.phase("drawing");
             let files = snapshots.pictures(
                 &format!("round-{:02}", round.round),

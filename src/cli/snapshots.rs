@@ -7,7 +7,7 @@
 use super::paths::file_names;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
-use crate::output::{Exposure, Format, Picture, camera, exr, file};
+use crate::output::{Exposure, Format, Picture, camera, exr, file, picture};
 use crate::scene::{Camera, Scene};
 use std::path::{Path, PathBuf};
 
@@ -33,6 +33,12 @@ impl Snapshots {
             cameras: names.into_iter().zip(cameras).collect(),
             exposure: None,
         })
+    }
+
+    /// What the pictures show of each surface.
+    pub(super) fn seen(&self, scene: &Scene) -> Vec<Vec<bool>> {
+        let pictures: Vec<_> = self.cameras.iter().map(|(_, c)| (c, format(c))).collect();
+        picture::seen(scene, &pictures)
     }
 
     /// The exposure of all pictures: metered when first asked for.

@@ -1,7 +1,7 @@
 //! The light at the vertices of the refined mesh.
 
 use super::point::{Gathered, Receiver};
-use super::refined::{Refined, Vertex};
+use super::refined::{Refined, Sheet, Vertex};
 use super::relit::KeptVertex;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler, de2000};
@@ -125,19 +125,49 @@ impl Bake {
         self.write_down(&refined, triangles, known, out)
     }
 
-    /// The same on the solver's own elements, without looking for what lies between and with few rays: for a picture on
-    /// the way.
-    pub fn sketch(&self, progress: &dyn Fn(usize, usize)) -> Baked {
+    /// The same on the solver's own elements, without looking for what lies between and with few rays: for pictures on
+    /// the way. Vertices of triangles of the input that no picture shows (`seen[surface][triangle]`) get the light of
+    /// their leaves as it is.
+    pub fn sketch(&self, seen: &[Vec<bool>], progress: &dyn Fn(usize, usize)) -> Baked {
         let mut refined = self.elements();
         let triangles = (0..refined.sheets.len() as u32)
             .map(|s| refined.triangles(s))
             .collect();
-        let mut known = Vec::new();
+        let mut known = self.unseen(&refined, seen);
         let out = Baked {
             rays: self.complete(&refined, &mut known, Care::Sketch, progress),
             ..Baked::default()
         };
         self.write_down(&refined, triangles, known, out)
+    }
+
+    /// The light of the leaves at vertices that nobody sees.
+    fn unseen(&self, refined: &Refined, seen: &[Vec<bool>]) -> Vec<Vec<Known>> {
+        let light = self.light();
+        let mut place = vec![usize::MAX; self.tree().nodes.len()];
+        for (k, &leaf) in light.leaves.iter().enumerate() {
+            place[leaf as usize] = k;
+        }
+        let of_leaf = |leaf: u32| {
+            let mut row = Box::new([0.0; 64]);
+            let known = light.irradiance.row(place[leaf as usize]);
+            row[..known.len()].copy_from_slice(known);
+            Some(Some(Seen { row, trace: None }))
+        };
+        let wanted = |triangle: u32| {
+            let (surface, local) = self.mesh().origin[triangle as usize];
+            seen[surface as usize][local as usize]
+        };
+        let sheet = |sheet: &Sheet| {
+            let used = refined.used(sheet, wanted);
+            let vertices = sheet.vertices.iter().zip(used);
+            let known = vertices.map(|(vertex, used)| match used {
+                true => None,
+                false => of_leaf(self.receiver(vertex, sheet.surface, sheet.back).leaf?),
+            });
+            known.collect()
+        };
+        refined.sheets.iter().map(sheet).collect()
     }
 
     /// The mesh of the solver's elements, crack-free.
@@ -166,9 +196,9 @@ impl Bake {
         known.resize(refined.sheets.len(), Vec::new());
         let mut wanted = Vec::new();
         for (s, sheet) in refined.sheets.iter().enumerate() {
-            let from = known[s].len();
             known[s].resize(sheet.vertices.len(), None);
-            wanted.extend((from..sheet.vertices.len()).map(|v| (s, v)));
+            let unknown = (0..sheet.vertices.len()).filter(|&v| known[s][v].is_none());
+            wanted.extend(unknown.map(|v| (s, v)));
         }
         // In parts, so that progress shows.
         const PART: usize = 16_384;

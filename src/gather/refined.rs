@@ -245,6 +245,24 @@ impl Refined {
         all
     }
 
+    /// Which vertices of a sheet do the triangles on some triangles of the mesh use?
+    pub(super) fn used(&self, sheet: &Sheet, wanted: impl Fn(u32) -> bool) -> Vec<bool> {
+        let mut used = vec![false; sheet.vertices.len()];
+        for cell in sheet
+            .cells
+            .iter()
+            .filter(|c| c.child == NONE && wanted(c.of.0))
+        {
+            let [a, b, c] = cell.corners.map(|x| x.vertex);
+            let middles =
+                [(a, b), (b, c), (c, a)].map(|(p, q)| sheet.middle.get(&key(p, q)).copied());
+            for vertex in [a, b, c].into_iter().chain(middles.into_iter().flatten()) {
+                used[vertex as usize] = true;
+            }
+        }
+        used
+    }
+
     pub(super) fn corners(&self, (sheet, cell): (u32, u32)) -> [Corner; 3] {
         self.sheets[sheet as usize].cells[cell as usize].corners
     }

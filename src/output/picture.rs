@@ -135,6 +135,21 @@ impl Picture {
     }
 }
 
+/// Triangles of each surface of the input that some of the pictures show: what light on the way to them must be known for.
+pub fn seen(scene: &Scene, pictures: &[(&Camera, Format)]) -> Vec<Vec<bool>> {
+    let mut all: Vec<Vec<bool>> = (scene.surfaces.iter())
+        .map(|surface| vec![false; surface.triangles.len()])
+        .collect();
+    for (camera, format) in pictures {
+        let view = View::new(scene, camera, format.width, format.height);
+        let some = raster::seen(scene, &view, [format.width, format.height], format.grid);
+        for (all, some) in all.iter_mut().flatten().zip(some.iter().flatten()) {
+            *all |= some;
+        }
+    }
+    all
+}
+
 /// What one sample shows, in f64: rgb and xyz radiance in cd/m2, then the display value.
 type Shade = [[f64; 3]; 3];
 

@@ -12,7 +12,7 @@
 use super::camera::View;
 use super::refined;
 use crate::gather::{BakedSurface, BakedVertex};
-use crate::scene::{Alpha, Scene, Sides, Surface};
+use crate::scene::{Alpha, Material, Scene, Sides, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -248,8 +248,14 @@ fn draw_band(
     hits
 }
 
-/// The input mesh, without holes: for choosing a camera.
+/// The input mesh, without what has holes: for choosing a camera, and what it sees.
 struct Bare<'a>(&'a Scene);
+
+impl Bare<'_> {
+    fn material(&self, mesh: usize) -> Option<&Material> {
+        self.0.materials.get(self.0.surfaces[mesh].material)
+    }
+}
 
 impl Meshes for Bare<'_> {
     fn sizes(&self) -> Vec<usize> {
@@ -262,20 +268,34 @@ impl Meshes for Bare<'_> {
     }
 
     fn two_sided(&self, mesh: usize) -> bool {
-        let material = self.0.surfaces[mesh].material;
-        self.0
-            .materials
-            .get(material)
-            .is_some_and(|m| m.sides == Sides::Both)
+        self.material(mesh).is_some_and(|m| m.sides == Sides::Both)
     }
 
-    fn has_holes(&self, _: usize) -> bool {
-        false
+    fn has_holes(&self, mesh: usize) -> bool {
+        self.material(mesh)
+            .is_some_and(|m| matches!(m.alpha, Alpha::Mask { .. }))
     }
 
     fn is_hole(&self, _: &Hit) -> bool {
-        false
+        true
     }
+}
+
+/// Which triangles of each surface of the input a picture shows; all of those with holes.
+pub(super) fn seen(scene: &Scene, view: &View, size: [usize; 2], grid: usize) -> Vec<Vec<bool>> {
+    let meshes = Bare(scene);
+    let mut seen: Vec<Vec<bool>> = (scene.surfaces.iter().enumerate())
+        .map(|(mesh, surface)| vec![meshes.has_holes(mesh); surface.triangles.len()])
+        .collect();
+    let hits = draw(&meshes, view, size, grid, |row| {
+        let mut hits: Vec<[u32; 2]> = row.iter().flatten().map(|h| [h.mesh, h.triangle]).collect();
+        hits.dedup();
+        hits
+    });
+    for [mesh, triangle] in hits {
+        seen[mesh as usize][triangle as usize] = true;
+    }
+    seen
 }
 
 /// World points of the input mesh seen at the middle of each pixel, row by row from the top.

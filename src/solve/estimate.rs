@@ -78,7 +78,8 @@ impl Probes {
             .collect()
     }
 
-    /// Takes what is seen now in round `round` (from 0); returns the estimated error, none after the first round.
+    /// Takes what is seen now in round `round` (from 0); returns the estimated error, none after the first round and none
+    /// where light is no number.
     /// `by_rays`: do points look for themselves?
     pub(super) fn compare(
         &mut self,
@@ -94,7 +95,13 @@ impl Probes {
             (false, 0 | 1) => SHARE_OF_FIRST,
             (false, _) => SHARE,
         };
-        let result = (!self.last.is_empty()).then(|| {
+        // A difference of colours that are no numbers would read as none.
+        let sound = now
+            .iter()
+            .chain(&self.last)
+            .flatten()
+            .all(|x| x.is_finite());
+        let result = (sound && !self.last.is_empty()).then(|| {
             let n = now.len() as f64;
             let pairs = || self.last.iter().zip(&now);
             let floor = 1e-4 * white[1];
@@ -111,5 +118,27 @@ impl Probes {
         });
         self.last = now;
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_that_is_no_number_has_no_estimate() {
+        let mut probes = Probes {
+            points: Vec::new(),
+            last: Vec::new(),
+        };
+        let mut error = |light: f64, round: usize| {
+            let distance = probes.compare(vec![[light; 3]], [1.0; 3], round, false);
+            distance.map(|d| d.de2000)
+        };
+        assert!(error(0.5, 0).is_none());
+        assert!(error(0.6, 1).unwrap() > 1.0);
+        assert!(error(f64::NAN, 2).is_none());
+        assert!(error(0.5, 3).is_none());
+        assert_eq!(error(0.5, 4), Some(0.0));
     }
 }
