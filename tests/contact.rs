@@ -1,7 +1,11 @@
 //! Light where things touch: vertices on the edges by which the blocks of the Cornell box stand on the floor, beside path
 //! tracing a little above them.
 
-use glam::DVec3;
+#[path = "common/built.rs"]
+mod built;
+
+use built::Room;
+use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
 use haarlight::scene::{Options, Scene};
@@ -57,4 +61,54 @@ fn blocks_on_the_floor() {
     let sum: f64 = truth.iter().sum();
     let off: f64 = truth.iter().zip(&lux).map(|(t, l)| (t - l).abs()).sum();
     assert!(off < 0.08 * sum, "{}", off / sum);
+}
+
+/// Below a block that shows its inside, too, it is dark; the floor beside it is lit up to the edge.
+#[test]
+fn no_dark_fringe_beside_a_block() {
+    for two_sided in [false, true] {
+        let mut room = Room::new();
+        let (wall, lamp, block) = (room.paint(0.5), room.lamp(0.5, 1000.0), room.paint(0.5));
+        if two_sided {
+            room.two_sided(block);
+        }
+        room.hollow(
+            DVec3::ZERO,
+            dvec3(4.0, 3.0, 5.0),
+            [wall, wall, wall, wall, wall, lamp],
+        );
+        let (low, high) = (dvec3(1.2, 0.0, 1.7), dvec3(2.4, 1.0, 2.9));
+        room.block(low, high, block);
+        let mut bake = Bake::new(room.scene(), Settings::default());
+        bake.run();
+        let (mut beside, mut below) = (0, 0);
+        for part in bake.baked(&|_, _| ()).surfaces {
+            let surface = &bake.scene().surfaces[part.surface];
+            let place = |v: u32| {
+                let v = &part.vertices[v as usize];
+                let corners = surface.triangles[v.triangle as usize];
+                let corners = corners.map(|k| surface.positions[k as usize]);
+                (0..3).map(|k| corners[k] * v.weights[k]).sum::<DVec3>()
+            };
+            for triangle in &part.triangles {
+                let places = triangle.map(place);
+                let facing = (places[1] - places[0]).cross(places[2] - places[0]).y;
+                if facing <= 0.0 || places.iter().any(|p| p.y != 0.0) {
+                    continue;
+                }
+                let middle = (places[0] + places[1] + places[2]) / 3.0;
+                let within = |k: usize| middle[k] > low[k] && middle[k] < high[k];
+                if within(0) && within(2) {
+                    below += 1;
+                    continue;
+                }
+                beside += 1;
+                let light = triangle.map(|v| part.vertices[v as usize].irradiance[1]);
+                let (least, most) =
+                    (light.iter()).fold((f32::MAX, 0.0_f32), |(l, m), &x| (l.min(x), m.max(x)));
+                assert!(least > 0.3 * most, "{two_sided} {middle}: {light:?}");
+            }
+        }
+        assert!(beside > 50 && below > 2, "{beside} {below}");
+    }
 }

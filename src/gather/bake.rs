@@ -180,7 +180,15 @@ impl Bake {
             .map(|s| scene.materials[s.material].sides == crate::scene::Sides::Both)
             .collect();
         let corners = |surface: usize, triangle: usize| scene.surfaces[surface].triangles[triangle];
-        let mut refined = Refined::new(self.mesh(), self.tree(), &corners, &flat, &sides, DEEPEST);
+        let mut refined = Refined::new(
+            self.mesh(),
+            self.tree(),
+            &corners,
+            &self.spaces(),
+            &flat,
+            &sides,
+            DEEPEST,
+        );
         refined.level();
         refined
     }

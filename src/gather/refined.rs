@@ -64,11 +64,13 @@ fn key(a: u32, b: u32) -> (u32, u32) {
 
 impl Refined {
     /// Starts from the elements of the hierarchy. `flat[s]`: does surface `s` have no shading normals of its own? Then its
-    /// vertices are not shared across planes.
+    /// vertices are not shared across planes. `spaces` holds the space of each entry and whether something covers it: none is
+    /// shared by faces of different spaces, and where a covered face meets a bare one it is the bare one's.
     pub(super) fn new(
         mesh: &Mesh,
         tree: &Tree,
         corners_of: &dyn Fn(usize, usize) -> [u32; 3],
+        spaces: &[(u32, bool)],
         flat: &[bool],
         two_sided: &[bool],
         deepest: u8,
@@ -88,9 +90,13 @@ impl Refined {
                     back,
                     ..Sheet::default()
                 };
-                let mut known: HashMap<(u64, u32), u32> = HashMap::new();
-                for triangle in mesh.first_triangle[surface]..mesh.first_triangle[surface + 1] {
-                    let entry = tree.entry[triangle as usize][usize::from(back)];
+                let mut known: HashMap<(u64, u32, u32), u32> = HashMap::new();
+                let all = mesh.first_triangle[surface]..mesh.first_triangle[surface + 1];
+                let entry = |triangle: u32| tree.entry[triangle as usize][usize::from(back)];
+                let of = |t: u32| spaces.get(entry(t) as usize).copied().unwrap_or_default();
+                let (covered, bare): (Vec<u32>, Vec<u32>) = all.partition(|&t| of(t).1);
+                for triangle in bare.into_iter().chain(covered) {
+                    let (entry, (space, _)) = (entry(triangle), of(triangle));
                     let local = mesh.origin[triangle as usize].1 as usize;
                     let names = corners_of(surface, local);
                     let group = if flat[surface] {
@@ -107,7 +113,7 @@ impl Refined {
                             // A point where triangles were cut belongs to its input triangle alone: attributes may jump.
                             None => u64::from(local as u32 + 1) << 32 | u64::from(point),
                         };
-                        let vertex = *known.entry((name, group)).or_insert_with(|| {
+                        let vertex = *known.entry((name, group, space)).or_insert_with(|| {
                             sheet.vertices.push(Vertex {
                                 point,
                                 triangle,

@@ -129,6 +129,8 @@ const FURNISHED: Shares = Shares {
 };
 /// In rooms of so few triangles each is cut wherever another meets it, and not only where that parts spaces.
 const FEW_TRIANGLES: usize = 256;
+/// A face that has less of its area bare lies below something.
+const MOSTLY_COVERED: f64 = 0.01;
 /// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
 const LEAST_ROUNDS: usize = 3;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already.
@@ -941,6 +943,18 @@ impl Bake {
                 )
             })
             .collect()
+    }
+
+    /// Of each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.
+    pub(crate) fn spaces(&self) -> Vec<(u32, bool)> {
+        let mut spaces = vec![(0, false); self.tree.faces.len()];
+        for (face, space) in self.mesh.faces.iter().zip(&self.spaces) {
+            let entry = self.tree.entry[face.triangle as usize][usize::from(face.back)];
+            let node = self.tree.face_node[entry as usize];
+            let covered = self.areas[node as usize] < MOSTLY_COVERED * self.tree.node(node).area;
+            spaces[entry as usize] = (*space, covered);
+        }
+        spaces
     }
 
     pub(crate) fn gatherer<'a>(&'a self, sight: &'a Sight<'a>) -> Gatherer<'a> {
