@@ -63,10 +63,44 @@ fn blocks_on_the_floor() {
     assert!(off < 0.08 * sum, "{}", off / sum);
 }
 
-/// Below a block that shows its inside, too, it is dark; the floor beside it is lit up to the edge.
+/// Light at the corners of the triangles of the floor beside a block, and how many triangles lie below it.
+fn floor_beside(bake: &Bake, low: DVec3, high: DVec3) -> (Vec<[f32; 3]>, usize) {
+    let (mut beside, mut below) = (Vec::new(), 0);
+    for part in bake.baked(&|_, _| ()).surfaces {
+        let surface = &bake.scene().surfaces[part.surface];
+        let place = |v: u32| {
+            let v = &part.vertices[v as usize];
+            let corners = surface.triangles[v.triangle as usize];
+            let corners = corners.map(|k| surface.positions[k as usize]);
+            (0..3).map(|k| corners[k] * v.weights[k]).sum::<DVec3>()
+        };
+        for triangle in &part.triangles {
+            let places = triangle.map(place);
+            let facing = (places[1] - places[0]).cross(places[2] - places[0]).y;
+            if facing <= 0.0 || places.iter().any(|p| p.y != 0.0) {
+                continue;
+            }
+            let beyond = |p: &DVec3| p.x < low.x || p.x > high.x || p.z < low.z || p.z > high.z;
+            let middle = (places[0] + places[1] + places[2]) / 3.0;
+            if beyond(&middle) {
+                beside.push(triangle.map(|v| part.vertices[v as usize].irradiance[1]));
+            } else {
+                below += 1;
+            }
+        }
+    }
+    (beside, below)
+}
+
+/// Below a block that shows its inside, too, it is dark, and below one that hovers a hair; the floor beside it is lit up to
+/// the edge. In a room of few triangles the floor is cut along the block, in one of many it is not.
 #[test]
 fn no_dark_fringe_beside_a_block() {
-    for two_sided in [false, true] {
+    for (two_sided, gap, many) in [
+        (false, 0.0, false),
+        (true, 0.0, false),
+        (false, 0.003, true),
+    ] {
         let mut room = Room::new();
         let (wall, lamp, block) = (room.paint(0.5), room.lamp(0.5, 1000.0), room.paint(0.5));
         if two_sided {
@@ -75,40 +109,28 @@ fn no_dark_fringe_beside_a_block() {
         room.hollow(
             DVec3::ZERO,
             dvec3(4.0, 3.0, 5.0),
-            [wall, wall, wall, wall, wall, lamp],
+            [wall, wall, wall, lamp, wall, wall],
         );
-        let (low, high) = (dvec3(1.2, 0.0, 1.7), dvec3(2.4, 1.0, 2.9));
+        let (low, high) = (dvec3(1.23, gap, 1.71), dvec3(2.39, 1.0, 2.93));
         room.block(low, high, block);
+        for k in 0..if many { 150 } else { 0 } {
+            let (x, y) = (0.2 * f64::from(k % 15), 0.2 * f64::from(k / 15));
+            let at = dvec3(0.1 + x, 0.5 + y, 4.9);
+            room.quad(at, 0.1 * DVec3::X, 0.1 * DVec3::Y, wall);
+        }
         let mut bake = Bake::new(room.scene(), Settings::default());
         bake.run();
-        let (mut beside, mut below) = (0, 0);
-        for part in bake.baked(&|_, _| ()).surfaces {
-            let surface = &bake.scene().surfaces[part.surface];
-            let place = |v: u32| {
-                let v = &part.vertices[v as usize];
-                let corners = surface.triangles[v.triangle as usize];
-                let corners = corners.map(|k| surface.positions[k as usize]);
-                (0..3).map(|k| corners[k] * v.weights[k]).sum::<DVec3>()
-            };
-            for triangle in &part.triangles {
-                let places = triangle.map(place);
-                let facing = (places[1] - places[0]).cross(places[2] - places[0]).y;
-                if facing <= 0.0 || places.iter().any(|p| p.y != 0.0) {
-                    continue;
-                }
-                let middle = (places[0] + places[1] + places[2]) / 3.0;
-                let within = |k: usize| middle[k] > low[k] && middle[k] < high[k];
-                if within(0) && within(2) {
-                    below += 1;
-                    continue;
-                }
-                beside += 1;
-                let light = triangle.map(|v| part.vertices[v as usize].irradiance[1]);
-                let (least, most) =
-                    (light.iter()).fold((f32::MAX, 0.0_f32), |(l, m), &x| (l.min(x), m.max(x)));
-                assert!(least > 0.3 * most, "{two_sided} {middle}: {light:?}");
-            }
-        }
-        assert!(beside > 50 && below > 2, "{beside} {below}");
+        let (beside, below) = floor_beside(&bake, low, high);
+        assert!(beside.len() > 50 && below > 1, "{} {below}", beside.len());
+        let teeth = beside.iter().filter(|light| {
+            let most = light.iter().copied().fold(0.0, f32::max);
+            light.iter().any(|&x| x < 0.3 * most)
+        });
+        assert_eq!(
+            teeth.count(),
+            0,
+            "{two_sided} {gap} {many} of {}",
+            beside.len()
+        );
     }
 }

@@ -229,6 +229,8 @@ pub struct VerdictRecord {
     pub triangles: usize,
     /// Vertices that something solid covers: they got their neighbours' light.
     pub covered: usize,
+    /// Vertices right below something that got the light of a neighbour in the open.
+    pub borrowed: usize,
     /// Triangles that wanted quartering when the limits were met.
     pub capped: usize,
     /// Vertices whose COLOR_0 had to be clipped into [0, 1].
@@ -292,6 +294,7 @@ impl VerdictRecord {
             vertices: end.glb.vertices,
             triangles: end.glb.triangles,
             covered: end.baked.covered,
+            borrowed: end.baked.borrowed,
             capped: end.baked.capped,
             clipped: end.glb.clipped,
             exposure: end.exposure,

@@ -42,6 +42,8 @@ pub struct Baked {
     pub(crate) kept: Vec<Vec<KeptVertex>>,
     /// Vertices that something solid covers: they got their neighbours' light.
     pub covered: usize,
+    /// Vertices right below something that got the light of a neighbour in the open.
+    pub borrowed: usize,
     /// Triangles that wanted quartering when the limits were met.
     pub capped: usize,
     /// Visibility rays cast.
@@ -250,7 +252,7 @@ impl Bake {
     }
 
     /// The place of a vertex, drawn into its triangle, with its shading normal.
-    fn receiver(&self, vertex: &Vertex, surface: usize, back: bool) -> Receiver {
+    pub(super) fn receiver(&self, vertex: &Vertex, surface: usize, back: bool) -> Receiver {
         let (mesh, tree) = (self.mesh(), self.tree());
         let surface = &self.scene().surfaces[surface];
         let triangle = vertex.triangle as usize;
@@ -355,6 +357,11 @@ impl Bake {
                     None => (None, None),
                 })
                 .unzip();
+            for (v, like) in self.below(refined, sheet, &triangles, &rows) {
+                let (v, like) = (v as usize, like as usize);
+                (rows[v], traces[v]) = (rows[like], traces[like].clone());
+                out.borrowed += 1;
+            }
             out.covered += lend(&mut rows, &triangles);
             // Vertices that were only looked at are left out.
             let mut place = vec![u32::MAX; sheet.vertices.len()];

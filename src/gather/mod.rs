@@ -1,6 +1,7 @@
 //! What the light looks like at points and at the vertices of the refined mesh.
 
 mod bake;
+mod below;
 pub mod hemisphere;
 pub mod point;
 mod refined;

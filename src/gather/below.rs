@@ -1,0 +1,62 @@
+//! Vertices right below something: the edge of what stands on a surface runs through the triangles around them.
+//!
+//! The mesh does not follow that edge. A triangle with corners on both sides of it shows the dark that lies below out in
+//! the open, as teeth along the edge. So a vertex with something above it, nearer than its triangles are long, takes over
+//! what its nearest brighter neighbour in the open has: the teeth then lie below.
+
+use super::refined::{Refined, Sheet};
+use crate::solve::Bake;
+use std::collections::BTreeMap;
+
+/// A vertex is dark if it has less than this share of a neighbour's light.
+const DARK: f64 = 0.5;
+
+impl Bake {
+    /// For vertices of a sheet that are dark because of something right above them, the neighbours in the open that they
+    /// are to be like: (vertex, neighbour), ascending.
+    pub(super) fn below(
+        &self,
+        refined: &Refined,
+        sheet: &Sheet,
+        triangles: &[[u32; 3]],
+        rows: &[Option<[f32; 64]>],
+    ) -> Vec<(u32, u32)> {
+        let light: Vec<Option<f64>> = rows
+            .iter()
+            .map(|row| row.map(|row| self.lanes().tristimulus(&row)[1]))
+            .collect();
+        let point = |v: u32| refined.points[sheet.vertices[v as usize].point as usize];
+        let mut reach = vec![0.0_f64; rows.len()];
+        let mut brighter: BTreeMap<u32, Vec<(f64, u32)>> = BTreeMap::new();
+        for t in triangles {
+            for (v, n) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                let length = point(v).distance(point(n));
+                for (v, n) in [(v, n), (n, v)] {
+                    reach[v as usize] = reach[v as usize].max(length);
+                    let pair = light[v as usize].zip(light[n as usize]);
+                    if pair.is_some_and(|(v, n)| v < DARK * n) {
+                        brighter.entry(v).or_default().push((length, n));
+                    }
+                }
+            }
+        }
+        let is_below = |v: u32, reach: f64| {
+            let vertex = &sheet.vertices[v as usize];
+            let from = self.receiver(vertex, sheet.surface, sheet.back);
+            let up = self.mesh().normal[vertex.triangle as usize];
+            let up = if sheet.back { -up } else { up };
+            let (from, up, plane) = (from.point.as_vec3(), up.as_vec3(), from.plane);
+            self.rays().closest(from, up, reach as f32, plane).is_some()
+        };
+        let mut found = Vec::new();
+        for (v, mut lit) in brighter {
+            let reach = reach[v as usize];
+            if is_below(v, reach) {
+                lit.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                let open = lit.iter().find(|&&(_, n)| !is_below(n, reach));
+                found.extend(open.map(|&(_, n)| (v, n)));
+            }
+        }
+        found
+    }
+}
