@@ -440,11 +440,22 @@ fn calibration_on_rooms_of_other_tools() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// The Cornell box away from edges: illuminance is off by less than 1 % of its mean by default and .3 % when asked (RMS), and
-/// colour differences are below .5 and .2. The path tracer's own noise is taken off (errors of independent estimates add in squares).
 #[test]
 fn the_cornell_box_has_no_plateau() {
-    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
+    has_no_plateau("cornell", 0.1, 1 << 15);
+}
+
+/// In the dark corners too.
+#[test]
+fn two_rooms_have_no_plateau() {
+    has_no_plateau("two-rooms", 0.05, 1 << 18);
+}
+
+/// Away from edges illuminance is off by less than 1 % of its mean by default and .3 % when `asked` (RMS), and colour
+/// differences are below .5 and .2. The path tracer's own noise is taken off (errors of independent estimates add in squares).
+fn has_no_plateau(room: &str, asked: f64, paths: usize) {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let room = scenes.join(format!("{room}.glb"));
     let bake = |error: f64| {
         let scene = Scene::load(&room, &Options::default()).unwrap();
         let settings = Settings {
@@ -453,8 +464,8 @@ fn the_cornell_box_has_no_plateau() {
         };
         Bake::new(scene, settings)
     };
-    let reference = Reference::new(&bake(0.5), 200, 1 << 15, 3);
-    for (error, least, colour) in [(0.5, 0.01, 0.5), (0.1, 0.003, 0.2)] {
+    let reference = Reference::new(&bake(0.5), 200, paths, 3);
+    for (error, least, colour) in [(0.5, 0.01, 0.5), (asked, 0.003, 0.2)] {
         let mut bake = bake(error);
         bake.run();
         let mesh = bake.mesh();

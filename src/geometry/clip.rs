@@ -128,11 +128,10 @@ impl Clipper {
         self.rest.clear();
         self.rest.extend_from_slice(piece);
         for side in &shadow.sides {
-            side.flipped().keep(&self.rest, thin, &mut self.outside);
+            side.split(&self.rest, thin, &mut self.inside, &mut self.outside);
             if !self.outside.is_empty() {
                 self.left.push(&self.outside);
             }
-            side.keep(&self.rest, thin, &mut self.inside);
             std::mem::swap(&mut self.rest, &mut self.inside);
             if self.rest.is_empty() {
                 // Not touched by the shadow: better whole.
@@ -202,34 +201,41 @@ impl HalfSpace {
         self.normal.dot(x) - self.offset
     }
 
-    /// The other side.
-    pub(crate) fn flipped(&self) -> Self {
-        Self {
-            normal: -self.normal,
-            offset: -self.offset,
-        }
-    }
-
-    /// The part of a convex polygon inside (Sutherland and Hodgman 1974); empty if no corner is deeper than `thin`. Corners nearer to the
-    /// plane than `thin` count as on it, so that no sliver is cut off there.
-    pub(crate) fn keep(&self, polygon: &[DVec3], thin: f64, out: &mut Vec<DVec3>) {
-        out.clear();
+    /// The parts of a convex polygon inside and outside (Sutherland and Hodgman 1974); empty if no corner is deeper than
+    /// `thin`. Corners nearer to the plane than `thin` count as on it, so that no sliver is cut off there.
+    pub(crate) fn split(
+        &self,
+        polygon: &[DVec3],
+        thin: f64,
+        inside: &mut Vec<DVec3>,
+        outside: &mut Vec<DVec3>,
+    ) {
+        inside.clear();
+        outside.clear();
         let Some(&last) = polygon.last() else { return };
         let (mut before, mut d0) = (last, self.outside(last));
-        let mut deepest = f64::INFINITY;
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
         for &corner in polygon {
             let d1 = self.outside(corner);
-            deepest = deepest.min(d1);
+            (least, most) = (least.min(d1), most.max(d1));
             if (d0 < -thin && d1 > thin) || (d0 > thin && d1 < -thin) {
-                out.push(before + (corner - before) * (d0 / (d0 - d1)));
+                let cut = before + (corner - before) * (d0 / (d0 - d1));
+                inside.push(cut);
+                outside.push(cut);
             }
             if d1 <= thin {
-                out.push(corner);
+                inside.push(corner);
+            }
+            if d1 >= -thin {
+                outside.push(corner);
             }
             (before, d0) = (corner, d1);
         }
-        if deepest >= -thin || out.len() < 3 {
-            out.clear();
+        if least >= -thin || inside.len() < 3 {
+            inside.clear();
+        }
+        if most <= thin || outside.len() < 3 {
+            outside.clear();
         }
     }
 }
@@ -277,6 +283,46 @@ impl Shadow {
 mod tests {
     use super::*;
     use crate::geometry::sampling::{Pcg, on_triangle, sequence02};
+
+    /// The part of a convex polygon on one side, plainly.
+    fn part(plane: &HalfSpace, sign: f64, polygon: &[DVec3], thin: f64) -> Vec<DVec3> {
+        let out = |p: DVec3| sign * plane.outside(p);
+        let mut part = Vec::new();
+        for k in 0..polygon.len() {
+            let (p, q) = (polygon[(k + polygon.len() - 1) % polygon.len()], polygon[k]);
+            if out(p).abs().min(out(q).abs()) > thin && out(p) * out(q) < 0.0 {
+                part.push(p + (q - p) * (out(p) / (out(p) - out(q))));
+            }
+            if out(q) <= thin {
+                part.push(q);
+            }
+        }
+        let deep = polygon.iter().any(|&p| out(p) < -thin);
+        if deep && part.len() > 2 {
+            part
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// Bit by bit, with corners on the plane and next to it.
+    #[test]
+    fn both_parts_are_those_of_both_sides() {
+        let mut rng = Pcg::new(11);
+        let mut number = || (rng.f64() * 9.0).floor() - 4.0;
+        for _ in 0..4096 {
+            let mut point = || DVec3::new(number(), number(), 0.0);
+            let polygon = [point(), point(), point(), point()];
+            let plane = HalfSpace {
+                normal: point().try_normalize().unwrap_or(DVec3::X),
+                offset: 0.5 * number(),
+            };
+            let (mut inside, mut outside) = (Vec::new(), Vec::new());
+            plane.split(&polygon, 1e-9, &mut inside, &mut outside);
+            assert_eq!(inside, part(&plane, 1.0, &polygon, 1e-9));
+            assert_eq!(outside, part(&plane, -1.0, &polygon, 1e-9));
+        }
+    }
 
     /// Two triangles over a parallelogram.
     fn quad(corner: DVec3, x: DVec3, y: DVec3) -> [[DVec3; 3]; 2] {

@@ -144,11 +144,10 @@ fn subtract(
             offset: outward.dot(*p),
         };
         let mut outside = Vec::new();
-        side.flipped().keep(&rest, thin, &mut outside);
+        side.split(&rest, thin, &mut inside, &mut outside);
         if !outside.is_empty() {
             left.push(outside);
         }
-        side.keep(&rest, thin, &mut inside);
         std::mem::swap(&mut rest, &mut inside);
         if rest.is_empty() {
             left.truncate(first);
