@@ -130,6 +130,9 @@ impl Bake {
     /// The same on the solver's own elements, without looking for what lies between and with few rays: for pictures on
     /// the way. Vertices of triangles of the input that no picture shows (`seen[surface][triangle]`) get the light of
     /// their leaves as it is.
+    ///
+    /// # Panics
+    /// If `seen` lacks a triangle of the room, or before the first round.
     pub fn sketch(&self, seen: &[Vec<bool>], progress: &dyn Fn(usize, usize)) -> Baked {
         let mut refined = self.elements();
         let triangles = (0..refined.sheets.len() as u32)

@@ -79,8 +79,7 @@ impl Probes {
     }
 
     /// Takes what is seen now in round `round` (from 0); returns the estimated error, none after the first round and none
-    /// where light is no number.
-    /// `by_rays`: do points look for themselves?
+    /// where light is no number. `by_rays`: do points look for themselves?
     pub(super) fn compare(
         &mut self,
         now: Vec<[f64; 3]>,
