@@ -1,10 +1,12 @@
 //! Vertices right below something: the edge of what stands on a surface runs through the triangles around them.
 //!
 //! The mesh does not follow that edge. A triangle with corners on both sides of it shows the dark that lies below out in
-//! the open, as teeth along the edge. So a vertex with something above it, nearer than its triangles are long, takes over
-//! what its nearest brighter neighbour in the open has: the teeth then lie below.
+//! the open, as teeth along the edge. So a dark vertex with something above it, nearer than its triangles are long, or inside
+//! something that is black from there, takes over what its nearest brighter neighbour in the open has: the teeth then lie
+//! below.
 
 use super::refined::{Refined, Sheet};
+use crate::hierarchy::NONE;
 use crate::solve::Bake;
 use std::collections::BTreeMap;
 
@@ -46,7 +48,11 @@ impl Bake {
             let up = self.mesh().normal[vertex.triangle as usize];
             let up = if sheet.back { -up } else { up };
             let (from, up, plane) = (from.point.as_vec3(), up.as_vec3(), from.plane);
-            self.rays().closest(from, up, reach as f32, plane).is_some()
+            let hit = self.rays().closest(from, up, f32::MAX, plane);
+            hit.is_some_and(|hit| {
+                let inside = self.tree().entry[hit.triangle as usize][usize::from(hit.from_behind)];
+                f64::from(hit.t) < reach || inside == NONE
+            })
         };
         let mut found = Vec::new();
         for (v, mut lit) in brighter {
