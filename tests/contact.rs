@@ -92,9 +92,9 @@ fn floor_beside(bake: &Bake, low: DVec3, high: DVec3) -> (Vec<[f32; 3]>, usize) 
     (beside, below)
 }
 
-/// Below a block that shows its inside, too, it is dark, below one that hovers a hair, and within one that is
-/// sunk in; the floor beside it is lit up to
-/// the edge. In a room of few triangles the floor is cut along the block, in one of many it is not.
+/// Below a block that shows its inside, too, it is dark, below one that hovers a hair, and within one that is sunk in; the
+/// floor beside it is lit up to the edge. In a room of few triangles the floor is cut along the block, in one of many it is
+/// not.
 #[test]
 fn no_dark_fringe_beside_a_block() {
     for (two_sided, gap, many) in [
