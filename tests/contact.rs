@@ -8,6 +8,7 @@ use built::Room;
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
+use haarlight::output::refined::position;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use std::path::Path;
@@ -34,10 +35,7 @@ fn blocks_on_the_floor() {
         for v in &part.vertices {
             let of = (part.surface as u32, v.triangle);
             let t = mesh.origin.iter().position(|o| (o.0, o.1) == of).unwrap();
-            let corners =
-                surface.triangles[v.triangle as usize].map(|k| surface.positions[k as usize]);
-            let point: DVec3 = (0..3).map(|k| corners[k] * v.weights[k]).sum();
-            let (point, normal) = (point - mesh.centre, mesh.normal[t]);
+            let (point, normal) = (position(surface, v) - mesh.centre, mesh.normal[t]);
             // The walls' edges are straight; the blocks stand askew.
             let askew = normal.x.abs().max(normal.z.abs()) < 0.99;
             if askew && (point.y - floor).abs() < 1e-6 && normal.y.abs() < 0.1 {
@@ -68,12 +66,7 @@ fn floor_beside(bake: &Bake, low: DVec3, high: DVec3) -> (Vec<[f32; 3]>, usize) 
     let (mut beside, mut below) = (Vec::new(), 0);
     for part in bake.baked(&|_, _| ()).surfaces {
         let surface = &bake.scene().surfaces[part.surface];
-        let place = |v: u32| {
-            let v = &part.vertices[v as usize];
-            let corners = surface.triangles[v.triangle as usize];
-            let corners = corners.map(|k| surface.positions[k as usize]);
-            (0..3).map(|k| corners[k] * v.weights[k]).sum::<DVec3>()
-        };
+        let place = |v: u32| position(surface, &part.vertices[v as usize]);
         for triangle in &part.triangles {
             let places = triangle.map(place);
             let facing = (places[1] - places[0]).cross(places[2] - places[0]).y;

@@ -132,7 +132,7 @@ impl Bake {
     /// their leaves as it is.
     ///
     /// # Panics
-    /// If `seen` lacks a triangle of the room, or before the first round.
+    /// If `seen` lacks a triangle of the room.
     pub fn sketch(&self, seen: &[Vec<bool>], progress: &dyn Fn(usize, usize)) -> Baked {
         let mut refined = self.elements();
         let triangles = (0..refined.sheets.len() as u32)
@@ -149,13 +149,11 @@ impl Bake {
     /// The light of the leaves at vertices that nobody sees.
     fn unseen(&self, refined: &Refined, seen: &[Vec<bool>]) -> Vec<Vec<Known>> {
         let light = self.light();
-        let mut place = vec![usize::MAX; self.tree().nodes.len()];
-        for (k, &leaf) in light.leaves.iter().enumerate() {
-            place[leaf as usize] = k;
-        }
         let of_leaf = |leaf: u32| {
             let mut row = Box::new([0.0; 64]);
-            let known = light.irradiance.row(place[leaf as usize]);
+            let known = light
+                .irradiance
+                .row(light.leaves.binary_search(&leaf).ok()?);
             row[..known.len()].copy_from_slice(known);
             Some(Some(Seen { row, trace: None }))
         };

@@ -49,10 +49,7 @@ impl Bake {
             let up = if sheet.back { -up } else { up };
             let (from, up, plane) = (from.point.as_vec3(), up.as_vec3(), from.plane);
             let hit = self.rays().closest(from, up, f32::MAX, plane);
-            hit.is_some_and(|hit| {
-                let inside = self.tree().entry[hit.triangle as usize][usize::from(hit.from_behind)];
-                f64::from(hit.t) < reach || inside == NONE
-            })
+            hit.is_some_and(|hit| f64::from(hit.t) < reach || self.tree().met(&hit) == NONE)
         };
         let mut found = Vec::new();
         for (v, mut lit) in brighter {

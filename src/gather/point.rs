@@ -302,7 +302,7 @@ impl Gatherer<'_> {
 
     /// The smallest patch of the solution at a hit; none on a back that has no face.
     fn met(&self, hit: &Hit) -> Option<u32> {
-        let entry = self.tree.entry[hit.triangle as usize][usize::from(hit.from_behind)];
+        let entry = self.tree.met(hit);
         if entry == NONE {
             return None;
         }

@@ -5,6 +5,7 @@
 //! (Hanrahan, Salzman and Aupperle 1991); clusters split as built.
 
 use super::mesh::{Face, Mesh};
+use crate::geometry::Hit;
 use crate::geometry::sampling::triangle_weights;
 use glam::DVec3;
 
@@ -227,6 +228,11 @@ impl Tree {
                 number[id] = number[self.nodes[id].parent as usize];
             }
         }
+    }
+
+    /// Entry of the face that a ray met; [`NONE`] for a black back.
+    pub fn met(&self, hit: &Hit) -> u32 {
+        self.entry[hit.triangle as usize][usize::from(hit.from_behind)]
     }
 
     /// The leaf element that holds a point of a face, given by barycentric weights on the whole face.

@@ -14,6 +14,7 @@ pub(crate) use kernel::pattern;
 pub use kernel::{Scratch, evaluate, facing, point_factor};
 pub use refine::{Demand, Graph, MAX_DEPTH, Refined, blockers_of};
 pub use store::LinkRows;
+pub(crate) use visibility::is_small;
 pub use visibility::{Opaque, Sight, View};
 
 use crate::hierarchy::Tree;

@@ -37,10 +37,15 @@ pub enum View {
     Crowded,
 }
 
+/// Has a room so few triangles that links with exact clipping serve it best?
+pub(crate) fn is_small(mesh: &Mesh) -> bool {
+    mesh.triangles.len() <= SMALL
+}
+
 impl Sight<'_> {
     /// So few triangles that a look into any shaft is cheap?
     pub fn small(&self) -> bool {
-        self.mesh.triangles.len() <= SMALL
+        is_small(self.mesh)
     }
 
     /// Looks into the shaft between two patches. `parents` is what is known of a pair that holds this one.

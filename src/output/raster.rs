@@ -248,22 +248,28 @@ fn draw_band(
     hits
 }
 
-/// The input mesh, without what has holes: for choosing a camera, and what it sees.
-struct Bare<'a>(&'a Scene);
+/// The input mesh: for choosing a camera, and what it sees.
+struct Bare<'a> {
+    scene: &'a Scene,
+    /// Is what has holes left out, or solid?
+    holes: bool,
+}
 
 impl Bare<'_> {
     fn material(&self, mesh: usize) -> Option<&Material> {
-        self.0.materials.get(self.0.surfaces[mesh].material)
+        let surface = &self.scene.surfaces[mesh];
+        self.scene.materials.get(surface.material)
     }
 }
 
 impl Meshes for Bare<'_> {
     fn sizes(&self) -> Vec<usize> {
-        self.0.surfaces.iter().map(|s| s.triangles.len()).collect()
+        let surfaces = self.scene.surfaces.iter();
+        surfaces.map(|s| s.triangles.len()).collect()
     }
 
     fn corners(&self, mesh: usize, triangle: usize) -> [DVec3; 3] {
-        let surface = &self.0.surfaces[mesh];
+        let surface = &self.scene.surfaces[mesh];
         surface.triangles[triangle].map(|c| surface.positions[c as usize])
     }
 
@@ -272,8 +278,8 @@ impl Meshes for Bare<'_> {
     }
 
     fn has_holes(&self, mesh: usize) -> bool {
-        self.material(mesh)
-            .is_some_and(|m| matches!(m.alpha, Alpha::Mask { .. }))
+        let masked = |m: &Material| matches!(m.alpha, Alpha::Mask { .. });
+        self.holes && self.material(mesh).is_some_and(masked)
     }
 
     fn is_hole(&self, _: &Hit) -> bool {
@@ -283,7 +289,7 @@ impl Meshes for Bare<'_> {
 
 /// Which triangles of each surface of the input a picture shows; all of those with holes.
 pub(super) fn seen(scene: &Scene, view: &View, size: [usize; 2], grid: usize) -> Vec<Vec<bool>> {
-    let meshes = Bare(scene);
+    let meshes = Bare { scene, holes: true };
     let mut seen: Vec<Vec<bool>> = (scene.surfaces.iter().enumerate())
         .map(|(mesh, surface)| vec![meshes.has_holes(mesh); surface.triangles.len()])
         .collect();
@@ -305,7 +311,10 @@ pub(super) fn points(
     width: usize,
     height: usize,
 ) -> Vec<Option<DVec3>> {
-    let meshes = Bare(scene);
+    let meshes = Bare {
+        scene,
+        holes: false,
+    };
     let point = |hit: &Hit| {
         let [a, b, c] = meshes.corners(hit.mesh as usize, hit.triangle as usize);
         hit.weights[0] * a + hit.weights[1] * b + hit.weights[2] * c

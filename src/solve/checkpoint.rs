@@ -252,7 +252,7 @@ impl Bake {
 
     fn light_up_lanes<const L: usize>(&mut self, reflected: &Rows) {
         let mut light = std::mem::take(&mut self.light);
-        let painter = super::Painter::new(&self.scene, &self.mesh, &self.upsampler);
+        let painter = self.painter();
         let emission = painter
             .paint(&self.tree, &light.leaves, &self.lanes)
             .emission;

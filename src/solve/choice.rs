@@ -4,7 +4,7 @@
 //! lights and materials alone.
 
 use super::lanes::Lanes;
-use super::sources::{DenseSources, Painter};
+use super::sources::DenseSources;
 use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
 use crate::link::{LinkRows, balance};
@@ -91,7 +91,7 @@ impl Bake {
                 (shadowed, balance.factor)
             }
         };
-        let painter = Painter::new(&self.scene, &self.mesh, &self.upsampler);
+        let painter = self.painter();
         let dense = DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
         coarse::Coarse::new(
             &self.tree,

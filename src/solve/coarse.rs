@@ -374,29 +374,35 @@ fn exchanges(
     count: usize,
 ) -> Vec<f64> {
     let mut mean: Vec<f64> = factor.iter().map(|&f| f64::from(f)).collect();
-    // For each node the patches that a link to it reaches, with their weights.
-    let mut reached: Vec<Vec<(u32, f64)>> = vec![Vec::new(); tree.nodes.len()];
+    // For each node above the cut the patches that a link to it reaches, with their weights.
+    let mut above: Vec<Vec<(u32, f64)>> = vec![Vec::new(); tree.nodes.len()];
     for (k, node) in tree.nodes.iter().enumerate().rev() {
-        let share = |c: u32| areas[c as usize] / areas[k];
-        if !node.is_leaf() {
-            let children = node.child_range();
-            mean[k] = children.map(|c| mean[c as usize] * share(c)).sum();
+        if node.is_leaf() {
+            continue;
         }
-        reached[k] = if group[k] == NONE {
-            let below = |c: u32| {
-                reached[c as usize]
-                    .iter()
-                    .map(move |&(g, w)| (g, w * share(c)))
-            };
-            node.child_range().flat_map(below).collect()
-        } else {
-            vec![(group[k], mean[k])]
-        };
+        let children = || node.child_range().map(|c| c as usize);
+        let share = |c: usize| areas[c] / areas[k];
+        mean[k] = children().map(|c| mean[c] * share(c)).sum();
+        if group[k] == NONE {
+            let mut reached = Vec::new();
+            for c in children() {
+                match group[c] {
+                    NONE => reached.extend(above[c].iter().map(|&(g, w)| (g, w * share(c)))),
+                    g => reached.push((g, mean[c] * share(c))),
+                }
+            }
+            above[k] = reached;
+        }
     }
     let mut matrix = vec![0.0; count * count];
     for link in links.iter().filter(|l| l.exchange > 0.0) {
-        for &(ga, wa) in &reached[link.a as usize] {
-            for &(gb, wb) in &reached[link.b as usize] {
+        let [(a, own_a), (b, own_b)] = [link.a, link.b]
+            .map(|k| k as usize)
+            .map(|k| (k, [(group[k], mean[k])]));
+        let reached_a: &[_] = if group[a] == NONE { &above[a] } else { &own_a };
+        let reached_b: &[_] = if group[b] == NONE { &above[b] } else { &own_b };
+        for &(ga, wa) in reached_a {
+            for &(gb, wb) in reached_b {
                 let g = f64::from(link.exchange) * wa * wb;
                 matrix[ga as usize * count + gb as usize] += g;
                 matrix[gb as usize * count + ga as usize] += g;

@@ -42,7 +42,7 @@ use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::RayIndex;
 use crate::hierarchy::{Mesh, Tree, cuts, spaces};
-use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance};
+use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance, is_small};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
@@ -127,8 +127,6 @@ const FURNISHED: Shares = Shares {
     direct: 5.0,
     reflected: 1.4,
 };
-/// In rooms of so few triangles each is cut wherever another meets it, and not only where that parts spaces.
-const FEW_TRIANGLES: usize = 256;
 /// A face that has less of its area bare lies below something.
 const MOSTLY_COVERED: f64 = 0.01;
 /// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
@@ -282,9 +280,9 @@ impl Bake {
                 if plan.runs(Kind::Occlusion) {
                     let cuts = cuts(&mesh, &rays);
                     let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
-                    if mesh.triangles.len() <= FEW_TRIANGLES {
-                        // A patch that something stands on shows what is left of it as one: dark wedges along the
-                        // contact.
+                    if is_small(&mesh) {
+                        // Here all are cut, and not only those that part spaces: a patch that something stands on
+                        // shows what is left of it as one, dark wedges along the contact.
                         found.parted = (0..cuts.len()).collect();
                     }
                     if !found.parted.is_empty() {
@@ -673,8 +671,10 @@ impl Bake {
     /// Puts emission and links in place for a gather.
     fn place_emission<const L: usize>(&mut self) {
         let leaves: Vec<u32> = self.tree.leaves().collect();
-        let painter = Painter::new(&self.scene, &self.mesh, &self.upsampler);
-        let emission = painter.paint(&self.tree, &leaves, &self.lanes).emission;
+        let emission = self
+            .painter()
+            .paint(&self.tree, &leaves, &self.lanes)
+            .emission;
         self.look_out();
         self.light.emitted = self.on_nodes::<L>(&emission, &leaves);
         self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
@@ -688,20 +688,24 @@ impl Bake {
         self.light = light;
     }
 
+    /// Turns materials into rows.
+    fn painter(&self) -> Painter<'_> {
+        Painter::new(&self.scene, &self.mesh, &self.upsampler)
+    }
+
     /// Solves on the current links and measures the solution.
     fn solve<const L: usize>(
         &mut self,
         rows: &LinkRows,
         leaves: &[u32],
     ) -> (Convergence, flux::Balance) {
-        let painter = Painter::new(&self.scene, &self.mesh, &self.upsampler);
         let mut first = Rows::zero(leaves.len(), L);
         for (k, &leaf) in leaves.iter().enumerate() {
             let row = self.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
         }
         let given = Given {
-            sources: painter.paint(&self.tree, leaves, &self.lanes),
+            sources: self.painter().paint(&self.tree, leaves, &self.lanes),
             first,
             reflected: self.guess::<L>(leaves),
             emitted: None,
@@ -731,13 +735,10 @@ impl Bake {
         if self.sealed == Closed::Yes {
             flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
         }
-        let mixed = self.lanes.is_mixed().then(|| {
-            Painter::new(&self.scene, &self.mesh, &self.upsampler).mixed(
-                &self.tree,
-                leaves,
-                &self.lanes,
-            )
-        });
+        let mixed = self
+            .lanes
+            .is_mixed()
+            .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes));
         let plus = |a: &Rows, b: &Rows| {
             let mut sum = a.clone();
             for (a, b) in sum.all_mut::<L>().iter_mut().zip(b.all::<L>()) {

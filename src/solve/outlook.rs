@@ -9,7 +9,6 @@
 use super::flux::Closed;
 use super::rows::Rows;
 use crate::gather::hemisphere::{BEAM, Hemisphere};
-use crate::geometry::Hit;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
 use crate::link::Sight;
@@ -358,11 +357,6 @@ fn mean_area(tree: &Tree) -> f64 {
     tree.nodes.first().map_or(0.0, |n| n.area) / tree.leaves().count().max(1) as f64
 }
 
-/// The face that a ray met, as its entry; [`NONE`] for a black back.
-fn face_met(tree: &Tree, hit: &Hit) -> u32 {
-    tree.entry[hit.triangle as usize][usize::from(hit.from_behind)]
-}
-
 /// Casts `count` rays out of a leaf. How many there were, how many missed all fronts, how many started where something
 /// covers the leaf.
 fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64) -> [usize; 3] {
@@ -382,7 +376,7 @@ fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64)
         sight.meet(&from, &directions, plane, &mut hits);
         for (hit, from) in hits.iter().zip(from) {
             match hit {
-                Some(hit) if face_met(tree, hit) != NONE => {}
+                Some(hit) if tree.met(hit) != NONE => {}
                 Some(_) if is_covered(tree, sight, from, node.normal, plane) => covered += 1,
                 _ => misses += 1,
             }
@@ -413,7 +407,7 @@ fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: 
             ends.push(match hit {
                 None => End::at(NOTHING),
                 Some(hit) => {
-                    let entry = face_met(tree, hit);
+                    let entry = tree.met(hit);
                     let [u, v] = hit.uv.map(|x| (x * 65536.0).clamp(0.0, 65535.0) as u16);
                     match entry {
                         NONE if is_covered(tree, sight, from[k], node.normal, plane) => {
@@ -439,7 +433,7 @@ fn is_covered(tree: &Tree, sight: &Sight, from: Vec3, normal: DVec3, plane: u32)
         std::array::from_fn(|k| cosine_direction(normal, sequence02(k as u32, 0)).as_vec3());
     sight.meet(&[from; COVER_RAYS], &directions, plane, &mut hits);
     hits.iter()
-        .all(|hit| hit.is_some_and(|hit| face_met(tree, &hit) == NONE))
+        .all(|hit| hit.is_some_and(|hit| tree.met(&hit) == NONE))
 }
 
 /// Weights of the point of a leaf that ray `k` starts from.

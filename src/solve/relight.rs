@@ -13,7 +13,7 @@ use super::conjugate::Convergence;
 use super::lanes::Lanes;
 use super::light::Light;
 use super::two_grid::TwoGrid;
-use super::{Bake, Closed, DE_PER_PERCENT, Given, Painter, Rows, Settings, flux, padded, punctual};
+use super::{Bake, Closed, DE_PER_PERCENT, Given, Rows, Settings, flux, padded, punctual};
 use crate::color::de2000;
 use crate::error::{Error, Result};
 use crate::gather::{Baked, Kept, trace};
@@ -413,7 +413,7 @@ impl Relighter {
         let bake = &mut self.bake;
         let leaves = bake.light.leaves.clone();
         bake.lamps = punctual::lamps(&bake.scene, &bake.mesh, &bake.lanes);
-        let painter = Painter::new(&bake.scene, &bake.mesh, &bake.upsampler);
+        let painter = bake.painter();
         let sources = painter.paint(&bake.tree, &leaves, &bake.lanes);
         let mut light = std::mem::take(&mut bake.light);
         let reflected = match self.start.take() {
