@@ -3,14 +3,17 @@
 mod bake;
 mod below;
 pub mod hemisphere;
+mod nearby;
 pub mod point;
 mod refined;
 mod relit;
 mod slope;
 mod spectra;
+mod sweep;
 pub(crate) mod trace;
 
 pub use bake::{Baked, MOSTLY, Probed};
+pub use nearby::Arrival;
 pub(crate) use relit::Kept;
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.

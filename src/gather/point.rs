@@ -4,24 +4,23 @@
 //! (its children take its place) while that could misplace more than the tolerance; a lamp is entered until it is even.
 //! Ways that a link proved clear cost no ray; others get rays in number with what they carry.
 
-use super::hemisphere::{BEAM, Hemisphere};
+use super::hemisphere::Hemisphere;
 use super::trace::Trace;
-use crate::geometry::sampling::tangents;
 use crate::geometry::{Hit, Segment, lambert_polygon};
 use crate::hierarchy::{Element, NONE, Node, Sample, Tree};
 use crate::link::{Sight, View, Way, blockers_of, pattern, point_factor};
 use crate::scene::{LightKind, PunctualLight};
 use crate::solve::light::Light;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Rays to a patch at least, and at the most.
 const RAYS: [usize; 2] = [4, 32];
 /// Points that stand for a far cluster: one that carries little, and one that carries much.
 const CLUSTER_POINTS: [usize; 2] = [4, 8];
-/// A cluster nearer than this many of its radii is entered.
-const CLOSE: f64 = 1.5;
+/// Nearer than this many of its radii a cluster is entered, and a patch is not even.
+pub(super) const CLOSE: f64 = 1.5;
 /// Faces of a cluster that are treated as polygons.
-const POLYGONS: u32 = 4;
+pub(super) const POLYGONS: u32 = 4;
 /// A clear patch may misplace this share of the tolerance: what many of them misplace goes the same way (the middle of a wall
 /// is brighter than its edges, and nearer), and to enter one costs no ray. With 1 the light in a white cube is .7 % low.
 const CLEAR_SHARE: f64 = 0.05;
@@ -31,9 +30,6 @@ const PRIOR: f64 = 4.0;
 const LAMP_DEPTH: u32 = 6;
 /// A lamp gets more than plain rays if it carries this many tolerances.
 const SHAFT_WORTH: f64 = 4.0;
-
-/// A patch so bright that one ray of the hemisphere would carry more than this many tolerances is gathered by its link.
-const GLARE: f64 = 4.0;
 
 /// Where light is received.
 #[derive(Debug, Clone, Copy)]
@@ -89,18 +85,31 @@ impl Gathered {
     }
 }
 
+/// A patch that a point is linked to: its node, what may stand between, what the link found visible.
+pub(super) type Linked = (u32, Way, f32);
+
+/// What light of patches is gathered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Of {
+    All,
+    Reflected,
+    Emitted,
+}
+
 /// Reused memory of one thread and its ray count.
 #[derive(Debug, Default)]
 pub struct Memory {
-    stack: Vec<(u32, Way, f32)>,
-    open: Vec<(u32, Way, f32)>,
+    pub(super) stack: Vec<Linked>,
+    pub(super) open: Vec<Linked>,
     /// Epoch in which each node was last gathered as a patch: rays that end on it bring nothing more.
-    taken: Vec<u32>,
-    epoch: u32,
+    pub(super) taken: Vec<u32>,
+    pub(super) epoch: u32,
     samples: Vec<Sample>,
     segments: Vec<Segment>,
     weights: Vec<f64>,
     blocked: Vec<bool>,
+    /// What the rays of a point met.
+    pub(super) met: Vec<(u32, Hit)>,
     /// Rays cast.
     pub rays: u64,
     /// Where the direct light of the last point comes from, where that is kept.
@@ -109,7 +118,7 @@ pub struct Memory {
 
 impl Memory {
     /// Another point: nothing is taken yet.
-    fn begin(&mut self, nodes: usize) {
+    pub(super) fn begin(&mut self, nodes: usize) {
         self.open.clear();
         self.stack.clear();
         self.epoch = self.epoch.wrapping_add(1);
@@ -151,22 +160,30 @@ impl Gatherer<'_> {
     /// Gathers what comes straight from lamps.
     pub fn direct(&self, to: &Receiver, memory: &mut Memory) -> [f32; 64] {
         let mut out = self.start();
+        self.lamps_of(to, memory, &mut out);
+        self.punctual(to, memory, &mut out);
+        memory.trace = out.trace;
+        out.direct
+    }
+
+    /// Gathers what patches emit.
+    pub(super) fn lamps_of(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
         memory.stack.clear();
         let mut above = to.leaf;
+        if above.is_none() && !self.tree.nodes.is_empty() {
+            memory.stack.push((0, Way::Crowded, 0.5));
+        }
         while let Some(id) = above {
             let row = self.light.neighbours.row(id).iter();
             memory.stack.extend(row.filter(|&&(other, ..)| lit(other)));
             above = Some(self.tree.node(id).parent).filter(|&p| p != NONE);
         }
-        while let Some((id, way, v)) = memory.stack.pop() {
-            if lit(id) {
-                self.visit(to, id, way, v, memory, &mut out);
+        while let Some(linked) = memory.stack.pop() {
+            if lit(linked.0) {
+                self.visit(to, linked, Of::Emitted, memory, out);
             }
         }
-        self.punctual(to, memory, &mut out);
-        memory.trace = out.trace;
-        out.direct
     }
 
     /// Gathers at a point.
@@ -192,8 +209,8 @@ impl Gatherer<'_> {
             None if !self.tree.nodes.is_empty() => memory.stack.push((0, Way::Crowded, 0.5)),
             None => {}
         }
-        while let Some((id, way, v)) = memory.stack.pop() {
-            self.visit(to, id, way, v, memory, &mut out);
+        while let Some(linked) = memory.stack.pop() {
+            self.visit(to, linked, Of::All, memory, &mut out);
         }
         if self.closed && out.seen > 0.5 {
             let scale = (1.0 / out.seen) as f32;
@@ -212,126 +229,18 @@ impl Gatherer<'_> {
         out
     }
 
-    /// Lamps and what is as bright by links, all else by rays.
-    fn sweep(
-        &self,
-        to: &Receiver,
-        hemisphere: &Hemisphere,
-        memory: &mut Memory,
-        out: &mut Gathered,
-    ) {
-        memory.begin(self.tree.nodes.len());
-        let mut above = to.leaf;
-        if above.is_none() && !self.tree.nodes.is_empty() {
-            memory.open.push((0, Way::Crowded, 0.5));
-        }
-        while let Some(id) = above {
-            memory.open.extend(self.light.neighbours.row(id));
-            above = Some(self.tree.node(id).parent).filter(|&p| p != NONE);
-        }
-        // A ray must not carry more than this.
-        let most = GLARE * self.tolerance * hemisphere.len() as f64;
-        while let Some((id, way, v)) = memory.open.pop() {
-            let k = id as usize;
-            let emitted = f64::from(self.light.bright_emitted[k]);
-            let brightest = f64::from(self.light.brightest[k]);
-            let node = self.tree.node(id);
-            let plain = node.faces.1 <= POLYGONS;
-            let exact = plain && way == Way::Clear && !self.has_parts(node);
-            if !(emitted > 0.0 || brightest > most || exact) || !self.can_see(to, node) {
-                continue;
-            }
-            if emitted <= 0.0 && !exact && self.bound(to, node) * brightest < self.tolerance {
-                continue;
-            }
-            let whole = plain
-                && (emitted > 0.0 || exact || f64::from(self.light.bright_reflected[k]) > most);
-            let slight = emitted > 0.0 && self.bound(to, node) * emitted < 0.1 * self.tolerance;
-            if whole || slight || !self.has_parts(node) {
-                memory.taken[k] = memory.epoch;
-                memory.stack.push((id, way, v));
-                while let Some((id, way, v)) = memory.stack.pop() {
-                    self.visit(to, id, way, v, memory, out);
-                }
-            } else {
-                memory.open.extend(node.child_range().map(|c| (c, way, v)));
-            }
-        }
-        for (x, d) in out.irradiance.iter_mut().zip(&out.direct) {
-            *x += d;
-        }
-        self.punctual(to, memory, out);
-        let share = 1.0 / hemisphere.len() as f32;
-        // Another seed turns the pattern.
-        let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
-        let [x, y] = tangents(to.normal);
-        let [x, y] = [x * cos + y * sin, y * cos - x * sin];
-        let from = [to.point.as_vec3(); BEAM];
-        let mut hits = [None; BEAM];
-        let mut directions = [Vec3::ZERO; BEAM];
-        let width = self.light.width();
-        for beam in hemisphere.beams() {
-            for (out, d) in directions.iter_mut().zip(beam) {
-                *out = (x * d.x + y * d.y + to.normal * d.z).as_vec3();
-            }
-            self.sight.meet(&from, &directions, to.plane, &mut hits);
-            memory.rays += BEAM as u64;
-            for hit in hits.iter().flatten() {
-                let Some(leaf) = self.met(hit) else {
-                    out.backs += f64::from(share);
-                    continue;
-                };
-                let mut id = leaf;
-                while id != NONE && memory.taken[id as usize] != memory.epoch {
-                    id = self.tree.node(id).parent;
-                }
-                if id != NONE {
-                    continue;
-                }
-                out.seen += f64::from(share);
-                if let Some(trace) = &mut out.trace {
-                    trace.hit(leaf, share);
-                }
-                let row = self.light.reflected.row(leaf as usize);
-                for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
-                    *x += share * r;
-                }
-            }
-        }
-    }
-
-    /// The smallest patch of the solution at a hit; none on a back that has no face.
-    fn met(&self, hit: &Hit) -> Option<u32> {
-        let entry = self.tree.met(hit);
-        if entry == NONE {
-            return None;
-        }
-        let [u, v] = hit.uv.map(f64::from);
-        let first = 1.0 - u - v;
-        let weights = if hit.from_behind {
-            [first, v, u]
-        } else {
-            [first, u, v]
-        };
-        let mut leaf = self.tree.leaf_at(entry, weights);
-        while leaf as usize >= self.light.bright_emitted.len() {
-            leaf = self.tree.node(leaf).parent;
-        }
-        Some(leaf)
-    }
-
     /// Greatest factor that a patch could have, by its projected area.
-    fn bound(&self, to: &Receiver, node: &Node) -> f64 {
+    pub(super) fn bound(&self, to: &Receiver, node: &Node) -> f64 {
         let gap = ((node.centre - to.point).length() - node.radius).max(0.0);
         node.area / (std::f64::consts::PI * gap * gap + node.area)
     }
 
-    fn visit(
+    /// Adds a patch, or puts its children in its place.
+    pub(super) fn visit(
         &self,
         to: &Receiver,
-        id: u32,
-        way: Way,
-        v: f32,
+        (id, way, v): Linked,
+        of: Of,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
@@ -341,10 +250,13 @@ impl Gatherer<'_> {
             return;
         }
         let k = id as usize;
-        let (reflected, emitted) = (
-            f64::from(self.light.bright_reflected[k]),
-            f64::from(self.light.bright_emitted[k]),
-        );
+        let mut reflected = f64::from(self.light.bright_reflected[k]);
+        let mut emitted = f64::from(self.light.bright_emitted[k]);
+        match of {
+            Of::All => {}
+            Of::Reflected => emitted = 0.0,
+            Of::Emitted => reflected = 0.0,
+        }
         let spread = f64::from(self.light.spread[k]);
         let distance = (node.centre - to.point).length();
         if node.faces.1 > POLYGONS {
@@ -356,7 +268,9 @@ impl Gatherer<'_> {
                 return;
             }
             let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
-            self.cluster(to, id, count, clear, memory, out);
+            if let Some((factor, visible)) = self.cluster(to, id, count, clear, memory) {
+                self.add(id, factor, visible, of, out);
+            }
             return;
         }
         let sample = Sample {
@@ -393,42 +307,49 @@ impl Gatherer<'_> {
                 memory,
             )
         };
-        self.add(id, factor, visible, out);
-        self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
+        self.add(id, factor, visible, of, out);
+        if of != Of::Emitted {
+            self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
+        }
     }
 
     /// Are the children of a node known to the solution? Elements split after it are not.
-    fn has_parts(&self, node: &Node) -> bool {
+    pub(super) fn has_parts(&self, node: &Node) -> bool {
         !node.is_leaf() && (node.child as usize) < self.light.bright_emitted.len()
     }
 
     /// Adds a patch with a factor and its visible share.
-    fn add(&self, id: u32, factor: f64, visible: f64, out: &mut Gathered) {
+    fn add(&self, id: u32, factor: f64, visible: f64, of: Of, out: &mut Gathered) {
         let seen = (factor * visible) as f32;
-        out.seen += factor * visible;
-        if let Some(trace) = &mut out.trace {
-            trace.patch(id, seen);
-        }
         let k = id as usize;
         let width = self.light.width();
-        for (x, r) in out.irradiance[..width]
-            .iter_mut()
-            .zip(self.light.reflected.row(k))
-        {
-            *x += seen * r;
+        if of != Of::Emitted {
+            out.seen += factor * visible;
+            let row = self.light.reflected.row(k);
+            for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
+                *x += seen * r;
+            }
         }
-        if self.light.bright_emitted[k] > 0.0 {
-            for (x, e) in out.direct[..width]
-                .iter_mut()
-                .zip(self.light.emitted.row(k))
-            {
+        if of != Of::Reflected && self.light.bright_emitted[k] > 0.0 {
+            let row = self.light.emitted.row(k);
+            for (x, e) in out.direct[..width].iter_mut().zip(row) {
                 *x += seen * e;
+            }
+        }
+        if let Some(trace) = &mut out.trace {
+            match of {
+                Of::All => trace.patch(id, seen),
+                Of::Reflected => trace.slope(id, seen),
+                Of::Emitted => {
+                    trace.patch(id, seen);
+                    trace.slope(id, -seen);
+                }
             }
         }
     }
 
     /// Could any of the patch be in front of the receiver, and the receiver in front of any of the patch?
-    fn can_see(&self, to: &Receiver, node: &Node) -> bool {
+    pub(super) fn can_see(&self, to: &Receiver, node: &Node) -> bool {
         let from = node.centre - to.point;
         let reach = (0.5 * (node.high - node.low))
             .dot(to.normal.abs())
@@ -451,7 +372,7 @@ impl Gatherer<'_> {
         angle < 0.5 * std::f64::consts::PI
     }
 
-    /// A far cluster by points, each with its own ray.
+    /// Factor and visible share of a far cluster by points, each with its own ray.
     fn cluster(
         &self,
         to: &Receiver,
@@ -459,8 +380,7 @@ impl Gatherer<'_> {
         count: usize,
         clear: bool,
         memory: &mut Memory,
-        out: &mut Gathered,
-    ) {
+    ) -> Option<(f64, f64)> {
         let shift = pattern(to.seed, id, 1);
         self.tree.samples(id, count, shift, &mut memory.samples);
         memory.segments.clear();
@@ -483,7 +403,7 @@ impl Gatherer<'_> {
         }
         let factor: f64 = memory.weights.iter().sum();
         if factor <= 0.0 {
-            return;
+            return None;
         }
         let mut visible = 1.0;
         if !clear {
@@ -498,7 +418,7 @@ impl Gatherer<'_> {
                 .map(|(w, _)| w);
             visible = open.sum::<f64>() / factor;
         }
-        self.add(id, factor, visible, out);
+        Some((factor, visible))
     }
 
     /// Visible share of a polygon patch. `carries` is what it would bring unblocked, share of white.
@@ -656,7 +576,7 @@ impl Gatherer<'_> {
     }
 
     /// Light of punctual lights, one ray each.
-    fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
+    pub(super) fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
             let (factor, end) = match punctual_factor(lamp, to, self.light.half_size) {
                 Some(x) => x,

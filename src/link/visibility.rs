@@ -130,6 +130,25 @@ impl Sight<'_> {
         }
     }
 
+    /// What one ray meets first; triangles of `plane` are looked through.
+    pub fn meet_one(&self, from: Vec3, direction: Vec3, plane: u32) -> Option<Hit> {
+        match self.opaque {
+            Some(opaque) => self
+                .rays
+                .closest_with(from, direction, f32::MAX, plane, &opaque),
+            None => self.rays.closest(from, direction, f32::MAX, plane),
+        }
+    }
+
+    /// Is one segment blocked?
+    pub fn blocks_one(&self, segment: &Segment) -> bool {
+        self.occlusion
+            && match self.opaque {
+                Some(opaque) => self.rays.occluded_with(segment, &opaque),
+                None => self.rays.occluded(segment),
+            }
+    }
+
     /// For each segment: is it blocked?
     pub fn blocked(&self, segments: &[Segment], view: &View, out: &mut Vec<bool>) {
         out.clear();

@@ -59,6 +59,7 @@ impl Bake {
             }
             let (reflected, traces) = self.decode_state(true, from)?;
             self.light_up(&reflected);
+            self.light_arrives();
             self.direct.keep(&self.light.leaves, traces.to_vec()?);
             self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
             let seen: Vec<[f64; 3]> = from.get_all()?;

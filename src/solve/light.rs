@@ -2,6 +2,7 @@
 
 use super::lanes::Lanes;
 use super::rows::Rows;
+use crate::gather::Arrival;
 use crate::hierarchy::Tree;
 use crate::link::{Graph, Way};
 use rayon::prelude::*;
@@ -25,6 +26,10 @@ pub struct Light {
     pub brightest: Vec<f32>,
     /// Standard deviation of brightness over the leaves of a node.
     pub spread: Vec<f32>,
+    /// What arrives on every node that is a leaf; nothing elsewhere.
+    pub arrival: Vec<Arrival>,
+    /// Brightness of a punctual light's intensity (of its normal irradiance where it is directional).
+    pub bright_lamps: Vec<f32>,
     /// Who is linked to whom.
     pub neighbours: Neighbours,
     /// Irradiance of the adaptation white, tristimulus.
@@ -50,7 +55,8 @@ impl Light {
         let rows = [&self.reflected, &self.emitted, &self.irradiance];
         rows.iter().map(|rows| rows.bytes()).sum::<usize>()
             + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
-            + 4 * self.leaves.len()
+            + size_of_val(self.arrival.as_slice())
+            + 4 * (self.bright_lamps.len() + self.leaves.len())
     }
 
     /// Works out brightness and its spread from the rows.

@@ -1,0 +1,231 @@
+//! What rays meet close by: the light of a leaf as a whole says little about a point of it that lies in the gap behind a
+//! cupboard, or within something that another thing stands into, when the rest of the leaf lies in the open.
+//!
+//! There the point that a ray met gathers for itself: its reflected light is the leaf's, times how much more or less light
+//! reaches the point than the leaf as a whole,
+//!
+//! `B(p) = B (D(p) + B(q)) / H`
+//!
+//! with H the leaf's irradiance, B what it reflects, D(p) the direct light of one lamp chosen by chance and q where one
+//! further ray ends, which may be close by again (a path, as in Kajiya 1986; the choice of a lamp descends the hierarchy,
+//! as in Conty Estevez and Kulla 2018). Only brightness follows the path: colours stay those of the leaf.
+
+use super::point::{Gatherer, Memory, Receiver, punctual_factor};
+use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
+use crate::geometry::{Hit, Segment};
+use crate::hierarchy::{NONE, Sample};
+use crate::link::point_factor;
+use glam::DVec3;
+
+/// What is nearer than this many times the square root of a leaf's area is close by.
+const NEAR: f64 = 1.5;
+/// A point of whose rays more than this share meet black backs lies within something: then all is close by.
+const WITHIN: f64 = 1.0 / 16.0;
+/// Steps of a path at the most.
+const STEPS: u64 = 8;
+/// Rays that meet something close by of which that is found out at the most.
+const FOLLOWED: usize = 64;
+/// Where direct light varies by less than this share over a leaf, any point of it has the mean.
+const EVEN: f32 = 0.05;
+
+/// Light that arrives on a leaf, in brightness, share of the white's.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Arrival {
+    /// All of it.
+    pub all: f32,
+    /// Of which straight from lamps.
+    pub direct: f32,
+    /// Half the range of direct light over the leaf.
+    pub spread: f32,
+}
+
+impl Gatherer<'_> {
+    /// Is a hit so near that its leaf says little about it? `backs`: share of the rays that met black backs.
+    pub(super) fn is_near(&self, leaf: u32, hit: &Hit, backs: f64) -> bool {
+        backs > WITHIN || f64::from(hit.t) < NEAR * self.tree.node(leaf).area.sqrt()
+    }
+
+    /// What the points that rays met close by reflect, together, as a share of what their leaves do.
+    pub(super) fn nearby(
+        &self,
+        hits: &[(u32, Hit)],
+        backs: f64,
+        seed: u64,
+        memory: &mut Memory,
+    ) -> f64 {
+        let count = hits.len().min(FOLLOWED);
+        let pairs: Vec<[f64; 2]> = (0..count)
+            .map(|k| {
+                let (leaf, hit) = &hits[k * hits.len() / count];
+                let point = self.follow(*leaf, *hit, backs, [k as u64, seed], memory);
+                [
+                    point,
+                    f64::from(self.light.bright_reflected[*leaf as usize]),
+                ]
+            })
+            .collect();
+        let leaves: f64 = pairs.iter().map(|p| p[1]).sum();
+        if leaves <= 0.0 {
+            return 1.0;
+        }
+        let ratio = pairs.iter().map(|p| p[0]).sum::<f64>() / leaves;
+        let square = |p: &[f64; 2]| (p[0] - ratio * p[1]).powi(2);
+        let noise = pairs.iter().map(square).sum::<f64>() / (leaves * leaves);
+        // Believed as far as it stands out of its noise (Stein's positive part).
+        let excess = ratio - 1.0;
+        if excess * excess > noise {
+            1.0 + excess - noise / excess
+        } else {
+            1.0
+        }
+    }
+
+    /// What a point reflects, by one path.
+    fn follow(
+        &self,
+        leaf: u32,
+        hit: Hit,
+        backs: f64,
+        [k, seed]: [u64; 2],
+        memory: &mut Memory,
+    ) -> f64 {
+        let sample = |dimension: u64| sequence02(k as u32, hash(seed, dimension));
+        let (mut leaf, mut hit) = (leaf, hit);
+        let (mut sum, mut through) = (0.0, 1.0);
+        for step in 0..STEPS {
+            let arrival = self.light.arrival[leaf as usize];
+            if arrival.all <= 0.0 {
+                break;
+            }
+            through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival.all);
+            let to = self.receiver(leaf, &hit);
+            let even = backs <= WITHIN && arrival.spread < EVEN * arrival.direct;
+            sum += through
+                * if even {
+                    f64::from(arrival.direct)
+                } else {
+                    self.one_lamp(&to, sample(2 * step + 1), memory)
+                };
+            let direction = cosine_direction(to.normal, sample(2 * step)).as_vec3();
+            let next = self.sight.meet_one(to.point.as_vec3(), direction, to.plane);
+            memory.rays += 1;
+            let Some((next, met)) = next.and_then(|next| self.met(&next).map(|met| (next, met)))
+            else {
+                break;
+            };
+            if step + 1 == STEPS || !self.is_near(met, &next, backs) {
+                sum += through * f64::from(self.light.bright_reflected[met as usize]);
+                break;
+            }
+            (leaf, hit) = (met, next);
+        }
+        sum
+    }
+
+    /// The point that a ray met.
+    fn receiver(&self, leaf: u32, hit: &Hit) -> Receiver {
+        let mesh = self.sight.mesh;
+        let [a, b, c] = mesh.triangles[hit.triangle as usize].map(|v| mesh.positions[v as usize]);
+        let [v, w] = hit.uv.map(f64::from);
+        let entry = self.tree.met(hit) as usize;
+        Receiver {
+            point: a * (1.0 - v - w) + b * v + c * w,
+            normal: self.tree.face_normal[entry],
+            plane: self.tree.face_plane[entry],
+            leaf: Some(leaf),
+            seed: 0,
+        }
+    }
+
+    /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
+    /// the probability that it brings the light: without bias.
+    fn one_lamp(&self, to: &Receiver, [mut u, v]: [f64; 2], memory: &mut Memory) -> f64 {
+        let mut sum = 0.0;
+        if let Some((bright, end)) = self.one_punctual(to, v) {
+            let segment = Segment {
+                from: to.point.as_vec3(),
+                to: end.as_vec3(),
+                planes: [to.plane, u32::MAX],
+            };
+            memory.rays += 1;
+            if !self.sight.blocks_one(&segment) {
+                sum += bright;
+            }
+        }
+        let Some((id, chance)) = self.one_emitter(to, &mut u) else {
+            return sum;
+        };
+        let sample = Sample {
+            point: to.point,
+            normal: to.normal,
+            plane: to.plane,
+            area: 1.0,
+        };
+        let node = self.tree.node(id);
+        let factor = point_factor(self.tree, &sample, node, &[]);
+        if let Some(element) = self.tree.element(node).filter(|_| factor > 0.0) {
+            let segment = Segment {
+                from: to.point.as_vec3(),
+                to: element.at(triangle_weights([u, v])).as_vec3(),
+                planes: [to.plane, self.tree.face_plane[element.face as usize]],
+            };
+            memory.rays += 1;
+            if !self.sight.blocks_one(&segment) {
+                sum += factor * f64::from(self.light.bright_emitted[id as usize]) / chance;
+            }
+        }
+        sum
+    }
+
+    /// Chooses a punctual light: brightness of them all, and where the ray to it ends.
+    fn one_punctual(&self, to: &Receiver, v: f64) -> Option<(f64, DVec3)> {
+        let each = || {
+            let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
+            lamps.filter_map(|((lamp, _), &bright)| {
+                let (factor, end) = punctual_factor(lamp, to, self.light.half_size)?;
+                Some((factor * f64::from(bright), end))
+            })
+        };
+        let all: f64 = each().map(|(bright, _)| bright).sum();
+        let mut left = v * all;
+        let (_, end) = each().find(|&(bright, _)| {
+            left -= bright;
+            left < 0.0
+        })?;
+        Some((all, end))
+    }
+
+    /// Chooses an emitting element and tells with what probability; `u` serves again afterwards.
+    fn one_emitter(&self, to: &Receiver, u: &mut f64) -> Option<(u32, f64)> {
+        let worth = |id: u32| {
+            let node = self.tree.node(id);
+            let emitted = f64::from(self.light.bright_emitted[id as usize]);
+            if emitted <= 0.0 || !self.can_see(to, node) {
+                return 0.0;
+            }
+            let distance = (node.centre - to.point).length_squared();
+            emitted * node.area / distance.max(node.radius * node.radius)
+        };
+        let (mut id, mut chance) = (0, 1.0);
+        if self.tree.nodes.is_empty() || worth(id) <= 0.0 {
+            return None;
+        }
+        // An element emits all over alike, whatever its parts.
+        while self.tree.node(id).element == NONE {
+            let children = self.tree.node(id).child_range();
+            let all: f64 = children.clone().map(worth).sum();
+            let mut left = *u * all;
+            let mut chosen = None;
+            for (child, worth) in children.map(|c| (c, worth(c))).filter(|c| c.1 > 0.0) {
+                chosen = Some((child, worth, (left / worth).min(1.0 - f64::EPSILON)));
+                if left < worth {
+                    break;
+                }
+                left -= worth;
+            }
+            let (child, worth, rest) = chosen?;
+            (id, *u, chance) = (child, rest, chance * worth / all);
+        }
+        Some((id, chance))
+    }
+}

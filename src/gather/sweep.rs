@@ -1,0 +1,163 @@
+//! Light at a point in rooms where much stands about: lamps and what is as bright by links, all else by rays.
+
+use super::hemisphere::{BEAM, Hemisphere};
+use super::point::{CLOSE, Gathered, Gatherer, Memory, Of, POLYGONS, Receiver};
+use crate::geometry::Hit;
+use crate::geometry::sampling::tangents;
+use crate::hierarchy::NONE;
+use crate::link::{Way, pattern};
+use glam::Vec3;
+
+/// A patch so bright that one ray of the hemisphere would carry more than this many tolerances is gathered by its link.
+const GLARE: f64 = 4.0;
+
+impl Gatherer<'_> {
+    /// Gathers at a point.
+    pub(super) fn sweep(
+        &self,
+        to: &Receiver,
+        hemisphere: &Hemisphere,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
+        memory.begin(self.tree.nodes.len());
+        self.lamps_of(to, memory, out);
+        // A ray must not carry more than this.
+        self.bright(
+            to,
+            GLARE * self.tolerance * hemisphere.len() as f64,
+            memory,
+            out,
+        );
+        for (x, d) in out.irradiance.iter_mut().zip(&out.direct) {
+            *x += d;
+        }
+        self.punctual(to, memory, out);
+        self.look(to, hemisphere, memory, out);
+    }
+
+    /// What patches reflect that the way is clear to, or that are brighter than `most`, by links.
+    fn bright(&self, to: &Receiver, most: f64, memory: &mut Memory, out: &mut Gathered) {
+        let mut above = to.leaf;
+        if above.is_none() && !self.tree.nodes.is_empty() {
+            memory.open.push((0, Way::Crowded, 0.5));
+        }
+        while let Some(id) = above {
+            memory.open.extend(self.light.neighbours.row(id));
+            above = Some(self.tree.node(id).parent).filter(|&p| p != NONE);
+        }
+        while let Some((id, way, v)) = memory.open.pop() {
+            let k = id as usize;
+            let brightest = f64::from(self.light.brightest[k]);
+            let node = self.tree.node(id);
+            let plain = node.faces.1 <= POLYGONS;
+            let exact = plain
+                && way == Way::Clear
+                && !self.has_parts(node)
+                && (node.centre - to.point).length() >= CLOSE * node.radius;
+            if !(brightest > most || exact) || !self.can_see(to, node) {
+                continue;
+            }
+            if !exact && self.bound(to, node) * brightest < self.tolerance {
+                continue;
+            }
+            let whole = plain && (exact || f64::from(self.light.bright_reflected[k]) > most);
+            if whole || !self.has_parts(node) {
+                memory.taken[k] = memory.epoch;
+                memory.stack.push((id, way, v));
+                while let Some(linked) = memory.stack.pop() {
+                    self.visit(to, linked, Of::Reflected, memory, out);
+                }
+            } else {
+                memory.open.extend(node.child_range().map(|c| (c, way, v)));
+            }
+        }
+    }
+
+    /// What all other patches reflect, by rays over the hemisphere.
+    fn look(
+        &self,
+        to: &Receiver,
+        hemisphere: &Hemisphere,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
+        let share = 1.0 / hemisphere.len() as f32;
+        let mut met = std::mem::take(&mut memory.met);
+        met.clear();
+        out.backs = f64::from(share) * self.cast(to, hemisphere, &mut met) as f64;
+        memory.rays += hemisphere.len() as u64;
+        // Rays that end on what was gathered as a patch bring nothing more.
+        met.retain(|&(leaf, _)| {
+            let mut id = leaf;
+            while id != NONE && memory.taken[id as usize] != memory.epoch {
+                id = self.tree.node(id).parent;
+            }
+            id == NONE
+        });
+        out.seen += f64::from(share) * met.len() as f64;
+        let is_near = |&(leaf, ref hit): &(u32, Hit)| self.is_near(leaf, hit, out.backs);
+        met.sort_by_key(is_near);
+        let (far, near) = met.split_at(met.partition_point(|m| !is_near(m)));
+        let near_share = share * self.nearby(near, out.backs, to.seed, memory) as f32;
+        let width = self.light.width();
+        for (k, &(leaf, _)) in met.iter().enumerate() {
+            let share = if k < far.len() { share } else { near_share };
+            let row = self.light.reflected.row(leaf as usize);
+            for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
+                *x += share * r;
+            }
+        }
+        if let Some(trace) = &mut out.trace {
+            far.iter().for_each(|&(leaf, _)| trace.hit(leaf, share));
+            near.iter()
+                .for_each(|&(leaf, _)| trace.slope(leaf, near_share));
+        }
+        memory.met = met;
+    }
+
+    /// Casts the rays of a point. Which leaves they met, and how many met black backs.
+    fn cast(&self, to: &Receiver, hemisphere: &Hemisphere, met: &mut Vec<(u32, Hit)>) -> usize {
+        // Another seed turns the pattern.
+        let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
+        let [x, y] = tangents(to.normal);
+        let [x, y] = [x * cos + y * sin, y * cos - x * sin];
+        let from = [to.point.as_vec3(); BEAM];
+        let mut hits = [None; BEAM];
+        let mut directions = [Vec3::ZERO; BEAM];
+        let mut backs = 0;
+        for beam in hemisphere.beams() {
+            for (out, d) in directions.iter_mut().zip(beam) {
+                *out = (x * d.x + y * d.y + to.normal * d.z).as_vec3();
+            }
+            self.sight.meet(&from, &directions, to.plane, &mut hits);
+            for hit in hits.iter().flatten() {
+                match self.met(hit) {
+                    Some(leaf) => met.push((leaf, *hit)),
+                    None => backs += 1,
+                }
+            }
+        }
+        backs
+    }
+
+    /// The smallest patch of the solution at a hit; none on a back that has no face.
+    pub(super) fn met(&self, hit: &Hit) -> Option<u32> {
+        let entry = self.tree.met(hit);
+        if entry == NONE {
+            return None;
+        }
+        let [u, v] = hit.uv.map(f64::from);
+        let first = 1.0 - u - v;
+        let weights = if hit.from_behind {
+            [first, v, u]
+        } else {
+            [first, u, v]
+        };
+        let mut leaf = self.tree.leaf_at(entry, weights);
+        while leaf as usize >= self.light.bright_emitted.len() {
+            leaf = self.tree.node(leaf).parent;
+        }
+        Some(leaf)
+    }
+}
