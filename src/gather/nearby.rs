@@ -13,9 +13,9 @@
 use super::point::{Gatherer, Memory, Receiver, punctual_factor};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
 use crate::geometry::{Hit, Segment};
-use crate::hierarchy::{NONE, Sample};
-use crate::link::point_factor;
+use crate::hierarchy::NONE;
 use glam::DVec3;
+use std::f64::consts::PI;
 
 /// What is nearer than this many times the square root of a leaf's area is close by.
 const NEAR: f64 = 1.5;
@@ -27,6 +27,8 @@ const STEPS: u64 = 8;
 const FOLLOWED: usize = 64;
 /// Where direct light varies by less than this share over a leaf, any point of it has the mean.
 const EVEN: f32 = 0.05;
+/// Points of an emitting element count as no nearer than the root of this share of its area.
+const NEAREST: f64 = 0.05;
 
 /// Light that arrives on a leaf, in brightness, share of the white's.
 #[derive(Debug, Clone, Copy, Default)]
@@ -58,26 +60,11 @@ impl Gatherer<'_> {
             .map(|k| {
                 let (leaf, hit) = &hits[k * hits.len() / count];
                 let point = self.follow(*leaf, *hit, backs, [k as u64, seed], memory);
-                [
-                    point,
-                    f64::from(self.light.bright_reflected[*leaf as usize]),
-                ]
+                let whole = self.light.bright_reflected[*leaf as usize];
+                [point, f64::from(whole)]
             })
             .collect();
-        let leaves: f64 = pairs.iter().map(|p| p[1]).sum();
-        if leaves <= 0.0 {
-            return 1.0;
-        }
-        let ratio = pairs.iter().map(|p| p[0]).sum::<f64>() / leaves;
-        let square = |p: &[f64; 2]| (p[0] - ratio * p[1]).powi(2);
-        let noise = pairs.iter().map(square).sum::<f64>() / (leaves * leaves);
-        // Believed as far as it stands out of its noise (Stein's positive part).
-        let excess = ratio - 1.0;
-        if excess * excess > noise {
-            1.0 + excess - noise / excess
-        } else {
-            1.0
-        }
+        believed(&pairs)
     }
 
     /// What a point reflects, by one path.
@@ -155,18 +142,19 @@ impl Gatherer<'_> {
         let Some((id, chance)) = self.one_emitter(to, &mut u) else {
             return sum;
         };
-        let sample = Sample {
-            point: to.point,
-            normal: to.normal,
-            plane: to.plane,
-            area: 1.0,
-        };
         let node = self.tree.node(id);
-        let factor = point_factor(self.tree, &sample, node, &[]);
-        if let Some(element) = self.tree.element(node).filter(|_| factor > 0.0) {
+        let Some(element) = self.tree.element(node) else {
+            return sum;
+        };
+        let end = element.at(triangle_weights([u, v]));
+        let way = end - to.point;
+        // The mean over the element, were it not for the limit very near it.
+        let factor = to.normal.dot(way) * -node.normal.dot(way) * node.area
+            / (PI * way.length_squared().max(NEAREST * node.area).powi(2));
+        if to.normal.dot(way) > 0.0 && factor > 0.0 {
             let segment = Segment {
                 from: to.point.as_vec3(),
-                to: element.at(triangle_weights([u, v])).as_vec3(),
+                to: end.as_vec3(),
                 planes: [to.plane, self.tree.face_plane[element.face as usize]],
             };
             memory.rays += 1;
@@ -227,5 +215,80 @@ impl Gatherer<'_> {
             (id, *u, chance) = (child, rest, chance * worth / all);
         }
         Some((id, chance))
+    }
+}
+
+/// Sum of the first of all pairs as a share of the second, as far as it stands out of its noise (Stein's positive part).
+fn believed(pairs: &[[f64; 2]]) -> f64 {
+    let leaves: f64 = pairs.iter().map(|p| p[1]).sum();
+    if leaves <= 0.0 {
+        return 1.0;
+    }
+    let ratio = pairs.iter().map(|p| p[0]).sum::<f64>() / leaves;
+    let square = |p: &[f64; 2]| (p[0] - ratio * p[1]).powi(2);
+    let noise = pairs.iter().map(square).sum::<f64>() / (leaves * leaves);
+    let excess = ratio - 1.0;
+    if excess * excess > noise {
+        1.0 + excess - noise / excess
+    } else {
+        1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Options, Scene};
+    use crate::solve::light::brightness;
+    use crate::solve::{Bake, Settings};
+    use std::path::Path;
+
+    /// Against all lamps in turn, exactly.
+    #[test]
+    fn one_lamp_by_chance_is_all_lamps_on_the_mean() {
+        const SAMPLES: u32 = 1024;
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/furnished.glb");
+        let settings = Settings {
+            rounds: 1,
+            ..Settings::default()
+        };
+        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
+        bake.run();
+        assert!(!bake.lamps().is_empty());
+        let (mut off, mut all) = (0.0, 0.0);
+        bake.with_sight(|bake, sight| {
+            let gatherer = bake.gatherer(sight);
+            let mut memory = Memory::default();
+            let tree = bake.tree();
+            for leaf in tree.leaves().step_by(97) {
+                let element = tree.element(tree.node(leaf)).unwrap();
+                let to = Receiver {
+                    point: element.at([1.0 / 3.0; 3]),
+                    normal: tree.face_normal[element.face as usize],
+                    plane: tree.face_plane[element.face as usize],
+                    leaf: Some(leaf),
+                    seed: 0,
+                };
+                let row = gatherer.direct(&to, &mut memory);
+                let want = brightness(bake.lanes().tristimulus(&row), bake.light().white);
+                let mut one = |k| gatherer.one_lamp(&to, sequence02(k, 0), &mut memory);
+                let mean = (0..SAMPLES).map(&mut one).sum::<f64>() / f64::from(SAMPLES);
+                off += (mean - want).abs();
+                all += want;
+            }
+        });
+        assert!(all > 1.0 && off < 0.02 * all, "{off} of {all}");
+    }
+
+    #[test]
+    fn what_does_not_stand_out_of_its_noise_is_not_believed() {
+        assert_eq!(believed(&[]), 1.0);
+        assert_eq!(believed(&[[1.0, 0.0]]), 1.0);
+        assert_eq!(believed(&[[1.0, 1.0]; 8]), 1.0);
+        assert_eq!(believed(&[[0.0, 1.0]; 8]), 0.0);
+        assert_eq!(believed(&[[0.1, 1.0], [2.1, 1.0]]), 1.0);
+        let pairs: Vec<_> = (0..64).map(|k| [f64::from(k % 2), 1.0]).collect();
+        let half = believed(&pairs);
+        assert!(half > 0.5 && half < 0.51, "{half}");
     }
 }

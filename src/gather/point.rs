@@ -110,6 +110,8 @@ pub struct Memory {
     blocked: Vec<bool>,
     /// What the rays of a point met.
     pub(super) met: Vec<(u32, Hit)>,
+    /// Of which close by.
+    pub(super) near: Vec<(u32, Hit)>,
     /// Rays cast.
     pub rays: u64,
     /// Where the direct light of the last point comes from, where that is kept.

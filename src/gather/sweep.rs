@@ -87,33 +87,42 @@ impl Gatherer<'_> {
         met.clear();
         out.backs = f64::from(share) * self.cast(to, hemisphere, &mut met) as f64;
         memory.rays += hemisphere.len() as u64;
-        // Rays that end on what was gathered as a patch bring nothing more.
-        met.retain(|&(leaf, _)| {
-            let mut id = leaf;
-            while id != NONE && memory.taken[id as usize] != memory.epoch {
-                id = self.tree.node(id).parent;
-            }
-            id == NONE
-        });
-        out.seen += f64::from(share) * met.len() as f64;
-        let is_near = |&(leaf, ref hit): &(u32, Hit)| self.is_near(leaf, hit, out.backs);
-        met.sort_by_key(is_near);
-        let (far, near) = met.split_at(met.partition_point(|m| !is_near(m)));
-        let near_share = share * self.nearby(near, out.backs, to.seed, memory) as f32;
         let width = self.light.width();
-        for (k, &(leaf, _)) in met.iter().enumerate() {
-            let share = if k < far.len() { share } else { near_share };
+        let mut add = |leaf: u32, share: f32| {
             let row = self.light.reflected.row(leaf as usize);
             for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
                 *x += share * r;
             }
+        };
+        let mut near = std::mem::take(&mut memory.near);
+        near.clear();
+        for &(leaf, hit) in &met {
+            // Rays that end on what was gathered as a patch bring nothing more.
+            let mut id = leaf;
+            while id != NONE && memory.taken[id as usize] != memory.epoch {
+                id = self.tree.node(id).parent;
+            }
+            if id != NONE {
+                continue;
+            }
+            out.seen += f64::from(share);
+            if self.is_near(leaf, &hit, out.backs) {
+                near.push((leaf, hit));
+                continue;
+            }
+            add(leaf, share);
+            if let Some(trace) = &mut out.trace {
+                trace.hit(leaf, share);
+            }
         }
-        if let Some(trace) = &mut out.trace {
-            far.iter().for_each(|&(leaf, _)| trace.hit(leaf, share));
-            near.iter()
-                .for_each(|&(leaf, _)| trace.slope(leaf, near_share));
+        let near_share = share * self.nearby(&near, out.backs, to.seed, memory) as f32;
+        for &(leaf, _) in &near {
+            add(leaf, near_share);
+            if let Some(trace) = &mut out.trace {
+                trace.slope(leaf, near_share);
+            }
         }
-        memory.met = met;
+        (memory.met, memory.near) = (met, near);
     }
 
     /// Casts the rays of a point. Which leaves they met, and how many met black backs.

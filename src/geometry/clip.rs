@@ -1,7 +1,7 @@
-//! What a point sees of a polygon: the polygon less the shadows of triangles in between, exactly.
+//! What a point sees of a polygon: the polygon less the shadows of others in between, exactly.
 //!
-//! A point q of the polygon is hidden from p by triangle T when q lies in the cone of p over T and beyond T's plane: four half-spaces.
-//! The polygon less such a region falls into at most four convex pieces, one outside each half-space; each
+//! A point q of the polygon is hidden from p by a convex polygon T when q lies in the cone of p over T and beyond T's plane: a
+//! half-space for each edge and one more. The polygon less such a region falls into as many convex pieces at the most, one outside each; each
 //! blocker does so to every piece that is left (convex decomposition, as in Nishita and Nakamae 1983 for shadows of area sources).
 //! Lengths in the caller's unit; nothing here knows of light.
 
@@ -20,14 +20,17 @@ const SLIVER: f64 = 1e-9;
 /// polygon's.
 const ROUNDING: [f64; 2] = [1e-13, 1e-3];
 
-/// The visible part of a convex polygon from a point, as convex pieces (none when all is hidden), `blockers` being the triangles that may
-/// stand between. None when it would take more than `cap` pieces.
+/// The visible part of a convex polygon from a point, as convex pieces (none when all is hidden), `blockers` being the triangles and
+/// convex quadrilaterals that may stand between. None when it would take more than `cap` pieces.
 ///
-/// A triangle whose plane holds the point hides nothing; neither does one that touches the polygon from the front or lies behind it.
+/// A blocker whose plane holds the point hides nothing; neither does one that touches the polygon from the front or lies behind it.
+///
+/// # Panics
+/// On a blocker of other than three or four corners.
 pub fn visible_part(
     point: DVec3,
     polygon: &[DVec3],
-    blockers: &[[DVec3; 3]],
+    blockers: &[impl AsRef<[DVec3]>],
     cap: usize,
 ) -> Option<Vec<Vec<DVec3>>> {
     let mut clipper = Clipper::default();
@@ -89,7 +92,7 @@ impl Clipper {
         &mut self,
         point: DVec3,
         polygon: &[DVec3],
-        blockers: &[[DVec3; 3]],
+        blockers: &[impl AsRef<[DVec3]>],
         cap: usize,
     ) -> bool {
         let reach = polygon
@@ -99,7 +102,7 @@ impl Clipper {
         let thin = THIN * reach;
         self.pieces.clear();
         self.pieces.push(polygon);
-        for blocker in blockers {
+        for blocker in blockers.iter().map(AsRef::as_ref) {
             if misses(point, polygon, blocker) {
                 continue;
             }
@@ -127,7 +130,7 @@ impl Clipper {
         let first = self.left.ends.len();
         self.rest.clear();
         self.rest.extend_from_slice(piece);
-        for side in &shadow.sides {
+        for side in &shadow.sides[..shadow.count] {
             side.split(&self.rest, thin, &mut self.inside, &mut self.outside);
             if !self.outside.is_empty() {
                 self.left.push(&self.outside);
@@ -143,20 +146,22 @@ impl Clipper {
     }
 }
 
-/// Does a whole polygon lie on one outer side of a triangle's shadow, as far as signs tell? False for a triangle seen
+/// Does a whole polygon lie on one outer side of a blocker's shadow, as far as signs tell? False for one seen
 /// edge-on. A test without roots or divisions, for the most part of all blockers.
-fn misses(point: DVec3, polygon: &[DVec3], triangle: &[DVec3; 3]) -> bool {
-    let [a, b, c] = triangle.map(|corner| corner - point);
-    let normal = (b - a).cross(c - a);
+fn misses(point: DVec3, polygon: &[DVec3], blocker: &[DVec3]) -> bool {
+    let a = blocker[0] - point;
+    let normal = (blocker[1] - blocker[0]).cross(blocker[2] - blocker[0]);
     let way = normal.dot(a);
     let beyond = |plane: DVec3, least: f64| {
         let side = |q: &DVec3| way * (plane.dot(*q - point) - least);
         polygon.iter().all(|q| side(q) <= 0.0)
     };
-    beyond(normal, way)
-        || [(a, b), (b, c), (c, a)]
-            .iter()
-            .any(|(p, q)| beyond(p.cross(*q), 0.0))
+    beyond(normal, way) || edges(blocker).any(|(p, q)| beyond((p - point).cross(q - point), 0.0))
+}
+
+fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
+    let ahead = polygon.iter().cycle().skip(1);
+    polygon.iter().copied().zip(ahead.copied())
 }
 
 /// Form factor from an element to the visible part of a convex polygon; None when it takes more than `cap` pieces.
@@ -164,7 +169,7 @@ pub fn lambert_visible(
     point: DVec3,
     normal: DVec3,
     polygon: &[DVec3],
-    blockers: &[[DVec3; 3]],
+    blockers: &[impl AsRef<[DVec3]>],
     cap: usize,
 ) -> Option<f64> {
     if blockers.is_empty() {
@@ -240,41 +245,42 @@ impl HalfSpace {
     }
 }
 
-/// Where a triangle's shadow lies.
+/// Corners of a blocker at the most.
+const CORNERS: usize = 4;
+
+/// Where a blocker's shadow lies.
 struct Shadow {
-    /// Beyond the triangle's plane, and inside the three planes through the point and an edge.
-    sides: [HalfSpace; 4],
+    /// Beyond the blocker's plane, and inside the planes through the point and an edge.
+    sides: [HalfSpace; CORNERS + 1],
+    count: usize,
 }
 
 impl Shadow {
-    /// None if the triangle is seen edge-on.
-    fn new(point: DVec3, triangle: &[DVec3; 3], thin: f64) -> Option<Self> {
-        let [a, b, c] = triangle.map(|corner| corner - point);
+    /// None if the blocker is seen edge-on.
+    fn new(point: DVec3, blocker: &[DVec3], thin: f64) -> Option<Self> {
+        let [a, b, c] = [blocker[0], blocker[1], blocker[2]].map(|corner| corner - point);
         let normal = (b - a).cross(c - a).try_normalize()?;
         let distance = normal.dot(a);
         if distance.abs() <= thin {
             return None;
         }
-        // Seen from the point, the triangle runs the one or the other way round.
+        // Seen from the point, the blocker runs the one or the other way round.
         let way = distance.signum();
-        let through = |p: DVec3, q: DVec3| {
-            let normal = -(p.cross(q) * way).try_normalize()?;
-            Some(HalfSpace {
+        let beyond = -normal * way;
+        let mut sides = [HalfSpace {
+            normal: beyond,
+            offset: beyond.dot(blocker[0]),
+        }; CORNERS + 1];
+        for (side, (p, q)) in sides[1..].iter_mut().zip(edges(blocker)) {
+            let normal = -((p - point).cross(q - point) * way).try_normalize()?;
+            *side = HalfSpace {
                 normal,
                 offset: normal.dot(point),
-            })
-        };
-        let beyond = -normal * way;
+            };
+        }
         Some(Self {
-            sides: [
-                HalfSpace {
-                    normal: beyond,
-                    offset: beyond.dot(triangle[0]),
-                },
-                through(a, b)?,
-                through(b, c)?,
-                through(c, a)?,
-            ],
+            sides,
+            count: 1 + blocker.len(),
         })
     }
 }
@@ -398,6 +404,29 @@ mod tests {
             let f = lambert_visible(DVec3::new(2.0, y, 0.0), DVec3::Z, &wall, &screen, 64).unwrap();
             assert!((100.0 * f - exact).abs() < 6e-4, "{f} {exact}");
         }
+    }
+
+    /// A quadrilateral hides what its halves hide, with fewer pieces.
+    #[test]
+    fn a_quadrilateral_hides_what_its_halves_hide() {
+        let mut random = Pcg::new(8);
+        let mut hidden = 0;
+        for _ in 0..400 {
+            let mut point = || DVec3::new(random.f64(), random.f64(), random.f64());
+            let (target, eye, normal) = ([point(), point(), point()], point(), point());
+            let (corner, x, y) = (point(), point() - 0.5, point() - 0.5);
+            let halves = quad(corner, x, y);
+            let whole = [[corner, corner + x, corner + x + y, corner + y]];
+            let [all, apart, together] = [
+                lambert_visible(eye, normal, &target, &[[DVec3::ZERO; 3]; 0], 9),
+                lambert_visible(eye, normal, &target, &halves, 99),
+                lambert_visible(eye, normal, &target, &whole, 99),
+            ]
+            .map(Option::unwrap);
+            assert!((apart - together).abs() < 1e-12, "{apart} {together}");
+            hidden += usize::from(together < all);
+        }
+        assert!(hidden > 40, "{hidden}");
     }
 
     #[test]

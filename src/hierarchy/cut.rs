@@ -410,6 +410,7 @@ impl Mesh {
         while self.first_triangle.len() < old.first_triangle.len() {
             self.first_triangle.push(self.triangles.len() as u32);
         }
+        self.half = self.paired();
         self
     }
 

@@ -35,6 +35,8 @@ pub struct Mesh {
     pub material: Vec<u32>,
     /// Plane of each triangle: equal for triangles in one plane, whichever way they face.
     pub plane: Vec<u32>,
+    /// The other half of the convex quadrilateral that each triangle is part of; [`NONE`](super::NONE) without.
+    pub(super) half: Vec<u32>,
     /// Unit normal of the front of each triangle.
     pub normal: Vec<DVec3>,
     /// Area of each triangle.
@@ -115,6 +117,7 @@ impl Mesh {
             mesh.first_triangle.push(mesh.triangles.len() as u32);
         }
         mesh.plane = plane_ids(&mesh.positions, &mesh.triangles);
+        mesh.half = mesh.paired();
         mesh.part = vec![WHOLE; mesh.triangles.len()];
         mesh
     }
@@ -128,6 +131,7 @@ impl Mesh {
             origin: Vec::new(),
             material: Vec::new(),
             plane: Vec::new(),
+            half: Vec::new(),
             normal: Vec::new(),
             area: Vec::new(),
             faces: Vec::new(),

@@ -2,12 +2,14 @@
 
 mod build;
 mod cut;
+mod halves;
 mod mesh;
 mod spaces;
 mod tree;
 mod validate;
 
 pub use cut::{Cut, cuts};
+pub use halves::Outline;
 pub use mesh::{Face, Mesh};
 pub use spaces::{Spaces, spaces};
 pub(crate) use tree::stratified;

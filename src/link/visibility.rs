@@ -1,7 +1,7 @@
 //! Is the way between two patches clear? Exactly where the shaft between them is empty, by rays elsewhere.
 
 use crate::geometry::{Hit, Patch, RayIndex, Segment, Shaft, ShaftContents, lambert_visible};
-use crate::hierarchy::{Mesh, Node, Sample, Tree};
+use crate::hierarchy::{Mesh, Node, Outline, Sample, Tree};
 use glam::{DVec3, Vec3};
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
@@ -79,16 +79,17 @@ impl Sight<'_> {
         if self.opaque.is_some() {
             return None;
         }
-        let mut corners = [[DVec3::ZERO; 3]; LISTED];
+        let mut blockers = [Outline::default(); LISTED];
         let mut count = 0;
         for &triangle in list {
-            if !planes.contains(&self.mesh.plane[triangle as usize]) {
-                corners[count] =
-                    self.mesh.triangles[triangle as usize].map(|v| self.mesh.positions[v as usize]);
+            if !planes.contains(&self.mesh.plane[triangle as usize])
+                && let Some(outline) = self.mesh.outline(triangle, list)
+            {
+                blockers[count] = outline;
                 count += 1;
             }
         }
-        lambert_visible(point, normal, polygon, &corners[..count], PIECES)
+        lambert_visible(point, normal, polygon, &blockers[..count], PIECES)
     }
 
     /// What may block between a point and a polygon.

@@ -20,6 +20,7 @@ const SHARE: f64 = 1.5;
 /// .5 of it in Cornell boxes, .25 to .85 elsewhere.
 const SHARE_OF_FIRST: f64 = 0.75;
 /// The same where points look for themselves. Their rays are new every round: errors of two rounds have little in common.
+/// Measured with 600 points in two furnished rooms: 0.94 and 1.01.
 const SHARE_OF_RAYS: f64 = 0.95;
 
 /// Watched points and what was seen there last.

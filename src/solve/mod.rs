@@ -505,7 +505,7 @@ impl Bake {
     }
 
     /// Runs `f` with what blocks light in this room.
-    fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
+    pub(crate) fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
         let opaque = |triangle: u32, u: f32, v: f32| {
             !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v])
         };
