@@ -23,7 +23,7 @@ const NEAR: f64 = 1.5;
 const WITHIN: f64 = 1.0 / 16.0;
 /// Steps of a path at the most.
 const STEPS: u64 = 8;
-/// Rays that meet something close by of which that is found out at the most.
+/// Of the rays that meet something close by so many are followed at the most.
 const FOLLOWED: usize = 64;
 /// Where direct light varies by less than this share over a leaf, any point of it has the mean.
 const EVEN: f32 = 0.05;
@@ -125,7 +125,7 @@ impl Gatherer<'_> {
     }
 
     /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
-    /// the probability that it brings the light: without bias.
+    /// the probability that it brings the light: without bias, but for the limit [`NEAREST`].
     fn one_lamp(&self, to: &Receiver, [mut u, v]: [f64; 2], memory: &mut Memory) -> f64 {
         let mut sum = 0.0;
         if let Some((bright, end)) = self.one_punctual(to, v) {

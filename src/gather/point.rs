@@ -168,19 +168,22 @@ impl Gatherer<'_> {
         out.direct
     }
 
+    /// Links of the receiver's leaf and of what holds it; without a leaf, the whole room.
+    pub(super) fn links(&self, to: &Receiver) -> impl Iterator<Item = Linked> {
+        let parent = |&id: &u32| Some(self.tree.node(id).parent).filter(|&p| p != NONE);
+        let room = to.leaf.is_none() && !self.tree.nodes.is_empty();
+        std::iter::successors(to.leaf, parent)
+            .flat_map(|id| self.light.neighbours.row(id).iter().copied())
+            .chain(room.then_some((0, Way::Crowded, 0.5)))
+    }
+
     /// Gathers what patches emit.
     pub(super) fn lamps_of(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
         memory.stack.clear();
-        let mut above = to.leaf;
-        if above.is_none() && !self.tree.nodes.is_empty() {
-            memory.stack.push((0, Way::Crowded, 0.5));
-        }
-        while let Some(id) = above {
-            let row = self.light.neighbours.row(id).iter();
-            memory.stack.extend(row.filter(|&&(other, ..)| lit(other)));
-            above = Some(self.tree.node(id).parent).filter(|&p| p != NONE);
-        }
+        memory
+            .stack
+            .extend(self.links(to).filter(|&(id, ..)| lit(id)));
         while let Some(linked) = memory.stack.pop() {
             if lit(linked.0) {
                 self.visit(to, linked, Of::Emitted, memory, out);
@@ -198,19 +201,7 @@ impl Gatherer<'_> {
             return out;
         }
         memory.stack.clear();
-        match to.leaf {
-            Some(leaf) => {
-                let mut id = leaf;
-                while id != NONE {
-                    for &(other, way, v) in self.light.neighbours.row(id) {
-                        memory.stack.push((other, way, v));
-                    }
-                    id = self.tree.node(id).parent;
-                }
-            }
-            None if !self.tree.nodes.is_empty() => memory.stack.push((0, Way::Crowded, 0.5)),
-            None => {}
-        }
+        memory.stack.extend(self.links(to));
         while let Some(linked) = memory.stack.pop() {
             self.visit(to, linked, Of::All, memory, &mut out);
         }

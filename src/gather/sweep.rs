@@ -38,14 +38,7 @@ impl Gatherer<'_> {
 
     /// What patches reflect that the way is clear to, or that are brighter than `most`, by links.
     fn bright(&self, to: &Receiver, most: f64, memory: &mut Memory, out: &mut Gathered) {
-        let mut above = to.leaf;
-        if above.is_none() && !self.tree.nodes.is_empty() {
-            memory.open.push((0, Way::Crowded, 0.5));
-        }
-        while let Some(id) = above {
-            memory.open.extend(self.light.neighbours.row(id));
-            above = Some(self.tree.node(id).parent).filter(|&p| p != NONE);
-        }
+        memory.open.extend(self.links(to));
         while let Some((id, way, v)) = memory.open.pop() {
             let k = id as usize;
             let brightest = f64::from(self.light.brightest[k]);

@@ -5,7 +5,7 @@
 //! blocker does so to every piece that is left (convex decomposition, as in Nishita and Nakamae 1983 for shadows of area sources).
 //! Lengths in the caller's unit; nothing here knows of light.
 
-use super::polygon::lambert_polygon;
+use super::polygon::{edges, lambert_polygon};
 use glam::DVec3;
 use std::cell::RefCell;
 
@@ -157,11 +157,6 @@ fn misses(point: DVec3, polygon: &[DVec3], blocker: &[DVec3]) -> bool {
         polygon.iter().all(|q| side(q) <= 0.0)
     };
     beyond(normal, way) || edges(blocker).any(|(p, q)| beyond((p - point).cross(q - point), 0.0))
-}
-
-fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
-    let ahead = polygon.iter().cycle().skip(1);
-    polygon.iter().copied().zip(ahead.copied())
 }
 
 /// Form factor from an element to the visible part of a convex polygon; None when it takes more than `cap` pieces.

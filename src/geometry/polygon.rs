@@ -59,6 +59,12 @@ pub fn lambert_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     (sum.abs() / std::f64::consts::TAU).min(1.0)
 }
 
+/// The edges of a closed outline, from its first corner on.
+pub(crate) fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
+    let ahead = polygon.iter().cycle().skip(1);
+    polygon.iter().copied().zip(ahead.copied())
+}
+
 /// Calls with every edge of a closed outline.
 fn for_edges(polygon: &[DVec3], mut call: impl FnMut(DVec3, DVec3)) {
     let mut before = polygon[polygon.len() - 1];

@@ -5,6 +5,7 @@
 //! corner, where its integrand is singular. For the others Gauss and Legendre's rule does it. The integrand
 //! is a logarithm where the area form has `1/r^2`: two triangles that share an edge are no hard case.
 
+use crate::geometry::polygon::edges;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -40,10 +41,6 @@ pub fn exchange(one: &[DVec3; 3], two: &[DVec3; 3]) -> f64 {
     }
     // Edges of facing triangles run against each other; rounding may leave a trace below zero.
     (sum / TAU).max(0.0)
-}
-
-fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
-    (0..polygon.len()).map(|k| (polygon[k], polygon[(k + 1) % polygon.len()]))
 }
 
 /// Mean of `ln |x - y|` over x on pq and y on rs.

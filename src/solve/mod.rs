@@ -633,13 +633,7 @@ impl Bake {
             _ => self.place_emission::<64>(),
         }
         self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
-        let white = self.light.white;
-        let weights: Vec<f64> = self
-            .lanes
-            .xyz()
-            .iter()
-            .map(|&xyz| light::brightness(xyz, white))
-            .collect();
+        let weights = self.bright_weights();
         let mut tree = std::mem::take(&mut self.tree);
         let mut direct = std::mem::take(&mut self.direct);
         self.with_sight(|bake, sight| {
@@ -872,13 +866,17 @@ impl Bake {
         (convergence, flux)
     }
 
+    /// What turns a row into brightness, share of the white's.
+    fn bright_weights(&self) -> Vec<f64> {
+        let white = self.light.white;
+        let xyz = self.lanes.xyz().iter();
+        xyz.map(|&xyz| light::brightness(xyz, white)).collect()
+    }
+
     /// Notes how bright what arrives on leaves is.
     pub(super) fn light_arrives(&mut self) {
         let light = &self.light;
-        let weights = self.lanes.xyz().iter();
-        let weights: Vec<f64> = weights
-            .map(|&xyz| light::brightness(xyz, light.white))
-            .collect();
+        let weights = self.bright_weights();
         let bright = |row: &[f32]| {
             let sum: f64 = row
                 .iter()
