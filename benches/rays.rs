@@ -675,6 +675,23 @@ fn lambert_single(bencher: Bencher<'_, '_>) {
     });
 }
 
+/// The same, the edges side by side.
+#[divan::bench]
+fn lambert_edges(bencher: Bencher<'_, '_>) {
+    let pairs = &CORNELL.patches;
+    bencher.counter(ItemsCount::new(8 * pairs.len())).bench(|| {
+        let mut sum = 0.0;
+        for [a, b] in black_box(pairs) {
+            let normal = normal(a);
+            for k in 0..8 {
+                let point = a[0].lerp(a[1], f64::from(k) / 8.0);
+                sum += lanes::lambert_edges_x8(point, normal, b);
+            }
+        }
+        sum
+    });
+}
+
 /// The same, eight at a time.
 #[divan::bench]
 fn lambert_x8(bencher: Bencher<'_, '_>) {
@@ -683,7 +700,7 @@ fn lambert_x8(bencher: Bencher<'_, '_>) {
         let mut sum = 0.0;
         for [a, b] in black_box(pairs) {
             let points: [DVec3; 8] = std::array::from_fn(|k| a[0].lerp(a[1], k as f64 / 8.0));
-            sum += lanes::lambert_points_x8(lanes::lanes_of(&points), normal(a), b).reduce_add();
+            sum += lanes::lambert_points_x8(lanes::lanes_of(points), normal(a), b).reduce_add();
         }
         sum
     });

@@ -431,7 +431,10 @@ fn the_command_relights() {
     assert_eq!(code, Some(0), "{said}");
     let line: serde_json::Value = serde_json::from_slice(&out).unwrap();
     assert_eq!(line["changed"], false);
-    assert_eq!(read("same.glb").len(), baked.len());
+    // The same meshes; only digits of numbers in the text may be fewer or more.
+    let binary =
+        |glb: &[u8]| glb.len() - u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    assert_eq!(binary(&read("same.glb")), binary(&baked));
     // A lamp of half the power: half the light, and an exposure that makes up for it.
     let spectra = String::from_utf8(read("cornell.spectra.json")).unwrap();
     let mut spectra: serde_json::Value = serde_json::from_str(&spectra).unwrap();

@@ -2,17 +2,21 @@
 
 mod bake;
 mod below;
+mod descent;
 pub mod hemisphere;
 mod nearby;
+mod patches;
 pub mod point;
 mod refined;
 mod relit;
+mod shadows;
 mod slope;
 mod spectra;
 mod sweep;
 pub(crate) mod trace;
 
 pub use bake::{Baked, MOSTLY, Probed};
+pub use descent::Descent;
 pub use nearby::Arrival;
 pub(crate) use relit::Kept;
 

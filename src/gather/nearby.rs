@@ -18,7 +18,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 /// What is nearer than this many times the square root of a leaf's area is close by.
-const NEAR: f64 = 1.5;
+pub(super) const NEAR: f64 = 1.5;
 /// A point of whose rays more than this share meet black backs lies within something: then all is close by.
 const WITHIN: f64 = 1.0 / 16.0;
 /// Steps of a path at the most.
@@ -44,7 +44,7 @@ pub struct Arrival {
 impl Gatherer<'_> {
     /// Is a hit so near that its leaf says little about it? `backs`: share of the rays that met black backs.
     pub(super) fn is_near(&self, leaf: u32, hit: &Hit, backs: f64) -> bool {
-        backs > WITHIN || f64::from(hit.t) < NEAR * self.tree.node(leaf).area.sqrt()
+        backs > WITHIN || hit.t < self.light.descent.near(leaf)
     }
 
     /// What the points that rays met close by reflect, together, as a share of what their leaves do.

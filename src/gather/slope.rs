@@ -6,7 +6,8 @@
 //! `W_j` the integral of w_j over the form factor's kernel, found by quartering the child while that matters.
 
 use super::point::{Gathered, Gatherer, Receiver};
-use crate::geometry::lambert_polygon;
+use crate::geometry::lambert_triangles_x8;
+use crate::geometry::lanes::lanes_of;
 use glam::DVec3;
 
 /// A leaf is quartered this often at the most.
@@ -90,13 +91,16 @@ fn moment(
     let half = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
     let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
     let (wab, wbc, wca) = (half(w[0], w[1]), half(w[1], w[2]), half(w[2], w[0]));
-    for (corners, w) in [
-        ([a, ab, ca], [w[0], wab, wca]),
-        ([ab, b, bc], [wab, w[1], wbc]),
-        ([ca, bc, c], [wca, wbc, w[2]]),
-        ([bc, ca, ab], [wbc, wca, wab]),
-    ] {
-        let part = lambert_polygon(to.point, to.normal, &corners);
+    let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]];
+    let weights = [
+        [w[0], wab, wca],
+        [wab, w[1], wbc],
+        [wca, wbc, w[2]],
+        [wbc, wca, wab],
+    ];
+    let corners = [0, 1, 2].map(|k| lanes_of(quarters.map(|q| q[k])));
+    let parts = lambert_triangles_x8(to.point, to.normal, corners).to_array();
+    for ((corners, w), part) in quarters.into_iter().zip(weights).zip(parts) {
         if part > 0.0 {
             moment(to, corners, w, part, limit, depth + 1, out);
         }

@@ -42,6 +42,10 @@ impl Gatherer<'_> {
         while let Some((id, way, v)) = memory.open.pop() {
             let k = id as usize;
             let brightest = f64::from(self.light.brightest[k]);
+            // Most are neither, and their patches need not be looked at.
+            if brightest <= most && way != Way::Clear {
+                continue;
+            }
             let node = self.tree.node(id);
             let plain = node.faces.1 <= POLYGONS;
             let exact = plain
@@ -57,14 +61,13 @@ impl Gatherer<'_> {
             let whole = plain && (exact || f64::from(self.light.bright_reflected[k]) > most);
             if whole || !self.has_parts(node) {
                 memory.taken[k] = memory.epoch;
+                memory.any_taken = true;
                 memory.stack.push((id, way, v));
-                while let Some(linked) = memory.stack.pop() {
-                    self.visit(to, linked, Of::Reflected, memory, out);
-                }
             } else {
                 memory.open.extend(node.child_range().map(|c| (c, way, v)));
             }
         }
+        self.patches(to, Of::Reflected, memory, out);
     }
 
     /// What all other patches reflect, by rays over the hemisphere.
@@ -91,11 +94,8 @@ impl Gatherer<'_> {
         near.clear();
         for &(leaf, hit) in &met {
             // Rays that end on what was gathered as a patch bring nothing more.
-            let mut id = leaf;
-            while id != NONE && memory.taken[id as usize] != memory.epoch {
-                id = self.tree.node(id).parent;
-            }
-            if id != NONE {
+            let taken = |id: u32| memory.taken[id as usize] == memory.epoch;
+            if memory.any_taken && self.light.descent.upwards(leaf).any(taken) {
                 continue;
             }
             out.seen += f64::from(share);
@@ -156,10 +156,6 @@ impl Gatherer<'_> {
         } else {
             [first, u, v]
         };
-        let mut leaf = self.tree.leaf_at(entry, weights);
-        while leaf as usize >= self.light.bright_emitted.len() {
-            leaf = self.tree.node(leaf).parent;
-        }
-        Some(leaf)
+        Some(self.light.descent.leaf_at(self.tree, entry, weights))
     }
 }

@@ -5,9 +5,9 @@
 //! blocker does so to every piece that is left (convex decomposition, as in Nishita and Nakamae 1983 for shadows of area sources).
 //! Lengths in the caller's unit; nothing here knows of light.
 
-use super::polygon::{edges, lambert_polygon};
+use super::lanes::lambert_edges_x8;
+use super::polygon::edges;
 use glam::DVec3;
-use std::cell::RefCell;
 
 /// Pieces thinner than this are nothing, of the distance from the point to the farthest corner.
 const THIN: f64 = 1e-12;
@@ -34,9 +34,26 @@ pub fn visible_part(
     cap: usize,
 ) -> Option<Vec<Vec<DVec3>>> {
     let mut clipper = Clipper::default();
-    clipper
-        .clip(point, polygon, blockers, cap)
-        .then(|| clipper.pieces.iter().map(<[DVec3]>::to_vec).collect())
+    clipper.begin(point, polygon);
+    let pieces = clipper.cut_all(point, blockers, cap)?.pieces.iter();
+    let back = |piece: &[DVec3]| piece.iter().map(|&q| q + point).collect();
+    Some(pieces.map(back).collect())
+}
+
+/// Form factor from an element to the visible part of a convex polygon; None when it takes more than `cap` pieces. Panics as
+/// [`visible_part`].
+pub fn lambert_visible(
+    point: DVec3,
+    normal: DVec3,
+    polygon: &[DVec3],
+    blockers: &[impl AsRef<[DVec3]>],
+    cap: usize,
+) -> Option<f64> {
+    let mut clipper = Clipper::default();
+    clipper.begin(point, polygon);
+    let whole = lambert_edges_x8(point, normal, polygon);
+    let left = clipper.cut_all(point, blockers, cap)?;
+    Some(left.factor(normal, whole))
 }
 
 /// Convex polygons in one stretch of memory.
@@ -71,9 +88,13 @@ impl Pieces {
     }
 }
 
-/// Reused memory: what is left of a polygon, and room to cut.
+/// What is left of a polygon while one shadow after the other is taken away, with the memory for that. Coordinates are from
+/// the point that looks.
 #[derive(Debug, Default)]
-struct Clipper {
+pub struct Clipper {
+    whole: Vec<DVec3>,
+    thin: f64,
+    touched: bool,
     pieces: Pieces,
     left: Pieces,
     rest: Vec<DVec3>,
@@ -81,63 +102,80 @@ struct Clipper {
     outside: Vec<DVec3>,
 }
 
-thread_local! {
-    /// The clipper of this thread: cutting takes less time than asking for memory.
-    static CLIPPER: RefCell<Clipper> = RefCell::default();
-}
-
 impl Clipper {
-    /// Leaves in `pieces` what the point sees of the polygon. False when that would take more than `cap` pieces.
-    fn clip(
+    /// Begins with a whole convex polygon, seen from a point.
+    pub fn begin(&mut self, point: DVec3, polygon: &[DVec3]) {
+        self.whole.clear();
+        self.whole.extend(polygon.iter().map(|&q| q - point));
+        let reach = self.whole.iter().map(|q| q.length_squared());
+        self.thin = THIN * reach.fold(0.0, f64::max).sqrt();
+        self.touched = false;
+        self.pieces.clear();
+        self.pieces.push(&self.whole);
+    }
+
+    /// Takes a shadow away, cast from the point that looks. False when more than `cap` pieces are left.
+    pub fn cut(&mut self, shadow: &Shadow, cap: usize) -> bool {
+        if shadow.is_edge_on(self.thin) || shadow.misses(&self.whole, 0.0) {
+            return true;
+        }
+        self.touched = true;
+        let pieces = std::mem::take(&mut self.pieces);
+        self.left.clear();
+        let fits = pieces.iter().all(|piece| {
+            self.subtract(shadow, piece);
+            self.left.ends.len() <= cap
+        });
+        self.pieces = std::mem::replace(&mut self.left, pieces);
+        fits
+    }
+
+    /// Takes the shadows of all blockers away; none when more than `cap` pieces are left.
+    fn cut_all(
         &mut self,
         point: DVec3,
-        polygon: &[DVec3],
         blockers: &[impl AsRef<[DVec3]>],
         cap: usize,
-    ) -> bool {
-        let reach = polygon
-            .iter()
-            .map(|q| q.distance(point))
-            .fold(0.0, f64::max);
-        let thin = THIN * reach;
-        self.pieces.clear();
-        self.pieces.push(polygon);
-        for blocker in blockers.iter().map(AsRef::as_ref) {
-            if misses(point, polygon, blocker) {
-                continue;
-            }
-            let Some(shadow) = Shadow::new(point, blocker, thin) else {
-                continue;
-            };
-            let pieces = std::mem::take(&mut self.pieces);
-            self.left.clear();
-            for piece in pieces.iter() {
-                self.subtract(&shadow, piece, thin);
-                if self.left.ends.len() > cap {
-                    return false;
-                }
-            }
-            self.pieces = std::mem::replace(&mut self.left, pieces);
-            if self.pieces.ends.is_empty() {
-                break;
-            }
+    ) -> Option<&Self> {
+        let mut shadows = blockers.iter().map(|b| Shadow::new(point, b.as_ref()));
+        shadows.all(|shadow| self.cut(&shadow, cap)).then_some(self)
+    }
+
+    /// Form factor of what is left; `whole` is that of the whole polygon.
+    pub fn factor(&self, normal: DVec3, whole: f64) -> f64 {
+        if !self.touched {
+            return whole;
         }
-        true
+        let factor = |piece| lambert_edges_x8(DVec3::ZERO, normal, piece);
+        let sum: f64 = self.pieces.iter().map(factor).sum();
+        if sum < SLIVER * whole || (sum < ROUNDING[0] && sum < ROUNDING[1] * whole) {
+            0.0
+        } else {
+            sum.min(1.0)
+        }
     }
 
     /// Pushes to `left` what is left of a piece.
-    fn subtract(&mut self, shadow: &Shadow, piece: &[DVec3], thin: f64) {
+    fn subtract(&mut self, shadow: &Shadow, piece: &[DVec3]) {
+        // Not touched by the shadow: better whole.
+        if shadow.misses(piece, self.thin) {
+            self.left.push(piece);
+            return;
+        }
         let first = self.left.ends.len();
         self.rest.clear();
         self.rest.extend_from_slice(piece);
         for side in &shadow.sides[..shadow.count] {
+            let thin = self.thin * side.normal.length();
+            if self.rest.iter().all(|&q| side.outside(q) <= thin) {
+                continue;
+            }
             side.split(&self.rest, thin, &mut self.inside, &mut self.outside);
             if !self.outside.is_empty() {
                 self.left.push(&self.outside);
             }
             std::mem::swap(&mut self.rest, &mut self.inside);
             if self.rest.is_empty() {
-                // Not touched by the shadow: better whole.
                 self.left.truncate(first);
                 self.left.push(piece);
                 return;
@@ -146,57 +184,15 @@ impl Clipper {
     }
 }
 
-/// Does a whole polygon lie on one outer side of a blocker's shadow, as far as signs tell? False for one seen
-/// edge-on. A test without roots or divisions, for the most part of all blockers.
-fn misses(point: DVec3, polygon: &[DVec3], blocker: &[DVec3]) -> bool {
-    let a = blocker[0] - point;
-    let normal = (blocker[1] - blocker[0]).cross(blocker[2] - blocker[0]);
-    let way = normal.dot(a);
-    let beyond = |plane: DVec3, least: f64| {
-        let side = |q: &DVec3| way * (plane.dot(*q - point) - least);
-        polygon.iter().all(|q| side(q) <= 0.0)
-    };
-    beyond(normal, way) || edges(blocker).any(|(p, q)| beyond((p - point).cross(q - point), 0.0))
-}
-
-/// Form factor from an element to the visible part of a convex polygon; None when it takes more than `cap` pieces.
-pub fn lambert_visible(
-    point: DVec3,
-    normal: DVec3,
-    polygon: &[DVec3],
-    blockers: &[impl AsRef<[DVec3]>],
-    cap: usize,
-) -> Option<f64> {
-    if blockers.is_empty() {
-        return Some(lambert_polygon(point, normal, polygon));
-    }
-    let sum = CLIPPER.with_borrow_mut(|clipper| {
-        clipper.clip(point, polygon, blockers, cap).then(|| {
-            let pieces = clipper.pieces.iter();
-            pieces
-                .map(|piece| lambert_polygon(point, normal, piece))
-                .sum::<f64>()
-        })
-    })?;
-    // Comparing costs another factor, and slivers are never large.
-    if sum < SLIVER {
-        let whole = lambert_polygon(point, normal, polygon);
-        if sum < SLIVER * whole || (sum < ROUNDING[0] && sum < ROUNDING[1] * whole) {
-            return Some(0.0);
-        }
-    }
-    Some(sum.min(1.0))
-}
-
 /// A half-space: inside is `normal . x <= offset`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HalfSpace {
     pub(crate) normal: DVec3,
     pub(crate) offset: f64,
 }
 
 impl HalfSpace {
-    /// Signed distance, positive outside.
+    /// Signed distance in lengths of the normal, positive outside.
     pub(crate) fn outside(&self, x: DVec3) -> f64 {
         self.normal.dot(x) - self.offset
     }
@@ -243,39 +239,56 @@ impl HalfSpace {
 /// Corners of a blocker at the most.
 const CORNERS: usize = 4;
 
-/// Where a blocker's shadow lies.
-struct Shadow {
-    /// Beyond the blocker's plane, and inside the planes through the point and an edge.
+/// Where the shadow of a blocker lies, seen from a point that is the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shadow {
+    /// Beyond the blocker's plane, and inside the planes through the point and an edge; normals of any length.
     sides: [HalfSpace; CORNERS + 1],
     count: usize,
 }
 
 impl Shadow {
-    /// None if the blocker is seen edge-on.
-    fn new(point: DVec3, blocker: &[DVec3], thin: f64) -> Option<Self> {
+    /// The shadow of a triangle or convex quadrilateral.
+    ///
+    /// # Panics
+    /// On other than three or four corners.
+    pub fn new(point: DVec3, blocker: &[DVec3]) -> Self {
         let [a, b, c] = [blocker[0], blocker[1], blocker[2]].map(|corner| corner - point);
-        let normal = (b - a).cross(c - a).try_normalize()?;
-        let distance = normal.dot(a);
-        if distance.abs() <= thin {
-            return None;
-        }
+        let normal = (b - a).cross(c - a);
+        let way = normal.dot(a);
         // Seen from the point, the blocker runs the one or the other way round.
-        let way = distance.signum();
-        let beyond = -normal * way;
+        let inward = -way.signum();
         let mut sides = [HalfSpace {
-            normal: beyond,
-            offset: beyond.dot(blocker[0]),
+            normal: normal * inward,
+            offset: -way.abs(),
         }; CORNERS + 1];
         for (side, (p, q)) in sides[1..].iter_mut().zip(edges(blocker)) {
-            let normal = -((p - point).cross(q - point) * way).try_normalize()?;
             *side = HalfSpace {
-                normal,
-                offset: normal.dot(point),
+                normal: (p - point).cross(q - point) * inward,
+                offset: 0.0,
             };
         }
-        Some(Self {
+        Self {
             sides,
             count: 1 + blocker.len(),
+        }
+    }
+
+    /// Does the point lie in the blocker's plane?
+    fn is_edge_on(&self, thin: f64) -> bool {
+        let plane = &self.sides[0];
+        plane.offset * plane.offset <= thin * thin * plane.normal.length_squared()
+    }
+
+    /// Does all of a polygon lie on one outer side, or not deeper than `thin` within it?
+    fn misses(&self, polygon: &[DVec3], thin: f64) -> bool {
+        self.sides[..self.count].iter().any(|side| {
+            let least = if thin > 0.0 {
+                -thin * side.normal.length()
+            } else {
+                0.0
+            };
+            polygon.iter().all(|&q| side.outside(q) >= least)
         })
     }
 }

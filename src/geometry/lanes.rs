@@ -3,7 +3,7 @@
 //! The triangle is cut at the horizon without branches: each edge keeps the part above it, and a fourth edge runs along the horizon
 //! from where the outline goes down to where it comes up.
 
-use super::polygon::IN_PLANE;
+use super::polygon::{IN_PLANE, lambert_polygon};
 use glam::DVec3;
 use wide::f64x8;
 
@@ -20,19 +20,21 @@ pub fn all_lanes(point: DVec3) -> Points8 {
     ]
 }
 
-/// Up to eight points; free lanes repeat the first.
-///
-/// # Panics
-/// On an empty slice.
+/// Up to eight points, the first of any more; free lanes repeat the first.
 #[inline]
-pub fn lanes_of(points: &[DVec3]) -> Points8 {
-    let (mut x, mut y, mut z) = ([points[0].x; 8], [points[0].y; 8], [points[0].z; 8]);
-    for (lane, p) in points.iter().take(8).enumerate() {
-        x[lane] = p.x;
-        y[lane] = p.y;
-        z[lane] = p.z;
+pub fn lanes_of(points: impl IntoIterator<Item = DVec3>) -> Points8 {
+    let mut lanes = [[0.0; 8]; 3];
+    let mut count = 0;
+    for p in points.into_iter().take(8) {
+        for (lane, x) in lanes.iter_mut().zip(p.to_array()) {
+            if count == 0 {
+                lane.fill(x);
+            }
+            lane[count] = x;
+        }
+        count += 1;
     }
-    [f64x8::new(x), f64x8::new(y), f64x8::new(z)]
+    lanes.map(f64x8::new)
 }
 
 /// Form factors from eight elements, each to its own triangle; as [`super::lambert_polygon`].
@@ -103,30 +105,86 @@ pub fn lambert_triangles_x8(point: DVec3, normal: DVec3, triangles: [Points8; 3]
     lambert_x8(all_lanes(point), all_lanes(normal), triangles)
 }
 
+/// Form factor from one point to one polygon, its edges side by side; as [`super::lambert_polygon`], which takes the polygons of
+/// more than seven corners.
+pub fn lambert_edges_x8(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
+    // The horizon may take a lane.
+    if !(3..8).contains(&polygon.len()) {
+        return lambert_polygon(point, normal, polygon);
+    }
+    // The outline above the horizon.
+    let mut corners = [DVec3::ZERO; 8];
+    let mut count = 0;
+    let mut before = polygon[polygon.len() - 1] - point;
+    let mut below = before.dot(normal);
+    for &corner in polygon {
+        let corner = corner - point;
+        let height = corner.dot(normal);
+        if count + 2 > corners.len() {
+            // One that is not convex may cross the horizon more often than twice.
+            return lambert_polygon(point, normal, polygon);
+        }
+        if (below < 0.0) != (height < 0.0) {
+            corners[count] = before + (corner - before) * (below / (below - height));
+            count += 1;
+        }
+        if height >= 0.0 {
+            corners[count] = corner;
+            count += 1;
+        }
+        (before, below) = (corner, height);
+    }
+    // Each edge a lane; free lanes run from the point to itself.
+    let (mut from, mut to) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
+    for lane in 0..count {
+        let ahead = if lane + 1 < count { lane + 1 } else { 0 };
+        for axis in 0..3 {
+            from[axis][lane] = corners[lane][axis];
+            to[axis][lane] = corners[ahead][axis];
+        }
+    }
+    let (a, b) = (from.map(f64x8::new), to.map(f64x8::new));
+    let crosses = cross(a, b);
+    let squares = dot(a, a);
+    let area = DVec3::from_array(crosses.map(f64x8::reduce_add));
+    let reach = squares.to_array().into_iter().fold(0.0, f64::max);
+    if area.dot(corners[0]).powi(2) <= IN_PLANE * IN_PLANE * area.length_squared() * reach {
+        return 0.0;
+    }
+    let size = (squares * dot(b, b)).sqrt();
+    let sum = edge(a, b, crosses, size, all_lanes(normal)).reduce_add();
+    (sum.abs() / std::f64::consts::TAU).min(1.0)
+}
+
 #[inline(always)]
 fn free_edge(a: Points8, b: Points8, normal: Points8) -> f64x8 {
     edge(a, b, cross(a, b), length(a) * length(b), normal)
 }
 
 /// As `edge` in [`super::polygon`]; 0 where the corners lie in one line. `size` = |a||b|.
-///
-/// gamma/|c| with c = a x b comes without a root: with x = a.b and w = tan^2(gamma/2) = (|a||b| - x)/(|a||b| + x), gamma/|c| = 2 P(w)/(|a||b| + x),
-/// P(w) = atan(sqrt w)/sqrt w. Beyond a right angle, the same for pi - gamma.
 #[inline(always)]
 fn edge(a: Points8, b: Points8, c: Points8, size: f64x8, normal: Points8) -> f64x8 {
-    let zero = f64x8::ZERO;
-    let x = dot(a, b);
+    let ratio = angle_over_sine(dot(a, b), size, || length(c));
+    // A point on the edge, or an edge of no length: infinite or NaN above, no angle here.
+    (dot(c, normal) * ratio) & dot(c, c).simd_gt(f64x8::ZERO)
+}
+
+/// The angle gamma between a and b over |c|, c = a x b, from x = a.b and `size` = |a||b|; without meaning where c is nil.
+///
+/// It comes without a root: with w = tan^2(gamma/2) = (|a||b| - x)/(|a||b| + x), gamma/|c| = 2 P(w)/(|a||b| + x),
+/// P(w) = atan(sqrt w)/sqrt w. Beyond a right angle, the same for pi - gamma, and then |c| itself is asked for.
+#[inline(always)]
+pub(crate) fn angle_over_sine(x: f64x8, size: f64x8, sine: impl FnOnce() -> f64x8) -> f64x8 {
     let folded = x.abs();
     let over = f64x8::ONE / (size + folded);
-    let w = (size - folded).fast_max(zero) * over;
-    let mut ratio = series(w) * (over + over);
-    let wide = x.simd_lt(zero);
+    let w = (size - folded).fast_max(f64x8::ZERO) * over;
+    let ratio = series(w) * (over + over);
+    let wide = x.simd_lt(f64x8::ZERO);
     if wide.any() {
-        let supplement = f64x8::PI / length(c) - ratio;
-        ratio = wide.select(supplement, ratio);
+        wide.select(f64x8::PI / sine() - ratio, ratio)
+    } else {
+        ratio
     }
-    // A point on the edge, or an edge of no length: infinite or NaN above, no angle here.
-    (dot(c, normal) * ratio) & dot(c, c).simd_gt(zero)
 }
 
 /// atan(sqrt w)/sqrt w for w in [0,1]: interpolated at the Chebyshev points of degree 18, relative error 3e-16.
@@ -185,12 +243,12 @@ fn add(a: Points8, b: Points8) -> Points8 {
 }
 
 #[inline(always)]
-fn sub(a: Points8, b: Points8) -> Points8 {
+pub(crate) fn sub(a: Points8, b: Points8) -> Points8 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-fn dot(a: Points8, b: Points8) -> f64x8 {
+pub(crate) fn dot(a: Points8, b: Points8) -> f64x8 {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
@@ -225,19 +283,46 @@ mod tests {
                 .collect();
             let eye = point(1.0);
             let normal = sphere_direction([random.f64(), random.f64()]);
-            let corners =
-                [0, 1, 2].map(|k| lanes_of(&triangles.iter().map(|t| t[k]).collect::<Vec<_>>()));
+            let corners = [0, 1, 2].map(|k| lanes_of(triangles.iter().map(|t| t[k])));
             let fast = lambert_triangles_x8(eye, normal, corners).to_array();
             for (triangle, fast) in triangles.iter().zip(fast) {
                 let plain = lambert_polygon(eye, normal, triangle);
+                let edges = lambert_edges_x8(eye, normal, triangle);
                 // The sum of three edges loses distance/size of its digits.
                 let lost = 1e-15 / scale.min(1.0);
-                assert!(
-                    (fast - plain).abs() <= 1e-13 * plain + lost,
-                    "{fast} {plain} at scale {scale}"
-                );
+                for fast in [fast, edges] {
+                    assert!(
+                        (fast - plain).abs() <= 1e-13 * plain + lost,
+                        "{fast} {plain} at scale {scale}"
+                    );
+                }
             }
         }
+    }
+
+    #[test]
+    fn edges_of_polygons_of_any_kind() {
+        let mut random = Pcg::new(12);
+        for round in 0..4_000 {
+            // Stars in a plane: most are not convex.
+            let count = round % 12;
+            let [x, y] = [0; 2].map(|_| sphere_direction([random.f64(), random.f64()]));
+            let at = sphere_direction([random.f64(), random.f64()]) * (2.0 * random.f64());
+            let polygon: Vec<DVec3> = (0..count)
+                .map(|k| {
+                    let (sine, cosine) =
+                        (f64::from(k) / f64::from(count.max(1)) * std::f64::consts::TAU).sin_cos();
+                    at + (x * cosine + y * sine) * (0.1 + random.f64())
+                })
+                .collect();
+            let normal = sphere_direction([random.f64(), random.f64()]);
+            let fast = lambert_edges_x8(DVec3::ZERO, normal, &polygon);
+            let plain = lambert_polygon(DVec3::ZERO, normal, &polygon);
+            assert!((fast - plain).abs() <= 1e-13, "{fast} {plain} {polygon:?}");
+        }
+        let inside = [DVec3::X, DVec3::Y, -DVec3::X - DVec3::Y];
+        assert_eq!(lambert_edges_x8(DVec3::ZERO, DVec3::Z, &inside), 0.0);
+        assert_eq!(lambert_edges_x8(DVec3::ZERO, DVec3::Z, &[DVec3::Z; 3]), 0.0);
     }
 
     #[test]
@@ -253,7 +338,7 @@ mod tests {
             DVec3::new(0.2, 0.2, 1.0),
             DVec3::new(0.2, 0.2, 0.999),
         ];
-        let f = lambert_points_x8(lanes_of(&points), DVec3::Z, &triangle).to_array();
+        let f = lambert_points_x8(lanes_of(points), DVec3::Z, &triangle).to_array();
         assert!((f[0] - 0.0962250448649376).abs() < 1e-15);
         assert_eq!(&f[1..3], [0.0, 0.0], "in the plane");
         assert!(f[3] > 0.99 && f[3] < 1.0);

@@ -57,9 +57,9 @@ mod triangle;
 mod walk;
 
 pub use blockers::ShaftContents;
-pub use clip::{lambert_visible, visible_part};
+pub use clip::{Clipper, Shadow, lambert_visible, visible_part};
 pub use index::{Hit, RayIndex};
-pub use lanes::{lambert_points_x8, lambert_triangles_x8};
+pub use lanes::{lambert_edges_x8, lambert_points_x8, lambert_triangles_x8};
 pub use nearest::nearest_point;
 pub use plane::plane_ids;
 pub use polygon::lambert_polygon;

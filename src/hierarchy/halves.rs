@@ -15,6 +15,15 @@ pub struct Outline {
     count: usize,
 }
 
+/// A triangle that blocks, alone or with its other half.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Blocker {
+    /// The triangle.
+    pub triangle: u32,
+    /// Does it stand for both halves?
+    pub together: bool,
+}
+
 impl AsRef<[DVec3]> for Outline {
     fn as_ref(&self) -> &[DVec3] {
         &self.corners[..self.count]
@@ -51,29 +60,35 @@ impl Mesh {
         half
     }
 
-    /// The outline of a triangle, with its other half where that is listed too; none where the other half stands for both.
-    pub fn outline(&self, triangle: u32, list: &[u32]) -> Option<Outline> {
-        let half = self.half[triangle as usize];
-        let together = half != NONE && list.contains(&half);
-        if together && half < triangle {
-            return None;
-        }
-        let mut corners = [DVec3::ZERO; 4];
-        let whole = together
-            .then(|| self.quadrilateral(triangle, half))
-            .flatten();
-        let count = match whole {
-            Some(ids) => {
-                corners = ids.map(|v| self.positions[v as usize]);
-                4
-            }
+    /// What hides as one: each listed triangle, or both halves of a quadrilateral where both are listed.
+    pub fn blockers(&self, list: &[u32]) -> impl Iterator<Item = Blocker> {
+        list.iter().filter_map(|&triangle| {
+            let half = self.half[triangle as usize];
+            let together = half != NONE && list.contains(&half);
+            // The first half stands for both.
+            (!together || triangle < half).then_some(Blocker { triangle, together })
+        })
+    }
+
+    /// The outline of a blocker.
+    pub fn outline(&self, blocker: Blocker) -> Outline {
+        let triangle = blocker.triangle as usize;
+        let half = blocker.together.then(|| self.half[triangle]);
+        let whole = half.and_then(|half| self.quadrilateral(blocker.triangle, half));
+        let at = |v: u32| self.positions[v as usize];
+        match whole {
+            Some(ids) => Outline {
+                corners: ids.map(at),
+                count: 4,
+            },
             None => {
-                let ids = self.triangles[triangle as usize];
-                corners[..3].copy_from_slice(&ids.map(|v| self.positions[v as usize]));
-                3
+                let [a, b, c] = self.triangles[triangle].map(at);
+                Outline {
+                    corners: [a, b, c, c],
+                    count: 3,
+                }
             }
-        };
-        Some(Outline { corners, count })
+        }
     }
 
     /// Corners of two triangles with a common edge, in the sense of the first.
@@ -124,7 +139,10 @@ mod tests {
         ];
         let mesh = mesh(&positions, &[[0, 1, 4], [1, 2, 5], [1, 5, 4], [0, 4, 3]]);
         assert_eq!(mesh.half, [3, 2, 1, 0]);
-        let corners = |t: u32, list: &[u32]| mesh.outline(t, list).map(|o| o.as_ref().to_vec());
+        let corners = |t: u32, list: &[u32]| {
+            let blocker = mesh.blockers(list).find(|b| b.triangle == t)?;
+            Some(mesh.outline(blocker).as_ref().to_vec())
+        };
         let of = |ids: &[usize]| {
             ids.iter()
                 .map(|&k| positions[k].into())

@@ -9,8 +9,8 @@ mod tree;
 mod validate;
 
 pub use cut::{Cut, cuts};
-pub use halves::Outline;
+pub use halves::{Blocker, Outline};
 pub use mesh::{Face, Mesh};
 pub use spaces::{Spaces, spaces};
-pub(crate) use tree::stratified;
 pub use tree::{Element, NONE, Node, Sample, Tree};
+pub(crate) use tree::{quarter, stratified};

@@ -89,6 +89,23 @@ impl Node {
         }
     }
 
+    /// Could a normal below come within a right angle of a direction that lies within `reach` of the end of `way`?
+    pub fn may_face(&self, way: DVec3, reach: f64) -> bool {
+        let distance = way.length();
+        if distance <= reach || self.cone <= 0.0 {
+            return true;
+        }
+        // Half angles of the bundle of directions and of the cone, as sine and cosine.
+        let [bundle, cone] = [
+            reach / distance,
+            (1.0 - self.cone * self.cone).max(0.0).sqrt(),
+        ];
+        let along = [(1.0 - bundle * bundle).sqrt(), self.cone];
+        // Together a right angle or more, or more than is missing from one.
+        along[0] * along[1] <= bundle * cone
+            || self.normal.dot(way) > -distance * (bundle * along[1] + along[0] * cone)
+    }
+
     /// Indices of the children.
     pub fn child_range(&self) -> std::ops::Range<u32> {
         if self.is_leaf() {
@@ -239,19 +256,7 @@ impl Tree {
     pub fn leaf_at(&self, entry: u32, mut w: [f64; 3]) -> u32 {
         let mut id = self.face_node[entry as usize];
         while !self.node(id).is_leaf() {
-            // Children 0, 1, 2 hold the corners, child 3 the middle (turned around).
-            let k = match w.iter().position(|&x| x >= 0.5) {
-                Some(k) => {
-                    w = std::array::from_fn(|i| if i == k { 2.0 * w[i] - 1.0 } else { 2.0 * w[i] });
-                    k
-                }
-                None => {
-                    // Middle child [bc, ca, ab]: a weight w_a there lies 1 - 2 w_a from the opposite midpoint.
-                    w = w.map(|x| 1.0 - 2.0 * x);
-                    3
-                }
-            };
-            id = self.node(id).child + k as u32;
+            id = self.node(id).child + quarter(&mut w);
         }
         id
     }
@@ -292,6 +297,22 @@ impl Tree {
                 plane: self.face_plane[entry],
                 area: share,
             });
+        }
+    }
+}
+
+/// Which child of an element holds a point, given by barycentric weights, which become those on the child.
+pub(crate) fn quarter(w: &mut [f64; 3]) -> u32 {
+    // Children 0, 1, 2 hold the corners, child 3 the middle (turned around).
+    match w.iter().position(|&x| x >= 0.5) {
+        Some(k) => {
+            *w = std::array::from_fn(|i| if i == k { 2.0 * w[i] - 1.0 } else { 2.0 * w[i] });
+            k as u32
+        }
+        None => {
+            // Middle child [bc, ca, ab]: a weight w_a there lies 1 - 2 w_a from the opposite midpoint.
+            *w = w.map(|x| 1.0 - 2.0 * x);
+            3
         }
     }
 }

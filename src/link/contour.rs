@@ -5,9 +5,11 @@
 //! corner, where its integrand is singular. For the others Gauss and Legendre's rule does it. The integrand
 //! is a logarithm where the area form has `1/r^2`: two triangles that share an edge are no hard case.
 
+use crate::geometry::lanes::{angle_over_sine, dot, sub};
 use crate::geometry::polygon::edges;
 use glam::DVec3;
 use std::f64::consts::TAU;
+use wide::f64x8;
 
 /// Points and weights of the 6-point Gauss-Legendre rule on [0, 1] (Abramowitz and Stegun 1964, table 25.4).
 const GAUSS: [(f64, f64); 6] = [
@@ -18,6 +20,9 @@ const GAUSS: [(f64, f64); 6] = [
     (0.830_604_693_233_132_3, 0.180_380_786_524_069_3),
     (0.966_234_757_101_576, 0.085_662_246_189_585_17),
 ];
+
+/// A logarithm of less is that of this; what it is multiplied by is nothing then.
+const LEAST: f64 = f64::MIN_POSITIVE;
 
 /// Edges whose directions differ by less count as parallel: what that misplaces is of the same order.
 const PARALLEL: f64 = 1e-10;
@@ -30,99 +35,178 @@ pub fn exchange(one: &[DVec3; 3], two: &[DVec3; 3]) -> f64 {
     if a.len() < 3 || b.len() < 3 {
         return 0.0;
     }
-    let mut sum = 0.0;
+    let mut sum = Logs::default();
     for (p, q) in edges(&a) {
         for (r, s) in edges(&b) {
             let along = (q - p).dot(s - r);
             if along != 0.0 {
-                sum += along * mean_log(p, q, r, s);
+                sum.pair(along, [p, q], [r, s]);
             }
         }
     }
     // Edges of facing triangles run against each other; rounding may leave a trace below zero.
-    (sum / TAU).max(0.0)
+    (sum.total() / TAU).max(0.0)
 }
 
-/// Mean of `ln |x - y|` over x on pq and y on rs.
+/// A weighted sum of means of `ln |x - y|`, eight of them worked out at once.
+#[derive(Default)]
+struct Logs {
+    sum: f64,
+    /// Over y on an edge: how often each counts, x, and both ends.
+    edges: Eight<10>,
+    /// Over both of two parallel edges: second primitives with their weights, u and h.
+    parallel: Eight<3>,
+}
+
+impl Logs {
+    /// Adds `weight` times the mean over x on pq and y on rs.
+    ///
+    /// Edges with a common corner, where the outer integrand is singular, have a closed form: with the corner as origin
+    /// and `f(a, b)` the double integral over lengths a and b, `f(ta, tb) = t^2 (f + a b ln t)`, hence by the derivative at
+    /// t = 1 `2 f + a b = a df/da + b df/db`, and both derivatives are integrals over one edge.
+    fn pair(&mut self, weight: f64, [p, q]: [DVec3; 2], [r, s]: [DVec3; 2]) {
+        if (p == r && q == s) || (p == s && q == r) {
+            self.sum += weight * (p.distance(q).ln() - 1.5);
+            return;
+        }
+        if self.parallel_pair(weight, [p, q], [r, s]) {
+            return;
+        }
+        let common = [(p, q, r, s), (p, q, s, r), (q, p, r, s), (q, p, s, r)]
+            .into_iter()
+            .find(|c| c.0 == c.2);
+        if let Some((corner, a, _, b)) = common {
+            self.edge(0.5 * weight, a, corner, b);
+            self.edge(0.5 * weight, b, corner, a);
+            self.sum -= 0.5 * weight;
+            return;
+        }
+        // Gauss points on the shorter edge: over it the integral changes less.
+        let ((p, q), (r, s)) = if p.distance_squared(q) <= r.distance_squared(s) {
+            ((p, q), (r, s))
+        } else {
+            ((r, s), (p, q))
+        };
+        for (t, part) in GAUSS {
+            self.edge(weight * part, p.lerp(q, t), r, s);
+        }
+    }
+
+    /// The same for parallel edges, whose double integral is elementary; false for others.
+    fn parallel_pair(&mut self, weight: f64, [p, q]: [DVec3; 2], [r, s]: [DVec3; 2]) -> bool {
+        let (a, b) = (q - p, s - r);
+        let (square_a, square_b) = (a.length_squared(), b.length_squared());
+        let sine = a.cross(b).length_squared();
+        if sine > PARALLEL * PARALLEL * square_a * square_b || square_a == 0.0 || square_b == 0.0 {
+            return false;
+        }
+        let (length_a, length_b) = (square_a.sqrt(), square_b.sqrt());
+        let along = b / length_b;
+        let from = p - r;
+        let u = from.dot(along);
+        let height = (from - along * u).length();
+        let step = length_a.copysign(a.dot(along));
+        // Positions of q and p against s and r: the second primitive is taken four times.
+        let weight = weight / (step * length_b);
+        for (u, sign) in [
+            (u, -1.0),
+            (u + step - length_b, -1.0),
+            (u - length_b, 1.0),
+            (u + step, 1.0),
+        ] {
+            self.second([sign * weight, u, height]);
+        }
+        true
+    }
+
+    /// Adds `weight` times the mean over y on rs.
+    fn edge(&mut self, weight: f64, x: DVec3, r: DVec3, s: DVec3) {
+        let row = [weight, x.x, x.y, x.z, r.x, r.y, r.z, s.x, s.y, s.z];
+        if self.edges.push(row) {
+            self.sum += means(self.edges.take());
+        }
+    }
+
+    /// Adds `weight` times the second primitive at u and h.
+    fn second(&mut self, row: [f64; 3]) {
+        if self.parallel.push(row) {
+            self.sum += second_primitives(self.parallel.take());
+        }
+    }
+
+    /// The sum, with what is left in the batches.
+    fn total(mut self) -> f64 {
+        self.sum + means(self.edges.take()) + second_primitives(self.parallel.take())
+    }
+}
+
+/// Up to eight rows of numbers, by column. Rows that are not set weigh nothing.
+struct Eight<const N: usize> {
+    columns: [[f64; 8]; N],
+    count: usize,
+}
+
+impl<const N: usize> Default for Eight<N> {
+    fn default() -> Self {
+        Self {
+            columns: [[0.0; 8]; N],
+            count: 0,
+        }
+    }
+}
+
+impl<const N: usize> Eight<N> {
+    /// Adds a row; true when that makes eight.
+    fn push(&mut self, row: [f64; N]) -> bool {
+        for (column, x) in self.columns.iter_mut().zip(row) {
+            column[self.count] = x;
+        }
+        self.count += 1;
+        self.count == 8
+    }
+
+    /// The columns; the next rows begin anew.
+    fn take(&mut self) -> [f64x8; N] {
+        // Weights stand first.
+        self.columns[0][self.count..].fill(0.0);
+        self.count = 0;
+        self.columns.map(f64x8::new)
+    }
+}
+
+/// Sum of weighted means of `ln |x - y|` over y on rs; an edge without length has none.
 ///
-/// Edges with a common corner, where the outer integrand is singular, have a closed form: with the corner as origin and
-/// `f(a, b)` the double integral over lengths a and b, `f(ta, tb) = t^2 (f + a b ln t)`, hence by the derivative at t = 1
-/// `2 f + a b = a df/da + b df/db`, and both derivatives are integrals over one edge.
-fn mean_log(p: DVec3, q: DVec3, r: DVec3, s: DVec3) -> f64 {
-    if (p == r && q == s) || (p == s && q == r) {
-        return p.distance(q).ln() - 1.5;
-    }
-    if let Some(mean) = mean_log_parallel(p, q, r, s) {
-        return mean;
-    }
-    let common = [(p, q, r, s), (p, q, s, r), (q, p, r, s), (q, p, s, r)]
-        .into_iter()
-        .find(|c| c.0 == c.2);
-    if let Some((corner, a, _, b)) = common {
-        return 0.5 * (mean_log_from(a, corner, b) + mean_log_from(b, corner, a) - 1.0);
-    }
-    // Gauss points on the shorter edge: over it the integral changes less.
-    let ((p, q), (r, s)) = if p.distance_squared(q) <= r.distance_squared(s) {
-        ((p, q), (r, s))
-    } else {
-        ((r, s), (p, q))
-    };
-    GAUSS
-        .iter()
-        .map(|&(t, weight)| weight * mean_log_from(p.lerp(q, t), r, s))
-        .sum()
+/// With x at height h over the line and its foot at u from r, the mean over the length L is
+/// `((L - u) ln |s - x| + u ln |r - x| + h angle) / L - 1`, the angle being that under which x sees the edge.
+fn means([weight, x, y, z, rx, ry, rz, sx, sy, sz]: [f64x8; 10]) -> f64 {
+    let (point, from, to) = ([x, y, z], [rx, ry, rz], [sx, sy, sz]);
+    let (edge, before, behind) = (sub(to, from), sub(point, from), sub(point, to));
+    let square = dot(edge, edge);
+    let over = f64x8::ONE / square.fast_max(f64x8::splat(LEAST));
+    let u = dot(before, edge) * over;
+    let foot = sub(before, edge.map(|e| u * e));
+    let (near, far) = (dot(before, before), dot(behind, behind));
+    let rest = f64x8::ONE - u;
+    let logs = rest * ln(far) + u * ln(near);
+    // In lengths of the edge, of which the sine is h.
+    let hh = dot(foot, foot) * over;
+    let size = (near * far).sqrt() * over;
+    let angle = hh * angle_over_sine(hh - u * rest, size, || hh.sqrt()) & hh.simd_gt(f64x8::ZERO);
+    let mean = f64x8::HALF * logs + angle - f64x8::ONE;
+    (weight * mean & square.simd_gt(f64x8::ZERO)).reduce_add()
 }
 
-/// The same for parallel edges, whose double integral is elementary; none for others.
-fn mean_log_parallel(p: DVec3, q: DVec3, r: DVec3, s: DVec3) -> Option<f64> {
-    let (a, b) = (q - p, s - r);
-    let (length_a, length_b) = (a.length(), b.length());
-    if a.cross(b).length() > PARALLEL * length_a * length_b || length_a == 0.0 || length_b == 0.0 {
-        return None;
-    }
-    let along = b / length_b;
-    let from = p - r;
-    let u = from.dot(along);
-    let height = (from - along * u).length();
-    let step = length_a.copysign(a.dot(along));
-    // Positions of q and p against s and r: the second primitive is taken four times.
-    let sum = second_primitive(u, height) + second_primitive(u + step - length_b, height)
-        - second_primitive(u - length_b, height)
-        - second_primitive(u + step, height);
-    Some(-sum / (step * length_b))
+fn ln(x: f64x8) -> f64x8 {
+    x.fast_max(f64x8::splat(LEAST)).ln()
 }
 
-/// A function of u whose second derivative is `ln sqrt(u^2 + h^2)`.
-fn second_primitive(u: f64, h: f64) -> f64 {
-    let square = u * u + h * h;
-    if square == 0.0 {
-        return 0.0;
-    }
-    0.25 * (u * u - h * h) * square.ln() - 0.75 * u * u
-        + if h > 0.0 { h * u * (u / h).atan() } else { 0.0 }
-}
-
-/// Mean of `ln |x - y|` over y on rs.
-fn mean_log_from(x: DVec3, r: DVec3, s: DVec3) -> f64 {
-    let length = (s - r).length();
-    if length == 0.0 {
-        return 0.0;
-    }
-    let along = (s - r) / length;
-    let d = x - r;
-    let u = d.dot(along);
-    let height = (d - along * u).length();
-    (primitive(length - u, height) - primitive(-u, height)) / length
-}
-
-/// Primitive of `ln sqrt(u^2 + h^2)` in u.
-fn primitive(u: f64, h: f64) -> f64 {
-    let square = u * u + h * h;
-    if square == 0.0 {
-        return 0.0;
-    }
-    // atan2 keeps the branch for h -> 0, where the term vanishes.
-    0.5 * u * square.ln() - u + if h > 0.0 { h * (u / h).atan() } else { 0.0 }
+/// Sum of weighted second primitives: functions of u whose second derivative is `ln sqrt(u^2 + h^2)`.
+fn second_primitives([weight, u, h]: [f64x8; 3]) -> f64 {
+    let (uu, hh) = (u * u, h * h);
+    let angle = (u / h).atan() & h.simd_gt(f64x8::ZERO);
+    let value =
+        f64x8::splat(0.25) * (uu - hh) * ln(uu + hh) - f64x8::splat(0.75) * uu + h * u * angle;
+    (weight * value).reduce_add()
 }
 
 /// The part of `polygon` in front of the plane of `other`.
@@ -189,6 +273,7 @@ mod arrayvec {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::sampling::Pcg;
 
     fn squares(a: [DVec3; 4], b: [DVec3; 4]) -> f64 {
         let halves = |q: [DVec3; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]];
@@ -218,6 +303,66 @@ mod tests {
         close(squares(floor, ceiling(0.1)), 0.826_994_522_397, 1e-4);
         let wall = [v(0., 0., 0.), v(0., 1., 0.), v(0., 1., 1.), v(0., 0., 1.)];
         close(squares(floor, wall), 0.200_043_776_075_403, 1e-5);
+    }
+
+    /// Mean of `ln |x - y|` over both edges, as the sums above have it.
+    fn mean_log(p: DVec3, q: DVec3, r: DVec3, s: DVec3) -> f64 {
+        let mut sum = Logs::default();
+        sum.pair(1.0, [p, q], [r, s]);
+        sum.total()
+    }
+
+    /// Eight at once against one at a time, in every place of a batch.
+    #[test]
+    fn batches_agree_with_plain_primitives() {
+        let primitive = |u: f64, h: f64| {
+            0.5 * u * (u * u + h * h).ln() - u + if h > 0.0 { h * (u / h).atan() } else { 0.0 }
+        };
+        let second = |u: f64, h: f64| {
+            let (uu, hh) = (u * u, h * h);
+            let angle = if h > 0.0 { (u / h).atan() } else { 0.0 };
+            0.25 * (uu - hh) * (uu + hh).ln() - 0.75 * uu + h * u * angle
+        };
+        let mut random = Pcg::new(3);
+        for round in 0..500 {
+            let scale = 10f64.powi(round % 9 - 6);
+            let (mut sum, mut plain, mut most) = (Logs::default(), 0.0, 0.0_f64);
+            for k in 0..=round % 21 {
+                let mut point = |s: f64| v(random.f64(), random.f64(), random.f64()) * s;
+                let (x, r) = (point(1.0), point(1.0));
+                let s = r + point(scale) - point(scale);
+                let weight = f64::from(k % 5) - 1.5;
+                sum.edge(weight, x, r, s);
+                let length = (s - r).length();
+                let along = (s - r) / length;
+                let u = (x - r).dot(along);
+                let h = (x - r - u * along).length();
+                plain += weight * (primitive(length - u, h) - primitive(-u, h)) / length;
+                sum.second([weight, u, h * scale]);
+                let term = weight * second(u, h * scale);
+                plain += term;
+                most += (weight * length.ln()).abs() + term.abs() + 4.0;
+            }
+            // The plain difference of primitives loses digits where the edge is short.
+            let lost = 1e-14 * most / scale.min(1.0);
+            let got = sum.total();
+            assert!((got - plain).abs() < lost, "{got} {plain} at {scale}");
+        }
+        // On the edge, at its end, beyond it; and an edge that is a point.
+        let (o, e) = (DVec3::ZERO, DVec3::X);
+        for (x, want) in [
+            (0.5 * e, -1.0 - 2.0_f64.ln()),
+            (o, -1.0),
+            (e, -1.0),
+            (2.0 * e, 4.0_f64.ln() - 1.0),
+        ] {
+            let mut sum = Logs::default();
+            sum.edge(1.0, x, o, e);
+            assert!((sum.total() - want).abs() < 1e-15, "{x}");
+        }
+        let mut sum = Logs::default();
+        sum.edge(1.0, e, o, o);
+        assert_eq!(sum.total(), 0.0);
     }
 
     /// Closed forms against plain double quadrature; the edges keep apart, where that is exact too.

@@ -5,10 +5,11 @@
 //! formula lies in [0, 1] however near the polygon is.
 
 use super::contour::exchange;
-use super::visibility::{View, segment};
+use super::visibility::{PIECES, View, segment};
 use super::{Link, Room, Way};
-use crate::geometry::{Segment, lambert_polygon, nearest_point};
-use crate::hierarchy::{Node, Sample, Tree};
+use crate::geometry::lanes::{all_lanes, lambert_x8, lanes_of};
+use crate::geometry::{Clipper, Segment, Shadow, nearest_point};
+use crate::hierarchy::{Node, Outline, Sample, Tree};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -37,6 +38,9 @@ pub struct Scratch {
     pub(crate) b: Vec<Sample>,
     pub(crate) segments: Vec<Segment>,
     pub(crate) weights: Vec<f64>,
+    pub(crate) factors: Vec<f64>,
+    outlines: Vec<Outline>,
+    clipper: Clipper,
     pub(crate) blocked: Vec<bool>,
     /// Rays cast.
     pub rays: u64,
@@ -62,19 +66,11 @@ fn in_front(tree: &Tree, a: &Node, b: &Node) -> bool {
         let reach = (0.5 * (b.high - b.low)).dot(a.normal.abs()).min(b.radius);
         return a.normal.dot(b.centre - origin) + reach > least;
     }
-    let between = b.centre - a.centre;
-    let distance = between.length();
-    let reach = a.radius + b.radius;
-    if distance <= reach || a.cone <= 0.0 {
-        return true;
-    }
-    // Directions from a point of a to a point of b lie within asin(reach / distance) of `between`.
-    let angle = a.normal.angle_between(between) - (reach / distance).asin() - a.cone.acos();
-    angle < 0.5 * PI
+    a.may_face(b.centre - a.centre, a.radius + b.radius)
 }
 
 /// The faces of a node as polygons with their normals.
-fn polygons<'a>(
+pub(crate) fn polygons<'a>(
     tree: &'a Tree,
     node: &Node,
 ) -> impl Iterator<Item = ([DVec3; 3], usize)> + use<'a> {
@@ -89,23 +85,55 @@ fn polygons<'a>(
     })
 }
 
-/// Factor from a point to a patch with nothing in the way, in [0, 1]: the share of the light leaving a small surface
+/// Factors from points to a patch with nothing in the way, each in [0, 1]: the share of the light leaving a small surface
 /// there that would reach the patch. `others` holds sample points of the patch if it is a large cluster.
-pub fn point_factor(tree: &Tree, s: &Sample, node: &Node, others: &[Sample]) -> f64 {
-    if node.faces.1 <= POLYGONS {
-        return polygons(tree, node)
-            .filter(|&(corners, entry)| {
-                tree.face_plane[entry] != s.plane
-                    && tree.face_normal[entry].dot(s.point - corners[0]) > 0.0
-            })
-            .map(|(corners, _)| lambert_polygon(s.point, s.normal, &corners))
-            .sum();
+pub fn point_factors(
+    tree: &Tree,
+    points: &[Sample],
+    node: &Node,
+    others: &[Sample],
+    out: &mut Vec<f64>,
+) {
+    out.clear();
+    if node.faces.1 > POLYGONS {
+        out.extend(points.iter().map(|s| {
+            let sum: f64 = others.iter().map(|t| point_to_point(s, t) * t.area).sum();
+            sum.min(1.0)
+        }));
+        return;
     }
-    others
-        .iter()
-        .map(|t| point_to_point(s, t) * t.area)
-        .sum::<f64>()
-        .min(1.0)
+    out.resize(points.len(), 0.0);
+    for (points, sums) in points.chunks(8).zip(out.chunks_mut(8)) {
+        for (corners, entry) in polygons(tree, node) {
+            add_factors(tree, points, &corners, entry, sums);
+        }
+    }
+}
+
+/// Adds the factors of up to eight points to a face, where they are in front of it and not in its plane.
+fn add_factors(
+    tree: &Tree,
+    points: &[Sample],
+    corners: &[DVec3; 3],
+    entry: usize,
+    sums: &mut [f64],
+) {
+    let sees = |s: &Sample| {
+        tree.face_plane[entry] != s.plane && tree.face_normal[entry].dot(s.point - corners[0]) > 0.0
+    };
+    if !points.iter().any(sees) {
+        return;
+    }
+    let factors = lambert_x8(
+        lanes_of(points.iter().map(|s| s.point)),
+        lanes_of(points.iter().map(|s| s.normal)),
+        corners.map(all_lanes),
+    );
+    for ((s, sum), f) in points.iter().zip(sums).zip(factors.to_array()) {
+        if sees(s) {
+            *sum += f;
+        }
+    }
 }
 
 /// `cos cos / max(pi r^2, area)` towards a random sample that stands for `area`: without bias where it is far, at most 1/area near.
@@ -168,8 +196,8 @@ pub fn evaluate(
         tree.samples(t, CLUSTER_POINTS, shift, &mut scratch.b);
     }
     let (mut open, mut least, mut most) = (0.0, f64::INFINITY, 0.0_f64);
-    for p in &scratch.a {
-        let f = point_factor(tree, p, nt, &scratch.b);
+    point_factors(tree, &scratch.a, nt, &scratch.b, &mut scratch.factors);
+    for (p, &f) in scratch.a.iter().zip(&scratch.factors) {
         open += f * p.area;
         least = least.min(f);
         most = most.max(f);
@@ -206,7 +234,7 @@ pub fn evaluate(
     // The smaller end says nothing about a larger one that it shines on here and there: a lamp close below a ceiling.
     let variation = if simple(ns) && simple(nt) && gap < NEAR {
         let mean = open / nt.area;
-        variation.max(variation_over(tree, t, ns, mean, shift, &mut scratch.b))
+        variation.max(variation_over(tree, t, ns, mean, shift, scratch))
     } else {
         variation
     };
@@ -264,8 +292,9 @@ fn variation_over(
     to: &Node,
     mean: f64,
     shift: [f64; 2],
-    samples: &mut Vec<Sample>,
+    scratch: &mut Scratch,
 ) -> f64 {
+    let samples = &mut scratch.b;
     tree.samples(on, 3, shift, samples);
     let nearest = polygons(tree, tree.node(on))
         .map(|(corners, entry)| (nearest_point(&corners, to.centre), entry))
@@ -280,8 +309,8 @@ fn variation_over(
         area: 0.0,
     }));
     let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
-    for s in samples {
-        let f = point_factor(tree, s, to, &[]);
+    point_factors(tree, samples, to, &[], &mut scratch.factors);
+    for &f in &scratch.factors {
         least = least.min(f);
         most = most.max(f);
     }
@@ -314,23 +343,31 @@ fn clipped_visibility(
     let tree = room.tree;
     tree.samples(s, POINTS, shift, &mut scratch.a);
     let (mut seen, mut total) = (0.0, 0.0);
-    for p in &scratch.a {
-        for (corners, entry) in polygons(tree, tree.node(t)) {
-            let plane = tree.face_plane[entry];
-            if plane == p.plane || tree.face_normal[entry].dot(p.point - corners[0]) <= 0.0 {
+    for (corners, entry) in polygons(tree, tree.node(t)) {
+        let mut open = [0.0; POINTS];
+        add_factors(tree, &scratch.a, &corners, entry, &mut open);
+        let plane = tree.face_plane[entry];
+        let mut known = None;
+        for (p, &open) in scratch.a.iter().zip(&open) {
+            if open <= 0.0 {
                 continue;
             }
-            let open = lambert_polygon(p.point, p.normal, &corners);
-            if open > 0.0 {
-                total += open;
-                seen += room.sight.visible_factor(
-                    p.point,
-                    p.normal,
-                    &corners,
-                    [p.plane, plane],
-                    list,
-                )?;
+            if known.replace(p.plane) != Some(p.plane) {
+                let blockers = room.sight.blockers(list, [p.plane, plane])?;
+                scratch.outlines.clear();
+                scratch
+                    .outlines
+                    .extend(blockers.map(|b| room.sight.mesh.outline(b)));
             }
+            scratch.clipper.begin(p.point, &corners);
+            for outline in &scratch.outlines {
+                let shadow = Shadow::new(p.point, outline.as_ref());
+                if !scratch.clipper.cut(&shadow, PIECES) {
+                    return None;
+                }
+            }
+            total += open;
+            seen += scratch.clipper.factor(p.normal, open);
         }
     }
     // Rounding leaves slivers of polygons that are seen edge-on: what is hidden must be exactly dark.

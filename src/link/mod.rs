@@ -10,12 +10,12 @@ mod visibility;
 pub(crate) use balance::row_sums;
 pub use balance::{Balance, balance};
 pub use contour::exchange;
-pub(crate) use kernel::pattern;
-pub use kernel::{Scratch, evaluate, facing, point_factor};
+pub use kernel::{Scratch, evaluate, facing, point_factors};
+pub(crate) use kernel::{pattern, polygons};
 pub use refine::{Demand, Graph, MAX_DEPTH, Refined, blockers_of};
 pub use store::LinkRows;
-pub(crate) use visibility::is_small;
 pub use visibility::{Opaque, Sight, View};
+pub(crate) use visibility::{PIECES, is_small};
 
 use crate::hierarchy::Tree;
 

@@ -1,7 +1,7 @@
 //! Is the way between two patches clear? Exactly where the shaft between them is empty, by rays elsewhere.
 
-use crate::geometry::{Hit, Patch, RayIndex, Segment, Shaft, ShaftContents, lambert_visible};
-use crate::hierarchy::{Mesh, Node, Outline, Sample, Tree};
+use crate::geometry::{Hit, Patch, RayIndex, Segment, Shaft, ShaftContents};
+use crate::hierarchy::{Blocker, Mesh, Node, Sample, Tree};
 use glam::{DVec3, Vec3};
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
@@ -9,7 +9,7 @@ const LISTED: usize = 24;
 /// A room of this many triangles is small: a shaft costs no more than a handful of rays.
 const SMALL: usize = 256;
 /// A polygon seen past its blockers may fall into this many pieces before rays take over.
-const PIECES: usize = 48;
+pub(crate) const PIECES: usize = 48;
 
 /// Tells whether a point of a masked triangle is solid: triangle, then barycentrics of its second and third corner.
 pub type Opaque<'a> = dyn Fn(u32, f32, f32) -> bool + Sync + 'a;
@@ -66,30 +66,16 @@ impl Sight<'_> {
         }
     }
 
-    /// Factor from a point to the visible part of a polygon past the listed triangles, exactly; none where that takes
-    /// too many pieces or a blocker has holes. `planes`: of the point and of the polygon, which do not block.
-    pub fn visible_factor(
+    /// What of the listed triangles blocks between faces of two planes, which do not block themselves; none where some have
+    /// holes.
+    pub fn blockers(
         &self,
-        point: DVec3,
-        normal: DVec3,
-        polygon: &[DVec3; 3],
-        planes: [u32; 2],
         list: &[u32],
-    ) -> Option<f64> {
-        if self.opaque.is_some() {
-            return None;
-        }
-        let mut blockers = [Outline::default(); LISTED];
-        let mut count = 0;
-        for &triangle in list {
-            if !planes.contains(&self.mesh.plane[triangle as usize])
-                && let Some(outline) = self.mesh.outline(triangle, list)
-            {
-                blockers[count] = outline;
-                count += 1;
-            }
-        }
-        lambert_visible(point, normal, polygon, &blockers[..count], PIECES)
+        planes: [u32; 2],
+    ) -> Option<impl Iterator<Item = Blocker>> {
+        let plane = |b: &Blocker| self.mesh.plane[b.triangle as usize];
+        let blockers = self.mesh.blockers(list);
+        (self.opaque.is_none()).then(|| blockers.filter(move |b| !planes.contains(&plane(b))))
     }
 
     /// What may block between a point and a polygon.

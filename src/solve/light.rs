@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use super::rows::Rows;
-use crate::gather::Arrival;
+use crate::gather::{Arrival, Descent};
 use crate::hierarchy::Tree;
 use crate::link::{Graph, Way};
 use rayon::prelude::*;
@@ -28,6 +28,8 @@ pub struct Light {
     pub spread: Vec<f32>,
     /// What arrives on every node that is a leaf; nothing elsewhere.
     pub arrival: Vec<Arrival>,
+    /// The hierarchy as rays look at it.
+    pub descent: Descent,
     /// Brightness of a punctual light's intensity (of its normal irradiance where it is directional).
     pub bright_lamps: Vec<f32>,
     /// Who is linked to whom.
@@ -56,14 +58,16 @@ impl Light {
         rows.iter().map(|rows| rows.bytes()).sum::<usize>()
             + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
             + size_of_val(self.arrival.as_slice())
+            + self.descent.bytes()
             + 4 * (self.bright_lamps.len() + self.leaves.len())
     }
 
-    /// Works out brightness and its spread from the rows.
+    /// Works out brightness and its spread from the rows, and what rays ask of the patches.
     pub fn measure(&mut self, tree: &Tree, lanes: &Lanes) {
         let white = self.white;
         let scalar = |row: &[f32]| brightness(lanes.tristimulus(row), white) as f32;
         let n = tree.nodes.len();
+        self.descent = Descent::new(tree);
         let each = |rows: &Rows| -> Vec<f32> {
             let all = (0..n).into_par_iter();
             all.map(|k| scalar(rows.row(k))).collect()

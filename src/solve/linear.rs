@@ -17,7 +17,7 @@
 use super::operator::{Vector, add, pull, scaled};
 use super::rows::Rows;
 use crate::hierarchy::{NONE, Node, Sample, Tree};
-use crate::link::{LinkRows, point_factor};
+use crate::link::{LinkRows, Scratch, point_factors};
 use rayon::prelude::*;
 use wide::{f32x4, f32x8, f32x16};
 
@@ -80,11 +80,11 @@ impl<'a> Slopes<'a> {
         let shares = nodes
             .par_chunks(CHUNK)
             .flat_map_iter(|some| {
-                let mut samples = Vec::new();
+                let mut scratch = Scratch::default();
                 let rows = some.iter().map(|&node| {
                     let shares = |&(source, _): &(u32, f32)| Shares {
-                        receiver: shares(tree, node, source, &mut samples),
-                        source: shares(tree, source, node, &mut samples),
+                        receiver: shares(tree, node, source, &mut scratch),
+                        source: shares(tree, source, node, &mut scratch),
                     };
                     let row = links.row(node as usize).iter();
                     row.map(shares).collect::<Vec<_>>()
@@ -277,13 +277,14 @@ fn points(tree: &Tree, node: &Node) -> Option<[Sample; 3]> {
 }
 
 /// Shares of `other` at the corners of `node`; 0 where that has no parts.
-fn shares(tree: &Tree, node: u32, other: u32, samples: &mut Vec<Sample>) -> [i16; 2] {
+fn shares(tree: &Tree, node: u32, other: u32, scratch: &mut Scratch) -> [i16; 2] {
     let (node, from) = (tree.node(node), tree.node(other));
     let Some(points) = points(tree, node).filter(|_| !node.is_leaf()) else {
         return [0; 2];
     };
-    tree.samples(other, POINTS, [0.5; 2], samples);
-    let factors = points.map(|p| point_factor(tree, &p, from, samples));
+    tree.samples(other, POINTS, [0.5; 2], &mut scratch.b);
+    point_factors(tree, &points, from, &scratch.b, &mut scratch.factors);
+    let factors = [0, 1, 2].map(|k| scratch.factors[k]);
     let mean = factors.iter().sum::<f64>() / 3.0;
     if mean <= 0.0 {
         return [0; 2];

@@ -1,0 +1,110 @@
+//! The hierarchy as rays look at it: from the face that a ray met down to a leaf, and up again to what was gathered whole.
+//!
+//! Every ray goes this way, and the patches themselves lie far apart in memory: what rays ask of them stands here, 12 bytes a
+//! patch.
+
+use super::nearby::NEAR;
+use super::point::POLYGONS;
+use crate::hierarchy::{NONE, Tree, quarter};
+
+/// What rays ask of the patches that a solution knows.
+#[derive(Debug, Clone, Default)]
+pub struct Descent {
+    steps: Vec<Step>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    /// First of the children; [`NONE`] for a leaf.
+    child: u32,
+    /// Parent, if that may be gathered whole: as polygons; else [`NONE`].
+    above: u32,
+    /// Hits nearer than this are close by.
+    near: f32,
+}
+
+impl Descent {
+    /// Of a whole hierarchy.
+    pub(crate) fn new(tree: &Tree) -> Self {
+        let whole = |&id: &u32| id != NONE && tree.node(id).faces.1 <= POLYGONS;
+        let steps = tree.nodes.iter().map(|node| Step {
+            child: node.child,
+            above: Some(node.parent).filter(whole).unwrap_or(NONE),
+            near: (NEAR * node.area.sqrt()) as f32,
+        });
+        Self {
+            steps: steps.collect(),
+        }
+    }
+
+    /// The leaf that holds a point of a face, as [`Tree::leaf_at`] when the solution was made.
+    pub(super) fn leaf_at(&self, tree: &Tree, entry: u32, mut weights: [f64; 3]) -> u32 {
+        let mut id = tree.face_node[entry as usize];
+        loop {
+            let child = self.steps[id as usize].child;
+            if child == NONE {
+                return id;
+            }
+            id = child + quarter(&mut weights);
+        }
+    }
+
+    /// A patch and those above it that may be gathered whole.
+    pub(super) fn upwards(&self, leaf: u32) -> impl Iterator<Item = u32> {
+        let above = |&id: &u32| Some(self.steps[id as usize].above).filter(|&id| id != NONE);
+        std::iter::successors(Some(leaf), above)
+    }
+
+    /// What is nearer than this to a leaf is close by.
+    pub(super) fn near(&self, leaf: u32) -> f32 {
+        self.steps[leaf as usize].near
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.steps.as_slice())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::{Pcg, triangle_weights};
+    use crate::hierarchy::Mesh;
+    use crate::scene::{Options, Scene};
+
+    /// Also where elements are split after the solution.
+    #[test]
+    fn it_ends_on_the_leaves_that_the_solution_knows() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
+        let scene = Scene::load(&path, &Options::default()).unwrap();
+        let mesh = Mesh::new(&scene);
+        let mut tree = Tree::new(&mesh, &vec![0; mesh.faces.len()]);
+        let mut random = Pcg::new(2);
+        let mut split = |tree: &mut Tree, times: usize| {
+            for _ in 0..times {
+                let leaves: Vec<u32> = tree.leaves().collect();
+                tree.subdivide(leaves[(random.f64() * leaves.len() as f64) as usize]);
+            }
+        };
+        split(&mut tree, 300);
+        let descent = Descent::new(&tree);
+        let mut points = Pcg::new(3);
+        let places: Vec<(u32, [f64; 3])> = (0..2_000)
+            .map(|_| {
+                let entry = points.f64() * tree.faces.len() as f64;
+                (entry as u32, triangle_weights([points.f64(), points.f64()]))
+            })
+            .collect();
+        let known: Vec<u32> = places.iter().map(|&(e, w)| tree.leaf_at(e, w)).collect();
+        split(&mut tree, 100);
+        for (&(entry, w), &leaf) in places.iter().zip(&known) {
+            assert_eq!(descent.leaf_at(&tree, entry, w), leaf);
+            // All patches above that have few faces, and no other.
+            let parent = |&id: &u32| Some(tree.node(id).parent).filter(|&p| p != NONE);
+            let plain = std::iter::successors(Some(leaf), parent)
+                .filter(|&id| tree.node(id).faces.1 <= POLYGONS);
+            assert!(descent.upwards(leaf).eq(plain));
+        }
+    }
+}

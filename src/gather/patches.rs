@@ -1,0 +1,434 @@
+//! What patches bring to a point: each with its exact polygon factor, or as its parts, and what is seen of it.
+//!
+//! A patch whose light varies is entered (its children take its place) while that could misplace more than the tolerance;
+//! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in number with what they
+//! carry.
+
+use super::point::{CLOSE, Gathered, Gatherer, Linked, Memory, Of, POLYGONS, Receiver};
+use crate::geometry::lanes::lanes_of;
+use crate::geometry::{Segment, lambert_triangles_x8};
+use crate::hierarchy::{Element, NONE, Node};
+use crate::link::{PIECES, View, Way, blockers_of, pattern, polygons};
+use glam::DVec3;
+
+/// Rays to a patch at least, and at the most.
+const RAYS: [usize; 2] = [4, 32];
+/// Points that stand for a far cluster: one that carries little, and one that carries much.
+const CLUSTER_POINTS: [usize; 2] = [4, 8];
+/// A clear patch may misplace this share of the tolerance: what many of them misplace goes the same way (the middle of a wall
+/// is brighter than its edges, and nearer), and to enter one costs no ray. With 1 the light in a white cube is .7 % low.
+const CLEAR_SHARE: f64 = 0.05;
+/// How many rays a link's visibility counts for.
+const PRIOR: f64 = 4.0;
+/// How often a lamp's triangle is quartered where its shadow boundary crosses it.
+const LAMP_DEPTH: u32 = 6;
+/// Rays to a quarter of a lamp's triangle, and quarters that get theirs together: a packet.
+const LAMP_RAYS: usize = 4;
+const QUARTERS: usize = 4;
+/// A lamp gets more than plain rays if it carries this many tolerances.
+const SHAFT_WORTH: f64 = 4.0;
+
+impl Gatherer<'_> {
+    /// Greatest factor that a patch could have, by its projected area.
+    pub(super) fn bound(&self, to: &Receiver, node: &Node) -> f64 {
+        let gap = ((node.centre - to.point).length() - node.radius).max(0.0);
+        node.area / (std::f64::consts::PI * gap * gap + node.area)
+    }
+
+    /// Adds the patches on the stack, or puts their children in their place. Factors are worked out for eight faces at once.
+    pub(super) fn patches(&self, to: &Receiver, of: Of, memory: &mut Memory, out: &mut Gathered) {
+        loop {
+            let mut open = [((NONE, Way::Clear, 0.0), 0.0); 8];
+            let mut held = 0;
+            let mut faces = [([DVec3::ZERO; 3], 0); 8];
+            let mut count = 0;
+            while let Some(&linked) = memory.stack.last() {
+                let node = self.tree.node(linked.0);
+                let plain = node.faces.1 <= POLYGONS;
+                if plain && count + node.faces.1 as usize > faces.len() {
+                    break;
+                }
+                memory.stack.pop();
+                if of == Of::Emitted && self.light.bright_emitted[linked.0 as usize] <= 0.0
+                    || !self.can_see(to, node)
+                {
+                    continue;
+                }
+                if !plain {
+                    self.cluster(to, linked, of, memory, out);
+                    continue;
+                }
+                let before = count;
+                for (corners, entry) in polygons(self.tree, node) {
+                    if self.tree.face_plane[entry] != to.plane
+                        && self.tree.face_normal[entry].dot(to.point - corners[0]) > 0.0
+                    {
+                        faces[count] = (corners, held);
+                        count += 1;
+                    }
+                }
+                if count > before {
+                    open[held].0 = linked;
+                    held += 1;
+                }
+            }
+            if held == 0 {
+                return;
+            }
+            let corners = [0, 1, 2].map(|k| lanes_of(faces[..count].iter().map(|f| f.0[k])));
+            let factors = lambert_triangles_x8(to.point, to.normal, corners).to_array();
+            for ((_, owner), factor) in faces[..count].iter().zip(factors) {
+                open[*owner].1 += factor;
+            }
+            for &(linked, factor) in &open[..held] {
+                if factor > 0.0 {
+                    self.patch(to, linked, factor, of, memory, out);
+                }
+            }
+        }
+    }
+
+    /// What a node reflects and emits, of what is gathered, as shares of white.
+    fn brightness(&self, id: u32, of: Of) -> (f64, f64) {
+        let reflected = f64::from(self.light.bright_reflected[id as usize]);
+        let emitted = f64::from(self.light.bright_emitted[id as usize]);
+        match of {
+            Of::All => (reflected, emitted),
+            Of::Reflected => (reflected, 0.0),
+            Of::Emitted => (0.0, emitted),
+        }
+    }
+
+    /// Adds a cluster of many faces if it is far, else puts its children in its place.
+    fn cluster(
+        &self,
+        to: &Receiver,
+        (id, way, v): Linked,
+        of: Of,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
+        let node = self.tree.node(id);
+        let (reflected, emitted) = self.brightness(id, of);
+        let spread = f64::from(self.light.spread[id as usize]);
+        let factor = self.bound(to, node);
+        let near = (node.centre - to.point).length() < CLOSE * node.radius;
+        // Points find a cluster's light to about a third of its spread, and where lamps are in it, of its light.
+        if near || factor * (0.3 * spread + emitted) > self.tolerance {
+            memory.stack.extend(node.child_range().map(|c| (c, way, v)));
+            return;
+        }
+        let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
+        let clear = way == Way::Clear || !self.sight.occlusion;
+        if let Some((factor, visible)) = self.sampled(to, id, count, clear, memory) {
+            self.add(id, factor, visible, of, out);
+        }
+    }
+
+    /// Adds a patch of a few faces, or puts its children in its place.
+    fn patch(
+        &self,
+        to: &Receiver,
+        (id, way, v): Linked,
+        factor: f64,
+        of: Of,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
+        let node = self.tree.node(id);
+        let clear = way == Way::Clear || !self.sight.occlusion;
+        let (size, limit) = if clear {
+            let distance = (node.centre - to.point).length();
+            let size = (node.radius / distance.max(1e-300)).min(1.0);
+            (size, CLEAR_SHARE * self.tolerance)
+        } else {
+            (1.0, self.tolerance)
+        };
+        let spread = f64::from(self.light.spread[id as usize]);
+        if self.has_parts(node) && (node.element == NONE || factor * spread * size > limit) {
+            memory.stack.extend(node.child_range().map(|c| (c, way, v)));
+            return;
+        }
+        let (reflected, emitted) = self.brightness(id, of);
+        let visible = if clear {
+            1.0
+        } else {
+            let carries = factor * (reflected + emitted);
+            self.visible(to, (id, way, v), factor, carries, emitted > 0.0, memory)
+        };
+        self.add(id, factor, visible, of, out);
+        if of != Of::Emitted {
+            self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
+        }
+    }
+
+    /// Are the children of a node known to the solution? Elements split after it are not.
+    pub(super) fn has_parts(&self, node: &Node) -> bool {
+        !node.is_leaf() && (node.child as usize) < self.light.bright_emitted.len()
+    }
+
+    /// Adds a patch with a factor and its visible share.
+    fn add(&self, id: u32, factor: f64, visible: f64, of: Of, out: &mut Gathered) {
+        let seen = (factor * visible) as f32;
+        let k = id as usize;
+        let width = self.light.width();
+        if of != Of::Emitted {
+            out.seen += factor * visible;
+            let row = self.light.reflected.row(k);
+            for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
+                *x += seen * r;
+            }
+        }
+        if of != Of::Reflected && self.light.bright_emitted[k] > 0.0 {
+            let row = self.light.emitted.row(k);
+            for (x, e) in out.direct[..width].iter_mut().zip(row) {
+                *x += seen * e;
+            }
+        }
+        if let Some(trace) = &mut out.trace {
+            match of {
+                Of::All => trace.patch(id, seen),
+                Of::Reflected => trace.slope(id, seen),
+                Of::Emitted => {
+                    trace.patch(id, seen);
+                    trace.slope(id, -seen);
+                }
+            }
+        }
+    }
+
+    /// Could any of the patch be in front of the receiver, and the receiver in front of any of the patch?
+    pub(super) fn can_see(&self, to: &Receiver, node: &Node) -> bool {
+        let from = node.centre - to.point;
+        let reach = (0.5 * (node.high - node.low))
+            .dot(to.normal.abs())
+            .min(node.radius);
+        if to.normal.dot(from) + reach <= 0.0 {
+            return false;
+        }
+        if node.flat {
+            let entry = node.faces.0 as usize;
+            return self.tree.face_plane[entry] != to.plane
+                && -node.normal.dot(from) + (0.5 * (node.high - node.low)).dot(node.normal.abs())
+                    > 0.0;
+        }
+        node.may_face(-from, node.radius)
+    }
+
+    /// Factor and visible share of a far cluster by points, each with its own ray.
+    fn sampled(
+        &self,
+        to: &Receiver,
+        id: u32,
+        count: usize,
+        clear: bool,
+        memory: &mut Memory,
+    ) -> Option<(f64, f64)> {
+        let shift = pattern(to.seed, id, 1);
+        self.tree.samples(id, count, shift, &mut memory.samples);
+        memory.segments.clear();
+        memory.weights.clear();
+        for s in &memory.samples {
+            let d = s.point - to.point;
+            let r2 = d.length_squared();
+            let (c1, c2) = (to.normal.dot(d), -s.normal.dot(d));
+            if c1 > 0.0 && c2 > 0.0 && s.plane != to.plane {
+                // Random points of a cluster that is far: without bias, and never near enough to blow up.
+                memory
+                    .weights
+                    .push(c1 * c2 / (std::f64::consts::PI * r2 * r2) * s.area);
+                memory.segments.push(Segment {
+                    from: to.point.as_vec3(),
+                    to: s.point.as_vec3(),
+                    planes: [to.plane, s.plane],
+                });
+            }
+        }
+        let factor: f64 = memory.weights.iter().sum();
+        if factor <= 0.0 {
+            return None;
+        }
+        let mut visible = 1.0;
+        if !clear {
+            self.sight
+                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            memory.rays += memory.segments.len() as u64;
+            let open = memory
+                .weights
+                .iter()
+                .zip(&memory.blocked)
+                .filter(|(_, b)| !**b)
+                .map(|(w, _)| w);
+            visible = open.sum::<f64>() / factor;
+        }
+        Some((factor, visible))
+    }
+
+    /// Visible share of a polygon patch. `carries` is what it would bring unblocked, share of white.
+    fn visible(
+        &self,
+        to: &Receiver,
+        (id, way, known): Linked,
+        factor: f64,
+        carries: f64,
+        lamp: bool,
+        memory: &mut Memory,
+    ) -> f64 {
+        let node = self.tree.node(id);
+        let Some(element) = self.tree.element(node) else {
+            return 1.0;
+        };
+        let plane = self.tree.face_plane[element.face as usize];
+        let planes = [to.plane, plane];
+        if let Way::Listed { .. } = way {
+            let list = blockers_of(&self.light.neighbours.blockers, way);
+            if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
+                return (seen / factor).min(1.0);
+            }
+        }
+        // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
+        if lamp && carries > SHAFT_WORTH * self.tolerance {
+            match self
+                .sight
+                .view_from(to.point, to.normal, &element.corners, [to.plane, plane])
+            {
+                View::Clear => return 1.0,
+                View::Listed(list) => {
+                    if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
+                        return (seen / factor).min(1.0);
+                    }
+                }
+                View::Crowded => {}
+            }
+        }
+        if lamp && carries > SHAFT_WORTH * self.tolerance {
+            return self.lamp_visible(to, element, plane, carries, memory);
+        }
+        // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
+        let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
+        let count = wanted.clamp(RAYS[0], RAYS[1]);
+        let shift = pattern(to.seed, id, 2);
+        let normal = node.normal;
+        memory.segments.clear();
+        memory.weights.clear();
+        for k in 0..count {
+            let p = element.at(crate::hierarchy::stratified(k, RAYS[1], shift));
+            let d = p - to.point;
+            let r2 = d.length_squared();
+            let (c1, c2) = (to.normal.dot(d), -normal.dot(d));
+            if c1 > 0.0 && c2 > 0.0 && r2 > 0.0 {
+                memory.weights.push(c1 * c2 / (r2 * r2));
+                memory.segments.push(Segment {
+                    from: to.point.as_vec3(),
+                    to: p.as_vec3(),
+                    planes: [to.plane, plane],
+                });
+            }
+        }
+        self.sight
+            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+        memory.rays += memory.segments.len() as u64;
+        let total: f64 = memory.weights.iter().sum();
+        let seen: f64 = memory
+            .weights
+            .iter()
+            .zip(&memory.blocked)
+            .filter(|(_, b)| !**b)
+            .map(|(w, _)| w)
+            .sum();
+        // Where no ray gets through, nothing does: what other parts of the element see must not leak in.
+        if seen <= 0.0 {
+            return 0.0;
+        }
+        // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
+        // blurs is bounded by the size of the receiving element. A lamp's shadow is not blurred.
+        let prior = if lamp || to.leaf.is_none() || self.hemisphere.is_some() {
+            0.0
+        } else {
+            PRIOR
+        };
+        (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
+    }
+
+    /// Factor of what is seen past the listed triangles, exactly; `whole` is that of the whole patch. None where that takes too
+    /// many pieces or a blocker has holes.
+    fn past(
+        &self,
+        list: &[u32],
+        planes: [u32; 2],
+        to: &Receiver,
+        element: &Element,
+        whole: f64,
+        memory: &mut Memory,
+    ) -> Option<f64> {
+        memory.clipper.begin(to.point, &element.corners);
+        for blocker in self.sight.blockers(list, planes)? {
+            let outline = || self.sight.mesh.outline(blocker);
+            let shadow = memory.shadows.of(to.point, blocker, outline);
+            if !memory.clipper.cut(shadow, PIECES) {
+                return None;
+            }
+        }
+        Some(memory.clipper.factor(to.normal, whole))
+    }
+
+    /// Visible share of a lamp's triangle: quartered where rays disagree, until a quarter carries less than the tolerance.
+    fn lamp_visible(
+        &self,
+        to: &Receiver,
+        element: &Element,
+        plane: u32,
+        carries: f64,
+        memory: &mut Memory,
+    ) -> f64 {
+        let mut seen = 0.0;
+        let mut total = 0.0;
+        let mut open = vec![(element.corners, 0_u32)];
+        while !open.is_empty() {
+            // The rays of several quarters together.
+            let some = open.split_off(open.len().saturating_sub(QUARTERS));
+            let corners = [0, 1, 2].map(|k| lanes_of(some.iter().map(|t| t.0[k])));
+            let factors = lambert_triangles_x8(to.point, to.normal, corners).to_array();
+            memory.segments.clear();
+            for ([a, b, c], _) in &some {
+                let middle = (a + b + c) / 3.0;
+                // Corners drawn a little inwards: a ray along the very edge says nothing about the inside.
+                let inwards = [a, b, c].map(|corner| corner.lerp(middle, 0.15));
+                memory
+                    .segments
+                    .extend(std::iter::once(middle).chain(inwards).map(|p| Segment {
+                        from: to.point.as_vec3(),
+                        to: p.as_vec3(),
+                        planes: [to.plane, plane],
+                    }));
+            }
+            self.sight
+                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            memory.rays += memory.segments.len() as u64;
+            let blocked = memory.blocked.chunks(LAMP_RAYS);
+            for (((corners, depth), factor), blocked) in some.into_iter().zip(factors).zip(blocked)
+            {
+                if factor <= 0.0 {
+                    continue;
+                }
+                let blocked = blocked.iter().filter(|b| **b).count();
+                let share = carries * 0.25_f64.powi(depth as i32);
+                let mixed = blocked != 0 && blocked != LAMP_RAYS;
+                if depth < LAMP_DEPTH
+                    && ((mixed && share > self.tolerance) || share > 64.0 * self.tolerance)
+                {
+                    let [a, b, c] = corners;
+                    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
+                    open.extend(
+                        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
+                            .map(|t| (t, depth + 1)),
+                    );
+                    continue;
+                }
+                total += factor;
+                seen += factor * (LAMP_RAYS - blocked) as f64 / LAMP_RAYS as f64;
+            }
+        }
+        if total > 0.0 { seen / total } else { 0.0 }
+    }
+}
