@@ -12,8 +12,9 @@
 
 use super::point::{Gatherer, Memory, Receiver, punctual_factor};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
-use crate::geometry::{Hit, Segment};
+use crate::geometry::{Hit, NO_PLANE, Segment};
 use crate::hierarchy::NONE;
+use crate::link::View;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -41,6 +42,20 @@ pub struct Arrival {
     pub spread: f32,
 }
 
+/// The light that a point close by reflects, by one path.
+struct Path {
+    /// Which of the samples.
+    sample: u32,
+    /// Where it has got to, while it goes on.
+    end: Option<(u32, Hit)>,
+    /// What of the light there gets back.
+    through: f64,
+    /// What got back.
+    sum: f64,
+    /// What the leaf reflects that it began on.
+    leaf: f64,
+}
+
 impl Gatherer<'_> {
     /// Is a hit so near that its leaf says little about it? `backs`: share of the rays that met black backs.
     pub(super) fn is_near(&self, leaf: u32, hit: &Hit, backs: f64) -> bool {
@@ -56,57 +71,74 @@ impl Gatherer<'_> {
         memory: &mut Memory,
     ) -> f64 {
         let count = hits.len().min(FOLLOWED);
-        let pairs: Vec<[f64; 2]> = (0..count)
+        let mut paths: Vec<Path> = (0..count)
             .map(|k| {
-                let (leaf, hit) = &hits[k * hits.len() / count];
-                let point = self.follow(*leaf, *hit, backs, [k as u64, seed], memory);
-                let whole = self.light.bright_reflected[*leaf as usize];
-                [point, f64::from(whole)]
+                let (leaf, hit) = hits[k * hits.len() / count];
+                Path {
+                    sample: k as u32,
+                    end: Some((leaf, hit)),
+                    through: 1.0,
+                    sum: 0.0,
+                    leaf: f64::from(self.light.bright_reflected[leaf as usize]),
+                }
             })
             .collect();
-        believed(&pairs)
-    }
-
-    /// What a point reflects, by one path.
-    fn follow(
-        &self,
-        leaf: u32,
-        hit: Hit,
-        backs: f64,
-        [k, seed]: [u64; 2],
-        memory: &mut Memory,
-    ) -> f64 {
-        let sample = |dimension: u64| sequence02(k as u32, hash(seed, dimension));
-        let (mut leaf, mut hit) = (leaf, hit);
-        let (mut sum, mut through) = (0.0, 1.0);
+        // All paths a step at a time: rays to lamps from places close by go together.
         for step in 0..STEPS {
-            let arrival = self.light.arrival[leaf as usize];
-            if arrival.all <= 0.0 {
-                break;
-            }
-            through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival.all);
-            let to = self.receiver(leaf, &hit);
-            let even = backs <= WITHIN && arrival.spread < EVEN * arrival.direct;
-            sum += through
-                * if even {
-                    f64::from(arrival.direct)
-                } else {
-                    self.one_lamp(&to, sample(2 * step + 1), memory)
-                };
-            let direction = cosine_direction(to.normal, sample(2 * step)).as_vec3();
-            let next = self.sight.meet_one(to.point.as_vec3(), direction, to.plane);
-            memory.rays += 1;
-            let Some((next, met)) = next.and_then(|next| self.met(&next).map(|met| (next, met)))
-            else {
-                break;
+            let sample = |dimension: u64, path: &Path| {
+                sequence02(path.sample, hash(seed, 2 * step + dimension))
             };
-            if step + 1 == STEPS || !self.is_near(met, &next, backs) {
-                sum += through * f64::from(self.light.bright_reflected[met as usize]);
-                break;
+            let mut to_lamps = std::mem::take(&mut memory.to_lamps);
+            memory.segments.clear();
+            to_lamps.clear();
+            for (k, path) in paths.iter_mut().enumerate() {
+                let Some((leaf, hit)) = path.end else {
+                    continue;
+                };
+                let arrival = self.light.arrival[leaf as usize];
+                if arrival.all <= 0.0 {
+                    path.end = None;
+                    continue;
+                }
+                path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival.all);
+                if backs <= WITHIN && arrival.spread <= EVEN * arrival.direct {
+                    path.sum += path.through * f64::from(arrival.direct);
+                    continue;
+                }
+                let lamps = self.one_lamp(&self.receiver(leaf, &hit), sample(1, path));
+                for (bright, segment) in lamps.into_iter().flatten() {
+                    memory.segments.push(segment);
+                    to_lamps.push((k, path.through * bright));
+                }
             }
-            (leaf, hit) = (met, next);
+            self.sight
+                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            memory.rays += memory.segments.len() as u64;
+            for (&(k, bright), blocked) in to_lamps.iter().zip(&memory.blocked) {
+                if !blocked {
+                    paths[k].sum += bright;
+                }
+            }
+            memory.to_lamps = to_lamps;
+            for path in &mut paths {
+                let Some((leaf, hit)) = path.end.take() else {
+                    continue;
+                };
+                let to = self.receiver(leaf, &hit);
+                let direction = cosine_direction(to.normal, sample(0, path)).as_vec3();
+                let next = self.sight.meet_one(to.point.as_vec3(), direction, to.plane);
+                memory.rays += 1;
+                path.end = next.and_then(|next| Some((self.met(&next)?, next)));
+                if let Some((met, _)) = path
+                    .end
+                    .take_if(|(met, next)| step + 1 == STEPS || !self.is_near(*met, next, backs))
+                {
+                    path.sum += path.through * f64::from(self.light.bright_reflected[met as usize]);
+                }
+            }
         }
-        sum
+        let pairs: Vec<[f64; 2]> = paths.iter().map(|path| [path.sum, path.leaf]).collect();
+        believed(&pairs)
     }
 
     /// The point that a ray met.
@@ -125,44 +157,31 @@ impl Gatherer<'_> {
     }
 
     /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
-    /// the probability that it brings the light: without bias, but for the limit [`NEAREST`].
-    fn one_lamp(&self, to: &Receiver, [mut u, v]: [f64; 2], memory: &mut Memory) -> f64 {
-        let mut sum = 0.0;
-        if let Some((bright, end)) = self.one_punctual(to, v) {
-            let segment = Segment {
-                from: to.point.as_vec3(),
-                to: end.as_vec3(),
-                planes: [to.plane, u32::MAX],
-            };
-            memory.rays += 1;
-            if !self.sight.blocks_one(&segment) {
-                sum += bright;
-            }
-        }
-        let Some((id, chance)) = self.one_emitter(to, &mut u) else {
-            return sum;
+    /// the probability that it brings the light, if nothing lies on the segments: without bias, but for the limit [`NEAREST`].
+    fn one_lamp(&self, to: &Receiver, [mut u, v]: [f64; 2]) -> [Option<(f64, Segment)>; 2] {
+        let segment = |end: DVec3, plane: u32| Segment {
+            from: to.point.as_vec3(),
+            to: end.as_vec3(),
+            planes: [to.plane, plane],
         };
-        let node = self.tree.node(id);
-        let Some(element) = self.tree.element(node) else {
-            return sum;
-        };
-        let end = element.at(triangle_weights([u, v]));
-        let way = end - to.point;
-        // The mean over the element, were it not for the limit very near it.
-        let factor = to.normal.dot(way) * -node.normal.dot(way) * node.area
-            / (PI * way.length_squared().max(NEAREST * node.area).powi(2));
-        if to.normal.dot(way) > 0.0 && factor > 0.0 {
-            let segment = Segment {
-                from: to.point.as_vec3(),
-                to: end.as_vec3(),
-                planes: [to.plane, self.tree.face_plane[element.face as usize]],
-            };
-            memory.rays += 1;
-            if !self.sight.blocks_one(&segment) {
-                sum += factor * f64::from(self.light.bright_emitted[id as usize]) / chance;
-            }
-        }
-        sum
+        let punctual = self.one_punctual(to, v);
+        let emitter = self.one_emitter(to, &mut u).and_then(|(id, chance)| {
+            let node = self.tree.node(id);
+            let element = self.tree.element(node)?;
+            let end = element.at(triangle_weights([u, v]));
+            let way = end - to.point;
+            let (here, there) = (to.normal.dot(way), -node.normal.dot(way));
+            // The mean over the element, were it not for the limit very near it.
+            let factor = here * there * node.area
+                / (PI * way.length_squared().max(NEAREST * node.area).powi(2));
+            let bright = factor * f64::from(self.light.bright_emitted[id as usize]) / chance;
+            let plane = self.tree.face_plane[element.face as usize];
+            (here > 0.0 && there > 0.0).then(|| (bright, segment(end, plane)))
+        });
+        [
+            punctual.map(|(bright, end)| (bright, segment(end, NO_PLANE))),
+            emitter,
+        ]
     }
 
     /// Chooses a punctual light: brightness of them all, and where the ray to it ends.
@@ -188,23 +207,27 @@ impl Gatherer<'_> {
         let worth = |id: u32| {
             let node = self.tree.node(id);
             let emitted = f64::from(self.light.bright_emitted[id as usize]);
-            if emitted <= 0.0 || !self.can_see(to, node) {
+            if !self.can_see(to, node) {
                 return 0.0;
             }
             let distance = (node.centre - to.point).length_squared();
             emitted * node.area / distance.max(node.radius * node.radius)
         };
-        let (mut id, mut chance) = (0, 1.0);
-        if self.tree.nodes.is_empty() || worth(id) <= 0.0 {
+        let mut id = *self.light.lit.first().filter(|&&id| id != NONE)?;
+        let mut chance = 1.0;
+        if worth(id) <= 0.0 {
             return None;
         }
         // An element emits all over alike, whatever its parts.
         while self.tree.node(id).element == NONE {
             let children = self.tree.node(id).child_range();
-            let all: f64 = children.clone().map(worth).sum();
+            let fork = |child: u32| self.light.lit[child as usize];
+            let children = children.map(fork).filter(|&child| child != NONE);
+            let worths = children.map(|child| (child, worth(child)));
+            let all: f64 = worths.clone().map(|c| c.1).sum();
             let mut left = *u * all;
             let mut chosen = None;
-            for (child, worth) in children.map(|c| (c, worth(c))).filter(|c| c.1 > 0.0) {
+            for (child, worth) in worths.filter(|c| c.1 > 0.0) {
                 chosen = Some((child, worth, (left / worth).min(1.0 - f64::EPSILON)));
                 if left < worth {
                     break;
@@ -271,8 +294,16 @@ mod tests {
                 };
                 let row = gatherer.direct(&to, &mut memory);
                 let want = brightness(bake.lanes().tristimulus(&row), bake.light().white);
-                let mut one = |k| gatherer.one_lamp(&to, sequence02(k, 0), &mut memory);
-                let mean = (0..SAMPLES).map(&mut one).sum::<f64>() / f64::from(SAMPLES);
+                let one = |k| {
+                    gatherer
+                        .one_lamp(&to, sequence02(k, 0))
+                        .into_iter()
+                        .flatten()
+                };
+                let open = (0..SAMPLES)
+                    .flat_map(one)
+                    .filter(|(_, segment)| !sight.blocks_one(segment));
+                let mean = open.map(|(bright, _)| bright).sum::<f64>() / f64::from(SAMPLES);
                 off += (mean - want).abs();
                 all += want;
             }

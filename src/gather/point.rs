@@ -101,6 +101,8 @@ pub struct Memory {
     pub(super) met: Vec<(u32, Hit)>,
     /// Of which close by.
     pub(super) near: Vec<(u32, Hit)>,
+    /// Which path each segment to a lamp belongs to, and what it brings.
+    pub(super) to_lamps: Vec<(usize, f64)>,
     /// Rays cast.
     pub rays: u64,
     /// Where the direct light of the last point comes from, where that is kept.

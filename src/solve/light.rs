@@ -3,7 +3,7 @@
 use super::lanes::Lanes;
 use super::rows::Rows;
 use crate::gather::{Arrival, Descent};
-use crate::hierarchy::Tree;
+use crate::hierarchy::{NONE, Tree};
 use crate::link::{Graph, Way};
 use rayon::prelude::*;
 
@@ -30,6 +30,9 @@ pub struct Light {
     pub arrival: Vec<Arrival>,
     /// The hierarchy as rays look at it.
     pub descent: Descent,
+    /// For each node the first below, or itself, that is an element that emits or has several children in which any does; none
+    /// where none does.
+    pub lit: Vec<u32>,
     /// Brightness of a punctual light's intensity (of its normal irradiance where it is directional).
     pub bright_lamps: Vec<f32>,
     /// Who is linked to whom.
@@ -59,7 +62,7 @@ impl Light {
             + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
             + size_of_val(self.arrival.as_slice())
             + self.descent.bytes()
-            + 4 * (self.bright_lamps.len() + self.leaves.len())
+            + 4 * (self.bright_lamps.len() + self.leaves.len() + self.lit.len())
     }
 
     /// Works out brightness and its spread from the rows, and what rays ask of the patches.
@@ -74,6 +77,15 @@ impl Light {
         };
         self.bright_reflected = each(&self.reflected);
         self.bright_emitted = each(&self.emitted);
+        self.lit = vec![NONE; n];
+        for k in (0..n).rev().filter(|&k| self.bright_emitted[k] > 0.0) {
+            let node = &tree.nodes[k];
+            let mut children = node.child_range().filter(|&c| self.lit[c as usize] != NONE);
+            self.lit[k] = match (children.next(), children.next()) {
+                (Some(only), None) if node.element == NONE => self.lit[only as usize],
+                _ => k as u32,
+            };
+        }
         self.brightest = self.bright_reflected.clone();
         for k in (0..n).rev() {
             let below = tree.nodes[k]
