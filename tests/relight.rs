@@ -259,24 +259,16 @@ fn light_adds_up() {
     let window = under(&|name| f64::from(u8::from(name == "sky")));
     let others = under(&|name| f64::from(u8::from(name != "sky")));
     let mean = all.iter().map(|xyz| xyz[1]).sum::<f64>() / all.len() as f64;
-    // Each of the two solves behind a sum ends at a relative error of .002 times the error asked for. It is the error of
-    // the light in the room: in pockets where little light arrives, and arrives late, it is a larger share of what is there.
-    let near = |a: f64, b: f64, least: f64| (a - b).abs() < 4.0 * 2e-3 * a.max(least * mean);
-    let mut late = 0;
+    // Each of the two solves behind a sum ends at a relative error of .002 times the error asked for, also in pockets where
+    // little light arrives, and arrives late: corrections of whole patches must not put light there, or take what is there.
+    let near = |a: f64, b: f64| (a - b).abs() < 2.5 * 2e-3 * a.max(0.1 * mean);
     for k in 0..all.len() {
         for c in 0..3 {
-            assert!(
-                near(2.0 * all[k][c], twice[k][c], 0.1),
-                "{:?} {:?}",
-                all[k],
-                twice[k]
-            );
-            let sum = window[k][c] + others[k][c];
-            assert!(near(all[k][c], sum, 1.0), "{:?} {sum}", all[k]);
-            late += usize::from(!near(all[k][c], sum, 0.1));
+            let (double, sum) = (twice[k][c], window[k][c] + others[k][c]);
+            assert!(near(2.0 * all[k][c], double), "{:?} {double}", all[k]);
+            assert!(near(all[k][c], sum), "{:?} {sum}", all[k]);
         }
     }
-    assert!(late * 10_000 < all.len(), "{late} of {}", all.len());
 }
 
 #[test]

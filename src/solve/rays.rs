@@ -136,7 +136,9 @@ impl RaySystem<'_> {
             {
                 let fair = fair.map(|x| x as f32);
                 let change = grid.means::<L>(&moved);
-                grid.correct::<L>(&change, rho, &fair, self.reflectance, reflected);
+                let means = grid.means::<L>(&self.sums::<L>(grid, &seen));
+                let received = [&seen, &means];
+                grid.correct::<L>(&change, rho, &fair, received, self.reflectance, reflected);
             }
         }
     }

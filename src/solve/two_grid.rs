@@ -142,12 +142,15 @@ impl TwoGrid {
     }
 
     /// Adds to what leaves reflect what the error after a sweep sends them. `change` is the mean change by the sweep,
-    /// `mean_reflectance` that of each patch, `fair` what each lane's irradiance is multiplied by.
+    /// `mean_reflectance` that of each patch, `fair` what each lane's irradiance is multiplied by. What leaves have `received`,
+    /// by leaf and as means over the patches, tells how far each is open to what its patch is sent: in a closed pocket a
+    /// correction meant for the room would put out what light there is, and sweeps bring it back only slowly.
     pub(super) fn correct<const L: usize>(
         &self,
         change: &Rows,
         mean_reflectance: &Rows,
         fair: &[f32; L],
+        received: [&Rows; 2],
         reflectance: &Rows,
         reflected: &mut Rows,
     ) {
@@ -170,12 +173,19 @@ impl TwoGrid {
         reflected
             .all_mut::<L>()
             .par_iter_mut()
-            .zip(reflectance.all::<L>())
+            .zip(
+                reflectance
+                    .all::<L>()
+                    .par_iter()
+                    .zip(received[0].all::<L>()),
+            )
             .zip(&self.patch)
-            .for_each(|((r, rho), &p)| {
-                for ((r, rho), u) in r.iter_mut().zip(rho).zip(&sent[p as usize]) {
+            .for_each(|((r, (rho, h)), &p)| {
+                let (sent, mean) = (&sent[p as usize], &received[1].all::<L>()[p as usize]);
+                for l in 0..L {
+                    let open = if h[l] < mean[l] { h[l] / mean[l] } else { 1.0 };
                     // Too much of a correction must not make light negative.
-                    *r = (*r + rho * u).max(0.0);
+                    r[l] = (r[l] + open * rho[l] * sent[l]).max(0.0);
                 }
             });
     }
