@@ -145,43 +145,6 @@ fn room(leaves: usize) -> (Tree, Vec<Link>) {
     (tree, graph.links)
 }
 
-fn ordered(tree: &Tree, links: &[Link]) -> (Tree, Vec<Link>) {
-    let mut new = vec![NONE; tree.nodes.len()];
-    let mut out = Tree {
-        nodes: vec![Node::bare(NONE, tree.nodes[0].area)],
-        ..Tree::default()
-    };
-    new[0] = 0;
-    let mut stack = vec![0_u32];
-    while let Some(id) = stack.pop() {
-        let node = tree.node(id);
-        if node.is_leaf() {
-            continue;
-        }
-        let first = out.nodes.len() as u32;
-        let me = new[id as usize];
-        let range = node.child_range();
-        (
-            out.nodes[me as usize].child,
-            out.nodes[me as usize].children,
-        ) = (first, range.len() as u8);
-        for (k, c) in range.clone().enumerate() {
-            new[c as usize] = first + k as u32;
-            out.nodes.push(Node::bare(me, tree.node(c).area));
-        }
-        stack.extend(range.rev());
-    }
-    let links = links
-        .iter()
-        .map(|l| Link {
-            a: new[l.a as usize],
-            b: new[l.b as usize],
-            ..*l
-        })
-        .collect();
-    (out, links)
-}
-
 /// Times all widths on some links and prints a line.
 fn measure(what: &str, tree: &Tree, links: &[Link], short: bool) {
     let leaves: Vec<u32> = tree.leaves().collect();
@@ -244,7 +207,5 @@ fn main() {
         }
         let (refined, own) = room(leaves.len());
         pool.install(|| measure("a room's", &refined, &own, short));
-        let (refined, own) = ordered(&refined, &own);
-        pool.install(|| measure("ordered", &refined, &own, short));
     }
 }
