@@ -83,62 +83,77 @@ impl Gatherer<'_> {
                 }
             })
             .collect();
-        // All paths a step at a time: rays to lamps from places close by go together.
+        // All paths a step at a time: rays from places close by go together.
         for step in 0..STEPS {
-            let sample = |dimension: u64, path: &Path| {
-                sequence02(path.sample, hash(seed, 2 * step + dimension))
-            };
-            let mut to_lamps = std::mem::take(&mut memory.to_lamps);
-            memory.segments.clear();
-            to_lamps.clear();
-            for (k, path) in paths.iter_mut().enumerate() {
-                let Some((leaf, hit)) = path.end else {
-                    continue;
-                };
-                let arrival = self.light.arrival[leaf as usize];
-                if arrival.all <= 0.0 {
-                    path.end = None;
-                    continue;
-                }
-                path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival.all);
-                if backs <= WITHIN && arrival.spread <= EVEN * arrival.direct {
-                    path.sum += path.through * f64::from(arrival.direct);
-                    continue;
-                }
-                let lamps = self.one_lamp(&self.receiver(leaf, &hit), sample(1, path));
-                for (bright, segment) in lamps.into_iter().flatten() {
-                    memory.segments.push(segment);
-                    to_lamps.push((k, path.through * bright));
-                }
-            }
-            self.sight
-                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
-            memory.rays += memory.segments.len() as u64;
-            for (&(k, bright), blocked) in to_lamps.iter().zip(&memory.blocked) {
-                if !blocked {
-                    paths[k].sum += bright;
-                }
-            }
-            memory.to_lamps = to_lamps;
+            let samples = |dimension: u64| hash(seed, 2 * step + dimension);
+            self.light_ends(&mut paths, backs, samples(1), memory);
+            self.go_on(&mut paths, samples(0), memory);
             for path in &mut paths {
-                let Some((leaf, hit)) = path.end.take() else {
-                    continue;
+                let last = |(leaf, hit): &mut (u32, Hit)| {
+                    step + 1 == STEPS || !self.is_near(*leaf, hit, backs)
                 };
-                let to = self.receiver(leaf, &hit);
-                let direction = cosine_direction(to.normal, sample(0, path)).as_vec3();
-                let next = self.sight.meet_one(to.point.as_vec3(), direction, to.plane);
-                memory.rays += 1;
-                path.end = next.and_then(|next| Some((self.met(&next)?, next)));
-                if let Some((met, _)) = path
-                    .end
-                    .take_if(|(met, next)| step + 1 == STEPS || !self.is_near(*met, next, backs))
-                {
-                    path.sum += path.through * f64::from(self.light.bright_reflected[met as usize]);
+                if let Some((leaf, _)) = path.end.take_if(last) {
+                    path.sum +=
+                        path.through * f64::from(self.light.bright_reflected[leaf as usize]);
                 }
             }
         }
         let pairs: Vec<[f64; 2]> = paths.iter().map(|path| [path.sum, path.leaf]).collect();
         believed(&pairs)
+    }
+
+    /// Adds the direct light at the ends of paths; ends those where no light arrives.
+    fn light_ends(&self, paths: &mut [Path], backs: f64, samples: u64, memory: &mut Memory) {
+        let mut to_lamps = std::mem::take(&mut memory.to_lamps);
+        memory.segments.clear();
+        to_lamps.clear();
+        for (k, path) in paths.iter_mut().enumerate() {
+            let Some((leaf, hit)) = path.end else {
+                continue;
+            };
+            let arrival = self.light.arrival[leaf as usize];
+            if arrival.all <= 0.0 {
+                path.end = None;
+                continue;
+            }
+            path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival.all);
+            if backs <= WITHIN && arrival.spread <= EVEN * arrival.direct {
+                path.sum += path.through * f64::from(arrival.direct);
+                continue;
+            }
+            let sample = sequence02(path.sample, samples);
+            let lamps = self.one_lamp(&self.receiver(leaf, &hit), sample);
+            for (bright, segment) in lamps.into_iter().flatten() {
+                memory.segments.push(segment);
+                to_lamps.push((k, path.through * bright));
+            }
+        }
+        self.sight
+            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+        memory.rays += memory.segments.len() as u64;
+        for (&(k, bright), blocked) in to_lamps.iter().zip(&memory.blocked) {
+            if !blocked {
+                paths[k].sum += bright;
+            }
+        }
+        memory.to_lamps = to_lamps;
+    }
+
+    /// Takes paths to where their next rays end; those that meet nothing end.
+    fn go_on(&self, paths: &mut [Path], samples: u64, memory: &mut Memory) {
+        for path in paths {
+            let Some((leaf, hit)) = path.end.take() else {
+                continue;
+            };
+            let to = self.receiver(leaf, &hit);
+            let way = cosine_direction(to.normal, sequence02(path.sample, samples));
+            // One by one: in packets such rays share too little of their way.
+            let next = self
+                .sight
+                .meet_one(to.point.as_vec3(), way.as_vec3(), to.plane);
+            path.end = next.and_then(|next| Some((self.met(&next)?, next)));
+            memory.rays += 1;
+        }
     }
 
     /// The point that a ray met.

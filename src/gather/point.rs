@@ -16,6 +16,7 @@ use glam::DVec3;
 pub(super) const CLOSE: f64 = 1.5;
 /// Faces of a cluster that are treated as polygons.
 pub(super) const POLYGONS: u32 = 4;
+
 /// Where light is received.
 #[derive(Debug, Clone, Copy)]
 pub struct Receiver {

@@ -5,9 +5,10 @@
 
 use crate::gather::point::{Memory, Receiver};
 use crate::gather::trace::Trace;
-use crate::hierarchy::{Tree, stratified};
+use crate::hierarchy::{NONE, Tree, stratified};
 use crate::link::{Demand, MAX_DEPTH};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Points of a leaf, each with its weight: exact for polynomials of degree 4 (Cowper 1973; Dunavant 1985, table II, p = 4).
 /// With the three points of degree 2, the mean over a large leaf near a lamp was off by up to 2.5 %.
@@ -34,17 +35,35 @@ const NOISE: f64 = 0.1;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
 
-/// Mean row over a leaf, half the range of brightness over its points, and where the light comes from, if that is kept.
-type AtLeaf = (Box<[f32]>, f32, Option<Box<[u8]>>);
+/// What was found at some leaves, in order.
+#[derive(Debug, Default)]
+struct Found {
+    /// Mean rows.
+    rows: Vec<f32>,
+    /// Half the range of brightness over a leaf's points.
+    spread: Vec<f32>,
+    /// Where the light comes from, if that is kept.
+    traces: Vec<Option<Box<[u8]>>>,
+    rays: u64,
+}
 
 /// Direct irradiance of nodes that are or were leaves.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Direct {
-    rows: Vec<Option<Box<[f32]>>>,
+    /// Lanes of a row.
+    width: usize,
+    /// Place of each node's row; [`NONE`] where it is not known.
+    place: Vec<u32>,
+    /// Rows by place.
+    rows: Vec<f32>,
+    /// Places whose rows are not asked for any more.
+    free: Vec<u32>,
     /// Half the range of brightness over a leaf's points.
     spread: Vec<f32>,
-    /// Where each leaf's light comes from; empty unless it is kept.
-    traces: Vec<Option<Box<[u8]>>>,
+    /// Where each leaf's light comes from: a stretch of `bytes`; empty unless it is kept. What belonged to leaves that were
+    /// split stays among the bytes: each level below is four times as many.
+    traces: Vec<Range<usize>>,
+    bytes: Vec<u8>,
     /// Rays cast so far.
     pub(super) rays: u64,
 }
@@ -59,12 +78,14 @@ impl Direct {
         spread: &[f32],
     ) -> Self {
         let mut known = Self {
-            rows: vec![None; nodes],
+            width,
+            place: vec![NONE; nodes],
+            rows: rows.to_vec(),
             spread: vec![0.0; nodes],
             ..Self::default()
         };
         for (k, &leaf) in leaves.iter().enumerate() {
-            known.rows[leaf as usize] = Some(rows[k * width..(k + 1) * width].into());
+            known.place[leaf as usize] = k as u32;
             known.spread[leaf as usize] = spread[k];
         }
         known
@@ -73,27 +94,32 @@ impl Direct {
     /// Where the light of leaves comes from, as it was before it was written down.
     pub(super) fn keep(&mut self, leaves: &[u32], traces: Vec<Option<Box<[u8]>>>) {
         for (trace, &leaf) in traces.into_iter().zip(leaves) {
-            if trace.is_some() {
-                self.traces.resize(self.rows.len(), None);
-                self.traces[leaf as usize] = trace;
-            }
+            self.keep_trace(leaf, trace.as_deref());
         }
+    }
+
+    fn keep_trace(&mut self, leaf: u32, trace: Option<&[u8]>) {
+        let Some(trace) = trace else { return };
+        self.traces.resize(self.place.len(), 0..0);
+        let start = self.bytes.len();
+        self.bytes.extend_from_slice(trace);
+        self.traces[leaf as usize] = start..self.bytes.len();
     }
 
     /// Where a leaf's light comes from (see `gather::trace`), if that is kept.
     pub(super) fn trace(&self, leaf: u32) -> Option<&[u8]> {
-        self.traces.get(leaf as usize)?.as_deref()
+        let stretch = self.traces.get(leaf as usize)?.clone();
+        (!stretch.is_empty()).then(|| &self.bytes[stretch])
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        let rows = self.rows.iter().flatten().map(|row| size_of_val(&**row));
-        let traces = self.traces.iter().flatten().map(|trace| trace.len());
-        size_of_val(self.rows.as_slice())
-            + size_of_val(self.traces.as_slice())
+        size_of_val(self.place.as_slice())
+            + size_of_val(self.rows.as_slice())
+            + size_of_val(self.free.as_slice())
             + size_of_val(self.spread.as_slice())
-            + rows.sum::<usize>()
-            + traces.sum::<usize>()
+            + size_of_val(self.traces.as_slice())
+            + self.bytes.len()
     }
 
     /// Half the range of brightness over a leaf's points.
@@ -103,21 +129,47 @@ impl Direct {
 
     /// Direct irradiance of a leaf by lane.
     pub(super) fn row(&self, leaf: u32) -> &[f32] {
-        self.rows[leaf as usize].as_deref().unwrap_or(&[])
+        let first = match self.place[leaf as usize] {
+            NONE => return &[],
+            place => place as usize * self.width,
+        };
+        &self.rows[first..first + self.width]
+    }
+
+    /// Puts a row in a free place.
+    fn put(&mut self, leaf: u32, row: &[f32], spread: f32) {
+        let place = match self.free.pop() {
+            Some(place) => {
+                let first = place as usize * self.width;
+                self.rows[first..first + self.width].copy_from_slice(row);
+                place
+            }
+            None => {
+                self.rows.extend_from_slice(row);
+                (self.rows.len() / self.width.max(1)) as u32 - 1
+            }
+        };
+        self.place[leaf as usize] = place;
+        self.spread[leaf as usize] = spread;
     }
 
     /// What was a leaf and is none any more asks for no memory.
     fn forget(&mut self, node: usize) {
-        self.rows[node] = None;
+        let place = std::mem::replace(&mut self.place[node], NONE);
+        self.free.extend(Some(place).filter(|&place| place != NONE));
         if let Some(trace) = self.traces.get_mut(node) {
-            *trace = None;
+            *trace = 0..0;
         }
     }
 
     /// Rows on other lanes: each new lane takes what the lane at its place held.
     pub(super) fn relabel(&mut self, places: &[usize]) {
-        for row in self.rows.iter_mut().flatten() {
-            *row = places.iter().map(|&k| row[k]).collect();
+        if self.width > 0 {
+            let rows = self.rows.chunks(self.width);
+            self.rows = rows
+                .flat_map(|row| places.iter().map(|&k| row[k]))
+                .collect();
+            self.width = places.len();
         }
     }
 
@@ -133,52 +185,48 @@ impl Direct {
         gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
     ) {
         let mut open: Vec<u32> = tree.leaves().collect();
-        for k in 0..self.rows.len() {
+        self.width = weights.len();
+        for k in 0..self.place.len() {
             if !tree.nodes[k].is_leaf() {
                 self.forget(k);
             }
         }
         while !open.is_empty() {
-            self.rows.resize(tree.nodes.len(), None);
+            self.place.resize(tree.nodes.len(), NONE);
             self.spread.resize(tree.nodes.len(), 0.0);
             let fresh: Vec<u32> = open
                 .iter()
                 .copied()
-                .filter(|&k| self.rows[k as usize].is_none())
+                .filter(|&k| self.place[k as usize] == NONE)
                 .collect();
-            let width = weights.len();
-            let parts: Vec<(Vec<AtLeaf>, u64)> = fresh
+            let parts: Vec<Found> = fresh
                 .par_chunks(CHUNK)
                 .map(|chunk| {
-                    let mut memory = Memory::default();
-                    let each = |&leaf: &u32| {
+                    let (mut memory, mut found) = (Memory::default(), Found::default());
+                    for &leaf in chunk {
                         // What would split the leaf is what it has to be told from.
                         let share = (tree.node(leaf).area / demand.total_area).sqrt();
                         at_leaf(
                             tree,
                             leaf,
-                            width,
                             weights,
                             (NOISE * demand.threshold / share).min(coarsest),
                             share * share < TINY,
                             gather,
                             &mut memory,
-                        )
-                    };
-                    let all = chunk.iter().map(each).collect();
-                    (all, memory.rays)
+                            &mut found,
+                        );
+                    }
+                    found.rays = memory.rays;
+                    found
                 })
                 .collect();
-            let mut next = fresh.iter();
-            for (part, rays) in parts {
-                self.rays += rays;
-                for ((row, spread, trace), &leaf) in part.into_iter().zip(next.by_ref()) {
-                    self.rows[leaf as usize] = Some(row);
-                    self.spread[leaf as usize] = spread;
-                    if trace.is_some() {
-                        self.traces.resize(tree.nodes.len(), None);
-                        self.traces[leaf as usize] = trace;
-                    }
+            for (part, leaves) in parts.iter().zip(fresh.chunks(CHUNK)) {
+                self.rays += part.rays;
+                for (k, &leaf) in leaves.iter().enumerate() {
+                    let row = &part.rows[k * self.width..(k + 1) * self.width];
+                    self.put(leaf, row, part.spread[k]);
+                    self.keep_trace(leaf, part.traces[k].as_deref());
                 }
             }
             let mut children = Vec::new();
@@ -199,21 +247,22 @@ impl Direct {
     }
 }
 
-/// Mean row over the points of a leaf, and half the range of brightness.
+/// Finds the mean row over the points of a leaf, and half the range of brightness.
 #[expect(clippy::too_many_arguments, reason = "one caller")]
 fn at_leaf(
     tree: &Tree,
     leaf: u32,
-    width: usize,
     weights: &[f64],
     tolerance: f64,
     tiny: bool,
     gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
     memory: &mut Memory,
-) -> AtLeaf {
+    found: &mut Found,
+) {
     let element = &tree.elements[tree.node(leaf).element as usize];
     let entry = element.face as usize;
-    let mut mean = vec![0.0_f32; width].into_boxed_slice();
+    let mut mean = [0.0_f32; 64];
+    let mean = &mut mean[..weights.len()];
     let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
     let mut bare = 0;
     // A face that is next to nothing of the room is looked at once: it is never split, and its pattern is not seen.
@@ -257,13 +306,13 @@ fn at_leaf(
         most = most.max(bright);
     }
     if total > 0.0 {
-        for m in &mut mean {
+        for m in &mut *mean {
             *m /= total;
         }
     }
-    (
-        mean,
-        (0.5 * (most - least).max(0.0)) as f32,
-        kept.map(|trace| trace.times(1.0 / total).pack()),
-    )
+    found.rows.extend_from_slice(mean);
+    found.spread.push((0.5 * (most - least).max(0.0)) as f32);
+    found
+        .traces
+        .push(kept.map(|trace| trace.times(1.0 / total).pack()));
 }
