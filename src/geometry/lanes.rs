@@ -24,15 +24,13 @@ pub fn all_lanes(point: DVec3) -> Points8 {
 #[inline]
 pub fn lanes_of(points: impl IntoIterator<Item = DVec3>) -> Points8 {
     let mut lanes = [[0.0; 8]; 3];
-    let mut count = 0;
-    for p in points.into_iter().take(8) {
+    for (k, p) in points.into_iter().take(8).enumerate() {
         for (lane, x) in lanes.iter_mut().zip(p.to_array()) {
-            if count == 0 {
+            if k == 0 {
                 lane.fill(x);
             }
-            lane[count] = x;
+            lane[k] = x;
         }
-        count += 1;
     }
     lanes.map(f64x8::new)
 }

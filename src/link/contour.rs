@@ -191,9 +191,10 @@ fn means([weight, x, y, z, rx, ry, rz, sx, sy, sz]: [f64x8; 10]) -> f64 {
     // In lengths of the edge, of which the sine is h.
     let hh = dot(foot, foot) * over;
     let size = (near * far).sqrt() * over;
-    let angle = hh * angle_over_sine(hh - u * rest, size, || hh.sqrt()) & hh.simd_gt(f64x8::ZERO);
+    let over_sine = angle_over_sine(hh - u * rest, size, || hh.sqrt());
+    let angle = (hh * over_sine) & hh.simd_gt(f64x8::ZERO);
     let mean = f64x8::HALF * logs + angle - f64x8::ONE;
-    (weight * mean & square.simd_gt(f64x8::ZERO)).reduce_add()
+    ((weight * mean) & square.simd_gt(f64x8::ZERO)).reduce_add()
 }
 
 fn ln(x: f64x8) -> f64x8 {
