@@ -658,9 +658,8 @@ fn light_from_points(bencher: Bencher<'_, '_>) {
         });
 }
 
-/// Form factors from points to triangles, one at a time.
-#[divan::bench]
-fn lambert_single(bencher: Bencher<'_, '_>) {
+/// Sums a form factor from points to triangles, one at a time.
+fn factors(bencher: Bencher<'_, '_>, factor: fn(DVec3, DVec3, &[DVec3]) -> f64) {
     let pairs = &CORNELL.patches;
     bencher.counter(ItemsCount::new(8 * pairs.len())).bench(|| {
         let mut sum = 0.0;
@@ -668,28 +667,23 @@ fn lambert_single(bencher: Bencher<'_, '_>) {
             let normal = normal(a);
             for k in 0..8 {
                 let point = a[0].lerp(a[1], f64::from(k) / 8.0);
-                sum += haarlight::geometry::lambert_polygon(point, normal, b);
+                sum += factor(point, normal, b);
             }
         }
         sum
     });
 }
 
+/// Form factors from points to triangles, one at a time.
+#[divan::bench]
+fn lambert_single(bencher: Bencher<'_, '_>) {
+    factors(bencher, haarlight::geometry::lambert_polygon);
+}
+
 /// The same, the edges side by side.
 #[divan::bench]
 fn lambert_edges(bencher: Bencher<'_, '_>) {
-    let pairs = &CORNELL.patches;
-    bencher.counter(ItemsCount::new(8 * pairs.len())).bench(|| {
-        let mut sum = 0.0;
-        for [a, b] in black_box(pairs) {
-            let normal = normal(a);
-            for k in 0..8 {
-                let point = a[0].lerp(a[1], f64::from(k) / 8.0);
-                sum += lanes::lambert_edges_x8(point, normal, b);
-            }
-        }
-        sum
-    });
+    factors(bencher, lanes::lambert_edges_x8);
 }
 
 /// The same, eight at a time.

@@ -174,11 +174,7 @@ impl Gatherer<'_> {
     /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
     /// the probability that it brings the light, if nothing lies on the segments: without bias, but for the limit [`NEAREST`].
     fn one_lamp(&self, to: &Receiver, [mut u, v]: [f64; 2]) -> [Option<(f64, Segment)>; 2] {
-        let segment = |end: DVec3, plane: u32| Segment {
-            from: to.point.as_vec3(),
-            to: end.as_vec3(),
-            planes: [to.plane, plane],
-        };
+        let segment = |end: DVec3, plane: u32| Segment::new(to.point, end, [to.plane, plane]);
         let punctual = self.one_punctual(to, v);
         let emitter = self.one_emitter(to, &mut u).and_then(|(id, chance)| {
             let node = self.tree.node(id);

@@ -237,11 +237,9 @@ impl Gatherer<'_> {
                 memory
                     .weights
                     .push(c1 * c2 / (std::f64::consts::PI * r2 * r2) * s.area);
-                memory.segments.push(Segment {
-                    from: to.point.as_vec3(),
-                    to: s.point.as_vec3(),
-                    planes: [to.plane, s.plane],
-                });
+                memory
+                    .segments
+                    .push(Segment::new(to.point, s.point, [to.plane, s.plane]));
             }
         }
         let factor: f64 = memory.weights.iter().sum();
@@ -318,11 +316,9 @@ impl Gatherer<'_> {
             let (c1, c2) = (to.normal.dot(d), -normal.dot(d));
             if c1 > 0.0 && c2 > 0.0 && r2 > 0.0 {
                 memory.weights.push(c1 * c2 / (r2 * r2));
-                memory.segments.push(Segment {
-                    from: to.point.as_vec3(),
-                    to: p.as_vec3(),
-                    planes: [to.plane, plane],
-                });
+                memory
+                    .segments
+                    .push(Segment::new(to.point, p, [to.plane, plane]));
             }
         }
         self.sight
@@ -394,13 +390,11 @@ impl Gatherer<'_> {
                 let middle = (a + b + c) / 3.0;
                 // Corners drawn a little inwards: a ray along the very edge says nothing about the inside.
                 let inwards = [a, b, c].map(|corner| corner.lerp(middle, 0.15));
-                memory
-                    .segments
-                    .extend(std::iter::once(middle).chain(inwards).map(|p| Segment {
-                        from: to.point.as_vec3(),
-                        to: p.as_vec3(),
-                        planes: [to.plane, plane],
-                    }));
+                memory.segments.extend(
+                    std::iter::once(middle)
+                        .chain(inwards)
+                        .map(|p| Segment::new(to.point, p, [to.plane, plane])),
+                );
             }
             self.sight
                 .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);

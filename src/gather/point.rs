@@ -5,7 +5,7 @@
 use super::hemisphere::Hemisphere;
 use super::shadows::Shadows;
 use super::trace::Trace;
-use crate::geometry::{Clipper, Hit, Segment};
+use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
 use crate::link::{Sight, View, Way};
 use crate::scene::{LightKind, PunctualLight};
@@ -24,7 +24,7 @@ pub struct Receiver {
     pub point: DVec3,
     /// Unit normal for the cosine.
     pub normal: DVec3,
-    /// Plane of the face that the point lies on; `u32::MAX` for a point in the air.
+    /// Plane of the face that the point lies on; [`NO_PLANE`] for a point in the air.
     pub plane: u32,
     /// Leaf of the hierarchy whose links are used; none: the whole room is searched.
     pub leaf: Option<u32>,
@@ -218,11 +218,9 @@ impl Gatherer<'_> {
             };
             if self.sight.occlusion {
                 memory.segments.clear();
-                memory.segments.push(Segment {
-                    from: to.point.as_vec3(),
-                    to: end.as_vec3(),
-                    planes: [to.plane, u32::MAX],
-                });
+                memory
+                    .segments
+                    .push(Segment::new(to.point, end, [to.plane, NO_PLANE]));
                 self.sight
                     .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
                 memory.rays += 1;

@@ -1,6 +1,6 @@
 //! The segment that a visibility query asks about.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Stands for "no plane" in [`Segment::planes`] and in `RayIndex::closest`.
 pub const NO_PLANE: u32 = u32::MAX;
@@ -16,4 +16,15 @@ pub struct Segment {
     /// Ids of the planes that the ends lie on; triangles of these planes never block the segment.
     /// [`NO_PLANE`] for an end in free space.
     pub planes: [u32; 2],
+}
+
+impl Segment {
+    /// The segment between two points, rounded, that lie on two planes.
+    pub fn new(from: DVec3, to: DVec3, planes: [u32; 2]) -> Self {
+        Self {
+            from: from.as_vec3(),
+            to: to.as_vec3(),
+            planes,
+        }
+    }
 }

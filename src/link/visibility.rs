@@ -156,11 +156,7 @@ impl Sight<'_> {
 
 /// The segment between two sample points.
 pub(super) fn segment(s: &Sample, t: &Sample) -> Segment {
-    Segment {
-        from: s.point.as_vec3(),
-        to: t.point.as_vec3(),
-        planes: [s.plane, t.plane],
-    }
+    Segment::new(s.point, t.point, [s.plane, t.plane])
 }
 
 /// A node as the end of a shaft.

@@ -130,8 +130,10 @@ const FURNISHED: Shares = Shares {
 };
 /// A face that has less of its area bare lies below something.
 const MOSTLY_COVERED: f64 = 0.01;
-/// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
+/// One distance between rounds may be small by chance, or because the second found nothing to refine yet: before this many
+/// rounds the estimate has to be so many times smaller than what is asked for.
 const LEAST_ROUNDS: usize = 3;
+const EARLY: f64 = 4.0;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already.
 const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
@@ -456,12 +458,13 @@ impl Bake {
     /// Has the bake come to an end, and how? None: another round may help.
     pub fn verdict(&self) -> Option<Verdict> {
         let last = self.rounds.last()?;
-        let met = last
-            .error
-            .total_de2000
-            .value
-            .is_some_and(|e| e <= self.settings.error);
-        if met && self.rounds.len() >= LEAST_ROUNDS {
+        let margin = if self.rounds.len() < LEAST_ROUNDS {
+            EARLY
+        } else {
+            1.0
+        };
+        let estimate = |r: &Round| r.error.total_de2000.value;
+        if estimate(last).is_some_and(|e| margin * e <= self.settings.error) {
             return Some(Verdict::Reached);
         }
         if self.tree.nodes.is_empty() || self.scene.spectra.is_empty() {
@@ -471,7 +474,6 @@ impl Bake {
             return Some(Verdict::OutOfRounds);
         }
         // Four times the links for next to nothing: what is left is the noise of visibility in the gather.
-        let estimate = |r: &Round| r.error.total_de2000.value;
         let before = self
             .rounds
             .len()

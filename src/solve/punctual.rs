@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use crate::gather::point::{Receiver, punctual_factor};
-use crate::geometry::Segment;
+use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Mesh, Sample, Tree};
 use crate::link::{Sight, View};
 use crate::scene::{LightKind, PunctualLight, Scene};
@@ -103,11 +103,7 @@ fn at_samples(
                 };
                 if let Some((factor, end)) = punctual_factor(light, &to, half_size) {
                     factors[k] = factor;
-                    segments.push(Segment {
-                        from: s.point.as_vec3(),
-                        to: end.as_vec3(),
-                        planes: [s.plane, u32::MAX],
-                    });
+                    segments.push(Segment::new(s.point, end, [s.plane, NO_PLANE]));
                     which.push(k);
                 }
             }

@@ -117,12 +117,7 @@ impl Ways {
     }
 
     fn blocked(&self, from: DVec3, to: DVec3, planes: [u32; 2]) -> bool {
-        self.blocks
-            && self.rays.occluded(&Segment {
-                from: from.as_vec3(),
-                to: to.as_vec3(),
-                planes,
-            })
+        self.blocks && self.rays.occluded(&Segment::new(from, to, planes))
     }
 }
 
