@@ -130,9 +130,10 @@ const FURNISHED: Shares = Shares {
 };
 /// A face that has less of its area bare lies below something.
 const MOSTLY_COVERED: f64 = 0.01;
-/// One distance between rounds may be small by chance, or because the second found nothing to refine yet: before this many
-/// rounds the estimate has to be so many times smaller than what is asked for.
+/// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
 const LEAST_ROUNDS: usize = 3;
+/// Fewer rounds do where a mere preview is asked for, an error of so much, and the estimate is so many times smaller.
+const PREVIEW: f64 = 2.0;
 const EARLY: f64 = 4.0;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already.
 const STALLED: f64 = 0.9;
@@ -458,13 +459,11 @@ impl Bake {
     /// Has the bake come to an end, and how? None: another round may help.
     pub fn verdict(&self) -> Option<Verdict> {
         let last = self.rounds.last()?;
-        let margin = if self.rounds.len() < LEAST_ROUNDS {
-            EARLY
-        } else {
-            1.0
-        };
         let estimate = |r: &Round| r.error.total_de2000.value;
-        if estimate(last).is_some_and(|e| margin * e <= self.settings.error) {
+        let asked = self.settings.error;
+        let settled =
+            |e: f64| self.rounds.len() >= LEAST_ROUNDS || (asked >= PREVIEW && EARLY * e <= asked);
+        if estimate(last).is_some_and(|e| e <= asked && settled(e)) {
             return Some(Verdict::Reached);
         }
         if self.tree.nodes.is_empty() || self.scene.spectra.is_empty() {
