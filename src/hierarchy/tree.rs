@@ -331,3 +331,40 @@ pub(crate) fn stratified(k: usize, count: usize, u: [f64; 2]) -> [f64; 3] {
     let y = (u[1] + 0.569_840_290_998_053_3 * (k as f64 + 1.0)).fract();
     triangle_weights([x, y])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::{Pcg, sphere_direction};
+    use std::f64::consts::FRAC_PI_2;
+
+    /// By the angles themselves.
+    #[test]
+    fn cones_that_may_face() {
+        let mut random = Pcg::new(4);
+        let mut facing = 0;
+        for round in 0..20_000 {
+            let mut direction = || sphere_direction([random.f64(), random.f64()]);
+            let (normal, way) = (direction(), direction());
+            let way = way * (0.1 + random.f64());
+            let node = Node {
+                normal,
+                cone: 1.2 * random.f64() - 0.2,
+                ..Node::bare(NONE, 1.0)
+            };
+            let reach = if round % 9 == 0 { 0.0 } else { random.f64() };
+            let may = node.may_face(way, reach);
+            if node.cone <= 0.0 || reach >= way.length() {
+                assert!(may);
+                continue;
+            }
+            let spare = (reach / way.length()).asin() + node.cone.acos();
+            let missing = normal.angle_between(way) - spare - FRAC_PI_2;
+            if missing.abs() > 1e-9 {
+                assert_eq!(may, missing < 0.0, "{node:?} {way} {reach}");
+            }
+            facing += usize::from(may);
+        }
+        assert!((2_000..14_000).contains(&facing), "{facing}");
+    }
+}
