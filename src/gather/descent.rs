@@ -4,8 +4,8 @@
 //! patch.
 
 use super::nearby::NEAR;
-use super::point::POLYGONS;
 use crate::hierarchy::{NONE, Tree, quarter};
+use crate::link::POLYGONS;
 
 /// What rays ask of the patches that a solution knows.
 #[derive(Debug, Clone, Default)]

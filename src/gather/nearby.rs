@@ -46,8 +46,8 @@ pub struct Arrival {
 struct Path {
     /// Which of the samples.
     sample: u32,
-    /// Where it has got to, while it goes on.
-    end: Option<(u32, Hit)>,
+    /// Where it has got to, on which leaf, while it goes on.
+    end: Option<(u32, Receiver)>,
     /// What of the light there gets back.
     through: f64,
     /// What got back.
@@ -76,7 +76,7 @@ impl Gatherer<'_> {
                 let (leaf, hit) = hits[k * hits.len() / count];
                 Path {
                     sample: k as u32,
-                    end: Some((leaf, hit)),
+                    end: Some((leaf, self.receiver(leaf, &hit))),
                     through: 1.0,
                     sum: 0.0,
                     leaf: f64::from(self.light.bright_reflected[leaf as usize]),
@@ -87,16 +87,8 @@ impl Gatherer<'_> {
         for step in 0..STEPS {
             let samples = |dimension: u64| hash(seed, 2 * step + dimension);
             self.light_ends(&mut paths, backs, samples(1), memory);
-            self.go_on(&mut paths, samples(0), memory);
-            for path in &mut paths {
-                let last = |(leaf, hit): &mut (u32, Hit)| {
-                    step + 1 == STEPS || !self.is_near(*leaf, hit, backs)
-                };
-                if let Some((leaf, _)) = path.end.take_if(last) {
-                    path.sum +=
-                        path.through * f64::from(self.light.bright_reflected[leaf as usize]);
-                }
-            }
+            let last = |leaf, hit: &Hit| step + 1 == STEPS || !self.is_near(leaf, hit, backs);
+            self.go_on(&mut paths, last, samples(0), memory);
         }
         let pairs: Vec<[f64; 2]> = paths.iter().map(|path| [path.sum, path.leaf]).collect();
         believed(&pairs)
@@ -108,7 +100,7 @@ impl Gatherer<'_> {
         memory.segments.clear();
         to_lamps.clear();
         for (k, path) in paths.iter_mut().enumerate() {
-            let Some((leaf, hit)) = path.end else {
+            let Some((leaf, to)) = path.end else {
                 continue;
             };
             let arrival = self.light.arrival[leaf as usize];
@@ -122,7 +114,7 @@ impl Gatherer<'_> {
                 continue;
             }
             let sample = sequence02(path.sample, samples);
-            let lamps = self.one_lamp(&self.receiver(leaf, &hit), sample);
+            let lamps = self.one_lamp(&to, sample);
             for (bright, segment) in lamps.into_iter().flatten() {
                 memory.segments.push(segment);
                 to_lamps.push((k, path.through * bright));
@@ -139,20 +131,33 @@ impl Gatherer<'_> {
         memory.to_lamps = to_lamps;
     }
 
-    /// Takes paths to where their next rays end; those that meet nothing end.
-    fn go_on(&self, paths: &mut [Path], samples: u64, memory: &mut Memory) {
+    /// Takes paths to where their next rays end. Those that meet nothing end; so do those for which that was the `last`, on a
+    /// leaf that says what it reflects.
+    fn go_on(
+        &self,
+        paths: &mut [Path],
+        last: impl Fn(u32, &Hit) -> bool,
+        samples: u64,
+        memory: &mut Memory,
+    ) {
         for path in paths {
-            let Some((leaf, hit)) = path.end.take() else {
+            let Some((_, to)) = path.end.take() else {
                 continue;
             };
-            let to = self.receiver(leaf, &hit);
             let way = cosine_direction(to.normal, sequence02(path.sample, samples));
             // One by one: in packets such rays share too little of their way.
             let next = self
                 .sight
                 .meet_one(to.point.as_vec3(), way.as_vec3(), to.plane);
-            path.end = next.and_then(|next| Some((self.met(&next)?, next)));
             memory.rays += 1;
+            let Some((leaf, hit)) = next.and_then(|hit| Some((self.met(&hit)?, hit))) else {
+                continue;
+            };
+            if last(leaf, &hit) {
+                path.sum += path.through * f64::from(self.light.bright_reflected[leaf as usize]);
+            } else {
+                path.end = Some((leaf, self.receiver(leaf, &hit)));
+            }
         }
     }
 

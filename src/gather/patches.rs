@@ -4,11 +4,12 @@
 //! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in number with what they
 //! carry.
 
-use super::point::{CLOSE, Gathered, Gatherer, Linked, Memory, Of, POLYGONS, Receiver};
-use crate::geometry::lanes::lanes_of;
-use crate::geometry::{Segment, lambert_triangles_x8};
+use super::point::{CLOSE, Gathered, Gatherer, Linked, Memory, Of, Receiver};
+use crate::geometry::{Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::{Element, NONE, Node};
-use crate::link::{PIECES, View, Way, blockers_of, pattern, polygons};
+use crate::link::{
+    PIECES, POLYGONS, View, Way, blockers_of, in_front_of, open_weight, pattern, polygons,
+};
 use glam::DVec3;
 
 /// Rays to a patch at least, and at the most.
@@ -60,9 +61,7 @@ impl Gatherer<'_> {
                 }
                 let before = count;
                 for (corners, entry) in polygons(self.tree, node) {
-                    if self.tree.face_plane[entry] != to.plane
-                        && self.tree.face_normal[entry].dot(to.point - corners[0]) > 0.0
-                    {
+                    if in_front_of(self.tree, &corners, entry, to.point, to.plane) {
                         faces[count] = (corners, held);
                         count += 1;
                     }
@@ -75,9 +74,10 @@ impl Gatherer<'_> {
             if held == 0 {
                 return;
             }
-            let corners = [0, 1, 2].map(|k| lanes_of(faces[..count].iter().map(|f| f.0[k])));
-            let factors = lambert_triangles_x8(to.point, to.normal, corners).to_array();
-            for ((_, owner), factor) in faces[..count].iter().zip(factors) {
+            let faces = &faces[..count];
+            let triangles = faces.iter().map(|face| face.0);
+            let factors = lambert_triangles_x8(to.point, to.normal, triangles).to_array();
+            for ((_, owner), factor) in faces.iter().zip(factors) {
                 open[*owner].1 += factor;
             }
             for &(linked, factor) in &open[..held] {
@@ -251,13 +251,7 @@ impl Gatherer<'_> {
             self.sight
                 .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
-            let open = memory
-                .weights
-                .iter()
-                .zip(&memory.blocked)
-                .filter(|(_, b)| !**b)
-                .map(|(w, _)| w);
-            visible = open.sum::<f64>() / factor;
+            visible = open_weight(&memory.weights, &memory.blocked) / factor;
         }
         Some((factor, visible))
     }
@@ -288,7 +282,7 @@ impl Gatherer<'_> {
         if lamp && carries > SHAFT_WORTH * self.tolerance {
             match self
                 .sight
-                .view_from(to.point, to.normal, &element.corners, [to.plane, plane])
+                .view_from(to.point, to.normal, &element.corners, planes)
             {
                 View::Clear => return 1.0,
                 View::Listed(list) => {
@@ -298,8 +292,6 @@ impl Gatherer<'_> {
                 }
                 View::Crowded => {}
             }
-        }
-        if lamp && carries > SHAFT_WORTH * self.tolerance {
             return self.lamp_visible(to, element, plane, carries, memory);
         }
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
@@ -316,22 +308,14 @@ impl Gatherer<'_> {
             let (c1, c2) = (to.normal.dot(d), -normal.dot(d));
             if c1 > 0.0 && c2 > 0.0 && r2 > 0.0 {
                 memory.weights.push(c1 * c2 / (r2 * r2));
-                memory
-                    .segments
-                    .push(Segment::new(to.point, p, [to.plane, plane]));
+                memory.segments.push(Segment::new(to.point, p, planes));
             }
         }
         self.sight
             .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
         memory.rays += memory.segments.len() as u64;
         let total: f64 = memory.weights.iter().sum();
-        let seen: f64 = memory
-            .weights
-            .iter()
-            .zip(&memory.blocked)
-            .filter(|(_, b)| !**b)
-            .map(|(w, _)| w)
-            .sum();
+        let seen = open_weight(&memory.weights, &memory.blocked);
         // Where no ray gets through, nothing does: what other parts of the element see must not leak in.
         if seen <= 0.0 {
             return 0.0;
@@ -383,8 +367,8 @@ impl Gatherer<'_> {
         while !open.is_empty() {
             // The rays of several quarters together.
             let some = open.split_off(open.len().saturating_sub(QUARTERS));
-            let corners = [0, 1, 2].map(|k| lanes_of(some.iter().map(|t| t.0[k])));
-            let factors = lambert_triangles_x8(to.point, to.normal, corners).to_array();
+            let triangles = some.iter().map(|quarter| quarter.0);
+            let factors = lambert_triangles_x8(to.point, to.normal, triangles).to_array();
             memory.segments.clear();
             for ([a, b, c], _) in &some {
                 let middle = (a + b + c) / 3.0;
@@ -411,12 +395,7 @@ impl Gatherer<'_> {
                 if depth < LAMP_DEPTH
                     && ((mixed && share > self.tolerance) || share > 64.0 * self.tolerance)
                 {
-                    let [a, b, c] = corners;
-                    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
-                    open.extend(
-                        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
-                            .map(|t| (t, depth + 1)),
-                    );
+                    open.extend(quarters(corners).map(|quarter| (quarter, depth + 1)));
                     continue;
                 }
                 total += factor;

@@ -7,15 +7,13 @@ use super::shadows::Shadows;
 use super::trace::Trace;
 use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
-use crate::link::{Sight, View, Way};
+use crate::link::{Sight, Way};
 use crate::scene::{LightKind, PunctualLight};
 use crate::solve::light::Light;
 use glam::DVec3;
 
 /// Nearer than this many of its radii a cluster is entered, and a patch is not even.
 pub(super) const CLOSE: f64 = 1.5;
-/// Faces of a cluster that are treated as polygons.
-pub(super) const POLYGONS: u32 = 4;
 
 /// Where light is received.
 #[derive(Debug, Clone, Copy)]
@@ -217,14 +215,9 @@ impl Gatherer<'_> {
                 None => continue,
             };
             if self.sight.occlusion {
-                memory.segments.clear();
-                memory
-                    .segments
-                    .push(Segment::new(to.point, end, [to.plane, NO_PLANE]));
-                self.sight
-                    .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
                 memory.rays += 1;
-                if memory.blocked[0] {
+                let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
+                if self.sight.blocks_one(&way) {
                     continue;
                 }
             }

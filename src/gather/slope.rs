@@ -6,8 +6,7 @@
 //! `W_j` the integral of w_j over the form factor's kernel, found by quartering the child while that matters.
 
 use super::point::{Gathered, Gatherer, Receiver};
-use crate::geometry::lambert_triangles_x8;
-use crate::geometry::lanes::lanes_of;
+use crate::geometry::{lambert_triangles_x8, quarters};
 use glam::DVec3;
 
 /// A leaf is quartered this often at the most.
@@ -55,7 +54,7 @@ impl Gatherer<'_> {
             .fold(0.0, f64::min);
         let scale = (bright(id) / -lowest).min(1.0);
         let mut moments = [0.0; 3];
-        let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let unit = DVec3::AXES;
         let limit = limit / steepest.max(f64::MIN_POSITIVE);
         moment(to, element.corners, unit, factor, limit, 0, &mut moments);
         let weights = moments.map(|w| sign * scale * visible * (w - factor / 3.0));
@@ -74,8 +73,8 @@ impl Gatherer<'_> {
 /// Adds the integrals of the barycentric weights over a triangle; `w` are those of its corners, `factor` its own.
 fn moment(
     to: &Receiver,
-    [a, b, c]: [DVec3; 3],
-    w: [[f64; 3]; 3],
+    corners: [DVec3; 3],
+    w: [DVec3; 3],
     factor: f64,
     limit: f64,
     depth: u32,
@@ -88,19 +87,9 @@ fn moment(
         }
         return;
     }
-    let half = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
-    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
-    let (wab, wbc, wca) = (half(w[0], w[1]), half(w[1], w[2]), half(w[2], w[0]));
-    let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]];
-    let weights = [
-        [w[0], wab, wca],
-        [wab, w[1], wbc],
-        [wca, wbc, w[2]],
-        [wbc, wca, wab],
-    ];
-    let corners = [0, 1, 2].map(|k| lanes_of(quarters.map(|q| q[k])));
-    let parts = lambert_triangles_x8(to.point, to.normal, corners).to_array();
-    for ((corners, w), part) in quarters.into_iter().zip(weights).zip(parts) {
+    let parts = quarters(corners);
+    let factors = lambert_triangles_x8(to.point, to.normal, parts.into_iter()).to_array();
+    for ((corners, w), part) in parts.into_iter().zip(quarters(w)).zip(factors) {
         if part > 0.0 {
             moment(to, corners, w, part, limit, depth + 1, out);
         }

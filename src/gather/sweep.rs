@@ -1,11 +1,11 @@
 //! Light at a point in rooms where much stands about: lamps and what is as bright by links, all else by rays.
 
 use super::hemisphere::{BEAM, Hemisphere};
-use super::point::{CLOSE, Gathered, Gatherer, Memory, Of, POLYGONS, Receiver};
+use super::point::{CLOSE, Gathered, Gatherer, Memory, Of, Receiver};
 use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
 use crate::hierarchy::NONE;
-use crate::link::{Way, pattern};
+use crate::link::{POLYGONS, Way, pattern};
 use glam::Vec3;
 
 /// A patch so bright that one ray of the hemisphere would carry more than this many tolerances is gathered by its link.

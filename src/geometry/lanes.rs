@@ -99,8 +99,13 @@ pub fn lambert_points_x8(points: Points8, normal: DVec3, triangle: &[DVec3; 3]) 
 
 /// Form factors from one point to up to eight triangles.
 #[inline]
-pub fn lambert_triangles_x8(point: DVec3, normal: DVec3, triangles: [Points8; 3]) -> f64x8 {
-    lambert_x8(all_lanes(point), all_lanes(normal), triangles)
+pub fn lambert_triangles_x8(
+    point: DVec3,
+    normal: DVec3,
+    triangles: impl Iterator<Item = [DVec3; 3]> + Clone,
+) -> f64x8 {
+    let corners = [0, 1, 2].map(|k| lanes_of(triangles.clone().map(|t| t[k])));
+    lambert_x8(all_lanes(point), all_lanes(normal), corners)
 }
 
 /// Form factor from one point to one polygon, its edges side by side; as [`super::lambert_polygon`], which takes the polygons of
@@ -281,8 +286,7 @@ mod tests {
                 .collect();
             let eye = point(1.0);
             let normal = sphere_direction([random.f64(), random.f64()]);
-            let corners = [0, 1, 2].map(|k| lanes_of(triangles.iter().map(|t| t[k])));
-            let fast = lambert_triangles_x8(eye, normal, corners).to_array();
+            let fast = lambert_triangles_x8(eye, normal, triangles.iter().copied()).to_array();
             for (triangle, fast) in triangles.iter().zip(fast) {
                 let plain = lambert_polygon(eye, normal, triangle);
                 let edges = lambert_edges_x8(eye, normal, triangle);

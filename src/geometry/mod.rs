@@ -63,5 +63,6 @@ pub use lanes::{lambert_edges_x8, lambert_points_x8, lambert_triangles_x8};
 pub use nearest::nearest_point;
 pub use plane::plane_ids;
 pub use polygon::lambert_polygon;
+pub(crate) use polygon::quarters;
 pub use segment::{NO_PLANE, Segment};
 pub use shaft::{Patch, Shaft};

@@ -65,6 +65,12 @@ pub(crate) fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
     polygon.iter().copied().zip(ahead.copied())
 }
 
+/// The four similar parts of a triangle: those at its corners, then the middle, turned round.
+pub(crate) fn quarters([a, b, c]: [DVec3; 3]) -> [[DVec3; 3]; 4] {
+    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
+    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
+}
+
 /// Calls with every edge of a closed outline.
 fn for_edges(polygon: &[DVec3], mut call: impl FnMut(DVec3, DVec3)) {
     let mut before = polygon[polygon.len() - 1];

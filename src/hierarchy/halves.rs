@@ -9,7 +9,7 @@ use std::collections::HashMap;
 const STRAIGHT: f64 = 1e-6;
 
 /// What hides as one: a triangle, or a convex quadrilateral in one plane.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Outline {
     corners: [DVec3; 4],
     count: usize,

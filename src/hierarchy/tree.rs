@@ -5,8 +5,8 @@
 //! (Hanrahan, Salzman and Aupperle 1991); clusters split as built.
 
 use super::mesh::{Face, Mesh};
-use crate::geometry::Hit;
 use crate::geometry::sampling::triangle_weights;
+use crate::geometry::{Hit, quarters};
 use glam::DVec3;
 
 /// No node.
@@ -210,13 +210,12 @@ impl Tree {
             return;
         }
         let Element {
-            corners: [a, b, c],
+            corners,
             face,
             depth,
         } = self.elements[node.element as usize];
-        let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
         let first = self.nodes.len() as u32;
-        for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]] {
+        for corners in quarters(corners) {
             let element = self.elements.len() as u32;
             self.elements.push(Element {
                 corners,

@@ -14,7 +14,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 /// Up to this many faces a cluster is a set of polygons; beyond, a set of sample points.
-const POLYGONS: u32 = 4;
+pub(crate) const POLYGONS: u32 = 4;
 /// Points that stand for a larger cluster.
 const CLUSTER_POINTS: usize = 8;
 /// Beyond this gap one point does: 1/r^2 changes by less than 2 % over the smaller end, and evenly.
@@ -85,6 +85,17 @@ pub(crate) fn polygons<'a>(
     })
 }
 
+/// Is a point, on a plane of its own, in front of a face?
+pub(crate) fn in_front_of(
+    tree: &Tree,
+    corners: &[DVec3; 3],
+    entry: usize,
+    point: DVec3,
+    plane: u32,
+) -> bool {
+    tree.face_plane[entry] != plane && tree.face_normal[entry].dot(point - corners[0]) > 0.0
+}
+
 /// Factors from points to a patch with nothing in the way, each in [0, 1]: the share of the light leaving a small surface
 /// there that would reach the patch. `others` holds sample points of the patch if it is a large cluster.
 pub fn point_factors(
@@ -118,9 +129,7 @@ fn add_factors(
     entry: usize,
     sums: &mut [f64],
 ) {
-    let sees = |s: &Sample| {
-        tree.face_plane[entry] != s.plane && tree.face_normal[entry].dot(s.point - corners[0]) > 0.0
-    };
+    let sees = |s: &Sample| in_front_of(tree, corners, entry, s.point, s.plane);
     if !points.iter().any(sees) {
         return;
     }
@@ -409,16 +418,19 @@ fn sampled_visibility(
         .blocked(&scratch.segments, view, &mut scratch.blocked);
     scratch.rays += scratch.segments.len() as u64;
     let total: f64 = scratch.weights.iter().sum();
-    let seen: f64 = scratch
-        .weights
-        .iter()
-        .zip(&scratch.blocked)
-        .filter(|(_, b)| !**b)
-        .map(|(w, _)| w)
-        .sum();
+    let seen = open_weight(&scratch.weights, &scratch.blocked);
     // No ray runs from front to front: the pair meets at the horizon and carries next to nothing. Taking it as open would
     // let light through walls.
     if total > 0.0 { seen / total } else { 0.0 }
+}
+
+/// Sum of the weights of what is not blocked.
+pub(crate) fn open_weight(weights: &[f64], blocked: &[bool]) -> f64 {
+    let pairs = weights.iter().zip(blocked);
+    pairs
+        .filter(|(_, blocked)| !**blocked)
+        .map(|(w, _)| w)
+        .sum()
 }
 
 /// A pair of numbers in [0, 1) that depends on the pair only.

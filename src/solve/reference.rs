@@ -8,7 +8,7 @@
 //! It shares triangles, Lambert's formula and the ray index with the solver: no hierarchy, no links, no lanes, no
 //! iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
 
-use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon};
+use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon, quarters};
 use crate::hierarchy::{Mesh, stratified};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{LightKind, Scene};
@@ -294,13 +294,7 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
         });
         let mut corners = vec![mesh.corners(face)];
         for _ in 0..depth {
-            corners = corners
-                .into_iter()
-                .flat_map(|[a, b, c]| {
-                    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
-                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
-                })
-                .collect();
+            corners = corners.into_iter().flat_map(quarters).collect();
         }
         let area = mesh.area[triangle] / corners.len() as f64;
         out.extend(corners.into_iter().map(|corners| Patch {
