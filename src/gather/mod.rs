@@ -4,6 +4,7 @@ mod bake;
 mod below;
 mod descent;
 pub mod hemisphere;
+mod lamp;
 mod nearby;
 mod patches;
 pub mod point;

@@ -7,16 +7,12 @@
 //! `B(p) = B (D(p) + B(q)) / H`
 //!
 //! with H the leaf's irradiance, B what it reflects, D(p) the direct light of one lamp chosen by chance and q where one
-//! further ray ends, which may be close by again (a path, as in Kajiya 1986; the choice of a lamp descends the hierarchy,
-//! as in Conty Estevez and Kulla 2018). Only brightness follows the path: colours stay those of the leaf.
+//! further ray ends, which may be close by again (a path, as in Kajiya 1986). Only brightness follows the path: colours stay those of the leaf.
 
-use super::point::{Gatherer, Memory, Receiver, punctual_factor};
-use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
-use crate::geometry::{Hit, NO_PLANE, Segment};
-use crate::hierarchy::NONE;
+use super::point::{Gatherer, Memory, Receiver};
+use crate::geometry::Hit;
+use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::link::View;
-use glam::DVec3;
-use std::f64::consts::PI;
 
 /// What is nearer than this many times the square root of a leaf's area is close by.
 pub(super) const NEAR: f64 = 1.5;
@@ -28,8 +24,6 @@ const STEPS: u64 = 8;
 const FOLLOWED: usize = 64;
 /// Where direct light varies by less than this share over a leaf, any point of it has the mean.
 const EVEN: f32 = 0.05;
-/// Points of an emitting element count as no nearer than the root of this share of its area.
-const NEAREST: f64 = 0.05;
 
 /// Light that arrives on a leaf, in brightness, share of the white's.
 #[derive(Debug, Clone, Copy, Default)]
@@ -175,86 +169,6 @@ impl Gatherer<'_> {
             seed: 0,
         }
     }
-
-    /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
-    /// the probability that it brings the light, if nothing lies on the segments: without bias, but for the limit [`NEAREST`].
-    fn one_lamp(&self, to: &Receiver, [mut u, v]: [f64; 2]) -> [Option<(f64, Segment)>; 2] {
-        let segment = |end: DVec3, plane: u32| Segment::new(to.point, end, [to.plane, plane]);
-        let punctual = self.one_punctual(to, v);
-        let emitter = self.one_emitter(to, &mut u).and_then(|(id, chance)| {
-            let node = self.tree.node(id);
-            let element = self.tree.element(node)?;
-            let end = element.at(triangle_weights([u, v]));
-            let way = end - to.point;
-            let (here, there) = (to.normal.dot(way), -node.normal.dot(way));
-            // The mean over the element, were it not for the limit very near it.
-            let factor = here * there * node.area
-                / (PI * way.length_squared().max(NEAREST * node.area).powi(2));
-            let bright = factor * f64::from(self.light.bright_emitted[id as usize]) / chance;
-            let plane = self.tree.face_plane[element.face as usize];
-            (here > 0.0 && there > 0.0).then(|| (bright, segment(end, plane)))
-        });
-        [
-            punctual.map(|(bright, end)| (bright, segment(end, NO_PLANE))),
-            emitter,
-        ]
-    }
-
-    /// Chooses a punctual light: brightness of them all, and where the ray to it ends.
-    fn one_punctual(&self, to: &Receiver, v: f64) -> Option<(f64, DVec3)> {
-        let each = || {
-            let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
-            lamps.filter_map(|((lamp, _), &bright)| {
-                let (factor, end) = punctual_factor(lamp, to, self.light.half_size)?;
-                Some((factor * f64::from(bright), end))
-            })
-        };
-        let all: f64 = each().map(|(bright, _)| bright).sum();
-        let mut left = v * all;
-        let (_, end) = each().find(|&(bright, _)| {
-            left -= bright;
-            left < 0.0
-        })?;
-        Some((all, end))
-    }
-
-    /// Chooses an emitting element and tells with what probability; `u` serves again afterwards.
-    fn one_emitter(&self, to: &Receiver, u: &mut f64) -> Option<(u32, f64)> {
-        let worth = |id: u32| {
-            let node = self.tree.node(id);
-            let emitted = f64::from(self.light.bright_emitted[id as usize]);
-            if !self.can_see(to, node) {
-                return 0.0;
-            }
-            let distance = (node.centre - to.point).length_squared();
-            emitted * node.area / distance.max(node.radius * node.radius)
-        };
-        let mut id = *self.light.lit.first().filter(|&&id| id != NONE)?;
-        let mut chance = 1.0;
-        if worth(id) <= 0.0 {
-            return None;
-        }
-        // An element emits all over alike, whatever its parts.
-        while self.tree.node(id).element == NONE {
-            let children = self.tree.node(id).child_range();
-            let fork = |child: u32| self.light.lit[child as usize];
-            let children = children.map(fork).filter(|&child| child != NONE);
-            let worths = children.map(|child| (child, worth(child)));
-            let all: f64 = worths.clone().map(|c| c.1).sum();
-            let mut left = *u * all;
-            let mut chosen = None;
-            for (child, worth) in worths.filter(|c| c.1 > 0.0) {
-                chosen = Some((child, worth, (left / worth).min(1.0 - f64::EPSILON)));
-                if left < worth {
-                    break;
-                }
-                left -= worth;
-            }
-            let (child, worth, rest) = chosen?;
-            (id, *u, chance) = (child, rest, chance * worth / all);
-        }
-        Some((id, chance))
-    }
 }
 
 /// Sum of the first of all pairs as a share of the second, as far as it stands out of its noise (Stein's positive part).
@@ -277,55 +191,6 @@ fn believed(pairs: &[[f64; 2]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Options, Scene};
-    use crate::solve::light::brightness;
-    use crate::solve::{Bake, Settings};
-    use std::path::Path;
-
-    /// Against all lamps in turn, exactly.
-    #[test]
-    fn one_lamp_by_chance_is_all_lamps_on_the_mean() {
-        const SAMPLES: u32 = 1024;
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/furnished.glb");
-        let settings = Settings {
-            rounds: 1,
-            ..Settings::default()
-        };
-        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
-        bake.run();
-        assert!(!bake.lamps().is_empty());
-        let (mut off, mut all) = (0.0, 0.0);
-        bake.with_sight(|bake, sight| {
-            let gatherer = bake.gatherer(sight);
-            let mut memory = Memory::default();
-            let tree = bake.tree();
-            for leaf in tree.leaves().step_by(97) {
-                let element = tree.element(tree.node(leaf)).unwrap();
-                let to = Receiver {
-                    point: element.at([1.0 / 3.0; 3]),
-                    normal: tree.face_normal[element.face as usize],
-                    plane: tree.face_plane[element.face as usize],
-                    leaf: Some(leaf),
-                    seed: 0,
-                };
-                let row = gatherer.direct(&to, &mut memory);
-                let want = brightness(bake.lanes().tristimulus(&row), bake.light().white);
-                let one = |k| {
-                    gatherer
-                        .one_lamp(&to, sequence02(k, 0))
-                        .into_iter()
-                        .flatten()
-                };
-                let open = (0..SAMPLES)
-                    .flat_map(one)
-                    .filter(|(_, segment)| !sight.blocks_one(segment));
-                let mean = open.map(|(bright, _)| bright).sum::<f64>() / f64::from(SAMPLES);
-                off += (mean - want).abs();
-                all += want;
-            }
-        });
-        assert!(all > 1.0 && off < 0.02 * all, "{off} of {all}");
-    }
 
     #[test]
     fn what_does_not_stand_out_of_its_noise_is_not_believed() {

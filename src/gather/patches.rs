@@ -5,7 +5,7 @@
 //! carry.
 
 use super::point::{CLOSE, Gathered, Gatherer, Linked, Memory, Of, Receiver};
-use crate::geometry::{Segment, lambert_triangles_x8, quarters};
+use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
 use crate::link::{
     PIECES, POLYGONS, View, Way, blockers_of, in_front_of, open_weight, pattern, polygons,
@@ -21,12 +21,7 @@ const CLUSTER_POINTS: [usize; 2] = [4, 8];
 const CLEAR_SHARE: f64 = 0.05;
 /// How many rays a link's visibility counts for.
 const PRIOR: f64 = 4.0;
-/// How often a lamp's triangle is quartered where its shadow boundary crosses it.
-const LAMP_DEPTH: u32 = 6;
-/// Rays to a quarter of a lamp's triangle, and quarters that get theirs together: a packet.
-const LAMP_RAYS: usize = 4;
-const QUARTERS: usize = 4;
-/// A lamp gets more than plain rays if it carries this many tolerances.
+/// A shaft to a lamp is looked into if the lamp carries this many tolerances.
 const SHAFT_WORTH: f64 = 4.0;
 
 impl Gatherer<'_> {
@@ -115,7 +110,16 @@ impl Gatherer<'_> {
         let near = (node.centre - to.point).length() < CLOSE * node.radius;
         // Points find a cluster's light to about a third of its spread, and where lamps are in it, of its light.
         if near || factor * (0.3 * spread + emitted) > self.tolerance {
-            memory.stack.extend(node.child_range().map(|c| (c, way, v)));
+            let part = |c: u32| match of {
+                Of::Emitted => self.light.lit[c as usize],
+                _ => c,
+            };
+            let parts = node.child_range().map(part).filter(|&c| c != NONE);
+            memory.stack.extend(parts.map(|c| (c, way, v)));
+            return;
+        }
+        if of == Of::Emitted {
+            self.lamps_by_chance(to, id, memory, out);
             return;
         }
         let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
@@ -144,7 +148,10 @@ impl Gatherer<'_> {
         } else {
             (1.0, self.tolerance)
         };
-        let spread = f64::from(self.light.spread[id as usize]);
+        let spread = match of {
+            Of::Emitted => self.uneven(node),
+            _ => f64::from(self.light.spread[id as usize]),
+        };
         if self.has_parts(node) && (node.element == NONE || factor * spread * size > limit) {
             memory.stack.extend(node.child_range().map(|c| (c, way, v)));
             return;
@@ -159,6 +166,23 @@ impl Gatherer<'_> {
         self.add(id, factor, visible, of, out);
         if of != Of::Emitted {
             self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
+        }
+    }
+
+    /// By how much what the children of a node emit differs: nothing, unless a texture glows.
+    fn uneven(&self, node: &Node) -> f64 {
+        if !self.has_parts(node) {
+            return 0.0;
+        }
+        let parts = node
+            .child_range()
+            .map(|c| self.light.bright_emitted[c as usize]);
+        let (least, most) = parts.fold((f32::MAX, 0.0_f32), |(l, m), x| (l.min(x), m.max(x)));
+        // Means of equal numbers differ by rounding.
+        if most - least > 1e-5 * most {
+            f64::from(most - least)
+        } else {
+            0.0
         }
     }
 
@@ -195,6 +219,11 @@ impl Gatherer<'_> {
                 }
             }
         }
+    }
+
+    /// Adds what a patch emits, times a factor.
+    pub(super) fn add_emitted(&self, id: u32, factor: f64, out: &mut Gathered) {
+        self.add(id, factor, 1.0, Of::Emitted, out);
     }
 
     /// Could any of the patch be in front of the receiver, and the receiver in front of any of the patch?
@@ -278,21 +307,23 @@ impl Gatherer<'_> {
                 return (seen / factor).min(1.0);
             }
         }
-        // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
-        if lamp && carries > SHAFT_WORTH * self.tolerance {
-            match self
-                .sight
-                .view_from(to.point, to.normal, &element.corners, planes)
-            {
-                View::Clear => return 1.0,
-                View::Listed(list) => {
-                    if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
-                        return (seen / factor).min(1.0);
+        if lamp {
+            // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
+            if self.shafts && carries > SHAFT_WORTH * self.tolerance {
+                match self
+                    .sight
+                    .view_from(to.point, to.normal, &element.corners, planes)
+                {
+                    View::Clear => return 1.0,
+                    View::Listed(list) => {
+                        if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
+                            return (seen / factor).min(1.0);
+                        }
                     }
+                    View::Crowded => {}
                 }
-                View::Crowded => {}
             }
-            return self.lamp_visible(to, element, plane, carries, memory);
+            return self.lamp_visible(to, id, factor, carries, memory);
         }
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
         let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
@@ -321,8 +352,8 @@ impl Gatherer<'_> {
             return 0.0;
         }
         // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
-        // blurs is bounded by the size of the receiving element. A lamp's shadow is not blurred.
-        let prior = if lamp || to.leaf.is_none() || self.hemisphere.is_some() {
+        // blurs is bounded by the size of the receiving element.
+        let prior = if to.leaf.is_none() || self.hemisphere.is_some() {
             0.0
         } else {
             PRIOR
@@ -350,58 +381,5 @@ impl Gatherer<'_> {
             }
         }
         Some(memory.clipper.factor(to.normal, whole))
-    }
-
-    /// Visible share of a lamp's triangle: quartered where rays disagree, until a quarter carries less than the tolerance.
-    fn lamp_visible(
-        &self,
-        to: &Receiver,
-        element: &Element,
-        plane: u32,
-        carries: f64,
-        memory: &mut Memory,
-    ) -> f64 {
-        let mut seen = 0.0;
-        let mut total = 0.0;
-        let mut open = vec![(element.corners, 0_u32)];
-        while !open.is_empty() {
-            // The rays of several quarters together.
-            let some = open.split_off(open.len().saturating_sub(QUARTERS));
-            let triangles = some.iter().map(|quarter| quarter.0);
-            let factors = lambert_triangles_x8(to.point, to.normal, triangles).to_array();
-            memory.segments.clear();
-            for ([a, b, c], _) in &some {
-                let middle = (a + b + c) / 3.0;
-                // Corners drawn a little inwards: a ray along the very edge says nothing about the inside.
-                let inwards = [a, b, c].map(|corner| corner.lerp(middle, 0.15));
-                memory.segments.extend(
-                    std::iter::once(middle)
-                        .chain(inwards)
-                        .map(|p| Segment::new(to.point, p, [to.plane, plane])),
-                );
-            }
-            self.sight
-                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
-            memory.rays += memory.segments.len() as u64;
-            let blocked = memory.blocked.chunks(LAMP_RAYS);
-            for (((corners, depth), factor), blocked) in some.into_iter().zip(factors).zip(blocked)
-            {
-                if factor <= 0.0 {
-                    continue;
-                }
-                let blocked = blocked.iter().filter(|b| **b).count();
-                let share = carries * 0.25_f64.powi(depth as i32);
-                let mixed = blocked != 0 && blocked != LAMP_RAYS;
-                if depth < LAMP_DEPTH
-                    && ((mixed && share > self.tolerance) || share > 64.0 * self.tolerance)
-                {
-                    open.extend(quarters(corners).map(|quarter| (quarter, depth + 1)));
-                    continue;
-                }
-                total += factor;
-                seen += factor * (LAMP_RAYS - blocked) as f64 / LAMP_RAYS as f64;
-            }
-        }
-        if total > 0.0 { seen / total } else { 0.0 }
     }
 }

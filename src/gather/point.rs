@@ -104,6 +104,8 @@ pub struct Memory {
     pub(super) to_lamps: Vec<(usize, f64)>,
     /// Rays cast.
     pub rays: u64,
+    /// Variance of brightness by the rays to the lamps of the last point.
+    pub(crate) noise: f64,
     /// Where the direct light of the last point comes from, where that is kept.
     pub(crate) trace: Option<Trace>,
 }
@@ -138,6 +140,8 @@ pub struct Gatherer<'a> {
     pub closed: bool,
     /// Directions for indirect light where rays find patches sooner than links do; none: by links.
     pub hemisphere: Option<&'a Hemisphere>,
+    /// Are shafts to lamps that matter looked into? Where many points stand for a leaf, rays do.
+    pub(crate) shafts: bool,
     /// Is it kept where light comes from?
     pub(crate) keep: bool,
 }
@@ -153,6 +157,7 @@ impl Gatherer<'_> {
     /// Gathers what comes straight from lamps.
     pub fn direct(&self, to: &Receiver, memory: &mut Memory) -> [f32; 64] {
         let mut out = self.start();
+        memory.noise = 0.0;
         self.lamps_of(to, memory, &mut out);
         self.punctual(to, memory, &mut out);
         memory.trace = out.trace;
@@ -168,13 +173,19 @@ impl Gatherer<'_> {
             .chain(room.then_some((0, Way::Crowded, 0.5)))
     }
 
-    /// Gathers what patches emit.
+    /// Gathers what patches emit. Where links say little about what stands between, lamps are looked for from the root: a lamp
+    /// is one element then, however many patches of it the receiver is linked to.
     pub(super) fn lamps_of(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
-        let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
         memory.stack.clear();
-        memory
-            .stack
-            .extend(self.links(to).filter(|&(id, ..)| lit(id)));
+        if self.hemisphere.is_some() {
+            let root = self.light.lit.first().filter(|&&id| id != NONE);
+            memory.stack.extend(root.map(|&id| (id, Way::Crowded, 0.5)));
+        } else {
+            let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
+            memory
+                .stack
+                .extend(self.links(to).filter(|&(id, ..)| lit(id)));
+        }
         self.patches(to, Of::Emitted, memory, out);
     }
 

@@ -151,7 +151,7 @@ impl Bake {
                     .iter()
                     .flat_map(|&k| self.direct.row(k).iter().copied()),
             )?;
-            out.put_list(leaves.len(), leaves.iter().map(|&k| self.direct.spread(k)))?;
+            out.put_list(leaves.len(), leaves.iter().map(|&k| self.direct.figures(k)))?;
         }
         out.put(self.direct.rays)?;
         let traces: Vec<_> = leaves.iter().map(|&k| self.direct.trace(k)).collect();
@@ -218,8 +218,8 @@ impl Bake {
             irradiance = rows(from, count, width)?;
             let lanes = self.lanes.len();
             let known: Vec<f32> = from.get_exactly(count * lanes)?;
-            let spread: Vec<f32> = from.get_exactly(count)?;
-            self.direct = direct::Direct::known(&leaves, nodes, lanes, &known, &spread);
+            let figures: Vec<[f32; 2]> = from.get_exactly(count)?;
+            self.direct = direct::Direct::known(&leaves, nodes, lanes, &known, &figures);
         }
         self.direct.rays = from.get()?;
         let traces = Packs::decode(from)?;

@@ -2,9 +2,14 @@
 //!
 //! Leaves over which direct light varies are split, which is where shadow boundaries and hot spots are; links then only
 //! carry reflected light, which is smooth. What a leaf got stays known for the rounds after.
+//!
+//! In rooms of few triangles a quadrature rule finds the mean over a leaf, and points that something covers are left out.
+//! Where leaves look for themselves the points are random, weighted by how open they are (a leaf is what others see of
+//! it, see `outlook`): without bias whatever lies across the leaf, from two points upwards. What matters gets more of them.
 
 use crate::gather::point::{Memory, Receiver};
 use crate::gather::trace::Trace;
+use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::hierarchy::{NONE, Tree, stratified};
 use crate::link::{Demand, MAX_DEPTH};
 use rayon::prelude::*;
@@ -32,6 +37,15 @@ const TINY: f64 = 1e-5;
 const MORE_POINTS: usize = 8;
 /// Error of a leaf's direct light, in what would split the leaf.
 const NOISE: f64 = 0.1;
+/// Random points of a leaf that nothing can split yet, of one that may have to be (as many decide about it), and at the most.
+const RANDOM: [usize; 3] = [2, 8, 256];
+/// What a leaf may misplace of all direct light by too few points, about. From the first round on a garage's leaves then
+/// receive what its lamp sends within a per cent.
+const FLUX_SHARE: f64 = 2e-4;
+/// Rays that tell how open a point is. Where they meet no front it weighs next to nothing, but so that a leaf which nobody
+/// sees is not without light.
+const OPEN_RAYS: usize = 4;
+const UNSEEN: f32 = 1e-4;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
 
@@ -40,8 +54,10 @@ const CHUNK: usize = 32;
 struct Found {
     /// Mean rows.
     rows: Vec<f32>,
-    /// Half the range of brightness over a leaf's points.
+    /// Half the range of brightness over a leaf's points; if that was not measured, less than zero by how much it may be.
     spread: Vec<f32>,
+    /// Mean brightness of the whole leaf over that of what others see of it.
+    whole: Vec<f32>,
     /// Where the light comes from, if that is kept.
     traces: Vec<Option<Box<[u8]>>>,
     rays: u64,
@@ -58,8 +74,10 @@ pub(super) struct Direct {
     rows: Vec<f32>,
     /// Places whose rows are not asked for any more.
     free: Vec<u32>,
-    /// Half the range of brightness over a leaf's points.
+    /// Half the range of brightness over a leaf's points; if that was not measured, less than zero by how much it may be.
     spread: Vec<f32>,
+    /// Mean brightness of the whole leaf over that of what others see of it.
+    whole: Vec<f32>,
     /// Where each leaf's light comes from: a stretch of `bytes`; empty unless it is kept. What belonged to leaves that were
     /// split stays among the bytes: each level below is four times as many.
     traces: Vec<Range<usize>>,
@@ -69,26 +87,33 @@ pub(super) struct Direct {
 }
 
 impl Direct {
-    /// What is known of `leaves`, as it was before it was written down: a row of `width` lanes and a spread each.
+    /// What is known of `leaves`, as it was before it was written down: a row of `width` lanes and two figures each, see
+    /// [`figures`](Self::figures).
     pub(super) fn known(
         leaves: &[u32],
         nodes: usize,
         width: usize,
         rows: &[f32],
-        spread: &[f32],
+        figures: &[[f32; 2]],
     ) -> Self {
         let mut known = Self {
             width,
             place: vec![NONE; nodes],
             rows: rows.to_vec(),
             spread: vec![0.0; nodes],
+            whole: vec![1.0; nodes],
             ..Self::default()
         };
         for (k, &leaf) in leaves.iter().enumerate() {
             known.place[leaf as usize] = k as u32;
-            known.spread[leaf as usize] = spread[k];
+            [known.spread[leaf as usize], known.whole[leaf as usize]] = figures[k];
         }
         known
+    }
+
+    /// What is known of a leaf beside its row.
+    pub(super) fn figures(&self, leaf: u32) -> [f32; 2] {
+        [self.spread[leaf as usize], self.whole[leaf as usize]]
     }
 
     /// Where the light of leaves comes from, as it was before it was written down.
@@ -118,13 +143,19 @@ impl Direct {
             + size_of_val(self.rows.as_slice())
             + size_of_val(self.free.as_slice())
             + size_of_val(self.spread.as_slice())
+            + size_of_val(self.whole.as_slice())
             + size_of_val(self.traces.as_slice())
             + self.bytes.len()
     }
 
-    /// Half the range of brightness over a leaf's points.
+    /// Half the range of brightness over a leaf's points, or how much it may be.
     pub(super) fn spread(&self, leaf: u32) -> f32 {
-        self.spread[leaf as usize]
+        self.spread[leaf as usize].abs()
+    }
+
+    /// Mean brightness of the whole leaf over that of what others see of it.
+    pub(super) fn whole(&self, leaf: u32) -> f32 {
+        self.whole[leaf as usize]
     }
 
     /// Direct irradiance of a leaf by lane.
@@ -137,7 +168,8 @@ impl Direct {
     }
 
     /// Puts a row in a free place.
-    fn put(&mut self, leaf: u32, row: &[f32], spread: f32) {
+    fn put(&mut self, leaf: u32, row: &[f32], figures: [f32; 2]) {
+        self.forget(leaf as usize);
         let place = match self.free.pop() {
             Some(place) => {
                 let first = place as usize * self.width;
@@ -150,7 +182,7 @@ impl Direct {
             }
         };
         self.place[leaf as usize] = place;
-        self.spread[leaf as usize] = spread;
+        [self.spread[leaf as usize], self.whole[leaf as usize]] = figures;
     }
 
     /// What was a leaf and is none any more asks for no memory.
@@ -175,17 +207,16 @@ impl Direct {
 
     /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
     /// No patch may misplace more than `coarsest` (share of white) of a leaf's light, however small the leaf: all small
-    /// leaves would err alike. `weights` turn a row into brightness, share of white; `gather` gives none for a point that something covers.
+    /// leaves would err alike.
     pub(super) fn refine(
         &mut self,
         tree: &mut Tree,
         demand: &Demand,
-        weights: &[f64],
         coarsest: f64,
-        gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
+        look: &impl Look,
     ) {
         let mut open: Vec<u32> = tree.leaves().collect();
-        self.width = weights.len();
+        self.width = look.weights().len();
         for k in 0..self.place.len() {
             if !tree.nodes[k].is_leaf() {
                 self.forget(k);
@@ -194,28 +225,32 @@ impl Direct {
         while !open.is_empty() {
             self.place.resize(tree.nodes.len(), NONE);
             self.spread.resize(tree.nodes.len(), 0.0);
-            let fresh: Vec<u32> = open
-                .iter()
-                .copied()
-                .filter(|&k| self.place[k as usize] == NONE)
+            self.whole.resize(tree.nodes.len(), 1.0);
+            let fresh: Vec<(u32, Stake)> = (open.iter())
+                .map(|&leaf| (leaf, Stake::new(tree, leaf, demand)))
+                .filter(|(leaf, stake)| {
+                    let k = *leaf as usize;
+                    self.place[k] == NONE || f64::from(-self.spread[k]) * stake.split > 1.0
+                })
                 .collect();
             let parts: Vec<Found> = fresh
                 .par_chunks(CHUNK)
                 .map(|chunk| {
                     let (mut memory, mut found) = (Memory::default(), Found::default());
-                    for &leaf in chunk {
+                    for &(leaf, ref stake) in chunk {
                         // What would split the leaf is what it has to be told from.
                         let share = (tree.node(leaf).area / demand.total_area).sqrt();
-                        at_leaf(
-                            tree,
-                            leaf,
-                            weights,
-                            (NOISE * demand.threshold / share).min(coarsest),
-                            share * share < TINY,
-                            gather,
-                            &mut memory,
-                            &mut found,
-                        );
+                        let tolerance = (NOISE * demand.threshold / share).min(coarsest);
+                        let mean = match look.openness(tree, leaf) {
+                            Some(open) => {
+                                by_chance(tree, leaf, look, &open, tolerance, stake, &mut memory)
+                            }
+                            None => {
+                                let tiny = share * share < TINY;
+                                by_rule(tree, leaf, look, tolerance, tiny, &mut memory)
+                            }
+                        };
+                        mean.end(&mut found, look.weights().len());
                     }
                     found.rays = memory.rays;
                     found
@@ -223,96 +258,345 @@ impl Direct {
                 .collect();
             for (part, leaves) in parts.iter().zip(fresh.chunks(CHUNK)) {
                 self.rays += part.rays;
-                for (k, &leaf) in leaves.iter().enumerate() {
+                for (k, &(leaf, _)) in leaves.iter().enumerate() {
                     let row = &part.rows[k * self.width..(k + 1) * self.width];
-                    self.put(leaf, row, part.spread[k]);
+                    self.put(leaf, row, [part.spread[k], part.whole[k]]);
                     self.keep_trace(leaf, part.traces[k].as_deref());
                 }
             }
-            let mut children = Vec::new();
-            for leaf in open {
-                let node = tree.node(leaf);
-                let depth = tree.elements[node.element as usize].depth;
-                let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
-                let error = f64::from(self.spread[leaf as usize] * keen)
-                    * (node.area / demand.total_area).sqrt();
-                if error > demand.threshold && node.area > demand.least_area && depth < MAX_DEPTH {
-                    tree.subdivide(leaf);
-                    self.forget(leaf as usize);
-                    children.extend(tree.node(leaf).child_range());
-                }
+            let split: Vec<u32> = (open.into_iter())
+                .filter(|&leaf| {
+                    let stake = Stake::new(tree, leaf, demand);
+                    f64::from(self.spread[leaf as usize]) * stake.split > 1.0 && stake.may_split
+                })
+                .collect();
+            open = Vec::new();
+            for leaf in split {
+                tree.subdivide(leaf);
+                self.forget(leaf as usize);
+                open.extend(tree.node(leaf).child_range());
             }
-            open = children;
         }
     }
 }
 
-/// Finds the mean row over the points of a leaf, and half the range of brightness.
-#[expect(clippy::too_many_arguments, reason = "one caller")]
-fn at_leaf(
-    tree: &Tree,
-    leaf: u32,
-    weights: &[f64],
-    tolerance: f64,
-    tiny: bool,
-    gather: &(impl Fn(&Tree, &Receiver, f64, &mut Memory) -> Option<[f32; 64]> + Sync),
-    memory: &mut Memory,
-    found: &mut Found,
-) {
-    let element = &tree.elements[tree.node(leaf).element as usize];
-    let entry = element.face as usize;
-    let mut mean = [0.0_f32; 64];
-    let mean = &mut mean[..weights.len()];
-    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
-    let mut bare = 0;
-    // A face that is next to nothing of the room is looked at once: it is never split, and its pattern is not seen.
-    let wanted = if tiny { 1 } else { POINTS.len() };
-    let first = if tiny { &MIDDLE } else { &POINTS[..] };
-    // The points of the rule; where one is covered, others until enough are found or the leaf counts as covered.
-    let more = (0..MORE_POINTS).map(|k| {
-        (
-            stratified(k, MORE_POINTS, [0.5, 0.5]),
-            1.0 / POINTS.len() as f64,
-        )
-    });
-    let mut total = 0.0_f32;
-    let mut kept: Option<Trace> = None;
-    for (k, (at, weight)) in first.iter().copied().chain(more).enumerate() {
-        if bare == wanted {
-            break;
+/// What a leaf's direct light matters for.
+struct Stake {
+    /// How much of what splits a leaf a range of one white takes.
+    split: f64,
+    /// How much of what a leaf may misplace of all light one white takes.
+    flux: f64,
+    /// Is it large enough to be split?
+    may_split: bool,
+}
+
+impl Stake {
+    fn new(tree: &Tree, leaf: u32, demand: &Demand) -> Self {
+        let node = tree.node(leaf);
+        let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
+        let share = node.area / demand.total_area;
+        let depth = tree.elements[node.element as usize].depth;
+        Self {
+            split: f64::from(keen) * share.sqrt() / demand.threshold,
+            // The white is twice the mean.
+            flux: share / (0.5 * FLUX_SHARE),
+            may_split: node.area > demand.least_area && depth < MAX_DEPTH,
         }
-        let to = Receiver {
-            point: element.at(at),
-            normal: tree.face_normal[entry],
-            plane: tree.face_plane[entry],
-            leaf: Some(leaf),
-            seed: u64::from(leaf) << 4 | k as u64,
-        };
-        let Some(row) = gather(tree, &to, tolerance, memory) else {
-            continue;
-        };
-        bare += 1;
-        total += weight as f32;
+    }
+}
+
+/// How points of leaves are looked at.
+pub(super) trait Look: Sync {
+    /// What turns a row into brightness, share of white.
+    fn weights(&self) -> &[f64];
+    /// Direct light at a point; none where something covers it.
+    fn direct(
+        &self,
+        tree: &Tree,
+        to: &Receiver,
+        tolerance: f64,
+        memory: &mut Memory,
+    ) -> Option<[f32; 64]>;
+    /// Greatest brightness of direct light on a leaf were nothing in the way, share of white, about.
+    fn unshadowed(&self, tree: &Tree, leaf: u32, tolerance: f64) -> f64;
+    /// What tells how open points of a leaf are, in rooms where that matters: the share of `rays` that meet fronts.
+    fn openness(&self, tree: &Tree, leaf: u32) -> Option<impl Fn(&Receiver, usize) -> f32>;
+}
+
+/// What points of a leaf get, being summed.
+struct Mean {
+    row: [f32; 64],
+    total: f32,
+    /// Range of brightness, and the sums of it with weights and without.
+    range: [f64; 2],
+    bright: [f64; 2],
+    points: usize,
+    /// Of open points: how many, sums of brightness, its square and the variance that rays to lamps explain.
+    open: [f64; 4],
+    trace: Option<Trace>,
+    /// Half the range of brightness, see [`Direct`].
+    spread: f64,
+}
+
+impl Mean {
+    fn new() -> Self {
+        Self {
+            row: [0.0; 64],
+            total: 0.0,
+            range: [f64::INFINITY, 0.0],
+            bright: [0.0; 2],
+            points: 0,
+            open: [0.0; 4],
+            trace: None,
+            spread: 0.0,
+        }
+    }
+
+    fn add(&mut self, row: &[f32; 64], weight: f32, weights: &[f64], memory: &mut Memory) {
+        self.total += weight;
+        self.points += 1;
         if let Some(trace) = memory.trace.take() {
-            kept.get_or_insert_with(Trace::new)
-                .absorb(&trace, weight as f32);
+            self.trace
+                .get_or_insert_with(Trace::new)
+                .absorb(&trace, weight);
         }
         let mut bright = 0.0;
-        for ((m, x), w) in mean.iter_mut().zip(row).zip(weights) {
-            *m += weight as f32 * x;
-            bright += f64::from(x) * w;
+        for ((sum, x), w) in self.row.iter_mut().zip(row).zip(weights) {
+            *sum += weight * x;
+            bright += f64::from(*x) * w;
         }
-        least = least.min(bright);
-        most = most.max(bright);
+        if weight > UNSEEN {
+            self.range = [self.range[0].min(bright), self.range[1].max(bright)];
+            let more = [1.0, bright, bright * bright, memory.noise];
+            self.open = std::array::from_fn(|k| self.open[k] + more[k]);
+        }
+        self.bright = [
+            self.bright[0] + f64::from(weight) * bright,
+            self.bright[1] + bright,
+        ];
     }
-    if total > 0.0 {
-        for m in &mut *mean {
-            *m /= total;
+
+    /// Half the range of brightness.
+    fn half_range(&self) -> f64 {
+        0.5 * (self.range[1] - self.range[0]).max(0.0)
+    }
+
+    /// Variance of brightness between open points, without the noise of rays.
+    fn variance(&self) -> f64 {
+        let [n, sum, squares, noise] = self.open;
+        if n < 2.0 {
+            return 0.0;
+        }
+        ((squares - sum * sum / n) / (n - 1.0) - noise / n).max(0.0)
+    }
+
+    /// Writes down the means.
+    fn end(self, found: &mut Found, width: usize) {
+        let share = if self.total > 0.0 {
+            1.0 / self.total
+        } else {
+            0.0
+        };
+        let row = &self.row[..width];
+        found.rows.extend(row.iter().map(|x| x * share));
+        found.spread.push(self.spread as f32);
+        let seen = self.bright[0] * f64::from(share);
+        let all = self.bright[1] / self.points.max(1) as f64;
+        found
+            .whole
+            .push(if seen > 0.0 { (all / seen) as f32 } else { 1.0 });
+        let trace = self.trace.map(|trace| trace.times(share).pack());
+        found.traces.push(trace);
+    }
+}
+
+/// A point of a leaf.
+pub(super) fn receiver(tree: &Tree, leaf: u32, at: [f64; 3], seed: u64) -> Receiver {
+    let element = &tree.elements[tree.node(leaf).element as usize];
+    let entry = element.face as usize;
+    Receiver {
+        point: element.at(at),
+        normal: tree.face_normal[entry],
+        plane: tree.face_plane[entry],
+        leaf: Some(leaf),
+        seed,
+    }
+}
+
+/// Mean over the points of a quadrature rule; where one is covered, others until enough are found or the leaf counts as
+/// covered. A face that is next to nothing of the room (`tiny`) is looked at once: it is never split, and its pattern is not
+/// seen.
+fn by_rule(
+    tree: &Tree,
+    leaf: u32,
+    look: &impl Look,
+    tolerance: f64,
+    tiny: bool,
+    memory: &mut Memory,
+) -> Mean {
+    let mut mean = Mean::new();
+    let wanted = if tiny { 1 } else { POINTS.len() };
+    let first = if tiny { &MIDDLE } else { &POINTS[..] };
+    let more = (0..MORE_POINTS).map(|k| {
+        let at = stratified(k, MORE_POINTS, [0.5, 0.5]);
+        (at, 1.0 / POINTS.len() as f64)
+    });
+    for (k, (at, weight)) in first.iter().copied().chain(more).enumerate() {
+        if mean.points == wanted {
+            break;
+        }
+        let to = receiver(tree, leaf, at, u64::from(leaf) << 4 | k as u64);
+        if let Some(row) = look.direct(tree, &to, tolerance, memory) {
+            mean.add(&row, weight as f32, look.weights(), memory);
         }
     }
-    found.rows.extend_from_slice(mean);
-    found.spread.push((0.5 * (most - least).max(0.0)) as f32);
-    found
-        .traces
-        .push(kept.map(|trace| trace.times(1.0 / total).pack()));
+    mean.spread = mean.half_range();
+    // Inside something nothing is brighter than elsewhere.
+    mean.bright[1] = mean.bright[0] / f64::from(mean.total.max(f32::MIN_POSITIVE));
+    mean.points = 1;
+    mean
+}
+
+/// Mean over random points, each weighted by how `open` it is.
+///
+/// How many there are follows from the light without shadows: were more taken where the first are bright, what is bright here
+/// and there would be found too dark. For the same reason the points that decide whether the leaf is split have no part in
+/// the mean: leaves that stay would be those on which few points found light to be even.
+fn by_chance(
+    tree: &Tree,
+    leaf: u32,
+    look: &impl Look,
+    open: &impl Fn(&Receiver, usize) -> f32,
+    tolerance: f64,
+    stake: &Stake,
+    memory: &mut Memory,
+) -> Mean {
+    let shift = hash(u64::from(leaf), 3);
+    let mut gather = |points: Range<usize>| {
+        let mut mean = Mean::new();
+        for k in points {
+            let at = triangle_weights(sequence02(k as u32, shift));
+            let to = receiver(tree, leaf, at, u64::from(leaf) << 9 | k as u64);
+            if let Some(row) = look.direct(tree, &to, tolerance, memory) {
+                let weight = open(&to, OPEN_RAYS).max(UNSEEN);
+                mean.add(&row, weight, look.weights(), memory);
+                memory.rays += OPEN_RAYS as u64;
+            }
+        }
+        mean
+    };
+    let most = look.unshadowed(tree, leaf, tolerance);
+    // Errors fall with the power 3/4 of the number of points.
+    let enough = (most * stake.flux).powf(4.0 / 3.0).ceil() as usize;
+    let count = enough.clamp(RANDOM[0], RANDOM[2]).next_power_of_two();
+    let mut spread = -most;
+    if most * stake.split > 1.0 {
+        // Points of the second half of the sequence: those of the first are stratified with them.
+        let decide = gather(RANDOM[2]..RANDOM[2] + RANDOM[1]);
+        // An even distribution has this half range.
+        spread = (3.0 * decide.variance()).sqrt();
+        if stake.may_split && spread * stake.split > 1.0 {
+            return Mean { spread, ..decide };
+        }
+    }
+    let count = if spread < 0.0 {
+        count
+    } else {
+        count.max(RANDOM[1])
+    };
+    let mut mean = gather(0..count);
+    mean.spread = spread;
+    mean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hierarchy::Mesh;
+    use crate::scene::{Options, Scene};
+    use std::path::Path;
+
+    /// Light and openness that depend on where a point is.
+    struct Fake;
+
+    fn light(to: &Receiver) -> f32 {
+        if to.point.x > 0.1 { 3.0 } else { 0.0 }
+    }
+
+    fn open(to: &Receiver) -> f32 {
+        if to.point.z > 0.0 { 1.0 } else { 0.25 }
+    }
+
+    impl Look for Fake {
+        fn weights(&self) -> &[f64] {
+            &[1.0]
+        }
+        fn direct(&self, _: &Tree, to: &Receiver, _: f64, _: &mut Memory) -> Option<[f32; 64]> {
+            Some([light(to); 64])
+        }
+        fn unshadowed(&self, _: &Tree, _: u32, _: f64) -> f64 {
+            3.0
+        }
+        fn openness(&self, _: &Tree, _: u32) -> Option<impl Fn(&Receiver, usize) -> f32> {
+            Some(|to: &Receiver, _| open(to))
+        }
+    }
+
+    /// Summed over leaves, for any number of points: a bias of 1 % would show.
+    #[test]
+    fn random_points_find_the_light_that_others_see() {
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
+        let mesh = Mesh::new(&Scene::load(&room, &Options::default()).unwrap());
+        let mut tree = Tree::new(&mesh, &vec![0; mesh.faces.len()]);
+        for _ in 0..4 {
+            for leaf in tree.leaves().collect::<Vec<_>>() {
+                tree.subdivide(leaf);
+            }
+        }
+        for flux in [0.0, 10.0] {
+            let stake = Stake {
+                split: 0.0,
+                flux,
+                may_split: true,
+            };
+            let (mut found, mut want) = ([0.0; 2], [0.0; 2]);
+            for leaf in tree.leaves() {
+                let area = tree.node(leaf).area;
+                let mut memory = Memory::default();
+                let open_share = |to: &Receiver, _: usize| open(to);
+                let mean = by_chance(&tree, leaf, &Fake, &open_share, 0.1, &stake, &mut memory);
+                let mut ended = Found::default();
+                mean.end(&mut ended, 1);
+                found[0] += area * f64::from(ended.rows[0]);
+                found[1] += area * f64::from(ended.rows[0] * ended.whole[0]);
+                let (mut seen, mut total, mut all) = (0.0, 0.0, 0.0);
+                for k in 0..64 {
+                    let at = triangle_weights(sequence02(k, 77));
+                    let to = receiver(&tree, leaf, at, 0);
+                    seen += f64::from(open(&to) * light(&to));
+                    total += f64::from(open(&to));
+                    all += f64::from(light(&to));
+                }
+                want[0] += area * seen / total;
+                want[1] += area * all / 64.0;
+            }
+            for (found, want) in found.iter().zip(want) {
+                assert!((found / want - 1.0).abs() < 0.005, "{flux}: {found} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_have_a_variance_and_a_range() {
+        let mean = |bright: &[f32]| {
+            let mut mean = Mean::new();
+            for &b in bright {
+                mean.add(&[b; 64], 1.0, &[1.0], &mut Memory::default());
+            }
+            mean
+        };
+        assert_eq!(mean(&[1.0, 1.0]).variance(), 0.0);
+        assert!((mean(&[0.0, 2.0]).variance() - 2.0).abs() < 1e-12);
+        assert_eq!(mean(&[0.0, 2.0]).half_range(), 1.0);
+    }
 }

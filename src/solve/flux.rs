@@ -1,6 +1,7 @@
 //! Where the light goes: closedness, a first guess of brightness, and the flux balance
 //! `emitted = absorbed + escaped` (any geometry, any wavelength).
 
+use super::sent::Sent;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, cosine_direction, sequence02, triangle_weights};
 use crate::hierarchy::{Mesh, NONE, Tree};
@@ -239,7 +240,7 @@ pub(super) fn conserve(
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Balance {
-    /// Luminous flux given out by surfaces, lm.
+    /// Luminous flux given out by surfaces and by lamps that have a flux (all but directional ones), lm.
     pub emitted_lm: f64,
     /// Luminous flux that fronts receive straight from lamps of any kind, lm.
     pub received_lm: f64,
@@ -250,6 +251,58 @@ pub struct Balance {
     /// Worst relative difference of received and absorbed + escaped over all bands that carry light: what the solve
     /// itself lost. Emitted and received differ by what direct light misses the room.
     pub worst_band: f64,
+    /// Where the light of lamps goes first, by rays from the lamps.
+    #[serde(default)]
+    pub sent: Sent,
+    /// What light was multiplied by.
+    #[serde(default)]
+    pub scaled: Scaled,
+}
+
+/// What the light of leaves was multiplied by, so that none goes missing: luminous flux after over before. 1 is nothing.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Scaled {
+    /// Direct light in sealed rooms of few triangles.
+    pub direct: f64,
+    /// Reflected light in rooms of few triangles, in the last pass over the links.
+    pub reflected: f64,
+}
+
+impl Default for Scaled {
+    fn default() -> Self {
+        Self {
+            direct: 1.0,
+            reflected: 1.0,
+        }
+    }
+}
+
+/// Luminous flux of rows by leaf.
+pub(super) fn lumens(
+    areas: &[f64],
+    lanes: &super::lanes::Lanes,
+    leaves: &[u32],
+    rows: &super::Rows,
+) -> f64 {
+    let each = leaves.iter().enumerate();
+    each.map(|(k, &leaf)| areas[leaf as usize] * lanes.tristimulus(rows.row(k))[1])
+        .sum()
+}
+
+/// Luminous flux of punctual lights with their rows; directional ones have none.
+pub(super) fn punctual_lumens(
+    lamps: &[(PunctualLight, Vec<f32>)],
+    lanes: &super::lanes::Lanes,
+) -> f64 {
+    let flux = |(light, row): &(PunctualLight, Vec<f32>)| {
+        super::punctual::solid_angle(light.kind).unwrap_or(0.0) * lanes.tristimulus(row)[1]
+    };
+    lamps.iter().map(flux).sum()
+}
+
+/// `after / before`; 1 where there was nothing.
+pub(super) fn ratio(after: f64, before: f64) -> f64 {
+    if before > 0.0 { after / before } else { 1.0 }
 }
 
 /// Sums the flux of a solution in f64: rows by leaf, `sums` the balanced row sums by node, `punctual` the irradiance
@@ -292,6 +345,57 @@ pub(super) fn flux(
         absorbed_lm: lumens(&absorbed),
         escaped_lm: lumens(&escaped),
         worst_band: worst,
+        ..Balance::default()
+    }
+}
+
+/// What the leaves receive as wholes, whatever others see of them.
+pub(super) struct Whole<'a> {
+    /// Irradiance by reflected light, by leaf.
+    pub(super) indirect: &'a super::Rows,
+    /// Direct light of a leaf as a share of that of what others see of it.
+    pub(super) direct: &'a dyn Fn(u32) -> f64,
+    /// Area of a leaf, all of it.
+    pub(super) area: &'a dyn Fn(u32) -> f64,
+}
+
+/// The flux where leaves look for themselves: nothing is scaled, and what the rays of leaves find more or less than leaves
+/// send is the defect. `areas` are those of what others see: all that they send meets fronts.
+pub(super) fn flux_by_rays(
+    areas: &[f64],
+    lanes: &super::lanes::Lanes,
+    leaves: &[u32],
+    rows: &FluxRows,
+    whole: &Whole,
+) -> Balance {
+    let n = lanes.len();
+    let (mut emitted, mut received, mut absorbed, mut escaped) =
+        (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for (k, &leaf) in leaves.iter().enumerate() {
+        let (area, seen) = ((whole.area)(leaf), areas[leaf as usize]);
+        let more = (whole.direct)(leaf);
+        for l in 0..n {
+            let get = |r: &super::Rows| f64::from(r.row(k)[l]);
+            let (rho, first) = (get(rows.reflectance), more * get(rows.first));
+            let all = first + get(whole.indirect);
+            emitted[l] += area * get(rows.emission);
+            received[l] += area * first;
+            absorbed[l] += area * (1.0 - rho) * all;
+            escaped[l] += area * rho * all - seen * get(rows.reflected);
+        }
+    }
+    let worst = (0..n)
+        .filter(|&l| received[l] > 0.0)
+        .map(|l| ((absorbed[l] + escaped[l]) / received[l] - 1.0).abs())
+        .fold(0.0, f64::max);
+    let lumens = |x: &[f64]| x.iter().zip(lanes.xyz()).map(|(x, w)| x * w[1]).sum();
+    Balance {
+        emitted_lm: lumens(&emitted),
+        received_lm: lumens(&received),
+        absorbed_lm: lumens(&absorbed),
+        escaped_lm: lumens(&escaped),
+        worst_band: worst,
+        ..Balance::default()
     }
 }
 

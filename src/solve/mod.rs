@@ -13,6 +13,7 @@ mod estimate;
 mod flux;
 pub mod forecast;
 mod held;
+mod lamp_light;
 pub mod lanes;
 pub mod light;
 mod linear;
@@ -27,6 +28,7 @@ pub mod reference;
 mod relight;
 mod representation;
 mod rows;
+mod sent;
 mod sources;
 mod two_grid;
 
@@ -155,9 +157,6 @@ const SOLVE_SHARE: f64 = 0.002;
 const SPECTRUM_SHARE: f64 = 0.2;
 /// What one patch may misplace in a gather, share of the asked-for error.
 const GATHER_SHARE: f64 = 0.1;
-/// What one patch may misplace of the direct light of a leaf, share of white for each unit of asked-for error. With five
-/// times as much a white room of 10 000 faces is 1 % too dark, without a limit 14 %.
-const DIRECT_SHARE: f64 = 0.02;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 const DE_PER_PERCENT: f64 = 0.35;
 
@@ -219,6 +218,8 @@ pub struct Bake {
     lamps: Vec<(PunctualLight, Vec<f32>)>,
     direct: direct::Direct,
     probes: estimate::Probes,
+    /// Where the light of lamps goes first.
+    sent: sent::Sent,
     hemisphere: Hemisphere,
     rounds: Vec<Round>,
     watch: Option<record::Watch>,
@@ -324,6 +325,7 @@ impl Bake {
             frozen: None,
             two_grid: None,
             spectrum_error: None,
+            sent: sent::Sent::default(),
             scene,
             settings,
             plan,
@@ -343,6 +345,7 @@ impl Bake {
             [bake.closed, bake.sealed] = closed;
             return bake;
         }
+        bake.sent = bake.with_sight(|bake, sight| bake.sent(sight));
         [bake.closed, bake.sealed] = bake.with_sight(|bake, sight| {
             flux::closedness(
                 &bake.mesh,
@@ -623,67 +626,6 @@ impl Bake {
         rays
     }
 
-    /// Gathers direct light on all leaves, splitting those that it varies over.
-    fn gather_direct(&mut self, demand: &Demand) {
-        let width = padded(self.lanes.len());
-        match width {
-            4 => self.place_emission::<4>(),
-            8 => self.place_emission::<8>(),
-            16 => self.place_emission::<16>(),
-            32 => self.place_emission::<32>(),
-            _ => self.place_emission::<64>(),
-        }
-        self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
-        let weights = self.bright_weights();
-        let mut tree = std::mem::take(&mut self.tree);
-        let mut direct = std::mem::take(&mut self.direct);
-        self.with_sight(|bake, sight| {
-            direct.refine(
-                &mut tree,
-                demand,
-                &weights,
-                DIRECT_SHARE * bake.settings.error,
-                &|tree, to, tolerance, memory| {
-                    let row = Gatherer {
-                        tree,
-                        tolerance,
-                        ..bake.gatherer(sight)
-                    }
-                    .direct(to, memory);
-                    let dark = row.iter().all(|&x| x == 0.0);
-                    let hidden = dark
-                        && bake.closed == Closed::No
-                        && flux::covered(
-                            &bake.mesh, tree, &bake.rays, to.point, to.normal, to.plane, to.seed,
-                        );
-                    (!hidden).then_some(row)
-                },
-            );
-        });
-        self.tree = tree;
-        self.direct = direct;
-    }
-
-    /// Puts emission and links in place for a gather.
-    fn place_emission<const L: usize>(&mut self) {
-        let leaves: Vec<u32> = self.tree.leaves().collect();
-        let emission = self
-            .painter()
-            .paint(&self.tree, &leaves, &self.lanes)
-            .emission;
-        self.look_out();
-        self.light.emitted = self.on_nodes::<L>(&emission, &leaves);
-        self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
-        self.light.half_size = self.mesh.half_size;
-        self.previous = std::mem::replace(
-            &mut self.light.reflected,
-            Rows::zero(self.tree.nodes.len(), L),
-        );
-        let mut light = std::mem::take(&mut self.light);
-        light.measure(&self.tree, &self.lanes);
-        self.light = light;
-    }
-
     /// Turns materials into rows.
     fn painter(&self) -> Painter<'_> {
         Painter::new(&self.scene, &self.mesh, &self.upsampler)
@@ -730,8 +672,13 @@ impl Bake {
             emitted,
         } = given;
         let nodes = self.tree.nodes.len();
-        if self.sealed == Closed::Yes {
+        let by_rays = self.by_rays();
+        let mut scaled = flux::Scaled::default();
+        if self.sealed == Closed::Yes && !by_rays {
+            let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);
+            let before = lumens(&first);
             flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
+            scaled.direct = flux::ratio(lumens(&first), before);
         }
         let mixed = self
             .lanes
@@ -760,7 +707,7 @@ impl Bake {
         };
         let tolerance = SOLVE_SHARE * self.settings.error;
         let runs = self.plan.runs(Kind::Interreflection);
-        let (convergence, mut irradiance, sums) = if self.by_rays() {
+        let (convergence, mut irradiance, sums) = if by_rays {
             let system = RaySystem {
                 tree: &self.tree,
                 outlook: &self.outlook,
@@ -770,13 +717,12 @@ impl Bake {
                 greatest: &greatest,
                 two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
             };
-            let sums = self.outlook.target.iter().map(|&t| f64::from(t)).collect();
             let (convergence, seen) = match &mixed {
                 _ if !runs => (Convergence::default(), Rows::zero(leaves.len(), L)),
                 Some(mixed) => mixed.solve_by_rays::<L>(&system, &first, &mut reflected, tolerance),
                 None => system.solve::<L>(&first, &mut reflected, tolerance),
             };
-            (convergence, seen, sums)
+            (convergence, seen, Vec::new())
         } else {
             let system = System {
                 operator: Operator::new(
@@ -804,6 +750,7 @@ impl Bake {
                 let bounced = reflect(&first);
                 for _ in 0..linear::PASSES {
                     irradiance = slopes.irradiance::<L>(&reflected);
+                    let before = flux::lumens(&self.areas, &self.lanes, leaves, &irradiance);
                     let again = reflect(&irradiance);
                     let [over, without] = slopes.balance::<L>(&irradiance, &bounced, &again);
                     if mixed.is_some() {
@@ -821,6 +768,8 @@ impl Bake {
                             *row = std::array::from_fn(|l| row[l] * scale[l]);
                         }
                     }
+                    let after = flux::lumens(&self.areas, &self.lanes, leaves, &irradiance);
+                    scaled.reflected = flux::ratio(after, before);
                     reflected = reflect(&plus(&irradiance, &first));
                 }
             }
@@ -848,9 +797,26 @@ impl Bake {
             first: &first,
             reflectance: &reflectance,
         };
-        let flux = flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums);
+        let on_nodes = self.on_nodes::<L>(&reflected, leaves);
+        let mut flux = if by_rays {
+            let mut whole = Rows::zero(leaves.len(), L);
+            if runs {
+                self.outlook
+                    .irradiance_of_whole::<L>(leaves, &on_nodes, &mut whole);
+            }
+            let whole = flux::Whole {
+                indirect: &whole,
+                direct: &|leaf| f64::from(self.direct.whole(leaf)),
+                area: &|leaf| self.tree.node(leaf).area,
+            };
+            flux::flux_by_rays(&self.areas, &self.lanes, leaves, &fluxes, &whole)
+        } else {
+            flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums)
+        };
+        flux.emitted_lm += flux::punctual_lumens(&self.lamps, &self.lanes);
+        (flux.sent, flux.scaled) = (self.sent, scaled);
         self.light = Light {
-            reflected: self.on_nodes::<L>(&reflected, leaves),
+            reflected: on_nodes,
             emitted: emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves)),
             irradiance,
             leaves: leaves.to_vec(),
@@ -997,6 +963,7 @@ impl Bake {
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
             hemisphere: by_rays(sight).then_some(&self.hemisphere),
+            shafts: true,
             keep: self.keep,
         }
     }

@@ -2,9 +2,15 @@
 //! stands about, what they see.
 //!
 //! There most links are partly hidden, and what a link finds out with a few rays it spreads over all the leaves below its
-//! ends: dark corners get light that belongs elsewhere. So the leaves look for themselves: `n` rays with density
-//! cos / pi from points of a leaf, and the mean of what they meet, `H = 1/n sum B(k)`, is its irradiance by reflected
-//! light. Rays of a leaf stay what they are from round to round; what they meet is looked up anew.
+//! ends: dark corners get light that belongs elsewhere. So the leaves look for themselves, by rays with density cos / pi
+//! from points of a leaf. Rays of a leaf stay what they are from round to round; what they meet is looked up anew.
+//!
+//! A leaf is what others see of it. Of a floor that a cupboard stands on only the part beside the cupboard sends light to
+//! anyone, and of a part that looks half into the open every other ray does. With the openness o(x), the share of the rays
+//! from x that meet fronts, the light of a leaf is the mean weighted by it, `H = int o(x) H(x) dx / int o(x) dx`, and
+//! `A = int o(x) dx` its area. Both follow from the rays themselves: two start from each point, in directions chosen
+//! independently, and each counts if the other met a front. What leaves of these areas send to fronts, all of it, is what
+//! all leaves receive: nothing need be scaled.
 
 use super::flux::Closed;
 use super::rows::Rows;
@@ -29,23 +35,23 @@ const LEAST_BARE: f64 = 1e-3;
 const CHUNK: usize = 64;
 /// Rays that tell whether a point is covered.
 const COVER_RAYS: usize = 4;
-/// In place of a face: the ray left the room or met a black back; it started at a covered point.
-const NOTHING: u32 = u32::MAX;
-const COVERED: u32 = u32::MAX - 1;
+/// Flag of a face or leaf that was met by a ray whose fellow from the same point met no front.
+const ALONE: u32 = 1 << 31;
 
 /// Where a ray ended.
 #[derive(Debug, Clone, Copy)]
 struct End {
-    /// Entry of the face, or [`NOTHING`], or [`COVERED`].
+    /// Entry of the face, maybe with the flag [`ALONE`]; [`NONE`]: the ray left the room or met a black back.
     entry: u32,
     /// Weights of the second and third corner, in 1/65536.
     at: [u16; 2],
 }
 
 impl End {
-    fn at(entry: u32) -> Self {
-        Self { entry, at: [0; 2] }
-    }
+    const NOWHERE: Self = Self {
+        entry: NONE,
+        at: [0; 2],
+    };
 }
 
 /// How the leaves of a hierarchy look out.
@@ -53,7 +59,8 @@ impl End {
 pub(super) struct Outlook {
     /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
     pub target: Vec<f32>,
-    /// For each node that is a leaf: share of its area that is not covered by something solid. NaN elsewhere.
+    /// For each node that is a leaf: share of its area that takes part. NaN elsewhere. Where leaves look for themselves it is
+    /// the mean openness, else what is not covered by something solid.
     pub bare: Vec<f32>,
     /// For each node: is it as good as certain that all its light meets fronts?
     certain: Vec<bool>,
@@ -61,7 +68,7 @@ pub(super) struct Outlook {
     ends: Vec<End>,
     /// First end of each node's rays, and how many there are.
     range: Vec<(u32, u32)>,
-    /// The leaf of the present hierarchy at each end; [`NONE`] where there is none.
+    /// The leaf of the present hierarchy at each end, maybe with the flag [`ALONE`]; [`NONE`] where there is none.
     met: Vec<u32>,
 }
 
@@ -155,11 +162,9 @@ impl Outlook {
         let mut cast = 0;
         for (ends, &leaf) in parts.into_iter().flatten().zip(&new) {
             let k = leaf as usize;
-            let count = |what| ends.iter().filter(|e| e.entry == what).count();
-            let (covered, misses) = (count(COVERED), count(NOTHING));
-            let bare = ends.len() - covered;
-            self.bare[k] = bare as f32 / ends.len() as f32;
-            self.target[k] = (bare - misses) as f32 / bare.max(1) as f32;
+            let fronts = ends.iter().filter(|end| end.entry != NONE).count();
+            self.bare[k] = fronts as f32 / ends.len() as f32;
+            self.target[k] = 1.0;
             self.range[k] = (self.ends.len() as u32, ends.len() as u32);
             cast += ends.len() as u64;
             self.ends.extend(ends);
@@ -174,11 +179,11 @@ impl Outlook {
             .ends
             .par_iter()
             .map(|end| {
-                if end.entry >= COVERED {
+                if end.entry == NONE {
                     return NONE;
                 }
                 let [v, w] = end.at.map(|x| f64::from(x) / 65536.0);
-                tree.leaf_at(end.entry, [1.0 - v - w, v, w])
+                tree.leaf_at(end.entry & !ALONE, [1.0 - v - w, v, w]) | end.entry & ALONE
             })
             .collect();
     }
@@ -231,14 +236,15 @@ impl Outlook {
             }
             let ends = entries.zip(places).map(|(entry, at)| End { entry, at });
             outlook.ends = ends.collect();
-            let there = |e: &End| e.entry >= COVERED || (e.entry as usize) < tree.faces.len();
+            let faces = tree.faces.len();
+            let there = |e: &End| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
             if !outlook.ends.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }
             outlook.find(tree);
         } else {
             outlook.met = from.get_all()?;
-            let there = |&k: &u32| k == NONE || (k as usize) < nodes;
+            let there = |&k: &u32| k == NONE || ((k & !ALONE) as usize) < nodes;
             if !outlook.met.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }
@@ -251,24 +257,50 @@ impl Outlook {
         Ok(outlook)
     }
 
-    /// Mean of what each leaf's rays meet, `nodes` being the radiosity of every patch: by leaf.
+    /// Irradiance of each leaf by what its rays met, `nodes` being the radiosity of every patch: by leaf.
     pub(super) fn irradiance<const L: usize>(&self, leaves: &[u32], nodes: &Rows, out: &mut Rows) {
+        self.means::<L, _>(leaves, nodes, out, |leaf| {
+            let (met, fronts) = self.met(leaf);
+            (met, 1.0 / fronts)
+        });
+    }
+
+    /// Irradiance of each leaf as a whole, whatever others see of it: by leaf, for the record of fluxes.
+    pub(super) fn irradiance_of_whole<const L: usize>(
+        &self,
+        leaves: &[u32],
+        nodes: &Rows,
+        out: &mut Rows,
+    ) {
+        self.means::<L, _>(leaves, nodes, out, |leaf| {
+            let met = self.ends_of(leaf);
+            let some = met.iter().filter(|&&k| k != NONE).map(|&k| k & !ALONE);
+            (some, 1.0 / met.len().max(1) as f32)
+        });
+    }
+
+    /// Sums over nodes, times a share of each leaf.
+    fn means<'a, const L: usize, Met: Iterator<Item = u32> + 'a>(
+        &'a self,
+        leaves: &[u32],
+        nodes: &Rows,
+        out: &mut Rows,
+        met: impl Fn(u32) -> (Met, f32) + Sync,
+    ) {
         let nodes = nodes.all::<L>();
         out.all_mut::<L>()
             .par_chunks_mut(CHUNK)
             .zip(leaves.par_chunks(CHUNK))
             .for_each(|(out, leaves)| {
                 for (row, &leaf) in out.iter_mut().zip(leaves) {
-                    let (met, bare) = self.met(leaf);
+                    let (met, share) = met(leaf);
                     let mut sum = [0.0_f32; L];
-                    for &met in met {
-                        if met != NONE {
-                            for (s, x) in sum.iter_mut().zip(&nodes[met as usize]) {
-                                *s += x;
-                            }
+                    for node in met {
+                        for (s, x) in sum.iter_mut().zip(&nodes[node as usize]) {
+                            *s += x;
                         }
                     }
-                    *row = sum.map(|x| x / bare);
+                    *row = sum.map(|x| x * share);
                 }
             });
     }
@@ -291,29 +323,37 @@ impl Outlook {
         outlook
     }
 
-    /// What the rays of a leaf met ([`NONE`]: nothing), and what the sum over them is divided by for their mean.
-    pub(super) fn met(&self, leaf: u32) -> (&[u32], f32) {
+    /// What the rays of a leaf met that count, and what the sum over them is divided by for the leaf's irradiance.
+    pub(super) fn met(&self, leaf: u32) -> (impl Iterator<Item = u32>, f32) {
+        let met = self.ends_of(leaf);
+        let fronts = (self.bare[leaf as usize] * met.len() as f32).round();
+        // The flag is the highest bit, and part of what stands for no leaf.
+        let counted = met.iter().copied().filter(|&k| k & ALONE == 0);
+        (counted, fronts.max(1.0))
+    }
+
+    fn ends_of(&self, leaf: u32) -> &[u32] {
         let (start, count) = self.range[leaf as usize];
-        let met = &self.met[start as usize..(start + count) as usize];
-        (met, (self.bare[leaf as usize] * count as f32).max(1.0))
+        &self.met[start as usize..(start + count) as usize]
     }
 
     /// How much reflected light varies over a leaf: the standard deviation between its four quarters that the noise of
     /// their rays does not explain, `bright` being that of every patch.
     pub(super) fn variation(&self, leaf: u32, bright: &[f32], seed: u64) -> f64 {
         let (first, count) = self.range[leaf as usize];
-        let at = hash(seed, u64::from(leaf));
+        let pairs = Pairs::new(leaf, count as usize, seed);
         let mut sums = [[0.0_f64; 3]; 4];
         for k in 0..count as usize {
-            let end = first as usize + k;
-            if self.ends[end].entry == COVERED {
+            // Points that see no fronts say nothing.
+            if self.met[first as usize + pairs.fellow(k)] == NONE {
                 continue;
             }
-            let b = match self.met[end] {
+            let b = match self.met[first as usize + k] {
                 NONE => 0.0,
-                met => f64::from(bright[met as usize]),
+                met => f64::from(bright[(met & !ALONE) as usize]),
             };
-            let quarter = start(k, at).iter().position(|&w| w >= 0.5).unwrap_or(3);
+            let quarter = (pairs.start(k).iter()).position(|&w| w >= 0.5);
+            let quarter = quarter.unwrap_or(3);
             let sum = &mut sums[quarter];
             *sum = [sum[0] + 1.0, sum[1] + b, sum[2] + b * b];
         }
@@ -337,7 +377,7 @@ impl Outlook {
         (size_of::<End>() + 4) * self.ends.len() + 8 * (self.range.len() + self.target.len())
     }
 
-    /// Area of every node that looks out; never quite zero, so that nothing is divided by zero.
+    /// Area of every node that takes part; never quite zero, so that nothing is divided by zero.
     pub(super) fn areas(&self, tree: &Tree) -> Vec<f64> {
         let mut areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
         for k in (0..areas.len()).rev() {
@@ -385,12 +425,13 @@ fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64)
     [count, misses, covered]
 }
 
-/// Casts the rays of a leaf: a turned pattern of directions, from points all over it.
+/// Casts the rays of a leaf: a turned pattern of directions, two from each of points all over it.
 fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: u64) -> Vec<End> {
     let node = tree.node(leaf);
     let element = &tree.elements[node.element as usize];
     let plane = tree.face_plane[element.face as usize];
-    let (at, turn) = (hash(seed, u64::from(leaf)), hash(seed ^ 1, u64::from(leaf)));
+    let pairs = Pairs::new(leaf, pattern.len(), seed);
+    let turn = hash(seed ^ 1, u64::from(leaf));
     let (sin, cos) = (std::f64::consts::TAU * sequence02(0, turn)[0]).sin_cos();
     let [x, y] = tangents(node.normal);
     let [x, y] = [x * cos + y * sin, y * cos - x * sin];
@@ -400,30 +441,62 @@ fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: 
     for beam in pattern.beams() {
         for (k, d) in beam.iter().enumerate() {
             directions[k] = (x * d.x + y * d.y + node.normal * d.z).as_vec3();
-            from[k] = element.at(start(ends.len() + k, at)).as_vec3();
+            from[k] = element.at(pairs.start(ends.len() + k)).as_vec3();
         }
         sight.meet(&from, &directions, plane, &mut hits);
-        for (k, hit) in hits.iter().enumerate() {
-            ends.push(match hit {
-                None => End::at(NOTHING),
-                Some(hit) => {
-                    let entry = tree.met(hit);
-                    let [u, v] = hit.uv.map(|x| (x * 65536.0).clamp(0.0, 65535.0) as u16);
-                    match entry {
-                        NONE if is_covered(tree, sight, from[k], node.normal, plane) => {
-                            End::at(COVERED)
-                        }
-                        NONE => End::at(NOTHING),
-                        entry => End {
-                            entry,
-                            at: if hit.from_behind { [v, u] } else { [u, v] },
-                        },
-                    }
-                }
-            });
+        ends.extend(hits.iter().map(|hit| {
+            let Some(hit) = hit else { return End::NOWHERE };
+            let [u, v] = hit.uv.map(|x| (x * 65536.0).clamp(0.0, 65535.0) as u16);
+            let at = if hit.from_behind { [v, u] } else { [u, v] };
+            match tree.met(hit) {
+                NONE => End::NOWHERE,
+                entry => End { entry, at },
+            }
+        }));
+    }
+    let fronts: Vec<bool> = ends.iter().map(|end| end.entry != NONE).collect();
+    for (k, end) in ends.iter_mut().enumerate() {
+        if fronts[k] && !fronts[pairs.fellow(k)] {
+            end.entry |= ALONE;
         }
     }
     ends
+}
+
+/// Which two rays of a leaf start from the same point: k and `k ^ mask`. The mask differs from leaf to leaf, so that the
+/// directions of the two have nothing in common.
+struct Pairs {
+    mask: usize,
+    shift: u64,
+}
+
+impl Pairs {
+    /// Of `count` rays, a power of two.
+    fn new(leaf: u32, count: usize, seed: u64) -> Self {
+        let shift = hash(seed, u64::from(leaf));
+        let others = (count as u64).saturating_sub(1).max(1);
+        Self {
+            mask: 1 + (hash(seed ^ 2, u64::from(leaf)) % others) as usize,
+            shift,
+        }
+    }
+
+    fn fellow(&self, k: usize) -> usize {
+        k ^ self.mask
+    }
+
+    /// Which of the points: 0 to half the number of rays.
+    fn pair(&self, k: usize) -> usize {
+        let top = 1 << self.mask.ilog2();
+        let first = if k & top == 0 { k } else { self.fellow(k) };
+        // Without the bit that is 0 in the first of every pair.
+        first & (top - 1) | first >> 1 & !(top - 1)
+    }
+
+    /// Weights of the point of the leaf that ray `k` starts from.
+    fn start(&self, k: usize) -> [f64; 3] {
+        start(self.pair(k), self.shift)
+    }
 }
 
 /// Does everything that a point sees turn its black back on it? Then something solid stands on the point, or holds it.
@@ -436,7 +509,48 @@ fn is_covered(tree: &Tree, sight: &Sight, from: Vec3, normal: DVec3, plane: u32)
         .all(|hit| hit.is_some_and(|hit| tree.met(&hit) == NONE))
 }
 
-/// Weights of the point of a leaf that ray `k` starts from.
+/// Weights of the `k`-th point of a leaf.
 fn start(k: usize, shift: u64) -> [f64; 3] {
     triangle_weights(sequence02(k as u32, shift))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_of_a_leaf_start_in_pairs() {
+        for (leaf, count) in (0..200).flat_map(|leaf| [(leaf, 16), (leaf, 64), (leaf, 256)]) {
+            let pairs = Pairs::new(leaf, count, 7);
+            let mut rays = vec![Vec::new(); count / 2];
+            for k in 0..count {
+                rays[pairs.pair(k)].push(k);
+            }
+            for two in rays {
+                assert!(matches!(two[..], [a, b] if pairs.fellow(a) == b && a != b));
+            }
+        }
+    }
+
+    /// Three points of a leaf, one of which is covered and one half open: light weighted by how open they are.
+    #[test]
+    fn a_leaf_is_what_others_see_of_it() {
+        let mut nodes = Rows::zero(3, 4);
+        nodes.row_mut(1).fill(6.0);
+        nodes.row_mut(2).fill(2.0);
+        // Pairs of rays: both meet fronts; one does; none does.
+        let outlook = Outlook {
+            target: vec![1.0],
+            bare: vec![0.5],
+            range: vec![(0, 6)],
+            met: vec![1, 2, 1 | ALONE, NONE, NONE, NONE],
+            ..Outlook::default()
+        };
+        let (mut seen, mut whole) = (Rows::zero(1, 4), Rows::zero(1, 4));
+        outlook.irradiance::<4>(&[0], &nodes, &mut seen);
+        outlook.irradiance_of_whole::<4>(&[0], &nodes, &mut whole);
+        // Openness 1, 1/2 and 0; irradiance (6 + 2) / 2, (6 + 0) / 2 and 0. Of the second point no pair counts.
+        let near = |row: &[f32], want: f32| row.iter().all(|x| (x - want).abs() < 1e-6);
+        assert!(near(seen.row(0), 8.0 / 3.0) && near(whole.row(0), 14.0 / 6.0));
+    }
 }

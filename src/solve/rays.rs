@@ -1,8 +1,8 @@
 //! The solution where leaves look for themselves: `R = rho (H0 + K R)`, `K` the mean over what the rays of a leaf meet.
 //!
-//! Plain sweeps (Jacobi) shrink every error by the albedo. Two factors a lane and sweep help: one makes the leaves receive
-//! just what the others send them (rays know that to a fraction of a percent only), the other scales the whole solution so
-//! that no light is missing: the slowest mode of a bright room is all of it together.
+//! Plain sweeps (Jacobi) shrink every error by the albedo. A factor a lane and sweep helps: it scales the whole solution so
+//! that no light is missing, because the slowest mode of a bright room is all of it together. It goes to 1 as the sweeps
+//! converge: rows are taken as they are.
 
 use super::conjugate::Convergence;
 use super::operator::pull;
@@ -26,7 +26,7 @@ pub(super) struct RaySystem<'a> {
     pub(super) tree: &'a Tree,
     pub(super) outlook: &'a Outlook,
     pub(super) leaves: &'a [u32],
-    /// Bare area by node.
+    /// Area by node that takes part.
     pub(super) areas: &'a [f64],
     /// By leaf.
     pub(super) reflectance: &'a Rows,
@@ -48,7 +48,6 @@ impl RaySystem<'_> {
         let mut seen = Rows::zero(self.leaves.len(), L);
         let mut done = Convergence::default();
         let area = |k: usize| self.areas[self.leaves[k] as usize];
-        let target = |k: usize| f64::from(self.outlook.target[self.leaves[k] as usize]);
         let mean_reflectance = self
             .two_grid
             .map(|(grid, _)| grid.means::<L>(&self.sums::<L>(grid, self.reflectance)));
@@ -57,8 +56,7 @@ impl RaySystem<'_> {
         let mut corrected = false;
         loop {
             self.receive::<L>(reflected, &mut nodes, &mut seen);
-            // What is sent to fronts, received, reflected, and what should be: the sums of one sweep.
-            let (mut sent, mut received) = ([0.0; L], [0.0; L]);
+            // What is reflected now, what of direct light, and what of that which a sweep brings.
             let (mut now, mut once, mut again) = ([0.0; L], [0.0; L], [0.0; L]);
             let rows = || {
                 reflected
@@ -69,22 +67,18 @@ impl RaySystem<'_> {
                     .enumerate()
             };
             for (k, ((r, h), (f, rho))) in rows() {
-                let (a, t) = (area(k), target(k));
+                let a = area(k);
                 for l in 0..L {
-                    sent[l] += a * t * f64::from(r[l]);
-                    received[l] += a * f64::from(h[l]);
                     now[l] += a * f64::from(r[l]);
                     once[l] += a * f64::from(rho[l] * f[l]);
                     again[l] += a * f64::from(rho[l] * h[l]);
                 }
             }
             let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 1.0 };
-            let fair: [f64; L] = std::array::from_fn(|l| ratio(sent[l], received[l]));
             let scale: [f64; L] = std::array::from_fn(|l| {
-                ratio(once[l], now[l] - fair[l] * again[l])
-                    .clamp(1.0 / GREATEST_SCALE, GREATEST_SCALE)
+                ratio(once[l], now[l] - again[l]).clamp(1.0 / GREATEST_SCALE, GREATEST_SCALE)
             });
-            let factor: [f32; L] = std::array::from_fn(|l| (fair[l] * scale[l]) as f32);
+            let factor = scale.map(|x| x as f32);
             for h in seen.all_mut::<L>() {
                 *h = std::array::from_fn(|l| h[l] * factor[l]);
             }
@@ -134,11 +128,10 @@ impl RaySystem<'_> {
             if let (Some((grid, _)), Some(rho), Some(moved), true) =
                 (self.two_grid, &mean_reflectance, moved, corrected)
             {
-                let fair = fair.map(|x| x as f32);
                 let change = grid.means::<L>(&moved);
                 let means = grid.means::<L>(&self.sums::<L>(grid, &seen));
                 let received = [&seen, &means];
-                grid.correct::<L>(&change, rho, &fair, received, self.reflectance, reflected);
+                grid.correct::<L>(&change, rho, received, self.reflectance, reflected);
             }
         }
     }

@@ -50,10 +50,10 @@ impl TwoGrid {
             .map(|members| {
                 let (mut sums, mut area) = (vec![0.0_f64; count], 0.0);
                 for &leaf in members {
-                    let (met, bare) = outlook.met(leaf);
+                    let (met, fronts) = outlook.met(leaf);
                     area += areas[leaf as usize];
-                    let each = areas[leaf as usize] / f64::from(bare);
-                    for &node in met.iter().filter(|&&node| node != NONE) {
+                    let each = areas[leaf as usize] / f64::from(fronts);
+                    for node in met {
                         if let Some(sum) = sums.get_mut(of_node[node as usize] as usize) {
                             *sum += each;
                         }
@@ -142,14 +142,13 @@ impl TwoGrid {
     }
 
     /// Adds to what leaves reflect what the error after a sweep sends them. `change` is the mean change by the sweep,
-    /// `mean_reflectance` that of each patch, `fair` what each lane's irradiance is multiplied by. What leaves have `received`,
-    /// by leaf and as means over the patches, tells how far each is open to what its patch is sent: in a closed pocket a
-    /// correction meant for the room would put out what light there is, and sweeps bring it back only slowly.
+    /// `mean_reflectance` that of each patch. What leaves have `received`, by leaf and as means over the patches, tells how far
+    /// each is open to what its patch is sent: in a closed pocket a correction meant for the room would put out what light
+    /// there is, and sweeps bring it back only slowly.
     pub(super) fn correct<const L: usize>(
         &self,
         change: &Rows,
         mean_reflectance: &Rows,
-        fair: &[f32; L],
         received: [&Rows; 2],
         reflectance: &Rows,
         reflected: &mut Rows,
@@ -160,7 +159,7 @@ impl TwoGrid {
                 let part = |rows: &Rows| -> Vec<f32x16> {
                     rows.all::<L>().iter().map(|row| block(row, b)).collect()
                 };
-                self.sent(&part(change), &part(mean_reflectance), block(fair, b))
+                self.sent(&part(change), &part(mean_reflectance))
             })
             .collect();
         let mut sent = Rows::zero(self.len(), L);
@@ -193,7 +192,7 @@ impl TwoGrid {
 
 impl TwoGrid {
     /// What patches send each other of the error, some lanes of it: sweeps in place.
-    fn sent(&self, change: &[f32x16], reflectance: &[f32x16], fair: f32x16) -> Vec<f32x16> {
+    fn sent(&self, change: &[f32x16], reflectance: &[f32x16]) -> Vec<f32x16> {
         let mut error = change.to_vec();
         let mut sent = vec![f32x16::ZERO; error.len()];
         for _ in 0..SWEEPS {
@@ -207,7 +206,7 @@ impl TwoGrid {
                     }
                 }
                 let [a, b, c, d] = sums;
-                sent[k] = fair * ((a + b) + (c + d));
+                sent[k] = (a + b) + (c + d);
                 let next = change[k] + reflectance[k] * sent[k];
                 let area = f32x16::splat(self.areas[k] as f32);
                 moved += area * (next - error[k]).abs();

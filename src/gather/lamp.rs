@@ -1,0 +1,367 @@
+//! Emitting elements and punctual lights at a point: how much of a lamp is seen, and lamps chosen by chance.
+//!
+//! A lamp near a point is cut into parts none of which is near; each has its exact factor (contour integral), and rays go to
+//! parts in proportion to it. How many rays is settled beforehand: to stop where the first few agree is to overlook thin
+//! things, and took 4 to 8 % of the light of lamps behind louvres.
+
+use super::point::{Gathered, Gatherer, Memory, Receiver, punctual_factor};
+use crate::geometry::sampling::{hash, sequence02, triangle_weights};
+use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
+use crate::hierarchy::NONE;
+use crate::link::{View, open_weight};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// A part is near a point that is closer to its middle than this many of its radii: beyond, what a differential area sends
+/// differs by less than a factor of 4 over the part, and weights make up for that.
+const NEAR: f64 = 2.0;
+/// Parts of a lamp at the most.
+const PARTS: usize = 64;
+/// Rays to an element of a lamp: at least, and at the most.
+const RAYS: [usize; 2] = [4, 256];
+/// Elements that stand for a far cluster of lamps.
+const CHOSEN: usize = 4;
+
+/// A triangle and its factor for a point.
+type Part = ([DVec3; 3], f64);
+
+/// A lamp that was chosen, the way to it, and what turns what it emits into irradiance by all that it stands for.
+struct Chosen {
+    element: u32,
+    factor: f64,
+    segment: Segment,
+}
+
+/// What a differential area at the end of `way` sends, per area; 0 if it is turned away.
+fn kernel(to: &Receiver, normal: DVec3, way: DVec3) -> f64 {
+    let (here, there) = (to.normal.dot(way), -normal.dot(way));
+    if here > 0.0 && there > 0.0 {
+        here * there / (PI * way.length_squared().powi(2))
+    } else {
+        0.0
+    }
+}
+
+/// Cuts a lamp's triangle of exact factor `whole` until no part is near or there are [`PARTS`]; their factors sum to `whole`.
+fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
+    let mut parts = vec![(corners, whole)];
+    let mut next = 0;
+    while next < parts.len() && parts.len() + 3 <= PARTS {
+        let (corners, _) = parts[next];
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius = corners.map(|c| c.distance_squared(middle));
+        let radius = radius.into_iter().fold(0.0, f64::max);
+        if middle.distance_squared(to.point) >= NEAR * NEAR * radius {
+            next += 1;
+            continue;
+        }
+        // What is cut goes to the end, so that the largest are cut first.
+        let cut = quarters(corners);
+        let factors = lambert_triangles_x8(to.point, to.normal, cut.into_iter()).to_array();
+        parts.remove(next);
+        parts.extend(cut.into_iter().zip(factors).filter(|part| part.1 > 0.0));
+    }
+    parts
+}
+
+/// A point of one of the parts, chosen by their factors, with the weight that makes the kernel there stand for them all: 1 in
+/// the mean. What is left of `u` after the choice of a part serves for the point.
+fn point_of(
+    to: &Receiver,
+    normal: DVec3,
+    parts: &[Part],
+    [u, v]: [f64; 2],
+) -> Option<(DVec3, f64)> {
+    let all: f64 = parts.iter().map(|part| part.1).sum();
+    let mut left = u * all;
+    let last = parts.len().checked_sub(1)?;
+    let mut k = 0;
+    while k < last && left >= parts[k].1 {
+        left -= parts[k].1;
+        k += 1;
+    }
+    let ([a, b, c], factor) = parts[k];
+    let w = triangle_weights([(left / factor).clamp(0.0, 1.0), v]);
+    let point = a * w[0] + b * w[1] + c * w[2];
+    let area = 0.5 * (b - a).cross(c - a).length();
+    Some((point, kernel(to, normal, point - to.point) * area / factor))
+}
+
+impl Gatherer<'_> {
+    /// Visible share of a lamp's triangle with the exact factor `factor`. `carries`: what it would bring unblocked, share of
+    /// white.
+    pub(super) fn lamp_visible(
+        &self,
+        to: &Receiver,
+        id: u32,
+        factor: f64,
+        carries: f64,
+        memory: &mut Memory,
+    ) -> f64 {
+        let node = self.tree.node(id);
+        let Some(element) = self.tree.element(node) else {
+            return 1.0;
+        };
+        // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses. Where many points stand for a leaf it is the
+        // points that make up for it.
+        let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
+        let most = if self.shafts { RAYS[1] } else { RAYS[0] };
+        let count = wanted.clamp(RAYS[0], most);
+        let planes = [to.plane, self.tree.face_plane[element.face as usize]];
+        let parts = parts_of(to, element.corners, factor);
+        let turn = hash(to.seed, u64::from(id));
+        memory.segments.clear();
+        memory.weights.clear();
+        for k in 0..count {
+            let u = sequence02(k as u32, turn);
+            let Some((point, weight)) = point_of(to, node.normal, &parts, u) else {
+                continue;
+            };
+            if weight > 0.0 {
+                memory.weights.push(weight);
+                memory.segments.push(Segment::new(to.point, point, planes));
+            }
+        }
+        self.sight
+            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+        memory.rays += memory.segments.len() as u64;
+        let total: f64 = memory.weights.iter().sum();
+        if total <= 0.0 {
+            return 0.0;
+        }
+        let visible = open_weight(&memory.weights, &memory.blocked) / total;
+        memory.noise += carries * carries * visible * (1.0 - visible) / (count as f64).powf(1.5);
+        visible
+    }
+
+    /// Adds what the emitting elements of a far cluster send, by some of them chosen by chance.
+    pub(super) fn lamps_by_chance(
+        &self,
+        to: &Receiver,
+        id: u32,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
+        let turn = hash(to.seed ^ 1, u64::from(id));
+        for k in 0..CHOSEN {
+            let u = sequence02(k as u32, turn);
+            let Some(chosen) = self.one_emitter(to, id, u) else {
+                continue;
+            };
+            memory.rays += 1;
+            if !self.sight.blocks_one(&chosen.segment) {
+                self.add_emitted(chosen.element, chosen.factor / CHOSEN as f64, out);
+            }
+        }
+    }
+
+    /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
+    /// the probability that it brings the light, if nothing lies on the segments: without bias.
+    pub(super) fn one_lamp(&self, to: &Receiver, [u, v]: [f64; 2]) -> [Option<(f64, Segment)>; 2] {
+        let punctual = self.one_punctual(to, v).map(|(bright, end)| {
+            let segment = Segment::new(to.point, end, [to.plane, NO_PLANE]);
+            (bright, segment)
+        });
+        let room = self.light.lit.first().copied().unwrap_or(NONE);
+        let emitter = self.one_emitter(to, room, [u, v]);
+        let emitter = emitter.map(|chosen| {
+            let emitted = f64::from(self.light.bright_emitted[chosen.element as usize]);
+            (chosen.factor * emitted, chosen.segment)
+        });
+        [punctual, emitter]
+    }
+
+    /// Chooses a punctual light: brightness of them all, and where the ray to it ends.
+    fn one_punctual(&self, to: &Receiver, v: f64) -> Option<(f64, DVec3)> {
+        let each = || {
+            let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
+            lamps.filter_map(|((lamp, _), &bright)| {
+                let (factor, end) = punctual_factor(lamp, to, self.light.half_size)?;
+                Some((factor * f64::from(bright), end))
+            })
+        };
+        let all: f64 = each().map(|(bright, _)| bright).sum();
+        let mut left = v * all;
+        let (_, end) = each().find(|&(bright, _)| {
+            left -= bright;
+            left < 0.0
+        })?;
+        Some((all, end))
+    }
+
+    /// Chooses a point of an emitting element below a node, [`NONE`] for no node.
+    fn one_emitter(&self, to: &Receiver, below: u32, [mut u, v]: [f64; 2]) -> Option<Chosen> {
+        let (id, chance) = self.emitting_element(to, below, &mut u)?;
+        let node = self.tree.node(id);
+        let element = self.tree.element(node)?;
+        let factors = lambert_triangles_x8(to.point, to.normal, [element.corners].into_iter());
+        let factor = factors.to_array()[0];
+        let plane = self.tree.face_plane[element.face as usize];
+        if factor <= 0.0 || plane == to.plane {
+            return None;
+        }
+        let parts = parts_of(to, element.corners, factor);
+        let (point, weight) = point_of(to, node.normal, &parts, [u, v])?;
+        (weight > 0.0).then(|| Chosen {
+            element: id,
+            factor: factor * weight / chance,
+            segment: Segment::new(to.point, point, [to.plane, plane]),
+        })
+    }
+
+    /// Chooses an emitting element below a node and tells with what probability; `u` serves again afterwards. The choice
+    /// descends the hierarchy (Conty Estevez and Kulla 2018).
+    fn emitting_element(&self, to: &Receiver, below: u32, u: &mut f64) -> Option<(u32, f64)> {
+        let worth = |id: u32| {
+            let node = self.tree.node(id);
+            let emitted = f64::from(self.light.bright_emitted[id as usize]);
+            if !self.can_see(to, node) {
+                return 0.0;
+            }
+            let distance = (node.centre - to.point).length_squared();
+            emitted * node.area / distance.max(node.radius * node.radius)
+        };
+        let fork = |id: u32| self.light.lit[id as usize];
+        let mut id = Some(below).filter(|&id| id != NONE).map(fork)?;
+        let mut chance = 1.0;
+        if id == NONE || worth(id) <= 0.0 {
+            return None;
+        }
+        // An element emits all over alike, whatever its parts.
+        while self.tree.node(id).element == NONE {
+            let children = self.tree.node(id).child_range();
+            let children = children.map(fork).filter(|&child| child != NONE);
+            let worths = children.map(|child| (child, worth(child)));
+            let all: f64 = worths.clone().map(|c| c.1).sum();
+            let mut left = *u * all;
+            let mut chosen = None;
+            for (child, worth) in worths.filter(|c| c.1 > 0.0) {
+                chosen = Some((child, worth, (left / worth).min(1.0 - f64::EPSILON)));
+                if left < worth {
+                    break;
+                }
+                left -= worth;
+            }
+            let (child, worth, rest) = chosen?;
+            (id, *u, chance) = (child, rest, chance * worth / all);
+        }
+        Some((id, chance))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::Pcg;
+    use crate::scene::{Options, Scene};
+    use crate::solve::light::brightness;
+    use crate::solve::{Bake, Settings};
+    use std::path::Path;
+
+    fn to() -> Receiver {
+        Receiver {
+            point: DVec3::ZERO,
+            normal: DVec3::Z,
+            plane: 0,
+            leaf: None,
+            seed: 0,
+        }
+    }
+
+    /// A random triangle that faces the origin, at about the given height above it.
+    fn triangle(random: &mut Pcg, height: f64) -> [DVec3; 3] {
+        let corners = [0; 3].map(|_| {
+            let [x, y] = [0; 2].map(|_| 2.0 * random.f64() - 1.0);
+            DVec3::new(x, y, height * (1.0 + random.f64()))
+        });
+        let [a, b, c] = corners;
+        if (b - a).cross(c - a).dot(a) < 0.0 {
+            corners
+        } else {
+            [a, c, b]
+        }
+    }
+
+    fn factor(to: &Receiver, corners: [DVec3; 3]) -> f64 {
+        lambert_triangles_x8(to.point, to.normal, [corners].into_iter()).to_array()[0]
+    }
+
+    #[test]
+    fn the_parts_of_a_lamp_make_up_the_whole() {
+        let mut random = Pcg::new(1);
+        for height in [0.01, 0.1, 1.0, 10.0] {
+            for _ in 0..100 {
+                let corners = triangle(&mut random, height);
+                let whole = factor(&to(), corners);
+                let parts = parts_of(&to(), corners, whole);
+                let sum: f64 = parts.iter().map(|part| part.1).sum();
+                assert!((sum - whole).abs() <= 1e-9 + 1e-6 * whole, "{sum} {whole}");
+                assert!(parts.len() <= PARTS);
+            }
+        }
+    }
+
+    /// Weights of 1 in the mean, and nowhere far from it unless the parts ran out.
+    #[test]
+    fn points_of_a_lamp_stand_for_its_factor() {
+        const SAMPLES: u32 = 4096;
+        let mut random = Pcg::new(2);
+        for height in [0.3, 1.0, 10.0] {
+            for _ in 0..20 {
+                let corners = triangle(&mut random, height);
+                let [a, b, c] = corners;
+                let normal = (b - a).cross(c - a).normalize();
+                let parts = parts_of(&to(), corners, factor(&to(), corners));
+                let weights = (0..SAMPLES)
+                    .map(|k| point_of(&to(), normal, &parts, sequence02(k, 5)).unwrap().1);
+                let mean = weights.sum::<f64>() / f64::from(SAMPLES);
+                assert!((mean - 1.0).abs() < 5e-3, "{height}: {mean}");
+            }
+        }
+    }
+
+    /// Against all lamps in turn, exactly.
+    #[test]
+    fn one_lamp_by_chance_is_all_lamps_on_the_mean() {
+        const SAMPLES: u32 = 1024;
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/furnished.glb");
+        let settings = Settings {
+            rounds: 1,
+            ..Settings::default()
+        };
+        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
+        bake.run();
+        assert!(!bake.lamps().is_empty());
+        let (mut off, mut all) = (0.0, 0.0);
+        bake.with_sight(|bake, sight| {
+            let gatherer = bake.gatherer(sight);
+            let mut memory = Memory::default();
+            let tree = bake.tree();
+            for leaf in tree.leaves().step_by(97) {
+                let element = tree.element(tree.node(leaf)).unwrap();
+                let to = Receiver {
+                    point: element.at([1.0 / 3.0; 3]),
+                    normal: tree.face_normal[element.face as usize],
+                    plane: tree.face_plane[element.face as usize],
+                    leaf: Some(leaf),
+                    seed: 0,
+                };
+                let row = gatherer.direct(&to, &mut memory);
+                let want = brightness(bake.lanes().tristimulus(&row), bake.light().white);
+                let one = |k| {
+                    gatherer
+                        .one_lamp(&to, sequence02(k, 0))
+                        .into_iter()
+                        .flatten()
+                };
+                let open = (0..SAMPLES)
+                    .flat_map(one)
+                    .filter(|(_, segment)| !sight.blocks_one(segment));
+                let mean = open.map(|(bright, _)| bright).sum::<f64>() / f64::from(SAMPLES);
+                off += (mean - want).abs();
+                all += want;
+            }
+        });
+        assert!(all > 1.0 && off < 0.02 * all, "{off} of {all}");
+    }
+}

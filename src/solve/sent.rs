@@ -1,0 +1,184 @@
+//! Where the light of lamps goes first: onto fronts, onto black backs, or out of the room.
+//!
+//! By rays from the lamps themselves: nothing that receives light has a part in it, so that what leaves are found to receive
+//! can be held against it.
+
+use super::{Bake, Closed};
+use crate::geometry::sampling::{cosine_direction, sequence02, tangents, triangle_weights};
+use crate::hierarchy::NONE;
+use crate::link::Sight;
+use crate::scene::{LightKind, PunctualLight};
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// Rays: an error of about 0.1 % of the flux.
+const RAYS: u32 = 32_768;
+/// Rays that go together.
+const TOGETHER: usize = 16;
+
+/// Shares of the luminous flux of all lamps, by rays from them (estimates, to about 0.1 %). Their sum is 1, or 0 where nothing
+/// shines. Directional lights have no flux and are left out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sent {
+    /// To the fronts of surfaces.
+    pub to_fronts: f64,
+    /// To black backs of one-sided surfaces.
+    pub to_backs: f64,
+    /// Out of the room.
+    pub outside: f64,
+}
+
+impl Bake {
+    /// Follows the light of lamps.
+    pub(super) fn sent(&self, sight: &Sight) -> Sent {
+        let lamps = self.sending();
+        let all: f64 = lamps.iter().map(|lamp| lamp.0).sum();
+        if all <= 0.0 {
+            return Sent::default();
+        }
+        if self.closed == Closed::Yes {
+            let to_fronts = 1.0;
+            return Sent {
+                to_fronts,
+                ..Sent::default()
+            };
+        }
+        let mut sent = Sent::default();
+        let mut first = 0;
+        for (flux, lamp) in lamps {
+            // At least a packet, so that no lamp goes without.
+            let count = (f64::from(RAYS) * flux / all).ceil() as usize;
+            let count = count.next_multiple_of(TOGETHER);
+            let each = flux / all / count as f64;
+            for start in (0..count).step_by(TOGETHER) {
+                let mut from = [Vec3::ZERO; TOGETHER];
+                let mut directions = [Vec3::ZERO; TOGETHER];
+                let mut plane = 0;
+                for k in 0..TOGETHER {
+                    let (point, direction, of) = lamp.ray(self, (first + start + k) as u32);
+                    (from[k], directions[k], plane) = (point.as_vec3(), direction.as_vec3(), of);
+                }
+                let mut hits = [None; TOGETHER];
+                sight.meet(&from, &directions, plane, &mut hits);
+                for hit in hits {
+                    let to = match hit {
+                        None => &mut sent.outside,
+                        Some(hit) if self.tree.met(&hit) == NONE => &mut sent.to_backs,
+                        Some(_) => &mut sent.to_fronts,
+                    };
+                    *to += each;
+                }
+            }
+            first += count;
+        }
+        sent
+    }
+
+    /// Lamps with their luminous flux.
+    fn sending(&self) -> Vec<(f64, Lamp<'_>)> {
+        let mut row = [0.0_f32; 64];
+        let mut lumens = |light: usize, shape: &[f64; 64], scale: f64| {
+            row.fill(0.0);
+            self.lanes.add_emission(light, shape, scale, &mut row);
+            self.lanes.tristimulus(&row)[1]
+        };
+        let exitance: Vec<f64> = (self.scene.materials.iter())
+            .map(|m| {
+                (m.emission.as_ref())
+                    .map_or(0.0, |e| lumens(e.light, &e.shape, std::f64::consts::PI))
+            })
+            .collect();
+        let faces = (0..self.tree.faces.len()).filter_map(|entry| {
+            let triangle = self.tree.faces[entry].triangle as usize;
+            let flux = exitance[self.mesh.material[triangle] as usize] * self.mesh.area[triangle];
+            (flux > 0.0).then_some((flux, Lamp::Face(entry)))
+        });
+        let mut lamps: Vec<_> = faces.collect();
+        for light in &self.scene.lights {
+            let Some(solid) = super::punctual::solid_angle(light.kind) else {
+                continue;
+            };
+            let flux = solid * lumens(light.light, &light.shape, 1.0);
+            if flux > 0.0 {
+                lamps.push((flux, Lamp::Punctual(light)));
+            }
+        }
+        lamps
+    }
+}
+
+/// What sends light.
+#[derive(Clone, Copy)]
+enum Lamp<'a> {
+    /// An entry of the hierarchy's faces.
+    Face(usize),
+    Punctual(&'a PunctualLight),
+}
+
+impl Lamp<'_> {
+    /// Start, direction and plane of its `k`-th ray.
+    fn ray(self, bake: &Bake, k: u32) -> (DVec3, DVec3, u32) {
+        let (u, v) = (sequence02(k, 11), sequence02(k, 13));
+        let tree = &bake.tree;
+        match self {
+            Lamp::Face(entry) => {
+                let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
+                let direction = cosine_direction(tree.face_normal[entry], v);
+                (
+                    element.at(triangle_weights(u)),
+                    direction,
+                    tree.face_plane[entry],
+                )
+            }
+            Lamp::Punctual(light) => {
+                let cosine = match light.kind {
+                    LightKind::Spot { inner, outer } => cosine_of_spot(inner, outer, v[0]),
+                    _ => 1.0 - 2.0 * v[0],
+                };
+                let [x, y] = tangents(light.direction);
+                let (sin, cos) = (std::f64::consts::TAU * v[1]).sin_cos();
+                let around = (x * cos + y * sin) * (1.0 - cosine * cosine).max(0.0).sqrt();
+                let from = light.position - bake.mesh.centre;
+                (
+                    from,
+                    light.direction * cosine + around,
+                    crate::geometry::NO_PLANE,
+                )
+            }
+        }
+    }
+}
+
+/// Cosine of an angle of a spot's light: of the share 1 - `u` of its flux that lies nearer to its axis. The intensity is 1 up
+/// to the inner angle and falls with `((c - c_o) / (c_i - c_o))^2` to the outer one (KHR_lights_punctual).
+fn cosine_of_spot(inner: f64, outer: f64, u: f64) -> f64 {
+    let (inner, outer) = (inner.cos(), outer.cos());
+    let core = 1.0 - inner;
+    let rim = (inner - outer) / 3.0;
+    let left = u * (core + rim);
+    if left < rim {
+        outer + (inner - outer) * (left / rim).cbrt()
+    } else {
+        inner + (left - rim).min(core)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_of_a_spot_lie_as_its_intensity_does() {
+        let (inner, outer) = (0.4_f64, 0.9_f64);
+        let (c_i, c_o) = (inner.cos(), outer.cos());
+        let total = (1.0 - c_i) + (c_i - c_o) / 3.0;
+        for (to, flux) in [
+            (c_i, (c_i - c_o) / 3.0 / total),
+            (0.5 * (c_i + c_o), (c_i - c_o) / 24.0 / total),
+        ] {
+            let below = (0..1000)
+                .filter(|&k| cosine_of_spot(inner, outer, (f64::from(k) + 0.5) / 1000.0) < to);
+            assert!((below.count() as f64 / 1000.0 - flux).abs() < 2e-3);
+        }
+    }
+}
