@@ -54,7 +54,7 @@ class Reference:
     @staticmethod
     def made(path, wanted):
         room = rooms.read(path)
-        renderer = peer.Peer(room)
+        renderer = peer.Peer(room, path)
         chosen = places.chosen(room, renderer, wanted.points, wanted.seed)
         if len(chosen) == 0:
             sys.exit(f"{wanted.room}: no place that light reaches")

@@ -9,37 +9,26 @@ import time
 
 import numpy as np
 
-from room import GREATEST_ALBEDO, LUMINANCE, Part
+import spectra
+from room import GREATEST_ALBEDO, Part
 
-XYZ = np.array([  # of linear sRGB
-    [0.4123907993, 0.3575843394, 0.1804807884],
-    [0.2126390059, 0.7151686788, 0.0721923154],
-    [0.0193308187, 0.1191947798, 0.9505321522],
-])
-WHITE = XYZ.sum(axis=1)
 MOST_RAYS = 1 << 20  # at once
 SPOT_PIXELS = 1024  # of the picture with a spot's fall-off
 SHEET = 1e-5  # of the room's size, between the two sides of a lamp that shines from both
 
 
-def is_grey(room):
-    """Is there no colour in it?"""
-    flat = lambda rgb: np.ptp(rgb) <= 1e-6 * np.max(rgb, initial=0)
-    return all(
-        flat(m.base_color) and flat(m.emission) and not m.paint and not m.emission_texture for m in room.materials
-    ) and all(flat(lamp.intensity) for lamp in room.lamps) and all(part.colors is None for part in room.parts)
-
-
 class Peer:
-    """The room in Mitsuba."""
+    """The room in Mitsuba: one number for light where all is grey, the same spectra as haarlight where nothing is painted
+    with pictures, else linear colours."""
 
-    def __init__(self, room):
+    def __init__(self, room, path):
         import drjit as dr
         import mitsuba as mi
 
-        self.grey = is_grey(room)
-        mi.set_variant("llvm_ad_mono" if self.grey else "llvm_ad_rgb")
+        self.kind = "mono" if room.is_grey() else "rgb" if room.is_painted() else "spectral"
+        mi.set_variant(f"llvm_ad_{self.kind}")
         self.dr, self.mi, self.room, self.size = dr, mi, room, room.size()
+        self.spectra = spectra.Spectra() if self.kind != "spectral" else spectra.give(room, path)
         scene = {"type": "scene"}
         for k, part in enumerate(merged(room)):
             for name, shape in self.shapes(part):
@@ -51,17 +40,16 @@ class Peer:
 
     # The scene
 
-    def value(self, rgb):
-        """A number in a grey room, else a linear colour that may exceed 1."""
-        if self.grey:
-            return {"type": "uniform", "value": float(LUMINANCE @ rgb)}
-        return {"type": "rgb", "value": [float(c) for c in rgb]}
-
-    def light(self, rgb):
-        if self.grey:
-            return {"type": "uniform", "value": float(LUMINANCE @ rgb)}
-        # Given as a spectrum of a lamp, "rgb" may exceed 1 and stays as it is.
-        return {"type": "rgb", "value": [float(c) for c in rgb]}
+    def value(self, rgb, leaves):
+        """A reflectance or a power in the way that this variant has it."""
+        if self.kind == "mono":
+            return {"type": "uniform", "value": float(self.spectra.to_xyz[1] @ rgb)}
+        if self.kind == "rgb":
+            return {"type": "rgb", "value": [float(c) for c in rgb]}
+        left = spectra.START + spectra.WIDTH * np.arange(spectra.LEAVES)
+        nm = np.stack([left + 1e-3, left + spectra.WIDTH - 1e-3], 1).ravel()
+        join = lambda numbers: ", ".join(f"{x:.9g}" for x in numbers)
+        return {"type": "irregular", "wavelengths": join(nm), "values": join(np.repeat(leaves, 2))}
 
     def bitmap(self, texture, factor, most=None):
         pixels = texture.pixels[..., :3] * factor
@@ -77,12 +65,12 @@ class Peer:
             return self.bitmap(material.paint, material.base_color, GREATEST_ALBEDO)
         if colors:
             return {"type": "mesh_attribute", "name": "vertex_color"}
-        return self.value(np.minimum(material.base_color, GREATEST_ALBEDO))
+        return self.value(np.minimum(material.base_color, GREATEST_ALBEDO), material.reflectance)
 
     def shapes(self, part):
         """One, or two back to back where a lamp shines from both sides: Mitsuba's lamps have one."""
         material = self.room.materials[part.material]
-        shines = np.any(material.emission > 0)
+        shines = material.shines()
         if not (shines and material.two_sided):
             return [("", self.mesh(part, material, material.two_sided, shines, part.corners))]
         normal = np.cross(part.corners[:, 1] - part.corners[:, 0], part.corners[:, 2] - part.corners[:, 0])
@@ -102,7 +90,7 @@ class Peer:
                     raise ValueError(f"material '{material.name}': texture of paint and of light at once")
                 radiance = self.bitmap(material.emission_texture, material.emission)
             else:
-                radiance = self.light(material.emission)
+                radiance = self.value(material.emission, material.power)
             properties["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
         uv = part.emission_uv if part.uv is None else part.uv
         n = len(corners)
@@ -121,9 +109,9 @@ class Peer:
     def lamp(self, lamp):
         mi = self.mi
         if lamp.kind == "point":
-            return {"type": "point", "position": list(lamp.position), "intensity": self.light(lamp.intensity)}
+            return {"type": "point", "position": list(lamp.position), "intensity": self.value(lamp.intensity, lamp.power)}
         if lamp.kind == "directional":
-            return {"type": "directional", "direction": list(lamp.direction), "irradiance": self.light(lamp.intensity)}
+            return {"type": "directional", "direction": list(lamp.direction), "irradiance": self.value(lamp.intensity, lamp.power)}
         up = [0, 1, 0] if abs(lamp.direction[1]) < 0.9 else [1, 0, 0]
         target = list(lamp.position + lamp.direction)
         degrees = float(np.degrees(lamp.outer))
@@ -131,7 +119,7 @@ class Peer:
             "type": "spot", "to_world": mi.ScalarTransform4f().look_at(list(lamp.position), target, up),
             # The picture does the fall-off, which is not the one that Mitsuba has.
             "cutoff_angle": degrees, "beam_width": degrees * (1 - 1e-6),
-            "intensity": self.light(lamp.intensity), "texture": self.fall_off(lamp),
+            "intensity": self.value(lamp.intensity, lamp.power), "texture": self.fall_off(lamp),
         }
 
     def fall_off(self, lamp):
@@ -186,6 +174,9 @@ class Peer:
         here = dr.zeros(mi.SurfaceInteraction3f, len(places) * samples)
         here.p, here.n = dr.gather(mi.Point3f, points, index), mi.Normal3f(dr.gather(mi.Vector3f, normals, index))
         here.sh_frame = mi.Frame3f(here.n)
+        per_wave = None
+        if self.kind == "spectral":
+            here.wavelengths, per_wave = mi.sample_rgb_spectrum(mi.sample_shifted(sampler.next_1d()))
 
         lamp, weight = self.scene.sample_emitter_direction(here, stratified(), True)
         cosine = dr.maximum(dr.dot(here.n, lamp.d), 0)
@@ -193,7 +184,7 @@ class Peer:
         light = weight * dr.select((cosine > 0) & (lamp.pdf > 0), cosine * share, 0)
 
         to = here.sh_frame.to_world(mi.warp.square_to_cosine_hemisphere(stratified()))
-        ray = mi.RayDifferential3f(here.p, to)
+        ray = mi.RayDifferential3f(here.p, to, 0.0, here.wavelengths)
         hit = self.scene.ray_intersect(ray)
         emitter = hit.emitter(self.scene)
         seen = hit.is_valid() & (emitter != None)  # noqa: E711 (an array)
@@ -204,10 +195,28 @@ class Peer:
         found, _, _ = self.integrator.sample(self.scene, sampler, ray)
         light += dr.pi * (found - shine * twice)
 
+        light = self.tristimulus(light, here.wavelengths, per_wave)
         means = [dr.block_sum(x, samples) / samples for x in light]
         dr.eval(means)
         means = np.stack([np.array(x, dtype=np.float64) for x in means], 1)
-        return means * WHITE if self.grey else means @ XYZ.T
+        return means * self.spectra.white if self.kind == "mono" else means
+
+    def tristimulus(self, light, wavelengths, per_wave):
+        """X, Y and Z; one number where all light is white."""
+        dr, mi = self.dr, self.mi
+        if self.kind == "mono":
+            return [light[0]]
+        if self.kind == "rgb":
+            return [sum(float(row[c]) * light[c] for c in range(3)) for row in self.spectra.to_xyz]
+        matching = [mi.Float((spectra.KM * row / spectra.WIDTH).astype(np.float32)) for row in self.spectra.weights]
+        sums = [mi.Float(0), mi.Float(0), mi.Float(0)]
+        for k in range(len(wavelengths)):
+            place = (wavelengths[k] - spectra.START) / spectra.WIDTH
+            leaf = mi.UInt32(dr.clip(place, 0, spectra.LEAVES - 1))
+            density = dr.select((place >= 0) & (place < spectra.LEAVES), light[k] * per_wave[k], 0) / len(wavelengths)
+            for c in range(3):
+                sums[c] += density * dr.gather(mi.Float, matching[c], leaf)
+        return sums
 
 
 def merged(room):

@@ -29,7 +29,7 @@ class Places:
 def scattered(room, count, seed):
     """Places evenly by area on surfaces that do not shine, on the front, or on either side of two-sided ones."""
     random = np.random.default_rng(seed)
-    dark = [part for part in room.parts if not np.any(room.materials[part.material].emission > 0)]
+    dark = [part for part in room.parts if not room.materials[part.material].shines()]
     if not dark:
         return Places(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=int))
     corners = np.concatenate([part.corners for part in dark])

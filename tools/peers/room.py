@@ -47,17 +47,25 @@ class Material:
     two_sided: bool
     emission: np.ndarray  # nits by linear colour
     emission_texture: Texture | None
-    measured: bool = False
+    spectra: dict = field(default_factory=dict)  # measured ones, by the file's extras
+    reflectance: np.ndarray | None = None  # on the leaves, once spectra.give was there
+    power: np.ndarray | None = None
+
+    def shines(self):
+        return bool(np.any(self.emission > 0)) or self.power is not None
 
 
 @dataclass
 class Lamp:
+    name: str
     kind: str  # point, spot, directional
     position: np.ndarray
     direction: np.ndarray
     intensity: np.ndarray  # candela or lux by linear colour
     inner: float = 0.0
     outer: float = np.pi / 4
+    spectra: dict = field(default_factory=dict)
+    power: np.ndarray | None = None
 
 
 @dataclass
@@ -87,6 +95,17 @@ class Room:
     materials: list
     parts: list = field(default_factory=list)
     lamps: list = field(default_factory=list)
+
+    def is_painted(self):
+        """Is there a picture or a colour of vertices in it?"""
+        pictures = any(m.paint or m.emission_texture for m in self.materials)
+        return pictures or any(part.colors is not None for part in self.parts)
+
+    def is_grey(self):
+        """Is there no colour in it?"""
+        flat = lambda rgb: np.ptp(rgb) <= 1e-6 * np.max(rgb, initial=0)
+        materials = all(flat(m.base_color) and flat(m.emission) and not m.spectra for m in self.materials)
+        return materials and all(flat(lamp.intensity) for lamp in self.lamps) and not self.is_painted()
 
     def size(self):
         """Greatest extent."""
@@ -241,7 +260,7 @@ class Reader:
             source.get("doubleSided", False),
             strength * np.array(source.get("emissiveFactor", [0, 0, 0]), dtype=np.float64),
             self.texture(source.get("emissiveTexture")),
-            "reflectance" in (source.get("extras") or {}) or "emission" in (source.get("extras") or {}),
+            {key: value for key, value in (source.get("extras") or {}).items() if key in ("reflectance", "emission")},
         )
 
     def texture(self, info):
@@ -292,7 +311,8 @@ class Reader:
         part.uv = self.coordinates(attributes, source.get("pbrMetallicRoughness", {}).get("baseColorTexture"), faces)
         part.emission_uv = self.coordinates(attributes, source.get("emissiveTexture"), faces)
         if "COLOR_0" in attributes:
-            part.colors = self.file.accessor(attributes["COLOR_0"])[:, :3].astype(np.float64)[faces]
+            colors = self.file.accessor(attributes["COLOR_0"])[:, :3].astype(np.float64)[faces]
+            part.colors = None if np.all(colors == 1) else colors
         self.room.parts.append(part)
 
     def coordinates(self, attributes, info, faces):
@@ -312,12 +332,14 @@ class Reader:
         spot = light.get("spot", {})
         direction = -to_world[:3, 2]
         lamp = Lamp(
+            light.get("name", ""),
             light["type"],
             to_world[:3, 3],
             direction / max(np.linalg.norm(direction), 1e-300),
             light.get("intensity", 1.0) * np.array(light.get("color", [1, 1, 1]), dtype=np.float64),
             spot.get("innerConeAngle", 0.0),
             spot.get("outerConeAngle", np.pi / 4),
+            {key: value for key, value in (light.get("extras") or {}).items() if key in ("name", "csv")},
         )
         if lamp.intensity.max() > 0:
             self.room.lamps.append(lamp)
