@@ -98,7 +98,7 @@ def haarlight(program, path, reference, error):
     found = json.loads(out.stdout)
     columns = [found["columns"].index(name) for name in ("E_X", "E_Y", "E_Z")]
     xyz = np.array(found["rows"], dtype=np.float64)[:, columns]
-    return after.ru_utime - before.ru_utime, xyz, found["error_de2000"]
+    return after.ru_utime - before.ru_utime, xyz, found["error_de2000"]["value"]
 
 
 def row(name, error, reference, truth, run):

@@ -128,7 +128,7 @@ class Peer:
         radius = np.hypot(*np.meshgrid(axis, axis)) * np.tan(lamp.outer)
         scale = 1 / max(0.001, np.cos(lamp.inner) - np.cos(lamp.outer))
         share = np.clip((1 / np.sqrt(1 + radius**2) - np.cos(lamp.outer)) * scale, 0, 1) ** 2
-        return {"type": "bitmap", "bitmap": self.mi.Bitmap(np.repeat(share[..., None], 3, 2).astype(np.float32)),
+        return {"type": "bitmap", "bitmap": self.mi.Bitmap(share[..., None].astype(np.float32)),
                 "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
 
     # Measuring
