@@ -12,11 +12,14 @@ import tempfile
 
 import numpy as np
 
+import grey
 import peer
 import places
 import room as rooms
 from metrics import Truth
 
+RUNS = 8  # of the reference between looks at its noise
+FEWEST = 16  # runs; fewer do not tell their noise
 COLUMNS = "room | `--error` | points | rel % | bias % | median % | off > 5 % | dE00 | 95 % | stated | CPU s | Mitsuba, CPU s"
 
 
@@ -24,7 +27,7 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("room", help=".glb or .gltf")
     parser.add_argument("--grey", action="store_true", help="every reflectance .5, lamps without colour, no textures")
-    parser.add_argument("--errors", default="2,1,.5", help="haarlight's --error, one run each; empty: the reference only")
+    parser.add_argument("--errors", default="2,1,.5", help="haarlight's --error, one run each; empty: make the reference, or make it better")
     parser.add_argument("--points", type=int, default=300)
     parser.add_argument("--reference", help="keep the reference here (.npz), and take it from here if it is there")
     parser.add_argument("--noise", type=float, default=0.25, help="median standard error of the reference's points, per cent")
@@ -47,35 +50,50 @@ def digest(path):
 class Reference:
     """What the peer measured, and what it took."""
 
+    FIELDS = ("points", "normals", "runs", "seconds", "paths", "digest")
+
     def __init__(self, points, normals, runs, seconds, paths, digest):
         self.points, self.normals, self.runs = points, normals, runs
         self.seconds, self.paths, self.digest = float(seconds), int(paths), str(digest)
 
     @staticmethod
-    def made(path, wanted):
+    def open(path, wanted):
+        """The kept one if it is of this very file, else a new one. Where only the reference is asked for, a kept one is
+        made better."""
+        kept = wanted.reference and os.path.exists(wanted.reference)
+        reference = Reference.load(wanted.reference) if kept else None
+        if reference and reference.digest == digest(path) and wanted.errors:
+            return reference
         room = rooms.read(path)
         renderer = peer.Peer(room, path)
-        chosen = places.chosen(room, renderer, wanted.points, wanted.seed)
-        if len(chosen) == 0:
-            sys.exit(f"{wanted.room}: no place that light reaches")
-        runs, seconds, paths = peer.measure(renderer, chosen, wanted.noise / 100, wanted.seconds, wanted.seed, say)
-        return Reference(chosen.points, chosen.normals, runs, seconds, paths, digest(path))
-
-    @staticmethod
-    def open(path, wanted):
-        """The kept one if it is of this very file, else a new one, which is kept."""
-        if wanted.reference and os.path.exists(wanted.reference):
-            with np.load(wanted.reference) as kept:
-                reference = Reference(*(kept[key] for key in Reference.FIELDS))
-            if reference.digest == digest(path):
-                return reference
-            say(f"{wanted.reference} is of another file; measuring again")
-        reference = Reference.made(path, wanted)
-        if wanted.reference:
-            np.savez(wanted.reference, **{key: getattr(reference, key) for key in Reference.FIELDS})
+        if reference is None or reference.digest != digest(path):
+            chosen = places.chosen(room, renderer, wanted.points, wanted.seed)
+            if len(chosen) == 0:
+                sys.exit(f"{wanted.room}: no place that light reaches")
+            nothing = np.zeros((0, len(chosen), 3))
+            reference = Reference(chosen.points, chosen.normals, nothing, 0, 0, digest(path))
+        reference.improve(renderer, wanted)
         return reference
 
-    FIELDS = ("points", "normals", "runs", "seconds", "paths", "digest")
+    @staticmethod
+    def load(path):
+        with np.load(path) as kept:
+            return Reference(*(kept[key] for key in Reference.FIELDS))
+
+    def improve(self, renderer, wanted):
+        """Adds runs until the noise is as wanted, and keeps what there is after every few."""
+        chosen = places.Places(self.points, self.normals, None)
+        while len(self.runs) < FEWEST or (
+            100 * Truth(self.runs).median_noise() > wanted.noise and self.seconds < wanted.seconds
+        ):
+            more, seconds, self.paths = peer.runs_more(renderer, chosen, RUNS, len(self.runs), wanted.seed)
+            self.runs, self.seconds = np.concatenate([self.runs, more]), self.seconds + seconds
+            noise = 100 * Truth(self.runs).median_noise()
+            say(f"{len(self.runs)} runs of {self.paths} paths a point, {self.seconds:.0f} CPU s, noise {noise:.2f} %")
+            if wanted.reference:
+                new = wanted.reference + ".new.npz"
+                np.savez(new, **{key: getattr(self, key) for key in self.FIELDS})
+                os.replace(new, wanted.reference)
 
     def seconds_to(self, rel, truth):
         """CPU seconds after which the peer is as right as this: its error falls with the root of its time."""
@@ -91,7 +109,7 @@ def haarlight(program, path, reference, error):
         np.savetxt(points, rows, delimiter=",", header="x,y,z,nx,ny,nz", comments="", fmt="%.17g")
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         command = [program, "probe", path, "--points", points, "--error", str(error), "--json", "-q"]
-        out = subprocess.run(command, stdout=subprocess.PIPE, text=True)
+        out = subprocess.run(command, check=False, stdout=subprocess.PIPE, text=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         if not out.stdout.strip():
             sys.exit(f"{' '.join(command)}: exit code {out.returncode}")
@@ -116,7 +134,7 @@ def main():
         path = wanted.room
         if wanted.grey:
             path = os.path.join(folder, "grey.glb")
-            rooms.write_grey(wanted.room, path)
+            grey.write_grey(wanted.room, path)
         reference = Reference.open(path, wanted)
         truth = Truth(reference.runs)
         say(f"{name}: {truth.lit.sum()} of {len(reference.points)} points; reference: {truth.runs} runs of {reference.paths} "

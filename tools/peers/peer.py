@@ -101,8 +101,8 @@ class Peer:
         parameters["vertex_positions"] = corners.ravel().astype(np.float32)
         parameters["faces"] = np.arange(3 * n, dtype=np.uint32)
         if uv is not None:
-            # Mitsuba's pictures begin at the bottom.
-            parameters["vertex_texcoords"] = (uv * [1, -1] + [0, 1]).ravel().astype(np.float32)
+            # A picture given as an array begins at v = 0, as in glTF.
+            parameters["vertex_texcoords"] = uv.ravel().astype(np.float32)
         parameters.update()
         return mesh
 
@@ -187,7 +187,7 @@ class Peer:
         ray = mi.RayDifferential3f(here.p, to, 0.0, here.wavelengths)
         hit = self.scene.ray_intersect(ray)
         emitter = hit.emitter(self.scene)
-        seen = hit.is_valid() & (emitter != None)  # noqa: E711 (an array)
+        seen = hit.is_valid() & (emitter != None)  # noqa: E711, RUF100 (an array)
         shine = dr.select(seen, emitter.eval(hit, seen), 0)
         other = self.scene.pdf_emitter_direction(here, mi.DirectionSample3f(self.scene, hit, here), seen)
         cosine = dr.maximum(dr.dot(here.n, to), 0)
@@ -228,22 +228,11 @@ def merged(room):
     return [Part.joined(parts) for _, parts in sorted(sets.items())]
 
 
-def measure(peer, places, noise, most_seconds, seed, say):
-    """Independent runs until the median of the points' standard errors is `noise`: (runs, CPU seconds, paths a point
-    and run). Kernels are compiled before time is taken."""
-    from metrics import Truth
-
+def runs_more(peer, places, count, done, seed):
+    """`count` further independent runs after `done` earlier ones: (runs, CPU seconds, paths a point and run). Kernels
+    are compiled before time is taken."""
     samples = max(1, MOST_RAYS // len(places))
-    paths = int(np.sqrt(samples)) ** 2
     peer.irradiance(places, samples, seed)
-    runs, start = [], time.process_time()
-    while True:
-        runs.append(peer.irradiance(places, samples, seed + 15_485_863 * (len(runs) + 1)))
-        spent = time.process_time() - start
-        if len(runs) < 16 or len(runs) % 2:
-            continue
-        reached = Truth(runs).median_noise()
-        if len(runs) % 16 == 0:
-            say(f"{len(runs)} runs of {paths} paths a point, {spent:.0f} CPU s, noise {100 * reached:.2f} %")
-        if reached <= noise or spent > most_seconds:
-            return np.array(runs), spent, paths
+    start = time.process_time()
+    runs = [peer.irradiance(places, samples, seed + 15_485_863 * (done + k + 1)) for k in range(count)]
+    return np.array(runs), time.process_time() - start, int(np.sqrt(samples)) ** 2

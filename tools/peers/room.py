@@ -5,30 +5,14 @@ material is doubleSided. Normals of the file are shading only and are not read. 
 matt, `range` of lamps is passed over. What the reader cannot do right it refuses with Unreadable.
 """
 
-import base64
-import copy
-import io
-import json
-import os
-import struct
 from dataclasses import dataclass, field
-from urllib.parse import unquote
 
 import numpy as np
 
+from gltf import File, Unreadable
+
 LUMINANCE = np.array([0.2126390059, 0.7151686788, 0.0721923154])  # Y of linear sRGB
 GREATEST_ALBEDO = 0.999
-GREY = 0.5  # the one reflectance of a grey room
-KINDS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-REFUSED = {
-    "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression",
-    "EXT_mesh_gpu_instancing", "KHR_texture_basisu",
-}
-
-
-class Unreadable(Exception):
-    """The file has something that this reader does not know."""
 
 
 @dataclass
@@ -111,98 +95,6 @@ class Room:
         """Greatest extent."""
         corners = np.concatenate([part.corners.reshape(-1, 3) for part in self.parts])
         return float(np.ptp(corners, axis=0).max())
-
-
-class File:
-    """A .glb or .gltf: its JSON, and what is in its buffers."""
-
-    def __init__(self, path):
-        self.folder = os.path.dirname(path)
-        with open(path, "rb") as file:
-            data = file.read()
-        self.binary = None
-        if data[:4] == b"glTF":
-            self.json, self.binary = chunks(data)
-        else:
-            self.json = json.loads(data)
-        refused = sorted(REFUSED & set(self.json.get("extensionsUsed", [])))
-        if refused:
-            raise Unreadable(", ".join(refused))
-        self.buffers = {}
-
-    def buffer(self, index):
-        if index not in self.buffers:
-            uri = self.json["buffers"][index].get("uri")
-            self.buffers[index] = self.binary if uri is None else self.fetch(uri)
-        return self.buffers[index]
-
-    def fetch(self, uri):
-        if uri.startswith("data:"):
-            return base64.b64decode(uri.split(",", 1)[1])
-        with open(os.path.join(self.folder, unquote(uri)), "rb") as file:
-            return file.read()
-
-    def view(self, index):
-        view = self.json["bufferViews"][index]
-        start = view.get("byteOffset", 0)
-        return self.buffer(view["buffer"])[start : start + view["byteLength"]]
-
-    def accessor(self, index):
-        """Values, one row an element; integers that stand for fractions are divided."""
-        accessor = self.json["accessors"][index]
-        kind, width, count = np.dtype(KINDS[accessor["componentType"]]), WIDTHS[accessor["type"]], accessor["count"]
-        values = np.zeros((count, width), dtype=kind)
-        if "bufferView" in accessor:
-            stride = self.json["bufferViews"][accessor["bufferView"]].get("byteStride", kind.itemsize * width)
-            values = elements(self.view(accessor["bufferView"]), accessor.get("byteOffset", 0), stride, kind, width, count)
-        if "sparse" in accessor:
-            values = self.replaced(values.copy(), accessor["sparse"])
-        if accessor.get("normalized") and kind.kind in "iu":
-            values = np.maximum(values / float(np.iinfo(kind).max), -1.0)
-        return values
-
-    def replaced(self, values, sparse):
-        indices, new = sparse["indices"], sparse["values"]
-        kind = np.dtype(KINDS[indices["componentType"]])
-        where = elements(self.view(indices["bufferView"]), indices.get("byteOffset", 0), kind.itemsize, kind, 1, sparse["count"])
-        stride = values.dtype.itemsize * values.shape[1]
-        values[where[:, 0]] = elements(self.view(new["bufferView"]), new.get("byteOffset", 0), stride, values.dtype, values.shape[1], sparse["count"])
-        return values
-
-    def picture(self, index):
-        """Linear light by rows from the top, alpha as it is."""
-        from PIL import Image
-
-        image = self.json["images"][index]
-        data = self.view(image["bufferView"]) if "bufferView" in image else self.fetch(image["uri"])
-        values = np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"), dtype=np.float64) / 255
-        values[..., :3] = linear(values[..., :3])
-        return values
-
-
-def chunks(data):
-    """JSON and binary chunk of a GLB."""
-    at, document, binary = 12, None, b""
-    while at + 8 <= len(data):
-        length, kind = struct.unpack("<II", data[at : at + 8])
-        chunk = data[at + 8 : at + 8 + length]
-        if kind == 0x4E4F534A:
-            document = json.loads(chunk)
-        elif kind == 0x004E4942:
-            binary = chunk
-        at += 8 + length
-    return document, binary
-
-
-def elements(data, start, stride, kind, width, count):
-    raw = np.frombuffer(data, dtype=np.uint8)
-    rows = start + stride * np.arange(count)[:, None] + np.arange(kind.itemsize * width)[None, :]
-    return np.ascontiguousarray(raw[rows]).view(kind).reshape(count, width)
-
-
-def linear(values):
-    """sRGB's transfer function undone."""
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
 def matrix(node):
@@ -357,60 +249,3 @@ def has_area(corners):
 def read(path):
     """The room in a file."""
     return Reader(path).room
-
-
-def write_grey(path, out):
-    """The same room with every reflectance .5, lamps without colour, no textures: it means the same to any program."""
-    file = File(path)
-    document = copy.deepcopy(file.json)
-    materials = document.setdefault("materials", [])
-    materials[:] = [grey_material(source) for source in [*materials, {}]]
-    for mesh in document["meshes"]:
-        for primitive in mesh["primitives"]:
-            primitive.setdefault("material", len(materials) - 1)
-            primitive["attributes"] = {k: v for k, v in primitive["attributes"].items() if k in ("POSITION", "NORMAL")}
-    for light in document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
-        light["color"] = [float(LUMINANCE @ light.get("color", [1, 1, 1]))] * 3
-        light.pop("extras", None)
-    for unused in ("images", "textures", "samplers"):
-        document.pop(unused, None)
-    known = {"KHR_lights_punctual", "KHR_materials_emissive_strength"}
-    for key in ("extensionsUsed", "extensionsRequired"):
-        kept = [name for name in document.pop(key, []) if name in known]
-        if kept:
-            document[key] = kept
-    write_glb(out, document, [file.buffer(i) for i in range(len(document.get("buffers", [])))])
-
-
-def grey_material(source):
-    out = {
-        "name": source.get("name", "default"),
-        "pbrMetallicRoughness": {"baseColorFactor": [GREY, GREY, GREY, 1.0], "metallicFactor": 0.0},
-    }
-    if source.get("doubleSided"):
-        out["doubleSided"] = True
-    luminance = float(LUMINANCE @ source.get("emissiveFactor", [0, 0, 0]))
-    if luminance > 0:
-        out["emissiveFactor"] = [min(luminance, 1.0)] * 3
-        strength = source.get("extensions", {}).get("KHR_materials_emissive_strength")
-        if strength is not None:
-            out["extensions"] = {"KHR_materials_emissive_strength": strength}
-    return out
-
-
-def write_glb(path, document, buffers):
-    """One GLB with all buffers in its binary chunk."""
-    binary, starts = b"", []
-    for data in buffers:
-        starts.append(len(binary))
-        binary += data + bytes(-len(data) % 4)
-    for view in document.get("bufferViews", []):
-        view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
-        view["buffer"] = 0
-    document["buffers"] = [{"byteLength": len(binary)}]
-    text = json.dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    total = 12 + 8 + len(text) + 8 + len(binary)
-    with open(path, "wb") as file:
-        file.write(struct.pack("<4sIIII", b"glTF", 2, total, len(text), 0x4E4F534A) + text)
-        file.write(struct.pack("<II", len(binary), 0x004E4942) + binary)

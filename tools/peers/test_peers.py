@@ -6,6 +6,8 @@ import struct
 import numpy as np
 import pytest
 
+import gltf
+import grey
 import places
 import room as rooms
 import spectra
@@ -44,7 +46,7 @@ def document():
 def written(tmp_path):
     def write(changed):
         path = str(tmp_path / "room.glb")
-        rooms.write_glb(path, changed, [QUAD.tobytes() + INDICES.tobytes()])
+        gltf.write_glb(path, changed, [QUAD.tobytes() + INDICES.tobytes()])
         return path
 
     return write
@@ -89,7 +91,7 @@ def test_what_cannot_be_read_is_refused(written):
     masked = document()
     masked["materials"][0]["alphaMode"] = "MASK"
     for changed in (draco, masked):
-        with pytest.raises(rooms.Unreadable):
+        with pytest.raises(gltf.Unreadable):
             rooms.read(written(changed))
 
 
@@ -99,7 +101,7 @@ def test_grey_keeps_luminance_and_drops_colour(written, tmp_path):
     changed["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
     changed["materials"][0]["extras"] = {"reflectance": {"name": "cornell/red"}}
     out = str(tmp_path / "grey.glb")
-    rooms.write_grey(written(changed), out)
+    grey.write_grey(written(changed), out)
     room = rooms.read(out)
     assert room.is_grey()
     floor = room.materials[0]
@@ -108,7 +110,7 @@ def test_grey_keeps_luminance_and_drops_colour(written, tmp_path):
     with open(out, "rb") as file:
         data = file.read()
     assert struct.unpack("<I", data[8:12])[0] == len(data)
-    assert json.dumps(rooms.chunks(data)[0]).count("Texture") == 0
+    assert json.dumps(gltf.chunks(data)[0]).count("Texture") == 0
 
 
 def test_places_are_on_dark_surfaces_and_free_of_others():
@@ -160,8 +162,8 @@ def test_a_colour_difference_of_the_published_table():
     white = np.ones(3)
     assert np.isclose(de2000(xyz(50, 2.6772, -79.7751), xyz(50, 0, -82.7485), white)[0], 2.0425, atol=1e-4)
     assert np.isclose(de2000(xyz(50, 2.5, 0), xyz(73, 25, -18), white)[0], 27.1492, atol=1e-4)
-    grey = np.full((1, 3), 0.2)
-    assert de2000(grey, grey, white)[0] == 0
+    same = np.full((1, 3), 0.2)
+    assert de2000(same, same, white)[0] == 0
 
 
 def test_upsampled_reflectances_have_their_colour():

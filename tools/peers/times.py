@@ -12,36 +12,11 @@ import time
 
 import numpy as np
 
+from metrics import DARK, de2000
+
 ILLUMINANCE = [5, 2, 1, 0.5]  # RMS error of illuminance, per cent of the mean illuminance
 COLOUR = [2, 1, 0.5]  # mean CIEDE2000
 SETTINGS = [2, 0.5, 0.25, 0.1, 0.05]  # haarlight's --error
-DARK = 0.02  # points darker than this share of the mean are covered, and left out
-
-
-def de2000(xyz1, xyz2, white):
-    """CIEDE2000 (CIE 142:2001) in CIELAB under `white`."""
-
-    def lab(xyz):
-        t = np.maximum(xyz / white, 0)
-        f = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29)
-        return 116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])
-
-    (l1, a1, b1), (l2, a2, b2) = lab(xyz1), lab(xyz2)
-    c7 = ((np.hypot(a1, b1) + np.hypot(a2, b2)) / 2) ** 7
-    g = 0.5 * (1 - np.sqrt(c7 / (c7 + 25.0**7)))
-    a1, a2 = (1 + g) * a1, (1 + g) * a2
-    c1, c2 = np.hypot(a1, b1), np.hypot(a2, b2)
-    h1, h2 = np.degrees(np.arctan2(b1, a1)) % 360, np.degrees(np.arctan2(b2, a2)) % 360
-    turn = (h2 - h1 + 180) % 360 - 180
-    dl, dc, dh = l2 - l1, c2 - c1, 2 * np.sqrt(c1 * c2) * np.sin(np.radians(turn / 2))
-    l, c, h = (l1 + l2) / 2, (c1 + c2) / 2, (h1 + turn / 2) % 360
-    cos = lambda degrees: np.cos(np.radians(degrees))
-    t = 1 - 0.17 * cos(h - 30) + 0.24 * cos(2 * h) + 0.32 * cos(3 * h + 6) - 0.2 * cos(4 * h - 63)
-    sl = 1 + 0.015 * (l - 50) ** 2 / np.sqrt(20 + (l - 50) ** 2)
-    sc, sh = 1 + 0.045 * c, 1 + 0.015 * c * t
-    rt = -2 * np.sqrt(c**7 / (c**7 + 25.0**7)) * np.sin(np.radians(60 * np.exp(-(((h - 275) / 25) ** 2))))
-    dl, dc, dh = dl / sl, dc / sc, dh / sh
-    return np.sqrt(np.maximum(dl**2 + dc**2 + dh**2 + rt * dc * dh, 0))
 
 
 class Mitsuba:
