@@ -16,7 +16,9 @@ import grey
 import peer
 import places
 import room as rooms
+from gltf import Unreadable
 from metrics import Truth
+from spectra import Unknown
 
 RUNS = 8  # of the reference between looks at its noise
 FEWEST = 16  # runs; fewer do not tell their noise
@@ -148,4 +150,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (Unreadable, Unknown) as problem:
+        sys.exit(f"cannot be compared: {problem}")

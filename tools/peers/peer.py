@@ -10,6 +10,7 @@ import time
 import numpy as np
 
 import spectra
+from gltf import Unreadable
 from room import GREATEST_ALBEDO, Part
 
 MOST_RAYS = 1 << 20  # at once
@@ -46,12 +47,16 @@ class Peer:
             return {"type": "uniform", "value": float(self.spectra.to_xyz[1] @ rgb)}
         if self.kind == "rgb":
             return {"type": "rgb", "value": [float(c) for c in rgb]}
+        if not np.any(leaves):
+            return {"type": "uniform", "value": 0.0}
         left = spectra.START + spectra.WIDTH * np.arange(spectra.LEAVES)
         nm = np.stack([left + 1e-3, left + spectra.WIDTH - 1e-3], 1).ravel()
         join = lambda numbers: ", ".join(f"{x:.9g}" for x in numbers)
         return {"type": "irregular", "wavelengths": join(nm), "values": join(np.repeat(leaves, 2))}
 
     def bitmap(self, texture, factor, most=None):
+        if texture.wrap[0] != texture.wrap[1]:
+            raise Unreadable("a picture that goes on differently in u and v")
         pixels = texture.pixels[..., :3] * factor
         if most is not None:
             pixels = np.minimum(pixels, most)
@@ -86,8 +91,8 @@ class Peer:
         properties["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": paint} if two_sided else paint)
         if shines:
             if material.emission_texture is not None and part.emission_uv is not None:
-                if material.paint is not None and part.uv is not None:
-                    raise ValueError(f"material '{material.name}': texture of paint and of light at once")
+                if material.paint is not None and not np.array_equal(part.uv, part.emission_uv):
+                    raise Unreadable(f"material '{material.name}': pictures of paint and of light lie differently")
                 radiance = self.bitmap(material.emission_texture, material.emission)
             else:
                 radiance = self.value(material.emission, material.power)

@@ -87,6 +87,10 @@ def chosen(room, peer, count, seed):
     """`count` places (fewer if the room has not that many) that are free, outside of solids, and lit."""
     places = scattered(room, 4 * count, seed)
     places = places.kept(free(room, places))
+    if len(places) == 0:
+        return places
     places = places.kept(peer.backs(places, LOOKS, seed) < INSIDE)
+    if len(places) == 0:
+        return places
     lit = peer.irradiance(places, 256, seed)[:, 1] > 0
     return places.kept(lit).kept(slice(0, count))
