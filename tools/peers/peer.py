@@ -26,7 +26,8 @@ class Peer:
         import drjit as dr
         import mitsuba as mi
 
-        self.kind = "mono" if room.is_grey() else "rgb" if room.is_painted() else "spectral"
+        grey = room.is_grey() and not spectra.side_file(path)
+        self.kind = "mono" if grey else "rgb" if room.is_painted() else "spectral"
         mi.set_variant(f"llvm_ad_{self.kind}")
         self.dr, self.mi, self.room, self.size = dr, mi, room, room.size()
         self.spectra = spectra.Spectra() if self.kind != "spectral" else spectra.give(room, path)
