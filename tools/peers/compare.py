@@ -1,246 +1,156 @@
 #!/usr/bin/env python3
-"""CPU time to error: haarlight against Mitsuba 3, same room, same points, same spectra, same cores. See README.md."""
+"""haarlight's light at random points of any room, beside Mitsuba 3's. See README.md."""
 
 import argparse
+import hashlib
 import json
 import os
-import platform
+import resource
 import subprocess
 import sys
 import tempfile
-import time
 
 import numpy as np
 
-ILLUMINANCE = [5, 2, 1, 0.5]  # RMS error of illuminance, per cent of the mean illuminance
-COLOUR = [2, 1, 0.5]  # mean CIEDE2000
-SETTINGS = [2, 0.5, 0.25, 0.1, 0.05]  # haarlight's --error
-DARK = 0.02  # points darker than this share of the mean are covered, and left out
+import grey
+import peer
+import places
+import room as rooms
+from gltf import Unreadable
+from metrics import Truth
+from spectra import Unknown
+
+RUNS = 8  # of the reference between looks at its noise
+FEWEST = 16  # runs; fewer do not tell their noise
+COLUMNS = "room | `--error` | points | rel % | bias % | median % | off > 5 % | dE00 | 95 % | stated | CPU s | Mitsuba, CPU s"
 
 
-def de2000(xyz1, xyz2, white):
-    """CIEDE2000 (CIE 142:2001) in CIELAB under `white`."""
-
-    def lab(xyz):
-        t = np.maximum(xyz / white, 0)
-        f = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29)
-        return 116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])
-
-    (l1, a1, b1), (l2, a2, b2) = lab(xyz1), lab(xyz2)
-    c7 = ((np.hypot(a1, b1) + np.hypot(a2, b2)) / 2) ** 7
-    g = 0.5 * (1 - np.sqrt(c7 / (c7 + 25.0**7)))
-    a1, a2 = (1 + g) * a1, (1 + g) * a2
-    c1, c2 = np.hypot(a1, b1), np.hypot(a2, b2)
-    h1, h2 = np.degrees(np.arctan2(b1, a1)) % 360, np.degrees(np.arctan2(b2, a2)) % 360
-    turn = (h2 - h1 + 180) % 360 - 180
-    dl, dc, dh = l2 - l1, c2 - c1, 2 * np.sqrt(c1 * c2) * np.sin(np.radians(turn / 2))
-    l, c, h = (l1 + l2) / 2, (c1 + c2) / 2, (h1 + turn / 2) % 360
-    cos = lambda degrees: np.cos(np.radians(degrees))
-    t = 1 - 0.17 * cos(h - 30) + 0.24 * cos(2 * h) + 0.32 * cos(3 * h + 6) - 0.2 * cos(4 * h - 63)
-    sl = 1 + 0.015 * (l - 50) ** 2 / np.sqrt(20 + (l - 50) ** 2)
-    sc, sh = 1 + 0.045 * c, 1 + 0.015 * c * t
-    rt = -2 * np.sqrt(c**7 / (c**7 + 25.0**7)) * np.sin(np.radians(60 * np.exp(-(((h - 275) / 25) ** 2))))
-    dl, dc, dh = dl / sl, dc / sc, dh / sh
-    return np.sqrt(np.maximum(dl**2 + dc**2 + dh**2 + rt * dc * dh, 0))
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("room", help=".glb or .gltf")
+    parser.add_argument("--grey", action="store_true", help="every reflectance .5, lamps without colour, no textures")
+    parser.add_argument("--errors", default="2,1,.5", help="haarlight's --error, one run each; empty: make the reference, or make it better")
+    parser.add_argument("--points", type=int, default=300)
+    parser.add_argument("--reference", help="keep the reference here (.npz), and take it from here if it is there")
+    parser.add_argument("--noise", type=float, default=0.25, help="median standard error of the reference's points, per cent")
+    parser.add_argument("--seconds", type=float, default=600, help="CPU seconds that the reference may take")
+    parser.add_argument("--seed", type=int, default=7)
+    parser.add_argument("--program", default="target/release/haarlight")
+    parser.add_argument("--bare", action="store_true", help="rows of the table without its head")
+    return parser.parse_args()
 
 
-class Mitsuba:
-    """The room in Mitsuba, and irradiance at its points by the `path` integrator.
-
-    Each path comes from just above a point down onto the surface there, so that the integrator samples lamps and
-    directions at the point itself; the radiance it finds, times pi over the reflectance, is the irradiance.
-    """
-
-    def __init__(self, room):
-        import drjit as dr
-        import mitsuba as mi
-
-        mi.set_variant("llvm_ad_spectral")
-        self.dr, self.mi, self.room = dr, mi, room
-        scene = {"type": "scene"}
-        positions = np.array(room["positions"])
-        triangles, owners = np.array(room["triangles"]), np.array(room["material"])
-        for m, material in enumerate(room["materials"]):
-            mine = triangles[owners == m]
-            if len(mine) == 0:
-                continue
-            shape = mi.Mesh(f"m{m}", 3 * len(mine), len(mine), props=self.properties(material))
-            parameters = mi.traverse(shape)
-            parameters["vertex_positions"] = positions[mine].ravel()
-            parameters["faces"] = np.arange(3 * len(mine))
-            parameters.update()
-            scene[f"m{m}"] = shape
-        self.scene = mi.load_dict(scene)
-        self.integrator = mi.load_dict({"type": "path", "max_depth": -1})
-        normals = np.array(room["normals"])
-        size = np.ptp(positions, axis=0).max()
-        points = np.array(room["points"]) + 1e-4 * size * normals
-        vectors = lambda rows: mi.Point3f(np.ascontiguousarray(rows.T).astype(np.float32))
-        numbers = lambda values: mi.Float(np.asarray(values, dtype=np.float32).ravel())
-        self.origins, self.directions = vectors(points), vectors(-normals)
-        self.count = len(points)
-        self.owner = mi.UInt32(np.array(room["point_material"], dtype=np.uint32))
-        self.reflectance = numbers([material["reflectance"] for material in room["materials"]])
-        self.matching = [numbers(np.array(w) / room["width_nm"]) for w in room["weights"]]
-
-    def properties(self, material):
-        mi = self.mi
-        properties = mi.Properties()
-        reflectance = mi.load_dict({"type": "diffuse", "reflectance": self.spectrum(material["reflectance"])})
-        if material["two_sided"]:
-            reflectance = mi.load_dict({"type": "twosided", "bsdf": reflectance})
-        properties["bsdf"] = reflectance
-        if material["emission"]:
-            properties["emitter"] = mi.load_dict({"type": "area", "radiance": self.spectrum(material["emission"])})
-        return properties
-
-    def spectrum(self, leaves):
-        """Constant on each leaf, zero outside."""
-        start, width = self.room["start_nm"], self.room["width_nm"]
-        left = start + width * np.arange(len(leaves))
-        nm = np.stack([left + 1e-3, left + width - 1e-3], 1).ravel()
-        values = np.repeat(leaves, 2)
-        join = lambda list: ", ".join(f"{x:.9g}" for x in list)
-        return {"type": "irregular", "wavelengths": join(nm), "values": join(values)}
-
-    def irradiance(self, samples, seed, most_rays=1 << 22):
-        """Tristimulus irradiance with `samples` paths a point (a power of four)."""
-        part = max(1, min(samples, most_rays // self.count))
-        part = 4 ** ((part.bit_length() - 1) // 2)
-        sums = np.zeros((self.count, 3))
-        for k in range(samples // part):
-            sums += self.part(part, seed + k) * (part / samples)
-        return sums
-
-    def part(self, samples, seed):
-        dr, mi, room = self.dr, self.mi, self.room
-        sampler = mi.load_dict({"type": "multijitter", "sample_count": samples})
-        samples = sampler.sample_count()
-        sampler.set_samples_per_wavefront(samples)
-        sampler.seed(seed, self.count * samples)
-        index = dr.arange(mi.UInt32, self.count * samples) // samples
-        pick = lambda table: dr.gather(mi.Point3f, table, index)
-        wavelengths, weight = mi.sample_rgb_spectrum(mi.sample_shifted(sampler.next_1d()))
-        ray = mi.RayDifferential3f(pick(self.origins), mi.Vector3f(pick(self.directions)), 0.0, wavelengths)
-        radiance, _, _ = self.integrator.sample(self.scene, sampler, ray, None, True)
-        owner = dr.gather(mi.UInt32, self.owner, index)
-        sums = [mi.Float(0), mi.Float(0), mi.Float(0)]
-        for k in range(len(wavelengths)):
-            place = (wavelengths[k] - room["start_nm"]) / room["width_nm"]
-            leaf = mi.UInt32(dr.clip(place, 0, 63))
-            reflectance = dr.gather(mi.Float, self.reflectance, leaf + 64 * owner)
-            density = radiance[k] * weight[k] * dr.pi / dr.maximum(reflectance, 1e-6)
-            density = dr.select((place >= 0) & (place < 64), density, 0)
-            for c in range(3):
-                sums[c] += density * dr.gather(mi.Float, self.matching[c], leaf) / len(wavelengths)
-        xyz = [dr.block_sum(x, samples) / samples for x in sums]
-        dr.eval(xyz)
-        return np.stack([np.array(x, dtype=np.float64) for x in xyz], 1)
+def say(text):
+    print(f"  {text}", file=sys.stderr, flush=True)
 
 
-class Truth:
-    """Two independent halves of a reference; their mean is the reference, their difference its noise."""
-
-    def __init__(self, halves):
-        self.xyz = (halves[0] + halves[1]) / 2
-        self.white = 2 * self.xyz.mean(axis=0)
-        self.lit = self.xyz[:, 1] > DARK * self.xyz[:, 1].mean()
-        apart = (halves[0] - halves[1])[self.lit, 1]
-        self.noise = 100 * np.sqrt(np.mean(apart**2)) / 2 / self.xyz[self.lit, 1].mean()
-
-    def errors(self, xyz):
-        """(RMS illuminance error in per cent of the mean, the reference's own noise taken off; mean dE00)"""
-        a, b = xyz[self.lit], self.xyz[self.lit]
-        rms = 100 * np.sqrt(np.mean((a[:, 1] - b[:, 1]) ** 2)) / b[:, 1].mean()
-        return np.sqrt(max(rms**2 - self.noise**2, 1e-12)), de2000(a, b, self.white).mean()
+def digest(path):
+    with open(path, "rb") as file:
+        return hashlib.sha256(file.read()).hexdigest()
 
 
-def haarlight(program, room, count, error):
-    """Per round: (CPU seconds, tristimulus irradiance)."""
-    out = subprocess.run([program, room, str(count), "run", str(error)], check=True, capture_output=True, text=True)
-    rounds = [json.loads(line) for line in out.stdout.splitlines()]
-    return [(r["cpu_s"], np.array(r["xyz"]), f"--error {error}, round {r['round']}") for r in rounds]
+class Reference:
+    """What the peer measured, and what it took."""
+
+    FIELDS = ("points", "normals", "runs", "seconds", "paths", "digest")
+
+    def __init__(self, points, normals, runs, seconds, paths, digest):
+        self.points, self.normals, self.runs = points, normals, runs
+        self.seconds, self.paths, self.digest = float(seconds), int(paths), str(digest)
+
+    @staticmethod
+    def open(path, wanted):
+        """The kept one if it is of this very file, else a new one. Where only the reference is asked for, a kept one is
+        made better."""
+        kept = wanted.reference and os.path.exists(wanted.reference)
+        reference = Reference.load(wanted.reference) if kept else None
+        if reference and reference.digest == digest(path) and wanted.errors:
+            return reference
+        room = rooms.read(path)
+        renderer = peer.Peer(room, path)
+        if reference is None or reference.digest != digest(path):
+            chosen = places.chosen(room, renderer, wanted.points, wanted.seed)
+            if len(chosen) == 0:
+                sys.exit(f"{wanted.room}: no place that light reaches")
+            nothing = np.zeros((0, len(chosen), 3))
+            reference = Reference(chosen.points, chosen.normals, nothing, 0, 0, digest(path))
+        reference.improve(renderer, wanted)
+        return reference
+
+    @staticmethod
+    def load(path):
+        with np.load(path) as kept:
+            return Reference(*(kept[key] for key in Reference.FIELDS))
+
+    def improve(self, renderer, wanted):
+        """Adds runs until the noise is as wanted, and keeps what there is after every few."""
+        chosen = places.Places(self.points, self.normals, None)
+        while len(self.runs) < FEWEST or (
+            100 * Truth(self.runs).median_noise() > wanted.noise and self.seconds < wanted.seconds
+        ):
+            more, seconds, self.paths = peer.runs_more(renderer, chosen, RUNS, len(self.runs), wanted.seed)
+            self.runs, self.seconds = np.concatenate([self.runs, more]), self.seconds + seconds
+            noise = 100 * Truth(self.runs).median_noise()
+            say(f"{len(self.runs)} runs of {self.paths} paths a point, {self.seconds:.0f} CPU s, noise {noise:.2f} %")
+            if wanted.reference:
+                new = wanted.reference + ".new.npz"
+                np.savez(new, **{key: getattr(self, key) for key in self.FIELDS})
+                os.replace(new, wanted.reference)
+
+    def seconds_to(self, rel, truth):
+        """CPU seconds after which the peer is as right as this: its error falls with the root of its time."""
+        whole = 100 * truth.rms_noise()
+        return self.seconds * (whole / rel) ** 2 if rel > 0 else float("inf")
 
 
-def mitsuba(renderer, most_seconds, seed):
-    """Four times the samples each time (squares suit the sampler): (CPU seconds, tristimulus irradiance)."""
-    out, samples = [], 4
-    while True:
-        start = time.process_time()
-        xyz = renderer.irradiance(samples, seed)
-        out.append((time.process_time() - start, xyz, f"{samples} paths"))
-        if out[-1][0] > most_seconds / 4:
-            return out
-        samples, seed = samples * 4, seed + 1_000_003
+def haarlight(program, path, reference, error):
+    """(CPU seconds of the whole process, tristimulus irradiance, stated dE00)."""
+    with tempfile.TemporaryDirectory() as folder:
+        points = os.path.join(folder, "points.csv")
+        rows = np.concatenate([reference.points, reference.normals], axis=1)
+        np.savetxt(points, rows, delimiter=",", header="x,y,z,nx,ny,nz", comments="", fmt="%.17g")
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = [program, "probe", path, "--points", points, "--error", str(error), "--json", "-q"]
+        out = subprocess.run(command, check=False, stdout=subprocess.PIPE, text=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        if not out.stdout.strip():
+            sys.exit(f"{' '.join(command)}: exit code {out.returncode}")
+    found = json.loads(out.stdout)
+    columns = [found["columns"].index(name) for name in ("E_X", "E_Y", "E_Z")]
+    xyz = np.array(found["rows"], dtype=np.float64)[:, columns]
+    return after.ru_utime - before.ru_utime, xyz, found["error_de2000"]["value"]
 
 
-def first(curve, column, target):
-    """Least CPU seconds of a run at or below the target."""
-    good = [row for row in curve if row[1][column] <= target]
-    return min(good, key=lambda row: row[0]) if good else None
-
-
-def between(curve, column, target):
-    """CPU seconds to the target on the line through the runs (log-log, least squares): fair to a program that can stop
-    anywhere. None beyond the longest run."""
-    x = np.log([row[0] for row in curve])
-    y = np.log([row[1][column] for row in curve])
-    slope, offset = np.polyfit(x[1:], y[1:], 1)
-    seconds = np.exp((np.log(target) - offset) / slope)
-    return seconds if slope < 0 and seconds <= 1.5 * np.exp(x.max()) else None
+def row(name, error, reference, truth, run):
+    seconds, xyz, stated = run
+    e = truth.errors(xyz)
+    stated = "-" if stated is None else f"{stated:.2f}"
+    return (f"{name} | {error:g} | {e['points']} | {e['rel']:.2f} | {e['bias']:+.2f} | {e['median']:+.2f} | {e['far']:.1f} | "
+            f"{e['de_mean']:.3f} | {e['de_95']:.2f} | {stated} | {seconds:.2f} | {reference.seconds_to(e['rel'], truth):.2f}")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("room")
-    parser.add_argument("--program", default="target/release/examples/points")
-    parser.add_argument("--points", type=int, default=200)
-    parser.add_argument("--repeat", type=int, default=3, help="runs of each, in turn")
-    parser.add_argument("--seconds", type=float, default=20, help="CPU seconds of Mitsuba's longest run")
-    parser.add_argument("--reference", type=int, default=1 << 17, help="Mitsuba's paths a point for the reference: twice a power of four")
-    parser.add_argument("--cores", default="", help="pin both to these, for example 0,1")
-    arguments = parser.parse_args()
-    if arguments.cores:
-        os.sched_setaffinity(0, [int(core) for core in arguments.cores.split(",")])
+    wanted = arguments()
+    name = os.path.splitext(os.path.basename(wanted.room))[0] + (", grey" if wanted.grey else "")
     with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "room.json")
-        subprocess.run([arguments.program, arguments.room, str(arguments.points), "scene", path], check=True)
-        with open(path) as file:
-            room = json.load(file)
-    renderer = Mitsuba(room)
-    start = time.process_time()
-    truth = Truth([renderer.irradiance(arguments.reference // 2, seed) for seed in (77_000_000, 99_000_000)])
-    print(f"{arguments.room}: {truth.lit.sum()} of {arguments.points} points; reference: Mitsuba, {arguments.reference} "
-          f"paths a point, {time.process_time() - start:.0f} CPU s, noise {truth.noise:.3f} % RMS", flush=True)
-    audit = np.array(room["audit_xyz"])
-    print("  haarlight's audit differs by %.3f %% RMS, dE00 %.3f," % truth.errors(audit))
-    ratio = audit[truth.lit, 1].sum() / truth.xyz[truth.lit, 1].sum()
-    print(f"  {100 * (ratio - 1):+.3f} % in the mean", flush=True)
-
-    ours, theirs = [], []
-    for run in range(arguments.repeat):
-        for error in SETTINGS:
-            ours += [(s, truth.errors(x), how) for s, x, how in haarlight(arguments.program, arguments.room, arguments.points, error)]
-        if run == 0:
-            # Kernels are compiled on first use, and that does not count.
-            mitsuba(renderer, arguments.seconds, 1)
-        theirs.append([(s, truth.errors(x), how) for s, x, how in mitsuba(renderer, arguments.seconds, 1000 * (run + 2))])
-    for name, curve in [("haarlight", sorted(ours)), ("Mitsuba", theirs[0])]:
-        for seconds, (rms, de), how in curve:
-            print(f"    {name:9} {seconds:8.3f} s  {rms:7.3f} %  dE00 {de:6.3f}  {how}", file=sys.stderr)
-
-    print(f"\n| to | haarlight, CPU s | Mitsuba, CPU s | ratio |\n|---|---|---|---|")
-    for column, targets, name in [(0, ILLUMINANCE, "RMS {} %"), (1, COLOUR, "mean dE00 {}")]:
-        for target in targets:
-            mine = first(ours, column, target)
-            other = [between(curve, column, target) for curve in theirs]
-            other = None if None in other else float(np.median(other))
-            text = lambda x, none: f"{x:.2f}" if x is not None else none
-            best = "not by %.3g" % min(row[1][column] for row in ours)
-            ratio = f"{other / mine[0]:.1f}" if mine and other else ("" if not mine else f"> {max(c[-1][0] for c in theirs) / mine[0]:.0f}")
-            print(f"| {name.format(target)} | {text(mine and mine[0], best)} | {text(other, 'not in %.0f s' % arguments.seconds)} | {ratio} |")
-    print(f"\n{platform.machine()}, {os.cpu_count()} cores, Mitsuba {renderer.mi.__version__}, {time.strftime('%Y-%m-%d')}")
+        path = wanted.room
+        if wanted.grey:
+            path = os.path.join(folder, "grey.glb")
+            grey.write_grey(wanted.room, path)
+        reference = Reference.open(path, wanted)
+        truth = Truth(reference.runs)
+        say(f"{name}: {truth.lit.sum()} of {len(reference.points)} points; reference: {truth.runs} runs of {reference.paths} "
+            f"paths a point, {reference.seconds:.0f} CPU s, standard error of a point {100 * truth.median_noise():.2f} % "
+            f"(median), {100 * truth.rms_noise():.2f} % (RMS), dE00 {truth.colour_noise:.3f}")
+        runs = [(e, haarlight(wanted.program, path, reference, e)) for e in map(float, filter(None, wanted.errors.split(",")))]
+    if runs and not wanted.bare:
+        print(f"| {COLUMNS} |\n|{'---|' * (COLUMNS.count('|') + 1)}")
+    for error, run in sorted(runs, key=lambda run: -truth.errors(run[1][1])["rel"]):
+        print(f"| {row(name, error, reference, truth, run)} |", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (Unreadable, Unknown) as problem:
+        sys.exit(f"cannot be compared: {problem}")

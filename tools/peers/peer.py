@@ -1,0 +1,244 @@
+"""Mitsuba 3's side: the room as its scene, and irradiance at places by its `path` integrator.
+
+The light at a place is found in two ways, weighted against each other (Veach's balance heuristic): a lamp is picked and
+looked at, and a ray is sent out by the cosine and followed by `path`, from which the lamp that it meets first is taken
+out as far as the first way has counted it. No reflectance of the place is needed for that.
+"""
+
+import time
+
+import numpy as np
+
+import spectra
+from gltf import Unreadable
+from room import GREATEST_ALBEDO, Part
+
+MOST_RAYS = 1 << 20  # at once
+SPOT_PIXELS = 1024  # of the picture with a spot's fall-off
+SHEET = 1e-5  # of the room's size, between the two sides of a lamp that shines from both
+
+
+class Peer:
+    """The room in Mitsuba: one number for light where all is grey, the same spectra as haarlight where nothing is painted
+    with pictures, else linear colours."""
+
+    def __init__(self, room, path):
+        import drjit as dr
+        import mitsuba as mi
+
+        grey = room.is_grey() and not spectra.side_file(path)
+        self.kind = "mono" if grey else "rgb" if room.is_painted() else "spectral"
+        mi.set_variant(f"llvm_ad_{self.kind}")
+        self.dr, self.mi, self.room, self.size = dr, mi, room, room.size()
+        self.spectra = spectra.Spectra() if self.kind != "spectral" else spectra.give(room, path)
+        scene = {"type": "scene"}
+        for k, part in enumerate(merged(room)):
+            for name, shape in self.shapes(part):
+                scene[f"part{k}{name}"] = shape
+        for k, lamp in enumerate(room.lamps):
+            scene[f"lamp{k}"] = self.lamp(lamp)
+        self.scene = mi.load_dict(scene)
+        self.integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": 8})
+
+    # The scene
+
+    def value(self, rgb, leaves):
+        """A reflectance or a power in the way that this variant has it."""
+        if self.kind == "mono":
+            return {"type": "uniform", "value": float(self.spectra.to_xyz[1] @ rgb)}
+        if self.kind == "rgb":
+            return {"type": "rgb", "value": [float(c) for c in rgb]}
+        if not np.any(leaves):
+            return {"type": "uniform", "value": 0.0}
+        left = spectra.START + spectra.WIDTH * np.arange(spectra.LEAVES)
+        nm = np.stack([left + 1e-3, left + spectra.WIDTH - 1e-3], 1).ravel()
+        join = lambda numbers: ", ".join(f"{x:.9g}" for x in numbers)
+        return {"type": "irregular", "wavelengths": join(nm), "values": join(np.repeat(leaves, 2))}
+
+    def bitmap(self, texture, factor, most=None):
+        if texture.wrap[0] != texture.wrap[1]:
+            raise Unreadable("a picture that goes on differently in u and v")
+        pixels = texture.pixels[..., :3] * factor
+        if most is not None:
+            pixels = np.minimum(pixels, most)
+        return {
+            "type": "bitmap", "bitmap": self.mi.Bitmap(pixels.astype(np.float32)), "raw": True,
+            "filter_type": "bilinear", "wrap_mode": texture.wrap[0],
+        }
+
+    def paint(self, material, colors):
+        if material.paint is not None:
+            return self.bitmap(material.paint, material.base_color, GREATEST_ALBEDO)
+        if colors:
+            return {"type": "mesh_attribute", "name": "vertex_color"}
+        return self.value(np.minimum(material.base_color, GREATEST_ALBEDO), material.reflectance)
+
+    def shapes(self, part):
+        """One, or two back to back where a lamp shines from both sides: Mitsuba's lamps have one."""
+        material = self.room.materials[part.material]
+        shines = material.shines()
+        if not (shines and material.two_sided):
+            return [("", self.mesh(part, material, material.two_sided, shines, part.corners))]
+        normal = np.cross(part.corners[:, 1] - part.corners[:, 0], part.corners[:, 2] - part.corners[:, 0])
+        normal *= SHEET * self.size / np.linalg.norm(normal, axis=1)[:, None]
+        back = part.turned((part.corners - normal[:, None])[:, ::-1])
+        return [("front", self.mesh(part, material, False, True, part.corners)),
+                ("back", self.mesh(back, material, False, True, back.corners))]
+
+    def mesh(self, part, material, two_sided, shines, corners):
+        mi = self.mi
+        properties = mi.Properties()
+        paint = {"type": "diffuse", "reflectance": self.paint(material, part.colors is not None)}
+        properties["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": paint} if two_sided else paint)
+        if shines:
+            if material.emission_texture is not None and part.emission_uv is not None:
+                if material.paint is not None and not np.array_equal(part.uv, part.emission_uv):
+                    raise Unreadable(f"material '{material.name}': pictures of paint and of light lie differently")
+                radiance = self.bitmap(material.emission_texture, material.emission)
+            else:
+                radiance = self.value(material.emission, material.power)
+            properties["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
+        uv = part.emission_uv if part.uv is None else part.uv
+        n = len(corners)
+        mesh = mi.Mesh("part", 3 * n, n, props=properties, has_vertex_texcoords=uv is not None)
+        if part.colors is not None and material.paint is None:
+            mesh.add_attribute("vertex_color", 3, (part.colors * material.base_color).ravel().astype(np.float32))
+        parameters = mi.traverse(mesh)
+        parameters["vertex_positions"] = corners.ravel().astype(np.float32)
+        parameters["faces"] = np.arange(3 * n, dtype=np.uint32)
+        if uv is not None:
+            # A picture given as an array begins at v = 0, as in glTF.
+            parameters["vertex_texcoords"] = uv.ravel().astype(np.float32)
+        parameters.update()
+        return mesh
+
+    def lamp(self, lamp):
+        mi = self.mi
+        if lamp.kind == "point":
+            return {"type": "point", "position": list(lamp.position), "intensity": self.value(lamp.intensity, lamp.power)}
+        if lamp.kind == "directional":
+            return {"type": "directional", "direction": list(lamp.direction), "irradiance": self.value(lamp.intensity, lamp.power)}
+        up = [0, 1, 0] if abs(lamp.direction[1]) < 0.9 else [1, 0, 0]
+        target = list(lamp.position + lamp.direction)
+        degrees = float(np.degrees(lamp.outer))
+        return {
+            "type": "spot", "to_world": mi.ScalarTransform4f().look_at(list(lamp.position), target, up),
+            # The picture does the fall-off, which is not the one that Mitsuba has.
+            "cutoff_angle": degrees, "beam_width": degrees * (1 - 1e-6),
+            "intensity": self.value(lamp.intensity, lamp.power), "texture": self.fall_off(lamp),
+        }
+
+    def fall_off(self, lamp):
+        """glTF's fall-off between the two cones of a spot, on the square that the outer one fills."""
+        axis = (np.arange(SPOT_PIXELS) + 0.5) / SPOT_PIXELS * 2 - 1
+        radius = np.hypot(*np.meshgrid(axis, axis)) * np.tan(lamp.outer)
+        scale = 1 / max(0.001, np.cos(lamp.inner) - np.cos(lamp.outer))
+        share = np.clip((1 / np.sqrt(1 + radius**2) - np.cos(lamp.outer)) * scale, 0, 1) ** 2
+        return {"type": "bitmap", "bitmap": self.mi.Bitmap(share[..., None].astype(np.float32)),
+                "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
+
+    # Measuring
+
+    def tables(self, places):
+        mi = self.mi
+        rows = lambda values: np.ascontiguousarray(values.T).astype(np.float32)
+        return mi.Point3f(rows(places.points)), mi.Vector3f(rows(places.normals))
+
+    def backs(self, places, looks, seed):
+        """The share of directions, by the cosine, in which the nearest thing is a black back."""
+        dr, mi = self.dr, self.mi
+        points, normals = self.tables(places)
+        index = dr.arange(mi.UInt32, len(places) * looks) // looks
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(seed, len(places) * looks)
+        frame = mi.Frame3f(dr.gather(mi.Vector3f, normals, index))
+        to = frame.to_world(mi.warp.square_to_cosine_hemisphere(sampler.next_2d()))
+        hit = self.scene.ray_intersect(mi.Ray3f(dr.gather(mi.Point3f, points, index), to))
+        one_sided = ~mi.has_flag(hit.bsdf().flags(), mi.BSDFFlags.BackSide)
+        back = hit.is_valid() & one_sided & (dr.dot(hit.n, to) > 0)
+        share = dr.block_sum(dr.select(back, mi.Float(1), 0), looks) / looks
+        return np.array(share)
+
+    def irradiance(self, places, samples, seed):
+        """Tristimulus irradiance (lx for Y) with about `samples` paths from each place."""
+        most = max(1, MOST_RAYS // len(places))
+        runs = -(-samples // most)
+        side = max(1, int(np.sqrt(samples / runs)))
+        return np.mean([self.run(places, side, (seed + 7919 * k) % 2**31) for k in range(runs)], axis=0)
+
+    def run(self, places, side, seed):
+        """side x side paths from each place, their first directions one to a cell of a grid."""
+        dr, mi = self.dr, self.mi
+        samples = side * side
+        points, normals = self.tables(places)
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(seed, len(places) * samples)
+        number = dr.arange(mi.UInt32, len(places) * samples)
+        index, cell = number // samples, number % samples
+        corner = mi.Point2f(mi.Float(cell % side), mi.Float(cell // side))
+        stratified = lambda: (corner + sampler.next_2d()) / side
+        here = dr.zeros(mi.SurfaceInteraction3f, len(places) * samples)
+        here.p, here.n = dr.gather(mi.Point3f, points, index), mi.Normal3f(dr.gather(mi.Vector3f, normals, index))
+        here.sh_frame = mi.Frame3f(here.n)
+        per_wave = None
+        if self.kind == "spectral":
+            here.wavelengths, per_wave = mi.sample_rgb_spectrum(mi.sample_shifted(sampler.next_1d()))
+
+        lamp, weight = self.scene.sample_emitter_direction(here, stratified(), True)
+        cosine = dr.maximum(dr.dot(here.n, lamp.d), 0)
+        share = dr.select(lamp.delta, 1, lamp.pdf / (lamp.pdf + cosine / dr.pi))
+        light = weight * dr.select((cosine > 0) & (lamp.pdf > 0), cosine * share, 0)
+
+        to = here.sh_frame.to_world(mi.warp.square_to_cosine_hemisphere(stratified()))
+        ray = mi.RayDifferential3f(here.p, to, 0.0, here.wavelengths)
+        hit = self.scene.ray_intersect(ray)
+        emitter = hit.emitter(self.scene)
+        seen = hit.is_valid() & (emitter != None)  # noqa: E711, RUF100 (an array)
+        shine = dr.select(seen, emitter.eval(hit, seen), 0)
+        other = self.scene.pdf_emitter_direction(here, mi.DirectionSample3f(self.scene, hit, here), seen)
+        cosine = dr.maximum(dr.dot(here.n, to), 0)
+        twice = dr.select(seen & (other + cosine > 0), other / (other + cosine / dr.pi), 0)
+        found, _, _ = self.integrator.sample(self.scene, sampler, ray)
+        light += dr.pi * (found - shine * twice)
+
+        light = self.tristimulus(light, here.wavelengths, per_wave)
+        means = [dr.block_sum(x, samples) / samples for x in light]
+        dr.eval(means)
+        means = np.stack([np.array(x, dtype=np.float64) for x in means], 1)
+        return means * self.spectra.white if self.kind == "mono" else means
+
+    def tristimulus(self, light, wavelengths, per_wave):
+        """X, Y and Z; one number where all light is white."""
+        dr, mi = self.dr, self.mi
+        if self.kind == "mono":
+            return [light[0]]
+        if self.kind == "rgb":
+            return [sum(float(row[c]) * light[c] for c in range(3)) for row in self.spectra.to_xyz]
+        matching = [mi.Float((spectra.KM * row / spectra.WIDTH).astype(np.float32)) for row in self.spectra.weights]
+        sums = [mi.Float(0), mi.Float(0), mi.Float(0)]
+        for k in range(len(wavelengths)):
+            place = (wavelengths[k] - spectra.START) / spectra.WIDTH
+            leaf = mi.UInt32(dr.clip(place, 0, spectra.LEAVES - 1))
+            density = dr.select((place >= 0) & (place < spectra.LEAVES), light[k] * per_wave[k], 0) / len(wavelengths)
+            for c in range(3):
+                sums[c] += density * dr.gather(mi.Float, matching[c], leaf)
+        return sums
+
+
+def merged(room):
+    """One part for each material and each set of what its triangles carry."""
+    sets = {}
+    for part in room.parts:
+        carried = part.uv is not None, part.emission_uv is not None, part.colors is not None
+        sets.setdefault((part.material, carried), []).append(part)
+    return [Part.joined(parts) for _, parts in sorted(sets.items())]
+
+
+def runs_more(peer, places, count, done, seed):
+    """`count` further independent runs after `done` earlier ones: (runs, CPU seconds, paths a point and run). Kernels
+    are compiled before time is taken."""
+    samples = max(1, MOST_RAYS // len(places))
+    peer.irradiance(places, samples, seed)
+    start = time.process_time()
+    runs = [peer.irradiance(places, samples, seed + 15_485_863 * (done + k + 1)) for k in range(count)]
+    return np.array(runs), time.process_time() - start, int(np.sqrt(samples)) ** 2
