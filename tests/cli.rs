@@ -460,7 +460,10 @@ fn a_probe_is_a_lux_meter() {
         .skip(1)
         .map(|l| l.split(',').map(|c| c.parse().unwrap()).collect())
         .collect();
-    assert_eq!(output.lines().next(), Some("x,y,z,nx,ny,nz,E_X,E_Y,E_Z"));
+    assert_eq!(
+        output.lines().next(),
+        Some("x,y,z,nx,ny,nz,E_X,E_Y,E_Z,lux,place")
+    );
     assert_eq!(rows.len(), points.len());
     for (row, [x, z]) in rows.iter().zip(&points) {
         let r = (x * x + z * z + 9.0).sqrt();

@@ -249,6 +249,8 @@ pub struct VerdictRecord {
     pub seconds: Seconds,
     /// What could not be carried over to the output.
     pub warnings: Vec<String>,
+    /// These and those of the plan.
+    pub warning_count: usize,
 }
 
 /// Everything that the last line tells of.
@@ -260,6 +262,7 @@ pub(super) struct End<'a> {
     pub(super) exposure: Exposure,
     pub(super) outputs: Outputs,
     pub(super) seconds: Seconds,
+    pub(super) warned: usize,
 }
 
 impl VerdictRecord {
@@ -304,6 +307,7 @@ impl VerdictRecord {
             links_per_s: rate(links, links_s),
             seconds: end.seconds,
             warnings: end.glb.warnings.clone(),
+            warning_count: end.warned,
         }
     }
 }
