@@ -489,16 +489,17 @@ fn a_probe_is_a_lux_meter() {
     let table = String::from_utf8(desk.read("out.csv")).unwrap();
     let header: Vec<&str> = table.lines().next().unwrap().split(',').collect();
     assert_eq!(
-        (header.len(), header[9], header[72]),
-        (73, "E_380", "E_695")
+        (header.len(), header[9], header[72], header[73]),
+        (75, "E_380", "E_695", "lux")
     );
     assert_eq!(json["columns"][72], "E_695");
     assert_eq!(json["verdict"], "reached");
     let weights =
         haarlight::color::Observer::cie1931().weights(&haarlight::spectrum::Grid::paper());
     for (k, line) in table.lines().skip(1).enumerate() {
-        let row: Vec<f64> = line.split(',').map(|c| c.parse().unwrap()).collect();
-        assert_eq!(json["rows"][k].as_array().unwrap().len(), 73);
+        let row: Vec<f64> = line.split(',').map_while(|c| c.parse().ok()).collect();
+        assert_eq!(row.len(), 74);
+        assert_eq!(json["rows"][k].as_array().unwrap().len(), 74);
         for (c, w) in weights.iter().enumerate() {
             let sum: f64 = row[9..].iter().zip(w).map(|(e, w)| 683.0 * e * w).sum();
             assert!((sum / row[6 + c] - 1.0).abs() < 1e-5, "{line}");

@@ -68,7 +68,7 @@ use crate::gather::Baked;
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
-use crate::solve::record::{Figure, Kind, LOG_VERSION};
+use crate::solve::record::{Figure, LOG_VERSION};
 use crate::solve::{Bake, Representation, Verdict};
 use serde::Serialize;
 
@@ -281,10 +281,7 @@ impl VerdictRecord {
                 0.0
             }
         };
-        let unknown = Figure {
-            value: None,
-            kind: Kind::Estimate,
-        };
+        let unknown = Figure::estimate(None);
         Self {
             record: "verdict",
             version: LOG_VERSION,

@@ -191,7 +191,8 @@ impl Bake {
             return Ok(None);
         }
         let (a, b) = (seen(before)?, seen(last)?);
-        let pairs = a.iter().zip(&b);
+        // Equal light is no difference, also in the dark, where there is no white.
+        let pairs = a.iter().zip(&b).filter(|(a, b)| a != b);
         let sum: f64 = pairs.map(|(a, b)| de2000(*a, *b, self.light.white)).sum();
         Ok(Some(sum / a.len() as f64))
     }
@@ -366,10 +367,7 @@ impl Relighter {
                 changed,
                 intervals_working: bake.lanes.len(),
                 iterations: if changed { convergence.iterations } else { 0 },
-                error_de2000: super::record::Figure {
-                    value: error,
-                    kind: super::record::Kind::Estimate,
-                },
+                error_de2000: super::record::Figure::estimate(error),
                 flux,
                 lanes_s,
                 direct_s,
