@@ -70,8 +70,8 @@ pub struct BakeArgs {
     pub checkpoint: Option<PathBuf>,
     /// Keep here what `haarlight relight` needs to change lamps and paints without casting a ray [without a value: ROOM's
     /// name with .cache, beside it, where `relight` looks].
-    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "")]
-    pub cache: Option<PathBuf>,
+    #[arg(long, value_name = "FILE")]
+    pub cache: Option<Option<PathBuf>>,
     /// The cache may take this much, MB.
     #[arg(long, value_name = "MB", default_value_t = 2048)]
     pub cache_limit: u64,
@@ -296,11 +296,8 @@ pub(super) fn prepare(
 
 /// Where the cache goes, if one is kept.
 fn cache(args: &BakeArgs) -> Option<PathBuf> {
-    let path = args.cache.as_ref()?;
-    Some(match path.as_os_str().is_empty() {
-        true => paths::cache_of(&args.room),
-        false => path.clone(),
-    })
+    let named = args.cache.clone()?;
+    Some(named.unwrap_or_else(|| paths::cache_of(&args.room)))
 }
 
 /// What is wrong with the output files.

@@ -3,19 +3,26 @@
 /// Names that are suggested.
 const SHOWN: usize = 3;
 
-/// The three of `names` nearest to `name` by edit distance (letter case is free), nearest first; of equals the first.
+/// The three of `names` nearest to `name`, nearest first: those that it begins or that begin it, then by edit distance
+/// (letter case is free); of equals the first.
 pub(crate) fn nearest_of<T: AsRef<str>>(
     name: &str,
     names: impl IntoIterator<Item = T>,
 ) -> Vec<String> {
-    let mut ranked: Vec<(usize, String)> = Vec::new();
+    let given = name.to_lowercase();
+    let rank = |known: &str| {
+        let lower = known.to_lowercase();
+        let begins = lower.starts_with(&given) || given.starts_with(&lower);
+        (!begins, edit_distance(name, known))
+    };
+    let mut ranked: Vec<((bool, usize), String)> = Vec::new();
     for known in names {
         let known = known.as_ref();
         if ranked.iter().all(|(_, other)| other != known) {
-            ranked.push((edit_distance(name, known), known.to_owned()));
+            ranked.push((rank(known), known.to_owned()));
         }
     }
-    ranked.sort_by_key(|(distance, _)| *distance);
+    ranked.sort_by_key(|(rank, _)| *rank);
     ranked.truncate(SHOWN);
     ranked.into_iter().map(|(_, known)| known).collect()
 }
@@ -46,6 +53,9 @@ mod tests {
         let names = ["wall", "lamp", "Wall", "lamp", "floor", "ceiling"];
         assert_eq!(nearest_of("lmap", names), ["lamp", "wall", "Wall"]);
         assert_eq!(nearest_of("wal", ["wall"; 5]), ["wall"]);
+        // A name that was cut short is nearer than a shorter one with fewer changes.
+        let keys = ["name", "csv", "luminance_cd_m2"];
+        assert_eq!(nearest_of("luminance", keys)[0], "luminance_cd_m2");
         assert!(nearest_of("x", Vec::<String>::new()).is_empty());
     }
 }

@@ -11,8 +11,8 @@ use glam::DVec3;
 pub(super) enum Met {
     /// A side of this surface that takes part.
     Front(usize),
-    /// The black back of a surface.
-    Back,
+    /// The black back of this surface.
+    Back(usize),
     /// Both sides of this surface take part: met from behind.
     Behind(usize),
     /// The ray leaves the room.
@@ -52,7 +52,7 @@ impl<'a> Eyes<'a> {
         match (hit.from_behind, sides) {
             (false, _) => Met::Front(surface),
             (true, Sides::Both) => Met::Behind(surface),
-            (true, Sides::Front) => Met::Back,
+            (true, Sides::Front) => Met::Back(surface),
         }
     }
 

@@ -2,7 +2,8 @@
 //!
 //! Rays from each lamp tell. A lamp lights the room if one of them meets a front that is not a lamp's own. If no lamp
 //! does, a lamp's surface is reversed if rays from its *backs* meet other things; if those are mostly backs, all faces
-//! of the room are reversed, and not the lamps alone.
+//! of the room are reversed, and not the lamps alone. Rooms where everything glows (a furnace, a scan whose picture is
+//! its emission) light themselves.
 
 use super::eyes::{Eyes, Met};
 use super::place;
@@ -38,9 +39,9 @@ struct Seen {
     things: usize,
     /// Fronts of other lamps.
     lamps: usize,
-    /// Black backs.
+    /// Black backs of others.
     backs: usize,
-    /// The lamp's own sides.
+    /// The lamp's own sides that take part.
     own: usize,
 }
 
@@ -50,8 +51,8 @@ impl Seen {
             Met::Front(s) | Met::Behind(s) if Some(s) == lamp => self.own += 1,
             Met::Front(s) | Met::Behind(s) if emits(scene, s) => self.lamps += 1,
             Met::Front(_) | Met::Behind(_) => self.things += 1,
-            Met::Back => self.backs += 1,
-            Met::Nothing => {}
+            Met::Back(s) if Some(s) != lamp => self.backs += 1,
+            Met::Back(_) | Met::Nothing => {}
         }
     }
 }
@@ -64,6 +65,9 @@ fn emits(scene: &Scene, surface: usize) -> bool {
 
 /// None if some lamp lights the room, or there is nothing that it could light.
 pub(super) fn away(scene: &Scene) -> Option<Away> {
+    if (0..scene.surfaces.len()).all(|s| emits(scene, s)) {
+        return None;
+    }
     let eyes = Eyes::new(scene);
     let [few, many] = RAYS;
     look(&eyes, few).and_then(|_| look(&eyes, many))

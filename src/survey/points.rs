@@ -1,8 +1,9 @@
 //! Where a point lies: in the room, inside something solid, or outside.
 //!
 //! Rays tell, in all directions from a point just above the given one (a sensor lies on a desk, not in it): a point that
-//! mostly sees black backs is inside something, one that mostly sees nothing is outside. Surfaces whose both sides take
-//! part show no back, so a solid made of them cannot be told from a room.
+//! mostly sees black backs and hardly a way out is inside something; one that sees neither backs nor fronts to speak of,
+//! or as much of nothing as of backs (below the floor), is outside. Surfaces whose both sides take part show no back, so
+//! a solid made of them cannot be told from a room.
 
 use super::eyes::{Eyes, Met};
 use crate::geometry::sampling::{sequence02, sphere_direction};
@@ -11,6 +12,8 @@ use glam::DVec3;
 
 /// Rays a point: in each half of any cut through the sphere there are about half of them.
 const RAYS: u32 = 64;
+/// Eighths of the rays that meet fronts in a room: on a floor without walls it is half of them, but for noise.
+const ROOM: u32 = 3;
 /// How far above its plane a point is looked from, as a share of half the room's diagonal: some millimetres.
 const ABOVE: f64 = 1e-4;
 
@@ -19,9 +22,9 @@ const ABOVE: f64 = 1e-4;
 pub enum Place {
     /// Where light may come.
     Room,
-    /// Most rays from it meet backs.
+    /// Its rays meet backs.
     Inside,
-    /// Most rays from it meet nothing.
+    /// Its rays meet nothing, or faces that look away.
     Outside,
 }
 
@@ -45,17 +48,21 @@ pub fn places(scene: &Scene, points: &[(DVec3, DVec3)]) -> Vec<Place> {
         let (mut backs, mut escapes) = (0, 0);
         for k in 0..RAYS {
             match eyes.look_around(from, sphere_direction(sequence02(k, 0))) {
-                Met::Back => backs += 1,
+                Met::Back(_) => backs += 1,
                 Met::Nothing => escapes += 1,
                 Met::Front(_) | Met::Behind(_) => {}
             }
         }
-        if 2 * backs > RAYS {
+        let fronts = RAYS - backs - escapes;
+        let enclosed = 2 * escapes < backs;
+        if 2 * backs > RAYS && enclosed {
             Place::Inside
-        } else if 2 * escapes > RAYS {
-            Place::Outside
-        } else {
+        } else if 8 * fronts >= ROOM * RAYS {
             Place::Room
+        } else if enclosed {
+            Place::Inside
+        } else {
+            Place::Outside
         }
     };
     points.iter().map(of).collect()

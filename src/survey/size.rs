@@ -6,8 +6,8 @@ use glam::DVec3;
 /// Larger than this a room is not, m, nor smaller.
 const LARGEST: f64 = 300.0;
 const SMALLEST: f64 = 0.3;
-/// What the longest side of a room is like, m.
-const LIKELY: [f64; 2] = [2.0, 100.0];
+/// What the longest side of a room is like, m, at least, as a rule, and at most.
+const LIKELY: [f64; 3] = [2.0, 6.0, 100.0];
 /// Units that files are drawn in by mistake: metres in one of them, and its name.
 const UNITS: [(f64, &str); 6] = [
     (0.01, "centimetres"),
@@ -27,8 +27,12 @@ pub(super) fn hint(scene: &Scene) -> Option<String> {
     if !(side > LARGEST || side < SMALLEST) {
         return None;
     }
-    let fits = |factor: f64| side * factor >= LIKELY[0] && side * factor <= LIKELY[1];
-    let unit = UNITS.iter().find(|(factor, _)| fits(*factor));
+    let [least, usual, most] = LIKELY;
+    let off = |factor: f64| (side * factor / usual).ln().abs();
+    let unit = UNITS
+        .iter()
+        .filter(|(factor, _)| (least..=most).contains(&(side * factor)))
+        .min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
     let (size, more) = (shown(side), scene.changes.scale);
     let way_out = match unit {
         Some((factor, name)) => format!(
