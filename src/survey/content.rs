@@ -35,7 +35,7 @@ pub(super) fn nothing(scene: &Scene) -> Option<Problem> {
         )
     } else if primitives.all(is_thin) {
         (
-            "it holds only lines or points",
+            "it holds only points or lines",
             "export faces: triangles are what light falls on",
         )
     } else {

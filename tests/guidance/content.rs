@@ -17,7 +17,7 @@ fn a_file_with_nothing_to_bake_is_refused() {
     }
     for (room, why) in [
         (Room::empty(), "the file has no mesh"),
-        (thin, "only lines or points"),
+        (thin, "only points or lines"),
         (unseen, "no triangle with an area is in the scene"),
         (bare, "no node shows a mesh"),
     ] {
