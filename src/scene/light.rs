@@ -276,11 +276,7 @@ pub(crate) fn punctual(
                 ));
                 return None;
             }
-            let unit = match light.kind {
-                RawLightKind::Directional => "lx",
-                _ => "cd",
-            };
-            if !bearable(size, unit, &place, check) {
+            if !bearable(size, unit(light.kind), &place, check) {
                 return None;
             }
             let lamp = match spectrum {
@@ -305,6 +301,14 @@ pub(crate) fn punctual(
             })
         })
         .collect()
+}
+
+/// What a light's intensity is given in.
+fn unit(kind: RawLightKind) -> &'static str {
+    match kind {
+        RawLightKind::Directional => "lx",
+        RawLightKind::Point | RawLightKind::Spot => "cd",
+    }
 }
 
 /// The light's name, or what a nameless one is called in messages and side files.

@@ -1,11 +1,11 @@
 //! A room from its file: document, geometry, paint and lamps, and everything that is wrong with any of them together.
 
 use super::changes::Changes;
-use super::check::Check;
+use super::check::{Check, Unknown};
 use super::document::Document;
 use super::light::{self, Lamps};
 use super::material;
-use super::spectra_file::{SpectraFile, Unknown};
+use super::spectra_file::SpectraFile;
 use super::{Scene, Surface, lacking};
 use crate::color::Upsampler;
 use crate::error::{Error, Result};

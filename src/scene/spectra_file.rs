@@ -19,7 +19,7 @@
 //! Unknown keys of the file, and names that the room does not have, are problems that come with the nearest names; a
 //! lenient reader is only warned of them. Unknown keys of `extras` belong to other programs and are passed over.
 
-use super::check::Check;
+use super::check::{Check, Unknown};
 use super::json::short;
 use super::uri;
 use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
@@ -206,17 +206,6 @@ fn folder_of(file: &Path) -> PathBuf {
     }
 }
 
-/// What becomes of keys that are not known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Unknown {
-    /// A problem: the file is ours, and the key is misspelled.
-    Refuse,
-    /// A warning, for files that are to be read all the same.
-    Warn,
-    /// Somebody else's key.
-    Ignore,
-}
-
 /// Reads the objects of a side file or of extras.
 struct Reader<'a> {
     folder: PathBuf,
@@ -361,16 +350,12 @@ impl Reader<'_> {
         } else {
             format!("the nearest names are {}", near.join(", "))
         };
-        self.stranger(place, format!("the room has no {kind} of that name"), next);
-    }
-
-    /// Something that nobody knows is a problem, or as the reader was told.
-    fn stranger(&mut self, place: &str, what: String, next: String) {
-        match self.unknown {
-            Unknown::Refuse => self.check.problem(place, what, next),
-            Unknown::Warn => self.check.warn(format!("{place}: {what}; {next}")),
-            Unknown::Ignore => {}
-        }
+        self.check.stranger(
+            self.unknown,
+            place,
+            format!("the room has no {kind} of that name"),
+            next,
+        );
     }
 
     /// The members of an object inside an object; none where it is missing.
@@ -406,7 +391,7 @@ impl Reader<'_> {
             let near = nearest_of(key, known);
             let what = format!("unknown key \"{}\"", short(key));
             let next = format!("the nearest names are {}", near.join(", "));
-            self.stranger(place, what, next);
+            self.check.stranger(self.unknown, place, what, next);
         }
     }
 }
