@@ -114,10 +114,14 @@ impl Probes {
             let n = now.len() as f64;
             // What is the same has no difference, also in a room without light, where there is no white to see it by.
             let pairs = || self.last.iter().zip(&now).filter(|(a, b)| a != b);
+            let mean = |differ: &dyn Fn([f64; 3], [f64; 3]) -> f64| {
+                // An empty sum would be -0.
+                pairs().fold(0.0, |sum, (a, b)| sum + differ(*a, *b)) / n
+            };
             let floor = 1e-4 * white[1];
             Distance {
-                de2000: share * pairs().map(|(a, b)| de2000(*a, *b, white)).sum::<f64>() / n,
-                de_luv: share * pairs().map(|(a, b)| de_luv(*a, *b, white)).sum::<f64>() / n,
+                de2000: share * mean(&|a, b| de2000(a, b, white)),
+                de_luv: share * mean(&|a, b| de_luv(a, b, white)),
                 relative: share
                     * (pairs()
                         .map(|(a, b)| ((a[1] - b[1]) / (0.5 * (a[1] + b[1])).max(floor)).powi(2))

@@ -14,7 +14,6 @@ fn estimates_are_numbers_or_unknown() {
         "--log",
         "log.jsonl",
         "--json",
-        "--cache",
     ];
     let (said, printed) = desk.run(&args, 0);
     let log = std::fs::read_to_string(desk.at("log.jsonl")).unwrap();
@@ -25,6 +24,13 @@ fn estimates_are_numbers_or_unknown() {
     assert_eq!(verdict["verdict"], "reached");
     let value = &verdict["error_de2000"]["value"];
     assert!(value.is_null() || value == 0.0, "{verdict}");
+
+    // There is nothing to keep for other lamps, and that is said; the room is written all the same.
+    let said = desk
+        .run(&["bake", "room.glb", "--allow-dark", "--cache"], 2)
+        .0;
+    assert!(said.contains("without light"), "{said}");
+    assert!(!desk.at("room.cache").exists() && desk.at("room.baked.glb").exists());
 
     // A lamp that lights nothing at all, one that is hardly there.
     let mut room = dark();
