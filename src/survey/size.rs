@@ -24,7 +24,7 @@ pub(super) fn hint(scene: &Scene) -> Option<String> {
     let low = positions().fold(DVec3::INFINITY, |low, p| low.min(*p));
     let high = positions().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
     let side = (high - low).max_element();
-    if !(side > LARGEST || side < SMALLEST) {
+    if (SMALLEST..=LARGEST).contains(&side) {
         return None;
     }
     let [least, usual, most] = LIKELY;
