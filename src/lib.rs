@@ -16,7 +16,8 @@
 //! ```
 //!
 //! The chain: [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`solve`] -> [`gather`] ->
-//! [`output`] and [`report`], with [`audit`] beside it and [`cost`] behind. A module uses what stands to its left.
+//! [`output`] and [`report`], with [`audit`] beside it and [`cost`] behind; [`survey`] looks at a room before [`solve`].
+//! A module uses what stands to its left.
 //!
 //! | Rougeron and Peroche 1997 | module |
 //! |---|---|
@@ -42,6 +43,7 @@ pub mod scene;
 pub mod solve;
 pub mod spectrum;
 pub mod store;
+pub mod survey;
 
 pub use error::{Error, Problem, Result};
 

@@ -15,8 +15,9 @@ use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
 use crate::output::{Exposure, baked_glb, file, npz};
 use crate::report::Log;
-use crate::scene::{Options, Scene};
+use crate::scene::Scene;
 use crate::solve::{Bake, Representation, Settings};
+use crate::survey::advise;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,7 +40,7 @@ Examples:
   haarlight bake room.gltf -o lit.glb --error 0.3 --spectra measured.spectra.json
   haarlight bake room.glb --snapshots pictures --log bake.jsonl --audit 200
   haarlight bake room.glb --checkpoint room.state      stop it at any time; the same command goes on
-  haarlight bake room.glb --cache room.cache           then change lamps or paints: haarlight relight room.glb")]
+  haarlight bake room.glb --cache                      then change lamps or paints: haarlight relight room.glb")]
 pub struct BakeArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,
@@ -67,9 +68,10 @@ pub struct BakeArgs {
     /// Keep the state of the bake here after every round; if the file is there already, go on from it.
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
-    /// Keep here what `haarlight relight` needs to change lamps and paints without casting a ray.
+    /// Keep here what `haarlight relight` needs to change lamps and paints without casting a ray [without a value: ROOM's
+    /// name with .cache, beside it, where `relight` looks].
     #[arg(long, value_name = "FILE")]
-    pub cache: Option<PathBuf>,
+    pub cache: Option<Option<PathBuf>>,
     /// The cache may take this much, MB.
     #[arg(long, value_name = "MB", default_value_t = 2048)]
     pub cache_limit: u64,
@@ -94,9 +96,10 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         .output
         .clone()
         .unwrap_or_else(|| args.room.with_extension("baked.glb"));
+    let cache = cache(args);
     talk.phase("reading");
     let scene = load(&args.room, &args.reading, |parts| {
-        problems(args, &output, parts)
+        problems(args, &output, cache.as_deref(), parts)
     })?;
     scene.warnings.iter().for_each(|w| talk.warn(w));
     let mut seconds = Seconds {
@@ -118,7 +121,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let clock = Instant::now();
     talk.phase("preparing");
     let mut bake = prepare(scene, &args.solving, common, args.spectrum, &talk);
-    if args.cache.is_some() {
+    if cache.is_some() {
         bake.keep();
     }
     write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
@@ -178,7 +181,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     }
     // A cache that cannot be written is told of when all else is done.
     let mut uncached = None;
-    if let Some(path) = &args.cache {
+    if let Some(path) = &cache {
         match bake.write_cache(&baked, path, args.cache_limit << 20) {
             Ok(size) => {
                 talk.say(&format!("cache: {}, {:.1} MB", text(path), megabytes(size)));
@@ -214,12 +217,14 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         exposure,
         outputs,
         seconds,
+        warned: talk.warned(),
     };
     let record = VerdictRecord::new(end);
     write(&mut log, &record)?;
     talk.clear();
     talk.say(&format!("\n{}", summary::rounds(bake.rounds())));
     talk.say(&summary::verdict(&record, audit.as_ref()));
+    talk.count_warnings();
     if args.json {
         let line = serde_json::to_string(&record)
             .map_err(|problem| Error::Internal(format!("verdict: {problem}")))?;
@@ -232,21 +237,22 @@ fn megabytes(bytes: u64) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 
-/// Reads a room; its problems and those that `others` finds (given the files the room is made of) come together.
+/// Reads a room and looks it over; its problems and those that `others` finds (given the files the room is made of) come together.
 pub(super) fn load(
     room: &Path,
     reading: &Reading,
     others: impl FnOnce(&[PathBuf]) -> Vec<Problem>,
 ) -> Result<Scene> {
-    let options = Options {
-        grid: reading.range.grid(),
-        spectra: reading.spectra.clone(),
-    };
-    match Scene::load(room, &options) {
-        Ok(scene) => match others(&paths::parts(&scene)) {
-            none if none.is_empty() => Ok(scene),
-            problems => Err(Error::Input(problems)),
-        },
+    match Scene::load(room, &reading.options()) {
+        Ok(mut scene) => {
+            let mut problems = advise(&mut scene, reading.wishes());
+            problems.extend(others(&paths::parts(&scene)));
+            if problems.is_empty() {
+                Ok(scene)
+            } else {
+                Err(Error::Input(problems))
+            }
+        }
         Err(Error::Input(mut problems)) => {
             problems.extend(others(&[]));
             Err(Error::Input(problems))
@@ -288,8 +294,19 @@ pub(super) fn prepare(
     bake
 }
 
+/// Where the cache goes, if one is kept.
+fn cache(args: &BakeArgs) -> Option<PathBuf> {
+    let named = args.cache.clone()?;
+    Some(named.unwrap_or_else(|| paths::cache_of(&args.room)))
+}
+
 /// What is wrong with the output files.
-fn problems(args: &BakeArgs, output: &Path, parts: &[PathBuf]) -> Vec<Problem> {
+fn problems(
+    args: &BakeArgs,
+    output: &Path,
+    cache: Option<&Path>,
+    parts: &[PathBuf],
+) -> Vec<Problem> {
     let mut outputs = vec![("-o", output)];
     outputs.extend(args.npz.as_deref().map(|path| ("--npz", path)));
     outputs.extend(args.log.as_deref().map(|path| ("--log", path)));
@@ -298,7 +315,7 @@ fn problems(args: &BakeArgs, output: &Path, parts: &[PathBuf]) -> Vec<Problem> {
             .as_deref()
             .map(|path| ("--checkpoint", path)),
     );
-    outputs.extend(args.cache.as_deref().map(|path| ("--cache", path)));
+    outputs.extend(cache.map(|path| ("--cache", path)));
     let mut inputs = vec![args.room.as_path()];
     let beside = args.room.with_extension("spectra.json");
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));

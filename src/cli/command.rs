@@ -1,8 +1,9 @@
 //! The command line as a whole.
 
 use super::options::Common;
-use super::{bake, cost, inspect, paper, probe, relight};
+use super::{bake, cost, inspect, paper, probe, relight, spectra};
 use crate::error::{Error, Result};
+use std::io::{ErrorKind, Write};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -10,6 +11,7 @@ Examples:
   haarlight bake room.glb --error 1 --time 60 --snapshots pictures --log bake.jsonl
   haarlight inspect room.glb                       what is in the room, and what would be simulated
   haarlight probe room.glb --points desk.csv       lux at points (columns x,y,z,nx,ny,nz)
+  haarlight spectra cie/F                          names that a room's .spectra.json may use
 
 Exit codes: 0 done, 1 stopped before the asked-for error was reached, 2 bad input, 3 a fault of the program.
 Results go to stdout or files, talk to stderr.";
@@ -37,6 +39,8 @@ pub enum Command {
     Inspect(inspect::InspectArgs),
     /// Irradiance at given points and normals: lux sensors.
     Probe(probe::ProbeArgs),
+    /// List the spectra that rooms may name.
+    Spectra(spectra::SpectraArgs),
     /// What accuracy costs on a room: measured error against time.
     Cost(cost::CostArgs),
     /// The paper's tables, measured beside printed.
@@ -59,15 +63,19 @@ pub fn run(cli: &Cli) -> Result<u8> {
         Command::Relight(args) => relight::run(args, &cli.common),
         Command::Inspect(args) => inspect::run(args, &mut std::io::stdout()).map(|()| 0),
         Command::Probe(args) => probe::run(args, &cli.common),
+        Command::Spectra(args) => spectra::run(args).map(|()| 0),
         Command::Cost(args) => cost::run(args, &cli.common),
         Command::Paper(args) => paper::run(args).map(|()| 0),
     }
 }
 
-/// Writes a result to stdout. A reader that has had enough (`| head`) is no error.
+/// Writes a result to stdout.
 pub(super) fn print(text: &str) -> Result<()> {
-    use std::io::{ErrorKind, Write};
-    let mut out = std::io::stdout().lock();
+    put(&mut std::io::stdout().lock(), text)
+}
+
+/// Writes a result. A reader that has had enough (`| head`) is no error.
+pub(super) fn put(out: &mut impl Write, text: &str) -> Result<()> {
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(problem) if problem.kind() != ErrorKind::BrokenPipe => {
             Err(Error::io("standard output".as_ref(), problem))

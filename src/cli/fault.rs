@@ -1,5 +1,6 @@
 //! Our own faults: a panic ends the command with a message and exit code 3, not with a stack trace and 101.
 
+use super::talk::tell;
 use crate::error::Error;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::{Arc, Mutex};
@@ -24,7 +25,7 @@ pub fn guarded(run: impl FnOnce() -> crate::Result<u8>) -> u8 {
             said.get_or_insert_with(|| format!("{what}{}", place.unwrap_or_default()));
         }
         if std::env::var_os("RUST_BACKTRACE").is_some() {
-            eprintln!("{}", std::backtrace::Backtrace::force_capture());
+            tell(&std::backtrace::Backtrace::force_capture().to_string());
         }
     }));
     // What the command held is gone with it: nothing broken can be seen afterwards.
@@ -38,7 +39,7 @@ pub fn guarded(run: impl FnOnce() -> crate::Result<u8>) -> u8 {
             Error::Internal(what.unwrap_or_else(|| "panic".into()))
         }
     };
-    eprintln!("haarlight: {error}");
+    tell(&format!("haarlight: {error}"));
     error.exit_code()
 }
 

@@ -7,12 +7,14 @@
 //! `unsupported` are the extensions that are not read (the page has them among its warnings);
 //! the fields of `facts` are those of [`Facts`], with units in their names.
 
+use super::command::put;
 use super::options::Reading;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::scene::Scene;
 use crate::scene::document::Document;
 use crate::scene::effects::Plan;
 use crate::scene::facts::{Facts, LightFact};
-use crate::scene::{Options, Scene};
+use crate::survey::advise;
 use serde_json::json;
 use std::io::Write;
 use std::path::PathBuf;
@@ -40,13 +42,12 @@ pub struct InspectArgs {
 pub fn run(args: &InspectArgs, out: &mut impl Write) -> Result<()> {
     let document = Document::open(&args.room)?;
     let unsupported = document.unsupported.clone();
-    let scene = Scene::from_document(
-        document,
-        &Options {
-            grid: args.reading.range.grid(),
-            spectra: args.reading.spectra.clone(),
-        },
-    )?;
+    let mut scene = Scene::from_document(document, &args.reading.options())?;
+    // What would stop a bake is only said: the page shows what is there.
+    let stops = advise(&mut scene, args.reading.wishes());
+    scene
+        .warnings
+        .extend(stops.iter().map(|p| format!("{}; {}", p.what, p.next)));
     let facts = Facts::of(&scene);
     let plan = Plan::of(&scene);
     let text = if args.json {
@@ -61,8 +62,7 @@ pub fn run(args: &InspectArgs, out: &mut impl Write) -> Result<()> {
     } else {
         page(&facts, &plan, &scene.warnings)
     };
-    out.write_all(text.as_bytes())
-        .map_err(|e| Error::io("standard output".as_ref(), e))
+    put(out, &text)
 }
 
 fn page(facts: &Facts, plan: &Plan, warnings: &[String]) -> String {

@@ -42,8 +42,8 @@
 //! | `flux.emitted_lm`, `.received_lm` | lm | given out by lamps of any kind, directional ones aside; what fronts receive straight from lamps of any kind |
 //! | `flux.absorbed_lm`, `.escaped_lm` | lm | absorbed by fronts; left the room or met a black back |
 //! | `flux.worst_band` | 1 | worst relative difference of received and absorbed + escaped light over all bands |
-//! | `flux.sent.to_fronts`, `.to_backs`, `.outside` | 1 | where the light of lamps goes first, by rays from them: shares of its luminous flux (estimates, to .1 %) |
-//! | `flux.scaled.direct`, `.reflected` | 1 | what light on leaves was multiplied by so that none goes missing; 1: nothing was |
+//! | `flux.sent` | 1 | where the light of lamps goes first, by rays from them: `to_fronts`, `to_backs`, `outside`, shares of its luminous flux (estimates, to .1 %) |
+//! | `flux.scaled` | 1 | what light on leaves was multiplied by so that none goes missing, `direct` and `reflected`; 1: nothing was |
 //! | `row_sum_defect`, `row_sum_defect_after` | 1 | distance of row sums from what each leaf looks out on: mean by area and greatest, before and after balancing |
 //!
 //! After a round with `--snapshots`, `{"record": "snapshots", ...}` ([`SnapshotsRecord`]): `round`, `files`,
@@ -70,7 +70,7 @@ use crate::gather::Baked;
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
-use crate::solve::record::{Figure, Kind, LOG_VERSION};
+use crate::solve::record::{Figure, LOG_VERSION};
 use crate::solve::{Bake, Representation, Verdict};
 use serde::Serialize;
 
@@ -251,6 +251,8 @@ pub struct VerdictRecord {
     pub seconds: Seconds,
     /// What could not be carried over to the output.
     pub warnings: Vec<String>,
+    /// These and those of the plan.
+    pub warning_count: usize,
 }
 
 /// Everything that the last line tells of.
@@ -262,6 +264,7 @@ pub(super) struct End<'a> {
     pub(super) exposure: Exposure,
     pub(super) outputs: Outputs,
     pub(super) seconds: Seconds,
+    pub(super) warned: usize,
 }
 
 impl VerdictRecord {
@@ -280,10 +283,7 @@ impl VerdictRecord {
                 0.0
             }
         };
-        let unknown = Figure {
-            value: None,
-            kind: Kind::Estimate,
-        };
+        let unknown = Figure::estimate(None);
         Self {
             record: "verdict",
             version: LOG_VERSION,
@@ -306,6 +306,7 @@ impl VerdictRecord {
             links_per_s: rate(links, links_s),
             seconds: end.seconds,
             warnings: end.glb.warnings.clone(),
+            warning_count: end.warned,
         }
     }
 }

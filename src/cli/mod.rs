@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `command` | the command line as a whole, exit codes |
 //! | `options` | options that commands share |
-//! | `bake`, `relight`, `inspect`, `probe`, `cost`, `paper` | the commands |
+//! | `bake`, `relight`, `inspect`, `probe`, `spectra`, `cost`, `paper` | the commands |
 //! | `log` | the log of a bake, field by field |
 //! | `snapshots` | pictures of the rounds |
 //! | `points` | the CSV of points for `probe` |
@@ -26,6 +26,7 @@ pub mod points;
 pub mod probe;
 pub mod relight;
 mod snapshots;
+pub mod spectra;
 pub mod stop;
 mod summary;
 pub mod talk;

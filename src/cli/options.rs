@@ -1,6 +1,8 @@
 //! Options that several commands share, as typed and as meant.
 
+use crate::scene::Options;
 use crate::spectrum::{Grid, LEAVES};
+use crate::survey::Wishes;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -33,6 +35,38 @@ pub struct Reading {
     /// Wavelengths to work on, nm; 64 leaves divide them.
     #[arg(long, value_name = "FROM..TO", default_value = "380..780")]
     pub range: Range,
+    /// Only warn of keys and names in the file of spectra that mean nothing.
+    #[arg(long)]
+    pub lenient: bool,
+    /// Metres for each unit of the file: 0.01 for a room drawn in centimetres. Files are written in the file's unit.
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
+    pub scale: Option<f64>,
+    /// Where all lamps shine away from the room: turn the faces that look reversed.
+    #[arg(long)]
+    pub flip: bool,
+    /// Go on where no lamp lights the room.
+    #[arg(long)]
+    pub allow_dark: bool,
+}
+
+impl Reading {
+    /// How to read a room.
+    pub fn options(&self) -> Options {
+        Options {
+            grid: self.range.grid(),
+            spectra: self.spectra.clone(),
+            lenient: self.lenient,
+            scale: self.scale,
+        }
+    }
+
+    /// What is decided before the room is looked over.
+    pub fn wishes(&self) -> Wishes {
+        Wishes {
+            allow_dark: self.allow_dark,
+            flip: self.flip,
+        }
+    }
 }
 
 /// Options of the commands that solve.

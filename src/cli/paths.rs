@@ -5,6 +5,11 @@ use crate::scene::Scene;
 use crate::scene::uri::{self, Place};
 use std::path::{Path, PathBuf};
 
+/// The cache that `bake --cache` writes and `relight` reads where none is named.
+pub(super) fn cache_of(room: &Path) -> PathBuf {
+    room.with_extension("cache")
+}
+
 /// What is wrong with the name of the room that a command writes; `which`: baked, relit.
 pub(super) fn not_glb(output: &Path, which: &str) -> Option<Problem> {
     let ends_well = output

@@ -1,10 +1,11 @@
 //! `haarlight probe ROOM --points POINTS.csv`: irradiance at points, by the same gather as the bake's.
 //!
 //! The CSV out has a line a point, in the order of the points:
-//! `x,y,z,nx,ny,nz,E_X,E_Y,E_Z` (unit normal; tristimulus irradiance with Km = 683 lm/W, so that E_Y is lux), with
-//! `--bands` also `E_380 ...`, one column for each of the 64 leaves by its left edge in nm, W/m2/nm, from a solution on
-//! all leaves. `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
-//! "columns": [names], "rows": [[numbers]]}`.
+//! `x,y,z,nx,ny,nz,E_X,E_Y,E_Z` (unit normal; tristimulus irradiance with Km = 683 lm/W), with `--bands` also `E_380 ...`,
+//! one column for each of the 64 leaves by its left edge in nm, W/m2/nm, from a solution on all leaves; then `lux`, which
+//! is `E_Y` under the name that people look for, and `place`: `room`, `inside` something solid or `outside` the room (see
+//! [`places`]). `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
+//! "columns": [names], "rows": [[numbers]], "places": [texts]}`; the columns have all but `place`.
 
 use super::bake::{load, prepare};
 use super::command::print;
@@ -19,6 +20,7 @@ use crate::gather::Probed;
 use crate::output::file;
 use crate::solve::Representation;
 use crate::spectrum::{Grid, LEAVES};
+use crate::survey::{Place, places};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -96,8 +98,26 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let mut bake = prepare(scene, &args.solving, common, representation, &talk);
     let verdict = stop.run(&mut bake, &talk, |_, _| Ok(()))?;
     talk.phase("probing");
-    let probed = bake.probe(&read.points);
+    let scale = bake.scene().changes.scale;
+    let points: Vec<Point> = (read.points.iter())
+        .map(|&(place, normal)| (scale * place, normal))
+        .collect();
+    let probed = bake.probe(&points);
+    let places = places(bake.scene(), &points);
     talk.clear();
+    for place in [Place::Inside, Place::Outside] {
+        let count = places.iter().filter(|p| **p == place).count();
+        if count > 0 {
+            let where_it_is = match place {
+                Place::Inside => "inside something solid",
+                _ => "outside the room",
+            };
+            talk.warn(&format!(
+                "{count} of {} points lie {where_it_is}: see the column 'place'",
+                places.len()
+            ));
+        }
+    }
 
     let columns = columns(args.bands, &bake.scene().grid);
     let rows: Vec<Vec<f64>> = read
@@ -107,10 +127,11 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
         .map(|(p, light)| row(p, light, args.bands))
         .collect();
     let csv = || {
-        let lines = rows
-            .iter()
-            .map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
-        std::iter::once(columns.join(","))
+        let lines = rows.iter().zip(&places).map(|(row, place)| {
+            let numbers: String = row.iter().map(|x| format!("{x},")).collect();
+            numbers + place.name()
+        });
+        std::iter::once(columns.join(",") + ",place")
             .chain(lines)
             .map(|line| line + "\n")
             .collect::<String>()
@@ -127,6 +148,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
             "error_de2000": error,
             "columns": columns,
             "rows": rows,
+            "places": places.iter().map(|p| p.name()).collect::<Vec<_>>(),
         });
         print(&format!("{all}\n"))?;
     } else if args.output.is_none() {
@@ -160,6 +182,7 @@ fn columns(bands: bool, grid: &Grid) -> Vec<String> {
     if bands {
         columns.extend((0..LEAVES).map(|leaf| format!("E_{}", grid.left(leaf))));
     }
+    columns.push("lux".into());
     columns
 }
 
@@ -168,6 +191,7 @@ fn row((point, normal): &Point, light: &Probed, bands: bool) -> Vec<f64> {
     if bands {
         row.extend(light.leaves);
     }
+    row.push(light.xyz[1]);
     row
 }
 
@@ -178,12 +202,12 @@ mod tests {
     #[test]
     fn bands_are_named_by_their_left_edge() {
         let names = columns(true, &Grid::default());
-        assert_eq!(names.len(), 9 + 64);
+        assert_eq!(names.len(), 9 + 64 + 1);
         assert_eq!(names[9..11], ["E_380", "E_386.25"]);
         assert_eq!(columns(true, &Grid::paper())[72], "E_695");
         assert_eq!(
             columns(false, &Grid::default()).join(","),
-            "x,y,z,nx,ny,nz,E_X,E_Y,E_Z"
+            "x,y,z,nx,ny,nz,E_X,E_Y,E_Z,lux"
         );
     }
 }

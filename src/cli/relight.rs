@@ -30,7 +30,7 @@ use std::time::Instant;
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  haarlight bake room.glb --cache room.cache
+  haarlight bake room.glb --cache
   haarlight relight room.glb                     after lamps, spectra or paints of room.glb were changed
   haarlight relight room.glb --spectra evening.spectra.json -o evening.glb")]
 pub struct RelightArgs {
@@ -80,9 +80,14 @@ struct Line<'a> {
 pub fn run(args: &RelightArgs, common: &Common) -> Result<u8> {
     let started = Instant::now();
     let talk = Talk::new(common.quiet);
-    let beside = |end: &str| args.room.with_extension(end);
-    let cache = args.cache.clone().unwrap_or_else(|| beside("cache"));
-    let output = args.output.clone().unwrap_or_else(|| beside("baked.glb"));
+    let cache = args
+        .cache
+        .clone()
+        .unwrap_or_else(|| paths::cache_of(&args.room));
+    let output = args
+        .output
+        .clone()
+        .unwrap_or_else(|| args.room.with_extension("baked.glb"));
     talk.phase("reading");
     let scene = load(&args.room, &args.reading, |parts| {
         problems(args, &output, &cache, parts)
@@ -120,6 +125,7 @@ pub fn run(args: &RelightArgs, common: &Common) -> Result<u8> {
     };
     talk.clear();
     talk.say(&summary(&line));
+    talk.count_warnings();
     if args.json {
         let line = serde_json::to_string(&line)
             .map_err(|problem| Error::Internal(format!("relit: {problem}")))?;

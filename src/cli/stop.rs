@@ -3,7 +3,7 @@
 //! The first Ctrl-C asks for an end after the current round, with everything written; the second ends the program at
 //! once with code 130 (128 + SIGINT), which may leave hidden temporary files.
 
-use super::talk::Talk;
+use super::talk::{Talk, tell};
 use crate::error::{Error, Result};
 use crate::solve::{Bake, Round, Verdict};
 use std::sync::Arc;
@@ -42,7 +42,7 @@ impl Stop {
             if interrupted.swap(true, Ordering::SeqCst) {
                 std::process::exit(KILLED);
             }
-            eprintln!("\nending after this round; Ctrl-C again ends at once");
+            tell("\nending after this round; Ctrl-C again ends at once");
         })
         .map_err(|problem| Error::Internal(format!("Ctrl-C: {problem}")))
     }

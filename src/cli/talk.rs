@@ -1,9 +1,11 @@
 //! What is said on stderr while a command works: lines, and a bar or spinner where stderr is a terminal.
 //!
-//! Nothing here changes what is computed; `--quiet` silences all of it.
+//! Nothing here changes what is computed; `--quiet` silences all of it, but warnings are counted, and logs have them. Where
+//! nobody listens any more (a closed pipe) the work goes on.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use std::cell::Cell;
+use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
 /// How often a spinner turns.
@@ -14,6 +16,12 @@ const TICK: Duration = Duration::from_millis(120);
 pub struct Talk {
     quiet: bool,
     bar: ProgressBar,
+    warned: Cell<usize>,
+}
+
+/// A line on stderr; that nobody reads it is no fault.
+pub(super) fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 impl Talk {
@@ -24,19 +32,38 @@ impl Talk {
         } else {
             ProgressBar::no_length()
         };
-        Self { quiet, bar }
+        Self {
+            quiet,
+            bar,
+            warned: Cell::new(0),
+        }
     }
 
     /// A line.
     pub fn say(&self, line: &str) {
         if !self.quiet {
-            self.bar.suspend(|| eprintln!("{line}"));
+            self.bar.suspend(|| tell(line));
         }
     }
 
     /// A line that begins with `warning:`.
     pub fn warn(&self, line: &str) {
+        self.warned.set(self.warned.get() + 1);
         self.say(&format!("warning: {line}"));
+    }
+
+    /// How many warnings there were, said or not.
+    pub fn warned(&self) -> usize {
+        self.warned.get()
+    }
+
+    /// Ends a summary with the count of warnings, if there were any: they may have scrolled away.
+    pub fn count_warnings(&self) {
+        match self.warned() {
+            0 => {}
+            1 => self.say("1 warning, above"),
+            n => self.say(&format!("{n} warnings, above")),
+        }
     }
 
     /// A phase of unknown length begins.

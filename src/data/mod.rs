@@ -1,6 +1,7 @@
 //! Published tables (CIE observer, illuminants, measured reflectances) and readers of spectra.
 
 mod blackbody;
+mod nearest;
 mod registry;
 mod table;
 
@@ -8,4 +9,5 @@ pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
 pub use registry::{Kind, Named, named, names, nearest};
 pub use table::{CsvProblem, Outside, Table};
 
-pub(crate) use registry::{cmf_1931, edit_distance};
+pub(crate) use nearest::nearest_of;
+pub(crate) use registry::cmf_1931;

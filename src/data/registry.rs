@@ -2,6 +2,7 @@
 //!
 //! The tables lie beside this file as CSV, each with its source, edition, step, range, units and licence.
 
+use super::nearest::nearest_of;
 use super::table::Columns;
 use super::{Table, blackbody};
 
@@ -149,29 +150,7 @@ pub fn names() -> Vec<String> {
 /// assert_eq!(haarlight::data::nearest("cornel/red")[0], "cornell/red");
 /// ```
 pub fn nearest(name: &str) -> Vec<String> {
-    let mut ranked: Vec<(usize, String)> = names()
-        .into_iter()
-        .map(|known| (edit_distance(name, &known), known))
-        .collect();
-    ranked.sort_by_key(|(distance, _)| *distance);
-    ranked.into_iter().take(3).map(|(_, known)| known).collect()
-}
-
-/// Levenshtein distance of the lower-case forms; letters beyond the 64th do not count.
-pub(crate) fn edit_distance(a: &str, b: &str) -> usize {
-    let letters = |text: &str| text.to_lowercase().chars().take(64).collect::<Vec<char>>();
-    let (a, b) = (letters(a), letters(b));
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, &from) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, &to) in b.iter().enumerate() {
-            let replace = diagonal + usize::from(from != to);
-            diagonal = row[j + 1];
-            row[j + 1] = replace.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
+    nearest_of(name, names())
 }
 
 /// The CIE 1931 2 degree observer: x_bar, y_bar, z_bar at 360-830 nm in steps of 1 nm.

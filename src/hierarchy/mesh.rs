@@ -4,9 +4,9 @@
 //! positions, so that neighbours know each other across surfaces.
 
 use super::cut::WHOLE;
-use crate::geometry::plane_ids;
-use crate::scene::{Scene, Sides};
-use glam::DVec3;
+use crate::geometry::{RayIndex, plane_ids};
+use crate::scene::{Alpha, Scene, Sides};
+use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 
 /// One side of a triangle: what emits, reflects and receives.
@@ -139,6 +139,14 @@ impl Mesh {
             part: Vec::new(),
             within: Vec::new(),
         }
+    }
+
+    /// What blocks rays.
+    pub fn index(&self, scene: &Scene) -> RayIndex {
+        let positions: Vec<Vec3> = self.positions.iter().map(|p| p.as_vec3()).collect();
+        let masks = |m: &u32| matches!(scene.materials[*m as usize].alpha, Alpha::Mask { .. });
+        let masked: Vec<bool> = self.material.iter().map(masks).collect();
+        RayIndex::build(&positions, &self.triangles, &self.plane, &masked)
     }
 
     /// Barycentric weights on the input triangle, from those on a triangle of the mesh.

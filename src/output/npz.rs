@@ -167,7 +167,8 @@ pub fn write_baked(
         let surface = &scene.surfaces[baked.surface];
         let first = owners.len() as u32;
         for vertex in &baked.vertices {
-            positions.extend(refined::position(surface, vertex).to_array());
+            let place = refined::position(surface, vertex) / scene.changes.scale;
+            positions.extend(place.to_array());
             normals.extend(refined::normal(surface, baked, vertex).as_vec3().to_array());
             xyz.extend(vertex.radiosity);
             owners.push(baked.surface as u32);

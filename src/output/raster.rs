@@ -464,6 +464,7 @@ mod tests {
                 lights: vec![],
                 cameras: vec![],
                 warnings: vec![],
+                changes: Default::default(),
             };
             let turn = if turned { std::f64::consts::PI } else { 0.0 };
             let camera = crate::scene::Camera {

@@ -17,6 +17,8 @@ const SMALL: f64 = 13.0;
 const MAJOR: &str = "#d9d9d9";
 const MINOR: &str = "#f0f0f0";
 const FRAME: &str = "#8c8c8c";
+/// Lines of more points are drawn without marks: they would be a string of beads.
+const MARKED: usize = 60;
 /// Least distance between two names, pixels.
 const NAME_STEP: f64 = 18.0;
 
@@ -87,7 +89,9 @@ impl Chart {
                 let run: Vec<[f64; 2]> = run.iter().flatten().copied().collect();
                 svg.polyline(&run, color);
             }
-            pixels.iter().flatten().for_each(|&p| svg.mark(p, color, i));
+            if pixels.len() <= MARKED {
+                pixels.iter().flatten().for_each(|&p| svg.mark(p, color, i));
+            }
             ends.push((pixels.iter().flatten().last().map_or(bottom, |p| p[1]), i));
         }
         self.names(&mut svg, ends, right, bottom);

@@ -6,6 +6,17 @@ use crate::error::Problem;
 /// A broken file of a million nodes must not become a message of a million lines.
 const MAX_LISTED: usize = 50;
 
+/// What becomes of keys and names that nobody knows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unknown {
+    /// A problem: the file is ours, and they are misspelled.
+    Refuse,
+    /// A warning, for files that are to be read all the same.
+    Warn,
+    /// They are somebody else's.
+    Ignore,
+}
+
 /// Problems and warnings of one file.
 #[derive(Debug, Clone)]
 pub(crate) struct Check {
@@ -56,6 +67,15 @@ impl Check {
             self.warnings.push(warning);
         } else {
             self.more_warnings += 1;
+        }
+    }
+
+    /// Something that nobody knows.
+    pub(crate) fn stranger(&mut self, unknown: Unknown, place: &str, what: String, next: String) {
+        match unknown {
+            Unknown::Refuse => self.problem(place, what, next),
+            Unknown::Warn => self.warn(format!("{place}: {what}; {next}")),
+            Unknown::Ignore => {}
         }
     }
 

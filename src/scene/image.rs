@@ -66,8 +66,7 @@ pub(crate) fn decode(
     let believable = if format == ImageFormat::Jpeg {
         pixels <= size.saturating_mul(MAX_JPEG_RATIO)
     } else {
-        let bits = u64::from(decoder.original_color_type().bits_per_pixel());
-        pixels * bits / 8 <= size.saturating_mul(MAX_PNG_RATIO)
+        pixels * stored_bits(bytes) / 8 <= size.saturating_mul(MAX_PNG_RATIO)
     };
     if !believable || pixels > MAX_FILE_PIXELS {
         return Err(format!(
@@ -81,6 +80,22 @@ pub(crate) fn decode(
     let decoded = DynamicImage::from_decoder(decoder).map_err(bad)?;
     let budget = (MAX_TEXELS / count.max(1)).clamp(1, MAX_IMAGE);
     Ok(linear(name, &decoded, budget))
+}
+
+/// Bits of a pixel in a PNG, from its header: a palette holds as little as one, where the decoder tells of the three or
+/// four bytes that it unfolds to.
+fn stored_bits(bytes: &[u8]) -> u64 {
+    // PNG, third edition, section 11.2.1: bit depth and colour type stand at 24 and 25.
+    let &[depth, kind] = bytes.get(24..26).unwrap_or(&[8, 6]) else {
+        return 32;
+    };
+    let channels = match kind {
+        0 | 3 => 1,
+        4 => 2,
+        2 => 3,
+        _ => 4,
+    };
+    u64::from(depth) * channels
 }
 
 /// In linear light, shrunk to at most `budget` texels.

@@ -27,6 +27,22 @@ const BY_COLOUR: &str = "cie/D65";
 /// smoother spectra: at 1 a saturated lamp would come out as a box.
 const LAMP_BRIGHTNESS: f64 = 0.5;
 
+/// Brighter lamps (cd/m2, cd, lx) are an input fault. Light is carried in f32, up to 3e38; squares of it are summed, and
+/// near a lamp, or where an albedo of .999 holds the light, it is a thousand times as strong. The sun has 2e9 cd/m2.
+pub(crate) const GREATEST_SIZE: f64 = 1e15;
+
+/// Says so where a lamp's luminous size is not one that can be carried; true where it is.
+pub(crate) fn bearable(size: f64, unit: &str, place: &str, check: &mut Check) -> bool {
+    // Written so that NaN fails.
+    let bears = size <= GREATEST_SIZE;
+    if !bears {
+        let what = format!("gives out {size:.3e} {unit}, more than can be reckoned with");
+        let next = format!("give at most {GREATEST_SIZE:e} {unit} (the sun has 2e9 cd/m2)");
+        check.problem(place, what, next);
+    }
+    bears
+}
+
 /// Shapes of one colour differ by no more than this, relative.
 const SAME_SHAPE: f64 = 1e-9;
 
@@ -99,9 +115,18 @@ impl<'a> Lamps<'a> {
         }
     }
 
+    /// The luminous size that a spectrum has by itself.
+    pub(crate) fn own_size(&self, spectrum: &Sampled) -> f64 {
+        self.size_of(&spectrum.leaves)
+    }
+
+    fn size_of(&self, power: &Leaves) -> f64 {
+        power.iter().zip(&self.luminous).map(|(p, y)| p * y).sum()
+    }
+
     /// Shares `power`, brought to luminous size 1, among the lamps of the same spectrum; returns the size it had.
     fn add(&mut self, name: &str, power: Leaves) -> (usize, f64) {
-        let size: f64 = power.iter().zip(&self.luminous).map(|(p, y)| p * y).sum();
+        let size = self.size_of(&power);
         let unit = power.map(|p| p / size);
         let same = self.spectra.iter().position(|s| s.power == unit);
         let light = same.unwrap_or_else(|| {
@@ -251,6 +276,9 @@ pub(crate) fn punctual(
                 ));
                 return None;
             }
+            if !bearable(size, unit(light.kind), &place, check) {
+                return None;
+            }
             let lamp = match spectrum {
                 Some(spectrum) => lamps.by_spectrum(&spectrum, Some(size)),
                 None => lamps.by_colour(light.color, f64::from(light.intensity)),
@@ -273,6 +301,14 @@ pub(crate) fn punctual(
             })
         })
         .collect()
+}
+
+/// What a light's intensity is given in.
+fn unit(kind: RawLightKind) -> &'static str {
+    match kind {
+        RawLightKind::Directional => "lx",
+        RawLightKind::Point | RawLightKind::Spot => "cd",
+    }
 }
 
 /// The light's name, or what a nameless one is called in messages and side files.

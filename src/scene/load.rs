@@ -1,6 +1,7 @@
 //! A room from its file: document, geometry, paint and lamps, and everything that is wrong with any of them together.
 
-use super::check::Check;
+use super::changes::Changes;
+use super::check::{Check, Unknown};
 use super::document::Document;
 use super::light::{self, Lamps};
 use super::material;
@@ -18,6 +19,10 @@ pub struct Options {
     pub grid: Grid,
     /// The file of spectra; none: `room.spectra.json` beside `room.glb`, if there is one.
     pub spectra: Option<PathBuf>,
+    /// Only warn of keys and names in the file of spectra that mean nothing.
+    pub lenient: bool,
+    /// Metres for each unit of the file; none: 1, as glTF has it.
+    pub scale: Option<f64>,
 }
 
 impl Scene {
@@ -52,7 +57,20 @@ impl Scene {
         let light_names: Vec<String> = raw_lights.iter().map(light::name_of).collect();
         let grid = options.grid;
         let asked = options.spectra.as_deref();
-        let file = SpectraFile::open(path, asked, &names, &light_names, &grid, &mut check);
+        let unknown = if options.lenient {
+            Unknown::Warn
+        } else {
+            Unknown::Refuse
+        };
+        let file = SpectraFile::open(
+            path,
+            asked,
+            &names,
+            &light_names,
+            &grid,
+            unknown,
+            &mut check,
+        );
         let upsampler = Upsampler::new(&grid);
         let mut lamps = Lamps::new(&grid, &upsampler);
         let mut materials = material::materials(
@@ -79,7 +97,7 @@ impl Scene {
         }
         let mut warnings = geometry.warnings;
         warnings.extend(said);
-        Ok(Self {
+        let scene = Self {
             source: document.source,
             grid,
             surfaces: geometry.surfaces,
@@ -89,7 +107,9 @@ impl Scene {
             lights,
             cameras: geometry.cameras,
             warnings,
-        })
+            changes: Changes::default(),
+        };
+        Ok(scene.scaled(options.scale.unwrap_or(1.0)))
     }
 }
 

@@ -7,7 +7,7 @@
 
 use super::check::Check;
 use super::json::short;
-use super::light::{Lamp, Lamps};
+use super::light::{Lamp, Lamps, bearable};
 use super::raw::{AlphaMode, RawMaterial};
 use super::spectra_file::{MaterialSpectra, Sampled, SpectraFile};
 use super::{Alpha, Emission, Material, Sides};
@@ -199,9 +199,16 @@ fn emission(
                 }
                 return None;
             }
+            let bright = size.unwrap_or_else(|| lamps.own_size(spectrum));
+            if !bearable(bright, "cd/m2", place, check) {
+                return None;
+            }
             lamps.by_spectrum(spectrum, size)
         }
         None if nits > 0.0 => {
+            if !bearable(nits, "cd/m2", place, check) {
+                return None;
+            }
             lamps.by_colour(raw.emissive_factor, f64::from(raw.emissive_strength))
         }
         None => return None,

@@ -4,6 +4,7 @@ mod accessor;
 pub mod alpha;
 pub(crate) mod buffers;
 mod camera;
+pub mod changes;
 pub(crate) mod check;
 mod compression;
 mod container;
@@ -27,8 +28,10 @@ mod texture_info;
 pub(crate) mod uri;
 mod world;
 
+pub(crate) use json::short;
 pub use load::Options;
 pub use material::GREATEST_ALBEDO;
+pub(crate) use material::listed;
 
 use crate::spectrum::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};
@@ -36,7 +39,7 @@ use std::sync::Arc;
 
 /// A room, read and checked.
 ///
-/// Positions are in the file's units (metres in glTF), world space, right-handed, +Y up.
+/// Positions are in metres (the file's units, times the scale that was asked for), world space, right-handed, +Y up.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// The document as read: written back by the output with the light added.
@@ -57,6 +60,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// What the user should know: nothing is dropped in silence.
     pub warnings: Vec<String>,
+    /// What was changed since it was read.
+    pub changes: changes::Changes,
 }
 
 /// The glTF document behind a scene: kept whole, so that names, cameras, extras and unknown things survive.

@@ -16,12 +16,13 @@
 //! luminance keeps the brightness that glTF gives the material. The spectrum of a *light* is a shape always: glTF's
 //! candela or lux, times the luminance of its colour, say how bright it is.
 //!
-//! Unknown keys of the file are a warning; unknown keys of `extras` belong to other programs and are passed over.
+//! Unknown keys of the file, and names that the room does not have, are problems that come with the nearest names; a
+//! lenient reader is only warned of them. Unknown keys of `extras` belong to other programs and are passed over.
 
-use super::check::Check;
+use super::check::{Check, Unknown};
 use super::json::short;
 use super::uri;
-use crate::data::{Kind, Named, Outside, Table, edit_distance, named, nearest};
+use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
 use crate::spectrum::{Grid, Leaves};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -70,13 +71,15 @@ pub(crate) struct SpectraFile {
 impl SpectraFile {
     /// Reads the file that was asked for, or the one beside the room if it is there.
     ///
-    /// `materials` and `lights` are the names in the room: an entry for any other name is a problem.
+    /// `materials` and `lights` are the names in the room; `unknown` is what becomes of entries for other names, and of
+    /// keys that mean nothing.
     pub(crate) fn open(
         room: &Path,
         asked: Option<&Path>,
         materials: &[String],
         lights: &[String],
         grid: &Grid,
+        unknown: Unknown,
         check: &mut Check,
     ) -> Self {
         let path = match asked {
@@ -109,7 +112,7 @@ impl SpectraFile {
             folder: folder_of(&path),
             grid,
             check,
-            unknown: Unknown::Warn,
+            unknown,
         };
         let mut file = Self::default();
         let Some(top) = reader.object(&json, &place) else {
@@ -187,17 +190,6 @@ impl SpectraFile {
     }
 }
 
-/// The three nearest of the room's own names.
-fn nearest_of(name: &str, names: &[String]) -> Vec<String> {
-    let mut ranked: Vec<(usize, &str)> = names
-        .iter()
-        .map(|n| (edit_distance(name, n), n.as_str()))
-        .collect();
-    ranked.sort();
-    ranked.dedup();
-    ranked.into_iter().take(3).map(|(_, n)| short(n)).collect()
-}
-
 /// `room.spectra.json` for `room.glb`, if it is there.
 fn beside(room: &Path) -> Option<PathBuf> {
     let stem = room.file_stem()?;
@@ -212,12 +204,6 @@ fn folder_of(file: &Path) -> PathBuf {
         Some(folder) if folder != Path::new("") => folder.to_path_buf(),
         _ => PathBuf::from("."),
     }
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Unknown {
-    Warn,
-    Ignore,
 }
 
 /// Reads the objects of a side file or of extras.
@@ -358,14 +344,18 @@ impl Reader<'_> {
         if names.iter().any(|n| n == name) {
             return;
         }
-        let near = nearest_of(name, names);
+        let near: Vec<String> = nearest_of(name, names).iter().map(|n| short(n)).collect();
         let next = if near.is_empty() {
             format!("the room has no {kind}s: take the entry out")
         } else {
             format!("the nearest names are {}", near.join(", "))
         };
-        self.check
-            .problem(place, format!("the room has no {kind} of that name"), next);
+        self.check.stranger(
+            self.unknown,
+            place,
+            format!("the room has no {kind} of that name"),
+            next,
+        );
     }
 
     /// The members of an object inside an object; none where it is missing.
@@ -384,7 +374,7 @@ impl Reader<'_> {
     fn object<'v>(&mut self, value: &'v Value, place: &str) -> Option<&'v Map<String, Value>> {
         let object = value.as_object();
         match (object, self.unknown) {
-            (None, Unknown::Warn) => {
+            (None, Unknown::Refuse | Unknown::Warn) => {
                 self.check
                     .problem(place, "is not a JSON object", "write { ... }")
             }
@@ -397,15 +387,11 @@ impl Reader<'_> {
     }
 
     fn keys(&mut self, object: &Map<String, Value>, known: &[&str], place: &str) {
-        if self.unknown == Unknown::Ignore {
-            return;
-        }
         for key in object.keys().filter(|key| !known.contains(&key.as_str())) {
-            self.check.warn(format!(
-                "{place}: unknown key \"{}\"; known are {}",
-                short(key),
-                known.join(", ")
-            ));
+            let near = nearest_of(key, known);
+            let what = format!("unknown key \"{}\"", short(key));
+            let next = format!("the nearest names are {}", near.join(", "));
+            self.check.stranger(self.unknown, place, what, next);
         }
     }
 }
@@ -417,6 +403,14 @@ mod tests {
 
     /// Opens a side file of this content for a room with materials wall, lamp and a light Spot.
     fn open(json: &Value, extra: &[(&str, &str)]) -> (SpectraFile, Vec<String>, Vec<String>) {
+        opened(json, extra, Unknown::Refuse)
+    }
+
+    fn opened(
+        json: &Value,
+        extra: &[(&str, &str)],
+        unknown: Unknown,
+    ) -> (SpectraFile, Vec<String>, Vec<String>) {
         let folder = tempfile::tempdir().unwrap();
         for (name, text) in extra {
             std::fs::write(folder.path().join(name), text).unwrap();
@@ -431,6 +425,7 @@ mod tests {
             &names,
             &["Spot".to_owned()],
             &Grid::default(),
+            unknown,
             &mut check,
         );
         let (problems, warnings) = check.into_parts();
@@ -492,15 +487,34 @@ mod tests {
             "climbs out of",
             "light 'Sun': the room has no light of that name; the nearest names are Spot",
             "light 'Sun': does not say which spectrum",
+            "material 'wall': unknown key \"emision\"; the nearest names are emission, reflectance",
+            "unknown key \"version\"",
         ] {
             assert!(all.contains(text), "{text}\n-- in --\n{all}");
         }
-        assert_eq!(problems.len(), 8, "{all}");
-        let all = warnings.join("\n");
-        assert!(
-            all.contains("\"emision\"") && all.contains("\"version\""),
-            "{all}"
+        assert_eq!((problems.len(), warnings.len()), (10, 0), "{all}");
+    }
+
+    #[test]
+    fn a_lenient_reader_is_warned_of_strangers() {
+        let (file, problems, warnings) = opened(
+            &json!({
+                "materials": {"wal": {}, "wall": {"emision": {}, "reflectance": {"name": "macbeth/white"}}},
+                "version": 1,
+            }),
+            &[],
+            Unknown::Warn,
         );
+        assert_eq!(problems, Vec::<String>::new());
+        assert!(file.materials["wall"].reflectance.is_some());
+        let all = warnings.join("\n");
+        for text in [
+            "\"emision\"; the nearest names are emission",
+            "\"version\"",
+            "'wal': the room has no",
+        ] {
+            assert!(all.contains(text), "{text}\n-- in --\n{all}");
+        }
     }
 
     #[test]
@@ -513,6 +527,7 @@ mod tests {
             &[],
             &[],
             &Grid::default(),
+            Unknown::Refuse,
             &mut check,
         );
         assert!(check.has_problems());

@@ -59,14 +59,16 @@ impl Bake {
                 let (spectra, weights) = (&self.scene.spectra, &self.weights);
                 let known = self.lanes.cuts();
                 let choice = model.choose(spectra, weights, self.light.white, tolerance, known);
-                self.spectrum_error = Some(choice.error);
+                // Without light there is no white to see an error by.
+                self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
                 Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights)
             }
             Representation::Guaranteed if !none => {
                 let model = self.model(BOUNDED_PATCHES);
                 let (spectra, weights) = (&self.scene.spectra, &self.weights);
                 let choice = model.choose_bounded(spectra, weights, self.light.white, tolerance);
-                self.spectrum_error = Some(choice.error);
+                // Without light there is no white to see an error by.
+                self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
                 Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights)
             }
             _ => {

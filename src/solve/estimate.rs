@@ -39,6 +39,15 @@ pub(super) struct Distance {
     pub relative: f64,
 }
 
+impl Distance {
+    /// Is it a number? Light under a white that is none gives no colour.
+    fn is_known(&self) -> bool {
+        [self.de2000, self.de_luv, self.relative]
+            .iter()
+            .all(|x| x.is_finite())
+    }
+}
+
 impl Probes {
     /// Random points, by area.
     pub(super) fn new(tree: &Tree, seed: u64) -> Self {
@@ -103,11 +112,16 @@ impl Probes {
             .all(|x| x.is_finite());
         let result = (sound && !self.last.is_empty()).then(|| {
             let n = now.len() as f64;
-            let pairs = || self.last.iter().zip(&now);
+            // What is the same has no difference, also in a room without light, where there is no white to see it by.
+            let pairs = || self.last.iter().zip(&now).filter(|(a, b)| a != b);
+            let mean = |differ: &dyn Fn([f64; 3], [f64; 3]) -> f64| {
+                // An empty sum would be -0.
+                pairs().fold(0.0, |sum, (a, b)| sum + differ(*a, *b)) / n
+            };
             let floor = 1e-4 * white[1];
             Distance {
-                de2000: share * pairs().map(|(a, b)| de2000(*a, *b, white)).sum::<f64>() / n,
-                de_luv: share * pairs().map(|(a, b)| de_luv(*a, *b, white)).sum::<f64>() / n,
+                de2000: share * mean(&|a, b| de2000(a, b, white)),
+                de_luv: share * mean(&|a, b| de_luv(a, b, white)),
                 relative: share
                     * (pairs()
                         .map(|(a, b)| ((a[1] - b[1]) / (0.5 * (a[1] + b[1])).max(floor)).powi(2))
@@ -116,6 +130,7 @@ impl Probes {
                         .sqrt(),
             }
         });
+        let result = result.filter(Distance::is_known);
         self.last = now;
         result
     }
@@ -140,5 +155,13 @@ mod tests {
         assert!(error(f64::NAN, 2).is_none());
         assert!(error(0.5, 3).is_none());
         assert_eq!(error(0.5, 4), Some(0.0));
+        // Dark rooms: no white, no difference; and no estimate where light comes and there is no white for it.
+        let mut dark = |light: f64| {
+            let distance = probes.compare(vec![[light; 3]], [0.0; 3], 4, false);
+            distance.map(|d| (d.de2000, d.de_luv, d.relative))
+        };
+        dark(0.0);
+        assert_eq!(dark(0.0), Some((0.0, 0.0, 0.0)));
+        assert_eq!(dark(1.0), None);
     }
 }

@@ -174,22 +174,6 @@ fn by_rays(sight: &Sight) -> bool {
     sight.occlusion && !sight.small()
 }
 
-/// What blocks rays in a scene.
-fn index(scene: &Scene, mesh: &Mesh) -> RayIndex {
-    let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
-    let masked: Vec<bool> = mesh
-        .material
-        .iter()
-        .map(|&m| {
-            matches!(
-                scene.materials[m as usize].alpha,
-                crate::scene::Alpha::Mask { .. }
-            )
-        })
-        .collect();
-    RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &masked)
-}
-
 /// A room being baked.
 pub struct Bake {
     scene: Scene,
@@ -250,7 +234,7 @@ struct Given {
 
 /// Cuts a mesh as it was cut before: the search casts no ray.
 fn recut(scene: &Scene, mesh: Mesh, parted: &[u32]) -> Mesh {
-    let cuts = cuts(&mesh, &index(scene, &mesh));
+    let cuts = cuts(&mesh, &mesh.index(scene));
     let some: Vec<_> = parted
         .iter()
         .filter_map(|&k| cuts.get(k as usize).cloned())
@@ -281,7 +265,7 @@ impl Bake {
                 (parted, closed) = (known.parted, Some(known.closed));
             }
             None => {
-                rays = index(&scene, &mesh);
+                rays = mesh.index(&scene);
                 if plan.runs(Kind::Occlusion) {
                     let cuts = cuts(&mesh, &rays);
                     let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
@@ -294,7 +278,7 @@ impl Bake {
                         parted = found.parted.iter().map(|&k| k as u32).collect();
                         let some: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
                         mesh = mesh.cut(&some);
-                        rays = index(&scene, &mesh);
+                        rays = mesh.index(&scene);
                         found = spaces(&mesh, &rays, &[], settings.seed);
                     }
                     spaces_of_faces = found.of_face;

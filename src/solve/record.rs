@@ -66,6 +66,16 @@ pub struct Figure {
     pub kind: Kind,
 }
 
+impl Figure {
+    /// An estimate; one that is no number is not known.
+    pub fn estimate(value: Option<f64>) -> Self {
+        Self {
+            value: value.filter(|v| v.is_finite()),
+            kind: Kind::Estimate,
+        }
+    }
+}
+
 /// What an error figure is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -198,10 +208,7 @@ pub(super) struct Measured<'a> {
 
 impl Round {
     pub(super) fn new(bake: &Bake, m: Measured) -> Self {
-        let estimate = |value: Option<f64>| Figure {
-            value,
-            kind: Kind::Estimate,
-        };
+        let estimate = Figure::estimate;
         let spectrum = bake.spectrum_error.unwrap_or(0.0);
         let convergence_de = m.convergence.bound * 100.0 * super::DE_PER_PERCENT;
         // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
@@ -211,7 +218,7 @@ impl Round {
         let white = bake.light.white;
         let light = &bake.light;
         let seconds = m.clock.total();
-        let error = m.distance.map(|d| all(d.de2000));
+        let error = m.distance.map(|d| all(d.de2000)).filter(|e| e.is_finite());
         let before = bake.rounds.iter();
         let curve: Vec<(f64, Option<f64>)> = before
             .map(|r| (r.round_s, r.error.total_de2000.value))
@@ -269,14 +276,14 @@ impl Round {
                 total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
                 geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),
                 spectrum_de_luv: Figure {
-                    value: bake.spectrum_error,
+                    value: bake.spectrum_error.filter(|e| e.is_finite()),
                     kind: match bake.settings.representation {
                         Representation::Guaranteed => Kind::Bound,
                         _ => Kind::Estimate,
                     },
                 },
                 convergence: Figure {
-                    value: Some(m.convergence.bound),
+                    value: Some(m.convergence.bound).filter(|e| e.is_finite()),
                     kind: Kind::Bound,
                 },
                 convergence_de_luv: estimate(Some(convergence_de)),

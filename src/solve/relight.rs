@@ -108,10 +108,17 @@ impl Bake {
     /// Writes what relighting needs beside the baked mesh; the size in bytes.
     ///
     /// # Errors
-    /// The cache would be larger than `limit` bytes; the file cannot be written; a bake that did not [`Bake::keep`].
+    /// The room is dark; the cache would be larger than `limit` bytes; the file cannot be written; a bake that did not [`Bake::keep`].
     pub fn write_cache(&self, baked: &Baked, path: &Path, limit: u64) -> Result<u64> {
         if !self.keep || baked.kept.len() != baked.surfaces.len() {
             return Err(Error::Internal("a bake that kept nothing".into()));
+        }
+        if self.light.white == [0.0; 3] {
+            return Err(Error::input(
+                path.display().to_string(),
+                "a room without light has nothing to keep: no patch is worth looking at",
+                "bake it under the lamps that are to be changed",
+            ));
         }
         let size = self.cache_bytes(baked);
         if size > limit {
@@ -191,7 +198,8 @@ impl Bake {
             return Ok(None);
         }
         let (a, b) = (seen(before)?, seen(last)?);
-        let pairs = a.iter().zip(&b);
+        // Equal light is no difference, also in the dark, where there is no white.
+        let pairs = a.iter().zip(&b).filter(|(a, b)| a != b);
         let sum: f64 = pairs.map(|(a, b)| de2000(*a, *b, self.light.white)).sum();
         Ok(Some(sum / a.len() as f64))
     }
@@ -366,10 +374,7 @@ impl Relighter {
                 changed,
                 intervals_working: bake.lanes.len(),
                 iterations: if changed { convergence.iterations } else { 0 },
-                error_de2000: super::record::Figure {
-                    value: error,
-                    kind: super::record::Kind::Estimate,
-                },
+                error_de2000: super::record::Figure::estimate(error),
                 flux,
                 lanes_s,
                 direct_s,

@@ -208,6 +208,7 @@ impl Room {
             lights: self.lights,
             cameras: Vec::new(),
             warnings: Vec::new(),
+            changes: Default::default(),
         }
     }
 }

@@ -300,6 +300,7 @@ pub fn room() -> Scene {
             aspect: None,
         }],
         warnings: Vec::new(),
+        changes: Default::default(),
     }
 }
 

@@ -20,7 +20,8 @@ impl Writer<'_> {
     pub(super) fn attributes(&mut self, primitive: &Value, baked: &BakedSurface) -> Result<Value> {
         let scene = self.scene;
         let surface = &scene.surfaces[baked.surface];
-        let input = Input::new(primitive, surface, &mut self.data)?;
+        let turned = scene.is_flipped(baked.surface);
+        let input = Input::new(primitive, surface, turned, &mut self.data)?;
         let mut out = Map::new();
 
         out.insert(
@@ -105,12 +106,19 @@ struct Input<'a> {
     surface: &'a Surface,
     primitive: &'a Value,
     tables: Vec<(String, Table)>,
+    /// Were its faces turned since the document was read?
+    turned: bool,
     /// World to local, where it exists and the document's own positions cannot be read.
     to_local: Option<glam::DMat4>,
 }
 
 impl<'a> Input<'a> {
-    fn new(primitive: &'a Value, surface: &'a Surface, data: &mut Data) -> Result<Self> {
+    fn new(
+        primitive: &'a Value,
+        surface: &'a Surface,
+        turned: bool,
+        data: &mut Data,
+    ) -> Result<Self> {
         let mut tables = Vec::new();
         if let Some(attributes) = primitive.get("attributes").and_then(Value::as_object)
             && !accessor::is_draco(primitive)
@@ -125,6 +133,7 @@ impl<'a> Input<'a> {
             surface,
             primitive,
             tables,
+            turned,
             to_local: None,
         };
         if input.vectors("POSITION").is_none() {
@@ -191,7 +200,7 @@ impl<'a> Input<'a> {
         }
         let normal = |v| {
             let smooth = local.and_then(|table| self.blend(table, v).try_normalize());
-            let smooth = smooth.map(|n| if baked.back { -n } else { n });
+            let smooth = smooth.map(|n| if baked.back != self.turned { -n } else { n });
             let world = || (back * refined::normal(self.surface, baked, v)).normalize_or(DVec3::Y);
             smooth.unwrap_or_else(world).as_vec3().to_array()
         };
@@ -216,7 +225,7 @@ impl<'a> Input<'a> {
             let hand = table.row(refined::corners(self.surface, vertex)[nearest])[3];
             let [x, y, z] = direction.as_vec3().to_array();
             // The bitangent, normal x tangent * hand, runs along the texture and stays; the back's normal is turned.
-            let left = (hand < 0.0) != baked.back;
+            let left = (hand < 0.0) != (baked.back != self.turned);
             [x, y, z, if left { -1.0 } else { 1.0 }]
         };
         Some(baked.vertices.iter().zip(normals).map(tangent).collect())

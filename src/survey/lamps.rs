@@ -1,0 +1,265 @@
+//! Do all lamps shine away from the room? A common fault of exports: faces whose corners run the wrong way round.
+//!
+//! Rays from each lamp tell. A lamp lights the room if one of them meets a front that is not a lamp's own. If no lamp
+//! does, a lamp's surface is reversed if rays from its *backs* meet other things; if those are mostly backs, all faces
+//! of the room are reversed, and not the lamps alone. Rooms where everything glows (a furnace, a scan whose picture is
+//! its emission) light themselves.
+
+use super::eyes::{Eyes, Met};
+use super::place;
+use crate::error::Problem;
+use crate::geometry::sampling::{
+    cosine_direction, hash, on_triangle, sequence02, sphere_direction, tangents,
+};
+use crate::scene::{LightKind, PunctualLight, Scene, Sides, listed, short};
+use glam::DVec3;
+use std::f64::consts::TAU;
+
+/// Rays of a lamp: a few for the first look, which most rooms pass with their first lamp, and many before a room is
+/// refused. A lamp deep in a housing shows through an opening that one ray in a thousand finds.
+const RAYS: [u32; 2] = [64, 8192];
+
+/// No lamp lights the room.
+#[derive(Debug)]
+pub(super) struct Away {
+    /// Surfaces of lamps that look reversed.
+    lamps: Vec<usize>,
+    /// Lights without extent.
+    lights: Vec<usize>,
+    /// Is the whole room reversed?
+    room: bool,
+    /// Surfaces to turn.
+    pub(super) turned: Vec<usize>,
+}
+
+/// What rays met.
+#[derive(Debug, Default, Clone, Copy)]
+struct Seen {
+    /// Fronts of what is no lamp.
+    things: usize,
+    /// Fronts of other lamps.
+    lamps: usize,
+    /// Black backs of others.
+    backs: usize,
+    /// The lamp's own sides that take part.
+    own: usize,
+}
+
+impl Seen {
+    fn add(&mut self, scene: &Scene, lamp: Option<usize>, met: Met) {
+        match met {
+            Met::Front(s) | Met::Behind(s) if Some(s) == lamp => self.own += 1,
+            Met::Front(s) | Met::Behind(s) if emits(scene, s) => self.lamps += 1,
+            Met::Front(_) | Met::Behind(_) => self.things += 1,
+            Met::Back(s) if Some(s) != lamp => self.backs += 1,
+            Met::Back(_) | Met::Nothing => {}
+        }
+    }
+}
+
+fn emits(scene: &Scene, surface: usize) -> bool {
+    scene.materials[scene.surfaces[surface].material]
+        .emission
+        .is_some()
+}
+
+/// None if some lamp lights the room, or there is nothing that it could light.
+pub(super) fn away(scene: &Scene) -> Option<Away> {
+    if (0..scene.surfaces.len()).all(|s| emits(scene, s)) {
+        return None;
+    }
+    let eyes = Eyes::new(scene);
+    let [few, many] = RAYS;
+    look(&eyes, few).and_then(|_| look(&eyes, many))
+}
+
+fn look(eyes: &Eyes, rays: u32) -> Option<Away> {
+    let scene = eyes.scene;
+    let mut found = Away {
+        lamps: Vec::new(),
+        lights: Vec::new(),
+        room: false,
+        turned: Vec::new(),
+    };
+    let (mut fronts, mut backs) = (0, 0);
+    for (k, light) in scene.lights.iter().enumerate() {
+        let seen = of_light(eyes, light, rays);
+        if seen.things + seen.lamps > 0 {
+            return None;
+        }
+        backs += seen.backs;
+        found.lights.push(k);
+    }
+    for surface in (0..scene.surfaces.len()).filter(|&s| emits(scene, s)) {
+        let ahead = of_surface(eyes, surface, Way::Ahead, rays);
+        if ahead.things > 0 {
+            return None;
+        }
+        let behind = of_surface(eyes, surface, Way::Behind, rays);
+        let one_sided = scene.materials[scene.surfaces[surface].material].sides == Sides::Front;
+        if !one_sided && behind.things > 0 {
+            return None;
+        }
+        // A shell that glows within, all around, with nothing outside: a furnace.
+        if ahead.lamps + ahead.own > 0 && behind.things + behind.backs == 0 {
+            return None;
+        }
+        if one_sided && behind.things + behind.backs > 0 {
+            fronts += behind.things;
+            backs += behind.backs;
+            found.lamps.push(surface);
+        }
+    }
+    if found.lamps.is_empty() && found.lights.is_empty() {
+        return None;
+    }
+    found.room = backs > fronts;
+    found.turned = if found.room {
+        (0..scene.surfaces.len()).collect()
+    } else {
+        found.lamps.clone()
+    };
+    Some(found)
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Ahead,
+    Behind,
+}
+
+/// What a surface's faces shine on, or would if they were turned.
+fn of_surface(eyes: &Eyes, surface: usize, way: Way, rays: u32) -> Seen {
+    let mesh = &eyes.mesh;
+    let range = mesh.first_triangle[surface] as usize..mesh.first_triangle[surface + 1] as usize;
+    let total: f64 = mesh.area[range.clone()].iter().sum();
+    let mut seen = Seen::default();
+    let shift = hash(surface as u64, u64::from(way == Way::Behind));
+    let (mut triangle, mut passed) = (range.start, 0.0);
+    for k in 0..rays {
+        // Rays in steps of area, so that every part of the lamp has its share.
+        let target = total * (f64::from(k) + 0.5) / f64::from(rays);
+        while passed + mesh.area[triangle] < target && triangle + 1 < range.end {
+            passed += mesh.area[triangle];
+            triangle += 1;
+        }
+        let corners = mesh.triangles[triangle].map(|v| mesh.positions[v as usize] + mesh.centre);
+        let from = on_triangle(&corners, sequence02(k, shift));
+        let normal = match way {
+            Way::Ahead => mesh.normal[triangle],
+            Way::Behind => -mesh.normal[triangle],
+        };
+        let direction = cosine_direction(normal, sequence02(k, hash(shift, 1)));
+        let met = eyes.look(from, direction, mesh.plane[triangle]);
+        seen.add(eyes.scene, Some(surface), met);
+    }
+    seen
+}
+
+/// What a light without extent shines on.
+fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
+    let mut seen = Seen::default();
+    for k in 0..rays {
+        let [x, y] = sequence02(k, 0);
+        let (from, direction) = match light.kind {
+            LightKind::Point => (light.position, sphere_direction([x, y])),
+            LightKind::Spot { outer, .. } => {
+                (light.position, in_cone(light.direction, outer, [x, y]))
+            }
+            LightKind::Directional => {
+                // From outside, on a disc that covers the room.
+                let (size, [u, v]) = (eyes.mesh.half_size, tangents(light.direction));
+                let (radius, angle) = (size * y.sqrt(), TAU * x);
+                let across = radius * (angle.cos() * u + angle.sin() * v);
+                let from = eyes.mesh.centre - 1.1 * size * light.direction + across;
+                (from, light.direction)
+            }
+        };
+        seen.add(eyes.scene, None, eyes.look_around(from, direction));
+    }
+    seen
+}
+
+/// A direction in the cone of half angle `outer` about `axis`, for a point of the unit square.
+fn in_cone(axis: DVec3, outer: f64, [x, y]: [f64; 2]) -> DVec3 {
+    let cos = 1.0 - y * (1.0 - outer.cos());
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    let [u, v] = tangents(axis);
+    let angle = TAU * x;
+    sin * (angle.cos() * u + angle.sin() * v) + cos * axis
+}
+
+impl Away {
+    /// The problem in words.
+    pub(super) fn problem(&self, scene: &Scene) -> Problem {
+        let mut what = Vec::new();
+        if !self.lamps.is_empty() {
+            what.push(format!("faces look reversed: {}", self.named(scene)));
+        }
+        if !self.lights.is_empty() {
+            let names: Vec<String> = self
+                .lights
+                .iter()
+                .map(|&k| {
+                    format!(
+                        "{} light '{}'",
+                        kind(&scene.lights[k]),
+                        short(&scene.lights[k].name)
+                    )
+                })
+                .collect();
+            what.push(format!(
+                "no front of a surface is met by {}",
+                listed(&names)
+            ));
+        }
+        if self.room {
+            what.push("the room's surfaces are seen from behind, their faces look reversed".into());
+        }
+        let next = match (self.turned.is_empty(), self.room) {
+            (true, _) => {
+                "turn the lights' nodes (they shine along their -Z), or move them into the room"
+            }
+            (false, false) => {
+                "turn the faces in the modelling program (Blender: Mesh > Normals > Flip), or give --flip"
+            }
+            (false, true) => {
+                "recalculate the normals in the modelling program, or give --flip, which turns all faces"
+            }
+        };
+        Problem::new(
+            place(scene),
+            format!("all lamps shine away from the room: {}", what.join("; ")),
+            format!("{next}; --allow-dark bakes it as it is"),
+        )
+    }
+
+    /// What was turned, in words.
+    pub(super) fn turning(&self, scene: &Scene) -> String {
+        if self.room {
+            return format!(
+                "--flip: the faces of all {} surfaces are turned",
+                self.turned.len()
+            );
+        }
+        format!("--flip: turned {}", self.named(scene))
+    }
+
+    /// Node, mesh and material of the lamps.
+    fn named(&self, scene: &Scene) -> String {
+        let name = |&s: &usize| {
+            let surface = &scene.surfaces[s];
+            let material = &scene.materials[surface.material].name;
+            format!("{}, material '{}'", surface.name, short(material))
+        };
+        listed(&self.lamps.iter().map(name).collect::<Vec<_>>())
+    }
+}
+
+fn kind(light: &PunctualLight) -> &'static str {
+    match light.kind {
+        LightKind::Point => "point",
+        LightKind::Spot { .. } => "spot",
+        LightKind::Directional => "directional",
+    }
+}
