@@ -134,23 +134,27 @@ impl Gatherer<'_> {
         visible
     }
 
-    /// Adds what the emitting elements of a far cluster send, by some of them chosen by chance.
+    /// Adds what the emitting elements of a far cluster send, by some of them chosen by chance. `carries`: how much that is
+    /// about, share of white.
     pub(super) fn lamps_by_chance(
         &self,
         to: &Receiver,
         id: u32,
+        carries: f64,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
         let turn = hash(to.seed ^ 1, u64::from(id));
-        for k in 0..CHOSEN {
+        let wanted = CHOSEN as f64 * carries / self.tolerance;
+        let count = (wanted.ceil() as usize).clamp(1, CHOSEN);
+        for k in 0..count {
             let u = sequence02(k as u32, turn);
             let Some(chosen) = self.one_emitter(to, id, u) else {
                 continue;
             };
             memory.rays += 1;
             if !self.sight.blocks_one(&chosen.segment) {
-                self.add_emitted(chosen.element, chosen.factor / CHOSEN as f64, out);
+                self.add_emitted(chosen.element, chosen.factor / count as f64, out);
             }
         }
     }

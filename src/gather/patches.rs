@@ -119,7 +119,7 @@ impl Gatherer<'_> {
             return;
         }
         if of == Of::Emitted {
-            self.lamps_by_chance(to, id, memory, out);
+            self.lamps_by_chance(to, id, factor * emitted, memory, out);
             return;
         }
         let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];

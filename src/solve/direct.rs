@@ -31,7 +31,7 @@ const POINTS: [([f64; 3], f64); 6] = {
     ]
 };
 const MIDDLE: [([f64; 3], f64); 1] = [([1.0 / 3.0; 3], 1.0)];
-/// Leaves below this share of all area are looked at from one point.
+/// Leaves below this share of all area are looked at from one point, or as few as can be.
 const TINY: f64 = 1e-5;
 /// Further points that are tried where some are covered.
 const MORE_POINTS: usize = 8;
@@ -206,8 +206,8 @@ impl Direct {
     }
 
     /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
-    /// No patch may misplace more than `coarsest` (share of white) of a leaf's light, however small the leaf: all small
-    /// leaves would err alike.
+    /// By a rule, no patch may misplace more than `coarsest` (share of white) of a leaf's light, however small the leaf: all
+    /// small leaves would err alike.
     pub(super) fn refine(
         &mut self,
         tree: &mut Tree,
@@ -240,14 +240,16 @@ impl Direct {
                     for &(leaf, ref stake) in chunk {
                         // What would split the leaf is what it has to be told from.
                         let share = (tree.node(leaf).area / demand.total_area).sqrt();
-                        let tolerance = (NOISE * demand.threshold / share).min(coarsest);
+                        let tolerance = NOISE * demand.threshold / share;
                         let mean = match look.openness(tree, leaf) {
                             Some(open) => {
+                                // What would be a share of all light that matters, too.
+                                let tolerance = tolerance.min(1.0 / stake.flux);
                                 by_chance(tree, leaf, look, &open, tolerance, stake, &mut memory)
                             }
                             None => {
-                                let tiny = share * share < TINY;
-                                by_rule(tree, leaf, look, tolerance, tiny, &mut memory)
+                                let tolerance = tolerance.min(coarsest);
+                                by_rule(tree, leaf, look, tolerance, stake.tiny, &mut memory)
                             }
                         };
                         mean.end(&mut found, look.weights().len());
@@ -288,6 +290,8 @@ struct Stake {
     flux: f64,
     /// Is it large enough to be split?
     may_split: bool,
+    /// Is it next to nothing of the room?
+    tiny: bool,
 }
 
 impl Stake {
@@ -301,6 +305,7 @@ impl Stake {
             // The white is twice the mean.
             flux: share / (0.5 * FLUX_SHARE),
             may_split: node.area > demand.least_area && depth < MAX_DEPTH,
+            tiny: share < TINY,
         }
     }
 }
@@ -485,6 +490,10 @@ fn by_chance(
         }
         mean
     };
+    if stake.tiny {
+        // It is never split.
+        return gather(0..RANDOM[0]);
+    }
     let most = look.unshadowed(tree, leaf, tolerance);
     // Errors fall with the power 3/4 of the number of points.
     let enough = (most * stake.flux).powf(4.0 / 3.0).ceil() as usize;
@@ -558,6 +567,7 @@ mod tests {
                 split: 0.0,
                 flux,
                 may_split: true,
+                tiny: false,
             };
             let (mut found, mut want) = ([0.0; 2], [0.0; 2]);
             for leaf in tree.leaves() {
