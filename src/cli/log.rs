@@ -65,6 +65,7 @@
 
 use crate::PROGRAM;
 use crate::gather::Baked;
+use crate::mesh::Interpolation;
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
@@ -219,8 +220,14 @@ pub struct VerdictRecord {
     pub rounds: usize,
     /// Mean CIEDE2000 asked for.
     pub asked_de2000: f64,
-    /// Total of the last round, CIEDE2000.
+    /// Error of the file, CIEDE2000: light at points and straight lines between vertices, whose squares add.
     pub error_de2000: Figure,
+    /// Of which light at points: total of the last round.
+    pub light_de2000: Figure,
+    /// Of which straight lines between vertices: rms, measured.
+    pub interpolation_de2000: Figure,
+    /// How that was measured, and what it may be.
+    pub interpolation: Option<Interpolation>,
     /// Files.
     pub outputs: Outputs,
     /// Vertices written.
@@ -289,7 +296,16 @@ impl VerdictRecord {
             exit_code: exit_code(end.verdict),
             rounds: rounds.len(),
             asked_de2000: end.bake.settings().error,
-            error_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
+            error_de2000: Figure {
+                value: file_error(end.bake, end.baked),
+                kind: Kind::Estimate,
+            },
+            light_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
+            interpolation_de2000: Figure {
+                value: end.baked.interpolation.map(|i| i.rms),
+                kind: Kind::Measured,
+            },
+            interpolation: end.baked.interpolation,
             outputs: end.outputs,
             vertices: end.glb.vertices,
             triangles: end.glb.triangles,
@@ -306,6 +322,12 @@ impl VerdictRecord {
             warnings: end.glb.warnings.clone(),
         }
     }
+}
+
+/// Estimated error of a file: of light at points as the last round estimates it, and between them as measured.
+pub(super) fn file_error(bake: &Bake, baked: &Baked) -> Option<f64> {
+    let light = bake.rounds().last()?.error.total_de2000.value?;
+    Some(light.hypot(baked.interpolation.map_or(0.0, |i| i.rms)))
 }
 
 /// 0 if the error was reached, 1 if the bake stopped before.

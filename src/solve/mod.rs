@@ -158,6 +158,11 @@ const GATHER_SHARE: f64 = 0.1;
 /// What one patch may misplace of the direct light of a leaf, share of white for each unit of asked-for error. With five
 /// times as much a white room of 10 000 faces is 1 % too dark, without a limit 14 %.
 const DIRECT_SHARE: f64 = 0.02;
+/// Shares of the error asked for that light at points and straight lines between the vertices of the output may take:
+/// squares add to 1. Half and half would ask a room whose rounds halve the error for a further round in one of four cases
+/// more.
+pub(crate) const LIGHT_SHARE: f64 = 0.8;
+pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 const DE_PER_PERCENT: f64 = 0.35;
 
@@ -460,7 +465,7 @@ impl Bake {
     pub fn verdict(&self) -> Option<Verdict> {
         let last = self.rounds.last()?;
         let estimate = |r: &Round| r.error.total_de2000.value;
-        let asked = self.settings.error;
+        let asked = LIGHT_SHARE * self.settings.error;
         let settled =
             |e: f64| self.rounds.len() >= LEAST_ROUNDS || (asked >= PREVIEW && EARLY * e <= asked);
         if estimate(last).is_some_and(|e| e <= asked && settled(e)) {

@@ -5,11 +5,13 @@
 //! something that is black from there, takes over what its nearest brighter neighbour in the open has: the teeth then lie
 //! below.
 
-use super::refined::{Refined, Sheet};
+use super::cells::Sheet;
 use crate::hierarchy::NONE;
 use crate::solve::Bake;
 use std::collections::BTreeMap;
 
+/// Nothing further above than this share of the room's half diagonal counts: light below a table is seen.
+const NEAR: f64 = 0.01;
 /// A vertex is dark if it has less than this share of a neighbour's light.
 const DARK: f64 = 0.5;
 
@@ -18,7 +20,6 @@ impl Bake {
     /// are to be like: (vertex, neighbour), ascending.
     pub(super) fn below(
         &self,
-        refined: &Refined,
         sheet: &Sheet,
         triangles: &[[u32; 3]],
         rows: &[Option<[f32; 64]>],
@@ -27,7 +28,7 @@ impl Bake {
             .iter()
             .map(|row| row.map(|row| self.lanes().tristimulus(&row)[1]))
             .collect();
-        let point = |v: u32| refined.points[sheet.vertices[v as usize].point as usize];
+        let point = |v: u32| self.place_of(&sheet.vertices[v as usize]);
         let mut reach = vec![0.0_f64; rows.len()];
         let mut brighter: BTreeMap<u32, Vec<(f64, u32)>> = BTreeMap::new();
         for t in triangles {
@@ -53,7 +54,7 @@ impl Bake {
         };
         let mut found = Vec::new();
         for (v, mut lit) in brighter {
-            let reach = reach[v as usize];
+            let reach = reach[v as usize].min(NEAR * self.mesh().half_size);
             if is_below(v, reach) {
                 lit.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                 let open = lit.iter().find(|&&(_, n)| !is_below(n, reach));

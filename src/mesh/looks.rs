@@ -1,0 +1,136 @@
+//! Looks at light: each place with its normal is gathered at once, whichever triangles ask for it.
+
+use crate::gather::point::{Gathered, Receiver};
+use crate::gather::{MOSTLY, Vertex};
+use crate::solve::{Bake, Care};
+use glam::DVec3;
+use std::collections::HashMap;
+
+/// Places closer than this share of the room's half diagonal are one.
+const SAME_PLACE: f64 = 1e-7;
+/// Normals that differ by less than this in each component are one.
+const SAME_NORMAL: f64 = 1e-4;
+/// Places gathered at a time, so that progress shows.
+const PART: usize = 16_384;
+
+/// What a place gets.
+#[derive(Debug)]
+pub(super) struct Seen {
+    /// Irradiance by lane.
+    pub(super) row: Box<[f32; 64]>,
+    /// Tristimulus irradiance.
+    pub(super) xyz: [f64; 3],
+    /// Where it comes from, if that is kept.
+    pub(super) trace: Option<Box<[u8]>>,
+}
+
+/// All looks so far.
+pub(super) struct Looks<'a> {
+    bake: &'a Bake,
+    care: Care,
+    /// Is the light of the leaves taken as it is?
+    pub(super) believing: bool,
+    spaces: Vec<(u32, bool)>,
+    /// Place, normal and space; is its leaf believed?
+    known: HashMap<([i64; 6], (u32, bool), bool), u32>,
+    places: Vec<(Receiver, bool)>,
+    /// None: something solid covers it.
+    seen: Vec<Option<Seen>>,
+    pub(super) rays: u64,
+}
+
+impl<'a> Looks<'a> {
+    pub(super) fn new(bake: &'a Bake, spaces: Vec<(u32, bool)>, care: Care) -> Self {
+        Self {
+            bake,
+            care,
+            believing: false,
+            spaces,
+            known: HashMap::new(),
+            places: Vec::new(),
+            seen: Vec::new(),
+            rays: 0,
+        }
+    }
+
+    /// Asks for a vertex; its number. It is looked at when [`Looks::complete`] is called.
+    pub(super) fn want(&mut self, vertex: &Vertex, surface: usize, back: bool) -> u32 {
+        let to = self.bake.receiver(vertex, surface, back);
+        let mesh = self.bake.mesh();
+        let place = self.bake.place_of(vertex) / (SAME_PLACE * mesh.half_size.max(f64::MIN_POSITIVE));
+        let round = |x: DVec3| x.to_array().map(|x| x.round() as i64);
+        let ([x, y, z], [i, j, k]) = (round(place), round(to.normal / SAME_NORMAL));
+        let space = self.spaces.get(vertex.entry as usize);
+        let (space, believing) = (space.copied().unwrap_or_default(), self.believing);
+        let (key, places) = (([x, y, z, i, j, k], space, believing), &mut self.places);
+        *self.known.entry(key).or_insert_with(|| {
+            places.push((to, believing));
+            places.len() as u32 - 1
+        })
+    }
+
+    fn seen_as(&self, row: [f32; 64], trace: Option<Box<[u8]>>) -> Seen {
+        Seen {
+            xyz: self.bake.lanes().tristimulus(&row),
+            row: Box::new(row),
+            trace,
+        }
+    }
+
+    /// What was seen.
+    pub(super) fn at(&self, look: u32) -> Option<&Seen> {
+        self.seen[look as usize].as_ref()
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Looks at all places asked for. `progress` is told (done, of) in places of this time.
+    pub(super) fn complete(&mut self, progress: &dyn Fn(usize, usize)) {
+        let first = self.seen.len();
+        let wanted = self.places.len() - first;
+        while self.seen.len() < self.places.len() {
+            let done = self.seen.len();
+            progress(done - first, wanted);
+            let part = &self.places[done..self.places.len().min(done + PART)];
+            let open = part.iter().filter(|(_, believed)| !believed);
+            let open: Vec<Receiver> = open.map(|(to, _)| *to).collect();
+            let gathered = self.bake.gather_with(&open, self.care);
+            let dark = |g: &Gathered| g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
+            let in_doubt = open.iter().zip(&gathered).filter(|(_, g)| dark(g));
+            let in_doubt: Vec<Receiver> = in_doubt.map(|(r, _)| *r).collect();
+            let mut covered = self.bake.covered(&in_doubt).into_iter();
+            let mut gathered = gathered.into_iter();
+            let part = done..done + part.len();
+            for k in part {
+                let (to, believed) = self.places[k];
+                let gathered = match believed {
+                    true => None,
+                    false => gathered.next(),
+                };
+                let seen = match gathered {
+                    None => self.told(&to),
+                    Some(gathered) => {
+                        self.rays += gathered.rays;
+                        let covered = dark(&gathered) && covered.next() == Some(true);
+                        let hidden = covered || gathered.backs > MOSTLY;
+                        (!hidden).then(|| self.seen_as(gathered.irradiance, gathered.packed))
+                    }
+                };
+                self.seen.push(seen);
+            }
+        }
+        progress(wanted, wanted);
+    }
+
+    /// The light of a leaf.
+    fn told(&self, to: &Receiver) -> Option<Seen> {
+        let light = self.bake.light();
+        let known = light.irradiance.row(light.leaves.binary_search(&to.leaf?).ok()?);
+        let mut row = [0.0; 64];
+        row[..known.len()].copy_from_slice(known);
+        Some(self.seen_as(row, None))
+    }
+}
