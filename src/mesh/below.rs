@@ -10,8 +10,6 @@ use crate::hierarchy::NONE;
 use crate::solve::Bake;
 use std::collections::BTreeMap;
 
-/// Nothing further above than this share of the room's half diagonal counts: light below a table is seen.
-const NEAR: f64 = 0.01;
 /// A vertex is dark if it has less than this share of a neighbour's light.
 const DARK: f64 = 0.5;
 
@@ -29,13 +27,11 @@ impl Bake {
             .map(|row| row.map(|row| self.lanes().tristimulus(&row)[1]))
             .collect();
         let point = |v: u32| self.place_of(&sheet.vertices[v as usize]);
-        let mut reach = vec![0.0_f64; rows.len()];
         let mut brighter: BTreeMap<u32, Vec<(f64, u32)>> = BTreeMap::new();
         for t in triangles {
             for (v, n) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                 let length = point(v).distance(point(n));
                 for (v, n) in [(v, n), (n, v)] {
-                    reach[v as usize] = reach[v as usize].max(length);
                     let pair = light[v as usize].zip(light[n as usize]);
                     if pair.is_some_and(|(v, n)| v < DARK * n) {
                         brighter.entry(v).or_default().push((length, n));
@@ -43,21 +39,20 @@ impl Bake {
                 }
             }
         }
-        let is_below = |v: u32, reach: f64| {
+        let is_below = |v: u32| {
             let vertex = &sheet.vertices[v as usize];
             let from = self.receiver(vertex, sheet.surface, sheet.back);
             let up = self.mesh().normal[vertex.triangle as usize];
             let up = if sheet.back { -up } else { up };
             let (from, up, plane) = (from.point.as_vec3(), up.as_vec3(), from.plane);
             let hit = self.rays().closest(from, up, f32::MAX, plane);
-            hit.is_some_and(|hit| f64::from(hit.t) < reach || self.tree().met(&hit) == NONE)
+            hit.is_some_and(|hit| self.tree().met(&hit) == NONE)
         };
         let mut found = Vec::new();
         for (v, mut lit) in brighter {
-            let reach = reach[v as usize].min(NEAR * self.mesh().half_size);
-            if is_below(v, reach) {
+            if is_below(v) {
                 lit.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                let open = lit.iter().find(|&&(_, n)| !is_below(n, reach));
+                let open = lit.iter().find(|&&(_, n)| !is_below(n));
                 found.extend(open.map(|&(_, n)| (v, n)));
             }
         }

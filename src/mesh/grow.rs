@@ -23,6 +23,8 @@ const SHRINK: f64 = 0.25;
 const BENDS: f64 = 0.5;
 /// Shares down to this part of the largest are dealt with at a time.
 const ALIKE: f64 = 1.0 / 16.0;
+/// Looks differ by chance: squares of differences up to this many times the variance of a look count for nothing.
+const BY_CHANCE: f64 = 2.0;
 /// Corners this far apart let expect this much of it between them, where nothing is known yet.
 const RANGE: f64 = 0.1;
 
@@ -37,6 +39,8 @@ pub(super) struct Growth<'a> {
     smallest: f64,
     /// Vertices at the most.
     pub(super) most: usize,
+    /// Variance of a look, by chance.
+    pub(super) noise: f64,
     /// Is light looked at, or is the solved light believed?
     looking: bool,
 }
@@ -67,6 +71,7 @@ impl<'a> Growth<'a> {
             white,
             smallest: SMALLEST * half_size,
             most: usize::MAX,
+            noise: 0.0,
             looking: true,
         }
     }
@@ -322,7 +327,9 @@ impl<'a> Growth<'a> {
         {
             let off = |look: u32, weights: [f64; 3]| {
                 let seen = self.looks.at(look);
-                seen.map_or(0.0, |seen| self.difference(mix(&light, weights), seen.xyz))
+                let off = seen.map_or(0.0, |seen| self.difference(mix(&light, weights), seen.xyz));
+                // What chance alone may do is no bend.
+                (off * off - BY_CHANCE * self.noise).max(0.0).sqrt()
             };
             let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
             let bent = [0, 1, 2].map(|e| off(middles[e], halves[e]));

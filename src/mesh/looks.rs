@@ -34,7 +34,7 @@ pub(super) struct Looks<'a> {
     /// Place, normal and space; is its leaf believed?
     known: HashMap<([i64; 6], (u32, bool), bool), u32>,
     places: Vec<(Receiver, bool)>,
-    /// None: something solid covers it.
+    /// None: something solid covers it, or lies right upon it.
     seen: Vec<Option<Seen>>,
     pub(super) rays: u64,
 }
@@ -77,6 +77,13 @@ impl<'a> Looks<'a> {
         }
     }
 
+    /// Asks for a vertex once more, with a pattern of rays of its own; the number of the look.
+    pub(super) fn again(&mut self, vertex: &Vertex, surface: usize, back: bool, seed: u64) -> u32 {
+        let to = self.bake.receiver(vertex, surface, back);
+        self.places.push((Receiver { seed, ..to }, self.believing));
+        self.places.len() as u32 - 1
+    }
+
     /// What was seen.
     pub(super) fn at(&self, look: u32) -> Option<&Seen> {
         self.seen[look as usize].as_ref()
@@ -96,21 +103,26 @@ impl<'a> Looks<'a> {
             progress(done - first, wanted);
             let part = &self.places[done..self.places.len().min(done + PART)];
             let open = part.iter().filter(|(_, believed)| !believed);
+            let all: Vec<Receiver> = open.map(|(to, _)| *to).collect();
+            let pressed = self.bake.pressed(&all);
+            let open = all.iter().zip(&pressed).filter(|(_, pressed)| !**pressed);
             let open: Vec<Receiver> = open.map(|(to, _)| *to).collect();
             let gathered = self.bake.gather_with(&open, self.care);
             let dark = |g: &Gathered| g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
             let in_doubt = open.iter().zip(&gathered).filter(|(_, g)| dark(g));
             let in_doubt: Vec<Receiver> = in_doubt.map(|(r, _)| *r).collect();
             let mut covered = self.bake.covered(&in_doubt).into_iter();
-            let mut gathered = gathered.into_iter();
+            let (mut gathered, mut pressed) = (gathered.into_iter(), pressed.into_iter());
             let part = done..done + part.len();
             for k in part {
                 let (to, believed) = self.places[k];
-                let gathered = match believed {
+                let is_pressed = !believed && pressed.next() == Some(true);
+                let gathered = match believed || is_pressed {
                     true => None,
                     false => gathered.next(),
                 };
                 let seen = match gathered {
+                    None if is_pressed => None,
                     None => self.told(&to),
                     Some(gathered) => {
                         self.rays += gathered.rays;

@@ -1,18 +1,25 @@
 //! The interpolation error of the output, measured: light between vertices beside light at fresh random points.
+//!
+//! Where points look by rays, a look errs by chance, which is no matter of interpolation: every point is looked at twice,
+//! with rays of its own each time. With s^2 the variance of a look, half the mean square of their difference, and weights w
+//! of the vertices, a look at a point differs from what is drawn there by `i^2 + s^2 (1 + sum of w^2)` in the mean square, at
+//! least, i the error of interpolation: the rays of vertices may have more in common than chance.
 
 use super::grow::{Growth, mix};
 use super::write::Settled;
 use crate::color::de2000;
 use crate::gather::Vertex;
-use crate::geometry::sampling::{Pcg, triangle_weights};
+use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
 use serde::Serialize;
 
 /// Points at the least and at the most, and as a share of the looks so far: the rms is then known to some per cent.
-const POINTS: [usize; 2] = [1024, 8192];
-const SHARE: usize = 8;
+const POINTS: [usize; 2] = [512, 4096];
+const SHARE: usize = 16;
 /// What was seen is learnt where its square is this many times what was expected.
 const SURPRISE: f64 = 4.0;
+/// A single point must differ by this many times the variance of a look to count.
+const CHANCE: f64 = 4.0;
 /// Distinguishes these random numbers from others.
 const SEED: u64 = 0x0067_0f11;
 
@@ -26,6 +33,8 @@ pub struct Interpolation {
     pub mean: f64,
     /// Value that 95 % of the points do not exceed.
     pub p95: f64,
+    /// Root of the mean variance of a look, which is not counted.
+    pub noise: f64,
     /// Points.
     pub points: usize,
     /// What the rms may be: its share of the error asked for.
@@ -36,12 +45,15 @@ pub struct Interpolation {
 
 impl Interpolation {
     pub(super) fn new(samples: &[Sample], allowed: f64, capped: bool) -> Self {
-        let mut off: Vec<f64> = samples.iter().map(|s| s.off).collect();
+        let mut off: Vec<f64> = samples.iter().map(|s| s.square.max(0.0).sqrt()).collect();
         off.sort_by(f64::total_cmp);
         let n = off.len().max(1) as f64;
         let rank = (0.95 * off.len() as f64) as usize;
+        let square = samples.iter().map(|s| s.square).sum::<f64>() / n;
+        let noise = samples.iter().map(|s| s.noise).sum::<f64>() / n;
         Self {
-            rms: (off.iter().map(|d| d * d).sum::<f64>() / n).sqrt(),
+            rms: square.max(0.0).sqrt(),
+            noise: noise.sqrt(),
             mean: off.iter().sum::<f64>() / n,
             p95: off.get(rank).copied().unwrap_or(0.0),
             points: off.len(),
@@ -60,8 +72,10 @@ impl Interpolation {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     cell: usize,
-    /// Colour difference.
-    off: f64,
+    /// Square of the colour difference that is of interpolation; below 0 by chance.
+    pub(super) square: f64,
+    /// Variance of a look.
+    pub(super) noise: f64,
 }
 
 impl Growth<'_> {
@@ -90,29 +104,42 @@ impl Growth<'_> {
             let weights = triangle_weights([rng.f64(), rng.f64()]);
             let of = &self.cells.all[cell];
             let sheet = &self.cells.sheets[of.sheet as usize];
+            let rng_seed = turn << 32 | k as u64;
             let vertex = Vertex {
                 triangle: of.of.0,
                 weights: of.at(weights),
                 entry: of.of.1,
             };
-            let look = self.looks.want(&vertex, sheet.surface, sheet.back);
-            asked.push((cell, weights, look));
+            let mut look = |turn: u64| {
+                let seed = hash(bake.settings().seed ^ SEED, 2 * rng_seed + turn);
+                self.looks.again(&vertex, sheet.surface, sheet.back, seed)
+            };
+            asked.push((cell, weights, [look(0), look(1)]));
         }
         self.looks.complete(progress);
         let white = bake.light().white;
-        let sample = |(cell, weights, look): (usize, [f64; 3], u32)| {
+        let difference = |a: [f64; 3], b: [f64; 3]| match a == b || white[1] <= 0.0 {
+            true => 0.0,
+            false => de2000(a, b, white),
+        };
+        let sample = |(cell, weights, looks): (usize, [f64; 3], [u32; 2])| {
             let of = &self.cells.all[cell];
-            let seen = self.looks.at(look)?.xyz;
+            let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| seen.xyz));
+            let (one, two) = (one?, two?);
             let light = of.corners.map(|c| {
                 let row = settled[of.sheet as usize].rows[c.vertex as usize];
                 row.map_or([0.0; 3], |row| bake.lanes().tristimulus(&row))
             });
             let drawn = mix(&light, weights);
-            let off = match drawn == seen || white[1] <= 0.0 {
-                true => 0.0,
-                false => de2000(drawn, seen, white),
-            };
-            Some(Sample { cell, off })
+            let noise = 0.5 * difference(one, two).powi(2);
+            let seen = 0.5 * (difference(drawn, one).powi(2) + difference(drawn, two).powi(2));
+            let of_vertices: f64 = weights.iter().map(|w| w * w).sum();
+            let square = seen - (1.0 + of_vertices) * noise;
+            Some(Sample {
+                cell,
+                square,
+                noise,
+            })
         };
         asked.into_iter().filter_map(sample).collect()
     }
@@ -121,10 +148,10 @@ impl Growth<'_> {
     pub(super) fn learn(&mut self, samples: &[Sample]) {
         for sample in samples {
             let doubt = &mut self.cells.all[sample.cell].doubt;
-            let square = sample.off * sample.off;
+            let square = sample.square - CHANCE * sample.noise;
             if square > SURPRISE * doubt.square {
                 doubt.square = square;
-                doubt.inside = sample.off as f32;
+                doubt.inside = square.sqrt() as f32;
                 doubt.tested = true;
             }
         }
@@ -134,5 +161,17 @@ impl Growth<'_> {
     pub(super) fn unfinished(&self, square: f64) -> usize {
         let small = |c: &&super::cells::Cell| c.doubt.square > square && self.is_smallest(c);
         self.cells.all.iter().filter(small).count()
+    }
+
+    pub(super) fn debug(&self, bake: &Bake, samples: &[Sample]) {
+        let mut some: Vec<&Sample> = samples.iter().collect();
+        some.sort_by(|a, b| b.square.total_cmp(&a.square));
+        for s in some.iter().take(12) {
+            let c = &self.cells.all[s.cell];
+            let sheet = &self.cells.sheets[c.sheet as usize];
+            let p = bake.place_of(&sheet.vertices[c.corners[0].vertex as usize]);
+            let n = bake.mesh().normal[c.of.0 as usize];
+            eprintln!("   off {:.1} noise {:.2} size {:.4} doubt {:.2} tested {} {} back {} at {:.2} n {:.2}", s.square.sqrt(), s.noise.sqrt(), self.cells.size(c), c.doubt.square.sqrt(), c.doubt.tested, bake.scene().surfaces[sheet.surface].name, sheet.back, p, n);
+        }
     }
 }

@@ -20,9 +20,12 @@ use grow::{End, Growth};
 use looks::Looks;
 
 /// Vertices at the most, about: half the triangles.
-const MOST_VERTICES: usize = 1_000_000;
+const MOST_VERTICES: usize = 300_000;
 /// The error is measured this often at the most.
 const MEASURED: u64 = 10;
+/// Growing ends where so many times the triangles leave more than this part of the error.
+const GROWN: f64 = 1.5;
+const STALLED: f64 = 0.93;
 /// After a measurement that was not met, growing aims at this part of what the measured error asks for.
 const BELOW: f64 = 0.8;
 /// And at no less than this part of what it aimed at before.
@@ -40,14 +43,30 @@ impl Bake {
         let allowed = INTERPOLATION_SHARE * self.settings().error;
         let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
         let mut aim = allowed * allowed * area;
-        let mut last = 0;
-        loop {
+        let settled = self.settled(&growth);
+        let samples = growth.measured(self, &settled, 0, progress);
+        let mut before = Interpolation::new(&samples, allowed, false);
+        growth.noise = before.noise * before.noise;
+        let mut size = growth.cells.all.len();
+        for turn in 1.. {
             let end = growth.grow(aim, progress);
             let settled = self.settled(&growth);
-            let samples = growth.measured(self, &settled, last, progress);
+            let samples = growth.measured(self, &settled, turn, progress);
             let interpolation = Interpolation::new(&samples, allowed, end == End::Most);
-            last += 1;
-            if interpolation.is_met() || end != End::Reached || last == MEASURED {
+            if std::env::var("HAARLIGHT_DEBUG").is_ok() {
+                let mut s: Vec<f64> = samples.iter().map(|s| s.square).collect();
+                s.sort_by(|a, b| b.total_cmp(a));
+                let all: f64 = s.iter().sum();
+                let top: f64 = s[..s.len() / 100].iter().sum();
+                eprintln!("DEBUG {end:?} cells {} looks {} aim {:.3} expected {:.3} {interpolation:?} top1% {:.2} max {:.1} covered {} of {}", growth.cells.all.len(), growth.looks.len(), (aim/area).sqrt(), (growth.sum()/area).sqrt(), top/all, s[0].sqrt(), growth.looks.len(), samples.len());
+                growth.debug(self, &samples);
+            }
+            let stalled = growth.cells.all.len() as f64 > GROWN * size as f64
+                && interpolation.rms > STALLED * before.rms;
+            if growth.cells.all.len() as f64 > GROWN * size as f64 {
+                (size, before) = (growth.cells.all.len(), interpolation);
+            }
+            if interpolation.is_met() || end != End::Reached || turn == MEASURED || (stalled && turn > 1) {
                 let capped = growth.unfinished(allowed * allowed);
                 let mut out = self.write_down(growth, settled);
                 out.capped = if interpolation.is_met() { 0 } else { capped };
@@ -58,6 +77,7 @@ impl Bake {
             aim = growth.sum().min(aim) * (BELOW / wrong).clamp(STEP, BELOW);
             growth.learn(&samples);
         }
+        unreachable!("ends after so many measurements")
     }
 
     /// The same for pictures on the way: as fine as the solved light tells, with few rays. Vertices of triangles of the input

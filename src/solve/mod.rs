@@ -41,7 +41,7 @@ use crate::color::{Observer, Upsampler};
 use crate::gather::Arrival;
 use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
-use crate::geometry::RayIndex;
+use crate::geometry::{NO_PLANE, RayIndex, Segment};
 use crate::hierarchy::{Mesh, Tree, cuts, spaces};
 use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance, is_small};
 use crate::scene::effects::{Kind, Plan};
@@ -165,6 +165,10 @@ pub(crate) const LIGHT_SHARE: f64 = 0.8;
 pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 const DE_PER_PERCENT: f64 = 0.35;
+
+/// A place with something right above it, within this share of the room's half diagonal, is not seen: a centimetre in a
+/// large room.
+const PRESSED: f64 = 2e-3;
 
 /// What a gather is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -979,6 +983,18 @@ impl Bake {
                 )
             })
             .collect()
+    }
+
+    /// Which receivers does something lie upon, so near that nobody sees them? See [`PRESSED`].
+    pub(crate) fn pressed(&self, receivers: &[Receiver]) -> Vec<bool> {
+        let height = PRESSED * self.mesh.half_size;
+        self.with_sight(|_, sight| {
+            let pressed = |to: &Receiver| {
+                let above = Segment::new(to.point, to.point + height * to.normal, [to.plane, NO_PLANE]);
+                sight.occlusion && sight.blocks_one(&above)
+            };
+            receivers.par_iter().map(pressed).collect()
+        })
     }
 
     /// Of each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.
