@@ -84,8 +84,10 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
             i.p95,
             match (i.is_met(), i.capped) {
                 (true, _) => String::new(),
-                (false, true) => format!(" (more than {:.3}: no more vertices allowed)", i.allowed),
-                (false, false) => format!(" (more than {:.3})", i.allowed),
+                (false, Some(most)) => {
+                    format!(" (more than {:.3}, with the {most} vertices allowed)", i.allowed)
+                }
+                (false, None) => format!(" (more than {:.3})", i.allowed),
             }
         ));
     }

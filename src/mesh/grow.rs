@@ -11,6 +11,7 @@ use crate::color::de2000;
 use crate::gather::Vertex;
 use crate::geometry::sampling::{hash, triangle_weights};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Not asked for yet.
 const UNKNOWN: u32 = u32::MAX;
@@ -25,8 +26,13 @@ const BENDS: f64 = 0.5;
 const ALIKE: f64 = 1.0 / 16.0;
 /// Looks differ by chance: squares of differences up to this many times the variance of a look count for nothing.
 const BY_CHANCE: f64 = 2.0;
+/// Where something covers the middle of an edge, this much of the difference of its ends counts.
+const COVERED: f64 = 0.25;
 /// Corners this far apart let expect this much of it between them, where nothing is known yet.
 const RANGE: f64 = 0.1;
+
+/// Sum of the light of neighbours of covered vertices, and how many there are.
+type Lent = HashMap<u32, ([f64; 3], f64)>;
 
 /// A mesh that grows.
 pub(super) struct Growth<'a> {
@@ -34,11 +40,15 @@ pub(super) struct Growth<'a> {
     pub(super) looks: Looks<'a>,
     /// Look of each vertex of each sheet.
     looked: Vec<Vec<u32>>,
+    /// What covered vertices of each sheet are lent.
+    lent: Vec<Lent>,
     white: [f64; 3],
     /// Edges no longer than this are not split.
     smallest: f64,
     /// Vertices at the most.
     pub(super) most: usize,
+    /// Mean square of the input's triangles until something is known of them: what the output may have.
+    pub(super) unknown: f64,
     /// Variance of a look, by chance.
     pub(super) noise: f64,
     /// Is light looked at, or is the solved light believed?
@@ -66,11 +76,13 @@ impl<'a> Growth<'a> {
     ) -> Self {
         Self {
             looked: vec![Vec::new(); cells.sheets.len()],
+            lent: vec![Lent::new(); cells.sheets.len()],
             cells,
             looks,
             white,
             smallest: SMALLEST * half_size,
             most: usize::MAX,
+            unknown: 0.0,
             noise: 0.0,
             looking: true,
         }
@@ -142,17 +154,38 @@ impl<'a> Growth<'a> {
         look.copied().filter(|&look| look != UNKNOWN)
     }
 
-    /// Light at the corners of a cell; a covered corner is lent that of the others, as in the output.
+    /// Light at the corners of a cell.
     fn light(&self, cell: usize) -> [[f64; 3]; 3] {
         let cell = &self.cells.all[cell];
-        let corners = cell.corners.map(|c| {
-            let look = self.look(cell.sheet as usize, c.vertex)?;
-            self.looks.at(look).map(|seen| seen.xyz)
-        });
-        let known: Vec<[f64; 3]> = corners.iter().flatten().copied().collect();
-        let n = known.len().max(1) as f64;
-        let mean = [0, 1, 2].map(|c| known.iter().map(|x| x[c]).sum::<f64>() / n);
-        corners.map(|x| x.unwrap_or(mean))
+        cell.corners.map(|c| {
+            let sheet = cell.sheet as usize;
+            let seen = self.seen(sheet, c.vertex);
+            let lent = || self.lent[sheet].get(&c.vertex).map(|(sum, n)| sum.map(|x| x / n));
+            seen.or_else(lent).unwrap_or_default()
+        })
+    }
+
+    fn seen(&self, sheet: usize, vertex: u32) -> Option<[f64; 3]> {
+        let look = self.look(sheet, vertex)?;
+        self.looks.at(look).map(|seen| seen.xyz)
+    }
+
+    /// Lends covered vertices the light of their neighbours, as is done in the output.
+    fn lend(&mut self) {
+        let mut lent = vec![Lent::new(); self.cells.sheets.len()];
+        for cell in &self.cells.all {
+            let sheet = cell.sheet as usize;
+            let light = cell.corners.map(|c| self.seen(sheet, c.vertex));
+            let covered = cell.corners.iter().zip(&light).filter(|(_, l)| l.is_none());
+            for (corner, _) in covered {
+                for x in light.iter().flatten() {
+                    let (sum, n) = lent[sheet].entry(corner.vertex).or_default();
+                    *sum = [0, 1, 2].map(|c| sum[c] + x[c]);
+                    *n += 1.0;
+                }
+            }
+        }
+        self.lent = lent;
     }
 
     /// Mean square of what the solved light differs by, its worst place and how much it differs there.
@@ -176,6 +209,7 @@ impl<'a> Growth<'a> {
     fn expect(&mut self, fresh: &[usize], first: bool, progress: &dyn Fn(usize, usize)) {
         self.want_corners(fresh);
         self.looks.complete(progress);
+        self.lend();
         let expected: Vec<f64> = fresh
             .par_iter()
             .map(|&k| {
@@ -185,7 +219,7 @@ impl<'a> Growth<'a> {
                 if first {
                     let range = (0..3).map(|k| self.difference(light[k], light[(k + 1) % 3]));
                     let range = RANGE * range.fold(0.0, f64::max);
-                    return told.max(range * range);
+                    return told.max(range * range).max(self.unknown);
                 }
                 square.max(told * f64::from(trust * trust))
             })
@@ -238,10 +272,16 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// About how many vertices are written: a third of the corners of triangles whose vertices have six each, at least
-    /// half the triangles.
-    fn used(&self) -> usize {
-        self.cells.all.len() / 2
+    /// How many vertices would be written.
+    pub(super) fn used(&self) -> usize {
+        let sheets = self.cells.sheets.iter();
+        let mut used: Vec<Vec<bool>> = sheets.map(|s| vec![false; s.vertices.len()]).collect();
+        for cell in &self.cells.all {
+            for corner in cell.corners {
+                used[cell.sheet as usize][corner.vertex as usize] = true;
+            }
+        }
+        used.iter().flatten().filter(|used| **used).count()
     }
 
     /// The cells with the largest shares that can be split, as many as make up the excess.
@@ -326,22 +366,29 @@ impl<'a> Growth<'a> {
             cells.iter().zip(told).zip(asked)
         {
             let off = |look: u32, weights: [f64; 3]| {
-                let seen = self.looks.at(look);
-                let off = seen.map_or(0.0, |seen| self.difference(mix(&light, weights), seen.xyz));
+                let seen = self.looks.at(look)?.xyz;
+                let off = self.difference(mix(&light, weights), seen);
                 // What chance alone may do is no bend.
-                (off * off - BY_CHANCE * self.noise).max(0.0).sqrt()
+                Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
             };
             let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
-            let bent = [0, 1, 2].map(|e| off(middles[e], halves[e]));
+            let bent = [0, 1, 2].map(|e| {
+                // The edge of something that stands here runs through.
+                let ends = || self.difference(light[e], light[(e + 1) % 3]);
+                off(middles[e], halves[e]).unwrap_or_else(|| COVERED * ends())
+            });
             let inside = off(inside, weights);
             let edges: f64 = bent.iter().map(|d| d * d).sum();
-            let (square, trust) = match worst {
-                Some((_, most)) => {
-                    let trust = (inside / most).min(1.0);
+            let before = f64::from(self.cells.all[k].doubt.trust);
+            let (square, trust) = match (worst, inside) {
+                (Some((_, most)), inside) => {
+                    let trust = inside.map_or(before, |inside| (inside / most).min(1.0));
                     ((0.25 * edges).max(trust * trust * told), trust)
                 }
-                None => (0.25 * (edges + inside * inside), 1.0),
+                (None, Some(inside)) => (0.25 * (edges + inside * inside), 1.0),
+                (None, None) => ((0.25 * edges).max(before * before * told), before),
             };
+            let inside = inside.unwrap_or(square.sqrt());
             self.cells.all[k].doubt = Doubt {
                 square,
                 tested: true,

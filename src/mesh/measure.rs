@@ -39,12 +39,12 @@ pub struct Interpolation {
     pub points: usize,
     /// What the rms may be: its share of the error asked for.
     pub allowed: f64,
-    /// Did the file get as many vertices as are allowed?
-    pub capped: bool,
+    /// Vertices that are allowed, if it got as many.
+    pub capped: Option<usize>,
 }
 
 impl Interpolation {
-    pub(super) fn new(samples: &[Sample], allowed: f64, capped: bool) -> Self {
+    pub(super) fn new(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Self {
         let mut off: Vec<f64> = samples.iter().map(|s| s.square.max(0.0).sqrt()).collect();
         off.sort_by(f64::total_cmp);
         let n = off.len().max(1) as f64;
@@ -171,6 +171,8 @@ impl Growth<'_> {
             let sheet = &self.cells.sheets[c.sheet as usize];
             let p = bake.place_of(&sheet.vertices[c.corners[0].vertex as usize]);
             let n = bake.mesh().normal[c.of.0 as usize];
+            let vals: Vec<i64> = c.corners.iter().map(|x| self.look(c.sheet as usize, x.vertex).map_or(-2, |l| self.looks.at(l).map_or(-1, |s| (s.xyz[1] / bake.light().white[1] * 1000.0) as i64))).collect();
+            eprint!("   corners {vals:?}");
             eprintln!("   off {:.1} noise {:.2} size {:.4} doubt {:.2} tested {} {} back {} at {:.2} n {:.2}", s.square.sqrt(), s.noise.sqrt(), self.cells.size(c), c.doubt.square.sqrt(), c.doubt.tested, bake.scene().surfaces[sheet.surface].name, sheet.back, p, n);
         }
     }

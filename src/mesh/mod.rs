@@ -19,8 +19,9 @@ use cells::Cells;
 use grow::{End, Growth};
 use looks::Looks;
 
-/// Vertices at the most, about: half the triangles.
-const MOST_VERTICES: usize = 300_000;
+/// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error.
+const MOST_VERTICES: f64 = 32_768.0;
+const AT: f64 = 0.5;
 /// The error is measured this often at the most.
 const MEASURED: u64 = 10;
 /// Growing ends where so many times the triangles leave more than this part of the error.
@@ -38,21 +39,24 @@ impl Bake {
     /// error asked for. `progress` is told (done, of) in looks of the present pass.
     pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
         let mut growth = self.growth(Care::Full);
-        growth.most = MOST_VERTICES;
-        growth.begin(progress);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
+        growth.unknown = allowed * allowed;
+        growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;
+        growth.begin(progress);
         let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
         let mut aim = allowed * allowed * area;
         let settled = self.settled(&growth);
         let samples = growth.measured(self, &settled, 0, progress);
-        let mut before = Interpolation::new(&samples, allowed, false);
+        let mut before = Interpolation::new(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
         let mut size = growth.cells.all.len();
-        for turn in 1.. {
+        let mut turn = 0;
+        loop {
+            turn += 1;
             let end = growth.grow(aim, progress);
             let settled = self.settled(&growth);
             let samples = growth.measured(self, &settled, turn, progress);
-            let interpolation = Interpolation::new(&samples, allowed, end == End::Most);
+            let interpolation = Interpolation::new(&samples, allowed, (end == End::Most).then_some(growth.most));
             if std::env::var("HAARLIGHT_DEBUG").is_ok() {
                 let mut s: Vec<f64> = samples.iter().map(|s| s.square).collect();
                 s.sort_by(|a, b| b.total_cmp(a));
@@ -77,7 +81,6 @@ impl Bake {
             aim = growth.sum().min(aim) * (BELOW / wrong).clamp(STEP, BELOW);
             growth.learn(&samples);
         }
-        unreachable!("ends after so many measurements")
     }
 
     /// The same for pictures on the way: as fine as the solved light tells, with few rays. Vertices of triangles of the input
