@@ -119,12 +119,7 @@ impl Report {
         Self::of(bake, reference, light.collect(), estimate)
     }
 
-    fn of(
-        bake: &Bake,
-        reference: &Reference,
-        light: Vec<[f64; 3]>,
-        estimate: Option<f64>,
-    ) -> Self {
+    fn of(bake: &Bake, reference: &Reference, light: Vec<[f64; 3]>, estimate: Option<f64>) -> Self {
         let white = bake.light().white;
         let seen: Vec<Seen> = light
             .into_iter()

@@ -48,7 +48,8 @@
 //! `exposure.scale` (display value for each lm/m2; metered in the first round and kept, so that pictures differ by their
 //! light alone).
 //!
-//! With `--audit N`, `{"record": "audit", ...}` ([`Report`](crate::audit::Report)):
+//! With `--audit N`, `{"record": "audit", ...}` ([`Report`](crate::audit::Report)), of light as a viewer draws it, interpolated
+//! between vertices:
 //!
 //! | field | unit | what |
 //! |---|---|---|
@@ -58,14 +59,13 @@
 //! | `relative` | 1 | error of illuminance without sign, the same |
 //! | `bias` | 1 | mean error of illuminance with sign, bake less truth: `value`, `low`, `high` |
 //! | `noise_de2000` | dE00 | mean standard error of the audit itself |
-//! | `estimate_de2000` | dE00 | what the last round estimated |
+//! | `estimate_de2000` | dE00 | what is estimated of the file: light of the last round, and between vertices |
 //! | `honesty` | | `honest`: estimate within 0.7 and 3 times `de2000.mean`, as far as its interval tells; `too_low`, `too_high`, `no_estimate` |
 //!
 //! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
 
 use crate::PROGRAM;
-use crate::gather::Baked;
-use crate::mesh::Interpolation;
+use crate::gather::{Baked, Interpolation};
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
@@ -236,9 +236,7 @@ pub struct VerdictRecord {
     pub triangles: usize,
     /// Vertices that something solid covers: they got their neighbours' light.
     pub covered: usize,
-    /// Vertices right below something that got the light of a neighbour in the open.
-    pub borrowed: usize,
-    /// Triangles that wanted quartering when the limits were met.
+    /// Triangles that wanted to be finer when the limits were met.
     pub capped: usize,
     /// Vertices whose COLOR_0 had to be clipped into [0, 1].
     pub clipped: usize,
@@ -310,7 +308,6 @@ impl VerdictRecord {
             vertices: end.glb.vertices,
             triangles: end.glb.triangles,
             covered: end.baked.covered,
-            borrowed: end.baked.borrowed,
             capped: end.baked.capped,
             clipped: end.glb.clipped,
             exposure: end.exposure,

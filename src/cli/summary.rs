@@ -85,7 +85,10 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
             match (i.is_met(), i.capped) {
                 (true, _) => String::new(),
                 (false, Some(most)) => {
-                    format!(" (more than {:.3}, with the {most} vertices allowed)", i.allowed)
+                    format!(
+                        " (more than {:.3}, with the {most} vertices allowed)",
+                        i.allowed
+                    )
                 }
                 (false, None) => format!(" (more than {:.3})", i.allowed),
             }

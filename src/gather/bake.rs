@@ -4,7 +4,6 @@ use super::point::{Gathered, Receiver};
 use super::relit::KeptVertex;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler};
-use crate::mesh::Interpolation;
 use crate::output::refined as refined_mesh;
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
@@ -28,8 +27,6 @@ pub struct Baked {
     pub(crate) kept: Vec<Vec<KeptVertex>>,
     /// Vertices that something solid covers: they got their neighbours' light.
     pub covered: usize,
-    /// Vertices right below something that got the light of a neighbour in the open.
-    pub borrowed: usize,
     /// Triangles that wanted to be finer when the limits were met.
     pub capped: usize,
     /// Triangle of [`Mesh`](crate::hierarchy::Mesh) that each triangle is part of; empty after relighting.
@@ -38,6 +35,33 @@ pub struct Baked {
     pub interpolation: Option<Interpolation>,
     /// Visibility rays cast.
     pub rays: u64,
+}
+
+/// How far light between the vertices of a file is from what looking there shows: colour differences (CIEDE2000 of a white
+/// surface's light under the adaptation white) at random points by area, those left out that something covers.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Interpolation {
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Value that 95 % of the points do not exceed.
+    pub p95: f64,
+    /// Root of the mean variance of a look, which is not counted.
+    pub noise: f64,
+    /// Points.
+    pub points: usize,
+    /// What the rms may be: its share of the error asked for.
+    pub allowed: f64,
+    /// Vertices that are allowed, if it got as many.
+    pub capped: Option<usize>,
+}
+
+impl Interpolation {
+    /// Is it as small as it has to be?
+    pub fn is_met(&self) -> bool {
+        self.rms <= self.allowed
+    }
 }
 
 /// A vertex on the mesh.

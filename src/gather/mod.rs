@@ -13,10 +13,10 @@ mod spectra;
 mod sweep;
 pub(crate) mod trace;
 
-pub use bake::{Baked, MOSTLY, Probed};
+pub use bake::{Baked, Interpolation, MOSTLY, Probed};
+pub(crate) use bake::{Vertex, lend};
 pub use descent::Descent;
 pub use nearby::Arrival;
-pub(crate) use bake::{Vertex, lend};
 pub(crate) use relit::{Kept, KeptVertex};
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.

@@ -6,12 +6,12 @@
 use super::skins::Skins;
 use crate::gather::Vertex;
 use crate::hierarchy::{Mesh, NONE, Tree};
-use crate::scene::Scene;
+use crate::scene::{Scene, Sides, Surface};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Edges shorter than this share of a triangle's longest are split only together with the longest. At 1/2 the garage
-/// takes a tenth more vertices for the same error, as strips do not stay strips; without a limit slivers turn up.
+/// Edges shorter than this share of a triangle's longest are split only together with the longest: strips may stay strips,
+/// needles may not turn up.
 const SLENDER: f64 = 0.25;
 
 /// A corner of a cell.
@@ -94,6 +94,27 @@ pub(super) struct Cells {
     points: Vec<DVec3>,
 }
 
+/// What the first cells are made from.
+struct Start<'a> {
+    mesh: &'a Mesh,
+    tree: &'a Tree,
+    spaces: &'a [(u32, bool)],
+    skins: Skins,
+    /// Edges by skin and ends.
+    edges: HashMap<(u32, u32, u32), u32>,
+}
+
+impl Start<'_> {
+    fn entry(&self, triangle: u32, back: bool) -> u32 {
+        self.tree.entry[triangle as usize][usize::from(back)]
+    }
+
+    fn space(&self, triangle: u32, back: bool) -> (u32, bool) {
+        let entry = self.entry(triangle, back);
+        self.spaces.get(entry as usize).copied().unwrap_or_default()
+    }
+}
+
 fn key(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
@@ -103,87 +124,93 @@ fn halfway(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 impl Cells {
-    /// Starts with the triangles of the mesh. Vertices are those of the input, not shared across planes where a surface
-    /// has no normals of its own. `spaces` holds the space of each entry and whether something covers it: none is shared by
-    /// faces of different spaces, and where a covered face meets a bare one it is the bare one's.
+    /// Starts with the triangles of the mesh. `spaces` holds the space of each entry and whether something covers it.
     pub(super) fn new(scene: &Scene, mesh: &Mesh, tree: &Tree, spaces: &[(u32, bool)]) -> Self {
-        let mut skins = Skins::new(scene, mesh);
+        let mut start = Start {
+            mesh,
+            tree,
+            spaces,
+            skins: Skins::new(scene, mesh),
+            edges: HashMap::new(),
+        };
         let mut cells = Self {
             sheets: Vec::new(),
             all: Vec::new(),
             edges: Vec::new(),
             points: mesh.positions.clone(),
         };
-        let mut edges: HashMap<(u32, u32, u32), u32> = HashMap::new();
         for (number, surface) in scene.surfaces.iter().enumerate() {
-            for back in [false, true] {
-                if back && scene.materials[surface.material].sides != crate::scene::Sides::Both {
-                    continue;
-                }
-                let mut sheet = Sheet {
-                    surface: number,
-                    back,
-                    ..Sheet::default()
-                };
-                let mut known: HashMap<(u64, u32, u32), u32> = HashMap::new();
-                let all = mesh.first_triangle[number]..mesh.first_triangle[number + 1];
-                let entry = |triangle: u32| tree.entry[triangle as usize][usize::from(back)];
-                let of = |t: u32| spaces.get(entry(t) as usize).copied().unwrap_or_default();
-                let (covered, bare): (Vec<u32>, Vec<u32>) = all.partition(|&t| of(t).1);
-                for triangle in bare.into_iter().chain(covered) {
-                    let (entry, (space, _)) = (entry(triangle), of(triangle));
-                    let local = mesh.origin[triangle as usize].1 as usize;
-                    let group = match surface.normals {
-                        Some(_) => u32::MAX,
-                        None => mesh.plane[triangle as usize],
-                    };
-                    let corner = |k: usize| {
-                        let point = mesh.triangles[triangle as usize][k];
-                        let mut weights = [0.0; 3];
-                        weights[k] = 1.0;
-                        let name = match mesh.input_corner(triangle as usize, k) {
-                            Some(corner) => u64::from(surface.triangles[local][corner]),
-                            // A point where triangles were cut belongs to its input triangle alone: attributes may jump.
-                            None => u64::from(local as u32 + 1) << 32 | u64::from(point),
-                        };
-                        let vertex = *known.entry((name, group, space)).or_insert_with(|| {
-                            sheet.vertices.push(Vertex {
-                                triangle,
-                                weights,
-                                entry,
-                            });
-                            sheet.vertices.len() as u32 - 1
-                        });
-                        Corner {
-                            point,
-                            vertex,
-                            weights,
-                        }
-                    };
-                    let mut corners = [0, 1, 2].map(corner);
-                    if back {
-                        corners.swap(1, 2);
-                    }
-                    let skin = skins.of(triangle, back);
-                    let edges = [0, 1, 2].map(|k| {
-                        let (a, b) = key(corners[k].point, corners[(k + 1) % 3].point);
-                        let known = edges.entry((skin, a, b));
-                        *known.or_insert_with(|| cells.edge(a, b))
-                    });
-                    cells.all.push(Cell {
-                        sheet: cells.sheets.len() as u32,
-                        of: (triangle, entry),
-                        corners,
-                        edges,
-                        area: mesh.area[triangle as usize],
-                        hints: (0, 0),
-                        doubt: Doubt::default(),
-                    });
-                }
-                cells.sheets.push(sheet);
+            cells.add(&mut start, number, surface, false);
+            if scene.materials[surface.material].sides == Sides::Both {
+                cells.add(&mut start, number, surface, true);
             }
         }
         cells
+    }
+
+    /// Adds a side of a surface. Vertices are those of the input, not shared across planes where a surface has no normals of
+    /// its own, nor by faces of different spaces; where a covered face meets a bare one it is the bare one's.
+    fn add(&mut self, start: &mut Start, number: usize, surface: &Surface, back: bool) {
+        let (mesh, number_of_sheet) = (start.mesh, self.sheets.len() as u32);
+        let mut sheet = Sheet {
+            surface: number,
+            back,
+            ..Sheet::default()
+        };
+        let mut known: HashMap<(u64, u32, u32), u32> = HashMap::new();
+        let all = mesh.first_triangle[number]..mesh.first_triangle[number + 1];
+        let (covered, bare): (Vec<u32>, Vec<u32>) = all.partition(|&t| start.space(t, back).1);
+        for triangle in bare.into_iter().chain(covered) {
+            let entry = start.entry(triangle, back);
+            let space = start.space(triangle, back).0;
+            let local = mesh.origin[triangle as usize].1 as usize;
+            let group = match surface.normals {
+                Some(_) => u32::MAX,
+                None => mesh.plane[triangle as usize],
+            };
+            let mut corners = [0, 1, 2].map(|k| {
+                let point = mesh.triangles[triangle as usize][k];
+                let mut weights = [0.0; 3];
+                weights[k] = 1.0;
+                let name = match mesh.input_corner(triangle as usize, k) {
+                    Some(corner) => u64::from(surface.triangles[local][corner]),
+                    // A point where triangles were cut belongs to its input triangle alone: attributes may jump.
+                    None => u64::from(local as u32 + 1) << 32 | u64::from(point),
+                };
+                let vertex = *known.entry((name, group, space)).or_insert_with(|| {
+                    sheet.vertices.push(Vertex {
+                        triangle,
+                        weights,
+                        entry,
+                    });
+                    sheet.vertices.len() as u32 - 1
+                });
+                Corner {
+                    point,
+                    vertex,
+                    weights,
+                }
+            });
+            if back {
+                corners.swap(1, 2);
+            }
+            let skin = start.skins.of(triangle, back);
+            let edges = [0, 1, 2].map(|k| {
+                let (a, b) = key(corners[k].point, corners[(k + 1) % 3].point);
+                let known = start.edges.entry((skin, a, b));
+                *known.or_insert_with(|| self.edge(a, b))
+            });
+            self.all.push(Cell {
+                sheet: number_of_sheet,
+                of: (triangle, entry),
+                corners,
+                edges,
+                area: mesh.area[triangle as usize],
+                hints: (0, 0),
+                doubt: Doubt::default(),
+            });
+        }
+        self.sheets.push(sheet);
     }
 
     fn edge(&mut self, a: u32, b: u32) -> u32 {

@@ -2,7 +2,6 @@
 
 use crate::gather::Baked;
 use crate::hierarchy::Face;
-use crate::output::refined::position;
 use crate::solve::{Bake, weights_of};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -12,7 +11,10 @@ impl Bake {
     pub fn drawn(&self, baked: &Baked, places: &[(Face, DVec3)]) -> Vec<Option<[f64; 3]>> {
         let mut wanted: HashMap<(u32, bool), Vec<usize>> = HashMap::new();
         for (k, (face, _)) in places.iter().enumerate() {
-            wanted.entry((face.triangle, face.back)).or_default().push(k);
+            wanted
+                .entry((face.triangle, face.back))
+                .or_default()
+                .push(k);
         }
         // How far outside a triangle each place is, and what it gets there.
         let mut best = vec![(f64::NEG_INFINITY, None); places.len()];
@@ -23,7 +25,11 @@ impl Bake {
                     continue;
                 };
                 let corners = triangle.map(|v| &part.vertices[v as usize]);
-                let [a, b, c] = corners.map(|v| position(surface, v));
+                let [a, b, c] = corners.map(|v| {
+                    let of = surface.triangles[v.triangle as usize];
+                    let of = of.map(|c| surface.positions[c as usize]);
+                    of[0] * v.weights[0] + of[1] * v.weights[1] + of[2] * v.weights[2]
+                });
                 if (b - a).cross(c - a).length_squared() <= 0.0 {
                     continue;
                 }

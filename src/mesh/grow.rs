@@ -31,6 +31,11 @@ const COVERED: f64 = 0.25;
 /// Corners this far apart let expect this much of it between them, where nothing is known yet.
 const RANGE: f64 = 0.1;
 
+/// Light at the corners of a cell, mean square of what the solved light differs by, and its worst place.
+type Told = ([[f64; 3]; 3], f64, Option<(Hint, f64)>);
+/// Looks in the middles of edges and inside, and weights of the corners there.
+type Asked = ([u32; 3], u32, [f64; 3]);
+
 /// Sum of the light of neighbours of covered vertices, and how many there are.
 type Lent = HashMap<u32, ([f64; 3], f64)>;
 
@@ -68,12 +73,7 @@ pub(super) enum End {
 
 impl<'a> Growth<'a> {
     /// Starts with cells.
-    pub(super) fn new(
-        cells: Cells,
-        looks: Looks<'a>,
-        white: [f64; 3],
-        half_size: f64,
-    ) -> Self {
+    pub(super) fn new(cells: Cells, looks: Looks<'a>, white: [f64; 3], half_size: f64) -> Self {
         Self {
             looked: vec![Vec::new(); cells.sheets.len()],
             lent: vec![Lent::new(); cells.sheets.len()],
@@ -160,7 +160,11 @@ impl<'a> Growth<'a> {
         cell.corners.map(|c| {
             let sheet = cell.sheet as usize;
             let seen = self.seen(sheet, c.vertex);
-            let lent = || self.lent[sheet].get(&c.vertex).map(|(sum, n)| sum.map(|x| x / n));
+            let lent = || {
+                self.lent[sheet]
+                    .get(&c.vertex)
+                    .map(|(sum, n)| sum.map(|x| x / n))
+            };
             seen.or_else(lent).unwrap_or_default()
         })
     }
@@ -362,40 +366,49 @@ impl<'a> Growth<'a> {
             asked.push((middles, inside, weights));
         }
         self.looks.complete(progress);
-        for ((&k, (light, told, worst)), (middles, inside, weights)) in
-            cells.iter().zip(told).zip(asked)
-        {
-            let off = |look: u32, weights: [f64; 3]| {
-                let seen = self.looks.at(look)?.xyz;
-                let off = self.difference(mix(&light, weights), seen);
-                // What chance alone may do is no bend.
-                Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
-            };
-            let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
-            let bent = [0, 1, 2].map(|e| {
-                // The edge of something that stands here runs through.
-                let ends = || self.difference(light[e], light[(e + 1) % 3]);
-                off(middles[e], halves[e]).unwrap_or_else(|| COVERED * ends())
-            });
-            let inside = off(inside, weights);
-            let edges: f64 = bent.iter().map(|d| d * d).sum();
-            let before = f64::from(self.cells.all[k].doubt.trust);
-            let (square, trust) = match (worst, inside) {
-                (Some((_, most)), inside) => {
-                    let trust = inside.map_or(before, |inside| (inside / most).min(1.0));
-                    ((0.25 * edges).max(trust * trust * told), trust)
-                }
-                (None, Some(inside)) => (0.25 * (edges + inside * inside), 1.0),
-                (None, None) => ((0.25 * edges).max(before * before * told), before),
-            };
-            let inside = inside.unwrap_or(square.sqrt());
-            self.cells.all[k].doubt = Doubt {
-                square,
-                tested: true,
-                bent: bent.map(|d| d as f32),
-                inside: inside as f32,
-                trust: trust as f32,
-            };
+        for ((&k, told), asked) in cells.iter().zip(told).zip(asked) {
+            self.cells.all[k].doubt = self.judged(k, told, asked);
+        }
+    }
+
+    /// What is known of a cell now: its light, what the solved light tells of it and where that is worst; looks in the middles
+    /// of edges, one inside, and where that is.
+    fn judged(
+        &self,
+        k: usize,
+        (light, told, worst): Told,
+        (middles, inside, weights): Asked,
+    ) -> Doubt {
+        let off = |look: u32, weights: [f64; 3]| {
+            let seen = self.looks.at(look)?.xyz;
+            let off = self.difference(mix(&light, weights), seen);
+            // What chance alone may do is no bend.
+            Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
+        };
+        let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+        let bent = [0, 1, 2].map(|e| {
+            // The edge of something that stands here runs through.
+            let ends = || self.difference(light[e], light[(e + 1) % 3]);
+            off(middles[e], halves[e]).unwrap_or_else(|| COVERED * ends())
+        });
+        let inside = off(inside, weights);
+        let edges: f64 = bent.iter().map(|d| d * d).sum();
+        let before = f64::from(self.cells.all[k].doubt.trust);
+        let (square, trust) = match (worst, inside) {
+            (Some((_, most)), inside) => {
+                let trust = inside.map_or(before, |inside| (inside / most).min(1.0));
+                ((0.25 * edges).max(trust * trust * told), trust)
+            }
+            (None, Some(inside)) => (0.25 * (edges + inside * inside), 1.0),
+            (None, None) => ((0.25 * edges).max(before * before * told), before),
+        };
+        let inside = inside.unwrap_or(square.sqrt());
+        Doubt {
+            square,
+            tested: true,
+            bent: bent.map(|d| d as f32),
+            inside: inside as f32,
+            trust: trust as f32,
         }
     }
 }

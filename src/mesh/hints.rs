@@ -32,13 +32,7 @@ pub(super) fn give(bake: &Bake, cells: &mut Cells) {
 }
 
 /// Leaves of a face: number, weights of the second and third corner of the triangle of the mesh at the middle, area.
-fn leaves(
-    tree: &Tree,
-    face: u32,
-    back: bool,
-    area: f64,
-    mut each: impl FnMut(u32, [f64; 2], f64),
-) {
+fn leaves(tree: &Tree, face: u32, back: bool, area: f64, mut each: impl FnMut(u32, [f64; 2], f64)) {
     let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0_f64]];
     let mut open = vec![(face, corners, area)];
     while let Some((id, [a, b, c], area)) = open.pop() {

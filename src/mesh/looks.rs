@@ -2,6 +2,7 @@
 
 use crate::gather::point::{Gathered, Receiver};
 use crate::gather::{MOSTLY, Vertex};
+use crate::hierarchy::NONE;
 use crate::solve::{Bake, Care};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -10,6 +11,8 @@ use std::collections::HashMap;
 const SAME_PLACE: f64 = 1e-7;
 /// Normals that differ by less than this in each component are one.
 const SAME_NORMAL: f64 = 1e-4;
+/// Darker than this share of the white, a place below a black back counts as inside of what that belongs to.
+const DIM: f64 = 0.05;
 /// Places gathered at a time, so that progress shows.
 const PART: usize = 16_384;
 
@@ -57,7 +60,8 @@ impl<'a> Looks<'a> {
     pub(super) fn want(&mut self, vertex: &Vertex, surface: usize, back: bool) -> u32 {
         let to = self.bake.receiver(vertex, surface, back);
         let mesh = self.bake.mesh();
-        let place = self.bake.place_of(vertex) / (SAME_PLACE * mesh.half_size.max(f64::MIN_POSITIVE));
+        let place =
+            self.bake.place_of(vertex) / (SAME_PLACE * mesh.half_size.max(f64::MIN_POSITIVE));
         let round = |x: DVec3| x.to_array().map(|x| x.round() as i64);
         let ([x, y, z], [i, j, k]) = (round(place), round(to.normal / SAME_NORMAL));
         let space = self.spaces.get(vertex.entry as usize);
@@ -128,7 +132,8 @@ impl<'a> Looks<'a> {
                         self.rays += gathered.rays;
                         let covered = dark(&gathered) && covered.next() == Some(true);
                         let hidden = covered || gathered.backs > MOSTLY;
-                        (!hidden).then(|| self.seen_as(gathered.irradiance, gathered.packed))
+                        let seen = self.seen_as(gathered.irradiance, gathered.packed);
+                        (!hidden && !self.is_inside(&to, &seen)).then_some(seen)
                     }
                 };
                 self.seen.push(seen);
@@ -137,10 +142,23 @@ impl<'a> Looks<'a> {
         progress(wanted, wanted);
     }
 
+    /// Does a place lie inside something that is black from there? Then it is dark, and a black back is above it.
+    fn is_inside(&self, to: &Receiver, seen: &Seen) -> bool {
+        let (rays, white) = (self.bake.rays(), self.bake.light().white);
+        if seen.xyz[1] >= DIM * white[1] {
+            return false;
+        }
+        let (from, up) = (to.point.as_vec3(), to.normal.as_vec3());
+        let hit = rays.closest(from, up, f32::MAX, to.plane);
+        hit.is_some_and(|hit| self.bake.tree().met(&hit) == NONE)
+    }
+
     /// The light of a leaf.
     fn told(&self, to: &Receiver) -> Option<Seen> {
         let light = self.bake.light();
-        let known = light.irradiance.row(light.leaves.binary_search(&to.leaf?).ok()?);
+        let known = light
+            .irradiance
+            .row(light.leaves.binary_search(&to.leaf?).ok()?);
         let mut row = [0.0; 64];
         row[..known.len()].copy_from_slice(known);
         Some(self.seen_as(row, None))

@@ -8,10 +8,9 @@
 use super::grow::{Growth, mix};
 use super::write::Settled;
 use crate::color::de2000;
-use crate::gather::Vertex;
+use crate::gather::{Interpolation, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
-use serde::Serialize;
 
 /// Points at the least and at the most, and as a share of the looks so far: the rms is then known to some per cent.
 const POINTS: [usize; 2] = [512, 4096];
@@ -23,48 +22,22 @@ const CHANCE: f64 = 4.0;
 /// Distinguishes these random numbers from others.
 const SEED: u64 = 0x0067_0f11;
 
-/// Interpolation error of a file: colour differences (CIEDE2000 of a white surface's light under the adaptation white) at
-/// random points by area, those left out that something solid covers.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Interpolation {
-    /// Root of the mean square.
-    pub rms: f64,
-    /// Mean.
-    pub mean: f64,
-    /// Value that 95 % of the points do not exceed.
-    pub p95: f64,
-    /// Root of the mean variance of a look, which is not counted.
-    pub noise: f64,
-    /// Points.
-    pub points: usize,
-    /// What the rms may be: its share of the error asked for.
-    pub allowed: f64,
-    /// Vertices that are allowed, if it got as many.
-    pub capped: Option<usize>,
-}
-
-impl Interpolation {
-    pub(super) fn new(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Self {
-        let mut off: Vec<f64> = samples.iter().map(|s| s.square.max(0.0).sqrt()).collect();
-        off.sort_by(f64::total_cmp);
-        let n = off.len().max(1) as f64;
-        let rank = (0.95 * off.len() as f64) as usize;
-        let square = samples.iter().map(|s| s.square).sum::<f64>() / n;
-        let noise = samples.iter().map(|s| s.noise).sum::<f64>() / n;
-        Self {
-            rms: square.max(0.0).sqrt(),
-            noise: noise.sqrt(),
-            mean: off.iter().sum::<f64>() / n,
-            p95: off.get(rank).copied().unwrap_or(0.0),
-            points: off.len(),
-            allowed,
-            capped,
-        }
-    }
-
-    /// Is it as small as it has to be?
-    pub fn is_met(&self) -> bool {
-        self.rms <= self.allowed
+/// What samples tell of a file.
+pub(super) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Interpolation {
+    let mut off: Vec<f64> = samples.iter().map(|s| s.square.max(0.0).sqrt()).collect();
+    off.sort_by(f64::total_cmp);
+    let n = off.len().max(1) as f64;
+    let rank = (0.95 * off.len() as f64) as usize;
+    let square = samples.iter().map(|s| s.square).sum::<f64>() / n;
+    let noise = samples.iter().map(|s| s.noise).sum::<f64>() / n;
+    Interpolation {
+        rms: square.max(0.0).sqrt(),
+        mean: off.iter().sum::<f64>() / n,
+        p95: off.get(rank).copied().unwrap_or(0.0),
+        noise: noise.sqrt(),
+        points: off.len(),
+        allowed,
+        capped,
     }
 }
 
@@ -73,9 +46,9 @@ impl Interpolation {
 pub(super) struct Sample {
     cell: usize,
     /// Square of the colour difference that is of interpolation; below 0 by chance.
-    pub(super) square: f64,
+    square: f64,
     /// Variance of a look.
-    pub(super) noise: f64,
+    noise: f64,
 }
 
 impl Growth<'_> {
@@ -161,19 +134,5 @@ impl Growth<'_> {
     pub(super) fn unfinished(&self, square: f64) -> usize {
         let small = |c: &&super::cells::Cell| c.doubt.square > square && self.is_smallest(c);
         self.cells.all.iter().filter(small).count()
-    }
-
-    pub(super) fn debug(&self, bake: &Bake, samples: &[Sample]) {
-        let mut some: Vec<&Sample> = samples.iter().collect();
-        some.sort_by(|a, b| b.square.total_cmp(&a.square));
-        for s in some.iter().take(12) {
-            let c = &self.cells.all[s.cell];
-            let sheet = &self.cells.sheets[c.sheet as usize];
-            let p = bake.place_of(&sheet.vertices[c.corners[0].vertex as usize]);
-            let n = bake.mesh().normal[c.of.0 as usize];
-            let vals: Vec<i64> = c.corners.iter().map(|x| self.look(c.sheet as usize, x.vertex).map_or(-2, |l| self.looks.at(l).map_or(-1, |s| (s.xyz[1] / bake.light().white[1] * 1000.0) as i64))).collect();
-            eprint!("   corners {vals:?}");
-            eprintln!("   off {:.1} noise {:.2} size {:.4} doubt {:.2} tested {} {} back {} at {:.2} n {:.2}", s.square.sqrt(), s.noise.sqrt(), self.cells.size(c), c.doubt.square.sqrt(), c.doubt.tested, bake.scene().surfaces[sheet.surface].name, sheet.back, p, n);
-        }
     }
 }

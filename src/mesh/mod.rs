@@ -1,7 +1,6 @@
 //! The mesh that is written: grown from the input's triangles, as fine as straight lines between vertices need it for the
 //! asked-for error, and measured.
 
-mod below;
 mod cells;
 mod drawn;
 mod grow;
@@ -11,13 +10,12 @@ mod measure;
 mod skins;
 mod write;
 
-pub use measure::Interpolation;
-
 use crate::gather::Baked;
 use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
 use cells::Cells;
 use grow::{End, Growth};
 use looks::Looks;
+use measure::summed;
 
 /// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error.
 const MOST_VERTICES: f64 = 32_768.0;
@@ -47,7 +45,7 @@ impl Bake {
         let mut aim = allowed * allowed * area;
         let settled = self.settled(&growth);
         let samples = growth.measured(self, &settled, 0, progress);
-        let mut before = Interpolation::new(&samples, allowed, None);
+        let mut before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
         let mut size = growth.cells.all.len();
         let mut turn = 0;
@@ -56,21 +54,15 @@ impl Bake {
             let end = growth.grow(aim, progress);
             let settled = self.settled(&growth);
             let samples = growth.measured(self, &settled, turn, progress);
-            let interpolation = Interpolation::new(&samples, allowed, (end == End::Most).then_some(growth.most));
-            if std::env::var("HAARLIGHT_DEBUG").is_ok() {
-                let mut s: Vec<f64> = samples.iter().map(|s| s.square).collect();
-                s.sort_by(|a, b| b.total_cmp(a));
-                let all: f64 = s.iter().sum();
-                let top: f64 = s[..s.len() / 100].iter().sum();
-                eprintln!("DEBUG {end:?} cells {} looks {} aim {:.3} expected {:.3} {interpolation:?} top1% {:.2} max {:.1} covered {} of {}", growth.cells.all.len(), growth.looks.len(), (aim/area).sqrt(), (growth.sum()/area).sqrt(), top/all, s[0].sqrt(), growth.looks.len(), samples.len());
-                growth.debug(self, &samples);
-            }
-            let stalled = growth.cells.all.len() as f64 > GROWN * size as f64
-                && interpolation.rms > STALLED * before.rms;
-            if growth.cells.all.len() as f64 > GROWN * size as f64 {
+            let interpolation =
+                summed(&samples, allowed, (end == End::Most).then_some(growth.most));
+            let has_grown = growth.cells.all.len() as f64 > GROWN * size as f64;
+            let stalled = turn > 1 && has_grown && interpolation.rms > STALLED * before.rms;
+            if has_grown {
                 (size, before) = (growth.cells.all.len(), interpolation);
             }
-            if interpolation.is_met() || end != End::Reached || turn == MEASURED || (stalled && turn > 1) {
+            let over = end != End::Reached || turn == MEASURED || stalled;
+            if interpolation.is_met() || over {
                 let capped = growth.unfinished(allowed * allowed);
                 let mut out = self.write_down(growth, settled);
                 out.capped = if interpolation.is_met() { 0 } else { capped };

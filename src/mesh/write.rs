@@ -1,5 +1,4 @@
-//! Light of the vertices that are written: covered ones are lent their neighbours', dark ones below something take over what
-//! lies in the open.
+//! The vertices that are written; covered ones are lent their neighbours' light.
 
 use super::grow::Growth;
 use crate::gather::{Baked, BakedSurface, KeptVertex, lend};
@@ -17,7 +16,6 @@ pub(super) struct Settled {
     pub(super) rows: Vec<Option<[f32; 64]>>,
     /// Look that it comes from.
     looks: Vec<u32>,
-    borrowed: usize,
     covered: usize,
 }
 
@@ -36,19 +34,12 @@ impl Bake {
                 look => growth.looks.at(look).map(|seen| *seen.row),
             };
             let mut rows: Vec<Option<[f32; 64]>> = looks.iter().map(row).collect();
-            let below = self.below(sheet, &triangles, &rows);
-            let borrowed = below.len();
-            for (v, like) in below {
-                let (v, like) = (v as usize, like as usize);
-                (rows[v], looks[v]) = (rows[like], looks[like]);
-            }
             let covered = lend(&mut rows, &triangles);
             Settled {
                 triangles,
                 of,
                 rows,
                 looks,
-                borrowed,
                 covered,
             }
         };
@@ -63,7 +54,6 @@ impl Bake {
             ..Baked::default()
         };
         for (sheet, settled) in growth.cells.sheets.iter().zip(settled) {
-            out.borrowed += settled.borrowed;
             out.covered += settled.covered;
             let mut place = vec![u32::MAX; sheet.vertices.len()];
             let mut surface = BakedSurface {

@@ -990,7 +990,11 @@ impl Bake {
         let height = PRESSED * self.mesh.half_size;
         self.with_sight(|_, sight| {
             let pressed = |to: &Receiver| {
-                let above = Segment::new(to.point, to.point + height * to.normal, [to.plane, NO_PLANE]);
+                let above = Segment::new(
+                    to.point,
+                    to.point + height * to.normal,
+                    [to.plane, NO_PLANE],
+                );
                 sight.occlusion && sight.blocks_one(&above)
             };
             receivers.par_iter().map(pressed).collect()
