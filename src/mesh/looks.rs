@@ -27,6 +27,9 @@ pub(super) struct Seen {
     pub(super) trace: Option<Box<[u8]>>,
 }
 
+/// Place and normal, rounded; space; is the light of its leaf taken as it is?
+type Key = ([i64; 6], (u32, bool), bool);
+
 /// All looks so far.
 pub(super) struct Looks<'a> {
     bake: &'a Bake,
@@ -34,8 +37,7 @@ pub(super) struct Looks<'a> {
     /// Is the light of the leaves taken as it is?
     pub(super) believing: bool,
     spaces: Vec<(u32, bool)>,
-    /// Place, normal and space; is its leaf believed?
-    known: HashMap<([i64; 6], (u32, bool), bool), u32>,
+    known: HashMap<Key, u32>,
     places: Vec<(Receiver, bool)>,
     /// None: something solid covers it, or lies right upon it.
     seen: Vec<Option<Seen>>,
