@@ -159,7 +159,7 @@ const GATHER_SHARE: f64 = 0.1;
 /// times as much a white room of 10 000 faces is 1 % too dark, without a limit 14 %.
 const DIRECT_SHARE: f64 = 0.02;
 /// Shares of the error asked for that light at points and straight lines between the vertices of the output may take:
-/// squares add to 1. Half and half would ask a room whose rounds halve the error for a further round in one of four cases
+/// squares add to 1. Half and half would ask a room whose rounds halve the error for a further round in one of six cases
 /// more.
 pub(crate) const LIGHT_SHARE: f64 = 0.8;
 pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
