@@ -16,8 +16,8 @@
 //! ```
 //!
 //! The chain: [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`solve`] -> [`gather`] ->
-//! [`output`] and [`report`], with [`audit`] beside it and [`cost`] behind; [`survey`] looks at a room before [`solve`].
-//! A module uses what stands to its left.
+//! [`mesh`] -> [`output`] and [`report`], with [`audit`] beside it and [`cost`] behind; [`survey`] looks at a room before
+//! [`solve`]. A module uses what stands to its left.
 //!
 //! | Rougeron and Peroche 1997 | module |
 //! |---|---|
@@ -37,6 +37,7 @@ pub mod gather;
 pub mod geometry;
 pub mod hierarchy;
 pub mod link;
+pub mod mesh;
 pub mod output;
 pub mod report;
 pub mod scene;

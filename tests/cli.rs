@@ -189,10 +189,12 @@ fn a_bake_writes_everything_that_was_asked_for_and_nothing_else() {
     let [low, high] = ["low", "high"].map(|k| audit["bias"][k].as_f64().unwrap());
     let mean = &audit["de2000"]["mean"];
     assert!(mean["low"].as_f64().unwrap() <= mean["high"].as_f64().unwrap());
+    assert_eq!(audit["estimate_de2000"], verdict["error_de2000"]["value"]);
     assert_eq!(
-        audit["estimate_de2000"],
+        verdict["light_de2000"]["value"],
         round["error"]["total_de2000"]["value"]
     );
+    assert_eq!(verdict["interpolation_de2000"]["kind"], "measured");
     assert!(["honest", "too_low", "too_high"].contains(&audit["honesty"].as_str().unwrap()));
     assert!(low < high && high < 0.3 && low > -0.3, "{audit}");
     assert_eq!(verdict["verdict"], "reached");

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use haarlight::color::de2000;
 use haarlight::gather::{Baked, BakedVertex, MOSTLY};
+use haarlight::geometry::{NO_PLANE, Segment};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Relighter, Relit, Representation, Settings};
 use haarlight::store::container;
@@ -94,7 +95,17 @@ fn difference(fresh: &Bake, relit: &Baked, step: usize) -> f64 {
             let [a, b, c] =
                 input.triangles[vertex.triangle as usize].map(|v| input.positions[v as usize]);
             let normal = (b - a).cross(c - a).normalize();
-            points.push((at(vertex, 2e-3), normal));
+            // Where something lies right upon it, a vertex takes its neighbours' light, whatever gets through the slit.
+            let (mesh, point) = (fresh.mesh(), at(vertex, 2e-3));
+            let from = point - mesh.centre;
+            let of = (surface.surface as u32, vertex.triangle);
+            let plane = mesh.origin.iter().position(|&o| o == of);
+            let plane = plane.map_or(NO_PLANE, |t| mesh.plane[t]);
+            let above = from + 2e-3 * mesh.half_size * normal;
+            if (fresh.rays()).occluded(&Segment::new(from, above, [plane, NO_PLANE])) {
+                continue;
+            }
+            points.push((point, normal));
             seen.push(vertex.irradiance.map(f64::from));
             areas.push(area);
         }

@@ -1,7 +1,7 @@
 //! The path tracer's answer at random points of a room, to which any number of bakes of that room can be held.
 //!
-//! Points lie on all faces, one in each of N strata of equal area; those that something solid covers are left out and
-//! counted. A pilot of few paths tells how many each point takes; it decides on numbers only, as using it in the answer
+//! Points lie on all faces, one in each of N strata of equal area; those that something solid covers or lies right upon are
+//! left out and counted. A pilot of few paths tells how many each point takes; it decides on numbers only, as using it in the answer
 //! would prefer lucky points. Figures are tristimulus irradiance, lm/m2; Y is lux.
 
 use super::path::{Answer, Audit, BATCHES};
@@ -146,8 +146,9 @@ fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
     }
     let receivers: Vec<Receiver> = all.iter().map(|place| receiver(bake, place, 0)).collect();
     let mut covered = bake.covered(&receivers).into_iter();
+    let mut pressed = bake.pressed(&receivers).into_iter();
     let before = all.len();
-    all.retain(|_| covered.next() != Some(true));
+    all.retain(|_| [covered.next(), pressed.next()] == [Some(false); 2]);
     let count = before - all.len();
     (all, count)
 }

@@ -6,6 +6,7 @@
 use super::reference::Reference;
 use super::spread::{Measured, Spread};
 use crate::color::de2000;
+use crate::gather::Baked;
 use crate::solve::Bake;
 use glam::DVec3;
 use serde::Serialize;
@@ -95,16 +96,36 @@ impl Report {
         Self::against(bake, &Reference::new(bake, points, most_paths, seed))
     }
 
-    /// Compares a bake with a reference of the same room.
+    /// Compares a bake with a reference of the same room: light gathered at the points.
     pub fn against(bake: &Bake, reference: &Reference) -> Self {
-        let white = bake.light().white;
         let gathered = bake.gather(&reference.receivers(bake));
-        let seen: Vec<Seen> = gathered
-            .iter()
+        let light = gathered.iter();
+        let light = light.map(|g| bake.lanes().tristimulus(&g.irradiance));
+        let last = bake.rounds().last();
+        let estimate = last.and_then(|r| r.error.total_de2000.value);
+        Self::of(bake, reference, light.collect(), estimate)
+    }
+
+    /// Compares a baked mesh with a reference of the same room: light as a viewer draws it, interpolated between vertices.
+    pub fn of_file(bake: &Bake, baked: &Baked, reference: &Reference) -> Self {
+        let points = reference.points.iter();
+        let places: Vec<_> = points.map(|p| (p.face, p.point)).collect();
+        let light = bake.drawn(baked, &places).into_iter();
+        let light = light.map(Option::unwrap_or_default);
+        let last = bake.rounds().last();
+        let estimate = last.and_then(|r| r.error.total_de2000.value);
+        let between = baked.interpolation.map_or(0.0, |i| i.rms);
+        let estimate = estimate.map(|e| e.hypot(between));
+        Self::of(bake, reference, light.collect(), estimate)
+    }
+
+    fn of(bake: &Bake, reference: &Reference, light: Vec<[f64; 3]>, estimate: Option<f64>) -> Self {
+        let white = bake.light().white;
+        let seen: Vec<Seen> = light
+            .into_iter()
             .enumerate()
-            .map(|(k, gathered)| {
+            .map(|(k, baked)| {
                 let (place, traced) = (&reference.points[k], reference.truth[k]);
-                let baked = bake.lanes().tristimulus(&gathered.irradiance);
                 let scale = traced[1].max(DARK * white[1]).max(f64::MIN_POSITIVE);
                 Seen {
                     point: place.point,
@@ -126,8 +147,6 @@ impl Report {
         let relative: Vec<[f64; 2]> = seen.iter().map(|s| s.relative).collect();
         let signed: Vec<f64> = relative.iter().map(|r| r[0]).collect();
         let de2000 = Spread::of(&colour);
-        let last = bake.rounds().last();
-        let estimate = last.and_then(|r| r.error.total_de2000.value);
         Self {
             record: "audit",
             points: seen.len(),

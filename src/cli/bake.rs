@@ -10,13 +10,13 @@ use super::snapshots::Snapshots;
 use super::stop::Stop;
 use super::talk::Talk;
 use super::{paths, summary};
-use crate::audit::Report;
+use crate::audit::{Reference, Report};
 use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
 use crate::output::{Exposure, baked_glb, file, npz};
 use crate::report::Log;
 use crate::scene::Scene;
-use crate::solve::{Bake, Representation, Settings};
+use crate::solve::{Bake, Representation, Settings, Verdict};
 use crate::survey::advise;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -166,6 +166,12 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let clock = Instant::now();
     let baked = bake.baked(&|done, of| talk.progress("gathering", done, of));
     seconds.gather = clock.elapsed().as_secs_f64();
+    // An error is reached when the file's is.
+    let met = baked.interpolation.is_none_or(|i| i.is_met());
+    let verdict = match verdict {
+        Verdict::Reached if !met => Verdict::Exhausted,
+        verdict => verdict,
+    };
 
     let clock = Instant::now();
     talk.phase("writing");
@@ -201,7 +207,9 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let clock = Instant::now();
     let audit = args.audit.map(|points| {
         talk.phase("auditing");
-        Report::new(&bake, points, AUDIT_PATHS, common.seed ^ AUDIT_SEED)
+        let seed = common.seed ^ AUDIT_SEED;
+        let reference = Reference::new(&bake, points, AUDIT_PATHS, seed);
+        Report::of_file(&bake, &baked, &reference)
     });
     if let Some(audit) = &audit {
         write(&mut log, audit)?;

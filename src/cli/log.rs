@@ -50,7 +50,8 @@
 //! `exposure.scale` (display value for each lm/m2; metered in the first round and kept, so that pictures differ by their
 //! light alone).
 //!
-//! With `--audit N`, `{"record": "audit", ...}` ([`Report`](crate::audit::Report)):
+//! With `--audit N`, `{"record": "audit", ...}` ([`Report`](crate::audit::Report)), of light as a viewer draws it, interpolated
+//! between vertices:
 //!
 //! | field | unit | what |
 //! |---|---|---|
@@ -60,13 +61,13 @@
 //! | `relative` | 1 | error of illuminance without sign, the same |
 //! | `bias` | 1 | mean error of illuminance with sign, bake less truth: `value`, `low`, `high` |
 //! | `noise_de2000` | dE00 | mean standard error of the audit itself |
-//! | `estimate_de2000` | dE00 | what the last round estimated |
+//! | `estimate_de2000` | dE00 | what is estimated of the file: light of the last round, and between vertices |
 //! | `honesty` | | `honest`: estimate within 0.7 and 3 times `de2000.mean`, as far as its interval tells; `too_low`, `too_high`, `no_estimate` |
 //!
 //! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
 
 use crate::PROGRAM;
-use crate::gather::Baked;
+use crate::gather::{Baked, Interpolation};
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
@@ -221,8 +222,14 @@ pub struct VerdictRecord {
     pub rounds: usize,
     /// Mean CIEDE2000 asked for.
     pub asked_de2000: f64,
-    /// Total of the last round, CIEDE2000.
+    /// Error of the file, CIEDE2000: light at points and straight lines between vertices, whose squares add.
     pub error_de2000: Figure,
+    /// Of which light at points: total of the last round.
+    pub light_de2000: Figure,
+    /// Of which straight lines between vertices: rms, measured.
+    pub interpolation_de2000: Figure,
+    /// How that was measured, and what it may be.
+    pub interpolation: Option<Interpolation>,
     /// Files.
     pub outputs: Outputs,
     /// Vertices written.
@@ -231,9 +238,7 @@ pub struct VerdictRecord {
     pub triangles: usize,
     /// Vertices that something solid covers: they got their neighbours' light.
     pub covered: usize,
-    /// Vertices right below something that got the light of a neighbour in the open.
-    pub borrowed: usize,
-    /// Triangles that wanted quartering when the limits were met.
+    /// Triangles that wanted to be finer when the limits were met.
     pub capped: usize,
     /// Vertices whose COLOR_0 had to be clipped into [0, 1].
     pub clipped: usize,
@@ -291,12 +296,20 @@ impl VerdictRecord {
             exit_code: exit_code(end.verdict),
             rounds: rounds.len(),
             asked_de2000: end.bake.settings().error,
-            error_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
+            error_de2000: Figure {
+                value: file_error(end.bake, end.baked),
+                kind: Kind::Estimate,
+            },
+            light_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
+            interpolation_de2000: Figure {
+                value: end.baked.interpolation.map(|i| i.rms),
+                kind: Kind::Measured,
+            },
+            interpolation: end.baked.interpolation,
             outputs: end.outputs,
             vertices: end.glb.vertices,
             triangles: end.glb.triangles,
             covered: end.baked.covered,
-            borrowed: end.baked.borrowed,
             capped: end.baked.capped,
             clipped: end.glb.clipped,
             exposure: end.exposure,
@@ -309,6 +322,12 @@ impl VerdictRecord {
             warning_count: end.warned,
         }
     }
+}
+
+/// Estimated error of a file: of light at points as the last round estimates it, and between them as measured.
+pub(super) fn file_error(bake: &Bake, baked: &Baked) -> Option<f64> {
+    let light = bake.rounds().last()?.error.total_de2000.value?;
+    Some(light.hypot(baked.interpolation.map_or(0.0, |i| i.rms)))
 }
 
 /// 0 if the error was reached, 1 if the bake stopped before.

@@ -57,7 +57,7 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
     };
     let mut lines = vec![
         format!(
-            "estimated error: dE00 {error}, asked for {}: {end}",
+            "estimated error of the file: dE00 {error}, asked for {}: {end}",
             v.asked_de2000
         ),
         format!(
@@ -76,6 +76,24 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
             v.seconds.write
         ),
     ];
+    if let Some(i) = &v.interpolation {
+        lines.push(format!(
+            "of which between vertices, measured at {} points: rms {:.3}, 95 % below {:.2}{}",
+            i.points,
+            i.rms,
+            i.p95,
+            match (i.is_met(), i.capped) {
+                (true, _) => String::new(),
+                (false, Some(most)) => {
+                    format!(
+                        " (more than {:.3}, with the {most} vertices allowed)",
+                        i.allowed
+                    )
+                }
+                (false, None) => format!(" (more than {:.3})", i.allowed),
+            }
+        ));
+    }
     if v.capped > 0 {
         lines.push(format!(
             "{} triangles wanted to be finer than is allowed",

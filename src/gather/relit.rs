@@ -1,10 +1,9 @@
 //! The output mesh kept with where its light comes from, and its light under other lamps and paints:
 //! one sparse product, no ray.
 
-use super::bake::{Baked, lend};
-use super::refined::Vertex;
+use super::bake::{Baked, Vertex, lend};
 use super::{BakedSurface, trace};
-use crate::hierarchy::{Mesh, NONE};
+use crate::hierarchy::Mesh;
 use crate::solve::{Bake, padded};
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Packs};
@@ -113,7 +112,6 @@ impl Bake {
                     .zip(&rows)
                     .map(|(&(triangle, weights), row)| {
                         let vertex = Vertex {
-                            point: NONE,
                             triangle,
                             weights,
                             entry: self.tree().entry[triangle as usize][usize::from(kept.back)],

@@ -43,7 +43,7 @@ use crate::color::{Observer, Upsampler};
 use crate::gather::Arrival;
 use crate::gather::hemisphere::Hemisphere;
 use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
-use crate::geometry::RayIndex;
+use crate::geometry::{NO_PLANE, RayIndex, Segment};
 use crate::hierarchy::{Mesh, Tree, cuts, spaces};
 use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance, is_small};
 use crate::scene::effects::{Kind, Plan};
@@ -157,8 +157,17 @@ const SOLVE_SHARE: f64 = 0.002;
 const SPECTRUM_SHARE: f64 = 0.2;
 /// What one patch may misplace in a gather, share of the asked-for error.
 const GATHER_SHARE: f64 = 0.1;
+/// Shares of the error asked for that light at points and straight lines between the vertices of the output may take:
+/// squares add to 1. Half and half would ask a room whose rounds halve the error for a further round in one of six cases
+/// more.
+pub(crate) const LIGHT_SHARE: f64 = 0.8;
+pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 const DE_PER_PERCENT: f64 = 0.35;
+
+/// A place with something right above it, within this share of the room's half diagonal, is not seen: a centimetre in a
+/// large room.
+const PRESSED: f64 = 2e-3;
 
 /// What a gather is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -447,7 +456,7 @@ impl Bake {
     pub fn verdict(&self) -> Option<Verdict> {
         let last = self.rounds.last()?;
         let estimate = |r: &Round| r.error.total_de2000.value;
-        let asked = self.settings.error;
+        let asked = LIGHT_SHARE * self.settings.error;
         let settled =
             |e: f64| self.rounds.len() >= LEAST_ROUNDS || (asked >= PREVIEW && EARLY * e <= asked);
         if estimate(last).is_some_and(|e| e <= asked && settled(e)) {
@@ -924,6 +933,22 @@ impl Bake {
                 )
             })
             .collect()
+    }
+
+    /// Which receivers does something lie upon, so near that nobody sees them? See [`PRESSED`].
+    pub(crate) fn pressed(&self, receivers: &[Receiver]) -> Vec<bool> {
+        let height = PRESSED * self.mesh.half_size;
+        self.with_sight(|_, sight| {
+            let pressed = |to: &Receiver| {
+                let above = Segment::new(
+                    to.point,
+                    to.point + height * to.normal,
+                    [to.plane, NO_PLANE],
+                );
+                sight.occlusion && sight.blocks_one(&above)
+            };
+            receivers.par_iter().map(pressed).collect()
+        })
     }
 
     /// Of each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.

@@ -225,7 +225,7 @@ impl Round {
             .chain([(seconds, error)])
             .collect();
         let times: Vec<f64> = curve.iter().map(|c| c.0).collect();
-        let ahead = forecast(&curve, bake.settings.error);
+        let ahead = forecast(&curve, super::LIGHT_SHARE * bake.settings.error);
         let per = |bytes: usize, count: usize| bytes as f64 / count.max(1) as f64;
         let of_links = m.link_bytes
             + size_of_val(bake.graph.links.as_slice())

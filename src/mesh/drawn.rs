@@ -1,0 +1,51 @@
+//! Light as a viewer draws it: interpolated between the vertices of the file.
+
+use crate::gather::Baked;
+use crate::hierarchy::Face;
+use crate::solve::{Bake, weights_of};
+use glam::DVec3;
+use std::collections::HashMap;
+
+impl Bake {
+    /// Tristimulus irradiance that a baked mesh shows at points of faces, world space; none where there is no triangle.
+    pub fn drawn(&self, baked: &Baked, places: &[(Face, DVec3)]) -> Vec<Option<[f64; 3]>> {
+        let mut wanted: HashMap<(u32, bool), Vec<usize>> = HashMap::new();
+        for (k, (face, _)) in places.iter().enumerate() {
+            wanted
+                .entry((face.triangle, face.back))
+                .or_default()
+                .push(k);
+        }
+        // How far outside a triangle each place is, and what it gets there.
+        let mut best = vec![(f64::NEG_INFINITY, None); places.len()];
+        for (part, of) in baked.surfaces.iter().zip(&baked.of) {
+            let surface = &self.scene().surfaces[part.surface];
+            for (triangle, of) in part.triangles.iter().zip(of) {
+                let Some(here) = wanted.get(&(*of, part.back)) else {
+                    continue;
+                };
+                let corners = triangle.map(|v| &part.vertices[v as usize]);
+                let [a, b, c] = corners.map(|v| {
+                    let of = surface.triangles[v.triangle as usize];
+                    let of = of.map(|c| surface.positions[c as usize]);
+                    of[0] * v.weights[0] + of[1] * v.weights[1] + of[2] * v.weights[2]
+                });
+                if (b - a).cross(c - a).length_squared() <= 0.0 {
+                    continue;
+                }
+                for &k in here {
+                    let w = weights_of(places[k].1, a, b, c);
+                    let least = w.into_iter().fold(f64::INFINITY, f64::min);
+                    if least > best[k].0 {
+                        let mix = |i: usize| {
+                            let at = |j: usize| w[j] * f64::from(corners[j].irradiance[i]);
+                            at(0) + at(1) + at(2)
+                        };
+                        best[k] = (least, Some([mix(0), mix(1), mix(2)]));
+                    }
+                }
+            }
+        }
+        best.into_iter().map(|(_, light)| light).collect()
+    }
+}

@@ -1,0 +1,419 @@
+//! The mesh grows where straight lines between its vertices are not what looking there shows.
+//!
+//! Every triangle has a mean square of the colour difference between both, times its area its share of the error: first as
+//! the solved light lets it expect, then as seen in the middles of its edges and at one point inside. The largest shares are
+//! looked at or, where that is done, split at the edges that bend; so shares become alike, which takes the fewest
+//! vertices for a sum.
+
+use super::cells::{Cell, Cells, Doubt, Hint, within};
+use super::looks::Looks;
+use crate::color::de2000;
+use crate::gather::Vertex;
+use crate::geometry::sampling::{hash, triangle_weights};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Not asked for yet.
+const UNKNOWN: u32 = u32::MAX;
+/// Triangles are split until their longest edge is this share of the room's half diagonal.
+const SMALLEST: f64 = 1e-3;
+/// What remains of the mean square after a bisection: two halve a smooth triangle's size, and its error falls with the
+/// square of that.
+const SHRINK: f64 = 0.25;
+/// Edges that bend by this share of what the worst does are split with it.
+const BENDS: f64 = 0.5;
+/// Shares down to this part of the largest are dealt with at a time.
+const ALIKE: f64 = 1.0 / 16.0;
+/// Looks differ by chance: squares of differences up to this many times the variance of a look count for nothing.
+const BY_CHANCE: f64 = 2.0;
+/// Where something covers the middle of an edge, this much of the difference of its ends counts.
+const COVERED: f64 = 0.25;
+/// Corners this far apart let expect this much of it between them, where nothing is known yet.
+const RANGE: f64 = 0.1;
+
+/// Light at the corners of a cell, mean square of what the solved light differs by, and its worst place.
+type Told = ([[f64; 3]; 3], f64, Option<(Hint, f64)>);
+/// Looks in the middles of edges and inside, and weights of the corners there.
+type Asked = ([u32; 3], u32, [f64; 3]);
+
+/// Sum of the light of neighbours of covered vertices, and how many there are.
+type Lent = HashMap<u32, ([f64; 3], f64)>;
+
+/// A mesh that grows.
+pub(super) struct Growth<'a> {
+    pub(super) cells: Cells,
+    pub(super) looks: Looks<'a>,
+    /// Look of each vertex of each sheet.
+    looked: Vec<Vec<u32>>,
+    /// What covered vertices of each sheet are lent.
+    lent: Vec<Lent>,
+    white: [f64; 3],
+    /// Edges no longer than this are not split.
+    smallest: f64,
+    /// Vertices at the most.
+    pub(super) most: usize,
+    /// Mean square of the input's triangles until something is known of them: what the output may have.
+    pub(super) unknown: f64,
+    /// Variance of a look, by chance.
+    pub(super) noise: f64,
+    /// Is light looked at, or is the solved light believed?
+    looking: bool,
+}
+
+/// How growing ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    /// The expected error is within the goal.
+    Reached,
+    /// What is left is too small to be split.
+    Smallest,
+    /// There are as many vertices as are allowed.
+    Most,
+}
+
+impl<'a> Growth<'a> {
+    /// Starts with cells.
+    pub(super) fn new(cells: Cells, looks: Looks<'a>, white: [f64; 3], half_size: f64) -> Self {
+        Self {
+            looked: vec![Vec::new(); cells.sheets.len()],
+            lent: vec![Lent::new(); cells.sheets.len()],
+            cells,
+            looks,
+            white,
+            smallest: SMALLEST * half_size,
+            most: usize::MAX,
+            unknown: 0.0,
+            noise: 0.0,
+            looking: true,
+        }
+    }
+
+    fn difference(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
+        // No light anywhere, or none left: no difference.
+        if a == b || self.white[1] <= 0.0 {
+            return 0.0;
+        }
+        de2000(a, b, self.white)
+    }
+
+    /// Asks for the vertices of some cells.
+    fn want_corners(&mut self, cells: &[usize]) {
+        for &k in cells {
+            let cell = &self.cells.all[k];
+            let (sheet, vertices) = (cell.sheet as usize, cell.corners.map(|c| c.vertex));
+            for vertex in vertices {
+                self.want(sheet, vertex);
+            }
+        }
+    }
+
+    fn want(&mut self, sheet: usize, vertex: u32) -> u32 {
+        let looked = &mut self.looked[sheet];
+        let sheet = &self.cells.sheets[sheet];
+        looked.resize(sheet.vertices.len(), UNKNOWN);
+        let look = &mut looked[vertex as usize];
+        if *look == UNKNOWN {
+            let vertex = &sheet.vertices[vertex as usize];
+            *look = self.looks.want(vertex, sheet.surface, sheet.back);
+        }
+        *look
+    }
+
+    /// Believes the solved light from now on, or looks.
+    pub(super) fn believe(&mut self, believing: bool) {
+        self.looking = !believing;
+        self.looks.believing = believing;
+    }
+
+    /// Looks again at the vertices of triangles that lie on some of the mesh's.
+    pub(super) fn look_again(
+        &mut self,
+        wanted: impl Fn(u32) -> bool,
+        progress: &dyn Fn(usize, usize),
+    ) {
+        let all = 0..self.cells.all.len();
+        let some: Vec<usize> = all.filter(|&k| wanted(self.cells.all[k].of.0)).collect();
+        for &k in &some {
+            let cell = &self.cells.all[k];
+            for corner in cell.corners {
+                self.looked[cell.sheet as usize][corner.vertex as usize] = UNKNOWN;
+            }
+        }
+        self.want_corners(&some);
+        self.looks.complete(progress);
+    }
+
+    /// Is a cell too small to be split?
+    pub(super) fn is_smallest(&self, cell: &Cell) -> bool {
+        self.cells.size(cell) <= self.smallest
+    }
+
+    /// Look of a vertex, if it was asked for.
+    pub(super) fn look(&self, sheet: usize, vertex: u32) -> Option<u32> {
+        let look = self.looked[sheet].get(vertex as usize);
+        look.copied().filter(|&look| look != UNKNOWN)
+    }
+
+    /// Light at the corners of a cell.
+    fn light(&self, cell: usize) -> [[f64; 3]; 3] {
+        let cell = &self.cells.all[cell];
+        cell.corners.map(|c| {
+            let sheet = cell.sheet as usize;
+            let seen = self.seen(sheet, c.vertex);
+            let lent = || {
+                self.lent[sheet]
+                    .get(&c.vertex)
+                    .map(|(sum, n)| sum.map(|x| x / n))
+            };
+            seen.or_else(lent).unwrap_or_default()
+        })
+    }
+
+    fn seen(&self, sheet: usize, vertex: u32) -> Option<[f64; 3]> {
+        let look = self.look(sheet, vertex)?;
+        self.looks.at(look).map(|seen| seen.xyz)
+    }
+
+    /// Lends covered vertices the light of their neighbours, as is done in the output.
+    fn lend(&mut self) {
+        let mut lent = vec![Lent::new(); self.cells.sheets.len()];
+        for cell in &self.cells.all {
+            let sheet = cell.sheet as usize;
+            let light = cell.corners.map(|c| self.seen(sheet, c.vertex));
+            let covered = cell.corners.iter().zip(&light).filter(|(_, l)| l.is_none());
+            for (corner, _) in covered {
+                for x in light.iter().flatten() {
+                    let (sum, n) = lent[sheet].entry(corner.vertex).or_default();
+                    *sum = [0, 1, 2].map(|c| sum[c] + x[c]);
+                    *n += 1.0;
+                }
+            }
+        }
+        self.lent = lent;
+    }
+
+    /// Mean square of what the solved light differs by, its worst place and how much it differs there.
+    fn told(&self, cell: usize, light: &[[f64; 3]; 3]) -> (f64, Option<(Hint, f64)>) {
+        let cell = &self.cells.all[cell];
+        let sheet = &self.cells.sheets[cell.sheet as usize];
+        let hints = &sheet.hints[cell.hints.0 as usize..cell.hints.1 as usize];
+        let (mut sum, mut area, mut worst) = (0.0, 0.0, None::<(Hint, f64)>);
+        for hint in hints {
+            let d = self.difference(mix(light, within(&cell.corners, hint.at)), hint.light);
+            sum += hint.area * d * d;
+            area += hint.area;
+            if worst.is_none_or(|(_, most)| d > most) {
+                worst = Some((*hint, d));
+            }
+        }
+        (if area > 0.0 { sum / area } else { 0.0 }, worst)
+    }
+
+    /// Looks at the corners of new cells, and what the solved light lets expect there.
+    fn expect(&mut self, fresh: &[usize], first: bool, progress: &dyn Fn(usize, usize)) {
+        self.want_corners(fresh);
+        self.looks.complete(progress);
+        self.lend();
+        let expected: Vec<f64> = fresh
+            .par_iter()
+            .map(|&k| {
+                let light = self.light(k);
+                let told = self.told(k, &light).0;
+                let Doubt { square, trust, .. } = self.cells.all[k].doubt;
+                if first {
+                    let range = (0..3).map(|k| self.difference(light[k], light[(k + 1) % 3]));
+                    let range = RANGE * range.fold(0.0, f64::max);
+                    return told.max(range * range).max(self.unknown);
+                }
+                square.max(told * f64::from(trust * trust))
+            })
+            .collect();
+        for (&k, square) in fresh.iter().zip(expected) {
+            let doubt = &mut self.cells.all[k].doubt;
+            doubt.square = square;
+            if first {
+                doubt.trust = 1.0;
+            }
+        }
+    }
+
+    /// The first vertices.
+    pub(super) fn begin(&mut self, progress: &dyn Fn(usize, usize)) {
+        let all: Vec<usize> = (0..self.cells.all.len()).collect();
+        self.expect(&all, true, progress);
+    }
+
+    /// Sum of all shares.
+    pub(super) fn sum(&self) -> f64 {
+        let cells = self.cells.all.iter();
+        cells.map(|c| c.area * c.doubt.square).sum()
+    }
+
+    /// Grows until the sum of all shares is at most `goal`.
+    pub(super) fn grow(&mut self, goal: f64, progress: &dyn Fn(usize, usize)) -> End {
+        loop {
+            let excess = self.sum() - goal;
+            if excess <= 0.0 {
+                return End::Reached;
+            }
+            if self.used() > self.most {
+                return End::Most;
+            }
+            let picked = self.pick(excess);
+            if picked.is_empty() {
+                return End::Smallest;
+            }
+            let looking = self.looking;
+            let (tested, untested): (Vec<usize>, Vec<usize>) = picked
+                .into_iter()
+                .partition(|&k| self.cells.all[k].doubt.tested || !looking);
+            self.test(&untested, progress);
+            for &k in &tested {
+                self.mark(k);
+            }
+            let fresh = self.cells.split(SHRINK);
+            self.expect(&fresh, false, progress);
+        }
+    }
+
+    /// How many vertices would be written.
+    pub(super) fn used(&self) -> usize {
+        let sheets = self.cells.sheets.iter();
+        let mut used: Vec<Vec<bool>> = sheets.map(|s| vec![false; s.vertices.len()]).collect();
+        for cell in &self.cells.all {
+            for corner in cell.corners {
+                used[cell.sheet as usize][corner.vertex as usize] = true;
+            }
+        }
+        used.iter().flatten().filter(|used| **used).count()
+    }
+
+    /// The cells with the largest shares that can be split, as many as make up the excess.
+    fn pick(&self, excess: f64) -> Vec<usize> {
+        let all = self.cells.all.par_iter().enumerate();
+        let mut shares: Vec<(f64, usize)> = all
+            .filter(|(_, c)| c.doubt.square > 0.0 && c.area > 0.0)
+            .filter(|(_, c)| !self.is_smallest(c))
+            .map(|(k, c)| (c.area * c.doubt.square, k))
+            .collect();
+        let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
+        shares.retain(|s| s.0 >= ALIKE * largest);
+        shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut left = 1.2 * excess;
+        let mut picked = Vec::new();
+        for (share, k) in shares {
+            if left <= 0.0 {
+                break;
+            }
+            left -= share;
+            picked.push(k);
+        }
+        picked
+    }
+
+    /// Marks the edges of a tested cell that bend; all of them if it is inside that light differs.
+    fn mark(&mut self, k: usize) {
+        let doubt = self.cells.all[k].doubt;
+        let worst = doubt.bent.into_iter().fold(doubt.inside, f32::max);
+        let limit = BENDS as f32 * worst;
+        let bends = |e: &usize| worst > 0.0 && doubt.bent[*e] >= limit;
+        let mut edges: Vec<usize> = (0..3).filter(bends).collect();
+        if edges.is_empty() {
+            edges = match self.looking && worst > 0.0 {
+                true => vec![0, 1, 2],
+                false => vec![self.cells.longest(&self.cells.all[k])],
+            };
+        }
+        for e in edges {
+            self.cells.mark(k, e);
+        }
+    }
+
+    /// Looks at light in the middles of edges and at a point inside: where the solved light is worst, or anywhere.
+    fn test(&mut self, cells: &[usize], progress: &dyn Fn(usize, usize)) {
+        let told: Vec<_> = cells
+            .par_iter()
+            .map(|&k| {
+                let light = self.light(k);
+                let (square, worst) = self.told(k, &light);
+                let cell = &self.cells.all[k];
+                // A single leaf says nothing of what differs inside.
+                let worst = worst.filter(|(_, d)| cell.hints.1 > cell.hints.0 + 1 && *d > 0.0);
+                (light, square, worst)
+            })
+            .collect();
+        let mut asked = Vec::with_capacity(cells.len());
+        for (&k, (_, _, worst)) in cells.iter().zip(&told) {
+            let sheet = self.cells.all[k].sheet as usize;
+            let middles = [0, 1, 2].map(|e| self.cells.middle(k, e));
+            let middles = middles.map(|vertex| self.want(sheet, vertex));
+            let cell = &self.cells.all[k];
+            let weights = match worst {
+                Some((hint, _)) => within(&cell.corners, hint.at),
+                None => {
+                    let seed = hash(k as u64, self.cells.all.len() as u64);
+                    let unit = |x: u64| (x >> 11) as f64 / (1_u64 << 53) as f64;
+                    triangle_weights([unit(seed), unit(hash(seed, 1))])
+                }
+            };
+            let inside = Vertex {
+                triangle: cell.of.0,
+                weights: cell.at(weights),
+                entry: cell.of.1,
+            };
+            let sheet = &self.cells.sheets[sheet];
+            let inside = self.looks.want(&inside, sheet.surface, sheet.back);
+            asked.push((middles, inside, weights));
+        }
+        self.looks.complete(progress);
+        for ((&k, told), asked) in cells.iter().zip(told).zip(asked) {
+            self.cells.all[k].doubt = self.judged(k, told, asked);
+        }
+    }
+
+    /// What is known of a cell now: its light, what the solved light tells of it and where that is worst; looks in the middles
+    /// of edges, one inside, and where that is.
+    fn judged(
+        &self,
+        k: usize,
+        (light, told, worst): Told,
+        (middles, inside, weights): Asked,
+    ) -> Doubt {
+        let off = |look: u32, weights: [f64; 3]| {
+            let seen = self.looks.at(look)?.xyz;
+            let off = self.difference(mix(&light, weights), seen);
+            // What chance alone may do is no bend.
+            Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
+        };
+        let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+        let bent = [0, 1, 2].map(|e| {
+            // The edge of something that stands here runs through.
+            let ends = || self.difference(light[e], light[(e + 1) % 3]);
+            off(middles[e], halves[e]).unwrap_or_else(|| COVERED * ends())
+        });
+        let inside = off(inside, weights);
+        let edges: f64 = bent.iter().map(|d| d * d).sum();
+        let before = f64::from(self.cells.all[k].doubt.trust);
+        let (square, trust) = match (worst, inside) {
+            (Some((_, most)), inside) => {
+                let trust = inside.map_or(before, |inside| (inside / most).min(1.0));
+                ((0.25 * edges).max(trust * trust * told), trust)
+            }
+            (None, Some(inside)) => (0.25 * (edges + inside * inside), 1.0),
+            (None, None) => ((0.25 * edges).max(before * before * told), before),
+        };
+        let inside = inside.unwrap_or(square.sqrt());
+        Doubt {
+            square,
+            tested: true,
+            bent: bent.map(|d| d as f32),
+            inside: inside as f32,
+            trust: trust as f32,
+        }
+    }
+}
+
+/// Light between three corners.
+pub(super) fn mix(light: &[[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|c| (0..3).map(|k| light[k][c] * weights[k]).sum())
+}

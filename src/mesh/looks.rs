@@ -1,0 +1,168 @@
+//! Looks at light: each place with its normal is gathered at once, whichever triangles ask for it.
+
+use crate::gather::point::{Gathered, Receiver};
+use crate::gather::{MOSTLY, Vertex};
+use crate::hierarchy::NONE;
+use crate::solve::{Bake, Care};
+use glam::DVec3;
+use std::collections::HashMap;
+
+/// Places closer than this share of the room's half diagonal are one.
+const SAME_PLACE: f64 = 1e-7;
+/// Normals that differ by less than this in each component are one.
+const SAME_NORMAL: f64 = 1e-4;
+/// Darker than this share of the white, a place below a black back counts as inside of what that belongs to.
+const DIM: f64 = 0.05;
+/// Places gathered at a time, so that progress shows.
+const PART: usize = 16_384;
+
+/// What a place gets.
+#[derive(Debug)]
+pub(super) struct Seen {
+    /// Irradiance by lane.
+    pub(super) row: Box<[f32; 64]>,
+    /// Tristimulus irradiance.
+    pub(super) xyz: [f64; 3],
+    /// Where it comes from, if that is kept.
+    pub(super) trace: Option<Box<[u8]>>,
+}
+
+/// Place and normal, rounded; space; is the light of its leaf taken as it is?
+type Key = ([i64; 6], (u32, bool), bool);
+
+/// All looks so far.
+pub(super) struct Looks<'a> {
+    bake: &'a Bake,
+    care: Care,
+    /// Is the light of the leaves taken as it is?
+    pub(super) believing: bool,
+    spaces: Vec<(u32, bool)>,
+    known: HashMap<Key, u32>,
+    places: Vec<(Receiver, bool)>,
+    /// None: something solid covers it, or lies right upon it.
+    seen: Vec<Option<Seen>>,
+    pub(super) rays: u64,
+}
+
+impl<'a> Looks<'a> {
+    pub(super) fn new(bake: &'a Bake, spaces: Vec<(u32, bool)>, care: Care) -> Self {
+        Self {
+            bake,
+            care,
+            believing: false,
+            spaces,
+            known: HashMap::new(),
+            places: Vec::new(),
+            seen: Vec::new(),
+            rays: 0,
+        }
+    }
+
+    /// Asks for a vertex; its number. It is looked at when [`Looks::complete`] is called.
+    pub(super) fn want(&mut self, vertex: &Vertex, surface: usize, back: bool) -> u32 {
+        let to = self.bake.receiver(vertex, surface, back);
+        let mesh = self.bake.mesh();
+        let place =
+            self.bake.place_of(vertex) / (SAME_PLACE * mesh.half_size.max(f64::MIN_POSITIVE));
+        let round = |x: DVec3| x.to_array().map(|x| x.round() as i64);
+        let ([x, y, z], [i, j, k]) = (round(place), round(to.normal / SAME_NORMAL));
+        let space = self.spaces.get(vertex.entry as usize);
+        let (space, believing) = (space.copied().unwrap_or_default(), self.believing);
+        let (key, places) = (([x, y, z, i, j, k], space, believing), &mut self.places);
+        *self.known.entry(key).or_insert_with(|| {
+            places.push((to, believing));
+            places.len() as u32 - 1
+        })
+    }
+
+    fn seen_as(&self, row: [f32; 64], trace: Option<Box<[u8]>>) -> Seen {
+        Seen {
+            xyz: self.bake.lanes().tristimulus(&row),
+            row: Box::new(row),
+            trace,
+        }
+    }
+
+    /// Asks for a vertex once more, with a pattern of rays of its own; the number of the look.
+    pub(super) fn again(&mut self, vertex: &Vertex, surface: usize, back: bool, seed: u64) -> u32 {
+        let to = self.bake.receiver(vertex, surface, back);
+        self.places.push((Receiver { seed, ..to }, self.believing));
+        self.places.len() as u32 - 1
+    }
+
+    /// What was seen.
+    pub(super) fn at(&self, look: u32) -> Option<&Seen> {
+        self.seen[look as usize].as_ref()
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Looks at all places asked for. `progress` is told (done, of) in places of this time.
+    pub(super) fn complete(&mut self, progress: &dyn Fn(usize, usize)) {
+        let first = self.seen.len();
+        let wanted = self.places.len() - first;
+        while self.seen.len() < self.places.len() {
+            let done = self.seen.len();
+            progress(done - first, wanted);
+            let part = &self.places[done..self.places.len().min(done + PART)];
+            let open = part.iter().filter(|(_, believed)| !believed);
+            let all: Vec<Receiver> = open.map(|(to, _)| *to).collect();
+            let pressed = self.bake.pressed(&all);
+            let open = all.iter().zip(&pressed).filter(|(_, pressed)| !**pressed);
+            let open: Vec<Receiver> = open.map(|(to, _)| *to).collect();
+            let gathered = self.bake.gather_with(&open, self.care);
+            let dark = |g: &Gathered| g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
+            let in_doubt = open.iter().zip(&gathered).filter(|(_, g)| dark(g));
+            let in_doubt: Vec<Receiver> = in_doubt.map(|(r, _)| *r).collect();
+            let mut covered = self.bake.covered(&in_doubt).into_iter();
+            let (mut gathered, mut pressed) = (gathered.into_iter(), pressed.into_iter());
+            let part = done..done + part.len();
+            for k in part {
+                let (to, believed) = self.places[k];
+                let is_pressed = !believed && pressed.next() == Some(true);
+                let gathered = match believed || is_pressed {
+                    true => None,
+                    false => gathered.next(),
+                };
+                let seen = match gathered {
+                    None if is_pressed => None,
+                    None => self.told(&to),
+                    Some(gathered) => {
+                        self.rays += gathered.rays;
+                        let covered = dark(&gathered) && covered.next() == Some(true);
+                        let hidden = covered || gathered.backs > MOSTLY;
+                        let seen = self.seen_as(gathered.irradiance, gathered.packed);
+                        (!hidden && !self.is_inside(&to, &seen)).then_some(seen)
+                    }
+                };
+                self.seen.push(seen);
+            }
+        }
+        progress(wanted, wanted);
+    }
+
+    /// Does a place lie inside something that is black from there? Then it is dark, and a black back is above it.
+    fn is_inside(&self, to: &Receiver, seen: &Seen) -> bool {
+        let (rays, white) = (self.bake.rays(), self.bake.light().white);
+        if seen.xyz[1] >= DIM * white[1] {
+            return false;
+        }
+        let (from, up) = (to.point.as_vec3(), to.normal.as_vec3());
+        let hit = rays.closest(from, up, f32::MAX, to.plane);
+        hit.is_some_and(|hit| self.bake.tree().met(&hit) == NONE)
+    }
+
+    /// The light of a leaf.
+    fn told(&self, to: &Receiver) -> Option<Seen> {
+        let light = self.bake.light();
+        let known = light
+            .irradiance
+            .row(light.leaves.binary_search(&to.leaf?).ok()?);
+        let mut row = [0.0; 64];
+        row[..known.len()].copy_from_slice(known);
+        Some(self.seen_as(row, None))
+    }
+}

@@ -1,0 +1,138 @@
+//! The interpolation error of the output, measured: light between vertices beside light at fresh random points.
+//!
+//! Where points look by rays, a look errs by chance, which is no matter of interpolation: every point is looked at twice,
+//! with rays of its own each time. With s^2 the variance of a look, half the mean square of their difference, and weights w
+//! of the vertices, a look at a point differs from what is drawn there by `i^2 + s^2 (1 + sum of w^2)` in the mean square, at
+//! least, i the error of interpolation: the rays of vertices may have more in common than chance.
+
+use super::grow::{Growth, mix};
+use super::write::Settled;
+use crate::color::de2000;
+use crate::gather::{Interpolation, Vertex};
+use crate::geometry::sampling::{Pcg, hash, triangle_weights};
+use crate::solve::Bake;
+
+/// Points at the least and at the most, and as a share of the looks so far: the rms is then known to some per cent.
+const POINTS: [usize; 2] = [512, 4096];
+const SHARE: usize = 16;
+/// What was seen is learnt where its square is this many times what was expected.
+const SURPRISE: f64 = 4.0;
+/// A single point must differ by this many times the variance of a look to count.
+const CHANCE: f64 = 4.0;
+/// Distinguishes these random numbers from others.
+const SEED: u64 = 0x0067_0f11;
+
+/// What samples tell of a file.
+pub(super) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Interpolation {
+    let mut off: Vec<f64> = samples.iter().map(|s| s.square.max(0.0).sqrt()).collect();
+    off.sort_by(f64::total_cmp);
+    let n = off.len().max(1) as f64;
+    let rank = (0.95 * off.len() as f64) as usize;
+    let square = samples.iter().map(|s| s.square).sum::<f64>() / n;
+    let noise = samples.iter().map(|s| s.noise).sum::<f64>() / n;
+    Interpolation {
+        rms: square.max(0.0).sqrt(),
+        mean: off.iter().sum::<f64>() / n,
+        p95: off.get(rank).copied().unwrap_or(0.0),
+        noise: noise.sqrt(),
+        points: off.len(),
+        allowed,
+        capped,
+    }
+}
+
+/// A random point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    cell: usize,
+    /// Square of the colour difference that is of interpolation; below 0 by chance.
+    square: f64,
+    /// Variance of a look.
+    noise: f64,
+}
+
+impl Growth<'_> {
+    /// Looks at random points that were never looked at before, one in each stratum of equal area.
+    pub(super) fn measured(
+        &mut self,
+        bake: &Bake,
+        settled: &[Settled],
+        turn: u64,
+        progress: &dyn Fn(usize, usize),
+    ) -> Vec<Sample> {
+        let count = (self.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]);
+        let whole: f64 = self.cells.all.iter().map(|c| c.area).sum();
+        if whole <= 0.0 {
+            return Vec::new();
+        }
+        let mut rng = Pcg::new(bake.settings().seed ^ SEED ^ turn << 32);
+        let (mut cell, mut upto) = (0, self.cells.all[0].area);
+        let mut asked = Vec::with_capacity(count);
+        for k in 0..count {
+            let target = (k as f64 + rng.f64()) / count as f64 * whole;
+            while upto <= target && cell + 1 < self.cells.all.len() {
+                cell += 1;
+                upto += self.cells.all[cell].area;
+            }
+            let weights = triangle_weights([rng.f64(), rng.f64()]);
+            let of = &self.cells.all[cell];
+            let sheet = &self.cells.sheets[of.sheet as usize];
+            let rng_seed = turn << 32 | k as u64;
+            let vertex = Vertex {
+                triangle: of.of.0,
+                weights: of.at(weights),
+                entry: of.of.1,
+            };
+            let mut look = |turn: u64| {
+                let seed = hash(bake.settings().seed ^ SEED, 2 * rng_seed + turn);
+                self.looks.again(&vertex, sheet.surface, sheet.back, seed)
+            };
+            asked.push((cell, weights, [look(0), look(1)]));
+        }
+        self.looks.complete(progress);
+        let white = bake.light().white;
+        let difference = |a: [f64; 3], b: [f64; 3]| match a == b || white[1] <= 0.0 {
+            true => 0.0,
+            false => de2000(a, b, white),
+        };
+        let sample = |(cell, weights, looks): (usize, [f64; 3], [u32; 2])| {
+            let of = &self.cells.all[cell];
+            let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| seen.xyz));
+            let (one, two) = (one?, two?);
+            let light = of.corners.map(|c| {
+                let row = settled[of.sheet as usize].rows[c.vertex as usize];
+                row.map_or([0.0; 3], |row| bake.lanes().tristimulus(&row))
+            });
+            let drawn = mix(&light, weights);
+            let noise = 0.5 * difference(one, two).powi(2);
+            let seen = 0.5 * (difference(drawn, one).powi(2) + difference(drawn, two).powi(2));
+            let of_vertices: f64 = weights.iter().map(|w| w * w).sum();
+            let square = seen - (1.0 + of_vertices) * noise;
+            Some(Sample {
+                cell,
+                square,
+                noise,
+            })
+        };
+        asked.into_iter().filter_map(sample).collect()
+    }
+
+    /// Takes what was seen at random points for what is to be expected of their triangles, where it is a surprise.
+    pub(super) fn learn(&mut self, samples: &[Sample]) {
+        for sample in samples {
+            let doubt = &mut self.cells.all[sample.cell].doubt;
+            let square = sample.square - CHANCE * sample.noise;
+            if square > SURPRISE * doubt.square {
+                doubt.square = square;
+                doubt.inside = square.sqrt() as f32;
+                doubt.tested = true;
+            }
+        }
+    }
+
+    /// Triangles that are as small as is allowed and still further off than `square`.
+    pub(super) fn unfinished(&self, square: f64) -> usize {
+        let small = |c: &&super::cells::Cell| c.doubt.square > square && self.is_smallest(c);
+        self.cells.all.iter().filter(small).count()
+    }
+}

@@ -1,0 +1,107 @@
+//! The mesh that is written: grown from the input's triangles, as fine as straight lines between vertices need it for the
+//! asked-for error, and measured.
+
+mod cells;
+mod drawn;
+mod grow;
+mod hints;
+mod looks;
+mod measure;
+mod skins;
+mod write;
+
+use crate::gather::Baked;
+use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
+use cells::Cells;
+use grow::{End, Growth};
+use looks::Looks;
+use measure::summed;
+
+/// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error.
+const MOST_VERTICES: f64 = 32_768.0;
+const AT: f64 = 0.5;
+/// The error is measured this often at the most.
+const MEASURED: u64 = 10;
+/// Growing ends where so many times the triangles leave more than this part of the error.
+const GROWN: f64 = 1.5;
+const STALLED: f64 = 0.93;
+/// After a measurement that was not met, growing aims at this part of what the measured error asks for.
+const BELOW: f64 = 0.8;
+/// And at no less than this part of what it aimed at before.
+const STEP: f64 = 0.2;
+/// Pictures on the way may be off by this many times the error asked for.
+const SKETCH: f64 = 4.0;
+
+impl Bake {
+    /// The mesh of the output with its light, grown until its interpolation error, measured, is within its share of the
+    /// error asked for. `progress` is told (done, of) in looks of the present pass.
+    pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
+        let mut growth = self.growth(Care::Full);
+        let allowed = INTERPOLATION_SHARE * self.settings().error;
+        growth.unknown = allowed * allowed;
+        growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;
+        growth.begin(progress);
+        let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
+        let mut aim = allowed * allowed * area;
+        let settled = self.settled(&growth);
+        let samples = growth.measured(self, &settled, 0, progress);
+        let mut before = summed(&samples, allowed, None);
+        growth.noise = before.noise * before.noise;
+        let mut size = growth.cells.all.len();
+        let mut turn = 0;
+        loop {
+            turn += 1;
+            let end = growth.grow(aim, progress);
+            let settled = self.settled(&growth);
+            let samples = growth.measured(self, &settled, turn, progress);
+            let interpolation =
+                summed(&samples, allowed, (end == End::Most).then_some(growth.most));
+            let has_grown = growth.cells.all.len() as f64 > GROWN * size as f64;
+            let stalled = turn > 1 && has_grown && interpolation.rms > STALLED * before.rms;
+            if has_grown {
+                (size, before) = (growth.cells.all.len(), interpolation);
+            }
+            let over = end != End::Reached || turn == MEASURED || stalled;
+            if interpolation.is_met() || over {
+                let capped = growth.unfinished(allowed * allowed);
+                let mut out = self.write_down(growth, settled);
+                out.capped = if interpolation.is_met() { 0 } else { capped };
+                out.interpolation = Some(interpolation);
+                return out;
+            }
+            let wrong = (interpolation.rms / allowed).powi(2);
+            aim = growth.sum().min(aim) * (BELOW / wrong).clamp(STEP, BELOW);
+            growth.learn(&samples);
+        }
+    }
+
+    /// The same for pictures on the way: as fine as the solved light tells, with few rays. Vertices of triangles of the input
+    /// that no picture shows (`seen[surface][triangle]`) get the light of their leaves as it is.
+    ///
+    /// # Panics
+    /// If `seen` lacks a triangle of the room.
+    pub fn sketch(&self, seen: &[Vec<bool>], progress: &dyn Fn(usize, usize)) -> Baked {
+        let mut growth = self.growth(Care::Sketch);
+        growth.believe(true);
+        growth.begin(progress);
+        let allowed = SKETCH * self.settings().error;
+        let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
+        growth.grow(allowed * allowed * area, progress);
+        let wanted = |triangle: u32| {
+            let (surface, local) = self.mesh().origin[triangle as usize];
+            seen[surface as usize][local as usize]
+        };
+        growth.believe(false);
+        growth.look_again(wanted, progress);
+        let settled = self.settled(&growth);
+        self.write_down(growth, settled)
+    }
+
+    fn growth(&self, care: Care) -> Growth<'_> {
+        let spaces = self.spaces();
+        let mut cells = Cells::new(self.scene(), self.mesh(), self.tree(), &spaces);
+        hints::give(self, &mut cells);
+        let looks = Looks::new(self, spaces, care);
+        Growth::new(cells, looks, self.light().white, self.mesh().half_size)
+    }
+}

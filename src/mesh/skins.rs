@@ -1,0 +1,65 @@
+//! Which sides of triangles look like one surface: where they meet, they must have the same vertices, or the background
+//! would shine through.
+//!
+//! Sides meet over an edge if they run along it in opposite senses. The two sides of one sheet do not: each may be as
+//! fine as its own light asks for.
+
+use crate::hierarchy::Mesh;
+use crate::scene::{Scene, Sides};
+use std::collections::HashMap;
+
+/// Sides in sets; side 2 t is the front of triangle t, 2 t + 1 its back.
+pub(super) struct Skins {
+    parent: Vec<u32>,
+}
+
+impl Skins {
+    pub(super) fn new(scene: &Scene, mesh: &Mesh) -> Self {
+        let count = 2 * mesh.triangles.len() as u32;
+        let mut skins = Self {
+            parent: (0..count).collect(),
+        };
+        let mut along: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
+        for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+            let both = scene.materials[mesh.material[t] as usize].sides == Sides::Both;
+            for [p, q] in [[a, b], [b, c], [c, a]] {
+                let front = 2 * t as u32;
+                along.entry([p, q]).or_default().push(front);
+                if both {
+                    along.entry([q, p]).or_default().push(front + 1);
+                }
+            }
+        }
+        // In any order: the least side of a set stands for it.
+        for ([p, q], sides) in &along {
+            for &side in sides {
+                for &other in along.get(&[*q, *p]).into_iter().flatten() {
+                    // The two sides of one triangle are never seen together.
+                    if side / 2 != other / 2 {
+                        skins.join(side, other);
+                    }
+                }
+            }
+        }
+        skins
+    }
+
+    fn root(&mut self, mut side: u32) -> u32 {
+        while self.parent[side as usize] != side {
+            let up = self.parent[self.parent[side as usize] as usize];
+            self.parent[side as usize] = up;
+            side = up;
+        }
+        side
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+
+    /// The set of a side.
+    pub(super) fn of(&mut self, triangle: u32, back: bool) -> u32 {
+        self.root(2 * triangle + u32::from(back))
+    }
+}

@@ -1,0 +1,96 @@
+//! The vertices that are written; covered ones are lent their neighbours' light.
+
+use super::grow::Growth;
+use crate::gather::{Baked, BakedSurface, KeptVertex, lend};
+use crate::solve::Bake;
+
+/// Nothing was seen.
+const UNSEEN: u32 = u32::MAX;
+
+/// Light of the vertices of a sheet, as it is written.
+pub(super) struct Settled {
+    triangles: Vec<[u32; 3]>,
+    /// Triangle of the mesh of each.
+    of: Vec<u32>,
+    /// Irradiance of each vertex that a triangle uses.
+    pub(super) rows: Vec<Option<[f32; 64]>>,
+    /// Look that it comes from.
+    looks: Vec<u32>,
+    covered: usize,
+}
+
+impl Bake {
+    /// The light of a mesh as it is written.
+    pub(super) fn settled(&self, growth: &Growth) -> Vec<Settled> {
+        let sheets = growth.cells.sheets.iter().enumerate();
+        let settle = |(number, sheet): (usize, &super::cells::Sheet)| {
+            let (triangles, of) = growth.cells.triangles(number);
+            let mut looks = vec![UNSEEN; sheet.vertices.len()];
+            for &v in triangles.iter().flatten() {
+                looks[v as usize] = growth.look(number, v).unwrap_or(UNSEEN);
+            }
+            let row = |&look: &u32| match look {
+                UNSEEN => None,
+                look => growth.looks.at(look).map(|seen| *seen.row),
+            };
+            let mut rows: Vec<Option<[f32; 64]>> = looks.iter().map(row).collect();
+            let covered = lend(&mut rows, &triangles);
+            Settled {
+                triangles,
+                of,
+                rows,
+                looks,
+                covered,
+            }
+        };
+        sheets.map(settle).collect()
+    }
+
+    /// Vertices with their colours, as the writers want them.
+    pub(super) fn write_down(&self, growth: Growth, settled: Vec<Settled>) -> Baked {
+        let looks = self.looks(self.upsampler());
+        let mut out = Baked {
+            rays: growth.looks.rays,
+            ..Baked::default()
+        };
+        for (sheet, settled) in growth.cells.sheets.iter().zip(settled) {
+            out.covered += settled.covered;
+            let mut place = vec![u32::MAX; sheet.vertices.len()];
+            let mut surface = BakedSurface {
+                surface: sheet.surface,
+                back: sheet.back,
+                ..BakedSurface::default()
+            };
+            let (mut spectra, mut kept) = (Vec::new(), Vec::new());
+            let look = &looks[self.scene().surfaces[sheet.surface].material];
+            for triangle in &settled.triangles {
+                surface.triangles.push(triangle.map(|v| {
+                    let v = v as usize;
+                    if place[v] == u32::MAX {
+                        place[v] = surface.vertices.len() as u32;
+                        let (vertex, row) =
+                            (&sheet.vertices[v], settled.rows[v].unwrap_or([0.0; 64]));
+                        let written = self.vertex(vertex, sheet.back, &row, look);
+                        surface.vertices.push(written);
+                        spectra.push(row);
+                        if self.keeps() {
+                            let seen = (settled.looks[v] != UNSEEN)
+                                .then(|| growth.looks.at(settled.looks[v]));
+                            kept.push(KeptVertex {
+                                triangle: vertex.triangle,
+                                weights: vertex.weights,
+                                trace: seen.flatten().and_then(|seen| seen.trace.clone()),
+                            });
+                        }
+                    }
+                    place[v]
+                }));
+            }
+            out.surfaces.push(surface);
+            out.irradiance.push(spectra);
+            out.kept.push(kept);
+            out.of.push(settled.of);
+        }
+        out
+    }
+}
