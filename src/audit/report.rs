@@ -114,7 +114,7 @@ impl Report {
         let light = light.map(Option::unwrap_or_default);
         let last = bake.rounds().last();
         let estimate = last.and_then(|r| r.error.total_de2000.value);
-        let between = baked.interpolation.map_or(0.0, |i| i.rms);
+        let between = baked.interpolation.map_or(0.0, |i| i.mean);
         let estimate = estimate.map(|e| e.hypot(between));
         Self::of(bake, reference, light.collect(), estimate)
     }

@@ -226,7 +226,7 @@ pub struct VerdictRecord {
     pub error_de2000: Figure,
     /// Of which light at points: total of the last round.
     pub light_de2000: Figure,
-    /// Of which straight lines between vertices: rms, measured.
+    /// Of which straight lines between vertices: mean, measured.
     pub interpolation_de2000: Figure,
     /// How that was measured, and what it may be.
     pub interpolation: Option<Interpolation>,
@@ -302,7 +302,7 @@ impl VerdictRecord {
             },
             light_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
             interpolation_de2000: Figure {
-                value: end.baked.interpolation.map(|i| i.rms),
+                value: end.baked.interpolation.map(|i| i.mean),
                 kind: Kind::Measured,
             },
             interpolation: end.baked.interpolation,
@@ -327,7 +327,7 @@ impl VerdictRecord {
 /// Estimated error of a file: of light at points as the last round estimates it, and between them as measured.
 pub(super) fn file_error(bake: &Bake, baked: &Baked) -> Option<f64> {
     let light = bake.rounds().last()?.error.total_de2000.value?;
-    Some(light.hypot(baked.interpolation.map_or(0.0, |i| i.rms)))
+    Some(light.hypot(baked.interpolation.map_or(0.0, |i| i.mean)))
 }
 
 /// 0 if the error was reached, 1 if the bake stopped before.

@@ -78,9 +78,9 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
     ];
     if let Some(i) = &v.interpolation {
         lines.push(format!(
-            "of which between vertices, measured at {} points: rms {:.3}, 95 % below {:.2}{}",
+            "of which between vertices, measured at {} points: mean {:.3}, 95 % below {:.2}{}",
             i.points,
-            i.rms,
+            i.mean,
             i.p95,
             match (i.is_met(), i.capped) {
                 (true, _) => String::new(),

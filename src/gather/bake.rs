@@ -51,7 +51,7 @@ pub struct Interpolation {
     pub noise: f64,
     /// Points.
     pub points: usize,
-    /// What the rms may be: its share of the error asked for.
+    /// What the mean may be: its share of the error asked for, which is a mean too.
     pub allowed: f64,
     /// Vertices that are allowed, if it got as many.
     pub capped: Option<usize>,
@@ -60,7 +60,7 @@ pub struct Interpolation {
 impl Interpolation {
     /// Is it as small as it has to be?
     pub fn is_met(&self) -> bool {
-        self.rms <= self.allowed
+        self.mean <= self.allowed
     }
 }
 

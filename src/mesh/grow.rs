@@ -1,9 +1,9 @@
 //! The mesh grows where straight lines between its vertices are not what looking there shows.
 //!
-//! Every triangle has a mean square of the colour difference between both, times its area its share of the error: first as
-//! the solved light lets it expect, then as seen in the middles of its edges and at one point inside. The largest shares are
-//! looked at or, where that is done, split at the edges that bend; so shares become alike, which takes the fewest
-//! vertices for a sum.
+//! Every triangle has a mean square of the colour difference between both; its root, times the area, is its share of the
+//! mean difference: first as the solved light lets it expect, then as seen in the middles of its edges and at one point
+//! inside. The largest shares are looked at or, where that is done, split at the edges that bend; so shares become alike,
+//! which takes the fewest vertices for a sum.
 
 use super::cells::{Cell, Cells, Doubt, Hint, within};
 use super::looks::Looks;
@@ -245,8 +245,7 @@ impl<'a> Growth<'a> {
 
     /// Sum of all shares.
     pub(super) fn sum(&self) -> f64 {
-        let cells = self.cells.all.iter();
-        cells.map(|c| c.area * c.doubt.square).sum()
+        self.cells.all.iter().map(share).sum()
     }
 
     /// Grows until the sum of all shares is at most `goal`.
@@ -294,7 +293,7 @@ impl<'a> Growth<'a> {
         let mut shares: Vec<(f64, usize)> = all
             .filter(|(_, c)| c.doubt.square > 0.0 && c.area > 0.0)
             .filter(|(_, c)| !self.is_smallest(c))
-            .map(|(k, c)| (c.area * c.doubt.square, k))
+            .map(|(k, c)| (share(c), k))
             .collect();
         let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
         shares.retain(|s| s.0 >= ALIKE * largest);
@@ -411,6 +410,11 @@ impl<'a> Growth<'a> {
             trust: trust as f32,
         }
     }
+}
+
+/// What a cell adds to the mean difference, times the area of all.
+fn share(cell: &Cell) -> f64 {
+    cell.area * cell.doubt.square.sqrt()
 }
 
 /// Light between three corners.

@@ -12,7 +12,7 @@ use crate::gather::{Interpolation, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
 
-/// Points at the least and at the most, and as a share of the looks so far: the rms is then known to some per cent.
+/// Points at the least and at the most, and as a share of the looks so far: the mean is then known to some per cent.
 const POINTS: [usize; 2] = [512, 4096];
 const SHARE: usize = 16;
 /// What was seen is learnt where its square is this many times what was expected.

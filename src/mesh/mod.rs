@@ -42,7 +42,7 @@ impl Bake {
         growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;
         growth.begin(progress);
         let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
-        let mut aim = allowed * allowed * area;
+        let mut aim = allowed * area;
         let settled = self.settled(&growth);
         let samples = growth.measured(self, &settled, 0, progress);
         let mut before = summed(&samples, allowed, None);
@@ -57,7 +57,7 @@ impl Bake {
             let interpolation =
                 summed(&samples, allowed, (end == End::Most).then_some(growth.most));
             let has_grown = growth.cells.all.len() as f64 > GROWN * size as f64;
-            let stalled = turn > 1 && has_grown && interpolation.rms > STALLED * before.rms;
+            let stalled = turn > 1 && has_grown && interpolation.mean > STALLED * before.mean;
             if has_grown {
                 (size, before) = (growth.cells.all.len(), interpolation);
             }
@@ -69,7 +69,7 @@ impl Bake {
                 out.interpolation = Some(interpolation);
                 return out;
             }
-            let wrong = (interpolation.rms / allowed).powi(2);
+            let wrong = interpolation.mean / allowed;
             aim = growth.sum().min(aim) * (BELOW / wrong).clamp(STEP, BELOW);
             growth.learn(&samples);
         }
@@ -86,7 +86,7 @@ impl Bake {
         growth.begin(progress);
         let allowed = SKETCH * self.settings().error;
         let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
-        growth.grow(allowed * allowed * area, progress);
+        growth.grow(allowed * area, progress);
         let wanted = |triangle: u32| {
             let (surface, local) = self.mesh().origin[triangle as usize];
             seen[surface as usize][local as usize]
