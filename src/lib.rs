@@ -15,9 +15,9 @@
 //! # Ok::<(), haarlight::Error>(())
 //! ```
 //!
-//! The chain: [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`solve`] -> [`gather`] ->
-//! [`mesh`] -> [`output`] and [`report`], with [`audit`] beside it and [`cost`] behind; [`survey`] looks at a room before
-//! [`solve`]. A module uses what stands to its left.
+//! The chain: [`data`] -> [`color`] -> [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`light`] ->
+//! [`transport`] -> [`solve`] -> [`gather`] -> [`mesh`] -> [`keep`] -> [`output`] and [`report`], with [`audit`] beside it and
+//! [`cost`] behind; [`survey`] looks at a room before [`solve`]. A module uses what stands to its left.
 //!
 //! | Rougeron and Peroche 1997 | module |
 //! |---|---|
@@ -36,6 +36,8 @@ pub mod error;
 pub mod gather;
 pub mod geometry;
 pub mod hierarchy;
+pub mod keep;
+pub mod light;
 pub mod link;
 pub mod mesh;
 pub mod output;
@@ -45,6 +47,7 @@ pub mod solve;
 pub mod spectrum;
 pub mod store;
 pub mod survey;
+pub mod transport;
 
 pub use error::{Error, Problem, Result};
 

@@ -8,7 +8,7 @@ use built::Room;
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
-use haarlight::output::refined::position;
+use haarlight::gather::refined::position;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use std::path::Path;

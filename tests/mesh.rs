@@ -7,7 +7,7 @@ use built::Room;
 use glam::{DVec3, dvec3};
 use haarlight::audit::{Reference, Report};
 use haarlight::gather::Baked;
-use haarlight::output::refined::position;
+use haarlight::gather::refined::position;
 use haarlight::output::{Exposure, baked_glb};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};

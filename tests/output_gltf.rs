@@ -67,7 +67,7 @@ fn the_file_for_the_validator() {
     let surfaces = refine(&scene, 3);
     let glb = baked_glb(&scene, &surfaces, &Exposure::auto(&scene, &surfaces)).unwrap();
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("output_room.glb");
-    haarlight::output::file::write_atomic(&path, None, |w| w.write_all(&glb.bytes)).unwrap();
+    haarlight::store::file::write_atomic(&path, None, |w| w.write_all(&glb.bytes)).unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), glb.bytes);
 }
 

@@ -68,7 +68,7 @@ fn arrays_come_back() {
     npz::write_baked(&mut zip, &scene, &surfaces, &spectra).unwrap();
     // For a look with NumPy itself.
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("output_room.npz");
-    haarlight::output::file::write_atomic(&path, None, |w| w.write_all(&zip)).unwrap();
+    haarlight::store::file::write_atomic(&path, None, |w| w.write_all(&zip)).unwrap();
 
     let entries = entries(&zip);
     let count = 6 * 9;

@@ -332,7 +332,7 @@ impl<'a> Audit<'a> {
         let reach = (4.0 * self.mesh.half_size) as f32;
         if self.masked {
             let opaque = |t: u32, u: f32, v: f32| {
-                !crate::scene::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
+                !crate::hierarchy::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
             };
             return self.rays.closest_with(
                 from.as_vec3(),
@@ -349,7 +349,7 @@ impl<'a> Audit<'a> {
     fn blocked(&self, segment: &Segment) -> bool {
         if self.masked {
             let opaque = |t: u32, u: f32, v: f32| {
-                !crate::scene::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
+                !crate::hierarchy::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
             };
             return self.rays.occluded_with(segment, &opaque);
         }

@@ -6,7 +6,7 @@
 
 use super::path::{Answer, Audit, BATCHES};
 use crate::color::{KM, Observer, de2000};
-use crate::gather::point::Receiver;
+use crate::transport::point::Receiver;
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::hierarchy::Face;
 use crate::solve::Bake;

@@ -10,7 +10,7 @@ use super::options::{Common, Reading, positive};
 use super::talk::Talk;
 use crate::cost::{Knob, Sweep, choose, plots, tables};
 use crate::error::{Error, Problem, Result};
-use crate::output::file;
+use crate::store::file;
 use crate::solve::Representation;
 use serde_json::json;
 use std::path::PathBuf;

@@ -71,7 +71,7 @@ use crate::gather::{Baked, Interpolation};
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
-use crate::solve::record::{Figure, LOG_VERSION};
+use crate::solve::record::{Figure, Kind, LOG_VERSION};
 use crate::solve::{Bake, Representation, Verdict};
 use serde::Serialize;
 
@@ -296,10 +296,7 @@ impl VerdictRecord {
             exit_code: exit_code(end.verdict),
             rounds: rounds.len(),
             asked_de2000: end.bake.settings().error,
-            error_de2000: Figure {
-                value: file_error(end.bake, end.baked),
-                kind: Kind::Estimate,
-            },
+            error_de2000: Figure::estimate(file_error(end.bake, end.baked)),
             light_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
             interpolation_de2000: Figure {
                 value: end.baked.interpolation.map(|i| i.mean),

@@ -17,7 +17,7 @@ use super::stop::Stop;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::gather::Probed;
-use crate::output::file;
+use crate::store::file;
 use crate::solve::Representation;
 use crate::spectrum::{Grid, LEAVES};
 use crate::survey::{Place, places};

@@ -7,7 +7,8 @@
 use super::paths::file_names;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
-use crate::output::{Exposure, Format, Picture, camera, exr, file, picture};
+use crate::output::{Exposure, Format, Picture, camera, exr, picture};
+use crate::store::file;
 use crate::scene::{Camera, Scene};
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,7 @@
 use super::command::print;
 use crate::data::{Kind, Named, named, names, nearest};
 use crate::error::{Error, Result};
-use crate::output::file;
+use crate::store::file;
 use crate::report::{Align, Chart, Scale, Series, Table};
 use std::path::{Path, PathBuf};
 

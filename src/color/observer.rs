@@ -5,7 +5,7 @@
 //! The paper samples a_bar at the left edge of the leaf instead.
 
 use crate::data::{Outside, Table, cmf_1931};
-use crate::spectrum::{Grid, Leaves};
+use crate::data::{Grid, Leaves};
 
 /// Maximum luminous efficacy of radiation, lm/W (CIE 018:2019; 683.002 for the SI's 540 THz, 683 by convention).
 pub const KM: f64 = 683.0;

@@ -3,7 +3,7 @@
 //! The factor k is the caller's: 683 lm/W for absolute values, 1 / sum(S y_bar) for a source that counts as 1.
 
 use super::Xyz;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::data::{LEAVES, Leaves};
 
 /// `sum spectrum * weights` for X, Y, Z, without a factor.
 pub fn tristimulus(spectrum: &Leaves, weights: &[Leaves; 3]) -> Xyz {
@@ -23,7 +23,7 @@ mod tests {
     use super::*;
     use crate::color::Observer;
     use crate::data::{Outside, named};
-    use crate::spectrum::Grid;
+    use crate::data::Grid;
 
     #[test]
     fn k_of_d65_is_the_published_one() {

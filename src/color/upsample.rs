@@ -12,7 +12,7 @@
 use super::display::LinearSrgb;
 use super::{Observer, Xyz, lab};
 use crate::data::{Outside, named};
-use crate::spectrum::{Grid, LEAVES, Leaves};
+use crate::data::{Grid, LEAVES, Leaves};
 use std::sync::OnceLock;
 
 /// Steps of the table along each of r, g, b. Measured over 20 000 random colours, largest dE00 between table and solved

@@ -1,11 +1,13 @@
-//! Published tables (CIE observer, illuminants, measured reflectances) and readers of spectra.
+//! Published tables (CIE observer, illuminants, measured reflectances), readers of spectra, and the leaves they are held on.
 
 mod blackbody;
+mod grid;
 mod nearest;
 mod registry;
 mod table;
 
 pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
+pub use grid::{Grid, LEAVES, Leaves};
 pub use registry::{Kind, Named, named, names, nearest};
 pub use table::{CsvProblem, Outside, Table};
 

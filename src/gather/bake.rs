@@ -1,10 +1,9 @@
 //! The light of a vertex of the output, and of any point.
 
-use super::point::{Gathered, Receiver};
-use super::relit::KeptVertex;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler};
-use crate::output::refined as refined_mesh;
+use super::refined as refined_mesh;
+use crate::transport::point::{Gathered, Receiver};
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
@@ -62,6 +61,14 @@ impl Interpolation {
     pub fn is_met(&self) -> bool {
         self.mean <= self.allowed
     }
+}
+
+/// A vertex of the output on the mesh, with where its light comes from; none if something covers it.
+#[derive(Debug)]
+pub(crate) struct KeptVertex {
+    pub(crate) triangle: u32,
+    pub(crate) weights: [f64; 3],
+    pub(crate) trace: Option<Box<[u8]>>,
 }
 
 /// A vertex on the mesh.
@@ -204,7 +211,7 @@ pub(crate) struct Look<'a> {
 }
 
 impl<'a> Look<'a> {
-    fn new(bake: &Bake, material: &Material, upsampler: &'a Upsampler) -> Self {
+    pub(crate) fn new(bake: &Bake, material: &Material, upsampler: &'a Upsampler) -> Self {
         let mean = material.paint.as_ref().map(|texture| {
             let image = &bake.scene().images[texture.image];
             let n = image.pixels.len().max(1) as f64;

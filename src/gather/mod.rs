@@ -1,24 +1,11 @@
 //! What the light looks like at points and at the vertices of the refined mesh.
 
 mod bake;
-mod descent;
-pub mod hemisphere;
-mod lamp;
-mod nearby;
-mod patches;
-pub mod point;
-mod relit;
-mod shadows;
-mod slope;
+pub mod refined;
 mod spectra;
-mod sweep;
-pub(crate) mod trace;
 
 pub use bake::{Baked, Interpolation, MOSTLY, Probed};
-pub(crate) use bake::{Vertex, lend};
-pub use descent::Descent;
-pub use nearby::Arrival;
-pub(crate) use relit::{Kept, KeptVertex};
+pub(crate) use bake::{KeptVertex, Vertex, lend};
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
 #[derive(Debug, Clone, Default)]

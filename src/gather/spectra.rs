@@ -6,7 +6,7 @@
 use super::bake::Baked;
 use super::{BakedSurface, BakedVertex};
 use crate::color::Upsampler;
-use crate::output::refined;
+use super::refined;
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
 use crate::spectrum::{LEAVES, Leaves};

@@ -1,5 +1,6 @@
 //! From triangles to the tree that links attach to: faces at the bottom of a cluster tree, elements below them.
 
+pub mod alpha;
 mod build;
 mod cut;
 mod halves;

@@ -1,6 +1,6 @@
 //! Looks at light: each place with its normal is gathered at once, whichever triangles ask for it.
 
-use crate::gather::point::{Gathered, Receiver};
+use crate::transport::point::{Gathered, Receiver};
 use crate::gather::{MOSTLY, Vertex};
 use crate::hierarchy::NONE;
 use crate::solve::{Bake, Care};

@@ -11,7 +11,7 @@
 
 use super::camera::{self, View};
 use super::raster::{self, Hit, Refined};
-use super::refined;
+use crate::gather::refined;
 use crate::gather::{BakedSurface, BakedVertex};
 use crate::scene::{Camera, Scene, Surface};
 use glam::DVec3;

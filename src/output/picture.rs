@@ -7,7 +7,7 @@
 use super::camera::View;
 use super::exposure::{self, Exposure};
 use super::raster::{self, Hit, Refined};
-use super::refined;
+use crate::gather::refined;
 use crate::color::{self, LinearSrgb};
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;

@@ -10,7 +10,7 @@
 //! Bands of rows are drawn in parallel; the result does not depend on their order.
 
 use super::camera::View;
-use super::refined;
+use crate::gather::refined;
 use crate::gather::{BakedSurface, BakedVertex};
 use crate::scene::{Alpha, Material, Scene, Sides, Surface};
 use glam::DVec3;

@@ -7,7 +7,7 @@ use super::json::short;
 use super::lacking::lacking;
 use super::material::listed;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
-use crate::spectrum::Leaves;
+use crate::data::Leaves;
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};

@@ -7,7 +7,7 @@
 
 use super::{LightKind, Material, Projection, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
-use crate::spectrum::Leaves;
+use crate::data::Leaves;
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -16,7 +16,7 @@ use super::spectra_file::{Sampled, SpectraFile};
 use super::{LightKind, LightSpectrum, Material, PunctualLight};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::{Outside, named};
-use crate::spectrum::{Grid, LEAVES, Leaves};
+use crate::data::{Grid, LEAVES, Leaves};
 use glam::DVec3;
 use std::path::Path;
 

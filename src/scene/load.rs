@@ -9,7 +9,7 @@ use super::spectra_file::SpectraFile;
 use super::{Scene, Surface, lacking};
 use crate::color::Upsampler;
 use crate::error::{Error, Result};
-use crate::spectrum::Grid;
+use crate::data::Grid;
 use std::path::{Path, PathBuf};
 
 /// How to read a room.

@@ -12,7 +12,7 @@ use super::raw::{AlphaMode, RawMaterial};
 use super::spectra_file::{MaterialSpectra, Sampled, SpectraFile};
 use super::{Alpha, Emission, Material, Sides};
 use crate::color::Upsampler;
-use crate::spectrum::{Grid, Leaves};
+use crate::data::{Grid, Leaves};
 use std::path::Path;
 
 /// Greatest albedo: at 1 a closed room that emits has no steady state, near it the condition is 1/(1 - albedo).
@@ -274,7 +274,7 @@ mod tests {
     use super::*;
     use crate::color::{KM, Observer};
     use crate::scene::LightSpectrum;
-    use crate::spectrum::LEAVES;
+    use crate::data::LEAVES;
     use serde_json::json;
 
     fn raw(name: &str, color: [f32; 3]) -> RawMaterial {

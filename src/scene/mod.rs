@@ -1,7 +1,6 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
 mod accessor;
-pub mod alpha;
 pub(crate) mod buffers;
 mod camera;
 pub mod changes;
@@ -33,7 +32,7 @@ pub use load::Options;
 pub use material::GREATEST_ALBEDO;
 pub(crate) use material::listed;
 
-use crate::spectrum::{Grid, Leaves};
+use crate::data::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};
 use std::sync::Arc;
 

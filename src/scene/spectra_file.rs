@@ -23,7 +23,7 @@ use super::check::{Check, Unknown};
 use super::json::short;
 use super::uri;
 use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
-use crate::spectrum::{Grid, Leaves};
+use crate::data::{Grid, Leaves};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -20,7 +20,7 @@
 
 use super::conjugate::add_products;
 use super::operator::{Operator, pull};
-use super::rows::Rows;
+use crate::light::rows::Rows;
 use crate::hierarchy::{NONE, Tree};
 use crate::link::LinkRows;
 use glam::DVec3;
@@ -53,7 +53,7 @@ struct Lane {
 
 impl Aggregates {
     /// Chooses aggregates and builds their matrices. `root` is `sqrt(rho A)`.
-    pub(super) fn new<const L: usize>(
+    pub(crate) fn new<const L: usize>(
         operator: &Operator,
         reflectance: &Rows,
         root: &Rows,
@@ -162,7 +162,7 @@ pub(super) struct Parts {
 impl Parts {
     /// Cuts the hierarchy, then bisects what the cut holds along its longest extent. Aggregates need not be nodes: a
     /// long triangle has long parts, but those beside each other make up a short piece of a corridor.
-    fn new(tree: &Tree, links: &LinkRows, most: usize) -> Self {
+    pub(crate) fn new(tree: &Tree, links: &LinkRows, most: usize) -> Self {
         let groups = groups(tree, links);
         let mut open = std::collections::BinaryHeap::new();
         // Positive numbers are in the order of their bits. What is apart comes first.
@@ -226,7 +226,7 @@ struct Part {
 }
 
 impl Part {
-    fn new(tree: &Tree, pieces: Vec<u32>) -> Self {
+    pub(crate) fn new(tree: &Tree, pieces: Vec<u32>) -> Self {
         let centres = || pieces.iter().map(|&id| tree.node(id).centre);
         let low = centres().fold(DVec3::INFINITY, DVec3::min);
         let high = centres().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -384,7 +384,7 @@ struct Shares {
 
 impl Shares {
     /// From the means that nodes have as their parents see them.
-    fn new<const L: usize>(tree: &Tree, areas: &[f64], parts: &Parts, mean: &[[f32; L]]) -> Self {
+    pub(crate) fn new<const L: usize>(tree: &Tree, areas: &[f64], parts: &Parts, mean: &[[f32; L]]) -> Self {
         let mut shares = Self {
             lanes: L,
             lists: vec![Vec::new(); parts.above.len()],

@@ -10,9 +10,11 @@
 //! themselves), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 a ray and `4 padded lanes` a leaf:
 //! the rest follows from where light comes from.
 
-use super::light::{Light, Neighbours};
+use crate::light::{Light, Neighbours};
 use super::outlook::Outlook;
-use super::{Bake, Lanes, Representation, Rows, direct, lanes, padded, punctual};
+use super::{Bake, Representation, direct, punctual};
+use crate::light::lanes::{self, Lanes};
+use crate::light::{Rows, padded};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
@@ -109,7 +111,7 @@ impl Bake {
     }
 
     /// Writes hierarchy, links and the last solution; `whole`: with what further rounds need.
-    pub(super) fn encode_state(
+    pub(crate) fn encode_state(
         &self,
         whole: bool,
         factor: &[f32],
@@ -166,7 +168,7 @@ impl Bake {
 
     /// Takes them up, except for what is behind `light.irradiance` (if `whole`) and `light.leaves`: what the leaves reflect,
     /// and where the direct light of each leaf comes from, if that was kept.
-    pub(super) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
+    pub(crate) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
         let splits = from.get_list::<u32>()?;
         self.tree.nodes.reserve(4 * splits.len());
         self.tree.elements.reserve(4 * splits.len());
@@ -241,7 +243,7 @@ impl Bake {
     }
 
     /// The last solution from what the leaves reflect.
-    pub(super) fn light_up(&mut self, reflected: &Rows) {
+    pub(crate) fn light_up(&mut self, reflected: &Rows) {
         match reflected.width() {
             4 => self.light_up_lanes::<4>(reflected),
             8 => self.light_up_lanes::<8>(reflected),

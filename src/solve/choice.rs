@@ -3,7 +3,7 @@
 //! Perceptual and guaranteed control choose on a model of the room (`coarse`, `bounded`); the others follow from the
 //! lights and materials alone.
 
-use super::lanes::Lanes;
+use crate::light::lanes::Lanes;
 use super::sources::DenseSources;
 use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
@@ -23,7 +23,7 @@ const BOUNDED_PATCHES: usize = 48;
 
 impl Bake {
     /// Chooses the lanes of the rounds to come.
-    pub(super) fn choose_lanes(&mut self) {
+    pub(crate) fn choose_lanes(&mut self) {
         let lanes = self.chosen_lanes();
         if !lanes.same_meaning(&self.lanes) {
             // The lanes of an earlier round mean something else: the next solve starts afresh.

@@ -5,9 +5,9 @@
 //! 64-leaf solution is affordable, and what a partition loses is *measured* on the model, an *estimate* for the room.
 
 use super::conjugate::System;
-use super::lanes::Lanes;
+use crate::light::lanes::Lanes;
 use super::operator::Operator;
-use super::rows::{Rows, padded};
+use crate::light::rows::{Rows, padded};
 use crate::color::luv_jacobian;
 use crate::hierarchy::{NONE, Node, Tree};
 use crate::link::{Link, LinkRows, Way};
@@ -59,7 +59,7 @@ pub(super) struct Choice {
 impl Coarse {
     /// Sums links and sources over a cut of `tree` into so many patches at the most.
     #[expect(clippy::too_many_arguments, reason = "one caller")]
-    pub(super) fn new(
+    pub(crate) fn new(
         tree: &Tree,
         links: &[Link],
         factor: &[f32],

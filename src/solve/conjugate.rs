@@ -6,7 +6,7 @@
 
 use super::aggregates::Aggregates;
 use super::operator::Operator;
-use super::rows::Rows;
+use crate::light::rows::Rows;
 use rayon::prelude::*;
 
 /// Iterations at the most. Corridors of albedo .99 take about 20.
@@ -31,7 +31,7 @@ fn pays(greatest: f64, bounds: &[f64], tolerance: f64) -> bool {
 
 /// How a solve went.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Convergence {
+pub(crate) struct Convergence {
     /// Operator applications.
     pub iterations: usize,
     /// Greatest relative residual of a lane.
@@ -66,7 +66,7 @@ impl System<'_> {
     }
 
     /// The same with the coarse step as soon as `pays` finds it worth it, from the bounds before each iteration.
-    fn solve_with<const L: usize>(
+    pub(crate) fn solve_with<const L: usize>(
         &self,
         first: &Rows,
         reflected: &mut Rows,

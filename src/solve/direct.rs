@@ -7,8 +7,8 @@
 //! Where leaves look for themselves the points are random, weighted by how open they are (a leaf is what others see of
 //! it, see `outlook`): without bias whatever lies across the leaf, from two points upwards. What matters gets more of them.
 
-use crate::gather::point::{Memory, Receiver};
-use crate::gather::trace::Trace;
+use crate::transport::point::{Memory, Receiver};
+use crate::transport::trace::Trace;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::hierarchy::{NONE, Tree, stratified};
 use crate::link::{Demand, MAX_DEPTH};
@@ -132,13 +132,13 @@ impl Direct {
     }
 
     /// Where a leaf's light comes from (see `gather::trace`), if that is kept.
-    pub(super) fn trace(&self, leaf: u32) -> Option<&[u8]> {
+    pub(crate) fn trace(&self, leaf: u32) -> Option<&[u8]> {
         let stretch = self.traces.get(leaf as usize)?.clone();
         (!stretch.is_empty()).then(|| &self.bytes[stretch])
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.place.as_slice())
             + size_of_val(self.rows.as_slice())
             + size_of_val(self.free.as_slice())
@@ -295,7 +295,7 @@ struct Stake {
 }
 
 impl Stake {
-    fn new(tree: &Tree, leaf: u32, demand: &Demand) -> Self {
+    pub(crate) fn new(tree: &Tree, leaf: u32, demand: &Demand) -> Self {
         let node = tree.node(leaf);
         let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
         let share = node.area / demand.total_area;
@@ -344,7 +344,7 @@ struct Mean {
 }
 
 impl Mean {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             row: [0.0; 64],
             total: 0.0,

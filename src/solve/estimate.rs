@@ -6,7 +6,7 @@
 //! truth lies between; [`SHARE`] was measured against the audit.
 
 use crate::color::{de_luv, de2000};
-use crate::gather::point::Receiver;
+use crate::transport::point::Receiver;
 use crate::geometry::sampling::{Pcg, triangle_weights};
 use crate::hierarchy::Tree;
 use glam::DVec3;
@@ -50,7 +50,7 @@ impl Distance {
 
 impl Probes {
     /// Random points, by area.
-    pub(super) fn new(tree: &Tree, seed: u64) -> Self {
+    pub(crate) fn new(tree: &Tree, seed: u64) -> Self {
         let mut rng = Pcg::new(seed ^ 0x009b_0be5);
         let mut points = Vec::new();
         if let Some(root) = tree.nodes.first() {

@@ -115,8 +115,8 @@ pub(super) struct Guess {
 }
 
 /// Light spread evenly over all faces: `H = flux / (A (1 - mean albedo))`.
-pub(super) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
-    let lanes = super::lanes::Lanes::dense(&scene.spectra, weights);
+pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
+    let lanes = crate::light::lanes::Lanes::dense(&scene.spectra, weights);
     let mut row = [0.0_f32; 64];
     let glow: Vec<[f64; 3]> = scene
         .materials
@@ -194,8 +194,8 @@ const GREATEST_LOSS: f64 = 0.1;
 /// Scales direct light on the leaves of a closed room, lane by lane, so that the fronts receive exactly what the lamps
 /// give out: what rows of links are balanced for, for lamps.
 pub(super) fn conserve(
-    first: &mut super::Rows,
-    emission: &super::Rows,
+    first: &mut crate::light::Rows,
+    emission: &crate::light::Rows,
     lamps: &[(PunctualLight, Vec<f32>)],
     areas: &[f64],
     leaves: &[u32],
@@ -280,9 +280,9 @@ impl Default for Scaled {
 /// Luminous flux of rows by leaf.
 pub(super) fn lumens(
     areas: &[f64],
-    lanes: &super::lanes::Lanes,
+    lanes: &crate::light::lanes::Lanes,
     leaves: &[u32],
-    rows: &super::Rows,
+    rows: &crate::light::Rows,
 ) -> f64 {
     let each = leaves.iter().enumerate();
     each.map(|(k, &leaf)| areas[leaf as usize] * lanes.tristimulus(rows.row(k))[1])
@@ -292,7 +292,7 @@ pub(super) fn lumens(
 /// Luminous flux of punctual lights with their rows; directional ones have none.
 pub(super) fn punctual_lumens(
     lamps: &[(PunctualLight, Vec<f32>)],
-    lanes: &super::lanes::Lanes,
+    lanes: &crate::light::lanes::Lanes,
 ) -> f64 {
     let flux = |(light, row): &(PunctualLight, Vec<f32>)| {
         super::punctual::solid_angle(light.kind).unwrap_or(0.0) * lanes.tristimulus(row)[1]
@@ -309,7 +309,7 @@ pub(super) fn ratio(after: f64, before: f64) -> f64 {
 /// from punctual lights by leaf.
 pub(super) fn flux(
     areas: &[f64],
-    lanes: &super::lanes::Lanes,
+    lanes: &crate::light::lanes::Lanes,
     leaves: &[u32],
     rows: &FluxRows,
     sums: &[f64],
@@ -320,7 +320,7 @@ pub(super) fn flux(
     for (k, &leaf) in leaves.iter().enumerate() {
         let area = areas[leaf as usize];
         for l in 0..n {
-            let get = |r: &super::Rows| f64::from(r.row(k)[l]);
+            let get = |r: &crate::light::Rows| f64::from(r.row(k)[l]);
             let (e, r, h, f, rho) = (
                 get(rows.emission),
                 get(rows.reflected),
@@ -352,7 +352,7 @@ pub(super) fn flux(
 /// What the leaves receive as wholes, whatever others see of them.
 pub(super) struct Whole<'a> {
     /// Irradiance by reflected light, by leaf.
-    pub(super) indirect: &'a super::Rows,
+    pub(super) indirect: &'a crate::light::Rows,
     /// Direct light of a leaf as a share of that of what others see of it.
     pub(super) direct: &'a dyn Fn(u32) -> f64,
     /// Area of a leaf, all of it.
@@ -363,7 +363,7 @@ pub(super) struct Whole<'a> {
 /// send is the defect. `areas` are those of what others see: all that they send meets fronts.
 pub(super) fn flux_by_rays(
     areas: &[f64],
-    lanes: &super::lanes::Lanes,
+    lanes: &crate::light::lanes::Lanes,
     leaves: &[u32],
     rows: &FluxRows,
     whole: &Whole,
@@ -375,7 +375,7 @@ pub(super) fn flux_by_rays(
         let (area, seen) = ((whole.area)(leaf), areas[leaf as usize]);
         let more = (whole.direct)(leaf);
         for l in 0..n {
-            let get = |r: &super::Rows| f64::from(r.row(k)[l]);
+            let get = |r: &crate::light::Rows| f64::from(r.row(k)[l]);
             let (rho, first) = (get(rows.reflectance), more * get(rows.first));
             let all = first + get(whole.indirect);
             emitted[l] += area * get(rows.emission);
@@ -401,9 +401,9 @@ pub(super) fn flux_by_rays(
 
 /// Rows by leaf that the flux is summed from.
 pub(super) struct FluxRows<'a> {
-    pub(super) emission: &'a super::Rows,
-    pub(super) reflected: &'a super::Rows,
-    pub(super) irradiance: &'a super::Rows,
-    pub(super) first: &'a super::Rows,
-    pub(super) reflectance: &'a super::Rows,
+    pub(super) emission: &'a crate::light::Rows,
+    pub(super) reflected: &'a crate::light::Rows,
+    pub(super) irradiance: &'a crate::light::Rows,
+    pub(super) first: &'a crate::light::Rows,
+    pub(super) reflectance: &'a crate::light::Rows,
 }

@@ -3,7 +3,7 @@
 //! What lanes do to colours is seen by itself here: beside a solution on all 64 leaves of the same links, with direct
 //! light gathered at the same points of the same leaves.
 
-use super::lanes::Lanes;
+use crate::light::lanes::Lanes;
 use super::{Bake, Direct, Representation, padded};
 use crate::link::{Demand, LinkRows, balance};
 use std::time::Instant;

@@ -2,10 +2,10 @@
 
 use super::direct::{Look, receiver};
 use super::flux::{self, Closed};
-use super::light::Neighbours;
-use super::rows::{Rows, padded};
+use crate::light::Neighbours;
+use crate::light::rows::{Rows, padded};
 use super::{Bake, by_rays, punctual};
-use crate::gather::point::{Gatherer, Memory, Receiver};
+use crate::transport::point::{Gatherer, Memory, Receiver};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree};
 use crate::link::{Demand, Sight};

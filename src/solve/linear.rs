@@ -15,7 +15,7 @@
 //! left is taken out of each row. At last each lane is scaled so that what arrives is what is given out.
 
 use super::operator::{Vector, add, pull, scaled};
-use super::rows::Rows;
+use crate::light::rows::Rows;
 use crate::hierarchy::{NONE, Node, Sample, Tree};
 use crate::link::{LinkRows, Scratch, point_factors};
 use rayon::prelude::*;
@@ -61,7 +61,7 @@ pub(super) struct Slopes<'a> {
 
 impl<'a> Slopes<'a> {
     /// Finds the slopes of all links. `target` holds what the row of each leaf node must sum to.
-    pub(super) fn new(
+    pub(crate) fn new(
         tree: &'a Tree,
         links: &'a LinkRows,
         areas: &'a [f64],

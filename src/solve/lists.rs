@@ -5,7 +5,7 @@
 //! is content with fewer intervals: siblings are merged while the colour of its irradiance under the adaptation white
 //! moves by no more than the limit (CIELUV). The union of the lists is what the room needs.
 
-use super::lanes::Lanes;
+use crate::light::lanes::Lanes;
 use crate::color::{KM, luv_jacobian};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{CmfTree, Control, Leaves, Metric, Partition, SpectralList, coarsen};
@@ -33,7 +33,7 @@ pub(super) struct Lister<'a> {
 }
 
 impl<'a> Lister<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         lanes: &'a Lanes,
         spectra: &[LightSpectrum],
         weights: &[Leaves; 3],

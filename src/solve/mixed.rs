@@ -5,10 +5,10 @@
 //! all lanes, with one alpha and beta. A reflection costs m^2 multiplications where lanes of intervals cost m.
 
 use super::conjugate::{Convergence, MAX_ITERATIONS, dot, step};
-use super::lanes::Lanes;
+use crate::light::lanes::Lanes;
 use super::operator::Operator;
 use super::rays::RaySystem;
-use super::rows::Rows;
+use crate::light::rows::Rows;
 use crate::spectrum::Leaves;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ pub(super) struct Mixed {
 
 impl Mixed {
     /// Matrices for paints, and the paint of each leaf.
-    pub(super) fn new(paints: &[Leaves], of: Vec<u32>, lanes: &Lanes, width: usize) -> Self {
+    pub(crate) fn new(paints: &[Leaves], of: Vec<u32>, lanes: &Lanes, width: usize) -> Self {
         let m = lanes.len();
         let rows = |matrix: &DMatrix<f64>| {
             let mut rows = Rows::zero(m, width);

@@ -7,42 +7,35 @@ mod bounded;
 mod checkpoint;
 mod choice;
 mod coarse;
-mod conjugate;
+pub(crate) mod conjugate;
 mod direct;
 mod estimate;
-mod flux;
+pub(crate) mod flux;
 pub mod forecast;
 mod held;
 mod lamp_light;
-pub mod lanes;
-pub mod light;
 mod linear;
 mod lists;
 mod mixed;
 mod operator;
 mod outlook;
-mod punctual;
+pub(crate) mod punctual;
 mod rays;
 pub mod record;
 pub mod reference;
-mod relight;
 mod representation;
-mod rows;
 mod sent;
 mod sources;
-mod two_grid;
+pub(crate) mod two_grid;
 
 pub use lists::PatchList;
 pub use record::{Round, Verdict};
-pub use relight::{Relighter, Relit, RelitRecord};
 pub use representation::Representation;
-pub use rows::{Rows, padded};
 pub(crate) use sources::weights_of;
 
 use crate::color::{Observer, Upsampler};
-use crate::gather::Arrival;
-use crate::gather::hemisphere::Hemisphere;
-use crate::gather::point::{Gathered, Gatherer, Memory, Receiver};
+use crate::transport::hemisphere::Hemisphere;
+use crate::transport::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::{NO_PLANE, RayIndex, Segment};
 use crate::hierarchy::{Mesh, Tree, cuts, spaces};
 use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance, is_small};
@@ -53,8 +46,8 @@ use conjugate::{Convergence, System};
 use direct::Direct;
 pub use flux::Closed;
 pub use held::Held;
-use lanes::Lanes;
-use light::{Light, Neighbours};
+use crate::light::lanes::Lanes;
+use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded};
 use mixed::Mixed;
 pub use operator::Operator;
 use outlook::Outlook;
@@ -163,7 +156,7 @@ const GATHER_SHARE: f64 = 0.1;
 pub(crate) const LIGHT_SHARE: f64 = 0.8;
 pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
-const DE_PER_PERCENT: f64 = 0.35;
+pub(crate) const DE_PER_PERCENT: f64 = 0.35;
 
 /// A place with something right above it, within this share of the room's half diagonal, is not seen: a centimetre in a
 /// large room.
@@ -185,60 +178,69 @@ fn by_rays(sight: &Sight) -> bool {
 
 /// A room being baked.
 pub struct Bake {
-    scene: Scene,
-    settings: Settings,
-    plan: Plan,
-    mesh: Mesh,
-    tree: Tree,
-    rays: RayIndex,
-    graph: Graph,
-    closed: Closed,
+    pub(crate) scene: Scene,
+    pub(crate) settings: Settings,
+    pub(crate) plan: Plan,
+    pub(crate) mesh: Mesh,
+    pub(crate) tree: Tree,
+    pub(crate) rays: RayIndex,
+    pub(crate) graph: Graph,
+    pub(crate) closed: Closed,
     /// The same for what is not covered by something solid.
-    sealed: Closed,
-    weights: [Leaves; 3],
+    pub(crate) sealed: Closed,
+    pub(crate) weights: [Leaves; 3],
     /// Colours of textures as spectra: its table is made once.
-    upsampler: Upsampler,
-    lanes: Lanes,
+    pub(crate) upsampler: Upsampler,
+    pub(crate) lanes: Lanes,
     /// Colour difference (CIELUV) that the lanes cause, as far as it is known.
-    spectrum_error: Option<f64>,
-    outlook: Outlook,
+    pub(crate) spectrum_error: Option<f64>,
+    pub(crate) outlook: Outlook,
     /// Area of each node that is not covered.
-    areas: Vec<f64>,
-    balance: Balance,
-    light: Light,
+    pub(crate) areas: Vec<f64>,
+    pub(crate) balance: Balance,
+    pub(crate) light: Light,
     /// Reflected radiosity of the round before, by node: where a solve starts.
-    previous: Rows,
-    lamps: Vec<(PunctualLight, Vec<f32>)>,
-    direct: direct::Direct,
-    probes: estimate::Probes,
+    pub(crate) previous: Rows,
+    pub(crate) lamps: Vec<(PunctualLight, Vec<f32>)>,
+    pub(crate) direct: direct::Direct,
+    pub(crate) probes: estimate::Probes,
     /// Where the light of lamps goes first.
-    sent: sent::Sent,
-    hemisphere: Hemisphere,
-    rounds: Vec<Round>,
-    watch: Option<record::Watch>,
+    pub(crate) sent: sent::Sent,
+    pub(crate) hemisphere: Hemisphere,
+    pub(crate) rounds: Vec<Round>,
+    pub(crate) watch: Option<record::Watch>,
     /// Is it kept where light comes from, for relighting?
-    keep: bool,
+    pub(crate) keep: bool,
     /// Where the light of the watched points came from in the last two rounds, if that is kept.
-    watched: [Vec<Option<Box<[u8]>>>; 2],
+    pub(crate) watched: [Vec<Option<Box<[u8]>>>; 2],
     /// What the choice of lanes may take for granted when lamps and paints change: shadows of punctual lights, balance.
-    frozen: Option<(punctual::Shadowed, Vec<f32>)>,
+    pub(crate) frozen: Option<(punctual::Shadowed, Vec<f32>)>,
     /// Few patches that stand for the room in a solve by rays.
-    two_grid: Option<two_grid::TwoGrid>,
+    pub(crate) two_grid: Option<two_grid::TwoGrid>,
     /// Space of each face, and which cuts were made for them, see [`spaces`].
-    spaces: Vec<u32>,
-    parted: Vec<u32>,
-    started: Instant,
+    pub(crate) spaces: Vec<u32>,
+    pub(crate) parted: Vec<u32>,
+    pub(crate) started: Instant,
+}
+
+/// What rays have told of a room before the first round.
+pub(crate) struct Known {
+    pub(crate) spaces: Vec<u32>,
+    /// Which cuts of triangles were made for their sake.
+    pub(crate) parted: Vec<u32>,
+    /// Of the room, and without what is covered.
+    pub(crate) closed: [Closed; 2],
 }
 
 /// What a solve starts from, by leaf.
-struct Given {
-    sources: Sources,
+pub(crate) struct Given {
+    pub(crate) sources: Sources,
     /// Direct irradiance.
-    first: Rows,
+    pub(crate) first: Rows,
     /// A guess of what is reflected.
-    reflected: Rows,
+    pub(crate) reflected: Rows,
     /// What every node emits, if that is known.
-    emitted: Option<Rows>,
+    pub(crate) emitted: Option<Rows>,
 }
 
 /// Cuts a mesh as it was cut before: the search casts no ray.
@@ -258,7 +260,7 @@ impl Bake {
     }
 
     /// The same where rays have told already which faces share a space, and what is closed.
-    fn with(scene: Scene, settings: Settings, known: Option<relight::Known>) -> Self {
+    pub(crate) fn with(scene: Scene, settings: Settings, known: Option<Known>) -> Self {
         let started = Instant::now();
         let plan = Plan::of(&scene);
         let mut mesh = Mesh::new(&scene);
@@ -504,7 +506,7 @@ impl Bake {
     /// Runs `f` with what blocks light in this room.
     pub(crate) fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
         let opaque = |triangle: u32, u: f32, v: f32| {
-            !crate::scene::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v])
+            !crate::hierarchy::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v])
         };
         let opaque: Option<&Opaque> = if self.plan.runs(Kind::AlphaMasks) {
             Some(&opaque)
@@ -541,7 +543,7 @@ impl Bake {
         }
         let mut keen = vec![0.0_f32; self.tree.nodes.len()];
         for (k, &leaf) in self.light.leaves.iter().enumerate() {
-            let h = light::brightness(
+            let h = brightness(
                 self.lanes.tristimulus(self.light.irradiance.row(k)),
                 self.light.white,
             );
@@ -620,7 +622,7 @@ impl Bake {
     }
 
     /// Turns materials into rows.
-    fn painter(&self) -> Painter<'_> {
+    pub(crate) fn painter(&self) -> Painter<'_> {
         Painter::new(&self.scene, &self.mesh, &self.upsampler)
     }
 
@@ -647,7 +649,7 @@ impl Bake {
     }
 
     /// The same with what it starts from.
-    fn solve_with<const L: usize>(
+    pub(crate) fn solve_with<const L: usize>(
         &mut self,
         rows: &LinkRows,
         leaves: &[u32],
@@ -830,7 +832,7 @@ impl Bake {
     fn bright_weights(&self) -> Vec<f64> {
         let white = self.light.white;
         let xyz = self.lanes.xyz().iter();
-        xyz.map(|&xyz| light::brightness(xyz, white)).collect()
+        xyz.map(|&xyz| brightness(xyz, white)).collect()
     }
 
     /// Notes how bright what arrives on leaves is.
@@ -871,7 +873,7 @@ impl Bake {
     }
 
     /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.
-    fn guess<const L: usize>(&self, leaves: &[u32]) -> Rows {
+    pub(crate) fn guess<const L: usize>(&self, leaves: &[u32]) -> Rows {
         let mut rows = Rows::zero(leaves.len(), L);
         if self.previous.width() == L {
             let known = self.previous.len();
@@ -887,7 +889,7 @@ impl Bake {
     }
 
     /// Leaf rows on all nodes, by area.
-    fn on_nodes<const L: usize>(&self, by_leaf: &Rows, leaves: &[u32]) -> Rows {
+    pub(crate) fn on_nodes<const L: usize>(&self, by_leaf: &Rows, leaves: &[u32]) -> Rows {
         let mut rows = Rows::zero(self.tree.nodes.len(), L);
         for (row, &leaf) in by_leaf.all::<L>().iter().zip(leaves) {
             rows.all_mut::<L>()[leaf as usize] = *row;

@@ -9,7 +9,7 @@
 //! themselves. The links of a row stand in order of their source. Vectors are explicit: of loops over arrays of 16 and
 //! 32 lanes the compiler made single numbers, eight times as slow.
 
-use super::rows::Rows;
+use crate::light::rows::Rows;
 use crate::hierarchy::{NONE, Tree};
 use crate::link::LinkRows;
 use bytemuck::{Pod, Zeroable};
@@ -52,7 +52,7 @@ struct Shape {
 }
 
 impl Shape {
-    fn new(tree: &Tree, leaves: &[u32], areas: &[f64]) -> Self {
+    pub(crate) fn new(tree: &Tree, leaves: &[u32], areas: &[f64]) -> Self {
         let nodes = &tree.nodes;
         let mut place = vec![NONE; nodes.len()];
         for (k, &leaf) in leaves.iter().enumerate() {

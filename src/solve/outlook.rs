@@ -13,8 +13,8 @@
 //! all leaves receive: nothing need be scaled.
 
 use super::flux::Closed;
-use super::rows::Rows;
-use crate::gather::hemisphere::{BEAM, Hemisphere};
+use crate::light::rows::Rows;
+use crate::transport::hemisphere::{BEAM, Hemisphere};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
 use crate::link::Sight;
@@ -189,7 +189,7 @@ impl Outlook {
     }
 
     /// Have leaves looked for themselves?
-    pub(super) fn looks(&self) -> bool {
+    pub(crate) fn looks(&self) -> bool {
         !self.range.is_empty()
     }
 
@@ -373,7 +373,7 @@ impl Outlook {
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         (size_of::<End>() + 4) * self.ends.len() + 8 * (self.range.len() + self.target.len())
     }
 
@@ -472,7 +472,7 @@ struct Pairs {
 
 impl Pairs {
     /// Of `count` rays, a power of two.
-    fn new(leaf: u32, count: usize, seed: u64) -> Self {
+    pub(crate) fn new(leaf: u32, count: usize, seed: u64) -> Self {
         let shift = hash(seed, u64::from(leaf));
         let others = (count as u64).saturating_sub(1).max(1);
         Self {

@@ -1,7 +1,7 @@
 //! Punctual lights on the hierarchy: never linked, but gathered at points of every element, with shadows.
 
-use super::lanes::Lanes;
-use crate::gather::point::{Receiver, punctual_factor};
+use crate::light::lanes::Lanes;
+use crate::transport::point::{Receiver, punctual_factor};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Mesh, Sample, Tree};
 use crate::link::{Sight, View};
@@ -21,7 +21,7 @@ type Factors = Vec<(u32, f32)>;
 
 /// For each leaf, the lights that reach it and the mean factor from intensity to irradiance.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Shadowed {
+pub(crate) struct Shadowed {
     /// (light, factor) lists by leaf.
     pub by_leaf: Vec<Vec<(u32, f32)>>,
     /// Rays cast.
@@ -29,7 +29,7 @@ pub(super) struct Shadowed {
 }
 
 /// Lights of the scene, recentred, with their rows.
-pub(super) fn lamps(scene: &Scene, mesh: &Mesh, lanes: &Lanes) -> Vec<(PunctualLight, Vec<f32>)> {
+pub(crate) fn lamps(scene: &Scene, mesh: &Mesh, lanes: &Lanes) -> Vec<(PunctualLight, Vec<f32>)> {
     scene
         .lights
         .iter()

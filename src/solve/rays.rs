@@ -7,7 +7,7 @@
 use super::conjugate::Convergence;
 use super::operator::pull;
 use super::outlook::Outlook;
-use super::rows::Rows;
+use crate::light::rows::Rows;
 use super::two_grid::TwoGrid;
 use crate::hierarchy::Tree;
 

@@ -207,7 +207,7 @@ pub(super) struct Measured<'a> {
 }
 
 impl Round {
-    pub(super) fn new(bake: &Bake, m: Measured) -> Self {
+    pub(crate) fn new(bake: &Bake, m: Measured) -> Self {
         let estimate = Figure::estimate;
         let spectrum = bake.spectrum_error.unwrap_or(0.0);
         let convergence_de = m.convergence.bound * 100.0 * super::DE_PER_PERCENT;

@@ -1,8 +1,8 @@
 //! Reflectance and emission of patches, row by row, from the materials.
 
-use super::lanes::Lanes;
+use crate::light::lanes::Lanes;
 use super::mixed::Mixed;
-use super::rows::{Rows, padded};
+use crate::light::rows::{Rows, padded};
 use crate::color::Upsampler;
 use crate::hierarchy::{Element, Mesh, Tree};
 use crate::scene::{Emission, Material, Scene, Surface, Texture};
@@ -34,7 +34,7 @@ pub(super) struct Painter<'a> {
 
 impl<'a> Painter<'a> {
     /// A painter for the materials of a scene.
-    pub(super) fn new(scene: &'a Scene, mesh: &'a Mesh, upsampler: &'a Upsampler) -> Self {
+    pub(crate) fn new(scene: &'a Scene, mesh: &'a Mesh, upsampler: &'a Upsampler) -> Self {
         Self {
             scene,
             mesh,
@@ -43,7 +43,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Rows for the given leaves of `tree`.
-    pub(super) fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
+    pub(crate) fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
         let width = padded(lanes.len());
         // One row a material; painted materials are worked out patch by patch.
         let plain: Vec<(Vec<f32>, Vec<f32>)> = self
@@ -220,7 +220,7 @@ pub(super) struct DenseSources<'a> {
 }
 
 impl<'a> DenseSources<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         painter: &'a Painter<'a>,
         tree: &'a Tree,
         shadowed: &'a super::punctual::Shadowed,

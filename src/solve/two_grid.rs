@@ -7,7 +7,7 @@
 //! leaf reflects its patch's u. What the cut gets wrong the next sweep finds; the sweeps alone say when it is enough.
 
 use super::outlook::Outlook;
-use super::rows::Rows;
+use crate::light::rows::Rows;
 use crate::hierarchy::{NONE, Tree};
 use rayon::prelude::*;
 use std::cmp::Reverse;
@@ -26,7 +26,7 @@ const BLOCK: usize = 16;
 const DARK: f64 = 0.05;
 
 /// The cut, and who sees whom on it.
-pub(super) struct TwoGrid {
+pub(crate) struct TwoGrid {
     /// Patch of each leaf, by leaf.
     patch: Vec<u32>,
     /// Bare area of each patch.
@@ -37,7 +37,7 @@ pub(super) struct TwoGrid {
 
 impl TwoGrid {
     /// Sums what the rays of the leaves met.
-    pub(super) fn new(tree: &Tree, outlook: &Outlook, leaves: &[u32], areas: &[f64]) -> Self {
+    pub(crate) fn new(tree: &Tree, outlook: &Outlook, leaves: &[u32], areas: &[f64]) -> Self {
         let of_node = cut(tree, PATCHES);
         let patch: Vec<u32> = leaves.iter().map(|&k| of_node[k as usize]).collect();
         let count = patch.iter().map(|&p| p as usize + 1).max().unwrap_or(0);

@@ -90,7 +90,7 @@
 
 mod bound;
 mod control;
-mod grid;
+
 mod interval;
 mod list;
 pub mod methods;
@@ -106,7 +106,7 @@ pub(crate) mod testing;
 
 pub use bound::Bounded;
 pub use control::{Control, Metric, Operation, Overshoot, Pairs, coarsen, control};
-pub use grid::{Grid, LEAVES, Leaves};
+pub use crate::data::{Grid, LEAVES, Leaves};
 pub use interval::{Cmf, Estimate, Interval, Moment, Representative};
 pub use list::List;
 pub use partition::{Intervals, Partition};

@@ -5,7 +5,7 @@
 //!
 //! The average of eq. 3 is the value that makes the sum of the squares of the three errors of eq. 2 least.
 
-use super::grid::{LEAVES, Leaves};
+use crate::data::{LEAVES, Leaves};
 use super::interval::{Cmf, Interval, Representative};
 use super::partition::Partition;
 

@@ -16,7 +16,7 @@
 use super::codec::{Broken, Decoder, Encoder, Plain, Read};
 use super::hash;
 use crate::error::{Error, Result};
-use crate::output::file;
+use crate::store::file;
 use std::fs::File;
 use std::io::{self, Read as _, Seek, SeekFrom};
 use std::path::Path;

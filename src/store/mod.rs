@@ -2,6 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `file` | a file is whole or not there |
 //! | `hash` | XXH64 |
 //! | `codec` | numbers and lists as bytes, and back without trust |
 //! | `packs` | many short pieces, read when they are asked for |
@@ -10,6 +11,7 @@
 
 pub mod codec;
 pub mod container;
+pub mod file;
 pub mod fingerprint;
 pub mod hash;
 pub mod packs;

@@ -2,7 +2,7 @@
 
 use crate::geometry::{NO_PLANE, RayIndex};
 use crate::hierarchy::Mesh;
-use crate::scene::alpha::is_hole;
+use crate::hierarchy::alpha::is_hole;
 use crate::scene::{Scene, Sides};
 use glam::DVec3;
 

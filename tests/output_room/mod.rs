@@ -370,7 +370,7 @@ pub fn refined(scene: &Scene, n: u32) -> Vec<BakedSurface> {
                         light: [0.0; 3],
                     };
                     let emits = scene.materials[surface.material].emission.is_some();
-                    let place = haarlight::output::refined::position(surface, &vertex);
+                    let place = haarlight::gather::refined::position(surface, &vertex);
                     vertex.light = if emits { [5000.0; 3] } else { light(place) };
                     vertex.radiosity = vertex.light;
                     baked.vertices.push(vertex);

@@ -15,7 +15,8 @@ mod keep;
 mod material;
 mod meshes;
 
-use super::{Exposure, refined};
+use super::Exposure;
+use crate::gather::refined;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use crate::scene::Scene;

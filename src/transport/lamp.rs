@@ -258,7 +258,7 @@ mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
     use crate::scene::{Options, Scene};
-    use crate::solve::light::brightness;
+    use crate::light::brightness;
     use crate::solve::{Bake, Settings};
     use std::path::Path;
 

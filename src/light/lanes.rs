@@ -155,7 +155,7 @@ impl Lanes {
     }
 
     /// These lanes.
-    pub(super) fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
+    pub(crate) fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
         let power: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
         let xyz = lanes
             .iter()

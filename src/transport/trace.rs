@@ -7,7 +7,7 @@
 //! Packed, ids stand sorted as differences in base 128: a patch takes about 6 bytes, a leaf that rays met about 2.
 
 use crate::scene::PunctualLight;
-use crate::solve::light::Light;
+use crate::light::Light;
 use crate::store::Broken;
 use crate::store::codec::Read;
 
@@ -242,7 +242,7 @@ pub(crate) fn lamps_of(packed: &[u8], nodes: usize, lamps: usize) -> Read<Vec<(u
 mod tests {
     use super::*;
     use crate::scene::LightKind;
-    use crate::solve::Rows;
+    use crate::light::Rows;
     use proptest::prelude::*;
 
     const NODES: usize = 400;

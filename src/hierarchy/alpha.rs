@@ -1,7 +1,7 @@
 //! Holes of alpha-masked surfaces.
 
-use super::{Alpha, Scene};
-use crate::hierarchy::Mesh;
+use super::Mesh;
+use crate::scene::{Alpha, Scene};
 
 /// Is a point of a triangle (barycentric weights of its corners) a hole?
 pub fn is_hole(scene: &Scene, mesh: &Mesh, triangle: u32, weights: [f32; 3]) -> bool {

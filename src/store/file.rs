@@ -20,7 +20,7 @@ const BUFFER: usize = 1 << 20;
 /// let folder = std::env::temp_dir().join(format!("haarlight-doc-{}", std::process::id()));
 /// std::fs::create_dir_all(&folder)?;
 /// let path = folder.join("a.txt");
-/// haarlight::output::file::write_atomic(&path, None, |w| w.write_all(b"light"))?;
+/// haarlight::store::file::write_atomic(&path, None, |w| w.write_all(b"light"))?;
 /// assert_eq!(std::fs::read(&path)?, b"light");
 /// # std::fs::remove_dir_all(&folder)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -76,7 +76,7 @@ impl Rows {
     }
 
     /// Parts of `rows` rows each, the last may have fewer.
-    pub(super) fn parts_mut(
+    pub(crate) fn parts_mut(
         &mut self,
         rows: usize,
     ) -> impl IndexedParallelIterator<Item = &mut [f32]> {
@@ -86,7 +86,7 @@ impl Rows {
     }
 
     /// All rows as vectors V, N a row. V and N make up the width; rows start on multiples of V's size.
-    pub(super) fn vectors<V: Pod, const N: usize>(&self) -> &[[V; N]] {
+    pub(crate) fn vectors<V: Pod, const N: usize>(&self) -> &[[V; N]] {
         debug_assert_eq!(size_of::<[V; N]>(), self.width * size_of::<f32>());
         &bytemuck::cast_slice::<Line, V>(&self.lines)
             .as_chunks::<N>()
@@ -94,7 +94,7 @@ impl Rows {
     }
 
     /// All rows as vectors V, N a row.
-    pub(super) fn vectors_mut<V: Pod, const N: usize>(&mut self) -> &mut [[V; N]] {
+    pub(crate) fn vectors_mut<V: Pod, const N: usize>(&mut self) -> &mut [[V; N]] {
         debug_assert_eq!(size_of::<[V; N]>(), self.width * size_of::<f32>());
         &mut bytemuck::cast_slice_mut::<Line, V>(&mut self.lines)
             .as_chunks_mut::<N>()

@@ -1,7 +1,7 @@
 //! The same room under other lamps and paints: links, form factors and visibility are kept, only the light is solved anew.
 //!
 //! A cache holds a finished bake (see `checkpoint`) and where every leaf and every vertex of the output gets its light
-//! from (see `gather::trace`). Light is linear in lamps and, given the solution, in paints: direct light of the leaves is
+//! from (see `transport::trace`). Light is linear in lamps and, given the solution, in paints: direct light of the leaves is
 //! one sparse product, the solve starts from the old solution, and the light of the vertices is another product. No ray
 //! is cast: there is not even a ray index. What was refined for the old light stays as fine as it was: shadows of a lamp
 //! that was dark beside the others are as coarse as they were worth then.
@@ -9,14 +9,16 @@
 //! A cache belongs to a shape: surfaces, sides, holes, places of lights. Where that changed it is refused with what
 //! changed; so is a room in which a surface gives out light that did not (lamps may go out).
 
-use super::conjugate::Convergence;
-use super::lanes::Lanes;
-use super::light::Light;
-use super::two_grid::TwoGrid;
-use super::{Bake, Closed, DE_PER_PERCENT, Given, Rows, Settings, flux, padded, punctual};
+use super::relit::Kept;
+use crate::light::lanes::Lanes;
+use crate::light::{Light, Rows, padded};
+use crate::solve::conjugate::Convergence;
+use crate::solve::two_grid::TwoGrid;
+use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, Settings, flux, punctual};
+use crate::transport::trace;
 use crate::color::de2000;
 use crate::error::{Error, Result};
-use crate::gather::{Baked, Kept, trace};
+use crate::gather::Baked;
 use crate::link::{LinkRows, balance};
 use crate::scene::Scene;
 use crate::spectrum::LEAVES;
@@ -24,15 +26,6 @@ use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
 use std::path::Path;
 use std::time::Instant;
-
-/// What rays have told of a room before the first round.
-pub(super) struct Known {
-    pub(super) spaces: Vec<u32>,
-    /// Which cuts of triangles were made for their sake.
-    pub(super) parted: Vec<u32>,
-    /// Of the room, and without what is covered.
-    pub(super) closed: [Closed; 2],
-}
 
 /// A finished bake whose lamps and paints may change.
 pub struct Relighter {
@@ -81,7 +74,7 @@ pub struct RelitRecord {
     /// Mean colour difference (CIEDE2000), an estimate: geometry as the bake estimated it, times how much more (or less)
     /// the gathers of its last two rounds differ under this light than under its own; wavelengths and the solve as they
     /// are now.
-    pub error_de2000: super::record::Figure,
+    pub error_de2000: crate::solve::record::Figure,
     /// Where the light went.
     pub flux: flux::Balance,
     /// Seconds: choice of lanes, direct light, solve, light of the vertices.
@@ -374,7 +367,7 @@ impl Relighter {
                 changed,
                 intervals_working: bake.lanes.len(),
                 iterations: if changed { convergence.iterations } else { 0 },
-                error_de2000: super::record::Figure::estimate(error),
+                error_de2000: crate::solve::record::Figure::estimate(error),
                 flux,
                 lanes_s,
                 direct_s,
@@ -524,7 +517,7 @@ fn lit(scene: &Scene) -> Vec<u8> {
 }
 
 /// Estimate of a round without its wavelengths and its solve, which are known anew.
-fn without(total: f64, round: &super::Round) -> f64 {
+fn without(total: f64, round: &crate::solve::Round) -> f64 {
     let parts = [round.error.spectrum_de_luv, round.error.convergence_de_luv]
         .map(|f| f.value.unwrap_or(0.0).powi(2));
     (total * total - parts[0] - parts[1]).max(0.0).sqrt()

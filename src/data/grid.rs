@@ -3,7 +3,7 @@
 //! Two ways to bring a table onto the leaves: the exact band means of the piecewise linear table, and the paper's
 //! convention, the value at the left edge of the leaf (380, 385, ... 695 nm). Units: nm.
 
-use crate::data::{Outside, Table};
+use super::{Outside, Table};
 
 /// Number of leaves: 2^6, the finest level of every spectral tree.
 pub const LEAVES: usize = 64;

@@ -1,22 +1,15 @@
 //! The output mesh kept with where its light comes from, and its light under other lamps and paints:
 //! one sparse product, no ray.
 
-use super::bake::{Baked, Vertex, lend};
-use super::{BakedSurface, trace};
+use crate::gather::{Baked, BakedSurface, KeptVertex, Vertex, lend};
 use crate::hierarchy::Mesh;
-use crate::solve::{Bake, padded};
+use crate::light::padded;
+use crate::solve::Bake;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Packs};
 use rayon::prelude::*;
+use crate::transport::trace;
 use std::io;
-
-/// A vertex of the output on the mesh, with where its light comes from; none if something covers it.
-#[derive(Debug)]
-pub(crate) struct KeptVertex {
-    pub(crate) triangle: u32,
-    pub(crate) weights: [f64; 3],
-    pub(crate) trace: Option<Box<[u8]>>,
-}
 
 /// One side of a surface: mesh and traces.
 #[derive(Debug)]

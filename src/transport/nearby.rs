@@ -14,8 +14,6 @@ use crate::geometry::Hit;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::link::View;
 
-/// What is nearer than this many times the square root of a leaf's area is close by.
-pub(super) const NEAR: f64 = 1.5;
 /// A point of whose rays more than this share meet black backs lies within something: then all is close by.
 const WITHIN: f64 = 1.0 / 16.0;
 /// Steps of a path at the most.
@@ -24,17 +22,6 @@ const STEPS: u64 = 8;
 const FOLLOWED: usize = 64;
 /// Where direct light varies by less than this share over a leaf, any point of it has the mean.
 const EVEN: f32 = 0.05;
-
-/// Light that arrives on a leaf, in brightness, share of the white's.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Arrival {
-    /// All of it.
-    pub all: f32,
-    /// Of which straight from lamps.
-    pub direct: f32,
-    /// Half the range of direct light over the leaf.
-    pub spread: f32,
-}
 
 /// The light that a point close by reflects, by one path.
 struct Path {

@@ -3,9 +3,11 @@
 //! Every ray goes this way, and the patches themselves lie far apart in memory: what rays ask of them stands here, 12 bytes a
 //! patch.
 
-use super::nearby::NEAR;
 use crate::hierarchy::{NONE, Tree, quarter};
 use crate::link::POLYGONS;
+
+/// What is nearer than this many times the square root of a leaf's area is close by.
+const NEAR: f64 = 1.5;
 
 /// What rays ask of the patches that a solution knows.
 #[derive(Debug, Clone, Default)]
@@ -38,7 +40,7 @@ impl Descent {
     }
 
     /// The leaf that holds a point of a face, as [`Tree::leaf_at`] when the solution was made.
-    pub(super) fn leaf_at(&self, tree: &Tree, entry: u32, mut weights: [f64; 3]) -> u32 {
+    pub(crate) fn leaf_at(&self, tree: &Tree, entry: u32, mut weights: [f64; 3]) -> u32 {
         let mut id = tree.face_node[entry as usize];
         loop {
             let child = self.steps[id as usize].child;
@@ -50,13 +52,13 @@ impl Descent {
     }
 
     /// A patch and those above it that may be gathered whole.
-    pub(super) fn upwards(&self, leaf: u32) -> impl Iterator<Item = u32> {
+    pub(crate) fn upwards(&self, leaf: u32) -> impl Iterator<Item = u32> {
         let above = |&id: &u32| Some(self.steps[id as usize].above).filter(|&id| id != NONE);
         std::iter::successors(Some(leaf), above)
     }
 
     /// What is nearer than this to a leaf is close by.
-    pub(super) fn near(&self, leaf: u32) -> f32 {
+    pub(crate) fn near(&self, leaf: u32) -> f32 {
         self.steps[leaf as usize].near
     }
 

@@ -9,7 +9,7 @@ use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
 use crate::link::{Sight, Way};
 use crate::scene::{LightKind, PunctualLight};
-use crate::solve::light::Light;
+use crate::light::Light;
 use glam::DVec3;
 
 /// Nearer than this many of its radii a cluster is entered, and a patch is not even.

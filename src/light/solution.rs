@@ -2,10 +2,21 @@
 
 use super::lanes::Lanes;
 use super::rows::Rows;
-use crate::gather::{Arrival, Descent};
+use super::descent::Descent;
 use crate::hierarchy::{NONE, Tree};
 use crate::link::{Graph, Way};
 use rayon::prelude::*;
+
+/// Light that arrives on a leaf, in brightness, share of the white's.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Arrival {
+    /// All of it.
+    pub all: f32,
+    /// Of which straight from lamps.
+    pub direct: f32,
+    /// Half the range of direct light over the leaf.
+    pub spread: f32,
+}
 
 /// The light in a room after a round.
 #[derive(Debug, Clone, Default)]

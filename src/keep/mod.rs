@@ -1,0 +1,6 @@
+//! What is kept of a finished bake, and the same room under other lamps and paints.
+
+mod relight;
+mod relit;
+
+pub use relight::{Relighter, Relit, RelitRecord};

@@ -1,0 +1,11 @@
+//! What both sides of the transport share: lanes, rows of them, and the solution on the patches.
+
+mod descent;
+pub mod lanes;
+pub(crate) mod rows;
+mod solution;
+
+pub use descent::Descent;
+pub use rows::{Rows, padded};
+pub use solution::{Arrival, Light, Neighbours};
+pub(crate) use solution::brightness;

@@ -1,0 +1,20 @@
+//! Light at a point: lamps, patches by exact polygons, and all else by rays over the hemisphere.
+//!
+//! | file | what |
+//! |---|---|
+//! | `point` | a receiver, and everything that it gets |
+//! | `patches`, `slope`, `shadows` | patches of few faces with their exact factors, past what blocks them |
+//! | `lamp` | parts of lamps near a point, and lamps chosen by chance |
+//! | `hemisphere`, `sweep` | beams of rays that find the patches they end on |
+//! | `nearby` | short paths where rays end close by |
+//! | `trace` | what a point gets its light from, kept for relighting |
+
+pub mod hemisphere;
+mod lamp;
+mod nearby;
+mod patches;
+pub mod point;
+mod shadows;
+mod slope;
+mod sweep;
+pub(crate) mod trace;
