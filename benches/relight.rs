@@ -3,8 +3,8 @@
 //!
 //! `cargo bench --bench relight [-- NAME]`, NAME a part of a room's name. The furnished room takes minutes.
 
-use haarlight::scene::{Options, Scene};
 use haarlight::keep::Relighter;
+use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use std::hint::black_box;
 use std::path::Path;

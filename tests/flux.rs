@@ -19,7 +19,7 @@ fn received(room: &Path, rounds: usize) -> Vec<f64> {
             assert!((sent.to_fronts + sent.to_backs + sent.outside - 1.0).abs() < 1e-9);
             // What is received stays or goes: rays of leaves lose none of it, but for their noise.
             assert!(flux.worst_band < 0.02, "{flux:?}");
-            flux.received_lm / (flux.emitted_lm * sent.to_fronts)
+            flux.received_lm / (sent.lamps_lm * sent.to_fronts)
         })
         .collect()
 }

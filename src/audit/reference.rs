@@ -6,11 +6,11 @@
 
 use super::path::{Answer, Audit, BATCHES};
 use crate::color::{KM, Observer, de2000};
-use crate::transport::point::Receiver;
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::hierarchy::Face;
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
+use crate::transport::point::Receiver;
 use glam::DVec3;
 
 /// Paths of a point that tell how many more it takes.

@@ -10,8 +10,8 @@ use super::options::{Common, Reading, positive};
 use super::talk::Talk;
 use crate::cost::{Knob, Sweep, choose, plots, tables};
 use crate::error::{Error, Problem, Result};
-use crate::store::file;
 use crate::solve::Representation;
+use crate::store::file;
 use serde_json::json;
 use std::path::PathBuf;
 

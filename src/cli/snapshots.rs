@@ -8,8 +8,8 @@ use super::paths::file_names;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use crate::output::{Exposure, Format, Picture, camera, exr, picture};
-use crate::store::file;
 use crate::scene::{Camera, Scene};
+use crate::store::file;
 use std::path::{Path, PathBuf};
 
 /// Proportions that pictures may have.

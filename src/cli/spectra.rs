@@ -5,8 +5,8 @@
 use super::command::print;
 use crate::data::{Kind, Named, named, names, nearest};
 use crate::error::{Error, Result};
-use crate::store::file;
 use crate::report::{Align, Chart, Scale, Series, Table};
+use crate::store::file;
 use std::path::{Path, PathBuf};
 
 /// As many lines as a chart tells apart.

@@ -4,8 +4,8 @@
 //! With S held constant on each leaf this is k * sum S_leaf w_leaf, w_leaf the integral of a_bar over the leaf, in nm.
 //! The paper samples a_bar at the left edge of the leaf instead.
 
-use crate::data::{Outside, Table, cmf_1931};
 use crate::data::{Grid, Leaves};
+use crate::data::{Outside, Table, cmf_1931};
 
 /// Maximum luminous efficacy of radiation, lm/W (CIE 018:2019; 683.002 for the SI's 540 THz, 683 by convention).
 pub const KM: f64 = 683.0;

@@ -22,8 +22,8 @@ pub fn normalization(source: &Leaves, weights: &[Leaves; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::color::Observer;
-    use crate::data::{Outside, named};
     use crate::data::Grid;
+    use crate::data::{Outside, named};
 
     #[test]
     fn k_of_d65_is_the_published_one() {

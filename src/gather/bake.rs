@@ -1,12 +1,12 @@
 //! The light of a vertex of the output, and of any point.
 
+use super::refined as refined_mesh;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler};
-use super::refined as refined_mesh;
-use crate::transport::point::{Gathered, Receiver};
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
+use crate::transport::point::{Gathered, Receiver};
 use glam::DVec3;
 
 /// Vertices are drawn this far into the triangle they belong to: a point on an edge lies on the neighbouring wall too.

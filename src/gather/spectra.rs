@@ -4,9 +4,9 @@
 //! with its mean colour. An emissive texture is looked up at the vertex.
 
 use super::bake::Baked;
+use super::refined;
 use super::{BakedSurface, BakedVertex};
 use crate::color::Upsampler;
-use super::refined;
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
 use crate::spectrum::{LEAVES, Leaves};

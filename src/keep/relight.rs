@@ -10,20 +10,20 @@
 //! changed; so is a room in which a surface gives out light that did not (lamps may go out).
 
 use super::relit::Kept;
-use crate::light::lanes::Lanes;
-use crate::light::{Light, Rows, padded};
-use crate::solve::conjugate::Convergence;
-use crate::solve::two_grid::TwoGrid;
-use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, Settings, flux, punctual};
-use crate::transport::trace;
 use crate::color::de2000;
 use crate::error::{Error, Result};
 use crate::gather::Baked;
+use crate::light::lanes::Lanes;
+use crate::light::{Light, Rows, padded};
 use crate::link::{LinkRows, balance};
 use crate::scene::Scene;
+use crate::solve::conjugate::Convergence;
+use crate::solve::two_grid::TwoGrid;
+use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, Settings, flux, punctual};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
+use crate::transport::trace;
 use std::path::Path;
 use std::time::Instant;
 

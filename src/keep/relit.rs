@@ -7,8 +7,8 @@ use crate::light::padded;
 use crate::solve::Bake;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Packs};
-use rayon::prelude::*;
 use crate::transport::trace;
+use rayon::prelude::*;
 use std::io;
 
 /// One side of a surface: mesh and traces.

@@ -1,8 +1,8 @@
 //! A solution: what every patch reflects and emits, in rows, with what the gather and the oracle ask of it.
 
+use super::descent::Descent;
 use super::lanes::Lanes;
 use super::rows::Rows;
-use super::descent::Descent;
 use crate::hierarchy::{NONE, Tree};
 use crate::link::{Graph, Way};
 use rayon::prelude::*;
@@ -130,7 +130,7 @@ impl Light {
 }
 
 /// One number for how bright a colour is beside the white: the mean of its three ratios, so that no colour counts nothing.
-pub fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
+pub(crate) fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
     (0..3)
         .map(|k| {
             if white[k] > 0.0 {

@@ -1,9 +1,9 @@
 //! Looks at light: each place with its normal is gathered at once, whichever triangles ask for it.
 
-use crate::transport::point::{Gathered, Receiver};
 use crate::gather::{MOSTLY, Vertex};
 use crate::hierarchy::NONE;
 use crate::solve::{Bake, Care};
+use crate::transport::point::{Gathered, Receiver};
 use glam::DVec3;
 use std::collections::HashMap;
 

@@ -5,9 +5,9 @@
 //! surface; `triangles` (T, 3) u32, rows of `positions`; `radiosity` (N, 64) f32, W/m2/nm on the leaves;
 //! `wavelengths` (65,) f64, the leaves' edges in nm; `xyz` (N, 3) f32, tristimulus radiosity, Y in lm/m2.
 
-use crate::gather::refined;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
+use crate::gather::refined;
 use crate::scene::Scene;
 use crate::spectrum::LEAVES;
 use std::io::{self, Write};

@@ -7,10 +7,10 @@
 use super::camera::View;
 use super::exposure::{self, Exposure};
 use super::raster::{self, Hit, Refined};
-use crate::gather::refined;
 use crate::color::{self, LinearSrgb};
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
+use crate::gather::refined;
 use crate::scene::{Camera, Scene};
 use std::f64::consts::PI;
 

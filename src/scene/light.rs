@@ -15,8 +15,8 @@ use super::raw::{RawLight, RawLightKind};
 use super::spectra_file::{Sampled, SpectraFile};
 use super::{LightKind, LightSpectrum, Material, PunctualLight};
 use crate::color::{KM, Observer, Upsampler};
-use crate::data::{Outside, named};
 use crate::data::{Grid, LEAVES, Leaves};
+use crate::data::{Outside, named};
 use glam::DVec3;
 use std::path::Path;
 

@@ -8,8 +8,8 @@ use super::material;
 use super::spectra_file::SpectraFile;
 use super::{Scene, Surface, lacking};
 use crate::color::Upsampler;
-use crate::error::{Error, Result};
 use crate::data::Grid;
+use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// How to read a room.

@@ -273,8 +273,8 @@ pub(crate) fn listed(names: &[String]) -> String {
 mod tests {
     use super::*;
     use crate::color::{KM, Observer};
-    use crate::scene::LightSpectrum;
     use crate::data::LEAVES;
+    use crate::scene::LightSpectrum;
     use serde_json::json;
 
     fn raw(name: &str, color: [f32; 3]) -> RawMaterial {

@@ -22,8 +22,8 @@
 use super::check::{Check, Unknown};
 use super::json::short;
 use super::uri;
-use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
 use crate::data::{Grid, Leaves};
+use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -20,8 +20,8 @@
 
 use super::conjugate::add_products;
 use super::operator::{Operator, pull};
-use crate::light::rows::Rows;
 use crate::hierarchy::{NONE, Tree};
+use crate::light::rows::Rows;
 use crate::link::LinkRows;
 use glam::DVec3;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -35,7 +35,7 @@ const MOST: usize = 64;
 const PIECES: usize = 8;
 
 /// Aggregates and their solved matrices.
-pub(super) struct Aggregates {
+pub(crate) struct Aggregates {
     /// Places of the leaves of each aggregate.
     members: Vec<Vec<u32>>,
     /// By lane; none where nothing is reflected.
@@ -150,7 +150,7 @@ impl Aggregates {
 }
 
 /// The hierarchy shared out among aggregates: each holds some nodes of a cut, close together.
-pub(super) struct Parts {
+pub(crate) struct Parts {
     /// How many aggregates.
     pub count: usize,
     /// Nodes above the cut, ascending.
@@ -384,7 +384,12 @@ struct Shares {
 
 impl Shares {
     /// From the means that nodes have as their parents see them.
-    pub(crate) fn new<const L: usize>(tree: &Tree, areas: &[f64], parts: &Parts, mean: &[[f32; L]]) -> Self {
+    pub(crate) fn new<const L: usize>(
+        tree: &Tree,
+        areas: &[f64],
+        parts: &Parts,
+        mean: &[[f32; L]],
+    ) -> Self {
         let mut shares = Self {
             lanes: L,
             lists: vec![Vec::new(); parts.above.len()],

@@ -10,13 +10,13 @@
 //! themselves), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 a ray and `4 padded lanes` a leaf:
 //! the rest follows from where light comes from.
 
-use crate::light::{Light, Neighbours};
 use super::outlook::Outlook;
 use super::{Bake, Representation, direct, punctual};
-use crate::light::lanes::{self, Lanes};
-use crate::light::{Rows, padded};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
+use crate::light::lanes::{self, Lanes};
+use crate::light::{Light, Neighbours};
+use crate::light::{Rows, padded};
 use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;

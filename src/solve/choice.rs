@@ -3,10 +3,10 @@
 //! Perceptual and guaranteed control choose on a model of the room (`coarse`, `bounded`); the others follow from the
 //! lights and materials alone.
 
-use crate::light::lanes::Lanes;
 use super::sources::DenseSources;
 use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
+use crate::light::lanes::Lanes;
 use crate::link::{LinkRows, balance};
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;

@@ -5,11 +5,11 @@
 //! 64-leaf solution is affordable, and what a partition loses is *measured* on the model, an *estimate* for the room.
 
 use super::conjugate::System;
-use crate::light::lanes::Lanes;
 use super::operator::Operator;
-use crate::light::rows::{Rows, padded};
 use crate::color::luv_jacobian;
 use crate::hierarchy::{NONE, Node, Tree};
+use crate::light::lanes::Lanes;
+use crate::light::rows::{Rows, padded};
 use crate::link::{Link, LinkRows, Way};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{LEAVES, Leaves, Partition};
@@ -24,7 +24,7 @@ const TOLERANCE: f64 = 1e-4;
 const UNSEEN: f64 = 1e-3;
 
 /// The model.
-pub(super) struct Coarse {
+pub(crate) struct Coarse {
     tree: Tree,
     pub(super) links: LinkRows,
     pub(super) leaves: Vec<u32>,
@@ -38,7 +38,7 @@ pub(super) struct Coarse {
 }
 
 /// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
-pub(super) trait Dense {
+pub(crate) trait Dense {
     /// Reflectance of a leaf node.
     fn reflectance(&self, leaf: u32) -> Leaves;
     /// Exitance shape of a leaf node under a light; none if it emits nothing of that light.
@@ -49,7 +49,7 @@ pub(super) trait Dense {
 
 /// What a choice of cuts does.
 #[derive(Debug, Clone)]
-pub(super) struct Choice {
+pub(crate) struct Choice {
     /// One cut a light.
     pub cuts: Vec<Partition>,
     /// Area-weighted mean CIELUV difference of irradiance that they cause on the model.

@@ -42,7 +42,7 @@ pub(crate) struct Convergence {
 
 /// The system `(1 - K) y = b`.
 #[derive(Debug)]
-pub(super) struct System<'a> {
+pub(crate) struct System<'a> {
     /// Pull, gather, push.
     pub operator: Operator<'a>,
     /// Reflectance of each leaf.

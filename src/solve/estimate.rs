@@ -6,9 +6,9 @@
 //! truth lies between; [`SHARE`] was measured against the audit.
 
 use crate::color::{de_luv, de2000};
-use crate::transport::point::Receiver;
 use crate::geometry::sampling::{Pcg, triangle_weights};
 use crate::hierarchy::Tree;
+use crate::transport::point::Receiver;
 use glam::DVec3;
 
 /// Points that are watched.
@@ -24,7 +24,7 @@ const SHARE_OF_FIRST: f64 = 0.75;
 const SHARE_OF_RAYS: f64 = 0.95;
 
 /// Watched points and what was seen there last.
-pub(super) struct Probes {
+pub(crate) struct Probes {
     /// Face entry, weights on the face, point and normal.
     pub(super) points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
     pub(super) last: Vec<[f64; 3]>,
@@ -32,7 +32,7 @@ pub(super) struct Probes {
 
 /// Distance between two rounds, turned into error.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Distance {
+pub(crate) struct Distance {
     pub de2000: f64,
     pub de_luv: f64,
     /// Root mean square of relative illuminance.

@@ -61,7 +61,7 @@ pub(super) fn closedness(
 
 /// What a ray from a surface meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Meets {
+pub(crate) enum Meets {
     Front,
     /// The black back of a one-sided surface: the ray started inside something solid.
     Back,
@@ -107,7 +107,7 @@ pub(super) fn covered(
 }
 
 /// What is known before the first solution.
-pub(super) struct Guess {
+pub(crate) struct Guess {
     /// Irradiance of the adaptation white: twice the mean irradiance.
     pub white: [f64; 3],
     /// Brightness of every node, share of white.
@@ -240,7 +240,7 @@ pub(super) fn conserve(
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Balance {
-    /// Luminous flux given out by surfaces and by lamps that have a flux (all but directional ones), lm.
+    /// Luminous flux given out by surfaces, lm.
     pub emitted_lm: f64,
     /// Luminous flux that fronts receive straight from lamps of any kind, lm.
     pub received_lm: f64,
@@ -287,17 +287,6 @@ pub(super) fn lumens(
     let each = leaves.iter().enumerate();
     each.map(|(k, &leaf)| areas[leaf as usize] * lanes.tristimulus(rows.row(k))[1])
         .sum()
-}
-
-/// Luminous flux of punctual lights with their rows; directional ones have none.
-pub(super) fn punctual_lumens(
-    lamps: &[(PunctualLight, Vec<f32>)],
-    lanes: &crate::light::lanes::Lanes,
-) -> f64 {
-    let flux = |(light, row): &(PunctualLight, Vec<f32>)| {
-        super::punctual::solid_angle(light.kind).unwrap_or(0.0) * lanes.tristimulus(row)[1]
-    };
-    lamps.iter().map(flux).sum()
 }
 
 /// `after / before`; 1 where there was nothing.
@@ -350,7 +339,7 @@ pub(super) fn flux(
 }
 
 /// What the leaves receive as wholes, whatever others see of them.
-pub(super) struct Whole<'a> {
+pub(crate) struct Whole<'a> {
     /// Irradiance by reflected light, by leaf.
     pub(super) indirect: &'a crate::light::Rows,
     /// Direct light of a leaf as a share of that of what others see of it.
@@ -400,7 +389,7 @@ pub(super) fn flux_by_rays(
 }
 
 /// Rows by leaf that the flux is summed from.
-pub(super) struct FluxRows<'a> {
+pub(crate) struct FluxRows<'a> {
     pub(super) emission: &'a crate::light::Rows,
     pub(super) reflected: &'a crate::light::Rows,
     pub(super) irradiance: &'a crate::light::Rows,

@@ -3,8 +3,8 @@
 //! What lanes do to colours is seen by itself here: beside a solution on all 64 leaves of the same links, with direct
 //! light gathered at the same points of the same leaves.
 
-use crate::light::lanes::Lanes;
 use super::{Bake, Direct, Representation, padded};
+use crate::light::lanes::Lanes;
 use crate::link::{Demand, LinkRows, balance};
 use std::time::Instant;
 

@@ -2,13 +2,13 @@
 
 use super::direct::{Look, receiver};
 use super::flux::{self, Closed};
-use crate::light::Neighbours;
-use crate::light::rows::{Rows, padded};
 use super::{Bake, by_rays, punctual};
-use crate::transport::point::{Gatherer, Memory, Receiver};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree};
+use crate::light::Neighbours;
+use crate::light::rows::{Rows, padded};
 use crate::link::{Demand, Sight};
+use crate::transport::point::{Gatherer, Memory, Receiver};
 use glam::Vec3;
 
 /// What one patch may misplace of the direct light of a leaf, share of white for each unit of asked-for error. With five

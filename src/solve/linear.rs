@@ -15,8 +15,8 @@
 //! left is taken out of each row. At last each lane is scaled so that what arrives is what is given out.
 
 use super::operator::{Vector, add, pull, scaled};
-use crate::light::rows::Rows;
 use crate::hierarchy::{NONE, Node, Sample, Tree};
+use crate::light::rows::Rows;
 use crate::link::{LinkRows, Scratch, point_factors};
 use rayon::prelude::*;
 use wide::{f32x4, f32x8, f32x16};
@@ -42,7 +42,7 @@ struct Shares {
 
 /// The links with the slopes of what they bring.
 #[derive(Debug)]
-pub(super) struct Slopes<'a> {
+pub(crate) struct Slopes<'a> {
     tree: &'a Tree,
     links: &'a LinkRows,
     areas: &'a [f64],

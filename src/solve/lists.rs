@@ -5,10 +5,12 @@
 //! is content with fewer intervals: siblings are merged while the colour of its irradiance under the adaptation white
 //! moves by no more than the limit (CIELUV). The union of the lists is what the room needs.
 
-use crate::light::lanes::Lanes;
+use super::{Bake, SPECTRUM_SHARE};
 use crate::color::{KM, luv_jacobian};
+use crate::light::lanes::Lanes;
 use crate::scene::LightSpectrum;
 use crate::spectrum::{CmfTree, Control, Leaves, Metric, Partition, SpectralList, coarsen};
+use rayon::prelude::*;
 
 /// One list for each light.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +27,7 @@ impl PatchList {
 }
 
 /// Coarsens rows.
-pub(super) struct Lister<'a> {
+pub(crate) struct Lister<'a> {
     lanes: &'a Lanes,
     trees: Vec<CmfTree>,
     white: [f64; 3],
@@ -81,5 +83,41 @@ impl<'a> Lister<'a> {
             lights.push((list.partition(), values));
         }
         PatchList { lights }
+    }
+}
+
+/// Leaves whose lists are looked at after a round.
+const LISTED_LEAVES: usize = 4096;
+
+impl Bake {
+    /// Mean number of intervals that a patch needs, over evenly chosen leaves.
+    pub(super) fn intervals_mean(&self) -> f64 {
+        let lists = self.lists(self.light.leaves.len().div_ceil(LISTED_LEAVES).max(1));
+        let sum: usize = lists.iter().map(PatchList::intervals).sum();
+        if lists.is_empty() {
+            0.0
+        } else {
+            sum as f64 / lists.len() as f64
+        }
+    }
+
+    /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
+    /// [`Light::leaves`]; empty where the rows hold the 64 leaves.
+    pub fn lists(&self, step: usize) -> Vec<PatchList> {
+        if !self.lanes.is_ratio() {
+            return Vec::new();
+        }
+        let limit = SPECTRUM_SHARE * self.settings.error;
+        let lister = Lister::new(
+            &self.lanes,
+            &self.scene.spectra,
+            &self.weights,
+            self.light.white,
+            limit,
+        );
+        let rows: Vec<usize> = (0..self.light.leaves.len()).step_by(step.max(1)).collect();
+        rows.into_par_iter()
+            .map(|k| lister.list(self.light.irradiance.row(k)))
+            .collect()
     }
 }

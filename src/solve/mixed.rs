@@ -5,9 +5,9 @@
 //! all lanes, with one alpha and beta. A reflection costs m^2 multiplications where lanes of intervals cost m.
 
 use super::conjugate::{Convergence, MAX_ITERATIONS, dot, step};
-use crate::light::lanes::Lanes;
 use super::operator::Operator;
 use super::rays::RaySystem;
+use crate::light::lanes::Lanes;
 use crate::light::rows::Rows;
 use crate::spectrum::Leaves;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -18,7 +18,7 @@ const CHUNK: usize = 256;
 
 /// How the leaves reflect: different paints, and which paint each leaf has.
 #[derive(Debug, Default)]
-pub(super) struct Mixed {
+pub(crate) struct Mixed {
     /// Rows of M, padded to the width of lanes, paint by paint.
     whole: Vec<Rows>,
     /// Rows of its root.

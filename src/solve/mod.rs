@@ -16,6 +16,7 @@ mod held;
 mod lamp_light;
 mod linear;
 mod lists;
+mod looking;
 mod mixed;
 mod operator;
 mod outlook;
@@ -23,8 +24,10 @@ pub(crate) mod punctual;
 mod rays;
 pub mod record;
 pub mod reference;
+mod refining;
 mod representation;
 mod sent;
+mod solving;
 mod sources;
 pub(crate) mod two_grid;
 
@@ -34,20 +37,20 @@ pub use representation::Representation;
 pub(crate) use sources::weights_of;
 
 use crate::color::{Observer, Upsampler};
-use crate::transport::hemisphere::Hemisphere;
-use crate::transport::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::{NO_PLANE, RayIndex, Segment};
 use crate::hierarchy::{Mesh, Tree, cuts, spaces};
+use crate::light::lanes::Lanes;
+use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded};
 use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance, is_small};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
+use crate::transport::hemisphere::Hemisphere;
+use crate::transport::point::{Gathered, Gatherer, Memory, Receiver};
 use conjugate::{Convergence, System};
 use direct::Direct;
 pub use flux::Closed;
 pub use held::Held;
-use crate::light::lanes::Lanes;
-use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded};
 use mixed::Mixed;
 pub use operator::Operator;
 use outlook::Outlook;
@@ -90,8 +93,6 @@ impl Default for Settings {
 const FIRST_THRESHOLD: f64 = 0.02;
 /// What a round divides the threshold by: about twice the links, half the error.
 const THRESHOLD_STEP: f64 = 3.0;
-/// Darker than this share of white counts as this dark: nobody sees lightness below it.
-const DARKEST: f64 = 0.02;
 /// How finely a room of one kind is divided, as multiples of the round's threshold.
 struct Shares {
     /// What a link may misplace.
@@ -123,8 +124,6 @@ const FURNISHED: Shares = Shares {
     direct: 5.0,
     reflected: 1.4,
 };
-/// A face that has less of its area bare lies below something.
-const MOSTLY_COVERED: f64 = 0.01;
 /// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
 const LEAST_ROUNDS: usize = 3;
 /// Fewer rounds do where a mere preview is asked for, an error of so much, and the estimate is so many times smaller.
@@ -137,19 +136,11 @@ const WORTH_STALLING: usize = 100_000;
 const MOST_LINKS: usize = 4_000_000;
 /// Rooms of this many faces choose their lanes once.
 const MANY_FACES: usize = 50_000;
-/// Levels that a round splits leaves by where reflected light varies.
-const LEVELS: usize = 4;
-/// Leaves whose lists are looked at after a round.
-const LISTED_LEAVES: usize = 4096;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
-/// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
-const SOLVE_SHARE: f64 = 0.002;
 /// The working partition may cause this share of the asked-for error. In the Cornell box under F2, .05 to .35 cost the
 /// same time within 2 %, and .35 left a third more error at 2 than .05.
 const SPECTRUM_SHARE: f64 = 0.2;
-/// What one patch may misplace in a gather, share of the asked-for error.
-const GATHER_SHARE: f64 = 0.1;
 /// Shares of the error asked for that light at points and straight lines between the vertices of the output may take:
 /// squares add to 1. Half and half would ask a room whose rounds halve the error for a further round in one of six cases
 /// more.
@@ -506,7 +497,12 @@ impl Bake {
     /// Runs `f` with what blocks light in this room.
     pub(crate) fn with_sight<T>(&self, f: impl FnOnce(&Self, &Sight) -> T) -> T {
         let opaque = |triangle: u32, u: f32, v: f32| {
-            !crate::hierarchy::alpha::is_hole(&self.scene, &self.mesh, triangle, [1.0 - u - v, u, v])
+            !crate::hierarchy::alpha::is_hole(
+                &self.scene,
+                &self.mesh,
+                triangle,
+                [1.0 - u - v, u, v],
+            )
         };
         let opaque: Option<&Opaque> = if self.plan.runs(Kind::AlphaMasks) {
             Some(&opaque)
@@ -522,492 +518,6 @@ impl Bake {
                 occlusion: self.plan.runs(Kind::Occlusion),
             },
         )
-    }
-
-    /// How bright every node is beside the white: from the last solution, or a guess before the first.
-    fn brightness_of_nodes(&mut self) -> Vec<f32> {
-        let nodes = self.tree.nodes.len();
-        if self.rounds.is_empty() {
-            let guess = flux::guess(&self.scene, &self.mesh, &self.tree, &self.weights);
-            self.light.white = self.settings.white.unwrap_or(guess.white);
-            return guess.bright;
-        }
-        let light = &self.light;
-        (0..nodes).map(|k| light.bright_reflected[k]).collect()
-    }
-
-    /// How much lightness a change of irradiance makes at every node, from the last solution; 1 before the first.
-    fn keenness(&self) -> Vec<f32> {
-        if self.rounds.is_empty() {
-            return vec![1.0; self.tree.nodes.len()];
-        }
-        let mut keen = vec![0.0_f32; self.tree.nodes.len()];
-        for (k, &leaf) in self.light.leaves.iter().enumerate() {
-            let h = brightness(
-                self.lanes.tristimulus(self.light.irradiance.row(k)),
-                self.light.white,
-            );
-            keen[leaf as usize] = h.max(DARKEST).powf(-2.0 / 3.0) as f32;
-        }
-        for k in (0..keen.len()).rev() {
-            let node = &self.tree.nodes[k];
-            if !node.is_leaf() {
-                let sum: f64 = node
-                    .child_range()
-                    .map(|c| f64::from(keen[c as usize]) * self.tree.node(c).area)
-                    .sum();
-                keen[k] = (sum / node.area) as f32;
-            }
-        }
-        keen
-    }
-
-    /// Learns how new leaves look out; returns the rays cast.
-    fn look_out(&mut self) -> u64 {
-        let mut outlook = std::mem::take(&mut self.outlook);
-        let seed = self.settings.seed;
-        let rays = self.with_sight(|bake, sight| {
-            if by_rays(sight) {
-                outlook.look(&bake.tree, sight, &bake.hemisphere, seed)
-            } else {
-                outlook.extend(&bake.tree, sight, bake.closed, seed)
-            }
-        });
-        self.outlook = outlook;
-        self.areas = self.outlook.areas(&self.tree);
-        rays
-    }
-
-    /// Splits leaves that look for themselves and see reflected light vary, and lets the parts look; the rays cast.
-    fn split_where_light_varies(&mut self, demand: &Demand) -> u64 {
-        if self.rounds.is_empty() || !self.by_rays() {
-            return 0;
-        }
-        let mut rays = 0;
-        for _ in 0..LEVELS {
-            rays += self.look_out();
-            let known = self.light.bright_reflected.len();
-            let nodes = self.tree.nodes.len() as u32;
-            // Parts of a patch that was a leaf in the last solution are as bright as it.
-            let mut bright = self.light.bright_reflected.clone();
-            for k in known..nodes as usize {
-                bright.push(bright[self.tree.nodes[k].parent as usize]);
-            }
-            let mut keen = demand.keen.to_vec();
-            for k in keen.len()..nodes as usize {
-                keen.push(keen[self.tree.nodes[k].parent as usize]);
-            }
-            let seed = self.settings.seed;
-            let split: Vec<u32> = (0..nodes)
-                .into_par_iter()
-                .filter(|&k| {
-                    let node = self.tree.node(k);
-                    node.is_leaf()
-                        && node.area > demand.least_area
-                        && self.tree.elements[node.element as usize].depth < MAX_DEPTH
-                        && self.outlook.variation(k, &bright, seed)
-                            * f64::from(keen[k as usize])
-                            * (node.area / demand.total_area).sqrt()
-                            > demand.threshold
-                })
-                .collect();
-            for &leaf in &split {
-                self.tree.subdivide(leaf);
-            }
-            if split.is_empty() {
-                break;
-            }
-        }
-        rays
-    }
-
-    /// Turns materials into rows.
-    pub(crate) fn painter(&self) -> Painter<'_> {
-        Painter::new(&self.scene, &self.mesh, &self.upsampler)
-    }
-
-    /// Solves on the current links and measures the solution.
-    fn solve<const L: usize>(
-        &mut self,
-        rows: &LinkRows,
-        leaves: &[u32],
-    ) -> (Convergence, flux::Balance) {
-        let mut first = Rows::zero(leaves.len(), L);
-        for (k, &leaf) in leaves.iter().enumerate() {
-            let row = self.direct.row(leaf);
-            first.row_mut(k)[..row.len()].copy_from_slice(row);
-        }
-        let given = Given {
-            sources: self.painter().paint(&self.tree, leaves, &self.lanes),
-            first,
-            reflected: self.guess::<L>(leaves),
-            emitted: None,
-        };
-        let solved = self.solve_with::<L>(rows, leaves, given);
-        self.light_arrives();
-        solved
-    }
-
-    /// The same with what it starts from.
-    pub(crate) fn solve_with<const L: usize>(
-        &mut self,
-        rows: &LinkRows,
-        leaves: &[u32],
-        given: Given,
-    ) -> (Convergence, flux::Balance) {
-        let Given {
-            sources:
-                Sources {
-                    mut reflectance,
-                    emission,
-                    greatest,
-                },
-            mut first,
-            mut reflected,
-            emitted,
-        } = given;
-        let nodes = self.tree.nodes.len();
-        let by_rays = self.by_rays();
-        let mut scaled = flux::Scaled::default();
-        if self.sealed == Closed::Yes && !by_rays {
-            let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);
-            let before = lumens(&first);
-            flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
-            scaled.direct = flux::ratio(lumens(&first), before);
-        }
-        let mixed = self
-            .lanes
-            .is_mixed()
-            .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes));
-        let plus = |a: &Rows, b: &Rows| {
-            let mut sum = a.clone();
-            for (a, b) in sum.all_mut::<L>().iter_mut().zip(b.all::<L>()) {
-                *a = std::array::from_fn(|l| a[l] + b[l]);
-            }
-            sum
-        };
-        let reflect = |irradiance: &Rows| match &mixed {
-            Some(mixed) => mixed.reflect::<L>(irradiance),
-            None => {
-                let mut reflected = irradiance.clone();
-                for (r, rho) in reflected
-                    .all_mut::<L>()
-                    .iter_mut()
-                    .zip(reflectance.all::<L>())
-                {
-                    *r = std::array::from_fn(|l| r[l] * rho[l]);
-                }
-                reflected
-            }
-        };
-        let tolerance = SOLVE_SHARE * self.settings.error;
-        let runs = self.plan.runs(Kind::Interreflection);
-        let (convergence, mut irradiance, sums) = if by_rays {
-            let system = RaySystem {
-                tree: &self.tree,
-                outlook: &self.outlook,
-                leaves,
-                areas: &self.areas,
-                reflectance: &reflectance,
-                greatest: &greatest,
-                two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
-            };
-            let (convergence, seen) = match &mixed {
-                _ if !runs => (Convergence::default(), Rows::zero(leaves.len(), L)),
-                Some(mixed) => mixed.solve_by_rays::<L>(&system, &first, &mut reflected, tolerance),
-                None => system.solve::<L>(&first, &mut reflected, tolerance),
-            };
-            (convergence, seen, Vec::new())
-        } else {
-            let system = System {
-                operator: Operator::new(
-                    &self.tree,
-                    rows,
-                    leaves,
-                    &self.areas,
-                    &self.balance.factor,
-                ),
-                reflectance: &reflectance,
-                greatest: &greatest,
-            };
-            let convergence = match &mixed {
-                _ if !runs => Convergence::default(),
-                Some(mixed) => {
-                    mixed.solve::<L>(&system.operator, &first, &mut reflected, tolerance)
-                }
-                None => system.solve::<L>(&first, &mut reflected, tolerance),
-            };
-            let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
-            let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
-            let mut irradiance = Rows::zero(leaves.len(), L);
-            if runs {
-                let slopes = linear::Slopes::new(&self.tree, rows, &self.areas, leaves, &sums);
-                let bounced = reflect(&first);
-                for _ in 0..linear::PASSES {
-                    irradiance = slopes.irradiance::<L>(&reflected);
-                    let before = flux::lumens(&self.areas, &self.lanes, leaves, &irradiance);
-                    let again = reflect(&irradiance);
-                    let [over, without] = slopes.balance::<L>(&irradiance, &bounced, &again);
-                    if mixed.is_some() {
-                        // Lanes are no bands: it is each of the 64 leaves that keeps its energy.
-                        let leaves_of = |sum: [f64; L]| self.lanes.leaves(&sum.map(|x| x as f32));
-                        let (over, without) = (leaves_of(over), leaves_of(without));
-                        let scale = std::array::from_fn(|k| linear::amplitude(over[k], without[k]));
-                        let whole = vec![0; leaves.len()];
-                        irradiance =
-                            Mixed::new(&[scale], whole, &self.lanes, L).reflect::<L>(&irradiance);
-                    } else {
-                        let scale: [f32; L] =
-                            std::array::from_fn(|l| linear::amplitude(over[l], without[l]) as f32);
-                        for row in irradiance.all_mut::<L>() {
-                            *row = std::array::from_fn(|l| row[l] * scale[l]);
-                        }
-                    }
-                    let after = flux::lumens(&self.areas, &self.lanes, leaves, &irradiance);
-                    scaled.reflected = flux::ratio(after, before);
-                    reflected = reflect(&plus(&irradiance, &first));
-                }
-            }
-            (convergence, irradiance, sums)
-        };
-        irradiance = plus(&irradiance, &first);
-        if !runs {
-            reflected = reflect(&irradiance);
-        }
-        if mixed.is_some() {
-            // Seen lane by lane, albedo is what came back of what came in.
-            for ((rho, r), h) in reflectance
-                .all_mut::<L>()
-                .iter_mut()
-                .zip(reflected.all::<L>())
-                .zip(irradiance.all::<L>())
-            {
-                *rho = std::array::from_fn(|l| if h[l] == 0.0 { 0.0 } else { r[l] / h[l] });
-            }
-        }
-        let fluxes = flux::FluxRows {
-            emission: &emission,
-            reflected: &reflected,
-            irradiance: &irradiance,
-            first: &first,
-            reflectance: &reflectance,
-        };
-        let on_nodes = self.on_nodes::<L>(&reflected, leaves);
-        let mut flux = if by_rays {
-            let mut whole = Rows::zero(leaves.len(), L);
-            if runs {
-                self.outlook
-                    .irradiance_of_whole::<L>(leaves, &on_nodes, &mut whole);
-            }
-            let whole = flux::Whole {
-                indirect: &whole,
-                direct: &|leaf| f64::from(self.direct.whole(leaf)),
-                area: &|leaf| self.tree.node(leaf).area,
-            };
-            flux::flux_by_rays(&self.areas, &self.lanes, leaves, &fluxes, &whole)
-        } else {
-            flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums)
-        };
-        flux.emitted_lm += flux::punctual_lumens(&self.lamps, &self.lanes);
-        (flux.sent, flux.scaled) = (self.sent, scaled);
-        self.light = Light {
-            reflected: on_nodes,
-            emitted: emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves)),
-            irradiance,
-            leaves: leaves.to_vec(),
-            neighbours: Neighbours::new(nodes, &self.graph),
-            white: self.light.white,
-            half_size: self.mesh.half_size,
-            ..Light::default()
-        };
-        self.light.white = self
-            .settings
-            .white
-            .unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
-        self.light.measure(&self.tree, &self.lanes);
-        (convergence, flux)
-    }
-
-    /// What turns a row into brightness, share of the white's.
-    fn bright_weights(&self) -> Vec<f64> {
-        let white = self.light.white;
-        let xyz = self.lanes.xyz().iter();
-        xyz.map(|&xyz| brightness(xyz, white)).collect()
-    }
-
-    /// Notes how bright what arrives on leaves is.
-    pub(super) fn light_arrives(&mut self) {
-        let light = &self.light;
-        let weights = self.bright_weights();
-        let bright = |row: &[f32]| {
-            let sum: f64 = row
-                .iter()
-                .zip(&weights)
-                .map(|(&x, w)| f64::from(x) * w)
-                .sum();
-            sum as f32
-        };
-        let mut arrival = vec![Arrival::default(); self.tree.nodes.len()];
-        for (k, &leaf) in light.leaves.iter().enumerate() {
-            arrival[leaf as usize] = Arrival {
-                all: bright(light.irradiance.row(k)),
-                direct: bright(self.direct.row(leaf)),
-                spread: self.direct.spread(leaf),
-            };
-        }
-        let lamps = self.lamps.iter();
-        let bright_lamps = lamps.map(|(_, row)| bright(row)).collect();
-        (self.light.arrival, self.light.bright_lamps) = (arrival, bright_lamps);
-    }
-
-    /// Area-weighted mean irradiance, tristimulus.
-    pub fn mean_irradiance(&self) -> [f64; 3] {
-        let (mut sum, mut area) = ([0.0; 3], 0.0);
-        for (k, &leaf) in self.light.leaves.iter().enumerate() {
-            let a = self.areas[leaf as usize];
-            let xyz = self.lanes.tristimulus(self.light.irradiance.row(k));
-            sum = std::array::from_fn(|c| sum[c] + a * xyz[c]);
-            area += a;
-        }
-        sum.map(|x| if area > 0.0 { x / area } else { 0.0 })
-    }
-
-    /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.
-    pub(crate) fn guess<const L: usize>(&self, leaves: &[u32]) -> Rows {
-        let mut rows = Rows::zero(leaves.len(), L);
-        if self.previous.width() == L {
-            let known = self.previous.len();
-            for (row, &leaf) in rows.all_mut::<L>().iter_mut().zip(leaves) {
-                let mut id = leaf;
-                while id as usize >= known {
-                    id = self.tree.node(id).parent;
-                }
-                *row = self.previous.all::<L>()[id as usize];
-            }
-        }
-        rows
-    }
-
-    /// Leaf rows on all nodes, by area.
-    pub(crate) fn on_nodes<const L: usize>(&self, by_leaf: &Rows, leaves: &[u32]) -> Rows {
-        let mut rows = Rows::zero(self.tree.nodes.len(), L);
-        for (row, &leaf) in by_leaf.all::<L>().iter().zip(leaves) {
-            rows.all_mut::<L>()[leaf as usize] = *row;
-        }
-        operator::pull::<f32, L>(&self.tree, &self.areas, rows.all_mut::<L>());
-        rows
-    }
-
-    /// Gathers at receivers, in order.
-    pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
-        self.gather_with(receivers, Care::Full)
-    }
-
-    /// Gathers with care, or just for a picture.
-    pub(crate) fn gather_with(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
-        if self.light.width() == 0 || self.light.white == [0.0; 3] {
-            // A room without light: nothing to look for.
-            return vec![Gathered::dark(); receivers.len()];
-        }
-        self.with_sight(|bake, sight| {
-            let sketched = Hemisphere::sketch();
-            let mut gatherer = bake.gatherer(sight);
-            if let (Care::Sketch, Some(hemisphere)) = (care, &mut gatherer.hemisphere) {
-                *hemisphere = &sketched;
-            }
-            receivers
-                .par_iter()
-                .map_init(Memory::default, |memory, r| gatherer.at(r, memory).pack())
-                .collect()
-        })
-    }
-
-    /// Which receivers does something solid cover?
-    pub(crate) fn covered(&self, receivers: &[Receiver]) -> Vec<bool> {
-        if self.closed == Closed::Yes {
-            return vec![false; receivers.len()];
-        }
-        receivers
-            .par_iter()
-            .map(|r| {
-                flux::covered(
-                    &self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed,
-                )
-            })
-            .collect()
-    }
-
-    /// Which receivers does something lie upon, so near that nobody sees them? See [`PRESSED`].
-    pub(crate) fn pressed(&self, receivers: &[Receiver]) -> Vec<bool> {
-        let height = PRESSED * self.mesh.half_size;
-        self.with_sight(|_, sight| {
-            let pressed = |to: &Receiver| {
-                let above = Segment::new(
-                    to.point,
-                    to.point + height * to.normal,
-                    [to.plane, NO_PLANE],
-                );
-                sight.occlusion && sight.blocks_one(&above)
-            };
-            receivers.par_iter().map(pressed).collect()
-        })
-    }
-
-    /// Of each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.
-    pub(crate) fn spaces(&self) -> Vec<(u32, bool)> {
-        let mut spaces = vec![(0, false); self.tree.faces.len()];
-        for (face, space) in self.mesh.faces.iter().zip(&self.spaces) {
-            let entry = self.tree.entry[face.triangle as usize][usize::from(face.back)];
-            let node = self.tree.face_node[entry as usize];
-            let covered = self.areas[node as usize] < MOSTLY_COVERED * self.tree.node(node).area;
-            spaces[entry as usize] = (*space, covered);
-        }
-        spaces
-    }
-
-    pub(crate) fn gatherer<'a>(&'a self, sight: &'a Sight<'a>) -> Gatherer<'a> {
-        Gatherer {
-            tree: &self.tree,
-            light: &self.light,
-            sight,
-            lamps: &self.lamps,
-            tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
-            closed: self.closed == Closed::Yes,
-            hemisphere: by_rays(sight).then_some(&self.hemisphere),
-            shafts: true,
-            keep: self.keep,
-        }
-    }
-
-    /// Mean number of intervals that a patch needs, over evenly chosen leaves.
-    fn intervals_mean(&self) -> f64 {
-        let lists = self.lists(self.light.leaves.len().div_ceil(LISTED_LEAVES).max(1));
-        let sum: usize = lists.iter().map(PatchList::intervals).sum();
-        if lists.is_empty() {
-            0.0
-        } else {
-            sum as f64 / lists.len() as f64
-        }
-    }
-
-    /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
-    /// [`Light::leaves`]; empty where the rows hold the 64 leaves.
-    pub fn lists(&self, step: usize) -> Vec<PatchList> {
-        if !self.lanes.is_ratio() {
-            return Vec::new();
-        }
-        let limit = SPECTRUM_SHARE * self.settings.error;
-        let lister = lists::Lister::new(
-            &self.lanes,
-            &self.scene.spectra,
-            &self.weights,
-            self.light.white,
-            limit,
-        );
-        let rows: Vec<usize> = (0..self.light.leaves.len()).step_by(step.max(1)).collect();
-        rows.into_par_iter()
-            .map(|k| lister.list(self.light.irradiance.row(k)))
-            .collect()
     }
 
     /// Punctual lights, recentred, with their rows.

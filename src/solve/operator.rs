@@ -9,8 +9,8 @@
 //! themselves. The links of a row stand in order of their source. Vectors are explicit: of loops over arrays of 16 and
 //! 32 lanes the compiler made single numbers, eight times as slow.
 
-use crate::light::rows::Rows;
 use crate::hierarchy::{NONE, Tree};
+use crate::light::rows::Rows;
 use crate::link::LinkRows;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -187,7 +187,7 @@ impl<'a> Operator<'a> {
 }
 
 /// A vector of f32, or one.
-pub(super) trait Vector:
+pub(crate) trait Vector:
     Pod + Zeroable + Send + Sync + Add<Output = Self> + Mul<Output = Self> + From<f32>
 {
 }

@@ -13,13 +13,13 @@
 //! all leaves receive: nothing need be scaled.
 
 use super::flux::Closed;
-use crate::light::rows::Rows;
-use crate::transport::hemisphere::{BEAM, Hemisphere};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
+use crate::light::rows::Rows;
 use crate::link::Sight;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder};
+use crate::transport::hemisphere::{BEAM, Hemisphere};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -56,7 +56,7 @@ impl End {
 
 /// How the leaves of a hierarchy look out.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Outlook {
+pub(crate) struct Outlook {
     /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
     pub target: Vec<f32>,
     /// For each node that is a leaf: share of its area that takes part. NaN elsewhere. Where leaves look for themselves it is

@@ -1,11 +1,11 @@
 //! Punctual lights on the hierarchy: never linked, but gathered at points of every element, with shadows.
 
-use crate::light::lanes::Lanes;
-use crate::transport::point::{Receiver, punctual_factor};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Mesh, Sample, Tree};
+use crate::light::lanes::Lanes;
 use crate::link::{Sight, View};
 use crate::scene::{LightKind, PunctualLight, Scene};
+use crate::transport::point::{Receiver, punctual_factor};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 

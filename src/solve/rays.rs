@@ -7,9 +7,9 @@
 use super::conjugate::Convergence;
 use super::operator::pull;
 use super::outlook::Outlook;
-use crate::light::rows::Rows;
 use super::two_grid::TwoGrid;
 use crate::hierarchy::Tree;
+use crate::light::rows::Rows;
 
 /// Sweeps at the most.
 const SWEEPS: usize = 400;
@@ -22,7 +22,7 @@ const SLOWEST: f64 = 0.95;
 const WORTH_CORRECTING: f64 = 0.5;
 
 /// What a solve by rays works on.
-pub(super) struct RaySystem<'a> {
+pub(crate) struct RaySystem<'a> {
     pub(super) tree: &'a Tree,
     pub(super) outlook: &'a Outlook,
     pub(super) leaves: &'a [u32],

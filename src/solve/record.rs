@@ -195,7 +195,7 @@ pub enum Verdict {
 }
 
 /// What a round measured, before it is written down.
-pub(super) struct Measured<'a> {
+pub(crate) struct Measured<'a> {
     pub(super) threshold: f64,
     pub(super) refined: &'a Refined,
     pub(super) convergence: &'a Convergence,

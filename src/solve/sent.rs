@@ -20,6 +20,8 @@ const TOGETHER: usize = 16;
 /// shines. Directional lights have no flux and are left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sent {
+    /// Luminous flux of all lamps, lm.
+    pub lamps_lm: f64,
     /// To the fronts of surfaces.
     pub to_fronts: f64,
     /// To black backs of one-sided surfaces.
@@ -37,13 +39,16 @@ impl Bake {
             return Sent::default();
         }
         if self.closed == Closed::Yes {
-            let to_fronts = 1.0;
             return Sent {
-                to_fronts,
+                lamps_lm: all,
+                to_fronts: 1.0,
                 ..Sent::default()
             };
         }
-        let mut sent = Sent::default();
+        let mut sent = Sent {
+            lamps_lm: all,
+            ..Sent::default()
+        };
         let mut first = 0;
         for (flux, lamp) in lamps {
             // At least a packet, so that no lamp goes without.

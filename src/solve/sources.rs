@@ -1,10 +1,10 @@
 //! Reflectance and emission of patches, row by row, from the materials.
 
-use crate::light::lanes::Lanes;
 use super::mixed::Mixed;
-use crate::light::rows::{Rows, padded};
 use crate::color::Upsampler;
 use crate::hierarchy::{Element, Mesh, Tree};
+use crate::light::lanes::Lanes;
+use crate::light::rows::{Rows, padded};
 use crate::scene::{Emission, Material, Scene, Surface, Texture};
 use crate::spectrum::Leaves;
 use glam::DVec3;
@@ -16,7 +16,7 @@ const CHUNK: usize = 256;
 
 /// What the leaves of a hierarchy reflect and emit.
 #[derive(Debug, Clone)]
-pub(super) struct Sources {
+pub(crate) struct Sources {
     /// Reflectance by leaf.
     pub reflectance: Rows,
     /// Exitance by leaf: pi times radiance.
@@ -26,7 +26,7 @@ pub(super) struct Sources {
 }
 
 /// Turns materials into rows.
-pub(super) struct Painter<'a> {
+pub(crate) struct Painter<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
     upsampler: &'a Upsampler,
@@ -211,7 +211,7 @@ pub(crate) fn weights_of(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
 }
 
 /// What single leaves reflect, emit and get from punctual lights, at full resolution.
-pub(super) struct DenseSources<'a> {
+pub(crate) struct DenseSources<'a> {
     painter: &'a Painter<'a>,
     tree: &'a Tree,
     shadowed: &'a super::punctual::Shadowed,

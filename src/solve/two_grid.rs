@@ -7,8 +7,8 @@
 //! leaf reflects its patch's u. What the cut gets wrong the next sweep finds; the sweeps alone say when it is enough.
 
 use super::outlook::Outlook;
-use crate::light::rows::Rows;
 use crate::hierarchy::{NONE, Tree};
+use crate::light::rows::Rows;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

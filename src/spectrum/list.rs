@@ -3,10 +3,10 @@
 //! The list is a cut of the range and, packed in order of wavelength, one record for each interval. It has room for all
 //! 64, so no operation allocates.
 
-use crate::data::{LEAVES, Leaves};
 use super::interval::{Cmf, Interval, Representative};
 use super::partition::Partition;
 use super::tree::{CmfTree, Tree, node};
+use crate::data::{LEAVES, Leaves};
 
 /// A piecewise constant spectrum with its errors.
 #[derive(Debug, Clone)]

@@ -104,9 +104,9 @@ mod tree;
 #[cfg(test)]
 pub(crate) mod testing;
 
+pub use crate::data::{Grid, LEAVES, Leaves};
 pub use bound::Bounded;
 pub use control::{Control, Metric, Operation, Overshoot, Pairs, coarsen, control};
-pub use crate::data::{Grid, LEAVES, Leaves};
 pub use interval::{Cmf, Estimate, Interval, Moment, Representative};
 pub use list::List;
 pub use partition::{Intervals, Partition};

@@ -5,9 +5,9 @@
 //!
 //! The average of eq. 3 is the value that makes the sum of the squares of the three errors of eq. 2 least.
 
-use crate::data::{LEAVES, Leaves};
 use super::interval::{Cmf, Interval, Representative};
 use super::partition::Partition;
+use crate::data::{LEAVES, Leaves};
 
 /// Nodes of a tree in heap order; index 0 is not used.
 pub const NODES: usize = 2 * LEAVES;

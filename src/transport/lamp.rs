@@ -257,8 +257,8 @@ impl Gatherer<'_> {
 mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
-    use crate::scene::{Options, Scene};
     use crate::light::brightness;
+    use crate::scene::{Options, Scene};
     use crate::solve::{Bake, Settings};
     use std::path::Path;
 

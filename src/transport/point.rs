@@ -7,9 +7,9 @@ use super::shadows::Shadows;
 use super::trace::Trace;
 use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
+use crate::light::Light;
 use crate::link::{Sight, Way};
 use crate::scene::{LightKind, PunctualLight};
-use crate::light::Light;
 use glam::DVec3;
 
 /// Nearer than this many of its radii a cluster is entered, and a patch is not even.

@@ -6,8 +6,8 @@
 //!
 //! Packed, ids stand sorted as differences in base 128: a patch takes about 6 bytes, a leaf that rays met about 2.
 
-use crate::scene::PunctualLight;
 use crate::light::Light;
+use crate::scene::PunctualLight;
 use crate::store::Broken;
 use crate::store::codec::Read;
 
@@ -241,8 +241,8 @@ pub(crate) fn lamps_of(packed: &[u8], nodes: usize, lamps: usize) -> Read<Vec<(u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::LightKind;
     use crate::light::Rows;
+    use crate::scene::LightKind;
     use proptest::prelude::*;
 
     const NODES: usize = 400;

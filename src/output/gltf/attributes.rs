@@ -6,8 +6,8 @@
 use super::accessor::{self, Data, Table};
 use super::{Writer, index};
 use crate::error::{Error, Result};
-use crate::gather::{BakedSurface, BakedVertex};
 use crate::gather::refined;
+use crate::gather::{BakedSurface, BakedVertex};
 use crate::output::exposure;
 use crate::scene::{Alpha, Surface};
 use glam::{DMat3, DVec3};

@@ -16,9 +16,9 @@ mod material;
 mod meshes;
 
 use super::Exposure;
-use crate::gather::refined;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
+use crate::gather::refined;
 use crate::scene::Scene;
 use crate::scene::buffers::Buffers;
 use accessor::Data;

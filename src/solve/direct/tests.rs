@@ -1,0 +1,89 @@
+use super::*;
+use crate::hierarchy::Mesh;
+use crate::scene::{Options, Scene};
+use std::path::Path;
+
+/// Light and openness that depend on where a point is.
+struct Fake;
+
+fn light(to: &Receiver) -> f32 {
+    if to.point.x > 0.1 { 3.0 } else { 0.0 }
+}
+
+fn open(to: &Receiver) -> f32 {
+    if to.point.z > 0.0 { 1.0 } else { 0.25 }
+}
+
+impl Look for Fake {
+    fn weights(&self) -> &[f64] {
+        &[1.0]
+    }
+    fn direct(&self, _: &Tree, to: &Receiver, _: f64, _: &mut Memory) -> Option<[f32; 64]> {
+        Some([light(to); 64])
+    }
+    fn unshadowed(&self, _: &Tree, _: u32, _: f64) -> f64 {
+        3.0
+    }
+    fn openness(&self, _: &Tree, _: u32) -> Option<impl Fn(&Receiver, usize) -> f32> {
+        Some(|to: &Receiver, _| open(to))
+    }
+}
+
+/// Summed over leaves, for any number of points: a bias of 1 % would show.
+#[test]
+fn random_points_find_the_light_that_others_see() {
+    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
+    let mesh = Mesh::new(&Scene::load(&room, &Options::default()).unwrap());
+    let mut tree = Tree::new(&mesh, &vec![0; mesh.faces.len()]);
+    for _ in 0..4 {
+        for leaf in tree.leaves().collect::<Vec<_>>() {
+            tree.subdivide(leaf);
+        }
+    }
+    for flux in [0.0, 10.0] {
+        let stake = Stake {
+            split: 0.0,
+            flux,
+            may_split: true,
+            tiny: false,
+        };
+        let (mut found, mut want) = ([0.0; 2], [0.0; 2]);
+        for leaf in tree.leaves() {
+            let area = tree.node(leaf).area;
+            let mut memory = Memory::default();
+            let open_share = |to: &Receiver, _: usize| open(to);
+            let mean = by_chance(&tree, leaf, &Fake, &open_share, 0.1, &stake, &mut memory);
+            let mut ended = Found::default();
+            mean.end(&mut ended, 1);
+            found[0] += area * f64::from(ended.rows[0]);
+            found[1] += area * f64::from(ended.rows[0] * ended.whole[0]);
+            let (mut seen, mut total, mut all) = (0.0, 0.0, 0.0);
+            for k in 0..64 {
+                let at = triangle_weights(sequence02(k, 77));
+                let to = receiver(&tree, leaf, at, 0);
+                seen += f64::from(open(&to) * light(&to));
+                total += f64::from(open(&to));
+                all += f64::from(light(&to));
+            }
+            want[0] += area * seen / total;
+            want[1] += area * all / 64.0;
+        }
+        for (found, want) in found.iter().zip(want) {
+            assert!((found / want - 1.0).abs() < 0.005, "{flux}: {found} {want}");
+        }
+    }
+}
+
+#[test]
+fn points_have_a_variance_and_a_range() {
+    let mean = |bright: &[f32]| {
+        let mut mean = Mean::new();
+        for &b in bright {
+            mean.add(&[b; 64], 1.0, &[1.0], &mut Memory::default());
+        }
+        mean
+    };
+    assert_eq!(mean(&[1.0, 1.0]).variance(), 0.0);
+    assert!((mean(&[0.0, 2.0]).variance() - 2.0).abs() < 1e-12);
+    assert_eq!(mean(&[0.0, 2.0]).half_range(), 1.0);
+}

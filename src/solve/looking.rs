@@ -1,0 +1,91 @@
+//! What a solution is asked: light at receivers, and which of them something covers.
+
+use super::*;
+
+/// What one patch may misplace in a gather, share of the asked-for error.
+const GATHER_SHARE: f64 = 0.1;
+/// A face that has less of its area bare lies below something.
+const MOSTLY_COVERED: f64 = 0.01;
+
+impl Bake {
+    /// Gathers at receivers, in order.
+    pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
+        self.gather_with(receivers, Care::Full)
+    }
+
+    /// Gathers with care, or just for a picture.
+    pub(crate) fn gather_with(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
+        if self.light.width() == 0 || self.light.white == [0.0; 3] {
+            // A room without light: nothing to look for.
+            return vec![Gathered::dark(); receivers.len()];
+        }
+        self.with_sight(|bake, sight| {
+            let sketched = Hemisphere::sketch();
+            let mut gatherer = bake.gatherer(sight);
+            if let (Care::Sketch, Some(hemisphere)) = (care, &mut gatherer.hemisphere) {
+                *hemisphere = &sketched;
+            }
+            receivers
+                .par_iter()
+                .map_init(Memory::default, |memory, r| gatherer.at(r, memory).pack())
+                .collect()
+        })
+    }
+
+    /// Which receivers does something solid cover?
+    pub(crate) fn covered(&self, receivers: &[Receiver]) -> Vec<bool> {
+        if self.closed == Closed::Yes {
+            return vec![false; receivers.len()];
+        }
+        receivers
+            .par_iter()
+            .map(|r| {
+                flux::covered(
+                    &self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed,
+                )
+            })
+            .collect()
+    }
+
+    /// Which receivers does something lie upon, so near that nobody sees them? See [`PRESSED`].
+    pub(crate) fn pressed(&self, receivers: &[Receiver]) -> Vec<bool> {
+        let height = PRESSED * self.mesh.half_size;
+        self.with_sight(|_, sight| {
+            let pressed = |to: &Receiver| {
+                let above = Segment::new(
+                    to.point,
+                    to.point + height * to.normal,
+                    [to.plane, NO_PLANE],
+                );
+                sight.occlusion && sight.blocks_one(&above)
+            };
+            receivers.par_iter().map(pressed).collect()
+        })
+    }
+
+    /// Of each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.
+    pub(crate) fn spaces(&self) -> Vec<(u32, bool)> {
+        let mut spaces = vec![(0, false); self.tree.faces.len()];
+        for (face, space) in self.mesh.faces.iter().zip(&self.spaces) {
+            let entry = self.tree.entry[face.triangle as usize][usize::from(face.back)];
+            let node = self.tree.face_node[entry as usize];
+            let covered = self.areas[node as usize] < MOSTLY_COVERED * self.tree.node(node).area;
+            spaces[entry as usize] = (*space, covered);
+        }
+        spaces
+    }
+
+    pub(crate) fn gatherer<'a>(&'a self, sight: &'a Sight<'a>) -> Gatherer<'a> {
+        Gatherer {
+            tree: &self.tree,
+            light: &self.light,
+            sight,
+            lamps: &self.lamps,
+            tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
+            closed: self.closed == Closed::Yes,
+            hemisphere: by_rays(sight).then_some(&self.hemisphere),
+            shafts: true,
+            keep: self.keep,
+        }
+    }
+}
