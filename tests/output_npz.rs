@@ -2,7 +2,8 @@
 
 mod output_room;
 
-use haarlight::output::{npz, refined};
+use haarlight::gather::refined;
+use haarlight::output::npz;
 use haarlight::spectrum::LEAVES;
 use std::collections::BTreeMap;
 
