@@ -4,9 +4,11 @@ mod output_room;
 
 use ::exr::prelude::{ReadChannels, ReadLayers};
 use glam::{DMat4, DVec3};
+use haarlight::gather::refined;
 use haarlight::gather::{BakedSurface, BakedVertex};
-use haarlight::output::{Exposure, Format, Picture, camera, exr, file, refined};
+use haarlight::output::{Exposure, Format, Picture, camera, exr};
 use haarlight::scene::*;
+use haarlight::store::file;
 use output_room::room;
 use std::f64::consts::PI;
 

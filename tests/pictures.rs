@@ -1,8 +1,9 @@
 //! Baked rooms, looked at as a person would: no seams, no black or glaring spots, smooth walls, sensible exposure.
 
+use haarlight::gather::refined;
 use haarlight::gather::{Baked, BakedSurface};
 use haarlight::output::picture::seen;
-use haarlight::output::{Exposure, Format, Picture, camera, refined};
+use haarlight::output::{Exposure, Format, Picture, camera};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use std::f64::consts::PI;
