@@ -10,9 +10,10 @@
 
 use haarlight::geometry::sampling::hash;
 use haarlight::hierarchy::{NONE, Node, Tree};
+use haarlight::light::Rows;
 use haarlight::link::{Demand, Graph, Link, LinkRows, Sight, Way};
 use haarlight::scene::{Options, Scene};
-use haarlight::solve::{Bake, Operator, Rows, Settings};
+use haarlight::solve::{Bake, Operator, Settings};
 use std::path::Path;
 use std::time::{Duration, Instant};
 

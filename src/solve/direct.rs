@@ -155,7 +155,8 @@ impl Direct {
 
     /// Mean brightness of the whole leaf over that of what others see of it.
     pub(super) fn whole(&self, leaf: u32) -> f32 {
-        self.whole[leaf as usize]
+        // Not known where light was replayed: leaves count as even then.
+        self.whole.get(leaf as usize).copied().unwrap_or(1.0)
     }
 
     /// Direct irradiance of a leaf by lane.
