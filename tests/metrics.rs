@@ -5,7 +5,8 @@ use std::path::Path;
 use std::process::Command;
 
 const NAMES: [&str; 12] = [
-    "lux", "CCT_K", "Duv", "Ra", "R9", "Rf", "Rg", "EDI_sc", "EDI_mc", "EDI_lc", "EDI_rh", "EDI_mel",
+    "lux", "CCT_K", "Duv", "Ra", "R9", "Rf", "Rg", "EDI_sc", "EDI_mc", "EDI_lc", "EDI_rh",
+    "EDI_mel",
 ];
 
 /// Prints of a probe of the Cornell box at points on its floor, and what it said.
@@ -28,7 +29,13 @@ fn probed(options: &[&str]) -> (String, String) {
 }
 
 /// Three in the room, one outside.
-const POINTS: &str = "x,y,z,nx,ny,nz\n@@";
+const POINTS: &str = "\
+x,y,z,nx,ny,nz
+0.1,0,-0.1,0,1,0
+0.28,0,-0.05,0,1,0
+0.5,0,-0.5,0,1,0
+0,-0.5,0,0,-1,0
+";
 
 #[test]
 fn metrics_come_after_the_other_columns() {
@@ -44,7 +51,10 @@ fn metrics_come_after_the_other_columns() {
     for line in csv.lines().skip(1) {
         assert_eq!(line.split(',').count(), header.len(), "{line}");
     }
-    assert!(said.contains("uniformity over 3 points: min/mean"), "{said}");
+    assert!(
+        said.contains("uniformity over 3 points: min/mean"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -70,12 +80,24 @@ fn figures_hold_their_ranges_and_a_finer_solution() {
         let row = coarse["rows"][k][lux].as_f64().unwrap();
         assert!((point["lux"]["value"].as_f64().unwrap() / row - 1.0).abs() < 1e-4);
         for name in NAMES {
-            let at = |key: &str| point[name][key].as_f64().unwrap_or_else(|| panic!("{name} {point}"));
-            assert!(at("low") <= at("value") && at("value") <= at("high"), "{name} {point}");
+            let at = |key: &str| {
+                point[name][key]
+                    .as_f64()
+                    .unwrap_or_else(|| panic!("{name} {point}"))
+            };
+            assert!(
+                at("low") <= at("value") && at("value") <= at("high"),
+                "{name} {point}"
+            );
             let better = fine["points"][k][name]["value"].as_f64().unwrap();
             all += 1;
             held += usize::from((at("low")..=at("high")).contains(&better));
-            println!("{k} {name}: {} {} {} finer {better}", at("low"), at("value"), at("high"));
+            println!(
+                "{k} {name}: {} {} {} finer {better}",
+                at("low"),
+                at("value"),
+                at("high")
+            );
         }
     }
     // Ranges are root mean squares, not bounds.

@@ -77,7 +77,13 @@ impl Metrics {
 
     /// Columns of the CSV.
     pub(super) fn columns() -> Vec<String> {
-        let of = |name: &str| [name.to_owned(), format!("{name}_low"), format!("{name}_high")];
+        let of = |name: &str| {
+            [
+                name.to_owned(),
+                format!("{name}_low"),
+                format!("{name}_high"),
+            ]
+        };
         // Illuminance has its column already.
         NAMES.iter().flat_map(|name| of(name)).skip(1).collect()
     }

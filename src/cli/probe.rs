@@ -208,12 +208,16 @@ fn table(
     if metrics.is_some() {
         header.extend(Metrics::columns());
     }
-    let lines = rows.iter().zip(places).enumerate().map(|(k, (row, place))| {
-        let mut cells: Vec<String> = row.iter().map(f64::to_string).collect();
-        cells.push(place.name().into());
-        cells.extend(metrics.iter().flat_map(|metrics| metrics.cells(k)));
-        cells.join(",") + "\n"
-    });
+    let lines = rows
+        .iter()
+        .zip(places)
+        .enumerate()
+        .map(|(k, (row, place))| {
+            let mut cells: Vec<String> = row.iter().map(f64::to_string).collect();
+            cells.push(place.name().into());
+            cells.extend(metrics.iter().flat_map(|metrics| metrics.cells(k)));
+            cells.join(",") + "\n"
+        });
     std::iter::once(header.join(",") + "\n")
         .chain(lines)
         .collect()

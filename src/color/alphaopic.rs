@@ -31,6 +31,8 @@ impl AlphaOpic {
 
     /// Equivalent daylight of a light, in units of `sum light y_bar`: multiply by 683 lm/W for lux.
     pub fn daylight(&self, light: &[f64]) -> [f64; 5] {
-        self.actions.each_ref().map(|action| weighted(light, action))
+        self.actions
+            .each_ref()
+            .map(|action| weighted(light, action))
     }
 }

@@ -67,15 +67,19 @@ impl Locus {
     /// The colour temperature of a chromaticity; none beyond either end of the locus.
     pub fn correlated(&self, uv: [f64; 2]) -> Option<Correlated> {
         let distance = |row: &Row| (uv[0] - row.uv[0]).hypot(uv[1] - row.uv[1]);
-        let nearest =
-            (0..self.rows.len()).min_by(|&a, &b| distance(&self.rows[a]).total_cmp(&distance(&self.rows[b])))?;
+        let nearest = (0..self.rows.len())
+            .min_by(|&a, &b| distance(&self.rows[a]).total_cmp(&distance(&self.rows[b])))?;
         let rows = self.rows.get(nearest.checked_sub(1)?..nearest + 2)?;
         let distances = [0, 1, 2].map(|k| distance(&rows[k]));
         let triangle = triangle([rows[0], rows[2]], [distances[0], distances[2]], uv)?;
         if triangle.duv.abs() < PARABOLA_FROM {
             return Some(triangle);
         }
-        Some(parabola([0, 1, 2].map(|k| rows[k].kelvin), distances, triangle.duv.signum()))
+        Some(parabola(
+            [0, 1, 2].map(|k| rows[k].kelvin),
+            distances,
+            triangle.duv.signum(),
+        ))
     }
 }
 

@@ -104,6 +104,9 @@ fn area(colours: &[Appearance], reference: &[Appearance]) -> f64 {
         .map(|[a, b, n]| [a / n, b / n])
         .collect();
     let next = corners.iter().cycle().skip(1);
-    let crosses = corners.iter().zip(next).map(|(p, q)| p[0] * q[1] - p[1] * q[0]);
+    let crosses = corners
+        .iter()
+        .zip(next)
+        .map(|(p, q)| p[0] * q[1] - p[1] * q[0]);
     0.5 * crosses.sum::<f64>()
 }

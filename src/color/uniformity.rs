@@ -44,7 +44,11 @@ impl Uniformity {
     pub fn range(ratio: f64, relative: f64) -> Range {
         let factor = (1.0 + relative) / (1.0 - relative);
         // An error of all there is leaves nothing known.
-        let factor = if relative < 1.0 { factor } else { f64::INFINITY };
+        let factor = if relative < 1.0 {
+            factor
+        } else {
+            f64::INFINITY
+        };
         Range {
             low: ratio / factor,
             high: (ratio * factor).min(1.0),

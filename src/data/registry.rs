@@ -160,7 +160,10 @@ pub(crate) fn cmf_1931() -> [Table; 3] {
 
 /// The CIE 1964 10 degree observer: x_bar, y_bar, z_bar at 360-830 nm in steps of 1 nm.
 pub(crate) fn cmf_1964() -> [Table; 3] {
-    columns_of(include_str!("cmf_1964.csv"), ["x10_bar", "y10_bar", "z10_bar"])
+    columns_of(
+        include_str!("cmf_1964.csv"),
+        ["x10_bar", "y10_bar", "z10_bar"],
+    )
 }
 
 /// The CIE S 026 action spectra: S-, M-, L-cone-opic, rhodopic, melanopic at 380-780 nm in steps of 1 nm.
@@ -249,17 +252,13 @@ mod tests {
 
     #[test]
     fn headers_state_their_source() {
-        for csv in FILES
-            .iter()
-            .map(|file| file.csv)
-            .chain([
-                include_str!("cmf_1931.csv"),
-                include_str!("cmf_1964.csv"),
-                include_str!("alpha_opic.csv"),
-                include_str!("test_colours.csv"),
-                include_str!("colour_evaluation.csv"),
-            ])
-        {
+        for csv in FILES.iter().map(|file| file.csv).chain([
+            include_str!("cmf_1931.csv"),
+            include_str!("cmf_1964.csv"),
+            include_str!("alpha_opic.csv"),
+            include_str!("test_colours.csv"),
+            include_str!("colour_evaluation.csv"),
+        ]) {
             for key in [
                 "# source: ",
                 "# edition: ",
