@@ -31,9 +31,9 @@ fn probed(options: &[&str]) -> (String, String) {
 /// Three in the room, one outside.
 const POINTS: &str = "\
 x,y,z,nx,ny,nz
-0.1,0,-0.1,0,1,0
-0.28,0,-0.05,0,1,0
-0.5,0,-0.5,0,1,0
+0.1,0,0.4,0,1,0
+0.4,0,0.1,0,1,0
+0.52,0,0.5,0,1,0
 0,-0.5,0,0,-1,0
 ";
 

@@ -7,7 +7,7 @@
 //! [`places`]). `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
 //! "columns": [names], "rows": [[numbers]], "places": [texts]}`; the columns have all but `place`.
 //!
-//! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see [`metrics`](super::metrics).
+//! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see `metrics.rs`.
 
 use super::bake::{load, prepare};
 use super::command::print;
@@ -25,7 +25,7 @@ use crate::solve::Representation;
 use crate::spectrum::{Grid, LEAVES};
 use crate::survey::{Place, places};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Version of the JSON form.
 const VERSION: u32 = 1;
@@ -70,21 +70,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let stop = Stop::new(args.solving.time);
     stop.listen()?;
     let talk = Talk::new(common.quiet);
-    let mut read = match Points::open(&args.points) {
-        Ok(read) => read,
-        Err(Error::Input(problems)) => Points {
-            problems,
-            ..Points::default()
-        },
-        Err(problem) => Points {
-            problems: vec![Problem::new(
-                "--points",
-                problem.to_string(),
-                "name a file that can be read",
-            )],
-            ..Points::default()
-        },
-    };
+    let mut read = read_points(&args.points);
     let wrong = std::mem::take(&mut read.problems);
     let scene = load(&args.room, &args.reading, |parts| {
         problems(args, parts, wrong)
@@ -148,6 +134,25 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
         print(&csv())?;
     }
     Ok(exit_code(verdict))
+}
+
+/// The points; a file that cannot be read is a problem like those in it.
+fn read_points(path: &Path) -> Points {
+    match Points::open(path) {
+        Ok(read) => read,
+        Err(Error::Input(problems)) => Points {
+            problems,
+            ..Points::default()
+        },
+        Err(problem) => Points {
+            problems: vec![Problem::new(
+                "--points",
+                problem.to_string(),
+                "name a file that can be read",
+            )],
+            ..Points::default()
+        },
+    }
 }
 
 /// Says how many points are not in the room.
