@@ -7,6 +7,7 @@
 //! | `bake`, `relight`, `inspect`, `probe`, `spectra`, `cost`, `paper` | the commands |
 //! | `log` | the log of a bake, field by field |
 //! | `snapshots` | pictures of the rounds |
+//! | `metrics` | figures of lighting practice for `probe` |
 //! | `points` | the CSV of points for `probe` |
 //! | `stop` | Ctrl-C and `--time` |
 //! | `paths` | checks on output files |
@@ -19,6 +20,7 @@ pub mod cost;
 mod fault;
 pub mod inspect;
 pub mod log;
+mod metrics;
 pub mod options;
 pub mod paper;
 mod paths;

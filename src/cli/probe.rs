@@ -6,10 +6,13 @@
 //! is `E_Y` under the name that people look for, and `place`: `room`, `inside` something solid or `outside` the room (see
 //! [`places`]). `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
 //! "columns": [names], "rows": [[numbers]], "places": [texts]}`; the columns have all but `place`.
+//!
+//! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see `metrics.rs`.
 
 use super::bake::{load, prepare};
 use super::command::print;
 use super::log::exit_code;
+use super::metrics::Metrics;
 use super::options::{Common, Reading, Solving};
 use super::paths;
 use super::points::{COLUMNS, Point, Points};
@@ -22,7 +25,7 @@ use crate::spectrum::{Grid, LEAVES};
 use crate::store::file;
 use crate::survey::{Place, places};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Version of the JSON form.
 const VERSION: u32 = 1;
@@ -45,6 +48,9 @@ pub struct ProbeArgs {
     /// Irradiance on the 64 leaves as well.
     #[arg(long)]
     pub bands: bool,
+    /// Colour temperature, rendering, fidelity and alpha-opic daylight as well, each with its range; solves on all leaves.
+    #[arg(long)]
+    pub metrics: bool,
     /// What to read.
     #[command(flatten)]
     pub reading: Reading,
@@ -64,21 +70,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let stop = Stop::new(args.solving.time);
     stop.listen()?;
     let talk = Talk::new(common.quiet);
-    let mut read = match Points::open(&args.points) {
-        Ok(read) => read,
-        Err(Error::Input(problems)) => Points {
-            problems,
-            ..Points::default()
-        },
-        Err(problem) => Points {
-            problems: vec![Problem::new(
-                "--points",
-                problem.to_string(),
-                "name a file that can be read",
-            )],
-            ..Points::default()
-        },
-    };
+    let mut read = read_points(&args.points);
     let wrong = std::mem::take(&mut read.problems);
     let scene = load(&args.room, &args.reading, |parts| {
         problems(args, parts, wrong)
@@ -90,7 +82,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
             read.ignored.join(", ")
         ));
     }
-    let representation = if args.bands {
+    let representation = if args.bands || args.metrics {
         Representation::Dense
     } else {
         Representation::Adaptive
@@ -104,7 +96,67 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
         .collect();
     let probed = bake.probe(&points);
     let places = places(bake.scene(), &points);
+    let metrics = (args.metrics)
+        .then(|| Metrics::new(&bake.scene().grid, &probed, &places, bake.rounds().last()));
     talk.clear();
+    warn_of(&places, &talk);
+    if let Some(line) = metrics.as_ref().and_then(Metrics::line) {
+        talk.say(&line);
+    }
+
+    let columns = columns(args.bands, &bake.scene().grid);
+    let rows: Vec<Vec<f64>> = read
+        .points
+        .iter()
+        .zip(&probed)
+        .map(|(p, light)| row(p, light, args.bands))
+        .collect();
+    let csv = || table(&columns, &rows, &places, metrics.as_ref());
+    if let Some(path) = &args.output {
+        file::write_atomic(path, Some(&args.room), |w| w.write_all(csv().as_bytes()))?;
+    }
+    if args.json {
+        let error = bake.rounds().last().map(|r| r.error.total_de2000);
+        let mut all = json!({
+            "version": VERSION,
+            "verdict": verdict,
+            "rounds": bake.rounds().len(),
+            "error_de2000": error,
+            "columns": columns,
+            "rows": rows,
+            "places": places.iter().map(|p| p.name()).collect::<Vec<_>>(),
+        });
+        if let Some(metrics) = &metrics {
+            all["metrics"] = metrics.json();
+        }
+        print(&format!("{all}\n"))?;
+    } else if args.output.is_none() {
+        print(&csv())?;
+    }
+    Ok(exit_code(verdict))
+}
+
+/// The points; a file that cannot be read is a problem like those in it.
+fn read_points(path: &Path) -> Points {
+    match Points::open(path) {
+        Ok(read) => read,
+        Err(Error::Input(problems)) => Points {
+            problems,
+            ..Points::default()
+        },
+        Err(problem) => Points {
+            problems: vec![Problem::new(
+                "--points",
+                problem.to_string(),
+                "name a file that can be read",
+            )],
+            ..Points::default()
+        },
+    }
+}
+
+/// Says how many points are not in the room.
+fn warn_of(places: &[Place], talk: &Talk) {
     for place in [Place::Inside, Place::Outside] {
         let count = places.iter().filter(|p| **p == place).count();
         if count > 0 {
@@ -118,43 +170,6 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
             ));
         }
     }
-
-    let columns = columns(args.bands, &bake.scene().grid);
-    let rows: Vec<Vec<f64>> = read
-        .points
-        .iter()
-        .zip(&probed)
-        .map(|(p, light)| row(p, light, args.bands))
-        .collect();
-    let csv = || {
-        let lines = rows.iter().zip(&places).map(|(row, place)| {
-            let numbers: String = row.iter().map(|x| format!("{x},")).collect();
-            numbers + place.name()
-        });
-        std::iter::once(columns.join(",") + ",place")
-            .chain(lines)
-            .map(|line| line + "\n")
-            .collect::<String>()
-    };
-    if let Some(path) = &args.output {
-        file::write_atomic(path, Some(&args.room), |w| w.write_all(csv().as_bytes()))?;
-    }
-    if args.json {
-        let error = bake.rounds().last().map(|r| r.error.total_de2000);
-        let all = json!({
-            "version": VERSION,
-            "verdict": verdict,
-            "rounds": bake.rounds().len(),
-            "error_de2000": error,
-            "columns": columns,
-            "rows": rows,
-            "places": places.iter().map(|p| p.name()).collect::<Vec<_>>(),
-        });
-        print(&format!("{all}\n"))?;
-    } else if args.output.is_none() {
-        print(&csv())?;
-    }
-    Ok(exit_code(verdict))
 }
 
 /// Problems of the points and the output.
@@ -184,6 +199,33 @@ fn columns(bands: bool, grid: &Grid) -> Vec<String> {
     }
     columns.push("lux".into());
     columns
+}
+
+/// The CSV.
+fn table(
+    columns: &[String],
+    rows: &[Vec<f64>],
+    places: &[Place],
+    metrics: Option<&Metrics>,
+) -> String {
+    let mut header = columns.to_vec();
+    header.push("place".into());
+    if metrics.is_some() {
+        header.extend(Metrics::columns());
+    }
+    let lines = rows
+        .iter()
+        .zip(places)
+        .enumerate()
+        .map(|(k, (row, place))| {
+            let mut cells: Vec<String> = row.iter().map(f64::to_string).collect();
+            cells.push(place.name().into());
+            cells.extend(metrics.iter().flat_map(|metrics| metrics.cells(k)));
+            cells.join(",") + "\n"
+        });
+    std::iter::once(header.join(",") + "\n")
+        .chain(lines)
+        .collect()
 }
 
 fn row((point, normal): &Point, light: &Probed, bands: bool) -> Vec<f64> {

@@ -1,15 +1,17 @@
 //! Published tables (CIE observer, illuminants, measured reflectances), readers of spectra, and the leaves they are held on.
 
 mod blackbody;
+mod daylight;
 mod grid;
 mod nearest;
 mod registry;
 mod table;
 
 pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
+pub use daylight::daylight;
 pub use grid::{Grid, LEAVES, Leaves};
 pub use registry::{Kind, Named, named, names, nearest};
 pub use table::{CsvProblem, Outside, Table};
 
 pub(crate) use nearest::nearest_of;
-pub(crate) use registry::cmf_1931;
+pub(crate) use registry::{alpha_opic, cmf_1931, cmf_1964, colour_evaluation, test_colours};

@@ -155,13 +155,53 @@ pub fn nearest(name: &str) -> Vec<String> {
 
 /// The CIE 1931 2 degree observer: x_bar, y_bar, z_bar at 360-830 nm in steps of 1 nm.
 pub(crate) fn cmf_1931() -> [Table; 3] {
-    let columns =
-        Columns::parse(include_str!("cmf_1931.csv")).expect("built-in tables are well formed");
-    ["x_bar", "y_bar", "z_bar"].map(|name| {
+    columns_of(include_str!("cmf_1931.csv"), ["x_bar", "y_bar", "z_bar"])
+}
+
+/// The CIE 1964 10 degree observer: x_bar, y_bar, z_bar at 360-830 nm in steps of 1 nm.
+pub(crate) fn cmf_1964() -> [Table; 3] {
+    columns_of(
+        include_str!("cmf_1964.csv"),
+        ["x10_bar", "y10_bar", "z10_bar"],
+    )
+}
+
+/// The CIE S 026 action spectra: S-, M-, L-cone-opic, rhodopic, melanopic at 380-780 nm in steps of 1 nm.
+pub(crate) fn alpha_opic() -> [Table; 5] {
+    let names = [
+        "s_cone_opic",
+        "m_cone_opic",
+        "l_cone_opic",
+        "rhodopic",
+        "melanopic",
+    ];
+    columns_of(include_str!("alpha_opic.csv"), names)
+}
+
+/// The 14 test colour samples of CIE 13.3, reflectance at 360-830 nm in steps of 5 nm.
+pub(crate) fn test_colours() -> Vec<Table> {
+    all_of(include_str!("test_colours.csv"))
+}
+
+/// The 99 colour evaluation samples of CIE 224 and TM-30, reflectance at 380-780 nm in steps of 5 nm.
+pub(crate) fn colour_evaluation() -> Vec<Table> {
+    all_of(include_str!("colour_evaluation.csv"))
+}
+
+fn columns_of<const N: usize>(csv: &str, names: [&str; N]) -> [Table; N] {
+    let columns = Columns::parse(csv).expect("built-in tables are well formed");
+    names.map(|name| {
         columns
             .table(name)
-            .expect("the observer has three functions")
+            .expect("built-in tables have the columns that they are read for")
     })
+}
+
+fn all_of(csv: &str) -> Vec<Table> {
+    let columns = Columns::parse(csv).expect("built-in tables are well formed");
+    (columns.names.iter())
+        .filter_map(|name| columns.table(name))
+        .collect()
 }
 
 #[cfg(test)]
@@ -212,11 +252,13 @@ mod tests {
 
     #[test]
     fn headers_state_their_source() {
-        for csv in FILES
-            .iter()
-            .map(|file| file.csv)
-            .chain([include_str!("cmf_1931.csv")])
-        {
+        for csv in FILES.iter().map(|file| file.csv).chain([
+            include_str!("cmf_1931.csv"),
+            include_str!("cmf_1964.csv"),
+            include_str!("alpha_opic.csv"),
+            include_str!("test_colours.csv"),
+            include_str!("colour_evaluation.csv"),
+        ]) {
             for key in [
                 "# source: ",
                 "# edition: ",

@@ -5,7 +5,7 @@
 //! would make the error of the later one `d / sqrt(1 + 1 / q^2) = 0.5 d`; were they alike, `d q / (1 - q) = 1.5 d`. The
 //! truth lies between; [`SHARE`] was measured against the audit.
 
-use crate::color::{de_luv, de2000};
+use crate::color::{de_luv, de2000, uv_1960};
 use crate::geometry::sampling::{Pcg, triangle_weights};
 use crate::hierarchy::Tree;
 use crate::transport::point::Receiver;
@@ -37,12 +37,14 @@ pub(crate) struct Distance {
     pub de_luv: f64,
     /// Root mean square of relative illuminance.
     pub relative: f64,
+    /// Root mean square of chromaticity, distance in (u, v) of the CIE 1960 diagram.
+    pub chromaticity: f64,
 }
 
 impl Distance {
     /// Is it a number? Light under a white that is none gives no colour.
     fn is_known(&self) -> bool {
-        [self.de2000, self.de_luv, self.relative]
+        [self.de2000, self.de_luv, self.relative, self.chromaticity]
             .iter()
             .all(|x| x.is_finite())
     }
@@ -119,6 +121,13 @@ impl Probes {
                 pairs().fold(0.0, |sum, (a, b)| sum + differ(*a, *b)) / n
             };
             let floor = 1e-4 * white[1];
+            // The colour of what is as good as black is not looked at.
+            let shift = |a: &[f64; 3], b: &[f64; 3]| match (uv_1960(*a), uv_1960(*b)) {
+                (Some(p), Some(q)) if a[1].min(b[1]) > floor => {
+                    (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)
+                }
+                _ => 0.0,
+            };
             Distance {
                 de2000: share * mean(&|a, b| de2000(a, b, white)),
                 de_luv: share * mean(&|a, b| de_luv(a, b, white)),
@@ -128,6 +137,7 @@ impl Probes {
                         .sum::<f64>()
                         / n)
                         .sqrt(),
+                chromaticity: share * (pairs().map(|(a, b)| shift(a, b)).sum::<f64>() / n).sqrt(),
             }
         });
         let result = result.filter(Distance::is_known);

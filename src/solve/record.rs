@@ -97,6 +97,9 @@ pub struct Errors {
     pub total_de_luv: Figure,
     /// Root mean square relative error of illuminance.
     pub total_relative: Figure,
+    /// Root mean square error of chromaticity by hierarchy, links and visibility, distance in (u, v) of the CIE 1960 diagram.
+    #[serde(default = "unknown")]
+    pub geometry_chromaticity: Figure,
     /// Hierarchy, links, visibility: CIELUV.
     pub geometry_de_luv: Figure,
     /// Working partition: CIELUV; none where nothing is known (uniform intervals, sRGB and the like). A bound under
@@ -108,6 +111,10 @@ pub struct Errors {
     pub convergence_de_luv: Figure,
     /// Root mean square error of tristimulus irradiance X, Y, Z by all sources, lm/m2.
     pub total_xyz: Figure,
+}
+
+fn unknown() -> Figure {
+    Figure::estimate(None)
 }
 
 fn round() -> &'static str {
@@ -274,6 +281,7 @@ impl Round {
                 total_de2000: estimate(error),
                 total_de_luv: estimate(m.distance.map(|d| all(d.de_luv))),
                 total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
+                geometry_chromaticity: estimate(m.distance.map(|d| d.chromaticity)),
                 geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),
                 spectrum_de_luv: Figure {
                     value: bake.spectrum_error.filter(|e| e.is_finite()),

@@ -1,0 +1,115 @@
+//! `haarlight probe --metrics` on the Cornell box: columns, ranges, and what the colour of the walls does to the light.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+
+const NAMES: [&str; 12] = [
+    "lux", "CCT_K", "Duv", "Ra", "R9", "Rf", "Rg", "EDI_sc", "EDI_mc", "EDI_lc", "EDI_rh",
+    "EDI_mel",
+];
+
+/// Prints of a probe of the Cornell box at points on its floor, and what it said.
+fn probed(options: &[&str]) -> (String, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let points = folder.path().join("points.csv");
+    std::fs::write(&points, POINTS).unwrap();
+    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
+    let output = Command::new(env!("CARGO_BIN_EXE_haarlight"))
+        .arg("probe")
+        .arg(room)
+        .arg("--points")
+        .arg(points)
+        .args(options)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    (String::from_utf8(output.stdout).unwrap(), said)
+}
+
+/// Three in the room, one outside.
+const POINTS: &str = "\
+x,y,z,nx,ny,nz
+0.1,0,0.4,0,1,0
+0.4,0,0.1,0,1,0
+0.52,0,0.5,0,1,0
+0,-0.5,0,0,-1,0
+";
+
+#[test]
+fn metrics_come_after_the_other_columns() {
+    let (plain, _) = probed(&[]);
+    let (csv, said) = probed(&["--metrics"]);
+    let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    let before = plain.lines().next().unwrap();
+    assert!(csv.starts_with(before), "{header:?}");
+    let first = before.split(',').count();
+    assert_eq!(header.len(), first + 3 * NAMES.len() - 1);
+    assert_eq!(header[first..first + 3], ["lux_low", "lux_high", "CCT_K"]);
+    assert_eq!(header.last(), Some(&"EDI_mel_high"));
+    for line in csv.lines().skip(1) {
+        assert_eq!(line.split(',').count(), header.len(), "{line}");
+    }
+    assert!(
+        said.contains("uniformity over 3 points: min/mean"),
+        "{said}"
+    );
+}
+
+#[test]
+fn figures_hold_their_ranges_and_a_finer_solution() {
+    let json = |options: &[&str]| -> Value { serde_json::from_str(&probed(options).0).unwrap() };
+    let coarse = json(&["--metrics", "--json", "--error", "1"]);
+    let fine = json(&["--metrics", "--json", "--error", "0.1"]);
+    let (metrics, fine) = (&coarse["metrics"], &fine["metrics"]);
+    assert_eq!(metrics["kind"], "estimate");
+    let error = |m: &Value, key: &str| m[key].as_f64().unwrap();
+    for key in ["relative_error", "chromaticity_error"] {
+        assert!(error(metrics, key) > error(fine, key), "{metrics} {fine}");
+    }
+    let lux = coarse["columns"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .position(|c| c == "lux")
+        .unwrap();
+    let (mut held, mut all) = (0, 0);
+    for k in 0..3 {
+        let point = &metrics["points"][k];
+        let row = coarse["rows"][k][lux].as_f64().unwrap();
+        assert!((point["lux"]["value"].as_f64().unwrap() / row - 1.0).abs() < 1e-4);
+        for name in NAMES {
+            let at = |key: &str| {
+                point[name][key]
+                    .as_f64()
+                    .unwrap_or_else(|| panic!("{name} {point}"))
+            };
+            assert!(
+                at("low") <= at("value") && at("value") <= at("high"),
+                "{name} {point}"
+            );
+            let better = fine["points"][k][name]["value"].as_f64().unwrap();
+            all += 1;
+            held += usize::from((at("low")..=at("high")).contains(&better));
+            println!(
+                "{k} {name}: {} {} {} finer {better}",
+                at("low"),
+                at("value"),
+                at("high")
+            );
+        }
+    }
+    // Ranges are root mean squares, not bounds.
+    assert!(3 * held >= 2 * all, "{held} of {all}");
+    let uniformity = &metrics["uniformity"];
+    assert_eq!(uniformity["points"], 3);
+    let least = uniformity["min_lux"].as_f64().unwrap() / uniformity["mean_lux"].as_f64().unwrap();
+    assert_eq!(uniformity["min_over_mean"]["value"].as_f64(), Some(least));
+    // The point outside is dark: nothing is known of a colour that is not there.
+    let dark = &metrics["points"][3];
+    assert_eq!(dark["lux"]["value"], 0.0);
+    for name in &NAMES[1..] {
+        assert_eq!(dark[name]["reason"], "no light", "{dark}");
+    }
+}
