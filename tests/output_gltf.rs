@@ -3,7 +3,8 @@
 mod output_room;
 
 use glam::{DMat4, DVec3, Mat4};
-use haarlight::output::{Exposure, baked_glb, refined};
+use haarlight::gather::refined;
+use haarlight::output::{Exposure, baked_glb};
 use haarlight::scene::Scene;
 use output_room::{refined as refine, room};
 
