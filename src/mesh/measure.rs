@@ -3,7 +3,8 @@
 //! Where points look by rays, a look errs by chance, which is no matter of interpolation: every point is looked at twice,
 //! with rays of its own each time. With s^2 the variance of a look, half the mean square of their difference, and weights w
 //! of the vertices, a look at a point differs from what is drawn there by `i^2 + s^2 (1 + sum of w^2)` in the mean square, at
-//! least, i the error of interpolation: the rays of vertices may have more in common than chance.
+//! least, i the error of interpolation: the rays of vertices may have more in common than chance. What is left when that is
+//! taken off scatters about i^2, below 0 as well as above: roots keep the sign, so that chance cancels in their mean.
 
 use super::grow::{Growth, mix};
 use super::write::Settled;
@@ -24,7 +25,8 @@ const SEED: u64 = 0x0067_0f11;
 
 /// What samples tell of a file.
 pub(super) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Interpolation {
-    let mut off: Vec<f64> = samples.iter().map(|s| s.square.max(0.0).sqrt()).collect();
+    let root = |s: &Sample| s.square.abs().sqrt().copysign(s.square);
+    let mut off: Vec<f64> = samples.iter().map(root).collect();
     off.sort_by(f64::total_cmp);
     let n = off.len().max(1) as f64;
     let rank = (0.95 * off.len() as f64) as usize;
@@ -32,8 +34,8 @@ pub(super) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) ->
     let noise = samples.iter().map(|s| s.noise).sum::<f64>() / n;
     Interpolation {
         rms: square.max(0.0).sqrt(),
-        mean: off.iter().sum::<f64>() / n,
-        p95: off.get(rank).copied().unwrap_or(0.0),
+        mean: (off.iter().sum::<f64>() / n).max(0.0),
+        p95: off.get(rank).map_or(0.0, |off| off.max(0.0)),
         noise: noise.sqrt(),
         points: off.len(),
         allowed,
