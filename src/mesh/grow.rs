@@ -1,9 +1,9 @@
 //! The mesh grows where straight lines between its vertices are not what looking there shows.
 //!
-//! Every triangle has a mean square of the colour difference between both; its root, times the area, is its share of the
-//! mean difference: first as the solved light lets it expect, then as seen in the middles of its edges and at one point
-//! inside. The largest shares are looked at or, where that is done, split at the edges that bend; so shares become alike,
-//! which takes the fewest vertices for a sum.
+//! Every triangle has a mean square of the colour difference between both, times its area its share of the error: first as
+//! the solved light lets it expect, then as seen in the middles of its edges and at one point inside. The largest shares are
+//! looked at or, where that is done, split at the edges that bend; so shares become alike, which takes the fewest
+//! vertices for a sum. Squares, although it is the mean that ends it: teeth along shadows are few, and seen.
 
 use super::cells::{Cell, Cells, Doubt, Hint, within};
 use super::looks::Looks;
@@ -412,9 +412,9 @@ impl<'a> Growth<'a> {
     }
 }
 
-/// What a cell adds to the mean difference, times the area of all.
+/// What a cell adds to the mean square, times the area of all.
 fn share(cell: &Cell) -> f64 {
-    cell.area * cell.doubt.square.sqrt()
+    cell.area * cell.doubt.square
 }
 
 /// Light between three corners.

@@ -42,7 +42,7 @@ impl Bake {
         growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;
         growth.begin(progress);
         let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
-        let mut aim = allowed * area;
+        let mut aim = allowed * allowed * area;
         let settled = self.settled(&growth);
         let samples = growth.measured(self, &settled, 0, progress);
         let mut before = summed(&samples, allowed, None);
@@ -69,7 +69,7 @@ impl Bake {
                 out.interpolation = Some(interpolation);
                 return out;
             }
-            let wrong = interpolation.mean / allowed;
+            let wrong = (interpolation.mean / allowed).powi(2);
             aim = growth.sum().min(aim) * (BELOW / wrong).clamp(STEP, BELOW);
             growth.learn(&samples);
         }
@@ -86,7 +86,7 @@ impl Bake {
         growth.begin(progress);
         let allowed = SKETCH * self.settings().error;
         let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
-        growth.grow(allowed * area, progress);
+        growth.grow(allowed * allowed * area, progress);
         let wanted = |triangle: u32| {
             let (surface, local) = self.mesh().origin[triangle as usize];
             seen[surface as usize][local as usize]
