@@ -4,7 +4,9 @@
 //! baked room is metered from its own light, whether or not pictures were taken: the same room gives the same bytes.
 
 use super::command::print;
-use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
+use super::log::{
+    End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code, file_error,
+};
 use super::options::{Common, Reading, Solving};
 use super::snapshots::Snapshots;
 use super::stop::Stop;
@@ -168,7 +170,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let baked = bake.baked(&|done, of| talk.progress("gathering", done, of));
     seconds.gather = clock.elapsed().as_secs_f64();
     // An error is reached when the file's is.
-    let met = baked.interpolation.is_none_or(|i| i.is_met());
+    let met = file_error(&bake, &baked).is_none_or(|e| e <= bake.settings().error);
     let verdict = match verdict {
         Verdict::Reached if !met => Verdict::Exhausted,
         verdict => verdict,

@@ -17,8 +17,10 @@ use grow::{End, Growth};
 use looks::Looks;
 use measure::summed;
 
-/// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error.
-const MOST_VERTICES: f64 = 32_768.0;
+/// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error. At 1 a
+/// furnished room of 12,000 triangles ends within its error at 96,000 vertices (mean .41; with a quarter of them 1.1) and a
+/// garage of 11,000 at .78 with 93,000 (1.2).
+const MOST_VERTICES: f64 = 131_072.0;
 const AT: f64 = 0.5;
 /// The error is measured this often at the most.
 const MEASURED: u64 = 10;
