@@ -251,27 +251,32 @@ impl<'a> Look<'a> {
     }
 }
 
-/// Gives covered vertices the mean of their neighbours in the open; returns how many there were. What has none stays dark:
-/// no part of the triangles around it is seen.
+/// Gives covered vertices the mean of their neighbours, ring by ring; returns how many there were. What no light surrounds
+/// stays dark.
 pub(crate) fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> usize {
-    let mut sums: std::collections::BTreeMap<u32, ([f32; 64], f32)> =
-        std::collections::BTreeMap::new();
-    for t in triangles {
-        for &v in t.iter().filter(|&&v| rows[v as usize].is_none()) {
-            let sum = sums.entry(v).or_insert(([0.0; 64], 0.0));
-            for row in t.iter().filter_map(|&n| rows[n as usize].as_ref()) {
-                sum.1 += 1.0;
-                for (s, x) in sum.0.iter_mut().zip(row) {
-                    *s += x;
+    let mut count = None;
+    loop {
+        let mut sums = std::collections::BTreeMap::<u32, ([f32; 64], f32)>::new();
+        for t in triangles {
+            for &v in t.iter().filter(|&&v| rows[v as usize].is_none()) {
+                let sum = sums.entry(v).or_insert(([0.0; 64], 0.0));
+                for row in t.iter().filter_map(|&n| rows[n as usize].as_ref()) {
+                    sum.1 += 1.0;
+                    for (s, x) in sum.0.iter_mut().zip(row) {
+                        *s += x;
+                    }
                 }
             }
         }
+        let count = *count.get_or_insert(sums.len());
+        sums.retain(|_, (_, n)| *n > 0.0);
+        if sums.is_empty() {
+            return count;
+        }
+        for (v, (sum, n)) in sums {
+            rows[v as usize] = Some(sum.map(|x| x / n));
+        }
     }
-    let count = sums.len();
-    for (v, (sum, n)) in sums.into_iter().filter(|(_, (_, n))| *n > 0.0) {
-        rows[v as usize] = Some(sum.map(|x| x / n));
-    }
-    count
 }
 
 /// Light at any point, for probes.

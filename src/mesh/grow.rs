@@ -125,14 +125,27 @@ impl<'a> Growth<'a> {
         self.looks.believing = believing;
     }
 
-    /// Looks again at the vertices of triangles that lie on some of the mesh's.
+    /// Looks again at the vertices of triangles that lie on some of the mesh's, and at their neighbours, which may lend them
+    /// light.
     pub(super) fn look_again(
         &mut self,
         wanted: impl Fn(u32) -> bool,
         progress: &dyn Fn(usize, usize),
     ) {
-        let all = 0..self.cells.all.len();
-        let some: Vec<usize> = all.filter(|&k| wanted(self.cells.all[k].of.0)).collect();
+        let all = || 0..self.cells.all.len();
+        let sheets = self.cells.sheets.iter();
+        let mut near: Vec<Vec<bool>> = sheets.map(|s| vec![false; s.vertices.len()]).collect();
+        for cell in self.cells.all.iter().filter(|cell| wanted(cell.of.0)) {
+            for corner in cell.corners {
+                near[cell.sheet as usize][corner.vertex as usize] = true;
+            }
+        }
+        let is_near = |&k: &usize| {
+            let cell = &self.cells.all[k];
+            let mut corners = cell.corners.iter();
+            corners.any(|c| near[cell.sheet as usize][c.vertex as usize])
+        };
+        let some: Vec<usize> = all().filter(is_near).collect();
         for &k in &some {
             let cell = &self.cells.all[k];
             for corner in cell.corners {
