@@ -38,7 +38,7 @@ pub struct InspectArgs {
 /// Reads the room and prints what is in it.
 ///
 /// # Errors
-/// As [`Scene::load`]; [`Error::Io`] if `out` cannot be written to.
+/// As [`Scene::load`]; [`Error::Io`](crate::Error::Io) if `out` cannot be written to.
 pub fn run(args: &InspectArgs, out: &mut impl Write) -> Result<()> {
     let document = Document::open(&args.room)?;
     let unsupported = document.unsupported.clone();

@@ -102,7 +102,7 @@ impl Bake {
     }
 
     /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
-    /// [`Light::leaves`]; empty where the rows hold the 64 leaves.
+    /// [`Light::leaves`](crate::light::Light::leaves); empty where the rows hold the 64 leaves.
     pub fn lists(&self, step: usize) -> Vec<PatchList> {
         if !self.lanes.is_ratio() {
             return Vec::new();
