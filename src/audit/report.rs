@@ -112,11 +112,7 @@ impl Report {
         let places: Vec<_> = points.map(|p| (p.face, p.point)).collect();
         let light = bake.drawn(baked, &places).into_iter();
         let light = light.map(Option::unwrap_or_default);
-        let last = bake.rounds().last();
-        let estimate = last.and_then(|r| r.error.total_de2000.value);
-        let between = baked.interpolation.map_or(0.0, |i| i.mean);
-        let estimate = estimate.map(|e| e.hypot(between));
-        Self::of(bake, reference, light.collect(), estimate)
+        Self::of(bake, reference, light.collect(), bake.error_of(baked))
     }
 
     fn of(bake: &Bake, reference: &Reference, light: Vec<[f64; 3]>, estimate: Option<f64>) -> Self {

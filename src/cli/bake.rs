@@ -3,11 +3,9 @@
 //! Rounds until the error asked for, `--time` or Ctrl-C; what there is then is written out whole. The exposure of the
 //! baked room is metered from its own light, whether or not pictures were taken: the same room gives the same bytes.
 
-use super::command::print;
-use super::log::{
-    End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code, file_error,
-};
+use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
 use super::options::{Common, Reading, Solving};
+use super::results::print;
 use super::snapshots::Snapshots;
 use super::stop::Stop;
 use super::talk::Talk;
@@ -170,7 +168,9 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let baked = bake.baked(&|done, of| talk.progress("gathering", done, of));
     seconds.gather = clock.elapsed().as_secs_f64();
     // An error is reached when the file's is.
-    let met = file_error(&bake, &baked).is_none_or(|e| e <= bake.settings().error);
+    let met = bake
+        .error_of(&baked)
+        .is_none_or(|e| e <= bake.settings().error);
     let verdict = match verdict {
         Verdict::Reached if !met => Verdict::Exhausted,
         verdict => verdict,

@@ -3,7 +3,6 @@
 use super::options::Common;
 use super::{bake, cost, inspect, paper, probe, relight, spectra};
 use crate::error::{Error, Result};
-use std::io::{ErrorKind, Write};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -66,21 +65,6 @@ pub fn run(cli: &Cli) -> Result<u8> {
         Command::Spectra(args) => spectra::run(args).map(|()| 0),
         Command::Cost(args) => cost::run(args, &cli.common),
         Command::Paper(args) => paper::run(args).map(|()| 0),
-    }
-}
-
-/// Writes a result to stdout.
-pub(super) fn print(text: &str) -> Result<()> {
-    put(&mut std::io::stdout().lock(), text)
-}
-
-/// Writes a result. A reader that has had enough (`| head`) is no error.
-pub(super) fn put(out: &mut impl Write, text: &str) -> Result<()> {
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(problem) if problem.kind() != ErrorKind::BrokenPipe => {
-            Err(Error::io("standard output".as_ref(), problem))
-        }
-        _ => Ok(()),
     }
 }
 

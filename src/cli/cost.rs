@@ -5,8 +5,8 @@
 //! with the fields of `cost::Run`, `cost::HeldRun` and `cost::Balance`.
 
 use super::bake::load;
-use super::command::print;
 use super::options::{Common, Reading, positive};
+use super::results::print;
 use super::talk::Talk;
 use crate::cost::{Knob, Sweep, choose, plots, tables};
 use crate::error::{Error, Problem, Result};

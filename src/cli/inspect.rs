@@ -7,8 +7,8 @@
 //! `unsupported` are the extensions that are not read (the page has them among its warnings);
 //! the fields of `facts` are those of [`Facts`], with units in their names.
 
-use super::command::put;
 use super::options::Reading;
+use super::results::put;
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::document::Document;

@@ -297,7 +297,7 @@ impl VerdictRecord {
             exit_code: exit_code(end.verdict),
             rounds: rounds.len(),
             asked_de2000: end.bake.settings().error,
-            error_de2000: Figure::estimate(file_error(end.bake, end.baked)),
+            error_de2000: Figure::estimate(end.bake.error_of(end.baked)),
             light_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
             interpolation_de2000: Figure {
                 value: end.baked.interpolation.map(|i| i.mean),
@@ -320,12 +320,6 @@ impl VerdictRecord {
             warning_count: end.warned,
         }
     }
-}
-
-/// Estimated error of a file: of light at points as the last round estimates it, and between them as measured.
-pub(super) fn file_error(bake: &Bake, baked: &Baked) -> Option<f64> {
-    let light = bake.rounds().last()?.error.total_de2000.value?;
-    Some(light.hypot(baked.interpolation.map_or(0.0, |i| i.mean)))
 }
 
 /// 0 if the error was reached, 1 if the bake stopped before.

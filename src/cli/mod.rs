@@ -11,6 +11,7 @@
 //! | `points` | the CSV of points for `probe` |
 //! | `stop` | Ctrl-C and `--time` |
 //! | `paths` | checks on output files |
+//! | `results` | what goes to stdout |
 //! | `talk` | lines and bars on stderr |
 //! | `fault` | panics become exit code 3 |
 
@@ -27,6 +28,7 @@ mod paths;
 pub mod points;
 pub mod probe;
 pub mod relight;
+mod results;
 mod snapshots;
 pub mod spectra;
 pub mod stop;

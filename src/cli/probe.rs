@@ -10,12 +10,12 @@
 //! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see `metrics.rs`.
 
 use super::bake::{load, prepare};
-use super::command::print;
 use super::log::exit_code;
 use super::metrics::Metrics;
 use super::options::{Common, Reading, Solving};
 use super::paths;
 use super::points::{COLUMNS, Point, Points};
+use super::results::print;
 use super::stop::Stop;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};

@@ -14,9 +14,9 @@
 //! | `glb`, `vertices`, `triangles`, `exposure`, `white` | | as in the verdict of a bake |
 
 use super::bake::{load, text, write_npz};
-use super::command::print;
 use super::options::{Common, Reading};
 use super::paths;
+use super::results::print;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::keep::{Relighter, RelitRecord};

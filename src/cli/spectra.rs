@@ -2,7 +2,7 @@
 //!
 //! One line a spectrum: name, what it is (`light` or `reflectance`), first and last wavelength in nm.
 
-use super::command::print;
+use super::results::print;
 use crate::data::{Kind, Named, named, names, nearest};
 use crate::error::{Error, Result};
 use crate::report::{Align, Chart, Scale, Series, Table};

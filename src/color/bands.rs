@@ -3,8 +3,8 @@
 //! A light has one power for each band. On leaves a weight is the exact integral of the weighting function over the leaf;
 //! on samples it is the function there, times the step, as the CIE sums (CIE 015:2004, 7.1).
 
-use crate::data::{Grid, LEAVES};
-use crate::data::{Outside, Table};
+use super::Xyz;
+use crate::data::{Grid, LEAVES, Outside, Table};
 
 /// Wavelength bands.
 #[derive(Debug, Clone)]
@@ -74,6 +74,35 @@ impl Bands {
                 }
             })
             .collect()
+    }
+}
+
+/// Coloured samples under a light: an observer on bands, and times each reflectance.
+#[derive(Debug, Clone)]
+pub(super) struct Samples {
+    white: [Vec<f64>; 3],
+    colours: Vec<[Vec<f64>; 3]>,
+}
+
+impl Samples {
+    pub(super) fn new(bands: &Bands, observer: &[Table; 3], reflectances: &[Table]) -> Self {
+        let times = |reflectance: &Table| {
+            let function = observer.each_ref();
+            function.map(|function| bands.reflected(function, reflectance))
+        };
+        Self {
+            white: observer.each_ref().map(|function| bands.weights(function)),
+            colours: reflectances.iter().map(times).collect(),
+        }
+    }
+
+    /// The white and the samples under a light, Y of the white 100.
+    pub(super) fn under(&self, light: &[f64]) -> (Xyz, impl Iterator<Item = Xyz>) {
+        let y = weighted(light, &self.white[1]);
+        let seen = move |weights: &[Vec<f64>; 3]| {
+            weights.each_ref().map(|w| 100.0 * weighted(light, w) / y)
+        };
+        (seen(&self.white), self.colours.iter().map(seen))
     }
 }
 

@@ -1,9 +1,8 @@
 //! Colour fidelity Rf (CIE 224:2017, the same in ANSI/IES TM-30-20) and gamut Rg (TM-30-20): 99 samples under the light and
 //! under a reference of the same colour temperature, in CAM02-UCS with the 10 degree observer.
 
-use super::Xyz;
 use super::appearance::{Appearance, Viewer};
-use super::bands::{Bands, weighted};
+use super::bands::{Bands, Samples, weighted};
 use crate::data::{blackbody, cmf_1931, cmf_1964, colour_evaluation, daylight};
 
 /// Between these the reference is a mixture of Planck and daylight, K.
@@ -28,21 +27,15 @@ pub struct EvaluationColours {
     bands: Bands,
     /// y_bar of the 2 degree observer, by which mixtures are weighed.
     luminous: Vec<f64>,
-    white: [Vec<f64>; 3],
-    samples: Vec<[Vec<f64>; 3]>,
+    samples: Samples,
 }
 
 impl EvaluationColours {
     /// The samples on bands.
     pub fn new(bands: &Bands) -> Self {
-        let cmf = cmf_1964();
         Self {
             luminous: bands.weights(&cmf_1931()[1]),
-            white: cmf.each_ref().map(|cmf| bands.weights(cmf)),
-            samples: colour_evaluation()
-                .iter()
-                .map(|sample| cmf.each_ref().map(|cmf| bands.reflected(cmf, sample)))
-                .collect(),
+            samples: Samples::new(bands, &cmf_1964(), &colour_evaluation()),
             bands: bands.clone(),
         }
     }
@@ -54,7 +47,7 @@ impl EvaluationColours {
             let squares = (0..3).map(|k| (a.uniform[k] - b.uniform[k]).powi(2));
             squares.sum::<f64>().sqrt()
         });
-        let mean = differences.sum::<f64>() / self.samples.len() as f64;
+        let mean = differences.sum::<f64>() / ours.len() as f64;
         let rf = 10.0 * (((100.0 - PER_DIFFERENCE * mean) / 10.0).exp().ln_1p());
         let rg = 100.0 * area(&ours, &right) / area(&right, &right);
         (rf.is_finite() && rg.is_finite()).then_some(Fidelity { rf, rg })
@@ -80,12 +73,9 @@ impl EvaluationColours {
     }
 
     fn seen(&self, light: &[f64]) -> Vec<Appearance> {
-        let y = weighted(light, &self.white[1]);
-        let xyz = |weights: &[Vec<f64>; 3]| -> Xyz {
-            weights.each_ref().map(|w| 100.0 * weighted(light, w) / y)
-        };
-        let viewer = Viewer::new(xyz(&self.white));
-        self.samples.iter().map(|s| viewer.see(xyz(s))).collect()
+        let (white, colours) = self.samples.under(light);
+        let viewer = Viewer::new(white);
+        colours.map(|xyz| viewer.see(xyz)).collect()
     }
 }
 

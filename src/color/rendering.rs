@@ -4,7 +4,7 @@
 //! are compared in W*U*V* after a von Kries adaptation; R = 100 - 4.6 dE.
 
 use super::Xyz;
-use super::bands::{Bands, weighted};
+use super::bands::{Bands, Samples};
 use super::correlated::uv_1960;
 use crate::data::{blackbody, cmf_1931, daylight, test_colours};
 
@@ -32,20 +32,14 @@ pub struct Rendering {
 #[derive(Debug, Clone)]
 pub struct TestColours {
     bands: Bands,
-    white: [Vec<f64>; 3],
-    samples: Vec<[Vec<f64>; 3]>,
+    samples: Samples,
 }
 
 impl TestColours {
     /// The samples on bands.
     pub fn new(bands: &Bands) -> Self {
-        let cmf = cmf_1931();
         Self {
-            white: cmf.each_ref().map(|cmf| bands.weights(cmf)),
-            samples: test_colours()
-                .iter()
-                .map(|sample| cmf.each_ref().map(|cmf| bands.reflected(cmf, sample)))
-                .collect(),
+            samples: Samples::new(bands, &cmf_1931(), &test_colours()),
             bands: bands.clone(),
         }
     }
@@ -57,17 +51,12 @@ impl TestColours {
         } else {
             daylight(kelvin)
         });
-        let seen = |power: &[f64], weights: &[Vec<f64>; 3]| {
-            let y = weighted(power, &self.white[1]);
-            weights.each_ref().map(|w| 100.0 * weighted(power, w) / y)
-        };
-        let white = uv_1960(seen(light, &self.white))?;
-        let aim = uv_1960(seen(&reference, &self.white))?;
+        let (white, ours) = self.samples.under(light);
+        let (aim, right) = self.samples.under(&reference);
+        let (white, aim) = (uv_1960(white)?, uv_1960(aim)?);
         let mut special = [0.0; 14];
-        for (index, sample) in special.iter_mut().zip(&self.samples) {
-            let under = seen(light, sample);
+        for (index, (under, right)) in special.iter_mut().zip(ours.zip(right)) {
             let ours = uniform(under[1], adapted(uv_1960(under)?, white, aim), aim);
-            let right = seen(&reference, sample);
             let right = uniform(right[1], uv_1960(right)?, aim);
             let squares = (0..3).map(|k| (ours[k] - right[k]).powi(2));
             *index = 100.0 - PER_DIFFERENCE * squares.sum::<f64>().sqrt();

@@ -84,10 +84,7 @@ pub(crate) struct Vertex {
 impl Bake {
     /// Where a vertex is, recentred.
     pub(crate) fn place_of(&self, vertex: &Vertex) -> DVec3 {
-        let [a, b, c] = self.mesh().triangles[vertex.triangle as usize]
-            .map(|v| self.mesh().positions[v as usize]);
-        let [u, v, w] = vertex.weights;
-        a * u + b * v + c * w
+        self.mesh().at(vertex.triangle as usize, vertex.weights)
     }
 
     /// The place of a vertex, drawn into its triangle, with its shading normal.
@@ -96,7 +93,6 @@ impl Bake {
         let surface = &self.scene().surfaces[surface];
         let triangle = vertex.triangle as usize;
         let inner = vertex.weights.map(|w| w * (1.0 - INSET) + INSET / 3.0);
-        let [a, b, c] = mesh.triangles[triangle].map(|v| mesh.positions[v as usize]);
         let flat = if back {
             -mesh.normal[triangle]
         } else {
@@ -129,9 +125,8 @@ impl Bake {
             };
             tree.leaf_at(vertex.entry, w)
         });
-        let point = a * inner[0] + b * inner[1] + c * inner[2];
         Receiver {
-            point,
+            point: mesh.at(triangle, inner),
             normal,
             plane: mesh.plane[triangle],
             leaf,

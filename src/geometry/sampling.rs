@@ -120,6 +120,14 @@ pub fn cosine_direction(normal: DVec3, [x, y]: [f64; 2]) -> DVec3 {
     tangent * (radius * cos) + bitangent * (radius * sin) + normal * (1.0 - y).max(0.0).sqrt()
 }
 
+/// Direction at an angle of this `cosine` to the unit vector `axis`; `turn` in [0,1) goes once around it.
+pub fn around(axis: DVec3, cosine: f64, turn: f64) -> DVec3 {
+    let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
+    let [tangent, bitangent] = tangents(axis);
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    (tangent * cos + bitangent * sin) * sine + axis * cosine
+}
+
 /// Direction uniform over the sphere, for a point of the unit square.
 pub fn sphere_direction([x, y]: [f64; 2]) -> DVec3 {
     let z = 1.0 - 2.0 * y;

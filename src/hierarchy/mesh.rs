@@ -149,6 +149,12 @@ impl Mesh {
         RayIndex::build(&positions, &self.triangles, &self.plane, &masked)
     }
 
+    /// A point of a triangle by its barycentric weights, recentred.
+    pub fn at(&self, triangle: usize, [u, v, w]: [f64; 3]) -> DVec3 {
+        let [a, b, c] = self.triangles[triangle].map(|v| self.positions[v as usize]);
+        a * u + b * v + c * w
+    }
+
     /// Barycentric weights on the input triangle, from those on a triangle of the mesh.
     pub fn on_origin(&self, triangle: usize, weights: [f64; 3]) -> [f64; 3] {
         match self.within.get(self.part[triangle] as usize) {

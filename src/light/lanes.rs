@@ -12,7 +12,7 @@
 //! absolute lanes are W/m2/nm; lanes of linear sRGB are W/m2 weighted by the observer, (1, 1, 1) has Y = 1 / KM lm/m2.
 
 use crate::color::{KM, LinearSrgb, Upsampler};
-use crate::scene::{GREATEST_ALBEDO, LightSpectrum};
+use crate::scene::{Emission, GREATEST_ALBEDO, LightSpectrum};
 use crate::spectrum::{LEAVES, Leaves, Partition};
 use nalgebra::Matrix3;
 
@@ -299,6 +299,20 @@ impl Lanes {
         } else {
             leaves.map(|k| f[k]).sum::<f64>() / lane.count as f64
         }
+    }
+
+    /// Tristimulus values of what a light gives out, `shape` of it times `scale`.
+    pub(crate) fn emission(&self, light: usize, shape: &Leaves, scale: f64) -> [f64; 3] {
+        let mut row = [0.0_f32; LEAVES];
+        self.add_emission(light, shape, scale, &mut row);
+        self.tristimulus(&row)
+    }
+
+    /// Tristimulus exitance of a surface: pi times its radiance; 0 where it does not shine.
+    pub(crate) fn exitance(&self, emission: Option<&Emission>) -> [f64; 3] {
+        emission.map_or([0.0; 3], |e| {
+            self.emission(e.light, &e.shape, std::f64::consts::PI)
+        })
     }
 
     /// Adds an emission of `light` with a shape (see [`crate::scene::Emission`]).

@@ -7,5 +7,5 @@ mod solution;
 
 pub use descent::Descent;
 pub use rows::{Rows, padded};
-pub(crate) use solution::brightness;
 pub use solution::{Arrival, Light, Neighbours};
+pub(crate) use solution::{brightness, weighed};

@@ -143,6 +143,12 @@ pub(crate) fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
         / 3.0
 }
 
+/// A row as one number, by what each lane counts.
+pub(crate) fn weighed(row: &[f32], weights: &[f64]) -> f64 {
+    let lanes = row.iter().zip(weights);
+    lanes.map(|(x, w)| f64::from(*x) * w).sum()
+}
+
 /// For each node, the other ends of its links and what may stand between. Links found blocked are here too:
 /// a point may see what sixteen rays did not.
 #[derive(Debug, Clone, Default)]

@@ -1,6 +1,7 @@
 //! Light as a viewer draws it: interpolated between the vertices of the file.
 
 use crate::gather::Baked;
+use crate::gather::refined::position;
 use crate::hierarchy::Face;
 use crate::solve::{Bake, weights_of};
 use glam::DVec3;
@@ -25,11 +26,7 @@ impl Bake {
                     continue;
                 };
                 let corners = triangle.map(|v| &part.vertices[v as usize]);
-                let [a, b, c] = corners.map(|v| {
-                    let of = surface.triangles[v.triangle as usize];
-                    let of = of.map(|c| surface.positions[c as usize]);
-                    of[0] * v.weights[0] + of[1] * v.weights[1] + of[2] * v.weights[2]
-                });
+                let [a, b, c] = corners.map(|v| position(surface, v));
                 if (b - a).cross(c - a).length_squared() <= 0.0 {
                     continue;
                 }

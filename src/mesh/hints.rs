@@ -1,8 +1,10 @@
 //! What the solved light tells of a triangle before anybody looks: every leaf of the hierarchy in it has a value.
 
 use super::cells::{Cells, Hint};
+use crate::geometry::quarters;
 use crate::hierarchy::Tree;
 use crate::solve::Bake;
+use glam::DVec3;
 
 /// Gives every sheet the leaves of its faces as hints, and every cell its share of them. Cells are still the triangles of
 /// the mesh.
@@ -33,25 +35,21 @@ pub(super) fn give(bake: &Bake, cells: &mut Cells) {
 
 /// Leaves of a face: number, weights of the second and third corner of the triangle of the mesh at the middle, area.
 fn leaves(tree: &Tree, face: u32, back: bool, area: f64, mut each: impl FnMut(u32, [f64; 2], f64)) {
-    let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0_f64]];
-    let mut open = vec![(face, corners, area)];
-    while let Some((id, [a, b, c], area)) = open.pop() {
+    // Weights of the corners, halved as the corners are.
+    let mut open = vec![(face, DVec3::AXES, area)];
+    while let Some((id, corners, area)) = open.pop() {
         let node = tree.node(id);
         if node.is_leaf() {
-            let middle: [f64; 3] = std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0);
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
             // The hierarchy's back faces have their corners the other way round.
             let at = match back {
-                true => [middle[2], middle[1]],
-                false => [middle[1], middle[2]],
+                true => [middle.z, middle.y],
+                false => [middle.y, middle.z],
             };
             each(id, at, area);
             continue;
         }
-        let half = |p: [f64; 3], q: [f64; 3]| std::array::from_fn(|k| 0.5 * (p[k] + q[k]));
-        let (ab, bc, ca) = (half(a, b), half(b, c), half(c, a));
-        // In the order of `Tree::subdivide`.
-        let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]];
-        for (child, corners) in node.child_range().zip(quarters) {
+        for (child, corners) in node.child_range().zip(quarters(corners)) {
             open.push((child, corners, 0.25 * area));
         }
     }

@@ -107,41 +107,37 @@ impl<'a> Looks<'a> {
         while self.seen.len() < self.places.len() {
             let done = self.seen.len();
             progress(done - first, wanted);
-            let part = &self.places[done..self.places.len().min(done + PART)];
-            let open = part.iter().filter(|(_, believed)| !believed);
-            let all: Vec<Receiver> = open.map(|(to, _)| *to).collect();
-            let pressed = self.bake.pressed(&all);
-            let open = all.iter().zip(&pressed).filter(|(_, pressed)| !**pressed);
-            let open: Vec<Receiver> = open.map(|(to, _)| *to).collect();
-            let gathered = self.bake.gather_with(&open, self.care);
-            let dark = |g: &Gathered| g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
-            let in_doubt = open.iter().zip(&gathered).filter(|(_, g)| dark(g));
-            let in_doubt: Vec<Receiver> = in_doubt.map(|(r, _)| *r).collect();
-            let mut covered = self.bake.covered(&in_doubt).into_iter();
-            let (mut gathered, mut pressed) = (gathered.into_iter(), pressed.into_iter());
-            let part = done..done + part.len();
-            for k in part {
-                let (to, believed) = self.places[k];
-                let is_pressed = !believed && pressed.next() == Some(true);
-                let gathered = match believed || is_pressed {
-                    true => None,
-                    false => gathered.next(),
-                };
-                let seen = match gathered {
-                    None if is_pressed => None,
-                    None => self.told(&to),
-                    Some(gathered) => {
-                        self.rays += gathered.rays;
-                        let covered = dark(&gathered) && covered.next() == Some(true);
-                        let hidden = covered || gathered.backs > MOSTLY;
-                        let seen = self.seen_as(gathered.irradiance, gathered.packed);
-                        (!hidden && !self.is_inside(&to, &seen)).then_some(seen)
-                    }
-                };
-                self.seen.push(seen);
+            let end = self.places.len().min(done + PART);
+            let (believed, open): (Vec<usize>, Vec<usize>) =
+                (done..end).partition(|&k| self.places[k].1);
+            self.seen.resize_with(end, || None);
+            for k in believed {
+                self.seen[k] = self.told(&self.places[k].0);
             }
+            self.gather(open);
         }
         progress(wanted, wanted);
+    }
+
+    /// Gathers at some places.
+    fn gather(&mut self, mut places: Vec<usize>) {
+        let receivers = |places: &[usize]| -> Vec<Receiver> {
+            places.iter().map(|&k| self.places[k].0).collect()
+        };
+        let mut pressed = self.bake.pressed(&receivers(&places)).into_iter();
+        places.retain(|_| pressed.next() == Some(false));
+        let gathered = self.bake.gather_with(&receivers(&places), self.care);
+        let dark = |g: &Gathered| g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
+        let in_doubt = places.iter().zip(&gathered).filter(|(_, g)| dark(g));
+        let in_doubt: Vec<usize> = in_doubt.map(|(&k, _)| k).collect();
+        let mut covered = self.bake.covered(&receivers(&in_doubt)).into_iter();
+        for (k, gathered) in places.into_iter().zip(gathered) {
+            self.rays += gathered.rays;
+            let covered = dark(&gathered) && covered.next() == Some(true);
+            let hidden = covered || gathered.backs > MOSTLY;
+            let seen = self.seen_as(gathered.irradiance, gathered.packed);
+            self.seen[k] = (!hidden && !self.is_inside(&self.places[k].0, &seen)).then_some(seen);
+        }
     }
 
     /// Does a place lie inside something that is black from there? Then it is dark, and a black back is above it.

@@ -99,6 +99,13 @@ impl Bake {
         self.write_down(growth, settled)
     }
 
+    /// Estimated error of a baked mesh, mean CIEDE2000: of light at points as the last round estimates it, and between them as
+    /// measured; squares add.
+    pub fn error_of(&self, baked: &Baked) -> Option<f64> {
+        let light = self.rounds().last()?.error.total_de2000.value?;
+        Some(light.hypot(baked.interpolation.map_or(0.0, |i| i.mean)))
+    }
+
     fn growth(&self, care: Care) -> Growth<'_> {
         let spaces = self.spaces();
         let mut cells = Cells::new(self.scene(), self.mesh(), self.tree(), &spaces);

@@ -9,6 +9,7 @@
 
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::hierarchy::{NONE, Tree, stratified};
+use crate::light::weighed;
 use crate::link::{Demand, MAX_DEPTH};
 use crate::transport::point::{Memory, Receiver};
 use crate::transport::trace::Trace;
@@ -42,9 +43,7 @@ const RANDOM: [usize; 3] = [2, 8, 256];
 /// What a leaf may misplace of all direct light by too few points, about. From the first round on a garage's leaves then
 /// receive what its lamp sends within a per cent.
 const FLUX_SHARE: f64 = 2e-4;
-/// Rays that tell how open a point is. Where they meet no front it weighs next to nothing, but so that a leaf which nobody
-/// sees is not without light.
-const OPEN_RAYS: usize = 4;
+/// A point that sees no front weighs next to nothing, but so that a leaf which nobody sees is not without light.
 const UNSEEN: f32 = 1e-4;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
@@ -239,19 +238,11 @@ impl Direct {
                 .map(|chunk| {
                     let (mut memory, mut found) = (Memory::default(), Found::default());
                     for &(leaf, ref stake) in chunk {
-                        // What would split the leaf is what it has to be told from.
-                        let share = (tree.node(leaf).area / demand.total_area).sqrt();
-                        let tolerance = NOISE * demand.threshold / share;
-                        let mean = match look.openness(tree, leaf) {
-                            Some(open) => {
-                                // What would be a share of all light that matters, too.
-                                let tolerance = tolerance.min(1.0 / stake.flux);
-                                by_chance(tree, leaf, look, &open, tolerance, stake, &mut memory)
-                            }
-                            None => {
-                                let tolerance = tolerance.min(coarsest);
-                                by_rule(tree, leaf, look, tolerance, stake.tiny, &mut memory)
-                            }
+                        let mean = if look.by_chance() {
+                            by_chance(tree, leaf, look, stake, &mut memory)
+                        } else {
+                            let tolerance = stake.tolerance.min(coarsest);
+                            by_rule(tree, leaf, look, tolerance, stake.tiny, &mut memory)
                         };
                         mean.end(&mut found, look.weights().len());
                     }
@@ -289,6 +280,8 @@ struct Stake {
     split: f64,
     /// How much of what a leaf may misplace of all light one white takes.
     flux: f64,
+    /// What a patch may misplace at a point, share of white: what would split the leaf is what it has to be told from.
+    tolerance: f64,
     /// Is it large enough to be split?
     may_split: bool,
     /// Is it next to nothing of the room?
@@ -305,6 +298,7 @@ impl Stake {
             split: f64::from(keen) * share.sqrt() / demand.threshold,
             // The white is twice the mean.
             flux: share / (0.5 * FLUX_SHARE),
+            tolerance: NOISE * demand.threshold / share.sqrt(),
             may_split: node.area > demand.least_area && depth < MAX_DEPTH,
             tiny: share < TINY,
         }
@@ -325,8 +319,10 @@ pub(crate) trait Look: Sync {
     ) -> Option<[f32; 64]>;
     /// Greatest brightness of direct light on a leaf were nothing in the way, share of white, about.
     fn unshadowed(&self, tree: &Tree, leaf: u32, tolerance: f64) -> f64;
-    /// What tells how open points of a leaf are, in rooms where that matters: the share of `rays` that meet fronts.
-    fn openness(&self, tree: &Tree, leaf: u32) -> Option<impl Fn(&Receiver, usize) -> f32>;
+    /// Do leaves count as what others see of them?
+    fn by_chance(&self) -> bool;
+    /// How open a point is, found from a few rays: the share of them that meet fronts.
+    fn openness(&self, tree: &Tree, to: &Receiver, memory: &mut Memory) -> f32;
 }
 
 /// What points of a leaf get, being summed.
@@ -366,11 +362,10 @@ impl Mean {
                 .get_or_insert_with(Trace::new)
                 .absorb(&trace, weight);
         }
-        let mut bright = 0.0;
-        for ((sum, x), w) in self.row.iter_mut().zip(row).zip(weights) {
+        for (sum, x) in self.row[..weights.len()].iter_mut().zip(row) {
             *sum += weight * x;
-            bright += f64::from(*x) * w;
         }
+        let bright = weighed(row, weights);
         if weight > UNSEEN {
             self.range = [self.range[0].min(bright), self.range[1].max(bright)];
             let more = [1.0, bright, bright * bright, memory.noise];
@@ -468,25 +463,18 @@ fn by_rule(
 /// How many there are follows from the light without shadows: were more taken where the first are bright, what is bright here
 /// and there would be found too dark. For the same reason the points that decide whether the leaf is split have no part in
 /// the mean: leaves that stay would be those on which few points found light to be even.
-fn by_chance(
-    tree: &Tree,
-    leaf: u32,
-    look: &impl Look,
-    open: &impl Fn(&Receiver, usize) -> f32,
-    tolerance: f64,
-    stake: &Stake,
-    memory: &mut Memory,
-) -> Mean {
+fn by_chance(tree: &Tree, leaf: u32, look: &impl Look, stake: &Stake, memory: &mut Memory) -> Mean {
     let shift = hash(u64::from(leaf), 3);
+    // What would be a share of all light that matters, too.
+    let tolerance = stake.tolerance.min(1.0 / stake.flux);
     let mut gather = |points: Range<usize>| {
         let mut mean = Mean::new();
         for k in points {
             let at = triangle_weights(sequence02(k as u32, shift));
             let to = receiver(tree, leaf, at, u64::from(leaf) << 9 | k as u64);
             if let Some(row) = look.direct(tree, &to, tolerance, memory) {
-                let weight = open(&to, OPEN_RAYS).max(UNSEEN);
+                let weight = look.openness(tree, &to, memory).max(UNSEEN);
                 mean.add(&row, weight, look.weights(), memory);
-                memory.rays += OPEN_RAYS as u64;
             }
         }
         mean
@@ -499,24 +487,23 @@ fn by_chance(
     // Errors fall with the power 3/4 of the number of points.
     let enough = (most * stake.flux).powf(4.0 / 3.0).ceil() as usize;
     let count = enough.clamp(RANDOM[0], RANDOM[2]).next_power_of_two();
-    let mut spread = -most;
-    if most * stake.split > 1.0 {
-        // Points of the second half of the sequence: those of the first are stratified with them.
-        let decide = gather(RANDOM[2]..RANDOM[2] + RANDOM[1]);
-        // An even distribution has this half range.
-        spread = (3.0 * decide.variance()).sqrt();
-        if stake.may_split && spread * stake.split > 1.0 {
-            return Mean { spread, ..decide };
-        }
+    if most * stake.split <= 1.0 {
+        return Mean {
+            spread: -most,
+            ..gather(0..count)
+        };
     }
-    let count = if spread < 0.0 {
-        count
-    } else {
-        count.max(RANDOM[1])
-    };
-    let mut mean = gather(0..count);
-    mean.spread = spread;
-    mean
+    // Points beyond those that the mean may take.
+    let decide = gather(RANDOM[2]..RANDOM[2] + RANDOM[1]);
+    // An even distribution has this half range.
+    let spread = (3.0 * decide.variance()).sqrt();
+    if stake.may_split && spread * stake.split > 1.0 {
+        return Mean { spread, ..decide };
+    }
+    Mean {
+        spread,
+        ..gather(0..count.max(RANDOM[1]))
+    }
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@ use super::sent::Sent;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, cosine_direction, sequence02, triangle_weights};
 use crate::hierarchy::{Mesh, NONE, Tree};
+use crate::light::Rows;
+use crate::light::lanes::Lanes;
 use crate::link::Sight;
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
@@ -116,18 +118,9 @@ pub(crate) struct Guess {
 
 /// Light spread evenly over all faces: `H = flux / (A (1 - mean albedo))`.
 pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
-    let lanes = crate::light::lanes::Lanes::dense(&scene.spectra, weights);
-    let mut row = [0.0_f32; 64];
-    let glow: Vec<[f64; 3]> = scene
-        .materials
-        .iter()
-        .map(|m| {
-            row.fill(0.0);
-            if let Some(e) = &m.emission {
-                lanes.add_emission(e.light, &e.shape, std::f64::consts::PI, &mut row);
-            }
-            lanes.tristimulus(&row)
-        })
+    let lanes = Lanes::dense(&scene.spectra, weights);
+    let glow: Vec<[f64; 3]> = (scene.materials.iter())
+        .map(|m| lanes.exitance(m.emission.as_ref()))
         .collect();
     let whole: f64 = weights[1].iter().sum();
     let albedo: Vec<f64> = scene
@@ -152,10 +145,8 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         mean += a * albedo[m];
     }
     for light in &scene.lights {
-        row.fill(0.0);
-        lanes.add_emission(light.light, &light.shape, 1.0, &mut row);
         let solid = super::punctual::solid_angle(light.kind).unwrap_or(0.25 * total);
-        let xyz = lanes.tristimulus(&row);
+        let xyz = lanes.emission(light.light, &light.shape, 1.0);
         flux = std::array::from_fn(|c| flux[c] + solid * xyz[c]);
     }
     // Open rooms lose light: half counts as lost before more is known, so that the guess stays finite.
@@ -194,8 +185,8 @@ const GREATEST_LOSS: f64 = 0.1;
 /// Scales direct light on the leaves of a closed room, lane by lane, so that the fronts receive exactly what the lamps
 /// give out: what rows of links are balanced for, for lamps.
 pub(super) fn conserve(
-    first: &mut crate::light::Rows,
-    emission: &crate::light::Rows,
+    first: &mut Rows,
+    emission: &Rows,
     lamps: &[(PunctualLight, Vec<f32>)],
     areas: &[f64],
     leaves: &[u32],
@@ -259,6 +250,36 @@ pub struct Balance {
     pub scaled: Scaled,
 }
 
+/// Adds fluxes that are given out, received, absorbed and escape, each as a density on an area.
+fn add(sums: &mut [f64; 4], area: f64, densities: [f64; 4]) {
+    for (sum, density) in sums.iter_mut().zip(densities) {
+        *sum += area * density;
+    }
+}
+
+impl Balance {
+    /// Of fluxes by lane that are given out, received, absorbed and escape.
+    fn of(fluxes: &[[f64; 4]], lanes: &Lanes) -> Self {
+        let lit = fluxes.iter().filter(|sums| sums[1] > 0.0);
+        let lumens = |k: usize| {
+            let by_lane = fluxes.iter().zip(lanes.xyz());
+            by_lane.map(|(sums, xyz)| sums[k] * xyz[1]).sum()
+        };
+        Self {
+            emitted_lm: lumens(0),
+            received_lm: lumens(1),
+            absorbed_lm: lumens(2),
+            escaped_lm: lumens(3),
+            worst_band: lit
+                .map(|[_, received, absorbed, escaped]| {
+                    ((absorbed + escaped) / received - 1.0).abs()
+                })
+                .fold(0.0, f64::max),
+            ..Self::default()
+        }
+    }
+}
+
 /// What the light of leaves was multiplied by, so that none goes missing: luminous flux after over before. 1 is nothing.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Scaled {
@@ -278,12 +299,7 @@ impl Default for Scaled {
 }
 
 /// Luminous flux of rows by leaf.
-pub(super) fn lumens(
-    areas: &[f64],
-    lanes: &crate::light::lanes::Lanes,
-    leaves: &[u32],
-    rows: &crate::light::Rows,
-) -> f64 {
+pub(super) fn lumens(areas: &[f64], lanes: &Lanes, leaves: &[u32], rows: &Rows) -> f64 {
     let each = leaves.iter().enumerate();
     each.map(|(k, &leaf)| areas[leaf as usize] * lanes.tristimulus(rows.row(k))[1])
         .sum()
@@ -294,22 +310,19 @@ pub(super) fn ratio(after: f64, before: f64) -> f64 {
     if before > 0.0 { after / before } else { 1.0 }
 }
 
-/// Sums the flux of a solution in f64: rows by leaf, `sums` the balanced row sums by node, `punctual` the irradiance
-/// from punctual lights by leaf.
+/// Sums the flux of a solution in f64: rows by leaf, the balanced `row_sums` by node.
 pub(super) fn flux(
     areas: &[f64],
-    lanes: &crate::light::lanes::Lanes,
+    lanes: &Lanes,
     leaves: &[u32],
     rows: &FluxRows,
-    sums: &[f64],
+    row_sums: &[f64],
 ) -> Balance {
-    let n = lanes.len();
-    let (mut emitted, mut received, mut absorbed, mut escaped) =
-        (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut fluxes = vec![[0.0; 4]; lanes.len()];
     for (k, &leaf) in leaves.iter().enumerate() {
         let area = areas[leaf as usize];
-        for l in 0..n {
-            let get = |r: &crate::light::Rows| f64::from(r.row(k)[l]);
+        for (l, sums) in fluxes.iter_mut().enumerate() {
+            let get = |r: &Rows| f64::from(r.row(k)[l]);
             let (e, r, h, f, rho) = (
                 get(rows.emission),
                 get(rows.reflected),
@@ -317,31 +330,17 @@ pub(super) fn flux(
                 get(rows.first),
                 get(rows.reflectance),
             );
-            emitted[l] += area * e;
-            received[l] += area * f;
-            absorbed[l] += area * (1.0 - rho) * h;
-            escaped[l] += area * r * (1.0 - sums[leaf as usize]);
+            let out = r * (1.0 - row_sums[leaf as usize]);
+            add(sums, area, [e, f, (1.0 - rho) * h, out]);
         }
     }
-    let worst = (0..n)
-        .filter(|&l| received[l] > 0.0)
-        .map(|l| ((absorbed[l] + escaped[l]) / received[l] - 1.0).abs())
-        .fold(0.0, f64::max);
-    let lumens = |x: &[f64]| x.iter().zip(lanes.xyz()).map(|(x, w)| x * w[1]).sum();
-    Balance {
-        emitted_lm: lumens(&emitted),
-        received_lm: lumens(&received),
-        absorbed_lm: lumens(&absorbed),
-        escaped_lm: lumens(&escaped),
-        worst_band: worst,
-        ..Balance::default()
-    }
+    Balance::of(&fluxes, lanes)
 }
 
 /// What the leaves receive as wholes, whatever others see of them.
 pub(crate) struct Whole<'a> {
     /// Irradiance by reflected light, by leaf.
-    pub(super) indirect: &'a crate::light::Rows,
+    pub(super) indirect: &'a Rows,
     /// Direct light of a leaf as a share of that of what others see of it.
     pub(super) direct: &'a dyn Fn(u32) -> f64,
     /// Area of a leaf, all of it.
@@ -352,47 +351,35 @@ pub(crate) struct Whole<'a> {
 /// send is the defect. `areas` are those of what others see: all that they send meets fronts.
 pub(super) fn flux_by_rays(
     areas: &[f64],
-    lanes: &crate::light::lanes::Lanes,
+    lanes: &Lanes,
     leaves: &[u32],
     rows: &FluxRows,
     whole: &Whole,
 ) -> Balance {
-    let n = lanes.len();
-    let (mut emitted, mut received, mut absorbed, mut escaped) =
-        (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut fluxes = vec![[0.0; 4]; lanes.len()];
     for (k, &leaf) in leaves.iter().enumerate() {
         let (area, seen) = ((whole.area)(leaf), areas[leaf as usize]);
         let more = (whole.direct)(leaf);
-        for l in 0..n {
-            let get = |r: &crate::light::Rows| f64::from(r.row(k)[l]);
+        for (l, sums) in fluxes.iter_mut().enumerate() {
+            let get = |r: &Rows| f64::from(r.row(k)[l]);
             let (rho, first) = (get(rows.reflectance), more * get(rows.first));
             let all = first + get(whole.indirect);
-            emitted[l] += area * get(rows.emission);
-            received[l] += area * first;
-            absorbed[l] += area * (1.0 - rho) * all;
-            escaped[l] += area * rho * all - seen * get(rows.reflected);
+            let out = rho * all - seen / area * get(rows.reflected);
+            add(
+                sums,
+                area,
+                [get(rows.emission), first, (1.0 - rho) * all, out],
+            );
         }
     }
-    let worst = (0..n)
-        .filter(|&l| received[l] > 0.0)
-        .map(|l| ((absorbed[l] + escaped[l]) / received[l] - 1.0).abs())
-        .fold(0.0, f64::max);
-    let lumens = |x: &[f64]| x.iter().zip(lanes.xyz()).map(|(x, w)| x * w[1]).sum();
-    Balance {
-        emitted_lm: lumens(&emitted),
-        received_lm: lumens(&received),
-        absorbed_lm: lumens(&absorbed),
-        escaped_lm: lumens(&escaped),
-        worst_band: worst,
-        ..Balance::default()
-    }
+    Balance::of(&fluxes, lanes)
 }
 
 /// Rows by leaf that the flux is summed from.
 pub(crate) struct FluxRows<'a> {
-    pub(super) emission: &'a crate::light::Rows,
-    pub(super) reflected: &'a crate::light::Rows,
-    pub(super) irradiance: &'a crate::light::Rows,
-    pub(super) first: &'a crate::light::Rows,
-    pub(super) reflectance: &'a crate::light::Rows,
+    pub(super) emission: &'a Rows,
+    pub(super) reflected: &'a Rows,
+    pub(super) irradiance: &'a Rows,
+    pub(super) first: &'a Rows,
+    pub(super) reflectance: &'a Rows,
 }

@@ -5,8 +5,7 @@ use super::flux::{self, Closed};
 use super::{Bake, by_rays, punctual};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree};
-use crate::light::Neighbours;
-use crate::light::rows::{Rows, padded};
+use crate::light::{Neighbours, Rows, padded, weighed};
 use crate::link::{Demand, Sight};
 use crate::transport::point::{Gatherer, Memory, Receiver};
 use glam::Vec3;
@@ -14,9 +13,8 @@ use glam::Vec3;
 /// What one patch may misplace of the direct light of a leaf, share of white for each unit of asked-for error. With five
 /// times as much a white room of 10 000 faces is 1 % too dark, without a limit 14 %.
 const DIRECT_SHARE: f64 = 0.02;
-/// Rays that tell how open a point is, at the most.
-const RAYS: usize = 16;
-
+/// Rays that tell how open a point is.
+const OPEN_RAYS: usize = 4;
 /// Places on a leaf that tell how bright it is without shadows: its middle, and near its corners.
 const PLACES: [[f64; 3]; 4] = [
     [1.0 / 3.0; 3],
@@ -73,27 +71,26 @@ impl Look for Looker<'_> {
         let mut memory = Memory::default();
         let bright = |at: [f64; 3]| {
             let row = gatherer.direct(&receiver(tree, leaf, at, 0), &mut memory);
-            let lanes = row.iter().zip(&self.weights);
-            lanes.map(|(x, w)| f64::from(*x) * w).sum::<f64>()
+            weighed(&row, &self.weights)
         };
         PLACES.map(bright).into_iter().fold(0.0, f64::max)
     }
 
-    fn openness(&self, tree: &Tree, _leaf: u32) -> Option<impl Fn(&Receiver, usize) -> f32> {
-        by_rays(self.sight).then_some(move |to: &Receiver, rays: usize| {
-            let rays = rays.min(RAYS);
-            let mut hits = [None; RAYS];
-            let shift = hash(to.seed, 5);
-            let directions: [Vec3; RAYS] = std::array::from_fn(|k| {
-                cosine_direction(to.normal, sequence02(k as u32, shift)).as_vec3()
-            });
-            let from = [to.point.as_vec3(); RAYS];
-            let (from, directions) = (&from[..rays], &directions[..rays]);
-            self.sight
-                .meet(from, directions, to.plane, &mut hits[..rays]);
-            let front = |hit: &&_| tree.met(hit) != NONE;
-            hits[..rays].iter().flatten().filter(front).count() as f32 / rays as f32
-        })
+    fn by_chance(&self) -> bool {
+        by_rays(self.sight)
+    }
+
+    fn openness(&self, tree: &Tree, to: &Receiver, memory: &mut Memory) -> f32 {
+        let shift = hash(to.seed, 5);
+        let directions: [Vec3; OPEN_RAYS] = std::array::from_fn(|k| {
+            cosine_direction(to.normal, sequence02(k as u32, shift)).as_vec3()
+        });
+        let mut hits = [None; OPEN_RAYS];
+        let from = [to.point.as_vec3(); OPEN_RAYS];
+        self.sight.meet(&from, &directions, to.plane, &mut hits);
+        memory.rays += OPEN_RAYS as u64;
+        let front = |hit: &&_| tree.met(hit) != NONE;
+        hits.iter().flatten().filter(front).count() as f32 / OPEN_RAYS as f32
     }
 }
 

@@ -1,11 +1,19 @@
 //! What a solution is asked: light at receivers, and which of them something covers.
 
-use super::*;
+use super::{Bake, Care, Closed, DE_PER_PERCENT, by_rays, flux};
+use crate::geometry::{NO_PLANE, Segment};
+use crate::link::Sight;
+use crate::transport::hemisphere::Hemisphere;
+use crate::transport::point::{Gathered, Gatherer, Memory, Receiver};
+use rayon::prelude::*;
 
 /// What one patch may misplace in a gather, share of the asked-for error.
 const GATHER_SHARE: f64 = 0.1;
 /// A face that has less of its area bare lies below something.
 const MOSTLY_COVERED: f64 = 0.01;
+/// A place with something right above it, within this share of the room's half diagonal, is not seen: a centimetre in a
+/// large room.
+const PRESSED: f64 = 2e-3;
 
 impl Bake {
     /// Gathers at receivers, in order.

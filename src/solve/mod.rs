@@ -37,26 +37,21 @@ pub use representation::Representation;
 pub(crate) use sources::weights_of;
 
 use crate::color::{Observer, Upsampler};
-use crate::geometry::{NO_PLANE, RayIndex, Segment};
+use crate::geometry::RayIndex;
 use crate::hierarchy::{Mesh, Tree, cuts, spaces};
 use crate::light::lanes::Lanes;
-use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded};
-use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Opaque, Sight, balance, is_small};
+use crate::light::{Light, Rows, padded};
+use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance, is_small};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
 use crate::transport::hemisphere::Hemisphere;
-use crate::transport::point::{Gathered, Gatherer, Memory, Receiver};
-use conjugate::{Convergence, System};
 use direct::Direct;
 pub use flux::Closed;
 pub use held::Held;
-use mixed::Mixed;
 pub use operator::Operator;
 use outlook::Outlook;
-use rayon::prelude::*;
-use rays::RaySystem;
-use sources::{Painter, Sources};
+use sources::Sources;
 use std::time::Instant;
 
 /// What the user asks for.
@@ -117,7 +112,7 @@ const TESSELLATED: Shares = Shares {
     reflected: 0.0,
 };
 const MANY_LEAVES: usize = 4096;
-/// Where leaves look for themselves links only lead to lamps and say where the hierarchy is too coarse, and points see
+/// Where leaves look for themselves links only say where the hierarchy is too coarse and what is near and clear, and points see
 /// reflected light through rays that end on many leaves.
 const FURNISHED: Shares = Shares {
     link: 0.4,
@@ -148,10 +143,6 @@ pub(crate) const LIGHT_SHARE: f64 = 0.8;
 pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 pub(crate) const DE_PER_PERCENT: f64 = 0.35;
-
-/// A place with something right above it, within this share of the room's half diagonal, is not seen: a centimetre in a
-/// large room.
-const PRESSED: f64 = 2e-3;
 
 /// What a gather is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,7 +177,7 @@ pub struct Bake {
     /// Colour difference (CIELUV) that the lanes cause, as far as it is known.
     pub(crate) spectrum_error: Option<f64>,
     pub(crate) outlook: Outlook,
-    /// Area of each node that is not covered.
+    /// Area of each node that takes part.
     pub(crate) areas: Vec<f64>,
     pub(crate) balance: Balance,
     pub(crate) light: Light,
@@ -331,7 +322,6 @@ impl Bake {
             [bake.closed, bake.sealed] = closed;
             return bake;
         }
-        bake.sent = bake.with_sight(|bake, sight| bake.sent(sight));
         [bake.closed, bake.sealed] = bake.with_sight(|bake, sight| {
             flux::closedness(
                 &bake.mesh,
@@ -341,6 +331,8 @@ impl Bake {
                 bake.settings.seed,
             )
         });
+        // In a closed room this is known without a ray.
+        bake.sent = bake.with_sight(|bake, sight| bake.sent(sight));
         bake
     }
 

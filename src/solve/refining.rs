@@ -1,6 +1,9 @@
 //! What a round refines by: how bright patches are, how much a change would be seen, and where reflected light varies.
 
-use super::*;
+use super::{Bake, by_rays, flux};
+use crate::light::brightness;
+use crate::link::{Demand, MAX_DEPTH};
+use rayon::prelude::*;
 
 /// Darker than this share of white counts as this dark: nobody sees lightness below it.
 const DARKEST: f64 = 0.02;

@@ -4,7 +4,10 @@
 //! can be held against it.
 
 use super::{Bake, Closed};
-use crate::geometry::sampling::{cosine_direction, sequence02, tangents, triangle_weights};
+use crate::geometry::NO_PLANE;
+use crate::geometry::sampling::{
+    around, cosine_direction, sequence02, sphere_direction, triangle_weights,
+};
 use crate::hierarchy::NONE;
 use crate::link::Sight;
 use crate::scene::{LightKind, PunctualLight};
@@ -81,17 +84,8 @@ impl Bake {
 
     /// Lamps with their luminous flux.
     fn sending(&self) -> Vec<(f64, Lamp<'_>)> {
-        let mut row = [0.0_f32; 64];
-        let mut lumens = |light: usize, shape: &[f64; 64], scale: f64| {
-            row.fill(0.0);
-            self.lanes.add_emission(light, shape, scale, &mut row);
-            self.lanes.tristimulus(&row)[1]
-        };
         let exitance: Vec<f64> = (self.scene.materials.iter())
-            .map(|m| {
-                (m.emission.as_ref())
-                    .map_or(0.0, |e| lumens(e.light, &e.shape, std::f64::consts::PI))
-            })
+            .map(|m| self.lanes.exitance(m.emission.as_ref())[1])
             .collect();
         let faces = (0..self.tree.faces.len()).filter_map(|entry| {
             let triangle = self.tree.faces[entry].triangle as usize;
@@ -103,7 +97,7 @@ impl Bake {
             let Some(solid) = super::punctual::solid_angle(light.kind) else {
                 continue;
             };
-            let flux = solid * lumens(light.light, &light.shape, 1.0);
+            let flux = solid * self.lanes.emission(light.light, &light.shape, 1.0)[1];
             if flux > 0.0 {
                 lamps.push((flux, Lamp::Punctual(light)));
             }
@@ -136,19 +130,13 @@ impl Lamp<'_> {
                 )
             }
             Lamp::Punctual(light) => {
-                let cosine = match light.kind {
-                    LightKind::Spot { inner, outer } => cosine_of_spot(inner, outer, v[0]),
-                    _ => 1.0 - 2.0 * v[0],
+                let direction = match light.kind {
+                    LightKind::Spot { inner, outer } => {
+                        around(light.direction, cosine_of_spot(inner, outer, v[0]), v[1])
+                    }
+                    _ => sphere_direction(v),
                 };
-                let [x, y] = tangents(light.direction);
-                let (sin, cos) = (std::f64::consts::TAU * v[1]).sin_cos();
-                let around = (x * cos + y * sin) * (1.0 - cosine * cosine).max(0.0).sqrt();
-                let from = light.position - bake.mesh.centre;
-                (
-                    from,
-                    light.direction * cosine + around,
-                    crate::geometry::NO_PLANE,
-                )
+                (light.position - bake.mesh.centre, direction, NO_PLANE)
             }
         }
     }

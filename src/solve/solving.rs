@@ -1,6 +1,16 @@
 //! The solve of a round: from direct light on the leaves to the light on every patch, with the flux that went where.
 
-use super::*;
+use super::conjugate::{Convergence, System};
+use super::flux::{self, Closed};
+use super::linear;
+use super::mixed::Mixed;
+use super::operator::{self, Operator};
+use super::rays::RaySystem;
+use super::sources::{Painter, Sources};
+use super::{Bake, Given};
+use crate::light::{Arrival, Light, Neighbours, Rows, brightness, weighed};
+use crate::link::LinkRows;
+use crate::scene::effects::Kind;
 
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.002;
@@ -223,14 +233,7 @@ impl Bake {
     pub(super) fn light_arrives(&mut self) {
         let light = &self.light;
         let weights = self.bright_weights();
-        let bright = |row: &[f32]| {
-            let sum: f64 = row
-                .iter()
-                .zip(&weights)
-                .map(|(&x, w)| f64::from(x) * w)
-                .sum();
-            sum as f32
-        };
+        let bright = |row: &[f32]| weighed(row, &weights) as f32;
         let mut arrival = vec![Arrival::default(); self.tree.nodes.len()];
         for (k, &leaf) in light.leaves.iter().enumerate() {
             arrival[leaf as usize] = Arrival {

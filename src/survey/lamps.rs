@@ -9,10 +9,9 @@ use super::eyes::{Eyes, Met};
 use super::place;
 use crate::error::Problem;
 use crate::geometry::sampling::{
-    cosine_direction, hash, on_triangle, sequence02, sphere_direction, tangents,
+    around, cosine_direction, hash, on_triangle, sequence02, sphere_direction, tangents,
 };
 use crate::scene::{LightKind, PunctualLight, Scene, Sides, listed, short};
-use glam::DVec3;
 use std::f64::consts::TAU;
 
 /// Rays of a lamp: a few for the first look, which most rooms pass with their first lamp, and many before a room is
@@ -164,7 +163,9 @@ fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
         let (from, direction) = match light.kind {
             LightKind::Point => (light.position, sphere_direction([x, y])),
             LightKind::Spot { outer, .. } => {
-                (light.position, in_cone(light.direction, outer, [x, y]))
+                // Evenly over the cone.
+                let cosine = 1.0 - y * (1.0 - outer.cos());
+                (light.position, around(light.direction, cosine, x))
             }
             LightKind::Directional => {
                 // From outside, on a disc that covers the room.
@@ -178,15 +179,6 @@ fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
         seen.add(eyes.scene, None, eyes.look_around(from, direction));
     }
     seen
-}
-
-/// A direction in the cone of half angle `outer` about `axis`, for a point of the unit square.
-fn in_cone(axis: DVec3, outer: f64, [x, y]: [f64; 2]) -> DVec3 {
-    let cos = 1.0 - y * (1.0 - outer.cos());
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    let [u, v] = tangents(axis);
-    let angle = TAU * x;
-    sin * (angle.cos() * u + angle.sin() * v) + cos * axis
 }
 
 impl Away {

@@ -144,12 +144,10 @@ impl Gatherer<'_> {
 
     /// The point that a ray met.
     fn receiver(&self, leaf: u32, hit: &Hit) -> Receiver {
-        let mesh = self.sight.mesh;
-        let [a, b, c] = mesh.triangles[hit.triangle as usize].map(|v| mesh.positions[v as usize]);
         let [v, w] = hit.uv.map(f64::from);
         let entry = self.tree.met(hit) as usize;
         Receiver {
-            point: a * (1.0 - v - w) + b * v + c * w,
+            point: (self.sight.mesh).at(hit.triangle as usize, [1.0 - v - w, v, w]),
             normal: self.tree.face_normal[entry],
             plane: self.tree.face_plane[entry],
             leaf: Some(leaf),

@@ -24,8 +24,11 @@ impl Look for Fake {
     fn unshadowed(&self, _: &Tree, _: u32, _: f64) -> f64 {
         3.0
     }
-    fn openness(&self, _: &Tree, _: u32) -> Option<impl Fn(&Receiver, usize) -> f32> {
-        Some(|to: &Receiver, _| open(to))
+    fn by_chance(&self) -> bool {
+        true
+    }
+    fn openness(&self, _: &Tree, to: &Receiver, _: &mut Memory) -> f32 {
+        open(to)
     }
 }
 
@@ -44,6 +47,7 @@ fn random_points_find_the_light_that_others_see() {
         let stake = Stake {
             split: 0.0,
             flux,
+            tolerance: 0.1,
             may_split: true,
             tiny: false,
         };
@@ -51,8 +55,7 @@ fn random_points_find_the_light_that_others_see() {
         for leaf in tree.leaves() {
             let area = tree.node(leaf).area;
             let mut memory = Memory::default();
-            let open_share = |to: &Receiver, _: usize| open(to);
-            let mean = by_chance(&tree, leaf, &Fake, &open_share, 0.1, &stake, &mut memory);
+            let mean = by_chance(&tree, leaf, &Fake, &stake, &mut memory);
             let mut ended = Found::default();
             mean.end(&mut ended, 1);
             found[0] += area * f64::from(ended.rows[0]);
