@@ -1,8 +1,9 @@
-"""Mitsuba 3's side: the room as its scene, and irradiance at places by its `path` integrator.
+"""Mitsuba 3's side: the room as its scene, and irradiance at places by paths through it.
 
 The light at a place is found in two ways, weighted against each other (Veach's balance heuristic): a lamp is picked and
-looked at, and a ray is sent out by the cosine and followed by `path`, from which the lamp that it meets first is taken
-out as far as the first way has counted it. No reflectance of the place is needed for that.
+looked at, and a ray goes out by the cosine to the next surface, where the same is done again. No reflectance of the place
+is needed for that. Mitsuba's own `path` passes over the last .9 thousandth of a ray to a lamp: bars 4 mm before a lamp
+that is 5 m away hide nothing from it, and a garage came out .9 % too bright. So lamps are looked at by whole rays here.
 """
 
 import time
@@ -15,6 +16,7 @@ from room import GREATEST_ALBEDO, Part
 
 MOST_RAYS = 1 << 20  # at once
 SPOT_PIXELS = 1024  # of the picture with a spot's fall-off
+NEAR = 1e-5  # of its distance, within which a lamp is what a ray met
 SHEET = 1e-5  # of the room's size, between the two sides of a lamp that shines from both
 
 
@@ -38,7 +40,6 @@ class Peer:
         for k, lamp in enumerate(room.lamps):
             scene[f"lamp{k}"] = self.lamp(lamp)
         self.scene = mi.load_dict(scene)
-        self.integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": 8})
 
     # The scene
 
@@ -184,28 +185,63 @@ class Peer:
         if self.kind == "spectral":
             here.wavelengths, per_wave = mi.sample_rgb_spectrum(mi.sample_shifted(sampler.next_1d()))
 
-        lamp, weight = self.scene.sample_emitter_direction(here, stratified(), True)
-        cosine = dr.maximum(dr.dot(here.n, lamp.d), 0)
-        share = dr.select(lamp.delta, 1, lamp.pdf / (lamp.pdf + cosine / dr.pi))
-        light = weight * dr.select((cosine > 0) & (lamp.pdf > 0), cosine * share, 0)
-
-        to = here.sh_frame.to_world(mi.warp.square_to_cosine_hemisphere(stratified()))
-        ray = mi.RayDifferential3f(here.p, to, 0.0, here.wavelengths)
-        hit = self.scene.ray_intersect(ray)
-        emitter = hit.emitter(self.scene)
-        seen = hit.is_valid() & (emitter != None)  # noqa: E711, RUF100 (an array)
-        shine = dr.select(seen, emitter.eval(hit, seen), 0)
-        other = self.scene.pdf_emitter_direction(here, mi.DirectionSample3f(self.scene, hit, here), seen)
-        cosine = dr.maximum(dr.dot(here.n, to), 0)
-        twice = dr.select(seen & (other + cosine > 0), other / (other + cosine / dr.pi), 0)
-        found, _, _ = self.integrator.sample(self.scene, sampler, ray)
-        light += dr.pi * (found - shine * twice)
-
+        light = self.paths(here, stratified(), stratified(), sampler)
         light = self.tristimulus(light, here.wavelengths, per_wave)
         means = [dr.block_sum(x, samples) / samples for x in light]
         dr.eval(means)
         means = np.stack([np.array(x, dtype=np.float64) for x in means], 1)
         return means * self.spectra.white if self.kind == "mono" else means
+
+    def paths(self, here, to_lamp, onwards, sampler):
+        """Irradiance at `here` by one path each, first directions from numbers given."""
+        dr, mi, scene = self.dr, self.mi, self.scene
+        lamp, radiance = self.look(here, to_lamp)
+        cosine = dr.maximum(dr.dot(here.n, lamp.d), 0)
+        light = radiance * (cosine * dr.select(lamp.delta, 1, lamp.pdf / (lamp.pdf + cosine / dr.pi)))
+
+        to = here.sh_frame.to_world(mi.warp.square_to_cosine_hemisphere(onwards))
+        ray = mi.Ray3f(here.p, to, 0.0, here.wavelengths)
+        state = {
+            "light": light, "share": mi.Spectrum(dr.pi), "ray": ray, "last": mi.Interaction3f(here), "bounce": mi.UInt32(0),
+            "density": dr.maximum(dr.dot(here.n, to), 0) / dr.pi, "sampler": sampler, "on": mi.Bool(True),
+        }
+        return dr.while_loop((state,), lambda s: s["on"], lambda s: (self.bounce(s),), label="paths")[0]["light"]
+
+    def bounce(self, s):
+        """The path goes on to the next surface: what shines there, what lamps bring there, and where to next."""
+        dr, mi, scene, sampler = self.dr, self.mi, self.scene, s["sampler"]
+        hit = scene.ray_intersect(s["ray"], s["on"])
+        emitter = hit.emitter(scene)
+        seen = hit.is_valid() & (emitter != None)  # noqa: E711, RUF100 (an array)
+        other = scene.pdf_emitter_direction(s["last"], mi.DirectionSample3f(scene, hit, s["last"]), seen)
+        twice = dr.select(seen, s["density"] / dr.maximum(s["density"] + other, 1e-30), 0)
+        s["light"] += s["share"] * dr.select(seen, emitter.eval(hit, seen), 0) * twice
+
+        on = s["on"] & hit.is_valid()
+        paint, context = hit.bsdf(s["ray"]), mi.BSDFContext()
+        lamp, radiance = self.look(hit, sampler.next_2d(), on)
+        value, density = paint.eval_pdf(context, hit, hit.to_local(lamp.d), on)
+        s["light"] += s["share"] * radiance * value * dr.select(lamp.delta, 1, lamp.pdf / dr.maximum(lamp.pdf + density, 1e-30))
+
+        sample, weight = paint.sample(context, hit, sampler.next_1d(), sampler.next_2d(), on)
+        s["share"] *= weight
+        s["bounce"] += 1
+        # Russian roulette from the eighth bounce on.
+        stay = dr.select(s["bounce"] < 8, 1, dr.minimum(dr.max(s["share"]) / dr.pi, 0.95))
+        on &= (sampler.next_1d() < stay) & (dr.max(s["share"]) > 0)
+        s["share"] /= dr.select(on, stay, 1)
+        s["ray"], s["last"], s["density"], s["on"] = hit.spawn_ray(hit.to_world(sample.wo)), mi.Interaction3f(hit), sample.pdf, on
+        return s
+
+    def look(self, here, number, active=True):
+        """A lamp picked by chance, and what it sends here past all that stands between."""
+        dr, scene = self.dr, self.scene
+        lamp, radiance = scene.sample_emitter_direction(here, number, False, active)
+        ray = here.spawn_ray_to(lamp.p)
+        far = dr.norm(lamp.p - ray.o)
+        ray.d, ray.maxt = (lamp.p - ray.o) / far, dr.inf
+        first = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        return lamp, dr.select(active & (lamp.pdf > 0) & (first.t > far * (1 - NEAR)), radiance, 0)
 
     def tristimulus(self, light, wavelengths, per_wave):
         """X, Y and Z; one number where all light is white."""
