@@ -13,8 +13,6 @@ use glam::DVec3;
 const INSET: f64 = 2e-3;
 /// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
 const PROBE_INSET: f64 = 1e-5;
-/// A vertex that sees more black backs than this, share of its rays, lies inside something.
-pub const MOSTLY: f64 = 0.75;
 /// The baked mesh and what it took.
 #[derive(Debug, Default)]
 pub struct Baked {

@@ -4,7 +4,8 @@ mod bake;
 pub mod refined;
 mod spectra;
 
-pub use bake::{Baked, Interpolation, MOSTLY, Probed};
+pub use crate::transport::point::MOSTLY;
+pub use bake::{Baked, Interpolation, Probed};
 pub(crate) use bake::{KeptVertex, Vertex, lend};
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.

@@ -8,4 +8,4 @@ mod solution;
 pub use descent::Descent;
 pub use rows::{Rows, padded};
 pub use solution::{Arrival, Light, Neighbours};
-pub(crate) use solution::{brightness, weighed};
+pub(crate) use solution::{brightness, keenness, weighed};

@@ -129,6 +129,14 @@ impl Light {
     }
 }
 
+/// Darker than this share of white counts as this dark: nobody sees lightness below it.
+const DARKEST: f64 = 0.02;
+
+/// How much lightness a change of light makes where it is so bright, as a multiple of what it makes at white.
+pub(crate) fn keenness(bright: f64) -> f64 {
+    bright.max(DARKEST).powf(-2.0 / 3.0)
+}
+
 /// One number for how bright a colour is beside the white: the mean of its three ratios, so that no colour counts nothing.
 pub(crate) fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
     (0..3)

@@ -70,6 +70,8 @@ pub(super) struct Hint {
     /// Weights of the second and third corner of the triangle of the mesh.
     pub(super) at: [f64; 2],
     pub(super) area: f64,
+    /// What of it others see, see `solve::outlook`.
+    pub(super) open: f64,
     /// Tristimulus irradiance.
     pub(super) light: [f64; 3],
 }

@@ -5,7 +5,7 @@
 //! looked at or, where that is done, split at the edges that bend; so shares become alike, which takes the fewest
 //! vertices for a sum. Squares, although it is the mean that ends it: teeth along shadows are few, and seen.
 
-use super::cells::{Cell, Cells, Doubt, Hint, within};
+use super::cells::{Cell, Cells, Corner, Doubt, Hint, within};
 use super::looks::Looks;
 use crate::color::de2000;
 use crate::gather::Vertex;
@@ -205,7 +205,16 @@ impl<'a> Growth<'a> {
         self.lent = lent;
     }
 
-    /// Mean square of what the solved light differs by, its worst place and how much it differs there.
+    /// Can anybody see anything of a cell? Corners, and what the rays of leaves tell.
+    fn is_seen(&self, cell: usize) -> bool {
+        let cell = &self.cells.all[cell];
+        let sheet = &self.cells.sheets[cell.sheet as usize];
+        let hints = &sheet.hints[cell.hints.0 as usize..cell.hints.1 as usize];
+        let corner = |c: &Corner| self.seen(cell.sheet as usize, c.vertex).is_some();
+        cell.corners.iter().any(corner) || hints.iter().any(|hint| hint.open > 0.0)
+    }
+
+    /// Mean square of what the solved light differs by, as far as others see it, its worst place and how much it differs there.
     fn told(&self, cell: usize, light: &[[f64; 3]; 3]) -> (f64, Option<(Hint, f64)>) {
         let cell = &self.cells.all[cell];
         let sheet = &self.cells.sheets[cell.sheet as usize];
@@ -213,9 +222,9 @@ impl<'a> Growth<'a> {
         let (mut sum, mut area, mut worst) = (0.0, 0.0, None::<(Hint, f64)>);
         for hint in hints {
             let d = self.difference(mix(light, within(&cell.corners, hint.at)), hint.light);
-            sum += hint.area * d * d;
+            sum += hint.area * hint.open * d * d;
             area += hint.area;
-            if worst.is_none_or(|(_, most)| d > most) {
+            if hint.open > 0.0 && worst.is_none_or(|(_, most)| d > most) {
                 worst = Some((*hint, d));
             }
         }
@@ -233,6 +242,9 @@ impl<'a> Growth<'a> {
                 let light = self.light(k);
                 let told = self.told(k, &light).0;
                 let Doubt { square, trust, .. } = self.cells.all[k].doubt;
+                if !self.is_seen(k) {
+                    return 0.0;
+                }
                 if first {
                     let range = (0..3).map(|k| self.difference(light[k], light[(k + 1) % 3]));
                     let range = RANGE * range.fold(0.0, f64::max);
@@ -398,9 +410,22 @@ impl<'a> Growth<'a> {
             Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
         };
         let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+        let Cell { sheet, corners, .. } = &self.cells.all[k];
+        let seen = corners.map(|c| self.seen(*sheet as usize, c.vertex).is_some());
+        let mut looks = middles.into_iter().chain([inside]);
+        if !seen.contains(&true) && looks.all(|look| self.looks.at(look).is_none()) {
+            // It lies below something.
+            return Doubt {
+                tested: true,
+                ..Doubt::default()
+            };
+        }
         let bent = [0, 1, 2].map(|e| {
-            // The edge of something that stands here runs through.
-            let ends = || self.difference(light[e], light[(e + 1) % 3]);
+            // The edge of something that stands here runs through, unless all of this lies below it.
+            let ends = || match seen[e] || seen[(e + 1) % 3] {
+                true => self.difference(light[e], light[(e + 1) % 3]),
+                false => 0.0,
+            };
             off(middles[e], halves[e]).unwrap_or_else(|| COVERED * ends())
         });
         let inside = off(inside, weights);

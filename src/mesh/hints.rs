@@ -24,9 +24,13 @@ pub(super) fn give(bake: &Bake, cells: &mut Cells) {
             let face = tree.face_node[cell.of.1 as usize];
             leaves(tree, face, sheet.back, cell.area, |leaf, at, area| {
                 let light = value(leaf);
-                sheet
-                    .hints
-                    .extend(light.map(|light| Hint { at, area, light }));
+                let open = bake.openness(leaf);
+                sheet.hints.extend(light.map(|light| Hint {
+                    at,
+                    area,
+                    open,
+                    light,
+                }));
             });
         }
         cell.hints = (first, sheet.hints.len() as u32);

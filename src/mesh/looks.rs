@@ -127,7 +127,8 @@ impl<'a> Looks<'a> {
         let mut pressed = self.bake.pressed(&receivers(&places)).into_iter();
         places.retain(|_| pressed.next() == Some(false));
         let gathered = self.bake.gather_with(&receivers(&places), self.care);
-        let dark = |g: &Gathered| g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
+        let dark =
+            |g: &Gathered| g.backs <= MOSTLY && g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
         let in_doubt = places.iter().zip(&gathered).filter(|(_, g)| dark(g));
         let in_doubt: Vec<usize> = in_doubt.map(|(&k, _)| k).collect();
         let mut covered = self.bake.covered(&receivers(&in_doubt)).into_iter();

@@ -38,7 +38,7 @@ impl Bake {
     /// The mesh of the output with its light, grown until its interpolation error, measured, is within its share of the
     /// error asked for. `progress` is told (done, of) in looks of the present pass.
     pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
-        let mut growth = self.growth(Care::Full);
+        let mut growth = self.growth(Care::Vertex);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
         growth.unknown = allowed * allowed;
         growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;

@@ -4,7 +4,7 @@ use super::{Bake, Care, Closed, DE_PER_PERCENT, by_rays, flux};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::link::Sight;
 use crate::transport::hemisphere::Hemisphere;
-use crate::transport::point::{Gathered, Gatherer, Memory, Receiver};
+use crate::transport::point::{Gathered, Gatherer, MOSTLY, Memory, Receiver};
 use rayon::prelude::*;
 
 /// What one patch may misplace in a gather, share of the asked-for error.
@@ -32,6 +32,9 @@ impl Bake {
             let mut gatherer = bake.gatherer(sight);
             if let (Care::Sketch, Some(hemisphere)) = (care, &mut gatherer.hemisphere) {
                 *hemisphere = &sketched;
+            }
+            if care != Care::Full {
+                gatherer.most_backs = MOSTLY;
             }
             receivers
                 .par_iter()
@@ -71,6 +74,11 @@ impl Bake {
         })
     }
 
+    /// What of a leaf others see.
+    pub(crate) fn openness(&self, leaf: u32) -> f64 {
+        f64::from(self.outlook.bare[leaf as usize])
+    }
+
     /// Of each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.
     pub(crate) fn spaces(&self) -> Vec<(u32, bool)> {
         let mut spaces = vec![(0, false); self.tree.faces.len()];
@@ -94,6 +102,7 @@ impl Bake {
             hemisphere: by_rays(sight).then_some(&self.hemisphere),
             shafts: true,
             keep: self.keep,
+            most_backs: 1.0,
         }
     }
 }

@@ -147,8 +147,10 @@ pub(crate) const DE_PER_PERCENT: f64 = 0.35;
 /// What a gather is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Care {
-    /// The result.
+    /// Points anywhere.
     Full,
+    /// Vertices: those within something are seen by nobody.
+    Vertex,
     /// A picture on the way.
     Sketch,
 }

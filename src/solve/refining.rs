@@ -1,12 +1,10 @@
 //! What a round refines by: how bright patches are, how much a change would be seen, and where reflected light varies.
 
 use super::{Bake, by_rays, flux};
-use crate::light::brightness;
+use crate::light::{brightness, keenness};
 use crate::link::{Demand, MAX_DEPTH};
 use rayon::prelude::*;
 
-/// Darker than this share of white counts as this dark: nobody sees lightness below it.
-const DARKEST: f64 = 0.02;
 /// Levels that a round splits leaves by where reflected light varies.
 const LEVELS: usize = 4;
 
@@ -34,7 +32,7 @@ impl Bake {
                 self.lanes.tristimulus(self.light.irradiance.row(k)),
                 self.light.white,
             );
-            keen[leaf as usize] = h.max(DARKEST).powf(-2.0 / 3.0) as f32;
+            keen[leaf as usize] = keenness(h) as f32;
         }
         for k in (0..keen.len()).rev() {
             let node = &self.tree.nodes[k];

@@ -4,6 +4,7 @@
 //! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in number with what they
 //! carry.
 
+use super::lamp::Lamp;
 use super::point::{CLOSE, Gathered, Gatherer, Linked, Memory, Of, Receiver};
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
@@ -67,6 +68,7 @@ impl Gatherer<'_> {
                 }
             }
             if held == 0 {
+                self.lamps_together(to, of, memory, out);
                 return;
             }
             let faces = &faces[..count];
@@ -157,12 +159,26 @@ impl Gatherer<'_> {
             return;
         }
         let (reflected, emitted) = self.brightness(id, of);
-        let visible = if clear {
-            1.0
-        } else {
-            let carries = factor * (reflected + emitted);
+        let carries = factor * (reflected + emitted);
+        if clear {
+            self.see(to, id, factor, 1.0, of, out);
+        } else if let Some(visible) =
             self.visible(to, (id, way, v), factor, carries, emitted > 0.0, memory)
-        };
+        {
+            self.see(to, id, factor, visible, of, out);
+        }
+    }
+
+    /// Adds a patch of a few faces of which a share is visible.
+    pub(super) fn see(
+        &self,
+        to: &Receiver,
+        id: u32,
+        factor: f64,
+        visible: f64,
+        of: Of,
+        out: &mut Gathered,
+    ) {
         self.add(id, factor, visible, of, out);
         if of != Of::Emitted {
             self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
@@ -285,7 +301,8 @@ impl Gatherer<'_> {
         Some((factor, visible))
     }
 
-    /// Visible share of a polygon patch. `carries` is what it would bring unblocked, share of white.
+    /// Visible share of a polygon patch; none yet for a lamp that rays must find, see `lamps_together`. `carries` is what it
+    /// would bring unblocked, share of white.
     fn visible(
         &self,
         to: &Receiver,
@@ -294,17 +311,17 @@ impl Gatherer<'_> {
         carries: f64,
         lamp: bool,
         memory: &mut Memory,
-    ) -> f64 {
+    ) -> Option<f64> {
         let node = self.tree.node(id);
         let Some(element) = self.tree.element(node) else {
-            return 1.0;
+            return Some(1.0);
         };
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
         if let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
-                return (seen / factor).min(1.0);
+                return Some((seen / factor).min(1.0));
             }
         }
         if lamp {
@@ -314,16 +331,21 @@ impl Gatherer<'_> {
                     .sight
                     .view_from(to.point, to.normal, &element.corners, planes)
                 {
-                    View::Clear => return 1.0,
+                    View::Clear => return Some(1.0),
                     View::Listed(list) => {
                         if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
-                            return (seen / factor).min(1.0);
+                            return Some((seen / factor).min(1.0));
                         }
                     }
                     View::Crowded => {}
                 }
             }
-            return self.lamp_visible(to, id, factor, carries, memory);
+            memory.lamps.push(Lamp {
+                id,
+                factor,
+                carries,
+            });
+            return None;
         }
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
         let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
@@ -349,7 +371,7 @@ impl Gatherer<'_> {
         let seen = open_weight(&memory.weights, &memory.blocked);
         // Where no ray gets through, nothing does: what other parts of the element see must not leak in.
         if seen <= 0.0 {
-            return 0.0;
+            return Some(0.0);
         }
         // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
         // blurs is bounded by the size of the receiving element.
@@ -358,7 +380,7 @@ impl Gatherer<'_> {
         } else {
             PRIOR
         };
-        (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
+        Some((seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior))
     }
 
     /// Factor of what is seen past the listed triangles, exactly; `whole` is that of the whole patch. None where that takes too

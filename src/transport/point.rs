@@ -3,6 +3,7 @@
 //! `H(p) = sum over patches F(p -> b) V(p, b) B_b` and what punctual lights bring.
 
 use super::hemisphere::Hemisphere;
+use super::lamp::Lamp;
 use super::shadows::Shadows;
 use super::trace::Trace;
 use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
@@ -14,6 +15,9 @@ use glam::DVec3;
 
 /// Nearer than this many of its radii a cluster is entered, and a patch is not even.
 pub(super) const CLOSE: f64 = 1.5;
+
+/// A vertex that sees more black backs than this, share of its rays, lies inside something.
+pub const MOSTLY: f64 = 0.75;
 
 /// Where light is received.
 #[derive(Debug, Clone, Copy)]
@@ -100,6 +104,8 @@ pub struct Memory {
     pub(super) met: Vec<(u32, Hit)>,
     /// Of which close by.
     pub(super) near: Vec<(u32, Hit)>,
+    /// Lamps that are put off until all of them are known.
+    pub(super) lamps: Vec<Lamp>,
     /// Which path each segment to a lamp belongs to, and what it brings.
     pub(super) to_lamps: Vec<(usize, f64)>,
     /// Rays cast.
@@ -144,6 +150,8 @@ pub struct Gatherer<'a> {
     pub(crate) shafts: bool,
     /// Is it kept where light comes from?
     pub(crate) keep: bool,
+    /// Points of whose rays more than this share meet black backs lie within something and are not gathered.
+    pub(crate) most_backs: f64,
 }
 
 impl Gatherer<'_> {

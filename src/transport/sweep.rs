@@ -1,11 +1,11 @@
 //! Light at a point in rooms where much stands about: lamps from the root, what is bright or clear by links, all else by rays.
 
 use super::hemisphere::{BEAM, Hemisphere};
-use super::point::{CLOSE, Gathered, Gatherer, Memory, Of, Receiver};
+use super::point::{Gathered, Gatherer, Memory, Of, Receiver};
 use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
 use crate::hierarchy::NONE;
-use crate::link::{POLYGONS, Way, pattern};
+use crate::link::{POLYGONS, pattern};
 use glam::Vec3;
 
 /// A patch so bright that one ray of the hemisphere would carry more than this many tolerances is gathered by its link.
@@ -21,6 +21,15 @@ impl Gatherer<'_> {
         out: &mut Gathered,
     ) {
         memory.begin(self.tree.nodes.len());
+        let mut met = std::mem::take(&mut memory.met);
+        met.clear();
+        let share = 1.0 / hemisphere.len() as f64;
+        out.backs = share * self.cast(to, hemisphere, &mut met) as f64;
+        memory.met = met;
+        memory.rays += hemisphere.len() as u64;
+        if out.backs > self.most_backs {
+            return;
+        }
         self.lamps_of(to, memory, out);
         // A ray must not carry more than this.
         self.bright(
@@ -33,33 +42,25 @@ impl Gatherer<'_> {
             *x += d;
         }
         self.punctual(to, memory, out);
-        self.look(to, hemisphere, memory, out);
+        self.look(to, share as f32, memory, out);
     }
 
-    /// What patches reflect that the way is clear to, or that are brighter than `most`, by links.
+    /// What patches reflect that are brighter than `most`, by links.
     fn bright(&self, to: &Receiver, most: f64, memory: &mut Memory, out: &mut Gathered) {
         memory.open.extend(self.links(to));
         while let Some((id, way, v)) = memory.open.pop() {
             let k = id as usize;
             let brightest = f64::from(self.light.brightest[k]);
-            // Most are neither, and their patches need not be looked at.
-            if brightest <= most && way != Way::Clear {
+            // Most are not, and their patches need not be looked at.
+            if brightest <= most {
                 continue;
             }
             let node = self.tree.node(id);
-            let plain = node.faces.1 <= POLYGONS;
-            let exact = plain
-                && way == Way::Clear
-                && !self.has_parts(node)
-                && (node.centre - to.point).length() >= CLOSE * node.radius;
-            if !(brightest > most || exact) || !self.can_see(to, node) {
+            if !self.can_see(to, node) || self.bound(to, node) * brightest < self.tolerance {
                 continue;
             }
-            if !exact && self.bound(to, node) * brightest < self.tolerance {
-                continue;
-            }
-            let whole = plain && (exact || f64::from(self.light.bright_reflected[k]) > most);
-            if whole || !self.has_parts(node) {
+            let even = f64::from(self.light.bright_reflected[k]) > most;
+            if node.faces.1 <= POLYGONS && even || !self.has_parts(node) {
                 memory.taken[k] = memory.epoch;
                 memory.any_taken = true;
                 memory.stack.push((id, way, v));
@@ -70,19 +71,9 @@ impl Gatherer<'_> {
         self.patches(to, Of::Reflected, memory, out);
     }
 
-    /// What all other patches reflect, by rays over the hemisphere.
-    fn look(
-        &self,
-        to: &Receiver,
-        hemisphere: &Hemisphere,
-        memory: &mut Memory,
-        out: &mut Gathered,
-    ) {
-        let share = 1.0 / hemisphere.len() as f32;
-        let mut met = std::mem::take(&mut memory.met);
-        met.clear();
-        out.backs = f64::from(share) * self.cast(to, hemisphere, &mut met) as f64;
-        memory.rays += hemisphere.len() as u64;
+    /// What all other patches reflect, by the rays that were cast over the hemisphere, each of which has a `share`.
+    fn look(&self, to: &Receiver, share: f32, memory: &mut Memory, out: &mut Gathered) {
+        let met = std::mem::take(&mut memory.met);
         let width = self.light.width();
         let mut add = |leaf: u32, share: f32| {
             let row = self.light.reflected.row(leaf as usize);
