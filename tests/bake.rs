@@ -2,7 +2,7 @@
 
 use haarlight::color::{KM, Observer};
 use haarlight::gather::Baked;
-use haarlight::output::{Exposure, baked_glb, npz};
+use haarlight::output::{Exposure, Writing, baked_glb, npz};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings, Verdict};
 use std::path::Path;
@@ -31,7 +31,9 @@ fn files(bake: &Bake, baked: &Baked) -> [Vec<u8>; 2] {
     let spectra = bake.radiosity_spectra(baked);
     npz::write_baked(&mut arrays, scene, &baked.surfaces, &spectra).unwrap();
     [
-        baked_glb(scene, &baked.surfaces, &look).unwrap().bytes,
+        baked_glb(scene, &baked.surfaces, &look, Writing::default())
+            .unwrap()
+            .bytes,
         arrays,
     ]
 }
@@ -105,7 +107,7 @@ fn threads_and_onlookers_change_nothing() {
     assert!(one[1] == two[1], "npz differs");
 }
 
-/// The spectra of the npz are the light of the glb: their tristimulus values are `_XYZ`.
+/// The spectra of the npz are the light of the glb: their tristimulus values are what `_XYZ` holds.
 #[test]
 fn spectra_integrate_to_the_tristimulus_radiosity() {
     let mut bake = Bake::new(room("cornell.glb"), settings(2.0));

@@ -1,6 +1,6 @@
 //! A bake that is stopped between rounds and resumed ends with the same bytes; what does not belong is refused.
 
-use haarlight::output::{Exposure, baked_glb, npz};
+use haarlight::output::{Exposure, Writing, baked_glb, npz};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use haarlight::store::container;
@@ -52,7 +52,7 @@ fn files(bake: &Bake) -> [Vec<u8>; 2] {
     let mut arrays = Vec::new();
     let spectra = bake.radiosity_spectra(&baked);
     npz::write_baked(&mut arrays, scene, &baked.surfaces, &spectra).unwrap();
-    let glb = baked_glb(scene, &baked.surfaces, &look).unwrap();
+    let glb = baked_glb(scene, &baked.surfaces, &look, Writing::default()).unwrap();
     [glb.bytes, arrays]
 }
 

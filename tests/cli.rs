@@ -283,6 +283,63 @@ fn time_that_is_up_leaves_a_whole_result_and_code_1() {
     desk.run(&["inspect", "cornell.baked.glb"], 0);
 }
 
+/// The verdict of a bake that was asked for it.
+fn verdict(desk: &Desk, more: &[&str], code: i32) -> Value {
+    let args = [&["bake", "cornell.glb", "--json"], more].concat();
+    serde_json::from_str(&printed(&desk.run(&args, code))).unwrap()
+}
+
+#[test]
+fn a_budget_is_kept_and_its_error_told() {
+    let desk = Desk::new(&["cornell"]);
+    let few = verdict(&desk, &["--vertices", "600"], 1);
+    assert!(few["vertices"].as_u64().unwrap() <= 600, "{few}");
+    assert!(few["vertices"].as_u64().unwrap() > 500, "{few}");
+    assert_eq!(few["verdict"], "exhausted");
+    assert!(few["interpolation_de2000"]["value"].as_f64().unwrap() > 0.5);
+    let small = verdict(&desk, &["--megabytes", "0.05"], 1);
+    let size = desk.read("cornell.baked.glb").len();
+    assert!((30_000..=50_000).contains(&size), "{size}");
+    assert_eq!(small["verdict"], "exhausted");
+    // Less than the room itself is said, and not done.
+    let output = desk.run(
+        &["bake", "cornell.glb", "--error", "4", "--vertices", "9"],
+        1,
+    );
+    assert!(said(&output).contains("not 9"), "{}", said(&output));
+}
+
+#[test]
+fn file_and_pictures_are_shown_alike() {
+    let desk = Desk::new(&["cornell"]);
+    let quick = ["--error", "4", "--log", "log", "--snapshots", "p"];
+    let auto = verdict(&desk, &quick, 0);
+    let glb = gltf::Glb::from_slice(&desk.read("cornell.baked.glb"))
+        .unwrap()
+        .json
+        .into_owned();
+    let json: Value = serde_json::from_slice(&glb).unwrap();
+    let stated = &json["asset"]["extras"]["haarlight"]["exposure"];
+    assert_eq!(stated["scale"], auto["exposure"]["scale"]);
+    let fixed = verdict(&desk, &[&quick[..], &["--exposure", "-2.5"]].concat(), 0);
+    assert!((fixed["ev100"].as_f64().unwrap() + 2.5).abs() < 1e-9);
+    for record in records(&desk.read("log")) {
+        if record["record"] == "snapshots" {
+            assert_eq!(record["exposure"]["scale"], fixed["exposure"]["scale"]);
+        }
+    }
+    let brighter = verdict(&desk, &["--error", "4", "--exposure", "auto+1"], 0);
+    let scale = |v: &Value| v["exposure"]["scale"].as_f64().unwrap();
+    assert!((scale(&brighter) / scale(&auto) - 2.0).abs() < 1e-9);
+    let warm = verdict(&desk, &["--error", "4", "--white-balance", "3000"], 0);
+    assert!(
+        warm["exposure"]["balance"][2][2].as_f64().unwrap() > 1.5,
+        "{warm}"
+    );
+    desk.run(&["bake", "cornell.glb", "--exposure", "bright"], 2);
+    desk.run(&["bake", "cornell.glb", "--white-balance", "-5"], 2);
+}
+
 #[cfg(unix)]
 #[test]
 fn ctrl_c_ends_after_the_round_with_everything_written() {

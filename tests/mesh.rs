@@ -8,7 +8,7 @@ use glam::{DVec3, dvec3};
 use haarlight::audit::{Reference, Report};
 use haarlight::gather::Baked;
 use haarlight::gather::refined::position;
-use haarlight::output::{Exposure, baked_glb};
+use haarlight::output::{Exposure, Writing, baked_glb};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use serde_json::Value;
@@ -164,11 +164,12 @@ fn the_file_has_the_error_that_is_stated() {
     let reference = Reference::new(&bake, 120, 4096, 3);
     let report = Report::of_file(&bake, &baked, &reference);
     let look = Exposure::auto(bake.scene(), &baked.surfaces);
-    let triangles = read_back(
-        &baked_glb(bake.scene(), &baked.surfaces, &look)
-            .unwrap()
-            .bytes,
-    );
+    let writing = Writing {
+        xyz: true,
+        ..Writing::default()
+    };
+    let glb = baked_glb(bake.scene(), &baked.surfaces, &look, writing).unwrap();
+    let triangles = read_back(&glb.bytes);
     let mut compared = 0;
     for seen in &report.seen {
         // The nearest triangle that faces the right way.

@@ -275,19 +275,23 @@ fn exposure_meters_what_the_camera_sees_without_lamps() {
         );
         Exposure::auto(scene, &surfaces)
     };
-    // All of the wall's width is in sight: 99 % lie below 990.
     scene.cameras = vec![camera(5.0)];
     let look = auto(&scene);
-    assert!((look.scale * 990.0 - 1.0).abs() < 0.01, "{look:?}");
     assert!((look.white_luminance() * PI * look.scale - 1.0).abs() < 1e-12);
-    // The brighter half is out of sight: 97 % of the area decide.
+    // A fifth of what is seen may be brighter than .9 of white: of 0 to 1000, what is above 800.
+    assert!(look.scale * 800.0 < 0.91, "{look:?}");
+    assert!(look.compressed.unwrap() < 0.35, "{look:?}");
+    // The darker half is shown brighter.
     scene.cameras = vec![camera(0.0)];
-    let look = auto(&scene);
-    assert!((look.scale * 970.0 - 1.0).abs() < 0.01, "{look:?}");
-    // A large wall that no light reaches changes nothing.
+    let darker = auto(&scene);
+    assert!(
+        (1.2..3.0).contains(&(darker.scale / look.scale)),
+        "{darker:?}"
+    );
+    // A large wall that no light reaches changes nothing, in sight or not.
     let unlit = [DVec3::NEG_Z, DVec3::X * 100.0, DVec3::Y * 100.0];
     add(&mut scene, 1, unlit);
-    assert!((auto(&scene).scale / look.scale - 1.0).abs() < 1e-9);
+    assert!((auto(&scene).scale / darker.scale - 1.0).abs() < 1e-9);
     let dark = lit(&scene, 1, |_, _, _| [0.0; 3]);
     assert_eq!(Exposure::auto(&scene, &dark).scale, 1.0);
 }
@@ -370,7 +374,7 @@ fn a_closed_room_is_seen_from_a_camera_of_our_own() {
     for (name, thin) in [("thin", true), ("thick", false)] {
         let (scene, surfaces) = furnished(thin);
         let look = Exposure::auto(&scene, &surfaces);
-        let camera = camera::own(&scene);
+        let camera = camera::own(&scene).swap_remove(0);
         let picture = Picture::draw(&scene, &surfaces, &camera, &look, Format::default()).unwrap();
         let png = picture.to_png().unwrap();
         let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
@@ -400,7 +404,7 @@ fn a_camera_of_the_file_is_used() {
 #[test]
 fn pictures_are_the_same_on_one_and_two_threads() {
     let (scene, surfaces) = furnished(true);
-    let camera = camera::own(&scene);
+    let camera = camera::own(&scene).swap_remove(0);
     let draw = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -422,7 +426,7 @@ fn pictures_are_the_same_on_one_and_two_threads() {
 #[test]
 fn exr_holds_radiance_by_named_channels() {
     let (scene, surfaces) = furnished(true);
-    let camera = camera::own(&scene);
+    let camera = camera::own(&scene).swap_remove(0);
     let format = Format {
         width: 40,
         height: 30,
@@ -456,7 +460,7 @@ fn exr_holds_radiance_by_named_channels() {
 #[test]
 fn a_broken_mesh_or_format_is_refused() {
     let (scene, mut surfaces) = furnished(true);
-    let camera = camera::own(&scene);
+    let camera = camera::own(&scene).swap_remove(0);
     let bad = Format { width: 0, ..SMALL };
     assert_eq!(
         Picture::draw(&scene, &surfaces, &camera, &Exposure::new(1.0), bad)

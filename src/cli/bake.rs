@@ -1,10 +1,11 @@
 //! `haarlight bake ROOM`: the room back with its light baked in, pictures and a log on the way.
 //!
 //! Rounds until the error asked for, `--time` or Ctrl-C; what there is then is written out whole. The exposure of the
-//! baked room is metered from its own light, whether or not pictures were taken: the same room gives the same bytes.
+//! baked room is metered from its own light, through its cameras, whether or not pictures were taken: the same room gives
+//! the same bytes.
 
 use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
-use super::options::{Common, Reading, Solving};
+use super::options::{Common, Reading, Showing, Solving, Storing, positive};
 use super::results::print;
 use super::snapshots::Snapshots;
 use super::stop::Stop;
@@ -13,7 +14,8 @@ use super::{paths, summary};
 use crate::audit::{Reference, Report};
 use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
-use crate::output::{Exposure, baked_glb, npz};
+use crate::mesh::Limits;
+use crate::output::{BakedGlb, baked_glb, camera, npz, vertices_within};
 use crate::report::Log;
 use crate::scene::Scene;
 use crate::solve::{Bake, Representation, Settings, Verdict};
@@ -28,6 +30,9 @@ use std::time::Instant;
 const PHASES: [&str; 6] = [
     "links", "spectrum", "direct", "balance", "solve", "estimate",
 ];
+/// Pictures of rounds take this share of the time so far at the most, once they have taken [`PICTURES_FREE_S`].
+const PICTURES_SHARE: f64 = 0.1;
+const PICTURES_FREE_S: f64 = 10.0;
 /// Distinguishes the audit's random numbers from the solver's.
 const AUDIT_SEED: u64 = 0x5eed_a0d1;
 /// Paths a point of the audit at the most.
@@ -54,6 +59,18 @@ pub struct BakeArgs {
     /// When to stop.
     #[command(flatten)]
     pub solving: Solving,
+    /// How it is shown.
+    #[command(flatten)]
+    pub showing: Showing,
+    /// How it is stored.
+    #[command(flatten)]
+    pub storing: Storing,
+    /// The baked room has this many vertices at the most, but never fewer than the room itself.
+    #[arg(long, value_name = "N")]
+    pub vertices: Option<usize>,
+    /// The baked room takes about this many megabytes (1e6 bytes) at the most, but never fewer than the room itself.
+    #[arg(long, value_name = "MB", value_parser = positive)]
+    pub megabytes: Option<f64>,
     /// JSON lines: plan, rounds, verdict.
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
@@ -108,10 +125,14 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         ..Seconds::default()
     };
 
-    let mut snapshots = args
+    let clock = Instant::now();
+    talk.phase("preparing");
+    let cameras = camera::cameras(&scene);
+    seconds.prepare = clock.elapsed().as_secs_f64();
+    let snapshots = args
         .snapshots
         .as_deref()
-        .map(|folder| Snapshots::new(folder, &scene))
+        .map(|folder| Snapshots::new(folder, &cameras))
         .transpose()?;
     let mut log = args.log.as_deref().map(Log::create).transpose()?;
     let mut outputs = Outputs {
@@ -120,7 +141,6 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     };
 
     let clock = Instant::now();
-    talk.phase("preparing");
     let mut bake = prepare(scene, &args.solving, common, args.spectrum, &talk);
     if cache.is_some() {
         bake.keep();
@@ -134,30 +154,36 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         let rounds = bake.rounds().len();
         talk.say(&format!("going on after round {rounds} of {}", text(path)));
     }
-    seconds.prepare = clock.elapsed().as_secs_f64();
+    seconds.prepare += clock.elapsed().as_secs_f64();
 
+    // Seconds that pictures of the result will take: as long as those of the last round.
+    let mut drawing = 0.0;
     let verdict = stop.run(&mut bake, &talk, |bake, round| {
         seconds.solve += round.round_s;
         write(&mut log, round)?;
         if let Some(path) = &args.checkpoint {
             bake.save(path)?;
         }
-        if let Some(snapshots) = &mut snapshots {
+        let affordable = PICTURES_SHARE * stop.elapsed_s().max(PICTURES_FREE_S / PICTURES_SHARE);
+        if let Some(snapshots) = snapshots
+            .as_ref()
+            .filter(|_| seconds.snapshots <= affordable)
+        {
             let clock = Instant::now();
             let seen = snapshots.seen(bake.scene());
             let light = bake.sketch(&seen, &|done, of| talk.progress("gathering", done, of));
             talk.phase("drawing");
-            let files = snapshots.pictures(
-                &format!("round-{:02}", round.round),
-                bake.scene(),
-                &light.surfaces,
-            )?;
-            let exposure = snapshots.exposure(bake.scene(), &light.surfaces);
+            let drawn = Instant::now();
+            let (scene, surfaces) = (bake.scene(), &light.surfaces);
+            let exposure = args.showing.of(scene, surfaces, &cameras);
+            let start = format!("round-{:02}", round.round);
+            let files = snapshots.pictures(&start, scene, surfaces, &exposure)?;
             write(
                 &mut log,
                 &SnapshotsRecord::new(round.round, &files, exposure),
             )?;
             outputs.pictures.extend(files);
+            drawing = drawn.elapsed().as_secs_f64();
             seconds.snapshots += clock.elapsed().as_secs_f64();
         }
         Ok(())
@@ -165,13 +191,19 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
 
     // Pictures on the way are sketches; the result is looked at more closely.
     let clock = Instant::now();
-    let baked = bake.baked(&|done, of| talk.progress("gathering", done, of));
+    let limits = Limits {
+        vertices: most_vertices(args, bake.scene())?,
+        late: &|| stop.is_late(drawing),
+    };
+    let baked = bake.baked_within(&limits, &|done, of| talk.progress("gathering", done, of));
+    let cut_short = stop.is_late(drawing);
     seconds.gather = clock.elapsed().as_secs_f64();
     // An error is reached when the file's is.
     let met = bake
         .error_of(&baked)
         .is_none_or(|e| e <= bake.settings().error);
     let verdict = match verdict {
+        Verdict::Reached if !met && cut_short => stop.reason().unwrap_or(Verdict::Exhausted),
         Verdict::Reached if !met => Verdict::Exhausted,
         verdict => verdict,
     };
@@ -179,9 +211,10 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let clock = Instant::now();
     talk.phase("writing");
     let (scene, room) = (bake.scene(), Some(args.room.as_path()));
-    let exposure = Exposure::auto(scene, &baked.surfaces);
-    let glb = baked_glb(scene, &baked.surfaces, &exposure)?;
+    let exposure = args.showing.of(scene, &baked.surfaces, &cameras);
+    let glb = baked_glb(scene, &baked.surfaces, &exposure, args.storing.writing())?;
     glb.warnings.iter().for_each(|w| talk.warn(w));
+    over_budget(args, &glb).iter().for_each(|w| talk.warn(w));
     file::write_atomic(&output, room, |w| w.write_all(&glb.bytes))?;
     outputs.glb = text(&output);
     if let Some(path) = &args.npz {
@@ -199,11 +232,10 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
             Err(error) => uncached = Some(error),
         }
     }
-    if let Some(snapshots) = &mut snapshots {
-        outputs
-            .pictures
-            .extend(snapshots.pictures("final", scene, &baked.surfaces)?);
-        outputs.exr = snapshots.exr(scene, &baked.surfaces)?;
+    if let Some(snapshots) = &snapshots {
+        let (files, exr) = snapshots.results(scene, &baked.surfaces, &exposure)?;
+        outputs.pictures.extend(files);
+        outputs.exr = exr;
     }
     seconds.write = clock.elapsed().as_secs_f64();
 
@@ -242,6 +274,29 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         print(&(line + "\n"))?;
     }
     uncached.map_or(Ok(exit_code(verdict)), Err)
+}
+
+/// Vertices that the budget allows.
+fn most_vertices(args: &BakeArgs, scene: &Scene) -> Result<Option<usize>> {
+    let of_bytes = args
+        .megabytes
+        .map(|mb| vertices_within(scene, (mb * 1e6) as usize, args.storing.writing()))
+        .transpose()?;
+    Ok(args.vertices.into_iter().chain(of_bytes).min())
+}
+
+/// What to say of a file that is larger than its budget.
+fn over_budget(args: &BakeArgs, glb: &BakedGlb) -> Vec<String> {
+    let mb = glb.bytes.len() as f64 / 1e6;
+    let vertices = args.vertices.filter(|most| glb.vertices > *most);
+    let megabytes = args.megabytes.filter(|most| mb > *most);
+    let of_vertices = vertices.map(|most| {
+        let count = glb.vertices;
+        format!("the baked room has {count} vertices and not {most}: the room itself needs as many")
+    });
+    let of_bytes =
+        megabytes.map(|most| format!("the baked room takes {mb:.2} MB, more than {most}"));
+    of_vertices.into_iter().chain(of_bytes).collect()
 }
 
 fn megabytes(bytes: u64) -> f64 {
@@ -296,11 +351,11 @@ pub(super) fn prepare(
         ..Settings::default()
     };
     let mut bake = Bake::new(scene, settings);
-    let bar = talk.watch();
+    let parts = talk.parts();
     bake.watch(Arc::new(move |ended| {
         let place = PHASES.iter().position(|phase| *phase == ended);
         let next = place.and_then(|k| PHASES.get(k + 1)).unwrap_or(&"");
-        bar.set_message(*next);
+        parts.begins("round", next);
     }));
     bake
 }

@@ -48,8 +48,8 @@
 //! | `row_sum_defect`, `row_sum_defect_after` | 1 | distance of row sums from what each leaf looks out on: mean by area and greatest, before and after balancing |
 //!
 //! After a round with `--snapshots`, `{"record": "snapshots", ...}` ([`SnapshotsRecord`]): `round`, `files`,
-//! `exposure.scale` (display value for each lm/m2; metered in the first round and kept, so that pictures differ by their
-//! light alone).
+//! `exposure`, metered in this round: `scale` (display value for each lm/m2), `balance` (white balance, a matrix on linear
+//! sRGB), `compressed` (share of what the cameras see, lamps left out, that the curve towards white makes darker).
 //!
 //! With `--audit N`, `{"record": "audit", ...}` ([`Report`](crate::audit::Report)), of light as a viewer draws it, interpolated
 //! between vertices:
@@ -155,7 +155,7 @@ pub struct SnapshotsRecord<'a> {
     pub round: usize,
     /// Paths.
     pub files: &'a [String],
-    /// Exposure of all pictures of the run.
+    /// Exposure of the pictures.
     pub exposure: Exposure,
 }
 
@@ -193,7 +193,7 @@ pub struct Outputs {
 pub struct Seconds {
     /// Reading the room.
     pub load: f64,
-    /// Hierarchy and ray index.
+    /// Cameras, hierarchy and ray index.
     pub prepare: f64,
     /// Rounds.
     pub solve: f64,
@@ -241,9 +241,13 @@ pub struct VerdictRecord {
     pub covered: usize,
     /// Triangles that wanted to be finer when the limits were met.
     pub capped: usize,
-    /// Vertices whose COLOR_0 had to be clipped into [0, 1].
+    /// Vertices that were beyond white or outside of sRGB before the curve.
     pub clipped: usize,
-    /// Exposure of COLOR_0: display value for each lm/m2.
+    /// Vertices that the curve towards white made darker.
+    pub compressed: usize,
+    /// Exposure value of COLOR_0 for ISO 100.
+    pub ev100: f64,
+    /// Exposure of COLOR_0 and of the last pictures.
     pub exposure: Exposure,
     /// Tristimulus irradiance of the adaptation white, lm/m2.
     pub white: [f64; 3],
@@ -310,6 +314,8 @@ impl VerdictRecord {
             covered: end.baked.covered,
             capped: end.baked.capped,
             clipped: end.glb.clipped,
+            compressed: end.glb.compressed,
+            ev100: end.exposure.ev(),
             exposure: end.exposure,
             white: end.bake.light().white,
             rays,

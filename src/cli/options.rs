@@ -1,6 +1,8 @@
 //! Options that several commands share, as typed and as meant.
 
-use crate::scene::Options;
+use crate::gather::BakedSurface;
+use crate::output::{Balance, Brightness, Exposure, Packing, Writing};
+use crate::scene::{Camera, Options, Scene};
 use crate::spectrum::{Grid, LEAVES};
 use crate::survey::Wishes;
 use std::num::NonZeroUsize;
@@ -75,10 +77,54 @@ pub struct Solving {
     /// Mean colour difference (CIEDE2000) at which to stop.
     #[arg(long, value_name = "DE", default_value_t = 0.5, value_parser = positive)]
     pub error: f64,
-    /// Begin no round that would end after this many seconds [default: no limit]. The first round is always done;
-    /// the final gather and the writing of files come on top.
+    /// Take about this many seconds in all, with gather, pictures and writing [default: no limit]. The first round is always
+    /// done.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub time: Option<f64>,
+}
+
+/// How the room is shown, in the file and in pictures.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
+pub struct Showing {
+    /// How bright: auto (what a person in the room adapts to), auto+1 (a stop brighter) or an exposure value for ISO 100.
+    #[arg(long, value_name = "EV", default_value_t, allow_hyphen_values = true)]
+    pub exposure: Brightness,
+    /// Which light shows as white: none (D65, colours as they are), auto (the room's) or a colour temperature, K.
+    #[arg(long, value_name = "KELVIN", default_value_t)]
+    pub white_balance: Balance,
+}
+
+impl Showing {
+    /// The exposure of a room, metered through its cameras.
+    pub(super) fn of(
+        self,
+        scene: &Scene,
+        surfaces: &[BakedSurface],
+        cameras: &[Camera],
+    ) -> Exposure {
+        Exposure::metered(scene, surfaces, cameras, self.exposure, self.white_balance)
+    }
+}
+
+/// What is written for each vertex, and how.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
+pub struct Storing {
+    /// Keep the tristimulus radiosity of every vertex in the baked room, as the attribute _XYZ: lm/m2, not clipped.
+    #[arg(long)]
+    pub xyz: bool,
+    /// How the baked room's numbers are stored: none (floats), quantize (8 and 16 bits, KHR_mesh_quantization) or meshopt
+    /// (these, packed: EXT_meshopt_compression).
+    #[arg(long, value_name = "HOW", default_value_t)]
+    pub compress: Packing,
+}
+
+impl Storing {
+    pub(super) fn writing(self) -> Writing {
+        Writing {
+            xyz: self.xyz,
+            packing: self.compress,
+        }
+    }
 }
 
 /// A range of wavelengths, typed as `380..780`.

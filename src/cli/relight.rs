@@ -14,13 +14,13 @@
 //! | `glb`, `vertices`, `triangles`, `exposure`, `white` | | as in the verdict of a bake |
 
 use super::bake::{load, text, write_npz};
-use super::options::{Common, Reading};
+use super::options::{Common, Reading, Showing, Storing};
 use super::paths;
 use super::results::print;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::keep::{Relighter, RelitRecord};
-use crate::output::{Exposure, baked_glb};
+use crate::output::{Exposure, baked_glb, camera};
 use crate::solve::record::LOG_VERSION;
 use crate::store::file;
 use serde::Serialize;
@@ -46,6 +46,12 @@ pub struct RelightArgs {
     /// What to read.
     #[command(flatten)]
     pub reading: Reading,
+    /// How it is shown.
+    #[command(flatten)]
+    pub showing: Showing,
+    /// How it is stored.
+    #[command(flatten)]
+    pub storing: Storing,
     /// Positions, normals and spectra of all vertices for NumPy.
     #[arg(long, value_name = "FILE")]
     pub npz: Option<PathBuf>,
@@ -104,8 +110,14 @@ pub fn run(args: &RelightArgs, common: &Common) -> Result<u8> {
     let clock = Instant::now();
     talk.phase("writing");
     let (bake, baked) = (room.bake(), &relit.baked);
-    let exposure = Exposure::auto(bake.scene(), &baked.surfaces);
-    let glb = baked_glb(bake.scene(), &baked.surfaces, &exposure)?;
+    let cameras = camera::cameras(bake.scene());
+    let exposure = args.showing.of(bake.scene(), &baked.surfaces, &cameras);
+    let glb = baked_glb(
+        bake.scene(),
+        &baked.surfaces,
+        &exposure,
+        args.storing.writing(),
+    )?;
     glb.warnings.iter().for_each(|w| talk.warn(w));
     file::write_atomic(&output, Some(&args.room), |w| w.write_all(&glb.bytes))?;
     if let Some(path) = &args.npz {

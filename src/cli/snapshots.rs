@@ -1,13 +1,12 @@
 //! Pictures of a bake: after every round a PNG from each camera (`round-03-NAME.png`), at the end one EXR each
 //! (`final-NAME.exr`).
 //!
-//! The exposure is metered in the first round and kept: pictures of a run differ by their light alone. The EXR is not
-//! exposed at all (cd/m2).
+//! The pictures of a round are exposed for its light, those of the result as the file. The EXR is not exposed at all (cd/m2).
 
 use super::paths::file_names;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
-use crate::output::{Exposure, Format, Picture, camera, exr, picture};
+use crate::output::{Exposure, Format, Picture, exr, picture};
 use crate::scene::{Camera, Scene};
 use crate::store::file;
 use std::path::{Path, PathBuf};
@@ -20,19 +19,16 @@ pub(super) struct Snapshots {
     folder: PathBuf,
     /// Cameras with their file names.
     cameras: Vec<(String, Camera)>,
-    exposure: Option<Exposure>,
 }
 
 impl Snapshots {
     /// Makes the folder.
-    pub(super) fn new(folder: &Path, scene: &Scene) -> Result<Self> {
+    pub(super) fn new(folder: &Path, cameras: &[Camera]) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(|problem| Error::io(folder, problem))?;
-        let cameras = camera::cameras(scene);
         let names = file_names(cameras.iter().map(|c| c.name.as_str()));
         Ok(Self {
             folder: folder.to_owned(),
-            cameras: names.into_iter().zip(cameras).collect(),
-            exposure: None,
+            cameras: names.into_iter().zip(cameras.iter().cloned()).collect(),
         })
     }
 
@@ -42,55 +38,45 @@ impl Snapshots {
         picture::seen(scene, &pictures)
     }
 
-    /// The exposure of all pictures: metered when first asked for.
-    pub(super) fn exposure(&mut self, scene: &Scene, surfaces: &[BakedSurface]) -> Exposure {
-        *self
-            .exposure
-            .get_or_insert_with(|| Exposure::auto(scene, surfaces))
-    }
-
-    /// Pictures of a round, or of the `final` mesh; the paths.
+    /// Pictures of a round; the paths.
     pub(super) fn pictures(
-        &mut self,
+        &self,
         start: &str,
         scene: &Scene,
         surfaces: &[BakedSurface],
+        look: &Exposure,
     ) -> Result<Vec<String>> {
-        let look = self.exposure(scene, surfaces);
-        self.each(start, "png", scene, |camera| {
-            Picture::draw(scene, surfaces, camera, &look, format(camera))?.to_png()
-        })
+        let draw = |(name, camera): &(String, Camera)| {
+            let picture = Picture::draw(scene, surfaces, camera, look, format(camera))?;
+            self.write(&format!("{start}-{name}.png"), scene, &picture.to_png()?)
+        };
+        self.cameras.iter().map(draw).collect()
     }
 
-    /// The EXRs of the final mesh; the paths.
-    pub(super) fn exr(&mut self, scene: &Scene, surfaces: &[BakedSurface]) -> Result<Vec<String>> {
-        let look = self.exposure(scene, surfaces);
-        self.each("final", "exr", scene, |camera| {
-            exr::to_exr(&Picture::draw(
-                scene,
-                surfaces,
-                camera,
-                &look,
-                format(camera),
-            )?)
-        })
-    }
-
-    fn each(
+    /// PNGs and EXRs of the final mesh; their paths.
+    pub(super) fn results(
         &self,
-        start: &str,
-        end: &str,
         scene: &Scene,
-        draw: impl Fn(&Camera) -> Result<Vec<u8>>,
-    ) -> Result<Vec<String>> {
-        let mut paths = Vec::new();
+        surfaces: &[BakedSurface],
+        look: &Exposure,
+    ) -> Result<(Vec<String>, Vec<String>)> {
+        let (mut shown, mut measured) = (Vec::new(), Vec::new());
         for (name, camera) in &self.cameras {
-            let path = self.folder.join(format!("{start}-{name}.{end}"));
-            let bytes = draw(camera)?;
-            file::write_atomic(&path, Some(&scene.source.path), |w| w.write_all(&bytes))?;
-            paths.push(path.display().to_string());
+            let picture = Picture::draw(scene, surfaces, camera, look, format(camera))?;
+            shown.push(self.write(&format!("final-{name}.png"), scene, &picture.to_png()?)?);
+            measured.push(self.write(
+                &format!("final-{name}.exr"),
+                scene,
+                &exr::to_exr(&picture)?,
+            )?);
         }
-        Ok(paths)
+        Ok((shown, measured))
+    }
+
+    fn write(&self, name: &str, scene: &Scene, bytes: &[u8]) -> Result<String> {
+        let path = self.folder.join(name);
+        file::write_atomic(&path, Some(&scene.source.path), |w| w.write_all(bytes))?;
+        Ok(path.display().to_string())
     }
 }
 

@@ -1,17 +1,25 @@
 //! When to stop early: Ctrl-C, and the time given.
 //!
 //! The first Ctrl-C asks for an end after the current round, with everything written; the second ends the program at
-//! once with code 130 (128 + SIGINT), which may leave hidden temporary files.
+//! once with code 130 (128 + SIGINT), which may leave hidden temporary files. The gather that follows the rounds ends in
+//! time as well: what it did not come to shows the solved light as it is.
 
 use super::talk::{Talk, tell};
 use crate::error::{Error, Result};
 use crate::solve::{Bake, Round, Verdict};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// What the second Ctrl-C exits with.
 const KILLED: i32 = 130;
+
+/// Share of the time given after which no round may end: the gather takes as long as the rounds, as a rule.
+const ROUNDS: f64 = 0.45;
+/// Share of the time given by which the gather ends: measuring what came of it and writing take the rest.
+const GATHER: f64 = 0.85;
+/// After Ctrl-C the gather may take so many seconds or this share of the time before, whichever is more.
+const AFTER: (f64, f64) = (3.0, 0.06);
 
 /// What may end a bake before its error is reached.
 #[derive(Debug, Clone)]
@@ -19,7 +27,8 @@ pub struct Stop {
     started: Instant,
     /// Seconds from the start.
     time: Option<f64>,
-    interrupted: Arc<AtomicBool>,
+    /// Milliseconds from the start to Ctrl-C, and one; 0: there was none.
+    interrupted: Arc<AtomicU64>,
 }
 
 impl Stop {
@@ -37,9 +46,11 @@ impl Stop {
     /// # Errors
     /// The system refuses the handler.
     pub fn listen(&self) -> Result<()> {
-        let interrupted = Arc::clone(&self.interrupted);
+        let (interrupted, started) = (Arc::clone(&self.interrupted), self.started);
         ctrlc::set_handler(move || {
-            if interrupted.swap(true, Ordering::SeqCst) {
+            // Half a thousand million years of milliseconds fit.
+            let now = started.elapsed().as_millis() as u64 + 1;
+            if interrupted.swap(now, Ordering::SeqCst) > 0 {
                 std::process::exit(KILLED);
             }
             tell("\nending after this round; Ctrl-C again ends at once");
@@ -52,6 +63,29 @@ impl Stop {
         self.started.elapsed().as_secs_f64()
     }
 
+    /// Seconds from the start to Ctrl-C.
+    fn interrupted_s(&self) -> Option<f64> {
+        let at = self.interrupted.load(Ordering::SeqCst).checked_sub(1)?;
+        Some(1e-3 * at as f64)
+    }
+
+    /// Must the gather end? `ahead`: seconds that are needed after it.
+    pub fn is_late(&self, ahead: f64) -> bool {
+        let now = self.elapsed_s();
+        let (least, share) = AFTER;
+        let interrupted = self.interrupted_s();
+        self.time.is_some_and(|time| now > GATHER * time - ahead)
+            || interrupted.is_some_and(|at| now > at + (share * at).max(least))
+    }
+
+    /// Why nothing more should be done, if there is a reason.
+    pub fn reason(&self) -> Option<Verdict> {
+        match self.interrupted_s() {
+            Some(_) => Some(Verdict::Interrupted),
+            None => self.time.map(|_| Verdict::OutOfTime),
+        }
+    }
+
     /// Should a bake that has done rounds do no further one?
     fn late(&self, rounds: &[Round]) -> Option<Verdict> {
         (!rounds.is_empty()).then(|| self.verdict(rounds)).flatten()
@@ -59,11 +93,13 @@ impl Stop {
 
     /// Should no further round begin?
     fn verdict(&self, rounds: &[Round]) -> Option<Verdict> {
-        if self.interrupted.load(Ordering::SeqCst) {
+        if self.interrupted_s().is_some() {
             return Some(Verdict::Interrupted);
         }
         let next = rounds.last().map_or(0.0, |r| r.next_round_s);
-        let late = self.time.is_some_and(|time| self.elapsed_s() + next > time);
+        let late = self
+            .time
+            .is_some_and(|time| self.elapsed_s() + next > ROUNDS * time);
         late.then_some(Verdict::OutOfTime)
     }
 
@@ -128,7 +164,7 @@ mod tests {
     fn an_interrupt_goes_before_the_time() {
         let stop = Stop::new(Some(1e-9));
         assert_eq!(stop.verdict(&[]), Some(Verdict::OutOfTime));
-        stop.interrupted.store(true, Ordering::SeqCst);
+        stop.interrupted.store(1, Ordering::SeqCst);
         assert_eq!(stop.verdict(&[]), Some(Verdict::Interrupted));
         assert_eq!(Stop::new(None).verdict(&[]), None);
     }

@@ -61,7 +61,7 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
             v.asked_de2000
         ),
         format!(
-            "{} vertices ({} covered, {} clipped), {} triangles; {:.0} rays/s, {:.0} links/s",
+            "{} vertices ({} covered, {} beyond white), {} triangles; {:.0} rays/s, {:.0} links/s",
             v.vertices, v.covered, v.clipped, v.triangles, v.rays_per_s, v.links_per_s
         ),
         format!(

@@ -1,4 +1,5 @@
-//! What is said on stderr while a command works: lines, and a bar or spinner where stderr is a terminal.
+//! What is said on stderr while a command works: lines, and a bar or spinner where stderr is a terminal. Where it is none,
+//! a line tells what is being done whenever nothing else was said for some seconds.
 //!
 //! Nothing here changes what is computed; `--quiet` silences all of it, but warnings are counted, and logs have them. Where
 //! nobody listens any more (a closed pipe) the work goes on.
@@ -6,10 +7,16 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::Cell;
 use std::io::{IsTerminal, Write};
-use std::time::Duration;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 /// How often a spinner turns.
 const TICK: Duration = Duration::from_millis(120);
+
+/// Silence after which a line is said where there is no terminal.
+const SILENCE: Duration = Duration::from_secs(5);
 
 /// The voice of a command.
 #[derive(Debug)]
@@ -17,6 +24,64 @@ pub struct Talk {
     quiet: bool,
     bar: ProgressBar,
     warned: Cell<usize>,
+    work: Work,
+    /// Tells of the work where there is no terminal, until the sender goes.
+    teller: Option<(Sender<()>, JoinHandle<()>)>,
+}
+
+/// What is being done, and when something was last said.
+#[derive(Debug, Clone)]
+struct Work(Arc<Mutex<(String, Instant)>>);
+
+impl Work {
+    fn begins(&self, name: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).0 = name;
+    }
+
+    fn said(&self) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).1 = Instant::now();
+    }
+
+    /// What to say, if nothing was for a while.
+    fn line(&self) -> Option<String> {
+        let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if work.1.elapsed() < SILENCE || work.0.is_empty() {
+            return None;
+        }
+        work.1 = Instant::now();
+        Some(work.0.clone())
+    }
+
+    fn tell_of(self) -> (Sender<()>, JoinHandle<()>) {
+        let (alive, gone) = channel();
+        let started = Instant::now();
+        let teller = std::thread::spawn(move || {
+            while gone.recv_timeout(SILENCE / 5) == Err(RecvTimeoutError::Timeout) {
+                if let Some(line) = self.line() {
+                    tell(&format!(
+                        "  {line} ({:.0} s)",
+                        started.elapsed().as_secs_f64()
+                    ));
+                }
+            }
+        });
+        (alive, teller)
+    }
+}
+
+/// Says which part of a phase begins.
+#[derive(Debug, Clone)]
+pub struct Parts {
+    bar: ProgressBar,
+    work: Work,
+}
+
+impl Parts {
+    /// A part begins.
+    pub fn begins(&self, phase: &str, part: &'static str) {
+        self.bar.set_message(part);
+        self.work.begins(format!("{phase}: {part}"));
+    }
 }
 
 /// A line on stderr; that nobody reads it is no fault.
@@ -32,10 +97,14 @@ impl Talk {
         } else {
             ProgressBar::no_length()
         };
+        let work = Work(Arc::new(Mutex::new((String::new(), Instant::now()))));
+        let mute = !quiet && bar.is_hidden();
         Self {
             quiet,
             bar,
             warned: Cell::new(0),
+            teller: mute.then(|| work.clone().tell_of()),
+            work,
         }
     }
 
@@ -43,6 +112,7 @@ impl Talk {
     pub fn say(&self, line: &str) {
         if !self.quiet {
             self.bar.suspend(|| tell(line));
+            self.work.said();
         }
     }
 
@@ -68,13 +138,22 @@ impl Talk {
 
     /// A phase of unknown length begins.
     pub fn phase(&self, name: &str) {
-        let bar = self.watch();
-        bar.set_prefix(name.to_owned());
-        bar.set_message("");
+        self.work.begins(name.to_owned());
+        self.spin();
+        self.bar.set_prefix(name.to_owned());
+        self.bar.set_message("");
     }
 
-    /// The spinner, to be handed to whoever knows the phases.
-    pub fn watch(&self) -> ProgressBar {
+    /// For whoever knows the parts of phases.
+    pub fn parts(&self) -> Parts {
+        self.spin();
+        Parts {
+            bar: self.bar.clone(),
+            work: self.work.clone(),
+        }
+    }
+
+    fn spin(&self) {
         if !self.bar.is_hidden() {
             // The templates are constants: they parse.
             if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix} {msg} {elapsed}") {
@@ -82,11 +161,11 @@ impl Talk {
             }
             self.bar.enable_steady_tick(TICK);
         }
-        self.bar.clone()
     }
 
     /// `done` of `of` things of the phase `name` are done.
     pub fn progress(&self, name: &str, done: usize, of: usize) {
+        self.work.begins(format!("{name}: {done} of {of}"));
         if self.bar.is_hidden() {
             return;
         }
@@ -104,11 +183,17 @@ impl Talk {
     /// The bar goes.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
+        self.work.begins(String::new());
     }
 }
 
 impl Drop for Talk {
     fn drop(&mut self) {
         self.clear();
+        if let Some((alive, teller)) = self.teller.take() {
+            drop(alive);
+            // It only waits and writes.
+            let _ = teller.join();
+        }
     }
 }

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::gather::{BakedSurface, BakedVertex};
 use crate::scene::{Scene, Surface};
 use glam::{DVec3, Vec3};
+use std::collections::HashMap;
 
 /// Checks that every index of a refined mesh points at something and that every number is one.
 ///
@@ -92,6 +93,26 @@ pub fn normal(surface: &Surface, baked: &BakedSurface, vertex: &BakedVertex) -> 
         .or(flat.try_normalize())
         .unwrap_or(DVec3::Y);
     if baked.back { -front } else { front }
+}
+
+/// Unit normals of the sheet itself at its vertices, out of the side that it shows: means over the triangles that meet at a
+/// place, by area, so that equal places have equal ones. Zero where they cancel.
+pub fn outward(surface: &Surface, baked: &BakedSurface) -> Vec<DVec3> {
+    // Adding zero turns -0 into +0.
+    let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+    let places: Vec<DVec3> = (baked.vertices.iter())
+        .map(|v| position(surface, v))
+        .collect();
+    let mut sums: HashMap<[u64; 3], DVec3> = HashMap::new();
+    for triangle in &baked.triangles {
+        let [a, b, c] = triangle.map(|v| places[v as usize]);
+        let normal = (b - a).cross(c - a);
+        for p in [a, b, c] {
+            *sums.entry(key(p)).or_default() += normal;
+        }
+    }
+    let sum = |p: &DVec3| sums.get(&key(*p)).copied().unwrap_or_default();
+    places.iter().map(|p| sum(p).normalize_or_zero()).collect()
 }
 
 /// Interpolates four-component vertex data; vertices beyond its end count as `missing`.

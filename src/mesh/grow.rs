@@ -31,6 +31,11 @@ const COVERED: f64 = 0.25;
 /// Corners this far apart let expect this much of it between them, where nothing is known yet.
 const RANGE: f64 = 0.1;
 
+/// Vertices that splitting one triangle may take, its neighbours' included: as measured, 1 to 5.
+const SPLIT: usize = 8;
+/// A limit of vertices counts as met where less than this part of it is left.
+const FULL: usize = 64;
+
 /// Light at the corners of a cell, mean square of what the solved light differs by, and its worst place.
 type Told = ([[f64; 3]; 3], f64, Option<(Hint, f64)>);
 /// Looks in the middles of edges and inside, and weights of the corners there.
@@ -52,6 +57,8 @@ pub(super) struct Growth<'a> {
     smallest: f64,
     /// Vertices at the most.
     pub(super) most: usize,
+    /// Is that a limit, or about right?
+    pub(super) strict: bool,
     /// Mean square of the input's triangles until something is known of them: what the output may have.
     pub(super) unknown: f64,
     /// Variance of a look, by chance.
@@ -69,6 +76,8 @@ pub(super) enum End {
     Smallest,
     /// There are as many vertices as are allowed.
     Most,
+    /// There is no time left.
+    Late,
 }
 
 impl<'a> Growth<'a> {
@@ -82,6 +91,7 @@ impl<'a> Growth<'a> {
             white,
             smallest: SMALLEST * half_size,
             most: usize::MAX,
+            strict: false,
             unknown: 0.0,
             noise: 0.0,
             looking: true,
@@ -280,10 +290,20 @@ impl<'a> Growth<'a> {
             if excess <= 0.0 {
                 return End::Reached;
             }
-            if self.used() > self.most {
+            if self.looking && self.looks.is_late() {
+                return End::Late;
+            }
+            let left = self.most.saturating_sub(self.used());
+            let batch = if self.strict {
+                left / SPLIT
+            } else {
+                usize::MAX
+            };
+            if left == 0 || batch < self.most / (SPLIT * FULL) {
                 return End::Most;
             }
-            let picked = self.pick(excess);
+            let mut picked = self.pick(excess);
+            picked.truncate(batch);
             if picked.is_empty() {
                 return End::Smallest;
             }

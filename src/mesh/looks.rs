@@ -34,6 +34,10 @@ type Key = ([i64; 6], (u32, bool), bool);
 pub(super) struct Looks<'a> {
     bake: &'a Bake,
     care: Care,
+    /// Is it time to end?
+    late: &'a (dyn Fn() -> bool + Sync),
+    /// Is everything looked at all the same?
+    pub(super) patient: bool,
     /// Is the light of the leaves taken as it is?
     pub(super) believing: bool,
     spaces: Vec<(u32, bool)>,
@@ -45,10 +49,17 @@ pub(super) struct Looks<'a> {
 }
 
 impl<'a> Looks<'a> {
-    pub(super) fn new(bake: &'a Bake, spaces: Vec<(u32, bool)>, care: Care) -> Self {
+    pub(super) fn new(
+        bake: &'a Bake,
+        spaces: Vec<(u32, bool)>,
+        care: Care,
+        late: &'a (dyn Fn() -> bool + Sync),
+    ) -> Self {
         Self {
             bake,
             care,
+            late,
+            patient: false,
             believing: false,
             spaces,
             known: HashMap::new(),
@@ -83,11 +94,15 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// Asks for a vertex once more, with a pattern of rays of its own; the number of the look.
+    /// Asks for a vertex once more, with a pattern of rays of its own, to be looked at in any case; the number of the look.
     pub(super) fn again(&mut self, vertex: &Vertex, surface: usize, back: bool, seed: u64) -> u32 {
         let to = self.bake.receiver(vertex, surface, back);
-        self.places.push((Receiver { seed, ..to }, self.believing));
+        self.places.push((Receiver { seed, ..to }, false));
         self.places.len() as u32 - 1
+    }
+
+    pub(super) fn is_late(&self) -> bool {
+        (self.late)()
     }
 
     /// What was seen.
@@ -108,8 +123,9 @@ impl<'a> Looks<'a> {
             let done = self.seen.len();
             progress(done - first, wanted);
             let end = self.places.len().min(done + PART);
+            let late = self.is_late() && !self.patient;
             let (believed, open): (Vec<usize>, Vec<usize>) =
-                (done..end).partition(|&k| self.places[k].1);
+                (done..end).partition(|&k| late || self.places[k].1);
             self.seen.resize_with(end, || None);
             for k in believed {
                 self.seen[k] = self.told(&self.places[k].0);

@@ -62,7 +62,10 @@ impl Growth<'_> {
         turn: u64,
         progress: &dyn Fn(usize, usize),
     ) -> Vec<Sample> {
-        let count = (self.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]);
+        let count = match self.looks.is_late() {
+            true => POINTS[0],
+            false => (self.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]),
+        };
         let whole: f64 = self.cells.all.iter().map(|c| c.area).sum();
         if whole <= 0.0 {
             return Vec::new();
@@ -91,7 +94,10 @@ impl Growth<'_> {
             };
             asked.push((cell, weights, [look(0), look(1)]));
         }
+        // However late it is, what is said of the error is measured.
+        self.looks.patient = true;
         self.looks.complete(progress);
+        self.looks.patient = false;
         let white = bake.light().white;
         let difference = |a: [f64; 3], b: [f64; 3]| match a == b || white[1] <= 0.0 {
             true => 0.0,

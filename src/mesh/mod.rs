@@ -31,18 +31,54 @@ const STALLED: f64 = 0.93;
 const BELOW: f64 = 0.8;
 /// And at no less than this part of what it aimed at before.
 const STEP: f64 = 0.2;
-/// Pictures on the way may be off by this many times the error asked for.
+/// Pictures on the way may be off by this many times the error asked for, but by no more than so much: a black floor below
+/// a bright wall is off by 16 in the mean.
 const SKETCH: f64 = 4.0;
+const SKETCH_MOST: f64 = 4.0;
+
+/// What bounds the mesh of the output besides its error.
+pub struct Limits<'a> {
+    /// Vertices at the most; the input's own are kept in any case. None: as many as the error may need.
+    pub vertices: Option<usize>,
+    /// Is it time to end? What is not looked at then shows the solved light as it is.
+    pub late: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Limits<'_> {
+    fn is_late(&self) -> bool {
+        (self.late)()
+    }
+}
+
+impl Default for Limits<'_> {
+    fn default() -> Self {
+        Self {
+            vertices: None,
+            late: &|| false,
+        }
+    }
+}
 
 impl Bake {
     /// The mesh of the output with its light, grown until its interpolation error, measured, is within its share of the
     /// error asked for. `progress` is told (done, of) in looks of the present pass.
     pub fn baked(&self, progress: &dyn Fn(usize, usize)) -> Baked {
-        let mut growth = self.growth(Care::Vertex);
+        self.baked_within(&Limits::default(), progress)
+    }
+
+    /// The same within limits: where they end it, with the error that was come to.
+    pub fn baked_within(&self, limits: &Limits, progress: &dyn Fn(usize, usize)) -> Baked {
+        let mut growth = self.growth(Care::Vertex, limits.late);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
         growth.unknown = allowed * allowed;
         growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;
+        if let Some(vertices) = limits.vertices {
+            (growth.most, growth.strict) = (vertices, true);
+        }
         growth.begin(progress);
+        if limits.is_late() {
+            self.grow_unseen(&mut growth, progress);
+        }
         let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
         let mut aim = allowed * allowed * area;
         let settled = self.settled(&growth);
@@ -63,7 +99,7 @@ impl Bake {
             if has_grown {
                 (size, before) = (growth.cells.all.len(), interpolation);
             }
-            let over = end != End::Reached || turn == MEASURED || stalled;
+            let over = end != End::Reached || turn == MEASURED || stalled || limits.is_late();
             if interpolation.is_met() || over {
                 let capped = growth.unfinished(allowed * allowed);
                 let mut out = self.write_down(growth, settled);
@@ -83,12 +119,10 @@ impl Bake {
     /// # Panics
     /// If `seen` lacks a triangle of the room.
     pub fn sketch(&self, seen: &[Vec<bool>], progress: &dyn Fn(usize, usize)) -> Baked {
-        let mut growth = self.growth(Care::Sketch);
+        let mut growth = self.growth(Care::Sketch, &|| false);
         growth.believe(true);
         growth.begin(progress);
-        let allowed = SKETCH * self.settings().error;
-        let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
-        growth.grow(allowed * allowed * area, progress);
+        self.grow_unseen(&mut growth, progress);
         let wanted = |triangle: u32| {
             let (surface, local) = self.mesh().origin[triangle as usize];
             seen[surface as usize][local as usize]
@@ -99,6 +133,14 @@ impl Bake {
         self.write_down(growth, settled)
     }
 
+    /// Grows as the solved light tells, without looking.
+    fn grow_unseen(&self, growth: &mut Growth, progress: &dyn Fn(usize, usize)) {
+        growth.believe(true);
+        let allowed = (SKETCH * self.settings().error).min(SKETCH_MOST);
+        let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
+        growth.grow(allowed * allowed * area, progress);
+    }
+
     /// Estimated error of a baked mesh, mean CIEDE2000: of light at points as the last round estimates it, and between them as
     /// measured; squares add.
     pub fn error_of(&self, baked: &Baked) -> Option<f64> {
@@ -106,11 +148,11 @@ impl Bake {
         Some(light.hypot(baked.interpolation.map_or(0.0, |i| i.mean)))
     }
 
-    fn growth(&self, care: Care) -> Growth<'_> {
+    fn growth<'a>(&'a self, care: Care, late: &'a (dyn Fn() -> bool + Sync)) -> Growth<'a> {
         let spaces = self.spaces();
         let mut cells = Cells::new(self.scene(), self.mesh(), self.tree(), &spaces);
         hints::give(self, &mut cells);
-        let looks = Looks::new(self, spaces, care);
+        let looks = Looks::new(self, spaces, care, late);
         Growth::new(cells, looks, self.light().white, self.mesh().half_size)
     }
 }

@@ -3,7 +3,7 @@
 //! A view maps a world point to homogeneous pixel coordinates (X, Y, W): the pixel is (X / W, Y / W), y down from the
 //! top; W is the distance along the view for a perspective and 1 for an orthographic projection.
 
-use super::raster;
+use super::viewpoint::{self, Viewpoint};
 use crate::scene::{Camera, Projection, Scene};
 use glam::{DMat4, DVec3};
 
@@ -14,21 +14,12 @@ const NEAR: f64 = 1e-4;
 const INSIDE_VIEW: f64 = 1.2;
 /// The same outside, looking in through an open or culled wall.
 const OUTSIDE_VIEW: f64 = 0.69;
-/// Distance of the inside camera from the walls, as a share of the room.
+/// Distance of a camera in a corner from the walls, as a share of the room.
 const INSET: f64 = 0.08;
-/// Height of the inside camera, as a share of the room's.
+/// Height of a camera in a corner, as a share of the room's.
 const EYE_HEIGHT: f64 = 0.72;
 /// Room left around the opening that an outside camera looks through.
 const MARGIN: f64 = 1.06;
-
-/// Size of the trial pictures that our own camera is chosen by.
-const TRIAL: [usize; 2] = [80, 60];
-/// What a trial from inside counts, against one from outside that sees as much: a view from outside shows the whole room.
-const INSIDE_WEIGHT: f64 = 0.65;
-/// A thing nearer than this share of the room's diagonal stands in the way.
-const TOO_NEAR: f64 = 0.1;
-/// A hit this close behind the room's outer hull (share of the diagonal) is the hull, not the room.
-const HULL: f64 = 0.02;
 
 /// A camera with a picture format.
 #[derive(Debug, Clone)]
@@ -99,55 +90,67 @@ impl View {
     }
 }
 
-/// The file's cameras; one of our own if it has none.
+/// The file's cameras; some of our own if it has none: see [`own`].
 pub fn cameras(scene: &Scene) -> Vec<Camera> {
     if scene.cameras.is_empty() {
-        vec![own(scene)]
+        own(scene)
     } else {
         scene.cameras.clone()
     }
 }
 
-/// A camera of our own: from a corner inside the room, or from outside through a side that is open or whose back faces
-/// are culled, whichever shows more of the room in small trial pictures.
-pub fn own(scene: &Scene) -> Camera {
+/// Cameras of our own: in the largest lit space with a view over it, in further spaces, or outside, looking in through an
+/// open or culled side, if that shows more. At least one; the best comes first.
+pub fn own(scene: &Scene) -> Vec<Camera> {
     let bounds = Bounds::of(scene);
-    let mut best: Option<(f64, Camera)> = None;
-    for (weight, camera) in candidates(&bounds) {
-        let score = weight * room_seen(scene, &camera, &bounds);
-        if best.as_ref().is_none_or(|(most, _)| score > *most) {
-            best = Some((score, camera));
-        }
+    let views = viewpoint::views(scene, INSIDE_VIEW, &candidates(&bounds));
+    let mut cameras: Vec<Camera> = (views.iter().enumerate())
+        .map(|(k, view)| Camera {
+            name: match k {
+                0 => "view".into(),
+                k => format!("view {}", k + 1),
+            },
+            ..looking(view.eye, view.target, view.angle)
+        })
+        .collect();
+    if cameras.is_empty() {
+        let target = bounds.centre();
+        cameras.push(looking(
+            target + bounds.diagonal() * DVec3::Z,
+            target,
+            OUTSIDE_VIEW,
+        ));
     }
-    // There are always candidates.
-    best.map_or_else(
-        || looking(DVec3::Z, DVec3::ZERO, OUTSIDE_VIEW),
-        |(_, camera)| camera,
-    )
+    cameras
 }
 
-/// Cameras to try, with their weights; the first of equals wins, +z (towards the viewer in glTF) before the others.
-fn candidates(bounds: &Bounds) -> Vec<(f64, Camera)> {
+/// Cameras that show a room whatever its light: from outside, +z (towards the viewer in glTF) before the others, and from
+/// the corners.
+fn candidates(bounds: &Bounds) -> Vec<Viewpoint> {
     let (centre, size) = (bounds.centre(), bounds.size());
-    let mut cameras = Vec::new();
+    let mut views = Vec::new();
     for side in [DVec3::Z, DVec3::X, DVec3::NEG_X, DVec3::NEG_Z] {
         let across = if side.x == 0.0 { size.x } else { size.z };
         let tangent = (0.5 * OUTSIDE_VIEW).tan();
         // Far enough that the nearest face of the bounds fits, in a picture of 4 by 3.
         let distance = MARGIN * (0.5 * size.y).max(0.5 * across * 0.75) / tangent;
         let depth = 0.5 * (size * side).length();
-        cameras.push((
-            1.0,
-            looking(centre + side * (depth + distance), centre, OUTSIDE_VIEW),
-        ));
+        views.push(Viewpoint {
+            eye: centre + side * (depth + distance),
+            target: centre,
+            angle: OUTSIDE_VIEW,
+        });
     }
     for (x, z) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
         let offset = DVec3::new(x * (0.5 - INSET), EYE_HEIGHT - 0.5, z * (0.5 - INSET)) * size;
-        // Down a little, to the middle of the floor's half of the room.
-        let target = centre - DVec3::new(0.0, 0.12 * size.y, 0.0);
-        cameras.push((INSIDE_WEIGHT, looking(centre + offset, target, INSIDE_VIEW)));
+        views.push(Viewpoint {
+            eye: centre + offset,
+            // Down a little, to the middle of the floor's half of the room.
+            target: centre - DVec3::new(0.0, 0.12 * size.y, 0.0),
+            angle: INSIDE_VIEW,
+        });
     }
-    cameras
+    views
 }
 
 fn looking(eye: DVec3, target: DVec3, angle: f64) -> Camera {
@@ -165,22 +168,6 @@ fn looking(eye: DVec3, target: DVec3, angle: f64) -> Camera {
         projection: Projection::Perspective(angle),
         aspect: None,
     }
-}
-
-/// Share of a trial picture that shows the inside of the room, not its hull and nothing right before the lens.
-fn room_seen(scene: &Scene, camera: &Camera, bounds: &Bounds) -> f64 {
-    let [width, height] = TRIAL;
-    let view = View::new(scene, camera, width, height);
-    let eye = camera.to_world.w_axis.truncate();
-    let diagonal = bounds.diagonal();
-    let inside = |point: DVec3| {
-        let entry = bounds.entry(eye, point);
-        let distance = (point - eye).length();
-        // From inside there is no entry, and the walls count.
-        distance > TOO_NEAR * diagonal && (entry == 0.0 || distance - entry > HULL * diagonal)
-    };
-    let seen = raster::points(scene, &view, width, height);
-    seen.iter().flatten().filter(|p| inside(**p)).count() as f64 / (width * height) as f64
 }
 
 /// The box around all surfaces.
@@ -220,30 +207,11 @@ impl Bounds {
     fn diagonal(&self) -> f64 {
         self.size().length().max(f64::MIN_POSITIVE)
     }
-
-    /// Distance from `eye` to where the way to `point` enters the box; 0 from inside.
-    fn entry(&self, eye: DVec3, point: DVec3) -> f64 {
-        let way = point - eye;
-        let (a, b) = ((self.low - eye) / way, (self.high - eye) / way);
-        // 0 / 0 on a face of the box is no limit: min and max drop NaN.
-        let near = a.min(b).to_array().into_iter().fold(0.0, f64::max);
-        near * way.length()
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn entry_into_a_box() {
-        let bounds = Bounds {
-            low: DVec3::NEG_ONE,
-            high: DVec3::ONE,
-        };
-        assert_eq!(bounds.entry(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO), 2.0);
-        assert_eq!(bounds.entry(DVec3::ZERO, DVec3::X), 0.0);
-    }
 
     #[test]
     fn our_camera_is_a_right_handed_frame_that_looks_at_its_target() {

@@ -1,188 +1,322 @@
-//! Exposure: which radiosity shows as white, metered from the room.
+//! Exposure: which radiosity shows as white, from what a person in the room adapts to.
 //!
-//! display = scale * radiosity, both linear, radiosity in lm/m2, display white = 1.
-//! The rule: of what does not shine itself, 99 % of what each camera sees and 97 % of the area that light reaches are shown
-//! unclipped, in each of the three channels. What is left over is spots beside lamps and tops of cupboards below them.
-//! Colours are scaled and never bent, so a coloured light (whose strongest channel is well above its luminance) gets a
-//! darker picture than a white one of equal luminance.
-//! The meter reads `light` (radiosity over the paint's texture) and not the radiosity itself: `light` is what COLOR_0
-//! holds, which glTF confines to [0, 1], so a dark texture must not push it out of range. It is the incident-light
-//! metering of photography: a dark wooden room comes out dark.
+//! display = curve(scale * balance * radiosity), all linear, radiosity in lm/m2, display white = 1; see [`curve`](super::curve).
+//!
+//! The level of the room is the mean logarithm over the pixels of small pictures from all cameras. A pixel's reading is the
+//! geometric mean of two that photographers know: what leaves it (a reflected-light meter, which shows white rooms and
+//! dark ones alike, as grey) and what a white surface would send there (an incident-light meter, which leaves a dark room
+//! dark). People judge in between. [`KEY`] is such that a grey of 18 % shows as 18 %, white rooms brighter, dark ones darker.
+//!
+//! Lamps have no vote. Neither has what is more than [`STOPS`] away from the level, found by repetition from the median: sun
+//! patches, spots beside lamps, single wrong vertices, what lies in the dark. As nearly all of what is seen may lie in the
+//! dark, or under a dark texture (COLOR_0 holds light before the texture and ends at 1), the share [`BELOW_WHITE`] of what
+//! is seen is at most [`WHITISH`] in COLOR_0, before the curve.
 
+use super::balance::{Balance, IDENTITY, Matrix};
 use super::camera::{self, View};
+use super::curve;
 use super::raster::{self, Hit, Refined};
+use crate::color::{Xyz, multiply};
+use crate::gather::BakedSurface;
 use crate::gather::refined;
-use crate::gather::{BakedSurface, BakedVertex};
-use crate::scene::{Camera, Scene, Surface};
-use glam::DVec3;
+use crate::scene::{Camera, Scene};
+use std::f64::consts::PI;
+use std::fmt;
+use std::str::FromStr;
 
-/// Share of what each camera sees, lamps left out, that is shown unclipped. Higher: darker pictures, fewer clipped spots.
-const SEEN: f64 = 0.99;
-
-/// The same for the lit area, seen or not: the baked room is walked through. Lower than [`SEEN`], for the brightest
-/// places of a room are small and near the ceiling, where nobody looks.
-const AREA: f64 = 0.97;
-
+/// What the level shows as where everything is white: sqrt(.18), see above.
+const KEY: f64 = 0.424_264;
+/// What is more stops away from the level than this has no vote.
+const STOPS: f64 = 3.0;
+/// How often the level is found anew at the most.
+const TURNS: usize = 16;
+/// Least reflectance that a reading supposes: the logarithm of black is no light level.
+const BLACK: f64 = 0.02;
+/// See above. With 1 for .9 a gallery with pale walls under wall washers lost its bricks (48 % of the picture above the knee).
+const BELOW_WHITE: f64 = 0.8;
+const WHITISH: f64 = 0.9;
+/// Readings below this share of the 95th percentile are of what no light reaches: backs of walls, gaps.
+const UNLIT: f64 = 1e-4;
 /// Size of the trial pictures that are metered.
 const TRIAL: [usize; 2] = [160, 120];
+/// Luminance that a meter shows as grey of 18 % at EV 0 (ISO 100): K / 100 with K = 12.5 cd s/m2 (ISO 2720:1974).
+const EV_0: f64 = 0.125;
+/// That grey.
+const GREY: f64 = 0.18;
 
-/// Area whose reading is below this share of the brightest is unlit: backs of walls, floors under furniture. A room
-/// would be metered by what no light reaches if it counted.
-const UNLIT: f64 = 1e-4;
+/// How bright the room is to be shown. Written `auto`, `auto+1`, `auto-0.5` (stops) or an exposure value for ISO 100.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Brightness {
+    /// As metered, brighter by so many stops.
+    Auto(f64),
+    /// A luminance of 0.125 * 2^EV cd/m2 shows as grey of 18 %.
+    Ev(f64),
+}
 
-/// Luminance weights of linear sRGB (IEC 61966-2-1, ITU-R BT.709 primaries).
-const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+impl Default for Brightness {
+    fn default() -> Self {
+        Self::Auto(0.0)
+    }
+}
+
+impl FromStr for Brightness {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (stops, make): (&str, fn(f64) -> Self) = match text.strip_prefix("auto") {
+            Some("") => return Ok(Self::default()),
+            Some(stops) if stops.starts_with(['+', '-']) => (stops, Self::Auto),
+            Some(_) => ("", Self::Auto),
+            None => (text, Self::Ev),
+        };
+        match stops.parse::<f64>() {
+            Ok(stops) if stops.abs() <= 40.0 => Ok(make(stops)),
+            _ => Err(
+                "auto, auto+1 (a stop brighter) or an exposure value such as 7.5 is wanted".into(),
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Brightness {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Auto(0.0) => f.write_str("auto"),
+            Self::Auto(stops) => write!(f, "auto{stops:+}"),
+            Self::Ev(ev) => write!(f, "{ev}"),
+        }
+    }
+}
 
 /// How radiosity becomes a display value.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Exposure {
-    /// Display value (1 = white) for each lm/m2 of radiosity.
+    /// Display value (1 = white) for each lm/m2 of radiosity, before the curve.
     pub scale: f64,
+    /// White balance: linear sRGB of radiosity to linear sRGB of equal luminance.
+    pub balance: Matrix,
+    /// Share of what the cameras see, lamps left out, that the curve makes darker in COLOR_0; none if it was not metered.
+    pub compressed: Option<f64>,
 }
 
 impl Exposure {
     /// The given factor from radiosity in lm/m2 to display value.
     pub fn new(scale: f64) -> Self {
-        Self { scale }
+        Self {
+            scale,
+            balance: IDENTITY,
+            compressed: None,
+        }
     }
 
-    /// Luminance of a diffuse surface that shows as white, cd/m2.
+    /// Luminance of a diffuse surface that shows as white but for the curve, cd/m2.
     pub fn white_luminance(&self) -> f64 {
-        1.0 / (self.scale * std::f64::consts::PI)
+        1.0 / (self.scale * PI)
     }
 
-    /// Meters the room: see the module's words.
-    ///
-    /// Lamps are left out unless nothing else is lit. A black room gets a scale of 1.
+    /// The exposure value for ISO 100.
+    pub fn ev(&self) -> f64 {
+        (GREY * self.white_luminance() / EV_0).log2()
+    }
+
+    /// What is shown of linear light, lm/m2, before the curve.
+    pub(crate) fn shown(&self, light: [f64; 3]) -> [f64; 3] {
+        let light = light.map(|c| self.scale * c);
+        if self.balance == IDENTITY {
+            light
+        } else {
+            multiply(&self.balance, light)
+        }
+    }
+
+    /// Meters the room as its own cameras see it: see the module's words.
     pub fn auto(scene: &Scene, surfaces: &[BakedSurface]) -> Self {
-        let meshes = Refined { scene, surfaces };
         let cameras = camera::cameras(scene);
-        let level = |lamps| {
-            let seen = cameras
-                .iter()
-                .filter_map(|camera| percentile(seen(&meshes, camera, lamps), SEEN));
-            seen.chain(percentile(areas(&meshes, lamps), AREA))
-                .reduce(f64::max)
+        let (brightness, balance) = (Brightness::default(), Balance::default());
+        Self::metered(scene, surfaces, &cameras, brightness, balance)
+    }
+
+    /// The same through given cameras, as bright and as white as is wished for. A black room gets a scale of 1.
+    pub fn metered(
+        scene: &Scene,
+        surfaces: &[BakedSurface],
+        cameras: &[Camera],
+        brightness: Brightness,
+        balance: Balance,
+    ) -> Self {
+        let meshes = Refined { scene, surfaces };
+        let seen = cameras.iter().flat_map(|camera| seen(&meshes, camera));
+        let (lamps, things): (Vec<Reading>, Vec<Reading>) = seen.partition(|r| r.lamp);
+        let (things, lamps) = (lit(things), lit(lamps));
+        let readings = if things.is_empty() { &lamps } else { &things };
+        let level = Level::of(readings);
+        let balance = level.map_or(IDENTITY, |level| balance.matrix(level.white));
+        let scale = match (brightness, level) {
+            (Brightness::Ev(ev), _) => GREY / (PI * EV_0 * ev.exp2()),
+            (Brightness::Auto(_), None) => 1.0,
+            (Brightness::Auto(stops), Some(level)) => {
+                let most = WHITISH / quantile(readings, BELOW_WHITE, |r| r.strongest);
+                (KEY / level.level).min(most) * stops.exp2()
+            }
         };
-        Self::new(
-            level(false)
-                .or(level(true))
-                .map_or(1.0, |level| 1.0 / level),
-        )
+        let over = |r: &&Reading| scale * r.strongest > curve::KNEE;
+        let compressed = readings.iter().filter(over).count() as f64 / readings.len().max(1) as f64;
+        Self {
+            scale,
+            balance,
+            compressed: Some(compressed),
+        }
     }
 }
 
-/// The level that a share of the weight of all lit (level, weight) stays below; none if all is dark.
-fn percentile(mut readings: Vec<(f64, f64)>, share: f64) -> Option<f64> {
-    readings.retain(|r| r.0 > 0.0 && r.0.is_finite());
-    // Stable, so that equal readings are summed in one order on every machine.
-    readings.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let brightest = readings.last()?.0;
-    let lit = &readings[readings.partition_point(|r| r.0 <= UNLIT * brightest)..];
-    let total: f64 = lit.iter().map(|r| r.1).sum();
-    let mut below = 0.0;
-    let level = lit.iter().find(|r| {
-        below += r.1;
-        below >= share * total
-    });
-    // Rounding may leave the last reading out of the sum.
-    level.or(lit.last()).map(|r| r.0)
+/// What a pixel shows, lm/m2.
+#[derive(Debug, Clone, Copy)]
+struct Reading {
+    /// Geometric mean of radiosity and of a white surface's there.
+    level: f64,
+    /// Strongest channel of what COLOR_0 holds.
+    strongest: f64,
+    /// Tristimulus irradiance.
+    white: Xyz,
+    lamp: bool,
 }
 
-/// Strongest channel of what COLOR_0 holds before exposure, lm/m2.
-fn strongest(surface: &Surface, vertex_paint: bool, vertex: &BakedVertex) -> f64 {
-    let paint = if vertex_paint {
-        refined::vertex_color(surface, vertex)
-    } else {
-        [1.0; 4]
-    };
-    let channels = vertex.light.into_iter().zip(paint);
-    channels.map(|(l, p)| f64::from(l * p)).fold(0.0, f64::max)
-}
-
-/// One reading for each pixel of a small picture.
-fn seen(meshes: &Refined, camera: &Camera, lamps: bool) -> Vec<(f64, f64)> {
-    let [width, height] = TRIAL;
-    let read = |hit: &Hit| {
-        let (surface, corners) = meshes.at(hit);
-        let material = &meshes.scene.materials[surface.material];
-        let level =
-            |k: usize| hit.weights[k] * strongest(surface, material.vertex_paint, corners[k]);
-        (material.emission.is_some() == lamps).then(|| (level(0) + level(1) + level(2), 1.0))
-    };
-    let view = View::new(meshes.scene, camera, width, height);
-    let pixels = raster::draw(meshes, &view, TRIAL, 1, |row| {
-        row.iter().map(|hit| hit.as_ref().and_then(read)).collect()
-    });
-    pixels.into_iter().flatten().collect()
-}
-
-/// One reading for each triangle, with its area in squared file units.
-fn areas(meshes: &Refined, lamps: bool) -> Vec<(f64, f64)> {
-    let mut readings = Vec::new();
-    for baked in meshes.surfaces {
-        let surface = &meshes.scene.surfaces[baked.surface];
-        let material = &meshes.scene.materials[surface.material];
-        if material.emission.is_some() != lamps {
-            continue;
-        }
-        let levels: Vec<f64> = (baked.vertices.iter())
-            .map(|v| strongest(surface, material.vertex_paint, v))
-            .collect();
-        let places: Vec<DVec3> = (baked.vertices.iter())
-            .map(|v| refined::position(surface, v))
-            .collect();
-        for corners in baked.triangles.iter().map(|t| t.map(|v| v as usize)) {
-            let [a, b, c] = corners.map(|v| places[v]);
-            let level = corners.iter().map(|&v| levels[v]).sum::<f64>() / 3.0;
-            readings.push((level, 0.5 * (b - a).cross(c - a).length()));
-        }
+/// Those that light reaches.
+fn lit(mut readings: Vec<Reading>) -> Vec<Reading> {
+    readings.retain(|r| r.strongest > 0.0 && (r.level * r.strongest).is_finite());
+    if !readings.is_empty() {
+        let least = UNLIT * quantile(&readings, 0.95, |r| r.level);
+        readings.retain(|r| r.level > least);
     }
     readings
 }
 
-/// The nearest colour of the same luminance and hue inside [0, 1]: mixed with its grey until it fits; white if brighter.
-pub(crate) fn into_display(rgb: [f64; 3]) -> [f64; 3] {
-    let grey: f64 = rgb.iter().zip(LUMINANCE).map(|(c, w)| c * w).sum();
-    if grey >= 1.0 {
-        return [1.0; 3];
-    }
-    if grey <= 0.0 || grey.is_nan() {
-        return [0.0; 3];
-    }
-    // `keep` is how much of the colour's distance from grey fits; each channel gives a limit.
-    let keep = rgb.iter().fold(1.0f64, |keep, &c| {
-        if c > 1.0 {
-            keep.min((1.0 - grey) / (c - grey))
-        } else if c < 0.0 {
-            keep.min(grey / (grey - c))
-        } else {
-            keep
+/// The value that a share of the readings, which are not none, stays below.
+fn quantile(readings: &[Reading], share: f64, value: impl Fn(&Reading) -> f64) -> f64 {
+    let mut values: Vec<f64> = readings.iter().map(value).collect();
+    values.sort_by(f64::total_cmp);
+    values[((share * values.len() as f64) as usize).min(values.len() - 1)].max(f64::MIN_POSITIVE)
+}
+
+/// What an eye adapts to.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    level: f64,
+    /// Colour of the light, tristimulus, Y = 1.
+    white: Xyz,
+}
+
+impl Level {
+    fn of(readings: &[Reading]) -> Option<Self> {
+        if readings.is_empty() {
+            return None;
         }
+        let mut level = quantile(readings, 0.5, |r| r.level);
+        let (mut white, mut voters) = ([0.0; 3], 0.0);
+        for _ in 0..TURNS {
+            let before = level;
+            let near = |r: &&Reading| (r.level / before).log2().abs() <= STOPS;
+            let (mut sum, mut count) = (0.0, 0.0);
+            white = [0.0; 3];
+            for r in readings.iter().filter(near) {
+                sum += r.level.ln();
+                count += 1.0;
+                if r.white[1] > 0.0 {
+                    white = std::array::from_fn(|c| white[c] + r.white[c] / r.white[1]);
+                }
+            }
+            if count == 0.0 {
+                break;
+            }
+            (level, voters) = ((sum / count).exp(), count);
+            if (level / before - 1.0).abs() < 1e-6 {
+                break;
+            }
+        }
+        Some(Self {
+            level,
+            white: white.map(|c| c / f64::max(voters, 1.0)),
+        })
+    }
+}
+
+/// One reading for each pixel of a small picture that shows a surface.
+fn seen(meshes: &Refined, camera: &Camera) -> Vec<Reading> {
+    let [width, height] = TRIAL;
+    let read = |hit: &Hit| {
+        let (surface, corners) = meshes.at(hit);
+        let material = &meshes.scene.materials[surface.material];
+        let paint = |k: usize| match material.vertex_paint {
+            true => refined::vertex_color(surface, corners[k]),
+            false => [1.0; 4],
+        };
+        let mix =
+            |value: &dyn Fn(usize) -> f64| (0..3).map(|k| hit.weights[k] * value(k)).sum::<f64>();
+        let channel = |c: usize| mix(&|k| f64::from(corners[k].light[c] * paint(k)[c]));
+        let white = [0, 1, 2].map(|c| mix(&|k| f64::from(corners[k].irradiance[c])));
+        let radiosity = mix(&|k| f64::from(corners[k].radiosity[1]));
+        // No surface reflects more than a white one; a lamp's own light is its level.
+        let white_y = white[1].max(radiosity);
+        Reading {
+            level: (white_y * radiosity.max(BLACK * white_y)).max(0.0).sqrt(),
+            strongest: curve::strongest([channel(0), channel(1), channel(2)]),
+            white,
+            lamp: material.emission.is_some(),
+        }
+    };
+    let view = View::new(meshes.scene, camera, width, height);
+    let pixels = raster::draw(meshes, &view, TRIAL, 1, |row| {
+        row.iter().map(|hit| hit.as_ref().map(read)).collect()
     });
-    rgb.map(|c| (grey + keep * (c - grey)).clamp(0.0, 1.0))
+    pixels.into_iter().flatten().collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn colours_inside_are_left_alone() {
-        assert_eq!(into_display([0.2, 0.5, 1.0]), [0.2, 0.5, 1.0]);
+    fn readings(levels: impl IntoIterator<Item = (f64, usize)>) -> Vec<Reading> {
+        let one = |level| Reading {
+            level,
+            strongest: level,
+            white: [level; 3],
+            lamp: false,
+        };
+        (levels.into_iter())
+            .flat_map(|(level, n)| vec![one(level); n])
+            .collect()
     }
 
     #[test]
-    fn clipping_keeps_luminance_and_order() {
-        let bright = [1.4, 0.6, 0.2];
-        let shown = into_display(bright);
-        let y = |c: [f64; 3]| c.iter().zip(LUMINANCE).map(|(c, w)| c * w).sum::<f64>();
-        assert!((y(shown) - y(bright)).abs() < 1e-12);
-        assert!((shown[0] - 1.0).abs() < 1e-12 && shown[0] > shown[1] && shown[1] > shown[2]);
-        let outside = [-0.2, 0.5, 0.1];
-        let shown = into_display(outside);
-        assert!((y(shown) - y(outside)).abs() < 1e-12);
-        assert!(shown[0].abs() < 1e-12);
-        assert_eq!(into_display([9.0, 2.0, 1.0]), [1.0; 3]);
+    fn sun_patches_dark_corners_and_wrong_vertices_have_no_vote() {
+        let plain = readings([(50.0, 300), (100.0, 400), (200.0, 300)]);
+        let level = Level::of(&plain).unwrap().level;
+        assert!((level / 100.0 - 1.0).abs() < 1e-9);
+        let disturbed = [(1e4, 250), (1e9, 3), (0.5, 200)];
+        let all = readings(
+            [(50.0, 300), (100.0, 400), (200.0, 300)]
+                .into_iter()
+                .chain(disturbed),
+        );
+        let level = Level::of(&lit(all)).unwrap().level;
+        assert!((level / 100.0 - 1.0).abs() < 1e-9, "{level}");
+        assert!(Level::of(&lit(readings([(0.0, 9)]))).is_none());
+    }
+
+    #[test]
+    fn exposure_values() {
+        // EV 7 at ISO 100: 16 cd/m2 is middle grey.
+        let scale = GREY / (PI * EV_0 * 7f64.exp2());
+        assert!((Exposure::new(scale).ev() - 7.0).abs() < 1e-12);
+        assert!((GREY * Exposure::new(scale).white_luminance() - 16.0).abs() < 1e-9);
+        assert_eq!("auto".parse(), Ok(Brightness::Auto(0.0)));
+        assert_eq!("auto-1.5".parse(), Ok(Brightness::Auto(-1.5)));
+        assert_eq!("-3".parse(), Ok(Brightness::Ev(-3.0)));
+        for bad in ["", "auto1", "auto+", "bright", "NaN", "1e9"] {
+            assert!(bad.parse::<Brightness>().is_err(), "{bad}");
+        }
+        for shown in ["auto", "auto+1", "auto-0.5", "7.5"] {
+            assert_eq!(shown.parse::<Brightness>().unwrap().to_string(), shown);
+        }
     }
 }

@@ -1,13 +1,18 @@
 //! What the program writes: the baked room, pictures, arrays.
 
+pub mod balance;
 pub mod camera;
+pub mod curve;
 pub mod exposure;
 pub mod exr;
 pub mod gltf;
+mod lit_space;
 pub mod npz;
 pub mod picture;
 mod raster;
+mod viewpoint;
 
-pub use exposure::Exposure;
-pub use gltf::{BakedGlb, baked_glb};
+pub use balance::Balance;
+pub use exposure::{Brightness, Exposure};
+pub use gltf::{BakedGlb, Packing, Writing, baked_glb, vertices_within};
 pub use picture::{Format, Picture};

@@ -1,11 +1,12 @@
 //! A picture of the baked room: radiance = light * texture * vertex colour / pi, smooth over the refined mesh.
 //!
-//! Radiance is in cd/m2 (linear sRGB primaries, and XYZ). The PNG is exposed, clipped at constant hue and luminance
-//! (colours beyond white turn white), averaged over the samples of a pixel after clipping (so that edges of lamps stay
-//! smooth), and encoded by the sRGB curve. No other tone curve.
+//! Radiance is in cd/m2 (linear sRGB primaries, and XYZ). The PNG is exposed, brought into the display by the curve of
+//! [`curve`](super::curve), averaged over the samples of a pixel after that (so that edges of lamps stay smooth), and
+//! encoded by the sRGB curve.
 
 use super::camera::View;
-use super::exposure::{self, Exposure};
+use super::curve;
+use super::exposure::Exposure;
 use super::raster::{self, Hit, Refined};
 use crate::color::{self, LinearSrgb};
 use crate::error::{Error, Result};
@@ -48,7 +49,7 @@ pub struct Pixel {
     pub xyz: [f32; 3],
     /// Share of the pixel that shows a surface.
     pub coverage: f32,
-    /// Exposed and clipped, linear, in [0, 1], over the background.
+    /// Exposed and through the curve, linear, in [0, 1], over the background.
     pub shown: [f32; 3],
 }
 
@@ -162,12 +163,18 @@ fn shade(meshes: &Refined, srgb: &LinearSrgb, look: &Exposure, hit: &Hit) -> Sha
         std::array::from_fn(|i| u * f64::from(a[i]) + v * f64::from(b[i]) + w * f64::from(c[i]))
     };
     let mut rgb = mix(&|k| corners[k].light);
+    // White balance is of light, not of paint.
+    let mut shown = look.shown(rgb);
+    let mut painted_by = |paint: [f64; 3]| {
+        rgb = std::array::from_fn(|i| rgb[i] * paint[i]);
+        shown = std::array::from_fn(|i| shown[i] * paint[i]);
+    };
     if let Some(paint) = &material.paint {
         let texel = paint.sample(
             &meshes.scene.images,
             meshes.uv(surface, corners, hit.weights, paint.texcoord),
         );
-        rgb = std::array::from_fn(|i| rgb[i] * f64::from(texel[i]));
+        painted_by([texel[0], texel[1], texel[2]].map(f64::from));
     }
     let vertex_paint = material.vertex_paint && surface.colors.is_some();
     if vertex_paint {
@@ -175,7 +182,7 @@ fn shade(meshes: &Refined, srgb: &LinearSrgb, look: &Exposure, hit: &Hit) -> Sha
             let [r, g, b, _] = refined::vertex_color(surface, corners[k]);
             [r, g, b]
         });
-        rgb = std::array::from_fn(|i| rgb[i] * color[i]);
+        painted_by(color);
     }
     // Without paint the tristimulus radiosity is at hand; with it the texel's colour is all there is.
     let painted = vertex_paint || material.paint.is_some();
@@ -187,7 +194,7 @@ fn shade(meshes: &Refined, srgb: &LinearSrgb, look: &Exposure, hit: &Hit) -> Sha
     [
         rgb.map(|c| c / PI),
         xyz.map(|c| c / PI),
-        exposure::into_display(rgb.map(|c| c * look.scale)),
+        curve::into_display(shown),
     ]
 }
 

@@ -248,11 +248,9 @@ fn draw_band(
     hits
 }
 
-/// The input mesh: for choosing a camera, and what it sees.
+/// The input mesh without what has holes: for what a camera sees.
 struct Bare<'a> {
     scene: &'a Scene,
-    /// Is what has holes left out, or solid?
-    holes: bool,
 }
 
 impl Bare<'_> {
@@ -279,7 +277,7 @@ impl Meshes for Bare<'_> {
 
     fn has_holes(&self, mesh: usize) -> bool {
         let masked = |m: &Material| matches!(m.alpha, Alpha::Mask { .. });
-        self.holes && self.material(mesh).is_some_and(masked)
+        self.material(mesh).is_some_and(masked)
     }
 
     fn is_hole(&self, _: &Hit) -> bool {
@@ -289,7 +287,7 @@ impl Meshes for Bare<'_> {
 
 /// Which triangles of each surface of the input a picture shows; all of those with holes.
 pub(super) fn seen(scene: &Scene, view: &View, size: [usize; 2], grid: usize) -> Vec<Vec<bool>> {
-    let meshes = Bare { scene, holes: true };
+    let meshes = Bare { scene };
     let mut seen: Vec<Vec<bool>> = (scene.surfaces.iter().enumerate())
         .map(|(mesh, surface)| vec![meshes.has_holes(mesh); surface.triangles.len()])
         .collect();
@@ -302,26 +300,6 @@ pub(super) fn seen(scene: &Scene, view: &View, size: [usize; 2], grid: usize) ->
         seen[mesh as usize][triangle as usize] = true;
     }
     seen
-}
-
-/// World points of the input mesh seen at the middle of each pixel, row by row from the top.
-pub(super) fn points(
-    scene: &Scene,
-    view: &View,
-    width: usize,
-    height: usize,
-) -> Vec<Option<DVec3>> {
-    let meshes = Bare {
-        scene,
-        holes: false,
-    };
-    let point = |hit: &Hit| {
-        let [a, b, c] = meshes.corners(hit.mesh as usize, hit.triangle as usize);
-        hit.weights[0] * a + hit.weights[1] * b + hit.weights[2] * c
-    };
-    draw(&meshes, view, [width, height], 1, |row| {
-        row.iter().map(|hit| hit.as_ref().map(point)).collect()
-    })
 }
 
 /// The refined mesh.

@@ -50,8 +50,11 @@ impl Desk {
 
     /// A quick bake that ends well; what was said.
     pub(crate) fn bake(&self, more: &[&str]) -> String {
-        self.run(&[&["bake", "room.glb", "--error", "4"], more].concat(), 0)
-            .0
+        self.run(
+            &[&["bake", "room.glb", "--error", "4", "--xyz"], more].concat(),
+            0,
+        )
+        .0
     }
 
     /// A bake that is refused; what was said.

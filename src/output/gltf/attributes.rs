@@ -4,11 +4,12 @@
 //! back by the inverse transform) where the data sits in a Draco stream. Everything is written as f32.
 
 use super::accessor::{self, Data, Table};
+use super::packing::Grid;
 use super::{Writer, index};
 use crate::error::{Error, Result};
 use crate::gather::refined;
 use crate::gather::{BakedSurface, BakedVertex};
-use crate::output::exposure;
+use crate::output::curve;
 use crate::scene::{Alpha, Surface};
 use glam::{DMat3, DVec3};
 use serde_json::{Map, Value, json};
@@ -25,21 +26,23 @@ impl Writer<'_> {
         let input = Input::new(primitive, surface, turned, &mut self.data)?;
         let mut out = Map::new();
 
-        out.insert(
-            "POSITION".into(),
-            json!(self.bin.positions(&input.positions(baked))),
-        );
+        let positions = input.positions(baked, self.apart);
+        let accessor = match &self.grid {
+            Some(grid) => self.bin.on_grid(grid, &positions),
+            None => self.bin.positions(&positions),
+        };
+        out.insert("POSITION".into(), json!(accessor));
         if let Some(normals) = input.normals(baked) {
-            out.insert("NORMAL".into(), json!(self.bin.floats(&normals)));
+            out.insert("NORMAL".into(), json!(self.bin.units(&normals)));
             if let Some(tangents) = input.tangents(baked, &normals) {
-                out.insert("TANGENT".into(), json!(self.bin.floats(&tangents)));
+                out.insert("TANGENT".into(), json!(self.bin.units(&tangents)));
             }
         }
         for name in input.names() {
             let accessor = match name.split_once('_') {
                 Some(("TEXCOORD", _)) => input
                     .rows::<2>(baked, &name)
-                    .map(|rows| self.bin.floats(&rows)),
+                    .map(|rows| self.bin.shares(&rows)),
                 Some(("COLOR", set)) if set != "0" => self.any_width(&input, baked, &name),
                 Some(("", _)) if name != "_XYZ" && input.is_float(&name) => {
                     self.any_width(&input, baked, &name)
@@ -51,9 +54,23 @@ impl Writer<'_> {
             }
         }
         out.insert("COLOR_0".into(), json!(self.light(surface, baked)));
-        let radiosity: Vec<[f32; 3]> = baked.vertices.iter().map(|v| v.radiosity).collect();
-        out.insert("_XYZ".into(), json!(self.bin.floats(&radiosity)));
+        if self.writing.xyz {
+            let radiosity: Vec<[f32; 3]> = baked.vertices.iter().map(|v| v.radiosity).collect();
+            out.insert("_XYZ".into(), json!(self.bin.floats(&radiosity)));
+        }
         Ok(Value::Object(out))
+    }
+
+    /// The grid that the positions of some refined primitives of a mesh lie on.
+    pub(super) fn grid(&mut self, parts: &[(&Value, &BakedSurface)]) -> Result<Option<Grid>> {
+        let mut all = Vec::new();
+        for (primitive, baked) in parts {
+            let surface = &self.scene.surfaces[baked.surface];
+            let turned = self.scene.is_flipped(baked.surface);
+            let input = Input::new(primitive, surface, turned, &mut self.data)?;
+            all.extend(input.positions(baked, self.apart));
+        }
+        Ok(Grid::around(&all))
     }
 
     fn any_width(&mut self, input: &Input, baked: &BakedSurface, name: &str) -> Option<usize> {
@@ -84,20 +101,20 @@ impl Writer<'_> {
             } else {
                 [1.0; 3]
             };
-            let wanted: [f64; 3] = std::array::from_fn(|i| {
-                self.look.scale * f64::from(vertex.light[i]) * f64::from(paint[i])
-            });
-            let shown = exposure::into_display(wanted).map(|c| c as f32);
+            let light = self.look.shown(vertex.light.map(f64::from));
+            let wanted: [f64; 3] = std::array::from_fn(|i| light[i] * f64::from(paint[i]));
+            let shown = curve::into_display(wanted).map(|c| c as f32);
             self.clipped += usize::from(wanted.iter().any(|&c| !(0.0..=1.0).contains(&c)));
+            self.compressed += usize::from(curve::is_compressed(wanted));
             colors.push([shown[0], shown[1], shown[2], alpha.clamp(0.0, 1.0)]);
         }
         let blends =
             matches!(material.alpha, Alpha::Mask { .. }) || colors.iter().any(|c| c[3] < 1.0);
         if surface.colors.is_some() && blends {
-            self.bin.floats(&colors)
+            self.bin.shares(&colors)
         } else {
             let opaque: Vec<[f32; 3]> = colors.iter().map(|c| [c[0], c[1], c[2]]).collect();
-            self.bin.floats(&opaque)
+            self.bin.shares(&opaque)
         }
     }
 }
@@ -177,17 +194,24 @@ impl<'a> Input<'a> {
         self.table(name).is_some_and(|t| t.component == FLOAT)
     }
 
-    fn positions(&self, baked: &BakedSurface) -> Vec<[f32; 3]> {
+    /// Positions; backs are drawn `apart` (world units) from the fronts that they would coincide with: path tracers, which
+    /// know no culling, could not tell them apart. Fronts stay, so that they meet their neighbours.
+    fn positions(&self, baked: &BakedSurface, apart: f64) -> Vec<[f32; 3]> {
         let place = |v| match (self.vectors("POSITION"), self.to_local) {
             (Some(local), _) => self.blend(local, v),
             (None, Some(to_local)) => to_local.transform_point3(refined::position(self.surface, v)),
             // `new` sets `to_local` where there are no positions.
             (None, None) => DVec3::ZERO,
         };
-        baked
-            .vertices
-            .iter()
-            .map(|v| place(v).as_vec3().to_array())
+        let to_local = self.surface.to_world.inverse();
+        let lift: Vec<DVec3> = match baked.back && to_local.is_finite() {
+            true => (refined::outward(self.surface, baked).into_iter())
+                .map(|out| to_local.transform_vector3(apart * out))
+                .collect(),
+            false => vec![DVec3::ZERO; baked.vertices.len()],
+        };
+        (baked.vertices.iter().zip(lift))
+            .map(|(v, lift)| (place(v) + lift).as_vec3().to_array())
             .collect()
     }
 

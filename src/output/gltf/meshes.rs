@@ -1,6 +1,7 @@
 //! Meshes and the nodes that show them: a mesh of its own for each node (the light differs), a child node for each
 //! instance of EXT_mesh_gpu_instancing.
 
+use super::packing::Packing;
 use super::{Writer, accessor, extension, index, keep::Role, list, put_list, remove_below};
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
@@ -13,7 +14,7 @@ const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 /// TRIANGLES.
 const TRIANGLES: u64 = 4;
 
-impl Writer<'_> {
+impl<'a> Writer<'a> {
     /// Replaces the document's meshes.
     pub(super) fn meshes(&mut self) -> Result<()> {
         self.find_kept_materials();
@@ -42,15 +43,16 @@ impl Writer<'_> {
             match extension(&nodes[node], INSTANCING).cloned() {
                 None => {
                     let new = self.mesh(mesh, node, None, &mut meshes)?;
-                    show(&mut nodes[node], new);
+                    self.show(&mut nodes, node, new);
                 }
                 Some(instancing) => {
                     for (instance, mut child) in
                         self.instances(node, &instancing)?.into_iter().enumerate()
                     {
                         let new = self.mesh(mesh, node, Some(instance), &mut meshes)?;
-                        show(&mut child, new);
-                        add_child(&mut nodes, node, child);
+                        show(&mut child, None);
+                        let place = add_child(&mut nodes, node, child);
+                        self.show(&mut nodes, place, new);
                     }
                     remove_below(&mut nodes[node], "extensions", INSTANCING);
                     show(&mut nodes[node], None);
@@ -64,6 +66,19 @@ impl Writer<'_> {
         put_list(&mut self.json, "nodes", nodes);
         put_list(&mut self.json, "meshes", meshes);
         Ok(())
+    }
+
+    /// Sets or removes the mesh of a node; one on a grid gets a node of its own, which undoes the grid.
+    fn show(&self, nodes: &mut Vec<Value>, node: usize, mesh: Option<usize>) {
+        match (&self.grid, mesh) {
+            (Some(grid), Some(mesh)) => {
+                show(&mut nodes[node], None);
+                let mut child = grid.node();
+                child["mesh"] = json!(mesh);
+                add_child(nodes, node, child);
+            }
+            _ => show(&mut nodes[node], mesh),
+        }
     }
 
     pub(super) fn is_baked(&self, node: usize) -> bool {
@@ -112,6 +127,19 @@ impl Writer<'_> {
             .get(&(node, instance))
             .cloned()
             .unwrap_or_default();
+        self.grid = None;
+        if self.writing.packing != Packing::Floats {
+            let all = list(input, "primitives").iter().enumerate();
+            let parts: Option<Vec<_>> = all.map(|(p, json)| Some((json, baked.get(&p)?))).collect();
+            // Lines and points would be moved with what is put on a grid.
+            if let Some(parts) = parts {
+                let each = |(json, surfaces): (_, &Vec<&'a BakedSurface>)| {
+                    surfaces.iter().map(move |s| (json, *s)).collect::<Vec<_>>()
+                };
+                let parts: Vec<_> = parts.into_iter().flat_map(each).collect();
+                self.grid = self.grid(&parts)?;
+            }
+        }
         let mut primitives = Vec::new();
         for (p, primitive) in list(input, "primitives").iter().enumerate() {
             match baked.get(&p) {
@@ -261,8 +289,9 @@ fn show(node: &mut Value, mesh: Option<usize>) {
     }
 }
 
-fn add_child(nodes: &mut Vec<Value>, parent: usize, child: Value) {
-    let new = json!(nodes.len());
+fn add_child(nodes: &mut Vec<Value>, parent: usize, child: Value) -> usize {
+    let place = nodes.len();
+    let new = json!(place);
     nodes.push(child);
     match nodes[parent]
         .get_mut("children")
@@ -271,4 +300,5 @@ fn add_child(nodes: &mut Vec<Value>, parent: usize, child: Value) {
         Some(children) => children.push(new),
         None => nodes[parent]["children"] = json!([new]),
     }
+    place
 }

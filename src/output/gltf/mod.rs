@@ -1,19 +1,22 @@
 //! The baked room as one GLB: the input document with its meshes replaced by the refined ones, light in COLOR_0.
 //!
-//! COLOR_0 = clip(exposure * light * vertex paint), linear sRGB, confined to [0, 1] as glTF 2.0 (section 3.7.2.1) asks;
+//! COLOR_0 = curve(exposure * light * vertex paint), linear sRGB, confined to [0, 1] as glTF 2.0 (section 3.7.2.1) asks
+//! by the curve of [`curve`](super::curve), which leaves alone what is below .8 of white;
 //! with KHR_materials_unlit a viewer shows COLOR_0 * base colour texture, which is the radiosity.
-//! `_XYZ` holds the unclipped truth: tristimulus radiosity, Y in lm/m2.
+//! `_XYZ`, if it is asked for, holds the unclipped truth: tristimulus radiosity, Y in lm/m2.
 //! What the bake does not touch (names, nodes, cameras, lights, animations, extras, unknown extensions) is kept.
 //! Not kept: skins and morph targets of baked meshes (the light belongs to one pose), material variants of baked
 //! primitives, instance attributes other than the transform.
 
 mod accessor;
 mod attributes;
+mod budget;
 mod buffer;
 mod image;
 mod keep;
 mod material;
 mod meshes;
+mod packing;
 
 use super::Exposure;
 use crate::error::{Error, Result};
@@ -22,12 +25,29 @@ use crate::gather::refined;
 use crate::scene::Scene;
 use crate::scene::buffers::Buffers;
 use accessor::Data;
+pub use budget::vertices_within;
 use buffer::Bin;
+use glam::DVec3;
+use packing::Grid;
+pub use packing::Packing;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
 /// Version of `asset.extras.haarlight`.
 pub const EXTRAS_VERSION: u32 = 1;
+
+/// How far backs of two-sided sheets are drawn from the fronts, share of half the room's diagonal: 512 steps of f32 there,
+/// .15 mm in a room of 10 m, so that rays in single precision meet the right one.
+const APART: f64 = 512.0 * 0.5 * f32::EPSILON as f64;
+
+/// What is written, and how.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Writing {
+    /// Is the tristimulus radiosity of vertices kept, as `_XYZ`?
+    pub xyz: bool,
+    /// How numbers are stored.
+    pub packing: Packing,
+}
 
 /// A written room and what is to be said about it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,8 +58,10 @@ pub struct BakedGlb {
     pub vertices: usize,
     /// Triangles written with light.
     pub triangles: usize,
-    /// Vertices whose COLOR_0 had to be clipped into [0, 1] (lamps, spots beside them).
+    /// Vertices that were beyond white or outside of sRGB before the curve (lamps, spots beside them).
     pub clipped: usize,
+    /// Vertices that the curve made darker, those beyond white among them.
+    pub compressed: usize,
     /// What could not be carried over.
     pub warnings: Vec<String>,
 }
@@ -50,10 +72,15 @@ pub struct BakedGlb {
 ///
 /// # Errors
 /// The refined mesh is broken (internal fault), an instance transform cannot be read, or the result passes 4 GiB.
-pub fn baked_glb(scene: &Scene, surfaces: &[BakedSurface], look: &Exposure) -> Result<BakedGlb> {
+pub fn baked_glb(
+    scene: &Scene,
+    surfaces: &[BakedSurface],
+    look: &Exposure,
+    writing: Writing,
+) -> Result<BakedGlb> {
     refined::check(scene, surfaces)?;
     let buffers = Buffers::sound(scene.source.buffers.clone());
-    let mut writer = Writer::new(scene, surfaces, look, &buffers);
+    let mut writer = Writer::new(scene, surfaces, look, writing, &buffers);
     writer.raw_views();
     writer.images();
     writer.meshes()?;
@@ -71,6 +98,11 @@ type Primitives<'a> = BTreeMap<usize, Vec<&'a BakedSurface>>;
 struct Writer<'a> {
     scene: &'a Scene,
     look: &'a Exposure,
+    writing: Writing,
+    /// Distance of backs from their fronts, world units.
+    apart: f64,
+    /// What positions of the mesh at hand are rounded to; none: they are floats.
+    grid: Option<Grid>,
     /// The refined meshes by (node, instance), then primitive.
     baked: BTreeMap<(usize, Option<usize>), Primitives<'a>>,
     data: Data<'a>,
@@ -85,6 +117,7 @@ struct Writer<'a> {
     vertices: usize,
     triangles: usize,
     clipped: usize,
+    compressed: usize,
     warnings: Vec<String>,
 }
 
@@ -93,6 +126,7 @@ impl<'a> Writer<'a> {
         scene: &'a Scene,
         surfaces: &'a [BakedSurface],
         look: &'a Exposure,
+        writing: Writing,
         buffers: &'a Buffers,
     ) -> Self {
         let mut baked: BTreeMap<_, Primitives> = BTreeMap::new();
@@ -101,38 +135,51 @@ impl<'a> Writer<'a> {
             let place = baked.entry((surface.node, surface.instance)).or_default();
             place.entry(surface.primitive).or_default().push(refined);
         }
+        let places = || scene.surfaces.iter().flat_map(|s| &s.positions);
+        let low = places().fold(DVec3::INFINITY, |low, p| low.min(*p));
+        let high = places().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
         Self {
             scene,
             look,
+            writing,
+            apart: APART * 0.5 * (high - low).max(DVec3::ZERO).length(),
+            grid: None,
             baked,
             data: Data::new(&scene.source, buffers),
             json: scene.source.json.as_object().cloned().unwrap_or_default(),
-            bin: Bin::default(),
+            bin: Bin::new(writing.packing),
             accessors: BTreeMap::new(),
             materials: material::Unlit::default(),
             quantized: false,
             vertices: 0,
             triangles: 0,
             clipped: 0,
+            compressed: 0,
             warnings: Vec::new(),
         }
     }
 
     /// What the file says about itself.
     fn asset(&mut self) {
-        let facts = json!({
+        let mut facts = json!({
             "version": EXTRAS_VERSION,
             "program": concat!("haarlight ", env!("CARGO_PKG_VERSION")),
             "exposure": {
                 "scale": self.look.scale,
+                "ev100": self.look.ev(),
                 "white_luminance_cd_m2": self.look.white_luminance(),
+                "white_balance": self.look.balance,
             },
             "attributes": {
-                "COLOR_0": "linear sRGB, radiosity over base colour texture, times exposure.scale, clipped to [0, 1]",
-                "_XYZ": "CIE 1931 tristimulus radiosity, lm/m2, not clipped",
+                "COLOR_0": "linear sRGB, radiosity over base colour texture, times exposure.white_balance and exposure.scale; a strongest channel p above 0.8 is brought to 1 - 0.04 / (p - 0.6) and the colour mixed with white",
             },
             "clipped_vertices": self.clipped,
+            "compressed_vertices": self.compressed,
         });
+        if self.writing.xyz {
+            let what = "CIE 1931 tristimulus radiosity, lm/m2, not clipped";
+            facts["attributes"]["_XYZ"] = json!(what);
+        }
         let asset = self.json.entry("asset").or_insert_with(|| json!({}));
         let Some(asset) = asset.as_object_mut() else {
             return;
@@ -154,16 +201,23 @@ impl<'a> Writer<'a> {
     }
 
     fn finish(mut self) -> Result<BakedGlb> {
-        let (bytes, views, accessors) = self.bin.finish();
-        let lists = [("bufferViews", views), ("accessors", accessors)];
+        let (bytes, buffers, views, accessors) = self.bin.finish()?;
+        let lists = [
+            ("buffers", buffers),
+            ("bufferViews", views),
+            ("accessors", accessors),
+        ];
         for (key, list) in lists {
             put_list(&mut self.json, key, list);
         }
-        if bytes.is_empty() {
-            self.json.shift_remove("buffers");
-        } else {
-            self.json
-                .insert("buffers".into(), json!([{ "byteLength": bytes.len() }]));
+        for name in self.bin.extensions() {
+            for key in ["extensionsUsed", "extensionsRequired"] {
+                let mut names = list(&Value::Object(self.json.clone()), key).to_vec();
+                if !names.iter().any(|n| n == name) {
+                    names.push(json!(name));
+                    put_list(&mut self.json, key, names);
+                }
+            }
         }
         let json = serde_json::to_vec(&Value::Object(self.json))
             .map_err(|problem| Error::Internal(format!("glTF JSON: {problem}")))?;
@@ -172,6 +226,7 @@ impl<'a> Writer<'a> {
             vertices: self.vertices,
             triangles: self.triangles,
             clipped: self.clipped,
+            compressed: self.compressed,
             warnings: self.warnings,
         })
     }
