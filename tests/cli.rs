@@ -621,3 +621,60 @@ fn wrong_points_are_listed_with_what_is_wrong_with_the_room() {
         std::fs::read(root().join("scenes/convex.glb")).unwrap()
     );
 }
+
+#[test]
+fn a_sky_is_typed_or_written_beside_the_room() {
+    let desk = Desk::new(&["daylit", "cornell-closed"]);
+    let plan = printed(&desk.run(&["inspect", "daylit.glb"], 0));
+    for said in ["CIE 12 (clear)", "38.0 deg high, azimuth 212.0 deg"] {
+        assert!(plan.contains(said), "{said}\n-- in --\n{plan}");
+    }
+    // What is typed wins, point by point.
+    let typed = [
+        "inspect",
+        "daylit.glb",
+        "--sky",
+        "overcast",
+        "--sky-lux",
+        "5000",
+    ];
+    let plan = printed(&desk.run(&typed, 0));
+    assert!(plan.contains("CIE 1 (overcast), 5000 lx"), "{plan}");
+    let cloudy = desk.run(&["inspect", "daylit.glb", "--sky", "cloudy"], 2);
+    assert!(
+        said(&cloudy).contains("cie:1 to cie:16"),
+        "{}",
+        said(&cloudy)
+    );
+
+    let beside = desk.at("daylit.spectra.json");
+    let wrong = r#"{"sky": {"typ": "clear", "illuminance_lx": -1, "sun": {"elevation_deg": 30}}}"#;
+    std::fs::write(&beside, wrong).unwrap();
+    let all = said(&desk.run(&["inspect", "daylit.glb"], 2));
+    for text in [
+        "unknown key \"typ\"; the nearest names are type",
+        "illuminance_lx is -1",
+        "does not say where the sun stands",
+    ] {
+        assert!(all.contains(text), "{text}\n-- in --\n{all}");
+    }
+    std::fs::write(&beside, r#"{"sky": {"type": "clear", "sun": "sun"}}"#).unwrap();
+    let all = said(&desk.run(&["inspect", "daylit.glb"], 2));
+    assert!(all.contains("no directional light is named 'sun'"), "{all}");
+
+    // Nobody describes a sky: it is said, and none is invented.
+    std::fs::remove_file(&beside).unwrap();
+    let all = said(&desk.run(&["bake", "daylit.glb", "--allow-dark"], 0));
+    assert!(all.contains("--sky overcast lights it"), "{all}");
+    // A closed room is none the brighter for one.
+    let bake = |name: &str, more: &[&str]| {
+        let args = [
+            &["bake", "cornell-closed.glb", "--error", "2", "-o", name],
+            more,
+        ]
+        .concat();
+        desk.run(&args, 0);
+        desk.read(name)
+    };
+    assert!(bake("a.glb", &[]) == bake("b.glb", &["--sky", "overcast"]));
+}

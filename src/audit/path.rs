@@ -6,9 +6,10 @@
 
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
-use crate::geometry::sampling::{Pcg, cosine_direction, hash, on_triangle, sequence02};
+use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Face, Mesh};
+use crate::scene::sky::SUN_RADIUS;
 use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
@@ -152,9 +153,10 @@ impl<'a> Audit<'a> {
         let (mut toward_lamp, mut toward_any) = (first[0], first[1]);
         for bounce in 0.. {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
-            self.punctual(&at, &throughput, sum);
+            self.punctual(&at, toward_lamp, &throughput, sum);
             let direction = cosine_direction(at.normal, toward_any);
             let Some(hit) = self.closest(at.point, direction, at.plane) else {
+                self.outside(direction, &throughput, sum);
                 return;
             };
             let triangle = hit.triangle as usize;
@@ -288,13 +290,41 @@ impl<'a> Audit<'a> {
         }
     }
 
-    fn punctual(&self, at: &Vertex, throughput: &Leaves, sum: &mut Leaves) {
+    /// What a path that leaves the room brings from there.
+    fn outside(&self, direction: DVec3, throughput: &Leaves, sum: &mut Leaves) {
+        let Some(sky) = &self.scene.sky else { return };
         for light in &self.scene.lights {
+            let radiance = match light.kind {
+                LightKind::Sky if direction.y > 0.0 => sky.radiance(direction),
+                LightKind::Ground if direction.y <= 0.0 => 1.0 / PI,
+                _ => continue,
+            };
+            let power = &self.scene.spectra[light.light].power;
+            for l in 0..LEAVES {
+                sum[l] += throughput[l] * PI * radiance * power[l] * light.shape[l];
+            }
+        }
+    }
+
+    fn punctual(&self, at: &Vertex, square: [f64; 2], throughput: &Leaves, sum: &mut Leaves) {
+        for light in &self.scene.lights {
+            if light.kind.is_dome() {
+                continue;
+            }
             let position = light.position - self.mesh.centre;
-            let (factor, end) = if light.kind == LightKind::Directional {
+            let (factor, end) = if light.kind.is_parallel() {
+                // A place on the sun's disc.
+                let toward = match light.kind {
+                    LightKind::Sun => around(
+                        -light.direction,
+                        1.0 - square[1] * (1.0 - SUN_RADIUS.cos()),
+                        square[0],
+                    ),
+                    _ => -light.direction,
+                };
                 (
-                    -at.normal.dot(light.direction),
-                    at.point - light.direction * (4.0 * self.mesh.half_size),
+                    at.normal.dot(toward),
+                    at.point + toward * (4.0 * self.mesh.half_size),
                 )
             } else {
                 let d = position - at.point;

@@ -29,6 +29,7 @@ pub mod points;
 pub mod probe;
 pub mod relight;
 mod results;
+mod sky;
 mod snapshots;
 pub mod spectra;
 pub mod stop;

@@ -1,5 +1,6 @@
 //! Options that several commands share, as typed and as meant.
 
+use super::sky::SkyArgs;
 use crate::gather::BakedSurface;
 use crate::output::{Balance, Brightness, Exposure, Packing, Writing};
 use crate::scene::{Camera, Options, Scene};
@@ -49,6 +50,9 @@ pub struct Reading {
     /// Go on where no lamp lights the room.
     #[arg(long)]
     pub allow_dark: bool,
+    /// What is outside.
+    #[command(flatten)]
+    pub sky: SkyArgs,
 }
 
 impl Reading {
@@ -59,6 +63,7 @@ impl Reading {
             spectra: self.spectra.clone(),
             lenient: self.lenient,
             scale: self.scale,
+            sky: self.sky.wish(),
         }
     }
 

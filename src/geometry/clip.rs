@@ -155,6 +155,11 @@ impl Clipper {
         }
     }
 
+    /// What is left, as convex pieces, seen from the point.
+    pub fn visible(&self) -> impl Iterator<Item = &[DVec3]> {
+        self.pieces.iter()
+    }
+
     /// Pushes to `left` what is left of a piece.
     fn subtract(&mut self, shadow: &Shadow, piece: &[DVec3]) {
         // Not touched by the shadow: better whole.

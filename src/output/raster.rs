@@ -440,6 +440,7 @@ mod tests {
                 images: vec![],
                 spectra: vec![],
                 lights: vec![],
+                sky: None,
                 cameras: vec![],
                 warnings: vec![],
                 changes: Default::default(),

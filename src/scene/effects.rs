@@ -43,6 +43,10 @@ pub enum Kind {
     SpotLights,
     /// Parallel light.
     DirectionalLights,
+    /// Light of a sky that enters where rays leave the room.
+    Sky,
+    /// Direct light of the sun.
+    Sun,
     /// Surfaces whose back reflects and emits too.
     TwoSided,
 }
@@ -61,6 +65,8 @@ impl Kind {
             Self::PointLights => "point lights",
             Self::SpotLights => "spot lights",
             Self::DirectionalLights => "directional lights",
+            Self::Sky => "sky",
+            Self::Sun => "sun",
             Self::TwoSided => "two-sided surfaces",
         }
     }
@@ -153,6 +159,13 @@ impl Plan {
             Kind::DirectionalLights,
             lights(|k| matches!(k, LightKind::Directional)),
         );
+        let sky = scene.sky.as_ref();
+        let said = |text: Option<&String>| match text {
+            Some(text) => (true, text.clone()),
+            None => (false, "none is described".into()),
+        };
+        plan.add(Kind::Sky, said(sky.map(|sky| &sky.said)));
+        plan.add(Kind::Sun, said(sky.and_then(|sky| sky.sun_said.as_ref())));
         plan.add(
             Kind::TwoSided,
             counted(used.iter().filter(|m| m.sides == Sides::Both), "material"),
@@ -176,6 +189,14 @@ impl Plan {
     /// The lines, [`Kind`]s in order, then what the program lacks.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
+    }
+
+    /// Takes an effect off.
+    pub(crate) fn off(&mut self, kind: Kind, reason: &str) {
+        let mut named = self.effects.iter_mut().filter(|e| e.name == kind.name());
+        if let Some(effect) = named.next() {
+            (effect.runs, effect.reason) = (false, reason.into());
+        }
     }
 
     fn add(&mut self, kind: Kind, (runs, reason): (bool, String)) {
@@ -334,7 +355,7 @@ fn blocked(surfaces: &[Surface], lights: &[PunctualLight]) -> Option<String> {
         .copied()
         .fold(DVec3::NEG_INFINITY, DVec3::max);
     let tolerance = CONVEX_TOLERANCE * (high - low).length();
-    let stands = |l: &&PunctualLight| l.kind != LightKind::Directional;
+    let stands = |l: &&PunctualLight| !(l.kind.is_parallel() || l.kind.is_dome());
     let mut pairs = 0;
     for surface in surfaces {
         for triangle in &surface.triangles {
@@ -357,7 +378,7 @@ fn blocked(surfaces: &[Surface], lights: &[PunctualLight]) -> Option<String> {
                     surface.name
                 ));
             }
-            let parallel = lights.iter().filter(|l| l.kind == LightKind::Directional);
+            let parallel = lights.iter().filter(|l| l.kind.is_parallel());
             if let Some(light) = parallel
                 .into_iter()
                 .find(|l| normal.dot(l.direction) > -CONVEX_TOLERANCE)

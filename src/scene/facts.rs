@@ -64,7 +64,7 @@ pub struct Closed {
 pub struct LightFact {
     /// Name of the material or light.
     pub name: String,
-    /// `surface`, `point`, `spot`, `directional`.
+    /// `surface`, `point`, `spot`, `directional`, `sun`, `sky`, `ground`.
     pub kind: &'static str,
     /// Luminous flux, lm; none for parallel light.
     pub flux_lm: Option<f64>,
@@ -72,7 +72,7 @@ pub struct LightFact {
     pub luminance_cd_m2: Option<f64>,
     /// Luminous intensity of a point or spot, cd.
     pub intensity_cd: Option<f64>,
-    /// Illuminance of parallel light on a plane across it, lx.
+    /// Illuminance of parallel light on a plane across it, of a sky on open level ground, lx; exitance of the ground.
     pub illuminance_lx: Option<f64>,
     /// Where its spectrum comes from.
     pub spectrum: String,
@@ -159,6 +159,9 @@ impl Facts {
                 LightKind::Point => ("point", Some(4.0 * PI * size)),
                 LightKind::Spot { inner, outer } => ("spot", Some(spot_flux(size, inner, outer))),
                 LightKind::Directional => ("directional", None),
+                LightKind::Sun => ("sun", None),
+                LightKind::Sky => ("sky", None),
+                LightKind::Ground => ("ground", None),
             };
             LightFact {
                 name: light.name.clone(),

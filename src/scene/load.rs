@@ -5,8 +5,9 @@ use super::check::{Check, Unknown};
 use super::document::Document;
 use super::light::{self, Lamps};
 use super::material;
+use super::sky::{self, SkyWish};
 use super::spectra_file::SpectraFile;
-use super::{Scene, Surface, lacking};
+use super::{LightSpectrum, Material, PunctualLight, Scene, Surface, lacking};
 use crate::color::Upsampler;
 use crate::data::Grid;
 use crate::error::{Error, Result};
@@ -23,6 +24,8 @@ pub struct Options {
     pub lenient: bool,
     /// Metres for each unit of the file; none: 1, as glTF has it.
     pub scale: Option<f64>,
+    /// Sky and sun; what is not said here the file of spectra may say.
+    pub sky: SkyWish,
 }
 
 impl Scene {
@@ -84,7 +87,21 @@ impl Scene {
             &mut check,
         );
         let mut lights = light::punctual(raw_lights, &file, path, &mut lamps, &mut check);
-        let spectra = lamps.finish(&mut materials, &mut lights);
+        let mut spectra = lamps.finish(&mut materials, &mut lights);
+        let nodes: Vec<(String, String)> = raw_lights
+            .iter()
+            .map(|raw| {
+                (
+                    node_name(&document.source.json, raw.node),
+                    light::name_of(raw),
+                )
+            })
+            .collect();
+        let wish = options.sky.clone().or(file.sky.clone());
+        let sky = sky::join(&wish, &nodes, &grid, &mut lights, &mut spectra, &mut check);
+        if sky.as_ref().is_some_and(|sky| sky.sun_of_file) {
+            prune(&mut materials, &mut lights, &mut spectra);
+        }
         for warning in lacking::warnings(&document.source.json) {
             check.warn(warning);
         }
@@ -105,12 +122,41 @@ impl Scene {
             images: geometry.images,
             spectra,
             lights,
+            sky,
             cameras: geometry.cameras,
             warnings,
             changes: Changes::default(),
         };
         Ok(scene.scaled(options.scale.unwrap_or(1.0)))
     }
+}
+
+fn node_name(json: &serde_json::Value, node: usize) -> String {
+    json["nodes"][node]["name"]
+        .as_str()
+        .unwrap_or_default()
+        .to_owned()
+}
+
+/// Takes out spectra that no lamp has any more.
+fn prune(
+    materials: &mut [Material],
+    lights: &mut [PunctualLight],
+    spectra: &mut Vec<LightSpectrum>,
+) {
+    let emissions = |m: &mut [Material]| -> Vec<usize> {
+        m.iter()
+            .filter_map(|m| Some(m.emission.as_ref()?.light))
+            .collect()
+    };
+    let mut used = emissions(materials);
+    used.extend(lights.iter().map(|l| l.light));
+    let kept: Vec<usize> = (0..spectra.len()).filter(|k| used.contains(k)).collect();
+    let place = |light: &mut usize| *light = kept.partition_point(|k| k < light);
+    let emissions = materials.iter_mut().filter_map(|m| m.emission.as_mut());
+    emissions.for_each(|e| place(&mut e.light));
+    lights.iter_mut().for_each(|l| place(&mut l.light));
+    *spectra = kept.iter().map(|&k| spectra[k].clone()).collect();
 }
 
 /// For each material: do all surfaces that carry it have vertex colours?

@@ -21,6 +21,7 @@ mod material;
 mod nodes;
 mod primitive;
 mod raw;
+pub mod sky;
 mod spectra_file;
 mod texture;
 mod texture_info;
@@ -53,8 +54,10 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// The distinct light spectra ("lamps by colour"); emissions and lights point in here.
     pub spectra: Vec<LightSpectrum>,
-    /// Punctual lights.
+    /// Punctual lights; those of a sky stand last.
     pub lights: Vec<PunctualLight>,
+    /// The sky, if one is described: how the light of [`LightKind::Sky`] is spread.
+    pub sky: Option<sky::Sky>,
     /// Cameras of the file.
     pub cameras: Vec<Camera>,
     /// What the user should know: nothing is dropped in silence.
@@ -181,7 +184,8 @@ pub struct LightSpectrum {
     pub power: Leaves,
 }
 
-/// A light without extent. Radiant intensity in W/sr/nm (point, spot) or irradiance in W/m2/nm (directional).
+/// A light without extent, or one of a sky. Radiant intensity in W/sr/nm (point, spot), irradiance in W/m2/nm across its rays
+/// (directional, sun) or of open level ground (sky), exitance in W/m2/nm (ground).
 #[derive(Debug, Clone)]
 pub struct PunctualLight {
     /// For messages.
@@ -198,7 +202,7 @@ pub struct PunctualLight {
     pub shape: Leaves,
 }
 
-/// Kinds of KHR_lights_punctual.
+/// Kinds of KHR_lights_punctual, and those of a sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {
     /// Shines alike in all directions.
@@ -212,6 +216,24 @@ pub enum LightKind {
     },
     /// Parallel light.
     Directional,
+    /// The sun: light from a disc of [`sky::SUN_RADIUS`], infinitely far away.
+    Sun,
+    /// The sky above the horizon, spread as [`Scene::sky`] says.
+    Sky,
+    /// Open ground below the horizon, alike in all directions.
+    Ground,
+}
+
+impl LightKind {
+    /// Does it shine from far away, from one direction?
+    pub fn is_parallel(self) -> bool {
+        matches!(self, Self::Directional | Self::Sun)
+    }
+
+    /// Does it shine from half of all directions?
+    pub fn is_dome(self) -> bool {
+        matches!(self, Self::Sky | Self::Ground)
+    }
 }
 
 /// A camera of the file in world space; looks along -Z of its own space.

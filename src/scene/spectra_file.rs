@@ -4,7 +4,8 @@
 //! { "materials": { "wall":  { "reflectance": { "csv": "spectra/wall.csv" } },
 //!                  "panel": { "reflectance": { "name": "macbeth/white" },
 //!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } } },
-//!   "lights":    { "Spot": { "name": "cie/A" } } }
+//!   "lights":    { "Spot": { "name": "cie/A" } },
+//!   "sky":       { "type": "overcast" } }
 //! ```
 //!
 //! Materials and lights go by their glTF names; all that share a name get the entry. `extras` of a material hold the
@@ -21,6 +22,7 @@
 
 use super::check::{Check, Unknown};
 use super::json::short;
+use super::sky::SkyWish;
 use super::uri;
 use crate::data::{Grid, Leaves};
 use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
@@ -66,6 +68,8 @@ impl MaterialSpectra {
 pub(crate) struct SpectraFile {
     materials: BTreeMap<String, MaterialSpectra>,
     lights: BTreeMap<String, Sampled>,
+    /// What is said of sky and sun.
+    pub(crate) sky: SkyWish,
 }
 
 impl SpectraFile {
@@ -109,7 +113,7 @@ impl SpectraFile {
             }
         };
         let mut reader = Reader {
-            folder: folder_of(&path),
+            folder: uri::folder_of(&path),
             grid,
             check,
             unknown,
@@ -118,7 +122,10 @@ impl SpectraFile {
         let Some(top) = reader.object(&json, &place) else {
             return file;
         };
-        reader.keys(top, &["materials", "lights"], &place);
+        reader.keys(top, &["materials", "lights", "sky"], &place);
+        if let Some(sky) = top.get("sky") {
+            file.sky = SkyWish::read(sky, &format!("{place}: sky"), &mut reader);
+        }
         for (name, entry) in reader.entries(top, "materials", &place) {
             let place = format!("{place}: material '{}'", short(name));
             reader.known(name, materials, "material", &place);
@@ -145,7 +152,7 @@ impl SpectraFile {
         check: &mut Check,
     ) -> MaterialSpectra {
         let mut reader = Reader {
-            folder: folder_of(room),
+            folder: uri::folder_of(room),
             grid,
             check,
             unknown: Unknown::Ignore,
@@ -179,7 +186,7 @@ impl SpectraFile {
             .as_str()
             .map_or(extras["csv"].is_string(), |n| n.contains('/'));
         let mut reader = Reader {
-            folder: folder_of(room),
+            folder: uri::folder_of(room),
             grid,
             check,
             unknown: Unknown::Ignore,
@@ -199,18 +206,11 @@ fn beside(room: &Path) -> Option<PathBuf> {
     path.exists().then_some(path)
 }
 
-fn folder_of(file: &Path) -> PathBuf {
-    match file.parent() {
-        Some(folder) if folder != Path::new("") => folder.to_path_buf(),
-        _ => PathBuf::from("."),
-    }
-}
-
 /// Reads the objects of a side file or of extras.
-struct Reader<'a> {
+pub(crate) struct Reader<'a> {
     folder: PathBuf,
     grid: &'a Grid,
-    check: &'a mut Check,
+    pub(super) check: &'a mut Check,
     unknown: Unknown,
 }
 
@@ -371,7 +371,11 @@ impl Reader<'_> {
             .unwrap_or_default()
     }
 
-    fn object<'v>(&mut self, value: &'v Value, place: &str) -> Option<&'v Map<String, Value>> {
+    pub(crate) fn object<'v>(
+        &mut self,
+        value: &'v Value,
+        place: &str,
+    ) -> Option<&'v Map<String, Value>> {
         let object = value.as_object();
         match (object, self.unknown) {
             (None, Unknown::Refuse | Unknown::Warn) => {
@@ -386,7 +390,7 @@ impl Reader<'_> {
         object
     }
 
-    fn keys(&mut self, object: &Map<String, Value>, known: &[&str], place: &str) {
+    pub(crate) fn keys(&mut self, object: &Map<String, Value>, known: &[&str], place: &str) {
         for key in object.keys().filter(|key| !known.contains(&key.as_str())) {
             let near = nearest_of(key, known);
             let what = format!("unknown key \"{}\"", short(key));

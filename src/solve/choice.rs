@@ -85,7 +85,14 @@ impl Bake {
             Some(known) => known,
             None => {
                 let shadowed = self.with_sight(|bake, sight| {
-                    punctual::factors(&bake.tree, &leaves, sight, &bake.scene, &bake.mesh)
+                    punctual::factors(
+                        &bake.tree,
+                        &leaves,
+                        sight,
+                        &bake.scene,
+                        &bake.mesh,
+                        bake.outside.as_ref(),
+                    )
                 });
                 let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
                 self.look_out();

@@ -116,6 +116,9 @@ pub(crate) struct Guess {
     pub bright: Vec<f32>,
 }
 
+/// Share of a room's faces that sees the sky, about, before anything is known of its openings.
+const DOME: f64 = 0.05;
+
 /// Light spread evenly over all faces: `H = flux / (A (1 - mean albedo))`.
 pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
     let lanes = Lanes::dense(&scene.spectra, weights);
@@ -145,7 +148,8 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         mean += a * albedo[m];
     }
     for light in &scene.lights {
-        let solid = super::punctual::solid_angle(light.kind).unwrap_or(0.25 * total);
+        let solid = super::punctual::solid_angle(light.kind);
+        let solid = solid.unwrap_or(total * if light.kind.is_dome() { DOME } else { 0.25 });
         let xyz = lanes.emission(light.light, &light.shape, 1.0);
         flux = std::array::from_fn(|c| flux[c] + solid * xyz[c]);
     }
@@ -231,7 +235,8 @@ pub(super) fn conserve(
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Balance {
-    /// Luminous flux given out by surfaces, lm.
+    /// Luminous flux given out by surfaces, lm. Light of a sky, of the sun and parallel light counts from where it is received:
+    /// what does not enter the room is in no sum.
     pub emitted_lm: f64,
     /// Luminous flux that fronts receive straight from lamps of any kind, lm.
     pub received_lm: f64,

@@ -106,6 +106,7 @@ impl Bake {
             _ => self.place_emission::<64>(),
         }
         self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
+        self.light.bright_lamps = self.bright_lamps();
         let mut tree = std::mem::take(&mut self.tree);
         let mut direct = std::mem::take(&mut self.direct);
         self.with_sight(|bake, sight| {

@@ -97,6 +97,7 @@ impl Bake {
             light: &self.light,
             sight,
             lamps: &self.lamps,
+            sky: self.outside.as_ref(),
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
             hemisphere: by_rays(sight).then_some(&self.hemisphere),

@@ -20,6 +20,7 @@ mod looking;
 mod mixed;
 mod operator;
 mod outlook;
+mod outside;
 pub(crate) mod punctual;
 mod rays;
 pub mod record;
@@ -46,6 +47,7 @@ use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
 use crate::transport::hemisphere::Hemisphere;
+use crate::transport::sky::Outside;
 use direct::Direct;
 pub use flux::Closed;
 pub use held::Held;
@@ -186,6 +188,8 @@ pub struct Bake {
     /// Reflected radiosity of the round before, by node: where a solve starts.
     pub(crate) previous: Rows,
     pub(crate) lamps: Vec<(PunctualLight, Vec<f32>)>,
+    /// What is outside; none where no light comes from there.
+    pub(crate) outside: Option<Outside>,
     pub(crate) direct: direct::Direct,
     pub(crate) probes: estimate::Probes,
     /// Where the light of lamps goes first.
@@ -295,6 +299,7 @@ impl Bake {
             light: Light::default(),
             previous: Rows::default(),
             lamps: Vec::new(),
+            outside: None,
             direct: direct::Direct::default(),
             graph: Graph::default(),
             rounds: Vec::new(),
@@ -322,6 +327,7 @@ impl Bake {
         };
         if let Some(closed) = closed {
             [bake.closed, bake.sealed] = closed;
+            bake.look_outside(false);
             return bake;
         }
         [bake.closed, bake.sealed] = bake.with_sight(|bake, sight| {
@@ -333,6 +339,7 @@ impl Bake {
                 bake.settings.seed,
             )
         });
+        bake.look_outside(true);
         // In a closed room this is known without a ray.
         bake.sent = bake.with_sight(|bake, sight| bake.sent(sight));
         bake

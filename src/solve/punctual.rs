@@ -6,6 +6,7 @@ use crate::light::lanes::Lanes;
 use crate::link::{Sight, View};
 use crate::scene::{LightKind, PunctualLight, Scene};
 use crate::transport::point::{Receiver, punctual_factor};
+use crate::transport::sky::{Look, Outside};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -66,7 +67,8 @@ fn at_samples(
     lights: &[PunctualLight],
     sight: &Sight,
     half_size: f64,
-    rays: &mut u64,
+    outside: Option<&Outside>,
+    look: &mut Look,
 ) -> Vec<[f64; POINTS]> {
     let mut samples: Vec<Sample> = Vec::with_capacity(POINTS);
     let corners = tree.elements[tree.node(leaf).element as usize].corners;
@@ -87,9 +89,23 @@ fn at_samples(
         });
     }
     let mut blocked = Vec::new();
+    // The sky changes slowly: the middle stands for all.
+    let middle = Receiver {
+        point: samples[0].point,
+        normal: samples[0].normal,
+        plane: samples[0].plane,
+        leaf: None,
+        seed: u64::from(leaf),
+    };
+    let dome = outside.map_or([0.0; 2], |o| o.lightly(sight, &middle, look));
     lights
         .iter()
         .map(|light| {
+            match light.kind {
+                LightKind::Sky => return [dome[0]; POINTS],
+                LightKind::Ground => return [dome[1]; POINTS],
+                _ => {}
+            }
             let mut factors = [0.0; POINTS];
             let mut segments = Vec::with_capacity(POINTS);
             let mut which = Vec::with_capacity(POINTS);
@@ -109,7 +125,7 @@ fn at_samples(
             }
             if sight.occlusion && !segments.is_empty() {
                 sight.blocked(&segments, &View::Crowded, &mut blocked);
-                *rays += segments.len() as u64;
+                look.rays += segments.len() as u64;
                 for (&k, &b) in which.iter().zip(&blocked) {
                     if b {
                         factors[k] = 0.0;
@@ -128,6 +144,7 @@ pub(super) fn factors(
     sight: &Sight,
     scene: &Scene,
     mesh: &Mesh,
+    outside: Option<&Outside>,
 ) -> Shadowed {
     let lights = recentred(scene, mesh);
     if lights.is_empty() {
@@ -140,14 +157,15 @@ pub(super) fn factors(
     let parts: Vec<(Vec<Factors>, u64)> = leaves
         .par_chunks(CHUNK)
         .map(|chunk| {
-            let mut rays = 0;
+            let mut look = Look::default();
             let lists = chunk
                 .iter()
                 .map(|&leaf| {
                     if tree.node(leaf).area < SLIGHT * total {
                         return Vec::new();
                     }
-                    at_samples(tree, leaf, &lights, sight, mesh.half_size, &mut rays)
+                    let half = mesh.half_size;
+                    at_samples(tree, leaf, &lights, sight, half, outside, &mut look)
                         .iter()
                         .enumerate()
                         .map(|(l, f)| (l as u32, (f.iter().sum::<f64>() / POINTS as f64) as f32))
@@ -155,7 +173,7 @@ pub(super) fn factors(
                         .collect()
                 })
                 .collect();
-            (lists, rays)
+            (lists, look.rays)
         })
         .collect();
     let mut out = Shadowed::default();
@@ -174,6 +192,6 @@ pub(super) fn solid_angle(kind: LightKind) -> Option<f64> {
         LightKind::Spot { inner, outer } => {
             Some(2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0))
         }
-        LightKind::Directional => None,
+        LightKind::Directional | LightKind::Sun | LightKind::Sky | LightKind::Ground => None,
     }
 }

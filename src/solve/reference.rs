@@ -8,6 +8,7 @@
 //! It shares triangles, Lambert's formula and the ray index with the solver: no hierarchy, no links, no lanes, no
 //! iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
 
+use crate::geometry::sampling::{cosine_direction, sequence02};
 use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon, quarters};
 use crate::hierarchy::{Mesh, stratified};
 use crate::scene::effects::{Kind, Plan};
@@ -17,6 +18,9 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+
+/// Rays for the sky of a point: .1 % of open ground's.
+const DOME_RAYS: u32 = 1024;
 
 /// Radon's rule of degree 5 on a triangle (1948; Abramowitz and Stegun 1964, 25.4.63): weight, and weights of corners.
 fn radon() -> [(f64, [f64; 3]); 7] {
@@ -354,7 +358,15 @@ fn punctual_at(
     let mut sum = [0.0; LEAVES];
     for light in &scene.lights {
         let (toward, end) = match light.kind {
-            LightKind::Directional => (
+            LightKind::Sky | LightKind::Ground => {
+                let factor = dome_at(scene, mesh, ways, at, normal, plane, light.kind);
+                let power = &scene.spectra[light.light].power;
+                for l in 0..LEAVES {
+                    sum[l] += factor * power[l] * light.shape[l];
+                }
+                continue;
+            }
+            LightKind::Directional | LightKind::Sun => (
                 -light.direction,
                 at - light.direction * (4.0 * mesh.half_size),
             ),
@@ -364,8 +376,8 @@ fn punctual_at(
             }
         };
         let spread = match light.kind {
-            LightKind::Directional => 1.0,
-            LightKind::Point => 1.0 / end.distance_squared(at),
+            LightKind::Directional | LightKind::Sun => 1.0,
+            LightKind::Point | LightKind::Sky | LightKind::Ground => 1.0 / end.distance_squared(at),
             LightKind::Spot { inner, outer } => {
                 let (cos, i, o) = (-light.direction.dot(toward), inner.cos(), outer.cos());
                 ((cos - o) / (i - o).max(1e-3)).clamp(0.0, 1.0).powi(2) / end.distance_squared(at)
@@ -380,6 +392,34 @@ fn punctual_at(
         }
     }
     sum
+}
+
+/// Irradiance of a point by a sky that gives open level ground 1, or by ground that sends out 1: the mean over many directions.
+fn dome_at(
+    scene: &Scene,
+    mesh: &Mesh,
+    ways: &Ways,
+    at: DVec3,
+    normal: DVec3,
+    plane: u32,
+    kind: LightKind,
+) -> f64 {
+    let Some(sky) = &scene.sky else { return 0.0 };
+    let brings = |k: u32| {
+        let d = cosine_direction(normal, sequence02(k, 0));
+        let factor = match kind {
+            LightKind::Sky if d.y > 0.0 => PI * sky.radiance(d),
+            LightKind::Ground if d.y <= 0.0 => 1.0,
+            _ => return 0.0,
+        };
+        let end = at + d * (4.0 * mesh.half_size);
+        if ways.blocked(at, end, [plane, NO_PLANE]) {
+            0.0
+        } else {
+            factor
+        }
+    };
+    (0..DOME_RAYS).map(brings).sum::<f64>() / f64::from(DOME_RAYS)
 }
 
 #[cfg(test)]

@@ -242,9 +242,17 @@ impl Bake {
                 spread: self.direct.spread(leaf),
             };
         }
+        self.light.arrival = arrival;
+        self.light.bright_lamps = self.bright_lamps();
+    }
+
+    /// How bright each lamp is for a factor of 1, share of the white's.
+    pub(super) fn bright_lamps(&self) -> Vec<f32> {
+        let weights = self.bright_weights();
         let lamps = self.lamps.iter();
-        let bright_lamps = lamps.map(|(_, row)| bright(row)).collect();
-        (self.light.arrival, self.light.bright_lamps) = (arrival, bright_lamps);
+        lamps
+            .map(|(_, row)| weighed(row, &weights) as f32)
+            .collect()
     }
 
     /// Area-weighted mean irradiance, tristimulus.

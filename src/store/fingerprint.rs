@@ -95,10 +95,16 @@ impl Fingerprint {
                 LightKind::Point => [0.0; 3],
                 LightKind::Spot { inner, outer } => [1.0, inner, outer],
                 LightKind::Directional => [2.0, 0.0, 0.0],
+                LightKind::Sun => [3.0, 0.0, 0.0],
+                LightKind::Sky => [4.0, 0.0, 0.0],
+                LightKind::Ground => [5.0, 0.0, 0.0],
             };
             mix.add(kind).add(light.direction.to_array());
-            if light.kind != LightKind::Directional {
+            if !light.kind.is_parallel() {
                 mix.add(light.position.to_array());
+            }
+            if let (LightKind::Sky, Some(sky)) = (light.kind, &scene.sky) {
+                mix.add(sky.dome.kind()).add(sky.dome.sun().to_array());
             }
             print.add(format!("place of light '{}'", light.name), &mix);
         }

@@ -60,7 +60,7 @@ pub(super) fn no_lamp(scene: &Scene) -> Option<Problem> {
             "there is no lamp, all would be black",
             "give a material an emissive colour and strength (KHR_materials_emissive_strength, cd/m2), export the \
              lights (KHR_lights_punctual), or write an \"emission\" with \"luminance_cd_m2\" for a material into the \
-             room's .spectra.json; --allow-dark bakes it as it is",
+             room's .spectra.json; where the room has openings --sky lights it; --allow-dark bakes it as it is",
         )
     })
 }

@@ -167,13 +167,19 @@ fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
                 let cosine = 1.0 - y * (1.0 - outer.cos());
                 (light.position, around(light.direction, cosine, x))
             }
-            LightKind::Directional => {
+            LightKind::Directional | LightKind::Sun | LightKind::Sky | LightKind::Ground => {
+                let from = if light.kind.is_dome() {
+                    cosine_direction(-light.direction, sequence02(k, 1))
+                } else {
+                    -light.direction
+                };
+                let away = -from;
                 // From outside, on a disc that covers the room.
-                let (size, [u, v]) = (eyes.mesh.half_size, tangents(light.direction));
+                let (size, [u, v]) = (eyes.mesh.half_size, tangents(away));
                 let (radius, angle) = (size * y.sqrt(), TAU * x);
                 let across = radius * (angle.cos() * u + angle.sin() * v);
-                let from = eyes.mesh.centre - 1.1 * size * light.direction + across;
-                (from, light.direction)
+                let from = eyes.mesh.centre - 1.1 * size * away + across;
+                (from, away)
             }
         };
         seen.add(eyes.scene, None, eyes.look_around(from, direction));
@@ -253,5 +259,8 @@ fn kind(light: &PunctualLight) -> &'static str {
         LightKind::Point => "point",
         LightKind::Spot { .. } => "spot",
         LightKind::Directional => "directional",
+        LightKind::Sun => "sun",
+        LightKind::Sky => "sky",
+        LightKind::Ground => "ground",
     }
 }

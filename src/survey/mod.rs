@@ -8,12 +8,14 @@
 //! | `eyes` | what a ray meets: a front, a back, nothing |
 //! | `content` | no surface, no lamp |
 //! | `lamps` | lamps that shine away from the room, and which faces to turn |
+//! | `openings` | open to a sky that nobody describes |
 //! | `size` | rooms that are too large or too small to be rooms |
 //! | `points` | points inside solids and outside the room |
 
 mod content;
 mod eyes;
 mod lamps;
+mod openings;
 mod points;
 mod size;
 
@@ -51,6 +53,7 @@ pub fn advise(scene: &mut Scene, wishes: Wishes) -> Vec<Problem> {
         return vec![problem];
     }
     scene.warnings.extend(size::hint(scene));
+    scene.warnings.extend(openings::hint(scene));
     let mut problem = content::no_lamp(scene);
     if problem.is_none() {
         let mut away = lamps::away(scene);

@@ -10,6 +10,7 @@ use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
 use crate::light::keenness;
 use crate::link::{View, open_weight};
+use crate::scene::LightKind;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -221,7 +222,7 @@ impl Gatherer<'_> {
     /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
     /// the probability that it brings the light, if nothing lies on the segments: without bias.
     pub(super) fn one_lamp(&self, to: &Receiver, [u, v]: [f64; 2]) -> [Option<(f64, Segment)>; 2] {
-        let punctual = self.one_punctual(to, v).map(|(bright, end)| {
+        let punctual = self.one_punctual(to, [u, v]).map(|(bright, end)| {
             let segment = Segment::new(to.point, end, [to.plane, NO_PLANE]);
             (bright, segment)
         });
@@ -235,11 +236,18 @@ impl Gatherer<'_> {
     }
 
     /// Chooses a punctual light: brightness of them all, and where the ray to it ends.
-    fn one_punctual(&self, to: &Receiver, v: f64) -> Option<(f64, DVec3)> {
+    fn one_punctual(&self, to: &Receiver, [u, v]: [f64; 2]) -> Option<(f64, DVec3)> {
+        let far = self.one_direction(to, [u, v]);
         let each = || {
             let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
             lamps.filter_map(|((lamp, _), &bright)| {
-                let (factor, end) = punctual_factor(lamp, to, self.light.half_size)?;
+                let (factor, end) = match (lamp.kind, far) {
+                    (LightKind::Sky | LightKind::Ground, Some((d, factors))) => {
+                        let factor = factors[usize::from(lamp.kind == LightKind::Ground)];
+                        (factor, to.point + d * (4.0 * self.light.half_size))
+                    }
+                    _ => punctual_factor(lamp, to, self.light.half_size)?,
+                };
                 Some((factor * f64::from(bright), end))
             })
         };

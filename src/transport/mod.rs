@@ -7,14 +7,17 @@
 //! | `lamp` | parts of lamps near a point, and lamps chosen by chance |
 //! | `hemisphere`, `sweep` | beams of rays that find the patches they end on |
 //! | `nearby` | short paths where rays end close by |
+//! | `openings`, `sky` | where rays leave the room, and what comes in there: sky, ground, the sun's disc |
 //! | `trace` | what a point gets its light from, kept for relighting |
 
 pub mod hemisphere;
 mod lamp;
 mod nearby;
+pub(crate) mod openings;
 mod patches;
 pub mod point;
 mod shadows;
+pub(crate) mod sky;
 mod slope;
 mod sweep;
 pub(crate) mod trace;

@@ -5,6 +5,7 @@
 use super::hemisphere::Hemisphere;
 use super::lamp::Lamp;
 use super::shadows::Shadows;
+use super::sky::{Look, Outside};
 use super::trace::Trace;
 use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
@@ -108,6 +109,10 @@ pub struct Memory {
     pub(super) lamps: Vec<Lamp>,
     /// Which path each segment to a lamp belongs to, and what it brings.
     pub(super) to_lamps: Vec<(usize, f64)>,
+    /// What a look outside takes.
+    pub(super) look: Look,
+    /// Directions in which the rays of a point leave the room.
+    pub(super) escaped: Vec<DVec3>,
     /// Rays cast.
     pub rays: u64,
     /// Variance of brightness by the rays to the lamps of the last point.
@@ -140,6 +145,8 @@ pub struct Gatherer<'a> {
     pub sight: &'a Sight<'a>,
     /// Punctual lights with their rows of radiant intensity (or normal irradiance), recentred.
     pub lamps: &'a [(PunctualLight, Vec<f32>)],
+    /// What is outside; none where no light comes from there.
+    pub(crate) sky: Option<&'a Outside>,
     /// What one patch may misplace, share of the white's irradiance.
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
@@ -168,6 +175,7 @@ impl Gatherer<'_> {
         memory.noise = 0.0;
         self.lamps_of(to, memory, &mut out);
         self.punctual(to, memory, &mut out);
+        self.outside(to, None, false, memory, &mut out);
         memory.trace = out.trace;
         out.direct
     }
@@ -222,6 +230,7 @@ impl Gatherer<'_> {
             *x += d;
         }
         self.punctual(to, memory, &mut out);
+        self.outside(to, None, true, memory, &mut out);
         out.rays = memory.rays - before;
         out
     }
@@ -229,11 +238,16 @@ impl Gatherer<'_> {
     /// Light of punctual lights, one ray each.
     pub(super) fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
-            let (factor, end) = match punctual_factor(lamp, to, self.light.half_size) {
+            let (mut factor, end) = match punctual_factor(lamp, to, self.light.half_size) {
                 Some(x) => x,
                 None => continue,
             };
-            if self.sight.occlusion {
+            if lamp.kind == LightKind::Sun {
+                factor *= self.sun_seen(to, lamp, memory);
+                if factor <= 0.0 {
+                    continue;
+                }
+            } else if self.sight.occlusion {
                 memory.rays += 1;
                 let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
                 if self.sight.blocks_one(&way) {
@@ -251,13 +265,17 @@ impl Gatherer<'_> {
     }
 }
 
-/// What turns a punctual light's intensity into irradiance at a receiver, and where the ray to it ends.
+/// What turns a punctual light's intensity into irradiance at a receiver, and where the ray to it ends. None for sky and ground,
+/// which shine from everywhere.
 pub fn punctual_factor(
     lamp: &PunctualLight,
     to: &Receiver,
     half_size: f64,
 ) -> Option<(f64, DVec3)> {
-    if lamp.kind == LightKind::Directional {
+    if lamp.kind.is_dome() {
+        return None;
+    }
+    if lamp.kind.is_parallel() {
         let cosine = -to.normal.dot(lamp.direction);
         return (cosine > 0.0).then(|| (cosine, to.point - lamp.direction * (4.0 * half_size)));
     }

@@ -6,7 +6,7 @@ use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
 use crate::hierarchy::NONE;
 use crate::link::{POLYGONS, pattern};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A patch so bright that one ray of the hemisphere would carry more than this many tolerances is gathered by its link.
 const GLARE: f64 = 4.0;
@@ -24,8 +24,9 @@ impl Gatherer<'_> {
         let mut met = std::mem::take(&mut memory.met);
         met.clear();
         let share = 1.0 / hemisphere.len() as f64;
-        out.backs = share * self.cast(to, hemisphere, &mut met) as f64;
-        memory.met = met;
+        let mut escaped = std::mem::take(&mut memory.escaped);
+        out.backs = share * self.cast(to, hemisphere, &mut met, &mut escaped) as f64;
+        (memory.met, memory.escaped) = (met, escaped);
         memory.rays += hemisphere.len() as u64;
         if out.backs > self.most_backs {
             return;
@@ -43,6 +44,9 @@ impl Gatherer<'_> {
         }
         self.punctual(to, memory, out);
         self.look(to, share as f32, memory, out);
+        let escaped = std::mem::take(&mut memory.escaped);
+        self.outside(to, Some((&escaped, hemisphere.len())), true, memory, out);
+        memory.escaped = escaped;
     }
 
     /// What patches reflect that are brighter than `most`, by links.
@@ -109,8 +113,15 @@ impl Gatherer<'_> {
         (memory.met, memory.near) = (met, near);
     }
 
-    /// Casts the rays of a point. Which leaves they met, and how many met black backs.
-    fn cast(&self, to: &Receiver, hemisphere: &Hemisphere, met: &mut Vec<(u32, Hit)>) -> usize {
+    /// Casts the rays of a point. Which leaves they met, in which directions they left the room, and how many met black backs.
+    fn cast(
+        &self,
+        to: &Receiver,
+        hemisphere: &Hemisphere,
+        met: &mut Vec<(u32, Hit)>,
+        escaped: &mut Vec<DVec3>,
+    ) -> usize {
+        escaped.clear();
         // Another seed turns the pattern.
         let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
         let [x, y] = tangents(to.normal);
@@ -124,7 +135,13 @@ impl Gatherer<'_> {
                 *out = (x * d.x + y * d.y + to.normal * d.z).as_vec3();
             }
             self.sight.meet(&from, &directions, to.plane, &mut hits);
-            for hit in hits.iter().flatten() {
+            for (hit, d) in hits.iter().zip(&directions) {
+                let Some(hit) = hit else {
+                    if self.sky.is_some() {
+                        escaped.push(d.as_dvec3());
+                    }
+                    continue;
+                };
                 match self.met(hit) {
                     Some(leaf) => met.push((leaf, *hit)),
                     None => backs += 1,

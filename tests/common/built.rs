@@ -7,6 +7,7 @@
 
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
+use haarlight::scene::sky::Sky;
 use haarlight::scene::{
     Alpha, Emission, GREATEST_ALBEDO, LightKind, LightSpectrum, Material, PunctualLight, Scene,
     Sides, Source, Surface,
@@ -21,6 +22,7 @@ pub(crate) struct Room {
     materials: Vec<Material>,
     spectra: Vec<LightSpectrum>,
     lights: Vec<PunctualLight>,
+    pub(crate) sky: Option<Sky>,
 }
 
 impl Room {
@@ -32,6 +34,7 @@ impl Room {
             materials: Vec::new(),
             spectra: Vec::new(),
             lights: Vec::new(),
+            sky: None,
         };
         room.spectrum("equal energy", [1.0; LEAVES]);
         room
@@ -206,6 +209,7 @@ impl Room {
             images: Vec::new(),
             spectra: kept.iter().map(|&k| self.spectra[k].clone()).collect(),
             lights: self.lights,
+            sky: self.sky,
             cameras: Vec::new(),
             warnings: Vec::new(),
             changes: Default::default(),

@@ -293,6 +293,7 @@ pub fn room() -> Scene {
             power: [1.0; LEAVES],
         }],
         lights: Vec::new(),
+        sky: None,
         cameras: vec![Camera {
             name: "eye".into(),
             to_world: DMat4::from_translation(DVec3::new(0.0, 1.0, 5.0)),

@@ -5,6 +5,7 @@
 mod cells;
 mod cie171;
 mod cornell;
+mod daylit;
 mod furnished;
 mod glb;
 mod shapes;
@@ -61,6 +62,7 @@ const ROOMS: &[Room] = &[
         Some(simple::two_rooms_spectra),
     ),
     ("corridor", simple::corridor, None),
+    ("daylit", daylit::room, Some(daylit::spectra)),
     ("furnace", simple::furnace, None),
     ("cie171-5.2", cie171::case_5_2, None),
     ("cie171-5.2-isotropic", cie171::case_5_2_isotropic, None),

@@ -1,0 +1,83 @@
+//! What is outside, as typed.
+
+use super::options::positive;
+use crate::scene::sky::{Brightness, SkyType, SkyWish, SunPlace, SunWish};
+
+/// Options of sky and sun. Each wins over what the file of spectra says.
+#[derive(Debug, Clone, Default, clap::Args)]
+#[command(next_help_heading = "Sky and sun")]
+pub struct SkyArgs {
+    /// Light that enters where rays leave the room: overcast, intermediate, clear, uniform, or cie:1 to cie:16 (ISO 15469).
+    #[arg(long = "sky", value_name = "TYPE")]
+    pub kind: Option<SkyType>,
+    /// Where the sun stands, degrees: its height and its azimuth from north (-Z) over east (+X); or the place and time that it
+    /// is seen from, as in 52.5,13.4,2026-06-21T12:00:00+02:00.
+    #[arg(
+        long,
+        value_name = "ELEVATION,AZIMUTH|LATITUDE,LONGITUDE,TIME",
+        allow_hyphen_values = true
+    )]
+    pub sun: Option<SunPlace>,
+    /// Illuminance of open level ground by the sky alone, lx [default: by type and height of the sun].
+    #[arg(long, value_name = "LX", value_parser = not_negative, conflicts_with = "sky_luminance")]
+    pub sky_lux: Option<f64>,
+    /// Luminance of the zenith, cd/m2.
+    #[arg(long, value_name = "CD_M2", value_parser = not_negative)]
+    pub sky_luminance: Option<f64>,
+    /// Correlated colour temperature of the sky, K [default: overcast 6504, intermediate 7500, clear 12000].
+    #[arg(long, value_name = "K", value_parser = kelvin)]
+    pub sky_cct: Option<f64>,
+    /// Illuminance of a plane across the sun's rays, lx; 0: the sky alone [default: by type and height of the sun].
+    #[arg(long, value_name = "LX", value_parser = not_negative)]
+    pub sun_lux: Option<f64>,
+    /// Correlated colour temperature of the sun, K [default: 5500].
+    #[arg(long, value_name = "K", value_parser = kelvin)]
+    pub sun_cct: Option<f64>,
+    /// Reflectance of open ground below the horizon [default: 0.2].
+    #[arg(long, value_name = "RHO", value_parser = share)]
+    pub ground: Option<f64>,
+    /// Where north is, degrees clockwise from -Z seen from above [default: 0].
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    pub north: Option<f64>,
+}
+
+impl SkyArgs {
+    /// What is meant.
+    pub(super) fn wish(&self) -> SkyWish {
+        let lux = self.sky_lux.map(Brightness::Illuminance);
+        SkyWish {
+            kind: self.kind,
+            brightness: lux.or(self.sky_luminance.map(Brightness::Luminance)),
+            kelvin: self.sky_cct,
+            ground: self.ground,
+            north: self.north.filter(|n| n.is_finite()),
+            sun: SunWish {
+                place: self.sun.clone(),
+                illuminance: self.sun_lux,
+                kelvin: self.sun_cct,
+            },
+        }
+    }
+}
+
+fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("a number from {least} to {most} is wanted")),
+    }
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    if text.trim() == "0" {
+        return Ok(0.0);
+    }
+    positive(text)
+}
+
+fn kelvin(text: &str) -> Result<f64, String> {
+    within(text, [4000.0, 25_000.0])
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    within(text, [0.0, 1.0])
+}

@@ -1,0 +1,350 @@
+//! What is said of sky and sun: `"sky"` of the side file, or the command line, which wins point by point.
+//!
+//! ```json
+//! "sky": { "type": "clear", "illuminance_lx": 12000, "cct_k": 12000, "ground_reflectance": 0.2, "north_deg": 0,
+//!          "sun": { "elevation_deg": 40, "azimuth_deg": 200, "illuminance_lx": 80000, "cct_k": 5500 } }
+//! ```
+//!
+//! `type` is overcast (CIE 1), intermediate (10), clear (12), uniform (5), or cie:1 to cie:16 (16: traditional overcast).
+//! `illuminance_lx` is that of open level ground by the sky alone; `luminance_cd_m2` in its place is that of the zenith. The sun
+//! stands at an elevation and azimuth, or where it is seen at `latitude_deg`, `longitude_deg` (east) and `time`
+//! (`2026-06-21T12:00:00+02:00`); or `"sun"` is the name of a directional light of the file. Its `illuminance_lx` is that of a plane
+//! across its rays.
+
+use super::sun::Hours;
+use crate::scene::spectra_file::Reader;
+use serde_json::{Map, Value};
+use std::str::FromStr;
+
+/// Type of a sky: 1 to 16.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SkyType(pub u8);
+
+const NAMES: [(&str, u8); 4] = [
+    ("overcast", 1),
+    ("uniform", 5),
+    ("intermediate", 10),
+    ("clear", 12),
+];
+
+impl SkyType {
+    /// In words.
+    pub(super) fn name(self) -> &'static str {
+        match self.0 {
+            5 => "uniform",
+            1..=6 | 16 => "overcast",
+            7..=10 => "intermediate",
+            _ => "clear",
+        }
+    }
+}
+
+impl FromStr for SkyType {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = NAMES.iter().find(|(name, _)| *name == text);
+        let number = text.strip_prefix("cie:").and_then(|n| n.parse().ok());
+        named
+            .map(|&(_, kind)| kind)
+            .or(number)
+            .filter(|kind| (1..=16).contains(kind))
+            .map(Self)
+            .ok_or_else(|| {
+                "a sky is overcast, intermediate, clear, uniform, or cie:1 to cie:16".into()
+            })
+    }
+}
+
+/// How bright the sky is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Brightness {
+    /// Of open level ground, by the sky alone, lx.
+    Illuminance(f64),
+    /// Of the zenith, cd/m2.
+    Luminance(f64),
+}
+
+/// Where the sun stands.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SunPlace {
+    /// Degrees above the horizon, and clockwise from north.
+    Angles {
+        /// Above the horizon.
+        elevation: f64,
+        /// From north over east.
+        azimuth: f64,
+    },
+    /// Seen from a place at a time.
+    Clock {
+        /// Degrees north.
+        latitude: f64,
+        /// Degrees east.
+        longitude: f64,
+        /// When.
+        time: Hours,
+    },
+    /// A directional light of the file, by its name or its node's.
+    Light(String),
+}
+
+impl FromStr for SunPlace {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            "the sun stands at ELEVATION,AZIMUTH in degrees, or at LATITUDE,LONGITUDE,TIME as in \
+             52.5,13.4,2026-06-21T12:00:00+02:00"
+                .to_owned()
+        };
+        let number = |text: &str| {
+            let number = text.trim().parse::<f64>().ok();
+            number.filter(|n| n.is_finite()).ok_or_else(wrong)
+        };
+        let parts: Vec<&str> = text.split(',').collect();
+        match parts[..] {
+            [elevation, azimuth] => Ok(Self::Angles {
+                elevation: number(elevation)?,
+                azimuth: number(azimuth)?,
+            }),
+            [latitude, longitude, time] => Ok(Self::Clock {
+                latitude: number(latitude)?,
+                longitude: number(longitude)?,
+                time: time.trim().parse().map_err(|_| wrong())?,
+            }),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+/// What is said of the sun.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SunWish {
+    /// Where it stands.
+    pub place: Option<SunPlace>,
+    /// Of a plane across its rays, lx.
+    pub illuminance: Option<f64>,
+    /// Correlated colour temperature, K.
+    pub kelvin: Option<f64>,
+}
+
+/// What is said of the sky.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SkyWish {
+    /// What kind of sky.
+    pub kind: Option<SkyType>,
+    /// How bright.
+    pub brightness: Option<Brightness>,
+    /// Correlated colour temperature, K.
+    pub kelvin: Option<f64>,
+    /// Reflectance of the ground below the horizon.
+    pub ground: Option<f64>,
+    /// Where north is, degrees clockwise from -Z.
+    pub north: Option<f64>,
+    /// The sun.
+    pub sun: SunWish,
+}
+
+impl SkyWish {
+    /// Nothing said?
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// These, and where they say nothing the others.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            kind: self.kind.or(other.kind),
+            brightness: self.brightness.or(other.brightness),
+            kelvin: self.kelvin.or(other.kelvin),
+            ground: self.ground.or(other.ground),
+            north: self.north.or(other.north),
+            sun: SunWish {
+                place: self.sun.place.or(other.sun.place),
+                illuminance: self.sun.illuminance.or(other.sun.illuminance),
+                kelvin: self.sun.kelvin.or(other.sun.kelvin),
+            },
+        }
+    }
+
+    /// Reads the entry of a side file.
+    pub(crate) fn read(value: &Value, place: &str, reader: &mut Reader) -> Self {
+        let Some(sky) = reader.object(value, place) else {
+            return Self::default();
+        };
+        let known = [
+            "type",
+            "illuminance_lx",
+            "luminance_cd_m2",
+            "cct_k",
+            "ground_reflectance",
+            "north_deg",
+            "sun",
+        ];
+        reader.keys(sky, &known, place);
+        let mut wish = Self {
+            kind: parsed(sky, "type", place, reader),
+            kelvin: number(sky, "cct_k", KELVIN, place, reader),
+            ground: number(sky, "ground_reflectance", [0.0, 1.0], place, reader),
+            north: number(sky, "north_deg", TURN, place, reader),
+            ..Self::default()
+        };
+        let lux = number(sky, "illuminance_lx", BRIGHT, place, reader);
+        let luminance = number(sky, "luminance_cd_m2", BRIGHT, place, reader);
+        wish.brightness = match (lux, luminance) {
+            (Some(_), Some(_)) => {
+                let what = "says how bright it is twice";
+                let next = "give either illuminance_lx or luminance_cd_m2";
+                reader.check.problem(place, what, next);
+                None
+            }
+            (Some(lux), None) => Some(Brightness::Illuminance(lux)),
+            (None, luminance) => luminance.map(Brightness::Luminance),
+        };
+        match sky.get("sun") {
+            None => {}
+            Some(Value::String(name)) => wish.sun.place = Some(SunPlace::Light(name.clone())),
+            Some(sun) => wish.sun = SunWish::read(sun, &format!("{place}, sun"), reader),
+        }
+        wish
+    }
+}
+
+/// Correlated colour temperatures of daylight, K.
+pub(super) const KELVIN: [f64; 2] = [4000.0, 25_000.0];
+const BRIGHT: [f64; 2] = [0.0, 1e9];
+const TURN: [f64; 2] = [-360.0, 360.0];
+
+impl SunWish {
+    fn read(value: &Value, place: &str, reader: &mut Reader) -> Self {
+        let Some(sun) = reader.object(value, place) else {
+            return Self::default();
+        };
+        let angles = ["elevation_deg", "azimuth_deg"];
+        let clock = ["latitude_deg", "longitude_deg", "time"];
+        let known = [&angles[..], &clock, &["light", "illuminance_lx", "cct_k"]].concat();
+        reader.keys(sun, &known, place);
+        let has = |keys: &[&str]| keys.iter().any(|key| sun.contains_key(*key));
+        let light = sun.get("light").and_then(Value::as_str).map(str::to_owned);
+        let said = match (has(&angles), has(&clock), light) {
+            (true, false, None) => {
+                let elevation = number(sun, angles[0], [-90.0, 90.0], place, reader);
+                let azimuth = number(sun, angles[1], TURN, place, reader);
+                elevation
+                    .zip(azimuth)
+                    .map(|(elevation, azimuth)| SunPlace::Angles { elevation, azimuth })
+            }
+            (false, true, None) => {
+                let latitude = number(sun, clock[0], [-90.0, 90.0], place, reader);
+                let longitude = number(sun, clock[1], [-180.0, 180.0], place, reader);
+                let time = parsed::<Hours>(sun, clock[2], place, reader);
+                let both = latitude.zip(longitude).zip(time);
+                both.map(|((latitude, longitude), time)| SunPlace::Clock {
+                    latitude,
+                    longitude,
+                    time,
+                })
+            }
+            (false, false, Some(name)) => Some(SunPlace::Light(name)),
+            (false, false, None) => return Self::with(None, sun, place, reader),
+            _ => None,
+        };
+        if said.is_none() {
+            let what = "does not say where the sun stands";
+            let next = "give elevation_deg and azimuth_deg, or latitude_deg, longitude_deg and time, or light";
+            reader.check.problem(place, what, next);
+        }
+        Self::with(said, sun, place, reader)
+    }
+
+    fn with(
+        said: Option<SunPlace>,
+        sun: &Map<String, Value>,
+        place: &str,
+        reader: &mut Reader,
+    ) -> Self {
+        Self {
+            place: said,
+            illuminance: number(sun, "illuminance_lx", BRIGHT, place, reader),
+            kelvin: number(sun, "cct_k", KELVIN, place, reader),
+        }
+    }
+}
+
+/// A number within bounds.
+fn number(
+    object: &Map<String, Value>,
+    key: &str,
+    [least, most]: [f64; 2],
+    place: &str,
+    reader: &mut Reader,
+) -> Option<f64> {
+    let value = object.get(key)?;
+    let number = value.as_f64().filter(|v| (least..=most).contains(v));
+    if number.is_none() {
+        let what = format!("{key} is {value}, not a number from {least} to {most}");
+        reader
+            .check
+            .problem(place, what, "give one within these bounds");
+    }
+    number
+}
+
+/// A text that reads as something.
+fn parsed<T: FromStr<Err: std::fmt::Display>>(
+    object: &Map<String, Value>,
+    key: &str,
+    place: &str,
+    reader: &mut Reader,
+) -> Option<T> {
+    let value = object.get(key)?;
+    let read = value.as_str().map(str::parse::<T>);
+    match read {
+        Some(Ok(read)) => Some(read),
+        Some(Err(why)) => {
+            reader
+                .check
+                .problem(place, format!("{key} is {value}"), why.to_string());
+            None
+        }
+        None => {
+            reader
+                .check
+                .problem(place, format!("{key} is {value}"), "write a text");
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn skies_and_suns_are_typed() {
+        for (text, kind) in [
+            ("overcast", 1),
+            ("clear", 12),
+            ("cie:16", 16),
+            ("uniform", 5),
+        ] {
+            assert_eq!(text.parse(), Ok(SkyType(kind)));
+        }
+        for bad in ["cie:0", "cie:17", "cie:", "cloudy", ""] {
+            assert!(bad.parse::<SkyType>().is_err(), "{bad}");
+        }
+        assert_eq!(
+            "40,200".parse(),
+            Ok(SunPlace::Angles {
+                elevation: 40.0,
+                azimuth: 200.0
+            })
+        );
+        let clock = "52.5,13.4,2026-06-21T12:00:00+02:00".parse();
+        assert!(matches!(clock, Ok(SunPlace::Clock { latitude: 52.5, .. })));
+        for bad in ["40", "a,b", "NaN,3", "1,2,noon", "1,2,3,4"] {
+            assert!(bad.parse::<SunPlace>().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! Light of sky and sun: CIE 171:2006, cases 5.9, 5.11 and 5.12, and closed forms.
+
+#[path = "common/built.rs"]
+mod built;
+
+use built::Room;
+use glam::{DVec3, dvec3};
+use haarlight::scene::Scene;
+use haarlight::scene::sky::{
+    Brightness, Distribution, SkyType, SkyWish, SunPlace, SunWish, direction,
+};
+use haarlight::solve::{Bake, Settings};
+use std::f64::consts::PI;
+
+/// Greatest error of a point.
+const POINT: f64 = 5e-3;
+/// Illuminance of open ground in these tests: per cent are lux.
+const LUX: f64 = 100.0;
+
+fn cie(x: f64, y: f64, z: f64) -> DVec3 {
+    dvec3(x, z, -y)
+}
+
+/// A sky of a CIE type with the sun at 60 degrees over y = 4 of the report (north here), without its direct light.
+fn wish(kind: u8) -> SkyWish {
+    SkyWish {
+        kind: Some(SkyType(kind)),
+        brightness: Some(Brightness::Illuminance(LUX)),
+        ground: Some(0.3),
+        sun: SunWish {
+            place: Some(SunPlace::Angles {
+                elevation: 60.0,
+                azimuth: 0.0,
+            }),
+            illuminance: Some(0.0),
+            kelvin: None,
+        },
+        ..SkyWish::default()
+    }
+}
+
+fn bake(room: Room, wish: &SkyWish) -> Bake {
+    bake_at(room, wish, 0.5)
+}
+
+fn bake_at(room: Room, wish: &SkyWish, error: f64) -> Bake {
+    let settings = Settings {
+        error,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(room.scene().under(wish).unwrap(), settings);
+    bake.run();
+    bake
+}
+
+/// The room of 5.9 with an opening of a width in the middle of its roof, every panel cut into `cuts` x `cuts` squares.
+fn room(rho: f64, opening: f64, cuts: usize) -> Room {
+    let mut room = Room::new();
+    let paint = room.paint(rho);
+    let mut panel = |corner: DVec3, u: DVec3, v: DVec3| {
+        let n = cuts as f64;
+        for j in 0..cuts {
+            for i in 0..cuts {
+                let at = corner + u * (i as f64 / n) + v * (j as f64 / n);
+                room.quad(at, u / n, v / n, paint);
+            }
+        }
+    };
+    let (x, y, z) = (cie(1.0, 0.0, 0.0), cie(0.0, 1.0, 0.0), cie(0.0, 0.0, 1.0));
+    panel(DVec3::ZERO, 4.0 * x, 4.0 * y);
+    panel(DVec3::ZERO, 3.0 * z, 4.0 * x);
+    panel(4.0 * y, 4.0 * x, 3.0 * z);
+    panel(DVec3::ZERO, 4.0 * y, 3.0 * z);
+    panel(4.0 * x, 3.0 * z, 4.0 * y);
+    let rim = 0.5 * (4.0 - opening);
+    if rim > 0.0 {
+        let top = 3.0 * z;
+        panel(top, rim * y, 4.0 * x);
+        panel(top + (4.0 - rim) * y, rim * y, 4.0 * x);
+        panel(top + rim * y, opening * y, rim * x);
+        panel(top + rim * y + (4.0 - rim) * x, opening * y, rim * x);
+    }
+    room
+}
+
+/// Points A to F of the wall and G to N of the floor, with their normals, in the room.
+fn points() -> Vec<(DVec3, DVec3)> {
+    let wall = (0..6).map(|k| (cie(2.0, 0.0, 2.75 - 0.5 * f64::from(k)), cie(0.0, 1.0, 0.0)));
+    let floor = (0..8).map(|k| (cie(2.0, 0.25 + 0.5 * f64::from(k), 0.0), DVec3::Y));
+    wall.chain(floor).collect()
+}
+
+/// Irradiance at a point through a parallelogram, lit by a sky of 1 (and ground of `ground`), by plain quadrature.
+fn through(
+    sky: &Distribution,
+    ground: f64,
+    [corner, u, v]: [DVec3; 3],
+    (point, normal): (DVec3, DVec3),
+) -> f64 {
+    const N: usize = 800;
+    let (area, across) = (u.cross(v).length(), u.cross(v).normalize());
+    let mut sum = 0.0;
+    for j in 0..N {
+        for i in 0..N {
+            let at = |k: usize| (k as f64 + 0.5) / N as f64;
+            let way = corner + u * at(i) + v * at(j) - point;
+            let r2 = way.length_squared();
+            let d = way / r2.sqrt();
+            let radiance = if d.y > 0.0 {
+                sky.radiance(d)
+            } else {
+                ground / PI
+            };
+            sum += radiance * normal.dot(d).max(0.0) * across.dot(d).abs() / r2;
+        }
+    }
+    sum * area / (N * N) as f64
+}
+
+fn roof(opening: f64) -> [DVec3; 3] {
+    let rim = 0.5 * (4.0 - opening);
+    [
+        cie(rim, rim, 3.0),
+        cie(opening, 0.0, 0.0),
+        cie(0.0, opening, 0.0),
+    ]
+}
+
+/// Figures of the report at A, C, G, J, N (CIE 171:2006 through published validations).
+const TABLES: [(u8, f64, [f64; 5]); 8] = [
+    (1, 1.0, [0.46, 2.34, 2.33, 4.29, 2.33]),
+    (5, 1.0, [1.04, 2.59, 1.95, 3.37, 1.95]),
+    (12, 1.0, [1.74, 4.55, 5.72, 3.97, 0.96]),
+    (16, 1.0, [0.56, 2.32, 2.29, 4.29, 2.29]),
+    (1, 4.0, [37.84, 26.85, 31.87, 43.35, 31.87]),
+    (5, 4.0, [46.74, 28.05, 26.80, 35.58, 26.80]),
+    (12, 4.0, [66.34, 44.25, 42.33, 40.85, 16.79]),
+    (16, 4.0, [39.28, 26.79, 31.36, 42.76, 31.36]),
+];
+
+fn check(kind: u8, opening: f64, cuts: usize, slack: f64) {
+    let bake = bake(room(0.0, opening, cuts), &wish(kind));
+    let sky = Distribution::new(kind, direction(60.0, 0.0));
+    let lux: Vec<f64> = bake.probe(&points()).iter().map(|p| p.xyz[1]).collect();
+    let mut worst = 0.0_f64;
+    for (k, (got, at)) in lux.iter().zip(points()).enumerate() {
+        let want = LUX * through(&sky, 0.0, roof(opening), at);
+        worst = worst.max((got / want - 1.0).abs());
+        println!("type {kind}, {opening} m, point {k}: {got:.4} for {want:.4}");
+        assert!(
+            (got / want - 1.0).abs() <= slack,
+            "{k}: {got} should be {want}"
+        );
+    }
+    println!("type {kind}, {opening} m: worst {:.3} %", 100.0 * worst);
+    if let Some((_, _, table)) = TABLES.iter().find(|t| (t.0, t.1) == (kind, opening)) {
+        for (place, want) in [0, 2, 6, 9, 13].into_iter().zip(table) {
+            // A of the report's 4 x 4 wall is wrong near the opening (see the closed form of type 5).
+            let wrong = opening == 4.0 && place == 0;
+            // Printed to two digits, or one unit beside.
+            let near = (POINT * want).max(0.015);
+            assert!(
+                wrong || (lux[place] - want).abs() <= near,
+                "{place}: {} {want}",
+                lux[place]
+            );
+        }
+    }
+}
+
+#[test]
+fn cie_171_case_5_9() {
+    for kind in [1, 5, 12, 16] {
+        for opening in [1.0, 4.0] {
+            check(kind, opening, 1, POINT);
+        }
+    }
+}
+
+/// The wall under the whole open roof, by the closed form of a rectangle seen from a perpendicular element.
+#[test]
+fn cie_171_case_5_9_closed_form() {
+    let bake = bake(room(0.0, 4.0, 1), &wish(5));
+    let wall = [45.12, 35.90, 27.99, 21.64, 16.72, 12.97];
+    for (got, want) in bake.probe(&points()).iter().zip(wall) {
+        assert!(
+            (got.xyz[1] / want - 1.0).abs() <= 1e-3,
+            "{} {want}",
+            got.xyz[1]
+        );
+    }
+}
+
+/// The same rooms of many triangles, where rays do what polygons do above: as right through a small opening as through a large one,
+/// where what is left is the noise of 768 rays about a sun's aureole.
+#[test]
+fn rays_through_an_opening_agree_with_polygons() {
+    for (kind, opening, slack) in [
+        (1, 1.0, 0.01),
+        (12, 1.0, 0.01),
+        (12, 4.0, 0.03),
+        (5, 0.2, 0.02),
+    ] {
+        check(kind, opening, 6, slack);
+    }
+}
+
+/// 5.11: a window in a wall shows sky above the horizon and ground below it.
+#[test]
+fn ground_below_the_horizon_lights_a_ceiling() {
+    let mut room = Room::new();
+    let paint = room.paint(0.0);
+    let (x, y, z) = (cie(1.0, 0.0, 0.0), cie(0.0, 1.0, 0.0), cie(0.0, 0.0, 1.0));
+    room.quad(DVec3::ZERO, 4.0 * x, 4.0 * y, paint);
+    room.quad(3.0 * z, 4.0 * y, 4.0 * x, paint);
+    room.quad(DVec3::ZERO, 3.0 * z, 4.0 * x, paint);
+    room.quad(DVec3::ZERO, 4.0 * y, 3.0 * z, paint);
+    room.quad(4.0 * x, 3.0 * z, 4.0 * y, paint);
+    // The wall y = 4 with a window of 2 m x 1 m, its sill at 1 m.
+    let wall = 4.0 * y;
+    room.quad(wall, 4.0 * x, 1.0 * z, paint);
+    room.quad(wall + 2.0 * z, 4.0 * x, 1.0 * z, paint);
+    room.quad(wall + 1.0 * z, 1.0 * x, 1.0 * z, paint);
+    room.quad(wall + 1.0 * z + 3.0 * x, 1.0 * x, 1.0 * z, paint);
+    let bake = bake(room, &wish(12));
+    let sky = Distribution::new(12, direction(60.0, 0.0));
+    let window = [wall + 1.0 * z + 1.0 * x, 2.0 * x, 1.0 * z];
+    let places = [
+        (cie(2.0, 2.0, 0.0), DVec3::Y),
+        (cie(2.0, 3.5, 0.0), DVec3::Y),
+        (cie(2.0, 2.0, 3.0), DVec3::NEG_Y),
+        (cie(1.0, 3.0, 3.0), DVec3::NEG_Y),
+        (cie(2.0, 0.0, 1.5), cie(0.0, 1.0, 0.0)),
+        (cie(0.0, 2.0, 1.0), cie(1.0, 0.0, 0.0)),
+    ];
+    for (probed, place) in bake.probe(&places).iter().zip(places) {
+        let (got, want) = (probed.xyz[1], LUX * through(&sky, 0.3, window, place));
+        println!("{place:?}: {got:.4} for {want:.4}");
+        assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
+    }
+}
+
+/// An even sky over an open floor: E = pi L everywhere, and half of it on a wall that stands alone, with half of the ground's.
+#[test]
+fn an_even_sky_gives_open_ground_pi_l() {
+    let mut room = Room::new();
+    let paint = room.paint(0.5);
+    room.quad(DVec3::ZERO, DVec3::Z * 5.0, DVec3::X * 5.0, paint);
+    let wish = SkyWish {
+        brightness: Some(Brightness::Luminance(1000.0)),
+        ..wish(5)
+    };
+    let bake = bake(room, &wish);
+    let at = dvec3(2.0, 0.0, 1.3);
+    let lux = bake.probe(&[(at, DVec3::Y)])[0].xyz[1];
+    assert!((lux / (1000.0 * PI) - 1.0).abs() < 1e-5, "{lux}");
+}
+
+/// What a closed room looks like does not depend on the sky, to the last bit; and no ray is cast for it.
+#[test]
+fn a_closed_room_has_no_sky() {
+    let closed = || {
+        let mut room = Room::new();
+        let (paint, lamp) = (room.paint(0.5), room.lamp(0.5, 100.0));
+        let materials = [paint, paint, paint, lamp, paint, paint];
+        room.hollow(DVec3::ZERO, dvec3(4.0, 3.0, 4.0), materials);
+        room.block(dvec3(1.0, 0.5, 1.0), dvec3(2.0, 1.5, 2.0), paint);
+        room
+    };
+    let lit = |scene: Scene| {
+        let mut bake = Bake::new(scene, Settings::default());
+        bake.run();
+        let rays: u64 = bake.rounds().iter().map(|r| r.rays).sum();
+        let probes = bake.probe(&[(dvec3(3.0, 0.0, 3.0), DVec3::Y)]);
+        (probes[0].leaves, rays, bake.plan().to_string())
+    };
+    let without = lit(closed().scene());
+    let under = lit(closed().scene().under(&wish(12)).unwrap());
+    assert_eq!((without.0, without.1), (under.0, under.1));
+    assert!(
+        under.2.contains("the room is closed: no ray leaves it"),
+        "{}",
+        under.2
+    );
+}
+
+/// The sun through an opening in the roof: a patch on the floor has its lux and its colour, the shade has neither.
+#[test]
+fn the_sun_lights_a_patch_of_the_floor() {
+    let place = SunPlace::Angles {
+        elevation: 60.0,
+        azimuth: 90.0,
+    };
+    let wish = SkyWish {
+        sun: SunWish {
+            place: Some(place),
+            illuminance: Some(80_000.0),
+            kelvin: Some(5000.0),
+        },
+        brightness: Some(Brightness::Illuminance(0.0)),
+        ..wish(12)
+    };
+    for cuts in [1, 6] {
+        let bake = bake_at(room(0.0, 1.0, cuts), &wish, 1.0);
+        // From the middle of the opening down along its rays, to the west.
+        let x = 2.0 - 3.0 / 60.0_f64.to_radians().tan();
+        let at = |x: f64| (cie(x, 2.0, 0.0), DVec3::Y);
+        let probed = bake.probe(&[at(x), at(x + 0.9), at(x + 0.4)]);
+        let want = 80_000.0 * 60.0_f64.to_radians().sin();
+        for lit in [&probed[0], &probed[2]] {
+            assert!((lit.xyz[1] / want - 1.0).abs() < 1e-3, "{:?}", lit.xyz);
+        }
+        assert!(probed[1].xyz[1] < 1e-3 * want, "{:?}", probed[1].xyz);
+        // Chromaticity of daylight at 5000 K (CIE 015, D50: x .3457, y .3585).
+        let [x, y, z] = probed[0].xyz;
+        let all = x + y + z;
+        assert!((x / all - 0.3457).abs() < 1e-3 && (y / all - 0.3585).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn a_clear_sky_asks_where_the_sun_stands() {
+    let asked = |wish: SkyWish| {
+        let error = room(0.5, 1.0, 1).scene().under(&wish).unwrap_err();
+        error.to_string()
+    };
+    let clear = SkyWish {
+        kind: Some(SkyType(12)),
+        ..SkyWish::default()
+    };
+    assert!(asked(clear.clone()).contains("where the sun stands"));
+    let below = SunPlace::Angles {
+        elevation: -3.0,
+        azimuth: 0.0,
+    };
+    let sun = SunWish {
+        place: Some(below),
+        ..SunWish::default()
+    };
+    assert!(
+        asked(SkyWish {
+            sun: sun.clone(),
+            ..clear
+        })
+        .contains("3.0 deg below the horizon")
+    );
+    assert!(
+        asked(SkyWish {
+            sun,
+            ..SkyWish::default()
+        })
+        .contains("what the sky is like")
+    );
+}
