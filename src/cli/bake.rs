@@ -6,15 +6,17 @@
 
 use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
 use super::options::{Common, Reading, Showing, Solving, Storing, positive};
+use super::report::Report;
 use super::results::print;
 use super::snapshots::Snapshots;
 use super::stop::Stop;
 use super::talk::Talk;
 use super::{paths, summary};
-use crate::audit::{Reference, Report};
+use crate::audit::{self, Reference};
 use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
 use crate::mesh::Limits;
+use crate::output::gltf::{Packing, Writing};
 use crate::output::{BakedGlb, baked_glb, camera, npz, vertices_within};
 use crate::report::Log;
 use crate::scene::Scene;
@@ -46,6 +48,7 @@ Examples:
   haarlight bake room.gltf -o lit.glb --error 0.3 --spectra measured.spectra.json
   haarlight bake room.glb --snapshots pictures --log bake.jsonl --audit 200
   haarlight bake room.glb --checkpoint room.state      stop it at any time; the same command goes on
+  haarlight bake room.glb --report                     and a page, room.report.html, to look at the light in a browser
   haarlight bake room.glb --cache                      then change lamps or paints: haarlight relight room.glb")]
 pub struct BakeArgs {
     /// The room, .glb or .gltf.
@@ -90,6 +93,10 @@ pub struct BakeArgs {
     /// name with .cache, beside it, where `relight` looks].
     #[arg(long, value_name = "FILE")]
     pub cache: Option<Option<PathBuf>>,
+    /// Write a page that shows the room with its light, its errors and what they took: one HTML file that needs no network
+    /// [without a value: ROOM's name with .report.html, beside it].
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<Option<PathBuf>>,
     /// The cache may take this much, MB.
     #[arg(long, value_name = "MB", default_value_t = 2048)]
     pub cache_limit: u64,
@@ -100,6 +107,19 @@ pub struct BakeArgs {
     /// Print the verdict as one JSON object.
     #[arg(long)]
     pub json: bool,
+}
+
+impl BakeArgs {
+    /// The same with a report, named or not.
+    pub(super) fn with_report(mut self) -> Self {
+        self.report.get_or_insert(None);
+        self
+    }
+
+    fn report(&self) -> Option<PathBuf> {
+        let named = self.report.clone()?;
+        Some(named.unwrap_or_else(|| paths::report_of(&self.room)))
+    }
 }
 
 /// Bakes; the exit code.
@@ -145,11 +165,19 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     if cache.is_some() {
         bake.keep();
     }
-    write(&mut log, &PlanRecord::new(&bake, args.solving.time))?;
+    let plan = PlanRecord::new(&bake, args.solving.time);
+    write(&mut log, &plan)?;
+    let mut report = args
+        .report()
+        .map(|path| Report::new(path, &plan))
+        .transpose()?;
     if let Some(path) = args.checkpoint.as_deref().filter(|path| path.exists()) {
         bake.resume(path)?;
         for round in bake.rounds() {
             write(&mut log, round)?;
+        }
+        if let Some(report) = &mut report {
+            report.note(&bake);
         }
         let rounds = bake.rounds().len();
         talk.say(&format!("going on after round {rounds} of {}", text(path)));
@@ -161,6 +189,9 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let verdict = stop.run(&mut bake, &talk, |bake, round| {
         seconds.solve += round.round_s;
         write(&mut log, round)?;
+        if let Some(report) = &mut report {
+            report.note(bake);
+        }
         if let Some(path) = &args.checkpoint {
             bake.save(path)?;
         }
@@ -217,6 +248,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     over_budget(args, &glb).iter().for_each(|w| talk.warn(w));
     file::write_atomic(&output, room, |w| w.write_all(&glb.bytes))?;
     outputs.glb = text(&output);
+    outputs.report = report.as_ref().map(|r| text(&r.path));
     if let Some(path) = &args.npz {
         write_npz(path, &args.room, &bake, &baked)?;
         outputs.npz = Some(text(path));
@@ -244,7 +276,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         talk.phase("auditing");
         let seed = common.seed ^ AUDIT_SEED;
         let reference = Reference::new(&bake, points, AUDIT_PATHS, seed);
-        Report::of_file(&bake, &baked, &reference)
+        audit::Report::of_file(&bake, &baked, &reference)
     });
     if let Some(audit) = &audit {
         write(&mut log, audit)?;
@@ -264,6 +296,19 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     };
     let record = VerdictRecord::new(end);
     write(&mut log, &record)?;
+    if let Some(report) = &report {
+        // The viewer opens no packed file, and knows vertices by their order.
+        let plain = Writing {
+            packing: Packing::default(),
+            ..args.storing.writing()
+        };
+        let plain = match plain == args.storing.writing() {
+            true => None,
+            false => Some(baked_glb(scene, &baked.surfaces, &exposure, plain)?),
+        };
+        let glb = plain.as_ref().unwrap_or(&glb);
+        report.write(&record, audit.as_ref(), &baked, glb, &bake)?;
+    }
     talk.clear();
     talk.say(&format!("\n{}", summary::rounds(bake.rounds())));
     talk.say(&summary::verdict(&record, audit.as_ref()));
@@ -382,6 +427,8 @@ fn problems(
             .map(|path| ("--checkpoint", path)),
     );
     outputs.extend(cache.map(|path| ("--cache", path)));
+    let report = args.report();
+    outputs.extend(report.as_deref().map(|path| ("--report", path)));
     let mut inputs = vec![args.room.as_path()];
     let beside = args.room.with_extension("spectra.json");
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));

@@ -8,6 +8,7 @@ const EXAMPLES: &str = "\
 Examples:
   haarlight bake room.glb                          writes room.baked.glb, exit code 0 once dE00 <= 0.5
   haarlight bake room.glb --error 1 --time 60 --snapshots pictures --log bake.jsonl
+  haarlight report room.glb                        bakes too, and writes room.report.html to look at it
   haarlight inspect room.glb                       what is in the room, and what would be simulated
   haarlight probe room.glb --points desk.csv       lux at points (columns x,y,z,nx,ny,nz)
   haarlight spectra cie/F                          names that a room's .spectra.json may use
@@ -32,6 +33,9 @@ pub struct Cli {
 pub enum Command {
     /// Write the room back with its light baked in.
     Bake(bake::BakeArgs),
+    /// Bake, and write a page beside the room that shows the light, how wrong it is, and what it took. Takes the options of
+    /// `bake`: the same as `bake --report`.
+    Report(bake::BakeArgs),
     /// Write the room back under other lamps and paints, from what a bake kept.
     Relight(relight::RelightArgs),
     /// Print what the program sees in a room. Nothing is solved.
@@ -59,6 +63,7 @@ pub fn run(cli: &Cli) -> Result<u8> {
     }
     match &cli.command {
         Command::Bake(args) => bake::run(args, &cli.common),
+        Command::Report(args) => bake::run(&args.clone().with_report(), &cli.common),
         Command::Relight(args) => relight::run(args, &cli.common),
         Command::Inspect(args) => inspect::run(args, &mut std::io::stdout()).map(|()| 0),
         Command::Probe(args) => probe::run(args, &cli.common),

@@ -1,4 +1,4 @@
-//! `haarlight inspect ROOM [--json] [--spectra FILE] [--range 380..780]`: what the program sees in a room.
+//! `haarlight inspect ROOM [--json] [--pictures DIR] [--spectra FILE] [--range 380..780]`: what the program sees in a room.
 //!
 //! Prints triangles, areas, whether the room is closed, lamps with lumens, materials with albedo (Y under D65) and where
 //! their spectrum comes from, the plan of effects, and warnings. Nothing is solved.
@@ -8,6 +8,7 @@
 //! the fields of `facts` are those of [`Facts`], with units in their names.
 
 use super::options::Reading;
+use super::pictures;
 use super::results::put;
 use crate::error::Result;
 use crate::scene::Scene;
@@ -30,6 +31,9 @@ pub struct InspectArgs {
     /// Print one JSON object.
     #[arg(long)]
     pub json: bool,
+    /// Draw the room from above, the spectra of its lamps and those of its materials: SVG, black on white.
+    #[arg(long, value_name = "DIR")]
+    pub pictures: Option<PathBuf>,
     /// What to read.
     #[command(flatten)]
     pub reading: Reading,
@@ -49,6 +53,9 @@ pub fn run(args: &InspectArgs, out: &mut impl Write) -> Result<()> {
         .warnings
         .extend(stops.iter().map(|p| format!("{}; {}", p.what, p.next)));
     let facts = Facts::of(&scene);
+    if let Some(folder) = &args.pictures {
+        pictures::write(folder, &scene, &facts)?;
+    }
     let plan = Plan::of(&scene);
     let text = if args.json {
         let all = json!({
@@ -197,6 +204,7 @@ mod tests {
             &InspectArgs {
                 room,
                 json,
+                pictures: None,
                 reading: Reading::default(),
             },
             &mut out,

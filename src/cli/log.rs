@@ -182,6 +182,8 @@ pub struct Outputs {
     pub log: Option<String>,
     /// What relighting needs.
     pub cache: Option<String>,
+    /// The page that shows the room.
+    pub report: Option<String>,
     /// Pictures of all rounds.
     pub pictures: Vec<String>,
     /// High dynamic range pictures of the result.

@@ -6,8 +6,10 @@
 //! | `options` | options that commands share |
 //! | `bake`, `relight`, `inspect`, `probe`, `spectra`, `cost`, `paper` | the commands |
 //! | `log` | the log of a bake, field by field |
+//! | `report` | the page of a bake |
 //! | `snapshots` | pictures of the rounds |
 //! | `metrics` | figures of lighting practice for `probe` |
+//! | `pictures` | plan and spectra of a room for `inspect` |
 //! | `points` | the CSV of points for `probe` |
 //! | `stop` | Ctrl-C and `--time` |
 //! | `paths` | checks on output files |
@@ -25,9 +27,11 @@ mod metrics;
 pub mod options;
 pub mod paper;
 mod paths;
+mod pictures;
 pub mod points;
 pub mod probe;
 pub mod relight;
+mod report;
 mod results;
 mod sky;
 mod snapshots;

@@ -10,6 +10,11 @@ pub(super) fn cache_of(room: &Path) -> PathBuf {
     room.with_extension("cache")
 }
 
+/// The page that `bake --report` writes where none is named.
+pub(super) fn report_of(room: &Path) -> PathBuf {
+    room.with_extension("report.html")
+}
+
 /// What is wrong with the name of the room that a command writes; `which`: baked, relit.
 pub(super) fn not_glb(output: &Path, which: &str) -> Option<Problem> {
     let ends_well = output

@@ -118,7 +118,7 @@ fn plot(path: &Path, pattern: &str, found: &[(String, Named)]) -> Result<()> {
         },
         x: "wavelength, nm".into(),
         y: y.into(),
-        x_scale: Scale::Linear,
+        x_scale: Scale::Fitted,
         y_scale: Scale::Linear,
         series: found.iter().map(series).collect(),
     };

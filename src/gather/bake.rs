@@ -230,6 +230,11 @@ impl<'a> Look<'a> {
         }
     }
 
+    /// Reflectance on the leaves, of a texture its mean; vertex colours apart.
+    pub(crate) fn reflectance(&self) -> &Leaves {
+        &self.reflectance
+    }
+
     /// Reflectance at a vertex that vertex colours paint; none elsewhere.
     fn painted(&self, surface: &Surface, vertex: &BakedVertex) -> Option<Leaves> {
         let base = self.base.filter(|_| surface.colors.is_some())?;

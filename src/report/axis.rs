@@ -5,6 +5,8 @@
 pub enum Scale {
     /// Evenly, from zero or below the least value.
     Linear,
+    /// Evenly, from the least value to the greatest: wavelengths, places.
+    Fitted,
     /// By their logarithm; values that are not positive cannot be shown.
     Log,
 }
@@ -42,6 +44,8 @@ impl Axis {
                 let step = step((high - low) / STEPS);
                 ((low / step).floor() * step, (high / step).ceil() * step)
             }
+            Scale::Fitted if low < high => (low, high),
+            Scale::Fitted => (low - 0.5, low + 0.5),
             // Out to the next of 1, 2, 5.
             Scale::Log => {
                 let (low, high) = (nice_below(low), nice_above(high));
@@ -66,7 +70,7 @@ impl Axis {
             return None;
         }
         let place = match self.scale {
-            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Linear | Scale::Fitted => (value - self.low) / (self.high - self.low),
             Scale::Log => (value / self.low).log10() / (self.high / self.low).log10(),
         };
         Some(self.pixels[0] + place * (self.pixels[1] - self.pixels[0]))
@@ -75,16 +79,16 @@ impl Axis {
     /// Ticks from low to high.
     pub(super) fn ticks(&self) -> Vec<Tick> {
         match self.scale {
-            Scale::Linear => {
+            Scale::Linear | Scale::Fitted => {
                 let step = step((self.high - self.low) / STEPS);
-                let count = ((self.high - self.low) / step).round() as usize;
-                let first = (self.low / step).round();
-                (0..=count)
-                    .map(|i| Tick {
-                        value: (first + i as f64) * step,
-                        label: true,
-                    })
-                    .collect()
+                // A hair of tolerance, for ends that are ticks but for rounding.
+                let first = (self.low / step - 1e-9).ceil() as i64;
+                let last = (self.high / step + 1e-9).floor() as i64;
+                let tick = |i: i64| Tick {
+                    value: i as f64 * step,
+                    label: true,
+                };
+                (first..=last).map(tick).collect()
             }
             Scale::Log => {
                 let decades = (self.high / self.low).log10();
@@ -108,7 +112,7 @@ impl Axis {
 }
 
 fn can_show(scale: Scale, value: f64) -> bool {
-    value.is_finite() && (scale == Scale::Linear || value > 0.0)
+    value.is_finite() && (scale != Scale::Log || value > 0.0)
 }
 
 /// The least of 1, 2, 5 times a power of ten that is not below `wanted`.
@@ -168,6 +172,16 @@ mod tests {
         let axis = Axis::new(Scale::Linear, [0.3, 2.9].into_iter(), [0.0, 300.0]);
         assert_eq!(labels(&axis), ["0", "0.5", "1", "1.5", "2", "2.5", "3"]);
         assert_eq!(axis.pixel(1.5), Some(150.0));
+    }
+
+    #[test]
+    fn fitted_axes_begin_where_values_do() {
+        let axis = Axis::new(Scale::Fitted, [380.0, 780.0].into_iter(), [0.0, 400.0]);
+        assert_eq!(labels(&axis), ["400", "500", "600", "700"]);
+        assert_eq!(
+            (axis.pixel(380.0), axis.pixel(780.0)),
+            (Some(0.0), Some(400.0))
+        );
     }
 
     #[test]

@@ -1,9 +1,11 @@
-//! What a person reads: the log, tables, charts.
+//! What a person reads: the log, tables, charts, the page.
 
 mod axis;
 pub mod bars;
 pub mod chart;
 pub mod log;
+pub mod page;
+pub mod plan;
 mod svg;
 pub mod table;
 

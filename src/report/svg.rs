@@ -56,6 +56,32 @@ impl Svg {
         );
     }
 
+    /// Straight lines between pairs of points, in one element.
+    pub(super) fn lines(
+        &mut self,
+        pairs: impl Iterator<Item = [[f64; 2]; 2]>,
+        color: &str,
+        width: f64,
+    ) {
+        let _ = write!(self.0, "<path d=\"");
+        for [[x1, y1], [x2, y2]] in pairs {
+            let _ = write!(self.0, "M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}");
+        }
+        let _ = writeln!(
+            self.0,
+            "\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" stroke-linecap=\"round\"/>"
+        );
+    }
+
+    /// Filled triangles, in one element.
+    pub(super) fn triangles(&mut self, all: impl Iterator<Item = [[f64; 2]; 3]>, color: &str) {
+        let _ = write!(self.0, "<path d=\"");
+        for [[x1, y1], [x2, y2], [x3, y3]] in all {
+            let _ = write!(self.0, "M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}L{x3:.1} {y3:.1}Z");
+        }
+        let _ = writeln!(self.0, "\" fill=\"{color}\"/>");
+    }
+
     /// A mark of one of four shapes, told apart without colour.
     pub(super) fn mark(&mut self, [x, y]: [f64; 2], color: &str, shape: usize) {
         let fill = format!("fill=\"{color}\" stroke=\"#ffffff\" stroke-width=\"1\"");

@@ -91,6 +91,18 @@ pub fn baked_glb(
     writer.finish()
 }
 
+/// The surfaces that are written, in the order in which the file's meshes and their primitives have them.
+pub fn order(scene: &Scene, surfaces: &[BakedSurface]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..surfaces.len())
+        .filter(|&k| !surfaces[k].triangles.is_empty())
+        .collect();
+    order.sort_by_key(|&k| {
+        let surface = &scene.surfaces[surfaces[k].surface];
+        (surface.node, surface.instance, surface.primitive)
+    });
+    order
+}
+
 /// The refined meshes of a mesh's primitives.
 type Primitives<'a> = BTreeMap<usize, Vec<&'a BakedSurface>>;
 

@@ -1,0 +1,66 @@
+//! The page of a bake (`--report`): what the log says, gathered while it is written.
+
+use super::log::{PlanRecord, VerdictRecord};
+use crate::audit;
+use crate::error::{Error, Result};
+use crate::gather::Baked;
+use crate::output::BakedGlb;
+use crate::report::page::{History, Page};
+use crate::solve::Bake;
+use crate::store::file;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// A page in the making.
+pub(super) struct Report {
+    pub(super) path: PathBuf,
+    plan: Value,
+    history: History,
+}
+
+impl Report {
+    pub(super) fn new(path: PathBuf, plan: &PlanRecord) -> Result<Self> {
+        Ok(Self {
+            path,
+            plan: value(plan)?,
+            history: History::default(),
+        })
+    }
+
+    /// A round is done.
+    pub(super) fn note(&mut self, bake: &Bake) {
+        self.history.note(bake);
+    }
+
+    /// The bake is over.
+    pub(super) fn write(
+        &self,
+        verdict: &VerdictRecord,
+        audit: Option<&audit::Report>,
+        baked: &Baked,
+        glb: &BakedGlb,
+        bake: &Bake,
+    ) -> Result<()> {
+        let log = json!({
+            "plan": self.plan,
+            "rounds": value(bake.rounds())?,
+            "audit": value(&audit)?,
+            "verdict": value(verdict)?,
+        });
+        let page = Page {
+            bake,
+            baked,
+            glb: &glb.bytes,
+            history: &self.history,
+            log,
+        };
+        let html = page.html()?;
+        let room = Some(bake.scene().source.path.as_path());
+        file::write_atomic(&self.path, room, |w| w.write_all(html.as_bytes()))
+    }
+}
+
+fn value(record: &(impl Serialize + ?Sized)) -> Result<Value> {
+    serde_json::to_value(record).map_err(|problem| Error::Internal(format!("report: {problem}")))
+}
