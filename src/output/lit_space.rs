@@ -14,6 +14,8 @@ use std::collections::HashSet;
 /// Paths from lamps: 12 k rays, some hundredths of a second in a room of 100,000 triangles.
 const PATHS: u32 = 3072;
 const BOUNCES: u32 = 3;
+/// Directions that stand for half a sky.
+const DOME: u32 = 32;
 /// Fewer segments than this are few.
 pub(super) const FEW: usize = 96;
 /// Cells that are lit or not: this many to half the room's diagonal.
@@ -172,7 +174,9 @@ impl<'a> Room<'a> {
         for light in &self.scene.lights {
             let place = light.position - mesh.centre;
             match light.kind {
-                LightKind::Directional => suns.push(Start::Sun(light.direction)),
+                LightKind::Directional | LightKind::Sun => suns.push(Start::Sun(light.direction)),
+                LightKind::Sky => suns.extend(dome(DVec3::Y)),
+                LightKind::Ground => suns.extend(dome(DVec3::NEG_Y)),
                 LightKind::Point => near.push(Start::Lamp(place)),
                 LightKind::Spot { outer, .. } => {
                     near.push(Start::Spot(place, light.direction, outer.cos()));
@@ -230,6 +234,11 @@ impl<'a> Room<'a> {
     pub(super) fn is_lit(&self, met: &Met) -> bool {
         self.lit.is_empty() || self.lit.contains(&self.cell(met))
     }
+}
+
+/// Light from all over the half of directions about `pole`, as from so many suns.
+fn dome(pole: DVec3) -> impl Iterator<Item = Start> {
+    (0..DOME).map(move |k| Start::Sun(-cosine_direction(pole, sequence02(k, 0))))
 }
 
 /// Which way a normal looks, of six.
