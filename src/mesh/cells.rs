@@ -47,8 +47,6 @@ pub(super) struct Doubt {
     pub(super) inside: f32,
     /// How much of what the solved light told of the triangle around this one proved true.
     pub(super) trust: f32,
-    /// Is it part of a triangle that was tested?
-    pub(super) deep: bool,
 }
 
 /// A triangle of the output.
@@ -366,7 +364,6 @@ impl Cells {
             doubt: Doubt {
                 square: shrink * doubt.square,
                 trust: doubt.trust,
-                deep: doubt.deep || doubt.tested,
                 ..Doubt::default()
             },
         };

@@ -38,8 +38,8 @@ const FULL: usize = 64;
 
 /// Light at the corners of a cell, mean square of what the solved light differs by, and its worst place.
 type Told = ([[f64; 3]; 3], f64, Option<(Hint, f64)>);
-/// Looks in the middles of edges and maybe inside, with weights of the corners there.
-type Asked = ([u32; 3], Option<(u32, [f64; 3])>);
+/// Looks in the middles of edges and inside, and weights of the corners there.
+type Asked = ([u32; 3], u32, [f64; 3]);
 
 /// Sum of the light of neighbours of covered vertices, and how many there are.
 type Lent = HashMap<u32, ([f64; 3], f64)>;
@@ -373,8 +373,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Looks at light in the middles of edges and at a point inside: where the solved light is worst, or anywhere if nobody looked
-    /// inside of what the cell is part of.
+    /// Looks at light in the middles of edges and at a point inside: where the solved light is worst, or anywhere.
     fn test(&mut self, cells: &[usize], progress: &dyn Fn(usize, usize)) {
         let told: Vec<_> = cells
             .par_iter()
@@ -394,24 +393,21 @@ impl<'a> Growth<'a> {
             let middles = middles.map(|vertex| self.want(sheet, vertex));
             let cell = &self.cells.all[k];
             let weights = match worst {
-                Some((hint, _)) => Some(within(&cell.corners, hint.at)),
-                None => (!cell.doubt.deep).then(|| {
+                Some((hint, _)) => within(&cell.corners, hint.at),
+                None => {
                     let seed = hash(k as u64, self.cells.all.len() as u64);
                     let unit = |x: u64| (x >> 11) as f64 / (1_u64 << 53) as f64;
                     triangle_weights([unit(seed), unit(hash(seed, 1))])
-                }),
+                }
+            };
+            let inside = Vertex {
+                triangle: cell.of.0,
+                weights: cell.at(weights),
+                entry: cell.of.1,
             };
             let sheet = &self.cells.sheets[sheet];
-            let inside = weights.map(|weights| {
-                let inside = Vertex {
-                    triangle: cell.of.0,
-                    weights: cell.at(weights),
-                    entry: cell.of.1,
-                };
-                let look = self.looks.want(&inside, sheet.surface, sheet.back);
-                (look, weights)
-            });
-            asked.push((middles, inside));
+            let inside = self.looks.want(&inside, sheet.surface, sheet.back);
+            asked.push((middles, inside, weights));
         }
         self.looks.complete(progress);
         for ((&k, told), asked) in cells.iter().zip(told).zip(asked) {
@@ -420,8 +416,13 @@ impl<'a> Growth<'a> {
     }
 
     /// What is known of a cell now: its light, what the solved light tells of it and where that is worst; looks in the middles
-    /// of edges, maybe one inside, and where that is.
-    fn judged(&self, k: usize, (light, told, worst): Told, (middles, inside): Asked) -> Doubt {
+    /// of edges, one inside, and where that is.
+    fn judged(
+        &self,
+        k: usize,
+        (light, told, worst): Told,
+        (middles, inside, weights): Asked,
+    ) -> Doubt {
         let off = |look: u32, weights: [f64; 3]| {
             let seen = self.looks.at(look)?.xyz;
             let off = self.difference(mix(&light, weights), seen);
@@ -431,7 +432,7 @@ impl<'a> Growth<'a> {
         let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
         let Cell { sheet, corners, .. } = &self.cells.all[k];
         let seen = corners.map(|c| self.seen(*sheet as usize, c.vertex).is_some());
-        let mut looks = middles.into_iter().chain(inside.map(|(look, _)| look));
+        let mut looks = middles.into_iter().chain([inside]);
         if !seen.contains(&true) && looks.all(|look| self.looks.at(look).is_none()) {
             // It lies below something.
             return Doubt {
@@ -447,8 +448,7 @@ impl<'a> Growth<'a> {
             };
             off(middles[e], halves[e]).unwrap_or_else(|| COVERED * ends())
         });
-        let asked = inside.is_some();
-        let inside = inside.and_then(|(look, weights)| off(look, weights));
+        let inside = off(inside, weights);
         let edges: f64 = bent.iter().map(|d| d * d).sum();
         let before = f64::from(self.cells.all[k].doubt.trust);
         let (square, trust) = match (worst, inside) {
@@ -457,8 +457,6 @@ impl<'a> Growth<'a> {
                 ((0.25 * edges).max(trust * trust * told), trust)
             }
             (None, Some(inside)) => (0.25 * (edges + inside * inside), 1.0),
-            // Three places of a triangle that is smaller than what was looked into.
-            (None, None) if !asked => (edges / 3.0, before),
             (None, None) => ((0.25 * edges).max(before * before * told), before),
         };
         let inside = inside.unwrap_or(square.sqrt());
@@ -468,7 +466,6 @@ impl<'a> Growth<'a> {
             bent: bent.map(|d| d as f32),
             inside: inside as f32,
             trust: trust as f32,
-            deep: self.cells.all[k].doubt.deep,
         }
     }
 }
