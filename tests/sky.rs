@@ -138,21 +138,24 @@ const TABLES: [(u8, f64, [f64; 5]); 8] = [
     (16, 4.0, [39.28, 26.79, 31.36, 42.76, 31.36]),
 ];
 
+/// `slack`: for the root mean square over the points; for each of them as well where nothing is left to chance, else three times
+/// as much.
 fn check(kind: u8, opening: f64, cuts: usize, slack: f64) {
     let bake = bake(room(0.0, opening, cuts), &wish(kind));
     let sky = Distribution::new(kind, direction(60.0, 0.0));
     let lux: Vec<f64> = bake.probe(&points()).iter().map(|p| p.xyz[1]).collect();
-    let mut worst = 0.0_f64;
+    let each = if cuts == 1 { slack } else { 3.0 * slack };
+    let (mut worst, mut squares) = (0.0_f64, 0.0);
     for (k, (got, at)) in lux.iter().zip(points()).enumerate() {
         let want = LUX * through(&sky, 0.0, roof(opening), at);
-        worst = worst.max((got / want - 1.0).abs());
+        let off = got / want - 1.0;
+        (worst, squares) = (worst.max(off.abs()), squares + off * off);
         println!("type {kind}, {opening} m, point {k}: {got:.4} for {want:.4}");
-        assert!(
-            (got / want - 1.0).abs() <= slack,
-            "{k}: {got} should be {want}"
-        );
+        assert!(off.abs() <= each, "{k}: {got} should be {want}");
     }
-    println!("type {kind}, {opening} m: worst {:.3} %", 100.0 * worst);
+    let rms = (squares / lux.len() as f64).sqrt();
+    println!("type {kind}, {opening} m: worst {worst:.5}, mean square {rms:.5}");
+    assert!(rms <= slack, "{rms}");
     if let Some((_, _, table)) = TABLES.iter().find(|t| (t.0, t.1) == (kind, opening)) {
         for (place, want) in [0, 2, 6, 9, 13].into_iter().zip(table) {
             // A of the report's 4 x 4 wall is wrong near the opening (see the closed form of type 5).
@@ -191,15 +194,15 @@ fn cie_171_case_5_9_closed_form() {
     }
 }
 
-/// The same rooms of many triangles, where rays do what polygons do above: as right through a small opening as through a large one,
-/// where what is left is the noise of 768 rays about a sun's aureole.
+/// The same rooms of many triangles, where rays do what polygons do above: as right through a small opening as through a large
+/// one. Where the sun's aureole is in sight their noise is what the default error of .5 stands for, 1.4 %.
 #[test]
 fn rays_through_an_opening_agree_with_polygons() {
     for (kind, opening, slack) in [
-        (1, 1.0, 0.01),
-        (12, 1.0, 0.01),
-        (12, 4.0, 0.03),
-        (5, 0.2, 0.02),
+        (1, 1.0, 0.005),
+        (12, 1.0, 0.005),
+        (12, 4.0, 0.014),
+        (5, 0.2, 0.01),
     ] {
         check(kind, opening, 6, slack);
     }

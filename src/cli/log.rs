@@ -47,7 +47,7 @@
 //! | `flux.scaled` | 1 | what light on leaves was multiplied by so that none goes missing, `direct` and `reflected`; 1: nothing was |
 //! | `row_sum_defect`, `row_sum_defect_after` | 1 | distance of row sums from what each leaf looks out on: mean by area and greatest, before and after balancing |
 //!
-//! After a round with `--snapshots`, `{"record": "snapshots", ...}` ([`SnapshotsRecord`]): `round`, `files`,
+//! After a round with `--snapshots` (left out while pictures take more than a tenth of the time), `{"record": "snapshots", ...}` ([`SnapshotsRecord`]): `round`, `files`,
 //! `exposure`, metered in this round: `scale` (display value for each lm/m2), `balance` (white balance, a matrix on linear
 //! sRGB), `compressed` (share of what the cameras see, lamps left out, that the curve towards white makes darker).
 //!

@@ -92,10 +92,15 @@ pub struct Solving {
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
 pub struct Showing {
     /// How bright: auto (what a person in the room adapts to), auto+1 (a stop brighter) or an exposure value for ISO 100.
-    #[arg(long, value_name = "EV", default_value_t, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "auto|auto+N|EV",
+        default_value_t,
+        allow_hyphen_values = true
+    )]
     pub exposure: Brightness,
     /// Which light shows as white: none (D65, colours as they are), auto (the room's) or a colour temperature, K.
-    #[arg(long, value_name = "KELVIN", default_value_t)]
+    #[arg(long, value_name = "none|auto|KELVIN", default_value_t)]
     pub white_balance: Balance,
 }
 

@@ -1,7 +1,6 @@
 //! What is outside, as typed.
 
-use super::options::positive;
-use crate::scene::sky::{Brightness, SkyType, SkyWish, SunPlace, SunWish};
+use crate::scene::sky::{BRIGHT, Brightness, KELVIN, SkyType, SkyWish, SunPlace, SunWish, TURN};
 
 /// Options of sky and sun. Each wins over what the file of spectra says.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -37,7 +36,7 @@ pub struct SkyArgs {
     #[arg(long, value_name = "RHO", value_parser = share)]
     pub ground: Option<f64>,
     /// Where north is, degrees clockwise from -Z seen from above [default: 0].
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, value_parser = turn)]
     pub north: Option<f64>,
 }
 
@@ -50,7 +49,7 @@ impl SkyArgs {
             brightness: lux.or(self.sky_luminance.map(Brightness::Luminance)),
             kelvin: self.sky_cct,
             ground: self.ground,
-            north: self.north.filter(|n| n.is_finite()),
+            north: self.north,
             sun: SunWish {
                 place: self.sun.clone(),
                 illuminance: self.sun_lux,
@@ -68,14 +67,15 @@ fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, String> {
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
-    if text.trim() == "0" {
-        return Ok(0.0);
-    }
-    positive(text)
+    within(text, BRIGHT)
+}
+
+fn turn(text: &str) -> Result<f64, String> {
+    within(text, TURN)
 }
 
 fn kelvin(text: &str) -> Result<f64, String> {
-    within(text, [4000.0, 25_000.0])
+    within(text, KELVIN)
 }
 
 fn share(text: &str) -> Result<f64, String> {

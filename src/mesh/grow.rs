@@ -299,7 +299,7 @@ impl<'a> Growth<'a> {
             } else {
                 usize::MAX
             };
-            if left == 0 || batch < self.most / (SPLIT * FULL) {
+            if left == 0 || batch == 0 || batch < self.most / (SPLIT * FULL) {
                 return End::Most;
             }
             let mut picked = self.pick(excess);

@@ -145,8 +145,16 @@ impl Exposure {
         balance: Balance,
     ) -> Self {
         let meshes = Refined { scene, surfaces };
-        let seen = cameras.iter().flat_map(|camera| seen(&meshes, camera));
-        let (lamps, things): (Vec<Reading>, Vec<Reading>) = seen.partition(|r| r.lamp);
+        let seen: Vec<Vec<Reading>> = cameras.iter().map(|c| seen(&meshes, c)).collect();
+        // No picture may be white all over because another is dark.
+        let white = |seen: &Vec<Reading>| {
+            let things = lit(seen.iter().filter(|r| !r.lamp).copied().collect());
+            let whitest = || WHITISH / quantile(&things, BELOW_WHITE, |r| r.strongest);
+            (!things.is_empty()).then(whitest)
+        };
+        let most = seen.iter().filter_map(white).reduce(f64::min);
+        let (lamps, things): (Vec<Reading>, Vec<Reading>) =
+            seen.into_iter().flatten().partition(|r| r.lamp);
         let (things, lamps) = (lit(things), lit(lamps));
         let readings = if things.is_empty() { &lamps } else { &things };
         let level = Level::of(readings);
@@ -155,7 +163,8 @@ impl Exposure {
             (Brightness::Ev(ev), _) => GREY / (PI * EV_0 * ev.exp2()),
             (Brightness::Auto(_), None) => 1.0,
             (Brightness::Auto(stops), Some(level)) => {
-                let most = WHITISH / quantile(readings, BELOW_WHITE, |r| r.strongest);
+                let whitest = || WHITISH / quantile(readings, BELOW_WHITE, |r| r.strongest);
+                let most = most.unwrap_or_else(whitest);
                 (KEY / level.level).min(most) * stops.exp2()
             }
         };

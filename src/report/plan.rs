@@ -225,6 +225,10 @@ fn lamps(svg: &mut Svg, scene: &Scene, at: &impl Fn(DVec3) -> [f64; 2]) -> Vec<(
     }
     for light in &scene.lights {
         number += 1;
+        // What is infinitely far away has no place; the list names it.
+        if light.kind.is_dome() || light.kind == LightKind::Sun {
+            continue;
+        }
         let place = at(light.position);
         if !matches!(light.kind, LightKind::Point) {
             let way = light.direction * ARROW;

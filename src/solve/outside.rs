@@ -18,6 +18,14 @@ impl Bake {
         if self.scene.sky.is_none() {
             return;
         }
+        let seed = self.settings.seed;
+        let find = |bake: &Self| {
+            bake.with_sight(|bake, sight| Openings::find(&bake.mesh, &bake.tree, sight, seed))
+        };
+        // The few rays that tell whether a room is closed may miss a slit. Those that are relit were looked at.
+        if rays && self.sealed == Closed::Yes && !find(self).is_empty() {
+            (self.closed, self.sealed) = (Closed::No, Closed::No);
+        }
         // Where only black backs are met besides fronts no ray leaves it either.
         if self.sealed == Closed::Yes {
             self.scene.shut_out_sky();
@@ -30,13 +38,11 @@ impl Bake {
         if !rays {
             return;
         }
-        let seed = self.settings.seed;
-        let openings = self.with_sight(|bake, sight| {
-            if Outside::is_exact(sight) {
-                return Openings::default();
-            }
-            Openings::find(&bake.mesh, &bake.tree, sight, seed)
-        });
+        let is_exact = self.with_sight(|_, sight| Outside::is_exact(sight));
+        let openings = match is_exact {
+            true => Openings::default(),
+            false => find(self),
+        };
         self.outside = self.scene.sky.clone().map(|sky| Outside { sky, openings });
     }
 }

@@ -6,7 +6,7 @@
 use super::{Bake, Closed};
 use crate::geometry::NO_PLANE;
 use crate::geometry::sampling::{
-    around, cosine_direction, sequence02, sphere_direction, triangle_weights,
+    Pcg, around, cosine_direction, hash, sequence02, sphere_direction, triangle_weights,
 };
 use crate::hierarchy::NONE;
 use crate::link::Sight;
@@ -117,7 +117,9 @@ enum Lamp<'a> {
 impl Lamp<'_> {
     /// Start, direction and plane of its `k`-th ray.
     fn ray(self, bake: &Bake, k: u32) -> (DVec3, DVec3, u32) {
-        let (u, v) = (sequence02(k, 11), sequence02(k, 13));
+        // Two shifts of one sequence depend on each other.
+        let mut random = Pcg::new(hash(13, u64::from(k)));
+        let (u, v) = (sequence02(k, 11), [random.f64(), random.f64()]);
         let tree = &bake.tree;
         match self {
             Lamp::Face(entry) => {

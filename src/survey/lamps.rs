@@ -9,7 +9,7 @@ use super::eyes::{Eyes, Met};
 use super::place;
 use crate::error::Problem;
 use crate::geometry::sampling::{
-    around, cosine_direction, hash, on_triangle, sequence02, sphere_direction, tangents,
+    Pcg, around, cosine_direction, hash, on_triangle, sequence02, sphere_direction, tangents,
 };
 use crate::scene::{LightKind, PunctualLight, Scene, Sides, listed, short};
 use std::f64::consts::TAU;
@@ -169,7 +169,9 @@ fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
             }
             LightKind::Directional | LightKind::Sun | LightKind::Sky | LightKind::Ground => {
                 let from = if light.kind.is_dome() {
-                    cosine_direction(-light.direction, sequence02(k, 1))
+                    // Two shifts of one sequence depend on each other.
+                    let mut random = Pcg::new(hash(1, u64::from(k)));
+                    cosine_direction(-light.direction, [random.f64(), random.f64()])
                 } else {
                     -light.direction
                 };

@@ -405,7 +405,11 @@ mod tests {
         assert!(!bake.lamps().is_empty());
         let (mut off, mut all) = (0.0, 0.0);
         bake.with_sight(|bake, sight| {
-            let gatherer = bake.gatherer(sight);
+            // So many rays that their noise is none.
+            let gatherer = Gatherer {
+                tolerance: 1e-6,
+                ..bake.gatherer(sight)
+            };
             let mut memory = Memory::default();
             let tree = bake.tree();
             for leaf in tree.leaves().step_by(97) {

@@ -103,6 +103,10 @@ impl Openings {
             places: Vec::new(),
             found: Vec::new(),
         };
+        if tree.nodes.is_empty() {
+            openings.divide(&[]);
+            return openings;
+        }
         let chunks: Vec<usize> = (0..POINTS).step_by(CHUNK).collect();
         let exits: Vec<Exit> = chunks
             .into_par_iter()
@@ -116,6 +120,11 @@ impl Openings {
             openings.cells /= 2;
         }
         openings
+    }
+
+    /// Does no ray leave the room?
+    pub(crate) fn is_empty(&self) -> bool {
+        self.parts.is_empty()
     }
 
     /// Sides and places at which rays from some of the points leave.

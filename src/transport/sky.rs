@@ -75,15 +75,14 @@ impl Outside {
     pub(super) fn seen(&self, sight: &Sight, to: &Receiver, way: Way, look: &mut Look) -> [f64; 2] {
         look.noise = 0.0;
         if let Way::Unshadowed = way {
-            let sky = |d: DVec3| {
-                if d.y > 0.0 {
-                    PI * self.sky.radiance(d)
-                } else {
-                    1.0
-                }
+            let up = |d: DVec3| match d.y > 0.0 {
+                true => PI * self.sky.radiance(d),
+                false => 0.0,
             };
-            let all = self.openings.most(to.point, to.normal, sky);
-            return [all, all];
+            let down = |d: DVec3| f64::from(u8::from(d.y <= 0.0));
+            let most =
+                |radiance: &dyn Fn(DVec3) -> f64| self.openings.most(to.point, to.normal, radiance);
+            return [most(&up), most(&down).min(1.0)];
         }
         if Self::is_exact(sight) {
             self.exactly(sight, to, look)
@@ -357,8 +356,8 @@ impl Gatherer<'_> {
             None if !self.shafts => Way::Rays(0),
             None => Way::Rays(if own { 2 } else { 1 }),
         };
-        // Where nothing is left to chance all points share one pattern: what is left of its error is smooth.
-        let seed = if self.hemisphere.is_some() {
+        // Points for their own sake share one pattern where links serve them: what is left of its error is smooth.
+        let seed = if self.hemisphere.is_some() || !own {
             to.seed
         } else {
             0

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 /// The picture, as an expression.
 pub(crate) const CANVAS: &str = "document.getElementById('canvas')";
 /// A page has this long to be ready: drawn in software, beside other tests.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(300);
 /// The pipes go to descriptors 3 and 4, where the browser looks for them.
 const START: &str = "exec \"$0\" --headless=new --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader \
     --remote-debugging-pipe --no-first-run --user-data-dir=\"$1\" 3<&0 4>&1 </dev/null >/dev/null 2>/dev/null";

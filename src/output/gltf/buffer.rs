@@ -204,7 +204,7 @@ impl Bin {
             std::mem::take(&mut self.views),
         );
         let mut buffers = Vec::new();
-        if self.packing == Packing::Meshopt {
+        if self.packing == Packing::Meshopt && !bytes.is_empty() {
             let whole = bytes.len();
             bytes = packing::packed(&bytes, &mut views, &self.modes)?;
             buffers.push(json!({ "byteLength": bytes.len() }));

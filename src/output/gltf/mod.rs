@@ -34,7 +34,7 @@ use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
 /// Version of `asset.extras.haarlight`.
-pub const EXTRAS_VERSION: u32 = 1;
+pub const EXTRAS_VERSION: u32 = 2;
 
 /// How far backs of two-sided sheets are drawn from the fronts, share of half the room's diagonal: 512 steps of f32 there,
 /// .15 mm in a room of 10 m, so that rays in single precision meet the right one.
@@ -150,11 +150,17 @@ impl<'a> Writer<'a> {
         let places = || scene.surfaces.iter().flat_map(|s| &s.positions);
         let low = places().fold(DVec3::INFINITY, |low, p| low.min(*p));
         let high = places().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
+        // On a grid of 65,536 steps a lift of one may round to none.
+        let steps = if writing.packing == Packing::Floats {
+            1.0
+        } else {
+            4.0
+        };
         Self {
             scene,
             look,
             writing,
-            apart: APART * 0.5 * (high - low).max(DVec3::ZERO).length(),
+            apart: steps * APART * 0.5 * (high - low).max(DVec3::ZERO).length(),
             grid: None,
             baked,
             data: Data::new(&scene.source, buffers),

@@ -152,7 +152,7 @@ fn errors(
     }
     let found = mean(&error, area);
     let scale = if found > 0.0 { stated / found } else { 0.0 };
-    let sound = scale.is_finite();
+    let sound = scale.is_finite() && found.is_finite();
     sound.then(|| (error.into_iter().map(|e| scale * e).collect(), stated))
 }
 

@@ -87,6 +87,13 @@ pub(crate) fn join(
     };
     makes.lamp("sky", LightKind::Sky, DVec3::NEG_Y, light, lux);
     makes.lamp("ground", LightKind::Ground, DVec3::Y, light, ground * lux);
+    if sun_lux <= 0.0
+        && let Some(Sun { light: Some(k), .. }) = sun
+    {
+        // A sun of the file without light is none.
+        makes.lights.remove(k);
+        sky.sun_of_file = false;
+    }
     if let Some(sun) = sun.filter(|_| sun_lux > 0.0) {
         let kelvin = wish.sun.kelvin.unwrap_or(SUN_KELVIN);
         makes.sun(&sun, sun_lux, kelvin, ground);

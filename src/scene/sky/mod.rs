@@ -22,6 +22,7 @@ mod wish;
 pub use cie::Distribution;
 pub(crate) use lamps::join;
 pub use sun::{Hours, direction};
+pub(crate) use wish::{BRIGHT, KELVIN, TURN};
 pub use wish::{Brightness, SkyType, SkyWish, SunPlace, SunWish};
 
 use super::check::Check;
@@ -54,11 +55,12 @@ impl Sky {
 }
 
 impl Scene {
-    /// The same room under a sky; names of nodes are not known here, those of lights are.
+    /// The same room under a sky, instead of the one it had; names of nodes are not known here, those of lights are.
     ///
     /// # Errors
     /// [`Error::Input`]: what is said of sky and sun does not go together.
     pub fn under(mut self, wish: &SkyWish) -> Result<Self> {
+        self.shut_out_sky();
         let mut check = Check::new(self.source.path.display().to_string());
         let (lights, spectra) = (&mut self.lights, &mut self.spectra);
         let sky = join(wish, &[], &self.grid, lights, spectra, &mut check);

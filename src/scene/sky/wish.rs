@@ -97,19 +97,20 @@ impl FromStr for SunPlace {
              52.5,13.4,2026-06-21T12:00:00+02:00"
                 .to_owned()
         };
-        let number = |text: &str| {
+        let number = |text: &str, [least, most]: [f64; 2]| {
             let number = text.trim().parse::<f64>().ok();
-            number.filter(|n| n.is_finite()).ok_or_else(wrong)
+            let within = number.filter(|n| (least..=most).contains(n));
+            within.ok_or_else(wrong)
         };
         let parts: Vec<&str> = text.split(',').collect();
         match parts[..] {
             [elevation, azimuth] => Ok(Self::Angles {
-                elevation: number(elevation)?,
-                azimuth: number(azimuth)?,
+                elevation: number(elevation, HEIGHT)?,
+                azimuth: number(azimuth, TURN)?,
             }),
             [latitude, longitude, time] => Ok(Self::Clock {
-                latitude: number(latitude)?,
-                longitude: number(longitude)?,
+                latitude: number(latitude, HEIGHT)?,
+                longitude: number(longitude, HALF_TURN)?,
                 time: time.trim().parse().map_err(|_| wrong())?,
             }),
             _ => Err(wrong()),
@@ -212,9 +213,12 @@ impl SkyWish {
 }
 
 /// Correlated colour temperatures of daylight, K.
-pub(super) const KELVIN: [f64; 2] = [4000.0, 25_000.0];
-const BRIGHT: [f64; 2] = [0.0, 1e9];
-const TURN: [f64; 2] = [-360.0, 360.0];
+/// Ranges of what may be said: K, lx or cd/m2, degrees.
+pub(crate) const KELVIN: [f64; 2] = [4000.0, 25_000.0];
+pub(crate) const BRIGHT: [f64; 2] = [0.0, 1e9];
+pub(crate) const TURN: [f64; 2] = [-360.0, 360.0];
+const HALF_TURN: [f64; 2] = [-180.0, 180.0];
+const HEIGHT: [f64; 2] = [-90.0, 90.0];
 
 impl SunWish {
     fn read(value: &Value, place: &str, reader: &mut Reader) -> Self {
@@ -229,15 +233,15 @@ impl SunWish {
         let light = sun.get("light").and_then(Value::as_str).map(str::to_owned);
         let said = match (has(&angles), has(&clock), light) {
             (true, false, None) => {
-                let elevation = number(sun, angles[0], [-90.0, 90.0], place, reader);
+                let elevation = number(sun, angles[0], HEIGHT, place, reader);
                 let azimuth = number(sun, angles[1], TURN, place, reader);
                 elevation
                     .zip(azimuth)
                     .map(|(elevation, azimuth)| SunPlace::Angles { elevation, azimuth })
             }
             (false, true, None) => {
-                let latitude = number(sun, clock[0], [-90.0, 90.0], place, reader);
-                let longitude = number(sun, clock[1], [-180.0, 180.0], place, reader);
+                let latitude = number(sun, clock[0], HEIGHT, place, reader);
+                let longitude = number(sun, clock[1], HALF_TURN, place, reader);
                 let time = parsed::<Hours>(sun, clock[2], place, reader);
                 let both = latitude.zip(longitude).zip(time);
                 both.map(|((latitude, longitude), time)| SunPlace::Clock {
