@@ -137,13 +137,15 @@ export class Controls {
     if (this.keys.has(code)) return;
     this.keys.add(code);
     this.#step(code, PRESS / TURN);
-    if (this.keys.size > 1) return;
+    if (this.moving) return;
+    this.moving = true;
     let last = performance.now();
     const tick = (now) => {
       const seconds = Math.min(0.1, (now - last) / 1000);
       last = now;
       for (const key of this.keys) this.#step(key, seconds);
-      if (this.keys.size) requestAnimationFrame(tick);
+      this.moving = this.keys.size > 0;
+      if (this.moving) requestAnimationFrame(tick);
     };
     requestAnimationFrame(tick);
   }

@@ -81,7 +81,10 @@ window.haarlightReport = async (data, open) => {
     for (const value of ["error", "both"]) {
       const input = $("looks").querySelector(`[value=${value}]`);
       input.disabled = true;
-      input.parentElement.title = "No error is known: it takes two rounds to tell how much they differ.";
+      input.parentElement.title =
+        data.log.verdict.error_de2000.value == null
+          ? "No error is known: it takes two rounds to tell how much they differ."
+          : "Where the error is was not kept: the bake went on from a checkpoint.";
     }
   }
   $("views").append(...stage.views.map((view, k) => h("option", { value: k }, view.name)));

@@ -20,7 +20,7 @@ export function header(data, light) {
   $("verdict").append(
     h("span", { class: `badge ${reached ? "good" : "bad"}` }, ENDS[verdict.verdict]),
     error == null
-      ? "No error is known: it takes two rounds to tell how much they differ. "
+      ? `No error is known${verdict.rounds < 2 ? ": it takes two rounds to tell how much they differ" : ""}. `
       : `The light of this file is off by a mean colour difference of ${digits(error)} ΔE00 (estimate), asked for ${label(verdict.asked_de2000)}. `,
     `It took ${verdict.rounds} ${verdict.rounds === 1 ? "round" : "rounds"} and ${digits(verdict.seconds.total - verdict.seconds.audit)} s.`,
     audit ? ` Measured by Monte Carlo at ${audit.points} points: ${digits(audit.de2000.mean.value)} ΔE00 (${digits(audit.de2000.mean.low)} to ${digits(audit.de2000.mean.high)}).` : "",

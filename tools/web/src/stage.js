@@ -89,8 +89,12 @@ export class Stage {
   #attach(gltf, maps) {
     const first = new Map();
     let next = 0;
+    // Other scenes of the file were not baked.
+    const shown = new Set();
+    gltf.scene.traverse((mesh) => mesh.isMesh && shown.add(gltf.parser.associations.get(mesh)?.meshes));
     (gltf.parser.json.meshes ?? []).forEach((mesh, m) =>
       mesh.primitives.forEach((primitive, p) => {
+        if (!shown.has(m)) return;
         const unlit = gltf.parser.json.materials?.[primitive.material]?.extensions?.KHR_materials_unlit;
         if (!unlit || primitive.attributes.COLOR_0 === undefined || (primitive.mode ?? 4) !== 4) return;
         first.set(`${m} ${p}`, { at: next, glows: this.light.index.glows[first.size] });
