@@ -146,29 +146,28 @@ impl Exposure {
     ) -> Self {
         let meshes = Refined { scene, surfaces };
         let seen: Vec<Vec<Reading>> = cameras.iter().map(|c| seen(&meshes, c)).collect();
-        // No picture may be white all over because another is dark.
-        let white = |seen: &Vec<Reading>| {
-            let things = lit(seen.iter().filter(|r| !r.lamp).copied().collect());
-            let whitest = || WHITISH / quantile(&things, BELOW_WHITE, |r| r.strongest);
-            (!things.is_empty()).then(whitest)
-        };
-        let most = seen.iter().filter_map(white).reduce(f64::min);
         let (lamps, things): (Vec<Reading>, Vec<Reading>) =
-            seen.into_iter().flatten().partition(|r| r.lamp);
+            seen.iter().flatten().copied().partition(|r| r.lamp);
         let (things, lamps) = (lit(things), lit(lamps));
         let readings = if things.is_empty() { &lamps } else { &things };
         let level = Level::of(readings);
         let balance = level.map_or(IDENTITY, |level| balance.matrix(level.white));
+        let whitest = |of: &[Reading]| WHITISH / quantile(of, BELOW_WHITE, |r| r.shown(&balance));
+        // No picture may be white all over because another is dark.
+        let of_picture = |seen: &Vec<Reading>| {
+            let things = lit(seen.iter().filter(|r| !r.lamp).copied().collect());
+            (!things.is_empty()).then(|| whitest(&things))
+        };
         let scale = match (brightness, level) {
             (Brightness::Ev(ev), _) => GREY / (PI * EV_0 * ev.exp2()),
             (Brightness::Auto(_), None) => 1.0,
             (Brightness::Auto(stops), Some(level)) => {
-                let whitest = || WHITISH / quantile(readings, BELOW_WHITE, |r| r.strongest);
-                let most = most.unwrap_or_else(whitest);
+                let most = seen.iter().filter_map(of_picture).reduce(f64::min);
+                let most = most.unwrap_or_else(|| whitest(readings));
                 (KEY / level.level).min(most) * stops.exp2()
             }
         };
-        let over = |r: &&Reading| scale * r.strongest > curve::KNEE;
+        let over = |r: &&Reading| scale * r.shown(&balance) > curve::KNEE;
         let compressed = readings.iter().filter(over).count() as f64 / readings.len().max(1) as f64;
         Self {
             scale,
@@ -183,11 +182,25 @@ impl Exposure {
 struct Reading {
     /// Geometric mean of radiosity and of a white surface's there.
     level: f64,
-    /// Strongest channel of what COLOR_0 holds.
+    /// Linear light, and what it is multiplied by in COLOR_0.
+    light: [f64; 3],
+    paint: [f64; 3],
+    /// Strongest channel of both together.
     strongest: f64,
     /// Tristimulus irradiance.
     white: Xyz,
     lamp: bool,
+}
+
+impl Reading {
+    /// Strongest channel of what COLOR_0 holds, after a white balance.
+    fn shown(&self, balance: &Matrix) -> f64 {
+        if *balance == IDENTITY {
+            return self.strongest;
+        }
+        let light = multiply(balance, self.light);
+        curve::strongest(std::array::from_fn(|c| light[c] * self.paint[c]))
+    }
 }
 
 /// Those that light reaches.
@@ -261,14 +274,17 @@ fn seen(meshes: &Refined, camera: &Camera) -> Vec<Reading> {
         };
         let mix =
             |value: &dyn Fn(usize) -> f64| (0..3).map(|k| hit.weights[k] * value(k)).sum::<f64>();
-        let channel = |c: usize| mix(&|k| f64::from(corners[k].light[c] * paint(k)[c]));
+        let light = [0, 1, 2].map(|c| mix(&|k| f64::from(corners[k].light[c])));
+        let paint = [0, 1, 2].map(|c| mix(&|k| f64::from(paint(k)[c])));
         let white = [0, 1, 2].map(|c| mix(&|k| f64::from(corners[k].irradiance[c])));
         let radiosity = mix(&|k| f64::from(corners[k].radiosity[1]));
         // No surface reflects more than a white one; a lamp's own light is its level.
         let white_y = white[1].max(radiosity);
         Reading {
             level: (white_y * radiosity.max(BLACK * white_y)).max(0.0).sqrt(),
-            strongest: curve::strongest([channel(0), channel(1), channel(2)]),
+            light,
+            paint,
+            strongest: curve::strongest(std::array::from_fn(|c| light[c] * paint[c])),
             white,
             lamp: material.emission.is_some(),
         }
@@ -287,6 +303,8 @@ mod tests {
     fn readings(levels: impl IntoIterator<Item = (f64, usize)>) -> Vec<Reading> {
         let one = |level| Reading {
             level,
+            light: [level; 3],
+            paint: [1.0; 3],
             strongest: level,
             white: [level; 3],
             lamp: false,
