@@ -24,7 +24,12 @@ const HEIGHT: f64 = 1e-3;
 fn blocks_on_the_floor() {
     let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
     let scene = Scene::load(&room, &Options::default()).unwrap();
-    let mut bake = Bake::new(scene, Settings::default());
+    // So that there are enough vertices on the edges.
+    let settings = Settings {
+        error: 0.3,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(scene, settings);
     bake.run();
     let baked = bake.baked(&|_, _| ());
     let (scene, mesh) = (bake.scene(), bake.mesh());
