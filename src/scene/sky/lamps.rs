@@ -53,6 +53,7 @@ pub(crate) fn join(
     }
     let dome = Distribution::new(kind.0, sun.as_ref().map_or(DVec3::Y, |sun| sun.toward));
     let [elevation, azimuth] = angles(dome.sun());
+    let azimuth = (azimuth - wish.north.unwrap_or(0.0)).rem_euclid(360.0);
     let usual = usual(kind, sun.as_ref().map(|_| elevation));
     let lux = match wish.brightness {
         Some(Brightness::Illuminance(lux)) => lux,
@@ -96,6 +97,12 @@ pub(crate) fn join(
     }
     if let Some(sun) = sun.filter(|_| sun_lux > 0.0) {
         let kelvin = wish.sun.kelvin.unwrap_or(SUN_KELVIN);
+        if let (Some(k), None) = (sun.light, wish.sun.kelvin) {
+            let name = short(&makes.lights[k].name);
+            check.warn(format!(
+                "light '{name}' is the sun: its colour gives way to daylight of {kelvin:.0} K (\"cct_k\" sets another)"
+            ));
+        }
         makes.sun(&sun, sun_lux, kelvin, ground);
         sky.sun_said = Some(format!(
             "{elevation:.1} deg high, azimuth {azimuth:.1} deg, {sun_lux:.0} lx across its rays, {kelvin:.0} K"
