@@ -5,6 +5,9 @@ mod built;
 
 use built::Room;
 use glam::{DVec3, dvec3};
+use haarlight::audit::Audit;
+use haarlight::color::{KM, Observer};
+use haarlight::geometry::NO_PLANE;
 use haarlight::scene::Scene;
 use haarlight::scene::sky::{
     Brightness, Distribution, SkyType, SkyWish, SunPlace, SunWish, direction,
@@ -14,6 +17,8 @@ use std::f64::consts::PI;
 
 /// Greatest error of a point.
 const POINT: f64 = 5e-3;
+/// Paths from a point.
+const PATHS: usize = 65_536;
 /// Illuminance of open ground in these tests: per cent are lux.
 const LUX: f64 = 100.0;
 
@@ -354,4 +359,24 @@ fn a_clear_sky_asks_where_the_sun_stands() {
         })
         .contains("what the sky is like")
     );
+}
+
+/// Skylight that surfaces pass on, beside paths: summed over the points, so that their noise is .3 %.
+#[test]
+fn reflected_skylight_agrees_with_paths() {
+    for cuts in [1, 6] {
+        let bake = bake(room(0.5, 1.0, cuts), &wish(12));
+        let got: f64 = bake.probe(&points()).iter().map(|p| p.xyz[1]).sum();
+        let (scene, mesh) = (bake.scene(), bake.mesh());
+        let weights = Observer::cie1931().weights(&scene.grid)[1].map(|y| KM * y);
+        let places: Vec<_> = points()
+            .into_iter()
+            .map(|(point, normal)| (point - mesh.centre + 1e-6 * normal, normal, NO_PLANE))
+            .collect();
+        let paths = vec![PATHS; places.len()];
+        let answers = Audit::new(scene, mesh, bake.rays()).irradiance(&places, &paths, 3);
+        let truth: f64 = answers.iter().map(|answer| answer.linear(&weights).0).sum();
+        println!("{cuts}: {got:.3} for {truth:.3}");
+        assert!((got / truth - 1.0).abs() < 0.01, "{cuts}: {got} {truth}");
+    }
 }

@@ -17,8 +17,10 @@ use crate::scene::{LightKind, PunctualLight};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// Rays over the hemisphere and to the openings: of a random point of a leaf, of a point by a rule, and of one for its own sake.
-const RAYS: [(usize, usize); 3] = [(16, 16), (64, 64), (512, 256)];
+/// Rays over the hemisphere and to the openings: of a random point of a leaf, of a point by a rule, of one for its own sake, and of
+/// one whose rays over the hemisphere are known. With 256 in place of 1024 points in sight of the sun's aureole were off by up to
+/// 4.6 %.
+const RAYS: [(usize, usize); 4] = [(16, 16), (64, 64), (512, 1024), (0, 256)];
 /// Rays to the sun's disc, likewise.
 const SUN_RAYS: [u32; 2] = [4, 16];
 /// The far triangles stand this many half sizes of the room away: all of it lies before their planes.
@@ -247,7 +249,7 @@ impl Outside {
 
     /// By rays.
     fn by_rays(&self, sight: &Sight, to: &Receiver, way: Way, look: &mut Look) -> [f64; 2] {
-        let (wide, narrow) = RAYS[if let Way::Rays(k) = way { k } else { 2 }];
+        let (wide, narrow) = RAYS[if let Way::Rays(k) = way { k } else { 3 }];
         let wide = match way {
             Way::Known(open, of) => {
                 look.open.clear();
