@@ -224,6 +224,12 @@ impl<'a> Growth<'a> {
         cell.corners.iter().any(corner) || hints.iter().any(|hint| hint.open > 0.0)
     }
 
+    /// Area of all cells of which anybody can see anything: what the error is a mean over.
+    pub(super) fn seen_area(&self) -> f64 {
+        let seen = (0..self.cells.all.len()).filter(|&k| self.is_seen(k));
+        seen.map(|k| self.cells.all[k].area).sum()
+    }
+
     /// Mean square of what the solved light differs by, as far as others see it, its worst place and how much it differs there.
     fn told(&self, cell: usize, light: &[[f64; 3]; 3]) -> (f64, Option<(Hint, f64)>) {
         let cell = &self.cells.all[cell];

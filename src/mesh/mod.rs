@@ -79,7 +79,7 @@ impl Bake {
         if limits.is_late() {
             self.grow_unseen(&mut growth, progress);
         }
-        let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
+        let area = growth.seen_area();
         let mut aim = allowed * allowed * area;
         let settled = self.settled(&growth);
         let samples = growth.measured(self, &settled, 0, progress);
