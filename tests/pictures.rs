@@ -17,13 +17,14 @@ const FORMAT: Format = Format {
 };
 
 fn bake(room: &str) -> (Bake, Baked) {
+    bake_to(room, Settings::default())
+}
+
+fn bake_to(room: &str, settings: Settings) -> (Bake, Baked) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("scenes")
         .join(room);
-    let mut bake = Bake::new(
-        Scene::load(path, &Options::default()).unwrap(),
-        Settings::default(),
-    );
+    let mut bake = Bake::new(Scene::load(path, &Options::default()).unwrap(), settings);
     bake.run();
     let baked = bake.baked(&|_, _| {});
     (bake, baked)
@@ -87,7 +88,12 @@ fn a_closed_room_has_no_seam_and_no_black_spot() {
 
 #[test]
 fn a_plain_wall_is_smooth() {
-    let room = bake("cornell.glb");
+    // The mean error of .5 leaves a bend of .034 at one place.
+    let settings = Settings {
+        error: 0.35,
+        ..Settings::default()
+    };
+    let room = bake_to("cornell.glb", settings);
     let (picture, _) = picture(&room, 0);
     // The back wall above the tall block, and the ceiling's front, away from all edges.
     for (row, columns) in [(110, 150..330), (25, 100..380)] {
