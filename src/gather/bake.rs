@@ -284,7 +284,7 @@ pub struct Probed {
     pub xyz: [f64; 3],
     /// Irradiance on the 64 leaves, W/m2/nm.
     pub leaves: Leaves,
-    /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`] a vertex there counts as covered.
+    /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`](super::MOSTLY) a vertex there counts as covered.
     pub backs: f64,
 }
 

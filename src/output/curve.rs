@@ -1,7 +1,7 @@
 //! From linear light to what a display can show: one curve for all channels together, so that bright light keeps its hue
 //! and ends in white.
 //!
-//! With p the strongest channel: colours with p up to [`KNEE`] stay what they are. Above, the colour is scaled so that p
+//! With p the strongest channel: colours with p up to `KNEE` stay what they are. Above, the colour is scaled so that p
 //! becomes `1 - d^2 / (p + d - KNEE)`, d = 1 - KNEE (continuous with its slope, below 1 for any p), and mixed with white
 //! of that strength, more the more was taken away. It is the upper part of Khronos' PBR Neutral tone mapper (2024), with
 //! its constants; the darkening of what reflects at grazing angles is left out.

@@ -1,16 +1,16 @@
 //! Exposure: which radiosity shows as white, from what a person in the room adapts to.
 //!
-//! display = curve(scale * balance * radiosity), all linear, radiosity in lm/m2, display white = 1; see [`curve`](super::curve).
+//! display = curve(scale * balance * radiosity), all linear, radiosity in lm/m2, display white = 1; see [`curve`].
 //!
 //! The level of the room is the mean logarithm over the pixels of small pictures from all cameras. A pixel's reading is the
 //! geometric mean of two that photographers know: what leaves it (a reflected-light meter, which shows white rooms and
 //! dark ones alike, as grey) and what a white surface would send there (an incident-light meter, which leaves a dark room
-//! dark). People judge in between. [`KEY`] is such that a grey of 18 % shows as 18 %, white rooms brighter, dark ones darker.
+//! dark). People judge in between. `KEY` is such that a grey of 18 % shows as 18 %, white rooms brighter, dark ones darker.
 //!
-//! Lamps have no vote. Neither has what is more than [`STOPS`] away from the level, found by repetition from the median: sun
+//! Lamps have no vote. Neither has what is more than `STOPS` away from the level, found by repetition from the median: sun
 //! patches, spots beside lamps, single wrong vertices, what lies in the dark. As nearly all of what is seen may lie in the
-//! dark, or under a dark texture (COLOR_0 holds light before the texture and ends at 1), the share [`BELOW_WHITE`] of what
-//! is seen is at most [`WHITISH`] in COLOR_0, before the curve.
+//! dark, or under a dark texture (COLOR_0 holds light before the texture and ends at 1), the share `BELOW_WHITE` of what
+//! is seen is at most `WHITISH` in COLOR_0, before the curve.
 
 use super::balance::{Balance, IDENTITY, Matrix};
 use super::camera::{self, View};

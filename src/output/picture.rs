@@ -1,7 +1,7 @@
 //! A picture of the baked room: radiance = light * texture * vertex colour / pi, smooth over the refined mesh.
 //!
 //! Radiance is in cd/m2 (linear sRGB primaries, and XYZ). The PNG is exposed, brought into the display by the curve of
-//! [`curve`](super::curve), averaged over the samples of a pixel after that (so that edges of lamps stay smooth), and
+//! [`curve`], averaged over the samples of a pixel after that (so that edges of lamps stay smooth), and
 //! encoded by the sRGB curve.
 
 use super::camera::View;
