@@ -308,7 +308,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
             false => Some(baked_glb(scene, &baked.surfaces, &exposure, plain)?),
         };
         let glb = plain.as_ref().unwrap_or(&glb);
-        report.write(&record, audit.as_ref(), &baked, glb, &bake)?;
+        report.write(&record, audit.as_ref(), &baked, &cameras, glb, &bake)?;
     }
     talk.clear();
     talk.say(&format!("\n{}", summary::rounds(bake.rounds())));

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::gather::Baked;
 use crate::output::BakedGlb;
 use crate::report::page::{History, Page};
+use crate::scene::Camera;
 use crate::solve::Bake;
 use crate::store::file;
 use serde::Serialize;
@@ -39,6 +40,7 @@ impl Report {
         verdict: &VerdictRecord,
         audit: Option<&audit::Report>,
         baked: &Baked,
+        cameras: &[Camera],
         glb: &BakedGlb,
         bake: &Bake,
     ) -> Result<()> {
@@ -51,6 +53,7 @@ impl Report {
         let page = Page {
             bake,
             baked,
+            cameras,
             glb: &glb.bytes,
             history: &self.history,
             log,

@@ -2,7 +2,7 @@
 
 use super::{Bake, Closed};
 use crate::light::lanes::Lanes;
-use crate::scene::effects::Kind;
+use crate::scene::effects::{Kind, Plan};
 use crate::transport::openings::Openings;
 use crate::transport::sky::Outside;
 
@@ -23,14 +23,18 @@ impl Bake {
             bake.with_sight(|bake, sight| Openings::find(&bake.mesh, &bake.tree, sight, seed))
         };
         // The few rays that tell whether a room is closed may miss a slit. Those that are relit were looked at.
-        if rays && self.sealed == Closed::Yes && !find(self).is_empty() {
-            (self.closed, self.sealed) = (Closed::No, Closed::No);
+        let mut found = None;
+        if rays && self.sealed == Closed::Yes {
+            found = Some(find(self)).filter(|openings| !openings.is_empty());
+            if found.is_some() {
+                (self.closed, self.sealed) = (Closed::No, Closed::No);
+            }
         }
         // Where only black backs are met besides fronts no ray leaves it either.
         if self.sealed == Closed::Yes {
             self.scene.shut_out_sky();
             self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
-            self.plan = crate::scene::effects::Plan::of(&self.scene);
+            self.plan = Plan::of(&self.scene);
             self.plan.off(Kind::Sky, CLOSED);
             self.plan.off(Kind::Sun, CLOSED);
             return;
@@ -41,7 +45,7 @@ impl Bake {
         let is_exact = self.with_sight(|_, sight| Outside::is_exact(sight));
         let openings = match is_exact {
             true => Openings::default(),
-            false => find(self),
+            false => found.unwrap_or_else(|| find(self)),
         };
         self.outside = self.scene.sky.clone().map(|sky| Outside { sky, openings });
     }

@@ -1,4 +1,4 @@
-//! Light at a point in rooms where much stands about: lamps from the root, what is bright or clear by links, all else by rays.
+//! Light at a point in rooms where much stands about: lamps from the root, what is bright by links, all else by rays.
 
 use super::hemisphere::{BEAM, Hemisphere};
 use super::point::{Gathered, Gatherer, Memory, Of, Receiver};

@@ -14,6 +14,7 @@ pub use room::lamp_spectra;
 use crate::error::{Error, Result};
 use crate::gather::Baked;
 use crate::output::gltf;
+use crate::scene::Camera;
 use crate::solve::Bake;
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -34,6 +35,8 @@ pub struct Page<'a> {
     pub bake: &'a Bake,
     /// Its mesh.
     pub baked: &'a Baked,
+    /// What it is looked at through, as in its pictures.
+    pub cameras: &'a [Camera],
     /// The file that was written of it.
     pub glb: &'a [u8],
     /// The light of the rounds.
@@ -57,7 +60,7 @@ impl Page<'_> {
         let data = json!({
             "name": name,
             "log": self.log,
-            "room": room::of(self.bake),
+            "room": room::of(self.bake, self.cameras),
             "light": index,
         });
         let parts = [

@@ -1,15 +1,14 @@
 //! What the page is told of a room besides its light: spectra of lamps and materials, viewpoints, the observer.
 
 use crate::color::{KM, LinearSrgb, Observer};
-use crate::output::camera;
 use crate::scene::facts::Facts;
-use crate::scene::{Projection, Scene};
+use crate::scene::{Camera, Projection, Scene};
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
 use serde_json::{Value, json};
 
 /// The room of a bake.
-pub(super) fn of(bake: &Bake) -> Value {
+pub(super) fn of(bake: &Bake, cameras: &[Camera]) -> Value {
     let scene = bake.scene();
     let grid = &scene.grid;
     let facts = Facts::of(scene);
@@ -35,7 +34,7 @@ pub(super) fn of(bake: &Bake) -> Value {
         "observer": weights.map(|w| w.map(|x| KM * x).to_vec()),
         "lamps": lamps(scene, &facts),
         "materials": materials,
-        "views": views(scene),
+        "views": views(cameras),
     })
 }
 
@@ -66,8 +65,8 @@ fn lamps(scene: &Scene, facts: &Facts) -> Vec<Value> {
 }
 
 /// Cameras of the file, or the program's own: matrix to world, half the height of the view.
-fn views(scene: &Scene) -> Vec<Value> {
-    let view = |c: crate::scene::Camera| {
+fn views(cameras: &[Camera]) -> Vec<Value> {
+    let view = |c: &Camera| {
         let (perspective, size) = match c.projection {
             Projection::Perspective(angle) => (true, angle),
             Projection::Orthographic(half) => (false, half),
@@ -80,7 +79,7 @@ fn views(scene: &Scene) -> Vec<Value> {
             "aspect": c.aspect,
         })
     };
-    camera::cameras(scene).into_iter().map(view).collect()
+    cameras.iter().map(view).collect()
 }
 
 /// Six digits are as many as a plot shows.
