@@ -28,8 +28,10 @@
 //! | 5 the neglected term | [`spectrum`]: `bound`, `sum` |
 
 pub mod audit;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod color;
+#[cfg(feature = "paper")]
 pub mod cost;
 pub mod data;
 pub mod error;
@@ -50,6 +52,7 @@ pub mod survey;
 pub mod transport;
 
 pub use error::{Error, Problem, Result};
+pub use glam;
 
 /// Name and version of the program.
 pub const PROGRAM: &str = concat!("haarlight ", env!("CARGO_PKG_VERSION"));

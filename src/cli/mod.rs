@@ -19,12 +19,14 @@
 
 pub mod bake;
 mod command;
+#[cfg(feature = "paper")]
 pub mod cost;
 mod fault;
 pub mod inspect;
 pub mod log;
 mod metrics;
 pub mod options;
+#[cfg(feature = "paper")]
 pub mod paper;
 mod paths;
 mod pictures;

@@ -469,7 +469,7 @@ impl Relighter {
     }
 
     /// The bake behind it. It has no rays: nothing may be gathered at new points.
-    pub(crate) fn bake(&self) -> &Bake {
+    pub fn bake(&self) -> &Bake {
         &self.bake
     }
 

@@ -18,6 +18,7 @@ pub mod lacking;
 mod light;
 mod load;
 mod material;
+mod meshes;
 mod nodes;
 mod primitive;
 mod raw;
@@ -32,6 +33,7 @@ pub(crate) use json::short;
 pub use load::Options;
 pub use material::GREATEST_ALBEDO;
 pub(crate) use material::listed;
+pub use meshes::{Meshes, Paint, PointLamp};
 
 use crate::data::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};

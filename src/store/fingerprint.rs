@@ -6,10 +6,10 @@
 //! is the same part.
 
 use super::codec::{Decoder, Encoder, Plain, Read};
-use super::hash::Hasher;
 use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
 use std::collections::BTreeMap;
 use std::io;
+use xxhash_rust::xxh64::Xxh64;
 
 /// Changes that a message names; the others are counted.
 const NAMED: usize = 4;
@@ -22,7 +22,7 @@ pub struct Fingerprint {
 
 /// A hash of plain numbers.
 #[derive(Default)]
-struct Mix(Hasher);
+struct Mix(Xxh64);
 
 impl Mix {
     fn add<T: Plain>(&mut self, x: T) -> &mut Self {
@@ -177,7 +177,7 @@ impl Fingerprint {
     }
 
     fn add(&mut self, name: String, mix: &Mix) {
-        self.parts.push((name, mix.0.finish()));
+        self.parts.push((name, mix.0.digest()));
     }
 
     /// What is different in `now`, in words; none if it is the same.
@@ -262,7 +262,7 @@ fn images(scene: &Scene) -> Vec<u64> {
             let mut mix = Mix::default();
             mix.add([image.width as u64, image.height as u64])
                 .all(&image.pixels);
-            mix.0.finish()
+            mix.0.digest()
         })
         .collect()
 }
