@@ -123,7 +123,7 @@ const DOME: f64 = 0.05;
 pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
     let lanes = Lanes::dense(&scene.spectra, weights);
     let glow: Vec<[f64; 3]> = (scene.materials.iter())
-        .map(|m| lanes.exitance(m.emission.as_ref()))
+        .map(|m| lanes.exitance(m.even_emission()))
         .collect();
     let whole: f64 = weights[1].iter().sum();
     let albedo: Vec<f64> = scene

@@ -4,9 +4,11 @@
 
 use super::hemisphere::Hemisphere;
 use super::lamp::Lamp;
+use super::luminaire;
 use super::shadows::Shadows;
 use super::sky::{Look, Outside};
 use super::trace::Trace;
+use crate::geometry::sampling::sequence02;
 use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
 use crate::light::Light;
@@ -242,7 +244,13 @@ impl Gatherer<'_> {
                 Some(x) => x,
                 None => continue,
             };
-            if lamp.kind == LightKind::Sun {
+            if lamp.kind == LightKind::Surface {
+                let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
+                factor = self.of_surface(to, lamp, f64::from(bright), memory);
+                if factor <= 0.0 {
+                    continue;
+                }
+            } else if lamp.kind == LightKind::Sun {
                 factor *= self.sun_seen(to, lamp, memory);
                 if factor <= 0.0 {
                     continue;
@@ -265,8 +273,8 @@ impl Gatherer<'_> {
     }
 }
 
-/// What turns a punctual light's intensity into irradiance at a receiver, and where the ray to it ends. None for sky and ground,
-/// which shine from everywhere.
+/// What turns a punctual light's intensity (of measured lamps, flux) into irradiance at a receiver where nothing is in between, and
+/// where the ray to it ends: of a lamp with an extent, at one of its points. None for sky and ground, which shine from everywhere.
 pub fn punctual_factor(
     lamp: &PunctualLight,
     to: &Receiver,
@@ -278,6 +286,9 @@ pub fn punctual_factor(
     if lamp.kind.is_parallel() {
         let cosine = -to.normal.dot(lamp.direction);
         return (cosine > 0.0).then(|| (cosine, to.point - lamp.direction * (4.0 * half_size)));
+    }
+    if lamp.kind == LightKind::Surface {
+        return luminaire::whole(lamp, to, half_size, sequence02(0, to.seed));
     }
     let d = lamp.position - to.point;
     let r2 = d.length_squared();
@@ -291,6 +302,10 @@ pub fn punctual_factor(
             let along = -lamp.direction.dot(d) / r2.sqrt();
             let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
             ((along - outer.cos()) * scale).clamp(0.0, 1.0).powi(2)
+        }
+        LightKind::Profile => {
+            let spread = lamp.luminaire.as_ref();
+            spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
         }
         _ => 1.0,
     };
