@@ -15,7 +15,7 @@
 //! beyond its rows, an emission is zero there. The emission of a *surface* given as a CSV without a luminance is
 //! spectral radiance in W/m2/sr/nm; with a luminance (cd/m2) only its shape counts. A named illuminant without a
 //! luminance keeps the brightness that glTF gives the material. The spectrum of a *light* is a shape always: glTF's
-//! candela or lux, times the luminance of its colour, say how bright it is.
+//! candela or lux, times the luminance of its colour, say how bright it is. `"profile"`: see `luminaires`.
 //!
 //! Unknown keys of the file, and names that the room does not have, are problems that come with the nearest names; a
 //! lenient reader is only warned of them. Unknown keys of `extras` belong to other programs and are passed over.
@@ -207,7 +207,7 @@ fn beside(room: &Path) -> Option<PathBuf> {
 
 /// Reads the objects of a side file or of extras.
 pub(crate) struct Reader<'a> {
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     grid: &'a Grid,
     pub(super) check: &'a mut Check,
     unknown: Unknown,
@@ -231,8 +231,7 @@ impl Reader<'_> {
             let place = format!("{place}, emission");
             if let Some(object) = self.object(value, &place) {
                 spectra.profile = luminaires::read_profile(self, object, &place);
-                let own = ["name", "csv", "luminance_cd_m2"];
-                self.keys(object, &[&own, &luminaires::KEYS[..]].concat(), &place);
+                self.keys(object, &luminaires::OF_EMISSION, &place);
                 let luminance = self.luminance(object, &place);
                 if luminaires::says_spectrum(object) || !object.contains_key("profile") {
                     let sampled = self.sampled(object, Kind::Illuminant, &place);
@@ -241,10 +240,6 @@ impl Reader<'_> {
             }
         }
         spectra
-    }
-
-    pub(super) fn folder(&self) -> &Path {
-        &self.folder
     }
 
     fn luminance(&mut self, object: &Map<String, Value>, place: &str) -> Option<f64> {

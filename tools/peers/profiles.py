@@ -35,6 +35,7 @@ def narrow(gamma, c):
 
 
 def ies(candela, opening, horizontal):
+    """`opening`: width and length; the length lies along C0."""
     vertical = [2.5 * k for k in range(37)]
     rows = [vertical, horizontal] + [[candela(v, h) for v in vertical] for h in horizontal]
     head = "IESNA:LM-63-2002\n[TEST] own figures\n[TESTLAB] none\n[ISSUEDATE] 2026\n[MANUFAC] nobody\nTILT=NONE\n"
@@ -128,8 +129,8 @@ def main():
     cases = [
         ("point, lopsided", lopsided, (0, 0), whole, None),
         ("point, narrow", narrow, (0, 0), [0.0], None),
-        ("panel .6 x 1.2 m, lopsided", lopsided, (0.6, 1.2), whole, (0.6, 1.2)),
-        ("panel .6 x 1.2 m, narrow", narrow, (0.6, 1.2), [0.0], (0.6, 1.2)),
+        ("panel 1.2 x .6 m, lopsided", lopsided, (0.6, 1.2), whole, (1.2, 0.6)),
+        ("panel 1.2 x .6 m, narrow", narrow, (0.6, 1.2), [0.0], (1.2, 0.6)),
     ]
     for name, candela, opening, horizontal, panel in cases:
         with tempfile.TemporaryDirectory() as folder:

@@ -2,7 +2,7 @@
 //! figures, none of a maker's.
 
 use crate::glb::{Glb, Mesh};
-use crate::shapes::{block, picture};
+use crate::shapes::block;
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -56,13 +56,7 @@ pub(crate) fn room() -> Glb {
     for (k, color) in colors.into_iter().enumerate() {
         let paint = glb.paint(&format!("picture {}", k + 1), color);
         let x = 1.1 + 1.9 * k as f64;
-        let at = [
-            [x, 1.0, 0.03],
-            [x + 1.0, 1.0, 0.03],
-            [x + 1.0, 2.0, 0.03],
-            [x, 2.0, 0.03],
-        ];
-        let mut mesh = picture(at);
+        let mut mesh = block([x, 1.0, 0.0], [x + 1.0, 2.0, 0.03]);
         mesh.uvs.clear();
         glb.draw(&format!("picture {}", k + 1), &[(&mesh, paint)]);
     }

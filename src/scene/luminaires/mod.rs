@@ -24,7 +24,9 @@ mod wish;
 pub(super) use extension::{IesNode, ies_node, profiles};
 pub use mounted::Luminaire;
 pub(super) use surfaces::{add, remount, tilt_share};
-pub(super) use wish::{KEYS, LampWish, ProfileWish, is_ours, read, read_profile, says_spectrum};
+pub(super) use wish::{
+    LampWish, OF_EMISSION, ProfileWish, is_ours, read, read_profile, says_spectrum,
+};
 
 #[cfg(test)]
 mod tests;

@@ -13,8 +13,20 @@ use crate::data::Kind;
 use serde_json::{Map, Value};
 use std::sync::Arc;
 
-/// Keys of a profile.
-pub(in crate::scene) const KEYS: [&str; 4] = ["profile", "multiplier", "flux_lm", "turn_deg"];
+/// Keys that go with a profile.
+const KEYS: [&str; 4] = ["profile", "multiplier", "flux_lm", "turn_deg"];
+/// Keys of a light.
+const OF_LIGHT: [&str; 6] = ["name", "csv", KEYS[0], KEYS[1], KEYS[2], KEYS[3]];
+/// Keys of the emission of a material.
+pub(in crate::scene) const OF_EMISSION: [&str; 7] = [
+    "name",
+    "csv",
+    "luminance_cd_m2",
+    KEYS[0],
+    KEYS[1],
+    KEYS[2],
+    KEYS[3],
+];
 
 /// A profile that was asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +53,7 @@ pub(in crate::scene) fn is_ours(extras: &Value) -> bool {
 /// Reads the object of a light.
 pub(in crate::scene) fn read(reader: &mut Reader, entry: &Value, place: &str) -> Option<LampWish> {
     let entry = reader.object(entry, place)?;
-    reader.keys(entry, &[&["name", "csv"], &KEYS[..]].concat(), place);
+    reader.keys(entry, &OF_LIGHT, place);
     let profile = read_profile(reader, entry, place);
     let silent = entry.contains_key("profile") && !says_spectrum(entry);
     let spectrum = (!silent).then(|| reader.sampled(entry, Kind::Illuminant, place));
@@ -81,7 +93,7 @@ pub(in crate::scene) fn read_profile(
             .problem(place, what, "name an .ies or .ldt file");
         return None;
     };
-    let read = uri::read(reader.folder(), path);
+    let read = uri::read(&reader.folder, path);
     let bytes = read.map_err(|why| {
         let next = "give an .ies or .ldt file inside the folder of the file that names it";
         reader.check.problem(place, why, next);

@@ -2,7 +2,7 @@
 //!
 //! A line that names the edition (not in 1986), keywords (`[LUMINAIRE] ...`; free text in 1986), a line `TILT=`, and then numbers
 //! without regard to lines: lamps, lumens of a lamp (-1: absolute photometry), a multiplier of the candela, numbers of vertical
-//! and horizontal angles, type (1 C, 2 B, 3 A), units (1 feet, 2 metres), width (along C0), length (along C90) and height
+//! and horizontal angles, type (1 C, 2 B, 3 A), units (1 feet, 2 metres), width (along C90), length (along C0) and height
 //! of the luminous opening, ballast factor, ballast-lamp factor (since 2002 a number for future use or the way the file was
 //! made, which multiplies nothing), watts; the angles, and the candela by horizontal angle.
 //!
@@ -96,7 +96,7 @@ pub(super) fn parse(text: &str) -> Result<Profile, Fault> {
     profile.format = head.edition.1.into();
     profile.tilt = head.tilt;
     // Negative lengths are diameters of round openings.
-    profile.opening_m = std::array::from_fn(|k| unit * opening[k].abs());
+    profile.opening_m = [1, 0, 2].map(|k: usize| unit * opening[k].abs());
     profile.lamps_lm = (lumens > 0.0)
         .then_some(lamps * lumens)
         .filter(|lm| *lm > 0.0);

@@ -81,7 +81,8 @@ pub struct Profile {
     pub angles: Angles,
     /// Luminous flux of the lamps in it, lm; none in absolute photometry.
     pub lamps_lm: Option<f64>,
-    /// Length along C0-C180, along C90-C270, and height of what shines, m; 0: a point.
+    /// Extent along C0-C180, along C90-C270, and height of what shines, m; 0: a point. (The length of a lamp lies along C0 in LM-63, and
+    /// along C90 in EULUMDAT.)
     pub opening_m: [f64; 3],
     /// Pairs of tilt (degrees from the position in which it was measured) and share of the light that is left.
     pub tilt: Vec<[f64; 2]>,

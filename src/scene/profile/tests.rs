@@ -259,7 +259,7 @@ fn multipliers_units_and_editions() {
         assert!((profile.toward(DVec3::X) - want).abs() < 1e-12, "{first}");
         assert_eq!(profile.lamps_lm, Some(3000.0));
         assert_eq!(profile.luminaire, "T5");
-        let [width, length, _] = profile.opening_m;
+        let [length, width, _] = profile.opening_m;
         assert!((width - 0.6096).abs() < 1e-12 && (length - 1.2192).abs() < 1e-12);
     }
     // Latin-1, and lines that end as they did on old machines.
