@@ -548,3 +548,51 @@ fn rooms_without_a_profile_have_none() {
             .all(|m| m.emission.is_none() || m.even_emission().is_some())
     );
 }
+
+#[test]
+fn what_is_wrong_with_a_profile_in_the_file_is_said() {
+    let said = |profiles: Value, carried: Value| {
+        let mut room = floor();
+        room.json["extensionsUsed"] = json!(["EXT_lights_ies"]);
+        room.json["extensions"] = json!({"EXT_lights_ies": {"lights": profiles}});
+        node(
+            &mut room,
+            json!({"name": "n", "extensions": {"EXT_lights_ies": carried}}),
+        );
+        let loaded = loaded(&room, &[("lamp.ies", "IESNA91\nTILT=NONE\n1 x")]);
+        loaded.unwrap_err().to_string()
+    };
+    for (profiles, carried, text) in [
+        (json!([]), json!({"light": 3}), "refers to profile 3"),
+        (
+            json!([{}]),
+            json!({"light": 0}),
+            "neither a URI nor a bufferView",
+        ),
+        (
+            json!([{"bufferView": 99}]),
+            json!({"light": 0}),
+            "bufferView 99",
+        ),
+        (
+            json!([{"uri": "gone.ies"}]),
+            json!({"light": 0}),
+            "gone.ies",
+        ),
+        (
+            json!([{"uri": "lamp.ies"}]),
+            json!({"light": 0}),
+            "line 3: 'x' stands where",
+        ),
+        (json!([7]), json!({"light": 0}), "profile 0"),
+        (json!([{}]), json!({}), "does not say which light"),
+        (
+            json!([{"uri": "lamp.ies"}]),
+            json!({"light": 0, "multiplier": -2}),
+            "negative multiplier",
+        ),
+    ] {
+        let said = said(profiles, carried);
+        assert!(said.contains(text), "{text}\n-- in --\n{said}");
+    }
+}

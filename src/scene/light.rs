@@ -255,28 +255,7 @@ pub(crate) fn punctual(
                 check.problem(&place, what, "give numbers of at least 0");
                 return None;
             }
-            let position = light.to_world.transform_point3(DVec3::ZERO);
-            let direction = light
-                .to_world
-                .transform_vector3(DVec3::NEG_Z)
-                .try_normalize();
-            let direction = match (light.kind, direction) {
-                (_, Some(direction)) => direction,
-                (RawLightKind::Point, None) => DVec3::NEG_Z,
-                (_, None) => {
-                    let what = "its node is scaled to nothing, so that it shines nowhere";
-                    check.problem(&place, what, "give the node a scale that is not zero");
-                    return None;
-                }
-            };
-            if !position.is_finite() {
-                check.problem(
-                    &place,
-                    "stands at no finite place",
-                    "mend the node's matrix",
-                );
-                return None;
-            }
+            let (position, direction) = placed(light, &place, check)?;
             if light.range.is_some() {
                 check.warn(format!("{place}: 'range' is passed over, light has none"));
             }
@@ -328,6 +307,29 @@ pub(crate) fn punctual(
             })
         })
         .collect()
+}
+
+/// Where a light stands and which way it shines; none where it cannot, which is said.
+fn placed(light: &RawLight, place: &str, check: &mut Check) -> Option<(DVec3, DVec3)> {
+    let position = light.to_world.transform_point3(DVec3::ZERO);
+    let direction = light
+        .to_world
+        .transform_vector3(DVec3::NEG_Z)
+        .try_normalize();
+    let direction = match (light.kind, direction) {
+        (_, Some(direction)) => direction,
+        (RawLightKind::Point, None) => DVec3::NEG_Z,
+        (_, None) => {
+            let what = "its node is scaled to nothing, so that it shines nowhere";
+            check.problem(place, what, "give the node a scale that is not zero");
+            return None;
+        }
+    };
+    if !position.is_finite() {
+        check.problem(place, "stands at no finite place", "mend the node's matrix");
+        return None;
+    }
+    Some((position, direction))
 }
 
 /// The profile of a light: the side file's, or its node's.

@@ -344,7 +344,7 @@ mod tests {
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
         let file = SpectraFile::default();
-        let mut made = materials(
+        let (mut made, _) = materials(
             raw,
             &vec![false; raw.len()],
             &file,
@@ -440,7 +440,7 @@ mod tests {
         let mut check = Check::new("room.glb");
         let room = folder.path().join("room.glb");
         let file = SpectraFile::default();
-        let mut made = materials(
+        let (mut made, _) = materials(
             &raws,
             &[false; 5],
             &file,

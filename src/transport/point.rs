@@ -240,27 +240,15 @@ impl Gatherer<'_> {
     /// Light of punctual lights, one ray each.
     pub(super) fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
-            let (mut factor, end) = match punctual_factor(lamp, to, self.light.half_size) {
-                Some(x) => x,
-                None => continue,
+            let factor = match lamp.kind {
+                LightKind::Surface => {
+                    let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
+                    self.of_surface(to, lamp, f64::from(bright), memory)
+                }
+                _ => self.of_light(to, lamp, memory),
             };
-            if lamp.kind == LightKind::Surface {
-                let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
-                factor = self.of_surface(to, lamp, f64::from(bright), memory);
-                if factor <= 0.0 {
-                    continue;
-                }
-            } else if lamp.kind == LightKind::Sun {
-                factor *= self.sun_seen(to, lamp, memory);
-                if factor <= 0.0 {
-                    continue;
-                }
-            } else if self.sight.occlusion {
-                memory.rays += 1;
-                let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
-                if self.sight.blocks_one(&way) {
-                    continue;
-                }
+            if factor <= 0.0 {
+                continue;
             }
             if let Some(trace) = &mut out.trace {
                 trace.lamp(k, factor as f32);
@@ -270,6 +258,24 @@ impl Gatherer<'_> {
                 *d += factor as f32 * r;
             }
         }
+    }
+
+    /// What turns the intensity of a light without extent, or of the sun, into irradiance, past what is in between.
+    fn of_light(&self, to: &Receiver, lamp: &PunctualLight, memory: &mut Memory) -> f64 {
+        let Some((factor, end)) = punctual_factor(lamp, to, self.light.half_size) else {
+            return 0.0;
+        };
+        if lamp.kind == LightKind::Sun {
+            return factor * self.sun_seen(to, lamp, memory);
+        }
+        if self.sight.occlusion {
+            memory.rays += 1;
+            let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
+            if self.sight.blocks_one(&way) {
+                return 0.0;
+            }
+        }
+        factor
     }
 }
 

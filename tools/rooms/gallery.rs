@@ -76,6 +76,19 @@ pub(crate) fn room() -> Glb {
     );
     panel.uvs.clear();
     glb.draw("panel", &[(&panel, opal)]);
+    lights(&mut glb);
+    glb.camera(
+        "door",
+        dvec3(5.9, 1.6, 4.6),
+        dvec3(2.9, 1.35, 0.6),
+        1.05,
+        4.0 / 3.0,
+    );
+    glb
+}
+
+/// Three spots on the pictures, two washers on the wall to the left.
+fn lights(glb: &mut Glb) {
     for k in 0..3 {
         let x = 1.6 + 1.9 * f64::from(k);
         let spot = json!({"name": "spot", "type": "spot", "intensity": 100.0});
@@ -85,14 +98,6 @@ pub(crate) fn room() -> Glb {
         let washer = json!({"name": "washer", "type": "point", "intensity": 100.0});
         glb.light(washer, dvec3(0.8, 3.1, z), dvec3(0.8, 0.0, z + 1e-6));
     }
-    glb.camera(
-        "door",
-        dvec3(5.9, 1.6, 4.6),
-        dvec3(2.9, 1.35, 0.6),
-        1.05,
-        4.0 / 3.0,
-    );
-    glb
 }
 
 /// Which lamp has which file and spectrum.
