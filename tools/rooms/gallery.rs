@@ -57,6 +57,9 @@ pub(crate) fn room() -> Glb {
         let paint = glb.paint(&format!("picture {}", k + 1), color);
         let x = 1.1 + 1.9 * k as f64;
         let mut mesh = block([x, 1.0, 0.0], [x + 1.0, 2.0, 0.03]);
+        // Its back lies on the wall, and would look out of the room.
+        let (positions, triangles) = (&mesh.positions, &mut mesh.triangles);
+        triangles.retain(|t| t.iter().any(|&v| positions[v as usize].z > 0.0));
         mesh.uvs.clear();
         glb.draw(&format!("picture {}", k + 1), &[(&mesh, paint)]);
     }
@@ -108,7 +111,7 @@ pub(crate) fn spectra() -> Value {
             "washer": {"profile": "gallery-washer.ies", "name": "cie/LED-B3", "multiplier": 0.8, "turn_deg": 90},
         },
         "materials": {
-            "panel": {"emission": {"profile": "gallery-panel.ldt", "name": "cie/LED-B3"}},
+            "panel": {"emission": {"profile": "gallery-panel.ldt", "name": "cie/LED-B3", "turn_deg": 90}},
         },
     })
 }

@@ -151,6 +151,14 @@ impl Luminaire {
         self.body.as_ref().map_or(0.0, |body| body.radius)
     }
 
+    /// Extent of what shines along C0 and along C90, m.
+    pub fn extent(&self) -> [f64; 2] {
+        [self.frame.x_axis, self.frame.y_axis].map(|axis| {
+            let along = self.triangles().iter().flatten().map(|p| p.dot(axis));
+            2.0 * along.fold(0.0, |most, x| x.abs().max(most))
+        })
+    }
+
     /// Area that shines, m2.
     pub fn area(&self) -> f64 {
         self.body.as_ref().map_or(0.0, |body| body.area)

@@ -14,6 +14,8 @@ use std::sync::Arc;
 
 /// Less of the light that has nowhere to go is not worth a word.
 const LOST: f64 = 0.01;
+/// A side that is so many times the other is the longer one.
+const LONG: f64 = 1.5;
 /// A surface that is so many times as long as the luminous opening of the file is no such lamp.
 const TOO_LONG: f64 = 3.0;
 
@@ -55,6 +57,13 @@ pub(in crate::scene) fn add(
                     2.0 * luminaire.radius()
                 ));
             }
+            if lies_across(&luminaire) {
+                check.warn(format!(
+                    "{place}: the longer side of {} lies across the one of its profile's opening; \"turn_deg\": 90 \
+                     turns the profile",
+                    surface.name
+                ));
+            }
             area += luminaire.area();
             flux += wish.flux * tilt;
             lights.push(PunctualLight {
@@ -82,6 +91,18 @@ pub(in crate::scene) fn add(
         emission.shape = emission.shape.map(|x| x * unit * luminance);
         emission.scale *= unit * luminance;
     }
+}
+
+/// Is a surface long where the opening of its profile is short?
+fn lies_across(luminaire: &Luminaire) -> bool {
+    let long = |[a, b]: [f64; 2]| match (a > LONG * b, b > LONG * a) {
+        (true, false) => Some(0),
+        (false, true) => Some(1),
+        _ => None,
+    };
+    let [a, b, _] = luminaire.profile.opening_m;
+    let (own, opening) = (long(luminaire.extent()), long([a, b]));
+    own.is_some() && opening.is_some() && own != opening
 }
 
 /// Share of its light that a lamp has left, hung as it is.
