@@ -82,6 +82,10 @@ fn from_far_away_a_surface_has_the_intensity_of_its_profile() {
     assert!((sheet.reach() - 1.0).abs() < 1e-9 && (body.reach() - 1.0).abs() < 1e-9);
     for k in 0..200 {
         let d = sphere_direction(sequence02(k, 3));
+        // Seen from the side a sheet shows nothing.
+        if d.y.abs() < 1e-6 {
+            continue;
+        }
         for lamp in [&sheet, &body] {
             let want = lamp.per_lumen(d);
             assert!((sent(lamp, d) / want - 1.0).abs() < 1e-9, "{d}");
