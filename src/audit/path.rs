@@ -10,7 +10,7 @@ use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Face, Mesh};
 use crate::scene::sky::SUN_RADIUS;
-use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
+use crate::scene::{Alpha, LightKind, PunctualLight, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -72,7 +72,7 @@ impl<'a> Audit<'a> {
         let mut total = 0.0;
         for &face in &mesh.faces {
             let material = &scene.materials[mesh.material[face.triangle as usize] as usize];
-            if let Some(e) = &material.emission {
+            if let Some(e) = material.even_emission() {
                 let power: f64 = e
                     .shape
                     .iter()
@@ -153,7 +153,7 @@ impl<'a> Audit<'a> {
         let (mut toward_lamp, mut toward_any) = (first[0], first[1]);
         for bounce in 0.. {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
-            self.punctual(&at, toward_lamp, &throughput, sum);
+            self.punctual(&at, toward_lamp, rng, &throughput, sum);
             let direction = cosine_direction(at.normal, toward_any);
             let Some(hit) = self.closest(at.point, direction, at.plane) else {
                 self.outside(direction, &throughput, sum);
@@ -217,7 +217,7 @@ impl<'a> Audit<'a> {
     /// Density per area with which a lamp's triangle is chosen.
     fn chance(&self, triangle: usize) -> f64 {
         let material = &self.scene.materials[self.mesh.material[triangle] as usize];
-        let Some(e) = &material.emission else {
+        let Some(e) = material.even_emission() else {
             return 0.0;
         };
         let power: f64 = e
@@ -306,7 +306,14 @@ impl<'a> Audit<'a> {
         }
     }
 
-    fn punctual(&self, at: &Vertex, square: [f64; 2], throughput: &Leaves, sum: &mut Leaves) {
+    fn punctual(
+        &self,
+        at: &Vertex,
+        square: [f64; 2],
+        rng: &mut Pcg,
+        throughput: &Leaves,
+        sum: &mut Leaves,
+    ) {
         for light in &self.scene.lights {
             if light.kind.is_dome() {
                 continue;
@@ -326,6 +333,8 @@ impl<'a> Audit<'a> {
                     at.normal.dot(toward),
                     at.point + toward * (4.0 * self.mesh.half_size),
                 )
+            } else if light.kind == LightKind::Surface {
+                self.shining(light, at, square, rng)
             } else {
                 let d = position - at.point;
                 let r2 = d.length_squared();
@@ -335,6 +344,10 @@ impl<'a> Audit<'a> {
                         ((along - outer.cos()) / (inner.cos() - outer.cos()).max(1e-3))
                             .clamp(0.0, 1.0)
                             .powi(2)
+                    }
+                    LightKind::Profile => {
+                        let spread = light.luminaire.as_ref();
+                        spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
                     }
                     _ => 1.0,
                 };
@@ -356,6 +369,37 @@ impl<'a> Audit<'a> {
                 sum[l] += throughput[l] * factor * power[l] * light.shape[l];
             }
         }
+    }
+
+    /// A random point of a lamp with an extent, by area: what turns its flux into irradiance, and the point.
+    fn shining(
+        &self,
+        light: &PunctualLight,
+        at: &Vertex,
+        square: [f64; 2],
+        rng: &mut Pcg,
+    ) -> (f64, DVec3) {
+        let nothing = (0.0, at.point);
+        let Some(luminaire) = &light.luminaire else {
+            return nothing;
+        };
+        let area = |[a, b, c]: &[DVec3; 3]| 0.5 * (*b - *a).cross(*c - *a).length();
+        let mut left = rng.f64() * luminaire.area();
+        let chosen = luminaire.triangles().iter().find(|t| {
+            left -= area(t);
+            left < 0.0
+        });
+        let Some(triangle) = chosen.or(luminaire.triangles().last()) else {
+            return nothing;
+        };
+        let [a, b, c] = *triangle;
+        let own = (b - a).cross(c - a).normalize_or_zero();
+        let from = on_triangle(triangle, square) + light.position - self.mesh.centre;
+        let d = from - at.point;
+        let (r2, way) = (d.length_squared(), d.normalize_or_zero());
+        let sent = luminaire.per_area(-way, own) * luminaire.area();
+        let end = from + own * (1e-5 * self.mesh.half_size);
+        (sent * at.normal.dot(way) / r2, end)
     }
 
     fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<crate::geometry::Hit> {
@@ -388,9 +432,7 @@ impl<'a> Audit<'a> {
 
     /// Emitted radiance at a point of a triangle, W/m2/sr/nm.
     fn radiance(&self, triangle: usize, weights: [f32; 3]) -> Option<Leaves> {
-        let e = self.scene.materials[self.mesh.material[triangle] as usize]
-            .emission
-            .as_ref()?;
+        let e = self.scene.materials[self.mesh.material[triangle] as usize].even_emission()?;
         let weights = self.mesh.on_origin_f32(triangle, weights);
         let power = &self.scene.spectra[e.light].power;
         let shape = match &e.texture {

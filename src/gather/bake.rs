@@ -8,6 +8,7 @@ use crate::solve::Bake;
 use crate::spectrum::Leaves;
 use crate::transport::point::{Gathered, Receiver};
 use glam::DVec3;
+use std::f64::consts::PI;
 
 /// Vertices are drawn this far into the triangle they belong to: a point on an edge lies on the neighbouring wall too.
 const INSET: f64 = 2e-3;
@@ -155,8 +156,8 @@ impl Bake {
                     vertex.weights
                 };
                 let leaf = self.tree().leaf_at(entry, w);
-                self.lanes()
-                    .tristimulus(self.light().emitted.row(leaf as usize))
+                let own = self.light().emitted.row(leaf as usize);
+                look.shown.unwrap_or_else(|| self.lanes().tristimulus(own))
             }
             _ => [0.0; 3],
         };
@@ -201,6 +202,8 @@ pub(crate) struct Look<'a> {
     /// Mean colour of the texture, which the display multiplies again.
     unpainted: Option<[f64; 3]>,
     emits: bool,
+    /// Exitance that a lamp with a profile is shown with.
+    shown: Option<[f64; 3]>,
 }
 
 impl<'a> Look<'a> {
@@ -227,6 +230,9 @@ impl<'a> Look<'a> {
             upsampler,
             unpainted: mean,
             emits: material.emission.is_some(),
+            shown: (material.emission.as_ref())
+                .filter(|e| e.profile.is_some())
+                .map(|e| bake.lanes().emission(e.light, &e.shape, PI)),
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! The document stays as it is, so that what is written has the file's units; turned faces are written turned.
 
-use super::{Projection, Scene};
+use super::{Projection, Scene, luminaires};
 use glam::{DMat4, DVec3};
 use std::collections::BTreeSet;
 
@@ -44,6 +44,9 @@ impl Scene {
                 *half *= factor;
             }
         }
+        if factor != 1.0 {
+            luminaires::remount(&mut self);
+        }
         self.changes.scale *= factor;
         self
     }
@@ -62,6 +65,7 @@ impl Scene {
                 self.changes.flipped.insert(k);
             }
         }
+        luminaires::remount(self);
     }
 
     /// Was the surface turned?

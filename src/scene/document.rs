@@ -23,7 +23,8 @@ use std::sync::Arc;
 const AGAIN: &str = "export the file again";
 
 /// Extensions that are read. The packed ones count only where their decoder is built in.
-const READ: [&str; 7] = [
+const READ: [&str; 8] = [
+    "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",

@@ -7,6 +7,7 @@ use super::json::short;
 use super::lacking::lacking;
 use super::material::listed;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
+use crate::color::{KM, Observer};
 use crate::data::Leaves;
 use glam::DVec3;
 use serde::Serialize;
@@ -43,6 +44,8 @@ pub enum Kind {
     SpotLights,
     /// Parallel light.
     DirectionalLights,
+    /// Lamps whose light is spread as a file of photometric data says.
+    MeasuredLamps,
     /// Light of a sky that enters where rays leave the room.
     Sky,
     /// Direct light of the sun.
@@ -65,6 +68,7 @@ impl Kind {
             Self::PointLights => "point lights",
             Self::SpotLights => "spot lights",
             Self::DirectionalLights => "directional lights",
+            Self::MeasuredLamps => "measured lamps",
             Self::Sky => "sky",
             Self::Sun => "sun",
             Self::TwoSided => "two-sided surfaces",
@@ -159,6 +163,7 @@ impl Plan {
             Kind::DirectionalLights,
             lights(|k| matches!(k, LightKind::Directional)),
         );
+        plan.add(Kind::MeasuredLamps, measured(scene));
         let sky = scene.sky.as_ref();
         let said = |text: Option<&String>| match text {
             Some(text) => (true, text.clone()),
@@ -245,6 +250,32 @@ fn number_of(names: &[String], what: &str) -> (bool, String) {
         1 => (true, format!("1 {what}: {}", names[0])),
         n => (true, format!("{n} {what}s: {}", listed(names))),
     }
+}
+
+/// Lamps with a profile, what it is of, and their lumens.
+fn measured(scene: &Scene) -> (bool, String) {
+    let luminous = Observer::cie1931().weights(&scene.grid)[1];
+    let lumens = |light: &PunctualLight| -> f64 {
+        let leaves = scene.spectra[light.light].power.iter().zip(&light.shape);
+        leaves
+            .zip(&luminous)
+            .map(|((p, s), y)| KM * p * s * y)
+            .sum()
+    };
+    let lamps = scene.lights.iter().filter_map(|light| {
+        let profile = &light.luminaire.as_ref()?.profile;
+        let of = match profile.luminaire.as_str() {
+            "" => &profile.format,
+            name => name,
+        };
+        Some(format!(
+            "{} as {}, {:.0} lm",
+            quoted(&light.name),
+            quoted(of),
+            lumens(light)
+        ))
+    });
+    number_of(&lamps.collect::<Vec<String>>(), "lamp")
 }
 
 fn counted<'a, 'b: 'a>(

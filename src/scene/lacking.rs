@@ -18,7 +18,6 @@ pub struct Lacking {
 
 /// Extensions that change the light and that the program lacks, with what they mean.
 const LACKING: &[(&str, &str)] = &[
-    ("EXT_lights_ies", "measured photometry"),
     ("EXT_lights_image_based", "sky"),
     ("EXT_lights_image_based_environment", "sky"),
     ("KHR_environment_map", "sky"),

@@ -8,12 +8,14 @@
 use super::check::Check;
 use super::json::short;
 use super::light::{Lamp, Lamps, bearable};
+use super::luminaires::ProfileWish;
 use super::raw::{AlphaMode, RawMaterial};
 use super::spectra_file::{MaterialSpectra, Sampled, SpectraFile};
 use super::{Alpha, Emission, Material, Sides};
 use crate::color::Upsampler;
 use crate::data::{Grid, Leaves};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Greatest albedo: at 1 a closed room that emits has no steady state, near it the condition is 1/(1 - albedo).
 pub const GREATEST_ALBEDO: f64 = 0.999;
@@ -69,7 +71,7 @@ pub(crate) fn materials(
     upsampler: &Upsampler,
     lamps: &mut Lamps,
     check: &mut Check,
-) -> Vec<Material> {
+) -> (Vec<Material>, Vec<Option<ProfileWish>>) {
     let mut said = Said::default();
     let made = raw
         .iter()
@@ -77,7 +79,7 @@ pub(crate) fn materials(
         .map(|(raw, tinted)| {
             let name = name_of(raw);
             let place = format!("material '{}'", short(&name));
-            let spectra = file.material(&name, raw.extras.as_ref(), room, grid, check);
+            let mut spectra = file.material(&name, raw.extras.as_ref(), room, grid, check);
             let raw = &checked(raw, &place, check);
             said.hear(raw, &name);
             let measured = spectra.reflectance.as_ref();
@@ -86,10 +88,13 @@ pub(crate) fn materials(
             if bright && (measured.is_some() || !tinted && raw.base_color_texture.is_none()) {
                 said.bright.push(name);
             }
-            material.emission = emission(raw, &spectra, &place, lamps, check);
-            material
+            material.emission = match &spectra.profile {
+                Some(wish) => shining(raw, wish, spectra.emission.as_ref(), &place, lamps, check),
+                None => emission(raw, &spectra, &place, lamps, check),
+            };
+            (material, spectra.profile.take())
         })
-        .collect();
+        .unzip();
     said.warn(check);
     made
 }
@@ -220,6 +225,50 @@ fn emission(
         color: lamp.color,
         scale: lamp.scale,
         from: lamp.from,
+        profile: None,
+    })
+}
+
+/// The emission of a surface that shines by a profile, of luminance 1 until it is known how large the surface is.
+fn shining(
+    raw: &RawMaterial,
+    wish: &ProfileWish,
+    spectrum: Option<&(Sampled, Option<f64>)>,
+    place: &str,
+    lamps: &mut Lamps,
+    check: &mut Check,
+) -> Option<Emission> {
+    if spectrum.is_some_and(|(_, luminance)| luminance.is_some()) {
+        let what = "has a luminance and a profile, which says how bright it is";
+        check.problem(place, what, "take out \"luminance_cd_m2\", or the profile");
+    }
+    if raw.emissive_texture.is_some() {
+        check.warn(format!(
+            "{place}: its emissive texture is passed over, it shines by its profile"
+        ));
+    }
+    let own = lamps.luminance(raw.emissive_factor);
+    let lamp = match spectrum {
+        _ if wish.flux <= 0.0 => {
+            check.warn(format!("{place}: gives no light (its flux is 0)"));
+            return None;
+        }
+        Some((spectrum, _)) => lamps.by_spectrum(spectrum, Some(1.0)),
+        None if own > 0.0 => lamps.by_colour(raw.emissive_factor, 1.0 / own),
+        None => {
+            let what = "has a profile, but neither a spectrum nor an emissive colour";
+            check.problem(place, what, "name a spectrum: \"name\": \"cie/LED-B3\"");
+            return None;
+        }
+    };
+    Some(Emission {
+        light: lamp.light,
+        shape: lamp.shape,
+        texture: None,
+        color: lamp.color,
+        scale: lamp.scale,
+        from: lamp.from,
+        profile: Some(Arc::clone(&wish.profile)),
     })
 }
 
@@ -295,7 +344,7 @@ mod tests {
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
         let file = SpectraFile::default();
-        let mut made = materials(
+        let (mut made, _) = materials(
             raw,
             &vec![false; raw.len()],
             &file,
@@ -391,7 +440,7 @@ mod tests {
         let mut check = Check::new("room.glb");
         let room = folder.path().join("room.glb");
         let file = SpectraFile::default();
-        let mut made = materials(
+        let (mut made, _) = materials(
             &raws,
             &[false; 5],
             &file,

@@ -17,10 +17,12 @@ mod json;
 pub mod lacking;
 mod light;
 mod load;
+pub mod luminaires;
 mod material;
 mod meshes;
 mod nodes;
 mod primitive;
+pub mod profile;
 mod raw;
 pub mod sky;
 mod spectra_file;
@@ -175,6 +177,16 @@ pub struct Emission {
     pub scale: f64,
     /// Where the spectrum comes from, for `inspect`.
     pub from: String,
+    /// How the light is spread, if not evenly: then `shape` only says how bright the surface is shown, and what it sends out is a
+    /// light of [`LightKind::Surface`].
+    pub profile: Option<Arc<profile::Profile>>,
+}
+
+impl Material {
+    /// What the surface sends out evenly to all sides; none where a profile says how it shines.
+    pub fn even_emission(&self) -> Option<&Emission> {
+        self.emission.as_ref().filter(|e| e.profile.is_none())
+    }
 }
 
 /// A spectrum that lamps share. Lamps given by colour share D65 and differ by `shape`.
@@ -187,7 +199,7 @@ pub struct LightSpectrum {
 }
 
 /// A light without extent, or one of a sky. Radiant intensity in W/sr/nm (point, spot), irradiance in W/m2/nm across its rays
-/// (directional, sun) or of open level ground (sky), exitance in W/m2/nm (ground).
+/// (directional, sun) or of open level ground (sky), exitance in W/m2/nm (ground), radiant flux in W/nm (profile, surface).
 #[derive(Debug, Clone)]
 pub struct PunctualLight {
     /// For messages.
@@ -202,9 +214,11 @@ pub struct PunctualLight {
     pub light: usize,
     /// `intensity(leaf) = spectra[light].power[leaf] * shape[leaf]`.
     pub shape: Leaves,
+    /// How its light is spread, and from where: of the kinds that say so, and of no other.
+    pub luminaire: Option<Arc<luminaires::Luminaire>>,
 }
 
-/// Kinds of KHR_lights_punctual, and those of a sky.
+/// Kinds of KHR_lights_punctual, measured lamps, and those of a sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {
     /// Shines alike in all directions.
@@ -218,6 +232,10 @@ pub enum LightKind {
     },
     /// Parallel light.
     Directional,
+    /// Shines from a point as its [profile](PunctualLight::luminaire) says.
+    Profile,
+    /// Shines from a surface as its profile says: a lamp with an extent.
+    Surface,
     /// The sun: light from a disc of [`sky::SUN_RADIUS`], infinitely far away.
     Sun,
     /// The sky above the horizon, spread as [`Scene::sky`] says.

@@ -7,6 +7,7 @@
 use crate::scene::Texture;
 use crate::scene::check::Check;
 use crate::scene::json::{self, Item};
+use crate::scene::luminaires::{IesNode, ies_node};
 use crate::scene::nodes::Placed;
 use crate::scene::texture_info::Slots;
 use glam::DMat4;
@@ -101,6 +102,8 @@ pub struct RawLight {
     pub node: usize,
     /// Node to world; the light shines along -Z of its own space.
     pub to_world: DMat4,
+    /// EXT_lights_ies of its node.
+    pub ies: Option<IesNode>,
 }
 
 /// `type` of a punctual light.
@@ -112,6 +115,8 @@ pub enum RawLightKind {
     Spot,
     /// Parallel.
     Directional,
+    /// As a profile of EXT_lights_ies says.
+    Profile,
 }
 
 /// All materials of the document; after them the default one if some primitive names none.
@@ -271,12 +276,17 @@ pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<
         let index = node
             .extension(NAME, check)
             .and_then(|e| e.index("light", check));
-        let Some(index) = index else { continue };
-        let item = json::referred(table, "lights", "light", index, &node.place, check);
-        let Some(item) = item else { continue };
-        let Some(light) = light(&item, &node, place, check) else {
-            continue;
+        let ies = ies_node(json, &node, check);
+        let light = match (index, ies) {
+            (Some(index), ies) => {
+                let item = json::referred(table, "lights", "light", index, &node.place, check);
+                let light = item.and_then(|item| light(&item, &node, place, check));
+                light.map(|light| RawLight { ies, ..light })
+            }
+            (None, Some(ies)) => Some(measured(ies, &node, place)),
+            (None, None) => None,
         };
+        let Some(light) = light else { continue };
         // Every node gets a copy of its light's name and extras.
         carried += light.name.len() + light.extras.as_ref().map_or(0, weight);
         if carried > MAX_CARRIED {
@@ -287,6 +297,28 @@ pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<
         lights.push(light);
     }
     lights
+}
+
+/// A light that only EXT_lights_ies describes.
+fn measured(ies: IesNode, node: &Item<'_>, placed: &Placed) -> RawLight {
+    let name = if ies.name.is_empty() {
+        node.name()
+    } else {
+        &ies.name
+    };
+    RawLight {
+        name: name.to_owned(),
+        kind: RawLightKind::Profile,
+        color: [1.0; 3],
+        intensity: 1.0,
+        range: None,
+        inner: 0.0,
+        outer: 0.0,
+        extras: None,
+        node: placed.node,
+        to_world: placed.to_world,
+        ies: Some(ies),
+    }
 }
 
 fn light(item: &Item<'_>, node: &Item<'_>, placed: &Placed, check: &mut Check) -> Option<RawLight> {
@@ -339,6 +371,7 @@ fn light(item: &Item<'_>, node: &Item<'_>, placed: &Placed, check: &mut Check) -
         extras: item.map.get("extras").cloned(),
         node: placed.node,
         to_world: placed.to_world,
+        ies: None,
     };
     let sum = light.intensity + light.color.iter().sum::<f32>();
     if !sum.is_finite() {

@@ -15,13 +15,14 @@
 //! beyond its rows, an emission is zero there. The emission of a *surface* given as a CSV without a luminance is
 //! spectral radiance in W/m2/sr/nm; with a luminance (cd/m2) only its shape counts. A named illuminant without a
 //! luminance keeps the brightness that glTF gives the material. The spectrum of a *light* is a shape always: glTF's
-//! candela or lux, times the luminance of its colour, say how bright it is.
+//! candela or lux, times the luminance of its colour, say how bright it is. `"profile"`: see `luminaires`.
 //!
 //! Unknown keys of the file, and names that the room does not have, are problems that come with the nearest names; a
 //! lenient reader is only warned of them. Unknown keys of `extras` belong to other programs and are passed over.
 
 use super::check::{Check, Unknown};
 use super::json::short;
+use super::luminaires::{self, LampWish, ProfileWish};
 use super::sky::SkyWish;
 use super::uri;
 use crate::data::{Grid, Leaves};
@@ -51,6 +52,8 @@ pub(crate) struct MaterialSpectra {
     pub(crate) reflectance: Option<Sampled>,
     /// Emission and its luminance, cd/m2, if given.
     pub(crate) emission: Option<(Sampled, Option<f64>)>,
+    /// How the emission is spread, if not evenly.
+    pub(crate) profile: Option<ProfileWish>,
 }
 
 impl MaterialSpectra {
@@ -59,6 +62,7 @@ impl MaterialSpectra {
         Self {
             reflectance: self.reflectance.or(other.reflectance),
             emission: self.emission.or(other.emission),
+            profile: self.profile.or(other.profile),
         }
     }
 }
@@ -67,7 +71,7 @@ impl MaterialSpectra {
 #[derive(Debug, Default)]
 pub(crate) struct SpectraFile {
     materials: BTreeMap<String, MaterialSpectra>,
-    lights: BTreeMap<String, Sampled>,
+    lights: BTreeMap<String, LampWish>,
     /// What is said of sky and sun.
     pub(crate) sky: SkyWish,
 }
@@ -135,8 +139,8 @@ impl SpectraFile {
         for (name, entry) in reader.entries(top, "lights", &place) {
             let place = format!("{place}: light '{}'", short(name));
             reader.known(name, lights, "light", &place);
-            if let Some(spectrum) = reader.light(entry, &place) {
-                file.lights.insert(name.clone(), spectrum);
+            if let Some(lamp) = luminaires::read(&mut reader, entry, &place) {
+                file.lights.insert(name.clone(), lamp);
             }
         }
         file
@@ -176,24 +180,19 @@ impl SpectraFile {
         room: &Path,
         grid: &Grid,
         check: &mut Check,
-    ) -> Option<Sampled> {
-        if let Some(spectrum) = self.lights.get(name) {
-            return Some(spectrum.clone());
+    ) -> Option<LampWish> {
+        if let Some(lamp) = self.lights.get(name) {
+            return Some(lamp.clone());
         }
-        // Other programs write a "name" into extras too; all of ours hold a slash.
-        let extras = extras?;
-        let is_ours = extras["name"]
-            .as_str()
-            .map_or(extras["csv"].is_string(), |n| n.contains('/'));
+        let extras = extras.filter(|extras| luminaires::is_ours(extras))?;
         let mut reader = Reader {
             folder: uri::folder_of(room),
             grid,
             check,
             unknown: Unknown::Ignore,
         };
-        is_ours
-            .then(|| reader.light(extras, &format!("light '{}', extras", short(name))))
-            .flatten()
+        let place = format!("light '{}', extras", short(name));
+        luminaires::read(&mut reader, extras, &place)
     }
 }
 
@@ -208,7 +207,7 @@ fn beside(room: &Path) -> Option<PathBuf> {
 
 /// Reads the objects of a side file or of extras.
 pub(crate) struct Reader<'a> {
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     grid: &'a Grid,
     pub(super) check: &'a mut Check,
     unknown: Unknown,
@@ -231,19 +230,16 @@ impl Reader<'_> {
         if let Some(value) = entry.get("emission") {
             let place = format!("{place}, emission");
             if let Some(object) = self.object(value, &place) {
-                self.keys(object, &["name", "csv", "luminance_cd_m2"], &place);
+                spectra.profile = luminaires::read_profile(self, object, &place);
+                self.keys(object, &luminaires::OF_EMISSION, &place);
                 let luminance = self.luminance(object, &place);
-                let sampled = self.sampled(object, Kind::Illuminant, &place);
-                spectra.emission = sampled.map(|s| (s, luminance));
+                if luminaires::says_spectrum(object) || !object.contains_key("profile") {
+                    let sampled = self.sampled(object, Kind::Illuminant, &place);
+                    spectra.emission = sampled.map(|s| (s, luminance));
+                }
             }
         }
         spectra
-    }
-
-    fn light(&mut self, entry: &Value, place: &str) -> Option<Sampled> {
-        let entry = self.object(entry, place)?;
-        self.keys(entry, &["name", "csv"], place);
-        self.sampled(entry, Kind::Illuminant, place)
     }
 
     fn luminance(&mut self, object: &Map<String, Value>, place: &str) -> Option<f64> {
@@ -257,7 +253,12 @@ impl Reader<'_> {
         number
     }
 
-    fn sampled(&mut self, object: &Map<String, Value>, kind: Kind, place: &str) -> Option<Sampled> {
+    pub(super) fn sampled(
+        &mut self,
+        object: &Map<String, Value>,
+        kind: Kind,
+        place: &str,
+    ) -> Option<Sampled> {
         let outside = match kind {
             Kind::Reflectance => Outside::Hold,
             Kind::Illuminant => Outside::Zero,
@@ -463,7 +464,8 @@ mod tests {
             (lamp.from.as_str(), *luminance, lamp.is_csv),
             ("cie/F2", Some(5000.0), false)
         );
-        assert_eq!(file.lights["Spot"].from, "cie/A");
+        let spot = file.lights["Spot"].spectrum.as_ref();
+        assert_eq!(spot.unwrap().from, "cie/A");
     }
 
     #[test]
@@ -586,7 +588,7 @@ mod tests {
                 &grid,
                 &mut check,
             );
-            spectrum.map(|s| s.from)
+            spectrum.and_then(|s| s.spectrum).map(|s| s.from)
         };
         assert_eq!(light(json!({"name": "cie/F11"})), Some("cie/F11".into()));
         assert_eq!(light(json!({"name": "Lamp.001"})), None);

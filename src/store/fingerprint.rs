@@ -95,6 +95,8 @@ impl Fingerprint {
                 LightKind::Point => [0.0; 3],
                 LightKind::Spot { inner, outer } => [1.0, inner, outer],
                 LightKind::Directional => [2.0, 0.0, 0.0],
+                LightKind::Profile => [6.0, 0.0, 0.0],
+                LightKind::Surface => [7.0, 0.0, 0.0],
                 LightKind::Sun => [3.0, 0.0, 0.0],
                 LightKind::Sky => [4.0, 0.0, 0.0],
                 LightKind::Ground => [5.0, 0.0, 0.0],
@@ -106,7 +108,15 @@ impl Fingerprint {
             if let (LightKind::Sky, Some(sky)) = (light.kind, &scene.sky) {
                 mix.add(sky.dome.kind()).add(sky.dome.sun().to_array());
             }
-            print.add(format!("place of light '{}'", light.name), &mix);
+            let mut what = "place";
+            if let Some(luminaire) = &light.luminaire {
+                what = "place or profile";
+                mix.all(&luminaire.numbers());
+                for numbers in luminaire.profile.numbers() {
+                    mix.all(numbers);
+                }
+            }
+            print.add(format!("{what} of light '{}'", light.name), &mix);
         }
         print
     }

@@ -4,6 +4,7 @@
 //! parts in proportion to it. How many rays is settled beforehand: to stop where the first few agree is to overlook thin
 //! things, and took 4 to 8 % of the light of lamps behind louvres.
 
+use super::luminaire;
 use super::point::{Gathered, Gatherer, Memory, Of, Receiver, punctual_factor};
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
@@ -142,9 +143,8 @@ impl Gatherer<'_> {
         memory.lamps.clear();
     }
 
-    /// Puts rays to lamps, in number as `all` that they would bring asks for, into the memory with their weights; which lamp
-    /// each goes to.
-    fn aim(&self, to: &Receiver, lamps: &[Lamp], all: f64, memory: &mut Memory) -> Vec<usize> {
+    /// How many rays lamps are worth that would bring `all`, share of white.
+    pub(super) fn rays_to_lamps(&self, to: &Receiver, all: f64) -> usize {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses; what is dark is seen more keenly. Where many
         // points stand for a leaf it is the points that make up for it.
         let here = to
@@ -152,10 +152,16 @@ impl Gatherer<'_> {
             .and_then(|leaf| self.light.arrival.get(leaf as usize));
         let here = here.map_or(all, |arrival| f64::from(arrival.all));
         let wanted = 0.5 * all * keenness(here) / (PATCHES * self.tolerance);
-        let count = match self.shafts {
+        match self.shafts {
             true => (wanted.powf(4.0 / 3.0).ceil() as usize).clamp(RAYS[0], RAYS[1]),
             false => LEAF_RAYS,
-        };
+        }
+    }
+
+    /// Puts rays to lamps, in number as `all` that they would bring asks for, into the memory with their weights; which lamp
+    /// each goes to.
+    fn aim(&self, to: &Receiver, lamps: &[Lamp], all: f64, memory: &mut Memory) -> Vec<usize> {
+        let count = self.rays_to_lamps(to, all);
         let turn = hash(to.seed, u64::from(lamps[0].id));
         let mut samples: Vec<[f64; 2]> = (0..count as u32).map(|k| sequence02(k, turn)).collect();
         samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -245,6 +251,9 @@ impl Gatherer<'_> {
                     (LightKind::Sky | LightKind::Ground, Some((d, factors))) => {
                         let factor = factors[usize::from(lamp.kind == LightKind::Ground)];
                         (factor, to.point + d * (4.0 * self.light.half_size))
+                    }
+                    (LightKind::Surface, _) => {
+                        luminaire::whole(lamp, to, self.light.half_size, [u, v])?
                     }
                     _ => punctual_factor(lamp, to, self.light.half_size)?,
                 };

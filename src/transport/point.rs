@@ -4,9 +4,11 @@
 
 use super::hemisphere::Hemisphere;
 use super::lamp::Lamp;
+use super::luminaire;
 use super::shadows::Shadows;
 use super::sky::{Look, Outside};
 use super::trace::Trace;
+use crate::geometry::sampling::sequence02;
 use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
 use crate::light::Light;
@@ -238,21 +240,15 @@ impl Gatherer<'_> {
     /// Light of punctual lights, one ray each.
     pub(super) fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
-            let (mut factor, end) = match punctual_factor(lamp, to, self.light.half_size) {
-                Some(x) => x,
-                None => continue,
+            let factor = match lamp.kind {
+                LightKind::Surface => {
+                    let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
+                    self.of_surface(to, lamp, f64::from(bright), memory)
+                }
+                _ => self.of_light(to, lamp, memory),
             };
-            if lamp.kind == LightKind::Sun {
-                factor *= self.sun_seen(to, lamp, memory);
-                if factor <= 0.0 {
-                    continue;
-                }
-            } else if self.sight.occlusion {
-                memory.rays += 1;
-                let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
-                if self.sight.blocks_one(&way) {
-                    continue;
-                }
+            if factor <= 0.0 {
+                continue;
             }
             if let Some(trace) = &mut out.trace {
                 trace.lamp(k, factor as f32);
@@ -263,10 +259,28 @@ impl Gatherer<'_> {
             }
         }
     }
+
+    /// What turns the intensity of a light without extent, or of the sun, into irradiance, past what is in between.
+    fn of_light(&self, to: &Receiver, lamp: &PunctualLight, memory: &mut Memory) -> f64 {
+        let Some((factor, end)) = punctual_factor(lamp, to, self.light.half_size) else {
+            return 0.0;
+        };
+        if lamp.kind == LightKind::Sun {
+            return factor * self.sun_seen(to, lamp, memory);
+        }
+        if self.sight.occlusion {
+            memory.rays += 1;
+            let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
+            if self.sight.blocks_one(&way) {
+                return 0.0;
+            }
+        }
+        factor
+    }
 }
 
-/// What turns a punctual light's intensity into irradiance at a receiver, and where the ray to it ends. None for sky and ground,
-/// which shine from everywhere.
+/// What turns a punctual light's intensity (of measured lamps, flux) into irradiance at a receiver where nothing is in between, and
+/// where the ray to it ends: of a lamp with an extent, at one of its points. None for sky and ground, which shine from everywhere.
 pub fn punctual_factor(
     lamp: &PunctualLight,
     to: &Receiver,
@@ -278,6 +292,9 @@ pub fn punctual_factor(
     if lamp.kind.is_parallel() {
         let cosine = -to.normal.dot(lamp.direction);
         return (cosine > 0.0).then(|| (cosine, to.point - lamp.direction * (4.0 * half_size)));
+    }
+    if lamp.kind == LightKind::Surface {
+        return luminaire::whole(lamp, to, half_size, sequence02(0, to.seed));
     }
     let d = lamp.position - to.point;
     let r2 = d.length_squared();
@@ -291,6 +308,10 @@ pub fn punctual_factor(
             let along = -lamp.direction.dot(d) / r2.sqrt();
             let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
             ((along - outer.cos()) * scale).clamp(0.0, 1.0).powi(2)
+        }
+        LightKind::Profile => {
+            let spread = lamp.luminaire.as_ref();
+            spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
         }
         _ => 1.0,
     };

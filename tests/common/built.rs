@@ -93,6 +93,7 @@ impl Room {
             color: [0.5; 3],
             scale: 2.0 * exitance / PI,
             from: "given".into(),
+            profile: None,
         });
     }
 
@@ -173,6 +174,7 @@ impl Room {
             direction: direction.normalize(),
             light: 0,
             shape: [intensity; LEAVES],
+            luminaire: None,
         });
     }
 

@@ -248,6 +248,7 @@ pub fn room() -> Scene {
         color: [1.0; 3],
         scale: 1.0,
         from: "emissive colour".into(),
+        profile: None,
     });
 
     let left = DMat4::from_translation(DVec3::X);

@@ -7,6 +7,7 @@ mod cie171;
 mod cornell;
 mod daylit;
 mod furnished;
+mod gallery;
 mod glb;
 mod shapes;
 mod simple;
@@ -64,6 +65,7 @@ const ROOMS: &[Room] = &[
     ("corridor", simple::corridor, None),
     ("daylit", daylit::room, Some(daylit::spectra)),
     ("furnace", simple::furnace, None),
+    ("gallery", gallery::room, Some(gallery::spectra)),
     ("cie171-5.2", cie171::case_5_2, None),
     ("cie171-5.2-isotropic", cie171::case_5_2_isotropic, None),
     ("cie171-5.3", cie171::case_5_3, None),
@@ -89,6 +91,11 @@ fn main() -> anyhow::Result<()> {
             std::fs::write(args.dir.join(format!("{name}.spectra.json")), text)?;
         }
         written += 1;
+    }
+    if wanted("gallery") {
+        for (name, text) in gallery::lamps() {
+            std::fs::write(args.dir.join(name), text)?;
+        }
     }
     if wanted("furnished") {
         write(&args.dir, "furnished", furnished::room(args.triangles))?;
