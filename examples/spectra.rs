@@ -11,12 +11,12 @@ use haarlight::spectrum::{
 fn main() {
     let grid = Grid::default();
     let cmf = CmfTree::new(Observer::cie1931().weights(&grid));
-    let table = |name: &str| &named(name).expect("a built-in spectrum").table;
-    let light = grid.means(table("cie/F11"), Outside::Zero);
+    let table = |name: &str| named(name).expect("a built-in spectrum").table;
+    let light = grid.means(&table("cie/F11"), Outside::Zero);
     let k = normalization(&light, cmf.leaves());
     let light = light.map(|s| k * s);
     let white = tristimulus(&light, cmf.leaves());
-    let paint = grid.means(table("macbeth/orange"), Outside::Hold);
+    let paint = grid.means(&table("macbeth/orange"), Outside::Hold);
     let (source, material) = (
         SpectralTree::new(&light, &cmf),
         SpectralTree::new(&paint, &cmf),

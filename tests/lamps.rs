@@ -61,8 +61,11 @@ fn ies(step: f64, candela: impl Fn(f64, f64) -> f64) -> String {
     text
 }
 
+/// A corner, both edges from there, and the material.
+type Quad = ([f32; 3], [f32; 3], [f32; 3], usize);
+
 /// Quads as surfaces of a file: corner, two sides (the front is where their product points), material.
-fn quads(room: &mut Room, quads: &[([f32; 3], [f32; 3], [f32; 3], usize)]) {
+fn quads(room: &mut Room, quads: &[Quad]) {
     let mut nodes = Vec::new();
     room.json["meshes"] = json!([]);
     for (k, (o, u, v, material)) in quads.iter().enumerate() {
@@ -292,7 +295,7 @@ fn flux_closes_with_the_lumens_of_the_file() {
 }
 
 /// A panel of 1.2 m by .6 m, its front down, over the floor.
-fn panel_room(height: f32, wish: &Value, more: &[([f32; 3], [f32; 3], [f32; 3], usize)]) -> Scene {
+fn panel_room(height: f32, wish: &Value, more: &[Quad]) -> Scene {
     let mut room = floor();
     let mut all = vec![
         ([-6.0, 0.0, -6.0], [0.0, 0.0, 12.0], [12.0, 0.0, 0.0], 0),
