@@ -31,8 +31,6 @@ const LACKING: &[(&str, &str)] = &[
     ("KHR_materials_sheen", "sheen"),
     ("KHR_materials_specular", "gloss"),
     ("KHR_materials_subsurface", "light below the surface"),
-    ("KHR_materials_transmission", "transmission"),
-    ("KHR_materials_volume", "transmission through volumes"),
     ("KHR_materials_volume_scatter", "scattering in volumes"),
     ("MSFT_lod", "levels of detail"),
 ];

@@ -1,13 +1,14 @@
 //! Materials: glTF's metallic-roughness model taken as Lambertian, with measured spectra where there are some.
 //!
 //! `reflectance(leaf) = min(upsample(base colour factor), 0.999)`, or the measured table. Metals reflect by their base
-//! colour as albedo, unlit materials are painted with it, blended ones are opaque; each is said in a warning.
+//! colour as albedo, unlit materials are painted with it; each is said in a warning.
 //! Emission: luminance = emissive strength (nits) times Y of the linear emissive factor, unless a side file says more.
-//! No gloss, no transmission.
+//! No gloss. What lets light through is a pane, see [`pane`].
 
 use super::check::Check;
 use super::json::short;
 use super::light::{Lamp, Lamps, bearable};
+use super::pane;
 use super::raw::{AlphaMode, RawMaterial};
 use super::spectra_file::{MaterialSpectra, Sampled, SpectraFile};
 use super::{Alpha, Emission, Material, Sides};
@@ -51,7 +52,7 @@ impl Emission {
 struct Said {
     metals: Vec<String>,
     unlit: Vec<String>,
-    blended: Vec<String>,
+    panes: pane::Said,
     bright: Vec<String>,
 }
 
@@ -84,9 +85,13 @@ pub(crate) fn materials(
             let (mut material, bright) = paint(raw, &name, measured, upsampler);
             // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
             if bright && (measured.is_some() || !tinted && raw.base_color_texture.is_none()) {
-                said.bright.push(name);
+                said.bright.push(name.clone());
             }
             material.emission = emission(raw, &spectra, &place, lamps, check);
+            let emits = material.emission.is_some();
+            let measured = spectra.transmittance.as_ref();
+            let panes = &mut said.panes;
+            material.pane = panes.pane(raw, &name, measured, emits, &place, upsampler, check);
             material
         })
         .collect();
@@ -162,6 +167,7 @@ fn paint(
             .filter(|_| measured.is_none()),
         vertex_paint: measured.is_none(),
         emission: None,
+        pane: None,
         alpha: match raw.alpha_mode {
             AlphaMode::Mask => Alpha::Mask {
                 cutoff: raw.alpha_cutoff,
@@ -232,9 +238,6 @@ impl Said {
         if raw.unlit {
             self.unlit.push(name.into());
         }
-        if raw.alpha_mode == AlphaMode::Blend {
-            self.blended.push(name.into());
-        }
     }
 
     fn warn(&self, check: &mut Check) {
@@ -247,7 +250,6 @@ impl Said {
                 &self.unlit,
                 "KHR_materials_unlit: lit all the same, as paint of the base colour",
             ),
-            (&self.blended, "alphaMode BLEND: opaque"),
             (&self.bright, "albedo above 0.999: brought down to 0.999"),
         ];
         for (names, what) in warnings {
@@ -256,6 +258,7 @@ impl Said {
                 check.warn(format!("{what} ({})", listed(&names)));
             }
         }
+        self.panes.warn(check);
     }
 }
 

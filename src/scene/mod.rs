@@ -19,6 +19,7 @@ mod light;
 mod load;
 mod material;
 mod nodes;
+pub mod pane;
 mod primitive;
 mod raw;
 pub mod sky;
@@ -48,6 +49,8 @@ pub struct Scene {
     pub grid: Grid,
     /// One entry for each drawn primitive at each node (and each instance of it).
     pub surfaces: Vec<Surface>,
+    /// The same for what lets light straight through: filters on rays, that neither block nor receive.
+    pub panes: Vec<Surface>,
     /// Materials; `Surface::material` points in here.
     pub materials: Vec<Material>,
     /// Decoded images that some paint, emission or alpha mask uses.
@@ -130,6 +133,8 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// Holes.
     pub alpha: Alpha,
+    /// What it lets straight through; then its surfaces stand in [`Scene::panes`].
+    pub pane: Option<pane::Pane>,
 }
 
 /// Which sides of a surface reflect and emit. The other side is black and blocks light.

@@ -3,7 +3,8 @@
 //! ```json
 //! { "materials": { "wall":  { "reflectance": { "csv": "spectra/wall.csv" } },
 //!                  "panel": { "reflectance": { "name": "macbeth/white" },
-//!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } } },
+//!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } },
+//!                  "glass": { "transmittance": { "csv": "spectra/glass.csv" } } },
 //!   "lights":    { "Spot": { "name": "cie/A" } },
 //!   "sky":       { "type": "overcast" } }
 //! ```
@@ -24,7 +25,7 @@ use super::check::{Check, Unknown};
 use super::json::short;
 use super::sky::SkyWish;
 use super::uri;
-use crate::data::{Grid, Leaves};
+use crate::data::{Grid, LEAVES, Leaves};
 use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -51,6 +52,8 @@ pub(crate) struct MaterialSpectra {
     pub(crate) reflectance: Option<Sampled>,
     /// Emission and its luminance, cd/m2, if given.
     pub(crate) emission: Option<(Sampled, Option<f64>)>,
+    /// Transmittance of a pane at normal incidence, unit 1.
+    pub(crate) transmittance: Option<Sampled>,
 }
 
 impl MaterialSpectra {
@@ -59,6 +62,7 @@ impl MaterialSpectra {
         Self {
             reflectance: self.reflectance.or(other.reflectance),
             emission: self.emission.or(other.emission),
+            transmittance: self.transmittance.or(other.transmittance),
         }
     }
 }
@@ -219,13 +223,21 @@ impl Reader<'_> {
         let Some(entry) = self.object(entry, place) else {
             return MaterialSpectra::default();
         };
-        self.keys(entry, &["reflectance", "emission"], place);
+        self.keys(entry, &["reflectance", "emission", "transmittance"], place);
         let mut spectra = MaterialSpectra::default();
         if let Some(value) = entry.get("reflectance") {
             let place = format!("{place}, reflectance");
             if let Some(object) = self.object(value, &place) {
                 self.keys(object, &["name", "csv"], &place);
                 spectra.reflectance = self.sampled(object, Kind::Reflectance, &place);
+            }
+        }
+        if let Some(value) = entry.get("transmittance") {
+            spectra.transmittance = self.transmittance(value, &format!("{place}, transmittance"));
+            if spectra.reflectance.is_some() || entry.get("emission").is_some() {
+                let what = "has a transmittance, and a reflectance or an emission beside it";
+                let next = "a pane lets light through and does nothing else: take the other out";
+                self.check.problem(place, what, next);
             }
         }
         if let Some(value) = entry.get("emission") {
@@ -238,6 +250,29 @@ impl Reader<'_> {
             }
         }
         spectra
+    }
+
+    /// Of a pane: by name or table as a reflectance, or one number for all wavelengths.
+    fn transmittance(&mut self, value: &Value, place: &str) -> Option<Sampled> {
+        let sampled = match value.as_f64() {
+            Some(plain) => Sampled {
+                from: format!("{plain}"),
+                leaves: [plain; LEAVES],
+                is_csv: false,
+            },
+            None => {
+                let object = self.object(value, place)?;
+                self.keys(object, &["name", "csv"], place);
+                self.sampled(object, Kind::Reflectance, place)?
+            }
+        };
+        if !sampled.leaves.iter().all(|t| (0.0..=1.0).contains(t)) {
+            let what = format!("'{}' goes beyond 0 to 1", sampled.from);
+            let next = "write the share of light that passes, from 0 to 1";
+            self.check.problem(place, what, next);
+            return None;
+        }
+        Some(sampled)
     }
 
     fn light(&mut self, entry: &Value, place: &str) -> Option<Sampled> {

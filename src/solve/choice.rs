@@ -6,6 +6,7 @@
 use super::sources::DenseSources;
 use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
+use crate::light::Filters;
 use crate::light::lanes::Lanes;
 use crate::link::{LinkRows, balance};
 use crate::scene::{LightSpectrum, Scene};
@@ -18,6 +19,8 @@ use crate::spectrum::{
 const PAPER_DE_LUV: f64 = 0.29;
 /// Materials whose first and second reflections the paper's control looks at, and that train a basis.
 const MATERIALS: usize = 32;
+/// Tinted panes that the choice of lanes looks at.
+const TINTS: usize = 8;
 /// Patches of the model on which bounds are worked out: they take a dozen numbers a lane and a hundred bounces.
 const BOUNDED_PATCHES: usize = 48;
 
@@ -34,6 +37,7 @@ impl Bake {
             }
         }
         self.lanes = lanes;
+        self.filters = Filters::new(&self.scene, &self.lanes);
     }
 
     pub(super) fn chosen_lanes(&mut self) -> Lanes {
@@ -48,6 +52,10 @@ impl Bake {
             Representation::Paper if !none => {
                 let cut = paper_cut(&self.scene, weights, tolerance);
                 Lanes::absolute(spectra, cut, weights)
+            }
+            // A filter would have to be a matrix there.
+            Representation::Characteristic(_) if self.panes.is_some() => {
+                Lanes::dense(spectra, weights)
             }
             Representation::Characteristic(n) if !none => {
                 let lights: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
@@ -102,7 +110,7 @@ impl Bake {
         };
         let painter = self.painter();
         let dense = DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
-        coarse::Coarse::new(
+        let mut model = coarse::Coarse::new(
             &self.tree,
             &self.graph.links,
             &factor,
@@ -111,8 +119,23 @@ impl Bake {
             &dense,
             self.scene.spectra.len(),
             patches,
-        )
+        );
+        model.tint(&tints(&self.scene));
+        model
     }
+}
+
+/// What the tinted panes of a scene let through, without those that come twice.
+fn tints(scene: &Scene) -> Vec<Leaves> {
+    let mut tints: Vec<Leaves> = Vec::new();
+    let panes = scene.panes.iter();
+    for pane in panes.filter_map(|s| scene.materials[s.material].pane.as_ref()) {
+        let normal = pane.normal();
+        if tints.len() < TINTS && !pane.is_neutral() && !tints.contains(&normal) {
+            tints.push(normal);
+        }
+    }
+    tints
 }
 
 /// Does every lamp shine with just its light's spectrum? Its direct light is then one number a light, on any cut.

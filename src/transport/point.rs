@@ -9,7 +9,7 @@ use super::sky::{Look, Outside};
 use super::trace::Trace;
 use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
-use crate::light::Light;
+use crate::light::{Filter, Glass, Light};
 use crate::link::{Sight, Way};
 use crate::scene::{LightKind, PunctualLight};
 use glam::DVec3;
@@ -103,6 +103,8 @@ pub struct Memory {
     pub(super) shadows: Shadows,
     /// What the rays of a point met.
     pub(super) met: Vec<(u32, Hit)>,
+    /// What panes leave of what these bring, in order; empty in a room without.
+    pub(super) tints: Vec<Option<Box<Filter>>>,
     /// Of which close by.
     pub(super) near: Vec<(u32, Hit)>,
     /// Lamps that are put off until all of them are known.
@@ -147,6 +149,8 @@ pub struct Gatherer<'a> {
     pub lamps: &'a [(PunctualLight, Vec<f32>)],
     /// What is outside; none where no light comes from there.
     pub(crate) sky: Option<&'a Outside>,
+    /// What light passes through on its way; none where the room has no panes.
+    pub(crate) glass: Option<Glass<'a>>,
     /// What one patch may misplace, share of the white's irradiance.
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
@@ -254,14 +258,27 @@ impl Gatherer<'_> {
                     continue;
                 }
             }
+            let filter = self.through(&Segment::new(to.point, end, [NO_PLANE; 2]));
             if let Some(trace) = &mut out.trace {
                 trace.lamp(k, factor as f32);
             }
-            for ((x, d), r) in out.irradiance.iter_mut().zip(&mut out.direct).zip(row) {
-                *x += factor as f32 * r;
-                *d += factor as f32 * r;
+            for (l, r) in row.iter().enumerate() {
+                let more = factor as f32 * r * filter.map_or(1.0, |filter| filter[l]);
+                out.irradiance[l] += more;
+                out.direct[l] += more;
             }
         }
+    }
+
+    /// What panes leave of light on a segment; none where all passes.
+    pub(super) fn through(&self, segment: &Segment) -> Option<Filter> {
+        self.glass?.through(segment.from, segment.to)
+    }
+
+    /// How bright light is that has passed a segment, as a share.
+    pub(super) fn dimmed(&self, segment: &Segment) -> f64 {
+        let glass = self.glass.as_ref();
+        glass.map_or(1.0, |glass| glass.brightness(segment.from, segment.to))
     }
 }
 
