@@ -379,8 +379,9 @@ impl<'a> Audit<'a> {
             };
             let [cosine, thickness, texel] =
                 [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
-            for (x, inside) in left.iter_mut().zip(pane.spectrum()) {
-                *x *= pane.passes(*inside, cosine, thickness, texel);
+            let passing = pane.passing(cosine, thickness, texel);
+            for (x, spectrum) in left.iter_mut().zip(pane.spectrum()) {
+                *x *= passing(*spectrum);
             }
         }
         left

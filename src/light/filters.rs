@@ -73,11 +73,11 @@ impl Filters {
         };
         let [cosine, thickness, texel] =
             [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
-        let through = |inside: f32| pane.passes(f64::from(inside), cosine, thickness, texel) as f32;
+        let passing = pane.passing(cosine, thickness, texel);
         let mut last = (f32::NAN, 1.0);
         for (x, &inside) in filter.iter_mut().zip(&self.inside[material]) {
             if inside != last.0 {
-                last = (inside, through(inside));
+                last = (inside, passing(f64::from(inside)) as f32);
             }
             *x *= last.1;
         }

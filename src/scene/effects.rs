@@ -353,13 +353,9 @@ fn panes(scene: &Scene) -> (bool, String) {
         .filter_map(|m| scene.materials.get(m))
         .filter_map(|m| Some((m, m.pane.as_ref()?)))
         .map(|(m, pane)| {
-            let through = upsampler.xyz(&pane.normal())[1];
-            format!(
-                "{} ({}: {:.2})",
-                quoted(&m.name),
-                short(&pane.from),
-                through
-            )
+            let (name, from) = (quoted(&m.name), short(&pane.from));
+            let (through, back) = (upsampler.xyz(&pane.normal())[1], pane.reflects());
+            format!("{name} ({from}: {through:.2} passes, {back:.2} reflected and left out)")
         })
         .collect();
     match names.len() {

@@ -470,7 +470,7 @@ mod tests {
         }
         assert_eq!(problems.len(), 3, "{problems:?}");
         assert!(problems.iter().all(|p| p.contains("material 'bad'")));
-        assert!(matches!(materials[1].alpha, Alpha::Opaque));
+        assert!(materials[1].pane.is_some() && materials[0].pane.is_none());
         assert_eq!(materials[4].name, "material 7");
         assert!(
             materials

@@ -70,16 +70,18 @@ impl Pane {
         }
     }
 
-    /// Transmittance where [`Pane::spectrum`] is `spectrum`, at a cosine of incidence, for a thickness in units and the texture's value.
-    pub fn passes(&self, spectrum: f64, cosine: f64, thickness: f64, texel: f64) -> f64 {
-        match self.kind {
+    /// Transmittance at a cosine of incidence, for a thickness in units and the texture's value, as a function of what
+    /// [`Pane::spectrum`] is.
+    pub fn passing(&self, cosine: f64, thickness: f64, texel: f64) -> impl Fn(f64) -> f64 + use<> {
+        let (slab, share, alpha) = match self.kind {
             PaneKind::Glass { ior, share, .. } => {
-                share * texel * slab(ior, spectrum, thickness, cosine)
+                (Some(Slab::new(ior, thickness, cosine)), share * texel, 0.0)
             }
-            PaneKind::Cover { alpha, .. } => {
-                let alpha = (alpha * texel).clamp(0.0, 1.0);
-                (1.0 - alpha) * (1.0 - alpha * (1.0 - spectrum))
-            }
+            PaneKind::Cover { alpha, .. } => (None, 1.0, (alpha * texel).clamp(0.0, 1.0)),
+        };
+        move |spectrum| match &slab {
+            Some(slab) => share * slab.passes(spectrum),
+            None => (1.0 - alpha) * (1.0 - alpha * (1.0 - spectrum)),
         }
     }
 
@@ -89,37 +91,67 @@ impl Pane {
         spectrum.iter().all(|x| *x == spectrum[0])
     }
 
+    /// About what share of light it reflects at normal incidence, which is left out: glass from both faces, paint by what it covers.
+    pub fn reflects(&self) -> f64 {
+        match &self.kind {
+            PaneKind::Glass { ior, share, .. } => {
+                let r = face(*ior);
+                share * (r + r * (1.0 - r) * (1.0 - r) / (1.0 - r * r))
+            }
+            PaneKind::Cover { alpha, colour } => {
+                alpha * colour.iter().sum::<f64>() / colour.len() as f64
+            }
+        }
+    }
+
     /// Transmittance by leaf at normal incidence of the pane as it stands.
     pub fn normal(&self) -> Leaves {
         let thickness = match self.kind {
             PaneKind::Glass { thickness, .. } => thickness,
             PaneKind::Cover { .. } => 1.0,
         };
-        self.spectrum().map(|s| self.passes(s, 1.0, thickness, 1.0))
+        self.spectrum().map(self.passing(1.0, thickness, 1.0))
     }
 }
 
 /// Transmittance of a slab for unpolarised light: `T = 1/2 sum over s, p of (1 - R)^2 a / (1 - R^2 a^2)` with Fresnel's R of one face
 /// and `a = inside^(thickness / cos of refraction)`.
 pub fn slab(ior: f64, inside: f64, thickness: f64, cosine: f64) -> f64 {
-    let c = cosine.clamp(0.0, 1.0);
-    // Of the refracted ray: Snell's law.
-    let r = (1.0 - (1.0 - c * c) / (ior * ior)).max(0.0).sqrt();
-    if c <= 0.0 || r <= 0.0 {
-        return 0.0;
+    Slab::new(ior, thickness, cosine).passes(inside)
+}
+
+/// A slab at one angle.
+struct Slab {
+    /// What one face reflects of each polarisation.
+    reflected: [f64; 2],
+    /// How many units of thickness light goes through; none: it gets in nowhere.
+    way: Option<f64>,
+}
+
+impl Slab {
+    fn new(ior: f64, thickness: f64, cosine: f64) -> Self {
+        let c = cosine.clamp(0.0, 1.0);
+        // Of the refracted ray: Snell's law.
+        let r = (1.0 - (1.0 - c * c) / (ior * ior)).max(0.0).sqrt();
+        let [s, p] = [(c - ior * r) / (c + ior * r), (ior * c - r) / (ior * c + r)];
+        Self {
+            reflected: [s * s, p * p],
+            way: (c > 0.0 && r > 0.0).then_some(thickness / r),
+        }
     }
-    let a = match inside {
-        1.0 => 1.0,
-        _ => inside.powf(thickness / r),
-    };
-    let s = (c - ior * r) / (c + ior * r);
-    let p = (ior * c - r) / (ior * c + r);
-    let each = |amplitude: f64| {
-        let reflected = amplitude * amplitude;
-        let once = 1.0 - reflected;
-        once * once * a / (1.0 - reflected * reflected * a * a)
-    };
-    0.5 * (each(s) + each(p))
+
+    fn passes(&self, inside: f64) -> f64 {
+        let Some(way) = self.way else { return 0.0 };
+        let a = match inside {
+            1.0 => 1.0,
+            _ => inside.powf(way),
+        };
+        let each = |reflected: f64| {
+            let once = 1.0 - reflected;
+            once * once * a / (1.0 - reflected * reflected * a * a)
+        };
+        0.5 * (each(self.reflected[0]) + each(self.reflected[1]))
+    }
 }
 
 /// Reflectance of one face at normal incidence.
@@ -128,7 +160,7 @@ fn face(ior: f64) -> f64 {
 }
 
 /// What the inside lets through of which the whole slab lets through `whole` at normal incidence: [`slab`] solved for `inside`.
-fn inside_of(whole: f64, ior: f64) -> f64 {
+pub fn inside_of(whole: f64, ior: f64) -> f64 {
     let r = face(ior);
     if whole <= 0.0 {
         return 0.0;
@@ -161,6 +193,10 @@ pub(super) struct Said {
 
 impl Said {
     /// The pane that a material is, if it is one.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one call; each is a different thing"
+    )]
     pub(super) fn pane(
         &mut self,
         raw: &RawMaterial,
@@ -311,4 +347,68 @@ pub(crate) fn texel(pane: &Pane, images: &[Image], uv: [f32; 2]) -> f64 {
     };
     let texture = pane.texture.as_ref();
     texture.map_or(1.0, |t| f64::from(t.sample(images, uv)[channel]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of the whole at normal incidence to the inside and back; glass of 1.5 without loss lets through (1 - .04) / (1 + .04).
+    #[test]
+    fn the_inside_of_a_measured_pane() {
+        for ior in [1.0, 1.33, 1.52, 2.4] {
+            let most = (1.0 - face(ior)) / (1.0 + face(ior));
+            for share in [0.0, 1e-6, 0.3, 0.9, 0.999] {
+                let inside = inside_of(share * most, ior);
+                assert!((slab(ior, inside, 1.0, 1.0) - share * most).abs() < 1e-12);
+            }
+            assert!((slab(ior, 1.0, 7.0, 1.0) - most).abs() < 1e-12);
+        }
+    }
+
+    /// More than an index lets through means a smaller index: none for a pane that takes nothing.
+    #[test]
+    fn an_index_fits_what_passes() {
+        assert_eq!(index_for(1.0, 1.5), 1.0);
+        assert_eq!(index_for(0.9, 1.5), 1.5);
+        let ior = index_for(0.95, 1.5);
+        assert!(ior > 1.0 && ior < 1.5 && (slab(ior, 1.0, 1.0, 1.0) - 0.95).abs() < 1e-12);
+    }
+
+    /// Nothing passes along the face, less at a slant than across, and only numbers in [0, 1] come out.
+    #[test]
+    fn transmittance_falls_with_the_angle() {
+        for (ior, inside) in [(1.0, 0.5), (1.5, 1.0), (1.5, 0.0), (1e3, 0.3), (1.5, 0.7)] {
+            let at = |k: u32| slab(ior, inside, 1.0, f64::from(k) / 1000.0);
+            assert_eq!(at(0), 0.0);
+            for k in 1..=1000 {
+                let t = at(k);
+                assert!((0.0..=1.0).contains(&t), "{ior} {inside} {k}: {t}");
+            }
+            assert!(at(100) <= at(1000));
+        }
+        // Brewster's angle: of p nothing is reflected, of s as Fresnel has it, summed over all passes.
+        let ior = 1.5_f64;
+        let c = (1.0 / (1.0 + ior * ior)).sqrt();
+        let r = ((1.0 - ior * ior) / (1.0 + ior * ior)).powi(2);
+        let want = 0.5 * (1.0 + (1.0 - r) / (1.0 + r));
+        assert!((slab(ior, 1.0, 1.0, c) - want).abs() < 1e-12);
+    }
+
+    /// Paint: all where alpha is 0, whatever its colour; nothing where it is 1.
+    #[test]
+    fn alpha_covers() {
+        let pane = |alpha: f64| Pane {
+            kind: PaneKind::Cover {
+                alpha,
+                colour: [0.2; LEAVES],
+            },
+            texture: None,
+            from: String::new(),
+        };
+        assert_eq!(pane(0.0).normal(), [1.0; LEAVES]);
+        assert_eq!(pane(1.0).normal(), [0.0; LEAVES]);
+        assert!((pane(0.5).passing(0.3, 1.0, 1.0)(0.2) - 0.5 * 0.6).abs() < 1e-12);
+        assert!((pane(0.5).passing(0.3, 1.0, 0.5)(0.2) - 0.75 * 0.8).abs() < 1e-12);
+    }
 }

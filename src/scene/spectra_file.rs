@@ -535,6 +535,42 @@ mod tests {
     }
 
     #[test]
+    fn panes_let_through_from_nothing_to_all() {
+        let table = [("glass.csv", "400,0.2\n700,1.2\n")];
+        let of = |wall: Value| open(&json!({"materials": {"wall": wall}}), &table);
+        let (file, problems, _) = of(json!({"transmittance": 0.8}));
+        assert_eq!(problems, Vec::<String>::new());
+        let glass = file.materials["wall"].transmittance.as_ref().unwrap();
+        assert_eq!(glass.leaves, [0.8; LEAVES]);
+        for (wall, text) in [
+            (
+                json!({"transmittance": 1.5}),
+                "material 'wall', transmittance: '1.5' goes beyond 0 to 1",
+            ),
+            (
+                json!({"transmittance": {"csv": "glass.csv"}}),
+                "'glass.csv' goes beyond 0 to 1",
+            ),
+            (json!({"transmittance": -0.1}), "'-0.1' goes beyond 0 to 1"),
+            (
+                json!({"transmittance": {"name": "cie/A"}}),
+                "'cie/A' is the light of a lamp",
+            ),
+            (
+                json!({"transmittance": 0.5, "reflectance": {"name": "macbeth/white"}}),
+                "has a transmittance, and a reflectance or an emission beside it",
+            ),
+        ] {
+            let (_, problems, _) = of(wall);
+            let all = problems.join("\n");
+            assert!(
+                all.contains(text) && problems.len() == 1,
+                "{text}\n-- in --\n{all}"
+            );
+        }
+    }
+
+    #[test]
     fn a_lenient_reader_is_warned_of_strangers() {
         let (file, problems, warnings) = opened(
             &json!({

@@ -12,7 +12,8 @@ use crate::link::{LinkRows, balance};
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;
 use crate::spectrum::{
-    CmfTree, Control, Estimate, Leaves, List, Metric, Partition, Path, Tree, control, represent,
+    CmfTree, Control, Estimate, LEAVES, Leaves, List, Metric, Partition, Path, Tree, control,
+    represent,
 };
 
 /// The paper's error limits leave its light sources (Table 1) this colour difference, CIELUV: mean of .26, .33 and .27.
@@ -63,10 +64,23 @@ impl Bake {
                 Lanes::vectors(spectra, basis, weights)
             }
             Representation::Adaptive if !none => {
-                let model = self.model(coarse::PATCHES);
+                let mut model = self.model(coarse::PATCHES);
                 let (spectra, weights) = (&self.scene.spectra, &self.weights);
-                let known = self.lanes.cuts();
-                let choice = model.choose(spectra, weights, self.light.white, tolerance, known);
+                let (known, white) = (self.lanes.cuts(), self.light.white);
+                let choose = |model: &coarse::Coarse| {
+                    model.choose(spectra, weights, white, tolerance, known.clone())
+                };
+                let mut choice = choose(&model);
+                // What lies behind a pane has light of its own spectra: lanes serve all of them.
+                let plain = (model.emission.clone(), model.punctual.clone());
+                for filter in tints(&self.scene) {
+                    (model.emission, model.punctual) = plain.clone();
+                    model.behind(&filter);
+                    let other = choose(&model);
+                    for (cut, more) in choice.cuts.iter_mut().zip(other.cuts) {
+                        *cut = cut.union(more);
+                    }
+                }
                 // Without light there is no white to see an error by.
                 self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
                 Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights)
@@ -110,7 +124,7 @@ impl Bake {
         };
         let painter = self.painter();
         let dense = DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
-        let mut model = coarse::Coarse::new(
+        coarse::Coarse::new(
             &self.tree,
             &self.graph.links,
             &factor,
@@ -119,13 +133,11 @@ impl Bake {
             &dense,
             self.scene.spectra.len(),
             patches,
-        );
-        model.tint(&tints(&self.scene));
-        model
+        )
     }
 }
 
-/// What the tinted panes of a scene let through, without those that come twice.
+/// What the tinted panes of a scene let through, without those that come twice, and what all of them do together.
 fn tints(scene: &Scene) -> Vec<Leaves> {
     let mut tints: Vec<Leaves> = Vec::new();
     let panes = scene.panes.iter();
@@ -134,6 +146,10 @@ fn tints(scene: &Scene) -> Vec<Leaves> {
         if tints.len() < TINTS && !pane.is_neutral() && !tints.contains(&normal) {
             tints.push(normal);
         }
+    }
+    if tints.len() > 1 {
+        let together = |all: Leaves, one: &Leaves| std::array::from_fn(|k| all[k] * one[k]);
+        tints.push(tints.iter().fold([1.0; LEAVES], together));
     }
     tints
 }

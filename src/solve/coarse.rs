@@ -136,21 +136,10 @@ impl Coarse {
         }
     }
 
-    /// Lights every few patches through panes: lanes that serve these serve what lies behind them. The patches take turns by a filter
-    /// each, none, and all filters together.
-    pub(super) fn tint(&mut self, filters: &[Leaves]) {
-        if filters.is_empty() {
-            return;
-        }
-        let mut turns = vec![[1.0; LEAVES]];
-        turns.extend_from_slice(filters);
-        let together = |all: Leaves, one: &Leaves| std::array::from_fn(|k| all[k] * one[k]);
-        turns.push(filters.iter().fold([1.0; LEAVES], together));
-        let shapes = self.emission.iter_mut().chain(&mut self.punctual);
-        for rows in shapes.chain([&mut self.reflectance]) {
-            for (row, turn) in rows.iter_mut().zip(turns.iter().cycle()) {
-                *row = together(*row, turn);
-            }
+    /// Puts all light behind a filter.
+    pub(super) fn behind(&mut self, filter: &Leaves) {
+        for row in self.emission.iter_mut().chain(&mut self.punctual).flatten() {
+            *row = std::array::from_fn(|k| row[k] * filter[k]);
         }
     }
 

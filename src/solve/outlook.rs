@@ -55,6 +55,9 @@ impl End {
     };
 }
 
+/// Where the rays of a leaf ended, and what those pass that pass panes.
+type Ends = (Vec<End>, Vec<(u32, Passed)>);
+
 /// How the leaves of a hierarchy look out.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Outlook {
@@ -148,7 +151,7 @@ impl Outlook {
             .map(Hemisphere::new)
             .collect();
         let usual = LOOKING.0 * hemisphere.len() as f64 / mean;
-        let parts: Vec<Vec<(Vec<End>, Vec<(u32, Passed)>)>> = new
+        let parts: Vec<Vec<Ends>> = new
             .par_chunks(CHUNK)
             .map(|chunk| {
                 let each = |&leaf: &u32| {
@@ -445,13 +448,7 @@ fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64)
 }
 
 /// Casts the rays of a leaf: a turned pattern of directions, two from each of points all over it.
-fn look_from(
-    tree: &Tree,
-    leaf: u32,
-    sight: &Sight,
-    pattern: &Hemisphere,
-    seed: u64,
-) -> (Vec<End>, Vec<(u32, Passed)>) {
+fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: u64) -> Ends {
     let node = tree.node(leaf);
     let element = &tree.elements[node.element as usize];
     let plane = tree.face_plane[element.face as usize];
