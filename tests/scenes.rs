@@ -39,7 +39,7 @@ fn the_generator_writes_the_committed_rooms() {
         }
         seen += 1;
     }
-    assert_eq!(seen, 24);
+    assert_eq!(seen, 26);
 }
 
 #[test]

@@ -136,7 +136,8 @@ impl Slab {
         let [s, p] = [(c - ior * r) / (c + ior * r), (ior * c - r) / (ior * c + r)];
         Self {
             reflected: [s * s, p * p],
-            way: (c > 0.0 && r > 0.0).then_some(thickness / r),
+            // Whatever numbers a file holds, a thickness is one.
+            way: (c > 0.0 && r > 0.0).then_some(thickness.max(0.0) / r),
         }
     }
 
@@ -410,5 +411,52 @@ mod tests {
         assert_eq!(pane(1.0).normal(), [0.0; LEAVES]);
         assert!((pane(0.5).passing(0.3, 1.0, 1.0)(0.2) - 0.5 * 0.6).abs() < 1e-12);
         assert!((pane(0.5).passing(0.3, 1.0, 0.5)(0.2) - 0.75 * 0.8).abs() < 1e-12);
+    }
+
+    fn made(change: impl FnOnce(&mut RawMaterial)) -> (Option<Pane>, String, String) {
+        let mut raw = RawMaterial {
+            index: Some(0),
+            name: "glass".into(),
+            transmission: Some(1.0),
+            ..RawMaterial::default()
+        };
+        change(&mut raw);
+        let upsampler = Upsampler::new(&crate::data::Grid::default());
+        let (mut said, mut check) = (Said::default(), Check::new("room.glb"));
+        let place = "material 'glass'";
+        let pane = said.pane(&raw, "glass", None, false, place, &upsampler, &mut check);
+        said.warn(&mut check);
+        let (problems, warnings) = check.into_parts();
+        let problems: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        (pane, problems.join("\n"), warnings.join("\n"))
+    }
+
+    #[test]
+    fn what_makes_a_pane_and_what_does_not() {
+        let (pane, problems, warnings) = made(|_| ());
+        assert!(pane.is_some() && problems.is_empty() && warnings.is_empty());
+        let (pane, _, warnings) = made(|raw| raw.transmission = Some(0.3));
+        assert!(
+            pane.is_none() && warnings.contains("below 0.5: opaque"),
+            "{warnings}"
+        );
+        let (pane, _, warnings) = made(|raw| {
+            (raw.transmission, raw.alpha_mode) = (None, AlphaMode::Blend);
+        });
+        let pane = pane.unwrap();
+        assert!(matches!(pane.kind, PaneKind::Cover { .. }));
+        assert!(
+            warnings.contains("(1 - alpha)") && warnings.contains("'glass'"),
+            "{warnings}"
+        );
+        for ior in [-1.0, 0.5, 1e9] {
+            let (_, problems, _) = made(|raw| raw.ior = Some(ior));
+            let text = format!("the refractive index is {ior}");
+            assert!(problems.contains(&text), "{problems}");
+            assert!(problems.contains("material 'glass'"), "{problems}");
+        }
+        // 0 is what exporters write for old materials.
+        let (pane, problems, _) = made(|raw| raw.ior = Some(0.0));
+        assert!(pane.is_some() && problems.is_empty());
     }
 }

@@ -7,6 +7,7 @@ mod cie171;
 mod cornell;
 mod daylit;
 mod furnished;
+mod glazed;
 mod glb;
 mod shapes;
 mod simple;
@@ -63,6 +64,7 @@ const ROOMS: &[Room] = &[
     ),
     ("corridor", simple::corridor, None),
     ("daylit", daylit::room, Some(daylit::spectra)),
+    ("glazed", glazed::room, Some(glazed::spectra)),
     ("furnace", simple::furnace, None),
     ("cie171-5.2", cie171::case_5_2, None),
     ("cie171-5.2-isotropic", cie171::case_5_2_isotropic, None),
