@@ -7,10 +7,11 @@
 
 use super::check::Check;
 use super::json::short;
+use super::known::{MaterialSpectra, Sampled};
 use super::light::{Lamp, Lamps, bearable};
 use super::pane;
 use super::raw::{AlphaMode, RawMaterial};
-use super::spectra_file::{MaterialSpectra, Sampled, SpectraFile};
+use super::spectra_file::SpectraFile;
 use super::{Alpha, Emission, Material, Sides};
 use crate::color::Upsampler;
 use crate::data::{Grid, Leaves};
@@ -80,18 +81,18 @@ pub(crate) fn materials(
             let place = format!("material '{}'", short(&name));
             let spectra = file.material(&name, raw.extras.as_ref(), room, grid, check);
             let raw = &checked(raw, &place, check);
-            said.hear(raw, &name);
             let measured = spectra.reflectance.as_ref();
             let (mut material, bright) = paint(raw, &name, measured, upsampler);
-            // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
-            if bright && (measured.is_some() || !tinted && raw.base_color_texture.is_none()) {
-                said.bright.push(name.clone());
-            }
             material.emission = emission(raw, &spectra, &place, lamps, check);
             let emits = material.emission.is_some();
-            let measured = spectra.transmittance.as_ref();
+            let through = spectra.transmittance.as_ref();
             let panes = &mut said.panes;
-            material.pane = panes.pane(raw, &name, measured, emits, &place, upsampler, check);
+            material.pane = panes.pane(raw, &name, through, emits, &place, upsampler, check);
+            if material.pane.is_none() {
+                // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
+                let plain = !tinted && raw.base_color_texture.is_none();
+                said.hear(raw, &name, bright && (measured.is_some() || plain));
+            }
             material
         })
         .collect();
@@ -230,7 +231,10 @@ fn emission(
 }
 
 impl Said {
-    fn hear(&mut self, raw: &RawMaterial, name: &str) {
+    fn hear(&mut self, raw: &RawMaterial, name: &str, bright: bool) {
+        if bright {
+            self.bright.push(name.into());
+        }
         // glTF's default material is a metal on paper only.
         if raw.metallic > METALLIC && raw.index.is_some() {
             self.metals.push(name.into());

@@ -14,6 +14,7 @@ pub mod geometry;
 mod image;
 mod instances;
 mod json;
+mod known;
 pub mod lacking;
 mod light;
 mod load;
@@ -26,6 +27,7 @@ pub mod sky;
 mod spectra_file;
 mod texture;
 mod texture_info;
+mod transmittance;
 pub(crate) mod uri;
 mod world;
 

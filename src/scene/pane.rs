@@ -10,9 +10,9 @@
 //! is 0, nothing where it is 1.
 
 use super::check::Check;
+use super::known::Sampled;
 use super::material::listed;
 use super::raw::{AlphaMode, RawMaterial};
-use super::spectra_file::Sampled;
 use super::{Image, Texture};
 use crate::color::Upsampler;
 use crate::data::{LEAVES, Leaves};

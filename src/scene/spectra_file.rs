@@ -23,9 +23,11 @@
 
 use super::check::{Check, Unknown};
 use super::json::short;
+use super::known::{MaterialSpectra, Sampled};
 use super::sky::SkyWish;
+use super::transmittance;
 use super::uri;
-use crate::data::{Grid, LEAVES, Leaves};
+use crate::data::Grid;
 use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -33,39 +35,6 @@ use std::path::{Path, PathBuf};
 
 /// Above this a table of reflectances is taken for percent.
 const NOT_A_FRACTION: f64 = 2.0;
-
-/// A spectrum on the grid, and where it came from.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sampled {
-    /// `cie/F2` or the CSV's path as written.
-    pub(crate) from: String,
-    /// Band means.
-    pub(crate) leaves: Leaves,
-    /// Values of a CSV carry a unit; those of the registry are relative.
-    pub(crate) is_csv: bool,
-}
-
-/// What is known of a material.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct MaterialSpectra {
-    /// Reflectance, unit 1.
-    pub(crate) reflectance: Option<Sampled>,
-    /// Emission and its luminance, cd/m2, if given.
-    pub(crate) emission: Option<(Sampled, Option<f64>)>,
-    /// Transmittance of a pane at normal incidence, unit 1.
-    pub(crate) transmittance: Option<Sampled>,
-}
-
-impl MaterialSpectra {
-    /// These spectra, and where they say nothing the others.
-    pub(crate) fn or(self, other: Self) -> Self {
-        Self {
-            reflectance: self.reflectance.or(other.reflectance),
-            emission: self.emission.or(other.emission),
-            transmittance: self.transmittance.or(other.transmittance),
-        }
-    }
-}
 
 /// The side file of a room; empty if there is none.
 #[derive(Debug, Default)]
@@ -233,12 +202,7 @@ impl Reader<'_> {
             }
         }
         if let Some(value) = entry.get("transmittance") {
-            spectra.transmittance = self.transmittance(value, &format!("{place}, transmittance"));
-            if spectra.reflectance.is_some() || entry.get("emission").is_some() {
-                let what = "has a transmittance, and a reflectance or an emission beside it";
-                let next = "a pane lets light through and does nothing else: take the other out";
-                self.check.problem(place, what, next);
-            }
+            spectra.transmittance = transmittance::read(self, entry, value, place);
         }
         if let Some(value) = entry.get("emission") {
             let place = format!("{place}, emission");
@@ -250,29 +214,6 @@ impl Reader<'_> {
             }
         }
         spectra
-    }
-
-    /// Of a pane: by name or table as a reflectance, or one number for all wavelengths.
-    fn transmittance(&mut self, value: &Value, place: &str) -> Option<Sampled> {
-        let sampled = match value.as_f64() {
-            Some(plain) => Sampled {
-                from: format!("{plain}"),
-                leaves: [plain; LEAVES],
-                is_csv: false,
-            },
-            None => {
-                let object = self.object(value, place)?;
-                self.keys(object, &["name", "csv"], place);
-                self.sampled(object, Kind::Reflectance, place)?
-            }
-        };
-        if !sampled.leaves.iter().all(|t| (0.0..=1.0).contains(t)) {
-            let what = format!("'{}' goes beyond 0 to 1", sampled.from);
-            let next = "write the share of light that passes, from 0 to 1";
-            self.check.problem(place, what, next);
-            return None;
-        }
-        Some(sampled)
     }
 
     fn light(&mut self, entry: &Value, place: &str) -> Option<Sampled> {
@@ -292,7 +233,12 @@ impl Reader<'_> {
         number
     }
 
-    fn sampled(&mut self, object: &Map<String, Value>, kind: Kind, place: &str) -> Option<Sampled> {
+    pub(super) fn sampled(
+        &mut self,
+        object: &Map<String, Value>,
+        kind: Kind,
+        place: &str,
+    ) -> Option<Sampled> {
         let outside = match kind {
             Kind::Reflectance => Outside::Hold,
             Kind::Illuminant => Outside::Zero,
@@ -532,42 +478,6 @@ mod tests {
             assert!(all.contains(text), "{text}\n-- in --\n{all}");
         }
         assert_eq!((problems.len(), warnings.len()), (10, 0), "{all}");
-    }
-
-    #[test]
-    fn panes_let_through_from_nothing_to_all() {
-        let table = [("glass.csv", "400,0.2\n700,1.2\n")];
-        let of = |wall: Value| open(&json!({"materials": {"wall": wall}}), &table);
-        let (file, problems, _) = of(json!({"transmittance": 0.8}));
-        assert_eq!(problems, Vec::<String>::new());
-        let glass = file.materials["wall"].transmittance.as_ref().unwrap();
-        assert_eq!(glass.leaves, [0.8; LEAVES]);
-        for (wall, text) in [
-            (
-                json!({"transmittance": 1.5}),
-                "material 'wall', transmittance: '1.5' goes beyond 0 to 1",
-            ),
-            (
-                json!({"transmittance": {"csv": "glass.csv"}}),
-                "'glass.csv' goes beyond 0 to 1",
-            ),
-            (json!({"transmittance": -0.1}), "'-0.1' goes beyond 0 to 1"),
-            (
-                json!({"transmittance": {"name": "cie/A"}}),
-                "'cie/A' is the light of a lamp",
-            ),
-            (
-                json!({"transmittance": 0.5, "reflectance": {"name": "macbeth/white"}}),
-                "has a transmittance, and a reflectance or an emission beside it",
-            ),
-        ] {
-            let (_, problems, _) = of(wall);
-            let all = problems.join("\n");
-            assert!(
-                all.contains(text) && problems.len() == 1,
-                "{text}\n-- in --\n{all}"
-            );
-        }
     }
 
     #[test]
