@@ -545,8 +545,11 @@ fn case_5_10_glazed_openings() {
 fn haarlight(arguments: &[&str]) -> (Option<i32>, String) {
     let command = env!("CARGO_BIN_EXE_haarlight");
     let done = Command::new(command).args(arguments).output().unwrap();
-    let text = String::from_utf8_lossy(&done.stderr).into_owned();
-    (done.status.code(), text)
+    let text = [done.stdout, done.stderr].concat();
+    (
+        done.status.code(),
+        String::from_utf8_lossy(&text).into_owned(),
+    )
 }
 
 /// Panes stand in the written file as they came; the room says why they run; what cannot be kept is refused before any work is done.
@@ -558,6 +561,7 @@ fn panes_are_written_back_as_they_came() {
     let named = out.to_str().unwrap();
     let (code, text) = haarlight(&["bake", room, "-o", named, "--error", "4"]);
     assert!(matches!(code, Some(0 | 1)), "{code:?}: {text}");
+    let (_, text) = haarlight(&["inspect", room]);
     for said in ["'blue film'", "reflected and left out", "(1 - alpha)"] {
         assert!(text.contains(said), "{said}\n-- in --\n{text}");
     }
