@@ -337,7 +337,7 @@ impl Gatherer<'_> {
     }
 
     /// Visible share of a polygon patch; none yet for a lamp that rays must find, see `lamps_together`. `carries` is what it
-    /// would bring unblocked, share of white.
+    /// would bring unblocked, share of white. What is clipped exactly knows no filters: behind panes rays decide.
     fn visible(
         &self,
         to: &Receiver,
@@ -353,11 +353,8 @@ impl Gatherer<'_> {
         };
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
-        // What is clipped exactly knows no filters.
         let clips = self.glass.is_none();
-        if let Way::Listed { .. } = way
-            && clips
-        {
+        if clips && let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
                 return Some((seen / factor).min(1.0));
