@@ -8,7 +8,7 @@ use crate::color::Upsampler;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
-use crate::hierarchy::{Face, Mesh};
+use crate::hierarchy::{Face, Glazing, Mesh, Panes};
 use crate::scene::sky::SUN_RADIUS;
 use crate::scene::{Alpha, LightKind, PunctualLight, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
@@ -31,6 +31,7 @@ pub struct Audit<'a> {
     lamps: Vec<(Face, f64)>,
     total: f64,
     masked: bool,
+    panes: Option<Panes>,
 }
 
 /// Irradiance at a point: mean and standard error per leaf, W/m2/nm, and the batch means for anything derived.
@@ -97,6 +98,7 @@ impl<'a> Audit<'a> {
             lamps,
             total,
             masked,
+            panes: Panes::new(scene, mesh.centre),
         }
     }
 
@@ -155,7 +157,10 @@ impl<'a> Audit<'a> {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
             self.punctual(&at, toward_lamp, rng, &throughput, sum);
             let direction = cosine_direction(at.normal, toward_any);
-            let Some(hit) = self.closest(at.point, direction, at.plane) else {
+            let hit = self.closest(at.point, direction, at.plane);
+            let reach = hit.map_or(4.0 * self.mesh.half_size, |hit| f64::from(hit.t));
+            throughput = self.filtered(&throughput, at.point, at.point + direction * reach);
+            let Some(hit) = hit else {
                 self.outside(direction, &throughput, sum);
                 return;
             };
@@ -285,6 +290,7 @@ impl<'a> Audit<'a> {
         let by_area = self.chance(triangle) * r2 / c2;
         let by_direction = c1 / PI;
         let factor = c1 / (by_area + by_direction);
+        let throughput = &self.filtered(throughput, at.point, q);
         for l in 0..LEAVES {
             sum[l] += throughput[l] * radiance[l] * factor;
         }
@@ -365,6 +371,7 @@ impl<'a> Audit<'a> {
                 continue;
             }
             let power = &self.scene.spectra[light.light].power;
+            let throughput = self.filtered(throughput, at.point, end);
             for l in 0..LEAVES {
                 sum[l] += throughput[l] * factor * power[l] * light.shape[l];
             }
@@ -400,6 +407,28 @@ impl<'a> Audit<'a> {
         let sent = luminaire.per_area(-way, own) * luminaire.area();
         let end = from + own * (1e-5 * self.mesh.half_size);
         (sent * at.normal.dot(way) / r2, end)
+    }
+
+    /// What panes between two points leave of light, leaf by leaf.
+    fn filtered(&self, throughput: &Leaves, from: DVec3, to: DVec3) -> Leaves {
+        let mut left = *throughput;
+        let Some(panes) = &self.panes else {
+            return left;
+        };
+        let scene = self.scene;
+        let glazing = Glazing { panes, scene };
+        for crossing in glazing.crossings(from.as_vec3(), to.as_vec3()) {
+            let Some(pane) = &scene.materials[crossing.material as usize].pane else {
+                continue;
+            };
+            let [cosine, thickness, texel] =
+                [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
+            let passing = pane.passing(cosine, thickness, texel);
+            for (x, spectrum) in left.iter_mut().zip(pane.spectrum()) {
+                *x *= passing(*spectrum);
+            }
+        }
+        left
     }
 
     fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<crate::geometry::Hit> {

@@ -163,7 +163,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
 
     let clock = Instant::now();
     let mut bake = prepare(scene, &args.solving, common, args.spectrum, &talk);
+    if args.checkpoint.is_some() {
+        bake.can_be_kept("--checkpoint")?;
+    }
     if cache.is_some() {
+        bake.can_be_kept("--cache")?;
         bake.keep();
     }
     let plan = PlanRecord::new(&bake, args.solving.time);

@@ -2,6 +2,7 @@
 //!
 //! The document stays as it is, so that what is written has the file's units; turned faces are written turned.
 
+use super::pane::PaneKind;
 use super::{Projection, Scene, luminaires};
 use glam::{DMat4, DVec3};
 use std::collections::BTreeSet;
@@ -29,9 +30,18 @@ impl Scene {
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         let larger = DMat4::from_scale(DVec3::splat(factor));
-        for surface in &mut self.surfaces {
+        for surface in self.surfaces.iter_mut().chain(&mut self.panes) {
             surface.positions.iter_mut().for_each(|p| *p *= factor);
             surface.to_world = larger * surface.to_world;
+        }
+        for pane in self.materials.iter_mut().filter_map(|m| m.pane.as_mut()) {
+            if let PaneKind::Glass {
+                unit: Some(unit), ..
+            } = &mut pane.kind
+            {
+                // Thicknesses of solids are measured in the room; that of a lone face keeps its number of units.
+                *unit *= factor;
+            }
         }
         for light in &mut self.lights {
             light.position *= factor;

@@ -7,7 +7,7 @@ use super::json::short;
 use super::lacking::lacking;
 use super::material::listed;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
-use crate::color::{KM, Observer};
+use crate::color::{KM, Observer, Upsampler};
 use crate::data::Leaves;
 use glam::DVec3;
 use serde::Serialize;
@@ -52,6 +52,8 @@ pub enum Kind {
     Sun,
     /// Surfaces whose back reflects and emits too.
     TwoSided,
+    /// What lets light straight through.
+    Panes,
 }
 
 impl Kind {
@@ -72,6 +74,7 @@ impl Kind {
             Self::Sky => "sky",
             Self::Sun => "sun",
             Self::TwoSided => "two-sided surfaces",
+            Self::Panes => "panes",
         }
     }
 }
@@ -175,6 +178,7 @@ impl Plan {
             Kind::TwoSided,
             counted(used.iter().filter(|m| m.sides == Sides::Both), "material"),
         );
+        plan.add(Kind::Panes, panes(scene));
         for lack in lacking(&scene.source.json) {
             plan.effects.push(Effect {
                 name: lack.effect,
@@ -337,6 +341,17 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
             }
         }
     }
+    let tinted = |s: &&Surface| {
+        let pane = scene
+            .materials
+            .get(s.material)
+            .and_then(|m| m.pane.as_ref());
+        pane.is_some_and(|pane| !pane.is_neutral())
+    };
+    if let Some(surface) = scene.panes.iter().find(tinted) {
+        let name = quoted(&scene.materials[surface.material].name);
+        return (true, format!("the pane {name} has a colour"));
+    }
     if let Some(light) = scene.lights.iter().find(|l| !is_flat(&l.shape)) {
         return (
             true,
@@ -360,8 +375,30 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
     (false, "every surface is grey: one band".into())
 }
 
+/// Materials that let light through, with the share of white (D65) that they do at normal incidence.
+fn panes(scene: &Scene) -> (bool, String) {
+    let used: BTreeSet<usize> = scene.panes.iter().map(|s| s.material).collect();
+    let upsampler = Upsampler::new(&scene.grid);
+    let names: Vec<String> = (used.into_iter())
+        .filter_map(|m| scene.materials.get(m))
+        .filter_map(|m| Some((m, m.pane.as_ref()?)))
+        .map(|(m, pane)| {
+            let (name, from) = (quoted(&m.name), short(&pane.from));
+            let (through, back) = (upsampler.xyz(&pane.normal())[1], pane.reflects());
+            format!("{name} ({from}: {through:.2} passes, {back:.2} reflected and left out)")
+        })
+        .collect();
+    match names.len() {
+        0 => (false, "none".into()),
+        _ => (true, format!("light passes {}", listed(&names))),
+    }
+}
+
 /// Off where nothing can stand between two points that see each other's front, nor between a point and a light.
 fn occlusion(scene: &Scene) -> (bool, String) {
+    if !scene.panes.is_empty() {
+        return (true, "panes stand in the way of light".into());
+    }
     match blocked(&scene.surfaces, &scene.lights) {
         None => (
             false,

@@ -11,10 +11,11 @@
 
 use super::check::Check;
 use super::json::short;
+use super::known::Sampled;
 use super::luminaires::{IesNode, LampWish, Luminaire, ProfileWish, tilt_share};
 use super::profile::Profile;
 use super::raw::{RawLight, RawLightKind};
-use super::spectra_file::{Sampled, SpectraFile};
+use super::spectra_file::SpectraFile;
 use super::{LightKind, LightSpectrum, Material, PunctualLight};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::{Grid, LEAVES, Leaves};

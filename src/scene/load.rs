@@ -128,10 +128,13 @@ impl Scene {
         }
         let mut warnings = geometry.warnings;
         warnings.extend(said);
+        let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
+        let (panes, surfaces) = geometry.surfaces.into_iter().partition(is_pane);
         let scene = Self {
             source: document.source,
             grid,
-            surfaces: geometry.surfaces,
+            surfaces,
+            panes,
             materials,
             images: geometry.images,
             spectra,

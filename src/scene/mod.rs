@@ -14,6 +14,7 @@ pub mod geometry;
 mod image;
 mod instances;
 mod json;
+mod known;
 pub mod lacking;
 mod light;
 mod load;
@@ -21,6 +22,7 @@ pub mod luminaires;
 mod material;
 mod meshes;
 mod nodes;
+pub mod pane;
 mod primitive;
 pub mod profile;
 mod raw;
@@ -28,6 +30,7 @@ pub mod sky;
 mod spectra_file;
 mod texture;
 mod texture_info;
+mod transmittance;
 pub(crate) mod uri;
 mod world;
 
@@ -52,6 +55,8 @@ pub struct Scene {
     pub grid: Grid,
     /// One entry for each drawn primitive at each node (and each instance of it).
     pub surfaces: Vec<Surface>,
+    /// The same for what lets light straight through: filters on rays, that neither block nor receive.
+    pub panes: Vec<Surface>,
     /// Materials; `Surface::material` points in here.
     pub materials: Vec<Material>,
     /// Decoded images that some paint, emission or alpha mask uses.
@@ -134,6 +139,8 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// Holes.
     pub alpha: Alpha,
+    /// What it lets straight through; then its surfaces stand in [`Scene::panes`].
+    pub pane: Option<pane::Pane>,
 }
 
 /// Which sides of a surface reflect and emit. The other side is black and blocks light.

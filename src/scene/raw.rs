@@ -40,6 +40,16 @@ pub struct RawMaterial {
     pub double_sided: bool,
     /// KHR_materials_unlit is there.
     pub unlit: bool,
+    /// Share that is let through, of KHR_materials_transmission.
+    pub transmission: Option<f64>,
+    /// Multiplies it (red).
+    pub transmission_texture: Option<Texture>,
+    /// Refractive index of KHR_materials_ior.
+    pub ior: Option<f64>,
+    /// KHR_materials_volume.
+    pub volume: Option<RawVolume>,
+    /// Roughness, if it is said.
+    pub roughness: Option<f32>,
     /// The material's extras.
     pub extras: Option<Value>,
     /// Names of all extensions on the material, sorted.
@@ -62,10 +72,26 @@ impl Default for RawMaterial {
             alpha_cutoff: 0.5,
             double_sided: false,
             unlit: false,
+            transmission: None,
+            transmission_texture: None,
+            ior: None,
+            volume: None,
+            roughness: None,
             extras: None,
             extensions: Vec::new(),
         }
     }
+}
+
+/// KHR_materials_volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawVolume {
+    /// Thickness below the surface, the file's units; 0: none.
+    pub thickness: f64,
+    /// Distance over which white light becomes `colour`, the file's units; none: it never does.
+    pub distance: Option<f64>,
+    /// Linear, each in [0, 1].
+    pub colour: [f32; 3],
 }
 
 /// `alphaMode` of a material.
@@ -170,6 +196,9 @@ fn material(
         if let Some(metallic) = pbr.number("metallicFactor", check) {
             out.metallic = unit(metallic, "metallicFactor", item, check);
         }
+        if let Some(roughness) = pbr.number("roughnessFactor", check) {
+            out.roughness = Some(unit(roughness, "roughnessFactor", item, check));
+        }
         let texture = pbr.child("baseColorTexture", check);
         out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
     }
@@ -185,6 +214,7 @@ fn material(
     let texture = item.child("emissiveTexture", check);
     out.emissive_texture = texture.and_then(|t| slots.texture(json, &t, check));
     emission(item, &mut out, check);
+    transmission(json, item, &mut out, slots, check);
     match item.text("alphaMode", check) {
         None | Some("OPAQUE") => {}
         Some("MASK") => out.alpha_mode = AlphaMode::Mask,
@@ -230,6 +260,43 @@ fn emission(item: &Item<'_>, out: &mut RawMaterial, check: &mut Check) {
             "gives out more light than a number holds",
             "lower it",
         );
+    }
+}
+
+/// KHR_materials_transmission, _volume and _ior.
+fn transmission(
+    json: &Value,
+    item: &Item<'_>,
+    out: &mut RawMaterial,
+    slots: &mut Slots,
+    check: &mut Check,
+) {
+    if let Some(pane) = item.extension("KHR_materials_transmission", check) {
+        let factor = pane.number("transmissionFactor", check).unwrap_or(0.0);
+        out.transmission = Some(f64::from(unit(factor, "transmissionFactor", item, check)));
+        let texture = pane.child("transmissionTexture", check);
+        out.transmission_texture = texture.and_then(|t| slots.texture(json, &t, check));
+    }
+    if let Some(ior) = item.extension("KHR_materials_ior", check) {
+        out.ior = ior.number("ior", check);
+    }
+    if let Some(volume) = item.extension("KHR_materials_volume", check) {
+        let thickness = volume.number("thicknessFactor", check).unwrap_or(0.0);
+        let distance = volume.number("attenuationDistance", check);
+        if thickness < 0.0 || distance.is_some_and(|d| d <= 0.0) {
+            let what =
+                "KHR_materials_volume has a negative thickness, or a distance that is not positive";
+            check.problem(&item.place, what, "mend the material and export again");
+            return;
+        }
+        let colour = volume.numbers::<3>("attenuationColor", check);
+        out.volume = Some(RawVolume {
+            thickness,
+            distance,
+            colour: colour
+                .unwrap_or([1.0; 3])
+                .map(|x| unit(x, "attenuationColor", item, check)),
+        });
     }
 }
 

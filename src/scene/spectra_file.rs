@@ -3,7 +3,8 @@
 //! ```json
 //! { "materials": { "wall":  { "reflectance": { "csv": "spectra/wall.csv" } },
 //!                  "panel": { "reflectance": { "name": "macbeth/white" },
-//!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } } },
+//!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } },
+//!                  "glass": { "transmittance": { "csv": "spectra/glass.csv" } } },
 //!   "lights":    { "Spot": { "name": "cie/A" } },
 //!   "sky":       { "type": "overcast" } }
 //! ```
@@ -22,10 +23,12 @@
 
 use super::check::{Check, Unknown};
 use super::json::short;
-use super::luminaires::{self, LampWish, ProfileWish};
+use super::known::{MaterialSpectra, Sampled};
+use super::luminaires::{self, LampWish};
 use super::sky::SkyWish;
+use super::transmittance;
 use super::uri;
-use crate::data::{Grid, Leaves};
+use crate::data::Grid;
 use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -33,39 +36,6 @@ use std::path::{Path, PathBuf};
 
 /// Above this a table of reflectances is taken for percent.
 const NOT_A_FRACTION: f64 = 2.0;
-
-/// A spectrum on the grid, and where it came from.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sampled {
-    /// `cie/F2` or the CSV's path as written.
-    pub(crate) from: String,
-    /// Band means.
-    pub(crate) leaves: Leaves,
-    /// Values of a CSV carry a unit; those of the registry are relative.
-    pub(crate) is_csv: bool,
-}
-
-/// What is known of a material.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct MaterialSpectra {
-    /// Reflectance, unit 1.
-    pub(crate) reflectance: Option<Sampled>,
-    /// Emission and its luminance, cd/m2, if given.
-    pub(crate) emission: Option<(Sampled, Option<f64>)>,
-    /// How the emission is spread, if not evenly.
-    pub(crate) profile: Option<ProfileWish>,
-}
-
-impl MaterialSpectra {
-    /// These spectra, and where they say nothing the others.
-    pub(crate) fn or(self, other: Self) -> Self {
-        Self {
-            reflectance: self.reflectance.or(other.reflectance),
-            emission: self.emission.or(other.emission),
-            profile: self.profile.or(other.profile),
-        }
-    }
-}
 
 /// The side file of a room; empty if there is none.
 #[derive(Debug, Default)]
@@ -218,7 +188,7 @@ impl Reader<'_> {
         let Some(entry) = self.object(entry, place) else {
             return MaterialSpectra::default();
         };
-        self.keys(entry, &["reflectance", "emission"], place);
+        self.keys(entry, &["reflectance", "emission", "transmittance"], place);
         let mut spectra = MaterialSpectra::default();
         if let Some(value) = entry.get("reflectance") {
             let place = format!("{place}, reflectance");
@@ -226,6 +196,9 @@ impl Reader<'_> {
                 self.keys(object, &["name", "csv"], &place);
                 spectra.reflectance = self.sampled(object, Kind::Reflectance, &place);
             }
+        }
+        if let Some(value) = entry.get("transmittance") {
+            spectra.transmittance = transmittance::read(self, entry, value, place);
         }
         if let Some(value) = entry.get("emission") {
             let place = format!("{place}, emission");

@@ -33,6 +33,9 @@ pub struct Sent {
     pub to_backs: f64,
     /// Out of the room.
     pub outside: f64,
+    /// Kept back by panes on the way: what they absorb, and what they reflect, which is left out.
+    #[serde(default)]
+    pub in_panes: f64,
 }
 
 impl Bake {
@@ -43,7 +46,7 @@ impl Bake {
         if all <= 0.0 {
             return Sent::default();
         }
-        if self.closed == Closed::Yes {
+        if self.closed == Closed::Yes && sight.panes.is_none() {
             return Sent {
                 lamps_lm: all,
                 to_fronts: 1.0,
@@ -54,6 +57,7 @@ impl Bake {
             lamps_lm: all,
             ..Sent::default()
         };
+        let glass = self.gatherer(sight).glass;
         let mut first = 0;
         for (flux, lamp) in lamps {
             // At least a packet, so that no lamp goes without.
@@ -72,13 +76,17 @@ impl Bake {
                 }
                 let mut hits = [None; TOGETHER];
                 sight.meet(&from, &directions, plane, &mut hits);
-                for (hit, weight) in hits.into_iter().zip(weights) {
+                for (k, hit) in hits.into_iter().enumerate() {
+                    let reach = hit.map_or(4.0 * self.mesh.half_size as f32, |hit| hit.t);
+                    let end = from[k] + reach * directions[k];
+                    let through = glass.map_or(1.0, |glass| glass.brightness(from[k], end));
                     let to = match hit {
                         None => &mut sent.outside,
                         Some(hit) if self.tree.met(&hit) == NONE => &mut sent.to_backs,
                         Some(_) => &mut sent.to_fronts,
                     };
-                    *to += each * weight;
+                    *to += each * weights[k] * through;
+                    sent.in_panes += each * weights[k] * (1.0 - through);
                 }
             }
             first += count;

@@ -9,7 +9,7 @@ use super::point::{Gathered, Gatherer, Memory, Of, Receiver, punctual_factor};
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
-use crate::light::keenness;
+use crate::light::{Filter, Tint, keenness};
 use crate::link::{View, open_weight};
 use crate::scene::LightKind;
 use glam::DVec3;
@@ -135,12 +135,38 @@ impl Gatherer<'_> {
                     seen[lamp] += weight / total * all / lamps[lamp].carries;
                 }
             }
-            for (lamp, &seen) in lamps.iter().zip(&seen).filter(|(_, seen)| **seen > 0.0) {
-                self.see(to, lamp.id, lamp.factor, seen, of, out);
+            let tints = self.tints(&owners, lamps.len(), memory);
+            let each = lamps.iter().zip(&seen).enumerate();
+            for (k, (lamp, &seen)) in each.filter(|(_, (_, seen))| **seen > 0.0) {
+                let tint = tints.get(k).or(tints.last());
+                self.see(to, lamp.id, lamp.factor, seen, tint, of, out);
             }
         }
         memory.lamps = lamps;
         memory.lamps.clear();
+    }
+
+    /// What panes leave of each lamp's light, by the rays that reached it, and last of all lamps' light together, which stands for
+    /// those that no ray went to. Empty in a room without panes.
+    pub(super) fn tints(&self, owners: &[usize], lamps: usize, memory: &Memory) -> Vec<Filter> {
+        let Some(glass) = &self.glass else {
+            return Vec::new();
+        };
+        let mut sums = vec![Tint::default(); lamps + 1];
+        let rays = memory.segments.iter().zip(&memory.weights);
+        for (((segment, &weight), _), &lamp) in (rays.zip(&memory.blocked))
+            .zip(owners)
+            .filter(|((_, blocked), _)| !**blocked)
+        {
+            let filter = glass.through(segment.from, segment.to);
+            let filter = filter.unwrap_or([1.0; 64]);
+            for k in [lamp, lamps] {
+                sums[k].add(&filter, weight);
+            }
+        }
+        let whole = sums[lamps].mean().unwrap_or([1.0; 64]);
+        let each = sums.iter();
+        each.map(|sum| sum.mean().unwrap_or(whole)).collect()
     }
 
     /// How many rays lamps are worth that would bring `all`, share of white.
@@ -220,7 +246,9 @@ impl Gatherer<'_> {
             };
             memory.rays += 1;
             if !self.sight.blocks_one(&chosen.segment) {
-                self.add_emitted(chosen.element, chosen.factor / count as f64, out);
+                let tint = self.through(&chosen.segment);
+                let factor = chosen.factor / count as f64;
+                self.add_emitted(chosen.element, factor, tint.as_ref(), out);
             }
         }
     }

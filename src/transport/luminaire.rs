@@ -8,6 +8,7 @@
 use super::point::{Gatherer, Memory, Receiver};
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, quarters};
+use crate::light::Filter;
 use crate::link::{PIECES, View, open_weight};
 use crate::scene::PunctualLight;
 use crate::scene::luminaires::Luminaire;
@@ -177,22 +178,24 @@ pub(super) fn whole(
 }
 
 impl Gatherer<'_> {
-    /// What turns the flux of a lamp with an extent into irradiance, past what is in between. `bright`: what the lamp's flux is,
-    /// share of white.
+    /// What turns the flux of a lamp with an extent into irradiance, past what is in between, and what panes leave of it. `bright`:
+    /// what the lamp's flux is, share of white.
     pub(super) fn of_surface(
         &self,
         to: &Receiver,
         lamp: &PunctualLight,
         bright: f64,
         memory: &mut Memory,
-    ) -> f64 {
+    ) -> (f64, Option<Filter>) {
         let Some(luminaire) = lamp.luminaire.as_deref() else {
-            return 0.0;
+            return (0.0, None);
         };
         let (mut seen, mut parts) = (0.0, Vec::new());
-        let exact = self.shafts && luminaire.triangles().len() <= FEW;
+        // Panes are found by rays.
+        let by_rays = self.sight.occlusion || self.glass.is_some();
+        let exact = self.shafts && self.glass.is_none() && luminaire.triangles().len() <= FEW;
         for triangle in facing(lamp, luminaire, to, self.light.half_size) {
-            let known = match self.sight.occlusion {
+            let known = match by_rays {
                 true if exact => self.past_blockers(luminaire, triangle, to, memory),
                 true => None,
                 false => {
@@ -207,9 +210,12 @@ impl Gatherer<'_> {
             }
         }
         if parts.is_empty() {
-            return seen;
+            return (seen, None);
         }
-        seen + self.by_lamp_rays(luminaire, &parts, to, bright, memory)
+        let more = self.by_lamp_rays(luminaire, &parts, to, bright, memory);
+        let owners = vec![0; memory.segments.len()];
+        let filter = self.tints(&owners, 1, memory).first().copied();
+        (seen + more, filter)
     }
 
     /// What a triangle of a lamp brings, less the shadows of what stands between; none where that is too much.

@@ -141,6 +141,7 @@ fn material(name: &str, index: usize) -> Material {
         vertex_paint: false,
         emission: None,
         alpha: Alpha::Opaque,
+        pane: None,
     }
 }
 
@@ -287,6 +288,7 @@ pub fn room() -> Scene {
         },
         grid: Grid::default(),
         surfaces,
+        panes: Vec::new(),
         materials: vec![tiles, wall_paint, light],
         images: vec![image],
         spectra: vec![LightSpectrum {

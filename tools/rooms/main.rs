@@ -8,6 +8,7 @@ mod cornell;
 mod daylit;
 mod furnished;
 mod gallery;
+mod glazed;
 mod glb;
 mod shapes;
 mod simple;
@@ -64,6 +65,7 @@ const ROOMS: &[Room] = &[
     ),
     ("corridor", simple::corridor, None),
     ("daylit", daylit::room, Some(daylit::spectra)),
+    ("glazed", glazed::room, Some(glazed::spectra)),
     ("furnace", simple::furnace, None),
     ("gallery", gallery::room, Some(gallery::spectra)),
     ("cie171-5.2", cie171::case_5_2, None),

@@ -189,6 +189,13 @@ impl<'a> Writer<'a> {
     /// A primitive without light (points, lines): carried over with its data. None: its data is only in a Draco stream.
     fn kept_primitive(&mut self, primitive: &Value) -> Option<Value> {
         if accessor::is_draco(primitive) {
+            let material = index(primitive, "material").and_then(|m| self.scene.materials.get(m));
+            if let Some(material) = material.filter(|m| m.pane.is_some()) {
+                let name = crate::scene::short(&material.name);
+                let what =
+                    "is only in a Draco stream and is not written: save the room without Draco";
+                self.warnings.push(format!("a pane of '{name}' {what}"));
+            }
             return None;
         }
         let mut out = primitive.clone();
