@@ -46,6 +46,15 @@ impl Scene {
         for light in &mut self.lights {
             light.position *= factor;
         }
+        let emissions = self
+            .materials
+            .iter_mut()
+            .filter_map(|m| m.emission.as_mut());
+        for emission in emissions.filter(|emission| emission.profile.is_some()) {
+            // The same lumens from another area.
+            emission.shape = emission.shape.map(|x| x / (factor * factor));
+            emission.scale /= factor * factor;
+        }
         for camera in &mut self.cameras {
             // Only its place: a camera's axes keep their length.
             let place = camera.to_world.w_axis.truncate() * factor;

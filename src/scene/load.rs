@@ -99,6 +99,7 @@ impl Scene {
             surfaces,
             &mut materials,
             &mut lights,
+            options.scale.unwrap_or(1.0),
             size,
             &mut check,
         );

@@ -192,13 +192,14 @@ impl Meshes {
 }
 
 impl Scene {
-    /// The room that meshes in memory make; messages name it `meshes`.
+    /// The room that meshes in memory make; messages name it `(meshes)`. No file of spectra is looked for, unless `options` name
+    /// one; what paints name by relative paths is looked for where the program runs.
     ///
     /// # Errors
     /// [`Error::Input`] with everything that is wrong with it, as [`Scene::load`].
     pub fn from_meshes(room: &Meshes, options: &Options) -> Result<Self> {
         Self::from_document(
-            Document::from_bytes(Path::new("meshes"), &room.glb()?)?,
+            Document::from_bytes(Path::new("(meshes)"), &room.glb()?)?,
             options,
         )
     }

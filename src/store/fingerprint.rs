@@ -112,6 +112,7 @@ impl Fingerprint {
             if let Some(luminaire) = &light.luminaire {
                 what = "place or profile";
                 mix.all(&luminaire.numbers());
+                mix.add(luminaire.profile.angles.letter() as u8);
                 for numbers in luminaire.profile.numbers() {
                     mix.all(numbers);
                 }

@@ -281,7 +281,10 @@ impl Gatherer<'_> {
                         (factor, to.point + d * (4.0 * self.light.half_size))
                     }
                     (LightKind::Surface, _) => {
-                        luminaire::whole(lamp, to, self.light.half_size, [u, v])?
+                        // Which lamp is chosen must not tell which of its points.
+                        let turn = hash(u.to_bits() ^ v.to_bits().rotate_left(32), 0x73);
+                        let at = sequence02(1, turn);
+                        luminaire::whole(lamp, to, self.light.half_size, at)?
                     }
                     _ => punctual_factor(lamp, to, self.light.half_size)?,
                 };

@@ -7,7 +7,7 @@
 
 use super::point::{Gatherer, Memory, Receiver};
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
-use crate::geometry::{NO_PLANE, Segment, quarters};
+use crate::geometry::{NO_PLANE, Segment, lambert_polygon, quarters};
 use crate::light::Filter;
 use crate::link::{PIECES, View, open_weight};
 use crate::scene::PunctualLight;
@@ -19,7 +19,7 @@ use glam::DVec3;
 const NEAR: f64 = 2.0;
 /// Beyond this many of its radii three points (a rule of degree 2) do as well.
 const FAR: f64 = 8.0;
-/// Parts of a lamp at the most, beside its own triangles.
+/// Parts of a triangle at the most.
 const PARTS: usize = 64;
 /// Lamps of more triangles are found by rays alone.
 const FEW: usize = 16;
@@ -89,6 +89,14 @@ fn density(luminaire: &Luminaire, at: DVec3, normal: DVec3, to: &Receiver) -> f6
     luminaire.per_area(way / square.sqrt(), normal) * cosine / square
 }
 
+/// The same of a place that is as bright from everywhere: cosines over the square of the distance.
+fn even(at: DVec3, normal: DVec3, to: &Receiver) -> f64 {
+    let way = to.point - at;
+    let square = way.length_squared();
+    let cosines = [-to.normal.dot(way), normal.dot(way)].map(|x| x.max(0.0));
+    cosines[0] * cosines[1] / square.powi(2).max(f64::MIN_POSITIVE)
+}
+
 /// Triangles of a lamp that face a point and lie above it, lifted off their surface, with their normals.
 fn facing(
     lamp: &PunctualLight,
@@ -107,34 +115,45 @@ fn facing(
     lifted.collect()
 }
 
-/// Cuts a triangle until no part is near, and adds the parts that bring something.
+/// Cuts a triangle, the nearest part first, until none is near or there are [`PARTS`], and adds the parts that bring something. Of
+/// near ones the exact form factor counts, so that only how the profile varies over a part is left to the rule.
 fn cut(
     luminaire: &Luminaire,
     (triangle, normal): ([DVec3; 3], DVec3),
     to: &Receiver,
     out: &mut Vec<Part>,
 ) {
-    let mut parts = vec![triangle];
-    let mut next = 0;
-    while let Some(&corners) = parts.get(next) {
-        next += 1;
+    // How many of its radii a part is away.
+    let away = |corners: &[DVec3; 3]| {
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         let radius = corners.map(|p| p.distance(middle));
-        let radius = radius.into_iter().fold(0.0, f64::max);
-        let distance = middle.distance(to.point);
-        // What is cut goes to the end, so that the largest are cut first.
-        if distance < NEAR * radius && parts.len() + 3 <= PARTS {
-            parts.extend(quarters(corners));
-            continue;
-        }
-        let rule = match distance < FAR * radius {
+        middle.distance(to.point) / radius.into_iter().fold(f64::MIN_POSITIVE, f64::max)
+    };
+    let mut parts = vec![(away(&triangle), triangle)];
+    while parts.len() + 3 <= PARTS {
+        let nearest = (0..parts.len()).min_by(|&j, &k| parts[j].0.total_cmp(&parts[k].0));
+        let Some(nearest) = nearest.filter(|&k| parts[k].0 < NEAR) else {
+            break;
+        };
+        let (_, corners) = parts.swap_remove(nearest);
+        parts.extend(quarters(corners).map(|corners| (away(&corners), corners)));
+    }
+    for (away, corners) in parts {
+        let rule = match away < FAR {
             true => &SEVEN[..],
             false => &THREE[..],
         };
         let [a, b, c] = corners;
         let area = 0.5 * (b - a).cross(c - a).length();
         let at = |w: &[f64; 3]| density(luminaire, mix(&corners, *w), normal, to);
-        let brings = area * rule.iter().map(|(w, weight)| weight * at(w)).sum::<f64>();
+        let mut brings = area * rule.iter().map(|(w, weight)| weight * at(w)).sum::<f64>();
+        if away < NEAR {
+            let even = |w: &[f64; 3]| even(mix(&corners, *w), normal, to);
+            let by_rule = area * rule.iter().map(|(w, weight)| weight * even(w)).sum::<f64>();
+            let exact = std::f64::consts::PI * lambert_polygon(to.point, to.normal, &corners);
+            // A part that no point of the rule sees brings as good as nothing.
+            brings *= if by_rule > 0.0 { exact / by_rule } else { 0.0 };
+        }
         if brings > 0.0 && brings.is_finite() {
             out.push(Part {
                 corners,

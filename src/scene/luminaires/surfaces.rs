@@ -16,16 +16,20 @@ use std::sync::Arc;
 const LOST: f64 = 0.01;
 /// A side that is so many times the other is the longer one.
 const LONG: f64 = 1.5;
+/// Triangles of a surface that shines by a profile, at the most: every place looks at all of them.
+const MOST_TRIANGLES: usize = 1024;
 /// A surface that is so many times as long as the luminous opening of the file is no such lamp.
 const TOO_LONG: f64 = 3.0;
 
 /// Adds the lights of surfaces, and gives their materials the luminance that they are shown with. `wishes` by material;
+/// `scale` is metres for a unit of the file;
 /// `size` tells the luminous size of a light spectrum with a shape.
 pub(in crate::scene) fn add(
     wishes: &[Option<ProfileWish>],
     surfaces: &[Surface],
     materials: &mut [Material],
     lights: &mut Vec<PunctualLight>,
+    scale: f64,
     size: impl Fn(usize, &Leaves) -> f64,
     check: &mut Check,
 ) {
@@ -37,6 +41,16 @@ pub(in crate::scene) fn add(
         let unit = 1.0 / size(emission.light, &emission.shape);
         let (mut area, mut flux, mut lost) = (0.0, 0.0, 0.0_f64);
         for (k, surface) in surfaces.iter().enumerate().filter(|s| s.1.material == m) {
+            if surface.triangles.len() > MOST_TRIANGLES {
+                let what = format!(
+                    "{} has {} triangles, and a profile shines from {MOST_TRIANGLES} at the most",
+                    surface.name,
+                    surface.triangles.len()
+                );
+                let next = "make the surface simpler, or give the profile to a light instead";
+                check.problem(&place, what, next);
+                continue;
+            }
             let profile = Arc::clone(&wish.profile);
             let mounted =
                 Luminaire::on_surface(profile, (k, surface), material.sides, wish.turn_deg);
@@ -49,12 +63,12 @@ pub(in crate::scene) fn add(
             let tilt = tilt_share(&luminaire);
             lost = lost.max(1.0 - luminaire.reach());
             let longest = luminaire.profile.opening_m.into_iter().fold(0.0, f64::max);
-            if longest > 0.0 && 2.0 * luminaire.radius() > TOO_LONG * longest {
+            let across = 2.0 * scale * luminaire.radius();
+            if longest > 0.0 && across > TOO_LONG * longest {
                 check.warn(format!(
-                    "{place}: {} is {:.2} m across, and its profile that of a lamp of {longest:.2} m; each surface \
+                    "{place}: {} is {across:.2} m across, and its profile that of a lamp of {longest:.2} m; each surface \
                      shines once, whatever its size",
-                    surface.name,
-                    2.0 * luminaire.radius()
+                    surface.name
                 ));
             }
             if lies_across(&luminaire) {

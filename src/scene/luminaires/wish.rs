@@ -45,10 +45,13 @@ pub(in crate::scene) struct LampWish {
     pub(in crate::scene) profile: Option<ProfileWish>,
 }
 
-/// Are these extras of a light ours? Other programs write a "name" into extras too; all of ours hold a slash.
+/// Are these extras of a light ours? Other programs write a "name" or "profile" into extras too; all of our names hold a slash, and
+/// our profiles are files of the two kinds.
 pub(in crate::scene) fn is_ours(extras: &Value) -> bool {
     let by_name = extras["name"].as_str().map(|name| name.contains('/'));
-    extras["profile"].is_string() || by_name.unwrap_or(extras["csv"].is_string())
+    let profile = extras["profile"].as_str().map(str::to_ascii_lowercase);
+    let by_file = profile.is_some_and(|p| p.ends_with(".ies") || p.ends_with(".ldt"));
+    by_file || by_name.unwrap_or(extras["csv"].is_string())
 }
 
 /// Reads the object of a light.

@@ -16,7 +16,7 @@
 
 use super::Fault;
 use super::numbers::Lines;
-use super::table::{Angles, MOST_ANGLES, Measured, Profile, Symmetry};
+use super::table::{Angles, BRIGHTEST, MOST_ANGLES, Measured, Profile, Symmetry};
 
 /// Metres in a millimetre.
 const MM: f64 = 1e-3;
@@ -30,7 +30,7 @@ const OFF: f64 = 0.03;
 pub(super) fn parse(text: &str) -> Result<Profile, Fault> {
     let mut lines = Lines::new(text);
     lines.next_line("the maker's name")?;
-    lines.line_number("the kind of lamp")?;
+    lines.next_line("the kind of lamp")?;
     let symmetry = lines.line_number("the symmetry")?;
     let symmetry = lines.count(symmetry, 4, "the symmetry")?;
     let planes = lines.line_number("the number of C planes")?;
@@ -58,7 +58,7 @@ pub(super) fn parse(text: &str) -> Result<Profile, Fault> {
     let sizes = lines.column(9, "a length")?;
     let shares = lines.column(2, "a share of the light")?;
     let factor = lines.line_number("the factor of the intensities")?;
-    lines.line_number("the tilt when measured")?;
+    lines.next_line("the tilt when measured")?;
     let lamps = lamps(&mut lines)?;
     lines.column(10, "a direct ratio")?;
     let scale = factor * lamps.lumens / 1000.0;
@@ -168,9 +168,12 @@ fn table(
         let mut plane = lines.column(rows, "an intensity")?;
         for value in &mut plane {
             *value *= scale;
-            if !(0.0..f64::MAX).contains(value) {
+            if !(0.0..=BRIGHTEST).contains(value) {
                 let what = format!("an intensity is {value} cd");
-                return Err(lines.fault(what, "give intensities of at least 0"));
+                return Err(lines.fault(
+                    what,
+                    "give intensities of at least 0, and no more than 1e12 cd",
+                ));
             }
         }
         let turns = if symmetry == 3 && k < planes {

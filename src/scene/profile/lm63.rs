@@ -12,7 +12,7 @@
 
 use super::Fault;
 use super::numbers::Lines;
-use super::table::{Angles, MOST_ANGLES, Measured, Profile, Symmetry};
+use super::table::{Angles, BRIGHTEST, MOST_ANGLES, Measured, Profile, Symmetry};
 
 /// Metres in a foot (exact, 1959).
 const FOOT: f64 = 0.3048;
@@ -37,7 +37,9 @@ pub(super) fn is_lm63(text: &str) -> bool {
             .get(..what.len())
             .is_some_and(|s| s.eq_ignore_ascii_case(what))
     };
-    start(text, "IES") || text.split(['\n', '\r']).any(|line| start(line, "TILT="))
+    start(text, "IESNA")
+        || start(text, "IES:LM-63")
+        || text.split(['\n', '\r']).any(|line| start(line, "TILT="))
 }
 
 /// Reads a file.
@@ -80,9 +82,9 @@ pub(super) fn parse(text: &str) -> Result<Profile, Fault> {
     let ballast = lines.number("the ballast factor")?;
     let ballast_lamp = lines.number("the ballast-lamp factor")?;
     let factor = match head.edition.1 {
-        // From 2002 on the number says other things.
-        "LM-63-2002" | "LM-63-2019" => multiplier * ballast,
-        _ => multiplier * ballast * ballast_lamp,
+        "LM-63-1986" | "LM-63-1991" => multiplier * ballast * ballast_lamp,
+        // From 1995 on the number is kept for other things.
+        _ => multiplier * ballast,
     };
     // Written so that NaN fails.
     if !(factor > 0.0 && factor.is_finite()) {
@@ -222,9 +224,9 @@ fn table(
         let mut plane = lines.list(rows, "an intensity")?;
         for value in &mut plane {
             *value *= factor;
-            if !(0.0..f64::MAX).contains(value) {
+            if !(0.0..=BRIGHTEST).contains(value) {
                 let what = format!("an intensity is {value} cd");
-                return Err(lines.fault(what, "give candela of at least 0"));
+                return Err(lines.fault(what, "give candela of at least 0, and no more than 1e12"));
             }
         }
         candela.push(plane);
@@ -269,7 +271,7 @@ fn table(
 /// Do planes from 0 to `last` go round? Some files leave out 360, where 0 stands already.
 fn closes(horizontal: &[f64], last: f64) -> bool {
     let steps = horizontal.windows(2).map(|w| w[1] - w[0]);
-    360.0 - last <= SAME + steps.fold(0.0, f64::max)
+    horizontal.len() > 2 && 360.0 - last <= SAME + steps.fold(0.0, f64::max)
 }
 
 /// Types A and B: which of the angles counts from the axis.

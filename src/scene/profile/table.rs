@@ -21,6 +21,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Most angles of a kind in a file. The finest goniometers have steps of .1 degrees.
 pub(super) const MOST_ANGLES: usize = 3601;
+/// No lamp has more candela; sums of what is beyond are no numbers.
+pub(super) const BRIGHTEST: f64 = 1e12;
 /// Angles that differ by less are one, degrees: files round to .1 or .01.
 const SAME: f64 = 1e-3;
 

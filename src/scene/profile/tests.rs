@@ -249,7 +249,7 @@ fn multipliers_units_and_editions() {
     for (first, format, factor) in [
         ("any words", "LM-63-1986", 0.9),
         ("IESNA91", "LM-63-1991", 0.9),
-        ("IESNA:LM-63-1995", "LM-63-1995", 0.9),
+        ("IESNA:LM-63-1995", "LM-63-1995", 1.0),
         ("IESNA:LM-63-2002", "LM-63-2002", 1.0),
         ("IES:LM-63-2019", "LM-63-2019", 1.0),
     ] {
