@@ -23,6 +23,7 @@ pub mod cost;
 mod fault;
 pub mod inspect;
 pub mod log;
+mod maps;
 mod metrics;
 pub mod options;
 pub mod paper;

@@ -53,7 +53,18 @@ impl Writer<'_> {
                 out.insert(name, json!(accessor));
             }
         }
-        out.insert("COLOR_0".into(), json!(self.light(surface, baked)));
+        match &baked.map {
+            Some(map) => {
+                let name = format!("TEXCOORD_{}", Self::free_set(primitive));
+                out.insert(name, json!(self.bin.floats(&map.uv)));
+                if let Some(colors) = self.vertex_paint(baked) {
+                    out.insert("COLOR_0".into(), json!(colors));
+                }
+            }
+            None => {
+                out.insert("COLOR_0".into(), json!(self.light(surface, baked)));
+            }
+        }
         if self.writing.xyz {
             let radiosity: Vec<[f32; 3]> = baked.vertices.iter().map(|v| v.radiosity).collect();
             out.insert("_XYZ".into(), json!(self.bin.floats(&radiosity)));
