@@ -4,9 +4,10 @@ use super::aliasing::Key;
 use super::cells::Cell;
 use super::charts::{Chart, charts};
 use super::grow::{Budget, End, Growth};
-use super::maps::{LightMaps, MARGIN, Page, Placed, Texel};
+use super::maps::{LightMaps, Page, Placed, Texel, margin};
 use super::pack::pack;
 use super::sampler::{Sample, Sampler};
+use super::seams::close;
 use super::texels::{Corners, Patch, lend, patch};
 use super::unwrap::Conformal;
 use crate::gather::{Baked, BakedSurface, Look, MapPlace};
@@ -64,18 +65,22 @@ impl Bake {
     pub fn light_maps(&self, limits: &MapLimits, progress: &dyn Fn(usize, usize)) -> LightMaps {
         let spaces = self.spaces();
         let all = charts(self.scene(), self.mesh(), self.tree(), &spaces, &Conformal);
-        let mut looks = Looks::new(self, spaces, Care::Vertex, limits.late);
+        let mut looks = Looks::new(self, spaces.clone(), Care::Vertex, limits.late);
         looks.indirect = limits.indirect;
         let more = AT / self.settings().error;
         let budget = Budget {
-            looks: all.len() + (MOST_LOOKS * more) as usize,
-            texels: limits.texels.unwrap_or((MOST_TEXELS * more) as usize),
+            looks: usize::MAX,
+            texels: usize::MAX,
             page: limits.page,
         };
         let mut growth = Growth::new(self, all, Sampler::new(looks), budget);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
         growth.unknown = allowed * allowed;
         growth.begin(progress);
+        // What every chart needs in any case comes on top.
+        growth.budget.looks = growth.sampler.looks.len() + (MOST_LOOKS * more) as usize;
+        let most = growth.texels() + (MOST_TEXELS * more) as usize;
+        growth.budget.texels = limits.texels.unwrap_or(most);
         let mut aim = allowed * allowed * growth.seen_area();
         let points = growth.points(self, 0, progress);
         let samples = growth.compared(&points, &self.placed(&growth, &Vec::new()).0);
@@ -95,7 +100,8 @@ impl Bake {
             let over = end != End::Reached || turn == MEASURED || stalled || (limits.late)();
             if found.is_met() || over {
                 let smoothed = growth.smooth(allowed, progress);
-                let (placed, covered) = self.placed(&growth, &smoothed);
+                let (mut placed, covered) = self.placed(&growth, &smoothed);
+                close(self, &growth.charts, &spaces, &mut placed);
                 let samples = growth.compared(&points, &placed);
                 let mut maps = self.written(growth, placed);
                 maps.indirect = limits.indirect;
@@ -180,10 +186,16 @@ impl Bake {
     /// Pages, and the mesh with its coordinates on them.
     fn written(&self, growth: Growth, mut placed: Placed) -> LightMaps {
         placed.charts = growth.charts;
-        let outer = |p: &Patch| [p.width + 2 * MARGIN, p.height + 2 * MARGIN];
-        let sizes: Vec<[usize; 2]> = placed.patches.iter().map(outer).collect();
-        let (places, pages) = pack(&sizes, growth.budget.page);
-        placed.places = places;
+        let shares = placed.share_dark();
+        let outer = |k: usize| {
+            let (patch, margin) = (&placed.patches[k], margin(&placed.lattices[k]));
+            [patch.width + 2 * margin, patch.height + 2 * margin]
+        };
+        let own: Vec<usize> = (0..shares.len()).filter(|&k| shares[k] == k).collect();
+        let sizes: Vec<[usize; 2]> = own.iter().map(|&k| outer(k)).collect();
+        let (found, pages) = pack(&sizes, growth.budget.page);
+        let place = |k: &usize| own.binary_search(k).map(|at| found[at]).unwrap_or_default();
+        placed.places = shares.iter().map(place).collect();
         let page = |[width, height]: [usize; 2]| Page {
             width,
             height,
@@ -191,13 +203,14 @@ impl Bake {
             surfaces: vec![u32::MAX; width * height],
         };
         let mut pages: Vec<Page> = pages.into_iter().map(page).collect();
-        for (k, patch) in placed.patches.iter().enumerate() {
-            let (place, [w, h]) = (placed.places[k], sizes[k]);
+        for (k, [w, h]) in own.into_iter().zip(sizes) {
+            let (patch, place) = (&placed.patches[k], placed.places[k]);
+            let margin = margin(&placed.lattices[k]);
             let page = &mut pages[place.page];
             for y in 0..h {
                 for x in 0..w {
                     // The margin goes on with the outermost texels.
-                    let inner = |at: usize, count: usize| at.saturating_sub(MARGIN).min(count - 1);
+                    let inner = |at: usize, count: usize| at.saturating_sub(margin).min(count - 1);
                     let from = inner(y, patch.height) * patch.width + inner(x, patch.width);
                     let to = (place.y + y) * page.width + place.x + x;
                     page.texels[to] = patch.texels[from];

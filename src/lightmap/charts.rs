@@ -54,6 +54,17 @@ impl Chart {
         }
     }
 
+    /// A corner of a facet, as a vertex of its own triangle.
+    pub(super) fn corner(&self, facet: &Facet, k: usize) -> Vertex {
+        let mut weights = [0.0; 3];
+        weights[turned([0, 1, 2], self.back)[k] as usize] = 1.0;
+        Vertex {
+            triangle: facet.triangle,
+            weights,
+            entry: facet.entry,
+        }
+    }
+
     /// Place in the plane of weights of the corners of a triangle of the mesh.
     pub(super) fn at(&self, facet: u32, [u, v, w]: [f64; 3]) -> DVec2 {
         let [a, b, c] = self.flat[facet as usize];

@@ -8,7 +8,7 @@
 
 use super::cells::{Cell, DEPTH, Doubt, Lattice, bilinear, first};
 use super::charts::Chart;
-use super::maps::MARGIN;
+use super::maps::{MARGIN, margin};
 use super::sampler::{Sample, Sampler};
 use crate::color::de2000;
 use crate::solve::Bake;
@@ -525,7 +525,8 @@ fn within(share: DVec2) -> bool {
 /// Texels that a chart takes on a page.
 pub(super) fn taken(lattice: &Lattice, more: [u8; 2]) -> usize {
     let [w, h] = lattice.texels(more);
-    (w + 2 * MARGIN) * (h + 2 * MARGIN)
+    let margin = margin(lattice);
+    (w + 2 * margin) * (h + 2 * margin)
 }
 
 /// Light between four corners.

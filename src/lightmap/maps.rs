@@ -13,6 +13,17 @@ use std::collections::HashMap;
 /// Texels around every chart, so that what a viewer's filter takes in beyond its edge is its own light, down to the map's half and
 /// quarter size.
 pub(super) const MARGIN: usize = 4;
+/// The same for charts of a single texel, whose texture coordinates are its centre.
+const MARGIN_OF_ONE: usize = 2;
+
+/// Texels around a chart.
+pub(super) fn margin(lattice: &Lattice) -> usize {
+    if lattice.single {
+        MARGIN_OF_ONE
+    } else {
+        MARGIN
+    }
+}
 
 /// A texel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -79,8 +90,26 @@ pub(super) struct Placed {
 }
 
 impl Placed {
+    /// Makes charts without any light one texel, the same for all; for each chart the one whose place it shares, its own for the
+    /// most.
+    pub(super) fn share_dark(&mut self) -> Vec<usize> {
+        let mut first = None;
+        (0..self.patches.len())
+            .map(|k| {
+                let patch = &mut self.patches[k];
+                if patch.texels.iter().any(|t| *t != Texel::default()) {
+                    return k;
+                }
+                (patch.width, patch.height) = (1, 1);
+                patch.texels.truncate(1);
+                self.lattices[k].single = true;
+                *first.get_or_insert(k)
+            })
+            .collect()
+    }
+
     /// Texels along both axes, from the first texel's centre, at a place of a chart.
-    fn step(&self, chart: usize, at: DVec2) -> DVec2 {
+    pub(super) fn step(&self, chart: usize, at: DVec2) -> DVec2 {
         let patch = &self.patches[chart];
         let intervals = DVec2::new((patch.width - 1) as f64, (patch.height - 1) as f64);
         match self.lattices[chart].single {
@@ -93,7 +122,8 @@ impl Placed {
     pub(super) fn on_page(&self, chart: usize, at: DVec2) -> DVec2 {
         let place = &self.places[chart];
         let corner = DVec2::new(place.x as f64, place.y as f64);
-        corner + (MARGIN as f64 + 0.5) + self.step(chart, at)
+        let margin = margin(&self.lattices[chart]) as f64;
+        corner + (margin + 0.5) + self.step(chart, at)
     }
 
     /// A bilinear look-up at a place of a chart.
@@ -103,28 +133,29 @@ impl Placed {
 }
 
 impl Patch {
-    /// A bilinear look-up between texels' centres; beyond the outermost these go on.
-    pub(super) fn look_up(&self, step: DVec2) -> Texel {
+    /// Numbers and weights of the four texels around a place; beyond the outermost texels these go on.
+    pub(super) fn corners(&self, step: DVec2) -> [(usize, f64); 4] {
         let most = DVec2::new((self.width - 1) as f64, (self.height - 1) as f64);
         let step = step.clamp(DVec2::ZERO, most);
         let low = step.floor().min((most - 1.0).max(DVec2::ZERO));
         let (x, y) = (low.x as usize, low.y as usize);
         let (x1, y1) = ((x + 1).min(self.width - 1), (y + 1).min(self.height - 1));
-        let corners = [(x, y), (x1, y), (x, y1), (x1, y1)];
         let weights = bilinear(step - low);
-        let part = |(w, (x, y)): (f64, (usize, usize))| (w, self.texels[y * self.width + x]);
-        Texel::mix(
-            &weights
-                .into_iter()
-                .zip(corners)
-                .map(part)
-                .collect::<Vec<_>>(),
-        )
+        let texels = [(x, y), (x1, y), (x, y1), (x1, y1)];
+        std::array::from_fn(|k| (texels[k].1 * self.width + texels[k].0, weights[k]))
+    }
+
+    /// A bilinear look-up.
+    fn look_up(&self, step: DVec2) -> Texel {
+        let parts = self
+            .corners(step)
+            .map(|(texel, weight)| (weight, self.texels[texel]));
+        Texel::mix(&parts)
     }
 }
 
 impl LightMaps {
-    /// Texels around every chart that hold its outermost light.
+    /// Texels around every chart of more than one texel that hold its outermost light.
     pub fn margin(&self) -> usize {
         MARGIN
     }

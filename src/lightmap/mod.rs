@@ -14,6 +14,7 @@ mod measure;
 mod pack;
 mod regions;
 mod sampler;
+mod seams;
 mod texels;
 mod unwrap;
 

@@ -6,7 +6,7 @@ const BLOCK: usize = 4;
 const SLACK: f64 = 1.05;
 
 /// Where a rectangle lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) page: usize,
     pub(super) x: usize,

@@ -56,7 +56,10 @@ impl Writer<'_> {
         match &baked.map {
             Some(map) => {
                 let name = format!("TEXCOORD_{}", Self::free_set(primitive));
-                out.insert(name, json!(self.bin.floats(&map.uv)));
+                let accessor = self.bin.floats(&map.uv);
+                // Sets must be numbered without gaps.
+                out.entry("TEXCOORD_0").or_insert(json!(accessor));
+                out.insert(name, json!(accessor));
                 if let Some(colors) = self.vertex_paint(baked) {
                     out.insert("COLOR_0".into(), json!(colors));
                 }

@@ -139,14 +139,14 @@ impl Writer<'_> {
         surfaces.map(|surface| base(surface.material)).collect()
     }
 
-    /// The set of texture coordinates that a primitive has free.
+    /// The set of texture coordinates for the map: the first that is free, but not 0, for engines look in 1 at the earliest.
     pub(super) fn free_set(primitive: &Value) -> usize {
         let has = |n: &usize| {
             primitive["attributes"]
                 .get(format!("TEXCOORD_{n}"))
                 .is_some()
         };
-        (0..).find(|n| !has(n)).unwrap_or(0)
+        (1..).find(|n| !has(n)).unwrap_or(1)
     }
 
     /// The output material of a surface on a page.

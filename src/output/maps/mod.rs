@@ -45,7 +45,7 @@ pub struct Index {
     pub lux_per_unit: f64,
     /// Display value (1: white) of a radiosity of 1 lm/m2 in the glb.
     pub exposure: f64,
-    /// Texels around every chart that hold its outermost light.
+    /// Texels around every chart of more than one texel that hold its outermost light.
     pub margin: usize,
     /// The pages.
     pub pages: Vec<PageEntry>,
