@@ -27,12 +27,10 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// Cells about as wide as high, none longer than `longest` where the number of cells allows; a single texel for charts
-    /// smaller than `tiny`.
+    /// Cells no longer than `longest`, where the number of cells allows; they may be as slender as the chart, for each axis is
+    /// halved by itself. A single texel for charts smaller than `tiny`.
     pub(super) fn new(size: DVec2, longest: f64, tiny: f64) -> Self {
-        let short = size.min_element().max(size.max_element() / FIRST);
-        let step = short.min(longest).max(size.max_element() / FIRST);
-        let count = |length: f64| (length / step - 1e-6).ceil().clamp(1.0, FIRST) as u32;
+        let count = |length: f64| (length / longest - 1e-6).ceil().clamp(1.0, FIRST) as u32;
         Self {
             counts: [count(size.x), count(size.y)],
             finest: [0, 0],
@@ -275,12 +273,12 @@ mod tests {
     }
 
     #[test]
-    fn lattices_are_nested_and_cells_square() {
+    fn lattices_are_nested() {
         let lattice = Lattice::new(DVec2::new(8.0, 2.0), 4.0, 0.0);
-        assert_eq!(lattice.counts, [4, 1]);
-        assert_eq!(lattice.at([4 << DEPTH, 1 << DEPTH]), DVec2::new(8.0, 2.0));
-        assert_eq!(lattice.texels([1, 0]), [9, 2]);
+        assert_eq!(lattice.counts, [2, 1]);
+        assert_eq!(lattice.at([2 << DEPTH, 1 << DEPTH]), DVec2::new(8.0, 2.0));
+        assert_eq!(lattice.texels([1, 0]), [5, 2]);
         let tube = Lattice::new(DVec2::new(100.0, 1e-3), 4.0, 0.0);
-        assert_eq!(tube.counts, [64, 1]);
+        assert_eq!(tube.counts, [25, 1]);
     }
 }

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 /// Cells are no longer than this share of the room's half diagonal at the beginning, so that what no leaf tells of is found.
 const LONGEST: f64 = 0.125;
 /// Charts smaller than this share of the room's half diagonal are one texel, until that proves wrong.
-const TINY: f64 = 0.01;
+const TINY: f64 = 0.02;
 /// What remains of the mean square of an axis when it is halved: 1/16 for smooth light, 1/2 for an edge.
 const SHRINK: f64 = 0.125;
 /// An axis that bends by this share of what the other does is split with it.

@@ -9,6 +9,7 @@ use super::sampler::Sample as Place;
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::mesh::measure::{CHANCE, POINTS, SHARE, SURPRISE, Sample};
 use crate::solve::Bake;
+use glam::DVec2;
 
 /// Distinguishes these random numbers from others.
 const SEED: u64 = 0x0067_0a55;
@@ -84,6 +85,7 @@ impl Growth<'_> {
 
     /// How far maps are off at points; those that something covers are left out. `Sample::cell` counts points here.
     pub(super) fn compared(&self, points: &[Point], placed: &Placed) -> Vec<Sample> {
+        let cells = self.by_chart();
         let sample = |(cell, point): (usize, &Point)| {
             let [one, two] = point
                 .looks
@@ -98,7 +100,7 @@ impl Growth<'_> {
                 0.5 * (self.difference(drawn, one).powi(2) + self.difference(drawn, two).powi(2));
             Some(Sample {
                 cell,
-                square: seen - (1.0 + self.shared(point)) * noise,
+                square: seen - (1.0 + self.shared(point, &cells)) * noise,
                 noise,
             })
         };
@@ -106,7 +108,7 @@ impl Growth<'_> {
     }
 
     /// Sum of squares of the weights of the looks that a point's light is interpolated from.
-    fn shared(&self, point: &Point) -> f64 {
+    fn shared(&self, point: &Point, cells: &[Vec<usize>]) -> f64 {
         let of_cell = |k: usize| {
             let cell = &self.cells[k];
             let share = cell.share(&self.lattices[point.chart], point.place.at);
@@ -114,28 +116,37 @@ impl Growth<'_> {
         };
         match self.lattices[point.chart].single {
             true => 1.0,
-            false => self.cell_at(point).map_or(1.0, of_cell),
+            false => self.cell_at(point, cells).map_or(1.0, of_cell),
         }
     }
 
-    fn cell_at(&self, point: &Point) -> Option<usize> {
+    /// Cells of each chart.
+    fn by_chart(&self) -> Vec<Vec<usize>> {
+        let mut cells = vec![Vec::new(); self.charts.len()];
+        for (k, cell) in self.cells.iter().enumerate() {
+            cells[cell.chart as usize].push(k);
+        }
+        cells
+    }
+
+    fn cell_at(&self, point: &Point, cells: &[Vec<usize>]) -> Option<usize> {
         let lattice = &self.lattices[point.chart];
         let holds = |k: &usize| {
-            let cell = &self.cells[*k];
-            let share = || cell.share(lattice, point.place.at);
-            cell.chart as usize == point.chart
-                && (lattice.single
-                    || share().cmpge(glam::DVec2::ZERO).all()
-                        && share().cmple(glam::DVec2::ONE).all())
+            let share = self.cells[*k].share(lattice, point.place.at);
+            lattice.single || (share.cmpge(DVec2::ZERO).all() && share.cmple(DVec2::ONE).all())
         };
-        (0..self.cells.len()).find(holds)
+        cells[point.chart].iter().copied().find(holds)
     }
 
     /// Takes what was seen at random points for what is to be expected of their cells, where it is a surprise.
     pub(super) fn learn(&mut self, points: &[Point], samples: &[Sample]) {
+        let cells = self.by_chart();
         for sample in samples {
             let square = sample.square - CHANCE * sample.noise;
-            let Some(cell) = self.cell_at(&points[sample.cell]).filter(|_| square > 0.0) else {
+            let Some(cell) = self
+                .cell_at(&points[sample.cell], &cells)
+                .filter(|_| square > 0.0)
+            else {
                 continue;
             };
             let doubt = &mut self.cells[cell].doubt;
