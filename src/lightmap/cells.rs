@@ -28,9 +28,10 @@ pub(super) struct Lattice {
 
 impl Lattice {
     /// Cells no longer than `longest`, where the number of cells allows; they may be as slender as the chart, for each axis is
-    /// halved by itself. A single texel for charts smaller than `tiny`.
-    pub(super) fn new(size: DVec2, longest: f64, tiny: f64) -> Self {
-        let count = |length: f64| (length / longest - 1e-6).ceil().clamp(1.0, FIRST) as u32;
+    /// halved by itself. A single texel for charts smaller than `tiny`; no more texels along an axis than `most`.
+    pub(super) fn new(size: DVec2, longest: f64, tiny: f64, most: usize) -> Self {
+        let most = (most.saturating_sub(1) as f64).clamp(1.0, FIRST);
+        let count = |length: f64| (length / longest - 1e-6).ceil().clamp(1.0, most) as u32;
         Self {
             counts: [count(size.x), count(size.y)],
             finest: [0, 0],
@@ -274,11 +275,13 @@ mod tests {
 
     #[test]
     fn lattices_are_nested() {
-        let lattice = Lattice::new(DVec2::new(8.0, 2.0), 4.0, 0.0);
+        let lattice = Lattice::new(DVec2::new(8.0, 2.0), 4.0, 0.0, 1024);
         assert_eq!(lattice.counts, [2, 1]);
         assert_eq!(lattice.at([2 << DEPTH, 1 << DEPTH]), DVec2::new(8.0, 2.0));
         assert_eq!(lattice.texels([1, 0]), [5, 2]);
-        let tube = Lattice::new(DVec2::new(100.0, 1e-3), 4.0, 0.0);
+        let tube = Lattice::new(DVec2::new(100.0, 1e-3), 4.0, 0.0, 1024);
         assert_eq!(tube.counts, [25, 1]);
+        let short = Lattice::new(DVec2::new(100.0, 1e-3), 4.0, 0.0, 8);
+        assert_eq!(short.texels([0, 0]), [8, 2]);
     }
 }

@@ -87,9 +87,9 @@ impl<'a> Growth<'a> {
         budget: Budget,
     ) -> Self {
         let half = bake.mesh().half_size;
-        let lattice = |c: &Chart| Lattice::new(c.size, LONGEST * half, TINY * half);
+        let most = budget.page.saturating_sub(2 * MARGIN);
         let mut growth = Self {
-            lattices: charts.iter().map(lattice).collect(),
+            lattices: Vec::with_capacity(charts.len()),
             cells: Vec::new(),
             sampler,
             budget,
@@ -102,9 +102,16 @@ impl<'a> Growth<'a> {
         };
         for (k, chart) in charts.iter().enumerate() {
             let (hints, at) = told_by(bake, chart);
-            growth
-                .cells
-                .extend(first(k as u32, chart, &growth.lattices[k], &at));
+            // A single look at what nobody sees, unless that proves wrong.
+            let is_hidden = !hints.is_empty() && hints.iter().all(|h| h.open <= 0.0);
+            let tiny = if is_hidden {
+                f64::INFINITY
+            } else {
+                TINY * half
+            };
+            let lattice = Lattice::new(chart.size, LONGEST * half, tiny, most);
+            growth.cells.extend(first(k as u32, chart, &lattice, &at));
+            growth.lattices.push(lattice);
             growth.hints.push(hints);
             growth.hints_at.push(at);
         }

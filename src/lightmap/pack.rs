@@ -2,8 +2,9 @@
 
 /// Sides of pages are multiples of this, as block-compressed formats want them.
 const BLOCK: usize = 4;
-/// Room that a page has over what its rectangles need, first tried.
-const SLACK: f64 = 1.05;
+/// Widths of a page that are tried: roots of so many times what its rectangles need. Charts of many sizes fill a square best,
+/// few large ones what happens to fit them.
+const WIDTHS: [f64; 6] = [1.02, 1.08, 1.2, 1.4, 1.7, 2.2];
 
 /// Where a rectangle lies.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -13,9 +14,11 @@ pub(super) struct Place {
     pub(super) y: usize,
 }
 
-/// Places rectangles (width, height) on as few pages as this finds, none larger than `most` along an axis; and the pages' sizes.
-/// No rectangle is larger than that.
+/// Places rectangles (width, height) on as few pages as this finds, none larger than `most` or the largest rectangle along an
+/// axis; and the pages' sizes.
 pub(super) fn pack(sizes: &[[usize; 2]], most: usize) -> (Vec<Place>, Vec<[usize; 2]>) {
+    // Whoever asks for more than a page gets a larger one.
+    let most = sizes.iter().flatten().copied().fold(most, usize::max);
     let mut places = vec![
         Place {
             page: 0,
@@ -36,26 +39,54 @@ pub(super) fn pack(sizes: &[[usize; 2]], most: usize) -> (Vec<Place>, Vec<[usize
     while !open.is_empty() {
         let area: usize = open.iter().map(|&k| sizes[k][0] * sizes[k][1]).sum();
         let widest = open.iter().map(|&k| sizes[k][0]).max().unwrap_or(0);
-        let wanted = ((SLACK * area as f64).sqrt() as usize).max(widest);
-        let width = wanted.next_multiple_of(BLOCK).min(most);
-        let mut page = Skyline::new(width, most);
-        let mut used = 0;
-        open.retain(|&k| {
-            let [w, h] = sizes[k];
-            let Some((x, y)) = page.put(w, h) else {
-                return true;
-            };
+        let tried = WIDTHS.map(|factor| {
+            let wanted = ((factor * area as f64).sqrt() as usize).max(widest);
+            let width = wanted.next_multiple_of(BLOCK).min(most);
+            filled(sizes, &open, width, most)
+        });
+        // All that is left if that goes on a page, on the smallest; else as much as can be.
+        let best = tried.into_iter().reduce(|best, next| {
+            let key = |page: &Filled| (std::cmp::Reverse(page.put.len()), page.width * page.used);
+            if key(&next) < key(&best) { next } else { best }
+        });
+        let Some(best) = best else {
+            break;
+        };
+        for &(k, x, y) in &best.put {
             places[k] = Place {
                 page: pages.len(),
                 x,
                 y,
             };
-            used = used.max(y + h);
-            false
-        });
-        pages.push([width, used.next_multiple_of(BLOCK).min(most)]);
+        }
+        let put: std::collections::HashSet<usize> = best.put.iter().map(|p| p.0).collect();
+        open.retain(|k| !put.contains(k));
+        pages.push([best.width, best.used.next_multiple_of(BLOCK).min(most)]);
     }
     (places, pages)
+}
+
+/// A page with rectangles on it: number and corner of each.
+struct Filled {
+    width: usize,
+    used: usize,
+    put: Vec<(usize, usize, usize)>,
+}
+
+/// Puts as many rectangles as fit on a page, in order.
+fn filled(sizes: &[[usize; 2]], open: &[usize], width: usize, most: usize) -> Filled {
+    let mut page = Skyline::new(width, most);
+    let put = open.iter().filter_map(|&k| {
+        let (x, y) = page.put(sizes[k][0], sizes[k][1])?;
+        Some((k, x, y))
+    });
+    let put: Vec<(usize, usize, usize)> = put.collect();
+    let used = put.iter().map(|&(k, _, y)| y + sizes[k][1]).max();
+    Filled {
+        width,
+        used: used.unwrap_or(0),
+        put,
+    }
 }
 
 /// What of a page is full: pieces from left to right, each with its left end and height.

@@ -15,6 +15,7 @@ use file::{Mapped, Texels};
 use glam::{DVec2, DVec3, dvec3};
 use haarlight::audit::{Reference, Report};
 use haarlight::color::{LinearSrgb, de2000};
+use haarlight::hierarchy::Face;
 use haarlight::lightmap::{LightMaps, MapLimits};
 use haarlight::output::{BakedGlb, Exposure, mapped_glb, maps};
 use haarlight::scene::{Options, Scene};
@@ -397,25 +398,22 @@ fn edges_of_shadows_have_no_steps() {
     room.polygon(&corners, black);
     let lamp = dvec3(0.0, 2.0, 0.0);
     room.point(lamp, 1000.0);
-    let file = written(solved(room.scene(), 1.0), &MapLimits::default());
-    let floor: Vec<Mapped> = file
-        .triangles()
-        .into_iter()
-        .filter(|t| t.corners.iter().all(|c| c.y == 0.0))
-        .collect();
+    let bake = solved(room.scene(), 1.0);
+    let maps = bake.light_maps(&MapLimits::default(), &|_, _| {});
+    let mesh = bake.mesh();
     let at = |p: DVec3| {
-        let inside = floor.iter().find_map(|t| {
-            let [a, b, c] = t.corners;
-            let twice = (b - a).cross(c - a).y;
-            let w = [
-                (c - b).cross(p - b).y / twice,
-                (a - c).cross(p - c).y / twice,
-                (b - a).cross(p - a).y / twice,
-            ];
-            let inside = w.iter().all(|w| *w >= -1e-9);
-            inside.then(|| file.look_up(t, t.uv[0] * w[0] + t.uv[1] * w[1] + t.uv[2] * w[2])[1])
+        let p = p - mesh.centre;
+        // The floor's two triangles come first.
+        let inside = (0..2).find(|t| {
+            let [a, b, c] = mesh.triangles[*t].map(|v| mesh.positions[v as usize]);
+            let left = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(r - p).y >= -1e-12;
+            left(a, b, p) && left(b, c, p) && left(c, a, p)
         });
-        inside.unwrap()
+        let face = Face {
+            triangle: inside.unwrap() as u32,
+            back: false,
+        };
+        maps.drawn(mesh, &[(face, p)])[0].unwrap()[1]
     };
     let shadow = corners.map(|c| lamp + (c - lamp) * 2.0 / 1.5);
     let (mut squares, mut count) = (0.0, 0.0);
@@ -453,7 +451,8 @@ fn indirect_light_is_what_lamps_do_not_send_straight() {
     assert!((0.2..0.8).contains(&share), "{share}");
 }
 
-/// With the npm module gltf-validator at hand: no errors.
+/// With the npm module gltf-validator at hand: no errors. It warns of unlit materials that have another extension beside, as
+/// light maps on unlit materials must.
 #[test]
 fn the_validator_has_nothing_to_say() {
     let file = written(solved(room(), 2.0), &MapLimits::default());
@@ -465,7 +464,12 @@ fn the_validator_has_nothing_to_say() {
     };
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     eprintln!("{text}");
-    assert!(output.status.success(), "{text}");
+    assert!(
+        text.starts_with("skipped") || text.contains(": 0 errors"),
+        "{text}"
+    );
+    let other = |line: &&str| line.contains(" warning ") && !line.contains("MULTIPLE_EXTENSIONS");
+    assert_eq!(text.lines().find(other), None);
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn url(kind: &str, bytes: &[u8]) -> String {
     let mut out = format!("data:{kind};base64,");
     for three in bytes.chunks(3) {
         let at = |k: usize| u32::from(*three.get(k).unwrap_or(&0));
-        let all = at(0) << 16 | at(1) << 8 | at(2);
+        let all = (at(0) << 16) | (at(1) << 8) | at(2);
         for k in 0..4 {
             let digit = DIGITS[(all >> (18 - 6 * k)) as usize % 64];
             out.push(if k <= three.len() {

@@ -4,9 +4,10 @@
 //! unless a number of 16 bits could not hold it. Row 0 is the top: texture coordinates as in glTF.
 //! `NAME.maps.json` lists the pages and, for each primitive with light, where its light is, see [`Index`].
 //!
-//! Radiosity is base colour times irradiance, lm/m2; radiance a pi-th of it. three.js: `lightMap` is a page and `lightMapIntensity`
-//! is `lux_per_unit` times the exposure, for three.js divides by pi itself. Bevy: `Lightmap { image, uv_rect }` with the exposure
-//! `lightmap_exposure` = `lux_per_unit / pi` (cd/m2 of a white surface).
+//! Radiosity is base colour times irradiance, lm/m2; radiance a pi-th of it. three.js shows base colour times texel times
+//! `lightMapIntensity` over pi: `pi * exposure * lux_per_unit` shows what the glb shows; its EXR loader begins with the bottom row
+//! (`repeat` (1, -1), `offset` (0, 1)). Bevy: `Lightmap { image, uv_rect }` with `lightmap_exposure` = `lux_per_unit / pi`, for it
+//! multiplies by the base colour alone.
 
 mod exr;
 mod ktx2;
