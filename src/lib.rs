@@ -16,7 +16,7 @@
 //! ```
 //!
 //! The chain: [`data`] -> [`color`] -> [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`light`] ->
-//! [`transport`] -> [`solve`] -> [`gather`] -> [`mesh`] -> [`keep`] -> [`output`] and [`report`], with [`audit`] beside it and
+//! [`transport`] -> [`solve`] -> [`gather`] -> [`mesh`], [`lightmap`] -> [`keep`] -> [`output`] and [`report`], with [`audit`] beside it and
 //! [`cost`] behind; [`survey`] looks at a room before [`solve`]. A module uses what stands to its left.
 //!
 //! | Rougeron and Peroche 1997 | module |
@@ -40,6 +40,7 @@ pub mod geometry;
 pub mod hierarchy;
 pub mod keep;
 pub mod light;
+pub mod lightmap;
 pub mod link;
 pub mod mesh;
 pub mod output;

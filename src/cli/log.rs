@@ -184,6 +184,8 @@ pub struct Outputs {
     pub cache: Option<String>,
     /// The page that shows the room.
     pub report: Option<String>,
+    /// The index of light maps, and their pages.
+    pub maps: Vec<String>,
     /// Pictures of all rounds.
     pub pictures: Vec<String>,
     /// High dynamic range pictures of the result.
