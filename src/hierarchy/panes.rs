@@ -23,6 +23,10 @@ const NEAR: f64 = 0.05;
 const TOGETHER: f64 = 2e-6;
 /// Cosine of two normals from which on faces are parallel: 2.6 degrees.
 const PARALLEL: f64 = 0.999;
+/// A closed part thinner than this share of its size holds nothing: f32 positions are off by 1e-7 of it.
+const HOLLOW: f64 = 1e-6;
+/// Pairs of solids and parts that may be their cavities, at the most.
+const MOST_PAIRS: usize = 1 << 22;
 
 /// One pane that a ray passes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +59,17 @@ struct Part {
     closed: bool,
     /// Of a closed part, volume over half its surface: the thickness of a sheet.
     thickness: f64,
+    /// Do its faces look inwards? So do those of a reversed solid, and of a cavity in one.
+    inward: bool,
+    /// Its ends.
+    bounds: [DVec3; 2],
+}
+
+impl Part {
+    fn holds(&self, other: &Self) -> bool {
+        let [low, high] = self.bounds;
+        self.closed && low.cmple(other.bounds[0]).all() && high.cmpge(other.bounds[1]).all()
+    }
 }
 
 /// All panes of a room.
@@ -63,6 +78,8 @@ pub struct Panes {
     rays: RayIndex,
     faces: Vec<Face>,
     parts: Vec<Part>,
+    /// Of each part: is it a solid whose faces look inwards?
+    reversed: Vec<bool>,
     /// Distance within which hits are in one place.
     together: f64,
 }
@@ -122,7 +139,15 @@ impl Panes {
         let rays = RayIndex::build(&positions, &triangles, &[], &vec![true; triangles.len()]);
         let [low, high] = rays.bounds();
         let far = low.abs().max(high.abs()).max_element();
+        let solids: Vec<&Part> = parts.iter().filter(|p| p.closed && !p.inward).collect();
+        let inward = parts.iter().filter(|p| p.closed && p.inward).count();
+        // Of more than that nobody asks which are cavities.
+        let few = inward * solids.len() <= MOST_PAIRS;
+        let reversed = parts
+            .iter()
+            .map(|part| few && part.closed && part.inward && !solids.iter().any(|s| s.holds(part)));
         Some(Self {
+            reversed: reversed.collect(),
             together: TOGETHER * f64::from(far),
             rays,
             faces,
@@ -179,7 +204,7 @@ impl Panes {
         Hit {
             at: (point.as_dvec3() - from).dot(direction),
             face,
-            enters: along < 0.0,
+            enters: (along < 0.0) != self.reversed[face.part as usize],
             cosine: along.abs(),
             texel: texel_at(scene, surface, face.triangle, weights),
         }
@@ -198,7 +223,9 @@ impl Panes {
                     && (hit.at - other.at).abs() <= self.together
             };
             // An edge that two triangles share; a back that stands right upon its front.
-            let again = open.iter().any(|o| o.enters == hit.enters && same(o));
+            let here = |o: &&Hit| hit.at - o.at <= self.together;
+            let mut near = open.iter().rev().take_while(here);
+            let again = near.any(|o| o.enters == hit.enters && same(o));
             if again || last.is_some_and(|last| same(&last)) {
                 continue;
             }
@@ -221,7 +248,8 @@ impl Panes {
     fn bound(&self, entry: &Hit, exit: &Hit) -> bool {
         let [a, b] = [entry.face, exit.face];
         let near = (exit.at - entry.at) * entry.cosine <= NEAR && is_parallel(entry, exit);
-        let one = a.part == b.part && self.parts[a.part as usize].closed;
+        // A cavity is a part of its own.
+        let one = [a, b].iter().all(|f| self.parts[f.part as usize].closed);
         a.material == b.material && (near || one)
     }
 
@@ -231,6 +259,10 @@ impl Panes {
             return;
         };
         let chord = exit.at - entry.at;
+        if chord <= self.together {
+            // A face and its back in one place.
+            return out.push(self.alone(scene, entry, 0.0));
+        }
         let parallel = is_parallel(entry, exit);
         let thin = self.parts[entry.face.part as usize].thickness <= NEAR
             || parallel && chord * entry.cosine <= NEAR;
@@ -340,6 +372,7 @@ fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
     let mut edges: BTreeMap<(u32, usize, usize), i64> = BTreeMap::new();
     let first = parts.len() as u32;
     let mut sums: Vec<[f64; 2]> = Vec::new();
+    let mut bounds: Vec<[DVec3; 2]> = Vec::new();
     let origin = surface.positions.first().copied().unwrap_or_default();
     let mut of = Vec::with_capacity(surface.triangles.len());
     for (corners, triangle) in triangles().zip(&surface.triangles) {
@@ -347,6 +380,12 @@ fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
         let part = *number.entry(root(&mut parent, corners[0])).or_insert(next);
         of.push(part);
         sums.resize(number.len(), [0.0; 2]);
+        bounds.resize(number.len(), [DVec3::INFINITY, DVec3::NEG_INFINITY]);
+        let [low, high] = &mut bounds[(part - first) as usize];
+        for i in triangle {
+            let p = surface.positions[*i as usize];
+            (*low, *high) = (low.min(p), high.max(p));
+        }
         let [a, b, c] = triangle.map(|i| surface.positions[i as usize] - origin);
         let sum = &mut sums[(part - first) as usize];
         sum[0] += a.dot(b.cross(c)) / 6.0;
@@ -360,12 +399,17 @@ fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
     for ((part, ..), balance) in edges {
         closed[(part - first) as usize] &= balance == 0;
     }
-    parts.extend(sums.iter().zip(closed).map(|(&[volume, area], closed)| {
-        let thickness = match closed {
-            true => 2.0 * volume.abs() / area,
-            false => f64::INFINITY,
-        };
-        Part { closed, thickness }
+    let each = sums.iter().zip(closed).zip(bounds);
+    parts.extend(each.map(|((&[volume, area], balanced), bounds)| {
+        let thickness = 2.0 * volume.abs() / area;
+        // A face and its back balance as well, and hold nothing.
+        let closed = balanced && thickness > HOLLOW * area.sqrt();
+        Part {
+            closed,
+            thickness: if closed { thickness } else { f64::INFINITY },
+            inward: volume < 0.0,
+            bounds,
+        }
     }));
     of
 }

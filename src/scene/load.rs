@@ -5,6 +5,7 @@ use super::check::{Check, Unknown};
 use super::document::Document;
 use super::light::{self, Lamps};
 use super::material;
+use super::pane;
 use super::sky::{self, SkyWish};
 use super::spectra_file::SpectraFile;
 use super::{LightSpectrum, Material, PunctualLight, Scene, Surface, lacking, luminaires};
@@ -53,9 +54,14 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn from_document(document: Document, options: &Options) -> Result<Self> {
         let geometry = document.load_geometry();
+        let raw_materials = &pane::blended(
+            document.raw_materials(),
+            &geometry.surfaces,
+            &geometry.images,
+        );
         let path = &document.source.path;
         let mut check = Check::new(path.display().to_string());
-        let (raw_materials, raw_lights) = (document.raw_materials(), document.raw_lights());
+        let raw_lights = document.raw_lights();
         let names: Vec<String> = raw_materials.iter().map(material::name_of).collect();
         let light_names: Vec<String> = raw_lights.iter().map(light::name_of).collect();
         let grid = options.grid;
@@ -93,10 +99,11 @@ impl Scene {
         let luminous = lamps.luminous();
         let mut spectra = lamps.finish(&mut materials, &mut lights);
         let size = |light: usize, shape: &Leaves| luminous(&spectra[light], shape);
-        let surfaces = &geometry.surfaces;
+        let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
+        let (panes, surfaces): (Vec<_>, Vec<_>) = geometry.surfaces.into_iter().partition(is_pane);
         luminaires::add(
             &shining,
-            surfaces,
+            &surfaces,
             &mut materials,
             &mut lights,
             options.scale.unwrap_or(1.0),
@@ -129,8 +136,6 @@ impl Scene {
         }
         let mut warnings = geometry.warnings;
         warnings.extend(said);
-        let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
-        let (panes, surfaces) = geometry.surfaces.into_iter().partition(is_pane);
         let scene = Self {
             source: document.source,
             grid,

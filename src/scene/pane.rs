@@ -13,7 +13,7 @@ use super::check::Check;
 use super::known::Sampled;
 use super::material::listed;
 use super::raw::{AlphaMode, RawMaterial, RawVolume};
-use super::{Image, Texture};
+use super::{Image, Surface, Texture};
 use crate::color::Upsampler;
 use crate::data::{LEAVES, Leaves};
 
@@ -148,6 +148,10 @@ impl Slab {
             _ => inside.powf(way),
         };
         let each = |reflected: f64| {
+            if reflected >= 1.0 {
+                // Along the face, as far as numbers can tell.
+                return 0.0;
+            }
             let once = 1.0 - reflected;
             once * once * a / (1.0 - reflected * reflected * a * a)
         };
@@ -182,6 +186,29 @@ fn index_for(most: f64, ior: f64) -> f64 {
     (1.0 + root) / (1.0 - root)
 }
 
+/// The materials with alphaMode BLEND only where their alpha is anywhere below 1: exporters mark whole rooms so.
+pub(super) fn blended(
+    materials: &[RawMaterial],
+    surfaces: &[Surface],
+    images: &[Image],
+) -> Vec<RawMaterial> {
+    let shows_through = |k: usize, raw: &RawMaterial| {
+        let texture = raw.base_color_texture.as_ref();
+        let image = texture.and_then(|texture| images.get(texture.image));
+        let mut of = surfaces.iter().filter(|s| s.material == k);
+        raw.base_color_factor[3] < 1.0
+            || image.is_some_and(|image| image.pixels.iter().any(|p| p[3] < 1.0))
+            || of.any(|s| s.colors.iter().flatten().any(|c| c[3] < 1.0))
+    };
+    let mut materials = materials.to_vec();
+    for (k, raw) in materials.iter_mut().enumerate() {
+        if raw.alpha_mode == AlphaMode::Blend && !shows_through(k, raw) {
+            raw.alpha_mode = AlphaMode::Opaque;
+        }
+    }
+    materials
+}
+
 /// What is said once about all panes.
 #[derive(Default)]
 pub(super) struct Said {
@@ -209,7 +236,6 @@ impl Said {
         upsampler: &Upsampler,
         check: &mut Check,
     ) -> Option<Pane> {
-        let ior = index(raw, place, check);
         let blends = raw.alpha_mode == AlphaMode::Blend;
         let glass = raw.transmission.is_some_and(|t| t >= LEAST);
         if raw.transmission.is_some_and(|t| t > 0.0 && t < LEAST) && measured.is_none() {
@@ -225,6 +251,7 @@ impl Said {
         if (measured.is_some() || glass) && raw.roughness.is_some_and(|r| r > ROUGH) {
             self.rough.push(name.into());
         }
+        let ior = index(raw, place, check);
         let [r, g, b, alpha] = raw.base_color_factor;
         let tint = upsampler.reflectance([r, g, b].map(|c| c.min(1.0)));
         if let Some(measured) = measured {

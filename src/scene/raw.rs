@@ -286,7 +286,10 @@ fn transmission(
         if thickness < 0.0 || distance.is_some_and(|d| d <= 0.0) {
             let what =
                 "KHR_materials_volume has a negative thickness, or a distance that is not positive";
-            check.problem(&item.place, what, "mend the material and export again");
+            match out.transmission {
+                Some(_) => check.problem(&item.place, what, "mend the material and export again"),
+                None => check.warn(format!("{}: {what}: it is passed over", item.place)),
+            }
             return;
         }
         let colour = volume.numbers::<3>("attenuationColor", check);

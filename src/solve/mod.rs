@@ -28,6 +28,7 @@ pub mod reference;
 mod refining;
 mod representation;
 mod sent;
+mod shares;
 mod solving;
 mod sources;
 mod tinted;
@@ -54,6 +55,7 @@ pub use flux::Closed;
 pub use held::Held;
 pub use operator::Operator;
 use outlook::Outlook;
+use shares::Shares;
 use sources::Sources;
 use std::time::Instant;
 
@@ -91,37 +93,6 @@ impl Default for Settings {
 const FIRST_THRESHOLD: f64 = 0.02;
 /// What a round divides the threshold by: about twice the links, half the error.
 const THRESHOLD_STEP: f64 = 3.0;
-/// How finely a room of one kind is divided, as multiples of the round's threshold.
-struct Shares {
-    /// What a link may misplace.
-    link: f64,
-    /// By how much direct light may vary over a leaf.
-    direct: f64,
-    /// By how much reflected light may vary over a leaf that looks for itself.
-    reflected: f64,
-}
-
-/// Rooms of few faces: there are many links to a leaf. Up to 16, the share for direct light changes the Cornell box's
-/// error at points by less than a tenth: what a leaf reflects is seen as a whole.
-const EMPTY: Shares = Shares {
-    link: 0.125,
-    direct: 1.0,
-    reflected: 0.0,
-};
-/// Rooms of at least [`MANY_LEAVES`] faces, nothing hidden: leaves are faces, and small anyway.
-const TESSELLATED: Shares = Shares {
-    link: 0.25,
-    direct: 4.0,
-    reflected: 0.0,
-};
-const MANY_LEAVES: usize = 4096;
-/// Where leaves look for themselves links only say where the hierarchy is too coarse and what is near and clear, and points see
-/// reflected light through rays that end on many leaves.
-const FURNISHED: Shares = Shares {
-    link: 0.4,
-    direct: 5.0,
-    reflected: 1.4,
-};
 /// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
 const LEAST_ROUNDS: usize = 3;
 /// Fewer rounds do where a mere preview is asked for, an error of so much, and the estimate is so many times smaller.
@@ -361,13 +332,7 @@ impl Bake {
 
         let bright = self.brightness_of_nodes();
         let by_rays = self.by_rays();
-        let shares = if by_rays {
-            FURNISHED
-        } else if self.tree.faces.len() >= MANY_LEAVES {
-            TESSELLATED
-        } else {
-            EMPTY
-        };
+        let shares = Shares::of(by_rays, is_small(&self.mesh), self.tree.faces.len());
         let keen = self.keenness();
         let demand = Demand {
             bright: &bright,

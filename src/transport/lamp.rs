@@ -125,8 +125,6 @@ impl Gatherer<'_> {
             let total: f64 = memory.weights.iter().sum();
             let open = open_weight(&memory.weights, &memory.blocked);
             let visible = if total > 0.0 { open / total } else { 0.0 };
-            memory.noise +=
-                all * all * visible * (1.0 - visible) / (owners.len().max(1) as f64).powf(1.5);
             let mut seen = vec![visible; lamps.len()];
             if visible > 0.0 && visible < 1.0 {
                 seen.fill(0.0);
@@ -136,6 +134,9 @@ impl Gatherer<'_> {
                 }
             }
             let tints = self.tints(&owners, lamps.len(), memory);
+            let left = all * self.left_by(tints.last());
+            memory.noise +=
+                left * left * visible * (1.0 - visible) / (owners.len().max(1) as f64).powf(1.5);
             let each = lamps.iter().zip(&seen).enumerate();
             for (k, (lamp, &seen)) in each.filter(|(_, (_, seen))| **seen > 0.0) {
                 let tint = tints.get(k).or(tints.last());
@@ -167,6 +168,14 @@ impl Gatherer<'_> {
         let whole = sums[lamps].mean().unwrap_or([1.0; 64]);
         let each = sums.iter();
         each.map(|sum| sum.mean().unwrap_or(whole)).collect()
+    }
+
+    /// How bright light is that has passed a filter, as a share.
+    pub(super) fn left_by(&self, filter: Option<&Filter>) -> f64 {
+        match (&self.glass, filter) {
+            (Some(glass), Some(filter)) => glass.filters.brightness(filter),
+            _ => 1.0,
+        }
     }
 
     /// How many rays lamps are worth that would bring `all`, share of white.

@@ -231,9 +231,10 @@ impl Gatherer<'_> {
         if parts.is_empty() {
             return (seen, None);
         }
-        let more = self.by_lamp_rays(luminaire, &parts, to, bright, memory);
+        let (more, noise) = self.by_lamp_rays(luminaire, &parts, to, bright, memory);
         let owners = vec![0; memory.segments.len()];
         let filter = self.tints(&owners, 1, memory).first().copied();
+        memory.noise += noise * self.left_by(filter.as_ref()).powi(2);
         (seen + more, filter)
     }
 
@@ -274,7 +275,7 @@ impl Gatherer<'_> {
         Some(parts.iter().map(|part| part.brings).sum())
     }
 
-    /// What rays to the parts of a lamp find of what they bring.
+    /// What rays to the parts of a lamp find of what they bring, and the variance of its brightness.
     fn by_lamp_rays(
         &self,
         luminaire: &Luminaire,
@@ -282,7 +283,7 @@ impl Gatherer<'_> {
         to: &Receiver,
         bright: f64,
         memory: &mut Memory,
-    ) -> f64 {
+    ) -> (f64, f64) {
         let all: f64 = parts.iter().map(|part| part.brings).sum();
         let count = self.rays_to_lamps(to, bright * all);
         let turn = hash(to.seed, 0x6c);
@@ -304,10 +305,10 @@ impl Gatherer<'_> {
         memory.rays += memory.segments.len() as u64;
         let total: f64 = memory.weights.iter().sum();
         if total <= 0.0 {
-            return 0.0;
+            return (0.0, 0.0);
         }
         let seen = open_weight(&memory.weights, &memory.blocked) / total;
-        memory.noise += (bright * all).powi(2) * seen * (1.0 - seen) / (count as f64).powf(1.5);
-        all * seen
+        let noise = (bright * all).powi(2) * seen * (1.0 - seen) / (count as f64).powf(1.5);
+        (all * seen, noise)
     }
 }

@@ -306,7 +306,7 @@ impl Outside {
         let free = ways.filter(|(_, blocked)| !**blocked);
         look.open
             .extend(free.map(|(s, _)| (s.to.as_dvec3() - to.point).normalize()));
-        let (mut seen, mut squares) = ([0.0; 2], 0.0);
+        let (mut seen, mut squares, mut sum) = ([0.0; 2], 0.0, 0.0);
         let mut tints = [Tint::default(); 2];
         let far = 4.0 * sight.mesh.half_size;
         for (k, &d) in look.open.iter().enumerate() {
@@ -327,14 +327,19 @@ impl Outside {
             };
             let brings = radiance * cosine * own / squared;
             seen[place] += brings;
+            let mut left = brings;
             if let Some(glass) = glass {
                 let filter = glass.through(to.point.as_vec3(), (to.point + d * far).as_vec3());
-                tints[place].add(&filter.unwrap_or([1.0; 64]), brings);
+                let filter = filter.unwrap_or([1.0; 64]);
+                left *= glass.filters.brightness(&filter);
+                tints[place].add(&filter, brings);
             }
-            squares += if place == 0 { brings * brings } else { 0.0 };
+            if place == 0 {
+                (squares, sum) = (squares + left * left, sum + left);
+            }
         }
         let count = (wide + narrow) as f64;
-        look.noise = (squares - seen[0] * seen[0] / count).max(0.0);
+        look.noise = (squares - sum * sum / count).max(0.0);
         look.tints = tints.map(|tint| tint.mean());
         seen
     }
