@@ -21,6 +21,7 @@ mod material;
 mod nodes;
 mod primitive;
 mod raw;
+mod said;
 pub mod sky;
 mod spectra_file;
 mod texture;
