@@ -41,7 +41,7 @@ impl Change {
                 continue;
             }
             let place = format!("relight '{name}'");
-            if !value.is_instance_of::<PyMapping>() {
+            if value.cast::<PyMapping>().is_err() {
                 return Err(wrong(py, &place, "is no number and no dictionary", next));
             }
             let entry = json_of(&value, &place)?;

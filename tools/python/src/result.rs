@@ -21,7 +21,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Arrays that were asked for: every caller gets the same ones.
-#[derive(Default)]
 struct Arrays {
     positions: PyOnceLock<Py<PyAny>>,
     normals: PyOnceLock<Py<PyAny>>,
@@ -30,6 +29,20 @@ struct Arrays {
     xyz: PyOnceLock<Py<PyAny>>,
     irradiance: PyOnceLock<Py<PyAny>>,
     spectra: PyOnceLock<Py<PyAny>>,
+}
+
+impl Arrays {
+    fn none() -> Self {
+        Self {
+            positions: PyOnceLock::new(),
+            normals: PyOnceLock::new(),
+            triangles: PyOnceLock::new(),
+            surface: PyOnceLock::new(),
+            xyz: PyOnceLock::new(),
+            irradiance: PyOnceLock::new(),
+            spectra: PyOnceLock::new(),
+        }
+    }
 }
 
 /// The light of a room. Made by `Room.bake` and `Result.relight`.
@@ -52,7 +65,7 @@ impl Lit {
     fn of(light: Light) -> Self {
         Self {
             light: Arc::new(light),
-            arrays: Arrays::default(),
+            arrays: Arrays::none(),
         }
     }
 
@@ -447,10 +460,10 @@ impl From<&str> for Text {
     }
 }
 
-impl<'py> FromPyObject<'_, 'py> for Text {
+impl<'a, 'py> FromPyObject<'a, 'py> for Text {
     type Error = PyErr;
 
-    fn extract(given: pyo3::Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+    fn extract(given: pyo3::Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
         given.str().map(|text| Self(text.to_string()))
     }
 }

@@ -98,7 +98,7 @@ pub(crate) fn load(
         ..Options::default()
     };
     match spectra {
-        Some(given) if given.is_instance_of::<PyMapping>() => {
+        Some(given) if given.cast::<PyMapping>().is_ok() => {
             options.say(json_of(given, "spectra")?);
         }
         Some(given) => options.spectra = Some(given.extract()?),

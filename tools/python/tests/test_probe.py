@@ -48,7 +48,7 @@ def test_bands_of_a_dense_bake_are_those_of_the_command(command, cornell, scenes
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64, np.longdouble, np.int64, list, tuple])
 def test_points_of_any_kind(lit, kind):
-    whole = [[0, 0, 0], [1, 0, -1]]
+    whole = [[0, 3, 0], [1, 0, -1]]
     numbers = {list: whole, tuple: tuple(map(tuple, whole))}.get(kind)
     points = np.array(whole, dtype=kind) if numbers is None else numbers
     with pytest.warns(haarlight.RoomWarning, match="of 2 points lie"):
@@ -95,4 +95,4 @@ def test_wrong_points_are_named(lit, points, normals, place, what):
 
 
 def test_places(lit):
-    assert lit.places([[0.2, 0.2, -0.2], [9.0, 9.0, 9.0]], UP) == ["room", "outside"]
+    assert lit.places([[0.4, 0.4, 0.1], [9.0, 9.0, 9.0]], UP) == ["room", "outside"]

@@ -65,8 +65,9 @@ def test_all_problems_come_together(scenes):
         "the room has no material of that name",
         "the room has no light of that name",
     ]
-    with pytest.warns(haarlight.RoomWarning, match="no material of that name"):
+    with pytest.warns(haarlight.RoomWarning) as warned:
         haarlight.load(scenes / "cornell.glb", said, lenient=True)
+    assert any("no material of that name" in str(warning.message) for warning in warned)
 
 
 def test_spectra_come_as_names_rows_and_arrays(scenes, grid):
