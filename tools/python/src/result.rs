@@ -372,7 +372,7 @@ impl Lit {
     ///
     /// Warns:
     ///     RoomWarning: what could not be carried over.
-    #[pyo3(signature = (path, *, exposure = "auto".into(), white_balance = "none".into(), xyz = false, compress = "none"))]
+    #[pyo3(signature = (path, *, exposure = "auto".into(), white_balance = "none".into(), xyz = false, compress = "none"), text_signature = "($self, path, *, exposure='auto', white_balance='none', xyz=False, compress='none')")]
     fn save(
         &self,
         py: Python<'_>,

@@ -71,7 +71,7 @@ pub(crate) struct Room {
 ///     InputError: all that is wrong with the room, as `problems`.
 ///     FileError: a file that cannot be read; `MissingFileError` where there is none.
 #[pyfunction]
-#[pyo3(signature = (path, spectra = None, *, sky = None, range = (380.0, 780.0), lenient = false, scale = None, flip = false, allow_dark = false))]
+#[pyo3(signature = (path, spectra = None, *, sky = None, range = (380.0, 780.0), lenient = false, scale = None, flip = false, allow_dark = false), text_signature = "(path, spectra=None, *, sky=None, range=(380.0, 780.0), lenient=False, scale=None, flip=False, allow_dark=False)")]
 #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
 pub(crate) fn load(
     py: Python<'_>,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class Named(NamedTuple):
+@dataclass(frozen=True)
+class Named:
     """A thing of the room's document, by index, name or both."""
 
     index: int | None

@@ -1,4 +1,4 @@
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, Protocol, TypeAlias, final
@@ -11,8 +11,8 @@ from ._types import Probe, Spectrum
 __version__: str
 PROGRAM: str
 
-Record: TypeAlias = dict[str, Any]
-Words: TypeAlias = Mapping[str, Any]
+_Record: TypeAlias = dict[str, Any]
+_Words: TypeAlias = Mapping[str, Any]
 """A dictionary in the words of a file of spectra."""
 
 class _Event(Protocol):
@@ -26,7 +26,7 @@ class Room:
     def path(self) -> Path:
         """The file."""
     @property
-    def plan(self) -> list[Record]:
+    def plan(self) -> list[_Record]:
         """What will be simulated and why: `name`, `runs`, `lacking`, `reason` of each effect."""
     @property
     def facts(self) -> Record:
@@ -35,14 +35,14 @@ class Room:
     def warnings(self) -> list[str]:
         """What the user should know of the room, sentences."""
     @property
-    def surfaces(self) -> list[Record]:
+    def surfaces(self) -> list[_Record]:
         """The surfaces, as `Result.surface` counts them: `name`, `node`, `mesh`, `primitive`, `instance`, `material`."""
     def bake(
         self,
         error: float = 0.5,
         *,
         time: float | None = None,
-        on_round: Callable[[Record], object] | None = None,
+        on_round: Callable[[_Record], object] | None = None,
         stop: _Event | None = None,
         mesh: bool = True,
         keep: bool = True,
@@ -68,10 +68,10 @@ class Result:
     def error(self) -> float | None:
         """Mean colour difference (CIEDE2000), an estimate; None before there are two rounds."""
     @property
-    def rounds(self) -> list[Record]:
+    def rounds(self) -> list[_Record]:
         """A flat record of every round, as `pandas.DataFrame` takes them."""
     @property
-    def relit(self) -> Record | None:
+    def relit(self) -> _Record | None:
         """What relighting took; None for a bake."""
     @property
     def white(self) -> list[float]:
@@ -103,7 +103,7 @@ class Result:
         """Light at points (N, 3) with normals (N, 3) or (3,)."""
     def places(self, points: ArrayLike, normals: ArrayLike) -> list[Literal["room", "inside", "outside"]]:
         """Where points (N, 3) with normals (N, 3) or (3,) lie."""
-    def relight(self, changes: Mapping[str, float | Words] | Room) -> Result:
+    def relight(self, changes: Mapping[str, float | _Words] | Room) -> Result:
         """The room under other lamps and paints, by name: a factor, or the words of a file of spectra."""
     def audit(self, points: int = 200, *, seed: int = 0) -> Record:
         """The error measured at random points by Monte Carlo, a flat record."""
@@ -120,10 +120,10 @@ class Result:
 
 def load(
     path: str | PathLike[str],
-    spectra: str | PathLike[str] | Words | None = None,
+    spectra: str | PathLike[str] | _Words | None = None,
     *,
-    sky: str | Words | None = None,
-    range: tuple[float, float] | Sequence[float] = (380.0, 780.0),
+    sky: str | _Words | None = None,
+    range: tuple[float, float] = (380.0, 780.0),
     lenient: bool = False,
     scale: float | None = None,
     flip: bool = False,
