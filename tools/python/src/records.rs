@@ -40,18 +40,3 @@ fn flatten(name: &str, value: Value, row: &mut Map<String, Value>) {
         flatten(&name, value, row);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    #[test]
-    fn figures_keep_their_kind() {
-        let mut row = Map::new();
-        let record = json!({"round": 1, "error": {"total": {"value": 0.5, "kind": "estimate"}}, "defect": [1, 2]});
-        flatten("", record, &mut row);
-        let flat = json!({"round": 1, "error.total": 0.5, "error.total.kind": "estimate", "defect": [1, 2]});
-        assert_eq!(Value::Object(row), flat);
-    }
-}
