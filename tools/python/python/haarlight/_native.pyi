@@ -29,7 +29,7 @@ class Room:
     def plan(self) -> list[_Record]:
         """What will be simulated and why: `name`, `runs`, `lacking`, `reason` of each effect."""
     @property
-    def facts(self) -> Record:
+    def facts(self) -> _Record:
         """What the room holds, as `haarlight inspect --json` has it."""
     @property
     def warnings(self) -> list[str]:
@@ -105,7 +105,7 @@ class Result:
         """Where points (N, 3) with normals (N, 3) or (3,) lie."""
     def relight(self, changes: Mapping[str, float | _Words] | Room) -> Result:
         """The room under other lamps and paints, by name: a factor, or the words of a file of spectra."""
-    def audit(self, points: int = 200, *, seed: int = 0) -> Record:
+    def audit(self, points: int = 200, *, seed: int = 0) -> _Record:
         """The error measured at random points by Monte Carlo, a flat record."""
     def save(
         self,
