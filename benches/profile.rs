@@ -75,7 +75,8 @@ fn main() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut each = Vec::new();
     for size in SIZES.into_iter().filter(|&s| s <= most) {
-        let made = Command::new(env!("CARGO_BIN_EXE_rooms"))
+        let made = Command::new(env!("CARGO"))
+            .args(["run", "--release", "--quiet", "--example", "rooms", "--"])
             .arg(folder.path())
             .args(["--only", "furnished", "--triangles", &size.to_string()])
             .output()

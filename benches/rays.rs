@@ -694,7 +694,10 @@ fn lambert_x8(bencher: Bencher<'_, '_>) {
         let mut sum = 0.0;
         for [a, b] in black_box(pairs) {
             let points: [DVec3; 8] = std::array::from_fn(|k| a[0].lerp(a[1], k as f64 / 8.0));
-            sum += lanes::lambert_points_x8(lanes::lanes_of(points), normal(a), b).reduce_add();
+            let normals = lanes::all_lanes(normal(a));
+            let factors =
+                lanes::lambert_x8(lanes::lanes_of(points), normals, b.map(lanes::all_lanes));
+            sum += factors.reduce_add();
         }
         sum
     });

@@ -124,6 +124,7 @@ fn room(leaves: usize) -> (Tree, Vec<Link>) {
         rays: bake.rays(),
         mesh: bake.mesh(),
         opaque: None,
+        panes: None,
         occlusion: false,
     };
     let mut tree = Tree::new(bake.mesh(), &vec![0; bake.mesh().faces.len()]);

@@ -16,7 +16,7 @@
 //! ```
 //!
 //! The chain: [`data`] -> [`color`] -> [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`light`] ->
-//! [`transport`] -> [`solve`] -> [`gather`] -> [`mesh`] -> [`keep`] -> [`output`] and [`report`], with [`audit`] beside it and
+//! [`transport`] -> [`solve`] -> [`gather`] -> [`mesh`], [`lightmap`] -> [`keep`] -> [`output`] and [`report`], with [`audit`] beside it and
 //! [`cost`] behind; [`survey`] looks at a room before [`solve`]. A module uses what stands to its left.
 //!
 //! | Rougeron and Peroche 1997 | module |
@@ -28,8 +28,10 @@
 //! | 5 the neglected term | [`spectrum`]: `bound`, `sum` |
 
 pub mod audit;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod color;
+#[cfg(feature = "paper")]
 pub mod cost;
 pub mod data;
 pub mod error;
@@ -38,6 +40,7 @@ pub mod geometry;
 pub mod hierarchy;
 pub mod keep;
 pub mod light;
+pub mod lightmap;
 pub mod link;
 pub mod mesh;
 pub mod output;
@@ -50,6 +53,7 @@ pub mod survey;
 pub mod transport;
 
 pub use error::{Error, Problem, Result};
+pub use glam;
 
 /// Name and version of the program.
 pub const PROGRAM: &str = concat!("haarlight ", env!("CARGO_PKG_VERSION"));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Folders and files of `src`, from the bottom to the top. `lib` and `main` hold them together.
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 22] = [
     "error",
     "data",
     "color",
@@ -19,6 +19,7 @@ const ORDER: [&str; 21] = [
     "solve",
     "gather",
     "mesh",
+    "lightmap",
     "keep",
     "audit",
     "output",

@@ -8,9 +8,9 @@ use crate::color::Upsampler;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
-use crate::hierarchy::{Face, Mesh};
+use crate::hierarchy::{Face, Glazing, Mesh, Panes};
 use crate::scene::sky::SUN_RADIUS;
-use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
+use crate::scene::{Alpha, LightKind, PunctualLight, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -31,6 +31,7 @@ pub struct Audit<'a> {
     lamps: Vec<(Face, f64)>,
     total: f64,
     masked: bool,
+    panes: Option<Panes>,
 }
 
 /// Irradiance at a point: mean and standard error per leaf, W/m2/nm, and the batch means for anything derived.
@@ -72,7 +73,7 @@ impl<'a> Audit<'a> {
         let mut total = 0.0;
         for &face in &mesh.faces {
             let material = &scene.materials[mesh.material[face.triangle as usize] as usize];
-            if let Some(e) = &material.emission {
+            if let Some(e) = material.even_emission() {
                 let power: f64 = e
                     .shape
                     .iter()
@@ -97,6 +98,7 @@ impl<'a> Audit<'a> {
             lamps,
             total,
             masked,
+            panes: Panes::new(scene, mesh.centre),
         }
     }
 
@@ -153,9 +155,12 @@ impl<'a> Audit<'a> {
         let (mut toward_lamp, mut toward_any) = (first[0], first[1]);
         for bounce in 0.. {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
-            self.punctual(&at, toward_lamp, &throughput, sum);
+            self.punctual(&at, toward_lamp, rng, &throughput, sum);
             let direction = cosine_direction(at.normal, toward_any);
-            let Some(hit) = self.closest(at.point, direction, at.plane) else {
+            let hit = self.closest(at.point, direction, at.plane);
+            let reach = hit.map_or(4.0 * self.mesh.half_size, |hit| f64::from(hit.t));
+            throughput = self.filtered(&throughput, at.point, at.point + direction * reach);
+            let Some(hit) = hit else {
                 self.outside(direction, &throughput, sum);
                 return;
             };
@@ -217,7 +222,7 @@ impl<'a> Audit<'a> {
     /// Density per area with which a lamp's triangle is chosen.
     fn chance(&self, triangle: usize) -> f64 {
         let material = &self.scene.materials[self.mesh.material[triangle] as usize];
-        let Some(e) = &material.emission else {
+        let Some(e) = material.even_emission() else {
             return 0.0;
         };
         let power: f64 = e
@@ -285,6 +290,7 @@ impl<'a> Audit<'a> {
         let by_area = self.chance(triangle) * r2 / c2;
         let by_direction = c1 / PI;
         let factor = c1 / (by_area + by_direction);
+        let throughput = &self.filtered(throughput, at.point, q);
         for l in 0..LEAVES {
             sum[l] += throughput[l] * radiance[l] * factor;
         }
@@ -306,7 +312,14 @@ impl<'a> Audit<'a> {
         }
     }
 
-    fn punctual(&self, at: &Vertex, square: [f64; 2], throughput: &Leaves, sum: &mut Leaves) {
+    fn punctual(
+        &self,
+        at: &Vertex,
+        square: [f64; 2],
+        rng: &mut Pcg,
+        throughput: &Leaves,
+        sum: &mut Leaves,
+    ) {
         for light in &self.scene.lights {
             if light.kind.is_dome() {
                 continue;
@@ -326,6 +339,8 @@ impl<'a> Audit<'a> {
                     at.normal.dot(toward),
                     at.point + toward * (4.0 * self.mesh.half_size),
                 )
+            } else if light.kind == LightKind::Surface {
+                self.shining(light, at, square, rng)
             } else {
                 let d = position - at.point;
                 let r2 = d.length_squared();
@@ -335,6 +350,10 @@ impl<'a> Audit<'a> {
                         ((along - outer.cos()) / (inner.cos() - outer.cos()).max(1e-3))
                             .clamp(0.0, 1.0)
                             .powi(2)
+                    }
+                    LightKind::Profile => {
+                        let spread = light.luminaire.as_ref();
+                        spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
                     }
                     _ => 1.0,
                 };
@@ -352,10 +371,64 @@ impl<'a> Audit<'a> {
                 continue;
             }
             let power = &self.scene.spectra[light.light].power;
+            let throughput = self.filtered(throughput, at.point, end);
             for l in 0..LEAVES {
                 sum[l] += throughput[l] * factor * power[l] * light.shape[l];
             }
         }
+    }
+
+    /// A random point of a lamp with an extent, by area: what turns its flux into irradiance, and the point.
+    fn shining(
+        &self,
+        light: &PunctualLight,
+        at: &Vertex,
+        square: [f64; 2],
+        rng: &mut Pcg,
+    ) -> (f64, DVec3) {
+        let nothing = (0.0, at.point);
+        let Some(luminaire) = &light.luminaire else {
+            return nothing;
+        };
+        let area = |[a, b, c]: &[DVec3; 3]| 0.5 * (*b - *a).cross(*c - *a).length();
+        let mut left = rng.f64() * luminaire.area();
+        let chosen = luminaire.triangles().iter().find(|t| {
+            left -= area(t);
+            left < 0.0
+        });
+        let Some(triangle) = chosen.or(luminaire.triangles().last()) else {
+            return nothing;
+        };
+        let [a, b, c] = *triangle;
+        let own = (b - a).cross(c - a).normalize_or_zero();
+        let from = on_triangle(triangle, square) + light.position - self.mesh.centre;
+        let d = from - at.point;
+        let (r2, way) = (d.length_squared(), d.normalize_or_zero());
+        let sent = luminaire.per_area(-way, own) * luminaire.area();
+        let end = from + own * (1e-5 * self.mesh.half_size);
+        (sent * at.normal.dot(way) / r2, end)
+    }
+
+    /// What panes between two points leave of light, leaf by leaf.
+    fn filtered(&self, throughput: &Leaves, from: DVec3, to: DVec3) -> Leaves {
+        let mut left = *throughput;
+        let Some(panes) = &self.panes else {
+            return left;
+        };
+        let scene = self.scene;
+        let glazing = Glazing { panes, scene };
+        for crossing in glazing.crossings(from.as_vec3(), to.as_vec3()) {
+            let Some(pane) = &scene.materials[crossing.material as usize].pane else {
+                continue;
+            };
+            let [cosine, thickness, texel] =
+                [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
+            let passing = pane.passing(cosine, thickness, texel);
+            for (x, spectrum) in left.iter_mut().zip(pane.spectrum()) {
+                *x *= passing(*spectrum);
+            }
+        }
+        left
     }
 
     fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<crate::geometry::Hit> {
@@ -388,9 +461,7 @@ impl<'a> Audit<'a> {
 
     /// Emitted radiance at a point of a triangle, W/m2/sr/nm.
     fn radiance(&self, triangle: usize, weights: [f32; 3]) -> Option<Leaves> {
-        let e = self.scene.materials[self.mesh.material[triangle] as usize]
-            .emission
-            .as_ref()?;
+        let e = self.scene.materials[self.mesh.material[triangle] as usize].even_emission()?;
         let weights = self.mesh.on_origin_f32(triangle, weights);
         let power = &self.scene.spectra[e.light].power;
         let shape = match &e.texture {

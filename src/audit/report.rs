@@ -7,6 +7,7 @@ use super::reference::Reference;
 use super::spread::{Measured, Spread};
 use crate::color::de2000;
 use crate::gather::Baked;
+use crate::lightmap::LightMaps;
 use crate::solve::Bake;
 use glam::DVec3;
 use serde::Serialize;
@@ -113,6 +114,17 @@ impl Report {
         let light = bake.drawn(baked, &places).into_iter();
         let light = light.map(Option::unwrap_or_default);
         Self::of(bake, reference, light.collect(), bake.error_of(baked))
+    }
+
+    /// Compares light maps with a reference of the same room: light as a bilinear look-up has it.
+    pub fn of_maps(bake: &Bake, maps: &LightMaps, reference: &Reference) -> Self {
+        let points = reference.points.iter();
+        let places: Vec<_> = points
+            .map(|p| (p.face, p.point - bake.mesh().centre))
+            .collect();
+        let light = maps.drawn(bake.mesh(), &places).into_iter();
+        let light = light.map(Option::unwrap_or_default);
+        Self::of(bake, reference, light.collect(), bake.error_of(&maps.baked))
     }
 
     fn of(bake: &Bake, reference: &Reference, light: Vec<[f64; 3]>, estimate: Option<f64>) -> Self {

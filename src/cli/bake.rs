@@ -5,6 +5,7 @@
 //! the same bytes.
 
 use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
+use super::maps::{self, Mapping};
 use super::options::{Common, Reading, Showing, Solving, Storing, positive};
 use super::report::Report;
 use super::results::print;
@@ -17,7 +18,7 @@ use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
 use crate::mesh::Limits;
 use crate::output::gltf::{Packing, Writing};
-use crate::output::{BakedGlb, baked_glb, camera, npz, vertices_within};
+use crate::output::{BakedGlb, baked_glb, camera, mapped_glb, npz, vertices_within};
 use crate::report::Log;
 use crate::scene::Scene;
 use crate::solve::{Bake, Representation, Settings, Verdict};
@@ -68,6 +69,9 @@ pub struct BakeArgs {
     /// How it is stored.
     #[command(flatten)]
     pub storing: Storing,
+    /// In vertices or in maps.
+    #[command(flatten)]
+    pub mapping: Mapping,
     /// The baked room has this many vertices at the most, but never fewer than the room itself.
     #[arg(long, value_name = "N")]
     pub vertices: Option<usize>,
@@ -163,7 +167,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
 
     let clock = Instant::now();
     let mut bake = prepare(scene, &args.solving, common, args.spectrum, &talk);
+    if args.checkpoint.is_some() {
+        bake.can_be_kept("--checkpoint")?;
+    }
     if cache.is_some() {
+        bake.can_be_kept("--cache")?;
         bake.keep();
     }
     let plan = PlanRecord::new(&bake, args.solving.time);
@@ -227,12 +235,17 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         vertices: most_vertices(args, bake.scene())?,
         late: &|| stop.is_late(drawing),
     };
-    let baked = bake.baked_within(&limits, &|done, of| talk.progress("gathering", done, of));
+    let maps = (args.mapping.is_wanted()).then(|| args.mapping.maps(&bake, &stop, &talk));
+    let of_vertices = match &maps {
+        Some(_) => maps::metered(&bake),
+        None => bake.baked_within(&limits, &|done, of| talk.progress("gathering", done, of)),
+    };
+    let baked = maps.as_ref().map_or(&of_vertices, |maps| &maps.baked);
     let cut_short = stop.is_late(drawing);
     seconds.gather = clock.elapsed().as_secs_f64();
     // An error is reached when the file's is.
     let met = bake
-        .error_of(&baked)
+        .error_of(baked)
         .is_none_or(|e| e <= bake.settings().error);
     let verdict = match verdict {
         Verdict::Reached if !met && cut_short => stop.reason().unwrap_or(Verdict::Exhausted),
@@ -243,21 +256,28 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let clock = Instant::now();
     talk.phase("writing");
     let (scene, room) = (bake.scene(), Some(args.room.as_path()));
-    let exposure = args.showing.of(scene, &baked.surfaces, &cameras);
-    let glb = baked_glb(scene, &baked.surfaces, &exposure, args.storing.writing())?;
+    let exposure = args.showing.of(scene, &of_vertices.surfaces, &cameras);
+    let glb = match &maps {
+        Some(maps) => mapped_glb(scene, maps, &exposure)?,
+        None => baked_glb(scene, &baked.surfaces, &exposure, args.storing.writing())?,
+    };
     glb.warnings.iter().for_each(|w| talk.warn(w));
     over_budget(args, &glb).iter().for_each(|w| talk.warn(w));
     file::write_atomic(&output, room, |w| w.write_all(&glb.bytes))?;
     outputs.glb = text(&output);
+    if let Some(maps) = &maps {
+        let (room, ktx2) = (&args.room, args.mapping.ktx2);
+        outputs.maps = maps::write(&output, room, scene, maps, &glb, &exposure, ktx2)?;
+    }
     outputs.report = report.as_ref().map(|r| text(&r.path));
     if let Some(path) = &args.npz {
-        write_npz(path, &args.room, &bake, &baked)?;
+        write_npz(path, &args.room, &bake, baked)?;
         outputs.npz = Some(text(path));
     }
     // A cache that cannot be written is told of when all else is done.
     let mut uncached = None;
     if let Some(path) = &cache {
-        match bake.write_cache(&baked, path, args.cache_limit << 20) {
+        match bake.write_cache(baked, path, args.cache_limit << 20) {
             Ok(size) => {
                 talk.say(&format!("cache: {}, {:.1} MB", text(path), megabytes(size)));
                 outputs.cache = Some(text(path));
@@ -277,7 +297,10 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         talk.phase("auditing");
         let seed = common.seed ^ AUDIT_SEED;
         let reference = Reference::new(&bake, points, AUDIT_PATHS, seed);
-        audit::Report::of_file(&bake, &baked, &reference)
+        match &maps {
+            Some(maps) => audit::Report::of_maps(&bake, maps, &reference),
+            None => audit::Report::of_file(&bake, baked, &reference),
+        }
     });
     if let Some(audit) = &audit {
         write(&mut log, audit)?;
@@ -288,7 +311,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let end = End {
         bake: &bake,
         verdict,
-        baked: &baked,
+        baked,
         glb: &glb,
         exposure,
         outputs,
@@ -308,7 +331,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
             false => Some(baked_glb(scene, &baked.surfaces, &exposure, plain)?),
         };
         let glb = plain.as_ref().unwrap_or(&glb);
-        report.write(&record, audit.as_ref(), &baked, &cameras, glb, &bake)?;
+        report.write(&record, audit.as_ref(), baked, &cameras, glb, &bake)?;
     }
     talk.clear();
     talk.say(&format!("\n{}", summary::rounds(bake.rounds())));
@@ -436,6 +459,7 @@ fn problems(
     inputs.extend(parts.iter().map(PathBuf::as_path));
     let mut problems = paths::problems(&outputs, &inputs);
     problems.extend(paths::not_glb(output, "baked"));
+    problems.extend(maps::problems(args));
     if let Some(folder) = args
         .snapshots
         .as_deref()

@@ -1,7 +1,9 @@
 //! The command line as a whole.
 
 use super::options::Common;
-use super::{bake, cost, inspect, paper, probe, relight, spectra};
+use super::{bake, inspect, probe, relight, spectra};
+#[cfg(feature = "paper")]
+use super::{cost, paper};
 use crate::error::{Error, Result};
 
 const EXAMPLES: &str = "\
@@ -44,8 +46,10 @@ pub enum Command {
     Probe(probe::ProbeArgs),
     /// List the spectra that rooms may name.
     Spectra(spectra::SpectraArgs),
+    #[cfg(feature = "paper")]
     /// What accuracy costs on a room: measured error against time.
     Cost(cost::CostArgs),
+    #[cfg(feature = "paper")]
     /// The paper's tables, measured beside printed.
     Paper(paper::PaperArgs),
 }
@@ -68,7 +72,9 @@ pub fn run(cli: &Cli) -> Result<u8> {
         Command::Inspect(args) => inspect::run(args, &mut std::io::stdout()).map(|()| 0),
         Command::Probe(args) => probe::run(args, &cli.common),
         Command::Spectra(args) => spectra::run(args).map(|()| 0),
+        #[cfg(feature = "paper")]
         Command::Cost(args) => cost::run(args, &cli.common),
+        #[cfg(feature = "paper")]
         Command::Paper(args) => paper::run(args).map(|()| 0),
     }
 }

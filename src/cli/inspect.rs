@@ -11,10 +11,10 @@ use super::options::Reading;
 use super::pictures;
 use super::results::put;
 use crate::error::Result;
-use crate::scene::Scene;
 use crate::scene::document::Document;
 use crate::scene::effects::Plan;
 use crate::scene::facts::{Facts, LightFact};
+use crate::scene::{Scene, short};
 use crate::survey::advise;
 use serde_json::json;
 use std::io::Write;
@@ -115,7 +115,7 @@ fn page(facts: &Facts, plan: &Plan, warnings: &[String]) -> String {
             light.kind.into(),
             flux,
             strength(light),
-            light.spectrum.clone(),
+            spectrum(light),
         ]);
     }
     if facts.lights.is_empty() {
@@ -154,6 +154,23 @@ fn page(facts: &Facts, plan: &Plan, warnings: &[String]) -> String {
         lines.extend(warnings.iter().map(|w| format!("  {w}")));
     }
     lines.join("\n") + "\n"
+}
+
+/// Where the spectrum comes from, and how the light is spread.
+fn spectrum(light: &LightFact) -> String {
+    let Some(profile) = &light.profile else {
+        return light.spectrum.clone();
+    };
+    let lamps = profile.lamps_lm.map(|lm| format!(" of {lm:.0} lm lamps"));
+    format!(
+        "{}, spread as '{}' ({}, type {}, {:.1} lm{})",
+        light.spectrum,
+        short(&profile.luminaire),
+        profile.format,
+        profile.angles,
+        profile.flux_lm,
+        lamps.unwrap_or_default()
+    )
 }
 
 fn strength(light: &LightFact) -> String {

@@ -43,7 +43,7 @@
 //! | `flux.emitted_lm`, `.received_lm` | lm | given out by surfaces; what fronts receive straight from lamps of any kind |
 //! | `flux.absorbed_lm`, `.escaped_lm` | lm | absorbed by fronts; left the room or met a black back |
 //! | `flux.worst_band` | 1 | worst relative difference of received and absorbed + escaped light over all bands |
-//! | `flux.sent` | 1 | where the light of lamps goes first, by rays from them: `to_fronts`, `to_backs`, `outside`, shares (estimates, to .1 %) of `lamps_lm`, the flux of all but directional lamps, lm |
+//! | `flux.sent` | 1 | where the light of lamps goes first, by rays from them: `to_fronts`, `to_backs`, `outside`, `in_panes` (absorbed or reflected by panes), shares (estimates, to .1 %) of `lamps_lm`, the flux of all but directional lamps, lm |
 //! | `flux.scaled` | 1 | what light on leaves was multiplied by so that none goes missing, `direct` and `reflected`; 1: nothing was |
 //! | `row_sum_defect`, `row_sum_defect_after` | 1 | distance of row sums from what each leaf looks out on: mean by area and greatest, before and after balancing |
 //!
@@ -184,6 +184,8 @@ pub struct Outputs {
     pub cache: Option<String>,
     /// The page that shows the room.
     pub report: Option<String>,
+    /// The index of light maps, and their pages.
+    pub maps: Vec<String>,
     /// Pictures of all rounds.
     pub pictures: Vec<String>,
     /// High dynamic range pictures of the result.

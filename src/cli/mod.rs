@@ -8,6 +8,7 @@
 //! | `log` | the log of a bake, field by field |
 //! | `report` | the page of a bake |
 //! | `snapshots` | pictures of the rounds |
+//! | `maps` | light maps of a bake, and what may be asked of them |
 //! | `metrics` | figures of lighting practice for `probe` |
 //! | `pictures` | plan and spectra of a room for `inspect` |
 //! | `points` | the CSV of points for `probe` |
@@ -19,12 +20,15 @@
 
 pub mod bake;
 mod command;
+#[cfg(feature = "paper")]
 pub mod cost;
 mod fault;
 pub mod inspect;
 pub mod log;
+mod maps;
 mod metrics;
 pub mod options;
+#[cfg(feature = "paper")]
 pub mod paper;
 mod paths;
 mod pictures;

@@ -1,10 +1,12 @@
-//! `inspect --pictures DIR`: `plan.svg`, `lamps.svg` and `materials.svg`, which go on in `lamps-2.svg` and so on.
+//! `inspect --pictures DIR`: `plan.svg`, `lamps.svg` and `materials.svg`, which go on in `lamps-2.svg` and so on, and
+//! `profile.svg`, `profile-2.svg` ..., the polar curves of lamps whose light is spread as a file says.
 
 use crate::error::{Error, Result};
 use crate::report::page::lamp_spectra;
-use crate::report::{Chart, Scale, Series, plan};
-use crate::scene::Scene;
+use crate::report::{Chart, Scale, Series, plan, polar};
 use crate::scene::facts::Facts;
+use crate::scene::profile::Profile;
+use crate::scene::{Scene, listed, short};
 use crate::spectrum::Leaves;
 use crate::store::file;
 use std::path::Path;
@@ -38,6 +40,7 @@ pub(super) fn write(folder: &Path, scene: &Scene, facts: &Facts) -> Result<()> {
             (format!("{}{less}", fact.name), material.reflectance)
         })
         .collect();
+    profiles(folder, scene)?;
     let of = |what: &str| format!("{what} of {room}");
     charts(
         folder,
@@ -55,6 +58,39 @@ pub(super) fn write(folder: &Path, scene: &Scene, facts: &Facts) -> Result<()> {
         scene,
         &materials,
     )
+}
+
+/// A polar curve for each file of photometric data, titled by the lamps that have it.
+fn profiles(folder: &Path, scene: &Scene) -> Result<()> {
+    let mut drawn: Vec<(&Profile, Vec<&str>)> = Vec::new();
+    for light in &scene.lights {
+        let Some(luminaire) = &light.luminaire else {
+            continue;
+        };
+        let profile = &*luminaire.profile;
+        match drawn.iter_mut().find(|(other, _)| *other == profile) {
+            Some((_, names)) if names.contains(&light.name.as_str()) => {}
+            Some((_, names)) => names.push(&light.name),
+            None => drawn.push((profile, vec![&light.name])),
+        }
+    }
+    for (k, (profile, names)) in drawn.iter().enumerate() {
+        let number = match k {
+            0 => String::new(),
+            k => format!("-{}", k + 1),
+        };
+        let names: Vec<String> = names.iter().map(|name| short(name)).collect();
+        let of = match profile.luminaire.as_str() {
+            "" => String::new(),
+            of => format!(": {}", short(of)),
+        };
+        let title = format!("{}{of}", listed(&names));
+        put(
+            &folder.join(format!("profile{number}.svg")),
+            &polar::svg(profile, &title),
+        )?;
+    }
+    Ok(())
 }
 
 fn charts(

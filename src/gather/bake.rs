@@ -8,9 +8,13 @@ use crate::solve::Bake;
 use crate::spectrum::Leaves;
 use crate::transport::point::{Gathered, Receiver};
 use glam::DVec3;
+use std::f64::consts::PI;
 
 /// Vertices are drawn this far into the triangle they belong to: a point on an edge lies on the neighbouring wall too.
 const INSET: f64 = 2e-3;
+/// Texels nearer to an edge than this share of the room's half diagonal (1 mm in a room of 20 m), or than vertices would be, are
+/// drawn that far into the triangle.
+const TEXEL_INSET: f64 = 1e-4;
 /// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
 const PROBE_INSET: f64 = 1e-5;
 /// The baked mesh and what it took.
@@ -87,10 +91,35 @@ impl Bake {
 
     /// The place of a vertex, drawn into its triangle, with its shading normal.
     pub(crate) fn receiver(&self, vertex: &Vertex, surface: usize, back: bool) -> Receiver {
+        let inner = vertex.weights.map(|w| w * (1.0 - INSET) + INSET / 3.0);
+        self.facing(vertex, inner, surface, back)
+    }
+
+    /// The place of a texel, moved only where it lies on an edge of its triangle, with its shading normal.
+    pub(crate) fn texel(&self, vertex: &Vertex, surface: usize, back: bool) -> Receiver {
+        let mesh = self.mesh();
+        let [a, b, c] =
+            mesh.triangles[vertex.triangle as usize].map(|p| mesh.positions[p as usize]);
+        let twice = 2.0 * mesh.area[vertex.triangle as usize];
+        let distance = TEXEL_INSET * mesh.half_size;
+        // Weight of a corner at that distance from the edge opposite to it.
+        let least = [c - b, a - c, b - a].map(|edge| {
+            let share = distance * edge.length() / twice;
+            if share < INSET / 3.0 {
+                share
+            } else {
+                INSET / 3.0
+            }
+        });
+        let pushed: [f64; 3] = std::array::from_fn(|k| vertex.weights[k].max(least[k]));
+        let sum: f64 = pushed.iter().sum();
+        self.facing(vertex, pushed.map(|w| w / sum), surface, back)
+    }
+
+    fn facing(&self, vertex: &Vertex, inner: [f64; 3], surface: usize, back: bool) -> Receiver {
         let (mesh, tree) = (self.mesh(), self.tree());
         let surface = &self.scene().surfaces[surface];
         let triangle = vertex.triangle as usize;
-        let inner = vertex.weights.map(|w| w * (1.0 - INSET) + INSET / 3.0);
         let flat = if back {
             -mesh.normal[triangle]
         } else {
@@ -155,8 +184,8 @@ impl Bake {
                     vertex.weights
                 };
                 let leaf = self.tree().leaf_at(entry, w);
-                self.lanes()
-                    .tristimulus(self.light().emitted.row(leaf as usize))
+                let own = self.light().emitted.row(leaf as usize);
+                look.shown.unwrap_or_else(|| self.lanes().tristimulus(own))
             }
             _ => [0.0; 3],
         };
@@ -201,6 +230,8 @@ pub(crate) struct Look<'a> {
     /// Mean colour of the texture, which the display multiplies again.
     unpainted: Option<[f64; 3]>,
     emits: bool,
+    /// Exitance that a lamp with a profile is shown with.
+    shown: Option<[f64; 3]>,
 }
 
 impl<'a> Look<'a> {
@@ -227,6 +258,9 @@ impl<'a> Look<'a> {
             upsampler,
             unpainted: mean,
             emits: material.emission.is_some(),
+            shown: (material.emission.as_ref())
+                .filter(|e| e.profile.is_some())
+                .map(|e| bake.lanes().emission(e.light, &e.shape, PI)),
         }
     }
 

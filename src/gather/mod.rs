@@ -6,7 +6,7 @@ mod spectra;
 
 pub use crate::transport::point::MOSTLY;
 pub use bake::{Baked, Interpolation, Probed};
-pub(crate) use bake::{KeptVertex, Vertex, lend};
+pub(crate) use bake::{KeptVertex, Look, Vertex, lend};
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
 #[derive(Debug, Clone, Default)]
@@ -19,6 +19,17 @@ pub struct BakedSurface {
     pub vertices: Vec<BakedVertex>,
     /// Triangles, counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
+    /// Where its light stands in light maps; none: at its vertices.
+    pub map: Option<MapPlace>,
+}
+
+/// A mesh's place in light maps.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MapPlace {
+    /// Number of the page.
+    pub page: usize,
+    /// Texture coordinates of each vertex on the page, in [0, 1], (0, 0) the upper left corner.
+    pub uv: Vec<[f32; 2]>,
 }
 
 /// One output vertex.

@@ -88,13 +88,6 @@ impl RayIndex {
         Some(self.tree.blocks[block].corner_lane(lane).map(Vec3::from))
     }
 
-    /// The plane of a triangle.
-    pub(crate) fn plane_of(&self, id: u32) -> u32 {
-        self.place(id).map_or(NO_PLANE, |(block, lane)| {
-            self.tree.blocks[block].planes[lane]
-        })
-    }
-
     /// Has the triangle an alpha mask?
     pub fn is_masked(&self, id: u32) -> bool {
         self.place(id)

@@ -89,14 +89,6 @@ fn clipped(corners: [Points8; 3], height: [f64x8; 3], normal: Points8) -> f64x8 
     sum + free_edge(down, up, normal)
 }
 
-/// Form factors from up to eight points with one normal to one triangle.
-#[inline]
-pub fn lambert_points_x8(points: Points8, normal: DVec3, triangle: &[DVec3; 3]) -> f64x8 {
-    let [a, b, c] = *triangle;
-    let triangle = [all_lanes(a), all_lanes(b), all_lanes(c)];
-    lambert_x8(points, all_lanes(normal), triangle)
-}
-
 /// Form factors from one point to up to eight triangles.
 #[inline]
 pub fn lambert_triangles_x8(
@@ -340,7 +332,12 @@ mod tests {
             DVec3::new(0.2, 0.2, 1.0),
             DVec3::new(0.2, 0.2, 0.999),
         ];
-        let f = lambert_points_x8(lanes_of(points), DVec3::Z, &triangle).to_array();
+        let f = lambert_x8(
+            lanes_of(points),
+            all_lanes(DVec3::Z),
+            triangle.map(all_lanes),
+        )
+        .to_array();
         assert!((f[0] - 0.0962250448649376).abs() < 1e-15);
         assert_eq!(&f[1..3], [0.0, 0.0], "in the plane");
         assert!(f[3] > 0.99 && f[3] < 1.0);

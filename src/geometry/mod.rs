@@ -12,7 +12,6 @@
 //! | `beam` | what up to sixteen rays from one point hit first |
 //! | [`shaft`] | the space between two patches |
 //! | [`blockers`] | which triangles of the index reach into a shaft |
-//! | [`hidden`] | is a pair hidden as a whole |
 //! | [`clip`] | the visible part of a polygon from a point |
 //! | [`polygon`] | form factor from an element of surface to a polygon |
 //! | [`nearest`] | the point of a triangle that is nearest to some point |
@@ -34,14 +33,13 @@
 //! | nearest hit, `closest` | 15 | 3.9 |
 //! | shafts with their lists (at most 16), `blockers` | 1.4 | 0.29 |
 //! | exact visible part of the light from a point: shaft, list, clip, factor | 1.8 | |
-//! | form factors to a triangle, `lambert_points_x8` / `lambert_edges_x8` / `lambert_polygon` | 152 / 17 / 11 | |
+//! | form factors to a triangle, `lambert_x8` / `lambert_edges_x8` / `lambert_polygon` | 152 / 17 / 11 | |
 //!
 //! The canteen's index takes 86 bytes a triangle and 0.17 s to build, its planes 0.19 s.
 
 mod beam;
 pub mod blockers;
 pub mod clip;
-pub mod hidden;
 pub mod index;
 pub mod lanes;
 pub mod nearest;
@@ -59,7 +57,7 @@ mod walk;
 pub use blockers::ShaftContents;
 pub use clip::{Clipper, Shadow, lambert_visible, visible_part};
 pub use index::{Hit, RayIndex};
-pub use lanes::{lambert_edges_x8, lambert_points_x8, lambert_triangles_x8};
+pub use lanes::{lambert_edges_x8, lambert_triangles_x8};
 pub use nearest::nearest_point;
 pub use plane::plane_ids;
 pub use polygon::lambert_polygon;

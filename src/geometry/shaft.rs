@@ -53,8 +53,6 @@ pub struct Shaft {
     /// All corners of both patches.
     corners: [DVec3; 16],
     corner_count: usize,
-    /// How many of them are the first patch's.
-    split: usize,
     pub(super) low: DVec3,
     pub(super) high: DVec3,
     pub(super) planes: [u32; 2],
@@ -160,7 +158,6 @@ impl Shaft {
             count: 0,
             corners: [DVec3::ZERO; 16],
             corner_count: 0,
-            split: sa.count,
             low: DVec3::INFINITY,
             high: DVec3::NEG_INFINITY,
             planes: [a.plane(), b.plane()],
@@ -242,12 +239,6 @@ impl Shaft {
             self.sides[self.count] = side;
             self.count += 1;
         }
-    }
-
-    /// The corners of each patch.
-    pub(super) fn ends(&self) -> [&[DVec3]; 2] {
-        let (a, b) = self.corners().split_at(self.split);
-        [a, b]
     }
 
     /// All corners of both patches.

@@ -103,6 +103,7 @@ impl Bake {
     /// # Errors
     /// The room is dark; the cache would be larger than `limit` bytes; the file cannot be written; a bake that did not [`Bake::keep`].
     pub fn write_cache(&self, baked: &Baked, path: &Path, limit: u64) -> Result<u64> {
+        self.can_be_kept("--cache")?;
         if !self.keep || baked.kept.len() != baked.surfaces.len() {
             return Err(Error::Internal("a bake that kept nothing".into()));
         }
@@ -447,7 +448,7 @@ impl Relighter {
     }
 
     /// The bake behind it. It has no rays: nothing may be gathered at new points, see [`Relighter::probe`].
-    pub(crate) fn bake(&self) -> &Bake {
+    pub fn bake(&self) -> &Bake {
         &self.bake
     }
 

@@ -116,6 +116,7 @@ impl Bake {
                 back: kept.back,
                 vertices: vertices.collect(),
                 triangles: kept.triangles.clone(),
+                map: None,
             });
             out.irradiance.push(rows);
         }

@@ -1,11 +1,13 @@
 //! What both sides of the transport share: lanes, rows of them, and the solution on the patches.
 
 mod descent;
+mod filters;
 pub mod lanes;
 pub(crate) mod rows;
 mod solution;
 
 pub use descent::Descent;
+pub use filters::{Filter, Filters, Glass, Tint};
 pub use rows::{Rows, padded};
 pub use solution::{Arrival, Light, Neighbours};
 pub(crate) use solution::{brightness, keenness, weighed};

@@ -1,7 +1,7 @@
 //! Is the way between two patches clear? Exactly where the shaft between them is empty, by rays elsewhere.
 
 use crate::geometry::{Hit, Patch, RayIndex, Segment, Shaft, ShaftContents};
-use crate::hierarchy::{Blocker, Mesh, Node, Sample, Tree};
+use crate::hierarchy::{Blocker, Glazing, Mesh, Node, Sample, Tree};
 use glam::{DVec3, Vec3};
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
@@ -22,6 +22,8 @@ pub struct Sight<'a> {
     pub opaque: Option<&'a Opaque<'a>>,
     /// Where the triangles are.
     pub mesh: &'a Mesh,
+    /// What light passes through on its way; none where the room has no panes.
+    pub panes: Option<Glazing<'a>>,
     /// False where nothing can block (a convex room): then no ray is cast and no shaft is built.
     pub occlusion: bool,
 }

@@ -38,7 +38,13 @@ pub(super) fn give(bake: &Bake, cells: &mut Cells) {
 }
 
 /// Leaves of a face: number, weights of the second and third corner of the triangle of the mesh at the middle, area.
-fn leaves(tree: &Tree, face: u32, back: bool, area: f64, mut each: impl FnMut(u32, [f64; 2], f64)) {
+pub(crate) fn leaves(
+    tree: &Tree,
+    face: u32,
+    back: bool,
+    area: f64,
+    mut each: impl FnMut(u32, [f64; 2], f64),
+) {
     // Weights of the corners, halved as the corners are.
     let mut open = vec![(face, DVec3::AXES, area)];
     while let Some((id, corners, area)) = open.pop() {

@@ -18,38 +18,40 @@ const PART: usize = 16_384;
 
 /// What a place gets.
 #[derive(Debug)]
-pub(super) struct Seen {
+pub(crate) struct Seen {
     /// Irradiance by lane.
-    pub(super) row: Box<[f32; 64]>,
+    pub(crate) row: Box<[f32; 64]>,
     /// Tristimulus irradiance.
-    pub(super) xyz: [f64; 3],
+    pub(crate) xyz: [f64; 3],
     /// Where it comes from, if that is kept.
-    pub(super) trace: Option<Box<[u8]>>,
+    pub(crate) trace: Option<Box<[u8]>>,
 }
 
 /// Place and normal, rounded; space; is the light of its leaf taken as it is?
 type Key = ([i64; 6], (u32, bool), bool);
 
 /// All looks so far.
-pub(super) struct Looks<'a> {
+pub(crate) struct Looks<'a> {
     bake: &'a Bake,
     care: Care,
     /// Is it time to end?
     late: &'a (dyn Fn() -> bool + Sync),
     /// Is everything looked at all the same?
-    pub(super) patient: bool,
+    pub(crate) patient: bool,
     /// Is the light of the leaves taken as it is?
-    pub(super) believing: bool,
+    pub(crate) believing: bool,
+    /// Is light that comes straight from lamps left out?
+    pub(crate) indirect: bool,
     spaces: Vec<(u32, bool)>,
     known: HashMap<Key, u32>,
     places: Vec<(Receiver, bool)>,
     /// None: something solid covers it, or lies right upon it.
     seen: Vec<Option<Seen>>,
-    pub(super) rays: u64,
+    pub(crate) rays: u64,
 }
 
 impl<'a> Looks<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         bake: &'a Bake,
         spaces: Vec<(u32, bool)>,
         care: Care,
@@ -61,6 +63,7 @@ impl<'a> Looks<'a> {
             late,
             patient: false,
             believing: false,
+            indirect: false,
             spaces,
             known: HashMap::new(),
             places: Vec::new(),
@@ -70,8 +73,18 @@ impl<'a> Looks<'a> {
     }
 
     /// Asks for a vertex; its number. It is looked at when [`Looks::complete`] is called.
-    pub(super) fn want(&mut self, vertex: &Vertex, surface: usize, back: bool) -> u32 {
+    pub(crate) fn want(&mut self, vertex: &Vertex, surface: usize, back: bool) -> u32 {
         let to = self.bake.receiver(vertex, surface, back);
+        self.ask(vertex, to)
+    }
+
+    /// The same for a texel of a light map, which lies where it is, save at edges.
+    pub(crate) fn want_texel(&mut self, vertex: &Vertex, surface: usize, back: bool) -> u32 {
+        let to = self.bake.texel(vertex, surface, back);
+        self.ask(vertex, to)
+    }
+
+    fn ask(&mut self, vertex: &Vertex, to: Receiver) -> u32 {
         let mesh = self.bake.mesh();
         let place =
             self.bake.place_of(vertex) / (SAME_PLACE * mesh.half_size.max(f64::MIN_POSITIVE));
@@ -95,28 +108,44 @@ impl<'a> Looks<'a> {
     }
 
     /// Asks for a vertex once more, with a pattern of rays of its own, to be looked at in any case; the number of the look.
-    pub(super) fn again(&mut self, vertex: &Vertex, surface: usize, back: bool, seed: u64) -> u32 {
+    pub(crate) fn again(&mut self, vertex: &Vertex, surface: usize, back: bool, seed: u64) -> u32 {
         let to = self.bake.receiver(vertex, surface, back);
-        self.places.push((Receiver { seed, ..to }, false));
+        self.once(Receiver { seed, ..to })
+    }
+
+    /// The same for a place of a light map.
+    pub(crate) fn texel_again(
+        &mut self,
+        vertex: &Vertex,
+        surface: usize,
+        back: bool,
+        seed: u64,
+    ) -> u32 {
+        let to = self.bake.texel(vertex, surface, back);
+        self.once(Receiver { seed, ..to })
+    }
+
+    fn once(&mut self, to: Receiver) -> u32 {
+        self.places.push((to, false));
         self.places.len() as u32 - 1
     }
 
-    pub(super) fn is_late(&self) -> bool {
+    pub(crate) fn is_late(&self) -> bool {
         (self.late)()
     }
 
     /// What was seen.
-    pub(super) fn at(&self, look: u32) -> Option<&Seen> {
+    pub(crate) fn at(&self, look: u32) -> Option<&Seen> {
         self.seen[look as usize].as_ref()
     }
 
     /// How many there are.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.places.len()
     }
 
     /// Looks at all places asked for. `progress` is told (done, of) in places of this time.
-    pub(super) fn complete(&mut self, progress: &dyn Fn(usize, usize)) {
+    pub(crate) fn complete(&mut self, progress: &dyn Fn(usize, usize)) {
         let first = self.seen.len();
         let wanted = self.places.len() - first;
         while self.seen.len() < self.places.len() {
@@ -153,7 +182,11 @@ impl<'a> Looks<'a> {
             let covered = dark(&gathered) && covered.next() == Some(true);
             let hidden = covered || gathered.backs > MOSTLY;
             let seen = self.seen_as(gathered.irradiance, gathered.packed);
-            self.seen[k] = (!hidden && !self.is_inside(&self.places[k].0, &seen)).then_some(seen);
+            let shown = !hidden && !self.is_inside(&self.places[k].0, &seen);
+            self.seen[k] = shown.then(|| match self.indirect {
+                true => self.seen_as(less(gathered.irradiance, &gathered.direct), seen.trace),
+                false => seen,
+            });
         }
     }
 
@@ -178,4 +211,12 @@ impl<'a> Looks<'a> {
         row[..known.len()].copy_from_slice(known);
         Some(self.seen_as(row, None))
     }
+}
+
+/// Irradiance without what comes straight from lamps. Not below 0: both are sums of the same numbers, rounded apart.
+fn less(mut all: [f32; 64], direct: &[f32; 64]) -> [f32; 64] {
+    for (all, direct) in all.iter_mut().zip(direct) {
+        *all = (*all - direct).max(0.0);
+    }
+    all
 }

@@ -14,17 +14,17 @@ use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
 
 /// Points at the least and at the most, and as a share of the looks so far: the mean is then known to some per cent.
-const POINTS: [usize; 2] = [512, 4096];
-const SHARE: usize = 16;
+pub(crate) const POINTS: [usize; 2] = [512, 4096];
+pub(crate) const SHARE: usize = 16;
 /// What was seen is learnt where its square is this many times what was expected.
-const SURPRISE: f64 = 4.0;
+pub(crate) const SURPRISE: f64 = 4.0;
 /// A single point must differ by this many times the variance of a look to count.
-const CHANCE: f64 = 4.0;
+pub(crate) const CHANCE: f64 = 4.0;
 /// Distinguishes these random numbers from others.
 const SEED: u64 = 0x0067_0f11;
 
 /// What samples tell of a file.
-pub(super) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Interpolation {
+pub(crate) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Interpolation {
     let root = |s: &Sample| s.square.abs().sqrt().copysign(s.square);
     let mut off: Vec<f64> = samples.iter().map(root).collect();
     off.sort_by(f64::total_cmp);
@@ -45,12 +45,12 @@ pub(super) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) ->
 
 /// A random point.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
-    cell: usize,
+pub(crate) struct Sample {
+    pub(crate) cell: usize,
     /// Square of the colour difference that is of interpolation; below 0 by chance.
-    square: f64,
+    pub(crate) square: f64,
     /// Variance of a look.
-    noise: f64,
+    pub(crate) noise: f64,
 }
 
 impl Growth<'_> {

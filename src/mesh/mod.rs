@@ -4,9 +4,9 @@
 mod cells;
 mod drawn;
 mod grow;
-mod hints;
-mod looks;
-mod measure;
+pub(crate) mod hints;
+pub(crate) mod looks;
+pub(crate) mod measure;
 mod skins;
 mod write;
 

@@ -177,7 +177,9 @@ impl<'a> Room<'a> {
                 LightKind::Directional | LightKind::Sun => suns.push(Start::Sun(light.direction)),
                 LightKind::Sky => suns.extend(dome(DVec3::Y)),
                 LightKind::Ground => suns.extend(dome(DVec3::NEG_Y)),
-                LightKind::Point => near.push(Start::Lamp(place)),
+                LightKind::Point | LightKind::Profile => near.push(Start::Lamp(place)),
+                // Its faces are among those that emit.
+                LightKind::Surface => {}
                 LightKind::Spot { outer, .. } => {
                     near.push(Start::Spot(place, light.direction, outer.cos()));
                 }

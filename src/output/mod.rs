@@ -7,6 +7,7 @@ pub mod exposure;
 pub mod exr;
 pub mod gltf;
 mod lit_space;
+pub mod maps;
 pub mod npz;
 pub mod picture;
 mod raster;
@@ -14,5 +15,5 @@ mod viewpoint;
 
 pub use balance::Balance;
 pub use exposure::{Brightness, Exposure};
-pub use gltf::{BakedGlb, Packing, Writing, baked_glb, vertices_within};
+pub use gltf::{BakedGlb, Packing, Writing, baked_glb, mapped_glb, vertices_within};
 pub use picture::{Format, Picture};

@@ -11,15 +11,13 @@ use crate::gather::refined;
 use crate::scene::Scene;
 use crate::spectrum::LEAVES;
 use std::io::{self, Write};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
 
-/// Polynomial of CRC-32 as ZIP uses it (reflected; APPNOTE.TXT, section 4.4.7).
-const POLYNOMIAL: u32 = 0xedb8_8320;
-/// 1 January 1980, the first date of the format: the bytes must not depend on the clock.
-const DATE: u16 = 0x21;
-/// ZIP 2.0.
-const VERSION: u16 = 20;
 /// The length of a `.npy` header is a multiple of this, so that the data is aligned.
 const ALIGNMENT: usize = 64;
+/// An entry of this many bytes needs the larger fields of ZIP64.
+const LARGE: usize = u32::MAX as usize;
 
 /// Values of an array, row by row.
 #[derive(Debug, Clone, Copy)]
@@ -49,20 +47,16 @@ impl Values<'_> {
         }
     }
 
-    /// Hands the little-endian bytes over in pieces.
-    fn for_each(&self, mut take: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
+    /// Writes the little-endian bytes in pieces.
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
         const PIECE: usize = 4096;
         let mut bytes = Vec::with_capacity(8 * PIECE);
-        let mut flush = |bytes: &mut Vec<u8>| {
-            let result = take(bytes);
-            bytes.clear();
-            result
-        };
         macro_rules! pieces {
             ($values:expr) => {
                 for piece in $values.chunks(PIECE) {
+                    bytes.clear();
                     piece.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
-                    flush(&mut bytes)?;
+                    out.write_all(&bytes)?;
                 }
             };
         }
@@ -89,53 +83,23 @@ pub struct Array<'a> {
 /// Writes an `.npz`.
 ///
 /// # Errors
-/// The writer fails, a shape does not fit its values, or an array or the archive passes 4 GiB.
+/// The writer fails, or a shape does not fit its values.
 pub fn write(out: &mut dyn Write, arrays: &[Array]) -> io::Result<()> {
-    let mut directory = Vec::new();
-    let mut offset = 0u64;
+    let mut archive = ZipWriter::new_stream(out);
     for array in arrays {
         let header = header(array)?;
         let (_, width) = array.values.kind();
-        let size = small((header.len() + array.values.len() * width) as u64)?;
-        let mut crc = Crc::new();
-        crc.update(&header);
-        array.values.for_each(|bytes| {
-            crc.update(bytes);
-            Ok(())
-        })?;
-        let name = format!("{}.npy", array.name);
-        // The fields that a local header (section 4.3.7) and a directory entry (4.3.12) share.
-        let mut fields = Vec::new();
-        for field in [VERSION, 0, 0, 0, DATE] {
-            fields.extend(field.to_le_bytes());
-        }
-        for field in [crc.value(), size, size, name.len() as u32] {
-            fields.extend(field.to_le_bytes());
-        }
-        let place = small(offset)?;
-        out.write_all(b"PK\x03\x04")?;
-        out.write_all(&fields)?;
-        out.write_all(name.as_bytes())?;
-        out.write_all(&header)?;
-        array.values.for_each(|bytes| out.write_all(bytes))?;
-        offset += 4 + fields.len() as u64 + name.len() as u64 + u64::from(size);
-
-        directory.extend(b"PK\x01\x02");
-        directory.extend(VERSION.to_le_bytes());
-        directory.extend(&fields);
-        // Comment length, disk, internal attributes (2 bytes each), external attributes (4): none.
-        directory.extend([0; 10]);
-        directory.extend(place.to_le_bytes());
-        directory.extend(name.as_bytes());
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            // The first date of the format: the bytes must not depend on the clock.
+            .last_modified_time(DateTime::default())
+            .large_file(header.len() + array.values.len() * width >= LARGE);
+        archive.start_file(format!("{}.npy", array.name), options)?;
+        archive.write_all(&header)?;
+        array.values.write(&mut archive)?;
     }
-    out.write_all(&directory)?;
-    out.write_all(b"PK\x05\x06\0\0\0\0")?;
-    let count = u16::try_from(arrays.len()).map_err(|_| too_large())?;
-    out.write_all(&count.to_le_bytes())?;
-    out.write_all(&count.to_le_bytes())?;
-    out.write_all(&small(directory.len() as u64)?.to_le_bytes())?;
-    out.write_all(&small(offset)?.to_le_bytes())?;
-    out.write_all(&[0; 2])
+    archive.finish()?;
+    Ok(())
 }
 
 /// Writes the refined mesh with its spectra: see the module's words.
@@ -251,63 +215,9 @@ fn header(array: &Array) -> io::Result<Vec<u8>> {
     Ok(header)
 }
 
-fn small(size: u64) -> io::Result<u32> {
-    u32::try_from(size).map_err(|_| too_large())
-}
-
-fn too_large() -> io::Error {
-    io::Error::new(
-        io::ErrorKind::FileTooLarge,
-        "an .npz of more than 4 GiB is not written; ask for a larger --error",
-    )
-}
-
-/// CRC-32, byte by byte from a table.
-struct Crc {
-    table: [u32; 256],
-    state: u32,
-}
-
-impl Crc {
-    fn new() -> Self {
-        let entry = |byte: usize| {
-            (0..8).fold(byte as u32, |crc, _| {
-                if crc & 1 == 1 {
-                    (crc >> 1) ^ POLYNOMIAL
-                } else {
-                    crc >> 1
-                }
-            })
-        };
-        Self {
-            table: std::array::from_fn(entry),
-            state: u32::MAX,
-        }
-    }
-
-    fn update(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            let low = (self.state ^ u32::from(byte)) & 0xff;
-            self.state = self.table[low as usize] ^ (self.state >> 8);
-        }
-    }
-
-    fn value(&self) -> u32 {
-        !self.state
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn crc_of_the_check_string() {
-        // The check value that every catalogue of CRCs gives for CRC-32/ISO-HDLC.
-        let mut crc = Crc::new();
-        crc.update(b"123456789");
-        assert_eq!(crc.value(), 0xcbf4_3926);
-    }
 
     #[test]
     fn headers_are_aligned_and_python_reads_one_tuple() {

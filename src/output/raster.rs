@@ -433,6 +433,7 @@ mod tests {
         fn every_sample_belongs_to_one_triangle(i in -7i32..8, j in -7i32..8, turned in any::<bool>()) {
             let fan = Fan(DVec3::new(f64::from(i) / 8.0, f64::from(j) / 8.0, 0.0));
             let scene = Scene {
+                panes: Vec::new(),
                 source: crate::scene::Source { path: "".into(), json: serde_json::Value::Null, buffers: vec![] },
                 grid: crate::spectrum::Grid::default(),
                 surfaces: vec![],

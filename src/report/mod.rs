@@ -6,6 +6,7 @@ pub mod chart;
 pub mod log;
 pub mod page;
 pub mod plan;
+pub mod polar;
 mod svg;
 pub mod table;
 

@@ -224,6 +224,10 @@ fn lamps(svg: &mut Svg, scene: &Scene, at: &impl Fn(DVec3) -> [f64; 2]) -> Vec<(
         }
     }
     for light in &scene.lights {
+        // A surface that shines by a profile was drawn.
+        if light.kind == LightKind::Surface {
+            continue;
+        }
         number += 1;
         // What is infinitely far away has no place; the list names it.
         if light.kind.is_dome() || light.kind == LightKind::Sun {

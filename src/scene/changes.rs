@@ -4,7 +4,8 @@
 
 use super::json::short;
 use super::light::GREATEST_SIZE;
-use super::{Projection, Scene};
+use super::pane::PaneKind;
+use super::{Projection, Scene, luminaires};
 use crate::color::{KM, Observer};
 use crate::data::{Leaves, nearest_of};
 use crate::error::{Error, Result};
@@ -34,12 +35,30 @@ impl Scene {
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         let larger = DMat4::from_scale(DVec3::splat(factor));
-        for surface in &mut self.surfaces {
+        for surface in self.surfaces.iter_mut().chain(&mut self.panes) {
             surface.positions.iter_mut().for_each(|p| *p *= factor);
             surface.to_world = larger * surface.to_world;
         }
+        for pane in self.materials.iter_mut().filter_map(|m| m.pane.as_mut()) {
+            if let PaneKind::Glass {
+                unit: Some(unit), ..
+            } = &mut pane.kind
+            {
+                // Thicknesses of solids are measured in the room; that of a lone face keeps its number of units.
+                *unit *= factor;
+            }
+        }
         for light in &mut self.lights {
             light.position *= factor;
+        }
+        let emissions = self
+            .materials
+            .iter_mut()
+            .filter_map(|m| m.emission.as_mut());
+        for emission in emissions.filter(|emission| emission.profile.is_some()) {
+            // The same lumens from another area.
+            emission.shape = emission.shape.map(|x| x / (factor * factor));
+            emission.scale /= factor * factor;
         }
         for camera in &mut self.cameras {
             // Only its place: a camera's axes keep their length.
@@ -48,6 +67,9 @@ impl Scene {
             if let Projection::Orthographic(half) = &mut camera.projection {
                 *half *= factor;
             }
+        }
+        if factor != 1.0 {
+            luminaires::remount(&mut self);
         }
         self.changes.scale *= factor;
         self
@@ -131,6 +153,7 @@ impl Scene {
                 self.changes.flipped.insert(k);
             }
         }
+        luminaires::remount(self);
     }
 
     /// Was the surface turned?

@@ -23,30 +23,31 @@ use std::sync::Arc;
 const AGAIN: &str = "export the file again";
 
 /// Extensions that are read. The packed ones count only where their decoder is built in.
-const READ: [&str; 7] = [
+const READ: [&str; 11] = [
+    "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
 
 /// Extensions that are not read, but leave a file without them whole: they add gloss, variants or metadata to surfaces
 /// that stay Lambertian here. A file that requires one is read with a warning.
-const HARMLESS: [&str; 13] = [
+const HARMLESS: [&str; 10] = [
     "KHR_animation_pointer",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_dispersion",
-    "KHR_materials_ior",
     "KHR_materials_iridescence",
     "KHR_materials_sheen",
     "KHR_materials_specular",
-    "KHR_materials_transmission",
     "KHR_materials_variants",
-    "KHR_materials_volume",
     "KHR_node_visibility",
     "KHR_xmp_json_ld",
 ];

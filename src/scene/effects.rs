@@ -7,6 +7,7 @@ use super::json::short;
 use super::lacking::lacking;
 use super::material::listed;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
+use crate::color::{KM, Observer, Upsampler};
 use crate::data::Leaves;
 use glam::DVec3;
 use serde::Serialize;
@@ -43,12 +44,16 @@ pub enum Kind {
     SpotLights,
     /// Parallel light.
     DirectionalLights,
+    /// Lamps whose light is spread as a file of photometric data says.
+    MeasuredLamps,
     /// Light of a sky that enters where rays leave the room.
     Sky,
     /// Direct light of the sun.
     Sun,
     /// Surfaces whose back reflects and emits too.
     TwoSided,
+    /// What lets light straight through.
+    Panes,
 }
 
 impl Kind {
@@ -65,9 +70,11 @@ impl Kind {
             Self::PointLights => "point lights",
             Self::SpotLights => "spot lights",
             Self::DirectionalLights => "directional lights",
+            Self::MeasuredLamps => "measured lamps",
             Self::Sky => "sky",
             Self::Sun => "sun",
             Self::TwoSided => "two-sided surfaces",
+            Self::Panes => "panes",
         }
     }
 }
@@ -159,6 +166,7 @@ impl Plan {
             Kind::DirectionalLights,
             lights(|k| matches!(k, LightKind::Directional)),
         );
+        plan.add(Kind::MeasuredLamps, measured(scene));
         let sky = scene.sky.as_ref();
         let said = |text: Option<&String>| match text {
             Some(text) => (true, text.clone()),
@@ -170,6 +178,7 @@ impl Plan {
             Kind::TwoSided,
             counted(used.iter().filter(|m| m.sides == Sides::Both), "material"),
         );
+        plan.add(Kind::Panes, panes(scene));
         for lack in lacking(&scene.source.json) {
             plan.effects.push(Effect {
                 name: lack.effect,
@@ -247,6 +256,32 @@ fn number_of(names: &[String], what: &str) -> (bool, String) {
     }
 }
 
+/// Lamps with a profile, what it is of, and their lumens.
+fn measured(scene: &Scene) -> (bool, String) {
+    let luminous = Observer::cie1931().weights(&scene.grid)[1];
+    let lumens = |light: &PunctualLight| -> f64 {
+        let leaves = scene.spectra[light.light].power.iter().zip(&light.shape);
+        leaves
+            .zip(&luminous)
+            .map(|((p, s), y)| KM * p * s * y)
+            .sum()
+    };
+    let lamps = scene.lights.iter().filter_map(|light| {
+        let profile = &light.luminaire.as_ref()?.profile;
+        let of = match profile.luminaire.as_str() {
+            "" => &profile.format,
+            name => name,
+        };
+        Some(format!(
+            "{} as {}, {:.0} lm",
+            quoted(&light.name),
+            quoted(of),
+            lumens(light)
+        ))
+    });
+    number_of(&lamps.collect::<Vec<String>>(), "lamp")
+}
+
 fn counted<'a, 'b: 'a>(
     materials: impl Iterator<Item = &'a &'b Material>,
     what: &str,
@@ -306,6 +341,17 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
             }
         }
     }
+    let tinted = |s: &&Surface| {
+        let pane = scene
+            .materials
+            .get(s.material)
+            .and_then(|m| m.pane.as_ref());
+        pane.is_some_and(|pane| !pane.is_neutral())
+    };
+    if let Some(surface) = scene.panes.iter().find(tinted) {
+        let name = quoted(&scene.materials[surface.material].name);
+        return (true, format!("the pane {name} has a colour"));
+    }
     if let Some(light) = scene.lights.iter().find(|l| !is_flat(&l.shape)) {
         return (
             true,
@@ -329,8 +375,30 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
     (false, "every surface is grey: one band".into())
 }
 
+/// Materials that let light through, with the share of white (D65) that they do at normal incidence.
+fn panes(scene: &Scene) -> (bool, String) {
+    let used: BTreeSet<usize> = scene.panes.iter().map(|s| s.material).collect();
+    let upsampler = Upsampler::new(&scene.grid);
+    let names: Vec<String> = (used.into_iter())
+        .filter_map(|m| scene.materials.get(m))
+        .filter_map(|m| Some((m, m.pane.as_ref()?)))
+        .map(|(m, pane)| {
+            let (name, from) = (quoted(&m.name), short(&pane.from));
+            let (through, back) = (upsampler.xyz(&pane.normal())[1], pane.reflects());
+            format!("{name} ({from}: {through:.2} passes, {back:.2} reflected and left out)")
+        })
+        .collect();
+    match names.len() {
+        0 => (false, "none".into()),
+        _ => (true, format!("light passes {}", listed(&names))),
+    }
+}
+
 /// Off where nothing can stand between two points that see each other's front, nor between a point and a light.
 fn occlusion(scene: &Scene) -> (bool, String) {
+    if !scene.panes.is_empty() {
+        return (true, "panes stand in the way of light".into());
+    }
     match blocked(&scene.surfaces, &scene.lights) {
         None => (
             false,

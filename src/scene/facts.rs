@@ -5,6 +5,7 @@
 //! KHR_lights_punctual's fall-off, `2 pi I ((1 - cos inner) + (cos inner - cos outer) / 3)`. A parallel light has lux.
 //! Holes are not subtracted.
 
+use super::profile::Profile;
 use super::{LightKind, Material, Projection, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::Leaves;
@@ -64,18 +65,54 @@ pub struct Closed {
 pub struct LightFact {
     /// Name of the material or light.
     pub name: String,
-    /// `surface`, `point`, `spot`, `directional`, `sun`, `sky`, `ground`.
+    /// `surface`, `point`, `spot`, `measured`, `directional`, `sun`, `sky`, `ground`.
     pub kind: &'static str,
     /// Luminous flux, lm; none for parallel light.
     pub flux_lm: Option<f64>,
     /// Luminance of an untextured surface, cd/m2.
     pub luminance_cd_m2: Option<f64>,
-    /// Luminous intensity of a point or spot, cd.
+    /// Luminous intensity of a point or spot, greatest one of a measured lamp, cd.
     pub intensity_cd: Option<f64>,
     /// Illuminance of parallel light on a plane across it, of a sky on open level ground, lx; exitance of the ground.
     pub illuminance_lx: Option<f64>,
     /// Where its spectrum comes from.
     pub spectrum: String,
+    /// How its light is spread, if a file says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub profile: Option<ProfileFact>,
+}
+
+/// A file of photometric data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ProfileFact {
+    /// Name of the luminaire in the file.
+    pub luminaire: String,
+    /// `LM-63-2002`, `EULUMDAT`.
+    pub format: String,
+    /// Type of the goniometer: A, B or C.
+    pub angles: char,
+    /// Flux of the file, lm: what its intensities integrate to.
+    pub flux_lm: f64,
+    /// Greatest intensity, cd.
+    pub peak_cd: f64,
+    /// Flux of the lamps in it, lm; none in absolute photometry.
+    pub lamps_lm: Option<f64>,
+    /// Luminous opening along C0, along C90, and its height, m.
+    pub opening_m: [f64; 3],
+}
+
+impl ProfileFact {
+    fn of(profile: &Profile) -> Self {
+        Self {
+            luminaire: profile.luminaire.clone(),
+            format: profile.format.clone(),
+            angles: profile.angles.letter(),
+            flux_lm: profile.flux(),
+            peak_cd: profile.peak(),
+            lamps_lm: profile.lamps_lm,
+            opening_m: profile.opening_m,
+        }
+    }
 }
 
 /// A material.
@@ -153,11 +190,14 @@ impl Facts {
         {
             lights.extend(meter.lamp(material, sums));
         }
-        lights.extend(scene.lights.iter().map(|light| {
+        // A surface that shines by a profile was named with its material.
+        let alone = scene.lights.iter().filter(|l| l.kind != LightKind::Surface);
+        lights.extend(alone.map(|light| {
             let size = meter.size(light.light, &light.shape);
             let (kind, flux) = match light.kind {
                 LightKind::Point => ("point", Some(4.0 * PI * size)),
                 LightKind::Spot { inner, outer } => ("spot", Some(spot_flux(size, inner, outer))),
+                LightKind::Profile | LightKind::Surface => ("measured", Some(size)),
                 LightKind::Directional => ("directional", None),
                 LightKind::Sun => ("sun", None),
                 LightKind::Sky => ("sky", None),
@@ -168,9 +208,16 @@ impl Facts {
                 kind,
                 flux_lm: flux,
                 luminance_cd_m2: None,
-                intensity_cd: flux.map(|_| size),
+                intensity_cd: flux.map(|_| match &light.luminaire {
+                    Some(l) => size * l.profile.peak() / l.profile.flux(),
+                    None => size,
+                }),
                 illuminance_lx: flux.is_none().then_some(size),
                 spectrum: scene.spectra[light.light].name.clone(),
+                profile: light
+                    .luminaire
+                    .as_ref()
+                    .map(|l| ProfileFact::of(&l.profile)),
             }
         }));
         let materials = scene
@@ -339,6 +386,7 @@ impl<'a> Meter<'a> {
             intensity_cd: None,
             illuminance_lx: None,
             spectrum: emission.from.clone(),
+            profile: emission.profile.as_deref().map(ProfileFact::of),
         })
     }
 }

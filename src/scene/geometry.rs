@@ -333,7 +333,11 @@ impl<'a> Reader<'a> {
             return;
         };
         let material = &self.document.materials[material];
-        let textures = [&material.base_color_texture, &material.emissive_texture];
+        let textures = [
+            &material.base_color_texture,
+            &material.emissive_texture,
+            &material.transmission_texture,
+        ];
         let sets = textures.into_iter().flatten().map(|t| t.texcoord);
         let Some(last) = sets.max() else { return };
         if last < read.texcoords.len() {

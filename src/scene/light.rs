@@ -11,14 +11,18 @@
 
 use super::check::Check;
 use super::json::short;
+use super::known::Sampled;
+use super::luminaires::{IesNode, LampWish, Luminaire, ProfileWish, tilt_share};
+use super::profile::Profile;
 use super::raw::{RawLight, RawLightKind};
-use super::spectra_file::{Sampled, SpectraFile};
+use super::spectra_file::SpectraFile;
 use super::{LightKind, LightSpectrum, Material, PunctualLight};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::{Grid, LEAVES, Leaves};
 use crate::data::{Outside, named};
 use glam::DVec3;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Name of the spectrum of all lamps that are given by colour.
 const BY_COLOUR: &str = "cie/D65";
@@ -214,6 +218,15 @@ impl<'a> Lamps<'a> {
         self.spectra
     }
 
+    /// Tells the luminous size of a finished spectrum under a shape.
+    pub(crate) fn luminous(&self) -> impl Fn(&LightSpectrum, &Leaves) -> f64 + use<> {
+        let luminous = self.luminous;
+        move |spectrum, shape| {
+            let leaves = spectrum.power.iter().zip(shape).zip(&luminous);
+            leaves.map(|((p, s), y)| p * s * y).sum()
+        }
+    }
+
     /// Luminous size of a spectrum under a shape.
     fn luminous_size(&self, light: usize, shape: &Leaves) -> f64 {
         let power = &self.spectra[light].power;
@@ -226,6 +239,7 @@ impl<'a> Lamps<'a> {
 /// The punctual lights of a document.
 pub(crate) fn punctual(
     raw: &[RawLight],
+    profiles: &[Option<Arc<Profile>>],
     file: &SpectraFile,
     room: &Path,
     lamps: &mut Lamps,
@@ -242,34 +256,26 @@ pub(crate) fn punctual(
                 check.problem(&place, what, "give numbers of at least 0");
                 return None;
             }
-            let position = light.to_world.transform_point3(DVec3::ZERO);
-            let direction = light
-                .to_world
-                .transform_vector3(DVec3::NEG_Z)
-                .try_normalize();
-            let direction = match (light.kind, direction) {
-                (_, Some(direction)) => direction,
-                (RawLightKind::Point, None) => DVec3::NEG_Z,
-                (_, None) => {
-                    let what = "its node is scaled to nothing, so that it shines nowhere";
-                    check.problem(&place, what, "give the node a scale that is not zero");
-                    return None;
-                }
-            };
-            if !position.is_finite() {
-                check.problem(
-                    &place,
-                    "stands at no finite place",
-                    "mend the node's matrix",
-                );
-                return None;
-            }
+            let (position, direction) = placed(light, &place, check)?;
             if light.range.is_some() {
                 check.warn(format!("{place}: 'range' is passed over, light has none"));
             }
             let size = f64::from(light.intensity) * lamps.luminance(light.color);
             // Read before the light is passed over for being dark, so that what is wrong in it is said.
-            let spectrum = file.light(&name, light.extras.as_ref(), room, grid, check);
+            let said = file.light(&name, light.extras.as_ref(), room, grid, check);
+            let LampWish { spectrum, profile } = said.unwrap_or_default();
+            if let Some(wish) = profile_of(light, profile, profiles) {
+                let lamp = measured(light, &wish, spectrum.as_ref(), &place, lamps, check)?;
+                return Some(PunctualLight {
+                    name,
+                    position,
+                    ..lamp
+                });
+            }
+            if light.kind == RawLightKind::Profile {
+                // Why there is none was said.
+                return None;
+            }
             if size == 0.0 {
                 check.warn(format!(
                     "{place}: gives no light (its colour or intensity is 0)"
@@ -284,7 +290,7 @@ pub(crate) fn punctual(
                 None => lamps.by_colour(light.color, f64::from(light.intensity)),
             };
             let kind = match light.kind {
-                RawLightKind::Point => LightKind::Point,
+                RawLightKind::Point | RawLightKind::Profile => LightKind::Point,
                 RawLightKind::Spot => LightKind::Spot {
                     inner: f64::from(light.inner),
                     outer: f64::from(light.outer),
@@ -298,16 +304,109 @@ pub(crate) fn punctual(
                 direction,
                 light: lamp.light,
                 shape: lamp.shape,
+                luminaire: None,
             })
         })
         .collect()
+}
+
+/// Where a light stands and which way it shines; none where it cannot, which is said.
+fn placed(light: &RawLight, place: &str, check: &mut Check) -> Option<(DVec3, DVec3)> {
+    let position = light.to_world.transform_point3(DVec3::ZERO);
+    let direction = light
+        .to_world
+        .transform_vector3(DVec3::NEG_Z)
+        .try_normalize();
+    let direction = match (light.kind, direction) {
+        (_, Some(direction)) => direction,
+        (RawLightKind::Point, None) => DVec3::NEG_Z,
+        (_, None) => {
+            let what = "its node is scaled to nothing, so that it shines nowhere";
+            check.problem(place, what, "give the node a scale that is not zero");
+            return None;
+        }
+    };
+    if !position.is_finite() {
+        check.problem(place, "stands at no finite place", "mend the node's matrix");
+        return None;
+    }
+    Some((position, direction))
+}
+
+/// The profile of a light: the side file's, or its node's.
+fn profile_of(
+    light: &RawLight,
+    wish: Option<ProfileWish>,
+    profiles: &[Option<Arc<Profile>>],
+) -> Option<ProfileWish> {
+    let own = |ies: &IesNode| {
+        let profile = profiles.get(ies.light)?.clone()?;
+        Some(ProfileWish {
+            flux: profile.flux() * ies.multiplier,
+            profile,
+            turn_deg: 0.0,
+        })
+    };
+    wish.or_else(|| light.ies.as_ref().and_then(own))
+}
+
+/// A light that shines by a profile, at no place yet. Its spectrum says nothing of how bright it is; a colour of
+/// EXT_lights_ies takes of the profile's light, one of KHR_lights_punctual only tints it.
+fn measured(
+    light: &RawLight,
+    wish: &ProfileWish,
+    spectrum: Option<&Sampled>,
+    place: &str,
+    lamps: &mut Lamps,
+    check: &mut Check,
+) -> Option<PunctualLight> {
+    if light.kind == RawLightKind::Directional {
+        let what = "is parallel light, which a profile cannot spread";
+        check.problem(place, what, "make it a point or a spot");
+        return None;
+    }
+    let profile = Arc::clone(&wish.profile);
+    let Some(luminaire) = Luminaire::at_node(profile, &light.to_world, wish.turn_deg) else {
+        let what = "its node is scaled to nothing, so that its profile has no direction";
+        check.problem(place, what, "give the node a scale that is not zero");
+        return None;
+    };
+    let tint = light.ies.as_ref().map_or([1.0; 3], |ies| ies.color);
+    let own = lamps.luminance(light.color);
+    let flux = wish.flux * tilt_share(&luminaire) * lamps.luminance(tint);
+    if flux == 0.0 || own == 0.0 {
+        check.warn(format!(
+            "{place}: gives no light (its flux or its colour is 0)"
+        ));
+        return None;
+    }
+    if !bearable(flux, "lm", place, check) {
+        return None;
+    }
+    let color: [f32; 3] = std::array::from_fn(|k| light.color[k] * tint[k]);
+    let lamp = match spectrum {
+        Some(spectrum) => lamps.by_spectrum(spectrum, Some(flux)),
+        None if lamps.luminance(color) > 0.0 => {
+            lamps.by_colour(color, flux / lamps.luminance(color))
+        }
+        None => lamps.by_colour([1.0; 3], flux),
+    };
+    Some(PunctualLight {
+        name: String::new(),
+        kind: LightKind::Profile,
+        position: DVec3::ZERO,
+        direction: luminaire.nadir(),
+        light: lamp.light,
+        shape: lamp.shape,
+        luminaire: Some(Arc::new(luminaire)),
+    })
 }
 
 /// What a light's intensity is given in.
 fn unit(kind: RawLightKind) -> &'static str {
     match kind {
         RawLightKind::Directional => "lx",
-        RawLightKind::Point | RawLightKind::Spot => "cd",
+        RawLightKind::Point | RawLightKind::Spot | RawLightKind::Profile => "cd",
     }
 }
 
@@ -338,6 +437,7 @@ mod tests {
             extras: None,
             node: 3,
             to_world: DMat4::from_translation(glam::dvec3(1.0, 2.0, 3.0)),
+            ies: None,
         }
     }
 
@@ -354,7 +454,14 @@ mod tests {
         let mut lamps = Lamps::new(&grid, &upsampler);
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
-        let mut lights = punctual(raw, &SpectraFile::default(), room, &mut lamps, &mut check);
+        let mut lights = punctual(
+            raw,
+            &[],
+            &SpectraFile::default(),
+            room,
+            &mut lamps,
+            &mut check,
+        );
         let spectra = lamps.finish(&mut [], &mut lights);
         let (problems, warnings) = check.into_parts();
         (

@@ -7,9 +7,9 @@ use super::light::{self, Lamps};
 use super::material;
 use super::sky::{self, SkyWish};
 use super::spectra_file::SpectraFile;
-use super::{LightSpectrum, Material, PunctualLight, Scene, Surface, lacking, said};
+use super::{LightSpectrum, Material, PunctualLight, Scene, Surface, lacking, luminaires, said};
 use crate::color::Upsampler;
-use crate::data::Grid;
+use crate::data::{Grid, Leaves};
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -72,7 +72,7 @@ impl Scene {
         let file = SpectraFile::open(path, options, &names, &light_names, &mut check);
         let upsampler = Upsampler::new(&grid);
         let mut lamps = Lamps::new(&grid, &upsampler);
-        let mut materials = material::materials(
+        let (mut materials, shining) = material::materials(
             raw_materials,
             &tinted(raw_materials.len(), &geometry.surfaces),
             &file,
@@ -82,8 +82,23 @@ impl Scene {
             &mut lamps,
             &mut check,
         );
-        let mut lights = light::punctual(raw_lights, &file, path, &mut lamps, &mut check);
+        let nodes = raw_lights.iter().filter_map(|raw| raw.ies.as_ref());
+        let profiles = luminaires::profiles(&document.source, nodes, &mut check);
+        let mut lights =
+            light::punctual(raw_lights, &profiles, &file, path, &mut lamps, &mut check);
+        let luminous = lamps.luminous();
         let mut spectra = lamps.finish(&mut materials, &mut lights);
+        let size = |light: usize, shape: &Leaves| luminous(&spectra[light], shape);
+        let surfaces = &geometry.surfaces;
+        luminaires::add(
+            &shining,
+            surfaces,
+            &mut materials,
+            &mut lights,
+            options.scale.unwrap_or(1.0),
+            size,
+            &mut check,
+        );
         let nodes: Vec<(String, String)> = raw_lights
             .iter()
             .map(|raw| {
@@ -110,10 +125,13 @@ impl Scene {
         }
         let mut warnings = geometry.warnings;
         warnings.extend(said);
+        let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
+        let (panes, surfaces) = geometry.surfaces.into_iter().partition(is_pane);
         let scene = Self {
             source: document.source,
             grid,
-            surfaces: geometry.surfaces,
+            surfaces,
+            panes,
             materials,
             images: geometry.images,
             spectra,

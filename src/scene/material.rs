@@ -1,19 +1,23 @@
 //! Materials: glTF's metallic-roughness model taken as Lambertian, with measured spectra where there are some.
 //!
 //! `reflectance(leaf) = min(upsample(base colour factor), 0.999)`, or the measured table. Metals reflect by their base
-//! colour as albedo, unlit materials are painted with it, blended ones are opaque; each is said in a warning.
+//! colour as albedo, unlit materials are painted with it; each is said in a warning.
 //! Emission: luminance = emissive strength (nits) times Y of the linear emissive factor, unless a side file says more.
-//! No gloss, no transmission.
+//! No gloss. What lets light through is a pane, see [`pane`].
 
 use super::check::Check;
 use super::json::short;
+use super::known::{MaterialSpectra, Sampled};
 use super::light::{Lamp, Lamps, bearable};
+use super::luminaires::ProfileWish;
+use super::pane;
 use super::raw::{AlphaMode, RawMaterial};
-use super::spectra_file::{MaterialSpectra, Sampled, SpectraFile};
+use super::spectra_file::SpectraFile;
 use super::{Alpha, Emission, Material, Sides};
 use crate::color::Upsampler;
 use crate::data::{Grid, Leaves};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Greatest albedo: at 1 a closed room that emits has no steady state, near it the condition is 1/(1 - albedo).
 pub const GREATEST_ALBEDO: f64 = 0.999;
@@ -51,7 +55,7 @@ impl Emission {
 struct Said {
     metals: Vec<String>,
     unlit: Vec<String>,
-    blended: Vec<String>,
+    panes: pane::Said,
     bright: Vec<String>,
 }
 
@@ -69,7 +73,7 @@ pub(crate) fn materials(
     upsampler: &Upsampler,
     lamps: &mut Lamps,
     check: &mut Check,
-) -> Vec<Material> {
+) -> (Vec<Material>, Vec<Option<ProfileWish>>) {
     let mut said = Said::default();
     let made = raw
         .iter()
@@ -77,19 +81,26 @@ pub(crate) fn materials(
         .map(|(raw, tinted)| {
             let name = name_of(raw);
             let place = format!("material '{}'", short(&name));
-            let spectra = file.material(&name, raw.extras.as_ref(), room, grid, check);
+            let mut spectra = file.material(&name, raw.extras.as_ref(), room, grid, check);
             let raw = &checked(raw, &place, check);
-            said.hear(raw, &name);
             let measured = spectra.reflectance.as_ref();
             let (mut material, bright) = paint(raw, &name, measured, upsampler);
-            // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
-            if bright && (measured.is_some() || !tinted && raw.base_color_texture.is_none()) {
-                said.bright.push(name);
+            material.emission = match &spectra.profile {
+                Some(wish) => shining(raw, wish, spectra.emission.as_ref(), &place, lamps, check),
+                None => emission(raw, &spectra, &place, lamps, check),
+            };
+            let emits = material.emission.is_some();
+            let through = spectra.transmittance.as_ref();
+            let panes = &mut said.panes;
+            material.pane = panes.pane(raw, &name, through, emits, &place, upsampler, check);
+            if material.pane.is_none() {
+                // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
+                let plain = !tinted && raw.base_color_texture.is_none();
+                said.hear(raw, &name, bright && (measured.is_some() || plain));
             }
-            material.emission = emission(raw, &spectra, &place, lamps, check);
-            material
+            (material, spectra.profile.take())
         })
-        .collect();
+        .unzip();
     said.warn(check);
     made
 }
@@ -162,6 +173,7 @@ fn paint(
             .filter(|_| measured.is_none()),
         vertex_paint: measured.is_none(),
         emission: None,
+        pane: None,
         alpha: match raw.alpha_mode {
             AlphaMode::Mask => Alpha::Mask {
                 cutoff: raw.alpha_cutoff,
@@ -220,20 +232,64 @@ fn emission(
         color: lamp.color,
         scale: lamp.scale,
         from: lamp.from,
+        profile: None,
+    })
+}
+
+/// The emission of a surface that shines by a profile, of luminance 1 until it is known how large the surface is.
+fn shining(
+    raw: &RawMaterial,
+    wish: &ProfileWish,
+    spectrum: Option<&(Sampled, Option<f64>)>,
+    place: &str,
+    lamps: &mut Lamps,
+    check: &mut Check,
+) -> Option<Emission> {
+    if spectrum.is_some_and(|(_, luminance)| luminance.is_some()) {
+        let what = "has a luminance and a profile, which says how bright it is";
+        check.problem(place, what, "take out \"luminance_cd_m2\", or the profile");
+    }
+    if raw.emissive_texture.is_some() {
+        check.warn(format!(
+            "{place}: its emissive texture is passed over, it shines by its profile"
+        ));
+    }
+    let own = lamps.luminance(raw.emissive_factor);
+    let lamp = match spectrum {
+        _ if wish.flux <= 0.0 => {
+            check.warn(format!("{place}: gives no light (its flux is 0)"));
+            return None;
+        }
+        Some((spectrum, _)) => lamps.by_spectrum(spectrum, Some(1.0)),
+        None if own > 0.0 => lamps.by_colour(raw.emissive_factor, 1.0 / own),
+        None => {
+            let what = "has a profile, but neither a spectrum nor an emissive colour";
+            check.problem(place, what, "name a spectrum: \"name\": \"cie/LED-B3\"");
+            return None;
+        }
+    };
+    Some(Emission {
+        light: lamp.light,
+        shape: lamp.shape,
+        texture: None,
+        color: lamp.color,
+        scale: lamp.scale,
+        from: lamp.from,
+        profile: Some(Arc::clone(&wish.profile)),
     })
 }
 
 impl Said {
-    fn hear(&mut self, raw: &RawMaterial, name: &str) {
+    fn hear(&mut self, raw: &RawMaterial, name: &str, bright: bool) {
+        if bright {
+            self.bright.push(name.into());
+        }
         // glTF's default material is a metal on paper only.
         if raw.metallic > METALLIC && raw.index.is_some() {
             self.metals.push(name.into());
         }
         if raw.unlit {
             self.unlit.push(name.into());
-        }
-        if raw.alpha_mode == AlphaMode::Blend {
-            self.blended.push(name.into());
         }
     }
 
@@ -247,7 +303,6 @@ impl Said {
                 &self.unlit,
                 "KHR_materials_unlit: lit all the same, as paint of the base colour",
             ),
-            (&self.blended, "alphaMode BLEND: opaque"),
             (&self.bright, "albedo above 0.999: brought down to 0.999"),
         ];
         for (names, what) in warnings {
@@ -256,6 +311,7 @@ impl Said {
                 check.warn(format!("{what} ({})", listed(&names)));
             }
         }
+        self.panes.warn(check);
     }
 }
 
@@ -295,7 +351,7 @@ mod tests {
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
         let file = SpectraFile::default();
-        let mut made = materials(
+        let (mut made, _) = materials(
             raw,
             &vec![false; raw.len()],
             &file,
@@ -391,7 +447,7 @@ mod tests {
         let mut check = Check::new("room.glb");
         let room = folder.path().join("room.glb");
         let file = SpectraFile::default();
-        let mut made = materials(
+        let (mut made, _) = materials(
             &raws,
             &[false; 5],
             &file,
@@ -467,7 +523,7 @@ mod tests {
         }
         assert_eq!(problems.len(), 3, "{problems:?}");
         assert!(problems.iter().all(|p| p.contains("material 'bad'")));
-        assert!(matches!(materials[1].alpha, Alpha::Opaque));
+        assert!(materials[1].pane.is_some() && materials[0].pane.is_none());
         assert_eq!(materials[4].name, "material 7");
         assert!(
             materials

@@ -14,18 +14,24 @@ pub mod geometry;
 mod image;
 mod instances;
 mod json;
+mod known;
 pub mod lacking;
 mod light;
 mod load;
+pub mod luminaires;
 mod material;
+mod meshes;
 mod nodes;
+pub mod pane;
 mod primitive;
+pub mod profile;
 mod raw;
 mod said;
 pub mod sky;
 mod spectra_file;
 mod texture;
 mod texture_info;
+mod transmittance;
 pub(crate) mod uri;
 mod world;
 
@@ -33,6 +39,7 @@ pub(crate) use json::short;
 pub use load::Options;
 pub use material::GREATEST_ALBEDO;
 pub(crate) use material::listed;
+pub use meshes::{Meshes, Paint, PointLamp};
 
 use crate::data::{Grid, Leaves};
 use glam::{DMat4, DVec3, Vec3};
@@ -49,6 +56,8 @@ pub struct Scene {
     pub grid: Grid,
     /// One entry for each drawn primitive at each node (and each instance of it).
     pub surfaces: Vec<Surface>,
+    /// The same for what lets light straight through: filters on rays, that neither block nor receive.
+    pub panes: Vec<Surface>,
     /// Materials; `Surface::material` points in here.
     pub materials: Vec<Material>,
     /// Decoded images that some paint, emission or alpha mask uses.
@@ -131,6 +140,8 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// Holes.
     pub alpha: Alpha,
+    /// What it lets straight through; then its surfaces stand in [`Scene::panes`].
+    pub pane: Option<pane::Pane>,
 }
 
 /// Which sides of a surface reflect and emit. The other side is black and blocks light.
@@ -174,6 +185,16 @@ pub struct Emission {
     pub scale: f64,
     /// Where the spectrum comes from, for `inspect`.
     pub from: String,
+    /// How the light is spread, if not evenly: then `shape` only says how bright the surface is shown, and what it sends out is a
+    /// light of [`LightKind::Surface`].
+    pub profile: Option<Arc<profile::Profile>>,
+}
+
+impl Material {
+    /// What the surface sends out evenly to all sides; none where a profile says how it shines.
+    pub fn even_emission(&self) -> Option<&Emission> {
+        self.emission.as_ref().filter(|e| e.profile.is_none())
+    }
 }
 
 /// A spectrum that lamps share. Lamps given by colour share D65 and differ by `shape`.
@@ -186,7 +207,7 @@ pub struct LightSpectrum {
 }
 
 /// A light without extent, or one of a sky. Radiant intensity in W/sr/nm (point, spot), irradiance in W/m2/nm across its rays
-/// (directional, sun) or of open level ground (sky), exitance in W/m2/nm (ground).
+/// (directional, sun) or of open level ground (sky), exitance in W/m2/nm (ground), radiant flux in W/nm (profile, surface).
 #[derive(Debug, Clone)]
 pub struct PunctualLight {
     /// For messages.
@@ -201,9 +222,11 @@ pub struct PunctualLight {
     pub light: usize,
     /// `intensity(leaf) = spectra[light].power[leaf] * shape[leaf]`.
     pub shape: Leaves,
+    /// How its light is spread, and from where: of the kinds that say so, and of no other.
+    pub luminaire: Option<Arc<luminaires::Luminaire>>,
 }
 
-/// Kinds of KHR_lights_punctual, and those of a sky.
+/// Kinds of KHR_lights_punctual, measured lamps, and those of a sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {
     /// Shines alike in all directions.
@@ -217,6 +240,10 @@ pub enum LightKind {
     },
     /// Parallel light.
     Directional,
+    /// Shines from a point as its [profile](PunctualLight::luminaire) says.
+    Profile,
+    /// Shines from a surface as its profile says: a lamp with an extent.
+    Surface,
     /// The sun: light from a disc of [`sky::SUN_RADIUS`], infinitely far away.
     Sun,
     /// The sky above the horizon, spread as [`Scene::sky`] says.

@@ -7,6 +7,7 @@
 use crate::scene::Texture;
 use crate::scene::check::Check;
 use crate::scene::json::{self, Item};
+use crate::scene::luminaires::{IesNode, ies_node};
 use crate::scene::nodes::Placed;
 use crate::scene::texture_info::Slots;
 use glam::DMat4;
@@ -39,6 +40,16 @@ pub struct RawMaterial {
     pub double_sided: bool,
     /// KHR_materials_unlit is there.
     pub unlit: bool,
+    /// Share that is let through, of KHR_materials_transmission.
+    pub transmission: Option<f64>,
+    /// Multiplies it (red).
+    pub transmission_texture: Option<Texture>,
+    /// Refractive index of KHR_materials_ior.
+    pub ior: Option<f64>,
+    /// KHR_materials_volume.
+    pub volume: Option<RawVolume>,
+    /// Roughness, if it is said.
+    pub roughness: Option<f32>,
     /// The material's extras.
     pub extras: Option<Value>,
     /// Names of all extensions on the material, sorted.
@@ -61,10 +72,26 @@ impl Default for RawMaterial {
             alpha_cutoff: 0.5,
             double_sided: false,
             unlit: false,
+            transmission: None,
+            transmission_texture: None,
+            ior: None,
+            volume: None,
+            roughness: None,
             extras: None,
             extensions: Vec::new(),
         }
     }
+}
+
+/// KHR_materials_volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawVolume {
+    /// Thickness below the surface, the file's units; 0: none.
+    pub thickness: f64,
+    /// Distance over which white light becomes `colour`, the file's units; none: it never does.
+    pub distance: Option<f64>,
+    /// Linear, each in [0, 1].
+    pub colour: [f32; 3],
 }
 
 /// `alphaMode` of a material.
@@ -101,6 +128,8 @@ pub struct RawLight {
     pub node: usize,
     /// Node to world; the light shines along -Z of its own space.
     pub to_world: DMat4,
+    /// EXT_lights_ies of its node.
+    pub ies: Option<IesNode>,
 }
 
 /// `type` of a punctual light.
@@ -112,6 +141,8 @@ pub enum RawLightKind {
     Spot,
     /// Parallel.
     Directional,
+    /// As a profile of EXT_lights_ies says.
+    Profile,
 }
 
 /// All materials of the document; after them the default one if some primitive names none.
@@ -165,6 +196,9 @@ fn material(
         if let Some(metallic) = pbr.number("metallicFactor", check) {
             out.metallic = unit(metallic, "metallicFactor", item, check);
         }
+        if let Some(roughness) = pbr.number("roughnessFactor", check) {
+            out.roughness = Some(unit(roughness, "roughnessFactor", item, check));
+        }
         let texture = pbr.child("baseColorTexture", check);
         out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
     }
@@ -180,6 +214,7 @@ fn material(
     let texture = item.child("emissiveTexture", check);
     out.emissive_texture = texture.and_then(|t| slots.texture(json, &t, check));
     emission(item, &mut out, check);
+    transmission(json, item, &mut out, slots, check);
     match item.text("alphaMode", check) {
         None | Some("OPAQUE") => {}
         Some("MASK") => out.alpha_mode = AlphaMode::Mask,
@@ -228,6 +263,43 @@ fn emission(item: &Item<'_>, out: &mut RawMaterial, check: &mut Check) {
     }
 }
 
+/// KHR_materials_transmission, _volume and _ior.
+fn transmission(
+    json: &Value,
+    item: &Item<'_>,
+    out: &mut RawMaterial,
+    slots: &mut Slots,
+    check: &mut Check,
+) {
+    if let Some(pane) = item.extension("KHR_materials_transmission", check) {
+        let factor = pane.number("transmissionFactor", check).unwrap_or(0.0);
+        out.transmission = Some(f64::from(unit(factor, "transmissionFactor", item, check)));
+        let texture = pane.child("transmissionTexture", check);
+        out.transmission_texture = texture.and_then(|t| slots.texture(json, &t, check));
+    }
+    if let Some(ior) = item.extension("KHR_materials_ior", check) {
+        out.ior = ior.number("ior", check);
+    }
+    if let Some(volume) = item.extension("KHR_materials_volume", check) {
+        let thickness = volume.number("thicknessFactor", check).unwrap_or(0.0);
+        let distance = volume.number("attenuationDistance", check);
+        if thickness < 0.0 || distance.is_some_and(|d| d <= 0.0) {
+            let what =
+                "KHR_materials_volume has a negative thickness, or a distance that is not positive";
+            check.problem(&item.place, what, "mend the material and export again");
+            return;
+        }
+        let colour = volume.numbers::<3>("attenuationColor", check);
+        out.volume = Some(RawVolume {
+            thickness,
+            distance,
+            colour: colour
+                .unwrap_or([1.0; 3])
+                .map(|x| unit(x, "attenuationColor", item, check)),
+        });
+    }
+}
+
 /// Brought into [0, 1], with a warning.
 fn unit(value: f64, key: &str, item: &Item<'_>, check: &mut Check) -> f32 {
     if !(0.0..=1.0).contains(&value) {
@@ -271,12 +343,17 @@ pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<
         let index = node
             .extension(NAME, check)
             .and_then(|e| e.index("light", check));
-        let Some(index) = index else { continue };
-        let item = json::referred(table, "lights", "light", index, &node.place, check);
-        let Some(item) = item else { continue };
-        let Some(light) = light(&item, &node, place, check) else {
-            continue;
+        let ies = ies_node(json, &node, check);
+        let light = match (index, ies) {
+            (Some(index), ies) => {
+                let item = json::referred(table, "lights", "light", index, &node.place, check);
+                let light = item.and_then(|item| light(&item, &node, place, check));
+                light.map(|light| RawLight { ies, ..light })
+            }
+            (None, Some(ies)) => Some(measured(ies, &node, place)),
+            (None, None) => None,
         };
+        let Some(light) = light else { continue };
         // Every node gets a copy of its light's name and extras.
         carried += light.name.len() + light.extras.as_ref().map_or(0, weight);
         if carried > MAX_CARRIED {
@@ -287,6 +364,28 @@ pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<
         lights.push(light);
     }
     lights
+}
+
+/// A light that only EXT_lights_ies describes.
+fn measured(ies: IesNode, node: &Item<'_>, placed: &Placed) -> RawLight {
+    let name = if ies.name.is_empty() {
+        node.name()
+    } else {
+        &ies.name
+    };
+    RawLight {
+        name: name.to_owned(),
+        kind: RawLightKind::Profile,
+        color: [1.0; 3],
+        intensity: 1.0,
+        range: None,
+        inner: 0.0,
+        outer: 0.0,
+        extras: None,
+        node: placed.node,
+        to_world: placed.to_world,
+        ies: Some(ies),
+    }
 }
 
 fn light(item: &Item<'_>, node: &Item<'_>, placed: &Placed, check: &mut Check) -> Option<RawLight> {
@@ -339,6 +438,7 @@ fn light(item: &Item<'_>, node: &Item<'_>, placed: &Placed, check: &mut Check) -
         extras: item.map.get("extras").cloned(),
         node: placed.node,
         to_world: placed.to_world,
+        ies: None,
     };
     let sum = light.intensity + light.color.iter().sum::<f32>();
     if !sum.is_finite() {

@@ -3,7 +3,8 @@
 //! ```json
 //! { "materials": { "wall":  { "reflectance": { "csv": "spectra/wall.csv" } },
 //!                  "panel": { "reflectance": { "name": "macbeth/white" },
-//!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } } },
+//!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } },
+//!                  "glass": { "transmittance": { "csv": "spectra/glass.csv" } } },
 //!   "lights":    { "Spot": { "name": "cie/A" } },
 //!   "sky":       { "type": "overcast" } }
 //! ```
@@ -15,18 +16,21 @@
 //! is the CSV itself. A reflectance is held beyond its rows, an emission is zero there. The emission of a *surface* given as a CSV without a luminance is
 //! spectral radiance in W/m2/sr/nm; with a luminance (cd/m2) only its shape counts. A named illuminant without a
 //! luminance keeps the brightness that glTF gives the material. The spectrum of a *light* is a shape always: glTF's
-//! candela or lux, times the luminance of its colour, say how bright it is.
+//! candela or lux, times the luminance of its colour, say how bright it is. `"profile"`: see `luminaires`.
 //!
 //! Unknown keys of the file, and names that the room does not have, are problems that come with the nearest names; a
 //! lenient reader is only warned of them. Unknown keys of `extras` belong to other programs and are passed over.
 
 use super::check::{Check, Unknown};
 use super::json::short;
+use super::known::{MaterialSpectra, Sampled};
 use super::load::Options;
+use super::luminaires::{self, LampWish};
 use super::said;
 use super::sky::SkyWish;
+use super::transmittance;
 use super::uri;
-use crate::data::{Grid, Leaves};
+use crate::data::Grid;
 use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -35,41 +39,11 @@ use std::path::{Path, PathBuf};
 /// Above this a table of reflectances is taken for percent.
 const NOT_A_FRACTION: f64 = 2.0;
 
-/// A spectrum on the grid, and where it came from.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sampled {
-    /// `cie/F2` or the CSV's path as written.
-    pub(crate) from: String,
-    /// Band means.
-    pub(crate) leaves: Leaves,
-    /// Values of a CSV carry a unit; those of the registry are relative.
-    pub(crate) is_csv: bool,
-}
-
-/// What is known of a material.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct MaterialSpectra {
-    /// Reflectance, unit 1.
-    pub(crate) reflectance: Option<Sampled>,
-    /// Emission and its luminance, cd/m2, if given.
-    pub(crate) emission: Option<(Sampled, Option<f64>)>,
-}
-
-impl MaterialSpectra {
-    /// These spectra, and where they say nothing the others.
-    pub(crate) fn or(self, other: Self) -> Self {
-        Self {
-            reflectance: self.reflectance.or(other.reflectance),
-            emission: self.emission.or(other.emission),
-        }
-    }
-}
-
 /// The side file of a room; empty if there is none.
 #[derive(Debug, Default)]
 pub(crate) struct SpectraFile {
     materials: BTreeMap<String, MaterialSpectra>,
-    lights: BTreeMap<String, Sampled>,
+    lights: BTreeMap<String, LampWish>,
     /// What is said of sky and sun.
     pub(crate) sky: SkyWish,
 }
@@ -130,8 +104,8 @@ impl SpectraFile {
         for (name, entry) in reader.entries(top, "lights", &place) {
             let place = format!("{place}: light '{}'", short(name));
             reader.known(name, lights, "light", &place);
-            if let Some(spectrum) = reader.light(entry, &place) {
-                file.lights.insert(name.clone(), spectrum);
+            if let Some(lamp) = luminaires::read(&mut reader, entry, &place) {
+                file.lights.insert(name.clone(), lamp);
             }
         }
         file
@@ -171,24 +145,19 @@ impl SpectraFile {
         room: &Path,
         grid: &Grid,
         check: &mut Check,
-    ) -> Option<Sampled> {
-        if let Some(spectrum) = self.lights.get(name) {
-            return Some(spectrum.clone());
+    ) -> Option<LampWish> {
+        if let Some(lamp) = self.lights.get(name) {
+            return Some(lamp.clone());
         }
-        // Other programs write a "name" into extras too; all of ours hold a slash.
-        let extras = extras?;
-        let is_ours = extras["name"]
-            .as_str()
-            .map_or(extras["csv"].is_string(), |n| n.contains('/'));
+        let extras = extras.filter(|extras| luminaires::is_ours(extras))?;
         let mut reader = Reader {
             folder: uri::folder_of(room),
             grid,
             check,
             unknown: Unknown::Ignore,
         };
-        is_ours
-            .then(|| reader.light(extras, &format!("light '{}', extras", short(name))))
-            .flatten()
+        let place = format!("light '{}', extras", short(name));
+        luminaires::read(&mut reader, extras, &place)
     }
 }
 
@@ -203,7 +172,7 @@ fn beside(room: &Path) -> Option<PathBuf> {
 
 /// Reads the objects of a side file or of extras.
 pub(crate) struct Reader<'a> {
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     grid: &'a Grid,
     pub(super) check: &'a mut Check,
     unknown: Unknown,
@@ -214,7 +183,7 @@ impl Reader<'_> {
         let Some(entry) = self.object(entry, place) else {
             return MaterialSpectra::default();
         };
-        self.keys(entry, &["reflectance", "emission"], place);
+        self.keys(entry, &["reflectance", "emission", "transmittance"], place);
         let mut spectra = MaterialSpectra::default();
         if let Some(value) = entry.get("reflectance") {
             let place = format!("{place}, reflectance");
@@ -223,22 +192,22 @@ impl Reader<'_> {
                 spectra.reflectance = self.sampled(object, Kind::Reflectance, &place);
             }
         }
+        if let Some(value) = entry.get("transmittance") {
+            spectra.transmittance = transmittance::read(self, entry, value, place);
+        }
         if let Some(value) = entry.get("emission") {
             let place = format!("{place}, emission");
             if let Some(object) = self.object(value, &place) {
-                self.keys(object, &["name", "csv", "luminance_cd_m2"], &place);
+                spectra.profile = luminaires::read_profile(self, object, &place);
+                self.keys(object, &luminaires::OF_EMISSION, &place);
                 let luminance = self.luminance(object, &place);
-                let sampled = self.sampled(object, Kind::Illuminant, &place);
-                spectra.emission = sampled.map(|s| (s, luminance));
+                if luminaires::says_spectrum(object) || !object.contains_key("profile") {
+                    let sampled = self.sampled(object, Kind::Illuminant, &place);
+                    spectra.emission = sampled.map(|s| (s, luminance));
+                }
             }
         }
         spectra
-    }
-
-    fn light(&mut self, entry: &Value, place: &str) -> Option<Sampled> {
-        let entry = self.object(entry, place)?;
-        self.keys(entry, &["name", "csv"], place);
-        self.sampled(entry, Kind::Illuminant, place)
     }
 
     fn luminance(&mut self, object: &Map<String, Value>, place: &str) -> Option<f64> {
@@ -252,7 +221,12 @@ impl Reader<'_> {
         number
     }
 
-    fn sampled(&mut self, object: &Map<String, Value>, kind: Kind, place: &str) -> Option<Sampled> {
+    pub(super) fn sampled(
+        &mut self,
+        object: &Map<String, Value>,
+        kind: Kind,
+        place: &str,
+    ) -> Option<Sampled> {
         let outside = match kind {
             Kind::Reflectance => Outside::Hold,
             Kind::Illuminant => Outside::Zero,
@@ -463,7 +437,8 @@ mod tests {
             (lamp.from.as_str(), *luminance, lamp.is_csv),
             ("cie/F2", Some(5000.0), false)
         );
-        assert_eq!(file.lights["Spot"].from, "cie/A");
+        let spot = file.lights["Spot"].spectrum.as_ref();
+        assert_eq!(spot.unwrap().from, "cie/A");
     }
 
     #[test]
@@ -581,7 +556,7 @@ mod tests {
                 &grid,
                 &mut check,
             );
-            spectrum.map(|s| s.from)
+            spectrum.and_then(|s| s.spectrum).map(|s| s.from)
         };
         assert_eq!(light(json!({"name": "cie/F11"})), Some("cie/F11".into()));
         assert_eq!(light(json!({"name": "Lamp.001"})), None);

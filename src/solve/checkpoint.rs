@@ -34,8 +34,9 @@ impl Bake {
     /// Writes a checkpoint; its size in bytes.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The file cannot be written, or the room has panes.
     pub fn save(&self, path: &Path) -> Result<u64> {
+        self.can_be_kept("--checkpoint")?;
         let print = self.fingerprint();
         container::write(path, Kind::Checkpoint, |out| {
             print.encode(out)?;
@@ -43,6 +44,21 @@ impl Bake {
             out.put_all(&self.probes.last)?;
             out.put(self.elapsed().as_secs_f64())
         })
+    }
+
+    /// Can what this bake knows be written down, as `option` asks? What rays pass on their way is in no file.
+    ///
+    /// # Errors
+    /// The room has panes.
+    pub fn can_be_kept(&self, option: &str) -> Result<()> {
+        if self.panes.is_none() {
+            return Ok(());
+        }
+        Err(Error::input(
+            self.scene.source.path.display().to_string(),
+            format!("{option} does not go with rooms that light passes panes in"),
+            format!("bake without {option}"),
+        ))
     }
 
     /// Takes up a checkpoint: this bake, which has done no round, goes on where that one stood.

@@ -6,18 +6,22 @@
 use super::sources::DenseSources;
 use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
+use crate::light::Filters;
 use crate::light::lanes::Lanes;
 use crate::link::{LinkRows, balance};
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;
 use crate::spectrum::{
-    CmfTree, Control, Estimate, Leaves, List, Metric, Partition, Path, Tree, control, represent,
+    CmfTree, Control, Estimate, LEAVES, Leaves, List, Metric, Partition, Path, Tree, control,
+    represent,
 };
 
 /// The paper's error limits leave its light sources (Table 1) this colour difference, CIELUV: mean of .26, .33 and .27.
 const PAPER_DE_LUV: f64 = 0.29;
 /// Materials whose first and second reflections the paper's control looks at, and that train a basis.
 const MATERIALS: usize = 32;
+/// Tinted panes that the choice of lanes looks at.
+const TINTS: usize = 8;
 /// Patches of the model on which bounds are worked out: they take a dozen numbers a lane and a hundred bounces.
 const BOUNDED_PATCHES: usize = 48;
 
@@ -34,6 +38,7 @@ impl Bake {
             }
         }
         self.lanes = lanes;
+        self.filters = Filters::new(&self.scene, &self.lanes);
     }
 
     pub(super) fn chosen_lanes(&mut self) -> Lanes {
@@ -49,16 +54,33 @@ impl Bake {
                 let cut = paper_cut(&self.scene, weights, tolerance);
                 Lanes::absolute(spectra, cut, weights)
             }
+            // A filter would have to be a matrix there.
+            Representation::Characteristic(_) if self.panes.is_some() => {
+                Lanes::dense(spectra, weights)
+            }
             Representation::Characteristic(n) if !none => {
                 let lights: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
                 let basis = basis(&lights, &paints(&self.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
             Representation::Adaptive if !none => {
-                let model = self.model(coarse::PATCHES);
+                let mut model = self.model(coarse::PATCHES);
                 let (spectra, weights) = (&self.scene.spectra, &self.weights);
-                let known = self.lanes.cuts();
-                let choice = model.choose(spectra, weights, self.light.white, tolerance, known);
+                let (known, white) = (self.lanes.cuts(), self.light.white);
+                let choose = |model: &coarse::Coarse| {
+                    model.choose(spectra, weights, white, tolerance, known.clone())
+                };
+                let mut choice = choose(&model);
+                // What lies behind a pane has light of its own spectra: lanes serve all of them.
+                let plain = (model.emission.clone(), model.punctual.clone());
+                for filter in tints(&self.scene) {
+                    (model.emission, model.punctual) = plain.clone();
+                    model.behind(&filter);
+                    let other = choose(&model);
+                    for (cut, more) in choice.cuts.iter_mut().zip(other.cuts) {
+                        *cut = cut.union(more);
+                    }
+                }
                 // Without light there is no white to see an error by.
                 self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
                 Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights)
@@ -113,6 +135,23 @@ impl Bake {
             patches,
         )
     }
+}
+
+/// What the tinted panes of a scene let through, without those that come twice, and what all of them do together.
+fn tints(scene: &Scene) -> Vec<Leaves> {
+    let mut tints: Vec<Leaves> = Vec::new();
+    let panes = scene.panes.iter();
+    for pane in panes.filter_map(|s| scene.materials[s.material].pane.as_ref()) {
+        let normal = pane.normal();
+        if tints.len() < TINTS && !pane.is_neutral() && !tints.contains(&normal) {
+            tints.push(normal);
+        }
+    }
+    if tints.len() > 1 {
+        let together = |all: Leaves, one: &Leaves| std::array::from_fn(|k| all[k] * one[k]);
+        tints.push(tints.iter().fold([1.0; LEAVES], together));
+    }
+    tints
 }
 
 /// Does every lamp shine with just its light's spectrum? Its direct light is then one number a light, on any cut.

@@ -136,6 +136,13 @@ impl Coarse {
         }
     }
 
+    /// Puts all light behind a filter.
+    pub(super) fn behind(&mut self, filter: &Leaves) {
+        for row in self.emission.iter_mut().chain(&mut self.punctual).flatten() {
+            *row = std::array::from_fn(|k| row[k] * filter[k]);
+        }
+    }
+
     /// Irradiance of the model's patches on some lanes.
     fn irradiance(&self, lanes: &Lanes) -> Rows {
         match padded(lanes.len()) {

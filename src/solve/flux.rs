@@ -123,7 +123,7 @@ const DOME: f64 = 0.05;
 pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
     let lanes = Lanes::dense(&scene.spectra, weights);
     let glow: Vec<[f64; 3]> = (scene.materials.iter())
-        .map(|m| lanes.exitance(m.emission.as_ref()))
+        .map(|m| lanes.exitance(m.even_emission()))
         .collect();
     let whole: f64 = weights[1].iter().sum();
     let albedo: Vec<f64> = scene
@@ -235,8 +235,8 @@ pub(super) fn conserve(
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Balance {
-    /// Luminous flux given out by surfaces, lm. Light of a sky, of the sun and parallel light counts from where it is received:
-    /// what does not enter the room is in no sum.
+    /// Luminous flux given out evenly by surfaces, lm (lamps with a profile are among `sent`). Light of a sky, of the sun and
+    /// parallel light counts from where it is received: what does not enter the room is in no sum.
     pub emitted_lm: f64,
     /// Luminous flux that fronts receive straight from lamps of any kind, lm.
     pub received_lm: f64,

@@ -66,6 +66,7 @@ impl Look for Looker<'_> {
             tree,
             tolerance,
             sight: &self.clear,
+            glass: None,
             ..self.bake.gatherer(self.sight)
         };
         let mut memory = Memory::default();
@@ -115,6 +116,7 @@ impl Bake {
                 sight,
                 clear: Sight {
                     occlusion: false,
+                    panes: None,
                     ..*sight
                 },
                 weights: bake.bright_weights(),

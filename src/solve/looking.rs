@@ -2,6 +2,7 @@
 
 use super::{Bake, Care, Closed, DE_PER_PERCENT, by_rays, flux};
 use crate::geometry::{NO_PLANE, Segment};
+use crate::light::Glass;
 use crate::link::Sight;
 use crate::transport::hemisphere::Hemisphere;
 use crate::transport::point::{Gathered, Gatherer, MOSTLY, Memory, Receiver};
@@ -98,6 +99,10 @@ impl Bake {
             sight,
             lamps: &self.lamps,
             sky: self.outside.as_ref(),
+            glass: sight.panes.map(|glazing| Glass {
+                glazing,
+                filters: &self.filters,
+            }),
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
             hemisphere: by_rays(sight).then_some(&self.hemisphere),

@@ -30,6 +30,7 @@ mod representation;
 mod sent;
 mod solving;
 mod sources;
+mod tinted;
 pub(crate) mod two_grid;
 
 pub use lists::PatchList;
@@ -39,9 +40,9 @@ pub(crate) use sources::weights_of;
 
 use crate::color::{Observer, Upsampler};
 use crate::geometry::RayIndex;
-use crate::hierarchy::{Mesh, Tree, cuts, spaces};
+use crate::hierarchy::{Glazing, Mesh, Panes, Tree, cuts, spaces};
 use crate::light::lanes::Lanes;
-use crate::light::{Light, Rows, padded};
+use crate::light::{Filters, Light, Rows, padded};
 use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance, is_small};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
@@ -157,9 +158,10 @@ pub(crate) enum Care {
     Sketch,
 }
 
-/// Do leaves and points of this room look for themselves? In a room of few triangles exact clipping is better.
+/// Do leaves and points of this room look for themselves? In a room of few triangles exact clipping is better, but it knows no
+/// filters: where there are panes rays do all.
 fn by_rays(sight: &Sight) -> bool {
-    sight.occlusion && !sight.small()
+    sight.occlusion && !(sight.small() && sight.panes.is_none())
 }
 
 /// A room being baked.
@@ -170,6 +172,10 @@ pub struct Bake {
     pub(crate) mesh: Mesh,
     pub(crate) tree: Tree,
     pub(crate) rays: RayIndex,
+    /// What light passes through; none where the room has no panes.
+    pub(crate) panes: Option<Panes>,
+    /// The spectra of the panes on the present lanes.
+    pub(crate) filters: Filters,
     pub(crate) graph: Graph,
     pub(crate) closed: Closed,
     /// The same for what is not covered by something solid.
@@ -310,6 +316,8 @@ impl Bake {
             two_grid: None,
             spectrum_error: None,
             sent: sent::Sent::default(),
+            panes: Panes::new(&scene, mesh.centre),
+            filters: Filters::new(&scene, &lanes),
             scene,
             settings,
             plan,
@@ -516,9 +524,16 @@ impl Bake {
                 rays: &self.rays,
                 mesh: &self.mesh,
                 opaque,
+                panes: self.glazing(),
                 occlusion: self.plan.runs(Kind::Occlusion),
             },
         )
+    }
+
+    /// The panes of this room.
+    pub(crate) fn glazing(&self) -> Option<Glazing<'_>> {
+        let scene = &self.scene;
+        (self.panes.as_ref()).map(|panes| Glazing { panes, scene })
     }
 
     /// Punctual lights, recentred, with their rows.

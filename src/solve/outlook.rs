@@ -13,6 +13,7 @@
 //! all leaves receive: nothing need be scaled.
 
 use super::flux::Closed;
+use super::tinted::{Passed, Tints, passed};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::rows::Rows;
@@ -54,6 +55,9 @@ impl End {
     };
 }
 
+/// Where the rays of a leaf ended, and what those pass that pass panes.
+type Ends = (Vec<End>, Vec<(u32, Passed)>);
+
 /// How the leaves of a hierarchy look out.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Outlook {
@@ -66,6 +70,8 @@ pub(crate) struct Outlook {
     certain: Vec<bool>,
     /// Where the rays of leaves ended, leaf after leaf.
     ends: Vec<End>,
+    /// What panes they pass.
+    pub(super) tints: Tints,
     /// First end of each node's rays, and how many there are.
     range: Vec<(u32, u32)>,
     /// The leaf of the present hierarchy at each end, maybe with the flag [`ALONE`]; [`NONE`] where there is none.
@@ -145,7 +151,7 @@ impl Outlook {
             .map(Hemisphere::new)
             .collect();
         let usual = LOOKING.0 * hemisphere.len() as f64 / mean;
-        let parts: Vec<Vec<Vec<End>>> = new
+        let parts: Vec<Vec<Ends>> = new
             .par_chunks(CHUNK)
             .map(|chunk| {
                 let each = |&leaf: &u32| {
@@ -160,13 +166,16 @@ impl Outlook {
             })
             .collect();
         let mut cast = 0;
-        for (ends, &leaf) in parts.into_iter().flatten().zip(&new) {
+        for ((ends, passed), &leaf) in parts.into_iter().flatten().zip(&new) {
             let k = leaf as usize;
             let fronts = ends.iter().filter(|end| end.entry != NONE).count();
             self.bare[k] = fronts as f32 / ends.len() as f32;
             self.target[k] = 1.0;
             self.range[k] = (self.ends.len() as u32, ends.len() as u32);
             cast += ends.len() as u64;
+            if sight.panes.is_some() {
+                self.tints.extend(ends.len(), passed);
+            }
             self.ends.extend(ends);
         }
         self.find(tree);
@@ -259,10 +268,10 @@ impl Outlook {
 
     /// Irradiance of each leaf by what its rays met, `nodes` being the radiosity of every patch: by leaf.
     pub(super) fn irradiance<const L: usize>(&self, leaves: &[u32], nodes: &Rows, out: &mut Rows) {
-        self.means::<L, _>(leaves, nodes, out, |leaf| {
-            let (met, fronts) = self.met(leaf);
-            (met, 1.0 / fronts)
-        });
+        // The flag is the highest bit, and part of what stands for no leaf.
+        let counted = |k: u32| Some(k).filter(|k| k & ALONE == 0);
+        let share = |leaf| 1.0 / self.met(leaf).1;
+        self.means::<L>(leaves, nodes, out, share, counted);
     }
 
     /// Irradiance of each leaf as a whole, whatever others see of it: by leaf, for the record of fluxes.
@@ -272,20 +281,19 @@ impl Outlook {
         nodes: &Rows,
         out: &mut Rows,
     ) {
-        self.means::<L, _>(leaves, nodes, out, |leaf| {
-            let met = self.ends_of(leaf);
-            let some = met.iter().filter(|&&k| k != NONE).map(|&k| k & !ALONE);
-            (some, 1.0 / met.len().max(1) as f32)
-        });
+        let counted = |k: u32| (k != NONE).then_some(k & !ALONE);
+        let share = |leaf| 1.0 / self.ends_of(leaf).len().max(1) as f32;
+        self.means::<L>(leaves, nodes, out, share, counted);
     }
 
-    /// Sums over nodes, times a share of each leaf.
-    fn means<'a, const L: usize, Met: Iterator<Item = u32> + 'a>(
-        &'a self,
+    /// Sums over what the rays of each leaf met, as far as it is counted, times a share of the leaf.
+    fn means<const L: usize>(
+        &self,
         leaves: &[u32],
         nodes: &Rows,
         out: &mut Rows,
-        met: impl Fn(u32) -> (Met, f32) + Sync,
+        share: impl Fn(u32) -> f32 + Sync,
+        counted: impl Fn(u32) -> Option<u32> + Sync,
     ) {
         let nodes = nodes.all::<L>();
         out.all_mut::<L>()
@@ -293,13 +301,25 @@ impl Outlook {
             .zip(leaves.par_chunks(CHUNK))
             .for_each(|(out, leaves)| {
                 for (row, &leaf) in out.iter_mut().zip(leaves) {
-                    let (met, share) = met(leaf);
+                    let met = self.ends_of(leaf);
                     let mut sum = [0.0_f32; L];
-                    for node in met {
-                        for (s, x) in sum.iter_mut().zip(&nodes[node as usize]) {
-                            *s += x;
+                    if self.tints.is_empty() {
+                        for node in met.iter().filter_map(|&k| counted(k)) {
+                            for (s, x) in sum.iter_mut().zip(&nodes[node as usize]) {
+                                *s += x;
+                            }
+                        }
+                    } else {
+                        let first = self.range[leaf as usize].0 as usize;
+                        for (ray, &met) in (first..).zip(met) {
+                            let Some(node) = counted(met) else { continue };
+                            let tint = self.tints.row::<L>(ray).unwrap_or(&[1.0; L]);
+                            for ((s, x), t) in sum.iter_mut().zip(&nodes[node as usize]).zip(tint) {
+                                *s += x * t;
+                            }
                         }
                     }
+                    let share = share(leaf);
                     *row = sum.map(|x| x * share);
                 }
             });
@@ -374,7 +394,9 @@ impl Outlook {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        (size_of::<End>() + 4) * self.ends.len() + 8 * (self.range.len() + self.target.len())
+        self.tints.bytes()
+            + (size_of::<End>() + 4) * self.ends.len()
+            + 8 * (self.range.len() + self.target.len())
     }
 
     /// Area of every node that takes part; never quite zero, so that nothing is divided by zero.
@@ -426,7 +448,7 @@ fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64)
 }
 
 /// Casts the rays of a leaf: a turned pattern of directions, two from each of points all over it.
-fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: u64) -> Vec<End> {
+fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: u64) -> Ends {
     let node = tree.node(leaf);
     let element = &tree.elements[node.element as usize];
     let plane = tree.face_plane[element.face as usize];
@@ -435,7 +457,7 @@ fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: 
     let (sin, cos) = (std::f64::consts::TAU * sequence02(0, turn)[0]).sin_cos();
     let [x, y] = tangents(node.normal);
     let [x, y] = [x * cos + y * sin, y * cos - x * sin];
-    let mut ends = Vec::with_capacity(pattern.len());
+    let (mut ends, mut tints) = (Vec::with_capacity(pattern.len()), Vec::new());
     let mut hits = [None; BEAM];
     let (mut from, mut directions) = ([Vec3::ZERO; BEAM], [Vec3::ZERO; BEAM]);
     for beam in pattern.beams() {
@@ -444,6 +466,15 @@ fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: 
             from[k] = element.at(pairs.start(ends.len() + k)).as_vec3();
         }
         sight.meet(&from, &directions, plane, &mut hits);
+        if let Some(glazing) = &sight.panes {
+            for (k, hit) in hits.iter().enumerate() {
+                let end = hit.map(|hit| from[k] + hit.t * directions[k]);
+                let passed = end.map_or(Vec::new(), |end| passed(glazing, from[k], end));
+                if !passed.is_empty() {
+                    tints.push(((ends.len() + k) as u32, passed));
+                }
+            }
+        }
         ends.extend(hits.iter().map(|hit| {
             let Some(hit) = hit else { return End::NOWHERE };
             let [u, v] = hit.uv.map(|x| (x * 65536.0).clamp(0.0, 65535.0) as u16);
@@ -460,7 +491,7 @@ fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: 
             end.entry |= ALONE;
         }
     }
-    ends
+    (ends, tints)
 }
 
 /// Which two rays of a leaf start from the same point: k and `k ^ mask`. The mask differs from leaf to leaf, so that the

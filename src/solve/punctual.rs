@@ -184,7 +184,8 @@ pub(super) fn factors(
     out
 }
 
-/// Integral of a light's angular distribution, so that flux is intensity times this; none for directional light.
+/// Integral of a light's angular distribution, so that flux is intensity times this (1 where the flux itself is what is known); none
+/// for directional light.
 pub(super) fn solid_angle(kind: LightKind) -> Option<f64> {
     match kind {
         LightKind::Point => Some(4.0 * PI),
@@ -192,6 +193,7 @@ pub(super) fn solid_angle(kind: LightKind) -> Option<f64> {
         LightKind::Spot { inner, outer } => {
             Some(2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0))
         }
+        LightKind::Profile | LightKind::Surface => Some(1.0),
         LightKind::Directional | LightKind::Sun | LightKind::Sky | LightKind::Ground => None,
     }
 }

@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 
 /// Rays: an error of about 0.1 % of the flux.
 const RAYS: u32 = 32_768;
+/// Rays from a surface start so far before it, share of half the room.
+const OFF: f64 = 1e-5;
 /// Rays that go together.
 const TOGETHER: usize = 16;
 
@@ -31,6 +33,9 @@ pub struct Sent {
     pub to_backs: f64,
     /// Out of the room.
     pub outside: f64,
+    /// Kept back by panes on the way: what they absorb, and what they reflect, which is left out.
+    #[serde(default)]
+    pub in_panes: f64,
 }
 
 impl Bake {
@@ -41,7 +46,7 @@ impl Bake {
         if all <= 0.0 {
             return Sent::default();
         }
-        if self.closed == Closed::Yes {
+        if self.closed == Closed::Yes && sight.panes.is_none() {
             return Sent {
                 lamps_lm: all,
                 to_fronts: 1.0,
@@ -52,29 +57,36 @@ impl Bake {
             lamps_lm: all,
             ..Sent::default()
         };
+        let glass = self.gatherer(sight).glass;
         let mut first = 0;
         for (flux, lamp) in lamps {
             // At least a packet, so that no lamp goes without.
             let count = (f64::from(RAYS) * flux / all).ceil() as usize;
             let count = count.next_multiple_of(TOGETHER);
-            let each = flux / all / count as f64;
+            let each = flux / all / lamp.weights(self, first as u32, count as u32);
             for start in (0..count).step_by(TOGETHER) {
                 let mut from = [Vec3::ZERO; TOGETHER];
+                let mut weights = [1.0; TOGETHER];
                 let mut directions = [Vec3::ZERO; TOGETHER];
                 let mut plane = 0;
                 for k in 0..TOGETHER {
-                    let (point, direction, of) = lamp.ray(self, (first + start + k) as u32);
+                    let (point, direction, of, weight) = lamp.ray(self, (first + start + k) as u32);
+                    weights[k] = weight;
                     (from[k], directions[k], plane) = (point.as_vec3(), direction.as_vec3(), of);
                 }
                 let mut hits = [None; TOGETHER];
                 sight.meet(&from, &directions, plane, &mut hits);
-                for hit in hits {
+                for (k, hit) in hits.into_iter().enumerate() {
+                    let reach = hit.map_or(4.0 * self.mesh.half_size as f32, |hit| hit.t);
+                    let end = from[k] + reach * directions[k];
+                    let through = glass.map_or(1.0, |glass| glass.brightness(from[k], end));
                     let to = match hit {
                         None => &mut sent.outside,
                         Some(hit) if self.tree.met(&hit) == NONE => &mut sent.to_backs,
                         Some(_) => &mut sent.to_fronts,
                     };
-                    *to += each;
+                    *to += each * weights[k] * through;
+                    sent.in_panes += each * weights[k] * (1.0 - through);
                 }
             }
             first += count;
@@ -85,7 +97,7 @@ impl Bake {
     /// Lamps with their luminous flux.
     fn sending(&self) -> Vec<(f64, Lamp<'_>)> {
         let exitance: Vec<f64> = (self.scene.materials.iter())
-            .map(|m| self.lanes.exitance(m.emission.as_ref())[1])
+            .map(|m| self.lanes.exitance(m.even_emission())[1])
             .collect();
         let faces = (0..self.tree.faces.len()).filter_map(|entry| {
             let triangle = self.tree.faces[entry].triangle as usize;
@@ -115,8 +127,19 @@ enum Lamp<'a> {
 }
 
 impl Lamp<'_> {
-    /// Start, direction and plane of its `k`-th ray.
-    fn ray(self, bake: &Bake, k: u32) -> (DVec3, DVec3, u32) {
+    /// Sum of what so many of its rays count for.
+    fn weights(self, bake: &Bake, first: u32, count: u32) -> f64 {
+        match self {
+            Lamp::Punctual(light) if light.luminaire.is_some() => {
+                let rays = (first..first + count).map(|k| self.ray(bake, k).3);
+                rays.sum::<f64>().max(f64::MIN_POSITIVE)
+            }
+            _ => f64::from(count),
+        }
+    }
+
+    /// Start, direction and plane of its `k`-th ray, and what it counts for: 1 in the mean.
+    fn ray(self, bake: &Bake, k: u32) -> (DVec3, DVec3, u32, f64) {
         // Two shifts of one sequence depend on each other.
         let mut random = Pcg::new(hash(13, u64::from(k)));
         let (u, v) = (sequence02(k, 11), [random.f64(), random.f64()]);
@@ -129,16 +152,25 @@ impl Lamp<'_> {
                     element.at(triangle_weights(u)),
                     direction,
                     tree.face_plane[entry],
+                    1.0,
                 )
             }
             Lamp::Punctual(light) => {
+                let place = light.position - bake.mesh.centre;
+                if let Some(luminaire) = &light.luminaire {
+                    let ray = luminaire.ray(u, v);
+                    let (start, direction, weight) = ray.unwrap_or((DVec3::ZERO, DVec3::Y, 0.0));
+                    // Off the surface, so that it is not met.
+                    let start = start + direction * (OFF * bake.mesh.half_size);
+                    return (place + start, direction, NO_PLANE, weight);
+                }
                 let direction = match light.kind {
                     LightKind::Spot { inner, outer } => {
                         around(light.direction, cosine_of_spot(inner, outer, v[0]), v[1])
                     }
                     _ => sphere_direction(v),
                 };
-                (light.position - bake.mesh.centre, direction, NO_PLANE)
+                (place, direction, NO_PLANE, 1.0)
             }
         }
     }

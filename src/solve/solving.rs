@@ -63,6 +63,7 @@ impl Bake {
         } = given;
         let nodes = self.tree.nodes.len();
         let by_rays = self.by_rays();
+        self.outlook.tints.on(&self.scene, &self.filters);
         let mut scaled = flux::Scaled::default();
         if self.sealed == Closed::Yes && !by_rays {
             let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);

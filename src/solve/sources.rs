@@ -53,7 +53,7 @@ impl<'a> Painter<'a> {
             .map(|m| {
                 let (mut rho, mut emission) = (vec![0.0; width], vec![0.0; width]);
                 lanes.averages(&m.reflectance, &mut rho);
-                if let Some(e) = &m.emission {
+                if let Some(e) = m.even_emission() {
                     lanes.add_emission(e.light, &e.shape, PI, &mut emission);
                 }
                 (rho, emission)
@@ -163,7 +163,7 @@ impl<'a> Painter<'a> {
         triangle: usize,
         element: &Element,
     ) -> Option<(&'m Emission, Leaves)> {
-        let e = m.emission.as_ref()?;
+        let e = m.even_emission()?;
         let texture = e.texture.as_ref()?;
         let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
         let texel = self.texel(
@@ -260,7 +260,7 @@ impl super::coarse::Dense for DenseSources<'_> {
 
     fn emission(&self, leaf: u32, light: usize) -> Option<Leaves> {
         let (m, triangle, element) = self.of(leaf);
-        let e = m.emission.as_ref().filter(|e| e.light == light)?;
+        let e = m.even_emission().filter(|e| e.light == light)?;
         Some(match self.painter.glow_of(m, triangle, &element) {
             Some((e, shape)) => shape.map(|x| PI * e.scale * x),
             None => e.shape.map(|x| PI * x),

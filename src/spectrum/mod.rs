@@ -97,6 +97,7 @@ pub mod methods;
 mod partition;
 mod product;
 mod source;
+#[cfg(any(feature = "paper", test))]
 pub mod study;
 mod sum;
 mod tree;

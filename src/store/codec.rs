@@ -4,10 +4,10 @@
 //! every failure is a [`Broken`], never a panic. What is large and read piece by piece stands *aside*: bytes of the file that
 //! neither the reader holds nor the checksum covers.
 
-use super::hash::Hasher;
 use std::fs::File;
 use std::io::{self, Write};
 use std::sync::Arc;
+use xxhash_rust::xxh64::Xxh64;
 
 /// What is wrong with bytes that were to be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,7 +72,7 @@ const BUFFER: usize = 1 << 16;
 /// Writes, and hashes what it writes.
 pub struct Encoder<'a> {
     out: &'a mut dyn Write,
-    hash: Hasher,
+    hash: Xxh64,
     /// Bytes so far.
     written: u64,
     /// Start and length of what stands aside.
@@ -84,7 +84,7 @@ impl<'a> Encoder<'a> {
     pub fn new(out: &'a mut dyn Write) -> Self {
         Self {
             out,
-            hash: Hasher::default(),
+            hash: Xxh64::new(0),
             written: 0,
             asides: Vec::new(),
         }
@@ -179,7 +179,7 @@ impl<'a> Encoder<'a> {
         let asides = std::mem::take(&mut self.asides);
         self.put_each(asides.iter().copied())?;
         self.put(asides.len() as u64)?;
-        let sum = self.hash.finish();
+        let sum = self.hash.digest();
         self.put(sum)?;
         Ok(self.written)
     }

@@ -14,13 +14,13 @@
 //! [`Problem`](crate::Problem) that says what to do.
 
 use super::codec::{Broken, Decoder, Encoder, Plain, Read};
-use super::hash;
 use crate::error::{Error, Result};
 use crate::store::file;
 use std::fs::File;
 use std::io::{self, Read as _, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
+use xxhash_rust::xxh64::{Xxh64, xxh64};
 
 const MAGIC: [u8; 8] = *b"\x89haarlt\n";
 const HEADER: usize = 16;
@@ -175,7 +175,7 @@ fn open(path: &Path, kind: Kind) -> io::Result<Read<Opened>> {
     (&file).take(end - at).read_to_end(&mut bytes)?;
     let body = bytes.len();
     bytes.extend(&last[..last.len() - size_of::<u64>()]);
-    if hash::of(&bytes) != sum {
+    if xxh64(&bytes, 0) != sum {
         return Ok(Err(short(kind)));
     }
     bytes.truncate(body);
@@ -189,7 +189,7 @@ fn open(path: &Path, kind: Kind) -> io::Result<Read<Opened>> {
 /// The checksum that should stand at the end of a file of these bytes, as far as they are one.
 pub fn checksum(bytes: &[u8]) -> u64 {
     let front = &bytes[..bytes.len().saturating_sub(size_of::<u64>())];
-    let mut sum = hash::Hasher::default();
+    let mut sum = Xxh64::new(0);
     let mut at = 0;
     if let Some((before, count)) = front.split_last_chunk::<8>() {
         let count = usize::try_from(u64::from_le_bytes(*count)).unwrap_or(usize::MAX);
@@ -201,7 +201,7 @@ pub fn checksum(bytes: &[u8]) -> u64 {
         }
     }
     sum.update(&front[at..]);
-    sum.finish()
+    sum.digest()
 }
 
 /// Reads a file through `decode`, which must use all of it.

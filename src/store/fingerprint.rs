@@ -6,10 +6,10 @@
 //! is the same part.
 
 use super::codec::{Decoder, Encoder, Plain, Read};
-use super::hash::Hasher;
 use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
 use std::collections::BTreeMap;
 use std::io;
+use xxhash_rust::xxh64::Xxh64;
 
 /// Changes that a message names; the others are counted.
 const NAMED: usize = 4;
@@ -22,7 +22,7 @@ pub struct Fingerprint {
 
 /// A hash of plain numbers.
 #[derive(Default)]
-struct Mix(Hasher);
+struct Mix(Xxh64);
 
 impl Mix {
     fn add<T: Plain>(&mut self, x: T) -> &mut Self {
@@ -95,6 +95,8 @@ impl Fingerprint {
                 LightKind::Point => [0.0; 3],
                 LightKind::Spot { inner, outer } => [1.0, inner, outer],
                 LightKind::Directional => [2.0, 0.0, 0.0],
+                LightKind::Profile => [6.0, 0.0, 0.0],
+                LightKind::Surface => [7.0, 0.0, 0.0],
                 LightKind::Sun => [3.0, 0.0, 0.0],
                 LightKind::Sky => [4.0, 0.0, 0.0],
                 LightKind::Ground => [5.0, 0.0, 0.0],
@@ -106,7 +108,16 @@ impl Fingerprint {
             if let (LightKind::Sky, Some(sky)) = (light.kind, &scene.sky) {
                 mix.add(sky.dome.kind()).add(sky.dome.sun().to_array());
             }
-            print.add(format!("place of light '{}'", light.name), &mix);
+            let mut what = "place";
+            if let Some(luminaire) = &light.luminaire {
+                what = "place or profile";
+                mix.all(&luminaire.numbers());
+                mix.add(luminaire.profile.angles.letter() as u8);
+                for numbers in luminaire.profile.numbers() {
+                    mix.all(numbers);
+                }
+            }
+            print.add(format!("{what} of light '{}'", light.name), &mix);
         }
         print
     }
@@ -177,7 +188,7 @@ impl Fingerprint {
     }
 
     fn add(&mut self, name: String, mix: &Mix) {
-        self.parts.push((name, mix.0.finish()));
+        self.parts.push((name, mix.0.digest()));
     }
 
     /// What is different in `now`, in words; none if it is the same.
@@ -262,7 +273,7 @@ fn images(scene: &Scene) -> Vec<u64> {
             let mut mix = Mix::default();
             mix.add([image.width as u64, image.height as u64])
                 .all(&image.pixels);
-            mix.0.finish()
+            mix.0.digest()
         })
         .collect()
 }

@@ -3,7 +3,6 @@
 //! | file | what |
 //! |---|---|
 //! | `file` | a file is whole or not there |
-//! | `hash` | XXH64 |
 //! | `codec` | numbers and lists as bytes, and back without trust |
 //! | `packs` | many short pieces, read when they are asked for |
 //! | `container` | magic, kind, version, what stands aside, checksum |
@@ -13,7 +12,6 @@ pub mod codec;
 pub mod container;
 pub mod file;
 pub mod fingerprint;
-pub mod hash;
 pub mod packs;
 
 pub use codec::{Broken, Decoder, Encoder};

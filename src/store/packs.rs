@@ -2,9 +2,9 @@
 //! and a checksum (8 bytes) a block. What is read once a relighting need not fill the memory.
 
 use super::codec::{Aside, Broken, Decoder, Encoder, Read};
-use super::hash;
 use rayon::prelude::*;
 use std::io;
+use xxhash_rust::xxh64::{Xxh64, xxh64};
 
 /// The length of a piece that is not there.
 const MISSING: u32 = u32::MAX;
@@ -39,12 +39,12 @@ impl Packs {
         let mut sums = Vec::with_capacity(pieces.len().div_ceil(Self::BLOCK));
         out.aside(|out| {
             for block in pieces.chunks(Self::BLOCK) {
-                let mut sum = hash::Hasher::default();
+                let mut sum = Xxh64::new(0);
                 for piece in block.iter().flatten() {
                     sum.update(piece);
                     out.write_all(piece)?;
                 }
-                sums.push(sum.finish());
+                sums.push(sum.digest());
             }
             Ok(pieces.iter().flatten().map(|p| p.len() as u64).sum())
         })?;
@@ -103,7 +103,7 @@ impl Packs {
         let Block { start, length, sum } = self.blocks[k];
         buffer.resize(length, 0);
         self.bytes.read(start, buffer)?;
-        if hash::of(buffer) != sum {
+        if xxh64(buffer, 0) != sum {
             return Err(Broken::new("is cut short or damaged"));
         }
         let first = k * Self::BLOCK;

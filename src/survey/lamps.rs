@@ -12,6 +12,7 @@ use crate::geometry::sampling::{
     Pcg, around, cosine_direction, hash, on_triangle, sequence02, sphere_direction, tangents,
 };
 use crate::scene::{LightKind, PunctualLight, Scene, Sides, listed, short};
+use glam::DVec3;
 use std::f64::consts::TAU;
 
 /// Rays of a lamp: a few for the first look, which most rooms pass with their first lamp, and many before a room is
@@ -82,6 +83,10 @@ fn look(eyes: &Eyes, rays: u32) -> Option<Away> {
     };
     let (mut fronts, mut backs) = (0, 0);
     for (k, light) in scene.lights.iter().enumerate() {
+        // What shines from a surface is looked at with the surfaces.
+        if light.kind == LightKind::Surface {
+            continue;
+        }
         let seen = of_light(eyes, light, rays);
         if seen.things + seen.lamps > 0 {
             return None;
@@ -166,6 +171,14 @@ fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
                 // Evenly over the cone.
                 let cosine = 1.0 - y * (1.0 - outer.cos());
                 (light.position, around(light.direction, cosine, x))
+            }
+            LightKind::Profile | LightKind::Surface => {
+                // Two shifts of one sequence depend on each other.
+                let mut random = Pcg::new(hash(2, u64::from(k)));
+                let way = light.luminaire.as_ref();
+                let ray = way.and_then(|l| l.ray([x, y], [random.f64(), random.f64()]));
+                let (_, direction, _) = ray.unwrap_or((DVec3::ZERO, light.direction, 0.0));
+                (light.position, direction)
             }
             LightKind::Directional | LightKind::Sun | LightKind::Sky | LightKind::Ground => {
                 let from = if light.kind.is_dome() {
@@ -261,6 +274,8 @@ fn kind(light: &PunctualLight) -> &'static str {
         LightKind::Point => "point",
         LightKind::Spot { .. } => "spot",
         LightKind::Directional => "directional",
+        LightKind::Profile => "measured",
+        LightKind::Surface => "surface",
         LightKind::Sun => "sun",
         LightKind::Sky => "sky",
         LightKind::Ground => "ground",

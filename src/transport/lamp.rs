@@ -4,11 +4,12 @@
 //! parts in proportion to it. How many rays is settled beforehand: to stop where the first few agree is to overlook thin
 //! things, and took 4 to 8 % of the light of lamps behind louvres.
 
+use super::luminaire;
 use super::point::{Gathered, Gatherer, Memory, Of, Receiver, punctual_factor};
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
-use crate::light::keenness;
+use crate::light::{Filter, Tint, keenness};
 use crate::link::{View, open_weight};
 use crate::scene::LightKind;
 use glam::DVec3;
@@ -134,17 +135,42 @@ impl Gatherer<'_> {
                     seen[lamp] += weight / total * all / lamps[lamp].carries;
                 }
             }
-            for (lamp, &seen) in lamps.iter().zip(&seen).filter(|(_, seen)| **seen > 0.0) {
-                self.see(to, lamp.id, lamp.factor, seen, of, out);
+            let tints = self.tints(&owners, lamps.len(), memory);
+            let each = lamps.iter().zip(&seen).enumerate();
+            for (k, (lamp, &seen)) in each.filter(|(_, (_, seen))| **seen > 0.0) {
+                let tint = tints.get(k).or(tints.last());
+                self.see(to, lamp.id, lamp.factor, seen, tint, of, out);
             }
         }
         memory.lamps = lamps;
         memory.lamps.clear();
     }
 
-    /// Puts rays to lamps, in number as `all` that they would bring asks for, into the memory with their weights; which lamp
-    /// each goes to.
-    fn aim(&self, to: &Receiver, lamps: &[Lamp], all: f64, memory: &mut Memory) -> Vec<usize> {
+    /// What panes leave of each lamp's light, by the rays that reached it, and last of all lamps' light together, which stands for
+    /// those that no ray went to. Empty in a room without panes.
+    pub(super) fn tints(&self, owners: &[usize], lamps: usize, memory: &Memory) -> Vec<Filter> {
+        let Some(glass) = &self.glass else {
+            return Vec::new();
+        };
+        let mut sums = vec![Tint::default(); lamps + 1];
+        let rays = memory.segments.iter().zip(&memory.weights);
+        for (((segment, &weight), _), &lamp) in (rays.zip(&memory.blocked))
+            .zip(owners)
+            .filter(|((_, blocked), _)| !**blocked)
+        {
+            let filter = glass.through(segment.from, segment.to);
+            let filter = filter.unwrap_or([1.0; 64]);
+            for k in [lamp, lamps] {
+                sums[k].add(&filter, weight);
+            }
+        }
+        let whole = sums[lamps].mean().unwrap_or([1.0; 64]);
+        let each = sums.iter();
+        each.map(|sum| sum.mean().unwrap_or(whole)).collect()
+    }
+
+    /// How many rays lamps are worth that would bring `all`, share of white.
+    pub(super) fn rays_to_lamps(&self, to: &Receiver, all: f64) -> usize {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses; what is dark is seen more keenly. Where many
         // points stand for a leaf it is the points that make up for it.
         let here = to
@@ -152,10 +178,16 @@ impl Gatherer<'_> {
             .and_then(|leaf| self.light.arrival.get(leaf as usize));
         let here = here.map_or(all, |arrival| f64::from(arrival.all));
         let wanted = 0.5 * all * keenness(here) / (PATCHES * self.tolerance);
-        let count = match self.shafts {
+        match self.shafts {
             true => (wanted.powf(4.0 / 3.0).ceil() as usize).clamp(RAYS[0], RAYS[1]),
             false => LEAF_RAYS,
-        };
+        }
+    }
+
+    /// Puts rays to lamps, in number as `all` that they would bring asks for, into the memory with their weights; which lamp
+    /// each goes to.
+    fn aim(&self, to: &Receiver, lamps: &[Lamp], all: f64, memory: &mut Memory) -> Vec<usize> {
+        let count = self.rays_to_lamps(to, all);
         let turn = hash(to.seed, u64::from(lamps[0].id));
         let mut samples: Vec<[f64; 2]> = (0..count as u32).map(|k| sequence02(k, turn)).collect();
         samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -214,7 +246,9 @@ impl Gatherer<'_> {
             };
             memory.rays += 1;
             if !self.sight.blocks_one(&chosen.segment) {
-                self.add_emitted(chosen.element, chosen.factor / count as f64, out);
+                let tint = self.through(&chosen.segment);
+                let factor = chosen.factor / count as f64;
+                self.add_emitted(chosen.element, factor, tint.as_ref(), out);
             }
         }
     }
@@ -245,6 +279,12 @@ impl Gatherer<'_> {
                     (LightKind::Sky | LightKind::Ground, Some((d, factors))) => {
                         let factor = factors[usize::from(lamp.kind == LightKind::Ground)];
                         (factor, to.point + d * (4.0 * self.light.half_size))
+                    }
+                    (LightKind::Surface, _) => {
+                        // Which lamp is chosen must not tell which of its points.
+                        let turn = hash(u.to_bits() ^ v.to_bits().rotate_left(32), 0x73);
+                        let at = sequence02(1, turn);
+                        luminaire::whole(lamp, to, self.light.half_size, at)?
                     }
                     _ => punctual_factor(lamp, to, self.light.half_size)?,
                 };

@@ -104,9 +104,10 @@ impl Gatherer<'_> {
         self.sight
             .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
         memory.rays += memory.segments.len() as u64;
-        for (&(k, bright), blocked) in to_lamps.iter().zip(&memory.blocked) {
+        let ways = memory.segments.iter().zip(&memory.blocked);
+        for (&(k, bright), (segment, blocked)) in to_lamps.iter().zip(ways) {
             if !blocked {
-                paths[k].sum += bright;
+                paths[k].sum += bright * self.dimmed(segment);
             }
         }
         memory.to_lamps = to_lamps;
@@ -134,6 +135,10 @@ impl Gatherer<'_> {
             let Some((leaf, hit)) = next.and_then(|hit| Some((self.met(&hit)?, hit))) else {
                 continue;
             };
+            if let Some(glass) = &self.glass {
+                let from = to.point.as_vec3();
+                path.through *= glass.brightness(from, from + way.as_vec3() * hit.t);
+            }
             if last(leaf, &hit) {
                 path.sum += path.through * f64::from(self.light.bright_reflected[leaf as usize]);
             } else {

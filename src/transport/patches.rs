@@ -8,6 +8,7 @@ use super::lamp::Lamp;
 use super::point::{CLOSE, Gathered, Gatherer, Linked, Memory, Of, Receiver};
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
+use crate::light::{Filter, Tint};
 use crate::link::{
     PIECES, POLYGONS, View, Way, blockers_of, in_front_of, open_weight, pattern, polygons,
 };
@@ -125,9 +126,10 @@ impl Gatherer<'_> {
             return;
         }
         let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
-        let clear = way == Way::Clear || !self.sight.occlusion;
+        let clear = self.is_clear(way);
         if let Some((factor, visible)) = self.sampled(to, id, count, clear, memory) {
-            self.add(id, factor, visible, of, out);
+            let tint = self.tint(memory);
+            self.add(id, factor, visible, tint.as_ref(), of, out);
         }
     }
 
@@ -142,7 +144,7 @@ impl Gatherer<'_> {
         out: &mut Gathered,
     ) {
         let node = self.tree.node(id);
-        let clear = way == Way::Clear || !self.sight.occlusion;
+        let clear = self.is_clear(way);
         let (size, limit) = if clear {
             let distance = (node.centre - to.point).length();
             let size = (node.radius / distance.max(1e-300)).min(1.0);
@@ -161,26 +163,48 @@ impl Gatherer<'_> {
         let (reflected, emitted) = self.brightness(id, of);
         let carries = factor * (reflected + emitted);
         if clear {
-            self.see(to, id, factor, 1.0, of, out);
+            self.see(to, id, factor, 1.0, None, of, out);
         } else if let Some(visible) =
             self.visible(to, (id, way, v), factor, carries, emitted > 0.0, memory)
         {
-            self.see(to, id, factor, visible, of, out);
+            let tint = self.tint(memory);
+            self.see(to, id, factor, visible, tint.as_ref(), of, out);
         }
     }
 
-    /// Adds a patch of a few faces of which a share is visible.
+    /// Is nothing on the way? A way that links proved clear may lead through a pane.
+    fn is_clear(&self, way: Way) -> bool {
+        self.glass.is_none() && (way == Way::Clear || !self.sight.occlusion)
+    }
+
+    /// What panes leave of what the last rays bring, where they are not blocked; none where no pane is passed.
+    fn tint(&self, memory: &Memory) -> Option<Filter> {
+        let glass = self.glass?;
+        let (mut tint, mut any) = (Tint::default(), false);
+        let rays = memory.segments.iter().zip(&memory.weights);
+        for ((segment, &weight), _) in (rays.zip(&memory.blocked)).filter(|(_, b)| !**b) {
+            let filter = glass.through(segment.from, segment.to);
+            any |= filter.is_some();
+            tint.add(&filter.unwrap_or([1.0; 64]), weight);
+        }
+        tint.mean().filter(|_| any)
+    }
+
+    /// Adds a patch of a few faces of which a share is visible, and of its light what a filter leaves.
+    #[expect(clippy::too_many_arguments, reason = "each is a different thing")]
     pub(super) fn see(
         &self,
         to: &Receiver,
         id: u32,
         factor: f64,
         visible: f64,
+        tint: Option<&Filter>,
         of: Of,
         out: &mut Gathered,
     ) {
-        self.add(id, factor, visible, of, out);
-        if of != Of::Emitted {
+        self.add(id, factor, visible, tint, of, out);
+        // Behind panes leaves are even: where there are any, patches are only gathered so if they glare.
+        if of != Of::Emitted && tint.is_none() {
             self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
         }
     }
@@ -208,22 +232,26 @@ impl Gatherer<'_> {
     }
 
     /// Adds a patch with a factor and its visible share.
-    fn add(&self, id: u32, factor: f64, visible: f64, of: Of, out: &mut Gathered) {
+    fn add(
+        &self,
+        id: u32,
+        factor: f64,
+        visible: f64,
+        tint: Option<&Filter>,
+        of: Of,
+        out: &mut Gathered,
+    ) {
         let seen = (factor * visible) as f32;
         let k = id as usize;
         let width = self.light.width();
         if of != Of::Emitted {
             out.seen += factor * visible;
             let row = self.light.reflected.row(k);
-            for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
-                *x += seen * r;
-            }
+            accumulate(&mut out.irradiance[..width], seen, row, tint);
         }
         if of != Of::Reflected && self.light.bright_emitted[k] > 0.0 {
             let row = self.light.emitted.row(k);
-            for (x, e) in out.direct[..width].iter_mut().zip(row) {
-                *x += seen * e;
-            }
+            accumulate(&mut out.direct[..width], seen, row, tint);
         }
         if let Some(trace) = &mut out.trace {
             match of {
@@ -238,8 +266,14 @@ impl Gatherer<'_> {
     }
 
     /// Adds what a patch emits, times a factor.
-    pub(super) fn add_emitted(&self, id: u32, factor: f64, out: &mut Gathered) {
-        self.add(id, factor, 1.0, Of::Emitted, out);
+    pub(super) fn add_emitted(
+        &self,
+        id: u32,
+        factor: f64,
+        tint: Option<&Filter>,
+        out: &mut Gathered,
+    ) {
+        self.add(id, factor, 1.0, tint, Of::Emitted, out);
     }
 
     /// Could any of the patch be in front of the receiver, and the receiver in front of any of the patch?
@@ -292,6 +326,7 @@ impl Gatherer<'_> {
             return None;
         }
         let mut visible = 1.0;
+        memory.blocked.clear();
         if !clear {
             self.sight
                 .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
@@ -302,7 +337,7 @@ impl Gatherer<'_> {
     }
 
     /// Visible share of a polygon patch; none yet for a lamp that rays must find, see `lamps_together`. `carries` is what it
-    /// would bring unblocked, share of white.
+    /// would bring unblocked, share of white. What is clipped exactly knows no filters: behind panes rays decide.
     fn visible(
         &self,
         to: &Receiver,
@@ -318,7 +353,8 @@ impl Gatherer<'_> {
         };
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
-        if let Way::Listed { .. } = way {
+        let clips = self.glass.is_none();
+        if clips && let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
                 return Some((seen / factor).min(1.0));
@@ -326,7 +362,7 @@ impl Gatherer<'_> {
         }
         if lamp {
             // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
-            if self.shafts && carries > SHAFT_WORTH * self.tolerance {
+            if self.shafts && clips && carries > SHAFT_WORTH * self.tolerance {
                 match self
                     .sight
                     .view_from(to.point, to.normal, &element.corners, planes)
@@ -403,5 +439,21 @@ impl Gatherer<'_> {
             }
         }
         Some(memory.clipper.factor(to.normal, whole))
+    }
+}
+
+/// Adds a row times a weight, of each lane what a filter leaves.
+pub(super) fn accumulate(sum: &mut [f32], weight: f32, row: &[f32], tint: Option<&Filter>) {
+    match tint {
+        None => {
+            for (x, r) in sum.iter_mut().zip(row) {
+                *x += weight * r;
+            }
+        }
+        Some(tint) => {
+            for ((x, r), t) in sum.iter_mut().zip(row).zip(tint) {
+                *x += weight * r * t;
+            }
+        }
     }
 }

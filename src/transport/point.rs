@@ -4,12 +4,14 @@
 
 use super::hemisphere::Hemisphere;
 use super::lamp::Lamp;
+use super::luminaire;
 use super::shadows::Shadows;
 use super::sky::{Look, Outside};
 use super::trace::Trace;
+use crate::geometry::sampling::sequence02;
 use crate::geometry::{Clipper, Hit, NO_PLANE, Segment};
 use crate::hierarchy::{NONE, Sample, Tree};
-use crate::light::Light;
+use crate::light::{Filter, Glass, Light};
 use crate::link::{Sight, Way};
 use crate::scene::{LightKind, PunctualLight};
 use glam::DVec3;
@@ -103,6 +105,8 @@ pub struct Memory {
     pub(super) shadows: Shadows,
     /// What the rays of a point met.
     pub(super) met: Vec<(u32, Hit)>,
+    /// What panes leave of what these bring, in order; empty in a room without.
+    pub(super) tints: Vec<Option<Box<Filter>>>,
     /// Of which close by.
     pub(super) near: Vec<(u32, Hit)>,
     /// Lamps that are put off until all of them are known.
@@ -147,6 +151,8 @@ pub struct Gatherer<'a> {
     pub lamps: &'a [(PunctualLight, Vec<f32>)],
     /// What is outside; none where no light comes from there.
     pub(crate) sky: Option<&'a Outside>,
+    /// What light passes through on its way; none where the room has no panes.
+    pub(crate) glass: Option<Glass<'a>>,
     /// What one patch may misplace, share of the white's irradiance.
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
@@ -238,35 +244,67 @@ impl Gatherer<'_> {
     /// Light of punctual lights, one ray each.
     pub(super) fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
-            let (mut factor, end) = match punctual_factor(lamp, to, self.light.half_size) {
-                Some(x) => x,
-                None => continue,
+            let (factor, filter) = match lamp.kind {
+                LightKind::Surface => {
+                    let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
+                    self.of_surface(to, lamp, f64::from(bright), memory)
+                }
+                _ => self.of_light(to, lamp, memory),
             };
-            if lamp.kind == LightKind::Sun {
-                factor *= self.sun_seen(to, lamp, memory);
-                if factor <= 0.0 {
-                    continue;
-                }
-            } else if self.sight.occlusion {
-                memory.rays += 1;
-                let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
-                if self.sight.blocks_one(&way) {
-                    continue;
-                }
+            if factor <= 0.0 {
+                continue;
             }
             if let Some(trace) = &mut out.trace {
                 trace.lamp(k, factor as f32);
             }
-            for ((x, d), r) in out.irradiance.iter_mut().zip(&mut out.direct).zip(row) {
-                *x += factor as f32 * r;
-                *d += factor as f32 * r;
+            for (l, r) in row.iter().enumerate() {
+                let more = factor as f32 * r * filter.map_or(1.0, |filter| filter[l]);
+                out.irradiance[l] += more;
+                out.direct[l] += more;
             }
         }
     }
+
+    /// What turns the intensity of a light without extent, or of the sun, into irradiance, past what is in between, and what
+    /// panes leave of it.
+    fn of_light(
+        &self,
+        to: &Receiver,
+        lamp: &PunctualLight,
+        memory: &mut Memory,
+    ) -> (f64, Option<Filter>) {
+        let Some((factor, end)) = punctual_factor(lamp, to, self.light.half_size) else {
+            return (0.0, None);
+        };
+        let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
+        let seen = match lamp.kind {
+            LightKind::Sun => self.sun_seen(to, lamp, memory),
+            _ if self.sight.occlusion => {
+                memory.rays += 1;
+                f64::from(u8::from(!self.sight.blocks_one(&way)))
+            }
+            _ => 1.0,
+        };
+        match seen > 0.0 {
+            true => (factor * seen, self.through(&way)),
+            false => (0.0, None),
+        }
+    }
+
+    /// What panes leave of light on a segment; none where all passes.
+    pub(super) fn through(&self, segment: &Segment) -> Option<Filter> {
+        self.glass?.through(segment.from, segment.to)
+    }
+
+    /// How bright light is that has passed a segment, as a share.
+    pub(super) fn dimmed(&self, segment: &Segment) -> f64 {
+        let glass = self.glass.as_ref();
+        glass.map_or(1.0, |glass| glass.brightness(segment.from, segment.to))
+    }
 }
 
-/// What turns a punctual light's intensity into irradiance at a receiver, and where the ray to it ends. None for sky and ground,
-/// which shine from everywhere.
+/// What turns a punctual light's intensity (of measured lamps, flux) into irradiance at a receiver where nothing is in between, and
+/// where the ray to it ends: of a lamp with an extent, at one of its points. None for sky and ground, which shine from everywhere.
 pub fn punctual_factor(
     lamp: &PunctualLight,
     to: &Receiver,
@@ -278,6 +316,9 @@ pub fn punctual_factor(
     if lamp.kind.is_parallel() {
         let cosine = -to.normal.dot(lamp.direction);
         return (cosine > 0.0).then(|| (cosine, to.point - lamp.direction * (4.0 * half_size)));
+    }
+    if lamp.kind == LightKind::Surface {
+        return luminaire::whole(lamp, to, half_size, sequence02(0, to.seed));
     }
     let d = lamp.position - to.point;
     let r2 = d.length_squared();
@@ -291,6 +332,10 @@ pub fn punctual_factor(
             let along = -lamp.direction.dot(d) / r2.sqrt();
             let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
             ((along - outer.cos()) * scale).clamp(0.0, 1.0).powi(2)
+        }
+        LightKind::Profile => {
+            let spread = lamp.luminaire.as_ref();
+            spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
         }
         _ => 1.0,
     };

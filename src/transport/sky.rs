@@ -6,11 +6,13 @@
 //! of the hemisphere that find a small opening brought 2 % of noise to what those toward it know.
 
 use super::openings::{Choice, Openings};
+use super::patches::accumulate;
 use super::point::{Gathered, Gatherer, Memory, Receiver};
 use crate::geometry::sampling::{around, cosine_direction, hash, sequence02};
 use crate::geometry::{
     Clipper, NO_PLANE, Patch, Segment, Shaft, ShaftContents, lambert_edges_x8, quarters,
 };
+use crate::light::{Filter, Glass, Tint};
 use crate::link::{Sight, View};
 use crate::scene::sky::{SUN_RADIUS, Sky};
 use crate::scene::{LightKind, PunctualLight};
@@ -20,6 +22,8 @@ use std::f64::consts::PI;
 /// Rays over the hemisphere and to the openings: of a random point of a leaf, of a point by a rule, of one for its own sake, and of
 /// one whose rays over the hemisphere are known.
 const RAYS: [(usize, usize); 4] = [(16, 16), (64, 64), (512, 1024), (0, 256)];
+/// So many times more to the openings in rooms of few triangles. With 4, one of the points of CIE 171 5.10 is off by .6 %.
+const FEW: usize = 16;
 /// Rays to the sun's disc, likewise.
 const SUN_RAYS: [u32; 2] = [4, 16];
 /// The far triangles stand this many half sizes of the room away: all of it lies before their planes.
@@ -58,6 +62,8 @@ pub(crate) struct Look {
     pub(crate) rays: u64,
     /// Variance of the first factor.
     noise: f64,
+    /// Mean filters of sky and ground where light comes through panes; none where none does.
+    tints: [Option<Filter>; 2],
 }
 
 /// How a point looks outside.
@@ -73,8 +79,14 @@ pub(super) enum Way<'a> {
 
 impl Outside {
     /// Irradiance of a point by the sky, where open level ground has 1, and by the ground below, where that sends out 1.
-    pub(super) fn seen(&self, sight: &Sight, to: &Receiver, way: Way, look: &mut Look) -> [f64; 2] {
-        look.noise = 0.0;
+    pub(super) fn seen(
+        &self,
+        (sight, glass): (&Sight, Option<Glass>),
+        to: &Receiver,
+        way: Way,
+        look: &mut Look,
+    ) -> [f64; 2] {
+        (look.noise, look.tints) = (0.0, [None; 2]);
         if let Way::Unshadowed = way {
             let up = |d: DVec3| match d.y > 0.0 {
                 true => PI * self.sky.radiance(d),
@@ -88,18 +100,18 @@ impl Outside {
         if Self::is_exact(sight) {
             self.exactly(sight, to, look)
         } else {
-            self.by_rays(sight, to, way, look)
+            self.by_rays((sight, glass), to, way, look)
         }
     }
 
     /// Is the sky of this room seen exactly, without openings?
     pub(crate) fn is_exact(sight: &Sight) -> bool {
-        sight.small() && sight.opaque.is_none()
+        sight.small() && sight.opaque.is_none() && sight.panes.is_none()
     }
 
     /// The same as one of many points sees it.
     pub(crate) fn lightly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; 2] {
-        self.seen(sight, to, Way::Rays(0), look)
+        self.seen((sight, None), to, Way::Rays(0), look)
     }
 
     /// By clipped polygons.
@@ -247,8 +259,18 @@ impl Outside {
     }
 
     /// By rays.
-    fn by_rays(&self, sight: &Sight, to: &Receiver, way: Way, look: &mut Look) -> [f64; 2] {
-        let (wide, narrow) = RAYS[if let Way::Rays(k) = way { k } else { 3 }];
+    fn by_rays(
+        &self,
+        (sight, glass): (&Sight, Option<Glass>),
+        to: &Receiver,
+        way: Way,
+        look: &mut Look,
+    ) -> [f64; 2] {
+        let (wide, mut narrow) = RAYS[if let Way::Rays(k) = way { k } else { 3 }];
+        if let (Way::Known(..), true) = (way, sight.small()) {
+            // Rooms of few triangles come here for their panes; a ray costs next to nothing there.
+            narrow *= FEW;
+        }
         let wide = match way {
             Way::Known(open, of) => {
                 look.open.clear();
@@ -285,6 +307,8 @@ impl Outside {
         look.open
             .extend(free.map(|(s, _)| (s.to.as_dvec3() - to.point).normalize()));
         let (mut seen, mut squares) = ([0.0; 2], 0.0);
+        let mut tints = [Tint::default(); 2];
+        let far = 4.0 * sight.mesh.half_size;
         for (k, &d) in look.open.iter().enumerate() {
             let cosine = to.normal.dot(d);
             if cosine <= 0.0 {
@@ -303,10 +327,15 @@ impl Outside {
             };
             let brings = radiance * cosine * own / squared;
             seen[place] += brings;
+            if let Some(glass) = glass {
+                let filter = glass.through(to.point.as_vec3(), (to.point + d * far).as_vec3());
+                tints[place].add(&filter.unwrap_or([1.0; 64]), brings);
+            }
             squares += if place == 0 { brings * brings } else { 0.0 };
         }
         let count = (wide + narrow) as f64;
         look.noise = (squares - seen[0] * seen[0] / count).max(0.0);
+        look.tints = tints.map(|tint| tint.mean());
         seen
     }
 
@@ -365,7 +394,7 @@ impl Gatherer<'_> {
         };
         let to = &Receiver { seed, ..*to };
         let before = memory.look.rays;
-        let seen = outside.seen(self.sight, to, way, &mut memory.look);
+        let seen = outside.seen((self.sight, self.glass), to, way, &mut memory.look);
         memory.rays += memory.look.rays - before;
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
             let factor = match lamp.kind {
@@ -383,10 +412,9 @@ impl Gatherer<'_> {
             if let Some(trace) = &mut out.trace {
                 trace.lamp(k, factor as f32);
             }
-            for ((x, d), r) in out.irradiance.iter_mut().zip(&mut out.direct).zip(row) {
-                *x += factor as f32 * r;
-                *d += factor as f32 * r;
-            }
+            let tint = memory.look.tints[usize::from(lamp.kind == LightKind::Ground)];
+            accumulate(&mut out.irradiance, factor as f32, row, tint.as_ref());
+            accumulate(&mut out.direct, factor as f32, row, tint.as_ref());
         }
     }
 

@@ -1,10 +1,12 @@
 //! Light at a point in rooms where much stands about: lamps from the root, what is bright by links, all else by rays.
 
 use super::hemisphere::{BEAM, Hemisphere};
+use super::patches::accumulate;
 use super::point::{Gathered, Gatherer, Memory, Of, Receiver};
 use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
 use crate::hierarchy::NONE;
+use crate::light::Filter;
 use crate::link::{POLYGONS, pattern};
 use glam::{DVec3, Vec3};
 
@@ -25,8 +27,10 @@ impl Gatherer<'_> {
         met.clear();
         let share = 1.0 / hemisphere.len() as f64;
         let mut escaped = std::mem::take(&mut memory.escaped);
-        out.backs = share * self.cast(to, hemisphere, &mut met, &mut escaped) as f64;
-        (memory.met, memory.escaped) = (met, escaped);
+        let mut tints = std::mem::take(&mut memory.tints);
+        let backs = self.cast(to, hemisphere, &mut met, &mut tints, &mut escaped);
+        out.backs = share * backs as f64;
+        (memory.met, memory.tints, memory.escaped) = (met, tints, escaped);
         memory.rays += hemisphere.len() as u64;
         if out.backs > self.most_backs {
             return;
@@ -79,15 +83,15 @@ impl Gatherer<'_> {
     fn look(&self, to: &Receiver, share: f32, memory: &mut Memory, out: &mut Gathered) {
         let met = std::mem::take(&mut memory.met);
         let width = self.light.width();
-        let mut add = |leaf: u32, share: f32| {
+        let tints = std::mem::take(&mut memory.tints);
+        let mut add = |leaf: u32, share: f32, ray: usize| {
             let row = self.light.reflected.row(leaf as usize);
-            for (x, r) in out.irradiance[..width].iter_mut().zip(row) {
-                *x += share * r;
-            }
+            let tint = tints.get(ray).and_then(Option::as_deref);
+            accumulate(&mut out.irradiance[..width], share, row, tint);
         };
-        let mut near = std::mem::take(&mut memory.near);
+        let (mut near, mut near_rays) = (std::mem::take(&mut memory.near), Vec::new());
         near.clear();
-        for &(leaf, hit) in &met {
+        for (ray, &(leaf, hit)) in met.iter().enumerate() {
             // Rays that end on what was gathered as a patch bring nothing more.
             let taken = |id: u32| memory.taken[id as usize] == memory.epoch;
             if memory.any_taken && self.light.descent.upwards(leaf).any(taken) {
@@ -96,21 +100,22 @@ impl Gatherer<'_> {
             out.seen += f64::from(share);
             if self.is_near(leaf, &hit, out.backs) {
                 near.push((leaf, hit));
+                near_rays.push(ray);
                 continue;
             }
-            add(leaf, share);
+            add(leaf, share, ray);
             if let Some(trace) = &mut out.trace {
                 trace.hit(leaf, share);
             }
         }
         let near_share = share * self.nearby(&near, out.backs, to.seed, memory) as f32;
-        for &(leaf, _) in &near {
-            add(leaf, near_share);
+        for (&(leaf, _), ray) in near.iter().zip(near_rays) {
+            add(leaf, near_share, ray);
             if let Some(trace) = &mut out.trace {
                 trace.slope(leaf, near_share);
             }
         }
-        (memory.met, memory.near) = (met, near);
+        (memory.met, memory.near, memory.tints) = (met, near, tints);
     }
 
     /// Casts the rays of a point. Which leaves they met, in which directions they left the room, and how many met black backs.
@@ -119,9 +124,11 @@ impl Gatherer<'_> {
         to: &Receiver,
         hemisphere: &Hemisphere,
         met: &mut Vec<(u32, Hit)>,
+        tints: &mut Vec<Option<Box<Filter>>>,
         escaped: &mut Vec<DVec3>,
     ) -> usize {
         escaped.clear();
+        tints.clear();
         // Another seed turns the pattern.
         let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
         let [x, y] = tangents(to.normal);
@@ -143,7 +150,13 @@ impl Gatherer<'_> {
                     continue;
                 };
                 match self.met(hit) {
-                    Some(leaf) => met.push((leaf, *hit)),
+                    Some(leaf) => {
+                        met.push((leaf, *hit));
+                        if let Some(glass) = &self.glass {
+                            let tint = glass.through(from[0], from[0] + *d * hit.t);
+                            tints.push(tint.map(Box::new));
+                        }
+                    }
                     None => backs += 1,
                 }
             }

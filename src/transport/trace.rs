@@ -269,6 +269,7 @@ mod tests {
                 direction: glam::DVec3::X,
                 light: 0,
                 shape: [0.0; 64],
+                luminaire: None,
             };
             (lamp, vec![k as f32; 5])
         };

@@ -7,6 +7,7 @@
 
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
+use haarlight::scene::pane::{Pane, PaneKind};
 use haarlight::scene::sky::Sky;
 use haarlight::scene::{
     Alpha, Emission, GREATEST_ALBEDO, LightKind, LightSpectrum, Material, PunctualLight, Scene,
@@ -73,6 +74,7 @@ impl Room {
             vertex_paint: false,
             emission: None,
             alpha: Alpha::Opaque,
+            pane: None,
         });
         self.materials.len() - 1
     }
@@ -93,7 +95,25 @@ impl Room {
             color: [0.5; 3],
             scale: 2.0 * exitance / PI,
             from: "given".into(),
+            profile: None,
         });
+    }
+
+    /// A pane of an index and of what its inside lets through, leaf by leaf; returns its index.
+    pub(crate) fn pane(&mut self, ior: f64, inside: Leaves) -> usize {
+        let material = self.paint(0.0);
+        self.materials[material].pane = Some(Pane {
+            kind: PaneKind::Glass {
+                ior,
+                inside,
+                unit: None,
+                thickness: 1.0,
+                share: 1.0,
+            },
+            texture: None,
+            from: "given".into(),
+        });
+        material
     }
 
     /// Lets the back of a material take part.
@@ -173,6 +193,7 @@ impl Room {
             direction: direction.normalize(),
             light: 0,
             shape: [intensity; LEAVES],
+            luminaire: None,
         });
     }
 
@@ -197,6 +218,8 @@ impl Room {
         {
             emission.light = place(emission.light);
         }
+        let is_pane = |s: &Surface| self.materials[s.material].pane.is_some();
+        let (panes, surfaces) = self.surfaces.into_iter().partition(is_pane);
         Scene {
             source: Source {
                 path: "built.glb".into(),
@@ -204,7 +227,8 @@ impl Room {
                 buffers: Vec::new(),
             },
             grid: self.grid,
-            surfaces: self.surfaces,
+            surfaces,
+            panes,
             materials: self.materials,
             images: Vec::new(),
             spectra: kept.iter().map(|&k| self.spectra[k].clone()).collect(),

@@ -141,6 +141,7 @@ fn material(name: &str, index: usize) -> Material {
         vertex_paint: false,
         emission: None,
         alpha: Alpha::Opaque,
+        pane: None,
     }
 }
 
@@ -248,6 +249,7 @@ pub fn room() -> Scene {
         color: [1.0; 3],
         scale: 1.0,
         from: "emissive colour".into(),
+        profile: None,
     });
 
     let left = DMat4::from_translation(DVec3::X);
@@ -286,6 +288,7 @@ pub fn room() -> Scene {
         },
         grid: Grid::default(),
         surfaces,
+        panes: Vec::new(),
         materials: vec![tiles, wall_paint, light],
         images: vec![image],
         spectra: vec![LightSpectrum {

@@ -7,6 +7,8 @@ mod cie171;
 mod cornell;
 mod daylit;
 mod furnished;
+mod gallery;
+mod glazed;
 mod glb;
 mod shapes;
 mod simple;
@@ -63,7 +65,9 @@ const ROOMS: &[Room] = &[
     ),
     ("corridor", simple::corridor, None),
     ("daylit", daylit::room, Some(daylit::spectra)),
+    ("glazed", glazed::room, Some(glazed::spectra)),
     ("furnace", simple::furnace, None),
+    ("gallery", gallery::room, Some(gallery::spectra)),
     ("cie171-5.2", cie171::case_5_2, None),
     ("cie171-5.2-isotropic", cie171::case_5_2_isotropic, None),
     ("cie171-5.3", cie171::case_5_3, None),
@@ -89,6 +93,11 @@ fn main() -> anyhow::Result<()> {
             std::fs::write(args.dir.join(format!("{name}.spectra.json")), text)?;
         }
         written += 1;
+    }
+    if wanted("gallery") {
+        for (name, text) in gallery::lamps() {
+            std::fs::write(args.dir.join(name), text)?;
+        }
     }
     if wanted("furnished") {
         write(&args.dir, "furnished", furnished::room(args.triangles))?;

@@ -53,7 +53,21 @@ impl Writer<'_> {
                 out.insert(name, json!(accessor));
             }
         }
-        out.insert("COLOR_0".into(), json!(self.light(surface, baked)));
+        match &baked.map {
+            Some(map) => {
+                let name = format!("TEXCOORD_{}", Self::free_set(primitive));
+                let accessor = self.bin.floats(&map.uv);
+                // Sets must be numbered without gaps.
+                out.entry("TEXCOORD_0").or_insert(json!(accessor));
+                out.insert(name, json!(accessor));
+                if let Some(colors) = self.vertex_paint(baked) {
+                    out.insert("COLOR_0".into(), json!(colors));
+                }
+            }
+            None => {
+                out.insert("COLOR_0".into(), json!(self.light(surface, baked)));
+            }
+        }
         if self.writing.xyz {
             let radiosity: Vec<[f32; 3]> = baked.vertices.iter().map(|v| v.radiosity).collect();
             out.insert("_XYZ".into(), json!(self.bin.floats(&radiosity)));

@@ -59,7 +59,7 @@ impl Writer<'_> {
         texture
     }
 
-    fn append(&mut self, key: &str, value: Value) -> usize {
+    pub(super) fn append(&mut self, key: &str, value: Value) -> usize {
         let Some(list) = self
             .json
             .entry(key)

@@ -37,6 +37,13 @@ impl Writer<'_> {
             .and_then(|i| list(&self.scene.source.json, "materials").get(i))
             .cloned();
         let baked = self.unlit_copy(material, input.unwrap_or_else(|| json!({})));
+        let index = self.place_material(place, baked);
+        self.materials.done.insert(material, index);
+        index
+    }
+
+    /// Puts a material in the input's place where that is free, else at the end; its number.
+    pub(super) fn place_material(&mut self, place: Option<usize>, baked: Value) -> usize {
         let out = self.json.entry("materials").or_insert_with(|| json!([]));
         // A document whose materials are no list has none; the importer refuses it long before.
         let Some(out) = out.as_array_mut() else {
@@ -45,7 +52,7 @@ impl Writer<'_> {
         let free = place.filter(|i| {
             *i < out.len() && !self.materials.kept.contains(i) && self.materials.taken.insert(*i)
         });
-        let index = match free {
+        match free {
             Some(index) => {
                 out[index] = baked;
                 index
@@ -54,12 +61,10 @@ impl Writer<'_> {
                 out.push(baked);
                 out.len() - 1
             }
-        };
-        self.materials.done.insert(material, index);
-        index
+        }
     }
 
-    fn unlit_copy(&mut self, index: usize, mut json: Value) -> Value {
+    pub(super) fn unlit_copy(&mut self, index: usize, mut json: Value) -> Value {
         let material = &self.scene.materials[index];
         if json.get("name").is_none() && !material.name.is_empty() {
             json["name"] = json!(material.name);

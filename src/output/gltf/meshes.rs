@@ -2,7 +2,9 @@
 //! instance of EXT_mesh_gpu_instancing.
 
 use super::packing::Packing;
-use super::{Writer, accessor, extension, index, keep::Role, list, put_list, remove_below};
+use super::{
+    MapPart, Writer, accessor, extension, index, keep::Role, list, put_list, remove_below,
+};
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use glam::DQuat;
@@ -145,6 +147,16 @@ impl<'a> Writer<'a> {
             match baked.get(&p) {
                 Some(surfaces) => {
                     for surface in surfaces {
+                        if let Some(map) = &surface.map {
+                            self.maps.parts.push(MapPart {
+                                surface: surface.surface,
+                                back: surface.back,
+                                mesh: meshes.len(),
+                                primitive: primitives.len(),
+                                page: map.page,
+                                texcoord: Self::free_set(primitive),
+                            });
+                        }
                         primitives.push(self.baked_primitive(primitive, surface)?);
                     }
                 }
@@ -175,7 +187,10 @@ impl<'a> Writer<'a> {
         let triangles: Vec<[u32; 3]> = baked.triangles.iter().map(local).collect();
         out["indices"] = json!(self.bin.triangles(&triangles, baked.vertices.len()));
         out["mode"] = json!(TRIANGLES);
-        out["material"] = json!(self.unlit(surface.material));
+        out["material"] = json!(match &baked.map {
+            Some(map) => self.mapped(surface.material, map.page, Self::free_set(primitive)),
+            None => self.unlit(surface.material),
+        });
         if let Some(out) = out.as_object_mut() {
             out.shift_remove("targets");
         }
@@ -189,6 +204,13 @@ impl<'a> Writer<'a> {
     /// A primitive without light (points, lines): carried over with its data. None: its data is only in a Draco stream.
     fn kept_primitive(&mut self, primitive: &Value) -> Option<Value> {
         if accessor::is_draco(primitive) {
+            let material = index(primitive, "material").and_then(|m| self.scene.materials.get(m));
+            if let Some(material) = material.filter(|m| m.pane.is_some()) {
+                let name = crate::scene::short(&material.name);
+                let what =
+                    "is only in a Draco stream and is not written: save the room without Draco";
+                self.warnings.push(format!("a pane of '{name}' {what}"));
+            }
             return None;
         }
         let mut out = primitive.clone();

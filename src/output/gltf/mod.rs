@@ -14,6 +14,7 @@ mod budget;
 mod buffer;
 mod image;
 mod keep;
+mod maps;
 mod material;
 mod meshes;
 mod packing;
@@ -22,12 +23,14 @@ use super::Exposure;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use crate::gather::refined;
+use crate::lightmap::LightMaps;
 use crate::scene::Scene;
 use crate::scene::buffers::Buffers;
 use accessor::Data;
 pub use budget::vertices_within;
 use buffer::Bin;
 use glam::DVec3;
+pub use maps::MapPart;
 use packing::Grid;
 pub use packing::Packing;
 use serde_json::{Map, Value, json};
@@ -64,6 +67,8 @@ pub struct BakedGlb {
     pub compressed: usize,
     /// What could not be carried over.
     pub warnings: Vec<String>,
+    /// Primitives with light maps.
+    pub parts: Vec<MapPart>,
 }
 
 /// Writes the room with its light: see the module's words.
@@ -78,11 +83,31 @@ pub fn baked_glb(
     look: &Exposure,
     writing: Writing,
 ) -> Result<BakedGlb> {
+    written(scene, surfaces, None, look, writing)
+}
+
+/// Writes the room's own mesh with its light in maps: see [`maps`].
+///
+/// # Errors
+/// As [`baked_glb`].
+pub fn mapped_glb(scene: &Scene, maps: &LightMaps, look: &Exposure) -> Result<BakedGlb> {
+    let surfaces = &maps.baked.surfaces;
+    written(scene, surfaces, Some(maps), look, Writing::default())
+}
+
+fn written(
+    scene: &Scene,
+    surfaces: &[BakedSurface],
+    maps: Option<&LightMaps>,
+    look: &Exposure,
+    writing: Writing,
+) -> Result<BakedGlb> {
     refined::check(scene, surfaces)?;
     let buffers = Buffers::sound(scene.source.buffers.clone());
     let mut writer = Writer::new(scene, surfaces, look, writing, &buffers);
     writer.raw_views();
     writer.images();
+    maps.map_or(Ok(()), |maps| writer.pages(maps))?;
     writer.meshes()?;
     writer.animations();
     writer.other_accessors();
@@ -124,6 +149,7 @@ struct Writer<'a> {
     /// Old accessor to new one, for what is carried over.
     accessors: BTreeMap<usize, usize>,
     materials: material::Unlit,
+    maps: maps::Maps,
     /// Does a kept primitive have vertices that need KHR_mesh_quantization?
     quantized: bool,
     vertices: usize,
@@ -168,6 +194,7 @@ impl<'a> Writer<'a> {
             bin: Bin::new(writing.packing),
             accessors: BTreeMap::new(),
             materials: material::Unlit::default(),
+            maps: maps::Maps::default(),
             quantized: false,
             vertices: 0,
             triangles: 0,
@@ -194,6 +221,13 @@ impl<'a> Writer<'a> {
             "clipped_vertices": self.clipped,
             "compressed_vertices": self.compressed,
         });
+        if let Some(intensity) = self.maps.intensity() {
+            facts["attributes"] = json!({
+                "MOZ_lightmap": "linear; texel * intensity / pi * base colour * texture * vertex colour = exposed radiosity, ends at 1",
+                "emissiveTexture": "sRGB; the same over the texture and vertex colours, as COLOR_0 would show it: for readers without KHR_materials_unlit",
+            });
+            facts["intensity"] = json!(intensity);
+        }
         if self.writing.xyz {
             let what = "CIE 1931 tristimulus radiosity, lm/m2, not clipped";
             facts["attributes"]["_XYZ"] = json!(what);
@@ -246,6 +280,7 @@ impl<'a> Writer<'a> {
             clipped: self.clipped,
             compressed: self.compressed,
             warnings: self.warnings,
+            parts: self.maps.parts,
         })
     }
 }

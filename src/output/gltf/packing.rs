@@ -82,6 +82,10 @@ impl Grid {
 
 /// How a view can be packed.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(
+    not(feature = "meshopt"),
+    expect(dead_code, reason = "only the codec asks for all of it")
+)]
 pub(super) enum Mode {
     Attributes { stride: usize },
     Triangles { size: usize, vertices: usize },

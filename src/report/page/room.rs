@@ -2,7 +2,7 @@
 
 use crate::color::{KM, LinearSrgb, Observer};
 use crate::scene::facts::Facts;
-use crate::scene::{Camera, Projection, Scene};
+use crate::scene::{Camera, LightKind, Projection, Scene};
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
 use serde_json::{Value, json};
@@ -53,7 +53,10 @@ pub fn lamp_spectra(scene: &Scene) -> Vec<Leaves> {
         .filter(|(m, _)| used(*m))
         .filter_map(|(_, material)| material.emission.as_ref())
         .map(|e| power(e.light, &e.shape));
-    let lights = scene.lights.iter().map(|l| power(l.light, &l.shape));
+    // A surface that shines by a profile is among the surfaces.
+    let lights = (scene.lights.iter())
+        .filter(|l| l.kind != LightKind::Surface)
+        .map(|l| power(l.light, &l.shape));
     surfaces.chain(lights).collect()
 }
 

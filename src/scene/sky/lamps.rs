@@ -246,6 +246,7 @@ impl Makes<'_> {
                 direction,
                 light,
                 shape: [lux; LEAVES],
+                luminaire: None,
             });
         }
     }

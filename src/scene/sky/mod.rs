@@ -22,7 +22,7 @@ mod wish;
 pub use cie::Distribution;
 pub(crate) use lamps::join;
 pub use sun::{Hours, direction};
-pub(crate) use wish::{BRIGHT, KELVIN, TURN};
+pub use wish::{BRIGHT, KELVIN, TURN};
 pub use wish::{Brightness, SkyType, SkyWish, SunPlace, SunWish};
 
 use super::check::Check;

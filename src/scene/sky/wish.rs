@@ -212,11 +212,12 @@ impl SkyWish {
     }
 }
 
-/// Correlated colour temperatures of daylight, K.
-/// Ranges of what may be said: K, lx or cd/m2, degrees.
-pub(crate) const KELVIN: [f64; 2] = [4000.0, 25_000.0];
-pub(crate) const BRIGHT: [f64; 2] = [0.0, 1e9];
-pub(crate) const TURN: [f64; 2] = [-360.0, 360.0];
+/// Range of the correlated colour temperature of daylight, K.
+pub const KELVIN: [f64; 2] = [4000.0, 25_000.0];
+/// Range of an illuminance, lx, or a luminance, cd/m2.
+pub const BRIGHT: [f64; 2] = [0.0, 1e9];
+/// Range of an azimuth, degrees.
+pub const TURN: [f64; 2] = [-360.0, 360.0];
 const HALF_TURN: [f64; 2] = [-180.0, 180.0];
 const HEIGHT: [f64; 2] = [-90.0, 90.0];
 

@@ -8,7 +8,8 @@ use crate::data::{Outside, Table, named};
 use crate::spectrum::{CmfTree, Grid, Leaves};
 
 /// Which measurement of the chart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Reflectances {
     /// Mean of 30 charts, 10 nm.
     #[default]

@@ -1,0 +1,170 @@
+//! `haarlight bake ROOM --light maps`: what may be asked for, and the files that are written.
+
+use super::bake::BakeArgs;
+use super::stop::Stop;
+use super::talk::Talk;
+use crate::error::{Error, Problem, Result};
+use crate::gather::Baked;
+use crate::lightmap::{LightMaps, MapLimits};
+use crate::output::gltf::Packing;
+use crate::output::{BakedGlb, Exposure, maps};
+use crate::scene::Scene;
+use crate::solve::Bake;
+use crate::store::file;
+use std::path::{Path, PathBuf};
+
+/// Pages are as many texels wide and high at the most, where nothing is said.
+const PAGE: usize = 1024;
+/// Least and most that can be asked for: margins take 8, and graphics cards hold 16,384.
+const PAGES: [usize; 2] = [64, 16_384];
+
+/// Where the light is written.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Medium {
+    /// At the vertices of a mesh that is as fine as the light needs it.
+    #[default]
+    Vertices,
+    /// In light maps for the room's own mesh.
+    Maps,
+}
+
+/// What of the light is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Only {
+    /// What was reflected at least once: for engines that keep their own lamps.
+    Indirect,
+}
+
+/// Options of light maps.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
+pub struct Mapping {
+    /// Where the light is written.
+    #[arg(long, value_enum, value_name = "WHERE", default_value_t)]
+    pub light: Medium,
+    /// With --light maps: pages have N x N texels at the most [default: 1024].
+    #[arg(long, value_name = "N")]
+    pub map_size: Option<usize>,
+    /// With --light maps: texels of all pages at the most, about [default: as many as the error needs].
+    #[arg(long, value_name = "N")]
+    pub texels: Option<usize>,
+    /// With --light maps: write only this light.
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub only: Option<Only>,
+    /// With --light maps: write the pages as KTX 2.0 too.
+    #[arg(long)]
+    pub ktx2: bool,
+}
+
+impl Mapping {
+    /// Are light maps wanted?
+    pub(super) fn is_wanted(&self) -> bool {
+        self.light == Medium::Maps
+    }
+
+    /// The light in maps.
+    pub(super) fn maps(&self, bake: &Bake, stop: &Stop, talk: &Talk) -> LightMaps {
+        let limits = MapLimits {
+            page: self.map_size.unwrap_or(PAGE),
+            texels: self.texels,
+            indirect: self.only == Some(Only::Indirect),
+            late: &|| stop.is_late(0.0),
+        };
+        bake.light_maps(&limits, &|done, of| {
+            talk.progress("gathering", done, of);
+        })
+    }
+}
+
+/// Options that do not go together.
+pub(super) fn problems(args: &BakeArgs) -> Vec<Problem> {
+    let own = [
+        ("--map-size", args.mapping.map_size.is_some()),
+        ("--texels", args.mapping.texels.is_some()),
+        ("--only", args.mapping.only.is_some()),
+        ("--ktx2", args.mapping.ktx2),
+    ];
+    let of_vertices = [
+        ("--vertices", args.vertices.is_some()),
+        ("--megabytes", args.megabytes.is_some()),
+        ("--xyz", args.storing.xyz),
+        ("--compress", args.storing.compress != Packing::Floats),
+        ("--npz", args.npz.is_some()),
+        ("--cache", args.cache.is_some()),
+        ("--report", args.report.is_some()),
+        ("--snapshots", args.snapshots.is_some()),
+    ];
+    let wanted = args.mapping.is_wanted();
+    let refused = |(option, given): (&'static str, bool)| given.then_some(option);
+    let mut problems: Vec<Problem> = if wanted {
+        let next = "leave it out, or leave --light maps out";
+        let what = "is for light at vertices";
+        let refused = of_vertices.into_iter().filter_map(refused);
+        refused
+            .map(|option| Problem::new(option, what, next))
+            .collect()
+    } else {
+        let (what, next) = ("is for light maps", "add --light maps, or leave it out");
+        let refused = own.into_iter().filter_map(refused);
+        refused
+            .map(|option| Problem::new(option, what, next))
+            .collect()
+    };
+    let [least, most] = PAGES;
+    if let Some(size) = args
+        .mapping
+        .map_size
+        .filter(|s| !(least..=most).contains(s))
+    {
+        problems.push(Problem::new(
+            format!("--map-size {size}"),
+            format!("pages have {least} to {most} texels along a side"),
+            "give a number between these",
+        ));
+    }
+    problems
+}
+
+/// A mesh with the solved light, as cameras meter it: what is written has too few vertices for that.
+pub(super) fn metered(bake: &Bake) -> Baked {
+    let none = |surface: &crate::scene::Surface| vec![false; surface.triangles.len()];
+    let nowhere: Vec<Vec<bool>> = bake.scene().surfaces.iter().map(none).collect();
+    bake.sketch(&nowhere, &|_, _| ())
+}
+
+/// Writes the pages and their index beside the glb; their names.
+pub(super) fn write(
+    output: &Path,
+    room: &Path,
+    scene: &Scene,
+    maps: &LightMaps,
+    glb: &BakedGlb,
+    look: &Exposure,
+    ktx2: bool,
+) -> Result<Vec<String>> {
+    let page_path = |k: usize, ending: &str| output.with_extension(format!("map-{k}.{ending}"));
+    let name = |k: usize, ending: &str| {
+        let path = page_path(k, ending);
+        path.file_name()
+            .map_or(String::new(), |n| n.to_string_lossy().into_owned())
+    };
+    let index = maps::index(scene, maps, glb, look, ktx2, &name)?;
+    let json = serde_json::to_vec_pretty(&index)
+        .map_err(|problem| Error::Internal(format!("index of light maps: {problem}")))?;
+    let mut files: Vec<(PathBuf, Vec<u8>)> = vec![(output.with_extension("maps.json"), json)];
+    for (k, page) in maps.pages.iter().enumerate() {
+        files.push((page_path(k, "exr"), maps::to_exr(page, index.lux_per_unit)?));
+        if ktx2 {
+            files.push((
+                page_path(k, "ktx2"),
+                maps::to_ktx2(page, index.lux_per_unit),
+            ));
+        }
+    }
+    for (path, bytes) in &files {
+        file::write_atomic(path, Some(room), |w| w.write_all(bytes))?;
+    }
+    Ok(files
+        .iter()
+        .map(|(path, _)| super::bake::text(path))
+        .collect())
+}

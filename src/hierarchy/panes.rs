@@ -1,0 +1,379 @@
+//! Where panes are: which of them a ray passes, at what angle, through how much glass.
+//!
+//! Panes stand in a ray index of their own and block nothing. A ray asks for all their faces that it crosses; faces that bound one
+//! sheet of glass count as one pane, however it was modelled:
+//! - a face that stands alone is a pane;
+//! - faces that lie upon each other (a quad and its back) are one;
+//! - where a ray enters by a face and leaves by another, parallel and nearer than [`NEAR`] or of the same thin closed part, both are
+//!   one pane;
+//! - a closed part that is thicker is a solid where its material has a volume, and absorbs along the chord; without one it is hollow,
+//!   and each of its walls is a pane.
+
+use crate::geometry::{NO_PLANE, RayIndex, Segment};
+use crate::scene::pane::{Pane, PaneKind, texel};
+use crate::scene::{Scene, Surface};
+use glam::{DVec3, Vec3};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
+
+/// Faces of one pane are at most this far apart, m: laminated glass of banks and aquaria is 30 to 50 mm thick, and the panes of double
+/// glazing stand as far from each other, but there each has both its faces.
+const NEAR: f64 = 0.05;
+/// Hits nearer to each other than this share of half the size of the panes are in one place: a few roundings of f32.
+const TOGETHER: f64 = 2e-6;
+/// Cosine of two normals from which on faces are parallel: 2.6 degrees.
+const PARALLEL: f64 = 0.999;
+
+/// One pane that a ray passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Index of its material.
+    pub material: u32,
+    /// Cosine of incidence.
+    pub cosine: f32,
+    /// Thickness of a slab that absorbs as much, in units of the material.
+    pub thickness: f32,
+    /// Value of the pane's texture there.
+    pub texel: f32,
+}
+
+/// A triangle of a pane.
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    /// Index in [`Scene::panes`], and of the triangle there.
+    surface: u32,
+    triangle: u32,
+    material: u32,
+    /// Which connected part.
+    part: u32,
+    normal: DVec3,
+}
+
+/// A connected part of a pane's surface.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    closed: bool,
+    /// Of a closed part, volume over half its surface: the thickness of a sheet.
+    thickness: f64,
+}
+
+/// All panes of a room.
+#[derive(Debug, Clone)]
+pub struct Panes {
+    rays: RayIndex,
+    faces: Vec<Face>,
+    parts: Vec<Part>,
+    /// Distance within which hits are in one place.
+    together: f64,
+}
+
+/// The panes of a room with what they are made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Glazing<'a> {
+    /// Where they are.
+    pub panes: &'a Panes,
+    /// Their materials.
+    pub scene: &'a Scene,
+}
+
+impl Glazing<'_> {
+    /// The panes that the segment passes, in any order.
+    pub fn crossings(&self, from: Vec3, to: Vec3) -> Vec<Crossing> {
+        self.panes.crossings(self.scene, from, to)
+    }
+}
+
+/// A face that a ray crosses.
+#[derive(Debug, Clone, Copy)]
+struct Hit {
+    /// Distance from the start of the ray.
+    at: f64,
+    face: Face,
+    enters: bool,
+    cosine: f64,
+    texel: f64,
+}
+
+impl Panes {
+    /// The panes of a scene, recentred as its mesh is; none where it has none.
+    pub fn new(scene: &Scene, centre: DVec3) -> Option<Self> {
+        if scene.panes.is_empty() {
+            return None;
+        }
+        let (mut faces, mut parts) = (Vec::new(), Vec::new());
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for (number, surface) in scene.panes.iter().enumerate() {
+            let first = positions.len() as u32;
+            positions.extend(surface.positions.iter().map(|p| (*p - centre).as_vec3()));
+            let of = parts_of(surface, &mut parts);
+            for (k, (corners, part)) in surface.triangles.iter().zip(of).enumerate() {
+                let [a, b, c] = corners.map(|i| surface.positions[i as usize]);
+                triangles.push(corners.map(|i| first + i));
+                faces.push(Face {
+                    surface: number as u32,
+                    triangle: k as u32,
+                    material: surface.material as u32,
+                    part,
+                    normal: (b - a).cross(c - a).normalize_or_zero(),
+                });
+            }
+        }
+        // All are masked: then the index asks about every face that a ray crosses.
+        let rays = RayIndex::build(&positions, &triangles, &[], &vec![true; triangles.len()]);
+        let [low, high] = rays.bounds();
+        let far = low.abs().max(high.abs()).max_element();
+        Some(Self {
+            together: TOGETHER * f64::from(far),
+            rays,
+            faces,
+            parts,
+        })
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.rays.bytes() + size_of_val(self.faces.as_slice()) + size_of_val(self.parts.as_slice())
+    }
+
+    fn crossings(&self, scene: &Scene, from: Vec3, to: Vec3) -> Vec<Crossing> {
+        let met = RefCell::new(Vec::new());
+        let segment = Segment {
+            from,
+            to,
+            planes: [NO_PLANE; 2],
+        };
+        self.rays.occluded_with(&segment, &|triangle, u, v| {
+            met.borrow_mut().push((triangle, u, v));
+            false
+        });
+        let met = met.into_inner();
+        if met.is_empty() {
+            return Vec::new();
+        }
+        let (from, to) = (from.as_dvec3(), to.as_dvec3());
+        let direction = (to - from).normalize_or_zero();
+        let mut hits: Vec<Hit> = met
+            .into_iter()
+            .map(|(triangle, u, v)| self.hit(scene, from, direction, (triangle, u, v)))
+            .collect();
+        hits.sort_by(|a, b| {
+            let key = |h: &Hit| (h.face.surface, h.face.triangle);
+            a.at.total_cmp(&b.at).then(key(a).cmp(&key(b)))
+        });
+        self.panes_of(scene, &hits, from.distance(to))
+    }
+
+    fn hit(
+        &self,
+        scene: &Scene,
+        from: DVec3,
+        direction: DVec3,
+        (triangle, u, v): (u32, f32, f32),
+    ) -> Hit {
+        let face = self.faces[triangle as usize];
+        let weights = [1.0 - u - v, u, v];
+        let corners = self.rays.triangle(triangle).unwrap_or_default();
+        let point: Vec3 = corners.into_iter().zip(weights).map(|(c, w)| c * w).sum();
+        let along = face.normal.dot(direction);
+        let surface = &scene.panes[face.surface as usize];
+        Hit {
+            at: (point.as_dvec3() - from).dot(direction),
+            face,
+            enters: along < 0.0,
+            cosine: along.abs(),
+            texel: texel_at(scene, surface, face.triangle, weights),
+        }
+    }
+
+    /// Puts faces together that bound one pane.
+    fn panes_of(&self, scene: &Scene, hits: &[Hit], length: f64) -> Vec<Crossing> {
+        let mut out = Vec::new();
+        // Faces that were entered and not left yet; and the last that was done with.
+        let mut open: Vec<Hit> = Vec::new();
+        let mut last: Option<Hit> = None;
+        for hit in hits {
+            let same = |other: &Hit| {
+                other.face.material == hit.face.material
+                    && other.face.normal.dot(hit.face.normal).abs() > PARALLEL
+                    && (hit.at - other.at).abs() <= self.together
+            };
+            // An edge that two triangles share; a back that stands right upon its front.
+            let again = open.iter().any(|o| o.enters == hit.enters && same(o));
+            if again || last.is_some_and(|last| same(&last)) {
+                continue;
+            }
+            if hit.enters {
+                open.push(*hit);
+                continue;
+            }
+            last = Some(*hit);
+            let entry = open.iter().rposition(|entry| self.bound(entry, hit));
+            match entry.map(|k| open.remove(k)) {
+                Some(entry) => self.between(scene, &entry, hit, &mut out),
+                None => out.push(self.alone(scene, hit, hit.at)),
+            }
+        }
+        out.extend(open.iter().map(|h| self.alone(scene, h, length - h.at)));
+        out
+    }
+
+    /// Do two faces bound the same glass?
+    fn bound(&self, entry: &Hit, exit: &Hit) -> bool {
+        let [a, b] = [entry.face, exit.face];
+        let near = (exit.at - entry.at) * entry.cosine <= NEAR && is_parallel(entry, exit);
+        let one = a.part == b.part && self.parts[a.part as usize].closed;
+        a.material == b.material && (near || one)
+    }
+
+    /// What lies between two faces.
+    fn between(&self, scene: &Scene, entry: &Hit, exit: &Hit, out: &mut Vec<Crossing>) {
+        let Some(pane) = pane_of(scene, entry) else {
+            return;
+        };
+        let chord = exit.at - entry.at;
+        let parallel = is_parallel(entry, exit);
+        let thin = self.parts[entry.face.part as usize].thickness <= NEAR
+            || parallel && chord * entry.cosine <= NEAR;
+        match pane.kind {
+            PaneKind::Glass {
+                unit: Some(unit),
+                ior,
+                ..
+            } => {
+                let way = if parallel {
+                    entry.cosine
+                } else {
+                    refracted(ior, entry.cosine)
+                };
+                out.push(entry.crossing(chord * way / unit));
+            }
+            PaneKind::Glass { thickness, .. } if thin => out.push(entry.crossing(thickness)),
+            PaneKind::Cover { .. } if thin => out.push(entry.crossing(1.0)),
+            _ => out.extend([entry, exit].map(|hit| self.alone(scene, hit, 0.0))),
+        }
+    }
+
+    /// A face by itself; a ray that starts or ends within a solid goes so far through it.
+    fn alone(&self, scene: &Scene, hit: &Hit, chord: f64) -> Crossing {
+        let solid = self.parts[hit.face.part as usize].closed;
+        match pane_of(scene, hit).map(|p| &p.kind) {
+            Some(&PaneKind::Glass {
+                unit: Some(unit),
+                ior,
+                ..
+            }) if solid => hit.crossing(chord * refracted(ior, hit.cosine) / unit),
+            Some(&PaneKind::Glass { thickness, .. }) => hit.crossing(thickness),
+            _ => hit.crossing(1.0),
+        }
+    }
+}
+
+impl Hit {
+    fn crossing(&self, thickness: f64) -> Crossing {
+        Crossing {
+            material: self.face.material,
+            cosine: self.cosine as f32,
+            thickness: thickness as f32,
+            texel: self.texel as f32,
+        }
+    }
+}
+
+fn is_parallel(a: &Hit, b: &Hit) -> bool {
+    a.face.normal.dot(b.face.normal).abs() > PARALLEL
+}
+
+/// Cosine of the refracted ray.
+fn refracted(ior: f64, cosine: f64) -> f64 {
+    (1.0 - (1.0 - cosine * cosine) / (ior * ior))
+        .max(0.0)
+        .sqrt()
+}
+
+fn pane_of<'a>(scene: &'a Scene, hit: &Hit) -> Option<&'a Pane> {
+    scene.materials[hit.face.material as usize].pane.as_ref()
+}
+
+/// Value of a pane's texture, and for paint of vertex alpha.
+fn texel_at(scene: &Scene, surface: &Surface, triangle: u32, weights: [f32; 3]) -> f64 {
+    let Some(pane) = &scene.materials[surface.material].pane else {
+        return 1.0;
+    };
+    let corners = surface.triangles[triangle as usize].map(|i| i as usize);
+    let mut value = 1.0;
+    if let Some(texture) = &pane.texture
+        && let Some(uvs) = surface.texcoords.get(texture.texcoord)
+    {
+        let uv = std::array::from_fn(|c| (0..3).map(|k| uvs[corners[k]][c] * weights[k]).sum());
+        value *= texel(pane, &scene.images, uv);
+    }
+    if let (PaneKind::Cover { .. }, Some(colors)) = (&pane.kind, &surface.colors) {
+        let alpha: f32 = (0..3).map(|k| colors[corners[k]][3] * weights[k]).sum();
+        value *= f64::from(alpha);
+    }
+    value
+}
+
+/// Adds the connected parts of a surface; which of them each triangle belongs to.
+fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
+    // Vertices at equal positions are one: exporters split them where normals or texture coordinates differ.
+    let mut welded: HashMap<[u64; 3], usize> = HashMap::new();
+    let mut of_vertex = Vec::with_capacity(surface.positions.len());
+    for p in &surface.positions {
+        let next = welded.len();
+        let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
+        of_vertex.push(*welded.entry(key).or_insert(next));
+    }
+    let mut parent: Vec<usize> = (0..welded.len()).collect();
+    let triangles = || {
+        let all = surface.triangles.iter();
+        all.map(|t| t.map(|i| of_vertex[i as usize]))
+    };
+    for [a, b, c] in triangles() {
+        for other in [b, c] {
+            let (x, y) = (root(&mut parent, a), root(&mut parent, other));
+            parent[x.max(y)] = x.min(y);
+        }
+    }
+    let mut number: BTreeMap<usize, u32> = BTreeMap::new();
+    // Of each part, how often each edge is run through one way more than the other; volume and area.
+    let mut edges: BTreeMap<(u32, usize, usize), i64> = BTreeMap::new();
+    let first = parts.len() as u32;
+    let mut sums: Vec<[f64; 2]> = Vec::new();
+    let origin = surface.positions.first().copied().unwrap_or_default();
+    let mut of = Vec::with_capacity(surface.triangles.len());
+    for (corners, triangle) in triangles().zip(&surface.triangles) {
+        let next = first + number.len() as u32;
+        let part = *number.entry(root(&mut parent, corners[0])).or_insert(next);
+        of.push(part);
+        sums.resize(number.len(), [0.0; 2]);
+        let [a, b, c] = triangle.map(|i| surface.positions[i as usize] - origin);
+        let sum = &mut sums[(part - first) as usize];
+        sum[0] += a.dot(b.cross(c)) / 6.0;
+        sum[1] += 0.5 * (b - a).cross(c - a).length();
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            *edges.entry((part, a.min(b), a.max(b))).or_default() += if a < b { 1 } else { -1 };
+        }
+    }
+    let mut closed = vec![true; sums.len()];
+    for ((part, ..), balance) in edges {
+        closed[(part - first) as usize] &= balance == 0;
+    }
+    parts.extend(sums.iter().zip(closed).map(|(&[volume, area], closed)| {
+        let thickness = match closed {
+            true => 2.0 * volume.abs() / area,
+            false => f64::INFINITY,
+        };
+        Part { closed, thickness }
+    }));
+    of
+}
+
+fn root(parent: &mut [usize], mut i: usize) -> usize {
+    while parent[i] != i {
+        parent[i] = parent[parent[i]];
+        i = parent[i];
+    }
+    i
+}

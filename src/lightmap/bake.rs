@@ -1,0 +1,276 @@
+//! From the solved light to maps.
+
+use super::aliasing::Key;
+use super::cells::Cell;
+use super::charts::{Chart, charts};
+use super::grow::{Budget, End, Growth};
+use super::maps::{LightMaps, Page, Placed, Texel, margin};
+use super::pack::pack;
+use super::sampler::{Sample, Sampler};
+use super::seams::close;
+use super::texels::{Corners, Patch, lend, patch};
+use super::unwrap::Conformal;
+use crate::gather::{Baked, BakedSurface, Look, MapPlace};
+use crate::mesh::looks::Looks;
+use crate::mesh::measure::summed;
+use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
+use glam::DVec2;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap};
+
+/// Looks at the most at an asked-for error of [`AT`]; half as many at twice the error.
+const MOST_LOOKS: f64 = 262_144.0;
+/// Texels at the most, margins included, at that error; half as many at twice the error.
+const MOST_TEXELS: f64 = 1_048_576.0;
+const AT: f64 = 0.5;
+/// The error is measured this often at the most.
+const MEASURED: u64 = 10;
+/// Growing ends where so many times the cells leave more than this part of the error.
+const GROWN: f64 = 1.5;
+const STALLED: f64 = 0.93;
+/// After a measurement that was not met, growing aims at this part of what the measured error asks for.
+const BELOW: f64 = 0.8;
+/// And at no less than this part of what it aimed at before.
+const STEP: f64 = 0.2;
+
+/// What bounds light maps besides their error.
+pub struct MapLimits<'a> {
+    /// Texels along an axis of a page at the most; 16 or more.
+    pub page: usize,
+    /// Texels of all pages at the most; every chart has one with its margin in any case. None: as many as the error may need.
+    pub texels: Option<usize>,
+    /// Is light that comes straight from lamps and the sky left out?
+    pub indirect: bool,
+    /// Is it time to end? What is not looked at then shows the solved light as it is.
+    pub late: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Default for MapLimits<'_> {
+    fn default() -> Self {
+        Self {
+            page: 1024,
+            texels: None,
+            indirect: false,
+            late: &|| false,
+        }
+    }
+}
+
+/// Means of the light around texels at edges.
+type Smoothed = Vec<(Key, Vec<(f64, Sample)>)>;
+
+impl Bake {
+    /// The light of the room in maps, whose interpolation error, measured, is within its share of the error asked for.
+    /// `progress` is told (done, of) in looks of the present pass.
+    pub fn light_maps(&self, limits: &MapLimits, progress: &dyn Fn(usize, usize)) -> LightMaps {
+        let spaces = self.spaces();
+        let all = charts(self.scene(), self.mesh(), self.tree(), &spaces, &Conformal);
+        let mut looks = Looks::new(self, spaces.clone(), Care::Vertex, limits.late);
+        looks.indirect = limits.indirect;
+        let more = AT / self.settings().error;
+        let budget = Budget {
+            looks: usize::MAX,
+            texels: usize::MAX,
+            page: limits.page,
+        };
+        let mut growth = Growth::new(self, all, Sampler::new(looks), budget);
+        let allowed = INTERPOLATION_SHARE * self.settings().error;
+        growth.unknown = allowed * allowed;
+        growth.begin(progress);
+        // What every chart needs in any case comes on top.
+        growth.budget.looks = growth.sampler.looks.len() + (MOST_LOOKS * more) as usize;
+        let most = growth.texels() + (MOST_TEXELS * more) as usize;
+        growth.budget.texels = limits.texels.unwrap_or(most);
+        let mut aim = allowed * allowed * growth.seen_area();
+        let points = growth.points(self, 0, progress);
+        let samples = growth.compared(&points, &self.placed(&growth, &Vec::new()).0);
+        let mut before = summed(&samples, allowed, None);
+        growth.noise = before.noise * before.noise;
+        let mut size = growth.cells.len();
+        for turn in 1.. {
+            let end = growth.grow(aim, progress);
+            let points = growth.points(self, turn, progress);
+            let samples = growth.compared(&points, &self.placed(&growth, &Vec::new()).0);
+            let found = summed(&samples, allowed, None);
+            let has_grown = growth.cells.len() as f64 > GROWN * size as f64;
+            let stalled = turn > 1 && has_grown && found.mean > STALLED * before.mean;
+            if has_grown {
+                (size, before) = (growth.cells.len(), found);
+            }
+            let over = end != End::Reached || turn == MEASURED || stalled || (limits.late)();
+            if found.is_met() || over {
+                let smoothed = growth.smooth(allowed, progress);
+                let (mut placed, covered) = self.placed(&growth, &smoothed);
+                close(self, &growth.charts, &spaces, &mut placed);
+                let samples = growth.compared(&points, &placed);
+                let mut maps = self.written(growth, placed);
+                maps.indirect = limits.indirect;
+                maps.baked.covered = covered;
+                maps.baked.interpolation = Some(summed(&samples, allowed, None));
+                return maps;
+            }
+            let wrong = (found.mean / allowed).powi(2);
+            aim = growth.sum().min(aim) * (BELOW / wrong).clamp(STEP, BELOW);
+            growth.learn(&points, &samples);
+        }
+        unreachable!("the last turn ends it")
+    }
+
+    /// The charts' texels, and how many places something covers. Charts move out of the growth only at its end, so these are
+    /// copies.
+    fn placed(&self, growth: &Growth, smoothed: &Smoothed) -> (Placed, usize) {
+        let looks = self.looks(self.upsampler());
+        let mut cells: Vec<Vec<&Cell>> = vec![Vec::new(); growth.charts.len()];
+        for cell in &growth.cells {
+            cells[cell.chart as usize].push(cell);
+        }
+        let mut means: HashMap<Key, &[(f64, Sample)]> = HashMap::new();
+        means.extend(smoothed.iter().map(|(key, parts)| (*key, parts.as_slice())));
+        let made: Vec<(Patch, usize)> = (0..growth.charts.len())
+            .into_par_iter()
+            .map(|k| {
+                let (chart, lattice) = (&growth.charts[k], &growth.lattices[k]);
+                let look = &looks[self.scene().surfaces[chart.surface].material];
+                let texel = |sample: &Sample| self.texel_of(growth, chart, look, sample);
+                let mut corners = Corners::new();
+                for point in cells[k].iter().flat_map(|cell| cell.corners()) {
+                    corners.entry(point).or_insert_with(|| {
+                        let own = growth
+                            .sampler
+                            .known(k as u32, lattice, point)
+                            .and_then(texel);
+                        let parts = means.get(&(k as u32, point)).into_iter().copied().flatten();
+                        let parts: Vec<(f64, Texel)> =
+                            parts.filter_map(|(w, s)| Some((*w, texel(s)?))).collect();
+                        let sum: f64 = parts.iter().map(|(w, _)| w).sum();
+                        match own.is_some() && sum > 0.0 {
+                            true => Some(Texel::mix(
+                                &parts.iter().map(|(w, t)| (w / sum, *t)).collect::<Vec<_>>(),
+                            )),
+                            false => own,
+                        }
+                    });
+                }
+                let covered = lend(&mut corners, &cells[k]);
+                (patch(lattice, &cells[k], &corners), covered)
+            })
+            .collect();
+        let covered = made.iter().map(|(_, covered)| covered).sum();
+        let patches = made.into_iter().map(|(patch, _)| patch).collect();
+        let placed = Placed {
+            sizes: growth.charts.iter().map(|c| c.size).collect(),
+            lattices: growth.lattices.clone(),
+            patches,
+            places: Vec::new(),
+            charts: Vec::new(),
+        };
+        (placed, covered)
+    }
+
+    /// What was seen at a place; none: something covers it.
+    fn texel_of(
+        &self,
+        growth: &Growth,
+        chart: &Chart,
+        look: &Look,
+        sample: &Sample,
+    ) -> Option<Texel> {
+        let seen = growth.sampler.looks.at(sample.look)?;
+        let vertex = self.vertex(&sample.vertex, chart.back, &seen.row, look);
+        Some(Texel {
+            irradiance: vertex.irradiance,
+            light: vertex.light,
+        })
+    }
+
+    /// Pages, and the mesh with its coordinates on them.
+    fn written(&self, growth: Growth, mut placed: Placed) -> LightMaps {
+        placed.charts = growth.charts;
+        let shares = placed.share_dark();
+        let outer = |k: usize| {
+            let (patch, margin) = (&placed.patches[k], margin(&placed.lattices[k]));
+            [patch.width + 2 * margin, patch.height + 2 * margin]
+        };
+        let own: Vec<usize> = (0..shares.len()).filter(|&k| shares[k] == k).collect();
+        let sizes: Vec<[usize; 2]> = own.iter().map(|&k| outer(k)).collect();
+        let (found, pages) = pack(&sizes, growth.budget.page);
+        let place = |k: &usize| own.binary_search(k).map(|at| found[at]).unwrap_or_default();
+        placed.places = shares.iter().map(place).collect();
+        let page = |[width, height]: [usize; 2]| Page {
+            width,
+            height,
+            texels: vec![Texel::default(); width * height],
+            surfaces: vec![u32::MAX; width * height],
+        };
+        let mut pages: Vec<Page> = pages.into_iter().map(page).collect();
+        for (k, [w, h]) in own.into_iter().zip(sizes) {
+            let (patch, place) = (&placed.patches[k], placed.places[k]);
+            let margin = margin(&placed.lattices[k]);
+            let page = &mut pages[place.page];
+            for y in 0..h {
+                for x in 0..w {
+                    // The margin goes on with the outermost texels.
+                    let inner = |at: usize, count: usize| at.saturating_sub(margin).min(count - 1);
+                    let from = inner(y, patch.height) * patch.width + inner(x, patch.width);
+                    let to = (place.y + y) * page.width + place.x + x;
+                    page.texels[to] = patch.texels[from];
+                    page.surfaces[to] = placed.charts[k].surface as u32;
+                }
+            }
+        }
+        let mut baked = Baked {
+            rays: growth.sampler.looks.rays,
+            ..Baked::default()
+        };
+        self.meshes(&placed, &pages, &mut baked);
+        LightMaps {
+            charts: placed.charts.len(),
+            indirect: false,
+            looked: growth.sampler.looks.len(),
+            pages,
+            baked,
+            placed,
+        }
+    }
+
+    /// The room's own mesh, a part for each side of a surface and page.
+    fn meshes(&self, placed: &Placed, pages: &[Page], baked: &mut Baked) {
+        let mut parts: BTreeMap<(usize, bool, usize), Vec<usize>> = BTreeMap::new();
+        for (k, chart) in placed.charts.iter().enumerate() {
+            let key = (chart.surface, chart.back, placed.places[k].page);
+            parts.entry(key).or_default().push(k);
+        }
+        let looks = self.looks(self.upsampler());
+        for ((number, back, page), charts) in parts {
+            let look = &looks[self.scene().surfaces[number].material];
+            let side = DVec2::new(pages[page].width as f64, pages[page].height as f64);
+            let mut surface = BakedSurface {
+                surface: number,
+                back,
+                ..BakedSurface::default()
+            };
+            let (mut uv, mut of) = (Vec::new(), Vec::new());
+            for k in charts {
+                let chart = &placed.charts[k];
+                let first = surface.vertices.len() as u32;
+                for (vertex, (_, at)) in chart.vertices.iter().zip(&chart.points) {
+                    let texel = placed.look_up(k, *at);
+                    let written = self.vertex(vertex, back, &[0.0; 64], look);
+                    surface.vertices.push(crate::gather::BakedVertex {
+                        irradiance: texel.irradiance,
+                        light: texel.light,
+                        ..written
+                    });
+                    uv.push((placed.on_page(k, *at) / side).as_vec2().to_array());
+                }
+                for facet in &chart.facets {
+                    surface.triangles.push(facet.corners.map(|c| first + c));
+                    of.push(facet.triangle);
+                }
+            }
+            surface.map = Some(MapPlace { page, uv });
+            baked.surfaces.push(surface);
+            baked.of.push(of);
+        }
+    }
+}

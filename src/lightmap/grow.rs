@@ -1,0 +1,543 @@
+//! Texels where a bilinear look-up is not what looking there shows.
+//!
+//! As the mesh of vertices grows: every cell has a mean square of the colour difference between both, times its area its share
+//! of the error: first as the solved light lets it expect, then as seen in the middles of its edges and inside. The largest
+//! shares are looked at or, where that is done, split along the axes that bend. A chart has as many texels as its finest cell
+//! asks for; what the looks of a coarse cell say of the texels in it is interpolated, so smooth parts of a chart with a shadow
+//! on it cost bytes but no rays.
+
+use super::cells::{Cell, DEPTH, Doubt, Lattice, bilinear, first};
+use super::charts::Chart;
+use super::maps::{MARGIN, margin};
+use super::sampler::{Sample, Sampler};
+use crate::color::de2000;
+use crate::solve::Bake;
+use glam::DVec2;
+use rayon::prelude::*;
+
+/// Cells are no longer than this share of the room's half diagonal at the beginning, so that what no leaf tells of is found.
+const LONGEST: f64 = 0.125;
+/// Charts smaller than this share of the room's half diagonal are one texel, until that proves wrong.
+const TINY: f64 = 0.02;
+/// What remains of the mean square of an axis when it is halved: 1/16 for smooth light, 1/2 for an edge.
+const SHRINK: f64 = 0.125;
+/// An axis that bends by this share of what the other does is split with it.
+const BENDS: f64 = 0.5;
+/// Shares down to this part of the largest are dealt with at a time.
+const ALIKE: f64 = 1.0 / 16.0;
+/// Squares of differences up to this many times the variance of a look count for nothing.
+const BY_CHANCE: f64 = 2.0;
+/// Corners this far apart let expect this much of it between them, where nothing is known yet.
+const RANGE: f64 = 0.1;
+
+/// What the solved light says at a place of a chart.
+#[derive(Debug, Clone, Copy)]
+struct Hint {
+    area: f64,
+    /// What of it others see.
+    open: f64,
+    light: [f64; 3],
+}
+
+/// What may be spent.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Budget {
+    /// Looks at light.
+    pub(super) looks: usize,
+    /// Texels of all charts, their margins included.
+    pub(super) texels: usize,
+    /// Texels along an axis of a page.
+    pub(super) page: usize,
+}
+
+/// How growing ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    /// The expected error is within the goal.
+    Reached,
+    /// What is left cannot be split: too small, or the page or the budget of texels is full.
+    Smallest,
+    /// As many looks as are allowed.
+    Most,
+    /// There is no time left.
+    Late,
+}
+
+/// Charts with texels that grow.
+pub(super) struct Growth<'a> {
+    pub(super) charts: Vec<Chart>,
+    pub(super) lattices: Vec<Lattice>,
+    pub(super) cells: Vec<Cell>,
+    pub(super) sampler: Sampler<'a>,
+    pub(super) budget: Budget,
+    hints: Vec<Vec<Hint>>,
+    hints_at: Vec<Vec<DVec2>>,
+    white: [f64; 3],
+    /// Mean square of a cell until something is known of it.
+    pub(super) unknown: f64,
+    /// Variance of a look, by chance.
+    pub(super) noise: f64,
+}
+
+impl<'a> Growth<'a> {
+    pub(super) fn new(
+        bake: &Bake,
+        charts: Vec<Chart>,
+        sampler: Sampler<'a>,
+        budget: Budget,
+    ) -> Self {
+        let half = bake.mesh().half_size;
+        let most = budget.page.saturating_sub(2 * MARGIN);
+        let mut growth = Self {
+            lattices: Vec::with_capacity(charts.len()),
+            cells: Vec::new(),
+            sampler,
+            budget,
+            hints: Vec::new(),
+            hints_at: Vec::new(),
+            white: bake.light().white,
+            unknown: 0.0,
+            noise: 0.0,
+            charts: Vec::new(),
+        };
+        for (k, chart) in charts.iter().enumerate() {
+            let (hints, at) = told_by(bake, chart);
+            // A single look at what nobody sees, unless that proves wrong.
+            let is_hidden = !hints.is_empty() && hints.iter().all(|h| h.open <= 0.0);
+            let tiny = if is_hidden {
+                f64::INFINITY
+            } else {
+                TINY * half
+            };
+            let lattice = Lattice::new(chart.size, LONGEST * half, tiny, most);
+            growth.cells.extend(first(k as u32, chart, &lattice, &at));
+            growth.lattices.push(lattice);
+            growth.hints.push(hints);
+            growth.hints_at.push(at);
+        }
+        growth.charts = charts;
+        growth
+    }
+
+    pub(super) fn difference(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
+        // No light anywhere, or none left: no difference.
+        if a == b || self.white[1] <= 0.0 {
+            return 0.0;
+        }
+        de2000(a, b, self.white)
+    }
+
+    fn want(&mut self, cell: usize, point: [u32; 2]) -> Sample {
+        let chart = self.cells[cell].chart;
+        let k = chart as usize;
+        self.sampler
+            .want(chart, &self.charts[k], &self.lattices[k], point)
+    }
+
+    /// Light at the corners of a cell; what is covered gets the mean of the others, as in the map.
+    pub(super) fn light(&self, cell: &Cell) -> Option<[[f64; 3]; 4]> {
+        let lattice = &self.lattices[cell.chart as usize];
+        let seen = cell.corners().map(|corner| {
+            let sample = self.sampler.known(cell.chart, lattice, corner)?;
+            self.sampler.seen(sample)
+        });
+        let count = seen.iter().flatten().count() as f64;
+        if count == 0.0 {
+            return None;
+        }
+        let sum = |c: usize| seen.iter().flatten().map(|light| light[c]).sum::<f64>();
+        let mean = [0, 1, 2].map(|c| sum(c) / count);
+        Some(seen.map(|light| light.unwrap_or(mean)))
+    }
+
+    /// Can anybody see anything of a cell?
+    pub(super) fn is_seen(&self, cell: &Cell) -> bool {
+        let hints = &self.hints[cell.chart as usize];
+        self.light(cell).is_some() || cell.hints.iter().any(|&h| hints[h as usize].open > 0.0)
+    }
+
+    /// Area of all cells of which anybody can see anything: what the error is a mean over.
+    pub(super) fn seen_area(&self) -> f64 {
+        let seen = self.cells.iter().filter(|c| self.is_seen(c));
+        seen.map(|c| c.area).sum()
+    }
+
+    /// Mean square of what the solved light differs by, as far as others see it, and its worst place.
+    fn told(&self, cell: &Cell, light: &[[f64; 3]; 4]) -> (f64, Option<(DVec2, f64)>) {
+        let k = cell.chart as usize;
+        let (mut sum, mut area, mut worst) = (0.0, 0.0, None::<(DVec2, f64)>);
+        for &h in &cell.hints {
+            let (hint, at) = (&self.hints[k][h as usize], self.hints_at[k][h as usize]);
+            let drawn = mix(light, cell.share(&self.lattices[k], at));
+            let d = self.difference(drawn, hint.light);
+            sum += hint.area * hint.open * d * d;
+            area += hint.area;
+            if hint.open > 0.0 && worst.is_none_or(|(_, most)| d > most) {
+                worst = Some((at, d));
+            }
+        }
+        (if area > 0.0 { sum / area } else { 0.0 }, worst)
+    }
+
+    /// Looks at the corners of cells, and what the solved light lets expect in them.
+    fn expect(&mut self, fresh: &[usize], beginning: bool, progress: &dyn Fn(usize, usize)) {
+        for &k in fresh {
+            for corner in self.cells[k].corners() {
+                self.want(k, corner);
+            }
+        }
+        self.sampler.looks.complete(progress);
+        let expected: Vec<f64> = fresh
+            .par_iter()
+            .map(|&k| {
+                let cell = &self.cells[k];
+                let Some(light) = self.light(cell) else {
+                    return if self.is_seen(cell) {
+                        self.unknown
+                    } else {
+                        0.0
+                    };
+                };
+                let told = self.told(cell, &light).0;
+                if beginning {
+                    let range = (1..4).map(|c| self.difference(light[0], light[c]));
+                    let range = RANGE * range.fold(0.0, f64::max);
+                    return told.max(range * range).max(self.unknown);
+                }
+                cell.doubt.square.max(told * cell.doubt.trust.powi(2))
+            })
+            .collect();
+        for (&k, square) in fresh.iter().zip(expected) {
+            let doubt = &mut self.cells[k].doubt;
+            doubt.square = square;
+            if beginning {
+                doubt.trust = 1.0;
+            }
+        }
+    }
+
+    /// The first looks.
+    pub(super) fn begin(&mut self, progress: &dyn Fn(usize, usize)) {
+        let all: Vec<usize> = (0..self.cells.len()).collect();
+        self.expect(&all, true, progress);
+    }
+
+    /// Sum of all shares.
+    pub(super) fn sum(&self) -> f64 {
+        self.cells.iter().map(share).sum()
+    }
+
+    /// Texels of all charts with their margins.
+    pub(super) fn texels(&self) -> usize {
+        self.lattices.iter().map(|l| taken(l, [0, 0])).sum()
+    }
+
+    /// Grows until the sum of all shares is at most `goal`.
+    pub(super) fn grow(&mut self, goal: f64, progress: &dyn Fn(usize, usize)) -> End {
+        loop {
+            let excess = self.sum() - goal;
+            if excess <= 0.0 {
+                return End::Reached;
+            }
+            if self.sampler.looks.is_late() {
+                return End::Late;
+            }
+            if self.sampler.looks.len() >= self.budget.looks {
+                return End::Most;
+            }
+            let picked = self.pick(excess);
+            if picked.is_empty() {
+                return End::Smallest;
+            }
+            let is_tested = |&k: &usize| self.cells[k].doubt.tested;
+            let (tested, untested): (Vec<usize>, Vec<usize>) =
+                picked.into_iter().partition(is_tested);
+            self.test(&untested, progress);
+            self.split(tested, progress);
+        }
+    }
+
+    /// The cells with the largest shares that can be split, as many as make up the excess.
+    fn pick(&self, excess: f64) -> Vec<usize> {
+        let mut left_texels = self.budget.texels.saturating_sub(self.texels());
+        let mut shares: Vec<(f64, usize)> = self
+            .cells
+            .iter()
+            .enumerate()
+            .filter(|(_, c)| c.doubt.square > 0.0)
+            .filter(|(_, c)| !c.doubt.tested || self.axes(c, left_texels).is_some())
+            .map(|(k, c)| (share(c), k))
+            .collect();
+        let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
+        shares.retain(|s| s.0 >= ALIKE * largest);
+        shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut left = 1.2 * excess;
+        let mut picked = Vec::new();
+        let mut raised: Vec<Option<[u8; 2]>> = vec![None; self.lattices.len()];
+        for (share, k) in shares {
+            if left <= 0.0 {
+                break;
+            }
+            let cell = &self.cells[k];
+            if cell.doubt.tested {
+                // Every chart is charged for once: what is asked of it next finds it as it is then.
+                let charged = raised[cell.chart as usize].is_some();
+                let Some(axes) = self.axes(cell, if charged { usize::MAX } else { left_texels })
+                else {
+                    continue;
+                };
+                if !charged {
+                    let more = self.more(cell, axes);
+                    raised[cell.chart as usize] = Some(more);
+                    let lattice = &self.lattices[cell.chart as usize];
+                    left_texels -= (taken(lattice, more) - taken(lattice, [0, 0])).min(left_texels);
+                }
+            }
+            left -= share;
+            picked.push(k);
+        }
+        picked
+    }
+
+    /// Halvings that a chart lacks for a cell to be split along some axes.
+    fn more(&self, cell: &Cell, axes: [bool; 2]) -> [u8; 2] {
+        let lattice = &self.lattices[cell.chart as usize];
+        [0, 1].map(|k| u8::from(axes[k] && cell.level[k] == lattice.finest[k]))
+    }
+
+    /// The axes along which a tested cell is to be split; none if nothing bends, or if there is no room.
+    fn axes(&self, cell: &Cell, texels: usize) -> Option<[bool; 2]> {
+        let lattice = &self.lattices[cell.chart as usize];
+        let doubt = &cell.doubt;
+        let worst = doubt.bent[0].max(doubt.bent[1]);
+        let mut axes = match worst >= BENDS * doubt.inside {
+            true => doubt.bent.map(|bent| bent >= BENDS * worst),
+            false => [true, true],
+        };
+        if lattice.single {
+            let fits = lattice.texels([0, 0]);
+            return (doubt.square > 0.0 && fits[0] <= self.budget.page).then_some(axes);
+        }
+        for k in 0..2 {
+            let mut more = [0, 0];
+            more[k] = u8::from(cell.level[k] == lattice.finest[k]);
+            let fits = lattice.texels(more)[k] + 2 * MARGIN <= self.budget.page;
+            axes[k] &= fits && u32::from(cell.level[k]) < DEPTH - 1;
+        }
+        let added = taken(lattice, self.more(cell, axes)) - taken(lattice, [0, 0]);
+        ((axes[0] || axes[1]) && added <= texels).then_some(axes)
+    }
+
+    fn split(&mut self, tested: Vec<usize>, progress: &dyn Fn(usize, usize)) {
+        let mut fresh = Vec::new();
+        for k in tested {
+            let children = self.children(k);
+            let mut children = children.into_iter();
+            let Some(first) = children.next() else {
+                // Nothing of the chart lies in it but for rounding.
+                self.cells[k].doubt.square = 0.0;
+                continue;
+            };
+            self.cells[k] = first;
+            fresh.push(k);
+            for child in children {
+                fresh.push(self.cells.len());
+                self.cells.push(child);
+            }
+        }
+        self.expect(&fresh, false, progress);
+    }
+
+    /// What a tested cell becomes.
+    fn children(&mut self, k: usize) -> Vec<Cell> {
+        let number = self.cells[k].chart as usize;
+        let (chart, hints) = (&self.charts[number], &self.hints_at[number]);
+        let lattice = &mut self.lattices[number];
+        let doubt = self.cells[k].doubt;
+        let heir = |cell: Cell, square: f64| Cell {
+            doubt: Doubt {
+                square,
+                trust: doubt.trust,
+                ..Doubt::default()
+            },
+            ..cell
+        };
+        if lattice.single {
+            lattice.single = false;
+            let cells = first(number as u32, chart, lattice, hints);
+            return cells
+                .into_iter()
+                .map(|c| heir(c, SHRINK * doubt.square))
+                .collect();
+        }
+        // Another cell may have taken the room since this one was picked.
+        let Some(axes) = self.axes(&self.cells[k], usize::MAX) else {
+            return vec![self.cells[k].clone()];
+        };
+        let more = self.more(&self.cells[k], axes);
+        let lattice = &mut self.lattices[number];
+        lattice.finest = [0, 1].map(|axis| lattice.finest[axis] + more[axis]);
+        let squares = doubt.bent.map(|bent| bent * bent + f64::MIN_POSITIVE);
+        let kept = [0, 1].map(|axis| if axes[axis] { SHRINK } else { 1.0 });
+        let left = (squares[0] * kept[0] + squares[1] * kept[1]) / (squares[0] + squares[1]);
+        let cells = self.cells[k].split(chart, lattice, hints, axes);
+        cells
+            .into_iter()
+            .map(|c| heir(c, left * doubt.square))
+            .collect()
+    }
+
+    /// Looks at light in the middles of edges and inside.
+    fn test(&mut self, cells: &[usize], progress: &dyn Fn(usize, usize)) {
+        let mut asked = Vec::with_capacity(cells.len());
+        for &k in cells {
+            let number = self.cells[k].chart as usize;
+            let lattice = self.lattices[number];
+            let chart = &self.charts[number];
+            if lattice.single {
+                // Corners of the rectangle, or what of the chart is nearest to them.
+                let places = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+                let samples =
+                    places.map(|at| self.sampler.want_at(chart, DVec2::from(at) * chart.size));
+                asked.push((samples.to_vec(), None, 0.0));
+                continue;
+            }
+            let middles = [[1, 0], [1, 2], [0, 1], [2, 1], [1, 1]];
+            let middles = middles.map(|halves| self.want(k, self.cells[k].point(halves)));
+            let light = self.light(&self.cells[k]).unwrap_or_default();
+            let (told, worst) = self.told(&self.cells[k], &light);
+            let cell = &self.cells[k];
+            let is_inside = |sample: &Sample| within(cell.share(&lattice, sample.at));
+            let few = middles.iter().filter(|s| is_inside(s)).count() < 2;
+            let (chart, lattice) = (&self.charts[number], &self.lattices[number]);
+            let inside = match worst.filter(|(_, d)| cell.hints.len() > 1 && *d > 0.0) {
+                Some((at, most)) => Some((at, most)),
+                None if few => Some((self.cells[k].clone().clip(chart, lattice), 0.0)),
+                None => None,
+            };
+            let inside = inside.map(|(at, most)| (self.sampler.want_at(chart, at), most));
+            asked.push((middles.to_vec(), inside, told));
+        }
+        self.sampler.looks.complete(progress);
+        for (&k, (middles, inside, told)) in cells.iter().zip(asked) {
+            self.cells[k].doubt = self.judged(&self.cells[k], &middles, inside, told);
+        }
+    }
+
+    /// What is known of a cell now, from looks in it.
+    fn judged(
+        &self,
+        cell: &Cell,
+        middles: &[Sample],
+        inside: Option<(Sample, f64)>,
+        told: f64,
+    ) -> Doubt {
+        let lattice = &self.lattices[cell.chart as usize];
+        let Some(light) = self.light(cell) else {
+            let any = middles
+                .iter()
+                .any(|sample| self.sampler.seen(sample).is_some());
+            // It lies below something, or its corners do: all of it is in doubt then.
+            let square = if any { self.unknown } else { 0.0 };
+            return Doubt {
+                square,
+                tested: true,
+                inside: square.sqrt(),
+                ..Doubt::default()
+            };
+        };
+        let off = |sample: &Sample| {
+            let share = cell.share(lattice, sample.at);
+            if !within(share) {
+                return None;
+            }
+            let off = self.difference(mix(&light, share), self.sampler.seen(sample)?);
+            // What chance alone may do is no bend.
+            Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
+        };
+        let seen: Vec<Option<f64>> = middles.iter().map(off).collect();
+        let count = seen.iter().flatten().count();
+        let mean = seen.iter().flatten().map(|d| d * d).sum::<f64>() / count.max(1) as f64;
+        let worst = |some: &[Option<f64>]| some.iter().flatten().copied().fold(0.0, f64::max);
+        let bent = match seen.len() {
+            5 => [worst(&seen[..2]), worst(&seen[2..4])],
+            _ => [worst(&seen); 2],
+        };
+        let extra = inside.as_ref().and_then(|(sample, _)| off(sample));
+        let before = cell.doubt.trust;
+        let (square, trust) = match (inside, extra) {
+            (Some((_, most)), Some(extra)) if most > 0.0 => {
+                let trust = (extra / most).min(1.0);
+                (mean.max(trust * trust * told), trust)
+            }
+            (_, Some(extra)) => (
+                (mean * count as f64 + extra * extra) / (count as f64 + 1.0),
+                before,
+            ),
+            (_, None) if count == 0 => (cell.doubt.square, before),
+            (_, None) => (mean, before),
+        };
+        let inside = seen
+            .get(4)
+            .copied()
+            .flatten()
+            .into_iter()
+            .chain(extra)
+            .fold(0.0, f64::max);
+        Doubt {
+            square,
+            tested: true,
+            bent,
+            inside: inside.max(if count == 0 { square.sqrt() } else { 0.0 }),
+            trust,
+        }
+    }
+}
+
+/// Light and leaves of the hierarchy in a chart.
+fn told_by(bake: &Bake, chart: &Chart) -> (Vec<Hint>, Vec<DVec2>) {
+    let (tree, light) = (bake.tree(), bake.light());
+    let (mut hints, mut places) = (Vec::new(), Vec::new());
+    for (k, facet) in chart.facets.iter().enumerate() {
+        if facet.entry == crate::hierarchy::NONE {
+            continue;
+        }
+        let face = tree.face_node[facet.entry as usize];
+        let area = bake.mesh().area[facet.triangle as usize];
+        crate::mesh::hints::leaves(tree, face, chart.back, area, |leaf, [v, w], area| {
+            let known = light.leaves.binary_search(&leaf).ok();
+            if let Some(place) = known.filter(|place| *place < light.irradiance.len()) {
+                hints.push(Hint {
+                    area,
+                    open: bake.openness(leaf),
+                    light: bake.lanes().tristimulus(light.irradiance.row(place)),
+                });
+                places.push(chart.at(k as u32, [1.0 - v - w, v, w]));
+            }
+        });
+    }
+    (hints, places)
+}
+
+/// What a cell adds to the mean square, times the area of all.
+fn share(cell: &Cell) -> f64 {
+    cell.area * cell.doubt.square
+}
+
+/// Is a place in the cell, but for rounding?
+fn within(share: DVec2) -> bool {
+    share.cmpge(DVec2::splat(-1e-9)).all() && share.cmple(DVec2::splat(1.0 + 1e-9)).all()
+}
+
+/// Texels that a chart takes on a page.
+pub(super) fn taken(lattice: &Lattice, more: [u8; 2]) -> usize {
+    let [w, h] = lattice.texels(more);
+    let margin = margin(lattice);
+    (w + 2 * margin) * (h + 2 * margin)
+}
+
+/// Light between four corners.
+pub(super) fn mix(light: &[[f64; 3]; 4], share: DVec2) -> [f64; 3] {
+    let weights = bilinear(share);
+    [0, 1, 2].map(|c| (0..4).map(|k| light[k][c] * weights[k]).sum())
+}

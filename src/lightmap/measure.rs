@@ -1,0 +1,160 @@
+//! The error of a light map, measured: a bilinear look-up beside light at fresh random points.
+//!
+//! As between vertices (`mesh::measure`): every point is looked at twice, and what looks differ by chance is taken off.
+
+use super::cells::bilinear;
+use super::grow::Growth;
+use super::maps::Placed;
+use super::sampler::Sample as Place;
+use crate::geometry::sampling::{Pcg, hash, triangle_weights};
+use crate::mesh::measure::{CHANCE, POINTS, SHARE, SURPRISE, Sample};
+use crate::solve::Bake;
+use glam::DVec2;
+
+/// Distinguishes these random numbers from others.
+const SEED: u64 = 0x0067_0a55;
+
+/// A random point of a chart, looked at twice.
+pub(super) struct Point {
+    chart: usize,
+    place: Place,
+    looks: [u32; 2],
+}
+
+impl Growth<'_> {
+    /// Looks at random points that were never looked at before, one in each stratum of equal area.
+    pub(super) fn points(
+        &mut self,
+        bake: &Bake,
+        turn: u64,
+        progress: &dyn Fn(usize, usize),
+    ) -> Vec<Point> {
+        let count = match self.sampler.looks.is_late() {
+            true => POINTS[0],
+            false => (self.sampler.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]),
+        };
+        let facets: Vec<(usize, usize, f64)> = (self.charts.iter().enumerate())
+            .flat_map(|(k, chart)| {
+                let areas = chart
+                    .facets
+                    .iter()
+                    .map(|f| bake.mesh().area[f.triangle as usize]);
+                areas.enumerate().map(move |(facet, area)| (k, facet, area))
+            })
+            .collect();
+        let whole: f64 = facets.iter().map(|f| f.2).sum();
+        if whole <= 0.0 {
+            return Vec::new();
+        }
+        let mut rng = Pcg::new(bake.settings().seed ^ SEED ^ turn << 32);
+        let (mut at, mut upto) = (0, facets[0].2);
+        let mut points = Vec::with_capacity(count);
+        for k in 0..count {
+            let target = (k as f64 + rng.f64()) / count as f64 * whole;
+            while upto <= target && at + 1 < facets.len() {
+                at += 1;
+                upto += facets[at].2;
+            }
+            let weights = triangle_weights([rng.f64(), rng.f64()]);
+            let (number, facet, _) = facets[at];
+            let chart = &self.charts[number];
+            let vertex = chart.vertex(facet as u32, weights);
+            let looks = [0, 1].map(|n| {
+                let seed = hash(bake.settings().seed ^ SEED, 2 * (turn << 32 | k as u64) + n);
+                self.sampler
+                    .looks
+                    .texel_again(&vertex, chart.surface, chart.back, seed)
+            });
+            let place = Place {
+                look: looks[0],
+                at: chart.at(facet as u32, vertex.weights),
+                vertex,
+            };
+            points.push(Point {
+                chart: number,
+                place,
+                looks,
+            });
+        }
+        // However late it is, what is said of the error is measured.
+        self.sampler.looks.patient = true;
+        self.sampler.looks.complete(progress);
+        self.sampler.looks.patient = false;
+        points
+    }
+
+    /// How far maps are off at points; those that something covers are left out. `Sample::cell` counts points here.
+    pub(super) fn compared(&self, points: &[Point], placed: &Placed) -> Vec<Sample> {
+        let cells = self.by_chart();
+        let sample = |(cell, point): (usize, &Point)| {
+            let [one, two] = point
+                .looks
+                .map(|look| self.sampler.looks.at(look).map(|s| s.xyz));
+            let (one, two) = (one?, two?);
+            let drawn = placed
+                .look_up(point.chart, point.place.at)
+                .irradiance
+                .map(f64::from);
+            let noise = 0.5 * self.difference(one, two).powi(2);
+            let seen =
+                0.5 * (self.difference(drawn, one).powi(2) + self.difference(drawn, two).powi(2));
+            Some(Sample {
+                cell,
+                square: seen - (1.0 + self.shared(point, &cells)) * noise,
+                noise,
+            })
+        };
+        points.iter().enumerate().filter_map(sample).collect()
+    }
+
+    /// Sum of squares of the weights of the looks that a point's light is interpolated from.
+    fn shared(&self, point: &Point, cells: &[Vec<usize>]) -> f64 {
+        let of_cell = |k: usize| {
+            let cell = &self.cells[k];
+            let share = cell.share(&self.lattices[point.chart], point.place.at);
+            bilinear(share).map(|w| w * w).iter().sum::<f64>()
+        };
+        match self.lattices[point.chart].single {
+            true => 1.0,
+            false => self.cell_at(point, cells).map_or(1.0, of_cell),
+        }
+    }
+
+    /// Cells of each chart.
+    fn by_chart(&self) -> Vec<Vec<usize>> {
+        let mut cells = vec![Vec::new(); self.charts.len()];
+        for (k, cell) in self.cells.iter().enumerate() {
+            cells[cell.chart as usize].push(k);
+        }
+        cells
+    }
+
+    fn cell_at(&self, point: &Point, cells: &[Vec<usize>]) -> Option<usize> {
+        let lattice = &self.lattices[point.chart];
+        let holds = |k: &usize| {
+            let share = self.cells[*k].share(lattice, point.place.at);
+            lattice.single || (share.cmpge(DVec2::ZERO).all() && share.cmple(DVec2::ONE).all())
+        };
+        cells[point.chart].iter().copied().find(holds)
+    }
+
+    /// Takes what was seen at random points for what is to be expected of their cells, where it is a surprise.
+    pub(super) fn learn(&mut self, points: &[Point], samples: &[Sample]) {
+        let cells = self.by_chart();
+        for sample in samples {
+            let square = sample.square - CHANCE * sample.noise;
+            let Some(cell) = self
+                .cell_at(&points[sample.cell], &cells)
+                .filter(|_| square > 0.0)
+            else {
+                continue;
+            };
+            let doubt = &mut self.cells[cell].doubt;
+            if square > SURPRISE * doubt.square {
+                doubt.square = square;
+                doubt.inside = square.sqrt();
+                doubt.tested = true;
+            }
+        }
+    }
+}

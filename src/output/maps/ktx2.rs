@@ -1,0 +1,104 @@
+//! KTX 2.0 of a page: R16G16B16A16_SFLOAT, one level, not compressed (KTX File Format Specification 2.0.4, sections 3 and 5).
+
+use super::texels;
+use crate::PROGRAM;
+use crate::lightmap::Page;
+use exr::prelude::f16;
+
+/// The file begins with this (section 3.1).
+const IDENTIFIER: [u8; 12] = [
+    0xab, b'K', b'T', b'X', b' ', b'2', b'0', 0xbb, b'\r', b'\n', 0x1a, b'\n',
+];
+/// VK_FORMAT_R16G16B16A16_SFLOAT.
+const FORMAT: u32 = 97;
+/// Bytes of header and index, and of the one level's entry.
+const HEADER: u32 = 80;
+const LEVEL: u32 = 24;
+/// Bytes of a texel.
+const TEXEL: u32 = 8;
+/// Levels begin on multiples of this: the least common multiple of a texel and 4.
+const ALIGN: usize = 8;
+
+/// The file's bytes; alpha is 1. See the module above for the numbers.
+pub fn to_ktx2(page: &Page, lux_per_unit: f64) -> Vec<u8> {
+    let descriptor = descriptor();
+    let values = key_value("KTXwriter", PROGRAM);
+    let at = HEADER + LEVEL;
+    let values_at = at + descriptor.len() as u32;
+    let level_at = (values_at as usize + values.len()).next_multiple_of(ALIGN) as u64;
+    let level = page.texels.len() as u64 * u64::from(TEXEL);
+    let mut out = IDENTIFIER.to_vec();
+    // Format, size of a number, width, height, depth, layers, faces, levels, supercompression.
+    let header = [
+        FORMAT,
+        2,
+        page.width as u32,
+        page.height as u32,
+        0,
+        0,
+        1,
+        1,
+        0,
+    ];
+    let index = [at, descriptor.len() as u32, values_at, values.len() as u32];
+    out.extend(header.into_iter().chain(index).flat_map(u32::to_le_bytes));
+    // No supercompression data; then the level: where, how long, how long unpacked.
+    out.extend(
+        [0, 0, level_at, level, level]
+            .into_iter()
+            .flat_map(u64::to_le_bytes),
+    );
+    out.extend(descriptor);
+    out.extend(values);
+    out.resize(level_at as usize, 0);
+    for [r, g, b] in texels(page, lux_per_unit) {
+        out.extend(
+            [r, g, b, 1.0]
+                .into_iter()
+                .flat_map(|c| f16::from_f32(c).to_le_bytes()),
+        );
+    }
+    out
+}
+
+/// Basic data format descriptor (Khronos Data Format Specification 1.3, section 5): linear, BT.709 primaries, four signed
+/// floats of 16 bits.
+fn descriptor() -> Vec<u8> {
+    let samples = [0_u32, 1, 2, 15];
+    let block = 24 + 16 * samples.len() as u32;
+    // Size; vendor and type 0; version 2 and the block's size; model RGBSDA, primaries BT709, linear; texel block 1 x 1 x 1 x 1; bytes a
+    // plane.
+    let mut words = vec![
+        4 + block,
+        0,
+        2 | (block << 16),
+        1 | (1 << 8) | (1 << 16),
+        0,
+        TEXEL,
+        0,
+    ];
+    for (k, channel) in (0..).zip(samples) {
+        // Offset, length less 1, channel with the flags signed and float; position; -1 and 1 as floats.
+        let kind: u32 = channel | 0x80 | 0x40;
+        words.extend([
+            (16 * k) | (15 << 16) | (kind << 24),
+            0,
+            (-1.0_f32).to_bits(),
+            1.0_f32.to_bits(),
+        ]);
+    }
+    words.into_iter().flat_map(u32::to_le_bytes).collect()
+}
+
+/// An entry of the key and value data, padded to a multiple of four (section 3.11).
+fn key_value(key: &str, value: &str) -> Vec<u8> {
+    let mut out = Vec::new();
+    let length = (key.len() + value.len() + 2) as u32;
+    out.extend(length.to_le_bytes());
+    for text in [key, value] {
+        out.extend(text.as_bytes());
+        out.push(0);
+    }
+    out.resize(out.len().next_multiple_of(4), 0);
+    out
+}

@@ -1,0 +1,96 @@
+//! EXT_lights_ies: profiles in the document, and the nodes that carry them.
+//!
+//! A node gives a profile, a multiplier (1) and a linear colour (white), which take of its light what they are below 1. Where a node
+//! carries a light of KHR_lights_punctual as well (some exporters write both), it is one lamp: the colours multiply.
+
+use super::super::Source;
+use super::super::buffers::{Buffers, Views};
+use super::super::check::Check;
+use super::super::json::{self, Item};
+use super::super::profile::Profile;
+use super::super::uri;
+use super::wish::checked;
+use serde_json::Value;
+use std::sync::Arc;
+
+const NAME: &str = "EXT_lights_ies";
+
+/// What a node says.
+#[derive(Debug, Clone)]
+pub struct IesNode {
+    /// Index in the document's list of profiles.
+    pub(in crate::scene) light: usize,
+    pub(in crate::scene) multiplier: f64,
+    pub(in crate::scene) color: [f32; 3],
+    /// Name of the profile in the document; empty if it has none.
+    pub(in crate::scene) name: String,
+}
+
+/// The profile at a node, if there is one.
+pub(in crate::scene) fn ies_node(json: &Value, node: &Item, check: &mut Check) -> Option<IesNode> {
+    let given = node.extension(NAME, check)?;
+    let light = given.index("light", check);
+    if light.is_none() {
+        let what = format!("{NAME} does not say which light");
+        check.problem(&node.place, what, "export the file again");
+    }
+    let light = light?;
+    let table = json.get("extensions").and_then(|e| e.get(NAME));
+    let nothing = Value::Null;
+    let table = table.unwrap_or(&nothing);
+    let item = json::referred(table, "lights", "profile", light, &node.place, check)?;
+    let multiplier = given.number("multiplier", check).unwrap_or(1.0);
+    let color = given.numbers::<3>("color", check).unwrap_or([1.0; 3]);
+    if multiplier < 0.0 || color.iter().any(|&c| c < 0.0) {
+        let what = format!("{NAME} has a negative multiplier or colour");
+        check.problem(&node.place, what, "give numbers of at least 0");
+    }
+    Some(IesNode {
+        light,
+        multiplier: multiplier.max(0.0),
+        color: color.map(|c| c.clamp(0.0, 1.0) as f32),
+        name: item.name().to_owned(),
+    })
+}
+
+/// The profiles of the document, in order; none where one cannot be read, which was said. Those that no node uses are not read.
+pub(in crate::scene) fn profiles<'a>(
+    source: &Source,
+    nodes: impl Iterator<Item = &'a IesNode>,
+    check: &mut Check,
+) -> Vec<Option<Arc<Profile>>> {
+    let nothing = Value::Null;
+    let table = source.json.get("extensions").and_then(|e| e.get(NAME));
+    let table = table.unwrap_or(&nothing);
+    let mut used = vec![false; json::len(table, "lights")];
+    for node in nodes {
+        used[node.light] = true;
+    }
+    let read = |(index, used): (usize, bool)| {
+        let item = json::item(table, "lights", "profile", index).filter(|_| used)?;
+        let item = Item {
+            place: format!("{NAME}, {}", item.place),
+            ..item
+        };
+        let bytes = bytes(source, &item, check)?;
+        checked(&bytes, &item.place, check)
+    };
+    used.into_iter().enumerate().map(read).collect()
+}
+
+fn bytes(source: &Source, item: &Item, check: &mut Check) -> Option<Vec<u8>> {
+    if item.map.contains_key("uri") {
+        let given = item.text("uri", check)?;
+        let folder = uri::folder_of(&source.path);
+        let failed = |why| check.problem(&item.place, why, "put the file there");
+        return uri::read(&folder, given).map_err(failed).ok();
+    }
+    let Some(view) = item.index("bufferView", check) else {
+        let what = "has neither a URI nor a bufferView";
+        check.problem(&item.place, what, "export the file again");
+        return None;
+    };
+    let buffers = Buffers::sound(source.buffers.clone());
+    let span = Views::new(&source.json, &buffers).view(view, &item.place, check)?;
+    Some(span.bytes().to_vec())
+}

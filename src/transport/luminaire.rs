@@ -1,0 +1,313 @@
+//! Lamps that shine from a surface as a profile says: what they bring to a point, near and far.
+//!
+//! `E(p) = Phi int i(p - x, n(x)) cos / r^2 V dA`, with `i` the intensity over flux and area of an element
+//! ([`Luminaire::per_area`](crate::scene::luminaires::Luminaire::per_area)). The surface is cut until no part is near the point; each part is
+//! a rule of seven points, or three where it is far. Where little stands between, what is seen is the surface less its shadows,
+//! exactly; else rays to parts chosen by what they bring find the visible share.
+
+use super::point::{Gatherer, Memory, Receiver};
+use crate::geometry::sampling::{hash, sequence02, triangle_weights};
+use crate::geometry::{NO_PLANE, Segment, lambert_polygon, quarters};
+use crate::light::Filter;
+use crate::link::{PIECES, View, open_weight};
+use crate::scene::PunctualLight;
+use crate::scene::luminaires::Luminaire;
+use glam::DVec3;
+
+/// A part nearer than this many of its radii is cut: what the rule of seven points then misses of a square panel is below
+/// .01 %.
+const NEAR: f64 = 2.0;
+/// Beyond this many of its radii three points (a rule of degree 2) do as well.
+const FAR: f64 = 8.0;
+/// Parts of a triangle at the most.
+const PARTS: usize = 64;
+/// Lamps of more triangles are found by rays alone.
+const FEW: usize = 16;
+/// Rays end so far before the surface, share of half the room: f32 positions are off by 1e-7 of it.
+const BEFORE: f64 = 1e-5;
+
+/// Points of a triangle and their weights, exact to degree 5 (Radon 1948; Cowper 1973).
+const SEVEN: [([f64; 3], f64); 7] = {
+    const THIRD: f64 = 1.0 / 3.0;
+    const A: f64 = 0.470_142_064_105_115;
+    const B: f64 = 0.101_286_507_323_456;
+    const W: [f64; 3] = [0.225, 0.132_394_152_788_506, 0.125_939_180_544_827];
+    [
+        ([THIRD; 3], W[0]),
+        ([1.0 - 2.0 * A, A, A], W[1]),
+        ([A, 1.0 - 2.0 * A, A], W[1]),
+        ([A, A, 1.0 - 2.0 * A], W[1]),
+        ([1.0 - 2.0 * B, B, B], W[2]),
+        ([B, 1.0 - 2.0 * B, B], W[2]),
+        ([B, B, 1.0 - 2.0 * B], W[2]),
+    ]
+};
+/// The same to degree 2 (Cowper 1973).
+const THREE: [([f64; 3], f64); 3] = {
+    const A: f64 = 1.0 / 6.0;
+    const B: f64 = 2.0 / 3.0;
+    [
+        ([B, A, A], 1.0 / 3.0),
+        ([A, B, A], 1.0 / 3.0),
+        ([A, A, B], 1.0 / 3.0),
+    ]
+};
+
+/// A part of a lamp, none near the point, and what turns the lamp's flux into what the part brings there.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    brings: f64,
+}
+
+impl Part {
+    /// A point of it by chance, and its weight: 1 in the mean.
+    fn point(&self, luminaire: &Luminaire, to: &Receiver, uv: [f64; 2]) -> (DVec3, f64) {
+        let [a, b, c] = self.corners;
+        let at = mix(&self.corners, triangle_weights(uv));
+        let area = 0.5 * (b - a).cross(c - a).length();
+        (
+            at,
+            area * density(luminaire, at, self.normal, to) / self.brings,
+        )
+    }
+}
+
+fn mix(&[a, b, c]: &[DVec3; 3], w: [f64; 3]) -> DVec3 {
+    a * w[0] + b * w[1] + c * w[2]
+}
+
+/// What a place of a lamp brings to a point, per area; 0 if it is turned away.
+fn density(luminaire: &Luminaire, at: DVec3, normal: DVec3, to: &Receiver) -> f64 {
+    let way = to.point - at;
+    let square = way.length_squared();
+    let cosine = -to.normal.dot(way) / square.sqrt();
+    if cosine <= 0.0 || cosine.is_nan() {
+        return 0.0;
+    }
+    luminaire.per_area(way / square.sqrt(), normal) * cosine / square
+}
+
+/// The same of a place that is as bright from everywhere: cosines over the square of the distance.
+fn even(at: DVec3, normal: DVec3, to: &Receiver) -> f64 {
+    let way = to.point - at;
+    let square = way.length_squared();
+    let cosines = [-to.normal.dot(way), normal.dot(way)].map(|x| x.max(0.0));
+    cosines[0] * cosines[1] / square.powi(2).max(f64::MIN_POSITIVE)
+}
+
+/// Triangles of a lamp that face a point and lie above it, lifted off their surface, with their normals.
+fn facing(
+    lamp: &PunctualLight,
+    luminaire: &Luminaire,
+    to: &Receiver,
+    half_size: f64,
+) -> Vec<([DVec3; 3], DVec3)> {
+    let lift = BEFORE * half_size;
+    let lifted = luminaire.triangles().iter().filter_map(|&[a, b, c]| {
+        let normal = (b - a).cross(c - a).try_normalize()?;
+        let corners = [a, b, c].map(|p| p + lamp.position + lift * normal);
+        let faces = normal.dot(to.point - corners[0]) > 0.0;
+        let above = |p: &DVec3| (*p - to.point).dot(to.normal) > 0.0;
+        (faces && corners.iter().any(above)).then_some((corners, normal))
+    });
+    lifted.collect()
+}
+
+/// Cuts a triangle, the nearest part first, until none is near or there are [`PARTS`], and adds the parts that bring something. Of
+/// near ones the exact form factor counts, so that only how the profile varies over a part is left to the rule.
+fn cut(
+    luminaire: &Luminaire,
+    (triangle, normal): ([DVec3; 3], DVec3),
+    to: &Receiver,
+    out: &mut Vec<Part>,
+) {
+    // How many of its radii a part is away.
+    let away = |corners: &[DVec3; 3]| {
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius = corners.map(|p| p.distance(middle));
+        middle.distance(to.point) / radius.into_iter().fold(f64::MIN_POSITIVE, f64::max)
+    };
+    let mut parts = vec![(away(&triangle), triangle)];
+    while parts.len() + 3 <= PARTS {
+        let nearest = (0..parts.len()).min_by(|&j, &k| parts[j].0.total_cmp(&parts[k].0));
+        let Some(nearest) = nearest.filter(|&k| parts[k].0 < NEAR) else {
+            break;
+        };
+        let (_, corners) = parts.swap_remove(nearest);
+        parts.extend(quarters(corners).map(|corners| (away(&corners), corners)));
+    }
+    for (away, corners) in parts {
+        let rule = match away < FAR {
+            true => &SEVEN[..],
+            false => &THREE[..],
+        };
+        let [a, b, c] = corners;
+        let area = 0.5 * (b - a).cross(c - a).length();
+        let at = |w: &[f64; 3]| density(luminaire, mix(&corners, *w), normal, to);
+        let mut brings = area * rule.iter().map(|(w, weight)| weight * at(w)).sum::<f64>();
+        if away < NEAR {
+            let even = |w: &[f64; 3]| even(mix(&corners, *w), normal, to);
+            let by_rule = area * rule.iter().map(|(w, weight)| weight * even(w)).sum::<f64>();
+            let exact = std::f64::consts::PI * lambert_polygon(to.point, to.normal, &corners);
+            // A part that no point of the rule sees brings as good as nothing.
+            brings *= if by_rule > 0.0 { exact / by_rule } else { 0.0 };
+        }
+        if brings > 0.0 && brings.is_finite() {
+            out.push(Part {
+                corners,
+                normal,
+                brings,
+            });
+        }
+    }
+}
+
+/// The part that a number in [0, 1) chooses by what parts bring, and what is left of the number.
+fn choose(parts: &[Part], all: f64, u: f64) -> Option<(&Part, f64)> {
+    let mut left = u * all;
+    let mut chosen = None;
+    for part in parts {
+        chosen = Some((part, (left / part.brings).clamp(0.0, 1.0 - f64::EPSILON)));
+        if left < part.brings {
+            break;
+        }
+        left -= part.brings;
+    }
+    chosen
+}
+
+/// What turns the flux of a lamp with an extent into irradiance where nothing is in between, and a point of it that two numbers
+/// in [0, 1) choose, by what it brings.
+pub(super) fn whole(
+    lamp: &PunctualLight,
+    to: &Receiver,
+    half_size: f64,
+    [u, v]: [f64; 2],
+) -> Option<(f64, DVec3)> {
+    let luminaire = lamp.luminaire.as_deref()?;
+    let mut parts = Vec::new();
+    for triangle in facing(lamp, luminaire, to, half_size) {
+        cut(luminaire, triangle, to, &mut parts);
+    }
+    let all = parts.iter().map(|part| part.brings).sum();
+    let (part, left) = choose(&parts, all, u)?;
+    Some((all, part.point(luminaire, to, [left, v]).0))
+}
+
+impl Gatherer<'_> {
+    /// What turns the flux of a lamp with an extent into irradiance, past what is in between, and what panes leave of it. `bright`:
+    /// what the lamp's flux is, share of white.
+    pub(super) fn of_surface(
+        &self,
+        to: &Receiver,
+        lamp: &PunctualLight,
+        bright: f64,
+        memory: &mut Memory,
+    ) -> (f64, Option<Filter>) {
+        let Some(luminaire) = lamp.luminaire.as_deref() else {
+            return (0.0, None);
+        };
+        let (mut seen, mut parts) = (0.0, Vec::new());
+        // Panes are found by rays.
+        let by_rays = self.sight.occlusion || self.glass.is_some();
+        let exact = self.shafts && self.glass.is_none() && luminaire.triangles().len() <= FEW;
+        for triangle in facing(lamp, luminaire, to, self.light.half_size) {
+            let known = match by_rays {
+                true if exact => self.past_blockers(luminaire, triangle, to, memory),
+                true => None,
+                false => {
+                    let mut whole = Vec::new();
+                    cut(luminaire, triangle, to, &mut whole);
+                    Some(whole.iter().map(|part| part.brings).sum())
+                }
+            };
+            match known {
+                Some(known) => seen += known,
+                None => cut(luminaire, triangle, to, &mut parts),
+            }
+        }
+        if parts.is_empty() {
+            return (seen, None);
+        }
+        let more = self.by_lamp_rays(luminaire, &parts, to, bright, memory);
+        let owners = vec![0; memory.segments.len()];
+        let filter = self.tints(&owners, 1, memory).first().copied();
+        (seen + more, filter)
+    }
+
+    /// What a triangle of a lamp brings, less the shadows of what stands between; none where that is too much.
+    fn past_blockers(
+        &self,
+        luminaire: &Luminaire,
+        (corners, normal): ([DVec3; 3], DVec3),
+        to: &Receiver,
+        memory: &mut Memory,
+    ) -> Option<f64> {
+        let planes = [to.plane, NO_PLANE];
+        let mut parts = Vec::new();
+        match self.sight.view_from(to.point, to.normal, &corners, planes) {
+            View::Clear => cut(luminaire, (corners, normal), to, &mut parts),
+            View::Crowded => return None,
+            View::Listed(list) => {
+                memory.clipper.begin(to.point, &corners);
+                for blocker in self.sight.blockers(&list, planes)? {
+                    let outline = || self.sight.mesh.outline(blocker);
+                    let shadow = memory.shadows.of(to.point, blocker, outline);
+                    if !memory.clipper.cut(shadow, PIECES) {
+                        return None;
+                    }
+                }
+                // What is left below this is rounding: what is hidden is exactly dark.
+                if memory.clipper.factor(to.normal, 1.0) <= 0.0 {
+                    return Some(0.0);
+                }
+                for piece in memory.clipper.visible() {
+                    for two in piece[1..].windows(2) {
+                        let fan = [piece[0], two[0], two[1]].map(|p| p + to.point);
+                        cut(luminaire, (fan, normal), to, &mut parts);
+                    }
+                }
+            }
+        }
+        Some(parts.iter().map(|part| part.brings).sum())
+    }
+
+    /// What rays to the parts of a lamp find of what they bring.
+    fn by_lamp_rays(
+        &self,
+        luminaire: &Luminaire,
+        parts: &[Part],
+        to: &Receiver,
+        bright: f64,
+        memory: &mut Memory,
+    ) -> f64 {
+        let all: f64 = parts.iter().map(|part| part.brings).sum();
+        let count = self.rays_to_lamps(to, bright * all);
+        let turn = hash(to.seed, 0x6c);
+        memory.segments.clear();
+        memory.weights.clear();
+        for k in 0..count as u32 {
+            let [u, v] = sequence02(k, turn);
+            let Some((part, left)) = choose(parts, all, u) else {
+                break;
+            };
+            let (end, weight) = part.point(luminaire, to, [left, v]);
+            memory
+                .segments
+                .push(Segment::new(to.point, end, [to.plane, NO_PLANE]));
+            memory.weights.push(weight);
+        }
+        self.sight
+            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+        memory.rays += memory.segments.len() as u64;
+        let total: f64 = memory.weights.iter().sum();
+        if total <= 0.0 {
+            return 0.0;
+        }
+        let seen = open_weight(&memory.weights, &memory.blocked) / total;
+        memory.noise += (bright * all).powi(2) * seen * (1.0 - seen) / (count as f64).powf(1.5);
+        all * seen
+    }
+}
