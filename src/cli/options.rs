@@ -61,6 +61,7 @@ impl Reading {
         Options {
             grid: self.range.grid(),
             spectra: self.spectra.clone(),
+            said: None,
             lenient: self.lenient,
             scale: self.scale,
             sky: self.sky.wish(),

@@ -46,16 +46,23 @@ impl Stop {
     /// # Errors
     /// The system refuses the handler.
     pub fn listen(&self) -> Result<()> {
-        let (interrupted, started) = (Arc::clone(&self.interrupted), self.started);
+        let stop = self.clone();
         ctrlc::set_handler(move || {
-            // Half a thousand million years of milliseconds fit.
-            let now = started.elapsed().as_millis() as u64 + 1;
-            if interrupted.swap(now, Ordering::SeqCst) > 0 {
+            if stop.interrupted_s().is_some() {
                 std::process::exit(KILLED);
             }
+            stop.interrupt();
             tell("\nending after this round; Ctrl-C again ends at once");
         })
         .map_err(|problem| Error::Internal(format!("Ctrl-C: {problem}")))
+    }
+
+    /// Asks for an end after the current round, as the first Ctrl-C does; from any thread, on any clone.
+    pub fn interrupt(&self) {
+        // Half a thousand million years of milliseconds fit.
+        let now = self.started.elapsed().as_millis() as u64 + 1;
+        // The first one counts.
+        let _ = (self.interrupted).compare_exchange(0, now, Ordering::SeqCst, Ordering::SeqCst);
     }
 
     /// Seconds since the start.
@@ -164,7 +171,7 @@ mod tests {
     fn an_interrupt_goes_before_the_time() {
         let stop = Stop::new(Some(1e-9));
         assert_eq!(stop.verdict(&[]), Some(Verdict::OutOfTime));
-        stop.interrupted.store(1, Ordering::SeqCst);
+        stop.interrupt();
         assert_eq!(stop.verdict(&[]), Some(Verdict::Interrupted));
         assert_eq!(Stop::new(None).verdict(&[]), None);
     }

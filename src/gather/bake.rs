@@ -325,12 +325,7 @@ pub struct Probed {
 impl Bake {
     /// Irradiance at points in world space with unit normals.
     pub fn probe(&self, points: &[(DVec3, DVec3)]) -> Vec<Probed> {
-        let receivers: Vec<Receiver> = points
-            .iter()
-            .enumerate()
-            .map(|(k, &(point, normal))| self.place(point - self.mesh().centre, normal, k as u64))
-            .collect();
-        self.gather(&receivers)
+        self.gather_at(points)
             .into_iter()
             .map(
                 |Gathered {
@@ -342,6 +337,16 @@ impl Bake {
                 },
             )
             .collect()
+    }
+
+    /// Light at points in world space with unit normals, by lane.
+    pub(crate) fn gather_at(&self, points: &[(DVec3, DVec3)]) -> Vec<Gathered> {
+        let receivers: Vec<Receiver> = points
+            .iter()
+            .enumerate()
+            .map(|(k, &(point, normal))| self.place(point - self.mesh().centre, normal, k as u64))
+            .collect();
+        self.gather(&receivers)
     }
 
     /// Finds the face that a point lies on, if its normal agrees; a point in the air looks at the whole room.

@@ -1,5 +1,6 @@
 //! What is kept of a finished bake, and the same room under other lamps and paints.
 
+mod probe;
 mod relight;
 mod relit;
 

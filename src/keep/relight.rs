@@ -162,30 +162,8 @@ impl Bake {
     /// light; none before there are two.
     fn watched_distance(&self) -> Read<Option<f64>> {
         let seen = |round: &[Option<Box<[u8]>>]| -> Read<Vec<[f64; 3]>> {
-            round
-                .iter()
-                .map(|packed| {
-                    let packed = packed.as_deref().unwrap_or(&[]);
-                    let (light, lamps) = (&self.light, &self.lamps);
-                    Ok(match self.light.width() {
-                        4 => self
-                            .lanes
-                            .tristimulus(&trace::replay::<4>(packed, light, lamps)?),
-                        8 => self
-                            .lanes
-                            .tristimulus(&trace::replay::<8>(packed, light, lamps)?),
-                        16 => self
-                            .lanes
-                            .tristimulus(&trace::replay::<16>(packed, light, lamps)?),
-                        32 => self
-                            .lanes
-                            .tristimulus(&trace::replay::<32>(packed, light, lamps)?),
-                        _ => self
-                            .lanes
-                            .tristimulus(&trace::replay::<64>(packed, light, lamps)?),
-                    })
-                })
-                .collect()
+            let rows = round.iter().map(|packed| self.replayed(packed.as_deref()));
+            rows.map(|row| Ok(self.lanes.tristimulus(&row?))).collect()
         };
         let [before, last] = &self.watched;
         if before.is_empty() || before.len() != last.len() {
@@ -469,7 +447,7 @@ impl Relighter {
         Ok((convergence, flux, [direct_s, clock.elapsed().as_secs_f64()]))
     }
 
-    /// The bake behind it. It has no rays: nothing may be gathered at new points.
+    /// The bake behind it. It has no rays: nothing may be gathered at new points, see [`Relighter::probe`].
     pub fn bake(&self) -> &Bake {
         &self.bake
     }

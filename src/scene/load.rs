@@ -1,14 +1,14 @@
 //! A room from its file: document, geometry, paint and lamps, and everything that is wrong with any of them together.
 
 use super::changes::Changes;
-use super::check::{Check, Unknown};
+use super::check::Check;
 use super::document::Document;
 use super::light::{self, Lamps};
 use super::material;
 use super::pane;
 use super::sky::{self, SkyWish};
 use super::spectra_file::SpectraFile;
-use super::{LightSpectrum, Material, PunctualLight, Scene, Surface, lacking, luminaires};
+use super::{LightSpectrum, Material, PunctualLight, Scene, Surface, lacking, luminaires, said};
 use crate::color::Upsampler;
 use crate::data::{Grid, Leaves};
 use crate::error::{Error, Result};
@@ -21,12 +21,22 @@ pub struct Options {
     pub grid: Grid,
     /// The file of spectra; none: `room.spectra.json` beside `room.glb`, if there is one.
     pub spectra: Option<PathBuf>,
+    /// What is said over the file of spectra, an object as in that file: the reflectance or emission of a material, a light
+    /// and a point of the sky replace what the file says of it.
+    pub said: Option<serde_json::Value>,
     /// Only warn of keys and names in the file of spectra that mean nothing.
     pub lenient: bool,
     /// Metres for each unit of the file; none: 1, as glTF has it.
     pub scale: Option<f64>,
     /// Sky and sun; what is not said here the file of spectra may say.
     pub sky: SkyWish,
+}
+
+impl Options {
+    /// Says more, over what was said: see [`Options::said`].
+    pub fn say(&mut self, more: serde_json::Value) {
+        self.said = said::over(self.said.take(), Some(&more));
+    }
 }
 
 impl Scene {
@@ -65,21 +75,7 @@ impl Scene {
         let names: Vec<String> = raw_materials.iter().map(material::name_of).collect();
         let light_names: Vec<String> = raw_lights.iter().map(light::name_of).collect();
         let grid = options.grid;
-        let asked = options.spectra.as_deref();
-        let unknown = if options.lenient {
-            Unknown::Warn
-        } else {
-            Unknown::Refuse
-        };
-        let file = SpectraFile::open(
-            path,
-            asked,
-            &names,
-            &light_names,
-            &grid,
-            unknown,
-            &mut check,
-        );
+        let file = SpectraFile::open(path, options, &names, &light_names, &mut check);
         let upsampler = Upsampler::new(&grid);
         let mut lamps = Lamps::new(&grid, &upsampler);
         let (mut materials, shining) = material::materials(

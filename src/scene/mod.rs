@@ -26,6 +26,7 @@ pub mod pane;
 mod primitive;
 pub mod profile;
 mod raw;
+mod said;
 pub mod sky;
 mod spectra_file;
 mod texture;

@@ -12,8 +12,8 @@
 //! Materials and lights go by their glTF names; all that share a name get the entry. `extras` of a material hold the
 //! object of a material, `extras` of a light that of a light. The file wins, reflectance and emission each by itself.
 //!
-//! A CSV (`wavelength_nm,value`, linear between rows) lies in the folder of the file that names it. A reflectance is held
-//! beyond its rows, an emission is zero there. The emission of a *surface* given as a CSV without a luminance is
+//! A CSV (`wavelength_nm,value`, linear between rows) lies in the folder of the file that names it; a text of several lines
+//! is the CSV itself. A reflectance is held beyond its rows, an emission is zero there. The emission of a *surface* given as a CSV without a luminance is
 //! spectral radiance in W/m2/sr/nm; with a luminance (cd/m2) only its shape counts. A named illuminant without a
 //! luminance keeps the brightness that glTF gives the material. The spectrum of a *light* is a shape always: glTF's
 //! candela or lux, times the luminance of its colour, say how bright it is. `"profile"`: see `luminaires`.
@@ -24,7 +24,9 @@
 use super::check::{Check, Unknown};
 use super::json::short;
 use super::known::{MaterialSpectra, Sampled};
+use super::load::Options;
 use super::luminaires::{self, LampWish};
+use super::said;
 use super::sky::SkyWish;
 use super::transmittance;
 use super::uri;
@@ -47,50 +49,43 @@ pub(crate) struct SpectraFile {
 }
 
 impl SpectraFile {
-    /// Reads the file that was asked for, or the one beside the room if it is there.
+    /// Reads the file that was asked for, or the one beside the room if it is there, and what was said over it.
     ///
-    /// `materials` and `lights` are the names in the room; `unknown` is what becomes of entries for other names, and of
-    /// keys that mean nothing.
+    /// `materials` and `lights` are the names in the room; entries for other names, and keys that mean nothing, are
+    /// problems unless the reader is lenient.
     pub(crate) fn open(
         room: &Path,
-        asked: Option<&Path>,
+        options: &Options,
         materials: &[String],
         lights: &[String],
-        grid: &Grid,
-        unknown: Unknown,
         check: &mut Check,
     ) -> Self {
-        let path = match asked {
-            Some(path) => path.to_path_buf(),
-            None => match beside(room) {
-                Some(path) => path,
-                None => return Self::default(),
+        let path = options.spectra.clone().or_else(|| beside(room));
+        let place = path
+            .as_ref()
+            .map_or_else(|| "spectra".to_owned(), |path| path.display().to_string());
+        let json = match &path {
+            Some(path) => match said::json_of(path) {
+                Ok(json) => Some(json),
+                Err((what, next)) => {
+                    check.problem(&place, what, next);
+                    return Self::default();
+                }
             },
+            None => None,
         };
-        let place = path.display().to_string();
-        let text = match uri::read_file(&path) {
-            Ok(text) => text,
-            Err(why) => {
-                check.problem(&place, why, "name a spectra file that can be read");
-                return Self::default();
-            }
-        };
-        let json: Value = match serde_json::from_slice(&text) {
-            Ok(json) => json,
-            Err(why) => {
-                check.problem(
-                    &place,
-                    format!("is not valid JSON ({why})"),
-                    "mend the file",
-                );
-                return Self::default();
-            }
+        let Some(json) = said::over(json, options.said.as_ref()) else {
+            return Self::default();
         };
         let mut reader = Reader {
-            folder: uri::folder_of(&path),
-            grid,
+            folder: uri::folder_of(path.as_deref().unwrap_or(room)),
+            grid: &options.grid,
             check,
-            unknown,
+            unknown: if options.lenient {
+                Unknown::Warn
+            } else {
+                Unknown::Refuse
+            },
         };
         let mut file = Self::default();
         let Some(top) = reader.object(&json, &place) else {
@@ -239,7 +234,7 @@ impl Reader<'_> {
         let text = |key: &str| object.get(key).map(|v| v.as_str().map(str::to_owned));
         let (table, from, is_csv) = match (text("name"), text("csv")) {
             (Some(Some(name)), None) => (self.named(&name, kind, place)?, name, false),
-            (None, Some(Some(path))) => (self.csv(&path, place)?, path, true),
+            (None, Some(Some(path))) => (self.csv(&path, place)?, said::called(&path), true),
             _ => {
                 let next = "give either \"name\" or \"csv\", a text";
                 self.check
@@ -297,7 +292,11 @@ impl Reader<'_> {
 
     fn csv(&mut self, path: &str, place: &str) -> Option<Table> {
         let next = "give a CSV of wavelength_nm,value inside the folder of the file that names it";
-        let bytes = match uri::read(&self.folder, path) {
+        let read = match said::is_rows(path) {
+            true => Ok(path.as_bytes().to_vec()),
+            false => uri::read(&self.folder, path),
+        };
+        let bytes = match read {
             Ok(bytes) => bytes,
             Err(why) => {
                 self.check.problem(place, why, next);
@@ -307,7 +306,8 @@ impl Reader<'_> {
         match Table::parse_csv(&String::from_utf8_lossy(&bytes)) {
             Ok(table) => Some(table),
             Err(why) => {
-                self.check.problem(place, format!("'{path}', {why}"), next);
+                let what = format!("'{}', {why}", said::called(path));
+                self.check.problem(place, what, next);
                 None
             }
         }
@@ -397,15 +397,12 @@ mod tests {
         let mut check = Check::new("room.glb");
         let names = ["wall", "lamp"].map(str::to_owned);
         let room = folder.path().join("room.glb");
-        let file = SpectraFile::open(
-            &room,
-            None,
-            &names,
-            &["Spot".to_owned()],
-            &Grid::default(),
-            unknown,
-            &mut check,
-        );
+        let options = Options {
+            lenient: unknown == Unknown::Warn,
+            ..Options::default()
+        };
+        let lights = ["Spot".to_owned()];
+        let file = SpectraFile::open(&room, &options, &names, &lights, &mut check);
         let (problems, warnings) = check.into_parts();
         (
             file,
@@ -429,6 +426,9 @@ mod tests {
         );
         assert_eq!((problems, warnings), (vec![], vec![]));
         let wall = file.materials["wall"].reflectance.as_ref().unwrap();
+        let rows = json!({"materials": {"wall": {"reflectance": {"csv": "400,0.2\n700,0.5"}}}});
+        let rows = open(&rows, &[]).0.materials["wall"].reflectance.clone();
+        assert_eq!(rows.unwrap().leaves, wall.leaves);
         // Held beyond its rows.
         assert!((wall.leaves[0] - 0.2).abs() < 1e-12 && (wall.leaves[63] - 0.5).abs() < 1e-12);
         assert!(wall.is_csv);
@@ -499,16 +499,11 @@ mod tests {
     #[test]
     fn a_broken_or_missing_file_is_a_problem() {
         let mut check = Check::new("room.glb");
-        let asked = Path::new("/nowhere/at/all.json");
-        SpectraFile::open(
-            Path::new("room.glb"),
-            Some(asked),
-            &[],
-            &[],
-            &Grid::default(),
-            Unknown::Refuse,
-            &mut check,
-        );
+        let asked = Options {
+            spectra: Some("/nowhere/at/all.json".into()),
+            ..Options::default()
+        };
+        SpectraFile::open(Path::new("room.glb"), &asked, &[], &[], &mut check);
         assert!(check.has_problems());
         assert!(open(&json!([1, 2]), &[]).1[0].contains("not a JSON object"));
         assert!(
