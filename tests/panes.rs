@@ -353,12 +353,19 @@ fn sunlit() -> Room {
 /// A solid absorbs along the way through it.
 #[test]
 fn solids_absorb_along_the_chord() {
+    // Reversed solids are solids.
+    for reversed in [false, true] {
+        wedge(reversed);
+    }
+}
+
+fn wedge(reversed: bool) {
     let mut room = sunlit();
     let pane = room.pane(1.0, [0.5; LEAVES]);
     // A wedge from 0 to 1 m thick over 2 m; half passes half a metre.
     let at = |x: f64, y: f64, z: f64| dvec3(1.0 + x, 1.0 + y, 1.0 + z);
     let ends = [0.0, 2.0].map(|z| [at(0.0, 0.0, z), at(2.0, 0.0, z), at(2.0, 1.0, z)]);
-    let triangles = vec![
+    let mut triangles = vec![
         [0, 2, 1],
         [3, 4, 5],
         [0, 1, 4],
@@ -368,6 +375,11 @@ fn solids_absorb_along_the_chord() {
         [0, 3, 5],
         [0, 5, 2],
     ];
+    if reversed {
+        triangles
+            .iter_mut()
+            .for_each(|t: &mut [u32; 3]| t.swap(1, 2));
+    }
     room.mesh(ends.concat(), triangles, pane);
     let mut scene = room.scene();
     if let Some(PaneKind::Glass { unit, .. }) =
@@ -381,6 +393,34 @@ fn solids_absorb_along_the_chord() {
     for x in [0.3, 1.1, 1.9] {
         let got = leaves(&bake, &[dvec3(1.0 + x, 0.0, 2.0)])[0][30];
         close(got / open, 0.5_f64.powf(x), 1e-4, "through the wedge");
+    }
+}
+
+/// A face and its back with a volume, in one place: the thickness that the material says, from either side.
+#[test]
+fn a_face_and_its_back_have_the_thickness_of_their_material() {
+    for turned in [false, true] {
+        let mut room = sunlit();
+        let pane = room.pane(1.0, [0.5; LEAVES]);
+        let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+        let corners = corners.map(|[x, z]| dvec3(x, 1.0, z)).to_vec();
+        let mut triangles = vec![[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]];
+        if turned {
+            triangles.reverse();
+        }
+        room.mesh(corners, triangles, pane);
+        let mut scene = room.scene();
+        if let Some(PaneKind::Glass {
+            unit, thickness, ..
+        }) = scene.materials[pane].pane.as_mut().map(|p| &mut p.kind)
+        {
+            (*unit, *thickness) = (Some(0.5), 3.0);
+        }
+        let mut bake = Bake::new(scene, Settings::default());
+        bake.run();
+        let open = 500.0 * bake.scene().spectra[0].power[30];
+        let got = leaves(&bake, &[dvec3(1.5, 0.0, 2.0)])[0][30];
+        close(got / open, 0.125, 1e-4, "through both faces");
     }
 }
 

@@ -105,6 +105,9 @@ const WORTH_STALLING: usize = 100_000;
 const MOST_LINKS: usize = 4_000_000;
 /// Rooms of this many faces choose their lanes once.
 const MANY_FACES: usize = 50_000;
+/// Rooms of few triangles with panes take directions for this share of the error: what is clipped exactly in others is found by rays
+/// there, and a ray costs next to nothing.
+const GLAZED: f64 = 0.25;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
 /// The working partition may cause this share of the asked-for error. In the Cornell box under F2, .05 to .35 cost the
@@ -265,7 +268,8 @@ impl Bake {
         let weights = Observer::cie1931().weights(&scene.grid);
         let upsampler = Upsampler::new(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
-        let hemisphere = Hemisphere::for_error(settings.error);
+        let glazed = !scene.panes.is_empty() && is_small(&mesh);
+        let hemisphere = Hemisphere::for_error(settings.error * if glazed { GLAZED } else { 1.0 });
         let probes = estimate::Probes::new(&tree, settings.seed);
         let mut bake = Self {
             closed: Closed::No,
