@@ -45,7 +45,8 @@ pub(super) fn read(
 
 #[cfg(test)]
 mod tests {
-    use super::super::check::{Check, Unknown};
+    use super::super::Options;
+    use super::super::check::Check;
     use super::super::spectra_file::SpectraFile;
     use super::*;
     use crate::data::Grid;
@@ -60,8 +61,7 @@ mod tests {
         let (grid, mut check) = (Grid::default(), Check::new("room.glb"));
         let room = folder.path().join("room.glb");
         let names = ["wall".to_owned()];
-        let unknown = Unknown::Refuse;
-        let file = SpectraFile::open(&room, None, &names, &[], &grid, unknown, &mut check);
+        let file = SpectraFile::open(&room, &Options::default(), &names, &[], &mut check);
         let spectra = file.material("wall", None, &room, &grid, &mut check);
         let problems = check.into_parts().0;
         let problems = problems.iter().map(ToString::to_string).collect();
