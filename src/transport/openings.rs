@@ -246,8 +246,10 @@ impl Openings {
                 .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[l, h], &(_, p)| {
                     [l.min(p), h.max(p)]
                 });
-            // The outermost of n rays lie about an n-th of the width from the edge.
-            let more = (most - least) * (4.0 / exits.len() as f64);
+            // The outermost of n rays lie about an n-th of the width from the edge; further than k of them with probability e^-k.
+            // With 4 one part in fourteen lost a sliver, which single rays of the hemisphere then stood for: 1.6 % at a point of CIE
+            // 171 5.10.
+            let more = (most - least) * (12.0 / exits.len() as f64);
             (low, high) = (low.max(least - more), high.min(most + more));
         }
         let end = if side < 3 { self.low } else { self.high };
