@@ -1,7 +1,7 @@
 //! The light in maps: pages of texels instead of vertices, for engines that want the room's own mesh.
 //!
 //! Every side of every surface is cut into charts, the charts get texels where the light needs them, and the file's error is that of
-//! a bilinear look-up, measured. Charts are flat where the surface is, else [`unwrap`] flattens them.
+//! a bilinear look-up, measured. Charts are flat where the surface is, else `unwrap` flattens them.
 
 mod aliasing;
 mod bake;

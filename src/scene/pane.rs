@@ -1,7 +1,7 @@
 //! Panes: materials that let light straight through, as filters on rays.
 //!
 //! Three things make a pane: a `transmittance` of the side file (of the whole pane at normal incidence),
-//! KHR_materials_transmission of at least [`LEAST`], and alphaMode BLEND.
+//! KHR_materials_transmission of at least .5, and alphaMode BLEND.
 //!
 //! Glass is an absorbing slab with plane faces: both polarisations, all reflections between the faces summed (Born and Wolf,
 //! Principles of Optics, 7th edition, section 14.4 without interference; the angles of ISO 9050:2003, section 5.2), see [`slab`]. With
@@ -62,7 +62,7 @@ pub enum PaneKind {
 }
 
 impl Pane {
-    /// What the inside of a pane lets through over a unit of thickness, or its paint: the spectrum that [`Pane::passes`] takes.
+    /// What the inside of a pane lets through over a unit of thickness, or its paint: the spectrum that [`Pane::passing`] takes.
     pub fn spectrum(&self) -> &Leaves {
         match &self.kind {
             PaneKind::Glass { inside, .. } => inside,

@@ -86,7 +86,7 @@ pub fn baked_glb(
     written(scene, surfaces, None, look, writing)
 }
 
-/// Writes the room's own mesh with its light in maps: see [`maps`].
+/// Writes the room's own mesh with its light in maps: see `maps`.
 ///
 /// # Errors
 /// As [`baked_glb`].

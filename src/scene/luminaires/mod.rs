@@ -1,4 +1,4 @@
-//! Lamps that shine as their maker measured them: a [`Profile`] on a light of the file, on a node, or on an emissive surface.
+//! Lamps that shine as their maker measured them: a [profile](super::profile) on a light of the file, on a node, or on an emissive surface.
 //!
 //! | file | what |
 //! |---|---|
