@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Folders and files of `src`, from the bottom to the top. `lib` and `main` hold them together.
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 22] = [
     "error",
     "data",
     "color",
@@ -24,6 +24,7 @@ const ORDER: [&str; 21] = [
     "output",
     "report",
     "cost",
+    "serve",
     "cli",
 ];
 const LONGEST: usize = 600;

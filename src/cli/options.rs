@@ -64,6 +64,7 @@ impl Reading {
             lenient: self.lenient,
             scale: self.scale,
             sky: self.sky.wish(),
+            changes: None,
         }
     }
 

@@ -1,7 +1,7 @@
 //! A room from its file: document, geometry, paint and lamps, and everything that is wrong with any of them together.
 
 use super::changes::Changes;
-use super::check::{Check, Unknown};
+use super::check::Check;
 use super::document::Document;
 use super::light::{self, Lamps};
 use super::material;
@@ -26,6 +26,9 @@ pub struct Options {
     pub scale: Option<f64>,
     /// Sky and sun; what is not said here the file of spectra may say.
     pub sky: SkyWish,
+    /// What is changed in the file of spectra, as if it stood there: an object of the same form, laid over it as RFC 7396 has
+    /// it (`null` takes out). None: nothing.
+    pub changes: Option<serde_json::Value>,
 }
 
 impl Scene {
@@ -59,21 +62,7 @@ impl Scene {
         let names: Vec<String> = raw_materials.iter().map(material::name_of).collect();
         let light_names: Vec<String> = raw_lights.iter().map(light::name_of).collect();
         let grid = options.grid;
-        let asked = options.spectra.as_deref();
-        let unknown = if options.lenient {
-            Unknown::Warn
-        } else {
-            Unknown::Refuse
-        };
-        let file = SpectraFile::open(
-            path,
-            asked,
-            &names,
-            &light_names,
-            &grid,
-            unknown,
-            &mut check,
-        );
+        let file = SpectraFile::open(path, options, &names, &light_names, &mut check);
         let upsampler = Upsampler::new(&grid);
         let mut lamps = Lamps::new(&grid, &upsampler);
         let (mut materials, shining) = material::materials(

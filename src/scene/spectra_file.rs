@@ -22,12 +22,13 @@
 
 use super::check::{Check, Unknown};
 use super::json::short;
+use super::load::Options;
 use super::luminaires::{self, LampWish, ProfileWish};
 use super::sky::SkyWish;
 use super::uri;
 use crate::data::{Grid, Leaves};
 use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -79,48 +80,38 @@ pub(crate) struct SpectraFile {
 impl SpectraFile {
     /// Reads the file that was asked for, or the one beside the room if it is there.
     ///
-    /// `materials` and `lights` are the names in the room; `unknown` is what becomes of entries for other names, and of
-    /// keys that mean nothing.
+    /// `materials` and `lights` are the names in the room: entries for others, and keys that mean nothing, are problems unless
+    /// the reader is lenient. `options.changes` are laid over the file.
     pub(crate) fn open(
         room: &Path,
-        asked: Option<&Path>,
+        options: &Options,
         materials: &[String],
         lights: &[String],
-        grid: &Grid,
-        unknown: Unknown,
         check: &mut Check,
     ) -> Self {
-        let path = match asked {
-            Some(path) => path.to_path_buf(),
-            None => match beside(room) {
-                Some(path) => path,
+        let path = options.spectra.clone().or_else(|| beside(room));
+        let mut json = match &path {
+            Some(path) => match parsed(path, check) {
+                Some(json) => json,
                 None => return Self::default(),
             },
+            None if options.changes.is_some() => json!({}),
+            None => return Self::default(),
         };
+        if let Some(changes) = &options.changes {
+            merge(&mut json, changes);
+        }
+        // Without a file the changes are the room's.
+        let path = path.as_deref().unwrap_or(room);
         let place = path.display().to_string();
-        let text = match uri::read_file(&path) {
-            Ok(text) => text,
-            Err(why) => {
-                check.problem(&place, why, "name a spectra file that can be read");
-                return Self::default();
-            }
-        };
-        let json: Value = match serde_json::from_slice(&text) {
-            Ok(json) => json,
-            Err(why) => {
-                check.problem(
-                    &place,
-                    format!("is not valid JSON ({why})"),
-                    "mend the file",
-                );
-                return Self::default();
-            }
-        };
         let mut reader = Reader {
-            folder: uri::folder_of(&path),
-            grid,
+            folder: uri::folder_of(path),
+            grid: &options.grid,
             check,
-            unknown,
+            unknown: match options.lenient {
+                true => Unknown::Warn,
+                false => Unknown::Refuse,
+            },
         };
         let mut file = Self::default();
         let Some(top) = reader.object(&json, &place) else {
@@ -193,6 +184,44 @@ impl SpectraFile {
         };
         let place = format!("light '{}', extras", short(name));
         luminaires::read(&mut reader, extras, &place)
+    }
+}
+
+fn parsed(path: &Path, check: &mut Check) -> Option<Value> {
+    let place = path.display().to_string();
+    let text = uri::read_file(path)
+        .map_err(|why| check.problem(&place, why, "name a spectra file that can be read"));
+    let json = serde_json::from_slice(&text.ok()?).map_err(|why| {
+        let what = format!("is not valid JSON ({why})");
+        check.problem(&place, what, "mend the file");
+    });
+    json.ok()
+}
+
+/// Lays a patch over a file of spectra (RFC 7396). One difference: the name of a spectrum takes the place of a CSV, and a CSV
+/// that of a name.
+fn merge(file: &mut Value, patch: &Value) {
+    let Some(patch) = patch.as_object() else {
+        *file = patch.clone();
+        return;
+    };
+    if !file.is_object() {
+        *file = json!({});
+    }
+    let Some(file) = file.as_object_mut() else {
+        return;
+    };
+    for (one, other) in [("name", "csv"), ("csv", "name")] {
+        if patch.get(one).is_some_and(Value::is_string) {
+            file.shift_remove(other);
+        }
+    }
+    for (key, value) in patch {
+        if value.is_null() {
+            file.shift_remove(key);
+        } else {
+            merge(file.entry(key.as_str()).or_insert(Value::Null), value);
+        }
     }
 }
 
@@ -404,7 +433,18 @@ impl Reader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
+
+    #[test]
+    fn changes_are_laid_over_the_file() {
+        let mut file = json!({ "materials": { "a": { "emission": { "csv": "a.csv", "luminance_cd_m2": 5 } }, "b": {} } });
+        let patch = json!({ "materials": { "a": { "emission": { "name": "cie/A" } }, "b": null }, "lights": { "c": { "name": "cie/A" } } });
+        merge(&mut file, &patch);
+        let wanted = json!({
+            "materials": { "a": { "emission": { "luminance_cd_m2": 5, "name": "cie/A" } } },
+            "lights": { "c": { "name": "cie/A" } },
+        });
+        assert_eq!(file, wanted);
+    }
 
     /// Opens a side file of this content for a room with materials wall, lamp and a light Spot.
     fn open(json: &Value, extra: &[(&str, &str)]) -> (SpectraFile, Vec<String>, Vec<String>) {
@@ -424,15 +464,12 @@ mod tests {
         let mut check = Check::new("room.glb");
         let names = ["wall", "lamp"].map(str::to_owned);
         let room = folder.path().join("room.glb");
-        let file = SpectraFile::open(
-            &room,
-            None,
-            &names,
-            &["Spot".to_owned()],
-            &Grid::default(),
-            unknown,
-            &mut check,
-        );
+        let options = Options {
+            lenient: unknown == Unknown::Warn,
+            ..Options::default()
+        };
+        let lights = ["Spot".to_owned()];
+        let file = SpectraFile::open(&room, &options, &names, &lights, &mut check);
         let (problems, warnings) = check.into_parts();
         (
             file,
