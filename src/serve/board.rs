@@ -44,6 +44,8 @@ pub(super) struct RoundLine {
 pub(super) struct RelitLine {
     /// From the request to the light, seconds.
     pub(super) seconds: f64,
+    /// Of which: choice of wavelength intervals, direct light, solve, light of the vertices.
+    pub(super) parts_s: [f64; 4],
     /// Estimate, mean CIEDE2000.
     pub(super) de2000: Option<f64>,
 }

@@ -185,6 +185,14 @@ impl Answer {
         }
     }
 
+    /// Nothing to be had, and no fault.
+    pub(super) fn nothing() -> Self {
+        Self {
+            status: 204,
+            ..Self::of("text/plain", "")
+        }
+    }
+
     /// A word for what is not answered.
     pub(super) fn refusal(status: u16, what: &str) -> Self {
         Self {
@@ -230,13 +238,13 @@ fn head<'a>(
     let reason = match status {
         200 => "OK",
         202 => "Accepted",
+        204 => "No Content",
         303 => "See Other",
         400 => "Bad Request",
         403 => "Forbidden",
         404 => "Not Found",
         405 => "Method Not Allowed",
         408 => "Request Timeout",
-        409 => "Conflict",
         411 => "Length Required",
         413 => "Content Too Large",
         431 => "Request Header Fields Too Large",

@@ -7,7 +7,7 @@
 //! | `GET /room` | JSON: name, lamps, materials, viewpoints, names of spectra; 503 while the room is prepared |
 //! | `GET /events` | server-sent events: the state, whole, whenever it is another |
 //! | `GET /mesh` | the GLB of the present mesh; its number in `X-Mesh` |
-//! | `GET /light?mesh=M&had=S` | what a browser lacks that has shape S of mesh M, see `picture`; 409: begin with `/mesh` |
+//! | `GET /light?mesh=M&had=S` | what a browser lacks that has shape S of mesh M, see `picture`; 204: begin with `/mesh` |
 //! | `POST /stop`, `/go`, `/save`, `/expose` | 202; what comes of it is told by events |
 //! | `POST /change` | 202, or 400 with what is wrong, see `changes` |
 
@@ -102,10 +102,11 @@ impl Routes {
                     return Answer::refusal(400, "say mesh=NUMBER and had=NUMBER");
                 };
                 let lacks = |picture: std::sync::Arc<super::picture::Picture>| {
-                    picture.since(mesh, had as usize).map_or_else(
-                        || Answer::refusal(409, "this is another mesh: begin with /mesh"),
-                        |bytes| Answer::of("application/octet-stream", bytes),
-                    )
+                    picture
+                        .since(mesh, had as usize)
+                        .map_or_else(Answer::nothing, |bytes| {
+                            Answer::of("application/octet-stream", bytes)
+                        })
                 };
                 board.picture().map_or_else(early, lacks)
             }

@@ -338,7 +338,11 @@ impl<'a> Session<'a> {
         };
         kept.change(scene.clone())?;
         let relit = kept.relight()?;
-        let de2000 = relit.record.error_de2000.value;
+        let r = &relit.record;
+        let (de2000, parts_s) = (
+            r.error_de2000.value,
+            [r.lanes_s, r.direct_s, r.solve_s, r.gather_s],
+        );
         let (shape, lit) = match &mut self.fine {
             Some((baked, shape)) => {
                 *baked = relit.baked;
@@ -358,7 +362,11 @@ impl<'a> Session<'a> {
         let fine = self.fine.is_some();
         self.board().show(picture, |state| {
             state.fine = fine;
-            state.relit = Some(RelitLine { seconds, de2000 });
+            state.relit = Some(RelitLine {
+                seconds,
+                parts_s,
+                de2000,
+            });
         });
         Ok(())
     }

@@ -20,7 +20,7 @@ export async function live(token) {
   const address = (path, more = "") => `${path}?token=${token}${more}`;
   const ask = async (path, more, options) => {
     const answer = await fetch(address(path, more), options);
-    if (!answer.ok && answer.status !== 409) throw new Error((await answer.text()).trim());
+    if (!answer.ok) throw new Error((await answer.text()).trim());
     return answer;
   };
   const post = (path, body) => ask(path, "", { method: "POST", body });
@@ -141,7 +141,7 @@ class View {
     while (!bytes) {
       const had = this.numbers ?? [0, 0];
       const answer = await this.ask("/light", `&mesh=${had[0]}&had=${had[1]}`);
-      if (answer.status === 409) await this.#begin();
+      if (answer.status === 204) await this.#begin();
       else bytes = await answer.arrayBuffer();
     }
     const { numbers, lux } = grow(this.stage, bytes);
