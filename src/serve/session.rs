@@ -309,7 +309,12 @@ impl<'a> Session<'a> {
         if self.stage == Stage::Solving {
             self.stage = Stage::Stopped;
         }
-        self.board().set(|state| state.changes = changes);
+        // Together, so that nobody takes the old light for the changed one's.
+        self.board().set(|state| {
+            state.changes = changes;
+            state.doing = Doing::Relighting;
+            state.progress = None;
+        });
         if self.bake.rounds().is_empty() {
             self.bake = begun(scene, self.wishes);
             self.stage = Stage::Solving;
@@ -322,7 +327,6 @@ impl<'a> Session<'a> {
             )));
             return Ok(());
         }
-        self.doing(Doing::Relighting);
         if self.kept.is_none() {
             self.fine = None;
             self.keep(&Baked::default())?;

@@ -374,7 +374,7 @@ fn saved_rooms_are_those_of_bake_and_relight() {
 
     let change = json!({
         "materials": {
-            "white": { "reflectance": { "name": "macbeth/neutral-5" } },
+            "white": { "reflectance": { "name": "macbeth/neutral_5" } },
             "light": { "emission": { "name": "cie/F2", "luminance_cd_m2": 3000 } },
         }
     });
