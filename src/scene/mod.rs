@@ -21,6 +21,7 @@ pub mod luminaires;
 mod material;
 mod meshes;
 mod nodes;
+mod overlay;
 mod primitive;
 pub mod profile;
 mod raw;

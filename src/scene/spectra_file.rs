@@ -24,6 +24,7 @@ use super::check::{Check, Unknown};
 use super::json::short;
 use super::load::Options;
 use super::luminaires::{self, LampWish, ProfileWish};
+use super::overlay::merge;
 use super::sky::SkyWish;
 use super::uri;
 use crate::data::{Grid, Leaves};
@@ -196,33 +197,6 @@ fn parsed(path: &Path, check: &mut Check) -> Option<Value> {
         check.problem(&place, what, "mend the file");
     });
     json.ok()
-}
-
-/// Lays a patch over a file of spectra (RFC 7396). One difference: the name of a spectrum takes the place of a CSV, and a CSV
-/// that of a name.
-fn merge(file: &mut Value, patch: &Value) {
-    let Some(patch) = patch.as_object() else {
-        *file = patch.clone();
-        return;
-    };
-    if !file.is_object() {
-        *file = json!({});
-    }
-    let Some(file) = file.as_object_mut() else {
-        return;
-    };
-    for (one, other) in [("name", "csv"), ("csv", "name")] {
-        if patch.get(one).is_some_and(Value::is_string) {
-            file.shift_remove(other);
-        }
-    }
-    for (key, value) in patch {
-        if value.is_null() {
-            file.shift_remove(key);
-        } else {
-            merge(file.entry(key.as_str()).or_insert(Value::Null), value);
-        }
-    }
 }
 
 /// `room.spectra.json` for `room.glb`, if it is there.
@@ -434,18 +408,6 @@ impl Reader<'_> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn changes_are_laid_over_the_file() {
-        let mut file = json!({ "materials": { "a": { "emission": { "csv": "a.csv", "luminance_cd_m2": 5 } }, "b": {} } });
-        let patch = json!({ "materials": { "a": { "emission": { "name": "cie/A" } }, "b": null }, "lights": { "c": { "name": "cie/A" } } });
-        merge(&mut file, &patch);
-        let wanted = json!({
-            "materials": { "a": { "emission": { "luminance_cd_m2": 5, "name": "cie/A" } } },
-            "lights": { "c": { "name": "cie/A" } },
-        });
-        assert_eq!(file, wanted);
-    }
-
     /// Opens a side file of this content for a room with materials wall, lamp and a light Spot.
     fn open(json: &Value, extra: &[(&str, &str)]) -> (SpectraFile, Vec<String>, Vec<String>) {
         opened(json, extra, Unknown::Refuse)
@@ -564,15 +526,11 @@ mod tests {
     fn a_broken_or_missing_file_is_a_problem() {
         let mut check = Check::new("room.glb");
         let asked = Path::new("/nowhere/at/all.json");
-        SpectraFile::open(
-            Path::new("room.glb"),
-            Some(asked),
-            &[],
-            &[],
-            &Grid::default(),
-            Unknown::Refuse,
-            &mut check,
-        );
+        let options = Options {
+            spectra: Some(asked.to_path_buf()),
+            ..Options::default()
+        };
+        SpectraFile::open(Path::new("room.glb"), &options, &[], &[], &mut check);
         assert!(check.has_problems());
         assert!(open(&json!([1, 2]), &[]).1[0].contains("not a JSON object"));
         assert!(

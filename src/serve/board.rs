@@ -42,9 +42,11 @@ pub(super) struct RoundLine {
 /// Light after a change.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct RelitLine {
-    /// From the request to the light, seconds.
-    pub(super) seconds: f64,
-    /// Of which: choice of wavelength intervals, direct light, solve, light of the vertices.
+    /// From the request to a first answer, seconds.
+    pub(super) first_s: f64,
+    /// And to the whole one, once it is there.
+    pub(super) whole_s: Option<f64>,
+    /// Of the last of the two: choice of wavelength intervals, direct light, solve, light of the vertices.
     pub(super) parts_s: [f64; 4],
     /// Estimate, mean CIEDE2000.
     pub(super) de2000: Option<f64>,

@@ -13,7 +13,7 @@ use super::server::Wishes;
 use crate::data::{Kind, named, names};
 use crate::error::Result;
 use crate::gather::Baked;
-use crate::keep::Relighter;
+use crate::keep::{Relighter, Relit};
 use crate::mesh::Limits;
 use crate::output::gltf;
 use crate::output::{Exposure, baked_glb, camera};
@@ -84,6 +84,8 @@ pub(super) struct Session<'a> {
     kept: Option<Relighter>,
     /// Lamps and paints that differ from those of the bake.
     changed: Option<Scene>,
+    /// Where only a first answer was given to a change: when it was asked for, and seconds until then.
+    rough: Option<(Instant, f64)>,
     exposure: Exposure,
     /// Numbers of meshes and pictures so far.
     meshes: u32,
@@ -116,6 +118,7 @@ impl<'a> Session<'a> {
             fine: None,
             kept: None,
             changed: None,
+            rough: None,
             exposure: Exposure::new(1.0),
             meshes: 1,
             lights: 0,
@@ -139,6 +142,11 @@ impl<'a> Session<'a> {
                         self.note(Some(problem.to_string()));
                     }
                 }
+                None if self.rough.is_some() => {
+                    if let Err(problem) = self.refine() {
+                        self.note(Some(problem.to_string()));
+                    }
+                }
                 None if self.bake.verdict().is_some() => self.finish()?,
                 None => self.round(),
             }
@@ -148,7 +156,8 @@ impl<'a> Session<'a> {
 
     /// Takes up commands, and waits for one where there is nothing else to do. Of changes the last counts.
     fn listen(&mut self, commands: &Receiver<Command>) -> std::result::Result<(), RecvError> {
-        if self.stage != Stage::Solving && self.queue.is_empty() {
+        let idle = self.stage != Stage::Solving && self.rough.is_none();
+        if idle && self.queue.is_empty() {
             self.queue.push_back(commands.recv()?);
         }
         loop {
@@ -203,6 +212,7 @@ impl<'a> Session<'a> {
     /// Says how far the room is, between two pieces of work.
     fn rest(&self) {
         self.doing(match self.stage {
+            _ if self.rough.is_some() => Doing::Relighting,
             Stage::Solving => Doing::Solving,
             Stage::Stopped => Doing::Stopped,
             Stage::Done => Doing::Done,
@@ -335,50 +345,71 @@ impl<'a> Session<'a> {
         self.relight(asked)
     }
 
-    /// The light of the changed room through the rows that are kept.
+    /// A first answer for the changed room, through the rows that are kept.
     fn relight(&mut self, asked: Instant) -> Result<()> {
         let (Some(scene), Some(kept)) = (&self.changed, &mut self.kept) else {
             return Ok(());
         };
         kept.change(scene.clone())?;
-        let relit = kept.relight()?;
+        let relit = kept.relight_roughly()?;
+        let first_s = self.show_relit(relit, asked, None);
+        self.rough = Some((asked, first_s));
+        Ok(())
+    }
+
+    /// The whole answer after the first.
+    fn refine(&mut self) -> Result<()> {
+        if let (Some((asked, first_s)), Some(kept)) = (self.rough.take(), &mut self.kept) {
+            let relit = kept.relight()?;
+            self.show_relit(relit, asked, Some(first_s));
+        }
+        Ok(())
+    }
+
+    /// Shows relit light; seconds since it was asked for. `first_s`: those of the first answer, if it was shown.
+    fn show_relit(&mut self, relit: Relit, asked: Instant, first_s: Option<f64>) -> f64 {
         let r = &relit.record;
-        let (de2000, parts_s) = (
-            r.error_de2000.value,
-            [r.lanes_s, r.direct_s, r.solve_s, r.gather_s],
-        );
-        let (shape, lit) = match &mut self.fine {
-            Some((baked, shape)) => {
-                *baked = relit.baked;
-                (Arc::clone(shape), baked.surfaces.clone())
-            }
-            None => (
-                Arc::new(self.patches.shape()),
-                self.patches.lit(kept.bake()),
-            ),
-        };
-        let Some(scene) = &self.changed else {
-            return Ok(());
-        };
-        self.lights += 1;
-        let picture = Picture::new(shape, self.lights, scene, &lit, &self.exposure);
+        let de2000 = r.error_de2000.value;
+        let parts_s = [r.lanes_s, r.direct_s, r.solve_s, r.gather_s];
+        if let Some((baked, _)) = &mut self.fine {
+            *baked = relit.baked;
+        }
+        self.paint();
         let seconds = asked.elapsed().as_secs_f64();
         let fine = self.fine.is_some();
-        self.board().show(picture, |state| {
+        self.board().set(|state| {
             state.fine = fine;
             state.relit = Some(RelitLine {
-                seconds,
+                first_s: first_s.unwrap_or(seconds),
+                whole_s: first_s.map(|_| seconds),
                 parts_s,
                 de2000,
             });
         });
-        Ok(())
+        seconds
+    }
+
+    /// Shows the present light of the changed room.
+    fn paint(&mut self) {
+        let scene = self.changed.as_ref().unwrap_or(self.bake.scene());
+        let of_patches;
+        let (shape, lit) = match (&self.fine, &self.kept) {
+            (Some((baked, shape)), _) => (Arc::clone(shape), &baked.surfaces),
+            (None, kept) => {
+                let relit = kept.as_ref().filter(|_| self.changed.is_some());
+                of_patches = self.patches.lit(relit.map_or(&self.bake, Relighter::bake));
+                (Arc::new(self.patches.shape()), &of_patches)
+            }
+        };
+        self.lights += 1;
+        let picture = Picture::new(shape, self.lights, scene, lit, &self.exposure);
+        self.board().show(picture, |_| {});
     }
 
     /// Solves a room from the beginning.
     fn restart(&mut self, scene: Scene) -> Result<()> {
         self.doing(Doing::Preparing);
-        (self.kept, self.fine, self.changed) = (None, None, None);
+        (self.kept, self.fine, self.changed, self.rough) = (None, None, None, None);
         self.bake = begun(scene, self.wishes);
         self.meshes += 1;
         self.patches = Patches::new(&self.bake, self.meshes)?;
@@ -399,6 +430,7 @@ impl<'a> Session<'a> {
             self.gather()?;
             self.relight(Instant::now())?;
         }
+        self.refine()?;
         self.doing(Doing::Saving);
         let Some((baked, _)) = &self.fine else {
             return Ok(());
@@ -425,21 +457,18 @@ impl<'a> Session<'a> {
 
     /// Exposes the picture for the light that it has.
     fn expose(&mut self) {
+        if self.bake.rounds().is_empty() {
+            return;
+        }
         let scene = self.changed.as_ref().unwrap_or(self.bake.scene());
-        let (shape, lit) = match (&self.fine, &self.kept) {
-            (Some((baked, shape)), _) => (Arc::clone(shape), baked.surfaces.clone()),
-            (None, Some(kept)) if self.changed.is_some() => (
-                Arc::new(self.patches.shape()),
-                self.patches.lit(kept.bake()),
-            ),
-            _ if self.bake.rounds().is_empty() => return,
-            _ => (Arc::new(self.patches.shape()), self.patches.lit(&self.bake)),
+        self.exposure = match (&self.fine, &self.kept) {
+            (Some((baked, _)), _) => self.metered(scene, &baked.surfaces),
+            (None, Some(kept)) if self.changed.is_some() => {
+                self.metered(scene, &self.patches.lit(kept.bake()))
+            }
+            _ => self.metered(scene, &self.patches.lit(&self.bake)),
         };
-        let exposure = self.metered(scene, &lit);
-        self.lights += 1;
-        let picture = Picture::new(shape, self.lights, scene, &lit, &exposure);
-        self.exposure = exposure;
-        self.board().show(picture, |_| {});
+        self.paint();
     }
 
     fn metered(&self, scene: &Scene, lit: &[crate::gather::BakedSurface]) -> Exposure {

@@ -399,7 +399,12 @@ fn saved_rooms_are_those_of_bake_and_relight() {
         "other.glb",
     ]);
     assert!(relit != baked, "the change changes nothing");
-    assert!(saved() == relit, "not what relight writes");
+    // A first answer came before, so that the solve ended elsewhere within what it leaves open.
+    let (own, other) = (colours(&saved()), colours(&relit));
+    assert_eq!(own.len(), other.len());
+    let apart = || own.iter().zip(&other).map(|(a, b)| (a - b).abs());
+    let mean = apart().sum::<f32>() / own.len() as f32;
+    assert!(mean < 1e-3 && apart().fold(0.0, f32::max) < 1e-2, "{mean}");
 }
 
 #[test]
@@ -492,4 +497,33 @@ fn changes_before_the_end_and_lamps_that_were_dark() {
 fn gltf_json(glb: &[u8]) -> Value {
     let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
     serde_json::from_slice(&glb[20..20 + length]).unwrap()
+}
+
+/// All colours of a baked room.
+fn colours(glb: &[u8]) -> Vec<f32> {
+    let json = gltf_json(glb);
+    let number = |v: &Value| v.as_u64().unwrap_or(0) as usize;
+    let body = &glb[28 + number(&json!(u32::from_le_bytes(glb[12..16].try_into().unwrap())))..];
+    let primitives = json["meshes"].as_array().unwrap().iter();
+    let primitives = primitives.flat_map(|m| m["primitives"].as_array().unwrap());
+    let mut out = Vec::new();
+    for primitive in primitives {
+        let accessor = &json["accessors"][number(&primitive["attributes"]["COLOR_0"])];
+        let view = &json["bufferViews"][number(&accessor["bufferView"])];
+        assert_eq!(
+            (&accessor["componentType"], &accessor["type"]),
+            (&json!(5126), &json!("VEC3"))
+        );
+        assert!(view["byteStride"].as_u64().is_none_or(|s| s == 12));
+        let at = number(&view["byteOffset"]) + number(&accessor["byteOffset"]);
+        let bytes = &body[at..at + 12 * number(&accessor["count"])];
+        out.extend(
+            bytes
+                .as_chunks::<4>()
+                .0
+                .iter()
+                .map(|b| f32::from_le_bytes(*b)),
+        );
+    }
+    out
 }

@@ -88,7 +88,7 @@ function tell(state) {
   const off = error == null ? "no error known yet" : `off by ΔE00 ${digits(error)} (estimate)`;
   $("doing").textContent = DOING[doing];
   $("doing").className = `badge ${doing === "done" ? (state.reached ? "good" : "warm") : ""}`;
-  const what = !last ? "" : relit ? `Relit in ${digits(1000 * relit.seconds, 2)} ms` : state.fine ? "The file" : `Round ${last.round}`;
+  const what = !last ? "" : relit ? `Relit in ${digits(1000 * relit.first_s, 2)} ms${relit.whole_s ? `, whole after ${digits(1000 * relit.whole_s, 2)} ms` : ""}` : state.fine ? "The file" : `Round ${last.round}`;
   const how = last ? `${whole(last.patches)} patches after ${digits(last.elapsed_s)} s` : "";
   $("status").textContent = last
     ? `${what}: ${off}, asked for ${digits(state.asked_de2000, 2)}. ${how}.`
