@@ -192,10 +192,13 @@ impl Patches {
             .for_each(|p| p.grown.triangles.clear());
         for (id, element) in leaves {
             let part = self.part_of[element.face as usize] as usize;
-            self.parts[part]
-                .grown
-                .triangles
-                .push(self.corners[id as usize]);
+            let triangles = &mut self.parts[part].grown.triangles;
+            joined(
+                &self.midpoints,
+                part as u32,
+                self.corners[id as usize],
+                triangles,
+            );
         }
         let now = self.parts.iter().map(|p| p.grown.midpoints.len() as u32);
         self.had.push(now.collect());
@@ -313,6 +316,23 @@ impl Patches {
             parts: self.parts.iter().map(|p| p.grown.clone()).collect(),
         }
     }
+}
+
+/// A leaf with the vertices that finer neighbours have on its edges, so that there are no cracks.
+fn joined(
+    midpoints: &HashMap<(u32, [u32; 2]), u32>,
+    part: u32,
+    corners: [u32; 3],
+    out: &mut Vec<[u32; 3]>,
+) {
+    for k in 0..3 {
+        let [a, b, c] = std::array::from_fn(|i| corners[(i + k) % 3]);
+        if let Some(&m) = midpoints.get(&(part, [a.min(b), a.max(b)])) {
+            joined(midpoints, part, [a, m, c], out);
+            return joined(midpoints, part, [m, b, c], out);
+        }
+    }
+    out.push(corners);
 }
 
 fn sense_of(plane: u32, normal: [i32; 3]) -> [i32; 3] {
