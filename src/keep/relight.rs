@@ -27,9 +27,10 @@ use crate::transport::trace;
 use std::path::Path;
 use std::time::Instant;
 
-/// Relative error at which the solve of a first answer ends: at .35 dE00 a per cent (`DE_PER_PERCENT`) a colour may be off
-/// by 1.75.
-const ROUGH: f64 = 0.05;
+/// Relative error, a bound, at which the solve of a first answer ends. In the furnished room such answers, to seven changes,
+/// differ from the whole ones by .08 % of the mean illuminance at the most (mean of the vertices; the worst vertex by 21 %),
+/// and come in a third to a half of the time.
+const ROUGH: f64 = 0.1;
 
 /// A finished bake whose lamps and paints may change.
 pub struct Relighter {

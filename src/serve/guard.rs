@@ -103,4 +103,25 @@ mod tests {
         assert!(a != b && same(&a, &a.clone()) && !same(&a, &b));
         assert!(!same(&a, &a[1..]) && !same("", &a) && !same(&a, ""));
     }
+
+    #[test]
+    fn a_ticket_leads_to_the_page_once() {
+        let guard = Guard::new(8017).unwrap();
+        let ticket = guard.ticket();
+        let target = ticket.strip_prefix("http://127.0.0.1:8017").unwrap();
+        let check = |target: &str, host: &str| {
+            let head = format!("GET {target} HTTP/1.1\r\nHost: {host}");
+            let request = Request::parse(head.as_bytes()).unwrap();
+            guard.check(&request).map_err(|answer| answer.status)
+        };
+        assert!(!ticket.contains(guard.token()));
+        let own = "127.0.0.1:8017";
+        assert_eq!(check("/?ticket=", own), Err(403));
+        assert_eq!(check(target, "evil.example:8017"), Err(403));
+        assert_eq!(check(&target.replace("/?", "/room?"), own), Err(403));
+        assert_eq!(check(target, own), Err(303));
+        assert_eq!(check(target, own), Err(403));
+        assert_eq!(check("/?ticket=", own), Err(403));
+        assert_eq!(check(&guard.page(), own), Ok(()));
+    }
 }

@@ -71,7 +71,7 @@ impl Request {
         Ok(request)
     }
 
-    fn parse(head: &[u8]) -> Result<Self, Answer> {
+    pub(super) fn parse(head: &[u8]) -> Result<Self, Answer> {
         let bad = |what: &str| Answer::refusal(400, what);
         let head = std::str::from_utf8(head).map_err(|_| bad("the head is not text"))?;
         let mut lines = head.split("\r\n");

@@ -13,11 +13,14 @@
 
 use super::guard::Guard;
 use super::http::{Answer, Request, TAKING, stream_head};
+use super::picture::Picture;
+use super::server::Place;
 use super::session::{Command, Shared};
 use crate::error::Error;
 use crate::report::page::{NOTICES, STYLE, VIEWER, escaped};
 use std::io::Write;
 use std::net::TcpStream;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
@@ -33,7 +36,7 @@ const STREAMS: usize = 16;
 pub(super) struct Routes {
     pub(super) guard: Guard,
     pub(super) commands: Sender<Command>,
-    pub(super) streams: AtomicUsize,
+    pub(super) streams: Arc<AtomicUsize>,
 }
 
 impl Routes {
@@ -101,7 +104,7 @@ impl Routes {
                 let (Some(mesh), Some(had)) = (number("mesh"), number("had")) else {
                     return Answer::refusal(400, "say mesh=NUMBER and had=NUMBER");
                 };
-                let lacks = |picture: std::sync::Arc<super::picture::Picture>| {
+                let lacks = |picture: Arc<Picture>| {
                     picture
                         .since(mesh, had as usize)
                         .map_or_else(Answer::nothing, |bytes| {
@@ -146,15 +149,13 @@ impl Routes {
 
     /// The state, whenever it is another, until nobody listens.
     fn events(&self, mut stream: TcpStream, shared: &Shared) {
-        let others = self.streams.fetch_add(1, Ordering::SeqCst);
-        if others < STREAMS {
-            // Ends with an error when the other side is gone, or takes nothing.
-            let _ = tell(&mut stream, shared);
-        } else {
+        let Some(_place) = Place::take(&self.streams, STREAMS) else {
             let full = Answer::refusal(503, "there are too many windows of this room");
             let _ = full.send(&mut stream);
-        }
-        self.streams.fetch_sub(1, Ordering::SeqCst);
+            return;
+        };
+        // Ends with an error when the other side is gone, or takes nothing.
+        let _ = tell(&mut stream, shared);
     }
 }
 

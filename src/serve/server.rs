@@ -74,7 +74,7 @@ impl Server {
             routes: Arc::new(Routes {
                 guard: Guard::new(port)?,
                 commands: sender,
-                streams: AtomicUsize::new(0),
+                streams: Arc::default(),
             }),
             shared: Arc::new(Shared {
                 board: Board::new(asked_de2000),
@@ -141,6 +141,23 @@ impl Server {
     }
 }
 
+/// One of a number of places, given back in the end.
+pub(super) struct Place(Arc<AtomicUsize>);
+
+impl Place {
+    /// Takes one; none if all are taken.
+    pub(super) fn take(taken: &Arc<AtomicUsize>, all: usize) -> Option<Self> {
+        let place = Self(Arc::clone(taken));
+        (taken.fetch_add(1, Ordering::SeqCst) < all).then_some(place)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
 fn listen(listener: &TcpListener, routes: &Arc<Routes>, shared: &Arc<Shared>) {
     let open = Arc::new(AtomicUsize::new(0));
     for stream in listener.incoming() {
@@ -150,20 +167,15 @@ fn listen(listener: &TcpListener, routes: &Arc<Routes>, shared: &Arc<Shared>) {
             continue;
         };
         let _ = stream.set_nodelay(true);
-        if open.fetch_add(1, Ordering::SeqCst) >= CONNECTIONS {
-            open.fetch_sub(1, Ordering::SeqCst);
-            drop(stream);
+        let Some(place) = Place::take(&open, CONNECTIONS) else {
             continue;
-        }
-        let (routes, shared, own) = (Arc::clone(routes), Arc::clone(shared), Arc::clone(&open));
-        let begun = std::thread::Builder::new()
-            .name("request".into())
-            .spawn(move || {
-                routes.serve(stream, &shared);
-                own.fetch_sub(1, Ordering::SeqCst);
-            });
-        if begun.is_err() {
-            open.fetch_sub(1, Ordering::SeqCst);
-        }
+        };
+        let (routes, shared) = (Arc::clone(routes), Arc::clone(shared));
+        let request = std::thread::Builder::new().name("request".into());
+        // Where there is no thread for it the connection is closed.
+        let _ = request.spawn(move || {
+            routes.serve(stream, &shared);
+            drop(place);
+        });
     }
 }

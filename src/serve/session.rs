@@ -326,9 +326,7 @@ impl<'a> Session<'a> {
             state.progress = None;
         });
         if self.bake.rounds().is_empty() {
-            self.bake = begun(scene, self.wishes);
-            self.stage = Stage::Solving;
-            return Ok(());
+            return self.restart(scene);
         }
         if let Some(lamp) = kindled(self.bake.scene(), &scene) {
             self.restart(scene)?;

@@ -438,6 +438,32 @@ fn lamps_dim_go_out_and_come_back() {
     }
 }
 
+/// A room whose lamps are all out is solved, too, and says why its lamps cannot be changed; with light again it is solved anew.
+#[test]
+fn a_dark_room_is_a_room() {
+    let program = Program::serve("cornell", &QUICK);
+    program.wait_done();
+    program.post("/change", r#"{"dim":{"materials":{"light":0}}}"#);
+    program.wait("dark", |s| !s["relit"].is_null() && s["doing"] == "done");
+    program.post("/go", "");
+    let state = program.wait("solved dark", |s| {
+        s["relit"].is_null() && s["fine"] == true && s["doing"] == "done"
+    });
+    assert!(
+        state["note"]
+            .as_str()
+            .is_some_and(|n| n.contains("without light")),
+        "{state}"
+    );
+    assert_eq!(program.light_now().mean_lux(), 0.0);
+    assert_eq!(program.post("/expose", "").status, 202);
+    assert_eq!(program.post("/change", "{}").status, 202);
+    let state = program.wait("light", |s| {
+        s["fine"] == true && s["changes"] == json!({}) && s["doing"] == "done"
+    });
+    assert!(program.light_now().mean_lux() > 0.0, "{state}");
+}
+
 /// A change while the room is solved ends the rounds and is seen on the patches; going on solves the changed room, in which a
 /// lamp that was dark can be lit again only by solving anew.
 #[test]
