@@ -131,7 +131,7 @@ fn exposed(
 }
 
 /// What COLOR_0 holds at a vertex of a surface: linear sRGB.
-pub(crate) fn color_0(
+pub fn color_0(
     scene: &Scene,
     surface: &Surface,
     vertex: &BakedVertex,

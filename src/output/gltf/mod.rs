@@ -25,7 +25,7 @@ use crate::gather::refined;
 use crate::scene::Scene;
 use crate::scene::buffers::Buffers;
 use accessor::Data;
-pub(crate) use attributes::color_0;
+pub use attributes::color_0;
 pub use budget::vertices_within;
 use buffer::Bin;
 use glam::DVec3;

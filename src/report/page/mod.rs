@@ -10,7 +10,7 @@ mod room;
 
 pub use history::History;
 pub use room::lamp_spectra;
-pub(crate) use room::of as room;
+pub use room::of as room;
 
 use crate::error::{Error, Result};
 use crate::gather::Baked;
