@@ -17,7 +17,7 @@
 //!
 //! The chain: [`data`] -> [`color`] -> [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`light`] ->
 //! [`transport`] -> [`solve`] -> [`gather`] -> [`mesh`], [`lightmap`] -> [`keep`] -> [`output`] and [`report`], with [`audit`] beside it and
-//! [`cost`] behind; [`survey`] looks at a room before [`solve`]. A module uses what stands to its left.
+//! [`cost`] and [`serve`] behind; [`survey`] looks at a room before [`solve`]. A module uses what stands to its left.
 //!
 //! | Rougeron and Peroche 1997 | module |
 //! |---|---|
@@ -46,6 +46,8 @@ pub mod mesh;
 pub mod output;
 pub mod report;
 pub mod scene;
+#[cfg(feature = "cli")]
+pub mod serve;
 pub mod solve;
 pub mod spectrum;
 pub mod store;

@@ -25,6 +25,7 @@ const ORDER: [&str; 22] = [
     "output",
     "report",
     "cost",
+    "serve",
     "cli",
 ];
 const LONGEST: usize = 600;

@@ -1,7 +1,7 @@
 //! The command line as a whole.
 
 use super::options::Common;
-use super::{bake, inspect, probe, relight, spectra};
+use super::{bake, inspect, probe, relight, serve, spectra};
 #[cfg(feature = "paper")]
 use super::{cost, paper};
 use crate::error::{Error, Result};
@@ -11,6 +11,7 @@ Examples:
   haarlight bake room.glb                          writes room.baked.glb, exit code 0 once dE00 <= 0.5
   haarlight bake room.glb --error 1 --time 60 --snapshots pictures --log bake.jsonl
   haarlight report room.glb                        bakes too, and writes room.report.html to look at it
+  haarlight serve room.glb                         shows the light in a browser as it comes, with lamps to turn
   haarlight inspect room.glb                       what is in the room, and what would be simulated
   haarlight probe room.glb --points desk.csv       lux at points (columns x,y,z,nx,ny,nz)
   haarlight spectra cie/F                          names that a room's .spectra.json may use
@@ -38,6 +39,8 @@ pub enum Command {
     /// Bake, and write a page beside the room that shows the light, how wrong it is, and what it took. Takes the options of
     /// `bake`: the same as `bake --report`.
     Report(bake::BakeArgs),
+    /// Show the room in a browser while its light is worked out; turn its lamps, change its paints.
+    Serve(serve::ServeArgs),
     /// Write the room back under other lamps and paints, from what a bake kept.
     Relight(relight::RelightArgs),
     /// Print what the program sees in a room. Nothing is solved.
@@ -68,6 +71,7 @@ pub fn run(cli: &Cli) -> Result<u8> {
     match &cli.command {
         Command::Bake(args) => bake::run(args, &cli.common),
         Command::Report(args) => bake::run(&args.clone().with_report(), &cli.common),
+        Command::Serve(args) => serve::run(args, &cli.common),
         Command::Relight(args) => relight::run(args, &cli.common),
         Command::Inspect(args) => inspect::run(args, &mut std::io::stdout()).map(|()| 0),
         Command::Probe(args) => probe::run(args, &cli.common),

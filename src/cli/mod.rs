@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `command` | the command line as a whole, exit codes |
 //! | `options` | options that commands share |
-//! | `bake`, `relight`, `inspect`, `probe`, `spectra`, `cost`, `paper` | the commands |
+//! | `bake`, `relight`, `inspect`, `probe`, `spectra`, `cost`, `serve`, `paper` | the commands |
 //! | `log` | the log of a bake, field by field |
 //! | `report` | the page of a bake |
 //! | `snapshots` | pictures of the rounds |
@@ -37,6 +37,7 @@ pub mod probe;
 pub mod relight;
 mod report;
 mod results;
+pub mod serve;
 mod sky;
 mod snapshots;
 pub mod spectra;

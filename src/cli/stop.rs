@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// What the second Ctrl-C exits with.
-const KILLED: i32 = 130;
+pub(super) const KILLED: i32 = 130;
 
 /// Share of the time given after which no round may end: the gather takes as long as the rounds, as a rule.
 const ROUNDS: f64 = 0.45;

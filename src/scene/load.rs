@@ -21,8 +21,8 @@ pub struct Options {
     pub grid: Grid,
     /// The file of spectra; none: `room.spectra.json` beside `room.glb`, if there is one.
     pub spectra: Option<PathBuf>,
-    /// What is said over the file of spectra, an object as in that file: the reflectance or emission of a material, a light
-    /// and a point of the sky replace what the file says of it.
+    /// What is said over the file of spectra: an object of the same form, laid over it as RFC 7396 has it (`null` takes out), where the
+    /// name of a spectrum takes the place of a CSV, and a CSV that of a name.
     pub said: Option<serde_json::Value>,
     /// Only warn of keys and names in the file of spectra that mean nothing.
     pub lenient: bool,

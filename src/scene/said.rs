@@ -1,44 +1,45 @@
 //! What is said over a file of spectra: objects laid one over the other; rows of numbers in place of a CSV's name.
-//!
-//! `materials` are laid over each other name by name and there key by key, `lights` name by name, `sky` key by key.
 
 use super::uri;
-use serde_json::{Map, Value};
+use serde_json::{Value, json};
 use std::path::Path;
-
-/// How deep the members of a file's key are laid over each other.
-fn depth(key: &str) -> usize {
-    match key {
-        "materials" => 2,
-        _ => 1,
-    }
-}
 
 /// The file's JSON with what was said over it; none if there is neither. What is no object is left for the reader to name.
 pub(super) fn over(file: Option<Value>, said: Option<&Value>) -> Option<Value> {
     match (file, said) {
         (file, None) => file,
         (None, Some(said)) => Some(said.clone()),
-        (Some(Value::Object(mut file)), Some(Value::Object(said))) => {
-            for (key, value) in said {
-                lay(&mut file, key, value, depth(key));
-            }
-            Some(Value::Object(file))
+        (Some(mut file), Some(said)) if file.is_object() => {
+            merge(&mut file, said);
+            Some(file)
         }
-        (Some(Value::Object(_)), Some(said)) => Some(said.clone()),
         (Some(file), Some(_)) => Some(file),
     }
 }
 
-fn lay(below: &mut Map<String, Value>, key: &str, value: &Value, depth: usize) {
-    match (below.get_mut(key), value) {
-        (Some(Value::Object(below)), Value::Object(members)) if depth > 0 => {
-            for (key, value) in members {
-                lay(below, key, value, depth - 1);
-            }
+/// Lays a patch over a file of spectra (RFC 7396). One difference: the name of a spectrum takes the place of a CSV, and a CSV
+/// that of a name.
+fn merge(file: &mut Value, patch: &Value) {
+    let Some(patch) = patch.as_object() else {
+        *file = patch.clone();
+        return;
+    };
+    if !file.is_object() {
+        *file = json!({});
+    }
+    let Some(file) = file.as_object_mut() else {
+        return;
+    };
+    for (one, other) in [("name", "csv"), ("csv", "name")] {
+        if patch.get(one).is_some_and(Value::is_string) {
+            file.shift_remove(other);
         }
-        _ => {
-            below.insert(key.to_owned(), value.clone());
+    }
+    for (key, value) in patch {
+        if value.is_null() {
+            file.shift_remove(key);
+        } else {
+            merge(file.entry(key.as_str()).or_insert(Value::Null), value);
         }
     }
 }
@@ -67,7 +68,6 @@ pub(super) fn json_of(path: &Path) -> Result<Value, (String, &'static str)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn what_is_said_replaces_spectra_and_lights_as_wholes() {
@@ -92,5 +92,17 @@ mod tests {
         assert_eq!(over(None, None), None);
         assert_eq!(over(Some(file), Some(&json!([1]))), Some(json!([1])));
         assert_eq!(over(Some(json!(7)), Some(&json!({}))), Some(json!(7)));
+    }
+
+    #[test]
+    fn changes_are_laid_over_the_file() {
+        let mut file = json!({ "materials": { "a": { "emission": { "csv": "a.csv", "luminance_cd_m2": 5 } }, "b": {} } });
+        let patch = json!({ "materials": { "a": { "emission": { "name": "cie/A" } }, "b": null }, "lights": { "c": { "name": "cie/A" } } });
+        merge(&mut file, &patch);
+        let wanted = json!({
+            "materials": { "a": { "emission": { "luminance_cd_m2": 5, "name": "cie/A" } } },
+            "lights": { "c": { "name": "cie/A" } },
+        });
+        assert_eq!(file, wanted);
     }
 }

@@ -209,6 +209,8 @@ pub(crate) struct Given {
     pub(crate) reflected: Rows,
     /// What every node emits, if that is known.
     pub(crate) emitted: Option<Rows>,
+    /// Relative error at which the solve ends.
+    pub(crate) tolerance: f64,
 }
 
 /// Cuts a mesh as it was cut before: the search casts no ray.

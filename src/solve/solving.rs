@@ -21,6 +21,11 @@ impl Bake {
         Painter::new(&self.scene, &self.mesh, &self.upsampler)
     }
 
+    /// Relative error at which a solve ends.
+    pub(crate) fn tolerance(&self) -> f64 {
+        SOLVE_SHARE * self.settings.error
+    }
+
     /// Solves on the current links and measures the solution.
     pub(super) fn solve<const L: usize>(
         &mut self,
@@ -37,6 +42,7 @@ impl Bake {
             first,
             reflected: self.guess::<L>(leaves),
             emitted: None,
+            tolerance: self.tolerance(),
         };
         let solved = self.solve_with::<L>(rows, leaves, given);
         self.light_arrives();
@@ -60,6 +66,7 @@ impl Bake {
             mut first,
             mut reflected,
             emitted,
+            tolerance,
         } = given;
         let nodes = self.tree.nodes.len();
         let by_rays = self.by_rays();
@@ -96,7 +103,6 @@ impl Bake {
                 reflected
             }
         };
-        let tolerance = SOLVE_SHARE * self.settings.error;
         let runs = self.plan.runs(Kind::Interreflection);
         let (convergence, mut irradiance, sums) = if by_rays {
             let system = RaySystem {

@@ -1,5 +1,7 @@
 //! A headless Chromium on two pipes: the DevTools protocol, messages of JSON that end in a zero byte.
 
+#![allow(dead_code, reason = "two tests share it, and neither uses all of it")]
+
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -22,6 +24,8 @@ pub(crate) struct Browser {
     session: Option<String>,
     sent: u64,
     faults: Vec<String>,
+    /// Addresses that may be asked begin with one of these.
+    own: Vec<String>,
     _profile: tempfile::TempDir,
 }
 
@@ -50,6 +54,7 @@ impl Browser {
             session: None,
             sent: 0,
             faults: Vec::new(),
+            own: ["file:", "data:", "blob:"].map(str::to_owned).to_vec(),
             _profile: profile,
         };
         let target = browser.send("Target.createTarget", &json!({ "url": "about:blank" }));
@@ -88,9 +93,7 @@ impl Browser {
     fn look(&mut self, event: &Value) {
         let params = &event["params"];
         let url = params["request"]["url"].as_str().unwrap_or("");
-        let own = ["file:", "data:", "blob:"]
-            .iter()
-            .any(|own| url.starts_with(own));
+        let own = self.own.iter().any(|own| url.starts_with(own));
         let fault = match event["method"].as_str().unwrap_or("") {
             "Runtime.exceptionThrown" => true,
             "Runtime.consoleAPICalled" => params["type"] == "error" || params["type"] == "warning",
@@ -104,10 +107,27 @@ impl Browser {
     }
 
     pub(crate) fn open(&mut self, page: &Path) {
-        self.send(
-            "Page.navigate",
-            &json!({ "url": format!("file://{}", page.display()) }),
-        );
+        self.go(&format!("file://{}", page.display()));
+    }
+
+    /// Opens a page of a server; it may ask that server.
+    pub(crate) fn visit(&mut self, address: &str) {
+        let server = address.split_inclusive('/').take(3).collect();
+        self.own.push(server);
+        self.go(address);
+    }
+
+    fn go(&mut self, url: &str) {
+        self.send("Page.navigate", &json!({ "url": url }));
+    }
+
+    /// Writes a PNG of the window where SCREENS names a folder, to be looked at.
+    pub(crate) fn screen(&mut self, name: &str) {
+        if let Some(folder) = std::env::var_os("SCREENS") {
+            let shot = self.send("Page.captureScreenshot", &json!({}));
+            let text = shot["data"].as_str().unwrap_or_default();
+            std::fs::write(Path::new(&folder).join(name), text).unwrap();
+        }
     }
 
     /// Runs an expression; what it gives, as text.
@@ -170,6 +190,13 @@ impl Browser {
     pub(crate) fn prefer_dark(&mut self) {
         let dark = json!({ "features": [{ "name": "prefers-color-scheme", "value": "dark" }] });
         self.send("Emulation.setEmulatedMedia", &dark);
+    }
+
+    /// Takes out the one fault that tells of this, which has to be there.
+    pub(crate) fn expect_fault(&mut self, of: &str) {
+        let before = self.faults.len();
+        self.faults.retain(|fault| !fault.contains(of));
+        assert_eq!(self.faults.len() + 1, before, "{of}: {:#?}", self.faults);
     }
 
     /// Exceptions, errors and warnings on the console, requests to elsewhere.

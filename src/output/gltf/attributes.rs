@@ -9,8 +9,8 @@ use super::{Writer, index};
 use crate::error::{Error, Result};
 use crate::gather::refined;
 use crate::gather::{BakedSurface, BakedVertex};
-use crate::output::curve;
-use crate::scene::{Alpha, Surface};
+use crate::output::{Exposure, curve};
+use crate::scene::{Alpha, Material, Scene, Surface};
 use glam::{DMat3, DVec3};
 use serde_json::{Map, Value, json};
 
@@ -109,14 +109,8 @@ impl Writer<'_> {
         let material = &self.scene.materials[surface.material];
         let mut colors = Vec::with_capacity(baked.vertices.len());
         for vertex in &baked.vertices {
-            let [r, g, b, alpha] = refined::vertex_color(surface, vertex);
-            let paint = if material.vertex_paint {
-                [r, g, b]
-            } else {
-                [1.0; 3]
-            };
-            let light = self.look.shown(vertex.light.map(f64::from));
-            let wanted: [f64; 3] = std::array::from_fn(|i| light[i] * f64::from(paint[i]));
+            let alpha = refined::vertex_color(surface, vertex)[3];
+            let wanted = exposed(material, surface, vertex, self.look);
             let shown = curve::into_display(wanted).map(|c| c as f32);
             self.clipped += usize::from(wanted.iter().any(|&c| !(0.0..=1.0).contains(&c)));
             self.compressed += usize::from(curve::is_compressed(wanted));
@@ -131,6 +125,34 @@ impl Writer<'_> {
             self.bin.shares(&opaque)
         }
     }
+}
+
+/// Exposed light times vertex paint, before the curve.
+fn exposed(
+    material: &Material,
+    surface: &Surface,
+    vertex: &BakedVertex,
+    look: &Exposure,
+) -> [f64; 3] {
+    let [r, g, b, _] = refined::vertex_color(surface, vertex);
+    let paint = if material.vertex_paint {
+        [r, g, b]
+    } else {
+        [1.0; 3]
+    };
+    let light = look.shown(vertex.light.map(f64::from));
+    std::array::from_fn(|i| light[i] * f64::from(paint[i]))
+}
+
+/// What COLOR_0 holds at a vertex of a surface: linear sRGB.
+pub fn color_0(
+    scene: &Scene,
+    surface: &Surface,
+    vertex: &BakedVertex,
+    look: &Exposure,
+) -> [f32; 3] {
+    let material = &scene.materials[surface.material];
+    curve::into_display(exposed(material, surface, vertex, look)).map(|c| c as f32)
 }
 
 /// The attributes of an input primitive, by name.

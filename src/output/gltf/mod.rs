@@ -27,6 +27,7 @@ use crate::lightmap::LightMaps;
 use crate::scene::Scene;
 use crate::scene::buffers::Buffers;
 use accessor::Data;
+pub use attributes::color_0;
 pub use budget::vertices_within;
 use buffer::Bin;
 use glam::DVec3;

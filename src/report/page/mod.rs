@@ -10,6 +10,7 @@ mod room;
 
 pub use history::History;
 pub use room::lamp_spectra;
+pub use room::of as room;
 
 use crate::error::{Error, Result};
 use crate::gather::Baked;
@@ -23,11 +24,11 @@ use std::io::Write;
 
 /// Around the data.
 const FRAME: &str = include_str!("page.html");
-const STYLE: &str = include_str!("page.css");
+pub(crate) const STYLE: &str = include_str!("page.css");
 /// `tools/web`, bundled, gzip.
-const VIEWER: &[u8] = include_bytes!("viewer.js.gz");
+pub(crate) const VIEWER: &[u8] = include_bytes!("viewer.js.gz");
 /// Licences of what the viewer is made of.
-const NOTICES: &str = include_str!("NOTICES.txt");
+pub(crate) const NOTICES: &str = include_str!("NOTICES.txt");
 
 /// What a page is made of.
 pub struct Page<'a> {
@@ -99,7 +100,7 @@ fn script(value: &Value) -> String {
 }
 
 /// Text as HTML.
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let text = text.replace('&', "&amp;").replace('<', "&lt;");
     text.replace('>', "&gt;").replace('"', "&quot;")
 }

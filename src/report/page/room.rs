@@ -8,7 +8,7 @@ use crate::spectrum::Leaves;
 use serde_json::{Value, json};
 
 /// The room of a bake.
-pub(super) fn of(bake: &Bake, cameras: &[Camera]) -> Value {
+pub fn of(bake: &Bake, cameras: &[Camera]) -> Value {
     let scene = bake.scene();
     let grid = &scene.grid;
     let facts = Facts::of(scene);

@@ -17,6 +17,13 @@ export const h = (tag, attributes, ...children) => filled(document.createElement
 export const s = (tag, attributes, ...children) => filled(document.createElementNS(SVG, tag), attributes, children);
 export const $ = (id) => document.getElementById(id);
 
+/** Radio buttons in a row: value and text of each. Calls `chosen` with a value; a function that checks one. */
+export function choice(place, name, entries, chosen) {
+  place.append(...entries.map(([value, text]) =>
+    h("label", {}, h("input", { type: "radio", name, value, onchange: () => chosen(value) }), h("span", {}, text))));
+  return (value) => (place.querySelector(`[value=${value}]`).checked = true);
+}
+
 /** A number with so many significant digits, without an exponent. */
 export function digits(value, count = 3) {
   if (value == null || !Number.isFinite(value)) return "–";

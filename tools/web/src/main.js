@@ -1,8 +1,10 @@
-// The page's parts put together. Called by the page itself: `haarlightReport(data, open)`.
+// The report's parts put together. Called by the page itself: `haarlightReport(data, open)`. A page with a token is live.
 
-import { $, digits, h, linearTicks, logTicks, niceAbove, niceBelow, whole } from "./dom.js";
+import { $, choice, digits, h, linearTicks, niceAbove, whole } from "./dom.js";
+import { pad } from "./pad.js";
 import { Light, mixed, temperature } from "./light.js";
-import { legend, MAGMA, VIRIDIS } from "./maps.js";
+import { live } from "./live.js";
+import { legend, luxScale, MAGMA, VIRIDIS } from "./maps.js";
 import { cards, header } from "./panels.js";
 import { spectrum } from "./plots.js";
 import { Stage } from "./stage.js";
@@ -10,21 +12,9 @@ import { Stage } from "./stage.js";
 /** Names and explanations of the pictures. */
 const LOOKS = [["light", "Light"], ["lux", "Illuminance"], ["error", "Error"], ["both", "Lux | error"]];
 const MOVES = [["orbit", "Orbit"], ["walk", "Walk"]];
-/** The least span of the scale of illuminance: below it lie corners that nobody asks about. */
-const SPAN = 200;
-
-function choice(place, name, entries, chosen) {
-  place.append(...entries.map(([value, text]) =>
-    h("label", {}, h("input", { type: "radio", name, value, onchange: () => chosen(value) }), h("span", {}, text))));
-  return (value) => (place.querySelector(`[value=${value}]`).checked = true);
-}
 
 function scales(light) {
-  const [low, high] = light.index.usual_lx;
-  const top = niceAbove(Math.max(high, 1e-3));
-  const bottom = niceBelow(Math.max(low, top / SPAN));
-  const [from, to] = bottom < top ? [bottom, top] : [top / 10, top];
-  const lux = { map: VIRIDIS, low: from, high: to, ticks: logTicks(from, to), place: (v) => Math.log(v / from) / Math.log(to / from) };
+  const lux = luxScale(...light.index.usual_lx);
   const most = niceAbove(Math.max(0.5, 4 * (light.index.error_mean_de2000 ?? 0)));
   const error = { map: MAGMA, low: 0, high: most, ticks: linearTicks(0, most), place: (v) => v / most };
   return { lux, error };
@@ -151,23 +141,6 @@ function rounds(data, light, show) {
   };
 }
 
-/** Buttons to walk with fingers. */
-function pad(controls) {
-  const keys = [["ArrowLeft", "↶", "Turn left"], ["ArrowUp", "↑", "Forward"], ["ArrowRight", "↷", "Turn right"],
-    ["KeyA", "←", "Left"], ["ArrowDown", "↓", "Back"], ["KeyD", "→", "Right"]];
-  $("pad").append(...keys.map(([code, sign, name]) => h("button", {
-    type: "button", "aria-label": name,
-    onpointerdown: (e) => (e.preventDefault(), controls.hold(code)),
-    onpointerup: () => controls.release(code),
-    onpointerleave: () => controls.release(code),
-    onpointercancel: () => controls.release(code),
-    onkeydown: (e) => ["Enter", " "].includes(e.key) && (e.preventDefault(), controls.hold(code)),
-    onkeyup: () => controls.release(code),
-    onblur: () => controls.release(code),
-    oncontextmenu: (e) => e.preventDefault(),
-  }, sign)));
-}
-
 /** The card of the measured point. */
 function reading(data, light) {
   const card = $("point");
@@ -203,3 +176,5 @@ function reading(data, light) {
         light.index.spectrum.left_out > 5e-4 ? `; spectra are kept to ${digits(100 * light.index.spectrum.left_out, 1)} %.` : "."));
   };
 }
+
+if (document.documentElement.dataset.token) live(document.documentElement.dataset.token);

@@ -10,10 +10,16 @@ import { table } from "./maps.js";
 
 const TICKS = 24;
 
-/** Values at vertices through a colour map, by pixel, with lines of equal value. */
-function falseColour(attribute, map, scale, log, own) {
+/** Ends of a scale and where its lines are, for the shader. */
+function measured(scale, log) {
   const lines = scale.ticks.map((t) => (log ? Math.log10(t) : t)).slice(0, TICKS);
   const [low, high] = [scale.low, scale.high].map((x) => (log ? Math.log10(x) : x));
+  return { range: new Vector2(low, high), lines: [...lines, ...Array(TICKS - lines.length).fill(1e9)] };
+}
+
+/** Values at vertices through a colour map, by pixel, with lines of equal value. */
+function falseColour(attribute, map, scale, log, own) {
+  const { range, lines } = measured(scale, log);
   const texture = new DataTexture(table(map), 256, 1);
   texture.magFilter = texture.minFilter = LinearFilter;
   texture.needsUpdate = true;
@@ -23,8 +29,8 @@ function falseColour(attribute, map, scale, log, own) {
     side: own.side,
     uniforms: {
       map: { value: texture },
-      range: { value: new Vector2(low, high) },
-      lines: { value: [...lines, ...Array(TICKS - lines.length).fill(1e9)] },
+      range: { value: range },
+      lines: { value: lines },
       contour: { value: log ? 1 : 0 },
       cut: { value: mask ? own.map : null },
       cutMatrix: { value: mask ? own.map.matrix : new Matrix3() },
@@ -66,7 +72,7 @@ export class Stage {
   }
 
   constructor(canvas, renderer, gltf, data, light, maps, picked) {
-    Object.assign(this, { canvas, renderer, light, picked });
+    Object.assign(this, { canvas, renderer, light, maps, picked });
     this.scene = new Scene();
     this.scene.add(gltf.scene);
     this.scene.updateMatrixWorld(true);
@@ -74,7 +80,7 @@ export class Stage {
     this.view = "light";
     this.foot = 0;
     this.step = light.last;
-    this.#attach(gltf, maps);
+    this.#attach(gltf);
     this.box = new Box3().setFromObject(this.scene);
     this.size = this.box.getSize(new Vector3()).length() || 1;
     this.camera = new PerspectiveCamera(50, 1, 2e-4 * this.size, 12 * this.size);
@@ -86,7 +92,8 @@ export class Stage {
   }
 
   /** Finds the vertices of each mesh among those of the planes: in the order of the file's primitives with light. */
-  #attach(gltf, maps) {
+  #attach(gltf) {
+    const { maps } = this;
     const first = new Map();
     let next = 0;
     // Other scenes of the file were not baked.
@@ -97,11 +104,11 @@ export class Stage {
         if (!shown.has(m)) return;
         const unlit = gltf.parser.json.materials?.[primitive.material]?.extensions?.KHR_materials_unlit;
         if (!unlit || primitive.attributes.COLOR_0 === undefined || (primitive.mode ?? 4) !== 4) return;
-        first.set(`${m} ${p}`, { at: next, glows: this.light.index.glows[first.size] });
+        first.set(`${m} ${p}`, { at: next, glows: this.light.index?.glows[first.size] });
         next += gltf.parser.json.accessors[primitive.attributes.POSITION].count;
       }),
     );
-    if (next !== this.light.count) throw new Error(`${next} vertices in the room, ${this.light.count} in its light`);
+    if (this.light.index && next !== this.light.count) throw new Error(`${next} vertices in the room, ${this.light.count} in its light`);
     gltf.scene.traverse((mesh) => {
       const place = mesh.isMesh && gltf.parser.associations.get(mesh);
       const own = place && first.get(`${place.meshes} ${place.primitives}`);
@@ -122,7 +129,29 @@ export class Stage {
         },
       });
     });
-    this.show(this.step);
+    if (this.light.index) this.show(this.step);
+  }
+
+  /** Shows another file from where one looks now. */
+  async replace(glb) {
+    const gltf = await new GLTFLoader().parseAsync(glb, "");
+    for (const part of this.parts) part.mesh.geometry.dispose();
+    this.scene.clear();
+    this.scene.add(gltf.scene);
+    this.scene.updateMatrixWorld(true);
+    this.parts = [];
+    this.#attach(gltf);
+  }
+
+  /** Another scale of illuminance. */
+  setScale(scale) {
+    this.maps.lux = scale;
+    const { range, lines } = measured(scale, true);
+    for (const part of this.parts) {
+      part.looks.lux.uniforms.range.value = range;
+      part.looks.lux.uniforms.lines.value = lines;
+    }
+    this.draw();
   }
 
   /** Shows the light of a step. */
@@ -248,12 +277,14 @@ export class Stage {
     const position = hit.object.geometry.attributes.position;
     const places = corners.map((c) => new Vector3().fromBufferAttribute(position, c));
     const local = hit.object.worldToLocal(hit.point.clone());
-    const weights = Triangle.getBarycoord(local, ...places, new Vector3());
+    const weights = Triangle.getBarycoord(local, ...places, new Vector3())?.toArray() ?? [1, 0, 0];
     this.spot = hit.point.clone();
     this.draw();
+    const { lux } = hit.object.geometry.attributes;
     return this.picked({
       vertices: corners.map((c) => c + part.at),
-      weights: weights ? weights.toArray() : [1, 0, 0],
+      weights,
+      lux: corners.reduce((sum, c, i) => sum + weights[i] * lux.getX(c), 0),
       point: hit.point.toArray(),
       material: part.name,
     });
