@@ -161,17 +161,6 @@ impl SpectraFile {
     }
 }
 
-fn parsed(path: &Path, check: &mut Check) -> Option<Value> {
-    let place = path.display().to_string();
-    let text = uri::read_file(path)
-        .map_err(|why| check.problem(&place, why, "name a spectra file that can be read"));
-    let json = serde_json::from_slice(&text.ok()?).map_err(|why| {
-        let what = format!("is not valid JSON ({why})");
-        check.problem(&place, what, "mend the file");
-    });
-    json.ok()
-}
-
 /// `room.spectra.json` for `room.glb`, if it is there.
 fn beside(room: &Path) -> Option<PathBuf> {
     let stem = room.file_stem()?;

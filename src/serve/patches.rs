@@ -68,6 +68,7 @@ impl Patches {
             back,
             vertices: Vec::new(),
             triangles: vec![[0; 3]],
+            map: None,
         };
         let bare: Vec<BakedSurface> = sides.iter().map(bare).collect();
         let order = gltf::order(bake.scene(), &bare);
@@ -251,6 +252,7 @@ impl Patches {
                 back: part.back,
                 vertices: part.vertices.iter().map(unlit).collect(),
                 triangles: Vec::new(),
+                map: None,
             })
             .collect();
         let tree = bake.tree();
@@ -302,6 +304,7 @@ impl Patches {
                 back: part.back,
                 vertices: vertices.collect(),
                 triangles: part.grown.triangles.clone(),
+                map: None,
             }
         };
         self.parts.iter().map(of_part).collect()
