@@ -5,7 +5,6 @@ mod room;
 mod three;
 
 #[path = "../report/browser.rs"]
-#[allow(dead_code, reason = "the report's tests use all of it")]
 mod browser;
 
 #[path = "../common/built.rs"]
