@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Folders and files of `src`, from the bottom to the top. `lib` and `main` hold them together.
-const ORDER: [&str; 22] = [
+const ORDER: [&str; 23] = [
     "error",
     "data",
     "color",
