@@ -98,20 +98,28 @@ class _Copies:
         self.warn = lambda text: None
 
     def collect(self, context, selected: bool) -> None:
+        """Copies what can be seen; in an order that hiding and showing do not change, for relighting needs the same one."""
         depsgraph = context.evaluated_depsgraph_get()
+        found = []
         for instance in depsgraph.object_instances:
             shown = instance.object
             owner = (instance.parent if instance.is_instance else shown).original
             wanted = instance.show_self and not owner.hide_render and INDEX not in owner
             if not wanted or (selected and not owner.select_get()):
                 continue
-            matrix = instance.matrix_world.copy()
-            source = shown.original
-            name = self._name(source.name if not instance.is_instance else f"{owner.name}/{source.name}")
-            if shown.type in SOLID:
-                self._solid(shown, source, name, matrix, depsgraph)
+            matrix, source = instance.matrix_world.copy(), shown.original
+            name = f"{owner.name}/{source.name}" if instance.is_instance else source.name
+            key = (owner.session_uid, tuple(instance.persistent_id) if instance.is_instance else (), source.session_uid)
+            # What an instance shows may be gone with the next one.
+            if shown.type in SOLID and matrix.determinant() != 0.0:
+                found.append((key, name, source, matrix, self._mesh(shown, matrix, depsgraph)))
             elif shown.type == "LIGHT":
-                self._lamp(shown.data, source, name, matrix)
+                found.append((key, name, source, matrix, shown.data))
+        for _, name, source, matrix, data in sorted(found, key=lambda one: one[0]):
+            if isinstance(data, bpy.types.Mesh):
+                self._solid(data, source, self._name(name), matrix)
+            else:
+                self._lamp(data, source, self._name(name), matrix)
 
     def _name(self, wanted: str) -> str:
         """A name that no other piece has."""
@@ -122,29 +130,30 @@ class _Copies:
             name = f"{wanted} [{number}]"
         return name
 
-    def _solid(self, shown, source, name, matrix, depsgraph) -> None:
-        if matrix.determinant() == 0.0:
-            return
+    def _mesh(self, shown, matrix, depsgraph) -> bpy.types.Mesh:
+        """The mesh of something that is shown; objects that share one get the same copy."""
         slots = [slot.material and slot.material.original for slot in shown.material_slots] or [None]
-        sheared = _sheared(matrix)
         data = shown.data if shown.type == "MESH" else shown
-        key = (data.as_pointer(), tuple(m and m.as_pointer() for m in slots), tuple(matrix[0]) if sheared else None)
-        mesh = self.meshes.get(key)
-        if mesh is None:
-            mesh = bpy.data.meshes.new_from_object(shown, preserve_all_data_layers=True, depsgraph=depsgraph)
-            self.meshes[key] = mesh
-            mesh.materials.clear()
-            for slot in slots:
-                mesh.materials.append(self.materials[self._material(slot)])
-            if sheared:
-                mesh.transform(matrix)
-                if matrix.determinant() < 0.0:
-                    mesh.flip_normals()
-        if not mesh.polygons:
-            return
-        matrix = Matrix.Identity(4) if sheared else matrix
-        piece = Piece(name, "mesh", source, matrix, [layer.name for layer in mesh.uv_layers])
-        self._place(piece, mesh)
+        shear = tuple(tuple(row) for row in matrix) if _sheared(matrix) else None
+        key = (data.as_pointer(), tuple(m and m.as_pointer() for m in slots), shear)
+        if key in self.meshes:
+            return self.meshes[key]
+        mesh = self.meshes[key] = bpy.data.meshes.new_from_object(
+            shown, preserve_all_data_layers=True, depsgraph=depsgraph
+        )
+        mesh.materials.clear()
+        for slot in slots:
+            mesh.materials.append(self.materials[self._material(slot)])
+        if shear:
+            mesh.transform(matrix)
+            if matrix.determinant() < 0.0:
+                mesh.flip_normals()
+        return mesh
+
+    def _solid(self, mesh, source, name, matrix) -> None:
+        if mesh.polygons:
+            placed = Matrix.Identity(4) if _sheared(matrix) else matrix
+            self._place(Piece(name, "mesh", source, placed, [layer.name for layer in mesh.uv_layers]), mesh)
 
     def _lamp(self, lamp, source, name, matrix) -> None:
         if lamp.type == "AREA":
@@ -261,17 +270,16 @@ def _finish(path: Path, copies: _Copies, lumens_per_watt: float) -> None:
     """Names as the user knows them, watts as lumens; radiance of surfaces too, so that what shines keeps its proportions."""
     glb = Glb(path)
     document = glb.document
-    for node in document.get("nodes", []):
-        number = node.get("extras", {}).get(INDEX)
-        if number is not None:
-            node["name"] = copies.pieces[number].name
+    # All nodes are pieces, and none stands below another.
+    document["nodes"].sort(key=lambda node: node["extras"][INDEX])
+    document["scenes"][0]["nodes"] = list(range(len(document["nodes"])))
+    for node in document["nodes"]:
+        node["name"] = copies.pieces[node["extras"][INDEX]].name
     for light in document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
         light["name"] = copies.pieces[light["extras"][INDEX]].name
         light["intensity"] = light.get("intensity", 1.0) * lumens_per_watt
     for material in document.get("materials", []):
-        number = material.get("extras", {}).get(INDEX)
-        if number is not None:
-            material["name"] = copies.names[number]
+        material["name"] = copies.names[material["extras"][INDEX]]
         if any(material.get("emissiveFactor", [])):
             extension = material.setdefault("extensions", {}).setdefault("KHR_materials_emissive_strength", {})
             extension["emissiveStrength"] = extension.get("emissiveStrength", 1.0) * lumens_per_watt
