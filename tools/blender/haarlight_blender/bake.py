@@ -27,7 +27,7 @@ class Wanted:
     spectra: dict
 
 
-@dataclass
+@dataclass(repr=False)
 class Lit:
     """What a bake gives."""
 

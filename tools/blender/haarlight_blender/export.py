@@ -22,6 +22,8 @@ INDEX = "haarlight_index"
 SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 # A matrix that scale, rotation and place give back to this share of its greatest number has no shear (float32).
 NO_SHEAR = 1e-5
+# glTF knows no cone without a rim (inner < outer); so much of it cannot be seen.
+SHARP = 1e-3
 
 
 @dataclass
@@ -141,9 +143,11 @@ class _Copies:
         mesh = self.meshes[key] = bpy.data.meshes.new_from_object(
             shown, preserve_all_data_layers=True, depsgraph=depsgraph
         )
-        mesh.materials.clear()
-        for slot in slots:
-            mesh.materials.append(self.materials[self._material(slot)])
+        # In place: taking a slot away would turn its faces over to the first one.
+        for number, slot in enumerate(slots):
+            if number == len(mesh.materials):
+                mesh.materials.append(None)
+            mesh.materials[number] = self.materials[self._material(slot)]
         if shear:
             mesh.transform(matrix)
             if matrix.determinant() < 0.0:
@@ -165,7 +169,7 @@ class _Copies:
         copy = bpy.data.lights.new(name, lamp.type)
         copy.energy, copy.color = power.watts, power.color
         if lamp.type == "SPOT":
-            copy.spot_size, copy.spot_blend = lamp.spot_size, lamp.spot_blend
+            copy.spot_size, copy.spot_blend = lamp.spot_size, max(lamp.spot_blend, SHARP)
         self.lights.append(copy)
         copy[INDEX] = len(self.pieces)
         location, rotation, _ = matrix.decompose()

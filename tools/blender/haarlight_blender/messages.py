@@ -8,6 +8,15 @@ from .export import NothingToBake
 from .read import Strange
 
 
+# What to do next, where the command's advice is about its options: what is wrong begins so.
+ADVICE = {
+    "there is no lamp": "add a lamp, give a material an emission strength, or switch World on",
+    "the sun stands": "turn it up, or switch World off",
+}
+# The same of warnings: words of the command, and what they are in Blender.
+WORDS = {"--sky overcast lights it": "a colour or a Sky Texture of the world lights it"}
+
+
 def status(context, text: str | None) -> None:
     """Sets the text of the status bar, or gives it back to Blender."""
     if context.workspace is not None:
@@ -29,12 +38,18 @@ def wrong(operator, problem: BaseException) -> set[str]:
 def done(operator, lit) -> None:
     """Reports the end and what the user should know."""
     for text in lit.warnings:
+        for command, here in WORDS.items():
+            text = text.replace(command, here)
         operator.report({"WARNING"}, f"haarlight: {text}")
     operator.report({"INFO"}, lit.summary())
 
 
 def _named(problem) -> str:
     """A problem, with the names that the user gave in place of a temporary file's."""
-    text = str(problem)
-    file = getattr(problem, "file", None)
-    return text.replace(f"{file}: ", "").replace(str(file), "the room") if file else text
+    if not isinstance(problem, haarlight.Problem):
+        return str(problem)
+    advice = next((here for begins, here in ADVICE.items() if problem.what.startswith(begins)), problem.next)
+    place = problem.place.replace(str(problem.file), "").strip(": ") if problem.file else problem.place
+    if place.endswith("room.glb"):
+        place = ""
+    return f"{place}: {problem.what}; {advice}".removeprefix(": ")

@@ -109,9 +109,7 @@ class _Works:
             messages.done(self, job.lit)
             return {"FINISHED"}
         finally:
-            # The bake's own room stays: relighting with other spectra reads it again.
-            if job.lit is None or job.relit is not None:
-                remove(room)
+            remove(room)
 
 
 class HAARLIGHT_OT_bake(_Works, bpy.types.Operator):

@@ -26,7 +26,7 @@ SRGB = np.array(
 FROM_XYZ = np.linalg.inv(SRGB)
 
 
-@dataclass
+@dataclass(repr=False)
 class Shape:
     """What one piece looks like, lit."""
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from .bake import Lit
 
+# The bake at hand, and the one before it, which an undo may bring back: each may hold hundreds of megabytes.
+KEPT = 2
 _baked: dict[str, Lit] = {}
 
 
 def keep(collection, key: str, lit: Lit) -> None:
-    """Keeps the bake of a collection; those of collections that an undo may still bring back stay too."""
+    """Keeps the bake of a collection, and lets go of the oldest."""
     _baked[collection[key]] = lit
+    while len(_baked) > KEPT:
+        del _baked[next(iter(_baked))]
 
 
 def baked(collection, key: str) -> Lit | None:

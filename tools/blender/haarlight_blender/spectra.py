@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from functools import lru_cache
 from pathlib import Path
 
@@ -26,7 +27,7 @@ def search(kind: str):
 
 def chosen(exported, path: str) -> dict:
     """What the file says, and over it what was chosen for materials and lamps, by their names in the exported room."""
-    said = _of_file(Path(path)) if path else {}
+    said = _of_file(Path(path), exported.path.parent) if path else {}
     materials, lights = said.setdefault("materials", {}), said.setdefault("lights", {})
     for name, original in zip(exported.materials, exported.originals):
         entry = _of_material(original.haarlight) if original else {}
@@ -52,26 +53,30 @@ def _of_material(wanted) -> dict:
     return entry
 
 
-def _of_file(path: Path) -> dict:
-    """A file of spectra, whose names of files count from its folder."""
+def _of_file(path: Path, folder: Path) -> dict:
+    """A file of spectra; the tables and profiles that it names are laid into the folder, beside the exported room."""
     try:
         said = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as problem:
         raise ValueError(f"{path}: cannot be read as a file of spectra ({problem}); choose another") from problem
     if not isinstance(said, dict):
-        raise ValueError(f"{path}: is no file of spectra; it is an object with \"materials\" and \"lights\"")
-    _absolute(said, path.resolve().parent)
+        raise ValueError(f'{path}: is no file of spectra; it is an object with "materials" and "lights"')
+    _laid(said, path.parent, folder)
     return said
 
 
-def _absolute(said, folder: Path) -> None:
+def _laid(said, beside: Path, folder: Path) -> None:
     if isinstance(said, list):
         for value in said:
-            _absolute(value, folder)
+            _laid(value, beside, folder)
     if not isinstance(said, dict):
         return
     for key, value in said.items():
-        if key in ("csv", "profile") and isinstance(value, str) and "\n" not in value:
-            said[key] = str(folder / value)
-        else:
-            _absolute(value, folder)
+        named = key in ("csv", "profile") and isinstance(value, str) and "\n" not in value
+        # What is not there is left for haarlight to name.
+        if named and (beside / value).is_file():
+            copy = folder / f"{len(list(folder.iterdir()))}-{Path(value).name}"
+            shutil.copyfile(beside / value, copy)
+            said[key] = copy.name
+        elif not named:
+            _laid(value, beside, folder)

@@ -12,6 +12,7 @@ import math
 import bpy
 
 from .lamps import LUMENS_PER_WATT
+from .paint import has_nodes
 
 # Linear sRGB to XYZ (IEC 61966-2-1).
 TO_XYZ = ((0.4124, 0.3576, 0.1805), (0.2126, 0.7152, 0.0722), (0.0193, 0.1192, 0.9505))
@@ -39,7 +40,7 @@ def sky(world: bpy.types.World | None, lumens_per_watt: float, warn) -> dict | N
 
 def _background(world, warn):
     """Strength, colour and sky texture of the world's background."""
-    if not world.use_nodes or not world.node_tree:
+    if not has_nodes(world):
         return 1.0, list(world.color), None
     output = world.node_tree.get_output_node("ALL")
     links = output.inputs["Surface"].links if output else ()
