@@ -33,7 +33,8 @@ class Piece:
     name: str
     kind: str
     """`mesh`, `lamp`, or `quad` for an area lamp."""
-    source: bpy.types.Object
+    uid: int
+    """`session_uid` of the object that it shows: an undo while a bake runs makes Blender's objects anew."""
     matrix: Matrix
     uvs: list[str] = field(default_factory=list)
 
@@ -46,12 +47,18 @@ class Exported:
     pieces: list[Piece]
     materials: list[str]
     """Names of materials in the file, unique; those of the user's materials where these are."""
-    originals: list[bpy.types.Material | None]
+    originals: list[int | None]
+    """`session_uid` of the user's materials."""
     scale: float
     """Metres for each unit of the scene."""
     sky: dict | None
     lumens_per_watt: float
     warnings: list[str]
+
+
+def by_uid(blocks) -> dict:
+    """Objects or materials of the file by `session_uid`."""
+    return {block.session_uid: block for block in blocks}
 
 
 class NothingToBake(ValueError):
@@ -91,11 +98,10 @@ class _Copies:
         self.scale = 1.0
         self.pieces: list[Piece] = []
         self.names: list[str] = []
-        self.originals: list[bpy.types.Material | None] = []
+        self.originals: list[int | None] = []
         self.materials: list[bpy.types.Material] = []
         self.meshes: dict[tuple, bpy.types.Mesh] = {}
         self.lights: list[bpy.types.Light] = []
-        self.lamp_names: dict[int, str] = {}
         self.numbers: dict[object, int] = {}
         self.warn = lambda text: None
 
@@ -157,7 +163,7 @@ class _Copies:
     def _solid(self, mesh, source, name, matrix) -> None:
         if mesh.polygons:
             placed = Matrix.Identity(4) if _sheared(matrix) else matrix
-            self._place(Piece(name, "mesh", source, placed, [layer.name for layer in mesh.uv_layers]), mesh)
+            self._place(Piece(name, "mesh", source.session_uid, placed, [layer.name for layer in mesh.uv_layers]), mesh)
 
     def _lamp(self, lamp, source, name, matrix) -> None:
         if lamp.type == "AREA":
@@ -177,7 +183,7 @@ class _Copies:
         if matrix.determinant() < 0.0:
             toward = (matrix.to_3x3() @ -Matrix.Identity(3).col[2]).normalized()
             rotation = toward.to_track_quat("-Z", "Y")
-        self._place(Piece(name, "lamp", source, Matrix.LocRotScale(location, rotation, None)), copy)
+        self._place(Piece(name, "lamp", source.session_uid, Matrix.LocRotScale(location, rotation, None)), copy)
 
     def _quad(self, lamp, source, name, matrix) -> None:
         corners = lamps.outline(lamp)
@@ -195,7 +201,7 @@ class _Copies:
         number = self._add_material(paint.emitter(name, power.color, radiance), name, None)
         mesh.materials.append(self.materials[number])
         self.meshes[("quad", len(self.pieces))] = mesh
-        self._place(Piece(name, "quad", source, Matrix.Identity(4)), mesh)
+        self._place(Piece(name, "quad", source.session_uid, Matrix.Identity(4)), mesh)
 
     def _place(self, piece: Piece, data) -> None:
         copy = bpy.data.objects.new(piece.name, data)
@@ -219,7 +225,7 @@ class _Copies:
         copy[INDEX] = len(self.materials)
         self.materials.append(copy)
         self.names.append(unique)
-        self.originals.append(original)
+        self.originals.append(original.session_uid if original else None)
         return len(self.materials) - 1
 
     def remove(self) -> None:

@@ -63,9 +63,13 @@ class _Works:
         return self._end(context, job)
 
     def invoke(self, context, event):
-        global running
         if bpy.app.background or context.window is None:
             return self.execute(context)
+        return self.begin(context)
+
+    def begin(self, context):
+        """Starts the thread, and a timer that looks at it."""
+        global running
         try:
             running = self.job(context)
         except Exception as problem:

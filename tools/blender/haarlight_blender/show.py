@@ -15,13 +15,14 @@ import numpy as np
 
 from . import paint
 from .bake import Lit
-from .export import INDEX
+from .export import INDEX, by_uid
 from .read import Shape
 
 IRRADIANCE, RADIOSITY, MAP = "haarlight_irradiance", "haarlight_radiosity", "haarlight_map"
 GROUP = "haarlight light"
 KEY = "haarlight"
 HIDDEN = "haarlight_hidden"
+OF = "haarlight_of"
 
 
 def show(context, lit: Lit, hide: bool) -> bpy.types.Collection:
@@ -33,19 +34,23 @@ def show(context, lit: Lit, hide: bool) -> bpy.types.Collection:
     scene.collection.children.link(collection)
     images = [_page(page) for page in lit.pages.files] if lit.pages else []
     materials: dict[tuple, bpy.types.Material] = {}
+    paints, objects = by_uid(bpy.data.materials), by_uid(bpy.data.objects)
+    originals = [paints.get(uid) for uid in lit.exported.originals]
     for number, shape in lit.shapes.items():
         piece = lit.exported.pieces[number]
         # An area lamp cannot be seen in Blender.
         if piece.kind != "mesh":
             continue
         mesh = _mesh(f"{piece.name} lit", shape, piece.uvs)
-        _paint(mesh, shape, lit, images, materials)
+        _paint(mesh, shape, lit, originals, images, materials)
         made = bpy.data.objects.new(f"{piece.name} lit", mesh)
-        made[INDEX], made["haarlight_of"], made["haarlight_name"] = number, piece.source, piece.name
+        made[INDEX], made["haarlight_name"] = number, piece.name
+        if piece.uid in objects:
+            made[OF] = objects[piece.uid]
         collection.objects.link(made)
         made.matrix_world = piece.matrix
     if hide:
-        hide_originals(context, collection, lit)
+        _hide(context, collection)
     context.view_layer.update()
     return collection
 
@@ -76,12 +81,9 @@ def clear(context) -> None:
     bpy.data.batch_remove([*collection.objects, *meshes, *materials, collection])
 
 
-def hide_originals(context, collection, lit: Lit) -> None:
+def _hide(context, collection) -> None:
     """Hides what was baked, and notes how it was: names with (hidden in the viewport, hidden in renders)."""
-    _hide(context, collection, {piece.source for piece in lit.exported.pieces if piece.kind == "mesh"})
-
-
-def _hide(context, collection, sources) -> None:
+    sources = {made[OF] for made in collection.objects if made.get(OF)}
     present = [s for s in sources if s.name in context.view_layer.objects]
     collection[HIDDEN] = json.dumps({s.name: (s.hide_get(), s.hide_render) for s in present})
     for source in present:
@@ -105,7 +107,7 @@ def originals_shown(collection) -> bool:
 
 
 def hide_again(context, collection, hidden: str) -> None:
-    """Hides the originals that `hidden`, a note of `hide_originals`, names."""
+    """Hides the originals that `hidden`, a note of `_hide`, names."""
     for name in json.loads(hidden):
         source = context.view_layer.objects.get(name)
         if source is not None:
@@ -118,7 +120,7 @@ def swap(context, collection) -> None:
     """Shows the originals in place of the light, or the light in place of them."""
     show_light = originals_shown(collection)
     if show_light:
-        _hide(context, collection, {made["haarlight_of"] for made in collection.objects if made.get("haarlight_of")})
+        _hide(context, collection)
     else:
         show_originals(context, collection)
     for made in collection.objects:
@@ -156,20 +158,20 @@ def _light(mesh, shape: Shape) -> None:
         mesh.color_attributes.active_color = mesh.color_attributes[RADIOSITY]
 
 
-def _paint(mesh, shape: Shape, lit: Lit, images, materials) -> None:
+def _paint(mesh, shape: Shape, lit: Lit, originals, images, materials) -> None:
     """Gives the mesh its materials: one for each material and page."""
     keys = np.column_stack([shape.material, np.where(shape.lit, shape.page, -2)])
     kinds, slots = np.unique(keys, axis=0, return_inverse=True)
     for number, page in kinds:
         key = (int(number), int(page))
         if key not in materials:
-            materials[key] = _material(*key, lit, images)
+            original = originals[number] if number >= 0 else None
+            materials[key] = _material(*key, original, lit, images)
         mesh.materials.append(materials[key])
     mesh.polygons.foreach_set("material_index", np.ascontiguousarray(slots.ravel(), np.int32))
 
 
-def _material(number: int, page: int, lit: Lit, images) -> bpy.types.Material | None:
-    original = lit.exported.originals[number] if number >= 0 else None
+def _material(number: int, page: int, original, lit: Lit, images) -> bpy.types.Material | None:
     if page == -2:
         return original
     made = paint.readable(original, lambda text: None)

@@ -7,7 +7,10 @@ import shutil
 from functools import lru_cache
 from pathlib import Path
 
+import bpy
 import haarlight
+
+from .export import by_uid
 
 
 @lru_cache
@@ -29,12 +32,13 @@ def chosen(exported, path: str) -> dict:
     """What the file says, and over it what was chosen for materials and lamps, by their names in the exported room."""
     said = _of_file(Path(path), exported.path.parent) if path else {}
     materials, lights = said.setdefault("materials", {}), said.setdefault("lights", {})
-    for name, original in zip(exported.materials, exported.originals):
-        entry = _of_material(original.haarlight) if original else {}
+    paints, objects = by_uid(bpy.data.materials), by_uid(bpy.data.objects)
+    for name, uid in zip(exported.materials, exported.originals):
+        entry = _of_material(paints[uid].haarlight) if uid in paints else {}
         if entry:
             materials[name] = {**materials.get(name, {}), **entry}
     for piece in exported.pieces:
-        wanted = piece.source.data.haarlight.spectrum if piece.kind != "mesh" else ""
+        wanted = objects[piece.uid].data.haarlight.spectrum if piece.kind != "mesh" else ""
         if wanted and piece.kind == "lamp":
             lights[piece.name] = {**lights.get(piece.name, {}), "name": wanted}
         elif wanted:

@@ -133,7 +133,8 @@ def test_a_sheared_and_a_mirrored_object_stand_where_they_stood(out):
         if piece.kind != "mesh" or piece.name == "Room":
             continue
         own = light.surface == next(k for k, s in enumerate(light.room.surfaces) if s["node"] == number)
-        corners = [piece.source.matrix_world @ v.co for v in piece.source.data.vertices]
+        source = bpy.data.objects[piece.name]
+        corners = [source.matrix_world @ v.co for v in source.data.vertices]
         wanted = {(round(c.x, 4), round(c.z, 4), round(-c.y, 4)) for c in corners}
         found = {tuple(round(float(c), 4) + 0.0 for c in p) for p in light.positions[own]}
         assert {tuple(c + 0.0 for c in p) for p in wanted} <= found, piece.name
