@@ -38,6 +38,8 @@ def camera(scene, at, turn, **dials):
 
 def matt(name, color):
     made = scenes.material(name, color)
+    # Blender's default: both sides are seen, and lit.
+    made.use_backface_culling = False
     tree = made.node_tree
     tree.nodes.clear()
     diffuse, end = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
