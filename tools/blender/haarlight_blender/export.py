@@ -35,6 +35,8 @@ class Piece:
     """`mesh`, `lamp`, or `quad` for an area lamp."""
     uid: int
     """`session_uid` of the object that it shows: an undo while a bake runs makes Blender's objects anew."""
+    owner: int
+    """The same of the object in the scene: what instances it, or itself."""
     matrix: Matrix
     uvs: list[str] = field(default_factory=list)
 
@@ -51,6 +53,8 @@ class Exported:
     """`session_uid` of the user's materials."""
     scale: float
     """Metres for each unit of the scene."""
+    only: frozenset[int] | None
+    """`session_uid` of the objects that were wanted; None: all."""
     sky: dict | None
     lumens_per_watt: float
     warnings: list[str]
@@ -65,8 +69,13 @@ class NothingToBake(ValueError):
     """There is no surface to bake."""
 
 
-def export(context, folder: Path, *, selected: bool, use_world: bool, lumens_per_watt: float) -> Exported:
-    """Writes `room.glb` into the folder."""
+def chosen(context) -> frozenset[int]:
+    """What is selected, as `only` of `export`."""
+    return frozenset(owner.session_uid for owner in context.view_layer.objects if owner.select_get())
+
+
+def export(context, folder: Path, *, only: frozenset[int] | None, use_world: bool, lumens_per_watt: float) -> Exported:
+    """Writes `room.glb` into the folder: all that can be seen, or of that only these."""
     warnings: list[str] = []
 
     def warn(text: str) -> None:
@@ -77,16 +86,16 @@ def export(context, folder: Path, *, selected: bool, use_world: bool, lumens_per
     with _copies(scene) as copies:
         copies.warn = warn
         copies.scale = scene.unit_settings.scale_length
-        copies.collect(context, selected)
+        copies.collect(context, only)
         if not any(piece.kind == "mesh" for piece in copies.pieces):
-            what = "is selected" if selected else "can be seen"
+            what = "can be seen" if only is None else "is selected"
             raise NothingToBake(f"no surface {what}; select objects with faces, or show them")
         path = folder / "room.glb"
         _write(context, copies.scene, path)
         sky = world.sky(scene.world, lumens_per_watt, warn) if use_world else None
         _finish(path, copies, lumens_per_watt)
         return Exported(
-            path, copies.pieces, copies.names, copies.originals, copies.scale, sky, lumens_per_watt, warnings
+            path, copies.pieces, copies.names, copies.originals, copies.scale, only, sky, lumens_per_watt, warnings
         )
 
 
@@ -105,7 +114,7 @@ class _Copies:
         self.numbers: dict[object, int] = {}
         self.warn = lambda text: None
 
-    def collect(self, context, selected: bool) -> None:
+    def collect(self, context, only: frozenset[int] | None) -> None:
         """Copies what can be seen; in an order that hiding and showing do not change, for relighting needs the same one."""
         depsgraph = context.evaluated_depsgraph_get()
         found = []
@@ -113,21 +122,20 @@ class _Copies:
             shown = instance.object
             owner = (instance.parent if instance.is_instance else shown).original
             wanted = instance.show_self and not owner.hide_render and INDEX not in owner
-            if not wanted or (selected and not owner.select_get()):
+            if not wanted or (only is not None and owner.session_uid not in only):
                 continue
             matrix, source = instance.matrix_world.copy(), shown.original
             name = f"{owner.name}/{source.name}" if instance.is_instance else source.name
+            uids = (source.session_uid, owner.session_uid)
             key = (owner.session_uid, tuple(instance.persistent_id) if instance.is_instance else (), source.session_uid)
             # What an instance shows may be gone with the next one.
             if shown.type in SOLID and matrix.determinant() != 0.0:
-                found.append((key, name, source, matrix, self._mesh(shown, matrix, depsgraph)))
+                found.append((key, name, uids, matrix, self._mesh(shown, matrix, depsgraph)))
             elif shown.type == "LIGHT":
-                found.append((key, name, source, matrix, shown.data))
-        for _, name, source, matrix, data in sorted(found, key=lambda one: one[0]):
-            if isinstance(data, bpy.types.Mesh):
-                self._solid(data, source, self._name(name), matrix)
-            else:
-                self._lamp(data, source, self._name(name), matrix)
+                found.append((key, name, uids, matrix, shown.data))
+        for _, name, uids, matrix, data in sorted(found, key=lambda one: one[0]):
+            make = self._solid if isinstance(data, bpy.types.Mesh) else self._lamp
+            make(data, uids, self._name(name), matrix)
 
     def _name(self, wanted: str) -> str:
         """A name that no other piece has."""
@@ -160,14 +168,14 @@ class _Copies:
                 mesh.flip_normals()
         return mesh
 
-    def _solid(self, mesh, source, name, matrix) -> None:
+    def _solid(self, mesh, uids, name, matrix) -> None:
         if mesh.polygons:
             placed = Matrix.Identity(4) if _sheared(matrix) else matrix
-            self._place(Piece(name, "mesh", source.session_uid, placed, [layer.name for layer in mesh.uv_layers]), mesh)
+            self._place(Piece(name, "mesh", *uids, placed, [layer.name for layer in mesh.uv_layers]), mesh)
 
-    def _lamp(self, lamp, source, name, matrix) -> None:
+    def _lamp(self, lamp, uids, name, matrix) -> None:
         if lamp.type == "AREA":
-            self._quad(lamp, source, name, matrix)
+            self._quad(lamp, uids, name, matrix)
             return
         power = lamps.power(lamp, lamps.radius_area(lamp), self.warn)
         if power.watts <= 0.0:
@@ -183,16 +191,16 @@ class _Copies:
         if matrix.determinant() < 0.0:
             toward = (matrix.to_3x3() @ -Matrix.Identity(3).col[2]).normalized()
             rotation = toward.to_track_quat("-Z", "Y")
-        self._place(Piece(name, "lamp", source.session_uid, Matrix.LocRotScale(location, rotation, None)), copy)
+        self._place(Piece(name, "lamp", *uids, Matrix.LocRotScale(location, rotation, None)), copy)
 
-    def _quad(self, lamp, source, name, matrix) -> None:
+    def _quad(self, lamp, uids, name, matrix) -> None:
         corners = lamps.outline(lamp)
         surface = lamps.area(corners, matrix)
         power = lamps.power(lamp, surface, self.warn)
         if surface <= 0.0 or power.watts <= 0.0:
             return
         if lamp.spread < math.pi - 1e-3:
-            self.warn(f"lamp '{source.name}': its spread is not read, it shines to all sides of its front")
+            self.warn(f"lamp '{name}': its spread is not read, it shines to all sides of its front")
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata([matrix @ corner for corner in corners], [], [list(range(len(corners)))])
         if matrix.determinant() < 0.0:
@@ -201,7 +209,7 @@ class _Copies:
         number = self._add_material(paint.emitter(name, power.color, radiance), name, None)
         mesh.materials.append(self.materials[number])
         self.meshes[("quad", len(self.pieces))] = mesh
-        self._place(Piece(name, "quad", source.session_uid, Matrix.Identity(4)), mesh)
+        self._place(Piece(name, "quad", *uids, Matrix.Identity(4)), mesh)
 
     def _place(self, piece: Piece, data) -> None:
         copy = bpy.data.objects.new(piece.name, data)

@@ -6,14 +6,14 @@ import bpy
 
 from . import messages, session, show, spectra
 from .bake import Job, Lit, Wanted, folder, remove
-from .export import Exported, export
+from .export import Exported, chosen, export
 
 # Seconds between two looks at the thread.
 LOOKS = 0.2
 running: Job | None = None
 
 
-def exported(context, selected: bool) -> Exported:
+def exported(context, only: frozenset[int] | None, lumens_per_watt: float) -> Exported:
     """The scene in a new temporary folder, with what is hidden while light is shown."""
     settings, collection = context.scene.haarlight, show.of_scene(context.scene)
     hidden = collection.get(show.HIDDEN, "{}") if collection else "{}"
@@ -22,9 +22,7 @@ def exported(context, selected: bool) -> Exported:
         context.view_layer.update()
     room = folder()
     try:
-        return export(
-            context, room, selected=selected, use_world=settings.use_world, lumens_per_watt=settings.lumens_per_watt
-        )
+        return export(context, room, only=only, use_world=settings.use_world, lumens_per_watt=lumens_per_watt)
     except BaseException:
         remove(room)
         raise
@@ -129,7 +127,7 @@ class HAARLIGHT_OT_bake(_Works, bpy.types.Operator):
 
     def job(self, context) -> Job:
         settings = context.scene.haarlight
-        room = exported(context, settings.selected)
+        room = exported(context, chosen(context) if settings.selected else None, settings.lumens_per_watt)
         try:
             return Job(room, wanted(settings, room))
         except BaseException:
@@ -160,7 +158,8 @@ class HAARLIGHT_OT_relight(_Works, bpy.types.Operator):
         before = session.baked(show.of_scene(context.scene), show.KEY)
         if before.wanted.medium == "MAPS":
             raise ValueError("light maps are not relit; bake again, or bake into vertices")
-        room = exported(context, context.scene.haarlight.selected)
+        # The same pieces, and lumens as what shows the light takes them.
+        room = exported(context, before.exported.only, before.exported.lumens_per_watt)
         try:
             return Job(room, wanted(context.scene.haarlight, room), before.light)
         except BaseException:

@@ -11,13 +11,27 @@ from . import operators, session, show
 RESTS = 0.4
 
 
+# Dials of lamps that give light or colour.
+DIALS = ("energy", "color", "exposure", "normalize", "use_temperature", "temperature")
+_figures: dict[int, tuple] = {}
+
+
+def figures(scene) -> dict[int, tuple]:
+    """What the lamps of a scene are set to. Blender tells of a lamp in other cases too: when it is shown, or selected."""
+    lamps = {o.data.session_uid: o.data for o in scene.objects if o.type == "LIGHT"}
+    return {uid: tuple(str(getattr(lamp, dial, None)) for dial in DIALS) for uid, lamp in lamps.items()}
+
+
 @persistent
 def changed(scene, depsgraph) -> None:
     """Notes that a lamp changed."""
-    if not scene.haarlight.live or operators.running is not None:
+    global _figures
+    if not scene.haarlight.live or show.of_scene(scene) is None:
         return
-    if any(isinstance(update.id, bpy.types.Light) for update in depsgraph.updates) and show.of_scene(scene) is not None:
-        later()
+    if not _figures or any(isinstance(update.id, bpy.types.Light) for update in depsgraph.updates):
+        before, _figures = _figures, figures(scene)
+        if before and before != _figures:
+            later()
 
 
 def later() -> None:
@@ -31,8 +45,10 @@ def now() -> float | None:
     """Relights; again later while a bake runs."""
     if operators.running is not None:
         return RESTS
-    if bpy.ops.haarlight.relight.poll():
-        bpy.ops.haarlight.relight("INVOKE_DEFAULT")
+    # A timer has no window of its own.
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        if bpy.ops.haarlight.relight.poll():
+            bpy.ops.haarlight.relight("INVOKE_DEFAULT")
     return None
 
 
@@ -40,6 +56,7 @@ def now() -> float | None:
 def opened(_file) -> None:
     """Another file: its bakes are not ours."""
     session.forget()
+    _figures.clear()
 
 
 def register() -> None:

@@ -22,7 +22,7 @@ IRRADIANCE, RADIOSITY, MAP = "haarlight_irradiance", "haarlight_radiosity", "haa
 GROUP = "haarlight light"
 KEY = "haarlight"
 HIDDEN = "haarlight_hidden"
-OF = "haarlight_of"
+OF, OWNER = "haarlight_of", "haarlight_owner"
 
 
 def show(context, lit: Lit, hide: bool) -> bpy.types.Collection:
@@ -45,8 +45,9 @@ def show(context, lit: Lit, hide: bool) -> bpy.types.Collection:
         _paint(mesh, shape, lit, originals, images, materials)
         made = bpy.data.objects.new(f"{piece.name} lit", mesh)
         made[INDEX], made["haarlight_name"] = number, piece.name
-        if piece.uid in objects:
-            made[OF] = objects[piece.uid]
+        for key, uid in ((OF, piece.uid), (OWNER, piece.owner)):
+            if uid in objects:
+                made[key] = objects[uid]
         collection.objects.link(made)
         made.matrix_world = piece.matrix
     if hide:
@@ -83,8 +84,8 @@ def clear(context) -> None:
 
 def _hide(context, collection) -> None:
     """Hides what was baked, and notes how it was: names with (hidden in the viewport, hidden in renders)."""
-    sources = {made[OF] for made in collection.objects if made.get(OF)}
-    present = [s for s in sources if s.name in context.view_layer.objects]
+    owners = {made[OWNER] for made in collection.objects if made.get(OWNER)}
+    present = [s for s in owners if s.name in context.view_layer.objects]
     collection[HIDDEN] = json.dumps({s.name: (s.hide_get(), s.hide_render) for s in present})
     for source in present:
         source.hide_set(True)

@@ -203,6 +203,31 @@ def test_a_change_of_a_lamp_asks_for_relighting():
     bpy.app.timers.unregister(relight.now)
     assert relight.now() is None
     assert colours(by_name(scene)["Room"]).mean() > 1.3 * before
+    bpy.context.view_layer.update()
+    assert not bpy.app.timers.is_registered(relight.now), "relighting is no change"
+
+
+def test_what_was_selected_is_relit_and_instances_are_hidden():
+    scene = grey_room(error=2.0, selected=True)
+    held = bpy.data.collections.new("held")
+    held.objects.link(bpy.data.objects.new("chair", scenes.box("chair", 0.3, scenes.material("m"))))
+    place = scenes.add("place", None, Matrix.Translation((-1.0, -1.0, -1.0)))
+    place.instance_type, place.instance_collection = "COLLECTION", held
+    for made in scene.objects:
+        made.select_set(made.name not in ("One", "Area"))
+    bpy.context.view_layer.update()
+    bpy.ops.haarlight.bake()
+    assert set(by_name(scene)) == {"Room", "Mirrored", "Other", "place/chair"}
+    assert by_name(scene)["place/chair"]["haarlight_of"].name == "chair"
+    assert place.hide_get() and not scene.objects["One"].hide_get()
+    before = mean_light(by_name(scene)["Room"])
+    scene.objects["Mirrored"].select_set(False)
+    bpy.data.lights["Point"].energy = 20.0
+    bpy.data.lights["Area"].energy = 1000.0
+    assert bpy.ops.haarlight.relight() == {"FINISHED"}
+    assert mean_light(by_name(scene)["Room"]) == pytest.approx(2.0 * before, rel=0.01)
+    show.clear(bpy.context)
+    assert not place.hide_get()
 
 
 def test_relighting_says_why_it_cannot():
@@ -275,7 +300,7 @@ def test_a_bake_is_one_step_of_undo():
 
 def test_a_bake_that_is_stopped_is_whole():
     scene = grey_room(error=0.05)
-    room = operators.exported(bpy.context, False)
+    room = operators.exported(bpy.context, None, 683.0)
     job = bake.Job(room, operators.wanted(scene.haarlight, room))
     job.begin()
     while job.running and not job.text.startswith("round"):

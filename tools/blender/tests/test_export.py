@@ -8,7 +8,7 @@ import haarlight
 import pytest
 import scenes
 from haarlight_blender import bake
-from haarlight_blender.export import NothingToBake, export
+from haarlight_blender.export import NothingToBake, chosen, export
 from haarlight_blender.glb import Glb
 from mathutils import Matrix
 
@@ -20,7 +20,11 @@ def out(tmp_path):
     def made(selected=False, lumens_per_watt=683.0, use_world=True):
         bpy.context.view_layer.update()
         return export(
-            bpy.context, tmp_path, selected=selected, use_world=use_world, lumens_per_watt=lumens_per_watt
+            bpy.context,
+            tmp_path,
+            only=chosen(bpy.context) if selected else None,
+            use_world=use_world,
+            lumens_per_watt=lumens_per_watt,
         )
 
     return made
