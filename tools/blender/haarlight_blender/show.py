@@ -20,7 +20,7 @@ from .read import Shape
 
 IRRADIANCE, RADIOSITY, MAP = "haarlight_irradiance", "haarlight_radiosity", "haarlight_map"
 GROUP = "haarlight light"
-KEY = "haarlight"
+KEY = "haarlight_light"
 HIDDEN = "haarlight_hidden"
 OF, OWNER = "haarlight_of", "haarlight_owner"
 

@@ -17,11 +17,18 @@ def empty(unit: float = 1.0) -> bpy.types.Scene:
     return scene
 
 
+def tree(block) -> bpy.types.NodeTree:
+    """The nodes of a material or world; up to Blender 4.5 they are asked for."""
+    if block.node_tree is None:
+        block.use_nodes = True
+    return block.node_tree
+
+
 def material(name: str, color=(0.5, 0.5, 0.5), emission: float = 0.0) -> bpy.types.Material:
     """A matt Principled BSDF that shows its front only."""
     made = bpy.data.materials.new(name)
     made.use_backface_culling = True
-    shader = made.node_tree.nodes["Principled BSDF"]
+    shader = tree(made).nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (*color, 1.0)
     shader.inputs["Emission Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     shader.inputs["Emission Strength"].default_value = emission

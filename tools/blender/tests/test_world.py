@@ -16,7 +16,7 @@ def said(made, lumens=683.0):
 
 def background(color=(1.0, 1.0, 1.0), strength=1.0):
     made = bpy.data.worlds.new("World")
-    node = made.node_tree.nodes["Background"]
+    node = scenes.tree(made).nodes["Background"]
     node.inputs["Color"].default_value = (*color, 1.0)
     node.inputs["Strength"].default_value = strength
     return made, node
