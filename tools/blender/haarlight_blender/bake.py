@@ -68,6 +68,15 @@ def room(exported: Exported, spectra: dict) -> haarlight.Room:
     return haarlight.load(exported.path, spectra, sky=exported.sky, scale=exported.scale)
 
 
+def _shown_otherwise(spectra: dict) -> list[str]:
+    """A map holds irradiance: what it is multiplied with is Blender's colour, not a spectrum's."""
+    named = [name for name, entry in spectra.get("materials", {}).items() if entry]
+    return [
+        f"material '{name}': its spectra count for the light, but in light maps it is shown in Blender's colour and emission"
+        for name in named
+    ]
+
+
 class Job:
     """Work that a panel can follow. `begin()` starts a thread; `run()` works in the calling one."""
 
@@ -118,6 +127,7 @@ class Job:
         path = exported.path.with_name("lit.glb")
         self.text, self.share = "writing", 1.0
         if maps:
+            said += _shown_otherwise(wanted.spectra)
             written = light.save_maps(path, size=wanted.map_size, on_progress=self._look, stop=self.stop)
             shapes, pages = in_maps(path, exported)
             return Lit(exported, wanted, light, shapes, pages, written["error"], said)

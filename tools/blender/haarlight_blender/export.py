@@ -39,6 +39,8 @@ class Piece:
     """The same of the object in the scene: what instances it, or itself."""
     matrix: Matrix
     uvs: list[str] = field(default_factory=list)
+    paint: str = ""
+    """Name of the colours of vertices that materials see, if there are any."""
 
 
 @dataclass
@@ -171,7 +173,8 @@ class _Copies:
     def _solid(self, mesh, uids, name, matrix) -> None:
         if mesh.polygons:
             placed = Matrix.Identity(4) if _sheared(matrix) else matrix
-            self._place(Piece(name, "mesh", *uids, placed, [layer.name for layer in mesh.uv_layers]), mesh)
+            uvs, paint = [layer.name for layer in mesh.uv_layers], mesh.color_attributes.active_color
+            self._place(Piece(name, "mesh", *uids, placed, uvs, paint.name if paint else ""), mesh)
 
     def _lamp(self, lamp, uids, name, matrix) -> None:
         if lamp.type == "AREA":

@@ -9,6 +9,10 @@ GREY = (0.8, 0.8, 0.8, 1.0)
 # Shaders whose "Color" is a diffuse one, or near it.
 PAINTS = {"BSDF_DIFFUSE", "BSDF_GLOSSY", "BSDF_ANISOTROPIC", "BSDF_SHEEN", "BSDF_TOON", "SUBSURFACE_SCATTERING"}
 
+# Nodes that bring an image, and those that bring colours of vertices.
+IMAGES = {"TEX_IMAGE"}
+PAINTED = {"VERTEX_COLOR", "ATTRIBUTE"}
+
 
 def has_nodes(block) -> bool:
     """Does a material or world count by its nodes? From Blender 5.0 on all do."""
@@ -44,9 +48,38 @@ def readable(material: bpy.types.Material | None, warn) -> bpy.types.Material:
         base.default_value = value
         if source is not None:
             copy.node_tree.links.new(source, base)
-    elif not any(node.type in ("BSDF_PRINCIPLED", "EMISSION") for node in _all(copy.node_tree)):
+    elif any(node.type in ("BSDF_PRINCIPLED", "EMISSION") for node in _all(copy.node_tree)):
+        _without_patterns(copy, material.name, warn)
+    else:
         warn(f"material '{material.name}': {shader.bl_label} is not read; give it a Principled BSDF")
     return copy
+
+
+def kinds_before(socket: bpy.types.NodeSocket) -> set[str]:
+    """Types of the nodes that an input depends on."""
+    found, ahead = set(), [link.from_node for link in socket.links]
+    seen = set()
+    while ahead:
+        node = ahead.pop()
+        if node.as_pointer() in seen:
+            continue
+        seen.add(node.as_pointer())
+        found.add(node.type)
+        inner = node.node_tree.nodes if node.type == "GROUP" and node.node_tree else ()
+        found.update(within.type for within in inner)
+        ahead += [link.from_node for given in node.inputs for link in given.links]
+    return found
+
+
+def _without_patterns(copy, name: str, warn) -> None:
+    """glTF has images and colours of vertices. What is worked out by nodes it would take as white: the value beside counts."""
+    for node in copy.node_tree.nodes:
+        for wanted in ("Base Color", "Emission Color"):
+            given = node.inputs.get(wanted) if node.type == "BSDF_PRINCIPLED" else None
+            if given is None or not given.is_linked or kinds_before(given) & {*IMAGES, *PAINTED, "RGB"}:
+                continue
+            copy.node_tree.links.remove(given.links[0])
+            warn(f"material '{name}': a pattern of nodes is not read, its {wanted.lower()} counts as if unlinked; bake it into an image")
 
 
 def emitter(name: str, color, radiance: float) -> bpy.types.Material:

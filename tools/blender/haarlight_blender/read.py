@@ -47,6 +47,8 @@ class Shape:
     irradiance: np.ndarray | None = None
     """(N, 3), or none where the light is in maps."""
     radiosity: np.ndarray | None = None
+    paint: np.ndarray | None = None
+    """Colours of vertices, (N, 4), where the light is in maps."""
 
 
 @dataclass
@@ -98,7 +100,7 @@ def in_maps(path: Path, exported: Exported) -> tuple[dict[int, Shape], Pages]:
         parts = [entries.get((mesh, k)) for k in range(len(primitives))]
         lit = {id(p): part is not None for p, part in zip(primitives, parts)}
         shape = _shape(glb, primitives, lambda p: lit[id(p)], exported.pieces[number].uvs)
-        coordinates, pages = [], []
+        coordinates, pages, paints = [], [], []
         for primitive, part in zip(primitives, parts):
             count = len(glb.array(primitive["attributes"]["POSITION"]))
             uv = np.zeros((count, 2), np.float32)
@@ -106,9 +108,14 @@ def in_maps(path: Path, exported: Exported) -> tuple[dict[int, Shape], Pages]:
                 rect = np.array(part["uv_rect"], np.float32)
                 uv = rect[:2] + glb.array(primitive["attributes"][f"TEXCOORD_{part['texcoord']}"]) * (rect[2:] - rect[:2])
             coordinates.append(_flipped(uv))
+            rgba = np.ones((count, 4), np.float32)
+            if "COLOR_0" in primitive["attributes"]:
+                given = glb.array(primitive["attributes"]["COLOR_0"])
+                rgba[:, : given.shape[1]] = given
+            paints.append(rgba)
             faces = len(_triangles(glb, primitive))
             pages.append(np.full(faces, -1 if part is None else part["page"]))
-        shape.map_uv, shape.page = np.concatenate(coordinates), np.concatenate(pages)
+        shape.map_uv, shape.page, shape.paint = map(np.concatenate, (coordinates, pages, paints))
         shapes[number] = shape
     pages = Pages([path.parent / page["exr"] for page in index["pages"]], index["lux_per_unit"])
     return shapes, pages

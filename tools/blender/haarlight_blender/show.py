@@ -42,6 +42,8 @@ def show(context, lit: Lit, hide: bool) -> bpy.types.Collection:
         if piece.kind != "mesh":
             continue
         mesh = _mesh(f"{piece.name} lit", shape, piece.uvs)
+        if shape.paint is not None and piece.paint:
+            _colours(mesh, piece.paint, shape.paint)
         _paint(mesh, shape, lit, originals, images, materials)
         made = bpy.data.objects.new(f"{piece.name} lit", mesh)
         made[INDEX], made["haarlight_name"] = number, piece.name
@@ -151,12 +153,16 @@ def _light(mesh, shape: Shape) -> None:
     for name, values in ((IRRADIANCE, shape.irradiance), (RADIOSITY, shape.radiosity)):
         if values is None:
             continue
-        attribute = mesh.color_attributes.get(name) or mesh.color_attributes.new(name, "FLOAT_COLOR", "POINT")
         rgba = np.ones((len(values), 4), np.float32)
         rgba[:, :3] = values
-        attribute.data.foreach_set("color", rgba.ravel())
+        _colours(mesh, name, rgba)
     if shape.radiosity is not None:
         mesh.color_attributes.active_color = mesh.color_attributes[RADIOSITY]
+
+
+def _colours(mesh, name: str, rgba) -> None:
+    attribute = mesh.color_attributes.get(name) or mesh.color_attributes.new(name, "FLOAT_COLOR", "POINT")
+    attribute.data.foreach_set("color", np.ascontiguousarray(rgba, np.float32).ravel())
 
 
 def _paint(mesh, shape: Shape, lit: Lit, originals, images, materials) -> None:
@@ -185,7 +191,9 @@ def _material(number: int, page: int, original, lit: Lit, images) -> bpy.types.M
     group = tree.nodes.new("ShaderNodeGroup")
     group.node_tree = _group()
     group.inputs["Lumens per Watt"].default_value = lit.exported.lumens_per_watt
-    textured = "Base Color" in shader.inputs and shader.inputs["Base Color"].is_linked
+    # Colours of vertices are in the radiosity; the mesh with light at its vertices has no others.
+    before = paint.kinds_before(shader.inputs["Base Color"]) if "Base Color" in shader.inputs else set()
+    textured = bool(before & paint.IMAGES) and not before & paint.PAINTED
     if page >= 0:
         light = tree.nodes.new("ShaderNodeTexImage")
         light.image, light.extension = images[page], "EXTEND"

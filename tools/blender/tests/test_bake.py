@@ -322,14 +322,30 @@ def test_time_bounds_a_bake():
     assert session.baked(show.of_scene(scene), show.KEY).light.verdict in ("out_of_time", "exhausted")
 
 
-class Said:
-    """An operator that only notes."""
-
-    def __init__(self):
-        self.all = []
-
-    def report(self, kind, text):
-        self.all.append((kind.pop(), text))
+@pytest.mark.parametrize("medium", ["VERTICES", "MAPS"])
+def test_colours_of_vertices_are_paint(medium):
+    scene = grey_room(medium=medium)
+    mesh = scenes.plane("sheet", 1.0, scenes.material("painted"))
+    colours_of = mesh.color_attributes.new("Paint", "FLOAT_COLOR", "POINT")
+    for k, value in enumerate(colours_of.data):
+        value.color = (0.8, 0.8, 0.8, 1.0) if k in (0, 3) else (0.1, 0.1, 0.1, 1.0)
+    mesh.color_attributes.active_color = colours_of
+    tree = mesh.materials[0].node_tree
+    node = tree.nodes.new("ShaderNodeVertexColor")
+    node.layer_name = "Paint"
+    tree.links.new(node.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    scenes.add("Sheet", mesh, Matrix.Translation((0.2, 0.9, -1.0)))
+    bpy.context.view_layer.update()
+    assert bpy.ops.haarlight.bake() == {"FINISHED"}
+    sheet = by_name(scene)["Sheet"]
+    left = np.array([v.co.x for v in sheet.data.vertices]) < -0.49
+    if medium == "VERTICES":
+        found = luminance(colours(sheet, show.RADIOSITY)) / luminance(colours(sheet))
+    else:
+        found = luminance(colours(sheet, "Paint"))
+    assert found[left] == pytest.approx(0.8, rel=0.02) and found[~left].min() == pytest.approx(0.1, rel=0.02)
+    kinds = {node.type for node in sheet.data.materials[0].node_tree.nodes}
+    assert "GROUP" in kinds
 
 
 def test_what_is_wrong_is_said_in_words_of_the_scene():
@@ -363,6 +379,10 @@ def test_spectra_go_by_name(tmp_path):
     box = by_name(scene)["One"]
     e, m = luminance(colours(box)), luminance(colours(box, show.RADIOSITY))
     assert m[e > 1.0] == pytest.approx(0.2 * e[e > 1.0], rel=1e-3)
+    scene.haarlight.medium = "MAPS"
+    bpy.ops.haarlight.bake()
+    told = session.baked(show.of_scene(scene), show.KEY).warnings
+    assert any("'wall'" in text and "shown in Blender's colour" in text for text in told)
     bpy.data.materials["wall"].haarlight.reflectance = "macbeth/wite"
     with pytest.raises(RuntimeError, match=r"(?s)haarlight: .*wall.*macbeth/wite.*macbeth/white"):
         bpy.ops.haarlight.bake()

@@ -191,6 +191,19 @@ def test_materials_made_otherwise_keep_their_colour(out):
     assert [n.type for n in matt.node_tree.nodes] == ["BSDF_DIFFUSE", "OUTPUT_MATERIAL"], "the user's is as it was"
 
 
+def test_a_pattern_of_nodes_is_not_taken_as_white(out):
+    scenes.empty()
+    room = scenes.room()
+    tree = room.data.materials[0].node_tree
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    exported = out()
+    found = Glb(exported.path).document["materials"][0]["pbrMetallicRoughness"]
+    assert found["baseColorFactor"][:3] == pytest.approx([0.5] * 3)
+    assert any("'wall'" in text and "pattern" in text for text in exported.warnings)
+    assert tree.nodes["Principled BSDF"].inputs["Base Color"].is_linked
+
+
 def test_faces_keep_their_own_material(out):
     scenes.empty()
     room = scenes.room()
