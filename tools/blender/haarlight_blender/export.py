@@ -24,6 +24,8 @@ SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 NO_SHEAR = 1e-5
 # glTF knows no cone without a rim (inner < outer); so much of it cannot be seen.
 SHARP = 1e-3
+# Watts of a lamp that was turned off: 1e-7 lm.
+OFF = 1e-10
 
 
 @dataclass
@@ -61,6 +63,11 @@ class Exported:
     lumens_per_watt: float
     warnings: list[str]
 
+    @property
+    def lamps(self) -> frozenset[tuple[int, int]]:
+        """The lamps, by `uid` and `owner`."""
+        return frozenset((piece.uid, piece.owner) for piece in self.pieces if piece.kind != "mesh")
+
 
 def by_uid(blocks) -> dict:
     """Objects or materials of the file by `session_uid`."""
@@ -76,8 +83,17 @@ def chosen(context) -> frozenset[int]:
     return frozenset(owner.session_uid for owner in context.view_layer.objects if owner.select_get())
 
 
-def export(context, folder: Path, *, only: frozenset[int] | None, use_world: bool, lumens_per_watt: float) -> Exported:
-    """Writes `room.glb` into the folder: all that can be seen, or of that only these."""
+def export(
+    context,
+    folder: Path,
+    *,
+    only: frozenset[int] | None,
+    use_world: bool,
+    lumens_per_watt: float,
+    lamps: frozenset[tuple[int, int]] = frozenset(),
+) -> Exported:
+    """Writes `room.glb` into the folder: all that can be seen, or of that only these. Lamps without power are left out, but for
+    `lamps`, the `Exported.lamps` of a bake that is relit."""
     warnings: list[str] = []
 
     def warn(text: str) -> None:
@@ -86,7 +102,7 @@ def export(context, folder: Path, *, only: frozenset[int] | None, use_world: boo
 
     scene = context.scene
     with _copies(scene) as copies:
-        copies.warn = warn
+        copies.warn, copies.kept = warn, lamps
         copies.scale = scene.unit_settings.scale_length
         copies.collect(context, only)
         if not any(piece.kind == "mesh" for piece in copies.pieces):
@@ -114,6 +130,7 @@ class _Copies:
         self.meshes: dict[tuple, bpy.types.Mesh] = {}
         self.lights: list[bpy.types.Light] = []
         self.numbers: dict[object, int] = {}
+        self.kept: frozenset[tuple[int, int]] = frozenset()
         self.warn = lambda text: None
 
     def collect(self, context, only: frozenset[int] | None) -> None:
@@ -181,10 +198,11 @@ class _Copies:
             self._quad(lamp, uids, name, matrix)
             return
         power = lamps.power(lamp, lamps.radius_area(lamp), self.warn)
-        if power.watts <= 0.0:
+        watts = self._watts(power, uids)
+        if watts <= 0.0:
             return
         copy = bpy.data.lights.new(name, lamp.type)
-        copy.energy, copy.color = power.watts, power.color
+        copy.energy, copy.color = watts, power.color
         if lamp.type == "SPOT":
             copy.spot_size, copy.spot_blend = lamp.spot_size, max(lamp.spot_blend, SHARP)
         self.lights.append(copy)
@@ -196,11 +214,16 @@ class _Copies:
             rotation = toward.to_track_quat("-Z", "Y")
         self._place(Piece(name, "lamp", *uids, Matrix.LocRotScale(location, rotation, None)), copy)
 
+    def _watts(self, power, uids) -> float:
+        """A lamp that is relit stays in the file when it is off; haarlight passes over those without any light."""
+        return max(power.watts, OFF) if uids in self.kept else power.watts
+
     def _quad(self, lamp, uids, name, matrix) -> None:
         corners = lamps.outline(lamp)
         surface = lamps.area(corners, matrix)
         power = lamps.power(lamp, surface, self.warn)
-        if surface <= 0.0 or power.watts <= 0.0:
+        watts = self._watts(power, uids)
+        if surface <= 0.0 or watts <= 0.0:
             return
         if lamp.spread < math.pi - 1e-3:
             self.warn(f"lamp '{name}': its spread is not read, it shines to all sides of its front")
@@ -208,7 +231,7 @@ class _Copies:
         mesh.from_pydata([matrix @ corner for corner in corners], [], [list(range(len(corners)))])
         if matrix.determinant() < 0.0:
             mesh.flip_normals()
-        radiance = power.watts / (math.pi * surface * self.scale**2)
+        radiance = watts / (math.pi * surface * self.scale**2)
         number = self._add_material(paint.emitter(name, power.color, radiance), name, None)
         mesh.materials.append(self.materials[number])
         self.meshes[("quad", len(self.pieces))] = mesh

@@ -12,9 +12,13 @@ from .read import Strange
 ADVICE = {
     "there is no lamp": "add a lamp, give a material an emission strength, or switch World on",
     "the sun stands": "turn it up, or switch World off",
+    "the cache belongs to": "bake again",
 }
-# The same of warnings: words of the command, and what they are in Blender.
-WORDS = {"--sky overcast lights it": "a colour or a Sky Texture of the world lights it"}
+# Words of the command, and what they are in Blender.
+WORDS = {
+    "--sky overcast lights it": "a colour or a Sky Texture of the world lights it",
+    "the cache belongs to a room of another shape": "the scene has another shape than the one that was baked",
+}
 
 
 def status(context, text: str | None) -> None:
@@ -38,10 +42,14 @@ def wrong(operator, problem: BaseException) -> set[str]:
 def done(operator, lit) -> None:
     """Reports the end and what the user should know."""
     for text in lit.warnings:
-        for command, here in WORDS.items():
-            text = text.replace(command, here)
-        operator.report({"WARNING"}, f"haarlight: {text}")
+        operator.report({"WARNING"}, f"haarlight: {_here(text)}")
     operator.report({"INFO"}, lit.summary())
+
+
+def _here(text: str) -> str:
+    for command, here in WORDS.items():
+        text = text.replace(command, here)
+    return text
 
 
 def _named(problem) -> str:
@@ -52,4 +60,4 @@ def _named(problem) -> str:
     place = problem.place.replace(str(problem.file), "").strip(": ") if problem.file else problem.place
     if place.endswith("room.glb"):
         place = ""
-    return f"{place}: {problem.what}; {advice}".removeprefix(": ")
+    return _here(f"{place}: {problem.what}; {advice}".removeprefix(": "))

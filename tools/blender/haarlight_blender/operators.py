@@ -13,8 +13,8 @@ LOOKS = 0.2
 running: Job | None = None
 
 
-def exported(context, only: frozenset[int] | None, lumens_per_watt: float) -> Exported:
-    """The scene in a new temporary folder, with what is hidden while light is shown."""
+def exported(context, only: frozenset[int] | None, lumens_per_watt: float, lamps=frozenset()) -> Exported:
+    """The scene in a new temporary folder, with what is hidden while light is shown; the rest as for `export`."""
     settings, collection = context.scene.haarlight, show.of_scene(context.scene)
     hidden = collection.get(show.HIDDEN, "{}") if collection else "{}"
     if collection:
@@ -22,7 +22,9 @@ def exported(context, only: frozenset[int] | None, lumens_per_watt: float) -> Ex
         context.view_layer.update()
     room = folder()
     try:
-        return export(context, room, only=only, use_world=settings.use_world, lumens_per_watt=lumens_per_watt)
+        return export(
+            context, room, only=only, use_world=settings.use_world, lumens_per_watt=lumens_per_watt, lamps=lamps
+        )
     except BaseException:
         remove(room)
         raise
@@ -159,7 +161,7 @@ class HAARLIGHT_OT_relight(_Works, bpy.types.Operator):
         if before.wanted.medium == "MAPS":
             raise ValueError("light maps are not relit; bake again, or bake into vertices")
         # The same pieces, and lumens as what shows the light takes them.
-        room = exported(context, before.exported.only, before.exported.lumens_per_watt)
+        room = exported(context, before.exported.only, before.exported.lumens_per_watt, before.exported.lamps)
         try:
             return Job(room, wanted(context.scene.haarlight, room), before.light)
         except BaseException:

@@ -236,8 +236,30 @@ def test_relighting_says_why_it_cannot():
     bpy.ops.haarlight.bake()
     scene.objects["One"].location.x += 0.1
     bpy.context.view_layer.update()
-    with pytest.raises(RuntimeError, match="haarlight: "):
+    with pytest.raises(RuntimeError, match="haarlight: .*another shape .*'One'.*; bake again$"):
         bpy.ops.haarlight.relight()
+
+
+def test_lamps_are_turned_off_and_on_again():
+    scene = grey_room(error=1.0)
+    scene.objects["Area"].data.energy = 0.0
+    bpy.ops.haarlight.bake()
+    assert {p.name for p in session.baked(show.of_scene(scene), show.KEY).exported.pieces if p.kind != "mesh"} == {"Point"}
+    scene.objects["Area"].data.energy = 10.0
+    # Its shadows are not known.
+    with pytest.raises(RuntimeError, match="'Area'.*; bake again"):
+        bpy.ops.haarlight.relight()
+    bpy.ops.haarlight.bake()
+    both = mean_light(by_name(scene)["Room"])
+    shares = []
+    for off, on in (("Area", "Point"), ("Point", "Area")):
+        bpy.data.lights[off].energy, bpy.data.lights[on].energy = 0.0, 10.0
+        assert bpy.ops.haarlight.relight() == {"FINISHED"}
+        shares.append(mean_light(by_name(scene)["Room"]))
+    assert sum(shares) == pytest.approx(both, rel=0.01) and min(share.min() for share in shares) > 1.0
+    bpy.data.lights["Area"].energy = 0.0
+    assert bpy.ops.haarlight.relight() == {"FINISHED"}
+    assert mean_light(by_name(scene)["Room"]).max() < 1e-6
 
 
 def test_originals_are_untouched_and_come_back():
