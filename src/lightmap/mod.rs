@@ -19,5 +19,4 @@ mod texels;
 mod unwrap;
 
 pub use bake::MapLimits;
-pub use maps::{LightMaps, Page};
-pub use texels::Texel;
+pub use maps::{LightMaps, Page, Texel};

@@ -209,7 +209,8 @@ impl Coarse {
     }
 
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
-    /// padding would waste. `known` cuts are kept if they are good enough.
+    /// padding would waste. `known` cuts are kept if they are good enough, and one for each light: where a lamp was given
+    /// another spectrum there may be more lights now, or fewer.
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
@@ -236,7 +237,7 @@ impl Coarse {
         let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
         let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
         let tolerance = tolerance.max(UNSEEN);
-        if let Some(cuts) = known {
+        if let Some(cuts) = known.filter(|cuts| cuts.len() == spectra.len()) {
             let lanes = Lanes::ratio(spectra, &cuts, weights);
             let (error, _) = self.loss(&lanes, &references, &jacobians, total);
             if error <= tolerance {

@@ -1,5 +1,6 @@
 //! Is there a surface, and is there a lamp?
 
+use super::place;
 use crate::error::Problem;
 use crate::scene::Scene;
 use serde_json::Value;
@@ -44,7 +45,7 @@ pub(super) fn nothing(scene: &Scene) -> Option<Problem> {
         )
     };
     let what = format!("there is nothing to bake: {why}");
-    Some(Problem::new(scene.source.place(), what, next))
+    Some(Problem::new(place(scene), what, next))
 }
 
 /// A room without a lamp.
@@ -55,7 +56,7 @@ pub(super) fn no_lamp(scene: &Scene) -> Option<Problem> {
     });
     (!glows && scene.lights.is_empty()).then(|| {
         Problem::new(
-            scene.source.place(),
+            place(scene),
             "there is no lamp, all would be black",
             "give a material an emissive colour and strength (KHR_materials_emissive_strength, cd/m2), export the \
              lights (KHR_lights_punctual), or write an \"emission\" with \"luminance_cd_m2\" for a material into the \

@@ -5,8 +5,7 @@
 //! a rule of seven points, or three where it is far. Where little stands between, what is seen is the surface less its shadows,
 //! exactly; else rays to parts chosen by what they bring find the visible share.
 
-use super::gatherer::{Gatherer, Memory};
-use super::receiver::Receiver;
+use super::point::{Gatherer, Memory, Receiver};
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_polygon, quarters};
 use crate::light::Filter;
@@ -233,7 +232,8 @@ impl Gatherer<'_> {
             return (seen, None);
         }
         let (more, noise) = self.by_lamp_rays(luminaire, &parts, to, bright, memory);
-        let filter = self.tint(memory);
+        let owners = vec![0; memory.segments.len()];
+        let filter = self.tints(&owners, 1, memory).first().copied();
         memory.noise += noise * self.left_by(filter.as_ref()).powi(2);
         (seen + more, filter)
     }

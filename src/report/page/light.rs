@@ -12,7 +12,7 @@
 //! | spectrum for each lux | mean and principal components, 65535ths of a component's range | stated in the page |
 
 use super::history::{Corner, History, corners};
-use crate::color::seen_difference;
+use crate::color::de2000;
 use crate::gather::Baked;
 use crate::solve::Bake;
 use crate::spectrum::{LEAVES, Leaves};
@@ -129,6 +129,22 @@ fn glows(bake: &Bake, baked: &Baked, part: usize) -> bool {
     scene.materials[surface.material].emission.is_some()
 }
 
+/// Error of the light at each vertex of a baked mesh, CIEDE2000, and its mean by area; `order`: its surfaces as the file has
+/// them. None where it is not known.
+pub(crate) fn error_map(
+    bake: &Bake,
+    baked: &Baked,
+    history: &History,
+    order: &[usize],
+) -> Option<(Vec<f64>, f64)> {
+    let corners = corners(bake, baked, order);
+    let count = order.iter().map(|&k| baked.surfaces[k].vertices.len());
+    let mut area = vec![0.0; count.sum()];
+    corners.iter().for_each(|c| area[c.vertex] += c.area);
+    let steps = history.at(bake.tree(), &corners, area.len());
+    errors(bake, &steps, &corners, &area)
+}
+
 /// Error of the light at each vertex, and its mean by area: how far the last two rounds are from each other there, evened out
 /// and scaled to have the mean that the last round states. None where a round has no estimate.
 fn errors(
@@ -142,8 +158,10 @@ fn errors(
     };
     let stated = bake.rounds().last()?.error.total_de2000.value?;
     let white = bake.light().white;
-    let differ =
-        |(a, b): (&[f32; 3], &[f32; 3])| seen_difference(a.map(f64::from), b.map(f64::from), white);
+    let differ = |(a, b): (&[f32; 3], &[f32; 3])| match a == b || white[1] <= 0.0 {
+        true => 0.0,
+        false => de2000(a.map(f64::from), b.map(f64::from), white),
+    };
     let mut error: Vec<f64> = before.iter().zip(last).map(differ).collect();
     for _ in 0..EVENED {
         even_out(&mut error, corners, area);
