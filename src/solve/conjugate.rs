@@ -214,7 +214,7 @@ fn ratios<const L: usize>(a: &[f64; L], b: &[f64; L]) -> [f32; L] {
 }
 
 /// `x y`, element by element.
-fn product<const L: usize>(x: &Rows, y: &Rows) -> Rows {
+pub(super) fn product<const L: usize>(x: &Rows, y: &Rows) -> Rows {
     let mut out = x.clone();
     for (x, y) in out.all_mut::<L>().iter_mut().zip(y.all::<L>()) {
         *x = std::array::from_fn(|l| x[l] * y[l]);
