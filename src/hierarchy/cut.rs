@@ -119,6 +119,30 @@ impl Cut {
         }
     }
 
+    /// Takes the points that edges of the triangle have: its own move onto them, those of neighbours are added.
+    fn share(&mut self, vertices: [u32; 3], edges: &BTreeMap<Edge, Vec<f64>>) {
+        for w in &mut self.points {
+            if let Some((edge, x)) = on_edge(vertices, *w)
+                && let Some(points) = edges.get(&edge)
+            {
+                let nearest = points
+                    .iter()
+                    .copied()
+                    .min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs()));
+                *w = edge_weights(vertices, edge, nearest.unwrap_or(x));
+            }
+        }
+        for k in 0..3 {
+            let edge = key(vertices[k], vertices[(k + 1) % 3]);
+            for &x in edges.get(&edge).into_iter().flatten() {
+                let w = edge_weights(vertices, edge, x);
+                if !self.points.contains(&w) {
+                    self.points.push(w);
+                }
+            }
+        }
+    }
+
     /// Gives every part the points that lie on its edges, so that neighbours have the same.
     fn fit(&mut self, plane: &Plane) {
         let at: Vec<DVec3> = self.points.iter().map(|&w| plane.at(w)).collect();
@@ -301,12 +325,15 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
         .collect()
 }
 
-fn key(a: u32, b: u32) -> (u32, u32) {
+/// Its lower and its higher vertex.
+type Edge = (u32, u32);
+
+fn key(a: u32, b: u32) -> Edge {
     (a.min(b), a.max(b))
 }
 
 /// An edge with the share of the way from its lower to its higher vertex, for a point on it.
-fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<((u32, u32), f64)> {
+fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<(Edge, f64)> {
     let k = w.iter().position(|&x| x == 0.0)?;
     let (i, j) = ((k + 1) % 3, (k + 2) % 3);
     if w[i] == 0.0 || w[j] == 0.0 {
@@ -316,25 +343,30 @@ fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<((u32, u32), f64)> {
     Some((key(a, b), if a < b { w[j] } else { w[i] }))
 }
 
+/// Shares of the way along each edge at which cuts have points, ascending; merged where both sides mean the same.
+fn points_on_edges(mesh: &Mesh, cuts: &[Cut]) -> BTreeMap<Edge, Vec<f64>> {
+    let mut edges: BTreeMap<Edge, Vec<f64>> = BTreeMap::new();
+    for cut in cuts {
+        let vertices = mesh.triangles[cut.triangle as usize];
+        for &w in &cut.points {
+            if let Some((edge, t)) = on_edge(vertices, w) {
+                edges.entry(edge).or_default().push(t);
+            }
+        }
+    }
+    for (&(a, b), points) in &mut edges {
+        let length = mesh.positions[a as usize].distance(mesh.positions[b as usize]);
+        let least = 2.0 * TOUCH * mesh.half_size / length;
+        points.sort_by(f64::total_cmp);
+        points.dedup_by(|x, y| *x - *y <= least);
+    }
+    edges
+}
+
 impl Mesh {
     /// The mesh with some triangles cut, and their neighbours fitted.
     pub fn cut(mut self, cuts: &[Cut]) -> Self {
-        // Points on edges, merged where both sides mean the same.
-        let mut edges: BTreeMap<(u32, u32), Vec<f64>> = BTreeMap::new();
-        for cut in cuts {
-            let vertices = self.triangles[cut.triangle as usize];
-            for &w in &cut.points {
-                if let Some((edge, t)) = on_edge(vertices, w) {
-                    edges.entry(edge).or_default().push(t);
-                }
-            }
-        }
-        for (&(a, b), points) in &mut edges {
-            let length = self.positions[a as usize].distance(self.positions[b as usize]);
-            let least = 2.0 * TOUCH * self.half_size / length;
-            points.sort_by(f64::total_cmp);
-            points.dedup_by(|x, y| *x - *y <= least);
-        }
+        let edges = points_on_edges(&self, cuts);
         let by_triangle: HashMap<u32, &Cut> = cuts.iter().map(|c| (c.triangle, c)).collect();
         let count = self.triangles.len();
         let mut sides = vec![[false; 2]; count];
@@ -346,7 +378,7 @@ impl Mesh {
         self.half_size = old.half_size;
         self.positions.clone_from(&old.positions);
         self.first_triangle.clear();
-        let mut welded: HashMap<((u32, u32), u64), u32> = HashMap::new();
+        let mut welded = HashMap::new();
         for (t, &sides) in sides.iter().enumerate() {
             while self.first_triangle.len() <= old.origin[t].0 as usize {
                 self.first_triangle.push(self.triangles.len() as u32);
@@ -363,44 +395,9 @@ impl Mesh {
                 }
             };
             let plane = Plane::of(&old, t as u32);
-            for w in &mut cut.points {
-                if let Some((edge, x)) = on_edge(vertices, *w)
-                    && let Some(points) = edges.get(&edge)
-                {
-                    let nearest = points
-                        .iter()
-                        .copied()
-                        .min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs()));
-                    *w = edge_weights(vertices, edge, nearest.unwrap_or(x));
-                }
-            }
-            for k in 0..3 {
-                let edge = key(vertices[k], vertices[(k + 1) % 3]);
-                for &x in edges.get(&edge).into_iter().flatten() {
-                    let w = edge_weights(vertices, edge, x);
-                    if !cut.points.contains(&w) {
-                        cut.points.push(w);
-                    }
-                }
-            }
+            cut.share(vertices, &edges);
             cut.fit(&plane);
-            let ids: Vec<u32> = cut
-                .points
-                .iter()
-                .map(|&w| {
-                    if let Some(k) = w.iter().position(|&x| x == 1.0) {
-                        return vertices[k];
-                    }
-                    let mut place = || {
-                        self.positions.push(plane.at(w));
-                        self.positions.len() as u32 - 1
-                    };
-                    match on_edge(vertices, w) {
-                        Some((edge, x)) => *welded.entry((edge, x.to_bits())).or_insert_with(place),
-                        None => place(),
-                    }
-                })
-                .collect();
+            let ids = self.weld(&cut, vertices, &plane, &mut welded);
             for corners in cut.triangles(&plane) {
                 let id = self.within.len() as u32;
                 self.within.push(corners.map(|k| cut.points[k as usize]));
@@ -412,6 +409,30 @@ impl Mesh {
         }
         self.half = self.paired();
         self
+    }
+
+    /// Vertices at the points of a cut: points on an edge are those of its neighbour.
+    fn weld(
+        &mut self,
+        cut: &Cut,
+        vertices: [u32; 3],
+        plane: &Plane,
+        welded: &mut HashMap<(Edge, u64), u32>,
+    ) -> Vec<u32> {
+        let id = |&w: &[f64; 3]| {
+            if let Some(k) = w.iter().position(|&x| x == 1.0) {
+                return vertices[k];
+            }
+            let mut place = || {
+                self.positions.push(plane.at(w));
+                self.positions.len() as u32 - 1
+            };
+            match on_edge(vertices, w) {
+                Some((edge, x)) => *welded.entry((edge, x.to_bits())).or_insert_with(place),
+                None => place(),
+            }
+        };
+        cut.points.iter().map(id).collect()
     }
 
     /// Takes over triangle `t` of another mesh, or a part of it.
@@ -438,7 +459,7 @@ impl Mesh {
 }
 
 /// Weights of a point on an edge, the same bits from both sides.
-fn edge_weights(vertices: [u32; 3], (low, high): (u32, u32), t: f64) -> [f64; 3] {
+fn edge_weights(vertices: [u32; 3], (low, high): Edge, t: f64) -> [f64; 3] {
     vertices.map(|v| {
         if v == low {
             1.0 - t

@@ -1,5 +1,6 @@
 //! What a solution is asked: light at receivers, and which of them something covers.
 
+use super::estimate::Distance;
 use super::{Bake, Care, Closed, DE_PER_PERCENT, by_rays, flux};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::light::Glass;
@@ -17,6 +18,22 @@ const MOSTLY_COVERED: f64 = 0.01;
 const PRESSED: f64 = 2e-3;
 
 impl Bake {
+    /// Looks at the watched points: how far they are from where they were a round ago, see [`super::estimate`].
+    pub(super) fn distance(&mut self) -> Option<Distance> {
+        let round = self.rounds.len();
+        let mut gathered = self.gather(&self.probes.receivers(&self.tree, round));
+        if self.keep {
+            let traces = gathered.iter_mut().map(|g| g.packed.take()).collect();
+            self.watched = [std::mem::take(&mut self.watched[1]), traces];
+        }
+        let seen: Vec<[f64; 3]> = gathered
+            .iter()
+            .map(|g| self.lanes.tristimulus(&g.irradiance))
+            .collect();
+        let by_rays = self.by_rays();
+        self.probes.compare(seen, self.light.white, round, by_rays)
+    }
+
     /// Gathers at receivers, in order.
     pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
         self.gather_with(receivers, Care::Full)
