@@ -2,9 +2,12 @@
 //! through it.
 
 use crate::scene::check::Check;
-use crate::scene::json::{self, Item};
+use crate::scene::json::{self, Item, double};
 use crate::scene::nodes::Placed;
 use crate::scene::{Camera, Projection};
+use gltf::json::Node;
+use gltf::json::camera::Type;
+use gltf::json::validation::Checked::{Invalid, Valid};
 use serde_json::Value;
 
 /// One entry for each node of the scene that carries a camera.
@@ -14,9 +17,11 @@ pub(crate) fn cameras(json: &Value, placed: &[Placed], check: &mut Check) -> Vec
         let Some(node) = json::item(json, "nodes", "node", placed.node) else {
             continue;
         };
-        let Some(index) = node.index("camera", check) else {
+        let read = node.read::<Node>(check);
+        let Some(index) = read.and_then(|node| node.camera) else {
             continue;
         };
+        let index = index.value();
         let item = json::referred(json, "cameras", "camera", index, &node.place, check);
         let Some(item) = item else { continue };
         match lens(&item, check) {
@@ -37,22 +42,21 @@ pub(crate) fn cameras(json: &Value, placed: &[Placed], check: &mut Check) -> Vec
 }
 
 fn lens(item: &Item<'_>, check: &mut Check) -> Option<(Projection, Option<f64>)> {
-    match item.text("type", check)? {
-        "perspective" => {
-            let lens = item.child("perspective", check)?;
-            let angle = lens.number("yfov", check)?;
-            let aspect = lens.number("aspectRatio", check).filter(|&a| a > 0.0);
+    let camera = item.read::<gltf::json::Camera>(check)?;
+    match camera.type_ {
+        Valid(Type::Perspective) => {
+            let lens = camera.perspective?;
+            let angle = double(lens.yfov);
+            let aspect = lens.aspect_ratio.map(double).filter(|&a| a > 0.0);
             let sound = angle > 0.0 && angle < std::f64::consts::PI;
             sound.then_some((Projection::Perspective(angle), aspect))
         }
-        "orthographic" => {
-            let lens = item.child("orthographic", check)?;
-            let (x, y) = (
-                lens.number("xmag", check)?.abs(),
-                lens.number("ymag", check)?.abs(),
-            );
-            (x > 0.0 && y > 0.0).then_some((Projection::Orthographic(y), Some(x / y)))
+        Valid(Type::Orthographic) => {
+            let lens = camera.orthographic?;
+            let [x, y] = [lens.xmag, lens.ymag].map(|half| double(half).abs());
+            let sound = [x, y].iter().all(|&half| half > 0.0 && half.is_finite());
+            sound.then_some((Projection::Orthographic(y), Some(x / y)))
         }
-        _ => None,
+        Invalid => None,
     }
 }

@@ -12,6 +12,7 @@ use crate::scene::nodes::Placed;
 use crate::scene::primitive::{self, MAX_TEXCOORDS, Outcome, Primitive};
 use crate::scene::{Camera, Image, Surface, camera, image, instances, world};
 use glam::DMat4;
+use gltf::json::{Node, mesh};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -167,9 +168,11 @@ impl<'a> Reader<'a> {
             let Some(node) = json::item(self.json, "nodes", "node", placed.node) else {
                 continue;
             };
-            let Some(mesh) = node.index("mesh", &mut silent) else {
+            let read = node.read::<Node>(&mut silent);
+            let Some(mesh) = read.and_then(|node| node.mesh) else {
                 continue;
             };
+            let mesh = mesh.value();
             let claims = by_mesh.entry(mesh).or_insert_with(|| self.claims(mesh));
             let copies = instances::count(&node, &self.accessors, &mut silent).unwrap_or(1);
             for (total, claim) in total.iter_mut().zip(claims) {
@@ -214,13 +217,15 @@ impl<'a> Reader<'a> {
         let Some(node) = json::item(self.json, "nodes", "node", placed.node) else {
             return;
         };
-        let Some(mesh) = node.index("mesh", check) else {
+        let read = node.read::<Node>(check);
+        let Some(mesh) = read.and_then(|node| node.mesh) else {
             return;
         };
+        let mesh = mesh.value();
         let item = json::referred(self.json, "meshes", "mesh", mesh, &node.place, check);
         let Some(mut item) = item else { return };
         item.place = format!("{}, {}", node.place, item.place);
-        if node.map.contains_key("skin") {
+        if node.has("skin") {
             let what = "nodes have a skin; their meshes are taken as they stand, unbent";
             self.tally.count(what, 1, &node.place);
         }
@@ -243,8 +248,11 @@ impl<'a> Reader<'a> {
                 continue;
             };
             let primitive = Item { map, place };
-            let material = self.material(&primitive, check);
-            self.read(mesh, index, &primitive, check);
+            let Some(given) = primitive.read::<mesh::Primitive>(check) else {
+                continue;
+            };
+            let material = self.material(&primitive, &given, check);
+            self.read((mesh, index), &primitive, &given, check);
             let (Some(material), Some(Some(read))) =
                 (material, self.primitives.get(&(mesh, index)))
             else {
@@ -282,39 +290,49 @@ impl<'a> Reader<'a> {
     }
 
     /// Index in the document's materials of what a primitive is made of.
-    fn material(&self, primitive: &Item<'_>, check: &mut Check) -> Option<usize> {
-        let materials = &self.document.materials;
-        if !primitive.map.contains_key("material") {
+    fn material(
+        &self,
+        item: &Item<'_>,
+        primitive: &mesh::Primitive,
+        check: &mut Check,
+    ) -> Option<usize> {
+        let Some(index) = primitive.material.map(|index| index.value()) else {
             // The default one stands at the end of the list as soon as one primitive needs it.
-            return materials.len().checked_sub(1);
-        }
-        let index = primitive.index("material", check)?;
-        let known = json::len(self.json, "materials");
+            let last = self.document.materials.len().checked_sub(1);
+            return last.filter(|_| !item.has("material"));
+        };
         json::referred(
             self.json,
             "materials",
             "material",
             index,
-            &primitive.place,
+            &item.place,
             check,
         )?;
-        (index < known).then_some(index)
+        Some(index)
     }
 
     /// Reads a primitive, once for all nodes that use its mesh.
-    fn read(&mut self, mesh: usize, index: usize, primitive: &Item<'a>, check: &mut Check) {
-        if self.primitives.contains_key(&(mesh, index)) {
+    fn read(
+        &mut self,
+        key: (usize, usize),
+        primitive: &Item<'a>,
+        given: &mesh::Primitive,
+        check: &mut Check,
+    ) {
+        if self.primitives.contains_key(&key) {
             return;
         }
-        let outcome = primitive::read(primitive, &mut self.accessors, self.unpacked, check);
+        let most = self.unpacked;
+        let outcome = primitive::read(primitive, given, &mut self.accessors, most, check);
         let read = match outcome {
             Outcome::Sound(mut read) => {
                 self.unpacked = self.unpacked.saturating_sub(read.size());
-                if primitive.map.contains_key("targets") {
+                if primitive.has("targets") {
                     let what = "primitives have morph targets; their base shape is taken";
                     self.tally.count(what, 1, &primitive.place);
                 }
-                self.fill_texcoords(primitive, &mut read, check);
+                self.fill_texcoords(primitive, given, &mut read, check);
                 Some(read)
             }
             Outcome::NoArea => {
@@ -324,12 +342,18 @@ impl<'a> Reader<'a> {
             }
             Outcome::Bad => None,
         };
-        self.primitives.insert((mesh, index), read);
+        self.primitives.insert(key, read);
     }
 
     /// A texture may ask for coordinates that the primitive does not have: then they are 0.
-    fn fill_texcoords(&mut self, item: &Item<'_>, read: &mut Primitive, check: &mut Check) {
-        let Some(material) = self.material(item, check) else {
+    fn fill_texcoords(
+        &mut self,
+        item: &Item<'_>,
+        given: &mesh::Primitive,
+        read: &mut Primitive,
+        check: &mut Check,
+    ) {
+        let Some(material) = self.material(item, given, check) else {
             return;
         };
         let material = &self.document.materials[material];

@@ -5,6 +5,7 @@ pub(crate) mod buffers;
 mod camera;
 pub mod changes;
 pub(crate) mod check;
+mod components;
 mod compression;
 mod container;
 pub mod document;
