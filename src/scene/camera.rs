@@ -2,13 +2,37 @@
 //! through it.
 
 use crate::scene::check::Check;
-use crate::scene::json::{self, Item, double};
+use crate::scene::json::{self, Item};
 use crate::scene::nodes::Placed;
-use crate::scene::{Camera, Projection};
+use glam::DMat4;
 use gltf::json::Node;
 use gltf::json::camera::Type;
-use gltf::json::validation::Checked::{Invalid, Valid};
+use gltf::json::validation::Checked::{self, Invalid, Valid};
+use serde::Deserialize;
 use serde_json::Value;
+use std::f64::consts::PI;
+
+/// A camera of the file in world space; looks along -Z of its own space.
+#[derive(Debug, Clone)]
+pub struct Camera {
+    /// For file names.
+    pub name: String,
+    /// Camera to world.
+    pub to_world: DMat4,
+    /// Vertical field of view in radians, or the half height of an orthographic view.
+    pub projection: Projection,
+    /// Width by height; none: 4 by 3.
+    pub aspect: Option<f64>,
+}
+
+/// Projection of a camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// Vertical field of view, radians.
+    Perspective(f64),
+    /// Half of the height, in the file's units.
+    Orthographic(f64),
+}
 
 /// One entry for each node of the scene that carries a camera.
 pub(crate) fn cameras(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<Camera> {
@@ -41,21 +65,38 @@ pub(crate) fn cameras(json: &Value, placed: &[Placed], check: &mut Check) -> Vec
     cameras
 }
 
+/// A camera as far as it says what is seen. gltf's type asks for clipping planes, and nothing here is clipped.
+#[derive(Debug, Deserialize)]
+struct View {
+    #[serde(rename = "type")]
+    kind: Option<Checked<Type>>,
+    perspective: Option<Lens>,
+    orthographic: Option<Lens>,
+}
+
+/// A lens of either kind.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Lens {
+    yfov: Option<f64>,
+    aspect_ratio: Option<f64>,
+    xmag: Option<f64>,
+    ymag: Option<f64>,
+}
+
 fn lens(item: &Item<'_>, check: &mut Check) -> Option<(Projection, Option<f64>)> {
-    let camera = item.read::<gltf::json::Camera>(check)?;
-    match camera.type_ {
+    let view = item.read::<View>(check)?;
+    match view.kind? {
         Valid(Type::Perspective) => {
-            let lens = camera.perspective?;
-            let angle = double(lens.yfov);
-            let aspect = lens.aspect_ratio.map(double).filter(|&a| a > 0.0);
-            let sound = angle > 0.0 && angle < std::f64::consts::PI;
-            sound.then_some((Projection::Perspective(angle), aspect))
+            let lens = view.perspective?;
+            let angle = lens.yfov.filter(|&a| a > 0.0 && a < PI)?;
+            let aspect = lens.aspect_ratio.filter(|&a| a > 0.0);
+            Some((Projection::Perspective(angle), aspect))
         }
         Valid(Type::Orthographic) => {
-            let lens = camera.orthographic?;
-            let [x, y] = [lens.xmag, lens.ymag].map(|half| double(half).abs());
-            let sound = [x, y].iter().all(|&half| half > 0.0 && half.is_finite());
-            sound.then_some((Projection::Orthographic(y), Some(x / y)))
+            let lens = view.orthographic?;
+            let (x, y) = (lens.xmag?.abs(), lens.ymag?.abs());
+            (x > 0.0 && y > 0.0).then_some((Projection::Orthographic(y), Some(x / y)))
         }
         Invalid => None,
     }

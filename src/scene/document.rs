@@ -5,7 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::scene::Source;
-use crate::scene::buffers::{Buffers, Views, size};
+use crate::scene::buffers::{Buffers, size};
 use crate::scene::check::Check;
 use crate::scene::compression;
 use crate::scene::container;
@@ -15,7 +15,7 @@ use crate::scene::raw;
 pub use crate::scene::raw::{AlphaMode, RawLight, RawLightKind, RawMaterial};
 use crate::scene::texture_info::Slots;
 use crate::scene::uri;
-use gltf::json::{Asset, Buffer, Image};
+use gltf::json::{Asset, Buffer};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -118,7 +118,7 @@ impl Document {
         if check.has_problems() {
             return Err(Error::Input(check.into_parts().0));
         }
-        let buffers = buffers(&json, folder(path), container.bin, &mut check);
+        let buffers = buffers(&json, &uri::folder_of(path), container.bin, &mut check);
         let placed = nodes::walk(&json, &mut check);
         let mut slots = Slots::default();
         let materials = raw::materials(&json, &mut slots, &mut check);
@@ -149,51 +149,6 @@ impl Document {
     pub fn raw_lights(&self) -> &[RawLight] {
         &self.lights
     }
-}
-
-impl Source {
-    /// The bytes of an image of the document, as stored (PNG or JPEG as a rule), wherever they are: in a buffer, a data
-    /// URI or a file beside the document.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if there is no such image or its bytes cannot be had.
-    pub fn image_bytes(&self, index: usize) -> Result<Vec<u8>> {
-        let mut check = Check::new(self.path.display().to_string());
-        let bytes = self.image_bytes_checked(index, &mut check);
-        bytes.ok_or_else(|| Error::Input(check.into_parts().0))
-    }
-
-    fn image_bytes_checked(&self, index: usize, check: &mut Check) -> Option<Vec<u8>> {
-        let item = json::referred(&self.json, "images", "image", index, "", check)?;
-        self.bytes_of(&item, check)
-    }
-
-    /// What an image, or anything that names its bytes as images do, stands for.
-    pub(crate) fn bytes_of(&self, item: &Item<'_>, check: &mut Check) -> Option<Vec<u8>> {
-        match item.read::<Image>(check)? {
-            Image { uri: Some(uri), .. } => uri::read(folder(&self.path), &uri)
-                .map_err(|why| check.problem(&item.place, why, "put the file there"))
-                .ok(),
-            Image {
-                buffer_view: Some(view),
-                ..
-            } => {
-                let buffers = Buffers::sound(self.buffers.clone());
-                let mut views = Views::new(&self.json, &buffers);
-                let span = views.view(view.value(), &item.place, check)?;
-                Some(span.bytes().to_vec())
-            }
-            _ => {
-                check.problem(&item.place, "has neither a URI nor a bufferView", AGAIN);
-                None
-            }
-        }
-    }
-}
-
-fn folder(path: &Path) -> &Path {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
-    parent.unwrap_or(Path::new("."))
 }
 
 fn version(json: &Value, check: &mut Check) {

@@ -3,9 +3,9 @@
 //! Only what some surface or lamp of the scene uses counts. A plan never leaves out an effect that could change the
 //! picture: where a question would be too dear to answer, the effect runs.
 
+use super::check::listed;
 use super::json::short;
 use super::lacking::lacking;
-use super::material::listed;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::Leaves;

@@ -5,7 +5,7 @@
 
 use crate::error::{Error, Problem, Result};
 use crate::scene::accessor::Accessors;
-use crate::scene::check::Check;
+use crate::scene::check::{Check, Tally};
 use crate::scene::document::Document;
 use crate::scene::json::{self, Item};
 use crate::scene::nodes::Placed;
@@ -116,30 +116,6 @@ impl Document {
             }));
         }
         images
-    }
-}
-
-/// What is counted over the whole document and said once.
-#[derive(Debug, Default)]
-pub(crate) struct Tally {
-    counts: BTreeMap<&'static str, (usize, String)>,
-}
-
-impl Tally {
-    pub(crate) fn count(&mut self, what: &'static str, how_many: usize, first: &str) {
-        if how_many > 0 {
-            let entry = self
-                .counts
-                .entry(what)
-                .or_insert_with(|| (0, first.to_owned()));
-            entry.0 += how_many;
-        }
-    }
-
-    fn report(&self, check: &mut Check) {
-        for (what, (count, first)) in &self.counts {
-            check.warn(format!("{count} {what} (first: {first})"));
-        }
     }
 }
 

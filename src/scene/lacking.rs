@@ -2,8 +2,8 @@
 //!
 //! Known are the extensions that change the light. Nothing of them is worked out: each is named, with its materials.
 
+use super::check::listed;
 use super::json::short;
-use super::material::listed;
 use serde_json::Value;
 use std::collections::BTreeMap;
 

@@ -5,9 +5,10 @@
 
 use super::super::check::Check;
 use super::super::json::short;
-use super::super::light::{GREATEST_SIZE, bearable};
+use super::super::lamps::{GREATEST_SIZE, bearable};
 use super::super::{LightKind, Material, PunctualLight, Scene, Sides, Surface};
-use super::{Luminaire, ProfileWish};
+use super::mounted::{Luminaire, tilt_share};
+use super::wish::ProfileWish;
 use crate::data::Leaves;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -117,12 +118,6 @@ fn lies_across(luminaire: &Luminaire) -> bool {
     let [a, b, _] = luminaire.profile.opening_m;
     let (own, opening) = (long(luminaire.extent()), long([a, b]));
     own.is_some() && opening.is_some() && own != opening
-}
-
-/// Share of its light that a lamp has left, hung as it is.
-pub(in crate::scene) fn tilt_share(luminaire: &Luminaire) -> f64 {
-    let cosine = luminaire.nadir().dot(glam::DVec3::NEG_Y).clamp(-1.0, 1.0);
-    luminaire.profile.at_tilt(cosine.acos().to_degrees())
 }
 
 /// Mounts the profiles of surfaces again, which were scaled or turned. A surface that shows nothing any more keeps its light as it was.

@@ -12,7 +12,7 @@
 //! across its rays.
 
 use super::sun::Hours;
-use crate::scene::spectra_file::Reader;
+use crate::scene::reader::Reader;
 use serde_json::{Map, Value};
 use std::str::FromStr;
 
