@@ -115,26 +115,8 @@ impl Plan {
         plan.add(Kind::Interreflection, interreflection(&used));
         plan.add(Kind::Occlusion, occlusion(scene));
         plan.add(Kind::Colour, colour(scene, &used));
-        let spectra = scene.spectra.len();
-        let names: Vec<String> = scene.spectra.iter().map(|s| s.name.clone()).collect();
-        plan.add(
-            Kind::LightSpectra,
-            match spectra {
-                0 => (false, "no lamp".into()),
-                1 => (false, format!("all light is {}", names[0])),
-                n => (true, format!("{n}: {}", listed(&names))),
-            },
-        );
-        let textured = |m: &&&Material| {
-            let mask = matches!(
-                &m.alpha,
-                Alpha::Mask {
-                    texture: Some(_),
-                    ..
-                }
-            );
-            m.paint.is_some() || mask || m.emission.as_ref().is_some_and(|e| e.texture.is_some())
-        };
+        plan.add(Kind::LightSpectra, light_spectra(scene));
+        let textured = |m: &&&Material| is_textured(m);
         plan.add(
             Kind::Textures,
             counted(used.iter().filter(textured), "material"),
@@ -216,6 +198,26 @@ impl Plan {
             reason,
         });
     }
+}
+
+fn light_spectra(scene: &Scene) -> (bool, String) {
+    let names: Vec<String> = scene.spectra.iter().map(|s| s.name.clone()).collect();
+    match &names[..] {
+        [] => (false, "no lamp".into()),
+        [one] => (false, format!("all light is {one}")),
+        many => (true, format!("{}: {}", many.len(), listed(many))),
+    }
+}
+
+fn is_textured(m: &Material) -> bool {
+    let mask = matches!(
+        &m.alpha,
+        Alpha::Mask {
+            texture: Some(_),
+            ..
+        }
+    );
+    m.paint.is_some() || mask || m.emission.as_ref().is_some_and(|e| e.texture.is_some())
 }
 
 impl fmt::Display for Plan {

@@ -133,48 +133,54 @@ fn checked(
             None => break,
         }
     }
-    let indices = match &packed {
-        Some(mesh) => Some(mesh.indices.clone()),
-        None => match given.indices {
-            Some(accessor) => {
-                let place = format!("{}, indices", item.place);
-                Some(accessors.indices(accessor.value(), &place, check)?)
-            }
-            None if item.has("indices") => return None,
-            None => None,
-        },
+    let triangles = match &packed {
+        // Draco always gives a plain list.
+        Some(mesh) => corners(&mesh.indices, Mode::Triangles, count, item, check)?,
+        None => {
+            let indices = match given.indices {
+                Some(accessor) => {
+                    let place = format!("{}, indices", item.place);
+                    accessors.indices(accessor.value(), &place, check)?
+                }
+                None if item.has("indices") => return None,
+                None => (0..u32::try_from(count).unwrap_or(0)).collect(),
+            };
+            corners(&indices, mode, count, item, check)?
+        }
     };
-    // Draco always gives a plain list.
-    let mode = if packed.is_some() {
-        Mode::Triangles
-    } else {
-        mode
-    };
-    let indices = indices.unwrap_or_else(|| (0..u32::try_from(count).unwrap_or(0)).collect());
-    if let Some(at) = indices.iter().position(|&i| i as usize >= count) {
-        let what = format!(
-            "index {at} is {}, but there are {count} vertices",
-            indices[at]
-        );
-        check.problem(&format!("{}, indices", item.place), what, AGAIN);
-        return None;
-    }
-    if mode == Mode::Triangles && indices.len() % 3 != 0 {
-        let left = indices.len() % 3;
-        check.warn(format!(
-            "{}: {left} indices beyond the last triangle are left out",
-            item.place
-        ));
-    }
     let mut primitive = Primitive {
         positions,
         normals,
         texcoords,
         colors,
-        triangles: triangles(&indices, mode),
+        triangles,
     };
     mend(&mut primitive, item, check);
     Some(primitive)
+}
+
+/// Triangles of so many vertices, made sure to name no others.
+fn corners(
+    indices: &[u32],
+    mode: Mode,
+    count: usize,
+    item: &Item<'_>,
+    check: &mut Check,
+) -> Option<Vec<[u32; 3]>> {
+    let place = &item.place;
+    if let Some(at) = indices.iter().position(|&i| i as usize >= count) {
+        let index = indices[at];
+        let what = format!("index {at} is {index}, but there are {count} vertices");
+        check.problem(&format!("{place}, indices"), what, AGAIN);
+        return None;
+    }
+    if mode == Mode::Triangles && indices.len() % 3 != 0 {
+        let left = indices.len() % 3;
+        check.warn(format!(
+            "{place}: {left} indices beyond the last triangle are left out"
+        ));
+    }
+    Some(triangles(indices, mode))
 }
 
 /// The problem was put on the list.

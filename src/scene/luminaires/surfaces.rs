@@ -63,22 +63,7 @@ pub(in crate::scene) fn add(
             };
             let tilt = tilt_share(&luminaire);
             lost = lost.max(1.0 - luminaire.reach());
-            let longest = luminaire.profile.opening_m.into_iter().fold(0.0, f64::max);
-            let across = 2.0 * scale * luminaire.radius();
-            if longest > 0.0 && across > TOO_LONG * longest {
-                check.warn(format!(
-                    "{place}: {} is {across:.2} m across, and its profile that of a lamp of {longest:.2} m; each surface \
-                     shines once, whatever its size",
-                    surface.name
-                ));
-            }
-            if lies_across(&luminaire) {
-                check.warn(format!(
-                    "{place}: the longer side of {} lies across the one of its profile's opening; \"turn_deg\": 90 \
-                     turns the profile",
-                    surface.name
-                ));
-            }
+            odd(&luminaire, surface, scale, &place, check);
             area += luminaire.area();
             flux += wish.flux * tilt;
             lights.push(PunctualLight {
@@ -105,6 +90,26 @@ pub(in crate::scene) fn add(
         debug_assert!(luminance <= GREATEST_SIZE);
         emission.shape = emission.shape.map(|x| x * unit * luminance);
         emission.scale *= unit * luminance;
+    }
+}
+
+/// Warns of a surface that has not the form of its profile's lamp.
+fn odd(luminaire: &Luminaire, surface: &Surface, scale: f64, place: &str, check: &mut Check) {
+    let longest = luminaire.profile.opening_m.into_iter().fold(0.0, f64::max);
+    let across = 2.0 * scale * luminaire.radius();
+    if longest > 0.0 && across > TOO_LONG * longest {
+        check.warn(format!(
+            "{place}: {} is {across:.2} m across, and its profile that of a lamp of {longest:.2} m; each surface \
+             shines once, whatever its size",
+            surface.name
+        ));
+    }
+    if lies_across(luminaire) {
+        check.warn(format!(
+            "{place}: the longer side of {} lies across the one of its profile's opening; \"turn_deg\": 90 \
+             turns the profile",
+            surface.name
+        ));
     }
 }
 
