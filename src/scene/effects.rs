@@ -23,6 +23,7 @@ const CONVEX_PAIRS: usize = 100_000_000;
 
 /// The effects, in the order of the list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Kind {
     /// Light that surfaces pass on.
     Interreflection,
@@ -81,6 +82,7 @@ impl Kind {
 
 /// One line of the plan.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Effect {
     /// [`Kind::name`], or the name of an effect that the program lacks.
     pub name: String,

@@ -19,6 +19,7 @@ const WELD: f64 = 1e-6;
 
 /// The facts of a scene. Lengths are in the file's units (metres in glTF).
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Facts {
     /// The file.
     pub room: String,
@@ -49,6 +50,7 @@ pub struct Facts {
 /// A hint whether the room is closed: edges that no second triangle meets, after welding. Walls that only touch (a
 /// T-vertex, a block on a floor) have open edges and may be tight all the same.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Closed {
     /// Parts that hang together by vertices.
     pub parts: usize,
@@ -62,6 +64,7 @@ pub struct Closed {
 
 /// A lamp.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct LightFact {
     /// Name of the material or light.
     pub name: String,
@@ -84,6 +87,7 @@ pub struct LightFact {
 
 /// A file of photometric data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ProfileFact {
     /// Name of the luminaire in the file.
     pub luminaire: String,
@@ -117,6 +121,7 @@ impl ProfileFact {
 
 /// A material.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct MaterialFact {
     /// Name.
     pub name: String,
@@ -138,6 +143,7 @@ pub struct MaterialFact {
 
 /// An image.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct ImageFact {
     /// Name.
     pub name: String,

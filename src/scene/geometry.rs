@@ -26,6 +26,7 @@ const AGAIN: &str = "export the file again";
 
 /// What a document holds besides paint and light. Of no use where `problems` is not empty.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Geometry {
     /// Every primitive with an area at every node (and instance) of the scene.
     pub surfaces: Vec<Surface>,

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 /// Something that a document asks for and the program lacks.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Lacking {
     /// The effect.
     pub effect: String,

@@ -36,6 +36,7 @@ pub struct PunctualLight {
 
 /// Kinds of KHR_lights_punctual, measured lamps, and those of a sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum LightKind {
     /// Shines alike in all directions.
     Point,

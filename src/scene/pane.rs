@@ -37,6 +37,7 @@ pub struct Pane {
 
 /// Kinds of panes.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum PaneKind {
     /// A slab.
     Glass {

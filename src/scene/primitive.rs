@@ -174,7 +174,7 @@ fn corners(
         check.problem(&format!("{place}, indices"), what, AGAIN);
         return None;
     }
-    if mode == Mode::Triangles && indices.len() % 3 != 0 {
+    if mode == Mode::Triangles && !indices.len().is_multiple_of(3) {
         let left = indices.len() % 3;
         check.warn(format!(
             "{place}: {left} indices beyond the last triangle are left out"

@@ -23,6 +23,7 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// A material, before spectra.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RawMaterial {
     /// Index in the document; none for glTF's default material.
     pub index: Option<usize>,
@@ -93,6 +94,7 @@ impl Default for RawMaterial {
 
 /// KHR_materials_volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct RawVolume {
     /// Thickness below the surface, the file's units; 0: none.
     pub thickness: f64,
@@ -104,6 +106,7 @@ pub struct RawVolume {
 
 /// A punctual light at a node, before spectra.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RawLight {
     /// The light's name, or the node's if it has none.
     pub name: String,
@@ -131,6 +134,7 @@ pub struct RawLight {
 
 /// `type` of a punctual light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RawLightKind {
     /// Alike in all directions.
     Point,

@@ -38,6 +38,7 @@ pub struct Scene {
 
 /// What was changed.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Changes {
     /// Metres for each unit of the file, as the user says.
     pub scale: f64,

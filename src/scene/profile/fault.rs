@@ -2,6 +2,7 @@
 
 /// What is wrong with a file of photometric data, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Fault {
     /// Line of the file, from 1.
     pub line: usize,

@@ -8,6 +8,7 @@ pub const SUN_RADIUS: f64 = 0.5 * 0.53 * std::f64::consts::PI / 180.0;
 
 /// The sky of a room.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Sky {
     /// How its light is spread.
     pub dome: Distribution,

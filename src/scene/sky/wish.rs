@@ -58,6 +58,7 @@ impl FromStr for SkyType {
 
 /// How bright the sky is.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Brightness {
     /// Of open level ground, by the sky alone, lx.
     Illuminance(f64),
@@ -67,6 +68,7 @@ pub enum Brightness {
 
 /// Where the sun stands.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum SunPlace {
     /// Degrees above the horizon, and clockwise from north.
     Angles {
