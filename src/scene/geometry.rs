@@ -124,8 +124,8 @@ struct Reader<'a> {
     document: &'a Document,
     json: &'a Value,
     accessors: Accessors<'a>,
-    /// Read primitives by mesh and index; none: without area, or broken and reported.
-    primitives: BTreeMap<(usize, usize), Option<Primitive>>,
+    /// Read primitives with their materials, by mesh and index; none: without area, or broken and reported.
+    primitives: BTreeMap<(usize, usize), Option<(usize, Primitive)>>,
     tally: Tally,
     /// Vertices and triangles that primitives may still have before they are placed. The claims bound plain ones; what
     /// Draco unpacks to is known only then.
@@ -225,14 +225,12 @@ impl<'a> Reader<'a> {
                 continue;
             };
             let primitive = Item { map, place };
-            let Some(given) = primitive.read::<mesh::Primitive>(check) else {
-                continue;
-            };
-            let material = self.material(&primitive, &given, check);
-            self.read((mesh, index), &primitive, &given, check);
-            let (Some(material), Some(Some(read))) =
-                (material, self.primitives.get(&(mesh, index)))
-            else {
+            // Once for all nodes that use the mesh.
+            if !self.primitives.contains_key(&(mesh, index)) {
+                let read = self.read(&primitive, check);
+                self.primitives.insert((mesh, index), read);
+            }
+            let Some((material, read)) = &self.primitives[&(mesh, index)] else {
                 continue;
             };
             let size = read.size().saturating_mul(copies.len());
@@ -253,7 +251,7 @@ impl<'a> Reader<'a> {
                     mesh,
                     primitive: index,
                     instance: *instance,
-                    material,
+                    material: *material,
                     to_world: *to_world,
                     positions: Vec::new(),
                     normals: None,
@@ -289,50 +287,37 @@ impl<'a> Reader<'a> {
         Some(index)
     }
 
-    /// Reads a primitive, once for all nodes that use its mesh.
-    fn read(
-        &mut self,
-        key: (usize, usize),
-        primitive: &Item<'a>,
-        given: &mesh::Primitive,
-        check: &mut Check,
-    ) {
-        if self.primitives.contains_key(&key) {
-            return;
-        }
-        let most = self.unpacked;
-        let outcome = primitive::read(primitive, given, &mut self.accessors, most, check);
-        let read = match outcome {
+    /// Reads a primitive: its material, and what it is in its own space.
+    fn read(&mut self, item: &Item<'a>, check: &mut Check) -> Option<(usize, Primitive)> {
+        let given = item.read::<mesh::Primitive>(check)?;
+        let material = self.material(item, &given, check);
+        match primitive::read(item, &given, &mut self.accessors, self.unpacked, check) {
             Outcome::Sound(mut read) => {
                 self.unpacked = self.unpacked.saturating_sub(read.size());
-                if primitive.has("targets") {
+                if item.has("targets") {
                     let what = "primitives have morph targets; their base shape is taken";
-                    self.tally.count(what, 1, &primitive.place);
+                    self.tally.count(what, 1, &item.place);
                 }
-                self.fill_texcoords(primitive, given, &mut read, check);
-                Some(read)
+                self.fill_texcoords(item, material?, &mut read, check);
+                Some((material?, read))
             }
             Outcome::NoArea => {
                 let what = "primitives are points or lines and are left out";
-                self.tally.count(what, 1, &primitive.place);
+                self.tally.count(what, 1, &item.place);
                 None
             }
             Outcome::Bad => None,
-        };
-        self.primitives.insert(key, read);
+        }
     }
 
     /// A texture may ask for coordinates that the primitive does not have: then they are 0.
     fn fill_texcoords(
         &mut self,
         item: &Item<'_>,
-        given: &mesh::Primitive,
+        material: usize,
         read: &mut Primitive,
         check: &mut Check,
     ) {
-        let Some(material) = self.material(item, given, check) else {
-            return;
-        };
         let material = &self.document.materials[material];
         let textures = [
             &material.base_color_texture,

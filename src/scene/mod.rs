@@ -41,6 +41,7 @@ mod surface;
 mod texture;
 mod texture_info;
 mod transmittance;
+mod typed;
 pub(crate) mod uri;
 mod world;
 
