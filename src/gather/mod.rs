@@ -4,7 +4,7 @@ mod bake;
 pub mod refined;
 mod spectra;
 
-pub use crate::transport::point::MOSTLY;
+pub use crate::transport::MOSTLY;
 pub use bake::{Baked, Interpolation, Probed};
 pub(crate) use bake::{KeptVertex, Look, Vertex, lend};
 

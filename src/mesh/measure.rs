@@ -8,7 +8,7 @@
 
 use super::grow::{Growth, mix};
 use super::write::Settled;
-use crate::color::de2000;
+use crate::color::seen_difference;
 use crate::gather::{Interpolation, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
@@ -99,10 +99,7 @@ impl Growth<'_> {
         self.looks.complete(progress);
         self.looks.patient = false;
         let white = bake.light().white;
-        let difference = |a: [f64; 3], b: [f64; 3]| match a == b || white[1] <= 0.0 {
-            true => 0.0,
-            false => de2000(a, b, white),
-        };
+        let difference = |a, b| seen_difference(a, b, white);
         let sample = |(cell, weights, looks): (usize, [f64; 3], [u32; 2])| {
             let of = &self.cells.all[cell];
             let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| seen.xyz));

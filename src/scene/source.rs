@@ -23,6 +23,11 @@ pub struct Source {
 }
 
 impl Source {
+    /// Where the problems of a whole room are.
+    pub(crate) fn place(&self) -> String {
+        self.path.display().to_string()
+    }
+
     /// The bytes of an image of the document, as stored (PNG or JPEG as a rule), wherever they are: in a buffer, a data
     /// URI or a file beside the document.
     ///
