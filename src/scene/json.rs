@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn all_that_is_wrong_is_told_and_the_rest_is_read() {
         let (read, problems) = node(
-            json!({"mesh": -1, "camera": 3, "scale": [1, 2], "matrix": "x",
+            json!({"mesh": -1, "camera": 3, "scale": [1, 2, 3, 4], "matrix": [1],
             "children": [4, "y", 5, 1u64 << 32], "translation": [1, "z", 3]}),
         );
         let read = read.unwrap();

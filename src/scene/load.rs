@@ -41,7 +41,7 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn from_document(document: Document, options: &Options) -> Result<Self> {
         let geometry = document.load_geometry();
-        let mut check = Check::new(document.source.path.display().to_string());
+        let mut check = Check::new(document.source.place());
         let (surfaces, images) = (geometry.surfaces, geometry.images);
         let mut lit = Lit::of(&document, surfaces, &images, options, &mut check);
         let sky = lit.under_sky(&document, options, &mut check);

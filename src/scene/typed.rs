@@ -2,9 +2,9 @@
 //! that the cost does not depend on what else a file puts there. What is wrong is told, with its path, and the rest read without it.
 
 use super::check::Check;
+use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{
-    DeserializeOwned, DeserializeSeed, Deserializer, Error, Expected, IntoDeserializer, MapAccess,
-    SeqAccess, Unexpected, Visitor, value::StrDeserializer,
+    DeserializeOwned, Deserializer, Error, Expected, IntoDeserializer, Unexpected, Visitor,
 };
 use serde_json::{Map, Value};
 use std::fmt;
@@ -53,7 +53,12 @@ pub(crate) fn read<T: DeserializeOwned>(
 ) -> Option<T> {
     let (mut without, mut told) = (Vec::new(), Vec::<String>::new());
     while told.len() < MOST_WRONG {
-        let wrong = match T::deserialize(Part::Object(map, &without)) {
+        let part = Part {
+            what: Json::Object(map),
+            at: At::Root,
+            without: &without,
+        };
+        let wrong = match T::deserialize(part) {
             Ok(read) => return Some(read),
             Err(wrong) => wrong,
         };
@@ -94,10 +99,13 @@ fn words(wanted: &str) -> String {
         "a sequence" => "a list".into(),
         "a map" => "an object".into(),
         _ if wanted.starts_with("struct ") => "an object".into(),
-        _ => match wanted.strip_prefix("an array of length ") {
-            Some(n) => format!("a list of {n} finite numbers"),
-            None => wanted.into(),
-        },
+        _ => {
+            let long = wanted.strip_prefix("an array of length ");
+            match long.or(wanted.strip_suffix(" elements in sequence")) {
+                Some(n) => format!("a list of {n} finite numbers"),
+                None => wanted.into(),
+            }
+        }
     }
 }
 
@@ -111,39 +119,73 @@ fn whole(value: &Value) -> Option<u64> {
     value.as_u64().or(sound.then_some(number as u64))
 }
 
-/// A piece of JSON that is read, and what it is read without.
+/// A piece of JSON that is read.
 #[derive(Clone, Copy)]
-enum Part<'a> {
-    Object(&'a Map<String, Value>, &'a [*const Value]),
-    /// With the key that it stands at.
-    Value(&'a Value, &'a str, &'a [*const Value]),
+struct Part<'a> {
+    what: Json<'a>,
+    at: At<'a>,
+    /// What it is read without.
+    without: &'a [*const Value],
+}
+
+#[derive(Clone, Copy)]
+enum Json<'a> {
+    Object(&'a Map<String, Value>),
+    Value(&'a Value),
+}
+
+/// Where in the piece around it.
+#[derive(Clone, Copy)]
+enum At<'a> {
+    Root,
+    Key(&'a str),
+    Index(usize),
 }
 
 impl<'de> Part<'de> {
-    /// The entries of an object that may be seen.
+    fn inside(self, value: &'de Value, at: At<'de>) -> Option<Self> {
+        let what = Json::Value(value);
+        let is_seen = !self.without.contains(&std::ptr::from_ref(value));
+        is_seen.then_some(Self { what, at, ..self })
+    }
+
+    /// What may be seen of an object.
     fn fields<V: Visitor<'de>>(
+        self,
         map: &'de Map<String, Value>,
         keys: impl Iterator<Item = &'de str>,
-        without: &'de [*const Value],
         visitor: V,
     ) -> Result<V::Value, Wrong> {
         let seen = keys.filter(|key| !PASSED_OVER.contains(key));
-        let each = seen.filter_map(|key| Some((key, map.get(key)?)));
-        visitor.visit_map(Entries {
-            each: each.filter(|(_, value)| !without.contains(&std::ptr::from_ref(*value))),
-            at: None,
-            without,
-        })
+        let each = seen.filter_map(|key| Some((key, self.inside(map.get(key)?, At::Key(key))?)));
+        visitor.visit_map(MapDeserializer::new(each))
+    }
+
+    fn elements<V: Visitor<'de>>(self, list: &'de [Value], visitor: V) -> Result<V::Value, Wrong> {
+        let each = list.iter().enumerate();
+        let each = each.filter_map(|(i, value)| self.inside(value, At::Index(i)));
+        let mut list = SeqDeserializer::new(each);
+        let read = visitor.visit_seq(&mut list)?;
+        list.end().map(|()| read)
     }
 
     /// Whole numbers as such, whatever they are written as; where an index of 32 bits would cut one short, as what no index is.
-    fn number<V: Visitor<'de>>(value: &Value, key: &str, visitor: V) -> Result<V::Value, Wrong> {
+    fn number<V: Visitor<'de>>(self, value: &Value, visitor: V) -> Result<V::Value, Wrong> {
+        let is = |keys: &[&str]| matches!(self.at, At::Key(key) if keys.contains(&key));
         match whole(value) {
-            Some(n) if u32::try_from(n).is_ok() || LARGE.contains(&key) => visitor.visit_u64(n),
+            Some(n) if u32::try_from(n).is_ok() || is(&LARGE) => visitor.visit_u64(n),
             // A set of coordinates is no index: that there are not so many is said where it is looked for.
-            Some(_) if key == "texCoord" => visitor.visit_u64(u32::MAX.into()),
+            Some(_) if is(&["texCoord"]) => visitor.visit_u64(u32::MAX.into()),
             _ => visitor.visit_f64(value.as_f64().unwrap_or(f64::NAN)),
         }
+    }
+}
+
+impl<'de> IntoDeserializer<'de, Wrong> for Part<'de> {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
     }
 }
 
@@ -151,31 +193,17 @@ impl<'de> Deserializer<'de> for Part<'de> {
     type Error = Wrong;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Wrong> {
-        match self {
-            Self::Object(map, without) | Self::Value(Value::Object(map), _, without) => {
-                Self::fields(map, map.keys().map(String::as_str), without, visitor)
+        let read = match self.what {
+            Json::Object(map) | Json::Value(Value::Object(map)) => {
+                self.fields(map, map.keys().map(String::as_str), visitor)
             }
-            Self::Value(Value::Array(list), key, without) => {
-                let seen = list.iter().enumerate();
-                let mut entries = Entries {
-                    each: seen.filter(|(_, v)| !without.contains(&std::ptr::from_ref(*v))),
-                    at: Some((key, list.len())),
-                    without,
-                };
-                let read = visitor.visit_seq(&mut entries)?;
-                match entries.each.next() {
-                    None => Ok(read),
-                    Some(_) => Err(Wrong::invalid_length(
-                        list.len(),
-                        &"a list as short as it must be",
-                    )),
-                }
-            }
-            Self::Value(number @ Value::Number(_), key, _) => Self::number(number, key, visitor),
-            Self::Value(Value::String(text), ..) => visitor.visit_borrowed_str(text),
-            Self::Value(Value::Bool(flag), ..) => visitor.visit_bool(*flag),
-            Self::Value(Value::Null, ..) => visitor.visit_unit(),
-        }
+            Json::Value(Value::Array(list)) => self.elements(list, visitor),
+            Json::Value(number @ Value::Number(_)) => self.number(number, visitor),
+            Json::Value(Value::String(text)) => visitor.visit_borrowed_str(text),
+            Json::Value(Value::Bool(flag)) => visitor.visit_bool(*flag),
+            Json::Value(Value::Null) => visitor.visit_unit(),
+        };
+        read.map_err(|wrong| wrong.inside(self))
     }
 
     fn deserialize_struct<V: Visitor<'de>>(
@@ -184,11 +212,11 @@ impl<'de> Deserializer<'de> for Part<'de> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Wrong> {
-        match self {
-            Self::Object(map, without) | Self::Value(Value::Object(map), _, without) => {
-                Self::fields(map, fields.iter().copied(), without, visitor)
-            }
-            _ => self.deserialize_any(visitor),
+        match self.what {
+            Json::Object(map) | Json::Value(Value::Object(map)) => self
+                .fields(map, fields.iter().copied(), visitor)
+                .map_err(|wrong| wrong.inside(self)),
+            Json::Value(_) => self.deserialize_any(visitor),
         }
     }
 
@@ -204,67 +232,9 @@ impl<'de> Deserializer<'de> for Part<'de> {
         visitor.visit_newtype_struct(self)
     }
 
-    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Wrong> {
-        visitor.visit_unit()
-    }
-
     serde::forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple
-        tuple_struct map enum identifier
-    }
-}
-
-/// The entries of an object or of a list.
-struct Entries<'a, I, A> {
-    each: I,
-    at: A,
-    without: &'a [*const Value],
-}
-
-impl<'de, I: Iterator<Item = (&'de str, &'de Value)>> MapAccess<'de>
-    for Entries<'de, I, Option<(&'de str, &'de Value)>>
-{
-    type Error = Wrong;
-
-    fn next_key_seed<K: DeserializeSeed<'de>>(
-        &mut self,
-        seed: K,
-    ) -> Result<Option<K::Value>, Wrong> {
-        self.at = self.each.next();
-        let Some((key, _)) = self.at else {
-            return Ok(None);
-        };
-        let key: StrDeserializer<'_, Wrong> = key.into_deserializer();
-        seed.deserialize(key).map(Some)
-    }
-
-    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Wrong> {
-        let (key, value) = self.at.expect("a key comes before its value");
-        let read = seed.deserialize(Part::Value(value, key, self.without));
-        read.map_err(|wrong| wrong.under(key, value))
-    }
-}
-
-impl<'de, I: Iterator<Item = (usize, &'de Value)>> SeqAccess<'de>
-    for &mut Entries<'de, I, Option<(&'de str, usize)>>
-{
-    type Error = Wrong;
-
-    fn next_element_seed<T: DeserializeSeed<'de>>(
-        &mut self,
-        seed: T,
-    ) -> Result<Option<T::Value>, Wrong> {
-        let Some((index, value)) = self.each.next() else {
-            return Ok(None);
-        };
-        let key = self.at.map_or("", |(key, _)| key);
-        let read = seed.deserialize(Part::Value(value, key, self.without));
-        read.map(Some)
-            .map_err(|wrong| wrong.under(&format!("[{index}]"), value))
-    }
-
-    fn size_hint(&self) -> Option<usize> {
-        self.at.map(|(_, length)| length)
+        tuple_struct map enum identifier ignored_any
     }
 }
 
@@ -292,14 +262,17 @@ impl Wrong {
         }
     }
 
-    fn under(mut self, key: &str, value: &Value) -> Self {
-        self.at.get_or_insert(value);
-        let dot = if self.path.is_empty() || self.path.starts_with('[') {
-            ""
-        } else {
-            "."
+    fn inside(mut self, part: Part<'_>) -> Self {
+        if let Json::Value(value) = part.what {
+            self.at.get_or_insert(value);
+        }
+        let rest = &self.path;
+        self.path = match part.at {
+            At::Root => return self,
+            At::Index(index) => format!("[{index}]{rest}"),
+            At::Key(key) if rest.is_empty() || rest.starts_with('[') => format!("{key}{rest}"),
+            At::Key(key) => format!("{key}.{rest}"),
         };
-        self.path = format!("{key}{dot}{}", self.path);
         self
     }
 }
