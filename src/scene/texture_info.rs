@@ -36,27 +36,20 @@ impl Slots {
         let found = json::referred(json, "textures", "texture", index, &item.place, check)?;
         let texture = found.read::<texture::Texture>(check)?;
         let source = texture.source.value();
-        let image = match found.has("source") {
-            true => {
-                json::referred(json, "images", "image", source, &found.place, check)?;
-                Some(source)
-            }
-            false => {
-                let named = found.map.get("extensions").and_then(Value::as_object);
-                let named: Vec<&str> = named
-                    .into_iter()
-                    .flat_map(|m| m.keys().map(String::as_str))
-                    .take(3)
-                    .collect();
-                let named = json::short(&named.join(", "));
-                let why = if named.is_empty() {
-                    "no image".to_owned()
-                } else {
-                    format!("an image only by {named}, which is not read")
-                };
-                check.warn(format!("{}: has {why}; grey stands in", found.place));
-                None
-            }
+        let image = if found.has("source") {
+            // What gltf has in its place where it is wrong, which was told.
+            let source = Some(source).filter(|&image| image != u32::MAX as usize)?;
+            json::referred(json, "images", "image", source, &found.place, check)?;
+            Some(source)
+        } else {
+            let named = found.extension_names();
+            let named = json::short(&named[..named.len().min(3)].join(", "));
+            let why = match named.is_empty() {
+                true => "no image".to_owned(),
+                false => format!("an image only by {named}, which is not read"),
+            };
+            check.warn(format!("{}: has {why}; grey stands in", found.place));
+            None
         };
         let moved = item.extension::<TextureTransform>("KHR_texture_transform", check);
         let moved = moved.unwrap_or_default();

@@ -9,34 +9,28 @@ use serde::de::{
 use serde_json::{Map, Value};
 use std::fmt;
 
-/// Keys that the types know and nobody here asks for, so that nothing can be wrong with them; and what is read by itself:
-/// names, extras, extensions, textures, which may have extensions, and primitives, which have places of their own.
-const PASSED_OVER: [&str; 24] = [
-    "baseColorTexture",
-    "diffuseTexture",
-    "emissiveTexture",
-    "extensions",
-    "extras",
-    "glossinessFactor",
-    "magFilter",
-    "max",
-    "metallicRoughnessTexture",
-    "mimeType",
-    "min",
-    "minFilter",
-    "name",
-    "normalTexture",
-    "occlusionTexture",
-    "primitives",
-    "skin",
-    "specularFactor",
-    "specularGlossinessTexture",
-    "target",
-    "targets",
-    "thicknessTexture",
-    "transmissionTexture",
-    "weights",
-];
+/// Fields of the types that nobody here asks for, so that nothing can be wrong with them; and what is read by itself: names, extras
+/// and extensions, and textures, which may have extensions.
+fn is_passed_over(key: &str) -> bool {
+    const KEYS: [&str; 14] = [
+        "extensions",
+        "extras",
+        "glossinessFactor",
+        "magFilter",
+        "max",
+        "mimeType",
+        "min",
+        "minFilter",
+        "name",
+        "skin",
+        "specularFactor",
+        "target",
+        "targets",
+        "weights",
+    ];
+    KEYS.contains(&key) || key.ends_with("Texture")
+}
+
 /// Keys of numbers of bytes or elements, which may be above 2^32.
 const LARGE: [&str; 3] = ["byteLength", "byteOffset", "count"];
 /// Wrong keys of an object that are looked for: more are not told in any case.
@@ -63,6 +57,11 @@ pub(crate) fn read<T: DeserializeOwned>(
             Err(wrong) => wrong,
         };
         let path = wrong.path;
+        // A list that is too short without a wrong entry is not told again.
+        let is_around = |told: &String| {
+            let inner = told.strip_prefix(&path);
+            inner.is_some_and(|inner| inner.starts_with(['.', '[']))
+        };
         match wrong.what {
             What::Missing(key) => {
                 let (of, dot) = match path.is_empty() {
@@ -75,8 +74,7 @@ pub(crate) fn read<T: DeserializeOwned>(
                     check.problem(place, what.trim_start(), AGAIN);
                 }
             }
-            // A list that is too short without a wrong entry is not told again.
-            What::Wanted(wanted) if !told.iter().any(|told| told.starts_with(&path)) => {
+            What::Wanted(wanted) if !told.iter().any(is_around) => {
                 let what = format!("'{prefix}{path}' is not {}", words(&wanted));
                 check.problem(place, what, AGAIN);
             }
@@ -156,7 +154,7 @@ impl<'de> Part<'de> {
         keys: impl Iterator<Item = &'de str>,
         visitor: V,
     ) -> Result<V::Value, Wrong> {
-        let seen = keys.filter(|key| !PASSED_OVER.contains(key));
+        let seen = keys.filter(|key| !is_passed_over(key));
         let each = seen.filter_map(|key| Some((key, self.inside(map.get(key)?, At::Key(key))?)));
         visitor.visit_map(MapDeserializer::new(each))
     }
