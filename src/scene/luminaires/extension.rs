@@ -18,7 +18,7 @@ const TABLE: &str = "/extensions/EXT_lights_ies";
 /// The extension on a node.
 #[derive(Debug, Deserialize)]
 struct Ies {
-    light: u32,
+    light: Option<u32>,
     multiplier: Option<f64>,
     color: Option<[f64; 3]>,
 }
@@ -37,7 +37,12 @@ pub struct IesNode {
 /// The profile at a node, if there is one.
 pub(in crate::scene) fn ies_node(json: &Value, node: &Item, check: &mut Check) -> Option<IesNode> {
     let given = node.extension::<Ies>(NAME, check)?;
-    let light = given.light as usize;
+    let Some(light) = given.light else {
+        let what = format!("{NAME} does not say which light");
+        check.problem(&node.place, what, "export the file again");
+        return None;
+    };
+    let light = light as usize;
     let nothing = Value::Null;
     let table = json.pointer(TABLE).unwrap_or(&nothing);
     let item = json::referred(table, "lights", "profile", light, &node.place, check)?;
