@@ -25,6 +25,7 @@ const VERSION: u32 = 1;
 
 /// Arguments of `inspect`.
 #[derive(Debug, Clone, clap::Args)]
+#[non_exhaustive]
 pub struct InspectArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,

@@ -19,6 +19,7 @@ pub const PAGES: [usize; 2] = [64, 16_384];
 
 /// Where the light is written.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+#[non_exhaustive]
 pub enum Medium {
     /// At the vertices of a mesh that is as fine as the light needs it.
     #[default]
@@ -29,6 +30,7 @@ pub enum Medium {
 
 /// What of the light is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[non_exhaustive]
 pub enum Only {
     /// What was reflected at least once: for engines that keep their own lamps.
     Indirect,
@@ -36,6 +38,7 @@ pub enum Only {
 
 /// Options of light maps.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
+#[non_exhaustive]
 pub struct Mapping {
     /// Where the light is written.
     #[arg(long, value_enum, value_name = "WHERE", default_value_t)]

@@ -13,6 +13,7 @@ const WORTH_KNOWING: f64 = 1.15;
 
 /// The choice.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Choice {
     /// The run that is taken; none if the sweep was empty.
     pub run: Option<Run>,

@@ -42,6 +42,7 @@ pub enum Knob {
 
 /// Everything that was found.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Study {
     /// Bakes, by representation as asked for and by falling error.
     pub runs: Vec<Run>,

@@ -37,6 +37,7 @@ const ROUNDS: usize = 15;
 
 /// One row: ns a product.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Stage {
     /// What is timed.
     pub stage: &'static str,
