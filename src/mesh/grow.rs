@@ -7,6 +7,7 @@
 
 use super::cells::{Cell, Cells, Corner, Doubt, Hint, within};
 use super::looks::Looks;
+use super::shades::Shades;
 use crate::color::de2000;
 use crate::gather::Vertex;
 use crate::geometry::sampling::{hash, triangle_weights};
@@ -19,7 +20,7 @@ const UNKNOWN: u32 = u32::MAX;
 const SMALLEST: f64 = 1e-3;
 /// What remains of the mean square after a bisection: two halve a smooth triangle's size, and its error falls with the
 /// square of that.
-const SHRINK: f64 = 0.25;
+pub(super) const SHRINK: f64 = 0.25;
 /// Edges that bend by this share of what the worst does are split with it.
 const BENDS: f64 = 0.5;
 /// Shares down to this part of the largest are dealt with at a time.
@@ -48,6 +49,8 @@ type Lent = HashMap<u32, ([f64; 3], f64)>;
 pub(super) struct Growth<'a> {
     pub(super) cells: Cells,
     pub(super) looks: Looks<'a>,
+    /// What throws shadows.
+    pub(super) shades: Shades<'a>,
     /// Look of each vertex of each sheet.
     looked: Vec<Vec<u32>>,
     /// What covered vertices of each sheet are lent.
@@ -64,7 +67,7 @@ pub(super) struct Growth<'a> {
     /// Variance of a look, by chance.
     pub(super) noise: f64,
     /// Is light looked at, or is the solved light believed?
-    looking: bool,
+    pub(super) looking: bool,
 }
 
 /// How growing ended.
@@ -82,12 +85,19 @@ pub(super) enum End {
 
 impl<'a> Growth<'a> {
     /// Starts with cells.
-    pub(super) fn new(cells: Cells, looks: Looks<'a>, white: [f64; 3], half_size: f64) -> Self {
+    pub(super) fn new(
+        cells: Cells,
+        looks: Looks<'a>,
+        shades: Shades<'a>,
+        white: [f64; 3],
+        half_size: f64,
+    ) -> Self {
         Self {
             looked: vec![Vec::new(); cells.sheets.len()],
             lent: vec![Lent::new(); cells.sheets.len()],
             cells,
             looks,
+            shades,
             white,
             smallest: SMALLEST * half_size,
             most: usize::MAX,
@@ -98,7 +108,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    fn difference(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
+    pub(super) fn difference(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
         // No light anywhere, or none left: no difference.
         if a == b || self.white[1] <= 0.0 {
             return 0.0;
@@ -123,8 +133,11 @@ impl<'a> Growth<'a> {
         looked.resize(sheet.vertices.len(), UNKNOWN);
         let look = &mut looked[vertex as usize];
         if *look == UNKNOWN {
-            let vertex = &sheet.vertices[vertex as usize];
-            *look = self.looks.want(vertex, sheet.surface, sheet.back);
+            let own = &sheet.vertices[vertex as usize];
+            *look = match sheet.beside.get(&vertex) {
+                Some(beside) => self.looks.want_texel(beside, sheet.surface, sheet.back),
+                None => self.looks.want(own, sheet.surface, sheet.back),
+            };
         }
         *look
     }
@@ -178,7 +191,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Light at the corners of a cell.
-    fn light(&self, cell: usize) -> [[f64; 3]; 3] {
+    pub(super) fn light(&self, cell: usize) -> [[f64; 3]; 3] {
         let cell = &self.cells.all[cell];
         cell.corners.map(|c| {
             let sheet = cell.sheet as usize;
@@ -248,7 +261,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Looks at the corners of new cells, and what the solved light lets expect there.
-    fn expect(&mut self, fresh: &[usize], first: bool, progress: &dyn Fn(usize, usize)) {
+    pub(super) fn expect(&mut self, fresh: &[usize], first: bool, progress: &dyn Fn(usize, usize)) {
         self.want_corners(fresh);
         self.looks.complete(progress);
         self.lend();
@@ -294,6 +307,9 @@ impl<'a> Growth<'a> {
         loop {
             let excess = self.sum() - goal;
             if excess <= 0.0 {
+                if self.looking && !self.strict {
+                    self.finish_lines(progress);
+                }
                 return End::Reached;
             }
             if self.looking && self.looks.is_late() {
@@ -318,10 +334,7 @@ impl<'a> Growth<'a> {
                 .into_iter()
                 .partition(|&k| self.cells.all[k].doubt.tested || !looking);
             self.test(&untested, progress);
-            for &k in &tested {
-                self.mark(k);
-            }
-            let fresh = self.cells.split(SHRINK);
+            let fresh = self.split(&tested);
             self.expect(&fresh, false, progress);
         }
     }
@@ -362,7 +375,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Marks the edges of a tested cell that bend; all of them if it is inside that light differs.
-    fn mark(&mut self, k: usize) {
+    pub(super) fn mark(&mut self, k: usize) {
         let doubt = self.cells.all[k].doubt;
         let worst = doubt.bent.into_iter().fold(doubt.inside, f32::max);
         let limit = BENDS as f32 * worst;
