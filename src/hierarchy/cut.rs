@@ -4,6 +4,9 @@
 //! triangle is cut along the segments in which others cross it or stand on it. The parts are convex; a cut runs on to the
 //! border of the part that it crosses. [`super::spaces`] finds out which triangles are worth it (those that belong to
 //! several spaces), and [`Mesh::cut`] makes the triangles, with the points on common edges that their neighbours have.
+//!
+//! What hovers right before a surface (a lamp below a ceiling, a rug, a picture) is as good as on it: below it is a gap with a
+//! light of its own, and a patch that lies in the gap and beside it would show the gap's light to the room.
 //! Lengths are in scene units; points within [`TOUCH`] of each other are one.
 
 use super::mesh::{Face, Mesh, WHOLE};
@@ -14,6 +17,10 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Surfaces nearer than this share of the scene's half size touch: what f32 positions in a file mean.
 const TOUCH: f64 = 1e-6;
+/// What hovers before a surface nearer than this share of the scene's half size cuts it. A room
+/// with a lamp 1 to 20 mm below its ceiling was 2 to 8 % too bright and is within 1.5 %; beyond 6 cm (2 %) nothing changes. Only in
+/// rooms all of whose cuts are made: in a restaurant, where rays do what links do here, four times the leaves gave nothing.
+const HOVER: f64 = 0.01;
 /// A triangle that more than this many others meet stays whole: it is foliage, not a wall.
 const MOST: usize = 256;
 
@@ -208,6 +215,7 @@ struct Plane {
     normal: DVec3,
     area: f64,
     touch: f64,
+    hover: f64,
 }
 
 impl Plane {
@@ -221,6 +229,7 @@ impl Plane {
             normal: mesh.normal[triangle as usize],
             area: mesh.area[triangle as usize],
             touch: TOUCH * mesh.half_size,
+            hover: HOVER * mesh.half_size,
         }
     }
 
@@ -241,12 +250,31 @@ impl Plane {
         2.0 * self.area / self.corners[(k + 1) % 3].distance(self.corners[(k + 2) % 3])
     }
 
+    /// How far points lie before the plane; nothing where that is less than `reach`.
+    fn before(&self, points: [DVec3; 3], reach: f64) -> [f64; 3] {
+        points.map(|p| {
+            let d = self.normal.dot(p - self.corners[0]);
+            if d.abs() <= reach { 0.0 } else { d }
+        })
+    }
+
+    /// Edges of another triangle that hover before this one, inside the triangle: one of them, or all, unless it touches.
+    fn hovering(&self, other: [DVec3; 3]) -> Vec<[DVec3; 2]> {
+        let exact = self.before(other, self.touch);
+        let near = self.before(other, self.hover);
+        let foot = |k: usize| other[k] - self.normal * exact[k];
+        let edge = |k: usize| {
+            let next = (k + 1) % 3;
+            let hovers = near[k] == 0.0 && near[next] == 0.0 && exact[k] * exact[next] > 0.0;
+            let inside = hovers.then(|| clipped([foot(k), foot(next)], &self.corners, self));
+            inside.flatten()
+        };
+        (0..3).filter_map(edge).collect()
+    }
+
     /// Where another triangle crosses this plane or stands on it, inside the triangle.
     fn met(&self, other: [DVec3; 3]) -> Option<[DVec3; 2]> {
-        let d = other.map(|p| {
-            let d = self.normal.dot(p - self.corners[0]);
-            if d.abs() <= self.touch { 0.0 } else { d }
-        });
+        let d = self.before(other, self.touch);
         let mut ends = Vec::with_capacity(3);
         for k in 0..3 {
             let next = (k + 1) % 3;
@@ -288,8 +316,8 @@ fn clipped([p, q]: [DVec3; 2], polygon: &[DVec3], plane: &Plane) -> Option<[DVec
         .then(|| [p + along * low, p + along * high])
 }
 
-/// All triangles that others meet, in parts.
-pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
+/// All triangles that others meet, or, where that is asked for, that something hovers before, in parts.
+pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
     let mut taking: Vec<u32> = mesh.faces.iter().map(|f| f.triangle).collect();
     taking.dedup();
     taking
@@ -300,7 +328,7 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
                 return None;
             }
             let [a, b, c] = plane.corners;
-            let reach = DVec3::splat(plane.touch);
+            let reach = DVec3::splat(if hovering { plane.hover } else { plane.touch });
             let (low, high) = (a.min(b).min(c) - reach, a.max(b).max(c) + reach);
             rays.near(low.as_vec3(), high.as_vec3(), near);
             near.sort_unstable();
@@ -310,7 +338,11 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
                 if mesh.plane[k] == mesh.plane[triangle as usize] || mesh.area[k] <= 0.0 {
                     continue;
                 }
-                segments.extend(plane.met(mesh.triangles[k].map(|v| mesh.positions[v as usize])));
+                let corners = mesh.triangles[k].map(|v| mesh.positions[v as usize]);
+                segments.extend(plane.met(corners));
+                if hovering {
+                    segments.extend(plane.hovering(corners));
+                }
                 if segments.len() > MOST {
                     return None;
                 }

@@ -78,18 +78,31 @@ impl Bake {
 
     /// Which receivers does something lie upon, so near that nobody sees them? See [`PRESSED`].
     pub(crate) fn pressed(&self, receivers: &[Receiver]) -> Vec<bool> {
-        let height = PRESSED * self.mesh.half_size;
         self.with_sight(|_, sight| {
-            let pressed = |to: &Receiver| {
-                let above = Segment::new(
-                    to.point,
-                    to.point + height * to.normal,
-                    [to.plane, NO_PLANE],
-                );
-                sight.occlusion && sight.blocks_one(&above)
-            };
+            let pressed = |to: &Receiver| self.is_pressed(sight, to);
             receivers.par_iter().map(pressed).collect()
         })
+    }
+
+    fn is_pressed(&self, sight: &Sight, to: &Receiver) -> bool {
+        let height = PRESSED * self.mesh.half_size;
+        let above = Segment::new(
+            to.point,
+            to.point + height * to.normal,
+            [to.plane, NO_PLANE],
+        );
+        sight.occlusion && sight.blocks_one(&above)
+    }
+
+    /// Does something solid cover a receiver, or lie upon it?
+    pub(crate) fn is_under(&self, sight: &Sight, to: &Receiver) -> bool {
+        let covered = || {
+            self.closed != Closed::Yes
+                && flux::covered(
+                    &self.mesh, &self.tree, &self.rays, to.point, to.normal, to.plane, to.seed,
+                )
+        };
+        self.is_pressed(sight, to) || covered()
     }
 
     /// What of a leaf others see.

@@ -29,11 +29,11 @@ impl Parting {
                 rays,
             };
         }
-        let cuts = cuts(&mesh, &rays);
+        let cuts = cuts(&mesh, &rays, is_small(&mesh));
         let found = spaces(&mesh, &rays, &cuts, seed);
         let parted = if is_small(&mesh) {
             // Here all are cut, and not only those that part spaces: a patch that something stands on shows what is left
-            // of it as one, dark wedges along the contact.
+            // of it as one, dark wedges along the contact; one that a lamp hangs before shows the gap's light to the room.
             (0..cuts.len()).collect()
         } else {
             found.parted
@@ -62,7 +62,7 @@ impl Parting {
         let mesh = if parted.is_empty() {
             mesh
         } else {
-            let cuts = cuts(&mesh, &mesh.index(scene));
+            let cuts = cuts(&mesh, &mesh.index(scene), is_small(&mesh));
             let some: Vec<_> = parted
                 .iter()
                 .filter_map(|&k| cuts.get(k as usize).cloned())
