@@ -102,7 +102,8 @@ const LEAST_ROUNDS: usize = 3;
 /// Fewer rounds do where a mere preview is asked for, an error of so much, and the estimate is so many times smaller.
 const PREVIEW: f64 = 2.0;
 const EARLY: f64 = 4.0;
-/// A round that leaves this share of the error of the one before has stalled, if there are many links already.
+/// A round that leaves this share of the error of the one before has stalled, if there are many links already. One that finds it
+/// much greater has not: it found light that the rounds before it overlooked, as in the gap above a lamp.
 const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
 /// No round that would make more links than this, at four times those of the last: about 200 MB.
@@ -390,7 +391,7 @@ impl Bake {
             .and_then(|k| estimate(&self.rounds[k]));
         let stalled = before
             .zip(estimate(last))
-            .is_some_and(|(before, now)| now > STALLED * before);
+            .is_some_and(|(before, now)| (STALLED..1.0 / STALLED).contains(&(now / before)));
         (4 * last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING))
             .then_some(Verdict::Exhausted)
     }
