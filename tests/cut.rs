@@ -7,7 +7,7 @@ use built::Room;
 use glam::{DVec3, dvec3};
 use haarlight::audit::Report;
 use haarlight::geometry::RayIndex;
-use haarlight::hierarchy::{Mesh, cuts};
+use haarlight::hierarchy::{Cut, Mesh, cuts};
 use haarlight::scene::Scene;
 use haarlight::solve::{Bake, Settings};
 use proptest::prelude::*;
@@ -237,4 +237,31 @@ fn a_lamp_right_below_a_ceiling_does_not_light_the_room_by_its_gap() {
         let bias = Report::new(&bake, 100, 8192, 1).bias;
         assert!(bias.value.abs() < 0.02, "{gap}: {bias:?}");
     }
+}
+
+/// A rug of many triangles hovers before a floor that a wall stands on: too many outlines to cut along, but the wall still cuts.
+#[test]
+fn what_hovers_takes_no_cut_away() {
+    let mut room = Room::new();
+    let (wall, sheet, rug) = (room.paint(0.5), room.paint(0.5), room.paint(0.5));
+    room.two_sided(sheet);
+    room.hollow(DVec3::ZERO, dvec3(4.0, 3.0, 5.0), [wall; 6]);
+    room.quad(DVec3::X, dvec3(0.0, 0.0, 5.0), dvec3(0.0, 3.0, 0.0), sheet);
+    for k in 0..100 {
+        let at = dvec3(
+            2.0 + 0.1 * f64::from(k % 10),
+            0.005,
+            1.0 + 0.1 * f64::from(k / 10),
+        );
+        room.quad(at, dvec3(0.0, 0.0, 0.1), dvec3(0.1, 0.0, 0.0), rug);
+    }
+    let scene = room.scene();
+    let whole = Mesh::new(&scene);
+    let (standing, all) = (
+        cuts(&whole, &index(&whole), false),
+        cuts(&whole, &index(&whole), true),
+    );
+    assert!(standing.len() >= 4 && all.len() >= standing.len());
+    let parts = |cuts: &[Cut]| Mesh::new(&scene).cut(cuts).triangles.len();
+    assert!(parts(&all) >= parts(&standing) && parts(&all) < 2_000);
 }

@@ -21,6 +21,8 @@ const TOUCH: f64 = 1e-6;
 /// with a lamp 1 to 20 mm below its ceiling was 2 to 8 % too bright and is within 1.5 %; beyond 6 cm (2 %) nothing changes. Only in
 /// rooms all of whose cuts are made: in a restaurant, where rays do what links do here, four times the leaves gave nothing.
 const HOVER: f64 = 0.01;
+/// Parts that what hovers may add to a triangle: a panel adds up to 8, and 40 cards one above the other thousands.
+const OUTLINED: usize = 64;
 /// A triangle that more than this many others meet stays whole: it is foliage, not a wall.
 const MOST: usize = 256;
 
@@ -147,6 +149,22 @@ impl Cut {
                     self.points.push(w);
                 }
             }
+        }
+    }
+
+    /// Cuts along the outlines of what hovers, unless that is too much: then none of them counts.
+    fn outlined(self, plane: &Plane, outlines: Vec<[DVec3; 2]>) -> Self {
+        let most = self.parts.len() + OUTLINED;
+        let mut cut = self.clone();
+        for &outline in outlines.iter().take(MOST + 1) {
+            cut.split(plane, outline);
+            if cut.parts.len() > most {
+                return self;
+            }
+        }
+        match outlines.len() > MOST {
+            true => self,
+            false => cut,
         }
     }
 
@@ -332,7 +350,7 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
             let (low, high) = (a.min(b).min(c) - reach, a.max(b).max(c) + reach);
             rays.near(low.as_vec3(), high.as_vec3(), near);
             near.sort_unstable();
-            let mut segments = Vec::new();
+            let (mut segments, mut outlines) = (Vec::new(), Vec::new());
             for &other in near.iter() {
                 let k = other as usize;
                 if mesh.plane[k] == mesh.plane[triangle as usize] || mesh.area[k] <= 0.0 {
@@ -340,8 +358,8 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
                 }
                 let corners = mesh.triangles[k].map(|v| mesh.positions[v as usize]);
                 segments.extend(plane.met(corners));
-                if hovering {
-                    segments.extend(plane.hovering(corners));
+                if hovering && outlines.len() <= MOST {
+                    outlines.extend(plane.hovering(corners));
                 }
                 if segments.len() > MOST {
                     return None;
@@ -351,6 +369,7 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
             for segment in segments {
                 cut.split(&plane, segment);
             }
+            let cut = cut.outlined(&plane, outlines);
             (cut.parts.len() > 1).then_some(cut)
         })
         .flatten()

@@ -6,6 +6,8 @@ use super::shades::COVER;
 /// What edges of shadows may take when the error is met: share of the triangles, and triangles of a small room.
 const FOR_LINES: f64 = 0.02;
 const LINES: usize = 400;
+/// How often in one go lines are carried on into the triangles that they lead to.
+const TURNS: usize = 6;
 
 impl Growth<'_> {
     /// Splits cells that were looked at; returns those that are new.
@@ -14,7 +16,10 @@ impl Growth<'_> {
             true => tested.iter().map(|&k| (k, self.lamps_of(k))).collect(),
             false => Vec::new(),
         };
-        let mut fresh = self.cells.split_along(&self.shades, wanted, SHRINK);
+        // Within a limit of vertices a line is carried on when growing picks it again.
+        let turns = if self.strict { 1 } else { TURNS };
+        let late = || self.looks.is_late();
+        let mut fresh = (self.cells).split_along(&self.shades, wanted, SHRINK, (turns, &late));
         for &k in tested {
             if fresh.binary_search(&k).is_err() {
                 self.mark(k);
@@ -28,10 +33,13 @@ impl Growth<'_> {
     }
 
     /// Carries edges of shadows on to their ends, whatever the error is: half a line is seen. Takes at most [`FOR_LINES`] as many
-    /// triangles as there are.
+    /// triangles as there are, however often it is called.
     pub(super) fn finish_lines(&mut self, progress: &dyn Fn(usize, usize)) {
-        let most = (FOR_LINES * self.cells.all.len() as f64) as usize + LINES;
-        let fresh = self.cells.finish_lines(&self.shades, most, SHRINK);
+        let all = (FOR_LINES * self.cells.all.len() as f64) as usize + LINES;
+        let (most, before) = (all.saturating_sub(self.for_lines), self.cells.all.len());
+        let late = || self.looks.is_late();
+        let fresh = (self.cells).finish_lines(&self.shades, most, SHRINK, &late);
+        self.for_lines += self.cells.all.len() - before;
         self.expect(&fresh, false, progress);
     }
 

@@ -41,8 +41,6 @@ const REACH: f64 = 4.0;
 /// What is left out at the ends of a line beside an edge, and at the least between a bend and the edges; shares.
 const END: f64 = 1e-4;
 const INSIDE: f64 = 1e-3;
-/// How often new triangles are looked into before light is.
-const TURNS: usize = 6;
 /// The same when lines are finished; and triangles are bisected for it down to this size: 2 cm.
 const FINISHING: usize = 24;
 const BISECTED: f64 = 4e-3;
@@ -418,17 +416,21 @@ impl Cells {
         }
     }
 
-    /// Splits cells along edges of shadows of lamps; returns the cells that are new. `shrink` is what remains of an expected
-    /// mean square.
+    /// Splits cells along edges of shadows of lamps, and those that the edges lead to, so many times or until it is late; returns
+    /// the cells that are new. `shrink` is what remains of an expected mean square.
     pub(super) fn split_along(
         &mut self,
         shades: &Shades,
         mut wanted: Vec<(usize, u64)>,
         shrink: f64,
+        (turns, late): (usize, &dyn Fn() -> bool),
     ) -> Vec<usize> {
         let lamps = wanted.iter().fold(0, |all, (_, lamps)| all | lamps);
         let mut fresh = Vec::new();
-        for _ in 0..TURNS {
+        for _ in 0..turns {
+            if late() {
+                break;
+            }
             let found = self.look_into(shades, &wanted);
             let split = self.split_found(shades, &wanted, &found, f64::INFINITY, shrink);
             if split.is_empty() {
@@ -445,7 +447,13 @@ impl Cells {
     /// Carries edges of shadows on to where they end: through all triangles that have a corner on one, which are bisected where
     /// there is no line and they are large enough for that to show. No more than `most` triangles come to be. Returns those that
     /// are new.
-    pub(super) fn finish_lines(&mut self, shades: &Shades, most: usize, shrink: f64) -> Vec<usize> {
+    pub(super) fn finish_lines(
+        &mut self,
+        shades: &Shades,
+        most: usize,
+        shrink: f64,
+        late: &dyn Fn() -> bool,
+    ) -> Vec<usize> {
         let least = BISECTED * shades.bake().mesh().half_size;
         let full = self.all.len() + most;
         let mut fresh = Vec::new();
@@ -458,11 +466,20 @@ impl Cells {
                 corners.fold(0, |all, corner| all | of(corner.point)) & !COVER
             };
             let all = some.iter().map(|&k| (k, lamps(k)));
-            let mut wanted: Vec<(usize, u64)> = all.filter(|(_, lamps)| *lamps != 0).collect();
-            wanted.truncate(full.saturating_sub(self.all.len()));
+            let wanted: Vec<(usize, u64)> = all.filter(|(_, lamps)| *lamps != 0).collect();
             let found = self.look_into(shades, &wanted);
+            // What is finished takes nothing of what there may be.
+            let is_open = |(wanted, found): &(&(usize, u64), &Found)| match found {
+                Found::Edge(_) => true,
+                Found::Other => self.size(&self.all[wanted.0]) > least,
+                _ => false,
+            };
+            let room = full.saturating_sub(self.all.len());
+            let open = wanted.iter().zip(&found).filter(is_open).take(room);
+            let (wanted, found): (Vec<(usize, u64)>, Vec<Found>) =
+                open.map(|(wanted, found)| (*wanted, found.clone())).unzip();
             some = self.split_found(shades, &wanted, &found, least, shrink);
-            if some.is_empty() {
+            if some.is_empty() || late() {
                 break;
             }
             fresh.extend_from_slice(&some);

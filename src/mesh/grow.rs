@@ -24,8 +24,9 @@ const SMALLEST: f64 = 1e-3;
 pub(super) const SHRINK: f64 = 0.25;
 /// Where something covers the middle of an edge, this much of the difference of its ends counts.
 const COVERED: f64 = 0.25;
-/// Vertices that splitting one triangle may take, its neighbours' included: as measured, 1 to 5.
-const SPLIT: usize = 8;
+/// Vertices that splitting one triangle may take, its neighbours' included: as measured, 1 to 5, twice as many on an edge of a
+/// shadow.
+const SPLIT: usize = 16;
 /// A limit of vertices counts as met where less than this part of it is left.
 const FULL: usize = 64;
 
@@ -60,6 +61,8 @@ pub(super) struct Growth<'a> {
     pub(super) noise: f64,
     /// Is light looked at, or is the solved light believed?
     pub(super) looking: bool,
+    /// Triangles that edges of shadows took to be finished.
+    pub(super) for_lines: usize,
 }
 
 impl<'a> Growth<'a> {
@@ -84,6 +87,7 @@ impl<'a> Growth<'a> {
             unknown: 0.0,
             noise: 0.0,
             looking: true,
+            for_lines: 0,
         }
     }
 
@@ -282,7 +286,7 @@ impl<'a> Growth<'a> {
         loop {
             let excess = self.sum() - goal;
             if excess <= 0.0 {
-                if self.looking && !self.strict {
+                if self.looking && !self.strict && !self.looks.is_late() {
                     self.finish_lines(progress);
                 }
                 return End::Reached;

@@ -38,7 +38,9 @@ impl Slots {
         let source = texture.source.value();
         let image = if found.has("source") {
             // What gltf has in its place where it is wrong, which was told.
-            let source = Some(source).filter(|&image| image != u32::MAX as usize)?;
+            let said = found.map.get("source").and_then(Value::as_f64);
+            let stands_in = source == u32::MAX as usize && said != Some(f64::from(u32::MAX));
+            let source = Some(source).filter(|_| !stands_in)?;
             json::referred(json, "images", "image", source, &found.place, check)?;
             Some(source)
         } else {

@@ -4,9 +4,11 @@
 use super::check::Check;
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{
-    DeserializeOwned, Deserializer, Error, Expected, IntoDeserializer, Unexpected, Visitor,
+    DeserializeOwned, Deserializer, Error, Expected, IgnoredAny, IntoDeserializer, SeqAccess,
+    Unexpected, Visitor,
 };
 use serde_json::{Map, Value};
+use std::cell::Cell;
 use std::fmt;
 
 /// Fields of the types that nobody here asks for, so that nothing can be wrong with them; and what is read by itself: names, extras
@@ -160,11 +162,22 @@ impl<'de> Part<'de> {
     }
 
     fn elements<V: Visitor<'de>>(self, list: &'de [Value], visitor: V) -> Result<V::Value, Wrong> {
+        let taken = Cell::new(0);
         let each = list.iter().enumerate();
-        let each = each.filter_map(|(i, value)| self.inside(value, At::Index(i)));
-        let mut list = SeqDeserializer::new(each);
-        let read = visitor.visit_seq(&mut list)?;
-        list.end().map(|()| read)
+        let each = each.filter_map(|(i, value)| {
+            taken.set(taken.get() + 1);
+            self.inside(value, At::Index(i))
+        });
+        let mut each = SeqDeserializer::new(each);
+        let read = visitor.visit_seq(&mut each)?;
+        // Counting all that is left would take as long as the list is, for each that refers to it.
+        match each.next_element::<IgnoredAny>()? {
+            None => Ok(read),
+            Some(_) => Err(Wrong::custom(format!(
+                "{} elements in sequence",
+                taken.get() - 1
+            ))),
+        }
     }
 
     /// Whole numbers as such, whatever they are written as; where an index of 32 bits would cut one short, as what no index is.
@@ -214,6 +227,10 @@ impl<'de> Deserializer<'de> for Part<'de> {
             Json::Object(map) | Json::Value(Value::Object(map)) => self
                 .fields(map, fields.iter().copied(), visitor)
                 .map_err(|wrong| wrong.inside(self)),
+            // Types would be read from lists as well, by position.
+            Json::Value(Value::Array(_)) => {
+                Err(Wrong::custom("struct ")).map_err(|wrong: Wrong| wrong.inside(self))
+            }
             Json::Value(_) => self.deserialize_any(visitor),
         }
     }
