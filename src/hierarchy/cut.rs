@@ -277,7 +277,7 @@ impl Plane {
     }
 
     /// Edges of another triangle that hover before this one, inside the triangle: one of them, or all, unless it touches.
-    fn hovering(&self, other: [DVec3; 3]) -> Vec<[DVec3; 2]> {
+    fn hovering(&self, other: [DVec3; 3]) -> Vec<(usize, [DVec3; 2])> {
         let exact = self.before(other, self.touch);
         let near = self.before(other, self.hover);
         let foot = |k: usize| other[k] - self.normal * exact[k];
@@ -285,7 +285,7 @@ impl Plane {
             let next = (k + 1) % 3;
             let hovers = near[k] == 0.0 && near[next] == 0.0 && exact[k] * exact[next] > 0.0;
             let inside = hovers.then(|| clipped([foot(k), foot(next)], &self.corners, self));
-            inside.flatten()
+            Some((k, inside.flatten()?))
         };
         (0..3).filter_map(edge).collect()
     }
@@ -359,7 +359,11 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
                 let corners = mesh.triangles[k].map(|v| mesh.positions[v as usize]);
                 segments.extend(plane.met(corners));
                 if hovering && outlines.len() <= MOST {
-                    outlines.extend(plane.hovering(corners));
+                    let vertices = mesh.triangles[k];
+                    outlines.extend(plane.hovering(corners).into_iter().map(|(e, segment)| {
+                        let edge = key(vertices[e], vertices[(e + 1) % 3]);
+                        ((mesh.plane[k], edge), segment)
+                    }));
                 }
                 if segments.len() > MOST {
                     return None;
@@ -369,7 +373,10 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
             for segment in segments {
                 cut.split(&plane, segment);
             }
-            let cut = cut.outlined(&plane, outlines);
+            // An edge of two triangles of one plane is no outline.
+            let is_once = |edge: &_| outlines.iter().filter(|(other, _)| other == edge).count() < 2;
+            let outlines = outlines.iter().filter(|(edge, _)| is_once(edge));
+            let cut = cut.outlined(&plane, outlines.map(|(_, segment)| *segment).collect());
             (cut.parts.len() > 1).then_some(cut)
         })
         .flatten()
