@@ -7,6 +7,7 @@
 use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
 use super::maps::{self, Mapping};
 use super::options::{Common, Reading, Showing, Solving, Storing, positive};
+use super::parting::{self, Parting};
 use super::report::Report;
 use super::results::print;
 use super::snapshots::Snapshots;
@@ -72,6 +73,9 @@ pub struct BakeArgs {
     /// In vertices or in maps.
     #[command(flatten)]
     pub mapping: Mapping,
+    /// What is written beside it.
+    #[command(flatten)]
+    pub parting: Parting,
     /// The baked room has this many vertices at the most, but never fewer than the room itself.
     #[arg(long, value_name = "N")]
     pub vertices: Option<usize>,
@@ -141,9 +145,10 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         .unwrap_or_else(|| args.room.with_extension("baked.glb"));
     let cache = cache(args);
     talk.phase("reading");
-    let scene = load(&args.room, &args.reading, |parts| {
+    let mut scene = load(&args.room, &args.reading, |parts| {
         problems(args, &output, cache.as_deref(), parts)
     })?;
+    args.parting.part(&mut scene, &talk)?;
     scene.warnings.iter().for_each(|w| talk.warn(w));
     let mut seconds = Seconds {
         load: stop.elapsed_s(),
@@ -460,6 +465,7 @@ fn problems(
     let mut problems = paths::problems(&outputs, &inputs);
     problems.extend(paths::not_glb(output, "baked"));
     problems.extend(maps::problems(args));
+    problems.extend(parting::problems(args));
     if let Some(folder) = args
         .snapshots
         .as_deref()

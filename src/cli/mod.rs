@@ -30,6 +30,7 @@ mod metrics;
 pub mod options;
 #[cfg(feature = "paper")]
 pub mod paper;
+mod parting;
 mod paths;
 mod pictures;
 pub mod points;

@@ -168,6 +168,20 @@ impl Bake {
         materials.map(|m| Look::new(self, m, upsampler)).collect()
     }
 
+    /// What a vertex gives out by itself; none of surfaces that do not shine.
+    pub(super) fn glow(&self, vertex: &Vertex, back: bool, look: &Look) -> Option<&[f32]> {
+        if !look.emits || vertex.entry == crate::hierarchy::NONE {
+            return None;
+        }
+        let w = if back {
+            [vertex.weights[0], vertex.weights[2], vertex.weights[1]]
+        } else {
+            vertex.weights
+        };
+        let leaf = self.tree().leaf_at(vertex.entry, w);
+        Some(self.light().emitted.row(leaf as usize))
+    }
+
     /// What a vertex shows.
     pub(crate) fn vertex(
         &self,
@@ -176,27 +190,11 @@ impl Bake {
         row: &[f32; 64],
         look: &Look,
     ) -> BakedVertex {
-        let glow = match (look.emits, vertex.entry) {
-            (true, entry) if entry != crate::hierarchy::NONE => {
-                let w = if back {
-                    [vertex.weights[0], vertex.weights[2], vertex.weights[1]]
-                } else {
-                    vertex.weights
-                };
-                let leaf = self.tree().leaf_at(entry, w);
-                let own = self.light().emitted.row(leaf as usize);
-                look.shown.unwrap_or_else(|| self.lanes().tristimulus(own))
-            }
-            _ => [0.0; 3],
+        let glow = match self.glow(vertex, back, look) {
+            Some(own) => look.shown.unwrap_or_else(|| self.lanes().tristimulus(own)),
+            None => [0.0; 3],
         };
-        let sum = |weights: &[[f64; 3]]| {
-            let mut xyz = [0.0; 3];
-            for (x, w) in row.iter().zip(weights) {
-                xyz = std::array::from_fn(|c| xyz[c] + f64::from(*x) * w[c]);
-            }
-            xyz
-        };
-        let reflected = sum(&look.reflected);
+        let reflected = look.reflect(row);
         let display = LinearSrgb::standard();
         let unpainted = look.unpainted.unwrap_or([1.0; 3]);
         let rgb = display.from_xyz(std::array::from_fn(|c| reflected[c] + glow[c]));
@@ -211,7 +209,7 @@ impl Bake {
             light: std::array::from_fn(|c| (rgb[c] / unpainted[c]) as f32),
         };
         if let Some(paint) = look.painted(&self.scene().surfaces[surface as usize], &out) {
-            let reflected = sum(&self.lanes().reflected(&paint));
+            let reflected = weighed(row, &self.lanes().reflected(&paint));
             out.radiosity = std::array::from_fn(|c| (reflected[c] + glow[c]) as f32);
         }
         out
@@ -228,10 +226,21 @@ pub(crate) struct Look<'a> {
     /// Tristimulus radiosity for a unit of each lane's irradiance.
     reflected: Vec<[f64; 3]>,
     /// Mean colour of the texture, which the display multiplies again.
-    unpainted: Option<[f64; 3]>,
+    pub(super) unpainted: Option<[f64; 3]>,
     emits: bool,
+    /// Light spectrum that it emits.
+    pub(super) light: Option<usize>,
     /// Exitance that a lamp with a profile is shown with.
-    shown: Option<[f64; 3]>,
+    pub(super) shown: Option<[f64; 3]>,
+}
+
+/// Sum of a row's lanes with tristimulus weights.
+fn weighed(row: &[f32; 64], weights: &[[f64; 3]]) -> [f64; 3] {
+    let mut xyz = [0.0; 3];
+    for (x, w) in row.iter().zip(weights) {
+        xyz = std::array::from_fn(|c| xyz[c] + f64::from(*x) * w[c]);
+    }
+    xyz
 }
 
 impl<'a> Look<'a> {
@@ -258,10 +267,16 @@ impl<'a> Look<'a> {
             upsampler,
             unpainted: mean,
             emits: material.emission.is_some(),
+            light: material.emission.as_ref().map(|e| e.light),
             shown: (material.emission.as_ref())
                 .filter(|e| e.profile.is_some())
                 .map(|e| bake.lanes().emission(e.light, &e.shape, PI)),
         }
+    }
+
+    /// Tristimulus radiosity that is reflected of a row of irradiance, vertex colours apart.
+    pub(super) fn reflect(&self, row: &[f32; 64]) -> [f64; 3] {
+        weighed(row, &self.reflected)
     }
 
     /// Reflectance on the leaves, of a texture its mean; vertex colours apart.

@@ -3,6 +3,7 @@
 //! The document stays as it is, so that what is written has the file's units; turned faces are written turned.
 
 use super::json::short;
+use super::layers::{self, Layers};
 use super::light::GREATEST_SIZE;
 use super::pane::PaneKind;
 use super::{Projection, Scene, luminaires};
@@ -19,6 +20,10 @@ pub struct Changes {
     pub scale: f64,
     /// Surfaces whose faces were turned.
     pub flipped: BTreeSet<usize>,
+    /// The lamps in groups, if they were parted.
+    pub layers: Option<Layers>,
+    /// Which groups the side file asks for.
+    pub(crate) layers_wished: Vec<layers::Wish>,
 }
 
 impl Default for Changes {
@@ -26,6 +31,8 @@ impl Default for Changes {
         Self {
             scale: 1.0,
             flipped: BTreeSet::new(),
+            layers: None,
+            layers_wished: Vec::new(),
         }
     }
 }

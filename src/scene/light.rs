@@ -268,6 +268,7 @@ pub(crate) fn punctual(
                 let lamp = measured(light, &wish, spectrum.as_ref(), &place, lamps, check)?;
                 return Some(PunctualLight {
                     name,
+                    node: Some(light.node),
                     position,
                     ..lamp
                 });
@@ -300,6 +301,7 @@ pub(crate) fn punctual(
             Some(PunctualLight {
                 name,
                 kind,
+                node: Some(light.node),
                 position,
                 direction,
                 light: lamp.light,
@@ -394,6 +396,7 @@ fn measured(
     Some(PunctualLight {
         name: String::new(),
         kind: LightKind::Profile,
+        node: None,
         position: DVec3::ZERO,
         direction: luminaire.nadir(),
         light: lamp.light,

@@ -1,14 +1,16 @@
 //! A room from its file: document, geometry, paint and lamps, and everything that is wrong with any of them together.
 
 use super::changes::Changes;
-use super::check::Check;
+use super::check::{Check, Unknown};
 use super::document::Document;
 use super::light::{self, Lamps};
 use super::material;
 use super::pane;
 use super::sky::{self, SkyWish};
 use super::spectra_file::SpectraFile;
-use super::{LightSpectrum, Material, PunctualLight, Scene, Surface, lacking, luminaires, said};
+use super::{
+    LightSpectrum, Material, PunctualLight, Scene, Surface, lacking, layers, luminaires, said,
+};
 use crate::color::Upsampler;
 use crate::data::{Grid, Leaves};
 use crate::error::{Error, Result};
@@ -120,6 +122,18 @@ impl Scene {
         if sky.as_ref().is_some_and(|sky| sky.sun_of_file) {
             prune(&mut materials, &mut lights, &mut spectra);
         }
+        let unknown = match options.lenient {
+            true => Unknown::Warn,
+            false => Unknown::Refuse,
+        };
+        layers::check_names(
+            &file.layers,
+            &document.source.json,
+            (&surfaces, &lights),
+            &materials,
+            unknown,
+            &mut check,
+        );
         for warning in lacking::warnings(&document.source.json) {
             check.warn(warning);
         }
@@ -144,7 +158,10 @@ impl Scene {
             sky,
             cameras: geometry.cameras,
             warnings,
-            changes: Changes::default(),
+            changes: Changes {
+                layers_wished: file.layers,
+                ..Changes::default()
+            },
         };
         Ok(scene.scaled(options.scale.unwrap_or(1.0)))
     }

@@ -16,6 +16,7 @@ mod instances;
 mod json;
 mod known;
 pub mod lacking;
+pub mod layers;
 mod light;
 mod load;
 pub mod luminaires;
@@ -214,6 +215,8 @@ pub struct PunctualLight {
     pub name: String,
     /// Kind and its parameters.
     pub kind: LightKind,
+    /// Index of its node in the document; none for lights of a sky and those of surfaces.
+    pub node: Option<usize>,
     /// World position.
     pub position: DVec3,
     /// World direction in which it shines, unit length.

@@ -6,7 +6,8 @@
 //!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } },
 //!                  "glass": { "transmittance": { "csv": "spectra/glass.csv" } } },
 //!   "lights":    { "Spot": { "name": "cie/A" } },
-//!   "sky":       { "type": "overcast" } }
+//!   "sky":       { "type": "overcast" },
+//!   "layers":    { "desk": ["Spot", "bulb"] } }
 //! ```
 //!
 //! Materials and lights go by their glTF names; all that share a name get the entry. `extras` of a material hold the
@@ -24,6 +25,7 @@
 use super::check::{Check, Unknown};
 use super::json::short;
 use super::known::{MaterialSpectra, Sampled};
+use super::layers::Wish;
 use super::load::Options;
 use super::luminaires::{self, LampWish};
 use super::said;
@@ -46,6 +48,8 @@ pub(crate) struct SpectraFile {
     lights: BTreeMap<String, LampWish>,
     /// What is said of sky and sun.
     pub(crate) sky: SkyWish,
+    /// Which lamps are told apart, see [`layers`](super::layers).
+    pub(crate) layers: Vec<Wish>,
 }
 
 impl SpectraFile {
@@ -91,7 +95,7 @@ impl SpectraFile {
         let Some(top) = reader.object(&json, &place) else {
             return file;
         };
-        reader.keys(top, &["materials", "lights", "sky"], &place);
+        reader.keys(top, &["materials", "lights", "sky", "layers"], &place);
         if let Some(sky) = top.get("sky") {
             file.sky = SkyWish::read(sky, &format!("{place}: sky"), &mut reader);
         }
@@ -100,6 +104,11 @@ impl SpectraFile {
             reader.known(name, materials, "material", &place);
             let spectra = reader.material(entry, &place);
             file.materials.insert(name.clone(), spectra);
+        }
+        for (name, entry) in reader.entries(top, "layers", &place) {
+            let place = format!("{place}: layer '{}'", short(name));
+            let lamps = reader.names(entry, &place);
+            file.layers.push((name.clone(), lamps));
         }
         for (name, entry) in reader.entries(top, "lights", &place) {
             let place = format!("{place}: light '{}'", short(name));
@@ -311,6 +320,21 @@ impl Reader<'_> {
                 None
             }
         }
+    }
+
+    /// A list of names, or one name.
+    fn names(&mut self, value: &Value, place: &str) -> Vec<String> {
+        let text = |v: &Value| v.as_str().map(str::to_owned);
+        let names = match value {
+            Value::Array(list) => list.iter().map(text).collect(),
+            one => text(one).map(|name| vec![name]),
+        };
+        let names = names.filter(|names: &Vec<String>| !names.is_empty());
+        if names.is_none() {
+            let next = "write [\"LAMP\", ...], names of lights, materials or nodes";
+            self.check.problem(place, "is no list of names", next);
+        }
+        names.unwrap_or_default()
     }
 
     /// An entry for a name that the room does not have.

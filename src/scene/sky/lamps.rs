@@ -242,6 +242,7 @@ impl Makes<'_> {
             self.lights.push(PunctualLight {
                 name: name.into(),
                 kind,
+                node: None,
                 position: DVec3::ZERO,
                 direction,
                 light,
