@@ -149,6 +149,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         problems(args, &output, cache.as_deref(), parts)
     })?;
     args.parting.part(&mut scene, &talk)?;
+    let grid = args.parting.grid(&scene)?;
     scene.warnings.iter().for_each(|w| talk.warn(w));
     let mut seconds = Seconds {
         load: stop.elapsed_s(),
@@ -273,6 +274,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     if let Some(maps) = &maps {
         let (room, ktx2) = (&args.room, args.mapping.ktx2);
         outputs.maps = maps::write(&output, room, scene, maps, &glb, &exposure, ktx2)?;
+    }
+    if let Some(grid) = &grid {
+        talk.phase("probing");
+        let names = (output.as_path(), args.room.as_path());
+        outputs.probes = parting::write_probes(&bake, grid, names, &exposure, &talk)?;
     }
     outputs.report = report.as_ref().map(|r| text(&r.path));
     if let Some(path) = &args.npz {

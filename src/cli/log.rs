@@ -186,6 +186,8 @@ pub struct Outputs {
     pub report: Option<String>,
     /// The index of light maps, and their pages.
     pub maps: Vec<String>,
+    /// Light in the air: the list of probes, and their texture.
+    pub probes: Vec<String>,
     /// Pictures of all rounds.
     pub pictures: Vec<String>,
     /// High dynamic range pictures of the result.

@@ -1,11 +1,17 @@
 //! `bake --layers` and `--probes`: the light of each group of lamps, and light in the air.
 
 use super::bake::BakeArgs;
+use super::bake::text as text_of;
 use super::options::positive;
 use super::talk::Talk;
-use crate::error::{Problem, Result};
+use crate::error::{Error, Problem, Result};
+use crate::output::Exposure;
+use crate::output::probes::{Grid, Probes, to_volume};
 use crate::scene::Scene;
-use crate::solve::Representation;
+use crate::solve::{Bake, Representation};
+use crate::store::file;
+use crate::survey::Place;
+use std::path::Path;
 
 /// What is written beside the light of surfaces.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
@@ -32,6 +38,46 @@ impl Parting {
         }
         Ok(())
     }
+
+    /// Where probes stand, if they were asked for.
+    ///
+    /// # Errors
+    /// They are too many.
+    pub(super) fn grid(self, scene: &Scene) -> Result<Option<Grid>> {
+        let spacing = self.probes.map(|spacing| spacing * scene.changes.scale);
+        spacing.map(|spacing| Grid::of(scene, spacing)).transpose()
+    }
+}
+
+/// Gathers the light of probes and writes it beside the glb; names of the files.
+pub(super) fn write_probes(
+    bake: &Bake,
+    grid: &Grid,
+    (output, room): (&Path, &Path),
+    look: &Exposure,
+    talk: &Talk,
+) -> Result<Vec<String>> {
+    let [json, ktx2] = ["probes.json", "probes.ktx2"].map(|end| output.with_extension(end));
+    let air = bake.air(&grid.points());
+    let count = |place| air.iter().filter(|a| a.place == place).count();
+    let (inside, outside) = (count(Place::Inside), count(Place::Outside));
+    let name = ktx2.file_name().map(|n| n.to_string_lossy().into_owned());
+    let error = bake.rounds().last().map(|round| round.error.total_de2000);
+    let name = name.unwrap_or_default();
+    let probes = Probes::new(bake.scene(), grid, air, look, error, name);
+    let [x, y, z] = probes.counts;
+    talk.say(&format!(
+        "probes: {x} x {y} x {z}, {inside} inside something solid, {outside} outside; nine coefficients leave out {:.1} % of the \
+         light's directions (mean, measured), {:.1} % at the most",
+        100.0 * probes.truncation.mean,
+        100.0 * probes.truncation.max,
+    ));
+    let text = serde_json::to_vec(&probes)
+        .map_err(|problem| Error::Internal(format!("probes: {problem}")))?;
+    for (path, bytes) in [(&json, text), (&ktx2, to_volume(&probes))] {
+        file::write_atomic(path, Some(room), |w| w.write_all(&bytes))?;
+    }
+    Ok([json, ktx2].map(|path| text_of(&path)).to_vec())
 }
 
 /// Options that do not go together.

@@ -1,11 +1,13 @@
 //! What the light looks like at points and at the vertices of the refined mesh.
 
+pub mod air;
 mod bake;
 mod layers;
 pub mod refined;
 mod spectra;
 
 pub use crate::transport::point::MOSTLY;
+pub use air::{Air, Around};
 pub use bake::{Baked, Interpolation, Probed};
 pub(crate) use bake::{KeptVertex, Look, Vertex, lend};
 pub(crate) use layers::LayerLanes;

@@ -10,12 +10,13 @@
 //! { "layers": { "ceiling": ["panel"], "desk": ["Desk lamp", "bulb"], "day": ["sky", "sun"] } }
 //! ```
 //!
-//! A lamp goes by the name of its light or material, by that of its node or of any node above it; sky and ground are
-//! `sky`, the sun is `sun`. The first layer that names it has it. What no layer names is a layer of its own: a light by
+//! A lamp goes by the name of its light or material, by that of its node or of any node above it; the sky, with the
+//! ground below it, is `sky`, the sun, with the ground that it lights, is `sun`. The first layer that names it has it. What no layer names is a layer of its own: a light by
 //! the name of its node, surfaces by that of their material.
 
 use super::check::{Check, Unknown};
 use super::json::short;
+use super::sky::lamps::LIT_GROUND;
 use super::{LightKind, LightSpectrum, PunctualLight, Scene, Surface};
 use crate::data::nearest_of;
 use crate::error::{Error, Result};
@@ -82,6 +83,7 @@ fn names_of_light<'a>(
     nodes: &'a Nodes,
 ) -> Vec<&'a str> {
     let mut names: Vec<&str> = match light.kind {
+        LightKind::Ground if light.name == LIT_GROUND => return vec![SUN],
         LightKind::Sky | LightKind::Ground => return vec![SKY],
         LightKind::Sun => vec![SUN],
         _ => Vec::new(),

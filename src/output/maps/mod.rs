@@ -19,6 +19,7 @@ use crate::lightmap::{LightMaps, Page};
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::Scene;
 pub use exr::to_exr;
+pub(super) use ktx2::ktx2;
 pub use ktx2::to_ktx2;
 use serde::Serialize;
 use serde_json::Value;

@@ -15,7 +15,7 @@
 //! room downwards meet open ground, lit by sky and sun and reflecting alike in all directions and wavelengths.
 
 mod cie;
-mod lamps;
+pub(super) mod lamps;
 mod sun;
 mod wish;
 
