@@ -1,6 +1,6 @@
 //! The table at the end of a bake: what each round cost and how wrong it left the room.
 
-use super::log::VerdictRecord;
+use super::log::{LayerRecord, VerdictRecord};
 use crate::audit::{Honesty, Report};
 use crate::report::{Align, Table};
 use crate::solve::{Round, Verdict};
@@ -92,6 +92,17 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
                 }
                 (false, None) => format!(" (more than {:.3})", i.allowed),
             }
+        ));
+    }
+    if !v.layers.is_empty() {
+        let one = |l: &LayerRecord| {
+            let mean = l.interpolation_de2000.value.unwrap_or(0.0);
+            format!("{} {mean:.3}", l.name)
+        };
+        let all: Vec<String> = v.layers.iter().map(one).collect();
+        lines.push(format!(
+            "of which by layer, each alone: {} (mean)",
+            all.join(", ")
         ));
     }
     if v.capped > 0 {

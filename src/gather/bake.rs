@@ -34,6 +34,8 @@ pub struct Baked {
     pub of: Vec<Vec<u32>>,
     /// How far light between vertices is from what looking there shows; none in a sketch and after relighting.
     pub interpolation: Option<Interpolation>,
+    /// The same for each layer by itself, under the adaptation white of the whole; none without layers, and of maps.
+    pub layers: Vec<Interpolation>,
     /// Visibility rays cast.
     pub rays: u64,
 }

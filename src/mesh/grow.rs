@@ -7,6 +7,7 @@
 
 use super::cells::{Cell, Cells, Corner, Doubt, Hint, within};
 use super::looks::Looks;
+use super::measure::PointLooks;
 use crate::color::de2000;
 use crate::gather::Vertex;
 use crate::geometry::sampling::{hash, triangle_weights};
@@ -63,6 +64,8 @@ pub(super) struct Growth<'a> {
     pub(super) unknown: f64,
     /// Variance of a look, by chance.
     pub(super) noise: f64,
+    /// Points of the last measurement.
+    pub(super) asked: Vec<PointLooks>,
     /// Is light looked at, or is the solved light believed?
     looking: bool,
 }
@@ -94,6 +97,7 @@ impl<'a> Growth<'a> {
             strict: false,
             unknown: 0.0,
             noise: 0.0,
+            asked: Vec::new(),
             looking: true,
         }
     }

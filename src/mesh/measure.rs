@@ -9,7 +9,7 @@
 use super::grow::{Growth, mix};
 use super::write::Settled;
 use crate::color::de2000;
-use crate::gather::{Interpolation, Vertex};
+use crate::gather::{Interpolation, LayerLanes, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
 
@@ -42,6 +42,9 @@ pub(crate) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) ->
         capped,
     }
 }
+
+/// Cell, weights of its corners, and two looks at a random point.
+pub(super) type PointLooks = (usize, [f64; 3], [u32; 2]);
 
 /// A random point.
 #[derive(Debug, Clone, Copy)]
@@ -98,18 +101,39 @@ impl Growth<'_> {
         self.looks.patient = true;
         self.looks.complete(progress);
         self.looks.patient = false;
+        self.asked = asked;
+        self.compared(bake, settled, None)
+    }
+
+    /// What the last measurement tells of each layer by itself, under the white of the whole.
+    pub(super) fn of_layers(
+        &self,
+        bake: &Bake,
+        settled: &[Settled],
+        allowed: f64,
+    ) -> Vec<Interpolation> {
+        let one = |lanes| summed(&self.compared(bake, settled, Some(lanes)), allowed, None);
+        bake.layer_lanes().iter().map(one).collect()
+    }
+
+    /// What is drawn at the points of the last measurement beside what was seen there: of all light, or of a layer's.
+    fn compared(&self, bake: &Bake, settled: &[Settled], part: Option<&LayerLanes>) -> Vec<Sample> {
         let white = bake.light().white;
+        let shown = |row: &[f32; 64]| match part {
+            Some(lanes) => bake.lanes().tristimulus(&lanes.of(row)),
+            None => bake.lanes().tristimulus(row),
+        };
         let difference = |a: [f64; 3], b: [f64; 3]| match a == b || white[1] <= 0.0 {
             true => 0.0,
             false => de2000(a, b, white),
         };
-        let sample = |(cell, weights, looks): (usize, [f64; 3], [u32; 2])| {
+        let sample = |&(cell, weights, looks): &PointLooks| {
             let of = &self.cells.all[cell];
-            let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| seen.xyz));
+            let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| shown(&seen.row)));
             let (one, two) = (one?, two?);
             let light = of.corners.map(|c| {
                 let row = settled[of.sheet as usize].rows[c.vertex as usize];
-                row.map_or([0.0; 3], |row| bake.lanes().tristimulus(&row))
+                row.map_or([0.0; 3], |row| shown(&row))
             });
             let drawn = mix(&light, weights);
             let noise = 0.5 * difference(one, two).powi(2);
@@ -122,7 +146,7 @@ impl Growth<'_> {
                 noise,
             })
         };
-        asked.into_iter().filter_map(sample).collect()
+        self.asked.iter().filter_map(sample).collect()
     }
 
     /// Takes what was seen at random points for what is to be expected of their triangles, where it is a surprise.

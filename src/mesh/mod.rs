@@ -102,7 +102,9 @@ impl Bake {
             let over = end != End::Reached || turn == MEASURED || stalled || limits.is_late();
             if interpolation.is_met() || over {
                 let capped = growth.unfinished(allowed * allowed);
+                let layers = growth.of_layers(self, &settled, allowed);
                 let mut out = self.write_down(growth, settled);
+                out.layers = layers;
                 out.capped = if interpolation.is_met() { 0 } else { capped };
                 out.interpolation = Some(interpolation);
                 return out;

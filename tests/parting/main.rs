@@ -1,6 +1,11 @@
 //! Layers: the light of groups of lamps adds up to the whole, and is what the group alone would give.
 
-#[path = "common/built.rs"]
+mod three;
+
+#[path = "../report/browser.rs"]
+mod browser;
+
+#[path = "../common/built.rs"]
 mod built;
 
 use built::Room;
@@ -552,4 +557,26 @@ fn what_does_not_go_together_is_refused() {
         assert!(said.contains(text), "{more:?}: {said}");
     }
     assert!(!Path::new(out).exists());
+}
+
+/// The lines of the README that dim lamps, in three.js itself.
+#[test]
+fn three_js_shows_the_sum_of_dimmed_layers() {
+    let bake = parted(loaded("two-rooms.glb", None), 2.0);
+    let glb = written(&bake, Packing::Floats);
+    let Some(seen) = three::seen(&glb.bytes, &[0.25, 0.6]) else {
+        return;
+    };
+    assert!(seen.len() > 20, "{}", seen.len());
+    let mut lit = 0;
+    for (shown, sum) in seen {
+        lit += usize::from(sum[1] > 0.05);
+        for c in 0..3 {
+            assert!(
+                (shown[c] - sum[c]).abs() < 2e-3 * sum[c].max(1.0),
+                "{shown:?} {sum:?}"
+            );
+        }
+    }
+    assert!(lit > 10, "{lit}");
 }
