@@ -21,7 +21,7 @@ pub struct Parting {
     #[arg(long)]
     pub layers: bool,
     /// Write light in the air, in a grid of points so far apart (in the file's unit), for objects that move.
-    #[arg(long, value_name = "SPACING", value_parser = positive)]
+    #[arg(long, value_name = "SPACING", value_parser = positive, allow_negative_numbers = true)]
     pub probes: Option<f64>,
 }
 

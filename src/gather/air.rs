@@ -60,7 +60,8 @@ pub fn directions() -> [(DVec3, f64); DIRECTIONS] {
     };
     for axis in axes {
         add(axis, 1.0 / 21.0);
-        add(-axis, 1.0 / 21.0);
+        // Without zeros below zero: directions of rays about a normal depend on their sign.
+        add(DVec3::ZERO - axis, 1.0 / 21.0);
     }
     for [a, b] in [[0, 1], [1, 2], [2, 0]] {
         for [s, t] in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {

@@ -58,7 +58,7 @@ fn written(bake: Bake, limits: &MapLimits) -> Written {
     let maps = bake.light_maps(limits, &|_, _| {});
     let look = Exposure::new(SCALE);
     let glb = mapped_glb(bake.scene(), &maps, &look).unwrap();
-    let name = |k: usize, ending: &str| format!("room.map-{k}.{ending}");
+    let name = |k: usize, _: Option<usize>, ending: &str| format!("room.map-{k}.{ending}");
     let index = maps::index(bake.scene(), &maps, &glb, &look, true, &name).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for (k, page) in maps.pages.iter().enumerate() {

@@ -132,17 +132,13 @@ fn layers_at_vertices_add_up_in_all_kinds_of_rooms() {
     sums_up(&bake, &bake.baked(&|_, _| {}), "two lamps");
     for (name, count) in [
         ("furnished.glb", 6),
-        ("gallery.glb", 6),
+        ("gallery.glb", 3),
         ("two-rooms.glb", 2),
         ("daylit.glb", 2),
         ("glazed.glb", 2),
     ] {
-        let bake = parted(loaded(name, None), 2.0);
-        assert!(
-            layers(&bake).names.len() >= count.min(2),
-            "{name}: {:?}",
-            layers(&bake).names
-        );
+        let bake = parted(loaded(name, None), 4.0);
+        assert_eq!(layers(&bake).names.len(), count, "{name}");
         assert!(bake.lanes().len() <= LEAVES);
         sums_up(&bake, &bake.baked(&|_, _| {}), name);
     }
@@ -184,11 +180,11 @@ fn a_layer_is_the_room_under_its_lamp_alone() {
         alone.lights.iter_mut().for_each(|l| l.light = 0);
         let alone = solved(alone, 0.5).air(&points);
         for (a, b) in together.iter().zip(&alone) {
-            let mean: f64 = (0..6).map(|s| b.light.cube[s][1]).sum::<f64>() / 6.0;
+            let mean = [0, 1, 2].map(|c| (0..6).map(|s| b.light.cube[s][c]).sum::<f64>() / 6.0);
             for side in 0..6 {
                 for c in 0..3 {
                     let (a, b) = (a.layers[k].cube[side][c], b.light.cube[side][c]);
-                    assert!((a - b).abs() < 0.03 * mean, "{name} {side} {c}: {a} {b}");
+                    assert!((a - b).abs() < 0.03 * mean[c], "{name} {side} {c}: {a} {b}");
                 }
             }
         }
