@@ -10,7 +10,7 @@ use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::hierarchy::Face;
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
-use crate::transport::point::Receiver;
+use crate::transport::Receiver;
 use glam::DVec3;
 
 /// Paths of a point that tell how many more it takes.

@@ -8,6 +8,7 @@ use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictReco
 use super::maps::{self, Mapping};
 use super::options::{Common, Reading, Showing, Solving, Storing, positive};
 use super::parting::{self, Parting};
+use super::paths::text;
 use super::report::Report;
 use super::results::print;
 use super::snapshots::Snapshots;
@@ -470,8 +471,18 @@ fn problems(
     inputs.extend(parts.iter().map(PathBuf::as_path));
     let mut problems = paths::problems(&outputs, &inputs);
     problems.extend(paths::not_glb(output, "baked"));
-    problems.extend(maps::problems(args));
-    problems.extend(parting::problems(args));
+    let of_vertices = [
+        ("--vertices", args.vertices.is_some()),
+        ("--megabytes", args.megabytes.is_some()),
+        ("--xyz", args.storing.xyz),
+        ("--compress", args.storing.compress != Packing::Floats),
+        ("--npz", args.npz.is_some()),
+        ("--cache", args.cache.is_some()),
+        ("--report", args.report.is_some()),
+        ("--snapshots", args.snapshots.is_some()),
+    ];
+    problems.extend(args.mapping.problems(&of_vertices));
+    problems.extend(args.parting.problems(args.spectrum, args.cache.is_some()));
     if let Some(folder) = args
         .snapshots
         .as_deref()
@@ -505,8 +516,4 @@ pub(super) fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) ->
         Some(Error::Internal(what)) => Err(Error::Internal(what)),
         _ => written,
     }
-}
-
-pub(super) fn text(path: &Path) -> String {
-    path.display().to_string()
 }

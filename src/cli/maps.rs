@@ -1,12 +1,11 @@
 //! `haarlight bake ROOM --light maps`: what may be asked for, and the files that are written.
 
-use super::bake::BakeArgs;
+use super::paths::text;
 use super::stop::Stop;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
 use crate::lightmap::{LightMaps, MapLimits};
-use crate::output::gltf::Packing;
 use crate::output::{BakedGlb, Exposure, maps};
 use crate::scene::Scene;
 use crate::solve::Bake;
@@ -73,55 +72,41 @@ impl Mapping {
             talk.progress("gathering", done, of);
         })
     }
-}
 
-/// Options that do not go together.
-pub(super) fn problems(args: &BakeArgs) -> Vec<Problem> {
-    let own = [
-        ("--map-size", args.mapping.map_size.is_some()),
-        ("--texels", args.mapping.texels.is_some()),
-        ("--only", args.mapping.only.is_some()),
-        ("--ktx2", args.mapping.ktx2),
-    ];
-    let of_vertices = [
-        ("--vertices", args.vertices.is_some()),
-        ("--megabytes", args.megabytes.is_some()),
-        ("--xyz", args.storing.xyz),
-        ("--compress", args.storing.compress != Packing::Floats),
-        ("--npz", args.npz.is_some()),
-        ("--cache", args.cache.is_some()),
-        ("--report", args.report.is_some()),
-        ("--snapshots", args.snapshots.is_some()),
-    ];
-    let wanted = args.mapping.is_wanted();
-    let refused = |(option, given): (&'static str, bool)| given.then_some(option);
-    let mut problems: Vec<Problem> = if wanted {
-        let next = "leave it out, or leave --light maps out";
-        let what = "is for light at vertices";
-        let refused = of_vertices.into_iter().filter_map(refused);
-        refused
-            .map(|option| Problem::new(option, what, next))
-            .collect()
-    } else {
-        let (what, next) = ("is for light maps", "add --light maps, or leave it out");
-        let refused = own.into_iter().filter_map(refused);
-        refused
-            .map(|option| Problem::new(option, what, next))
-            .collect()
-    };
-    let [least, most] = PAGES;
-    if let Some(size) = args
-        .mapping
-        .map_size
-        .filter(|s| !(least..=most).contains(s))
-    {
-        problems.push(Problem::new(
-            format!("--map-size {size}"),
-            format!("pages have {least} to {most} texels along a side"),
-            "give a number between these",
-        ));
+    /// Options that do not go together; `of_vertices`: options for light at vertices, and whether they were given.
+    pub(super) fn problems(&self, of_vertices: &[(&str, bool)]) -> Vec<Problem> {
+        let own = [
+            ("--map-size", self.map_size.is_some()),
+            ("--texels", self.texels.is_some()),
+            ("--only", self.only.is_some()),
+            ("--ktx2", self.ktx2),
+        ];
+        let (options, what, next) = match self.is_wanted() {
+            true => (
+                of_vertices,
+                "is for light at vertices",
+                "leave it out, or leave --light maps out",
+            ),
+            false => (
+                &own[..],
+                "is for light maps",
+                "add --light maps, or leave it out",
+            ),
+        };
+        let refused = options.iter().filter(|(_, given)| *given);
+        let mut problems: Vec<Problem> = refused
+            .map(|(option, _)| Problem::new(*option, what, next))
+            .collect();
+        let [least, most] = PAGES;
+        if let Some(size) = self.map_size.filter(|s| !(least..=most).contains(s)) {
+            problems.push(Problem::new(
+                format!("--map-size {size}"),
+                format!("pages have {least} to {most} texels along a side"),
+                "give a number between these",
+            ));
+        }
+        problems
     }
-    problems
 }
 
 /// A mesh with the solved light, as cameras meter it: what is written has too few vertices for that.
@@ -168,8 +153,5 @@ pub(super) fn write(
     for (path, bytes) in &files {
         file::write_atomic(path, Some(room), |w| w.write_all(bytes))?;
     }
-    Ok(files
-        .iter()
-        .map(|(path, _)| super::bake::text(path))
-        .collect())
+    Ok(files.iter().map(|(path, _)| text(path)).collect())
 }

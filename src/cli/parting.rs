@@ -1,8 +1,7 @@
 //! `bake --layers` and `--probes`: the light of each group of lamps, and light in the air.
 
-use super::bake::BakeArgs;
-use super::bake::text as text_of;
 use super::options::positive;
+use super::paths::text as text_of;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::output::Exposure;
@@ -47,6 +46,29 @@ impl Parting {
         let spacing = self.probes.map(|spacing| spacing * scene.changes.scale);
         spacing.map(|spacing| Grid::of(scene, spacing)).transpose()
     }
+
+    /// Options that do not go together: how spectra are carried, and whether a cache is kept.
+    pub(super) fn problems(self, spectrum: Representation, cache: bool) -> Vec<Problem> {
+        let refused = [
+            (
+                "--spectrum",
+                spectrum != Representation::Adaptive,
+                "does not hold the light of each lamp by itself",
+            ),
+            (
+                "--cache",
+                cache,
+                "is for changing lamps without layers: `relight` knows none",
+            ),
+        ];
+        let next = "leave it out, or leave --layers out";
+        let given = refused
+            .into_iter()
+            .filter(|(_, given, _)| *given && self.layers);
+        given
+            .map(|(option, _, what)| Problem::new(option, what, next))
+            .collect()
+    }
 }
 
 /// Gathers the light of probes and writes it beside the glb; names of the files.
@@ -78,28 +100,4 @@ pub(super) fn write_probes(
         file::write_atomic(path, Some(room), |w| w.write_all(&bytes))?;
     }
     Ok([json, ktx2].map(|path| text_of(&path)).to_vec())
-}
-
-/// Options that do not go together.
-pub(super) fn problems(args: &BakeArgs) -> Vec<Problem> {
-    if !args.parting.layers {
-        return Vec::new();
-    }
-    let other = args.spectrum != Representation::Adaptive;
-    let refused = [
-        (
-            "--spectrum",
-            other,
-            "does not hold the light of each lamp by itself",
-        ),
-        (
-            "--cache",
-            args.cache.is_some(),
-            "is for changing lamps without layers: `relight` knows none",
-        ),
-    ];
-    let given = refused.into_iter().filter(|(_, given, _)| *given);
-    given
-        .map(|(option, _, what)| Problem::new(option, what, "leave it out, or leave --layers out"))
-        .collect()
 }

@@ -5,6 +5,11 @@ use crate::scene::Scene;
 use crate::scene::uri::{self, Place};
 use std::path::{Path, PathBuf};
 
+/// A path as it is said.
+pub(super) fn text(path: &Path) -> String {
+    path.display().to_string()
+}
+
 /// The cache that `bake --cache` writes and `relight` reads where none is named.
 pub(super) fn cache_of(room: &Path) -> PathBuf {
     room.with_extension("cache")

@@ -13,9 +13,10 @@
 //! | `load_s`, `open_s`, `write_s`, `total_s` | s | reading the room, the cache, writing, all together |
 //! | `glb`, `vertices`, `triangles`, `exposure`, `white` | | as in the verdict of a bake |
 
-use super::bake::{load, text, write_npz};
+use super::bake::{load, write_npz};
 use super::options::{Common, Reading, Showing, Storing};
 use super::paths;
+use super::paths::text;
 use super::results::print;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};

@@ -54,6 +54,14 @@ pub fn de2000(a: Xyz, b: Xyz, white: Xyz) -> f64 {
     de2000_lab(lab(a, white), lab(b, white))
 }
 
+/// CIEDE2000 of two lights under a white that may be black, as before any light or without a lamp: nothing differs then.
+pub(crate) fn seen_difference(a: Xyz, b: Xyz, white: Xyz) -> f64 {
+    match a == b || white[1] <= 0.0 {
+        true => 0.0,
+        false => de2000(a, b, white),
+    }
+}
+
 /// The Jacobian d(L*, u*, v*) / d(X, Y, Z): rows L*, u*, v*.
 ///
 /// To first order a tristimulus error e is a colour difference of |J e|. At black, where u' and v' have no value, only

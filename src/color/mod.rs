@@ -20,6 +20,7 @@ pub use adaptation::{bradford, multiply};
 pub use alphaopic::{AlphaOpic, RECEPTORS};
 pub use bands::Bands;
 pub use correlated::{Correlated, GREATEST_DUV, KNOWN_KELVIN, Locus, uv_1960};
+pub(crate) use difference::seen_difference;
 pub use difference::{de_luv, de2000, lab, luv, luv_jacobian};
 pub use display::{LinearSrgb, decode, encode, encode_byte};
 pub use fidelity::{EvaluationColours, Fidelity};

@@ -1,8 +1,7 @@
 //! The study as pictures (SVG).
 
-use super::run::Run;
+use super::run::{PHASES, Run};
 use super::sweep::Study;
-use super::tables::PHASES;
 use crate::report::{Bars, Chart, Scale, Series};
 use crate::solve::Representation;
 

@@ -11,6 +11,11 @@ use serde::Serialize;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
+/// Phases in the order in which they happen.
+pub(super) const PHASES: [&str; 8] = [
+    "prepare", "links", "spectrum", "direct", "balance", "solve", "estimate", "vertices",
+];
+
 /// What is to be baked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {

@@ -1,17 +1,12 @@
 //! The study as CSV and Markdown.
 
 use super::choice::Choice;
-use super::run::Run;
+use super::run::{PHASES, Run};
 use super::sweep::Study;
 use crate::report::{Align, Table};
 
 /// Version of the CSV's columns.
 pub const CSV_VERSION: u32 = 1;
-/// Phases in the order in which they happen.
-pub const PHASES: [&str; 8] = [
-    "prepare", "links", "spectrum", "direct", "balance", "solve", "estimate", "vertices",
-];
-
 /// All runs, one a line: times in s, errors in CIEDE2000 (spectra: CIELUV), memory in bytes.
 pub fn csv(study: &Study) -> String {
     let titles = [

@@ -15,7 +15,7 @@ use super::LayerLanes;
 use crate::geometry::NO_PLANE;
 use crate::solve::Bake;
 use crate::survey::{Place, places};
-use crate::transport::point::{Gathered, Receiver};
+use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 use std::f64::consts::PI;
 

@@ -6,7 +6,7 @@ use crate::color::{LinearSrgb, Upsampler};
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
-use crate::transport::point::{Gathered, Receiver};
+use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 use std::f64::consts::PI;
 

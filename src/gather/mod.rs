@@ -6,7 +6,7 @@ mod layers;
 pub mod refined;
 mod spectra;
 
-pub use crate::transport::point::MOSTLY;
+pub use crate::transport::MOSTLY;
 pub use air::{Air, Around};
 pub use bake::{Baked, Interpolation, Probed};
 pub(crate) use bake::{KeptVertex, Look, Vertex, lend};

@@ -6,10 +6,9 @@
 //! Triangles block from both sides. Those with an alpha mask ask the caller, in the `_with` variants, whether the point is
 //! opaque; the others never do.
 
-use super::packet::Packet;
 use super::segment::{NO_PLANE, Segment};
 use super::tree::{Input, LEAF, Tree};
-use super::triangle::{BLOCK, Block, PACKET, Shear};
+use super::triangle::{BLOCK, Block, Shear};
 use super::walk::{Slabs, Stack, push_by_distance};
 use glam::Vec3;
 
@@ -184,46 +183,6 @@ impl RayIndex {
     /// When the slices differ in length.
     pub fn occluded_many(&self, segments: &[Segment], out: &mut [bool]) {
         self.occluded_many_with(segments, out, &|_, _, _| true);
-    }
-
-    /// As [`Self::occluded_with`] for many segments.
-    ///
-    /// # Panics
-    /// When the slices differ in length.
-    pub fn occluded_many_with(
-        &self,
-        segments: &[Segment],
-        out: &mut [bool],
-        opaque: &impl Fn(u32, f32, f32) -> bool,
-    ) {
-        assert_eq!(segments.len(), out.len(), "one answer for each segment");
-        for (group, answers) in segments.chunks(PACKET).zip(out.chunks_mut(PACKET)) {
-            let hidden = Packet::occluded(self, group, opaque);
-            for (k, answer) in answers.iter_mut().enumerate() {
-                *answer = hidden >> k & 1 == 1;
-            }
-        }
-    }
-
-    /// Does one of the triangles of `list` block? For a shaft with few blockers: no tree is walked. Otherwise as
-    /// [`Self::occluded_many_with`].
-    ///
-    /// # Panics
-    /// When the slices differ in length.
-    pub fn occluded_by(
-        &self,
-        list: &[u32],
-        segments: &[Segment],
-        out: &mut [bool],
-        opaque: &impl Fn(u32, f32, f32) -> bool,
-    ) {
-        assert_eq!(segments.len(), out.len(), "one answer for each segment");
-        for (group, answers) in segments.chunks(PACKET).zip(out.chunks_mut(PACKET)) {
-            let hidden = Packet::occluded_by(self, list, group, opaque);
-            for (k, answer) in answers.iter_mut().enumerate() {
-                *answer = hidden >> k & 1 == 1;
-            }
-        }
     }
 
     /// The nearest hit with t in the open interval from the gap to `t_max` (in lengths of `direction`), triangles of

@@ -73,76 +73,80 @@ impl Bounds {
     }
 }
 
-pub(super) fn build(mesh: &Mesh, spaces: &[u32]) -> Tree {
-    let mut items: Vec<Item> = mesh
-        .faces
-        .iter()
-        .enumerate()
-        .map(|(k, &face)| {
-            let corners = mesh.corners(face);
-            let low = corners[0].min(corners[1]).min(corners[2]);
-            let high = corners[0].max(corners[1]).max(corners[2]);
-            let t = face.triangle as usize;
-            let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-            Item {
-                face: k as u32,
-                centre,
-                low,
-                high,
-                normal: mesh.face_normal(face),
-                area: mesh.area[t],
-                plane: mesh.plane[t],
-                space: spaces[k],
-            }
-        })
-        .collect();
-    // Spaces first; within one, in the order of the file.
-    items.sort_by_key(|item| item.space);
-    let mut tree = Tree {
-        nodes: Vec::with_capacity(2 * items.len()),
-        elements: Vec::with_capacity(items.len()),
-        faces: Vec::new(),
-        face_node: vec![NONE; items.len()],
-        face_plane: Vec::new(),
-        face_normal: Vec::new(),
-        face_area: vec![0.0],
-        entry: vec![[NONE; 2]; mesh.triangles.len()],
-    };
-    if items.is_empty() {
-        return tree;
-    }
-    tree.nodes.push(placeholder(NONE, 0, items.len()));
-    // A stack instead of recursion: depth is bounded by the number of faces only.
-    let mut open = vec![0_u32];
-    while let Some(id) = open.pop() {
-        let (first, count) = (
-            tree.node(id).faces.0 as usize,
-            tree.node(id).faces.1 as usize,
-        );
-        if count == 1 {
-            continue;
+impl Tree {
+    /// Builds the clusters over all faces of `mesh`; only the topmost hold faces of more than one of the `spaces`, which
+    /// name the space of each face.
+    pub fn new(mesh: &Mesh, spaces: &[u32]) -> Self {
+        let mut items: Vec<Item> = mesh
+            .faces
+            .iter()
+            .enumerate()
+            .map(|(k, &face)| {
+                let corners = mesh.corners(face);
+                let low = corners[0].min(corners[1]).min(corners[2]);
+                let high = corners[0].max(corners[1]).max(corners[2]);
+                let t = face.triangle as usize;
+                let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+                Item {
+                    face: k as u32,
+                    centre,
+                    low,
+                    high,
+                    normal: mesh.face_normal(face),
+                    area: mesh.area[t],
+                    plane: mesh.plane[t],
+                    space: spaces[k],
+                }
+            })
+            .collect();
+        // Spaces first; within one, in the order of the file.
+        items.sort_by_key(|item| item.space);
+        let mut tree = Tree {
+            nodes: Vec::with_capacity(2 * items.len()),
+            elements: Vec::with_capacity(items.len()),
+            faces: Vec::new(),
+            face_node: vec![NONE; items.len()],
+            face_plane: Vec::new(),
+            face_normal: Vec::new(),
+            face_area: vec![0.0],
+            entry: vec![[NONE; 2]; mesh.triangles.len()],
+        };
+        if items.is_empty() {
+            return tree;
         }
-        let part = &mut items[first..first + count];
-        let half = between_spaces(part).unwrap_or_else(|| split(part));
-        let child = tree.nodes.len() as u32;
-        tree.nodes.push(placeholder(id, first, half));
-        tree.nodes.push(placeholder(id, first + half, count - half));
-        let node = &mut tree.nodes[id as usize];
-        node.child = child;
-        node.children = 2;
-        open.push(child + 1);
-        open.push(child);
+        tree.nodes.push(placeholder(NONE, 0, items.len()));
+        // A stack instead of recursion: depth is bounded by the number of faces only.
+        let mut open = vec![0_u32];
+        while let Some(id) = open.pop() {
+            let (first, count) = (
+                tree.node(id).faces.0 as usize,
+                tree.node(id).faces.1 as usize,
+            );
+            if count == 1 {
+                continue;
+            }
+            let part = &mut items[first..first + count];
+            let half = between_spaces(part).unwrap_or_else(|| split(part));
+            let child = tree.nodes.len() as u32;
+            tree.nodes.push(placeholder(id, first, half));
+            tree.nodes.push(placeholder(id, first + half, count - half));
+            let node = &mut tree.nodes[id as usize];
+            node.child = child;
+            node.children = 2;
+            open.push(child + 1);
+            open.push(child);
+        }
+        for (k, item) in items.iter().enumerate() {
+            let face = mesh.faces[item.face as usize];
+            tree.faces.push(face);
+            tree.face_plane.push(item.plane);
+            tree.face_normal.push(item.normal);
+            tree.face_area.push(tree.face_area[k] + item.area);
+            tree.entry[face.triangle as usize][usize::from(face.back)] = k as u32;
+        }
+        finish(mesh, &mut tree);
+        tree
     }
-    for (k, item) in items.iter().enumerate() {
-        let face = mesh.faces[item.face as usize];
-        tree.faces.push(face);
-        tree.face_plane.push(item.plane);
-        tree.face_normal.push(item.normal);
-        tree.face_area.push(tree.face_area[k] + item.area);
-        tree.entry[face.triangle as usize][usize::from(face.back)] = k as u32;
-    }
-    finish(mesh, &mut tree);
-    tree
 }
 
 fn placeholder(parent: u32, first: usize, count: usize) -> Node {

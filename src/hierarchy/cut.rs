@@ -6,7 +6,7 @@
 //! several spaces), and [`Mesh::cut`] makes the triangles, with the points on common edges that their neighbours have.
 //! Lengths are in scene units; points within [`TOUCH`] of each other are one.
 
-use super::mesh::{Face, Mesh};
+use super::mesh::{Face, Mesh, WHOLE};
 use crate::geometry::RayIndex;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -436,9 +436,6 @@ impl Mesh {
         }
     }
 }
-
-/// In [`Mesh::part`]: the triangle is a whole one.
-pub(super) const WHOLE: u32 = u32::MAX;
 
 /// Weights of a point on an edge, the same bits from both sides.
 fn edge_weights(vertices: [u32; 3], (low, high): (u32, u32), t: f64) -> [f64; 3] {

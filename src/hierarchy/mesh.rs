@@ -3,11 +3,13 @@
 //! Positions are recentred on the middle of the scene, f64, in the file's units. Welding joins vertices at equal
 //! positions, so that neighbours know each other across surfaces.
 
-use super::cut::WHOLE;
 use crate::geometry::{RayIndex, plane_ids};
 use crate::scene::{Alpha, Scene, Sides};
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
+
+/// In [`Mesh::part`]: the triangle is a whole one.
+pub(super) const WHOLE: u32 = u32::MAX;
 
 /// One side of a triangle: what emits, reflects and receives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

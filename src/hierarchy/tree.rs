@@ -4,7 +4,7 @@
 //! is one backward and *push* one forward sweep. Elements split one to four at their edge midpoints
 //! (Hanrahan, Salzman and Aupperle 1991); clusters split as built.
 
-use super::mesh::{Face, Mesh};
+use super::mesh::Face;
 use crate::geometry::sampling::triangle_weights;
 use crate::geometry::{Hit, quarters};
 use glam::DVec3;
@@ -169,12 +169,6 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// Builds the clusters over all faces of `mesh`; only the topmost hold faces of more than one of the `spaces`, which
-    /// name the space of each face.
-    pub fn new(mesh: &Mesh, spaces: &[u32]) -> Self {
-        super::build::build(mesh, spaces)
-    }
-
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.nodes.len() * size_of::<Node>()

@@ -141,3 +141,19 @@ impl Glass<'_> {
         filter.map_or(1.0, |filter| self.filters.brightness(&filter))
     }
 }
+
+/// Adds a row times a weight, of each lane what a filter leaves.
+pub(crate) fn accumulate(sum: &mut [f32], weight: f32, row: &[f32], tint: Option<&Filter>) {
+    match tint {
+        None => {
+            for (x, r) in sum.iter_mut().zip(row) {
+                *x += weight * r;
+            }
+        }
+        Some(tint) => {
+            for ((x, r), t) in sum.iter_mut().zip(row).zip(tint) {
+                *x += weight * r * t;
+            }
+        }
+    }
+}

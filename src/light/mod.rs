@@ -7,6 +7,7 @@ pub(crate) mod rows;
 mod solution;
 
 pub use descent::Descent;
+pub(crate) use filters::accumulate;
 pub use filters::{Filter, Filters, Glass, Tint};
 pub use rows::{Rows, padded};
 pub use solution::{Arrival, Light, Neighbours};

@@ -1,18 +1,19 @@
 //! From the solved light to maps.
 
-use super::aliasing::Key;
+use super::aliasing::{Key, Smoothed};
 use super::cells::Cell;
 use super::charts::{Chart, charts};
-use super::grow::{Budget, End, Growth};
-use super::maps::{LightMaps, Page, Placed, Texel, margin};
+use super::grow::{Budget, Growth};
+use super::maps::{LightMaps, Page, Placed, margin};
 use super::pack::pack;
 use super::sampler::{Sample, Sampler};
 use super::seams::close;
-use super::texels::{Corners, Patch, lend, patch};
+use super::texels::{Corners, Patch, Texel, lend, patch};
 use super::unwrap::Conformal;
 use crate::gather::{Baked, BakedSurface, LayerLanes, Look, MapPlace};
 use crate::mesh::looks::Looks;
 use crate::mesh::measure::summed;
+use crate::mesh::turns::Turns;
 use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -23,15 +24,6 @@ const MOST_LOOKS: f64 = 262_144.0;
 /// Texels at the most, margins included, at that error; half as many at twice the error.
 const MOST_TEXELS: f64 = 1_048_576.0;
 const AT: f64 = 0.5;
-/// The error is measured this often at the most.
-const MEASURED: u64 = 10;
-/// Growing ends where so many times the cells leave more than this part of the error.
-const GROWN: f64 = 1.5;
-const STALLED: f64 = 0.93;
-/// After a measurement that was not met, growing aims at this part of what the measured error asks for.
-const BELOW: f64 = 0.8;
-/// And at no less than this part of what it aimed at before.
-const STEP: f64 = 0.2;
 
 /// What bounds light maps besides their error.
 pub struct MapLimits<'a> {
@@ -55,9 +47,6 @@ impl Default for MapLimits<'_> {
         }
     }
 }
-
-/// Means of the light around texels at edges.
-pub(super) type Smoothed = Vec<(Key, Vec<(f64, Sample)>)>;
 
 /// Number and lanes of a layer.
 pub(super) type Part<'a> = (usize, &'a LayerLanes);
@@ -84,24 +73,19 @@ impl Bake {
         growth.budget.looks = growth.sampler.looks.len() + (MOST_LOOKS * more) as usize;
         let most = growth.texels() + (MOST_TEXELS * more) as usize;
         growth.budget.texels = limits.texels.unwrap_or(most);
-        let mut aim = allowed * allowed * growth.seen_area();
+        let area = growth.seen_area();
         let points = growth.points(self, 0, progress);
         let samples = growth.compared(&points, &self.placed(&growth, &Vec::new(), None).0);
-        let mut before = summed(&samples, allowed, None);
+        let before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
-        let mut size = growth.cells.len();
-        for turn in 1.. {
-            let end = growth.grow(aim, progress);
-            let points = growth.points(self, turn, progress);
+        let mut turns = Turns::new(allowed, area, growth.cells.len(), before);
+        loop {
+            let end = growth.grow(turns.aim, progress);
+            let points = growth.points(self, turns.turn, progress);
             let samples = growth.compared(&points, &self.placed(&growth, &Vec::new(), None).0);
             let found = summed(&samples, allowed, None);
-            let has_grown = growth.cells.len() as f64 > GROWN * size as f64;
-            let stalled = turn > 1 && has_grown && found.mean > STALLED * before.mean;
-            if has_grown {
-                (size, before) = (growth.cells.len(), found);
-            }
-            let over = end != End::Reached || turn == MEASURED || stalled || (limits.late)();
-            if found.is_met() || over {
+            let ended = (end, (limits.late)());
+            if turns.is_over(found, growth.cells.len(), ended, growth.sum()) {
                 let smoothed = growth.smooth(allowed, progress);
                 let (mut placed, covered) = self.placed(&growth, &smoothed, None);
                 close(self, &growth.charts, &spaces, &mut placed);
@@ -113,11 +97,8 @@ impl Bake {
                 maps.baked.interpolation = Some(summed(&samples, allowed, None));
                 return maps;
             }
-            let wrong = (found.mean / allowed).powi(2);
-            aim = growth.sum().min(aim) * (BELOW / wrong).clamp(STEP, BELOW);
             growth.learn(&points, &samples);
         }
-        unreachable!("the last turn ends it")
     }
 
     /// The charts' texels, and how many places something covers. Charts move out of the growth only at its end, so these are

@@ -10,7 +10,8 @@ use super::cells::{Cell, DEPTH, Doubt, Lattice, bilinear, first};
 use super::charts::Chart;
 use super::maps::{MARGIN, margin};
 use super::sampler::{Sample, Sampler};
-use crate::color::de2000;
+use crate::color::seen_difference;
+use crate::mesh::turns::{BENDS, BY_CHANCE, EXCESS, End, RANGE, largest};
 use crate::solve::Bake;
 use glam::DVec2;
 use rayon::prelude::*;
@@ -21,14 +22,6 @@ const LONGEST: f64 = 0.125;
 const TINY: f64 = 0.02;
 /// What remains of the mean square of an axis when it is halved: 1/16 for smooth light, 1/2 for an edge.
 const SHRINK: f64 = 0.125;
-/// An axis that bends by this share of what the other does is split with it.
-const BENDS: f64 = 0.5;
-/// Shares down to this part of the largest are dealt with at a time.
-const ALIKE: f64 = 1.0 / 16.0;
-/// Squares of differences up to this many times the variance of a look count for nothing.
-const BY_CHANCE: f64 = 2.0;
-/// Corners this far apart let expect this much of it between them, where nothing is known yet.
-const RANGE: f64 = 0.1;
 
 /// What the solved light says at a place of a chart.
 #[derive(Debug, Clone, Copy)]
@@ -48,19 +41,6 @@ pub(super) struct Budget {
     pub(super) texels: usize,
     /// Texels along an axis of a page.
     pub(super) page: usize,
-}
-
-/// How growing ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum End {
-    /// The expected error is within the goal.
-    Reached,
-    /// What is left cannot be split: too small, or the page or the budget of texels is full.
-    Smallest,
-    /// As many looks as are allowed.
-    Most,
-    /// There is no time left.
-    Late,
 }
 
 /// Charts with texels that grow.
@@ -120,11 +100,7 @@ impl<'a> Growth<'a> {
     }
 
     pub(super) fn difference(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
-        // No light anywhere, or none left: no difference.
-        if a == b || self.white[1] <= 0.0 {
-            return 0.0;
-        }
-        de2000(a, b, self.white)
+        seen_difference(a, b, self.white)
     }
 
     fn want(&mut self, cell: usize, point: [u32; 2]) -> Sample {
@@ -260,7 +236,7 @@ impl<'a> Growth<'a> {
     /// The cells with the largest shares that can be split, as many as make up the excess.
     fn pick(&self, excess: f64) -> Vec<usize> {
         let mut left_texels = self.budget.texels.saturating_sub(self.texels());
-        let mut shares: Vec<(f64, usize)> = self
+        let shares = self
             .cells
             .iter()
             .enumerate()
@@ -268,13 +244,10 @@ impl<'a> Growth<'a> {
             .filter(|(_, c)| !c.doubt.tested || self.axes(c, left_texels).is_some())
             .map(|(k, c)| (share(c), k))
             .collect();
-        let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
-        shares.retain(|s| s.0 >= ALIKE * largest);
-        shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut left = 1.2 * excess;
+        let mut left = EXCESS * excess;
         let mut picked = Vec::new();
         let mut raised: Vec<Option<[u8; 2]>> = vec![None; self.lattices.len()];
-        for (share, k) in shares {
+        for (share, k) in largest(shares) {
             if left <= 0.0 {
                 break;
             }

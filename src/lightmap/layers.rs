@@ -3,11 +3,12 @@
 //! All that makes texels of looks is linear but the closing of seams, which ends when it is close enough. What the layers then
 //! lack of the whole goes to the brightest of them, texel by texel, so that they add up.
 
+use super::aliasing::Smoothed;
+use super::charts::Chart;
 use super::grow::Growth;
-use super::maps::{Page, Placed, Texel, margin};
+use super::maps::{Page, Placed, margin};
 use super::seams::close;
-use super::texels::Patch;
-use super::{bake::Smoothed, charts::Chart};
+use super::texels::{Patch, Texel};
 use crate::solve::Bake;
 
 impl Bake {

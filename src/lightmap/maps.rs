@@ -3,7 +3,7 @@
 use super::cells::{Lattice, bilinear};
 use super::charts::Chart;
 use super::pack::Place;
-use super::texels::Patch;
+use super::texels::{Patch, Texel};
 use crate::gather::Baked;
 use crate::hierarchy::{Face, Mesh};
 use crate::solve::weights_of;
@@ -22,31 +22,6 @@ pub(super) fn margin(lattice: &Lattice) -> usize {
         MARGIN_OF_ONE
     } else {
         MARGIN
-    }
-}
-
-/// A texel.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Texel {
-    /// Tristimulus irradiance, lm/m2 (Y: lx).
-    pub irradiance: [f32; 3],
-    /// What times the paint's texture and vertex colour is the radiosity, as at vertices: linear sRGB, lm/m2.
-    pub light: [f32; 3],
-}
-
-impl Texel {
-    /// Sum of weights times texels.
-    pub(super) fn mix(parts: &[(f64, Self)]) -> Self {
-        let sum = |get: fn(&Self) -> [f32; 3], c: usize| {
-            parts
-                .iter()
-                .map(|(w, t)| w * f64::from(get(t)[c]))
-                .sum::<f64>() as f32
-        };
-        Self {
-            irradiance: [0, 1, 2].map(|c| sum(|t| t.irradiance, c)),
-            light: [0, 1, 2].map(|c| sum(|t| t.light, c)),
-        }
     }
 }
 

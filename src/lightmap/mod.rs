@@ -20,4 +20,5 @@ mod texels;
 mod unwrap;
 
 pub use bake::MapLimits;
-pub use maps::{LightMaps, Page, Texel};
+pub use maps::{LightMaps, Page};
+pub use texels::Texel;

@@ -5,7 +5,8 @@
 //! `(c . d + g)^2 + STAY |d|^2` is least where `(C^T C + STAY) d = -C^T g`, solved by conjugate gradients.
 
 use super::charts::Chart;
-use super::maps::{Placed, Texel};
+use super::maps::Placed;
+use super::texels::Texel;
 use crate::gather::Vertex;
 use crate::solve::Bake;
 use glam::{DVec2, DVec3};

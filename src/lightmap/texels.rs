@@ -1,9 +1,33 @@
 //! The texels of a chart: what was looked at as it is, the rest interpolated in its cell, what is off the chart filled up.
 
 use super::cells::{Cell, DEPTH, Lattice, bilinear};
-use super::maps::Texel;
 use glam::DVec2;
 use std::collections::{BTreeMap, HashMap, VecDeque};
+
+/// A texel.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Texel {
+    /// Tristimulus irradiance, lm/m2 (Y: lx).
+    pub irradiance: [f32; 3],
+    /// What times the paint's texture and vertex colour is the radiosity, as at vertices: linear sRGB, lm/m2.
+    pub light: [f32; 3],
+}
+
+impl Texel {
+    /// Sum of weights times texels.
+    pub(super) fn mix(parts: &[(f64, Self)]) -> Self {
+        let sum = |get: fn(&Self) -> [f32; 3], c: usize| {
+            parts
+                .iter()
+                .map(|(w, t)| w * f64::from(get(t)[c]))
+                .sum::<f64>() as f32
+        };
+        Self {
+            irradiance: [0, 1, 2].map(|c| sum(|t| t.irradiance, c)),
+            light: [0, 1, 2].map(|c| sum(|t| t.light, c)),
+        }
+    }
+}
 
 /// Texels of a chart without margins.
 #[derive(Debug, Clone, Default)]

@@ -7,8 +7,8 @@
 
 use super::cells::{Cell, Cells, Corner, Doubt, Hint, within};
 use super::looks::Looks;
-use super::measure::PointLooks;
-use crate::color::de2000;
+use super::turns::{BENDS, BY_CHANCE, EXCESS, End, RANGE, largest};
+use crate::color::seen_difference;
 use crate::gather::Vertex;
 use crate::geometry::sampling::{hash, triangle_weights};
 use rayon::prelude::*;
@@ -21,17 +21,8 @@ const SMALLEST: f64 = 1e-3;
 /// What remains of the mean square after a bisection: two halve a smooth triangle's size, and its error falls with the
 /// square of that.
 const SHRINK: f64 = 0.25;
-/// Edges that bend by this share of what the worst does are split with it.
-const BENDS: f64 = 0.5;
-/// Shares down to this part of the largest are dealt with at a time.
-const ALIKE: f64 = 1.0 / 16.0;
-/// Looks differ by chance: squares of differences up to this many times the variance of a look count for nothing.
-const BY_CHANCE: f64 = 2.0;
 /// Where something covers the middle of an edge, this much of the difference of its ends counts.
 const COVERED: f64 = 0.25;
-/// Corners this far apart let expect this much of it between them, where nothing is known yet.
-const RANGE: f64 = 0.1;
-
 /// Vertices that splitting one triangle may take, its neighbours' included: as measured, 1 to 5.
 const SPLIT: usize = 8;
 /// A limit of vertices counts as met where less than this part of it is left.
@@ -44,6 +35,9 @@ type Asked = ([u32; 3], u32, [f64; 3]);
 
 /// Sum of the light of neighbours of covered vertices, and how many there are.
 type Lent = HashMap<u32, ([f64; 3], f64)>;
+
+/// Cell, weights of its corners, and two looks at a random point.
+pub(super) type PointLooks = (usize, [f64; 3], [u32; 2]);
 
 /// A mesh that grows.
 pub(super) struct Growth<'a> {
@@ -70,19 +64,6 @@ pub(super) struct Growth<'a> {
     looking: bool,
 }
 
-/// How growing ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum End {
-    /// The expected error is within the goal.
-    Reached,
-    /// What is left is too small to be split.
-    Smallest,
-    /// There are as many vertices as are allowed.
-    Most,
-    /// There is no time left.
-    Late,
-}
-
 impl<'a> Growth<'a> {
     /// Starts with cells.
     pub(super) fn new(cells: Cells, looks: Looks<'a>, white: [f64; 3], half_size: f64) -> Self {
@@ -103,11 +84,7 @@ impl<'a> Growth<'a> {
     }
 
     fn difference(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
-        // No light anywhere, or none left: no difference.
-        if a == b || self.white[1] <= 0.0 {
-            return 0.0;
-        }
-        de2000(a, b, self.white)
+        seen_difference(a, b, self.white)
     }
 
     /// Asks for the vertices of some cells.
@@ -345,17 +322,14 @@ impl<'a> Growth<'a> {
     /// The cells with the largest shares that can be split, as many as make up the excess.
     fn pick(&self, excess: f64) -> Vec<usize> {
         let all = self.cells.all.par_iter().enumerate();
-        let mut shares: Vec<(f64, usize)> = all
+        let shares = all
             .filter(|(_, c)| c.doubt.square > 0.0 && c.area > 0.0)
             .filter(|(_, c)| !self.is_smallest(c))
             .map(|(k, c)| (share(c), k))
             .collect();
-        let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
-        shares.retain(|s| s.0 >= ALIKE * largest);
-        shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut left = 1.2 * excess;
+        let mut left = EXCESS * excess;
         let mut picked = Vec::new();
-        for (share, k) in shares {
+        for (share, k) in largest(shares) {
             if left <= 0.0 {
                 break;
             }

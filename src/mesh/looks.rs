@@ -3,7 +3,7 @@
 use crate::gather::{MOSTLY, Vertex};
 use crate::hierarchy::NONE;
 use crate::solve::{Bake, Care};
-use crate::transport::point::{Gathered, Receiver};
+use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 use std::collections::HashMap;
 

@@ -6,9 +6,9 @@
 //! least, i the error of interpolation: the rays of vertices may have more in common than chance. What is left when that is
 //! taken off scatters about i^2, below 0 as well as above: roots keep the sign, so that chance cancels in their mean.
 
-use super::grow::{Growth, mix};
+use super::grow::{Growth, PointLooks, mix};
 use super::write::Settled;
-use crate::color::de2000;
+use crate::color::seen_difference;
 use crate::gather::{Interpolation, LayerLanes, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
@@ -42,9 +42,6 @@ pub(crate) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) ->
         capped,
     }
 }
-
-/// Cell, weights of its corners, and two looks at a random point.
-pub(super) type PointLooks = (usize, [f64; 3], [u32; 2]);
 
 /// A random point.
 #[derive(Debug, Clone, Copy)]
@@ -123,10 +120,7 @@ impl Growth<'_> {
             Some(lanes) => bake.lanes().tristimulus(&lanes.of(row)),
             None => bake.lanes().tristimulus(row),
         };
-        let difference = |a: [f64; 3], b: [f64; 3]| match a == b || white[1] <= 0.0 {
-            true => 0.0,
-            false => de2000(a, b, white),
-        };
+        let difference = |a, b| seen_difference(a, b, white);
         let sample = |&(cell, weights, looks): &PointLooks| {
             let of = &self.cells.all[cell];
             let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| shown(&seen.row)));

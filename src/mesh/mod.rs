@@ -8,29 +8,22 @@ pub(crate) mod hints;
 pub(crate) mod looks;
 pub(crate) mod measure;
 mod skins;
+pub(crate) mod turns;
 mod write;
 
 use crate::gather::Baked;
 use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
 use cells::Cells;
-use grow::{End, Growth};
+use grow::Growth;
 use looks::Looks;
 use measure::summed;
+use turns::{End, Turns};
 
 /// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error. At 1 a
 /// furnished room of 12,000 triangles ends within its error at 96,000 vertices (mean .41; with a quarter of them 1.1) and a
 /// garage of 11,000 at .78 with 93,000 (1.2).
 const MOST_VERTICES: f64 = 131_072.0;
 const AT: f64 = 0.5;
-/// The error is measured this often at the most.
-const MEASURED: u64 = 10;
-/// Growing ends where so many times the triangles leave more than this part of the error.
-const GROWN: f64 = 1.5;
-const STALLED: f64 = 0.93;
-/// After a measurement that was not met, growing aims at this part of what the measured error asks for.
-const BELOW: f64 = 0.8;
-/// And at no less than this part of what it aimed at before.
-const STEP: f64 = 0.2;
 /// Pictures on the way may be off by this many times the error asked for, but by no more than so much: a black floor below
 /// a bright wall is off by 16 in the mean.
 const SKETCH: f64 = 4.0;
@@ -80,27 +73,19 @@ impl Bake {
             self.grow_unseen(&mut growth, progress);
         }
         let area = growth.seen_area();
-        let mut aim = allowed * allowed * area;
         let settled = self.settled(&growth);
         let samples = growth.measured(self, &settled, 0, progress);
-        let mut before = summed(&samples, allowed, None);
+        let before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
-        let mut size = growth.cells.all.len();
-        let mut turn = 0;
+        let mut turns = Turns::new(allowed, area, growth.cells.all.len(), before);
         loop {
-            turn += 1;
-            let end = growth.grow(aim, progress);
+            let end = growth.grow(turns.aim, progress);
             let settled = self.settled(&growth);
-            let samples = growth.measured(self, &settled, turn, progress);
+            let samples = growth.measured(self, &settled, turns.turn, progress);
             let interpolation =
                 summed(&samples, allowed, (end == End::Most).then_some(growth.most));
-            let has_grown = growth.cells.all.len() as f64 > GROWN * size as f64;
-            let stalled = turn > 1 && has_grown && interpolation.mean > STALLED * before.mean;
-            if has_grown {
-                (size, before) = (growth.cells.all.len(), interpolation);
-            }
-            let over = end != End::Reached || turn == MEASURED || stalled || limits.is_late();
-            if interpolation.is_met() || over {
+            let ended = (end, limits.is_late());
+            if turns.is_over(interpolation, growth.cells.all.len(), ended, growth.sum()) {
                 let capped = growth.unfinished(allowed * allowed);
                 let layers = growth.of_layers(self, &settled, allowed);
                 let mut out = self.write_down(growth, settled);
@@ -109,8 +94,6 @@ impl Bake {
                 out.interpolation = Some(interpolation);
                 return out;
             }
-            let wrong = (interpolation.mean / allowed).powi(2);
-            aim = growth.sum().min(aim) * (BELOW / wrong).clamp(STEP, BELOW);
             growth.learn(&samples);
         }
     }

@@ -16,19 +16,26 @@ pub fn to_exr(picture: &Picture) -> Result<Vec<u8>> {
             FlatSamples::F32(picture.pixels.iter().map(value).collect()),
         )
     };
-    let mut channels: SmallVec<[_; 4]> = SmallVec::new();
-    channels.push(plane("A", &|p| p.coverage));
+    let mut channels = vec![plane("A", &|p| p.coverage)];
     for (i, name) in ["R", "G", "B"].into_iter().enumerate() {
         channels.push(plane(name, &|p| p.rgb[i]));
     }
     for (i, name) in ["xyz.X", "xyz.Y", "xyz.Z"].into_iter().enumerate() {
         channels.push(plane(name, &|p| p.xyz[i]));
     }
+    encoded((picture.width, picture.height), channels)
+}
+
+/// The bytes of a file with some channels.
+pub(super) fn encoded(
+    size: (usize, usize),
+    channels: Vec<AnyChannel<FlatSamples>>,
+) -> Result<Vec<u8>> {
     let layer = Layer::new(
-        (picture.width, picture.height),
+        size,
         LayerAttributes::default(),
         Encoding::SMALL_LOSSLESS,
-        AnyChannels::sort(channels),
+        AnyChannels::sort(channels.into()),
     );
     let mut out = std::io::Cursor::new(Vec::new());
     Image::from_layer(layer)

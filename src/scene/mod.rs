@@ -88,6 +88,13 @@ pub struct Source {
     pub buffers: Vec<Arc<[u8]>>,
 }
 
+impl Source {
+    /// Where the problems of a whole room are.
+    pub(crate) fn place(&self) -> String {
+        self.path.display().to_string()
+    }
+}
+
 /// A primitive at a node: the unit of input and of output.
 #[derive(Debug, Clone)]
 pub struct Surface {

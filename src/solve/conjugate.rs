@@ -4,7 +4,7 @@
 //! `|error| <= |residual| / (1 - rho_max)` in the norm `sum A R^2 / rho`: a *bound*, given exact row sums. Where that
 //! takes long, [`Aggregates`] precondition it.
 
-use super::aggregates::Aggregates;
+use super::aggregates::{Aggregates, add_products};
 use super::operator::Operator;
 use crate::light::rows::Rows;
 use rayon::prelude::*;
@@ -266,14 +266,6 @@ pub(super) fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
     parts.iter().fold([0.0; L], |acc, part| {
         std::array::from_fn(|l| acc[l] + part[l])
     })
-}
-
-/// `sum += x y`. Slices of a length that the compiler does not know: of arrays it makes single numbers.
-#[inline(never)]
-pub(super) fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
-    for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
-        *s += f64::from(*x) * f64::from(*y);
-    }
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::hierarchy::{NONE, Tree, stratified};
 use crate::light::weighed;
 use crate::link::{Demand, MAX_DEPTH};
-use crate::transport::point::{Memory, Receiver};
 use crate::transport::trace::Trace;
+use crate::transport::{Memory, Receiver};
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -8,7 +8,7 @@
 use crate::color::{de_luv, de2000, uv_1960};
 use crate::geometry::sampling::{Pcg, triangle_weights};
 use crate::hierarchy::Tree;
-use crate::transport::point::Receiver;
+use crate::transport::Receiver;
 use glam::DVec3;
 
 /// Points that are watched.

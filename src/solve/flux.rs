@@ -1,7 +1,6 @@
 //! Where the light goes: closedness, a first guess of brightness, and the flux balance
 //! `emitted = absorbed + escaped` (any geometry, any wavelength).
 
-use super::sent::Sent;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, cosine_direction, sequence02, triangle_weights};
 use crate::hierarchy::{Mesh, NONE, Tree};
@@ -25,6 +24,23 @@ pub enum Closed {
     Yes,
     /// Some did.
     No,
+}
+
+/// Shares of the luminous flux of all lamps, by rays from them (estimates, to about 0.1 %). Their sum is 1, or 0 where nothing
+/// shines. Directional lights have no flux and are left out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Sent {
+    /// Luminous flux of all lamps, lm.
+    pub lamps_lm: f64,
+    /// To the fronts of surfaces.
+    pub to_fronts: f64,
+    /// To black backs of one-sided surfaces.
+    pub to_backs: f64,
+    /// Out of the room.
+    pub outside: f64,
+    /// Kept back by panes on the way: what they absorb, and what they reflect, which is left out.
+    #[serde(default)]
+    pub in_panes: f64,
 }
 
 /// Casts rays from the fronts of all faces: the room is closed if every one meets the front of something. The second

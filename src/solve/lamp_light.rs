@@ -7,7 +7,7 @@ use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::{Neighbours, Rows, padded, weighed};
 use crate::link::{Demand, Sight};
-use crate::transport::point::{Gatherer, Memory, Receiver};
+use crate::transport::{Gatherer, Memory, Receiver};
 use glam::Vec3;
 
 /// What one patch may misplace of the direct light of a leaf, share of white for each unit of asked-for error. With five

@@ -5,7 +5,7 @@ use crate::geometry::{NO_PLANE, Segment};
 use crate::light::Glass;
 use crate::link::Sight;
 use crate::transport::hemisphere::Hemisphere;
-use crate::transport::point::{Gathered, Gatherer, MOSTLY, Memory, Receiver};
+use crate::transport::{Gathered, Gatherer, MOSTLY, Memory, Receiver};
 use rayon::prelude::*;
 
 /// What one patch may misplace in a gather, share of the asked-for error.

@@ -24,6 +24,7 @@ mod outside;
 pub(crate) mod punctual;
 mod rays;
 pub mod record;
+mod recording;
 pub mod reference;
 mod refining;
 mod representation;
@@ -48,8 +49,8 @@ use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance, is_s
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
+use crate::transport::Outside;
 use crate::transport::hemisphere::Hemisphere;
-use crate::transport::sky::Outside;
 use direct::Direct;
 pub use flux::Closed;
 pub use held::Held;
@@ -107,7 +108,7 @@ const MOST_LINKS: usize = 4_000_000;
 const MANY_FACES: usize = 50_000;
 /// Rooms of few triangles with panes take directions for this share of the error: what is clipped exactly in others is found by rays
 /// there, and a ray costs next to nothing.
-const GLAZED: f64 = 0.25;
+const GLAZED_DIRECTIONS: f64 = 0.25;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
 /// The working partition may cause this share of the asked-for error. In the Cornell box under F2, .05 to .35 cost the
@@ -173,7 +174,7 @@ pub struct Bake {
     pub(crate) direct: direct::Direct,
     pub(crate) probes: estimate::Probes,
     /// Where the light of lamps goes first.
-    pub(crate) sent: sent::Sent,
+    pub(crate) sent: flux::Sent,
     pub(crate) hemisphere: Hemisphere,
     pub(crate) rounds: Vec<Round>,
     pub(crate) watch: Option<record::Watch>,
@@ -271,7 +272,8 @@ impl Bake {
         let upsampler = Upsampler::new(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
         let glazed = !scene.panes.is_empty() && is_small(&mesh);
-        let hemisphere = Hemisphere::for_error(settings.error * if glazed { GLAZED } else { 1.0 });
+        let hemisphere =
+            Hemisphere::for_error(settings.error * if glazed { GLAZED_DIRECTIONS } else { 1.0 });
         let probes = estimate::Probes::new(&tree, settings.seed);
         let mut bake = Self {
             closed: Closed::No,
@@ -292,7 +294,7 @@ impl Bake {
             frozen: None,
             two_grid: None,
             spectrum_error: None,
-            sent: sent::Sent::default(),
+            sent: flux::Sent::default(),
             panes: Panes::new(&scene, mesh.centre),
             filters: Filters::new(&scene, &lanes),
             scene,
@@ -406,19 +408,16 @@ impl Bake {
         let white = self.light.white;
         let distance = self.probes.compare(seen, white, round, by_rays);
         clock.lap("estimate");
-        let record = Round::new(
-            self,
-            record::Measured {
-                threshold,
-                refined: &refined,
-                convergence: &solved.0,
-                distance,
-                flux: solved.1,
-                link_bytes: rows.bytes(),
-                rays: refined.rays + escape_rays + self.direct.rays - direct_rays,
-                clock: &clock,
-            },
-        );
+        let record = self.recorded(record::Measured {
+            threshold,
+            refined: &refined,
+            convergence: &solved.0,
+            distance,
+            flux: solved.1,
+            link_bytes: rows.bytes(),
+            rays: refined.rays + escape_rays + self.direct.rays - direct_rays,
+            clock: &clock,
+        });
         self.rounds.push(record);
         &self.rounds[round]
     }

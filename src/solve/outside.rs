@@ -3,8 +3,8 @@
 use super::{Bake, Closed};
 use crate::light::lanes::Lanes;
 use crate::scene::effects::{Kind, Plan};
+use crate::transport::Outside;
 use crate::transport::openings::Openings;
-use crate::transport::sky::Outside;
 
 /// Why a closed room has neither.
 const CLOSED: &str = "the room is closed: no ray leaves it";

@@ -5,8 +5,8 @@ use crate::hierarchy::{Mesh, Sample, Tree};
 use crate::light::lanes::Lanes;
 use crate::link::{Sight, View};
 use crate::scene::{LightKind, PunctualLight, Scene};
-use crate::transport::point::{Receiver, punctual_factor};
-use crate::transport::sky::{Look, Outside};
+use crate::transport::{Look, Outside};
+use crate::transport::{Receiver, punctual_factor};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 

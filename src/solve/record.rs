@@ -1,12 +1,9 @@
 //! What is written down after every round: the lines of the log.
 
-use super::Bake;
-use super::Representation;
 use super::conjugate::Convergence;
 use super::estimate::Distance;
 use super::flux::Balance;
-use super::forecast::{forecast, next_round};
-use crate::link::{Refined, Way};
+use crate::link::Refined;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -52,7 +49,7 @@ impl Clock {
         &self.laps
     }
 
-    fn total(&self) -> f64 {
+    pub(super) fn total(&self) -> f64 {
         self.start.elapsed().as_secs_f64()
     }
 }
@@ -211,98 +208,4 @@ pub(crate) struct Measured<'a> {
     pub(super) link_bytes: usize,
     pub(super) rays: u64,
     pub(super) clock: &'a Clock,
-}
-
-impl Round {
-    pub(crate) fn new(bake: &Bake, m: Measured) -> Self {
-        let estimate = Figure::estimate;
-        let spectrum = bake.spectrum_error.unwrap_or(0.0);
-        let convergence_de = m.convergence.bound * 100.0 * super::DE_PER_PERCENT;
-        // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
-        let all = |geometry: f64| {
-            (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt()
-        };
-        let white = bake.light.white;
-        let light = &bake.light;
-        let seconds = m.clock.total();
-        let error = m.distance.map(|d| all(d.de2000)).filter(|e| e.is_finite());
-        let before = bake.rounds.iter();
-        let curve: Vec<(f64, Option<f64>)> = before
-            .map(|r| (r.round_s, r.error.total_de2000.value))
-            .chain([(seconds, error)])
-            .collect();
-        let times: Vec<f64> = curve.iter().map(|c| c.0).collect();
-        let ahead = forecast(&curve, super::LIGHT_SHARE * bake.settings.error);
-        let per = |bytes: usize, count: usize| bytes as f64 / count.max(1) as f64;
-        let of_links = m.link_bytes
-            + size_of_val(bake.graph.links.as_slice())
-            + size_of_val(bake.graph.blockers.as_slice())
-            + light.neighbours.bytes();
-        let of_elements = bake.tree.bytes()
-            + light.bytes()
-            + bake.direct.bytes()
-            + size_of_val(bake.areas.as_slice())
-            + size_of_val(bake.balance.factor.as_slice())
-            + bake.outlook.bytes();
-        Self {
-            record: "round",
-            round: bake.rounds.len() + 1,
-            elapsed_s: bake.started.elapsed().as_secs_f64(),
-            round_s: seconds,
-            next_round_s: next_round(&times),
-            remaining_rounds: ahead.map(|a| a.rounds),
-            remaining_s: ahead.map(|a| a.seconds),
-            phases_s: m
-                .clock
-                .laps()
-                .iter()
-                .map(|(name, s)| ((*name).to_owned(), (*s).into()))
-                .collect(),
-            threshold: m.threshold,
-            rays: m.rays,
-            links_evaluated: m.refined.evaluated,
-            links_capped: m.refined.capped,
-            elements: light.leaves.len(),
-            nodes: bake.tree.nodes.len(),
-            links: bake.graph.links.len(),
-            links_clear: bake
-                .graph
-                .links
-                .iter()
-                .filter(|l| l.way == Way::Clear)
-                .count(),
-            intervals_working: bake.lanes.len(),
-            intervals_mean: bake.intervals_mean(),
-            memory_bytes: of_links + of_elements,
-            bytes_per_link: per(of_links, bake.graph.links.len()),
-            bytes_per_element: per(of_elements, light.leaves.len()),
-            iterations: m.convergence.iterations,
-            error: Errors {
-                total_de2000: estimate(error),
-                total_de_luv: estimate(m.distance.map(|d| all(d.de_luv))),
-                total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
-                geometry_chromaticity: estimate(m.distance.map(|d| d.chromaticity)),
-                geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),
-                spectrum_de_luv: Figure {
-                    value: bake.spectrum_error.filter(|e| e.is_finite()),
-                    kind: match bake.settings.representation {
-                        Representation::Guaranteed => Kind::Bound,
-                        _ => Kind::Estimate,
-                    },
-                },
-                convergence: Figure {
-                    value: Some(m.convergence.bound).filter(|e| e.is_finite()),
-                    kind: Kind::Bound,
-                },
-                convergence_de_luv: estimate(Some(convergence_de)),
-                total_xyz: estimate(
-                    m.distance
-                        .map(|d| d.relative * white.iter().sum::<f64>() / 6.0),
-                ),
-            },
-            flux: m.flux,
-            row_sum_defect: bake.balance.defect_before,
-            row_sum_defect_after: bake.balance.defect_after,
-        }
-    }
 }

@@ -3,6 +3,7 @@
 //! By rays from the lamps themselves: nothing that receives light has a part in it, so that what leaves are found to receive
 //! can be held against it.
 
+use super::flux::Sent;
 use super::{Bake, Closed};
 use crate::geometry::NO_PLANE;
 use crate::geometry::sampling::{
@@ -12,7 +13,6 @@ use crate::hierarchy::NONE;
 use crate::link::Sight;
 use crate::scene::{LightKind, PunctualLight};
 use glam::{DVec3, Vec3};
-use serde::{Deserialize, Serialize};
 
 /// Rays: an error of about 0.1 % of the flux.
 const RAYS: u32 = 32_768;
@@ -20,23 +20,6 @@ const RAYS: u32 = 32_768;
 const OFF: f64 = 1e-5;
 /// Rays that go together.
 const TOGETHER: usize = 16;
-
-/// Shares of the luminous flux of all lamps, by rays from them (estimates, to about 0.1 %). Their sum is 1, or 0 where nothing
-/// shines. Directional lights have no flux and are left out.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Sent {
-    /// Luminous flux of all lamps, lm.
-    pub lamps_lm: f64,
-    /// To the fronts of surfaces.
-    pub to_fronts: f64,
-    /// To black backs of one-sided surfaces.
-    pub to_backs: f64,
-    /// Out of the room.
-    pub outside: f64,
-    /// Kept back by panes on the way: what they absorb, and what they reflect, which is left out.
-    #[serde(default)]
-    pub in_panes: f64,
-}
 
 impl Bake {
     /// Follows the light of lamps.
@@ -63,19 +46,16 @@ impl Bake {
             // At least a packet, so that no lamp goes without.
             let count = (f64::from(RAYS) * flux / all).ceil() as usize;
             let count = count.next_multiple_of(TOGETHER);
-            let each = flux / all / lamp.weights(self, first as u32, count as u32);
-            for start in (0..count).step_by(TOGETHER) {
-                let mut from = [Vec3::ZERO; TOGETHER];
-                let mut weights = [1.0; TOGETHER];
-                let mut directions = [Vec3::ZERO; TOGETHER];
-                let mut plane = 0;
-                for k in 0..TOGETHER {
-                    let (point, direction, of, weight) = lamp.ray(self, (first + start + k) as u32);
-                    weights[k] = weight;
-                    (from[k], directions[k], plane) = (point.as_vec3(), direction.as_vec3(), of);
-                }
+            let rays: Vec<_> = (first..first + count)
+                .map(|k| lamp.ray(self, k as u32))
+                .collect();
+            let weights: f64 = rays.iter().map(|ray| ray.3).sum();
+            let each = flux / all / weights.max(f64::MIN_POSITIVE);
+            for rays in rays.chunks_exact(TOGETHER) {
+                let from: [Vec3; TOGETHER] = std::array::from_fn(|k| rays[k].0.as_vec3());
+                let directions: [Vec3; TOGETHER] = std::array::from_fn(|k| rays[k].1.as_vec3());
                 let mut hits = [None; TOGETHER];
-                sight.meet(&from, &directions, plane, &mut hits);
+                sight.meet(&from, &directions, rays[0].2, &mut hits);
                 for (k, hit) in hits.into_iter().enumerate() {
                     let reach = hit.map_or(4.0 * self.mesh.half_size as f32, |hit| hit.t);
                     let end = from[k] + reach * directions[k];
@@ -85,8 +65,8 @@ impl Bake {
                         Some(hit) if self.tree.met(&hit) == NONE => &mut sent.to_backs,
                         Some(_) => &mut sent.to_fronts,
                     };
-                    *to += each * weights[k] * through;
-                    sent.in_panes += each * weights[k] * (1.0 - through);
+                    *to += each * rays[k].3 * through;
+                    sent.in_panes += each * rays[k].3 * (1.0 - through);
                 }
             }
             first += count;
@@ -127,17 +107,6 @@ enum Lamp<'a> {
 }
 
 impl Lamp<'_> {
-    /// Sum of what so many of its rays count for.
-    fn weights(self, bake: &Bake, first: u32, count: u32) -> f64 {
-        match self {
-            Lamp::Punctual(light) if light.luminaire.is_some() => {
-                let rays = (first..first + count).map(|k| self.ray(bake, k).3);
-                rays.sum::<f64>().max(f64::MIN_POSITIVE)
-            }
-            _ => f64::from(count),
-        }
-    }
-
     /// Start, direction and plane of its `k`-th ray, and what it counts for: 1 in the mean.
     fn ray(self, bake: &Bake, k: u32) -> (DVec3, DVec3, u32, f64) {
         // Two shifts of one sequence depend on each other.

@@ -1,6 +1,5 @@
 //! Is there a surface, and is there a lamp?
 
-use super::place;
 use crate::error::Problem;
 use crate::scene::Scene;
 use serde_json::Value;
@@ -45,7 +44,7 @@ pub(super) fn nothing(scene: &Scene) -> Option<Problem> {
         )
     };
     let what = format!("there is nothing to bake: {why}");
-    Some(Problem::new(place(scene), what, next))
+    Some(Problem::new(scene.source.place(), what, next))
 }
 
 /// A room without a lamp.
@@ -56,7 +55,7 @@ pub(super) fn no_lamp(scene: &Scene) -> Option<Problem> {
     });
     (!glows && scene.lights.is_empty()).then(|| {
         Problem::new(
-            place(scene),
+            scene.source.place(),
             "there is no lamp, all would be black",
             "give a material an emissive colour and strength (KHR_materials_emissive_strength, cd/m2), export the \
              lights (KHR_lights_punctual), or write an \"emission\" with \"luminance_cd_m2\" for a material into the \

@@ -6,7 +6,6 @@
 //! its emission) light themselves.
 
 use super::eyes::{Eyes, Met};
-use super::place;
 use crate::error::Problem;
 use crate::geometry::sampling::{
     Pcg, around, cosine_direction, hash, on_triangle, sequence02, sphere_direction, tangents,
@@ -241,7 +240,7 @@ impl Away {
             }
         };
         Problem::new(
-            place(scene),
+            scene.source.place(),
             format!("all lamps shine away from the room: {}", what.join("; ")),
             format!("{next}; --allow-dark bakes it as it is"),
         )

@@ -81,8 +81,3 @@ pub fn advise(scene: &mut Scene, wishes: Wishes) -> Vec<Problem> {
         problem => problem.into_iter().collect(),
     }
 }
-
-/// Where the problems of a whole room are.
-fn place(scene: &Scene) -> String {
-    scene.source.path.display().to_string()
-}

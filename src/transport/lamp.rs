@@ -4,8 +4,10 @@
 //! parts in proportion to it. How many rays is settled beforehand: to stop where the first few agree is to overlook thin
 //! things, and took 4 to 8 % of the light of lamps behind louvres.
 
+use super::gatherer::{Gatherer, Lamp, Memory, Of};
 use super::luminaire;
-use super::point::{Gathered, Gatherer, Memory, Of, Receiver, punctual_factor};
+use super::punctual::punctual_factor;
+use super::receiver::{Gathered, Receiver};
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
@@ -33,15 +35,6 @@ const CHOSEN: usize = 4;
 
 /// A triangle and its factor for a point.
 type Part = ([DVec3; 3], f64);
-
-/// An element of a lamp whose visible share rays must find: its exact factor, and what it would bring unblocked, share of
-/// white.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Lamp {
-    pub(super) id: u32,
-    pub(super) factor: f64,
-    pub(super) carries: f64,
-}
 
 /// A lamp that was chosen, the way to it, and what turns what it emits into irradiance by all that it stands for.
 struct Chosen {
@@ -281,9 +274,9 @@ impl Gatherer<'_> {
     /// Chooses a punctual light: brightness of them all, and where the ray to it ends.
     fn one_punctual(&self, to: &Receiver, [u, v]: [f64; 2]) -> Option<(f64, DVec3)> {
         let far = self.one_direction(to, [u, v]);
-        let each = || {
-            let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
-            lamps.filter_map(|((lamp, _), &bright)| {
+        let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
+        let each: Vec<(f64, DVec3)> = lamps
+            .filter_map(|((lamp, _), &bright)| {
                 let (factor, end) = match (lamp.kind, far) {
                     (LightKind::Sky | LightKind::Ground, Some((d, factors))) => {
                         let factor = factors[usize::from(lamp.kind == LightKind::Ground)];
@@ -299,10 +292,10 @@ impl Gatherer<'_> {
                 };
                 Some((factor * f64::from(bright), end))
             })
-        };
-        let all: f64 = each().map(|(bright, _)| bright).sum();
+            .collect();
+        let all: f64 = each.iter().map(|(bright, _)| bright).sum();
         let mut left = v * all;
-        let (_, end) = each().find(|&(bright, _)| {
+        let (_, end) = each.into_iter().find(|&(bright, _)| {
             left -= bright;
             left < 0.0
         })?;

@@ -5,7 +5,8 @@
 //! a rule of seven points, or three where it is far. Where little stands between, what is seen is the surface less its shadows,
 //! exactly; else rays to parts chosen by what they bring find the visible share.
 
-use super::point::{Gatherer, Memory, Receiver};
+use super::gatherer::{Gatherer, Memory};
+use super::receiver::Receiver;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_polygon, quarters};
 use crate::light::Filter;
@@ -232,8 +233,7 @@ impl Gatherer<'_> {
             return (seen, None);
         }
         let (more, noise) = self.by_lamp_rays(luminaire, &parts, to, bright, memory);
-        let owners = vec![0; memory.segments.len()];
-        let filter = self.tints(&owners, 1, memory).first().copied();
+        let filter = self.tint(memory);
         memory.noise += noise * self.left_by(filter.as_ref()).powi(2);
         (seen + more, filter)
     }

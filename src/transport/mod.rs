@@ -2,24 +2,34 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `point` | a receiver, and everything that it gets |
+//! | `receiver`, `gatherer` | a point, what it gets, and what gathering looks at |
+//! | `point` | everything that a point gets |
 //! | `patches`, `slope`, `shadows` | patches of few faces with their exact factors, past what blocks them |
 //! | `lamp` | parts of lamps near a point, and lamps chosen by chance |
-//! | `luminaire` | lamps that shine from a surface by a profile |
+//! | `punctual`, `luminaire` | lights without extent, and lamps that shine from a surface by a profile |
 //! | `hemisphere`, `sweep` | beams of rays that find the patches they end on |
 //! | `nearby` | short paths where rays end close by |
-//! | `openings`, `sky` | where rays leave the room, and what comes in there: sky, ground, the sun's disc |
+//! | `openings`, `outside`, `sky` | where rays leave the room, and what comes in there: sky, ground, the sun's disc |
 //! | `trace` | what a point gets its light from, kept for relighting |
 
+mod gatherer;
 pub mod hemisphere;
 mod lamp;
 mod luminaire;
 mod nearby;
 pub(crate) mod openings;
+mod outside;
 mod patches;
-pub mod point;
+mod point;
+mod punctual;
+mod receiver;
 mod shadows;
-pub(crate) mod sky;
+mod sky;
 mod slope;
 mod sweep;
 pub(crate) mod trace;
+
+pub use gatherer::{Gatherer, Memory};
+pub(crate) use outside::{Look, Outside};
+pub use punctual::punctual_factor;
+pub use receiver::{Gathered, MOSTLY, Receiver};

@@ -9,7 +9,8 @@
 //! with H the leaf's irradiance, B what it reflects, D(p) the direct light of one lamp chosen by chance and q where one
 //! further ray ends, which may be close by again (a path, as in Kajiya 1986). Only brightness follows the path: colours stay those of the leaf.
 
-use super::point::{Gatherer, Memory, Receiver};
+use super::gatherer::{Gatherer, Memory};
+use super::receiver::Receiver;
 use crate::geometry::Hit;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::link::View;

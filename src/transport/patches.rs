@@ -4,11 +4,11 @@
 //! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in number with what they
 //! carry.
 
-use super::lamp::Lamp;
-use super::point::{CLOSE, Gathered, Gatherer, Linked, Memory, Of, Receiver};
+use super::gatherer::{CLOSE, Gatherer, Lamp, Linked, Memory, Of};
+use super::receiver::{Gathered, Receiver};
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
-use crate::light::{Filter, Tint};
+use crate::light::{Filter, Tint, accumulate};
 use crate::link::{
     PIECES, POLYGONS, View, Way, blockers_of, in_front_of, open_weight, pattern, polygons,
 };
@@ -178,7 +178,7 @@ impl Gatherer<'_> {
     }
 
     /// What panes leave of what the last rays bring, where they are not blocked; none where no pane is passed.
-    fn tint(&self, memory: &Memory) -> Option<Filter> {
+    pub(super) fn tint(&self, memory: &Memory) -> Option<Filter> {
         let glass = self.glass?;
         let (mut tint, mut any) = (Tint::default(), false);
         let rays = memory.segments.iter().zip(&memory.weights);
@@ -439,21 +439,5 @@ impl Gatherer<'_> {
             }
         }
         Some(memory.clipper.factor(to.normal, whole))
-    }
-}
-
-/// Adds a row times a weight, of each lane what a filter leaves.
-pub(super) fn accumulate(sum: &mut [f32], weight: f32, row: &[f32], tint: Option<&Filter>) {
-    match tint {
-        None => {
-            for (x, r) in sum.iter_mut().zip(row) {
-                *x += weight * r;
-            }
-        }
-        Some(tint) => {
-            for ((x, r), t) in sum.iter_mut().zip(row).zip(tint) {
-                *x += weight * r * t;
-            }
-        }
     }
 }

@@ -5,7 +5,8 @@
 //! round: -2), which keeps the child's mean B. A point receives `sum over j of s_j W_j` more than by the mean alone, with
 //! `W_j` the integral of w_j over the form factor's kernel, found by quartering the child while that matters.
 
-use super::point::{Gathered, Gatherer, Receiver};
+use super::gatherer::Gatherer;
+use super::receiver::{Gathered, Receiver};
 use crate::geometry::{lambert_triangles_x8, quarters};
 use glam::DVec3;
 

@@ -1,12 +1,12 @@
 //! Light at a point in rooms where much stands about: lamps from the root, what is bright by links, all else by rays.
 
+use super::gatherer::{Gatherer, Memory, Of};
 use super::hemisphere::{BEAM, Hemisphere};
-use super::patches::accumulate;
-use super::point::{Gathered, Gatherer, Memory, Of, Receiver};
+use super::receiver::{Gathered, Receiver};
 use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
 use crate::hierarchy::NONE;
-use crate::light::Filter;
+use crate::light::{Filter, accumulate};
 use crate::link::{POLYGONS, pattern};
 use glam::{DVec3, Vec3};
 

@@ -12,7 +12,7 @@
 //! | spectrum for each lux | mean and principal components, 65535ths of a component's range | stated in the page |
 
 use super::history::{Corner, History, corners};
-use crate::color::de2000;
+use crate::color::seen_difference;
 use crate::gather::Baked;
 use crate::solve::Bake;
 use crate::spectrum::{LEAVES, Leaves};
@@ -142,10 +142,8 @@ fn errors(
     };
     let stated = bake.rounds().last()?.error.total_de2000.value?;
     let white = bake.light().white;
-    let differ = |(a, b): (&[f32; 3], &[f32; 3])| match a == b || white[1] <= 0.0 {
-        true => 0.0,
-        false => de2000(a.map(f64::from), b.map(f64::from), white),
-    };
+    let differ =
+        |(a, b): (&[f32; 3], &[f32; 3])| seen_difference(a.map(f64::from), b.map(f64::from), white);
     let mut error: Vec<f64> = before.iter().zip(last).map(differ).collect();
     for _ in 0..EVENED {
         even_out(&mut error, corners, area);

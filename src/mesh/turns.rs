@@ -1,0 +1,92 @@
+//! Growing and measuring take turns until the error is met; meshes and light maps alike.
+
+use crate::gather::Interpolation;
+
+/// The error is measured this often at the most.
+const MEASURED: u64 = 10;
+/// Growing ends where so many times the cells leave more than this part of the error.
+const GROWN: f64 = 1.5;
+const STALLED: f64 = 0.93;
+/// After a measurement that was not met, growing aims at this part of what the measured error asks for.
+const BELOW: f64 = 0.8;
+/// And at no less than this part of what it aimed at before.
+const STEP: f64 = 0.2;
+/// Shares down to this part of the largest are dealt with at a time.
+const ALIKE: f64 = 1.0 / 16.0;
+/// Of what is too much, so many times are dealt with at a time: not all that is split becomes as good as expected.
+pub(crate) const EXCESS: f64 = 1.2;
+/// What bends by this share of what the worst does is split with it.
+pub(crate) const BENDS: f64 = 0.5;
+/// Looks differ by chance: squares of differences up to this many times the variance of a look count for nothing.
+pub(crate) const BY_CHANCE: f64 = 2.0;
+/// Corners this far apart let expect this much of it between them, where nothing is known yet.
+pub(crate) const RANGE: f64 = 0.1;
+
+/// How growing ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum End {
+    /// The expected error is within the goal.
+    Reached,
+    /// What is left cannot be split.
+    Smallest,
+    /// What may be spent is spent.
+    Most,
+    /// There is no time left.
+    Late,
+}
+
+/// What was come to so far.
+pub(crate) struct Turns {
+    /// What the sum of all cells' shares of the mean square, times their area, is to come down to.
+    pub(crate) aim: f64,
+    /// The number of this turn, from 1.
+    pub(crate) turn: u64,
+    allowed: f64,
+    /// Cells, and what was measured, when there were last [`GROWN`] times as many as before.
+    cells: usize,
+    before: Interpolation,
+}
+
+impl Turns {
+    /// Begins with the allowed error (mean CIEDE2000), the area that is seen, and what so many cells were measured to have.
+    pub(crate) fn new(allowed: f64, area: f64, cells: usize, before: Interpolation) -> Self {
+        Self {
+            aim: allowed * allowed * area,
+            turn: 1,
+            allowed,
+            cells,
+            before,
+        }
+    }
+
+    /// Is it over, with what was found after growing to so many cells? If not, the next turn has a new aim, below the `sum`
+    /// of shares that growing believes in.
+    pub(crate) fn is_over(
+        &mut self,
+        found: Interpolation,
+        cells: usize,
+        (end, is_late): (End, bool),
+        sum: f64,
+    ) -> bool {
+        let has_grown = cells as f64 > GROWN * self.cells as f64;
+        let stalled = self.turn > 1 && has_grown && found.mean > STALLED * self.before.mean;
+        if has_grown {
+            (self.cells, self.before) = (cells, found);
+        }
+        if found.is_met() || end != End::Reached || self.turn == MEASURED || stalled || is_late {
+            return true;
+        }
+        let wrong = (found.mean / self.allowed).powi(2);
+        self.aim = sum.min(self.aim) * (BELOW / wrong).clamp(STEP, BELOW);
+        self.turn += 1;
+        false
+    }
+}
+
+/// Cells whose shares are alike, the largest first; of those that are the same, the first.
+pub(crate) fn largest(mut shares: Vec<(f64, usize)>) -> Vec<(f64, usize)> {
+    let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
+    shares.retain(|s| s.0 >= ALIKE * largest);
+    shares.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    shares
+}

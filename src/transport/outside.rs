@@ -1,0 +1,370 @@
+//! What comes in from outside: sky, and ground below the horizon.
+//!
+//! In rooms of few triangles exactly: the directions fall into eight triangles, far away, less the shadows of what stands before them;
+//! what is left is cut until the sky is even over each part, whose factor is exact. Elsewhere by rays over the hemisphere
+//! and toward the [`Openings`], both together by the power heuristic (Veach and Guibas 1995): by the balance heuristic the few rays
+//! of the hemisphere that find a small opening brought 2 % of noise to what those toward it know.
+
+use super::openings::{Choice, Openings};
+use super::receiver::Receiver;
+use crate::geometry::sampling::{cosine_direction, hash, sequence02};
+use crate::geometry::{
+    Clipper, NO_PLANE, Patch, Segment, Shaft, ShaftContents, lambert_edges_x8, quarters,
+};
+use crate::light::{Filter, Glass, Tint};
+use crate::link::{Sight, View};
+use crate::scene::sky::Sky;
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
+
+/// Rays over the hemisphere and to the openings: of a random point of a leaf, of a point by a rule, of one for its own sake, and of
+/// one whose rays over the hemisphere are known.
+const RAYS: [(usize, usize); 4] = [(16, 16), (64, 64), (512, 1024), (0, 256)];
+/// So many times more to the openings in rooms of few triangles. With 4, one of the points of CIE 171 5.10 is off by .6 %.
+const FEW: usize = 16;
+/// The far triangles stand this many half sizes of the room away: all of it lies before their planes.
+const FAR: f64 = 8.0;
+/// Blockers of a far triangle at the most, and pieces it may fall into, before it is cut.
+const LISTED: usize = 64;
+const PIECES: usize = 64;
+/// How often a far triangle is cut before rays decide: to 3 degrees.
+const CUTS: u32 = 5;
+/// Rays into what is left then.
+const LAST_RAYS: u32 = 16;
+/// A part is even where two means of the sky over it differ by less than this share. With .005 points of CIE 171 5.9 are off by
+/// .1 %.
+const EVEN: f64 = 0.005;
+/// And whose corners are less than this far apart, cosine: 25 degrees.
+const NARROW: f64 = 0.9;
+/// How often a part is cut for the sky's sake: about the sun it changes within a degree.
+const DEPTH: u32 = 6;
+
+/// What is outside a room.
+#[derive(Debug, Clone)]
+pub(crate) struct Outside {
+    pub(crate) sky: Sky,
+    pub(crate) openings: Openings,
+}
+
+/// What a look outside takes.
+#[derive(Debug, Default)]
+pub(crate) struct Look {
+    clipper: Clipper,
+    choice: Choice,
+    segments: Vec<Segment>,
+    open: Vec<DVec3>,
+    blocked: Vec<bool>,
+    /// Rays cast.
+    pub(crate) rays: u64,
+    /// Variance of the first factor.
+    pub(super) noise: f64,
+    /// Mean filters of sky and ground where light comes through panes; none where none does.
+    pub(super) tints: [Option<Filter>; 2],
+}
+
+/// How a point looks outside.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Way<'a> {
+    /// By these of [`RAYS`].
+    Rays(usize),
+    /// These directions, of so many over the hemisphere, lead out of the room.
+    Known(&'a [DVec3], usize),
+    /// As if nothing stood in the way.
+    Unshadowed,
+}
+
+impl Outside {
+    /// Irradiance of a point by the sky, where open level ground has 1, and by the ground below, where that sends out 1.
+    pub(super) fn seen(
+        &self,
+        (sight, glass): (&Sight, Option<Glass>),
+        to: &Receiver,
+        way: Way,
+        look: &mut Look,
+    ) -> [f64; 2] {
+        (look.noise, look.tints) = (0.0, [None; 2]);
+        if let Way::Unshadowed = way {
+            let up = |d: DVec3| match d.y > 0.0 {
+                true => PI * self.sky.radiance(d),
+                false => 0.0,
+            };
+            let down = |d: DVec3| f64::from(u8::from(d.y <= 0.0));
+            let most =
+                |radiance: &dyn Fn(DVec3) -> f64| self.openings.most(to.point, to.normal, radiance);
+            return [most(&up), most(&down).min(1.0)];
+        }
+        if Self::is_exact(sight) {
+            self.exactly(sight, to, look)
+        } else {
+            self.by_rays((sight, glass), to, way, look)
+        }
+    }
+
+    /// Is the sky of this room seen exactly, without openings?
+    pub(crate) fn is_exact(sight: &Sight) -> bool {
+        sight.small() && sight.opaque.is_none() && sight.panes.is_none()
+    }
+
+    /// The same as one of many points sees it.
+    pub(crate) fn lightly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; 2] {
+        self.seen((sight, None), to, Way::Rays(0), look)
+    }
+
+    /// By clipped polygons.
+    fn exactly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; 2] {
+        let mut seen = [0.0; 2];
+        let far = FAR * sight.mesh.half_size;
+        for octant in 0..8_u32 {
+            let sign = |bit: u32| if octant >> bit & 1 == 1 { -far } else { far };
+            let [x, y, z] = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
+            if [x, y, z].iter().all(|d| d.dot(to.normal) <= 0.0) {
+                continue;
+            }
+            // Their fronts are inside.
+            let corners = if octant.count_ones() % 2 == 0 {
+                [x, z, y]
+            } else {
+                [x, y, z]
+            };
+            let corners = corners.map(|d| to.point + d);
+            let cell = Cell {
+                corners,
+                up: y.y > 0.0,
+                cuts: CUTS,
+            };
+            self.cell(sight, to, &cell, None, look, &mut seen);
+        }
+        seen
+    }
+
+    /// Adds what is seen of a far triangle; of its blockers nothing is known but that they are among the candidates.
+    fn cell(
+        &self,
+        sight: &Sight,
+        to: &Receiver,
+        cell: &Cell,
+        candidates: Option<&[u32]>,
+        look: &mut Look,
+        seen: &mut [f64; 2],
+    ) {
+        let point = Patch::Point {
+            at: to.point,
+            normal: to.normal,
+            plane: to.plane,
+        };
+        let far = Patch::Triangle {
+            corners: cell.corners,
+            plane: NO_PLANE,
+        };
+        let shaft = Shaft::between(&point, &far);
+        let list = match sight.rays.blockers(&shaft, candidates, LISTED) {
+            ShaftContents::Clear => Some(Vec::new()),
+            ShaftContents::Few(list) => Some(list),
+            ShaftContents::Many => None,
+        };
+        if let Some(list) = &list {
+            let clipper = &mut look.clipper;
+            clipper.begin(to.point, &cell.corners);
+            let planes = [to.plane, NO_PLANE];
+            let blockers = sight.blockers(list, planes).into_iter().flatten();
+            let fits = blockers.into_iter().all(|blocker| {
+                let outline = sight.mesh.outline(blocker);
+                let shadow = crate::geometry::Shadow::new(to.point, outline.as_ref());
+                clipper.cut(&shadow, PIECES)
+            });
+            if fits {
+                let whole = lambert_edges_x8(to.point, to.normal, &cell.corners);
+                if clipper.factor(to.normal, whole) > 0.0 {
+                    for piece in clipper.visible() {
+                        self.add(to.normal, cell.up, piece, seen);
+                    }
+                }
+                return;
+            }
+        }
+        if cell.cuts > 0 {
+            for corners in quarters(cell.corners) {
+                let part = Cell {
+                    corners,
+                    cuts: cell.cuts - 1,
+                    ..*cell
+                };
+                self.cell(sight, to, &part, list.as_deref().or(candidates), look, seen);
+            }
+            return;
+        }
+        let [a, b, c] = cell.corners;
+        let open = (0..LAST_RAYS).filter(|&k| {
+            let w = crate::geometry::sampling::triangle_weights(sequence02(k, to.seed));
+            let end = a * w[0] + b * w[1] + c * w[2];
+            !sight
+                .rays
+                .occluded(&Segment::new(to.point, end, [to.plane, NO_PLANE]))
+        });
+        let share = open.count() as f64 / f64::from(LAST_RAYS);
+        look.rays += u64::from(LAST_RAYS);
+        if share > 0.0 {
+            let mut whole = [0.0; 2];
+            let corners = cell.corners.map(|c| c - to.point);
+            self.add(to.normal, cell.up, &corners, &mut whole);
+            *seen = std::array::from_fn(|k| seen[k] + share * whole[k]);
+        }
+    }
+
+    /// Adds a polygon of directions, any lengths.
+    fn add(&self, normal: DVec3, up: bool, polygon: &[DVec3], seen: &mut [f64; 2]) {
+        if !up || self.sky.dome.is_even() {
+            let factor = lambert_edges_x8(DVec3::ZERO, normal, polygon);
+            seen[usize::from(!up)] += factor;
+            return;
+        }
+        let first = polygon[0].normalize();
+        for two in polygon[1..].windows(2) {
+            let corners = [first, two[0].normalize(), two[1].normalize()];
+            let radiance = corners.map(|d| self.sky.radiance(d));
+            seen[0] += self.triangle(normal, corners, radiance, DEPTH);
+        }
+    }
+
+    /// Irradiance by a triangle of sky, of which the radiance at the corners is known.
+    fn triangle(&self, normal: DVec3, corners: [DVec3; 3], radiance: [f64; 3], depth: u32) -> f64 {
+        let [a, b, c] = corners;
+        if corners.iter().all(|d| d.dot(normal) <= 0.0) {
+            return 0.0;
+        }
+        let middles = [a + b, b + c, c + a].map(|d| d.normalize());
+        let halfway = middles.map(|d| self.sky.radiance(d));
+        let mean = |values: [f64; 3]| values.iter().sum::<f64>() / 3.0;
+        // Exact for quadratic variation, and what is exact for linear.
+        let (fine, coarse) = (mean(halfway), mean(radiance));
+        let narrow = a.dot(b).min(b.dot(c)).min(c.dot(a)) > NARROW;
+        if depth == 0 || (narrow && (fine - coarse).abs() <= EVEN * fine) {
+            return PI * fine * lambert_edges_x8(DVec3::ZERO, normal, &corners);
+        }
+        let ([ab, bc, ca], [u, v, w]) = (middles, halfway);
+        let [x, y, z] = radiance;
+        [
+            ([a, ab, ca], [x, u, w]),
+            ([ab, b, bc], [u, y, v]),
+            ([ca, bc, c], [w, v, z]),
+            ([ab, bc, ca], halfway),
+        ]
+        .into_iter()
+        .map(|(part, radiance)| self.triangle(normal, part, radiance, depth - 1))
+        .sum()
+    }
+
+    /// By rays.
+    fn by_rays(
+        &self,
+        (sight, glass): (&Sight, Option<Glass>),
+        to: &Receiver,
+        way: Way,
+        look: &mut Look,
+    ) -> [f64; 2] {
+        let (wide, mut narrow) = RAYS[if let Way::Rays(k) = way { k } else { 3 }];
+        if let (Way::Known(..), true) = (way, sight.small()) {
+            // Rooms of few triangles come here for their panes; a ray costs next to nothing there.
+            narrow *= FEW;
+        }
+        let wide = match way {
+            Way::Known(open, of) => {
+                look.open.clear();
+                look.open.extend_from_slice(open);
+                of
+            }
+            _ => {
+                self.look_around(sight, to, wide, look);
+                wide
+            }
+        };
+        let sky = |d: DVec3| {
+            if d.y > 0.0 {
+                PI * self.sky.radiance(d)
+            } else {
+                0.2
+            }
+        };
+        self.openings
+            .weigh(to.point, to.normal, sky, &mut look.choice);
+        look.segments.clear();
+        let turn = hash(to.seed, 0x5c1);
+        for k in 0..narrow as u32 {
+            let at = self.openings.choose(&look.choice, sequence02(k, turn));
+            let ahead = at.filter(|at| to.normal.dot(at - to.point) > 0.0);
+            look.segments
+                .extend(ahead.map(|at| Segment::new(to.point, at, [to.plane, NO_PLANE])));
+        }
+        sight.blocked(&look.segments, &View::Crowded, &mut look.blocked);
+        look.rays += look.segments.len() as u64;
+        let around = look.open.len();
+        let ways = look.segments.iter().zip(&look.blocked);
+        let free = ways.filter(|(_, blocked)| !**blocked);
+        look.open
+            .extend(free.map(|(s, _)| (s.to.as_dvec3() - to.point).normalize()));
+        let (mut seen, mut squares, mut sum) = ([0.0; 2], 0.0, 0.0);
+        let mut tints = [Tint::default(); 2];
+        let far = 4.0 * sight.mesh.half_size;
+        for (k, &d) in look.open.iter().enumerate() {
+            let cosine = to.normal.dot(d);
+            if cosine <= 0.0 {
+                continue;
+            }
+            let densities = [
+                wide as f64 * cosine / PI,
+                narrow as f64 * self.openings.density(&look.choice, to.point, d),
+            ];
+            let squared = densities[0] * densities[0] + densities[1] * densities[1];
+            let own = densities[usize::from(k >= around)];
+            let (place, radiance) = if d.y > 0.0 {
+                (0, self.sky.radiance(d))
+            } else {
+                (1, 1.0 / PI)
+            };
+            let brings = radiance * cosine * own / squared;
+            seen[place] += brings;
+            let mut left = brings;
+            if let Some(glass) = glass {
+                let filter = glass.through(to.point.as_vec3(), (to.point + d * far).as_vec3());
+                let filter = filter.unwrap_or([1.0; 64]);
+                left *= glass.filters.brightness(&filter);
+                tints[place].add(&filter, brings);
+            }
+            if place == 0 {
+                (squares, sum) = (squares + left * left, sum + left);
+            }
+        }
+        let count = (wide + narrow) as f64;
+        look.noise = (squares - sum * sum / count).max(0.0);
+        look.tints = tints.map(|tint| tint.mean());
+        seen
+    }
+
+    /// Rays over the hemisphere: leaves the directions that lead outside.
+    fn look_around(&self, sight: &Sight, to: &Receiver, count: usize, look: &mut Look) {
+        const TOGETHER: usize = 16;
+        look.open.clear();
+        let shift = hash(to.seed, 0x5c2);
+        for first in (0..count).step_by(TOGETHER) {
+            let directions: [DVec3; TOGETHER] = std::array::from_fn(|k| {
+                cosine_direction(to.normal, sequence02((first + k) as u32, shift))
+            });
+            let mut hits = [None; TOGETHER];
+            let from = [to.point.as_vec3(); TOGETHER];
+            let ways: [Vec3; TOGETHER] = directions.map(|d| d.as_vec3());
+            sight.meet(&from, &ways, to.plane, &mut hits);
+            let open = directions.iter().zip(hits).filter(|(_, hit)| hit.is_none());
+            look.open.extend(open.map(|(d, _)| d));
+        }
+        look.rays += count as u64;
+    }
+}
+
+/// A far triangle.
+struct Cell {
+    corners: [DVec3; 3],
+    /// Is it above the horizon?
+    up: bool,
+    /// How often it may still be cut.
+    cuts: u32,
+}

@@ -1,0 +1,101 @@
+//! Lights without extent, the sun, and lamps with a profile, one after the other.
+
+use super::gatherer::{Gatherer, Memory};
+use super::luminaire;
+use super::receiver::{Gathered, Receiver};
+use crate::geometry::sampling::sequence02;
+use crate::geometry::{NO_PLANE, Segment};
+use crate::light::Filter;
+use crate::scene::{LightKind, PunctualLight};
+use glam::DVec3;
+
+impl Gatherer<'_> {
+    /// Light of punctual lights, one ray each.
+    pub(super) fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
+        for (k, (lamp, row)) in self.lamps.iter().enumerate() {
+            let (factor, filter) = match lamp.kind {
+                LightKind::Surface => {
+                    let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
+                    self.of_surface(to, lamp, f64::from(bright), memory)
+                }
+                _ => self.of_light(to, lamp, memory),
+            };
+            if factor <= 0.0 {
+                continue;
+            }
+            if let Some(trace) = &mut out.trace {
+                trace.lamp(k, factor as f32);
+            }
+            for (l, r) in row.iter().enumerate() {
+                let more = factor as f32 * r * filter.map_or(1.0, |filter| filter[l]);
+                out.irradiance[l] += more;
+                out.direct[l] += more;
+            }
+        }
+    }
+
+    /// What turns the intensity of a light without extent, or of the sun, into irradiance, past what is in between, and what
+    /// panes leave of it.
+    fn of_light(
+        &self,
+        to: &Receiver,
+        lamp: &PunctualLight,
+        memory: &mut Memory,
+    ) -> (f64, Option<Filter>) {
+        let Some((factor, end)) = punctual_factor(lamp, to, self.light.half_size) else {
+            return (0.0, None);
+        };
+        let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
+        let seen = match lamp.kind {
+            LightKind::Sun => self.sun_seen(to, lamp, memory),
+            _ if self.sight.occlusion => {
+                memory.rays += 1;
+                f64::from(u8::from(!self.sight.blocks_one(&way)))
+            }
+            _ => 1.0,
+        };
+        match seen > 0.0 {
+            true => (factor * seen, self.through(&way)),
+            false => (0.0, None),
+        }
+    }
+}
+
+/// What turns a punctual light's intensity (of measured lamps, flux) into irradiance at a receiver where nothing is in between, and
+/// where the ray to it ends: of a lamp with an extent, at one of its points. None for sky and ground, which shine from everywhere.
+pub fn punctual_factor(
+    lamp: &PunctualLight,
+    to: &Receiver,
+    half_size: f64,
+) -> Option<(f64, DVec3)> {
+    if lamp.kind.is_dome() {
+        return None;
+    }
+    if lamp.kind.is_parallel() {
+        let cosine = -to.normal.dot(lamp.direction);
+        return (cosine > 0.0).then(|| (cosine, to.point - lamp.direction * (4.0 * half_size)));
+    }
+    if lamp.kind == LightKind::Surface {
+        return luminaire::whole(lamp, to, half_size, sequence02(0, to.seed));
+    }
+    let d = lamp.position - to.point;
+    let r2 = d.length_squared();
+    let cosine = to.normal.dot(d) / r2.sqrt();
+    if !(cosine > 0.0 && r2 > 0.0) {
+        return None;
+    }
+    let spot = match lamp.kind {
+        LightKind::Spot { inner, outer } => {
+            // The fall-off that KHR_lights_punctual gives: smooth between the cosines of both angles.
+            let along = -lamp.direction.dot(d) / r2.sqrt();
+            let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
+            ((along - outer.cos()) * scale).clamp(0.0, 1.0).powi(2)
+        }
+        LightKind::Profile => {
+            let spread = lamp.luminaire.as_ref();
+            spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
+        }
+        _ => 1.0,
+    };
+    (spot > 0.0).then(|| (spot * cosine / r2, lamp.position))
+}

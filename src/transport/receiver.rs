@@ -1,0 +1,61 @@
+//! A point that light comes to, and what it gets.
+
+use super::trace::Trace;
+use glam::DVec3;
+
+/// A vertex that sees more black backs than this, share of its rays, lies inside something.
+pub const MOSTLY: f64 = 0.75;
+
+/// Where light is received.
+#[derive(Debug, Clone, Copy)]
+pub struct Receiver {
+    /// The point, recentred.
+    pub point: DVec3,
+    /// Unit normal for the cosine.
+    pub normal: DVec3,
+    /// Plane of the face that the point lies on; [`NO_PLANE`] for a point in the air.
+    pub plane: u32,
+    /// Leaf of the hierarchy whose links are used; none: the whole room is searched.
+    pub leaf: Option<u32>,
+    /// Distinguishes sampling patterns.
+    pub seed: u64,
+}
+
+/// Light at a point.
+#[derive(Debug, Clone)]
+pub struct Gathered {
+    /// Irradiance by lane.
+    pub irradiance: [f32; 64],
+    /// Of which straight from lamps.
+    pub direct: [f32; 64],
+    /// Sum of visible factors: 1 in a closed room.
+    pub seen: f64,
+    /// Share of the rays over the hemisphere that met a black back; 0 where light is gathered by links.
+    pub backs: f64,
+    /// Visibility rays cast for this point.
+    pub rays: u64,
+    /// Where it comes from, where that is kept; at last packed.
+    pub(crate) trace: Option<Trace>,
+    pub(crate) packed: Option<Box<[u8]>>,
+}
+
+impl Gathered {
+    /// No light, nothing seen.
+    pub(crate) fn dark() -> Self {
+        Self {
+            irradiance: [0.0; 64],
+            direct: [0.0; 64],
+            seen: 0.0,
+            backs: 0.0,
+            rays: 0,
+            trace: None,
+            packed: None,
+        }
+    }
+
+    /// Packs the trace.
+    pub(crate) fn pack(mut self) -> Self {
+        self.packed = self.trace.take().map(Trace::pack);
+        self
+    }
+}
