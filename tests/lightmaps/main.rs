@@ -63,7 +63,7 @@ fn written(bake: Bake, limits: &MapLimits) -> Written {
     let folder = tempfile::tempdir().unwrap();
     for (k, page) in maps.pages.iter().enumerate() {
         let exr = maps::to_exr(page, index.lux_per_unit).unwrap();
-        std::fs::write(folder.path().join(name(k, "exr")), exr).unwrap();
+        std::fs::write(folder.path().join(name(k, None, "exr")), exr).unwrap();
     }
     std::fs::write(folder.path().join("room.glb"), &glb.bytes).unwrap();
     let index = serde_json::to_value(&index).unwrap();
