@@ -4,6 +4,7 @@ use std::fmt;
 
 /// One thing that is wrong with the input.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Problem {
     /// Where: file, then node, mesh, primitive or material by index and name, e.g. `room.glb: mesh 3 'chair', primitive 0`.
     pub place: String,
@@ -72,6 +73,7 @@ impl fmt::Display for Problem {
 
 /// Everything that can stop a bake.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The input cannot be used; every problem found is listed (exit code 2).
     #[error("{}", list(.0))]

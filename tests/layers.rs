@@ -1,5 +1,6 @@
 //! The code reads in the order light travels: a folder uses what stands before it, and no file is too long to be read.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Folders and files of `src`, from the bottom to the top. `lib` and `main` hold them together.
@@ -29,6 +30,13 @@ const ORDER: [&str; 23] = [
     "cli",
 ];
 const LONGEST: usize = 600;
+/// Lines of a function.
+const LONGEST_FUNCTION: usize = 80;
+/// Functions that are longer still: file of `src`, and name.
+const LONG: [(&str, &str); 1] = [("cli/bake.rs", "run")];
+
+/// A folder whose files still use each other in a circle: its writer and the parts that it is made of.
+const CIRCULAR: [&str; 2] = ["output", "gltf"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -90,4 +98,243 @@ fn files_can_be_read() {
     let lines = |file: &PathBuf| std::fs::read_to_string(file).unwrap().lines().count();
     files.retain(|file| lines(file) > LONGEST);
     assert!(files.is_empty(), "longer than {LONGEST} lines: {files:#?}");
+}
+
+/// Names and lengths of the functions of a file, tests aside. Each ends at the brace below its first column: the code is
+/// formatted.
+fn functions(text: &str) -> Vec<(String, usize)> {
+    let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    let lines: Vec<&str> = text[..end].lines().collect();
+    let mut found = Vec::new();
+    for (at, line) in lines.iter().enumerate() {
+        let indent = line.len() - line.trim_start().len();
+        let mut words = line.split_whitespace();
+        let begins = |word: &str| {
+            matches!(word, "pub" | "const" | "async" | "unsafe" | "extern" | "in")
+                || word.starts_with(['"', '('])
+                || word.starts_with("pub(")
+                || word.ends_with(')')
+        };
+        let Some("fn") = words.find(|word| !begins(word)) else {
+            continue;
+        };
+        let name: String = (words.next().unwrap_or("").chars())
+            .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
+            .collect();
+        let own = |line: &&str| line.len() - line.trim_start().len() == indent;
+        let last = lines[at..].iter().position(|line| {
+            let text = line.trim_end();
+            // A body ends so; what a trait asks for, and a body of one line, end in their own way.
+            own(line) && (text.trim_start() == "}" || text.ends_with([';', '}']))
+        });
+        found.push((name, last.expect("every function ends") + 1));
+    }
+    found
+}
+
+#[test]
+fn functions_can_be_read() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let (mut count, mut long) = (0, Vec::new());
+    for file in &files {
+        let relative = file.strip_prefix(&root).unwrap();
+        for (name, lines) in functions(&std::fs::read_to_string(file).unwrap()) {
+            count += 1;
+            let is_known =
+                |(place, known): &(&str, &str)| relative.starts_with(place) && *known == name;
+            if lines > LONGEST_FUNCTION && !LONG.iter().any(is_known) {
+                long.push(format!("{} {name}: {lines}", relative.display()));
+            }
+        }
+    }
+    assert!(count > 2000, "{count} functions found");
+    assert!(
+        long.is_empty(),
+        "longer than {LONGEST_FUNCTION} lines: {long:#?}"
+    );
+}
+
+#[test]
+fn lengths_of_functions_are_found() {
+    let text = "pub(in crate::a) const fn one(\n    x: u8,\n) -> u8 {\n    x\n}\n\ntrait T {\n    fn two(&self);\n    \
+                fn three(&self) {\n        four();\n        five();\n    }\n}\nfn six() {}\n#[cfg(test)]\nmod tests {\n\
+                fn seven() {}\n}\n";
+    let expected = [("one", 5), ("two", 1), ("three", 4), ("six", 1)];
+    assert_eq!(
+        functions(text),
+        expected.map(|(name, n)| (name.to_owned(), n))
+    );
+}
+
+/// The modules of `src`: path to file.
+fn modules(root: &Path) -> BTreeMap<Vec<String>, PathBuf> {
+    let mut files = Vec::new();
+    sources(root, &mut files);
+    let of = |file: PathBuf| {
+        let relative = file.strip_prefix(root).unwrap().with_extension("");
+        let mut path: Vec<String> = (relative.iter())
+            .map(|part| part.to_str().unwrap().to_owned())
+            .collect();
+        path.pop_if(|last| *last == "mod" || *last == "lib");
+        (path, file)
+    };
+    files.into_iter().map(of).collect()
+}
+
+/// The paths of a `use` tree: `a::{b, c::d as e}` is `a::b` known as `b`, and `a::c::d` known as `e`.
+fn leaves(tree: &str, before: &[String], found: &mut Vec<(String, Vec<String>)>) {
+    let tree = tree.trim();
+    if let Some((head, group)) = tree.split_once('{') {
+        let parts = head.split("::").map(|part| part.trim().to_owned());
+        let before: Vec<String> = before
+            .iter()
+            .cloned()
+            .chain(parts.filter(|p| !p.is_empty()))
+            .collect();
+        let (mut depth, mut from) = (0, 0);
+        let group = &group[..group.rfind('}').unwrap_or(group.len())];
+        for (at, c) in group.char_indices().chain([(group.len(), ',')]) {
+            match c {
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                ',' if depth == 0 => {
+                    leaves(&group[from..at], &before, found);
+                    from = (at + 1).min(group.len());
+                }
+                _ => {}
+            }
+        }
+    } else if !tree.is_empty() {
+        let (path, name) = tree.split_once(" as ").unwrap_or((tree, ""));
+        let mut whole: Vec<String> = before.to_vec();
+        whole.extend(path.split("::").map(|part| part.trim().to_owned()));
+        whole.pop_if(|last| *last == "self");
+        let name = match name.trim() {
+            "" => whole.last().cloned().unwrap_or_default(),
+            name => name.to_owned(),
+        };
+        found.push((name, whole));
+    }
+}
+
+/// What a file names of others: its `use` lines, said in public or not, and paths in its code.
+fn named(code: &str) -> Vec<(bool, String, Vec<String>)> {
+    let mut found = Vec::new();
+    let mut rest = String::new();
+    for statement in code.split_inclusive(';') {
+        let at = statement.find("use ").filter(|at| {
+            let head = statement[..*at]
+                .rsplit(['\n', '{', '}'])
+                .next()
+                .unwrap()
+                .trim();
+            head.is_empty() || head.starts_with("pub")
+        });
+        let Some(at) = at else {
+            rest.push_str(statement);
+            continue;
+        };
+        let is_public = statement[..at].trim_end().ends_with(['b', ')']);
+        rest.push_str(&statement[..at]);
+        let mut some = Vec::new();
+        leaves(statement[at + 4..].trim_end_matches(';'), &[], &mut some);
+        found.extend(some.into_iter().map(|(name, path)| (is_public, name, path)));
+    }
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == ':';
+    for word in rest
+        .split(|c| !is_part(c))
+        .filter(|word| word.contains("::"))
+    {
+        let path: Vec<String> = word.split("::").map(str::to_owned).collect();
+        found.push((false, String::new(), path));
+    }
+    found
+}
+
+/// The file that a path means, seen from a module; `Y` of `pub use x::Y` stands where `x` says.
+struct Resolver {
+    files: BTreeMap<Vec<String>, PathBuf>,
+    names: BTreeMap<Vec<String>, Vec<(bool, String, Vec<String>)>>,
+}
+
+impl Resolver {
+    fn file(&self, from: &[String], path: &[String], depth: usize) -> Option<Vec<String>> {
+        let mut at = from.to_vec();
+        let mut rest = path;
+        match path.first()?.as_str() {
+            "crate" => (at, rest) = (Vec::new(), &path[1..]),
+            "self" => rest = &path[1..],
+            "super" => {
+                while rest.first().is_some_and(|part| part == "super") {
+                    at.pop();
+                    rest = &rest[1..];
+                }
+            }
+            first => {
+                at.push(first.to_owned());
+                if !self.files.contains_key(&at) {
+                    return None;
+                }
+                rest = &path[1..];
+            }
+        }
+        while let Some(part) = rest.first() {
+            at.push(part.clone());
+            if self.files.contains_key(&at) {
+                rest = &rest[1..];
+                continue;
+            }
+            at.pop();
+            let again = self.names[&at].iter().find(|(_, name, _)| name == part);
+            return match again {
+                Some((_, _, path)) if depth > 0 => self.file(&at, path, depth - 1),
+                _ => Some(at),
+            };
+        }
+        Some(at)
+    }
+}
+
+#[test]
+fn no_circle_of_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let files = modules(&root);
+    let read = |file: &PathBuf| named(&code(&std::fs::read_to_string(file).unwrap()));
+    let names = files.iter().map(|(path, file)| (path.clone(), read(file)));
+    let resolver = Resolver {
+        names: names.collect(),
+        files,
+    };
+    let mut uses: BTreeMap<&Vec<String>, BTreeSet<Vec<String>>> = BTreeMap::new();
+    for (from, names) in &resolver.names {
+        let of = uses.entry(from).or_default();
+        // What a module only hands on it does not use.
+        for (_, _, path) in names.iter().filter(|(is_public, ..)| !is_public) {
+            of.extend(
+                resolver
+                    .file(from, path, 8)
+                    .filter(|to| to != from && !to.is_empty()),
+            );
+        }
+    }
+    assert!(uses.values().map(BTreeSet::len).sum::<usize>() > 500);
+    let reach = |from: &Vec<String>| {
+        let (mut seen, mut left) = (BTreeSet::new(), vec![from]);
+        while let Some(file) = left.pop() {
+            left.extend(uses[file].iter().filter(|to| seen.insert((*to).clone())));
+        }
+        seen
+    };
+    let reached: BTreeMap<&Vec<String>, BTreeSet<Vec<String>>> =
+        uses.keys().map(|from| (*from, reach(from))).collect();
+    let mut circles = Vec::new();
+    for (from, of) in &uses {
+        let back = of.iter().filter(|to| reached[to].contains(*from));
+        let known = from.starts_with(&CIRCULAR.map(String::from));
+        let back = back.filter(|_| !known);
+        circles.extend(back.map(|to| format!("{} uses {}", from.join("/"), to.join("/"))));
+    }
+    assert!(circles.is_empty(), "circles of files: {circles:#?}");
 }

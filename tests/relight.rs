@@ -481,3 +481,46 @@ fn the_command_relights() {
     assert_eq!(code, Some(2));
     assert!(said.contains("no cache of this program"), "{said}");
 }
+
+/// Lamps that shared a spectrum get spectra of their own, and share one again: lanes follow, and nobody's light is lost.
+#[test]
+fn lamps_get_spectra_of_their_own_and_share_one_again() {
+    let read = |changes: &str| {
+        let mut options = Options::default();
+        options.say(serde_json::from_str(changes).unwrap());
+        Scene::load(scenes().join("furnished.glb"), &options).unwrap()
+    };
+    let tinted = || {
+        read(
+            r#"{ "materials": { "bulb": { "emission": { "name": "cie/F11", "luminance_cd_m2": 20000 } } } }"#,
+        )
+    };
+    let lights = |scene: &Scene| scene.spectra.len();
+    assert!(lights(&tinted()) > lights(&read("{}")));
+    let cached = Cached::new(read("{}"), settings(3.0, 3));
+    let mean = |baked: &Baked| -> f64 {
+        let all = irradiance(baked);
+        all.iter().map(|xyz| xyz[1]).sum::<f64>() / all.len() as f64
+    };
+    let before = mean(&cached.baked);
+    let (mut relighter, _) = cached.relit(read("{}"));
+    relighter.change(tinted()).unwrap();
+    let more = relighter.relight().unwrap();
+    let mut fresh = Bake::new(tinted(), settings(3.0, 3));
+    fresh.run();
+    let stated = more.record.error_de2000.value.unwrap();
+    let measured = difference(&fresh, &more.baked, 1);
+    println!(
+        "measured {measured}, stated {stated} and {}",
+        estimate(&fresh)
+    );
+    assert!(
+        measured < stated.hypot(estimate(&fresh)),
+        "{measured} {stated}"
+    );
+    // What is undone is undone, by way of a first answer.
+    relighter.change(read("{}")).unwrap();
+    relighter.relight_roughly().unwrap();
+    let back = mean(&relighter.relight().unwrap().baked);
+    assert!((back / before - 1.0).abs() < 0.01, "{back} {before}");
+}

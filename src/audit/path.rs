@@ -36,6 +36,7 @@ pub struct Audit<'a> {
 
 /// Irradiance at a point: mean and standard error per leaf, W/m2/nm, and the batch means for anything derived.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Answer {
     /// Mean.
     pub mean: Leaves,

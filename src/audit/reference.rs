@@ -20,6 +20,7 @@ const NOISE_SHARE: f64 = 0.25;
 
 /// A point of a face.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Place {
     /// The face.
     pub face: Face,
@@ -33,6 +34,7 @@ pub struct Place {
 
 /// What the path tracer says at points of a room.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Reference {
     /// The points.
     pub points: Vec<Place>,

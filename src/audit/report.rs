@@ -22,6 +22,7 @@ pub const HONEST: [f64; 2] = [0.7, 3.0];
 /// Was the solver's estimate honest?
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Honesty {
     /// Between [`HONEST`] times the measured error, as far as its interval tells.
     Honest,
@@ -35,6 +36,7 @@ pub enum Honesty {
 
 /// The outcome of an audit.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct Report {
     /// Always `audit`.
     pub record: &'static str,
@@ -65,6 +67,7 @@ pub struct Report {
 
 /// One point of an audit.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Seen {
     /// World space.
     pub point: DVec3,

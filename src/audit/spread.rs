@@ -14,6 +14,7 @@ const NORMAL_95: f64 = 1.96;
 
 /// A measured figure with its interval of 95 %.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Measured {
     /// Best figure.
     pub value: f64,
@@ -25,6 +26,7 @@ pub struct Measured {
 
 /// Mean, 95th percentile and greatest of a measured error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Spread {
     /// Mean.
     pub mean: Measured,

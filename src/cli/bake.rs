@@ -53,6 +53,7 @@ Examples:
   haarlight bake room.glb --checkpoint room.state      stop it at any time; the same command goes on
   haarlight bake room.glb --report                     and a page, room.report.html, to look at the light in a browser
   haarlight bake room.glb --cache                      then change lamps or paints: haarlight relight room.glb")]
+#[non_exhaustive]
 pub struct BakeArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,

@@ -22,6 +22,7 @@ Results go to stdout or files, talk to stderr.";
 /// Bakes light into glTF rooms in full spectrum, and says how wrong it still is.
 #[derive(Debug, clap::Parser)]
 #[command(name = "haarlight", version, after_help = EXAMPLES)]
+#[non_exhaustive]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -33,6 +34,7 @@ pub struct Cli {
 
 /// The commands.
 #[derive(Debug, clap::Subcommand)]
+#[non_exhaustive]
 pub enum Command {
     /// Write the room back with its light baked in.
     Bake(bake::BakeArgs),

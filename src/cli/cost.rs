@@ -24,6 +24,7 @@ const VERSION: u32 = 1;
 Examples:
   haarlight cost room.glb                          sweeps, and writes room.cost/cost.md with its plots
   haarlight cost room.glb --errors 1,0.5 --representations adaptive,uniform:12,rgb --points 100")]
+#[non_exhaustive]
 pub struct CostArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,

@@ -13,7 +13,7 @@ use super::results::put;
 use crate::error::Result;
 use crate::scene::document::Document;
 use crate::scene::effects::Plan;
-use crate::scene::facts::{Facts, LightFact};
+use crate::scene::facts::{Facts, LightFact, MaterialFact};
 use crate::scene::{Scene, short};
 use crate::survey::advise;
 use serde_json::json;
@@ -25,6 +25,7 @@ const VERSION: u32 = 1;
 
 /// Arguments of `inspect`.
 #[derive(Debug, Clone, clap::Args)]
+#[non_exhaustive]
 pub struct InspectArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,
@@ -103,50 +104,9 @@ fn page(facts: &Facts, plan: &Plan, warnings: &[String]) -> String {
         lines.push(format!("  cameras: {}", facts.cameras.join(", ")));
     }
     lines.push("\nLamps".into());
-    let mut rows = vec![
-        ["name", "kind", "flux lm", "", "spectrum"]
-            .map(String::from)
-            .to_vec(),
-    ];
-    for light in &facts.lights {
-        let flux = light.flux_lm.map_or("-".into(), |f| format!("{f:.1}"));
-        rows.push(vec![
-            light.name.clone(),
-            light.kind.into(),
-            flux,
-            strength(light),
-            spectrum(light),
-        ]);
-    }
-    if facts.lights.is_empty() {
-        rows = vec![vec!["none: the room stays dark".into()]];
-    }
-    lines.extend(table(&rows));
+    lines.extend(table(&lamps(&facts.lights)));
     lines.push("\nMaterials".into());
-    let mut rows = vec![
-        [
-            "name",
-            "triangles",
-            "area m2",
-            "albedo",
-            "sides",
-            "reflectance",
-        ]
-        .map(String::from)
-        .to_vec(),
-    ];
-    for material in &facts.materials {
-        let textured = if material.textured { ", textured" } else { "" };
-        rows.push(vec![
-            material.name.clone(),
-            material.triangles.to_string(),
-            format!("{:.3}", material.area_m2),
-            format!("{:.3}", material.albedo_y),
-            material.sides.into(),
-            format!("{}{textured}", material.reflectance),
-        ]);
-    }
-    lines.extend(table(&rows));
+    lines.extend(table(&materials(&facts.materials)));
     lines.push("\nEffects".into());
     lines.extend(plan.to_string().lines().map(|l| format!("  {l}")));
     if !warnings.is_empty() {
@@ -154,6 +114,52 @@ fn page(facts: &Facts, plan: &Plan, warnings: &[String]) -> String {
         lines.extend(warnings.iter().map(|w| format!("  {w}")));
     }
     lines.join("\n") + "\n"
+}
+
+/// A row a lamp.
+fn lamps(lights: &[LightFact]) -> Vec<Vec<String>> {
+    if lights.is_empty() {
+        return vec![vec!["none: the room stays dark".into()]];
+    }
+    let titles = ["name", "kind", "flux lm", "", "spectrum"].map(String::from);
+    let row = |light: &LightFact| {
+        vec![
+            light.name.clone(),
+            light.kind.into(),
+            light.flux_lm.map_or("-".into(), |f| format!("{f:.1}")),
+            strength(light),
+            spectrum(light),
+        ]
+    };
+    let rows = lights.iter().map(row);
+    std::iter::once(titles.to_vec()).chain(rows).collect()
+}
+
+/// A row a material.
+fn materials(materials: &[MaterialFact]) -> Vec<Vec<String>> {
+    let titles = [
+        "name",
+        "triangles",
+        "area m2",
+        "albedo",
+        "sides",
+        "reflectance",
+    ];
+    let row = |material: &MaterialFact| {
+        let textured = if material.textured { ", textured" } else { "" };
+        vec![
+            material.name.clone(),
+            material.triangles.to_string(),
+            format!("{:.3}", material.area_m2),
+            format!("{:.3}", material.albedo_y),
+            material.sides.into(),
+            format!("{}{textured}", material.reflectance),
+        ]
+    };
+    let rows = materials.iter().map(row);
+    std::iter::once(titles.map(String::from).to_vec())
+        .chain(rows)
+        .collect()
 }
 
 /// Where the spectrum comes from, and how the light is spread.

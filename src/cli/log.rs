@@ -78,6 +78,7 @@ use serde::Serialize;
 
 /// What was asked for.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct SettingsRecord {
     /// Mean CIEDE2000 at which to stop.
     pub error_de2000: f64,
@@ -173,6 +174,7 @@ impl<'a> SnapshotsRecord<'a> {
 
 /// Files written.
 #[derive(Debug, Clone, Default, Serialize)]
+#[non_exhaustive]
 pub struct Outputs {
     /// The baked room.
     pub glb: String,
@@ -219,6 +221,7 @@ impl LayerRecord {
 
 /// Seconds of the parts of a bake, wall time.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
+#[non_exhaustive]
 pub struct Seconds {
     /// Reading the room.
     pub load: f64,

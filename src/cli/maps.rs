@@ -15,10 +15,11 @@ use std::path::{Path, PathBuf};
 /// Pages are as many texels wide and high at the most, where nothing is said.
 const PAGE: usize = 1024;
 /// Least and most that can be asked for: margins take 8, and graphics cards hold 16,384.
-const PAGES: [usize; 2] = [64, 16_384];
+pub const PAGES: [usize; 2] = [64, 16_384];
 
 /// Where the light is written.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+#[non_exhaustive]
 pub enum Medium {
     /// At the vertices of a mesh that is as fine as the light needs it.
     #[default]
@@ -29,6 +30,7 @@ pub enum Medium {
 
 /// What of the light is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[non_exhaustive]
 pub enum Only {
     /// What was reflected at least once: for engines that keep their own lamps.
     Indirect,
@@ -36,6 +38,7 @@ pub enum Only {
 
 /// Options of light maps.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
+#[non_exhaustive]
 pub struct Mapping {
     /// Where the light is written.
     #[arg(long, value_enum, value_name = "WHERE", default_value_t)]
@@ -110,14 +113,17 @@ impl Mapping {
 }
 
 /// A mesh with the solved light, as cameras meter it: what is written has too few vertices for that.
-pub(super) fn metered(bake: &Bake) -> Baked {
+pub fn metered(bake: &Bake) -> Baked {
     let none = |surface: &crate::scene::Surface| vec![false; surface.triangles.len()];
     let nowhere: Vec<Vec<bool>> = bake.scene().surfaces.iter().map(none).collect();
     bake.sketch(&nowhere, &|_, _| ())
 }
 
-/// Writes the pages and their index beside the glb; their names.
-pub(super) fn write(
+/// Writes the pages and their index beside the glb at `output`; their names. `room` is not written over.
+///
+/// # Errors
+/// A file cannot be written, or an internal fault of an encoder.
+pub fn write(
     output: &Path,
     room: &Path,
     scene: &Scene,

@@ -26,7 +26,7 @@ pub mod cost;
 mod fault;
 pub mod inspect;
 pub mod log;
-mod maps;
+pub mod maps;
 mod metrics;
 pub mod options;
 #[cfg(feature = "paper")]

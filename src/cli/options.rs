@@ -17,6 +17,7 @@ const LEAST_LEAF_NM: f64 = 1.0;
 
 /// Options of all commands.
 #[derive(Debug, Clone, Default, clap::Args)]
+#[non_exhaustive]
 pub struct Common {
     /// Threads to work with; the result does not depend on it [default: all cores].
     #[arg(long, global = true, value_name = "N")]
@@ -31,6 +32,7 @@ pub struct Common {
 
 /// Options of the commands that read a room.
 #[derive(Debug, Clone, Default, clap::Args)]
+#[non_exhaustive]
 pub struct Reading {
     /// Spectra of materials and lights [default: ROOM's name with .spectra.json, if it is there].
     #[arg(long, value_name = "FILE")]
@@ -79,6 +81,7 @@ impl Reading {
 
 /// Options of the commands that solve.
 #[derive(Debug, Clone, Copy, clap::Args)]
+#[non_exhaustive]
 pub struct Solving {
     /// Mean colour difference (CIEDE2000) at which to stop.
     #[arg(long, value_name = "DE", default_value_t = 0.5, value_parser = positive)]
@@ -91,6 +94,7 @@ pub struct Solving {
 
 /// How the room is shown, in the file and in pictures.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
+#[non_exhaustive]
 pub struct Showing {
     /// How bright: auto (what a person in the room adapts to), auto+1 (a stop brighter) or an exposure value for ISO 100.
     #[arg(
@@ -119,6 +123,7 @@ impl Showing {
 
 /// What is written for each vertex, and how.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
+#[non_exhaustive]
 pub struct Storing {
     /// Keep the tristimulus radiosity of every vertex in the baked room, as the attribute _XYZ: lm/m2, not clipped.
     #[arg(long)]

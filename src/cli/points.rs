@@ -19,6 +19,7 @@ pub type Point = (DVec3, DVec3);
 
 /// Points, and every problem by line.
 #[derive(Debug, Default)]
+#[non_exhaustive]
 pub struct Points {
     /// Points in the order of the file.
     pub points: Vec<Point>,

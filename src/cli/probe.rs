@@ -36,6 +36,7 @@ const VERSION: u32 = 1;
 Example:
   printf 'x,y,z,nx,ny,nz\\n0.2,0.1,-0.2,0,1,0\\n' > points.csv
   haarlight probe room.glb --points points.csv --bands -o light.csv")]
+#[non_exhaustive]
 pub struct ProbeArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,

@@ -35,6 +35,7 @@ Examples:
   haarlight bake room.glb --cache
   haarlight relight room.glb                     after lamps, spectra or paints of room.glb were changed
   haarlight relight room.glb --spectra evening.spectra.json -o evening.glb")]
+#[non_exhaustive]
 pub struct RelightArgs {
     /// The room, of the same shape as when it was baked.
     pub room: PathBuf,

@@ -22,6 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 Examples:
   haarlight serve room.glb                       opens the browser
   haarlight serve room.glb --no-open --port 8017 prints the address only; Ctrl-C ends it")]
+#[non_exhaustive]
 pub struct ServeArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,

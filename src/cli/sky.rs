@@ -5,6 +5,7 @@ use crate::scene::sky::{BRIGHT, Brightness, KELVIN, SkyType, SkyWish, SunPlace, 
 /// Options of sky and sun. Each wins over what the file of spectra says.
 #[derive(Debug, Clone, Default, clap::Args)]
 #[command(next_help_heading = "Sky and sun")]
+#[non_exhaustive]
 pub struct SkyArgs {
     /// Light that enters where rays leave the room: overcast, intermediate, clear, uniform, or cie:1 to cie:16 (ISO 15469).
     #[arg(long = "sky", value_name = "TYPE")]

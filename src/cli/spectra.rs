@@ -19,6 +19,7 @@ Examples:
   haarlight spectra                                every name
   haarlight spectra macbeth                        those with 'macbeth' in them
   haarlight spectra blackbody/3200 --plot warm.svg")]
+#[non_exhaustive]
 pub struct SpectraArgs {
     /// List the names that hold this, letter case free.
     pub pattern: Option<String>,

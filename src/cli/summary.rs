@@ -2,6 +2,7 @@
 
 use super::log::{LayerRecord, VerdictRecord};
 use crate::audit::{Honesty, Report};
+use crate::gather::Interpolation;
 use crate::report::{Align, Table};
 use crate::solve::{Round, Verdict};
 
@@ -77,22 +78,7 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
         ),
     ];
     if let Some(i) = &v.interpolation {
-        lines.push(format!(
-            "of which between vertices, measured at {} points: mean {:.3}, 95 % below {:.2}{}",
-            i.points,
-            i.mean,
-            i.p95,
-            match (i.is_met(), i.capped) {
-                (true, _) => String::new(),
-                (false, Some(most)) => {
-                    format!(
-                        " (more than {:.3}, with the {most} vertices allowed)",
-                        i.allowed
-                    )
-                }
-                (false, None) => format!(" (more than {:.3})", i.allowed),
-            }
-        ));
+        lines.push(between_vertices(i));
     }
     if !v.layers.is_empty() {
         let one = |l: &LayerRecord| {
@@ -112,26 +98,47 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
         ));
     }
     if let Some(audit) = audit {
-        let honest = match audit.honesty {
-            Honesty::Honest => "the estimate was honest",
-            Honesty::TooLow => "the estimate was TOO LOW",
-            Honesty::TooHigh => "the estimate was too high",
-            Honesty::NoEstimate => "there was no estimate",
-        };
-        let (de, bias) = (&audit.de2000, audit.bias);
-        lines.push(format!(
-            "measured error at {} points: dE00 mean {:.3} ({:.3} .. {:.3}), 95 % below {:.2}, max {:.2}; illuminance {:+.2} % ({:.2} .. {:.2}); {honest}",
-            audit.points,
-            de.mean.value,
-            de.mean.low,
-            de.mean.high,
-            de.p95.value,
-            de.max.value,
-            100.0 * bias.value,
-            100.0 * bias.low,
-            100.0 * bias.high
-        ));
+        lines.push(measured(audit));
     }
     lines.push(format!("written: {}", v.outputs.glb));
     lines.join("\n")
+}
+
+/// The error that vertices cause by the light between them.
+fn between_vertices(i: &Interpolation) -> String {
+    let excess = match (i.is_met(), i.capped) {
+        (true, _) => String::new(),
+        (false, Some(most)) => format!(
+            " (more than {:.3}, with the {most} vertices allowed)",
+            i.allowed
+        ),
+        (false, None) => format!(" (more than {:.3})", i.allowed),
+    };
+    format!(
+        "of which between vertices, measured at {} points: mean {:.3}, 95 % below {:.2}{excess}",
+        i.points, i.mean, i.p95
+    )
+}
+
+/// The error as the audit measured it, and what that makes of the estimate.
+fn measured(audit: &Report) -> String {
+    let honest = match audit.honesty {
+        Honesty::Honest => "the estimate was honest",
+        Honesty::TooLow => "the estimate was TOO LOW",
+        Honesty::TooHigh => "the estimate was too high",
+        Honesty::NoEstimate => "there was no estimate",
+    };
+    let (de, bias) = (&audit.de2000, audit.bias);
+    format!(
+        "measured error at {} points: dE00 mean {:.3} ({:.3} .. {:.3}), 95 % below {:.2}, max {:.2}; illuminance {:+.2} % ({:.2} .. {:.2}); {honest}",
+        audit.points,
+        de.mean.value,
+        de.mean.low,
+        de.mean.high,
+        de.p95.value,
+        de.max.value,
+        100.0 * bias.value,
+        100.0 * bias.low,
+        100.0 * bias.high
+    )
 }

@@ -22,6 +22,7 @@ const PARABOLA_FROM: f64 = 0.002;
 
 /// A colour temperature and how far from the locus it was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Correlated {
     /// Correlated colour temperature, K.
     pub kelvin: f64,

@@ -14,6 +14,7 @@ const BINS: usize = 16;
 
 /// Both figures of a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Fidelity {
     /// Fidelity, 0 to 100.
     pub rf: f64,

@@ -25,6 +25,7 @@ const DAYLIGHT: usize = MEASURES - RECEPTORS.len();
 
 /// Why a measure has no value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Undefined {
     /// Nothing shines there.
     NoLight,
@@ -46,6 +47,7 @@ impl fmt::Display for Undefined {
 
 /// A light, measured.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Measured {
     /// In the order of [`NAMES`].
     pub values: [Result<f64, Undefined>; MEASURES],

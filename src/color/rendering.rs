@@ -19,6 +19,7 @@ pub const GREATEST_DISTANCE: f64 = 5.4e-3;
 
 /// The indices of a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Rendering {
     /// The general index.
     pub ra: f64,

@@ -14,6 +14,7 @@ const DIRECTIONS: usize = 8;
 
 /// Errors that a light is stated to have.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Stated {
     /// Of illuminance, relative.
     pub relative: f64,

@@ -4,6 +4,7 @@ use super::tolerance::Range;
 
 /// Illuminance over points, lx.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Uniformity {
     /// The least.
     pub min: f64,

@@ -14,6 +14,7 @@ const COUNTS: [u8; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
 
 /// One solution on held links.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct HeldRun {
     /// How spectra are carried.
     pub representation: Representation,

@@ -15,6 +15,7 @@ const AS_GOOD: f64 = 1.02;
 
 /// A fixed pair of tolerances.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Pair {
     /// Mean CIEDE2000.
     pub geometry: f64,
@@ -34,6 +35,7 @@ impl Pair {
 
 /// The automatic run of an error beside the best fixed pair.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct Balance {
     /// The automatic run.
     pub automatic: Run,

@@ -30,6 +30,7 @@ pub struct Task {
 
 /// What came of it.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct Run {
     /// How spectra were carried.
     pub representation: Representation,

@@ -42,6 +42,7 @@ pub enum Knob {
 
 /// Everything that was found.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Study {
     /// Bakes, by representation as asked for and by falling error.
     pub runs: Vec<Run>,
@@ -81,20 +82,7 @@ impl Sweep {
         let least = errors.last().copied().unwrap_or(0.5);
         let steps = 2 + repeats * (tasks.len() + pairs.len());
         progress(0, steps, "reference");
-        let adaptive = |error| Task {
-            representation: Representation::Adaptive,
-            error,
-            spectrum: None,
-        };
-        let mut first = Bake::new(scene.clone(), settings(adaptive(least), None, self.seed));
-        first.step();
-        // Its noise is brought to a share of what `first` was asked for: the least error of all.
-        let truth = Reference::new(&first, self.points, MOST_PATHS, self.seed ^ TRUTH_SEED);
-        let n = truth.truth.len().max(1) as f64;
-        let white = truth.truth.iter().fold([0.0; 3], |sum, xyz| {
-            std::array::from_fn(|c| sum[c] + 2.0 * xyz[c] / n)
-        });
-        drop(first);
+        let (truth, white) = self.reference(scene, least);
 
         // Repeats go through all tasks, so that what disturbs the machine for a while disturbs no task alone.
         let all: Vec<Task> = tasks
@@ -121,14 +109,7 @@ impl Sweep {
         }
         progress(steps - 1, steps, "held links");
         let middle = errors.get(errors.len() / 2).copied().unwrap_or(least);
-        let mut bake = Bake::new(
-            scene.clone(),
-            settings(adaptive(middle), Some(white), self.seed),
-        );
-        bake.run();
-        let last = bake.rounds().last();
-        let held_on = [last.map_or(0, |r| r.elements), last.map_or(0, |r| r.links)];
-        let held = held(&mut bake, white);
+        let (held, held_on) = self.held(scene, middle, white);
         progress(steps, steps, "");
         let fixed = runs.split_off(tasks.len());
         Study {
@@ -139,5 +120,36 @@ impl Sweep {
             points: self.points,
             white,
         }
+    }
+
+    /// The path tracer's answer, its noise brought to a share of the least error asked for, and the white of the room.
+    fn reference(&self, scene: &Scene, least: f64) -> (Reference, [f64; 3]) {
+        let mut first = Bake::new(scene.clone(), settings(adaptive(least), None, self.seed));
+        first.step();
+        let truth = Reference::new(&first, self.points, MOST_PATHS, self.seed ^ TRUTH_SEED);
+        let n = truth.truth.len().max(1) as f64;
+        let white = truth.truth.iter().fold([0.0; 3], |sum, xyz| {
+            std::array::from_fn(|c| sum[c] + 2.0 * xyz[c] / n)
+        });
+        (truth, white)
+    }
+
+    /// Other lanes on the links of a bake for `error`, and the elements and links of that.
+    fn held(&self, scene: &Scene, error: f64, white: [f64; 3]) -> (Vec<HeldRun>, [usize; 2]) {
+        let settings = settings(adaptive(error), Some(white), self.seed);
+        let mut bake = Bake::new(scene.clone(), settings);
+        bake.run();
+        let last = bake.rounds().last();
+        let held_on = [last.map_or(0, |r| r.elements), last.map_or(0, |r| r.links)];
+        (held(&mut bake, white), held_on)
+    }
+}
+
+/// A bake with adaptive lanes.
+fn adaptive(error: f64) -> Task {
+    Task {
+        representation: Representation::Adaptive,
+        error,
+        spectrum: None,
     }
 }

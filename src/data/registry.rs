@@ -17,6 +17,7 @@ pub enum Kind {
 
 /// A spectrum of the registry.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Named {
     /// Its values.
     pub table: Table,

@@ -23,6 +23,7 @@ pub enum Outside {
 
 /// What is wrong with a CSV.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub struct CsvProblem {
     /// Line, counted from 1; the last line where something is missing.
     pub line: usize,

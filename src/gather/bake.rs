@@ -43,6 +43,7 @@ pub struct Baked {
 /// How far light between the vertices of a file is from what looking there shows: colour differences (CIEDE2000 of a white
 /// surface's light under the adaptation white) at random points by area, those left out that something covers.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Interpolation {
     /// Root of the mean square.
     pub rms: f64,
@@ -330,6 +331,7 @@ pub(crate) fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> us
 
 /// Light at any point, for probes.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Probed {
     /// Tristimulus irradiance; Y is lux.
     pub xyz: [f64; 3],

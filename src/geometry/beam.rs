@@ -6,7 +6,7 @@
 use super::index::{Hit, Nearest, RayIndex};
 use super::packet::Packet;
 use super::segment::{NO_PLANE, Segment};
-use super::tree::{LEAF, WIDTH};
+use super::tree::{LEAF, Node, WIDTH};
 use super::triangle::PACKET;
 use super::walk::Stack;
 use glam::Vec3;
@@ -33,7 +33,47 @@ impl RayIndex {
         if self.tree.nodes.is_empty() || directions.is_empty() {
             return;
         }
-        // Beyond everything, wherever the rays start.
+        let (segments, far) = self.whole_way(from, directions, ignore_plane);
+        let Some(packet) = Packet::new(self, &segments[..directions.len()]) else {
+            return;
+        };
+        let mut beam = Beam {
+            index: self,
+            directions,
+            packet,
+            nearest: [None; PACKET],
+            farthest: 1.0,
+        };
+        let mut stack = Stack::new((0.0_f32, 0_u32, beam.packet.open()));
+        while let Some((near, entry, lanes)) = stack.pop() {
+            if near > beam.farthest {
+                continue;
+            }
+            if entry & LEAF != 0 {
+                beam.meet((entry & !LEAF) as usize, lanes, opaque);
+            } else {
+                beam.enter(&self.tree.nodes[entry as usize], lanes, &mut stack);
+            }
+        }
+        for (k, out) in out.iter_mut().enumerate() {
+            *out = beam.nearest[k].map(|n| {
+                let hit = self.hit(&n, directions[k]);
+                Hit {
+                    t: hit.t * far[k],
+                    ..hit
+                }
+            });
+        }
+    }
+
+    /// Segments that end beyond everything, wherever the rays start, and their lengths.
+    #[inline]
+    fn whole_way(
+        &self,
+        from: &[Vec3],
+        directions: &[Vec3],
+        ignore_plane: u32,
+    ) -> ([Segment; PACKET], [f32; PACKET]) {
         let [low, high] = self.tree.bounds;
         let mut far = [0.0_f32; PACKET];
         let mut segments = [Segment {
@@ -46,82 +86,81 @@ impl RayIndex {
             segments[k].from = from;
             segments[k].to = from + far[k] * direction;
         }
-        let Some(mut packet) = Packet::new(self, &segments[..directions.len()]) else {
-            return;
-        };
-        let mut nearest = [None::<Nearest>; PACKET];
-        let mut stack = Stack::new((0.0_f32, 0_u32, packet.open()));
-        let mut farthest = 1.0_f32;
-        while let Some((near, entry, lanes)) = stack.pop() {
-            if near > farthest {
-                continue;
-            }
-            if entry & LEAF != 0 {
-                let number = (entry & !LEAF) as usize;
-                let block = &self.tree.blocks[number];
-                let mut places = packet.straddled(block);
-                let mut shortened = false;
-                while places != 0 {
-                    let place = places.trailing_zeros() as usize;
-                    places &= places - 1;
-                    let (mut met, e) = packet.meet(block, place, lanes);
-                    while met != 0 {
-                        let lane = met.trailing_zeros() as usize;
-                        met &= met - 1;
-                        let det = e.det.as_array()[lane];
-                        let found = Nearest {
-                            t: e.height.as_array()[lane] / det,
-                            block: number,
-                            place,
-                            uv: [e.v.as_array()[lane] / det, e.w.as_array()[lane] / det],
-                        };
-                        if self.is_nearer(&found, nearest[lane].as_ref(), directions[lane])
-                            && (block.masked >> place & 1 == 0
-                                || opaque(block.ids[place], found.uv[0], found.uv[1]))
-                        {
-                            packet.shorten(lane, found.end());
-                            nearest[lane] = Some(found);
-                            shortened = true;
-                        }
-                    }
+        (segments, far)
+    }
+}
+
+/// Rays on their way, each with what it met first so far.
+struct Beam<'a> {
+    index: &'a RayIndex,
+    directions: &'a [Vec3],
+    packet: Packet,
+    nearest: [Option<Nearest>; PACKET],
+    /// Where the longest ray ends now.
+    farthest: f32,
+}
+
+impl Beam<'_> {
+    /// Ends the rays of `lanes` at the triangles of a block.
+    #[inline(always)]
+    fn meet(&mut self, number: usize, lanes: u32, opaque: &impl Fn(u32, f32, f32) -> bool) {
+        let block = &self.index.tree.blocks[number];
+        let mut places = self.packet.straddled(block);
+        let mut shortened = false;
+        while places != 0 {
+            let place = places.trailing_zeros() as usize;
+            places &= places - 1;
+            let (mut met, e) = self.packet.meet(block, place, lanes);
+            while met != 0 {
+                let lane = met.trailing_zeros() as usize;
+                met &= met - 1;
+                let det = e.det.as_array()[lane];
+                let found = Nearest {
+                    t: e.height.as_array()[lane] / det,
+                    block: number,
+                    place,
+                    uv: [e.v.as_array()[lane] / det, e.w.as_array()[lane] / det],
+                };
+                let known = self.nearest[lane].as_ref();
+                if (self.index).is_nearer(&found, known, self.directions[lane])
+                    && (block.masked >> place & 1 == 0
+                        || opaque(block.ids[place], found.uv[0], found.uv[1]))
+                {
+                    self.packet.shorten(lane, found.end());
+                    self.nearest[lane] = Some(found);
+                    shortened = true;
                 }
-                if shortened {
-                    farthest = packet.farthest();
-                }
-                continue;
-            }
-            let node = &self.tree.nodes[entry as usize];
-            let mut sorted = [(0.0_f32, 0_u32, 0_u32); WIDTH];
-            let mut count = 0;
-            let mut boxes = packet.boxes(node);
-            while boxes != 0 {
-                let child = boxes.trailing_zeros() as usize;
-                boxes &= boxes - 1;
-                let (near, through) = packet.enter_near(node, child);
-                let through = through & lanes;
-                if through == 0 {
-                    continue;
-                }
-                let mut place = count;
-                while place > 0 && sorted[place - 1].0 < near {
-                    sorted[place] = sorted[place - 1];
-                    place -= 1;
-                }
-                sorted[place] = (near, node.children[child], through);
-                count += 1;
-            }
-            for &entry in &sorted[..count] {
-                stack.push(entry);
             }
         }
-        for (k, out) in out.iter_mut().enumerate() {
-            *out = nearest[k].map(|n| {
-                let hit = self.hit(&n, directions[k]);
-                Hit {
-                    t: hit.t * far[k],
-                    ..hit
-                }
-            });
+        if shortened {
+            self.farthest = self.packet.farthest();
+        }
+    }
+
+    /// Puts the children that rays of `lanes` meet on the stack, the nearest last.
+    #[inline(always)]
+    fn enter(&self, node: &Node, lanes: u32, stack: &mut Stack<(f32, u32, u32)>) {
+        let mut sorted = [(0.0_f32, 0_u32, 0_u32); WIDTH];
+        let mut count = 0;
+        let mut boxes = self.packet.boxes(node);
+        while boxes != 0 {
+            let child = boxes.trailing_zeros() as usize;
+            boxes &= boxes - 1;
+            let (near, through) = self.packet.enter_near(node, child);
+            let through = through & lanes;
+            if through == 0 {
+                continue;
+            }
+            let mut place = count;
+            while place > 0 && sorted[place - 1].0 < near {
+                sorted[place] = sorted[place - 1];
+                place -= 1;
+            }
+            sorted[place] = (near, node.children[child], through);
+            count += 1;
+        }
+        for &entry in &sorted[..count] {
+            stack.push(entry);
         }
     }
 }

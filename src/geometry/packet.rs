@@ -147,85 +147,22 @@ impl Packet {
         for (place, segment) in rows.iter_mut().zip(segments) {
             *place = row(segment);
         }
-        let (mut least, mut most) = (rows[0], rows[0]);
-        for row in &rows[1..] {
-            least = least.fast_min(*row);
-            most = most.fast_max(*row);
-        }
-        let [
-            r0,
-            r1,
-            r2,
-            r3,
-            r4,
-            r5,
-            r6,
-            r7,
-            r8,
-            r9,
-            ra,
-            rb,
-            rc,
-            rd,
-            re,
-            rf,
-        ] = rows;
-        let low = f32x8::transpose([r0, r1, r2, r3, r4, r5, r6, r7]);
-        let high = f32x8::transpose([r8, r9, ra, rb, rc, rd, re, rf]);
-        let [fx, fy, fz] = [
-            join(low[0], high[0]),
-            join(low[1], high[1]),
-            join(low[2], high[2]),
-        ];
-        let [tx, ty, tz] = [
-            join(low[3], high[3]),
-            join(low[4], high[4]),
-            join(low[5], high[5]),
-        ];
-        let [p0, p1] = [join(low[6], high[6]), join(low[7], high[7])];
-
-        let from = [fx, fy, fz];
-        let d = [tx - fx, ty - fy, tz - fz];
-        let size = [d[0].abs(), d[1].abs(), d[2].abs()];
-        let main_z = size[2].simd_ge(size[0]) & size[2].simd_ge(size[1]);
-        let main_y = size[1].simd_ge(size[0]) & !main_z;
-        let main_x = !(main_y | main_z);
-        let lanes = 0xffff;
-        let turn = if main_x.to_bitmask() == lanes {
-            Turn::Same([1, 2, 0])
-        } else if main_y.to_bitmask() == lanes {
-            Turn::Same([2, 0, 1])
-        } else if main_z.to_bitmask() == lanes {
-            Turn::Same([0, 1, 2])
-        } else {
-            Turn::Mixed([main_x, main_y])
-        };
+        let (from, to, planes) = columns(&rows);
+        let d = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
+        let turn = Turn::of(d);
         let turned = turn.lanes(d);
         let inverse = f32x16::ONE / turned[2];
         let gap = f32x16::splat(index.gap) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-
         let inverses = [safe_inverse(d[0]), safe_inverse(d[1]), safe_inverse(d[2])];
-        let mut bundle = Bundle {
-            starts: [ends_of(least).0, ends_of(most).0],
-            ends: [ends_of(least).1, ends_of(most).1],
-            inverse: [[0.0; 2]; 3],
-            way: [0; 3],
-            slack: SIDE_SLACK * index.reach(),
-        };
-        for (axis, &inverse) in inverses.iter().enumerate() {
-            let [a, b] = range_of(inverse);
-            bundle.inverse[axis] = [a, b];
-            bundle.way[axis] = i8::from(a > 0.0) - i8::from(b < 0.0);
-        }
         Some(Self {
             origin: turn.lanes(from),
             slope: [turned[0] * inverse, turned[1] * inverse, inverse],
             range: [gap, f32x16::ONE - gap],
-            offset: [fx * inverses[0], fy * inverses[1], fz * inverses[2]],
+            offset: std::array::from_fn(|axis| from[axis] * inverses[axis]),
+            bundle: Bundle::of(&rows, &inverses, SIDE_SLACK * index.reach()),
             inverse: inverses,
-            planes: [p0.to_bits(), p1.to_bits()],
+            planes,
             turn,
-            bundle,
             open: (1 << count) - 1,
         })
     }
@@ -409,6 +346,25 @@ impl Packet {
 }
 
 impl Turn {
+    /// By the greatest component of each direction.
+    #[inline(always)]
+    fn of(d: [f32x16; 3]) -> Self {
+        let size = [d[0].abs(), d[1].abs(), d[2].abs()];
+        let main_z = size[2].simd_ge(size[0]) & size[2].simd_ge(size[1]);
+        let main_y = size[1].simd_ge(size[0]) & !main_z;
+        let main_x = !(main_y | main_z);
+        let lanes = 0xffff;
+        if main_x.to_bitmask() == lanes {
+            Self::Same([1, 2, 0])
+        } else if main_y.to_bitmask() == lanes {
+            Self::Same([2, 0, 1])
+        } else if main_z.to_bitmask() == lanes {
+            Self::Same([0, 1, 2])
+        } else {
+            Self::Mixed([main_x, main_y])
+        }
+    }
+
     /// World axes to turned axes.
     #[inline(always)]
     fn lanes(&self, [x, y, z]: [f32x16; 3]) -> [f32x16; 3] {
@@ -428,6 +384,20 @@ impl Turn {
 fn row(s: &Segment) -> f32x8 {
     let [p, q] = [f32::from_bits(s.planes[0]), f32::from_bits(s.planes[1])];
     f32x8::new([s.from.x, s.from.y, s.from.z, s.to.x, s.to.y, s.to.z, p, q])
+}
+
+/// Starts, ends and planes of sixteen rows, side by side.
+#[inline(always)]
+fn columns(rows: &[f32x8; PACKET]) -> ([f32x16; 3], [f32x16; 3], [u32x16; 2]) {
+    let [r0, r1, r2, r3, r4, r5, r6, r7, rest @ ..] = *rows;
+    let low = f32x8::transpose([r0, r1, r2, r3, r4, r5, r6, r7]);
+    let high = f32x8::transpose(rest);
+    let column = |k: usize| join(low[k], high[k]);
+    (
+        [column(0), column(1), column(2)],
+        [column(3), column(4), column(5)],
+        [column(6).to_bits(), column(7).to_bits()],
+    )
 }
 
 /// The two ends in a row.
@@ -476,6 +446,29 @@ fn range_of(x: f32x16) -> [f32; 2] {
 }
 
 impl Bundle {
+    /// Bounds on rows and on 1/d.
+    #[inline(always)]
+    fn of(rows: &[f32x8; PACKET], inverses: &[f32x16; 3], slack: f32) -> Self {
+        let (mut least, mut most) = (rows[0], rows[0]);
+        for row in &rows[1..] {
+            least = least.fast_min(*row);
+            most = most.fast_max(*row);
+        }
+        let mut bundle = Self {
+            starts: [ends_of(least).0, ends_of(most).0],
+            ends: [ends_of(least).1, ends_of(most).1],
+            inverse: [[0.0; 2]; 3],
+            way: [0; 3],
+            slack,
+        };
+        for (axis, &inverse) in inverses.iter().enumerate() {
+            let [a, b] = range_of(inverse);
+            bundle.inverse[axis] = [a, b];
+            bundle.way[axis] = i8::from(a > 0.0) - i8::from(b < 0.0);
+        }
+        bundle
+    }
+
     /// A bit for each child whose box some segment of the bundle might meet.
     #[inline(always)]
     fn enter(&self, node: &Node) -> u32 {

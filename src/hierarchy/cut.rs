@@ -4,6 +4,9 @@
 //! triangle is cut along the segments in which others cross it or stand on it. The parts are convex; a cut runs on to the
 //! border of the part that it crosses. [`super::spaces`] finds out which triangles are worth it (those that belong to
 //! several spaces), and [`Mesh::cut`] makes the triangles, with the points on common edges that their neighbours have.
+//!
+//! What hovers right before a surface (a lamp below a ceiling, a rug, a picture) is as good as on it: below it is a gap with a
+//! light of its own, and a patch that lies in the gap and beside it would show the gap's light to the room.
 //! Lengths are in scene units; points within [`TOUCH`] of each other are one.
 
 use super::mesh::{Face, Mesh, WHOLE};
@@ -14,6 +17,10 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Surfaces nearer than this share of the scene's half size touch: what f32 positions in a file mean.
 const TOUCH: f64 = 1e-6;
+/// What hovers before a surface nearer than this share of the scene's half size cuts it. A room
+/// with a lamp 1 to 20 mm below its ceiling was 2 to 8 % too bright and is within 1.5 %; beyond 6 cm (2 %) nothing changes. Only in
+/// rooms all of whose cuts are made: in a restaurant, where rays do what links do here, four times the leaves gave nothing.
+const HOVER: f64 = 0.01;
 /// A triangle that more than this many others meet stays whole: it is foliage, not a wall.
 const MOST: usize = 256;
 
@@ -119,6 +126,30 @@ impl Cut {
         }
     }
 
+    /// Takes the points that edges of the triangle have: its own move onto them, those of neighbours are added.
+    fn share(&mut self, vertices: [u32; 3], edges: &BTreeMap<Edge, Vec<f64>>) {
+        for w in &mut self.points {
+            if let Some((edge, x)) = on_edge(vertices, *w)
+                && let Some(points) = edges.get(&edge)
+            {
+                let nearest = points
+                    .iter()
+                    .copied()
+                    .min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs()));
+                *w = edge_weights(vertices, edge, nearest.unwrap_or(x));
+            }
+        }
+        for k in 0..3 {
+            let edge = key(vertices[k], vertices[(k + 1) % 3]);
+            for &x in edges.get(&edge).into_iter().flatten() {
+                let w = edge_weights(vertices, edge, x);
+                if !self.points.contains(&w) {
+                    self.points.push(w);
+                }
+            }
+        }
+    }
+
     /// Gives every part the points that lie on its edges, so that neighbours have the same.
     fn fit(&mut self, plane: &Plane) {
         let at: Vec<DVec3> = self.points.iter().map(|&w| plane.at(w)).collect();
@@ -184,6 +215,7 @@ struct Plane {
     normal: DVec3,
     area: f64,
     touch: f64,
+    hover: f64,
 }
 
 impl Plane {
@@ -197,6 +229,7 @@ impl Plane {
             normal: mesh.normal[triangle as usize],
             area: mesh.area[triangle as usize],
             touch: TOUCH * mesh.half_size,
+            hover: HOVER * mesh.half_size,
         }
     }
 
@@ -217,12 +250,31 @@ impl Plane {
         2.0 * self.area / self.corners[(k + 1) % 3].distance(self.corners[(k + 2) % 3])
     }
 
+    /// How far points lie before the plane; nothing where that is less than `reach`.
+    fn before(&self, points: [DVec3; 3], reach: f64) -> [f64; 3] {
+        points.map(|p| {
+            let d = self.normal.dot(p - self.corners[0]);
+            if d.abs() <= reach { 0.0 } else { d }
+        })
+    }
+
+    /// Edges of another triangle that hover before this one, inside the triangle: one of them, or all, unless it touches.
+    fn hovering(&self, other: [DVec3; 3]) -> Vec<[DVec3; 2]> {
+        let exact = self.before(other, self.touch);
+        let near = self.before(other, self.hover);
+        let foot = |k: usize| other[k] - self.normal * exact[k];
+        let edge = |k: usize| {
+            let next = (k + 1) % 3;
+            let hovers = near[k] == 0.0 && near[next] == 0.0 && exact[k] * exact[next] > 0.0;
+            let inside = hovers.then(|| clipped([foot(k), foot(next)], &self.corners, self));
+            inside.flatten()
+        };
+        (0..3).filter_map(edge).collect()
+    }
+
     /// Where another triangle crosses this plane or stands on it, inside the triangle.
     fn met(&self, other: [DVec3; 3]) -> Option<[DVec3; 2]> {
-        let d = other.map(|p| {
-            let d = self.normal.dot(p - self.corners[0]);
-            if d.abs() <= self.touch { 0.0 } else { d }
-        });
+        let d = self.before(other, self.touch);
         let mut ends = Vec::with_capacity(3);
         for k in 0..3 {
             let next = (k + 1) % 3;
@@ -264,8 +316,8 @@ fn clipped([p, q]: [DVec3; 2], polygon: &[DVec3], plane: &Plane) -> Option<[DVec
         .then(|| [p + along * low, p + along * high])
 }
 
-/// All triangles that others meet, in parts.
-pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
+/// All triangles that others meet, or, where that is asked for, that something hovers before, in parts.
+pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
     let mut taking: Vec<u32> = mesh.faces.iter().map(|f| f.triangle).collect();
     taking.dedup();
     taking
@@ -276,7 +328,7 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
                 return None;
             }
             let [a, b, c] = plane.corners;
-            let reach = DVec3::splat(plane.touch);
+            let reach = DVec3::splat(if hovering { plane.hover } else { plane.touch });
             let (low, high) = (a.min(b).min(c) - reach, a.max(b).max(c) + reach);
             rays.near(low.as_vec3(), high.as_vec3(), near);
             near.sort_unstable();
@@ -286,7 +338,11 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
                 if mesh.plane[k] == mesh.plane[triangle as usize] || mesh.area[k] <= 0.0 {
                     continue;
                 }
-                segments.extend(plane.met(mesh.triangles[k].map(|v| mesh.positions[v as usize])));
+                let corners = mesh.triangles[k].map(|v| mesh.positions[v as usize]);
+                segments.extend(plane.met(corners));
+                if hovering {
+                    segments.extend(plane.hovering(corners));
+                }
                 if segments.len() > MOST {
                     return None;
                 }
@@ -301,12 +357,15 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
         .collect()
 }
 
-fn key(a: u32, b: u32) -> (u32, u32) {
+/// Its lower and its higher vertex.
+type Edge = (u32, u32);
+
+fn key(a: u32, b: u32) -> Edge {
     (a.min(b), a.max(b))
 }
 
 /// An edge with the share of the way from its lower to its higher vertex, for a point on it.
-fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<((u32, u32), f64)> {
+fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<(Edge, f64)> {
     let k = w.iter().position(|&x| x == 0.0)?;
     let (i, j) = ((k + 1) % 3, (k + 2) % 3);
     if w[i] == 0.0 || w[j] == 0.0 {
@@ -316,25 +375,30 @@ fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<((u32, u32), f64)> {
     Some((key(a, b), if a < b { w[j] } else { w[i] }))
 }
 
+/// Shares of the way along each edge at which cuts have points, ascending; merged where both sides mean the same.
+fn points_on_edges(mesh: &Mesh, cuts: &[Cut]) -> BTreeMap<Edge, Vec<f64>> {
+    let mut edges: BTreeMap<Edge, Vec<f64>> = BTreeMap::new();
+    for cut in cuts {
+        let vertices = mesh.triangles[cut.triangle as usize];
+        for &w in &cut.points {
+            if let Some((edge, t)) = on_edge(vertices, w) {
+                edges.entry(edge).or_default().push(t);
+            }
+        }
+    }
+    for (&(a, b), points) in &mut edges {
+        let length = mesh.positions[a as usize].distance(mesh.positions[b as usize]);
+        let least = 2.0 * TOUCH * mesh.half_size / length;
+        points.sort_by(f64::total_cmp);
+        points.dedup_by(|x, y| *x - *y <= least);
+    }
+    edges
+}
+
 impl Mesh {
     /// The mesh with some triangles cut, and their neighbours fitted.
     pub fn cut(mut self, cuts: &[Cut]) -> Self {
-        // Points on edges, merged where both sides mean the same.
-        let mut edges: BTreeMap<(u32, u32), Vec<f64>> = BTreeMap::new();
-        for cut in cuts {
-            let vertices = self.triangles[cut.triangle as usize];
-            for &w in &cut.points {
-                if let Some((edge, t)) = on_edge(vertices, w) {
-                    edges.entry(edge).or_default().push(t);
-                }
-            }
-        }
-        for (&(a, b), points) in &mut edges {
-            let length = self.positions[a as usize].distance(self.positions[b as usize]);
-            let least = 2.0 * TOUCH * self.half_size / length;
-            points.sort_by(f64::total_cmp);
-            points.dedup_by(|x, y| *x - *y <= least);
-        }
+        let edges = points_on_edges(&self, cuts);
         let by_triangle: HashMap<u32, &Cut> = cuts.iter().map(|c| (c.triangle, c)).collect();
         let count = self.triangles.len();
         let mut sides = vec![[false; 2]; count];
@@ -346,7 +410,7 @@ impl Mesh {
         self.half_size = old.half_size;
         self.positions.clone_from(&old.positions);
         self.first_triangle.clear();
-        let mut welded: HashMap<((u32, u32), u64), u32> = HashMap::new();
+        let mut welded = HashMap::new();
         for (t, &sides) in sides.iter().enumerate() {
             while self.first_triangle.len() <= old.origin[t].0 as usize {
                 self.first_triangle.push(self.triangles.len() as u32);
@@ -363,44 +427,9 @@ impl Mesh {
                 }
             };
             let plane = Plane::of(&old, t as u32);
-            for w in &mut cut.points {
-                if let Some((edge, x)) = on_edge(vertices, *w)
-                    && let Some(points) = edges.get(&edge)
-                {
-                    let nearest = points
-                        .iter()
-                        .copied()
-                        .min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs()));
-                    *w = edge_weights(vertices, edge, nearest.unwrap_or(x));
-                }
-            }
-            for k in 0..3 {
-                let edge = key(vertices[k], vertices[(k + 1) % 3]);
-                for &x in edges.get(&edge).into_iter().flatten() {
-                    let w = edge_weights(vertices, edge, x);
-                    if !cut.points.contains(&w) {
-                        cut.points.push(w);
-                    }
-                }
-            }
+            cut.share(vertices, &edges);
             cut.fit(&plane);
-            let ids: Vec<u32> = cut
-                .points
-                .iter()
-                .map(|&w| {
-                    if let Some(k) = w.iter().position(|&x| x == 1.0) {
-                        return vertices[k];
-                    }
-                    let mut place = || {
-                        self.positions.push(plane.at(w));
-                        self.positions.len() as u32 - 1
-                    };
-                    match on_edge(vertices, w) {
-                        Some((edge, x)) => *welded.entry((edge, x.to_bits())).or_insert_with(place),
-                        None => place(),
-                    }
-                })
-                .collect();
+            let ids = self.weld(&cut, vertices, &plane, &mut welded);
             for corners in cut.triangles(&plane) {
                 let id = self.within.len() as u32;
                 self.within.push(corners.map(|k| cut.points[k as usize]));
@@ -412,6 +441,30 @@ impl Mesh {
         }
         self.half = self.paired();
         self
+    }
+
+    /// Vertices at the points of a cut: points on an edge are those of its neighbour.
+    fn weld(
+        &mut self,
+        cut: &Cut,
+        vertices: [u32; 3],
+        plane: &Plane,
+        welded: &mut HashMap<(Edge, u64), u32>,
+    ) -> Vec<u32> {
+        let id = |&w: &[f64; 3]| {
+            if let Some(k) = w.iter().position(|&x| x == 1.0) {
+                return vertices[k];
+            }
+            let mut place = || {
+                self.positions.push(plane.at(w));
+                self.positions.len() as u32 - 1
+            };
+            match on_edge(vertices, w) {
+                Some((edge, x)) => *welded.entry((edge, x.to_bits())).or_insert_with(place),
+                None => place(),
+            }
+        };
+        cut.points.iter().map(id).collect()
     }
 
     /// Takes over triangle `t` of another mesh, or a part of it.
@@ -438,7 +491,7 @@ impl Mesh {
 }
 
 /// Weights of a point on an edge, the same bits from both sides.
-fn edge_weights(vertices: [u32; 3], (low, high): (u32, u32), t: f64) -> [f64; 3] {
+fn edge_weights(vertices: [u32; 3], (low, high): Edge, t: f64) -> [f64; 3] {
     vertices.map(|v| {
         if v == low {
             1.0 - t

@@ -60,6 +60,7 @@ pub struct Relighter {
 
 /// A relit room.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Relit {
     /// The output mesh with its new light.
     pub baked: Baked,
@@ -69,6 +70,7 @@ pub struct Relit {
 
 /// What relighting took and how wrong it may be.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct RelitRecord {
     /// Always `relit`.
     pub record: &'static str,

@@ -55,7 +55,7 @@ impl Lanes {
     /// One cut a light; falls back to [`Lanes::dense`] beyond 64 lanes. `weights` are the integrals of the colour
     /// matching functions over the leaves, nm.
     pub fn ratio(spectra: &[LightSpectrum], cuts: &[Partition], weights: &[Leaves; 3]) -> Self {
-        debug_assert_eq!(spectra.len(), cuts.len());
+        assert_eq!(spectra.len(), cuts.len(), "a cut for each light");
         if cuts.iter().map(|c| c.count()).sum::<usize>() > LEAVES {
             return Self::dense(spectra, weights);
         }

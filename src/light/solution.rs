@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 /// Light that arrives on a leaf, in brightness, share of the white's.
 #[derive(Debug, Clone, Copy, Default)]
+#[non_exhaustive]
 pub struct Arrival {
     /// All of it.
     pub all: f32,

@@ -165,6 +165,135 @@ fn gap(a: &Node, b: &Node) -> f64 {
     a.centre.distance(b.centre) / (a.radius + b.radius)
 }
 
+/// A set of polygons, or a cluster that points stand for?
+fn simple(node: &Node) -> bool {
+    node.faces.1 <= POLYGONS
+}
+
+/// Two patches as the kernel takes them: one is sampled, towards the other the factor is exact if it is simple.
+#[derive(Debug, Clone, Copy)]
+struct Ends<'a> {
+    sampled: u32,
+    other: u32,
+    s: &'a Node,
+    t: &'a Node,
+    /// Distance of the centres in sums of the radii.
+    gap: f64,
+    shift: [f64; 2],
+}
+
+impl<'a> Ends<'a> {
+    /// The smaller end is sampled, the larger is the polygon: the factor varies less over a small patch.
+    fn of(room: &'a Room, a: u32, b: u32) -> Self {
+        let (na, nb) = (room.tree.node(a), room.tree.node(b));
+        let a_sampled = match (simple(na), simple(nb)) {
+            (true, false) => false,
+            (false, true) => true,
+            _ => na.area <= nb.area,
+        };
+        let (sampled, other) = if a_sampled { (a, b) } else { (b, a) };
+        let (s, t) = (room.tree.node(sampled), room.tree.node(other));
+        Self {
+            sampled,
+            other,
+            s,
+            t,
+            gap: gap(s, t),
+            shift: pattern(room.seed, a, b),
+        }
+    }
+
+    /// Points on the sampled end.
+    fn points(&self) -> usize {
+        match simple(self.s) {
+            false if self.gap > NEAR => CLUSTER_POINTS,
+            false => 2 * CLUSTER_POINTS,
+            true if self.gap > FAR => 1,
+            true => 3,
+        }
+    }
+
+    /// Do contour integrals take the place of points?
+    fn are_polygons(&self) -> bool {
+        simple(self.s) && simple(self.t)
+    }
+
+    /// Exchange with nothing in the way, and its relative variation; none where no points face each other.
+    #[inline]
+    fn unoccluded(&self, tree: &Tree, scratch: &mut Scratch) -> Option<(f64, f64)> {
+        let count = self.points();
+        tree.samples(self.sampled, count, self.shift, &mut scratch.a);
+        if simple(self.t) {
+            scratch.b.clear();
+        } else {
+            tree.samples(self.other, CLUSTER_POINTS, self.shift, &mut scratch.b);
+        }
+        let (mut open, mut least, mut most) = (0.0, f64::INFINITY, 0.0_f64);
+        point_factors(tree, &scratch.a, self.t, &scratch.b, &mut scratch.factors);
+        for (p, &f) in scratch.a.iter().zip(&scratch.factors) {
+            open += f * p.area;
+            least = least.min(f);
+            most = most.max(f);
+        }
+        let near = self.gap < NEAR;
+        if self.are_polygons() && (near || open <= 0.0) {
+            open = contours(tree, self.s, self.t);
+        }
+        if open <= 0.0 {
+            return None;
+        }
+        // One point says nothing about variation: 1/r^2 over the patch's own size does.
+        let variation = if count == 1 {
+            let distance = self.s.centre.distance(self.t.centre);
+            2.0 * (self.s.radius / distance.max(self.s.radius + f64::MIN_POSITIVE))
+        } else {
+            (0.5 * (most - least) / (open / self.s.area)).min(MOST_VARIATION)
+        };
+        // The smaller end says nothing about a larger one that it shines on here and there: a lamp close below a ceiling.
+        if self.are_polygons() && near {
+            let mean = open / self.t.area;
+            let over = variation_over(tree, self.other, self.s, mean, self.shift, scratch);
+            return Some((open, variation.max(over)));
+        }
+        Some((open, variation))
+    }
+
+    /// The share that is visible, and the way between.
+    #[inline]
+    fn visible(&self, room: &Room, parents: &View, scratch: &mut Scratch) -> (f64, View) {
+        let (sight, tree, shift) = (room.sight, room.tree, self.shift);
+        let (s, t) = (self.sampled, self.other);
+        let view = || sight.view(tree, self.s, self.t, parents);
+        // A look into the shaft costs as much as many rays where much stands about. It is worth that where it starts from
+        // a list, or where rays say that it may come out clear.
+        let (view, rays) = if *parents == View::Crowded && !sight.small() && sight.occlusion {
+            let rays = sampled_visibility(room, s, t, shift, &View::Crowded, scratch);
+            let view = if rays == 1.0 { view() } else { View::Crowded };
+            (view, Some(rays))
+        } else {
+            (view(), None)
+        };
+        let share = match (&view, rays) {
+            (View::Clear, _) => 1.0,
+            // Where a plane cuts one end, no point of it may lie in front of the other end; then the other end looks.
+            (View::Listed(list), _) if simple(self.t) => {
+                clipped_visibility(room, s, t, shift, list, scratch)
+                    .or_else(|| {
+                        if simple(self.s) {
+                            clipped_visibility(room, t, s, shift, list, scratch)
+                        } else {
+                            None
+                        }
+                    })
+                    .unwrap_or_else(|| sampled_visibility(room, s, t, shift, &view, scratch))
+            }
+            (_, Some(rays)) => rays,
+            _ => sampled_visibility(room, s, t, shift, &view, scratch),
+        };
+        (share, view)
+    }
+}
+
 /// Works out the link between two patches and the way between; none if they exchange nothing. `parents` is what is known
 /// of a pair that holds this one.
 pub fn evaluate(
@@ -174,50 +303,11 @@ pub fn evaluate(
     parents: &View,
     scratch: &mut Scratch,
 ) -> Option<(Link, View)> {
-    let tree = room.tree;
-    let (na, nb) = (tree.node(a), tree.node(b));
-    // The smaller end is sampled, the larger is the polygon: the factor varies less over a small patch.
-    let simple = |n: &Node| n.faces.1 <= POLYGONS;
-    let a_sampled = match (simple(na), simple(nb)) {
-        (true, false) => false,
-        (false, true) => true,
-        _ => na.area <= nb.area,
-    };
-    let (s, t) = if a_sampled { (a, b) } else { (b, a) };
-    let (ns, nt) = (tree.node(s), tree.node(t));
-    let gap = gap(ns, nt);
-    let count = if !simple(ns) {
-        if gap > NEAR {
-            CLUSTER_POINTS
-        } else {
-            2 * CLUSTER_POINTS
-        }
-    } else if gap > FAR {
-        1
-    } else {
-        3
-    };
-    let shift = pattern(room.seed, a, b);
-    tree.samples(s, count, shift, &mut scratch.a);
-    if simple(nt) {
-        scratch.b.clear();
-    } else {
-        tree.samples(t, CLUSTER_POINTS, shift, &mut scratch.b);
-    }
-    let (mut open, mut least, mut most) = (0.0, f64::INFINITY, 0.0_f64);
-    point_factors(tree, &scratch.a, nt, &scratch.b, &mut scratch.factors);
-    for (p, &f) in scratch.a.iter().zip(&scratch.factors) {
-        open += f * p.area;
-        least = least.min(f);
-        most = most.max(f);
-    }
-    if simple(ns) && simple(nt) && (gap < NEAR || open <= 0.0) {
-        open = contours(tree, ns, nt);
-        if open <= 0.0 {
+    let ends = Ends::of(room, a, b);
+    let Some((open, variation)) = ends.unoccluded(room.tree, scratch) else {
+        if ends.are_polygons() {
             return None;
         }
-    }
-    if open <= 0.0 {
         // No two points of these clusters face each other; others may, and a lamp among them must not get lost.
         let link = Link {
             a,
@@ -228,56 +318,8 @@ pub fn evaluate(
             way: Way::Crowded,
         };
         return Some((link, View::Crowded));
-    }
-    let mean = open / ns.area;
-    let size = ns.radius
-        / ns.centre
-            .distance(nt.centre)
-            .max(ns.radius + f64::MIN_POSITIVE);
-    // One point says nothing about variation: 1/r^2 over the patch's own size does.
-    let variation = if count == 1 {
-        2.0 * size
-    } else {
-        (0.5 * (most - least) / mean).min(MOST_VARIATION)
     };
-    // The smaller end says nothing about a larger one that it shines on here and there: a lamp close below a ceiling.
-    let variation = if simple(ns) && simple(nt) && gap < NEAR {
-        let mean = open / nt.area;
-        variation.max(variation_over(tree, t, ns, mean, shift, scratch))
-    } else {
-        variation
-    };
-    let sight = room.sight;
-    // A look into the shaft costs as much as many rays where much stands about. It is worth that where it starts from a
-    // list, or where rays say that it may come out clear.
-    let mut view = View::Crowded;
-    let mut visible = None;
-    if *parents == View::Crowded && !sight.small() && sight.occlusion {
-        let rays = sampled_visibility(room, s, t, shift, &view, scratch);
-        if rays == 1.0 {
-            view = sight.view(tree, na, nb, parents);
-        }
-        visible = Some(rays);
-    } else {
-        view = sight.view(tree, na, nb, parents);
-    }
-    let visible = match (&view, visible) {
-        (View::Clear, _) => 1.0,
-        // Where a plane cuts one end, no point of it may lie in front of the other end; then the other end looks.
-        (View::Listed(list), _) if simple(nt) => {
-            clipped_visibility(room, s, t, shift, list, scratch)
-                .or_else(|| {
-                    if simple(ns) {
-                        clipped_visibility(room, t, s, shift, list, scratch)
-                    } else {
-                        None
-                    }
-                })
-                .unwrap_or_else(|| sampled_visibility(room, s, t, shift, &view, scratch))
-        }
-        (_, Some(rays)) => rays,
-        _ => sampled_visibility(room, s, t, shift, &view, scratch),
-    };
+    let (visible, view) = ends.visible(room, parents, scratch);
     let link = Link {
         a,
         b,

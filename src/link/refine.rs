@@ -96,80 +96,63 @@ impl Graph {
         demand: &Demand,
     ) -> Refined {
         let mut done = Refined::default();
-        let mut open: Vec<(Link, View)> = Vec::new();
+        let mut open = Vec::new();
         if self.links.is_empty() {
             let pairs: Vec<(u32, u32, u32)> = Self::start(tree)
                 .into_iter()
                 .map(|(a, b)| (a, b, 0))
                 .collect();
-            let fresh = evaluate_all(
-                &Room { tree, sight, seed },
-                &pairs,
-                &[View::Crowded],
-                &mut done,
-            );
+            let room = Room { tree, sight, seed };
+            let fresh = evaluate_all(&room, &pairs, &[View::Crowded], &mut done);
             self.sort_out(tree, demand, fresh, &mut open, &mut done);
         } else {
-            let wants: Vec<bool> = self
-                .links
-                .par_iter()
-                .map(|l| demand.error(tree, l) > demand.threshold)
-                .collect();
-            let mut kept = Vec::with_capacity(self.links.len());
-            let mut split = Vec::new();
-            for (link, wants) in self.links.iter().zip(wants) {
-                if wants && splittable(tree, link, demand).is_some() {
-                    split.push(*link);
-                } else {
-                    kept.push(*link);
-                    done.capped += u64::from(wants);
-                }
-            }
-            // Lists of links that are opened go; the others move up.
-            let blockers = std::mem::take(&mut self.blockers);
-            for link in &mut kept {
-                if let Way::Listed { count, .. } = link.way {
-                    let start = self.blockers.len() as u32;
-                    self.blockers.extend(blockers_of(&blockers, link.way));
-                    link.way = Way::Listed { start, count };
-                }
-            }
-            self.links = kept;
-            open = split
-                .into_par_iter()
-                .map(|link| {
-                    let view = match link.way {
-                        Way::Clear => View::Clear,
-                        Way::Listed { .. } => {
-                            View::Listed(blockers_of(&blockers, link.way).to_vec())
-                        }
-                        Way::Crowded => View::Crowded,
-                    };
-                    (link, view)
-                })
-                .collect();
+            open = self.open(tree, demand, &mut done);
         }
         while !open.is_empty() {
-            let mut pairs = Vec::with_capacity(4 * open.len());
-            let mut views = Vec::with_capacity(open.len());
-            for (k, (link, view)) in open.into_iter().enumerate() {
-                // Only links that can be split are opened.
-                let Some((end, other)) = splittable(tree, &link, demand) else {
-                    continue;
-                };
-                tree.subdivide(end);
-                pairs.extend(
-                    tree.node(end)
-                        .child_range()
-                        .map(|child| (child, other, k as u32)),
-                );
-                views.push(view);
-            }
+            let (pairs, views) = split(tree, demand, open);
             let fresh = evaluate_all(&Room { tree, sight, seed }, &pairs, &views, &mut done);
             open = Vec::new();
             self.sort_out(tree, demand, fresh, &mut open, &mut done);
         }
         done
+    }
+
+    /// Takes out the links that exceed the demand and can be split, with their views.
+    fn open(&mut self, tree: &Tree, demand: &Demand, done: &mut Refined) -> Vec<(Link, View)> {
+        let wants: Vec<bool> = self
+            .links
+            .par_iter()
+            .map(|l| demand.error(tree, l) > demand.threshold)
+            .collect();
+        let mut kept = Vec::with_capacity(self.links.len());
+        let mut opened = Vec::new();
+        for (link, wants) in self.links.iter().zip(wants) {
+            if wants && splittable(tree, link, demand).is_some() {
+                opened.push(*link);
+            } else {
+                kept.push(*link);
+                done.capped += u64::from(wants);
+            }
+        }
+        // Lists of links that are opened go; the others move up.
+        let blockers = std::mem::take(&mut self.blockers);
+        for link in &mut kept {
+            if let Way::Listed { count, .. } = link.way {
+                let start = self.blockers.len() as u32;
+                self.blockers.extend(blockers_of(&blockers, link.way));
+                link.way = Way::Listed { start, count };
+            }
+        }
+        self.links = kept;
+        let view = |way: Way| match way {
+            Way::Clear => View::Clear,
+            Way::Listed { .. } => View::Listed(blockers_of(&blockers, way).to_vec()),
+            Way::Crowded => View::Crowded,
+        };
+        opened
+            .into_par_iter()
+            .map(|link| (link, view(link.way)))
+            .collect()
     }
 
     /// Good links are kept, the others opened.
@@ -235,6 +218,27 @@ fn splittable(tree: &Tree, link: &Link, demand: &Demand) -> Option<(u32, u32)> {
         [(b, a), (a, b)]
     };
     larger_first.into_iter().find(|&(end, _)| can(end))
+}
+
+/// Splits one end of each link: the pairs (part, other end, index of the view), and the links' views.
+fn split(
+    tree: &mut Tree,
+    demand: &Demand,
+    open: Vec<(Link, View)>,
+) -> (Vec<(u32, u32, u32)>, Vec<View>) {
+    let mut pairs = Vec::with_capacity(4 * open.len());
+    let mut views = Vec::with_capacity(open.len());
+    for (link, view) in open {
+        // Only links that can be split are opened.
+        let Some((end, other)) = splittable(tree, &link, demand) else {
+            continue;
+        };
+        tree.subdivide(end);
+        let parts = tree.node(end).child_range();
+        pairs.extend(parts.map(|part| (part, other, views.len() as u32)));
+        views.push(view);
+    }
+    (pairs, views)
 }
 
 /// Evaluates pairs (a, b, index of what is known of their parents' view), in order.

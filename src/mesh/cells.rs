@@ -1,4 +1,5 @@
-//! The triangles of the output: input triangles, bisected at the middles of edges that they share.
+//! The triangles of the output: input triangles, bisected at edges that they share: in their middles, or where the edge of a
+//! shadow crosses them.
 //!
 //! An edge that is split is split for every triangle that has it, so a vertex never lies on the edge of a triangle that
 //! does not use it. Which triangles share an edge, see [`Skins`](super::skins::Skins).
@@ -17,7 +18,7 @@ const SLENDER: f64 = 0.25;
 /// A corner of a cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {
-    point: u32,
+    pub(super) point: u32,
     /// Index in the sheet's vertices.
     pub(super) vertex: u32,
     /// Weights of the corners of the triangle of the mesh.
@@ -26,12 +27,24 @@ pub(super) struct Corner {
 
 /// What two points bound.
 #[derive(Debug, Clone, Copy)]
-struct Edge {
-    ends: [u32; 2],
-    length: f64,
-    marked: bool,
-    /// Once it is split: the point in its middle, and both halves.
-    split: Option<(u32, [u32; 2])>,
+pub(super) struct Edge {
+    pub(super) ends: [u32; 2],
+    pub(super) length: f64,
+    pub(super) marked: bool,
+    /// Where it is to be split, from the first end on, if the edge of a shadow crosses it.
+    pub(super) crossed: Option<f64>,
+    /// Lamps whose light ends along it, a bit each.
+    pub(super) sharp: u64,
+    /// Once it is split: the point there, and both halves.
+    pub(super) split: Option<(u32, [u32; 2])>,
+}
+
+/// A place where the edge of a shadow bends or ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    Point(u32),
+    /// Where an edge is to be split.
+    Crossing(u32),
 }
 
 /// How far light in a triangle is from what its corners say.
@@ -57,7 +70,7 @@ pub(super) struct Cell {
     pub(super) of: (u32, u32),
     pub(super) corners: [Corner; 3],
     /// Edge k leads from corner k to the next.
-    edges: [u32; 3],
+    pub(super) edges: [u32; 3],
     pub(super) area: f64,
     /// Which of the sheet's hints lie in it.
     pub(super) hints: (u32, u32),
@@ -83,8 +96,14 @@ pub(super) struct Sheet {
     pub(super) back: bool,
     pub(super) vertices: Vec<Vertex>,
     pub(super) hints: Vec<Hint>,
-    /// Vertex in the middle of two.
-    middle: HashMap<(u32, u32), u32>,
+    /// Vertex between two: in their middle (0), or at that share from the first to the second.
+    between: HashMap<(u32, u32, u64), u32>,
+    /// Vertices on the edge of a shadow: the one before light there was known to be two, lamps that end there, and which of
+    /// them light its side.
+    pub(super) sides: HashMap<(u32, u64, u64), u32>,
+    pub(super) base: HashMap<u32, u32>,
+    /// Where light is looked at for them.
+    pub(super) beside: HashMap<u32, Vertex>,
 }
 
 /// All triangles.
@@ -92,8 +111,17 @@ pub(super) struct Sheet {
 pub(super) struct Cells {
     pub(super) sheets: Vec<Sheet>,
     pub(super) all: Vec<Cell>,
-    edges: Vec<Edge>,
-    points: Vec<DVec3>,
+    pub(super) edges: Vec<Edge>,
+    pub(super) points: Vec<DVec3>,
+    /// Points on edges of shadows, and lamps whose light ends there.
+    pub(super) sharp: HashMap<u32, u64>,
+    /// Of which those that were not before.
+    pub(super) sharpened: Vec<u32>,
+    /// Edges of shadows that are to be edges of triangles when next is split.
+    pub(super) lines: Vec<([End; 2], u64)>,
+    pub(super) along: HashMap<(u32, u32), u64>,
+    /// Triangles that came to be by points inside others.
+    pub(super) starred: Vec<usize>,
 }
 
 /// What the first cells are made from.
@@ -117,12 +145,13 @@ impl Start<'_> {
     }
 }
 
-fn key(a: u32, b: u32) -> (u32, u32) {
+pub(super) fn key(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-fn halfway(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+/// Both triangles of an edge get the same bits, whichever weights are zero.
+fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
+    std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
 }
 
 impl Cells {
@@ -140,6 +169,11 @@ impl Cells {
             all: Vec::new(),
             edges: Vec::new(),
             points: mesh.positions.clone(),
+            sharp: HashMap::new(),
+            sharpened: Vec::new(),
+            lines: Vec::new(),
+            along: HashMap::new(),
+            starred: Vec::new(),
         };
         for (number, surface) in scene.surfaces.iter().enumerate() {
             cells.add(&mut start, number, surface, false);
@@ -215,12 +249,14 @@ impl Cells {
         self.sheets.push(sheet);
     }
 
-    fn edge(&mut self, a: u32, b: u32) -> u32 {
+    pub(super) fn edge(&mut self, a: u32, b: u32) -> u32 {
         let length = self.points[a as usize].distance(self.points[b as usize]);
         self.edges.push(Edge {
             ends: [a, b],
             length,
             marked: false,
+            crossed: None,
+            sharp: 0,
             split: None,
         });
         self.edges.len() as u32 - 1
@@ -249,7 +285,21 @@ impl Cells {
         let Cell {
             sheet, of, corners, ..
         } = self.all[cell];
-        self.sheets[sheet as usize].between(of, corners[k], corners[(k + 1) % 3])
+        let sharp = self.sharp_along(&self.all[cell], k) != 0;
+        let [a, b, c] = [0, 1, 2].map(|e| corners[(k + e) % 3]);
+        let sheet = &mut self.sheets[sheet as usize];
+        let middle = sheet.between(of, a, b, 0.5);
+        if sharp {
+            sheet.beside_line(middle, of, [a, b, c]);
+        }
+        middle
+    }
+
+    /// Vertex in the middle of an edge of a cell, if there is one.
+    pub(super) fn known_middle(&self, cell: &Cell, k: usize) -> Option<u32> {
+        let [a, b] = [k, (k + 1) % 3].map(|k| cell.corners[k].vertex);
+        let known = &self.sheets[cell.sheet as usize].between;
+        known.get(&(a.min(b), a.max(b), 0)).copied()
     }
 
     /// Marks an edge of a cell to be split.
@@ -266,18 +316,28 @@ impl Cells {
             let Edge {
                 ends: [a, b],
                 marked,
+                crossed,
+                sharp,
                 split,
                 ..
             } = self.edges[k];
             if marked && split.is_none() {
-                let middle = self.points.len() as u32;
-                let between = 0.5 * (self.points[a as usize] + self.points[b as usize]);
-                self.points.push(between);
-                let halves = [self.edge(a, middle), self.edge(middle, b)];
-                self.edges[k].split = Some((middle, halves));
+                let point = self.points.len() as u32;
+                let at = crossed.unwrap_or(0.5);
+                let (from, to) = (self.points[a as usize], self.points[b as usize]);
+                self.points.push((1.0 - at) * from + at * to);
+                let halves = [self.edge(a, point), self.edge(point, b)];
+                for half in halves {
+                    self.edges[half as usize].sharp = sharp;
+                }
+                if sharp != 0 {
+                    self.sharp.insert(point, sharp);
+                }
+                self.edges[k].split = Some((point, halves));
             }
         }
-        let mut fresh = Vec::new();
+        self.draw_lines();
+        let mut fresh = std::mem::take(&mut self.starred);
         let mut k = 0;
         // Halves that still have a split edge come up again, at the end or here.
         while k < self.all.len() {
@@ -305,7 +365,11 @@ impl Cells {
                 let longest = self.longest(cell);
                 let limit = SLENDER * self.length(cell, longest);
                 let edge = |k: usize| &self.edges[cell.edges[k] as usize];
-                let slender = |k: usize| edge(k).marked && edge(k).length < limit;
+                // Where the edge of a shadow crosses it, it must be split there, and may be alone.
+                let slender = |k: usize| {
+                    let edge = edge(k);
+                    edge.marked && edge.crossed.is_none() && edge.length < limit
+                };
                 if !edge(longest).marked && (0..3).any(slender) {
                     self.mark(k, longest);
                     any = true;
@@ -317,14 +381,15 @@ impl Cells {
         }
     }
 
-    /// The longest of the split edges of a cell.
+    /// The longest of the split edges of a cell; those that the edge of a shadow crosses come first, so that it becomes one.
     fn to_bisect(&self, cell: &Cell) -> Option<usize> {
-        let split = |&k: &usize| self.edges[cell.edges[k] as usize].split.is_some();
-        let longer = |best: usize, k: usize| match self.length(cell, k) > self.length(cell, best) {
+        let edge = |k: usize| &self.edges[cell.edges[k] as usize];
+        let rank = |k: usize| (edge(k).crossed.is_some(), edge(k).length);
+        let split = (0..3).filter(|&k| edge(k).split.is_some());
+        split.reduce(|best, k| match rank(k) > rank(best) {
             true => k,
             false => best,
-        };
-        (0..3).filter(split).reduce(longer)
+        })
     }
 
     /// Bisects a cell at a split edge: one half takes its place, the other is the last.
@@ -340,26 +405,38 @@ impl Cells {
         } = self.all[k];
         let [a, b, c] = [0, 1, 2].map(|k| corners[(edge + k) % 3]);
         let [ab, bc, ca] = [0, 1, 2].map(|k| edges[(edge + k) % 3]);
-        let Edge { ends, split, .. } = self.edges[ab as usize];
+        let Edge {
+            ends,
+            split,
+            crossed,
+            ..
+        } = self.edges[ab as usize];
         let Some((point, mut halves)) = split else {
             return;
         };
-        if ends[0] != a.point {
-            halves.swap(0, 1);
-        }
+        let at = crossed.unwrap_or(0.5);
+        let (from, to, of_a) = match ends[0] == a.point {
+            true => (a, b, at),
+            false => {
+                halves.swap(0, 1);
+                (b, a, 1.0 - at)
+            }
+        };
         let m = Corner {
             point,
-            vertex: self.sheets[sheet as usize].between(of, a, b),
-            weights: halfway(a.weights, b.weights),
+            vertex: self.sheets[sheet as usize].between(of, from, to, at),
+            weights: between(from.weights, to.weights, at),
         };
         let mc = self.edge(point, c.point);
+        let sharp = self.along.get(&key(point, c.point));
+        self.edges[mc as usize].sharp = sharp.copied().unwrap_or(0);
         let border = self.sheets[sheet as usize].part(hints, m, c, a);
-        let half = |corners, edges, hints| Cell {
+        let half = |corners, edges, share: f64, hints| Cell {
             sheet,
             of,
             corners,
             edges,
-            area: 0.5 * area,
+            area: share * area,
             hints,
             doubt: Doubt {
                 square: shrink * doubt.square,
@@ -367,9 +444,11 @@ impl Cells {
                 ..Doubt::default()
             },
         };
-        self.all[k] = half([a, m, c], [halves[0], mc, ca], (hints.0, border));
+        let first = half([a, m, c], [halves[0], mc, ca], of_a, (hints.0, border));
+        let rest = (border, hints.1);
+        self.all[k] = first;
         self.all
-            .push(half([m, b, c], [halves[1], bc, mc], (border, hints.1)));
+            .push(half([m, b, c], [halves[1], bc, mc], 1.0 - of_a, rest));
     }
 
     /// Triangles of a sheet by their vertices, with the triangle of the mesh that each is part of.
@@ -382,13 +461,17 @@ impl Cells {
 }
 
 impl Sheet {
-    fn between(&mut self, (triangle, entry): (u32, u32), a: Corner, b: Corner) -> u32 {
+    /// Vertex on the way from `a` to `b`.
+    fn between(&mut self, (triangle, entry): (u32, u32), a: Corner, b: Corner, at: f64) -> u32 {
         let vertices = &mut self.vertices;
-        let known = self.middle.entry(key(a.vertex, b.vertex));
-        *known.or_insert_with(|| {
+        let name = match at == 0.5 {
+            true => (a.vertex.min(b.vertex), a.vertex.max(b.vertex), 0),
+            false => (a.vertex, b.vertex, at.to_bits()),
+        };
+        *self.between.entry(name).or_insert_with(|| {
             vertices.push(Vertex {
                 triangle,
-                weights: halfway(a.weights, b.weights),
+                weights: between(a.weights, b.weights, at),
                 entry,
             });
             vertices.len() as u32 - 1
@@ -396,7 +479,7 @@ impl Sheet {
     }
 
     /// Parts hints at the line from `m` to `c`: those on the side of `a` come first; where the others begin.
-    fn part(&mut self, hints: (u32, u32), m: Corner, c: Corner, a: Corner) -> u32 {
+    pub(super) fn part(&mut self, hints: (u32, u32), m: Corner, c: Corner, a: Corner) -> u32 {
         let flat = |w: [f64; 3]| [w[1], w[2]];
         let (m, c, a) = (flat(m.weights), flat(c.weights), flat(a.weights));
         let side = |p: [f64; 2]| (c[0] - m[0]) * (p[1] - m[1]) - (c[1] - m[1]) * (p[0] - m[0]);

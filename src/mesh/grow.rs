@@ -7,6 +7,7 @@
 
 use super::cells::{Cell, Cells, Corner, Doubt, Hint, within};
 use super::looks::Looks;
+use super::shades::Shades;
 use super::turns::{BENDS, BY_CHANCE, EXCESS, End, RANGE, largest};
 use crate::color::seen_difference;
 use crate::gather::Vertex;
@@ -20,7 +21,7 @@ const UNKNOWN: u32 = u32::MAX;
 const SMALLEST: f64 = 1e-3;
 /// What remains of the mean square after a bisection: two halve a smooth triangle's size, and its error falls with the
 /// square of that.
-const SHRINK: f64 = 0.25;
+pub(super) const SHRINK: f64 = 0.25;
 /// Where something covers the middle of an edge, this much of the difference of its ends counts.
 const COVERED: f64 = 0.25;
 /// Vertices that splitting one triangle may take, its neighbours' included: as measured, 1 to 5.
@@ -43,6 +44,8 @@ pub(super) type PointLooks = (usize, [f64; 3], [u32; 2]);
 pub(super) struct Growth<'a> {
     pub(super) cells: Cells,
     pub(super) looks: Looks<'a>,
+    /// What throws shadows.
+    pub(super) shades: Shades<'a>,
     /// Look of each vertex of each sheet.
     looked: Vec<Vec<u32>>,
     /// What covered vertices of each sheet are lent.
@@ -61,17 +64,24 @@ pub(super) struct Growth<'a> {
     /// Points of the last measurement.
     pub(super) asked: Vec<PointLooks>,
     /// Is light looked at, or is the solved light believed?
-    looking: bool,
+    pub(super) looking: bool,
 }
 
 impl<'a> Growth<'a> {
     /// Starts with cells.
-    pub(super) fn new(cells: Cells, looks: Looks<'a>, white: [f64; 3], half_size: f64) -> Self {
+    pub(super) fn new(
+        cells: Cells,
+        looks: Looks<'a>,
+        shades: Shades<'a>,
+        white: [f64; 3],
+        half_size: f64,
+    ) -> Self {
         Self {
             looked: vec![Vec::new(); cells.sheets.len()],
             lent: vec![Lent::new(); cells.sheets.len()],
             cells,
             looks,
+            shades,
             white,
             smallest: SMALLEST * half_size,
             most: usize::MAX,
@@ -83,7 +93,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    fn difference(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
+    pub(super) fn difference(&self, a: [f64; 3], b: [f64; 3]) -> f64 {
         seen_difference(a, b, self.white)
     }
 
@@ -104,8 +114,11 @@ impl<'a> Growth<'a> {
         looked.resize(sheet.vertices.len(), UNKNOWN);
         let look = &mut looked[vertex as usize];
         if *look == UNKNOWN {
-            let vertex = &sheet.vertices[vertex as usize];
-            *look = self.looks.want(vertex, sheet.surface, sheet.back);
+            let own = &sheet.vertices[vertex as usize];
+            *look = match sheet.beside.get(&vertex) {
+                Some(beside) => self.looks.want_texel(beside, sheet.surface, sheet.back),
+                None => self.looks.want(own, sheet.surface, sheet.back),
+            };
         }
         *look
     }
@@ -159,7 +172,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Light at the corners of a cell.
-    fn light(&self, cell: usize) -> [[f64; 3]; 3] {
+    pub(super) fn light(&self, cell: usize) -> [[f64; 3]; 3] {
         let cell = &self.cells.all[cell];
         cell.corners.map(|c| {
             let sheet = cell.sheet as usize;
@@ -229,7 +242,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Looks at the corners of new cells, and what the solved light lets expect there.
-    fn expect(&mut self, fresh: &[usize], first: bool, progress: &dyn Fn(usize, usize)) {
+    pub(super) fn expect(&mut self, fresh: &[usize], first: bool, progress: &dyn Fn(usize, usize)) {
         self.want_corners(fresh);
         self.looks.complete(progress);
         self.lend();
@@ -275,6 +288,9 @@ impl<'a> Growth<'a> {
         loop {
             let excess = self.sum() - goal;
             if excess <= 0.0 {
+                if self.looking && !self.strict {
+                    self.finish_lines(progress);
+                }
                 return End::Reached;
             }
             if self.looking && self.looks.is_late() {
@@ -299,10 +315,7 @@ impl<'a> Growth<'a> {
                 .into_iter()
                 .partition(|&k| self.cells.all[k].doubt.tested || !looking);
             self.test(&untested, progress);
-            for &k in &tested {
-                self.mark(k);
-            }
-            let fresh = self.cells.split(SHRINK);
+            let fresh = self.split(&tested);
             self.expect(&fresh, false, progress);
         }
     }
@@ -340,7 +353,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Marks the edges of a tested cell that bend; all of them if it is inside that light differs.
-    fn mark(&mut self, k: usize) {
+    pub(super) fn mark(&mut self, k: usize) {
         let doubt = self.cells.all[k].doubt;
         let worst = doubt.bent.into_iter().fold(doubt.inside, f32::max);
         let limit = BENDS as f32 * worst;

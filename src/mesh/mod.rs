@@ -1,12 +1,16 @@
 //! The mesh that is written: grown from the input's triangles, as fine as straight lines between vertices need it for the
 //! asked-for error, and measured.
 
+mod along;
 mod cells;
 mod drawn;
+mod edges;
 mod grow;
 pub(crate) mod hints;
+mod lines;
 pub(crate) mod looks;
 pub(crate) mod measure;
+mod shades;
 mod skins;
 pub(crate) mod turns;
 mod write;
@@ -17,6 +21,7 @@ use cells::Cells;
 use grow::Growth;
 use looks::Looks;
 use measure::summed;
+use shades::Shades;
 use turns::{End, Turns};
 
 /// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error. At 1 a
@@ -138,6 +143,12 @@ impl Bake {
         let mut cells = Cells::new(self.scene(), self.mesh(), self.tree(), &spaces);
         hints::give(self, &mut cells);
         let looks = Looks::new(self, spaces, care, late);
-        Growth::new(cells, looks, self.light().white, self.mesh().half_size)
+        Growth::new(
+            cells,
+            looks,
+            Shades::new(self),
+            self.light().white,
+            self.mesh().half_size,
+        )
     }
 }

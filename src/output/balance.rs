@@ -19,6 +19,7 @@ pub(crate) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0
 
 /// Which light is to show as white. Written `none`, `auto` or a temperature in kelvin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub enum Balance {
     /// D65, the display's own: colours as they are.
     #[default]

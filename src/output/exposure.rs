@@ -46,6 +46,7 @@ const GREY: f64 = 0.18;
 
 /// How bright the room is to be shown. Written `auto`, `auto+1`, `auto-0.5` (stops) or an exposure value for ISO 100.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Brightness {
     /// As metered, brighter by so many stops.
     Auto(f64),
@@ -90,6 +91,7 @@ impl fmt::Display for Brightness {
 
 /// How radiosity becomes a display value.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Exposure {
     /// Display value (1 = white) for each lm/m2 of radiosity, before the curve.
     pub scale: f64,

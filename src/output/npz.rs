@@ -125,69 +125,67 @@ pub fn write_baked(
             "spectra do not match the refined mesh".into(),
         ));
     }
-    let (mut positions, mut normals, mut xyz) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut owners, mut triangles) = (Vec::new(), Vec::new());
-    for baked in surfaces {
-        let surface = &scene.surfaces[baked.surface];
-        let first = owners.len() as u32;
-        for vertex in &baked.vertices {
-            let place = refined::position(surface, vertex) / scene.changes.scale;
-            positions.extend(place.to_array());
-            normals.extend(refined::normal(surface, baked, vertex).as_vec3().to_array());
-            xyz.extend(vertex.radiosity);
-            owners.push(baked.surface as u32);
-        }
-        triangles.extend(baked.triangles.iter().flatten().map(|v| first + v));
-    }
+    let columns = Columns::of(scene, surfaces);
     let radiosity: Vec<f32> = spectra.iter().flatten().flatten().copied().collect();
-    let width = scene.grid.width();
     let mut edges: Vec<f64> = (0..LEAVES).map(|leaf| scene.grid.left(leaf)).collect();
-    edges.push(scene.grid.left(LEAVES - 1) + width);
-    let count = owners.len();
+    edges.push(scene.grid.left(LEAVES - 1) + scene.grid.width());
+    let count = columns.surface.len();
+    let array = |name, shape, values| Array {
+        name,
+        shape,
+        values,
+    };
     write(
         out,
         &[
-            Array {
-                name: "positions",
-                shape: &[count, 3],
-                values: Values::F64(&positions),
-            },
-            Array {
-                name: "normals",
-                shape: &[count, 3],
-                values: Values::F32(&normals),
-            },
-            Array {
-                name: "surface",
-                shape: &[count],
-                values: Values::U32(&owners),
-            },
-            Array {
-                name: "triangles",
-                shape: &[triangles.len() / 3, 3],
-                values: Values::U32(&triangles),
-            },
-            Array {
-                name: "radiosity",
-                shape: &[count, LEAVES],
-                values: Values::F32(&radiosity),
-            },
-            Array {
-                name: "wavelengths",
-                shape: &[LEAVES + 1],
-                values: Values::F64(&edges),
-            },
-            Array {
-                name: "xyz",
-                shape: &[count, 3],
-                values: Values::F32(&xyz),
-            },
+            array("positions", &[count, 3], Values::F64(&columns.positions)),
+            array("normals", &[count, 3], Values::F32(&columns.normals)),
+            array("surface", &[count], Values::U32(&columns.surface)),
+            array(
+                "triangles",
+                &[columns.triangles.len() / 3, 3],
+                Values::U32(&columns.triangles),
+            ),
+            array("radiosity", &[count, LEAVES], Values::F32(&radiosity)),
+            array("wavelengths", &[LEAVES + 1], Values::F64(&edges)),
+            array("xyz", &[count, 3], Values::F32(&columns.xyz)),
         ],
     )
     .map_err(|problem| Error::Io {
         path: "npz".into(),
         source: problem,
     })
+}
+
+/// The refined mesh of all surfaces, column by column: as the arrays of their names.
+#[derive(Default)]
+struct Columns {
+    positions: Vec<f64>,
+    normals: Vec<f32>,
+    xyz: Vec<f32>,
+    surface: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl Columns {
+    fn of(scene: &Scene, surfaces: &[BakedSurface]) -> Self {
+        let mut all = Self::default();
+        for baked in surfaces {
+            let surface = &scene.surfaces[baked.surface];
+            let first = all.surface.len() as u32;
+            for vertex in &baked.vertices {
+                let place = refined::position(surface, vertex) / scene.changes.scale;
+                let normal = refined::normal(surface, baked, vertex).as_vec3();
+                all.positions.extend(place.to_array());
+                all.normals.extend(normal.to_array());
+                all.xyz.extend(vertex.radiosity);
+                all.surface.push(baked.surface as u32);
+            }
+            let triangles = baked.triangles.iter().flatten();
+            all.triangles.extend(triangles.map(|v| first + v));
+        }
+        all
+    }
 }
 
 /// Magic, version, length and the dictionary that describes the array.

@@ -42,6 +42,7 @@ impl Default for Format {
 
 /// One pixel: means over its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Pixel {
     /// Radiance in linear sRGB, cd/m2; 0 where there is no surface.
     pub rgb: [f32; 3],
@@ -55,6 +56,7 @@ pub struct Pixel {
 
 /// A drawn picture, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Picture {
     /// Pixels across.
     pub width: usize,

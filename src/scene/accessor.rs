@@ -1,97 +1,43 @@
 //! Reads accessors (glTF 2.0, sections 3.6.2 and 5.1): every component type, strides, sparse values, normalised
 //! integers (also as KHR_mesh_quantization allows them).
 //!
-//! Every bound is checked against the bytes that are there before anything is allocated. A normalised integer c means
-//! c / max, for signed types max(c / max, -1) (glTF 2.0, section 3.6.2.2).
+//! Every bound is checked against the bytes that are there before anything is allocated.
 
-use crate::scene::buffers::{Buffers, Span, Views};
+use crate::scene::buffers::{Buffers, Span, Views, size};
 use crate::scene::check::Check;
-use crate::scene::json::{self, Item};
+use crate::scene::components::{self, to_vectors};
+use crate::scene::json;
+use gltf::json::Index;
+use gltf::json::accessor::sparse::Sparse;
+use gltf::json::accessor::{
+    Accessor, ComponentType, GenericComponentType, IndexComponentType, Type,
+};
+use gltf::json::buffer::View;
+use gltf::json::validation::{Checked::Valid, USize64};
 use serde_json::Value;
 
 /// Elements that an accessor without bytes (all zeros) may have even in a small file.
 const FREE_ZEROS: usize = 65_536;
 const AGAIN: &str = "export the file again";
 
-/// Scalar storage of an accessor, by the standard's numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
-}
-
-impl Component {
-    /// By `componentType`.
-    pub(crate) fn from_code(code: usize) -> Option<Self> {
-        match code {
-            5120 => Some(Self::I8),
-            5121 => Some(Self::U8),
-            5122 => Some(Self::I16),
-            5123 => Some(Self::U16),
-            5125 => Some(Self::U32),
-            5126 => Some(Self::F32),
-            _ => None,
-        }
-    }
-
-    /// Bytes.
-    pub(crate) fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::U32 | Self::F32 => 4,
-        }
-    }
-
-    /// One little-endian component; `bytes` has `size()` of them.
-    pub(crate) fn value(self, bytes: &[u8], normalized: bool) -> f32 {
-        let scaled = |value: f32, max: f32| {
-            if normalized {
-                (value / max).max(-1.0)
-            } else {
-                value
-            }
-        };
-        match (self, bytes) {
-            (Self::I8, &[a]) => scaled(f32::from(i8::from_le_bytes([a])), 127.0),
-            (Self::U8, &[a]) => scaled(f32::from(a), 255.0),
-            (Self::I16, &[a, b]) => scaled(f32::from(i16::from_le_bytes([a, b])), 32767.0),
-            (Self::U16, &[a, b]) => scaled(f32::from(u16::from_le_bytes([a, b])), 65535.0),
-            (Self::U32, &[a, b, c, d]) => {
-                let value = f64::from(u32::from_le_bytes([a, b, c, d]));
-                let max = if normalized { f64::from(u32::MAX) } else { 1.0 };
-                (value / max) as f32
-            }
-            (Self::F32, &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]),
-            // Callers cut the bytes by `size()`.
-            _ => f32::NAN,
-        }
-    }
-
-    /// One little-endian index; none for types that are no indices.
-    pub(crate) fn index(self, bytes: &[u8]) -> Option<u32> {
-        match (self, bytes) {
-            (Self::U8, &[a]) => Some(u32::from(a)),
-            (Self::U16, &[a, b]) => Some(u32::from(u16::from_le_bytes([a, b]))),
-            (Self::U32, &[a, b, c, d]) => Some(u32::from_le_bytes([a, b, c, d])),
-            _ => None,
-        }
-    }
-}
-
 /// What an accessor holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Layout {
-    pub(crate) component: Component,
+    pub(crate) component: ComponentType,
     /// Components of an element: 1 to 4.
     pub(crate) width: usize,
     /// Elements.
     pub(crate) count: usize,
     pub(crate) normalized: bool,
+}
+
+/// An accessor that a document has.
+#[derive(Debug)]
+pub(crate) struct Found {
+    accessor: Accessor,
+    /// Does it name no view at all?
+    pub(crate) is_bare: bool,
+    place: String,
 }
 
 impl Layout {
@@ -119,44 +65,49 @@ impl<'a> Accessors<'a> {
         }
     }
 
-    /// What accessor `index`, used at `place`, holds.
+    /// Accessor `index`, used at `place`, and what it holds.
     pub(crate) fn layout(
         &self,
         index: usize,
         place: &str,
         check: &mut Check,
-    ) -> Option<(Item<'a>, Layout)> {
+    ) -> Option<(Found, Layout)> {
         let mut item = json::referred(self.json, "accessors", "accessor", index, place, check)?;
         item.place = format!("{place}, {}", item.place);
-        let at = &item.place;
-        let code = item.index("componentType", check);
-        let Some(component) = code.and_then(Component::from_code) else {
-            check.problem(at, "has no componentType of the standard", AGAIN);
+        let accessor = item.read::<Accessor>(check)?;
+        let Valid(GenericComponentType(component)) = accessor.component_type else {
+            let what = "has no componentType of the standard";
+            check.problem(&item.place, what, AGAIN);
             return None;
         };
-        let width = match item.text("type", check) {
-            Some("SCALAR") => 1,
-            Some("VEC2") => 2,
-            Some("VEC3") => 3,
-            Some("VEC4") => 4,
-            other => {
-                let what = format!("has the type '{}'", json::short(other.unwrap_or("")));
-                check.problem(at, what, AGAIN);
+        let width = match accessor.type_ {
+            Valid(Type::Scalar) => 1,
+            Valid(Type::Vec2) => 2,
+            Valid(Type::Vec3) => 3,
+            Valid(Type::Vec4) => 4,
+            _ => {
+                let what = format!("has the type '{}'", item.said("type"));
+                check.problem(&item.place, what, AGAIN);
                 return None;
             }
         };
-        let Some(count) = item.index("count", check) else {
-            check.problem(at, "has no count", AGAIN);
-            return None;
-        };
-        let normalized = item.flag("normalized", check);
         let layout = Layout {
             component,
             width,
-            count,
-            normalized,
+            count: size(accessor.count),
+            normalized: accessor.normalized,
         };
-        Some((item, layout))
+        // A view that is named wrongly is no absent one.
+        let is_bare = !item.has("bufferView");
+        let place = item.place;
+        Some((
+            Found {
+                accessor,
+                is_bare,
+                place,
+            },
+            layout,
+        ))
     }
 
     /// Vectors of `N` components; another number of them than `count` is a problem, found before they are read.
@@ -167,18 +118,18 @@ impl<'a> Accessors<'a> {
         place: &str,
         check: &mut Check,
     ) -> Option<Vec<[f32; N]>> {
-        let (item, layout) = self.layout(index, place, check)?;
+        let (found, layout) = self.layout(index, place, check)?;
         if layout.width != N {
             let what = format!("has {} components an element, not {N}", layout.width);
-            check.problem(&item.place, what, AGAIN);
+            check.problem(&found.place, what, AGAIN);
             return None;
         }
         if let Some(count) = count.filter(|&count| count != layout.count) {
             let what = format!("has {} elements for {count} vertices", layout.count);
-            check.problem(&item.place, what, AGAIN);
+            check.problem(&found.place, what, AGAIN);
             return None;
         }
-        let bytes = self.elements(&item, layout, check)?;
+        let bytes = self.elements(&found, layout, check)?;
         Some(to_vectors(&bytes, layout.component, layout.normalized))
     }
 
@@ -189,33 +140,34 @@ impl<'a> Accessors<'a> {
         place: &str,
         check: &mut Check,
     ) -> Option<Vec<u32>> {
-        let (item, layout) = self.layout(index, place, check)?;
+        let (found, layout) = self.layout(index, place, check)?;
         let unsigned = matches!(
             layout.component,
-            Component::U8 | Component::U16 | Component::U32
+            ComponentType::U8 | ComponentType::U16 | ComponentType::U32
         );
         if layout.width != 1 || !unsigned || layout.normalized {
             let what = "holds indices, but not as unsigned whole scalars";
-            check.problem(&item.place, what, AGAIN);
+            check.problem(&found.place, what, AGAIN);
             return None;
         }
-        let bytes = self.elements(&item, layout, check)?;
+        let bytes = self.elements(&found, layout, check)?;
         let each = bytes.chunks_exact(layout.component.size());
-        each.map(|bytes| layout.component.index(bytes)).collect()
+        each.map(|bytes| components::index(layout.component, bytes))
+            .collect()
     }
 
     /// All elements, tightly packed, with the sparse ones put in.
-    fn elements(&mut self, item: &Item<'_>, layout: Layout, check: &mut Check) -> Option<Vec<u8>> {
-        let offset = item.index("byteOffset", check).unwrap_or(0);
-        let at = &item.place;
-        let mut bytes = match item.index("bufferView", check) {
+    fn elements(&mut self, found: &Found, layout: Layout, check: &mut Check) -> Option<Vec<u8>> {
+        let (accessor, at) = (&found.accessor, &found.place);
+        let mut bytes = match accessor.buffer_view {
             Some(view) => {
-                let span = self.views.view(view, at, check)?;
+                let span = self.views.view(view.value(), at, check)?;
+                let offset = size(accessor.byte_offset.unwrap_or_default());
                 packed(&span, offset, layout, true)
                     .map_err(|what| check.problem(at, what, AGAIN))
                     .ok()?
             }
-            None if item.map.contains_key("bufferView") => return None,
+            None if !found.is_bare => return None,
             None => {
                 if layout.count > self.total.max(FREE_ZEROS) {
                     let what = format!("claims {} elements, but has no bytes", layout.count);
@@ -226,8 +178,9 @@ impl<'a> Accessors<'a> {
                 vec![0; layout.count.checked_mul(layout.element())?]
             }
         };
-        if let Some(sparse) = item.child("sparse", check) {
-            self.put_sparse(&sparse, layout, &mut bytes, check)?;
+        if let Some(sparse) = &accessor.sparse {
+            let at = format!("{at}, sparse");
+            self.put_sparse(sparse, &at, layout, &mut bytes, check)?;
         }
         Some(bytes)
     }
@@ -235,27 +188,21 @@ impl<'a> Accessors<'a> {
     /// Replaces the elements that `sparse` lists.
     fn put_sparse(
         &mut self,
-        sparse: &Item<'_>,
+        sparse: &Sparse,
+        at: &str,
         layout: Layout,
         bytes: &mut [u8],
         check: &mut Check,
     ) -> Option<()> {
-        let at = format!("{}, sparse", sparse.place);
-        let count = sparse.index("count", check);
-        let indices = sparse.child("indices", check);
-        let values = sparse.child("values", check);
-        let (Some(count), Some(indices), Some(values)) = (count, indices, values) else {
-            check.problem(&at, "lacks count, indices or values", AGAIN);
-            return None;
-        };
+        let (count, indices, values) = (size(sparse.count), &sparse.indices, &sparse.values);
         if count > layout.count {
             let what = format!("lists {count} of {} elements", layout.count);
-            check.problem(&at, what, AGAIN);
+            check.problem(at, what, AGAIN);
             return None;
         }
-        let code = indices.index("componentType", check);
-        let Some(component) = code.and_then(Component::from_code) else {
-            check.problem(&at, "has indices without a componentType", AGAIN);
+        let Valid(IndexComponentType(component)) = indices.component_type else {
+            let what = "has indices that are not unsigned whole numbers";
+            check.problem(at, what, AGAIN);
             return None;
         };
         let index_layout = Layout {
@@ -265,49 +212,28 @@ impl<'a> Accessors<'a> {
             normalized: false,
         };
         let value_layout = Layout { count, ..layout };
-        let mut part = |item: &Item<'_>, layout: Layout, check: &mut Check| {
-            let Some(view) = item.index("bufferView", check) else {
-                check.problem(&at, "has a part without a bufferView", AGAIN);
-                return None;
-            };
-            let offset = item.index("byteOffset", check).unwrap_or(0);
-            let span = self.views.view(view, &at, check)?;
-            packed(&span, offset, layout, false)
-                .map_err(|what| check.problem(&at, what, AGAIN))
+        let mut part = |view: Index<View>, offset: USize64, layout: Layout| {
+            let span = self.views.view(view.value(), at, check)?;
+            packed(&span, size(offset), layout, false)
+                .map_err(|what| check.problem(at, what, AGAIN))
                 .ok()
         };
-        let indices = part(&indices, index_layout, check)?;
-        let values = part(&values, value_layout, check)?;
+        let indices = part(indices.buffer_view, indices.byte_offset, index_layout)?;
+        let values = part(values.buffer_view, values.byte_offset, value_layout)?;
         let indices = indices.chunks_exact(component.size());
         for (index, value) in indices.zip(values.chunks_exact(layout.element())) {
-            let target = component
-                .index(index)
+            let target = components::index(component, index)
                 .and_then(|i| usize::try_from(i).ok()?.checked_mul(layout.element()))
                 .and_then(|start| bytes.get_mut(start..start.checked_add(layout.element())?));
             let Some(target) = target else {
                 let what = "has an index beyond the accessor's count, or of a wrong type";
-                check.problem(&at, what, AGAIN);
+                check.problem(at, what, AGAIN);
                 return None;
             };
             target.copy_from_slice(value);
         }
         Some(())
     }
-}
-
-/// Elements of tightly packed bytes as vectors of `N` components.
-pub(crate) fn to_vectors<const N: usize>(
-    bytes: &[u8],
-    component: Component,
-    normalized: bool,
-) -> Vec<[f32; N]> {
-    let size = component.size();
-    let each = bytes.chunks_exact(size * N);
-    each.map(|element| {
-        let mut parts = element.chunks_exact(size);
-        std::array::from_fn(|_| parts.next().map_or(0.0, |p| component.value(p, normalized)))
-    })
-    .collect()
 }
 
 /// Elements of a span, tightly packed; `strided`: the span's stride holds (it does not for sparse parts).

@@ -5,6 +5,9 @@
 use crate::scene::check::Check;
 use crate::scene::compression;
 use crate::scene::json::{self, Item};
+use gltf::json::buffer::View;
+use gltf::json::validation::USize64;
+use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -53,6 +56,21 @@ impl Buffers {
     }
 }
 
+/// A number of bytes or elements; what no machine has is too many everywhere.
+pub(crate) fn size(number: USize64) -> usize {
+    usize::try_from(number.0).unwrap_or(usize::MAX)
+}
+
+/// What EXT_meshopt_compression says besides where its bytes are.
+#[derive(Debug, Deserialize)]
+struct Packed {
+    #[serde(default)]
+    count: usize,
+    #[serde(default)]
+    mode: String,
+    filter: Option<String>,
+}
+
 /// The buffer views of one document; remembers what it unpacked.
 #[derive(Debug)]
 pub(crate) struct Views<'a> {
@@ -80,7 +98,7 @@ impl<'a> Views<'a> {
         let mut item = json::referred(self.json, "bufferViews", "bufferView", index, place, check)?;
         item.place = format!("{place}, {}", item.place);
         for name in compression::MESHOPT {
-            let Some(mut packed) = item.extension(name, check) else {
+            let Some(mut packed) = item.extended(name, check) else {
                 continue;
             };
             packed.place = format!("{}, {name}", item.place);
@@ -100,10 +118,8 @@ impl<'a> Views<'a> {
 
     /// The stretch of a buffer that `buffer`, `byteOffset` and `byteLength` of an item name.
     fn stretch(&self, item: &Item<'_>, check: &mut Check) -> Option<Span> {
-        let Some(buffer) = item.index("buffer", check) else {
-            check.problem(&item.place, "names no buffer", AGAIN);
-            return None;
-        };
+        let view = item.read::<View>(check)?;
+        let buffer = view.buffer.value();
         let Some(data) = self.buffers.bytes.get(buffer) else {
             let what = format!("refers to buffer {buffer}, which the document does not have");
             check.problem(&item.place, what, AGAIN);
@@ -112,11 +128,8 @@ impl<'a> Views<'a> {
         if !self.buffers.sound[buffer] {
             return None;
         }
-        let start = item.index("byteOffset", check).unwrap_or(0);
-        let Some(length) = item.index("byteLength", check) else {
-            check.problem(&item.place, "has no byteLength", AGAIN);
-            return None;
-        };
+        let start = size(view.byte_offset.unwrap_or_default());
+        let length = size(view.byte_length);
         let end = start.checked_add(length).filter(|&end| end <= data.len());
         let Some(end) = end else {
             let what = format!(
@@ -130,17 +143,20 @@ impl<'a> Views<'a> {
             data: Arc::clone(data),
             start,
             end,
-            stride: item.index("byteStride", check),
+            stride: view.byte_stride.map(|stride| stride.0),
         })
     }
 
     fn unpack(&mut self, packed: &Item<'_>, check: &mut Check) -> Option<Span> {
         let source = self.stretch(packed, check)?;
-        let stride = packed.index("byteStride", check).unwrap_or(0);
-        let count = packed.index("count", check).unwrap_or(0);
-        let mode = packed.text("mode", check).unwrap_or("");
-        let filter = packed.text("filter", check).unwrap_or("NONE");
-        match compression::unpack_meshopt(source.bytes(), stride, count, mode, filter) {
+        let stride = source.stride.unwrap_or(0);
+        let Packed {
+            count,
+            mode,
+            filter,
+        } = packed.read(check)?;
+        let filter = filter.as_deref().unwrap_or("NONE");
+        match compression::unpack_meshopt(source.bytes(), stride, count, &mode, filter) {
             Ok(bytes) if bytes.len() > self.room => {
                 let what = format!("the packed views hold more than {MAX_UNPACKED} bytes");
                 check.problem("", what, "split or simplify the room");

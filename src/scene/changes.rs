@@ -3,39 +3,14 @@
 //! The document stays as it is, so that what is written has the file's units; turned faces are written turned.
 
 use super::json::short;
-use super::layers::{self, Layers};
-use super::light::GREATEST_SIZE;
+use super::lamps::GREATEST_SIZE;
 use super::pane::PaneKind;
+pub use super::room::Changes;
 use super::{Projection, Scene, luminaires};
 use crate::color::{KM, Observer};
 use crate::data::{Leaves, nearest_of};
 use crate::error::{Error, Result};
 use glam::{DMat4, DVec3};
-use std::collections::BTreeSet;
-
-/// What was changed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Changes {
-    /// Metres for each unit of the file, as the user says.
-    pub scale: f64,
-    /// Surfaces whose faces were turned.
-    pub flipped: BTreeSet<usize>,
-    /// The lamps in groups, if they were parted.
-    pub layers: Option<Layers>,
-    /// Which groups the side file asks for.
-    pub(crate) layers_wished: Vec<layers::Wish>,
-}
-
-impl Default for Changes {
-    fn default() -> Self {
-        Self {
-            scale: 1.0,
-            flipped: BTreeSet::new(),
-            layers: None,
-            layers_wished: Vec::new(),
-        }
-    }
-}
 
 impl Scene {
     /// Multiplies all positions (surfaces, lights, cameras) by `factor`. Lamps keep their luminance and candela.

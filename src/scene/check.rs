@@ -1,6 +1,7 @@
 //! Collects what is wrong with a room, so that everything is reported together.
 
 use crate::error::Problem;
+use std::collections::BTreeMap;
 
 /// How many problems (and how many warnings) are listed one by one; the rest is counted.
 /// A broken file of a million nodes must not become a message of a million lines.
@@ -112,6 +113,40 @@ impl Check {
             self.file.clone()
         } else {
             format!("{}: {place}", self.file)
+        }
+    }
+}
+
+/// At most eight names, the others counted.
+pub(crate) fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let shown = names[..names.len().min(SHOWN)].join(", ");
+    match names.len() {
+        n if n > SHOWN => format!("{shown} and {} more", n - SHOWN),
+        _ => shown,
+    }
+}
+
+/// What is counted over the whole document and said once.
+#[derive(Debug, Default)]
+pub(crate) struct Tally {
+    counts: BTreeMap<&'static str, (usize, String)>,
+}
+
+impl Tally {
+    pub(crate) fn count(&mut self, what: &'static str, how_many: usize, first: &str) {
+        if how_many > 0 {
+            let entry = self
+                .counts
+                .entry(what)
+                .or_insert_with(|| (0, first.to_owned()));
+            entry.0 += how_many;
+        }
+    }
+
+    pub(crate) fn report(&self, check: &mut Check) {
+        for (what, (count, first)) in &self.counts {
+            check.warn(format!("{count} {what} (first: {first})"));
         }
     }
 }

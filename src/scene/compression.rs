@@ -3,7 +3,7 @@
 //! The claims of a packed stream are compared with its size before memory is given to it, since both codecs can turn
 //! a few bytes into millions of vertices.
 
-use crate::scene::accessor::Component;
+use gltf::json::accessor::ComponentType as Component;
 
 /// The names under which meshopt's codec goes in glTF.
 pub(crate) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
@@ -267,6 +267,7 @@ pub(crate) fn unpack_draco(
 #[cfg(feature = "draco")]
 mod draco_codec {
     use super::{Component, DracoMesh, Unpacked};
+    use crate::scene::components;
     use draco_gltf::{
         ComponentType, DecodeLimits, DracoPrimitiveContract, DracoPrimitiveExtension, JsonValue,
     };
@@ -313,7 +314,7 @@ mod draco_codec {
         let indices = geometry.indices().ok_or("unpacks to no triangles")?;
         let kind = component(indices.component_type()).ok_or("has indices of an unknown type")?;
         let each = indices.bytes().chunks_exact(kind.size());
-        let indices: Option<Vec<u32>> = each.map(|bytes| kind.index(bytes)).collect();
+        let indices: Option<Vec<u32>> = each.map(|bytes| components::index(kind, bytes)).collect();
         Ok(DracoMesh {
             attributes,
             indices: indices.ok_or("has indices that are not unsigned")?,

@@ -5,16 +5,17 @@
 
 use crate::error::{Error, Result};
 use crate::scene::Source;
-use crate::scene::buffers::{Buffers, Views};
+use crate::scene::buffers::{Buffers, size};
 use crate::scene::check::Check;
 use crate::scene::compression;
 use crate::scene::container;
-use crate::scene::json;
+use crate::scene::json::{self, Item};
 use crate::scene::nodes::{self, Placed};
 use crate::scene::raw;
 pub use crate::scene::raw::{AlphaMode, RawLight, RawLightKind, RawMaterial};
 use crate::scene::texture_info::Slots;
 use crate::scene::uri;
+use gltf::json::{Asset, Buffer};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -117,7 +118,7 @@ impl Document {
         if check.has_problems() {
             return Err(Error::Input(check.into_parts().0));
         }
-        let buffers = buffers(&json, folder(path), container.bin, &mut check);
+        let buffers = buffers(&json, &uri::folder_of(path), container.bin, &mut check);
         let placed = nodes::walk(&json, &mut check);
         let mut slots = Slots::default();
         let materials = raw::materials(&json, &mut slots, &mut check);
@@ -150,59 +151,26 @@ impl Document {
     }
 }
 
-impl Source {
-    /// The bytes of an image of the document, as stored (PNG or JPEG as a rule), wherever they are: in a buffer, a data
-    /// URI or a file beside the document.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if there is no such image or its bytes cannot be had.
-    pub fn image_bytes(&self, index: usize) -> Result<Vec<u8>> {
-        let mut check = Check::new(self.path.display().to_string());
-        let bytes = self.image_bytes_checked(index, &mut check);
-        bytes.ok_or_else(|| Error::Input(check.into_parts().0))
-    }
-
-    fn image_bytes_checked(&self, index: usize, check: &mut Check) -> Option<Vec<u8>> {
-        let item = json::referred(&self.json, "images", "image", index, "", check)?;
-        if item.map.contains_key("uri") {
-            let given = item.text("uri", check)?;
-            let read = uri::read(folder(&self.path), given);
-            let failed = |why| check.problem(&item.place, why, "put the image there");
-            return read.map_err(failed).ok();
-        }
-        if !item.map.contains_key("bufferView") {
-            check.problem(&item.place, "has neither a URI nor a bufferView", AGAIN);
-            return None;
-        }
-        let view = item.index("bufferView", check)?;
-        let buffers = Buffers::sound(self.buffers.clone());
-        let span = Views::new(&self.json, &buffers).view(view, &item.place, check)?;
-        Some(span.bytes().to_vec())
-    }
-}
-
-fn folder(path: &Path) -> &Path {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
-    parent.unwrap_or(Path::new("."))
-}
-
 fn version(json: &Value, check: &mut Check) {
-    let asset = json.get("asset");
-    let text = |key: &str| asset.and_then(|a| a.get(key)).and_then(Value::as_str);
     let next = "export as glTF 2.0";
-    match text("version") {
-        None => check.problem("", "has no 'asset' with a version, so it is not glTF", next),
-        Some(version) if version != "2" && !version.starts_with("2.") => {
-            let what = format!("is glTF {}, only 2.0 is read", json::short(version));
-            check.problem("", what, next);
-        }
-        Some(_) => {}
+    let map = json.get("asset").and_then(Value::as_object);
+    let item = map.map(|map| Item {
+        map,
+        place: String::new(),
+    });
+    let Some(asset) = item.and_then(|item| item.read::<Asset>(&mut Check::new(""))) else {
+        let what = "has no 'asset' with a version, so it is not glTF";
+        return check.problem("", what, next);
+    };
+    let version = &asset.version;
+    if version != "2" && !version.starts_with("2.") {
+        let what = format!("is glTF {}, only 2.0 is read", json::short(version));
+        check.problem("", what, next);
     }
-    if let Some(least) = text("minVersion").filter(|&v| v != "2.0" && v != "2") {
-        let what = format!(
-            "needs a reader of glTF {}, this one reads 2.0",
-            json::short(least)
-        );
+    let least = asset.min_version.as_deref();
+    if let Some(least) = least.filter(|&v| v != "2.0" && v != "2") {
+        let least = json::short(least);
+        let what = format!("needs a reader of glTF {least}, this one reads 2.0");
         check.problem("", what, next);
     }
 }
@@ -220,39 +188,35 @@ fn baked(json: &Value, check: &mut Check) {
 
 /// Checks what the document requires; returns what it uses and is not read.
 fn extensions(json: &Value, check: &mut Check) -> Vec<String> {
-    let names = |key: &str| {
-        let list = json.get(key).and_then(Value::as_array);
-        let each = list.into_iter().flatten().filter_map(Value::as_str);
-        let mut names: Vec<&str> = each.collect();
+    let root = json::root(json, check);
+    let sorted = |names: &mut Vec<String>| {
         names.sort_unstable();
         names.dedup();
-        names
     };
-    let read = |name: &&str| READ.contains(name) || compression::is_built_in(name);
-    let mut missing = names("extensionsRequired");
-    missing.retain(|name| !read(name) && !HARMLESS.contains(name));
+    let read = |name: &String| READ.contains(&name.as_str()) || compression::is_built_in(name);
+    let mut missing = root.extensions_required.clone();
+    sorted(&mut missing);
+    missing.retain(|name| !read(name) && !HARMLESS.contains(&name.as_str()));
     if !missing.is_empty() {
         let what = format!("requires what is not supported: {}", missing.join(", "));
         let next = "export without these extensions";
         check.problem("extensionsRequired", what, next);
     }
-    let mut unsupported = names("extensionsUsed");
-    unsupported.extend(names("extensionsRequired"));
-    unsupported.sort_unstable();
-    unsupported.dedup();
+    let mut unsupported = root.extensions_used;
+    unsupported.extend(root.extensions_required);
+    sorted(&mut unsupported);
     unsupported.retain(|name| !read(name));
     if !unsupported.is_empty() {
         let list = unsupported.join(", ");
         check.warn(format!("extensions that are not read: {list}"));
     }
-    unsupported.into_iter().map(str::to_owned).collect()
+    unsupported
 }
 
 /// Reads all buffers; a missing one is a problem.
 fn buffers(json: &Value, folder: &Path, bin: Option<&[u8]>, check: &mut Check) -> Buffers {
-    let used = json.get("extensionsUsed").and_then(Value::as_array);
-    let mut used = used.into_iter().flatten().filter_map(Value::as_str);
-    let placeholders = used.any(|name| compression::MESHOPT.contains(&name));
+    let used = json::root(json, check).extensions_used;
+    let placeholders = (used.iter()).any(|name| compression::MESHOPT.contains(&name.as_str()));
     let mut buffers = Buffers {
         bytes: Vec::new(),
         sound: Vec::new(),
@@ -280,15 +244,18 @@ fn buffer(
         check.problem(&format!("buffer {index}"), "is not an object", AGAIN);
         return None;
     };
-    let Some(length) = item.index("byteLength", check) else {
+    if !item.has("byteLength") {
         check.problem(&item.place, "has no byteLength", AGAIN);
         return None;
-    };
-    let bytes = if item.map.contains_key("uri") {
-        let given = item.text("uri", check)?;
-        let read = shared(folder, given, files);
+    }
+    let given = item.read::<Buffer>(check)?;
+    let length = size(given.byte_length);
+    let bytes = if let Some(uri) = given.uri {
+        let read = shared(folder, &uri, files);
         let failed = |why| check.problem(&item.place, why, "put the buffer there");
         read.map_err(failed).ok()?
+    } else if item.has("uri") {
+        return None;
     } else if let (0, Some(bin)) = (index, bin) {
         Arc::from(bin)
     } else if placeholders {

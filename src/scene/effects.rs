@@ -3,9 +3,9 @@
 //! Only what some surface or lamp of the scene uses counts. A plan never leaves out an effect that could change the
 //! picture: where a question would be too dear to answer, the effect runs.
 
+use super::check::listed;
 use super::json::short;
 use super::lacking::lacking;
-use super::material::listed;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::Leaves;
@@ -23,6 +23,7 @@ const CONVEX_PAIRS: usize = 100_000_000;
 
 /// The effects, in the order of the list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Kind {
     /// Light that surfaces pass on.
     Interreflection,
@@ -81,6 +82,7 @@ impl Kind {
 
 /// One line of the plan.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Effect {
     /// [`Kind::name`], or the name of an effect that the program lacks.
     pub name: String,
@@ -115,26 +117,8 @@ impl Plan {
         plan.add(Kind::Interreflection, interreflection(&used));
         plan.add(Kind::Occlusion, occlusion(scene));
         plan.add(Kind::Colour, colour(scene, &used));
-        let spectra = scene.spectra.len();
-        let names: Vec<String> = scene.spectra.iter().map(|s| s.name.clone()).collect();
-        plan.add(
-            Kind::LightSpectra,
-            match spectra {
-                0 => (false, "no lamp".into()),
-                1 => (false, format!("all light is {}", names[0])),
-                n => (true, format!("{n}: {}", listed(&names))),
-            },
-        );
-        let textured = |m: &&&Material| {
-            let mask = matches!(
-                &m.alpha,
-                Alpha::Mask {
-                    texture: Some(_),
-                    ..
-                }
-            );
-            m.paint.is_some() || mask || m.emission.as_ref().is_some_and(|e| e.texture.is_some())
-        };
+        plan.add(Kind::LightSpectra, light_spectra(scene));
+        let textured = |m: &&&Material| is_textured(m);
         plan.add(
             Kind::Textures,
             counted(used.iter().filter(textured), "material"),
@@ -216,6 +200,26 @@ impl Plan {
             reason,
         });
     }
+}
+
+fn light_spectra(scene: &Scene) -> (bool, String) {
+    let names: Vec<String> = scene.spectra.iter().map(|s| s.name.clone()).collect();
+    match &names[..] {
+        [] => (false, "no lamp".into()),
+        [one] => (false, format!("all light is {one}")),
+        many => (true, format!("{}: {}", many.len(), listed(many))),
+    }
+}
+
+fn is_textured(m: &Material) -> bool {
+    let mask = matches!(
+        &m.alpha,
+        Alpha::Mask {
+            texture: Some(_),
+            ..
+        }
+    );
+    m.paint.is_some() || mask || m.emission.as_ref().is_some_and(|e| e.texture.is_some())
 }
 
 impl fmt::Display for Plan {

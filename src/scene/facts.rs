@@ -6,7 +6,7 @@
 //! Holes are not subtracted.
 
 use super::profile::Profile;
-use super::{LightKind, Material, Projection, Scene, Sides, Surface, Texture};
+use super::{LightKind, Material, Projection, PunctualLight, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::Leaves;
 use glam::DVec3;
@@ -19,6 +19,7 @@ const WELD: f64 = 1e-6;
 
 /// The facts of a scene. Lengths are in the file's units (metres in glTF).
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Facts {
     /// The file.
     pub room: String,
@@ -49,6 +50,7 @@ pub struct Facts {
 /// A hint whether the room is closed: edges that no second triangle meets, after welding. Walls that only touch (a
 /// T-vertex, a block on a floor) have open edges and may be tight all the same.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Closed {
     /// Parts that hang together by vertices.
     pub parts: usize,
@@ -62,6 +64,7 @@ pub struct Closed {
 
 /// A lamp.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct LightFact {
     /// Name of the material or light.
     pub name: String,
@@ -84,6 +87,7 @@ pub struct LightFact {
 
 /// A file of photometric data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ProfileFact {
     /// Name of the luminaire in the file.
     pub luminaire: String,
@@ -117,6 +121,7 @@ impl ProfileFact {
 
 /// A material.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct MaterialFact {
     /// Name.
     pub name: String,
@@ -138,6 +143,7 @@ pub struct MaterialFact {
 
 /// An image.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct ImageFact {
     /// Name.
     pub name: String,
@@ -168,79 +174,18 @@ impl Facts {
                 meter.add(surface, material, &mut sums[surface.material]);
             }
         }
-        let positions = || {
-            scene
-                .surfaces
-                .iter()
-                .flat_map(|s| s.positions.iter().copied())
-        };
-        let bounds = match positions().next() {
-            Some(first) => [
-                positions().fold(first, DVec3::min),
-                positions().fold(first, DVec3::max),
-            ],
-            None => [DVec3::ZERO; 2],
-        };
-        let mut lights: Vec<LightFact> = Vec::new();
-        for (material, sums) in scene
-            .materials
-            .iter()
-            .zip(&sums)
-            .filter(|(_, s)| s.triangles > 0)
-        {
-            lights.extend(meter.lamp(material, sums));
-        }
+        let bounds = bounds(scene);
+        let each = || scene.materials.iter().zip(&sums);
+        let shining = each().filter(|(_, sums)| sums.triangles > 0);
         // A surface that shines by a profile was named with its material.
         let alone = scene.lights.iter().filter(|l| l.kind != LightKind::Surface);
-        lights.extend(alone.map(|light| {
-            let size = meter.size(light.light, &light.shape);
-            let (kind, flux) = match light.kind {
-                LightKind::Point => ("point", Some(4.0 * PI * size)),
-                LightKind::Spot { inner, outer } => ("spot", Some(spot_flux(size, inner, outer))),
-                LightKind::Profile | LightKind::Surface => ("measured", Some(size)),
-                LightKind::Directional => ("directional", None),
-                LightKind::Sun => ("sun", None),
-                LightKind::Sky => ("sky", None),
-                LightKind::Ground => ("ground", None),
-            };
-            LightFact {
-                name: light.name.clone(),
-                kind,
-                flux_lm: flux,
-                luminance_cd_m2: None,
-                intensity_cd: flux.map(|_| match &light.luminaire {
-                    Some(l) => size * l.profile.peak() / l.profile.flux(),
-                    None => size,
-                }),
-                illuminance_lx: flux.is_none().then_some(size),
-                spectrum: scene.spectra[light.light].name.clone(),
-                profile: light
-                    .luminaire
-                    .as_ref()
-                    .map(|l| ProfileFact::of(&l.profile)),
-            }
-        }));
-        let materials = scene
-            .materials
-            .iter()
-            .zip(&sums)
-            .map(|(material, sums)| MaterialFact {
-                name: material.name.clone(),
-                index: material.index,
-                triangles: sums.triangles,
-                area_m2: sums.area,
-                albedo_y: if sums.area > 0.0 {
-                    sums.albedo / sums.area
-                } else {
-                    meter.albedo(material)
-                },
-                reflectance: material.reflectance_from.clone(),
-                textured: material.paint.is_some(),
-                sides: match material.sides {
-                    Sides::Front => "front",
-                    Sides::Both => "both",
-                },
-            });
+        let surfaces = shining.filter_map(|(material, sums)| meter.lamp(material, sums));
+        let lights = surfaces.chain(alone.map(|light| meter.light(light)));
+        let images = scene.images.iter().map(|image| ImageFact {
+            name: image.name.clone(),
+            width: image.width,
+            height: image.height,
+        });
         Self {
             room: scene.source.path.display().to_string(),
             surfaces: scene.surfaces.len(),
@@ -250,24 +195,24 @@ impl Facts {
             closed: closed(&scene.surfaces, WELD * (bounds[1] - bounds[0]).length()),
             range_nm: [scene.grid.start(), scene.grid.end()],
             light_spectra: scene.spectra.iter().map(|s| s.name.clone()).collect(),
-            lights,
-            materials: materials.collect(),
+            lights: lights.collect(),
+            materials: each().map(|(m, sums)| meter.material(m, sums)).collect(),
             cameras: scene
                 .cameras
                 .iter()
                 .map(|c| camera(&c.name, c.projection))
                 .collect(),
-            images: scene
-                .images
-                .iter()
-                .map(|i| ImageFact {
-                    name: i.name.clone(),
-                    width: i.width,
-                    height: i.height,
-                })
-                .collect(),
+            images: images.collect(),
         }
     }
+}
+
+/// Lowest and highest corner.
+fn bounds(scene: &Scene) -> [DVec3; 2] {
+    let positions = || scene.surfaces.iter().flat_map(|s| s.positions.iter());
+    positions().next().map_or([DVec3::ZERO; 2], |first| {
+        [DVec3::min, DVec3::max].map(|end| positions().copied().fold(*first, end))
+    })
 }
 
 fn camera(name: &str, projection: Projection) -> String {
@@ -388,6 +333,49 @@ impl<'a> Meter<'a> {
             spectrum: emission.from.clone(),
             profile: emission.profile.as_deref().map(ProfileFact::of),
         })
+    }
+
+    fn light(&self, light: &PunctualLight) -> LightFact {
+        let size = self.size(light.light, &light.shape);
+        let (kind, flux) = match light.kind {
+            LightKind::Point => ("point", Some(4.0 * PI * size)),
+            LightKind::Spot { inner, outer } => ("spot", Some(spot_flux(size, inner, outer))),
+            LightKind::Profile | LightKind::Surface => ("measured", Some(size)),
+            LightKind::Directional => ("directional", None),
+            LightKind::Sun => ("sun", None),
+            LightKind::Sky => ("sky", None),
+            LightKind::Ground => ("ground", None),
+        };
+        let profile = light.luminaire.as_ref().map(|l| &l.profile);
+        LightFact {
+            name: light.name.clone(),
+            kind,
+            flux_lm: flux,
+            luminance_cd_m2: None,
+            intensity_cd: flux.map(|_| profile.map_or(size, |p| size * p.peak() / p.flux())),
+            illuminance_lx: flux.is_none().then_some(size),
+            spectrum: self.scene.spectra[light.light].name.clone(),
+            profile: profile.map(|profile| ProfileFact::of(profile)),
+        }
+    }
+
+    fn material(&self, material: &Material, sums: &Sums) -> MaterialFact {
+        MaterialFact {
+            name: material.name.clone(),
+            index: material.index,
+            triangles: sums.triangles,
+            area_m2: sums.area,
+            albedo_y: match sums.area > 0.0 {
+                true => sums.albedo / sums.area,
+                false => self.albedo(material),
+            },
+            reflectance: material.reflectance_from.clone(),
+            textured: material.paint.is_some(),
+            sides: match material.sides {
+                Sides::Front => "front",
+                Sides::Both => "both",
+            },
+        }
     }
 }
 

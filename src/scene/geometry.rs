@@ -5,13 +5,14 @@
 
 use crate::error::{Error, Problem, Result};
 use crate::scene::accessor::Accessors;
-use crate::scene::check::Check;
+use crate::scene::check::{Check, Tally};
 use crate::scene::document::Document;
 use crate::scene::json::{self, Item};
 use crate::scene::nodes::Placed;
 use crate::scene::primitive::{self, MAX_TEXCOORDS, Outcome, Primitive};
 use crate::scene::{Camera, Image, Surface, camera, image, instances, world};
 use glam::DMat4;
+use gltf::json::{Node, mesh};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -25,6 +26,7 @@ const AGAIN: &str = "export the file again";
 
 /// What a document holds besides paint and light. Of no use where `problems` is not empty.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Geometry {
     /// Every primitive with an area at every node (and instance) of the scene.
     pub surfaces: Vec<Surface>,
@@ -118,36 +120,12 @@ impl Document {
     }
 }
 
-/// What is counted over the whole document and said once.
-#[derive(Debug, Default)]
-pub(crate) struct Tally {
-    counts: BTreeMap<&'static str, (usize, String)>,
-}
-
-impl Tally {
-    pub(crate) fn count(&mut self, what: &'static str, how_many: usize, first: &str) {
-        if how_many > 0 {
-            let entry = self
-                .counts
-                .entry(what)
-                .or_insert_with(|| (0, first.to_owned()));
-            entry.0 += how_many;
-        }
-    }
-
-    fn report(&self, check: &mut Check) {
-        for (what, (count, first)) in &self.counts {
-            check.warn(format!("{count} {what} (first: {first})"));
-        }
-    }
-}
-
 struct Reader<'a> {
     document: &'a Document,
     json: &'a Value,
     accessors: Accessors<'a>,
-    /// Read primitives by mesh and index; none: without area, or broken and reported.
-    primitives: BTreeMap<(usize, usize), Option<Primitive>>,
+    /// Read primitives with their materials, by mesh and index; none: without area, or broken and reported.
+    primitives: BTreeMap<(usize, usize), Option<(usize, Primitive)>>,
     tally: Tally,
     /// Vertices and triangles that primitives may still have before they are placed. The claims bound plain ones; what
     /// Draco unpacks to is known only then.
@@ -167,9 +145,11 @@ impl<'a> Reader<'a> {
             let Some(node) = json::item(self.json, "nodes", "node", placed.node) else {
                 continue;
             };
-            let Some(mesh) = node.index("mesh", &mut silent) else {
+            let read = node.read::<Node>(&mut silent);
+            let Some(mesh) = read.and_then(|node| node.mesh) else {
                 continue;
             };
+            let mesh = mesh.value();
             let claims = by_mesh.entry(mesh).or_insert_with(|| self.claims(mesh));
             let copies = instances::count(&node, &self.accessors, &mut silent).unwrap_or(1);
             for (total, claim) in total.iter_mut().zip(claims) {
@@ -214,13 +194,15 @@ impl<'a> Reader<'a> {
         let Some(node) = json::item(self.json, "nodes", "node", placed.node) else {
             return;
         };
-        let Some(mesh) = node.index("mesh", check) else {
+        let read = node.read::<Node>(check);
+        let Some(mesh) = read.and_then(|node| node.mesh) else {
             return;
         };
+        let mesh = mesh.value();
         let item = json::referred(self.json, "meshes", "mesh", mesh, &node.place, check);
         let Some(mut item) = item else { return };
         item.place = format!("{}, {}", node.place, item.place);
-        if node.map.contains_key("skin") {
+        if node.has("skin") {
             let what = "nodes have a skin; their meshes are taken as they stand, unbent";
             self.tally.count(what, 1, &node.place);
         }
@@ -243,11 +225,12 @@ impl<'a> Reader<'a> {
                 continue;
             };
             let primitive = Item { map, place };
-            let material = self.material(&primitive, check);
-            self.read(mesh, index, &primitive, check);
-            let (Some(material), Some(Some(read))) =
-                (material, self.primitives.get(&(mesh, index)))
-            else {
+            // Once for all nodes that use the mesh.
+            if !self.primitives.contains_key(&(mesh, index)) {
+                let read = self.read(&primitive, check);
+                self.primitives.insert((mesh, index), read);
+            }
+            let Some((material, read)) = &self.primitives[&(mesh, index)] else {
                 continue;
             };
             let size = read.size().saturating_mul(copies.len());
@@ -268,7 +251,7 @@ impl<'a> Reader<'a> {
                     mesh,
                     primitive: index,
                     instance: *instance,
-                    material,
+                    material: *material,
                     to_world: *to_world,
                     positions: Vec::new(),
                     normals: None,
@@ -282,56 +265,59 @@ impl<'a> Reader<'a> {
     }
 
     /// Index in the document's materials of what a primitive is made of.
-    fn material(&self, primitive: &Item<'_>, check: &mut Check) -> Option<usize> {
-        let materials = &self.document.materials;
-        if !primitive.map.contains_key("material") {
+    fn material(
+        &self,
+        item: &Item<'_>,
+        primitive: &mesh::Primitive,
+        check: &mut Check,
+    ) -> Option<usize> {
+        let Some(index) = primitive.material.map(|index| index.value()) else {
             // The default one stands at the end of the list as soon as one primitive needs it.
-            return materials.len().checked_sub(1);
-        }
-        let index = primitive.index("material", check)?;
-        let known = json::len(self.json, "materials");
+            let last = self.document.materials.len().checked_sub(1);
+            return last.filter(|_| !item.has("material"));
+        };
         json::referred(
             self.json,
             "materials",
             "material",
             index,
-            &primitive.place,
+            &item.place,
             check,
         )?;
-        (index < known).then_some(index)
+        Some(index)
     }
 
-    /// Reads a primitive, once for all nodes that use its mesh.
-    fn read(&mut self, mesh: usize, index: usize, primitive: &Item<'a>, check: &mut Check) {
-        if self.primitives.contains_key(&(mesh, index)) {
-            return;
-        }
-        let outcome = primitive::read(primitive, &mut self.accessors, self.unpacked, check);
-        let read = match outcome {
+    /// Reads a primitive: its material, and what it is in its own space.
+    fn read(&mut self, item: &Item<'a>, check: &mut Check) -> Option<(usize, Primitive)> {
+        let given = item.read::<mesh::Primitive>(check)?;
+        let material = self.material(item, &given, check);
+        match primitive::read(item, &given, &mut self.accessors, self.unpacked, check) {
             Outcome::Sound(mut read) => {
                 self.unpacked = self.unpacked.saturating_sub(read.size());
-                if primitive.map.contains_key("targets") {
+                if item.has("targets") {
                     let what = "primitives have morph targets; their base shape is taken";
-                    self.tally.count(what, 1, &primitive.place);
+                    self.tally.count(what, 1, &item.place);
                 }
-                self.fill_texcoords(primitive, &mut read, check);
-                Some(read)
+                self.fill_texcoords(item, material?, &mut read, check);
+                Some((material?, read))
             }
             Outcome::NoArea => {
                 let what = "primitives are points or lines and are left out";
-                self.tally.count(what, 1, &primitive.place);
+                self.tally.count(what, 1, &item.place);
                 None
             }
             Outcome::Bad => None,
-        };
-        self.primitives.insert((mesh, index), read);
+        }
     }
 
     /// A texture may ask for coordinates that the primitive does not have: then they are 0.
-    fn fill_texcoords(&mut self, item: &Item<'_>, read: &mut Primitive, check: &mut Check) {
-        let Some(material) = self.material(item, check) else {
-            return;
-        };
+    fn fill_texcoords(
+        &mut self,
+        item: &Item<'_>,
+        material: usize,
+        read: &mut Primitive,
+        check: &mut Check,
+    ) {
         let material = &self.document.materials[material];
         let textures = [
             &material.base_color_texture,

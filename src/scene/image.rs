@@ -7,7 +7,6 @@
 //! Large images are shrunk by whole factors with a box filter, in linear light: what the solver needs are means over
 //! elements. So the memory for images is bounded: [`MAX_TEXELS`] in all.
 
-use crate::scene::Image;
 use image::{DynamicImage, GenericImageView, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
@@ -26,6 +25,19 @@ const MAX_DECODE: u64 = 1 << 30;
 /// block of 64 pixels and plane, so stays below 512 pixels.
 const MAX_PNG_RATIO: u64 = 1032;
 const MAX_JPEG_RATIO: u64 = 512;
+
+/// A decoded image: linear light, alpha as is.
+#[derive(Debug, Clone)]
+pub struct Image {
+    /// For messages.
+    pub name: String,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Linear RGBA, row by row from the top.
+    pub pixels: Vec<[f32; 4]>,
+}
 
 /// What stands in for an image that cannot be read: a grey that neither brightens nor darkens much.
 pub(crate) fn neutral(name: &str) -> Image {

@@ -5,19 +5,20 @@ use crate::scene::check::Check;
 use crate::scene::json::Item;
 use crate::scene::nodes;
 use glam::{DMat4, DVec3, Vec3};
+use gltf::json::{Accessor, Index};
+use serde::Deserialize;
+use std::collections::BTreeMap;
 
 const NAME: &str = "EXT_mesh_gpu_instancing";
 const AGAIN: &str = "export the file again";
 
 const ATTRIBUTES: [&str; 3] = ["TRANSLATION", "ROTATION", "SCALE"];
 
-fn attributes<'a>(node: &Item<'a>, check: &mut Check) -> Option<Item<'a>> {
-    if !node.map.contains_key("extensions") {
-        return None;
-    }
-    let mut attributes = node.extension(NAME, check)?.child("attributes", check)?;
-    attributes.place = format!("{}, {NAME}", node.place);
-    Some(attributes)
+/// The extension on a node.
+#[derive(Debug, Deserialize)]
+struct Instancing {
+    #[serde(default)]
+    attributes: BTreeMap<String, Index<Accessor>>,
 }
 
 /// How many instances a node has by EXT_mesh_gpu_instancing.
@@ -26,9 +27,9 @@ pub(crate) fn count(
     accessors: &Accessors<'_>,
     check: &mut Check,
 ) -> Option<usize> {
-    let attributes = attributes(node, check)?;
+    let attributes = node.extension::<Instancing>(NAME, check)?.attributes;
     let each = ATTRIBUTES.iter().filter_map(|semantic| {
-        let accessor = attributes.index(semantic, check)?;
+        let accessor = attributes.get(*semantic)?.value();
         let (_, layout) = accessors.layout(accessor, "", check)?;
         Some(layout.count)
     });
@@ -41,13 +42,17 @@ pub(crate) fn read(
     accessors: &mut Accessors<'_>,
     check: &mut Check,
 ) -> Option<Option<Vec<DMat4>>> {
-    let Some(attributes) = attributes(node, check) else {
+    let Some(Instancing { attributes }) = node.extension(NAME, check) else {
         return Some(None);
     };
-    let [translation, rotation, scale] = ATTRIBUTES;
-    let translations = values::<3>(&attributes, accessors, translation, check)?;
-    let rotations = values::<4>(&attributes, accessors, rotation, check)?;
-    let scales = values::<3>(&attributes, accessors, scale, check)?;
+    let place = &format!("{}, {NAME}", node.place);
+    let [translation, rotation, scale] = ATTRIBUTES.map(|name| {
+        let accessor = attributes.get(name);
+        accessor.map(|accessor| (accessor.value(), format!("{place}, {name}")))
+    });
+    let translations = values::<3>(accessors, translation, check)?;
+    let rotations = values::<4>(accessors, rotation, check)?;
+    let scales = values::<3>(accessors, scale, check)?;
     let counts = [
         translations.as_ref().map(Vec::len),
         rotations.as_ref().map(Vec::len),
@@ -58,11 +63,7 @@ pub(crate) fn read(
         return Some(None);
     };
     if counts.any(|other| other != count) {
-        check.problem(
-            &attributes.place,
-            "has attributes of different lengths",
-            AGAIN,
-        );
+        check.problem(place, "has attributes of different lengths", AGAIN);
         return None;
     }
     let pick = |values: &Option<Vec<[f32; 3]>>, i: usize, otherwise: DVec3| {
@@ -83,24 +84,20 @@ pub(crate) fn read(
     let matrices: Vec<DMat4> = (0..count).map(matrix).collect();
     if let Some(bad) = matrices.iter().position(|m| !m.is_finite()) {
         let what = format!("has a transform that is not finite, at instance {bad}");
-        check.problem(&attributes.place, what, AGAIN);
+        check.problem(place, what, AGAIN);
         return None;
     }
     Some(Some(matrices))
 }
 
 fn values<const N: usize>(
-    attributes: &Item<'_>,
     accessors: &mut Accessors<'_>,
-    semantic: &str,
+    attribute: Option<(usize, String)>,
     check: &mut Check,
 ) -> Option<Option<Vec<[f32; N]>>> {
-    if !attributes.map.contains_key(semantic) {
+    let Some((accessor, place)) = attribute else {
         return Some(None);
-    }
-    let place = format!("{}, {semantic}", attributes.place);
-    let accessor = attributes.index(semantic, check)?;
-    accessors
-        .vectors::<N>(accessor, None, &place, check)
-        .map(Some)
+    };
+    let vectors = accessors.vectors::<N>(accessor, None, &place, check);
+    vectors.map(Some)
 }

@@ -1,9 +1,16 @@
-//! Typed views of the document's JSON: a missing key is an absence, a wrong type is a problem with a place.
+//! The document's JSON, element by element, as the types of [`gltf::json`]: a missing key is an absence, a wrong type is a problem with
+//! a place, and the element is read on without it, so that all its problems are told together.
 //!
-//! Nothing here panics or trusts a number: indices are checked by whoever looks them up.
+//! Nothing here panics or trusts a number: indices are checked by whoever looks them up. The types hold single precision; where
+//! things stand is read in double ([`nodes`](super::nodes)).
 
 use crate::scene::check::Check;
+use crate::scene::typed::read;
+use gltf::json::Root;
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
+
+const AGAIN: &str = "export the file again";
 
 /// An object of the document with the words for its place.
 #[derive(Debug, Clone)]
@@ -44,9 +51,18 @@ pub(crate) fn referred<'a>(
             "refers to {kind} {index}, which the document does not have (it has {})",
             len(json, key)
         );
-        check.problem(place, what, "export the file again");
+        check.problem(place, what, AGAIN);
     }
     found
+}
+
+/// The document without its elements, which are read one by one, and its asset, which is asked for first of all.
+pub(crate) fn root(json: &Value, check: &mut Check) -> Root {
+    let keys = ["extensionsRequired", "extensionsUsed", "scene"];
+    let said = keys.map(|key| Some((key.to_owned(), json.get(key)?.clone())));
+    let mut map: Map<String, Value> = said.into_iter().flatten().collect();
+    map.insert("asset".into(), serde_json::json!({"version": "2.0"}));
+    read(&map, "", "", check).unwrap_or_default()
 }
 
 /// Names from a file may be long; messages are not.
@@ -64,64 +80,38 @@ impl<'a> Item<'a> {
         self.map.get("name").and_then(Value::as_str).unwrap_or("")
     }
 
-    /// A non-negative whole number.
-    pub(crate) fn index(&self, key: &str, check: &mut Check) -> Option<usize> {
-        let value = self.map.get(key)?;
-        let index = whole(value);
-        if index.is_none() {
-            self.wrong(key, "a non-negative whole number", check);
-        }
-        index
+    /// Is there such a key?
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.map.contains_key(key)
     }
 
-    /// A finite number.
-    pub(crate) fn number(&self, key: &str, check: &mut Check) -> Option<f64> {
-        let value = self.map.get(key)?;
-        let number = value.as_f64().filter(|x| x.is_finite());
-        if number.is_none() {
-            self.wrong(key, "a finite number", check);
-        }
-        number
-    }
-
-    /// A list of exactly `N` finite numbers.
-    pub(crate) fn numbers<const N: usize>(&self, key: &str, check: &mut Check) -> Option<[f64; N]> {
-        let value = self.map.get(key)?;
-        let mut numbers = [0.0; N];
-        let list = value.as_array().filter(|list| list.len() == N);
-        let all = list.is_some_and(|list| {
-            list.iter().zip(&mut numbers).all(|(value, slot)| {
-                *slot = value.as_f64().unwrap_or(f64::NAN);
-                slot.is_finite()
-            })
-        });
-        if all {
-            Some(numbers)
-        } else {
-            self.wrong(key, &format!("a list of {N} finite numbers"), check);
-            None
+    /// What stands at a key, for messages.
+    pub(crate) fn said(&self, key: &str) -> String {
+        match self.map.get(key) {
+            Some(Value::String(text)) => short(text),
+            Some(other) => short(&other.to_string()),
+            None => String::new(),
         }
     }
 
-    /// A string.
-    pub(crate) fn text(&self, key: &str, check: &mut Check) -> Option<&'a str> {
-        let value = self.map.get(key)?;
-        let text = value.as_str();
-        if text.is_none() {
-            self.wrong(key, "a string", check);
-        }
-        text
+    /// The object as a type; none where something that it cannot be without is missing or wrong. All that is wrong is told.
+    pub(crate) fn read<T: DeserializeOwned>(&self, check: &mut Check) -> Option<T> {
+        read(self.map, &self.place, "", check)
     }
 
-    /// A boolean; false where it is missing.
-    pub(crate) fn flag(&self, key: &str, check: &mut Check) -> bool {
-        let Some(value) = self.map.get(key) else {
-            return false;
-        };
-        value.as_bool().unwrap_or_else(|| {
-            self.wrong(key, "true or false", check);
-            false
-        })
+    /// An extension on this item, as a type.
+    pub(crate) fn extension<T: DeserializeOwned>(
+        &self,
+        name: &str,
+        check: &mut Check,
+    ) -> Option<T> {
+        let item = self.extended(name, check)?;
+        read(item.map, &self.place, &format!("{name}."), check)
+    }
+
+    /// The object of an extension on this item.
+    pub(crate) fn extended(&self, name: &str, check: &mut Check) -> Option<Item<'a>> {
+        self.child("extensions", check)?.child(name, check)
     }
 
     /// A list; empty where it is missing.
@@ -131,7 +121,7 @@ impl<'a> Item<'a> {
         };
         value.as_array().map_or_else(
             || {
-                self.wrong(key, "a list", check);
+                wrong(&self.place, key, "a list", check);
                 &[][..]
             },
             Vec::as_slice,
@@ -143,18 +133,12 @@ impl<'a> Item<'a> {
         let value = self.map.get(key)?;
         let map = value.as_object();
         if map.is_none() {
-            self.wrong(key, "an object", check);
+            wrong(&self.place, key, "an object", check);
         }
         Some(Item {
             map: map?,
             place: self.place.clone(),
         })
-    }
-
-    /// The object of an extension on this item.
-    pub(crate) fn extension(&self, name: &str, check: &mut Check) -> Option<Item<'a>> {
-        let extensions = self.child("extensions", check)?;
-        extensions.child(name, check)
     }
 
     /// Names of all extensions on this item, sorted.
@@ -164,56 +148,81 @@ impl<'a> Item<'a> {
         names.sort();
         names
     }
-
-    fn wrong(&self, key: &str, wanted: &str, check: &mut Check) {
-        let what = format!("'{key}' is not {wanted}");
-        check.problem(&self.place, what, "export the file again");
-    }
 }
 
-/// A non-negative whole number below 2^53; glTF allows `3.0` for 3.
-pub(crate) fn whole(value: &Value) -> Option<usize> {
-    const LARGEST: f64 = 9_007_199_254_740_992.0;
-    if let Some(index) = value.as_u64() {
-        return usize::try_from(index).ok();
-    }
-    let number = value.as_f64()?;
-    // The range check makes the conversion exact.
-    let sound = (0.0..LARGEST).contains(&number) && number.fract() == 0.0;
-    sound.then_some(number as usize)
+fn wrong(place: &str, key: &str, wanted: &str, check: &mut Check) {
+    check.problem(place, format!("'{key}' is not {wanted}"), AGAIN);
+}
+
+/// A number of single precision as it was written, as far as its seven digits tell: .004 is .004.
+pub(crate) fn double(x: f32) -> f64 {
+    x.to_string().parse().unwrap_or(f64::from(x))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gltf::json::{Index, Node, buffer::View};
     use serde_json::json;
 
-    #[test]
-    fn wrong_types_are_problems_and_missing_keys_are_not() {
-        let json = json!({"nodes": [{"name": "a", "mesh": -1, "scale": [1, 2], "matrix": "x", "camera": 2.0}, 5]});
+    /// Node 0 of a list, and what is wrong with it.
+    fn node(node: Value) -> (Option<Node>, Vec<String>) {
+        let json = json!({"nodes": [node]});
         let mut check = Check::new("f");
-        let node = item(&json, "nodes", "node", 0).unwrap();
-        assert_eq!(node.place, "node 0 'a'");
-        assert_eq!(node.index("skin", &mut check), None);
-        assert_eq!(node.index("camera", &mut check), Some(2));
-        assert!(!check.has_problems());
-        assert_eq!(node.index("mesh", &mut check), None);
-        assert_eq!(node.numbers::<3>("scale", &mut check), None);
-        assert_eq!(node.numbers::<16>("matrix", &mut check), None);
-        assert!(item(&json, "nodes", "node", 1).is_none());
-        assert!(referred(&json, "nodes", "node", 2, "scene 0", &mut check).is_none());
-        let (problems, _) = check.into_parts();
-        assert_eq!(problems.len(), 4);
-        assert!(problems[3].what.contains("node 2"));
+        let read = item(&json, "nodes", "node", 0).unwrap().read(&mut check);
+        let problems = check.into_parts().0;
+        (read, problems.into_iter().map(|p| p.what).collect())
     }
 
     #[test]
-    fn whole_numbers_only() {
-        assert_eq!(whole(&json!(7)), Some(7));
-        assert_eq!(whole(&json!(7.0)), Some(7));
-        assert_eq!(whole(&json!(7.5)), None);
-        assert_eq!(whole(&json!(-1)), None);
-        assert_eq!(whole(&json!(1e300)), None);
-        assert_eq!(whole(&json!("7")), None);
+    fn missing_keys_and_unseen_ones_are_no_problems() {
+        let (read, problems) =
+            node(json!({"camera": 2.0, "extras": 5, "name": 5, "weights": "x", "other": [null]}));
+        assert_eq!(read.unwrap().camera, Some(Index::new(2)));
+        assert_eq!(problems, Vec::<String>::new());
+        let json = json!({"nodes": [{"name": "a"}, 5]});
+        assert_eq!(item(&json, "nodes", "node", 0).unwrap().place, "node 0 'a'");
+        assert!(item(&json, "nodes", "node", 1).is_none());
+        let mut check = Check::new("f");
+        assert!(referred(&json, "nodes", "node", 2, "scene 0", &mut check).is_none());
+        assert!(check.into_parts().0[0].what.contains("node 2"));
+    }
+
+    #[test]
+    fn all_that_is_wrong_is_told_and_the_rest_is_read() {
+        let (read, problems) = node(
+            json!({"mesh": -1, "camera": 3, "scale": [1, 2, 3, 4], "matrix": [1],
+            "children": [4, "y", 5, 1u64 << 32], "translation": [1, "z", 3]}),
+        );
+        let read = read.unwrap();
+        assert_eq!((read.mesh, read.camera), (None, Some(Index::new(3))));
+        assert_eq!(read.children, Some(vec![Index::new(4), Index::new(5)]));
+        let whole = "is not a non-negative whole number";
+        assert_eq!(
+            problems,
+            [
+                format!("'children[1]' {whole}"),
+                format!("'children[3]' {whole}"),
+                "'matrix' is not a list of 16 finite numbers".into(),
+                format!("'mesh' {whole}"),
+                "'scale' is not a list of 3 finite numbers".into(),
+                "'translation[1]' is not a finite number".into(),
+            ]
+        );
+    }
+
+    #[test]
+    fn what_an_element_cannot_be_without_is_named() {
+        let view = |value: Value| {
+            let json = json!({"bufferViews": [value]});
+            let mut check = Check::new("f");
+            let item = item(&json, "bufferViews", "bufferView", 0).unwrap();
+            assert!(item.read::<View>(&mut check).is_none());
+            let problems = check.into_parts().0.into_iter();
+            problems.map(|p| p.what).collect::<Vec<_>>()
+        };
+        assert_eq!(view(json!({"buffer": 0})), ["has no byteLength"]);
+        let wrong = "'byteLength' is not a non-negative whole number";
+        assert_eq!(view(json!({"byteLength": -1, "buffer": 0})), [wrong]);
     }
 }

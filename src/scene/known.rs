@@ -1,18 +1,10 @@
 //! What side files and extras say of a material.
 
-use super::luminaires::ProfileWish;
-use crate::data::Leaves;
-
-/// A spectrum on the grid, and where it came from.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sampled {
-    /// `cie/F2` or the CSV's path as written.
-    pub(crate) from: String,
-    /// Band means.
-    pub(crate) leaves: Leaves,
-    /// Values of a CSV carry a unit; those of the registry are relative.
-    pub(crate) is_csv: bool,
-}
+use super::luminaires::{self, ProfileWish};
+use super::reader::{Reader, Sampled};
+use super::transmittance;
+use crate::data::Kind;
+use serde_json::{Map, Value};
 
 /// What is known of a material.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -37,4 +29,48 @@ impl MaterialSpectra {
             transmittance: self.transmittance.or(other.transmittance),
         }
     }
+}
+
+/// Reads the object of a material.
+pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialSpectra {
+    let Some(entry) = reader.object(entry, place) else {
+        return MaterialSpectra::default();
+    };
+    reader.keys(entry, &["reflectance", "emission", "transmittance"], place);
+    let mut spectra = MaterialSpectra::default();
+    if let Some(value) = entry.get("reflectance") {
+        let place = format!("{place}, reflectance");
+        if let Some(object) = reader.object(value, &place) {
+            reader.keys(object, &["name", "csv"], &place);
+            spectra.reflectance = reader.sampled(object, Kind::Reflectance, &place);
+        }
+    }
+    if let Some(value) = entry.get("transmittance") {
+        spectra.transmittance = transmittance::read(reader, entry, value, place);
+    }
+    if let Some(value) = entry.get("emission") {
+        let place = format!("{place}, emission");
+        if let Some(object) = reader.object(value, &place) {
+            spectra.profile = luminaires::read_profile(reader, object, &place);
+            reader.keys(object, &luminaires::OF_EMISSION, &place);
+            let luminance = luminance(reader, object, &place);
+            if luminaires::says_spectrum(object) || !object.contains_key("profile") {
+                let sampled = reader.sampled(object, Kind::Illuminant, &place);
+                spectra.emission = sampled.map(|s| (s, luminance));
+            }
+        }
+    }
+    spectra
+}
+
+fn luminance(reader: &mut Reader, object: &Map<String, Value>, place: &str) -> Option<f64> {
+    let value = object.get("luminance_cd_m2")?;
+    let number = value.as_f64().filter(|v| v.is_finite() && *v >= 0.0);
+    if number.is_none() {
+        let what = format!("luminance_cd_m2 is {value}, not a number of at least 0");
+        reader
+            .check
+            .problem(place, what, "give the luminance in cd/m2");
+    }
+    number
 }

@@ -2,13 +2,14 @@
 //!
 //! Known are the extensions that change the light. Nothing of them is worked out: each is named, with its materials.
 
+use super::check::listed;
 use super::json::short;
-use super::material::listed;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Something that a document asks for and the program lacks.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Lacking {
     /// The effect.
     pub effect: String,

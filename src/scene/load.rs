@@ -2,44 +2,21 @@
 
 use super::changes::Changes;
 use super::check::{Check, Unknown};
-use super::document::Document;
-use super::light::{self, Lamps};
-use super::material;
+use super::document::{Document, RawLight};
+use super::lamps::Lamps;
+use super::layers::Wish;
+use super::lights;
+use super::materials;
 use super::pane;
-use super::sky::{self, SkyWish};
+use super::parting;
+use super::sky::{self, Sky, SkyWish};
 use super::spectra_file::SpectraFile;
-use super::{
-    LightSpectrum, Material, PunctualLight, Scene, Surface, lacking, layers, luminaires, said,
-};
+use super::{Image, LightSpectrum, Material, Options, PunctualLight, Scene, Surface};
+use super::{lacking, luminaires};
 use crate::color::Upsampler;
-use crate::data::{Grid, Leaves};
+use crate::data::Leaves;
 use crate::error::{Error, Result};
-use std::path::{Path, PathBuf};
-
-/// How to read a room.
-#[derive(Debug, Clone, Default)]
-pub struct Options {
-    /// The wavelengths to work on; 380 to 780 nm by default.
-    pub grid: Grid,
-    /// The file of spectra; none: `room.spectra.json` beside `room.glb`, if there is one.
-    pub spectra: Option<PathBuf>,
-    /// What is said over the file of spectra: an object of the same form, laid over it as RFC 7396 has it (`null` takes out), where the
-    /// name of a spectrum takes the place of a CSV, and a CSV that of a name.
-    pub said: Option<serde_json::Value>,
-    /// Only warn of keys and names in the file of spectra that mean nothing.
-    pub lenient: bool,
-    /// Metres for each unit of the file; none: 1, as glTF has it.
-    pub scale: Option<f64>,
-    /// Sky and sun; what is not said here the file of spectra may say.
-    pub sky: SkyWish,
-}
-
-impl Options {
-    /// Says more, over what was said: see [`Options::said`].
-    pub fn say(&mut self, more: serde_json::Value) {
-        self.said = said::over(self.said.take(), Some(&more));
-    }
-}
+use std::path::Path;
 
 impl Scene {
     /// Reads a room.
@@ -66,78 +43,25 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn from_document(document: Document, options: &Options) -> Result<Self> {
         let geometry = document.load_geometry();
-        let raw_materials = &pane::blended(
-            document.raw_materials(),
-            &geometry.surfaces,
-            &geometry.images,
-        );
-        let path = &document.source.path;
-        let mut check = Check::new(path.display().to_string());
-        let raw_lights = document.raw_lights();
-        let names: Vec<String> = raw_materials.iter().map(material::name_of).collect();
-        let light_names: Vec<String> = raw_lights.iter().map(light::name_of).collect();
-        let grid = options.grid;
-        let file = SpectraFile::open(path, options, &names, &light_names, &mut check);
-        let upsampler = Upsampler::new(&grid);
-        let mut lamps = Lamps::new(&grid, &upsampler);
-        let (mut materials, shining) = material::materials(
-            raw_materials,
-            &tinted(raw_materials.len(), &geometry.surfaces),
-            &file,
-            path,
-            &grid,
-            &upsampler,
-            &mut lamps,
-            &mut check,
-        );
-        let nodes = raw_lights.iter().filter_map(|raw| raw.ies.as_ref());
-        let profiles = luminaires::profiles(&document.source, nodes, &mut check);
-        let mut lights =
-            light::punctual(raw_lights, &profiles, &file, path, &mut lamps, &mut check);
-        let luminous = lamps.luminous();
-        let mut spectra = lamps.finish(&mut materials, &mut lights);
-        let size = |light: usize, shape: &Leaves| luminous(&spectra[light], shape);
-        let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
-        let (panes, surfaces): (Vec<_>, Vec<_>) = geometry.surfaces.into_iter().partition(is_pane);
-        luminaires::add(
-            &shining,
-            &surfaces,
-            &mut materials,
-            &mut lights,
-            options.scale.unwrap_or(1.0),
-            size,
-            &mut check,
-        );
-        let nodes: Vec<(String, String)> = raw_lights
-            .iter()
-            .map(|raw| {
-                (
-                    node_name(&document.source.json, raw.node),
-                    light::name_of(raw),
-                )
-            })
-            .collect();
-        let wish = options.sky.clone().or(file.sky.clone());
-        let sky = sky::join(&wish, &nodes, &grid, &mut lights, &mut spectra, &mut check);
-        if sky.as_ref().is_some_and(|sky| sky.sun_of_file) {
-            prune(&mut materials, &mut lights, &mut spectra);
-        }
+        let mut check = Check::new(document.source.place());
+        let (surfaces, images) = (geometry.surfaces, geometry.images);
+        let mut lit = Lit::of(&document, surfaces, &images, options, &mut check);
+        let sky = lit.under_sky(&document, options, &mut check);
         let unknown = match options.lenient {
             true => Unknown::Warn,
             false => Unknown::Refuse,
         };
-        layers::check_names(
-            &file.layers,
+        parting::check_names(
+            &lit.layers,
             &document.source.json,
-            (&surfaces, &lights),
-            &materials,
+            (&lit.surfaces, &lit.lights),
+            &lit.materials,
             unknown,
             &mut check,
         );
         for warning in lacking::warnings(&document.source.json) {
             check.warn(warning);
         }
-
         let (found, said) = check.into_parts();
         let mut problems = geometry.problems;
         problems.extend(found);
@@ -148,18 +72,18 @@ impl Scene {
         warnings.extend(said);
         let scene = Self {
             source: document.source,
-            grid,
-            surfaces,
-            panes,
-            materials,
-            images: geometry.images,
-            spectra,
-            lights,
+            grid: options.grid,
+            surfaces: lit.surfaces,
+            panes: lit.panes,
+            materials: lit.materials,
+            images,
+            spectra: lit.spectra,
+            lights: lit.lights,
             sky,
             cameras: geometry.cameras,
             warnings,
             changes: Changes {
-                layers_wished: file.layers,
+                layers_wished: lit.layers,
                 ..Changes::default()
             },
         };
@@ -167,11 +91,88 @@ impl Scene {
     }
 }
 
-fn node_name(json: &serde_json::Value, node: usize) -> String {
-    json["nodes"][node]["name"]
-        .as_str()
-        .unwrap_or_default()
-        .to_owned()
+/// Surfaces with their paint, and lamps.
+struct Lit {
+    surfaces: Vec<Surface>,
+    panes: Vec<Surface>,
+    materials: Vec<Material>,
+    lights: Vec<PunctualLight>,
+    spectra: Vec<LightSpectrum>,
+    /// What the file of spectra says of the sky.
+    sky: SkyWish,
+    /// And of layers.
+    layers: Vec<Wish>,
+}
+
+impl Lit {
+    fn of(
+        document: &Document,
+        surfaces: Vec<Surface>,
+        images: &[Image],
+        options: &Options,
+        check: &mut Check,
+    ) -> Self {
+        let (path, grid) = (&document.source.path, &options.grid);
+        let raw = &pane::blended(document.raw_materials(), &surfaces, images);
+        let raw_lights = document.raw_lights();
+        let names: Vec<String> = raw.iter().map(materials::name_of).collect();
+        let light_names: Vec<String> = raw_lights.iter().map(lights::name_of).collect();
+        let file = SpectraFile::open(path, options, &names, &light_names, check);
+        let upsampler = Upsampler::new(grid);
+        let mut lamps = Lamps::new(grid, &upsampler);
+        let tinted = tinted(raw.len(), &surfaces);
+        let (mut materials, shining) = materials::materials(
+            raw, &tinted, &file, path, grid, &upsampler, &mut lamps, check,
+        );
+        let nodes = raw_lights.iter().filter_map(|raw| raw.ies.as_ref());
+        let profiles = luminaires::profiles(&document.source, nodes, check);
+        let mut lights = lights::punctual(raw_lights, &profiles, &file, path, &mut lamps, check);
+        let luminous = lamps.luminous();
+        let spectra = lamps.finish(&mut materials, &mut lights);
+        let size = |light: usize, shape: &Leaves| luminous(&spectra[light], shape);
+        let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
+        let (panes, surfaces): (Vec<_>, Vec<_>) = surfaces.into_iter().partition(is_pane);
+        let scale = options.scale.unwrap_or(1.0);
+        luminaires::add(
+            &shining,
+            &surfaces,
+            &mut materials,
+            &mut lights,
+            scale,
+            size,
+            check,
+        );
+        Self {
+            surfaces,
+            panes,
+            materials,
+            lights,
+            spectra,
+            sky: file.sky,
+            layers: file.layers,
+        }
+    }
+
+    /// Adds the lamps of the sky that is asked for.
+    fn under_sky(
+        &mut self,
+        document: &Document,
+        options: &Options,
+        check: &mut Check,
+    ) -> Option<Sky> {
+        let named = |raw: &RawLight| {
+            let name = document.source.json["nodes"][raw.node]["name"].as_str();
+            (name.unwrap_or_default().to_owned(), lights::name_of(raw))
+        };
+        let nodes: Vec<(String, String)> = document.raw_lights().iter().map(named).collect();
+        let wish = options.sky.clone().or(self.sky.clone());
+        let (lights, spectra) = (&mut self.lights, &mut self.spectra);
+        let sky = sky::join(&wish, &nodes, &options.grid, lights, spectra, check);
+        if sky.as_ref().is_some_and(|sky| sky.sun_of_file) {
+            prune(&mut self.materials, lights, spectra);
+        }
+        sky
+    }
 }
 
 /// Takes out spectra that no lamp has any more.

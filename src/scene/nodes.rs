@@ -6,6 +6,8 @@
 use crate::scene::check::Check;
 use crate::scene::json::{self, Item};
 use glam::{DMat4, DQuat, DVec3};
+use gltf::json::{Node, Scene};
+use serde::Deserialize;
 use serde_json::Value;
 
 const AGAIN: &str = "mend the node hierarchy and export again";
@@ -46,11 +48,9 @@ pub(crate) fn walk(json: &Value, check: &mut Check) -> Vec<Placed> {
             continue;
         }
         placed.push(Placed { node, to_world });
-        for child in item.list("children", check).iter().rev() {
-            match json::whole(child) {
-                Some(child) => stack.push((child, to_world, Some(node))),
-                None => check.problem(&item.place, "has a child that is no index", AGAIN),
-            }
+        let children = item.read::<Node>(check).and_then(|node| node.children);
+        for child in children.into_iter().flatten().rev() {
+            stack.push((child.value(), to_world, Some(node)));
         }
     }
     left_out(json, &seen, check);
@@ -65,42 +65,38 @@ pub(crate) fn place(json: &Value, node: usize) -> String {
 /// The root nodes of the default scene, else of the first scene, else all nodes that are nobody's child.
 fn roots(json: &Value, check: &mut Check) -> Vec<usize> {
     let scenes = json::len(json, "scenes");
-    if scenes == 0 && json.get("scene").is_none() {
+    let chosen = json::root(json, check).scene.map(|scene| scene.value());
+    if scenes == 0 && chosen.is_none() {
         return orphans(json);
     }
-    let chosen = match json.get("scene") {
-        None => 0,
-        Some(index) => json::whole(index).unwrap_or(usize::MAX),
-    };
-    let Some(scene) = json::item(json, "scenes", "scene", chosen) else {
+    let Some(item) = json::item(json, "scenes", "scene", chosen.unwrap_or(0)) else {
         let what = format!("'scene' is not the index of one of the {scenes} scenes");
         check.problem("", what, "export the file again");
         return Vec::new();
     };
     if scenes > 1 {
+        let place = &item.place;
         check.warn(format!(
-            "{} of {scenes} is read, the other scenes are not",
-            scene.place
+            "{place} of {scenes} is read, the other scenes are not"
         ));
     }
-    let mut roots = Vec::new();
-    for root in scene.list("nodes", check) {
-        match json::whole(root) {
-            Some(root) => roots.push(root),
-            None => check.problem(&scene.place, "has a node that is no index", AGAIN),
-        }
+    if !item.has("nodes") {
+        return Vec::new();
     }
-    roots
+    let scene = item.read::<Scene>(check);
+    let nodes = scene.into_iter().flat_map(|scene| scene.nodes);
+    nodes.map(|node| node.value()).collect()
 }
 
 fn orphans(json: &Value) -> Vec<usize> {
     let count = json::len(json, "nodes");
     let mut is_child = vec![false; count];
     for node in 0..count {
+        // What is wrong is told when the node is walked to.
         let item = json::item(json, "nodes", "node", node);
-        let children = item.and_then(|item| item.map.get("children")?.as_array());
-        for child in children.into_iter().flatten().filter_map(json::whole) {
-            if let Some(flag) = is_child.get_mut(child) {
+        let read = item.and_then(|item| item.read::<Node>(&mut Check::new("")));
+        for child in read.and_then(|node| node.children).into_iter().flatten() {
+            if let Some(flag) = is_child.get_mut(child.value()) {
                 *flag = true;
             }
         }
@@ -119,7 +115,7 @@ fn left_out(json: &Value, seen: &[bool], check: &mut Check) {
         return;
     }
     let item = |node| json::item(json, "nodes", "node", node);
-    let with_mesh = unseen.filter(|&n| item(n).is_some_and(|i| i.map.contains_key("mesh")));
+    let with_mesh = unseen.filter(|&n| item(n).is_some_and(|i| i.has("mesh")));
     let count = with_mesh.count();
     if count > 0 && !check.has_problems() {
         check.warn(format!(
@@ -128,22 +124,28 @@ fn left_out(json: &Value, seen: &[bool], check: &mut Check) {
     }
 }
 
+/// Where a node stands: in double precision, which gltf's `Node` has not.
+#[derive(Debug, Default, Deserialize)]
+struct Transform {
+    matrix: Option<[f64; 16]>,
+    translation: Option<[f64; 3]>,
+    rotation: Option<[f64; 4]>,
+    scale: Option<[f64; 3]>,
+}
+
 /// A node's own transform: its matrix (column by column), or translation, rotation and scale.
 fn local(item: &Item<'_>, check: &mut Check) -> DMat4 {
-    if item.map.contains_key("matrix") {
-        let matrix = item.numbers::<16>("matrix", check);
-        return matrix.map_or(DMat4::IDENTITY, |m| DMat4::from_cols_array(&m));
+    let own = item.read::<Transform>(check).unwrap_or_default();
+    if item.has("matrix") {
+        return own
+            .matrix
+            .map_or(DMat4::IDENTITY, |m| DMat4::from_cols_array(&m));
     }
-    let translation = item
-        .numbers::<3>("translation", check)
-        .map_or(DVec3::ZERO, DVec3::from);
-    let scale = item
-        .numbers::<3>("scale", check)
-        .map_or(DVec3::ONE, DVec3::from);
-    let rotation = item
-        .numbers::<4>("rotation", check)
-        .map_or(DQuat::IDENTITY, rotation);
-    DMat4::from_scale_rotation_translation(scale, rotation, translation)
+    DMat4::from_scale_rotation_translation(
+        own.scale.map_or(DVec3::ONE, DVec3::from),
+        own.rotation.map_or(DQuat::IDENTITY, rotation),
+        own.translation.map_or(DVec3::ZERO, DVec3::from),
+    )
 }
 
 /// A rotation from its four numbers, brought to unit length; without length: none.

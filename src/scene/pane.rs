@@ -9,10 +9,9 @@
 //! inside. A BLEND surface of alpha a and base colour c is a grid of paint: it lets through `(1 - a) (1 - a (1 - c))`, all where alpha
 //! is 0, nothing where it is 1.
 
-use super::check::Check;
-use super::known::Sampled;
-use super::material::listed;
+use super::check::{Check, listed};
 use super::raw::{AlphaMode, RawMaterial, RawVolume};
+use super::reader::Sampled;
 use super::{Image, Surface, Texture};
 use crate::color::Upsampler;
 use crate::data::{LEAVES, Leaves};
@@ -38,6 +37,7 @@ pub struct Pane {
 
 /// Kinds of panes.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum PaneKind {
     /// A slab.
     Glass {

@@ -1,10 +1,16 @@
 //! One primitive of a mesh, read and checked, in its own space: vertices and a list of triangles
 //! (glTF 2.0, section 3.7.2).
 
-use crate::scene::accessor::{Accessors, to_vectors};
+use crate::scene::accessor::Accessors;
 use crate::scene::check::Check;
+use crate::scene::components::to_vectors;
 use crate::scene::compression::{self, DracoMesh, Unpacked};
 use crate::scene::json::Item;
+use gltf::json::buffer::View;
+use gltf::json::mesh::{self, Mode, Semantic};
+use gltf::json::validation::Checked::{self, Invalid, Valid};
+use gltf::json::{Accessor, Index};
+use serde::Deserialize;
 use std::collections::BTreeMap;
 
 const AGAIN: &str = "export the file again";
@@ -30,14 +36,6 @@ impl Primitive {
     }
 }
 
-/// `mode` of a primitive that has an area.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Mode {
-    Triangles,
-    Strip,
-    Fan,
-}
-
 /// What became of a primitive.
 #[derive(Debug, Clone)]
 pub(crate) enum Outcome {
@@ -52,38 +50,41 @@ pub(crate) enum Outcome {
 /// Vertices and corners of triangles that a primitive claims to have, read off its accessors' counts without
 /// reading them.
 pub(crate) fn claimed(item: &Item<'_>, accessors: &Accessors<'_>) -> (usize, usize) {
-    // A broken accessor is reported when it is read.
+    // What is broken is reported when it is read.
     let mut silent = Check::new("");
-    let attributes = item.child("attributes", &mut silent);
-    let position = attributes.and_then(|a| a.index("POSITION", &mut silent));
-    let mut count = |accessor: Option<usize>| {
-        let layout = accessor.and_then(|a| accessors.layout(a, "", &mut silent));
+    let Some(given) = item.read::<mesh::Primitive>(&mut silent) else {
+        return (0, 0);
+    };
+    let mut count = |accessor: Option<Index<Accessor>>| {
+        let layout = accessor.and_then(|a| accessors.layout(a.value(), "", &mut silent));
         layout.map(|(_, layout)| layout.count)
     };
-    let vertices = count(position).unwrap_or(0);
-    let mut quiet = Check::new("");
-    let corners = count(item.index("indices", &mut quiet)).unwrap_or(vertices);
+    let position = given.attributes.get(&Valid(Semantic::Positions));
+    let vertices = count(position.copied()).unwrap_or(0);
+    let corners = count(given.indices).unwrap_or(vertices);
     (vertices, corners)
 }
 
 /// Reads a primitive; `most` bounds the vertices and triangles that a packed one may unpack to.
 pub(crate) fn read(
     item: &Item<'_>,
+    given: &mesh::Primitive,
     accessors: &mut Accessors<'_>,
     most: usize,
     check: &mut Check,
 ) -> Outcome {
-    let mode = match item.index("mode", check) {
-        None | Some(4) => Mode::Triangles,
-        Some(5) => Mode::Strip,
-        Some(6) => Mode::Fan,
-        Some(0..=3) => return Outcome::NoArea,
-        Some(other) => {
-            check.problem(&item.place, format!("has the mode {other}"), AGAIN);
+    let mode = match given.mode {
+        Valid(Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) => {
+            return Outcome::NoArea;
+        }
+        Valid(mode) => mode,
+        Invalid => {
+            let what = format!("has the mode {}", item.said("mode"));
+            check.problem(&item.place, what, AGAIN);
             return Outcome::Bad;
         }
     };
-    match checked(item, mode, accessors, most, check) {
+    match checked(item, given, mode, accessors, most, check) {
         Some(primitive) => Outcome::Sound(primitive),
         None => Outcome::Bad,
     }
@@ -91,27 +92,28 @@ pub(crate) fn read(
 
 fn checked(
     item: &Item<'_>,
+    given: &mesh::Primitive,
     mode: Mode,
     accessors: &mut Accessors<'_>,
     most: usize,
     check: &mut Check,
 ) -> Option<Primitive> {
-    let attributes = item.child("attributes", check);
-    let Some(attributes) = attributes.filter(|a| a.map.contains_key("POSITION")) else {
+    let Some(position) = given.attributes.get(&Valid(Semantic::Positions)) else {
         check.problem(&item.place, "has no POSITION", AGAIN);
         return None;
     };
-    let packed = match draco(item, &attributes, accessors, most, check) {
+    let packed = match draco(item, *position, accessors, most, check) {
         Ok(packed) => packed,
         Err(Reported) => return None,
     };
     let mut vertices = Vertices {
-        attributes: &attributes,
+        place: &item.place,
+        attributes: &given.attributes,
         packed: packed.as_ref(),
         accessors,
         check,
     };
-    let positions = vertices.read::<3>("POSITION", None)?;
+    let positions = vertices.read::<3>(Semantic::Positions, *position, None)?;
     if let Some(index) = positions
         .iter()
         .position(|p| !p.iter().all(|x| x.is_finite()))
@@ -122,55 +124,63 @@ fn checked(
         return None;
     }
     let count = positions.len();
-    let normals = vertices.optional::<3>("NORMAL", count)?;
+    let normals = vertices.optional::<3>(Semantic::Normals, count)?;
     let colors = vertices.colors(count)?;
     let mut texcoords = Vec::new();
-    while texcoords.len() < MAX_TEXCOORDS {
-        match vertices.optional::<2>(&format!("TEXCOORD_{}", texcoords.len()), count)? {
+    for set in (0..).take(MAX_TEXCOORDS) {
+        match vertices.optional::<2>(Semantic::TexCoords(set), count)? {
             Some(set) => texcoords.push(set),
             None => break,
         }
     }
-    let indices = match &packed {
-        Some(mesh) => Some(mesh.indices.clone()),
-        None if item.map.contains_key("indices") => {
-            let place = format!("{}, indices", item.place);
-            let accessor = item.index("indices", check)?;
-            Some(accessors.indices(accessor, &place, check)?)
+    let triangles = match &packed {
+        // Draco always gives a plain list.
+        Some(mesh) => corners(&mesh.indices, Mode::Triangles, count, item, check)?,
+        None => {
+            let indices = match given.indices {
+                Some(accessor) => {
+                    let place = format!("{}, indices", item.place);
+                    accessors.indices(accessor.value(), &place, check)?
+                }
+                None if item.has("indices") => return None,
+                None => (0..u32::try_from(count).unwrap_or(0)).collect(),
+            };
+            corners(&indices, mode, count, item, check)?
         }
-        None => None,
     };
-    // Draco always gives a plain list.
-    let mode = if packed.is_some() {
-        Mode::Triangles
-    } else {
-        mode
-    };
-    let indices = indices.unwrap_or_else(|| (0..u32::try_from(count).unwrap_or(0)).collect());
-    if let Some(at) = indices.iter().position(|&i| i as usize >= count) {
-        let what = format!(
-            "index {at} is {}, but there are {count} vertices",
-            indices[at]
-        );
-        check.problem(&format!("{}, indices", item.place), what, AGAIN);
-        return None;
-    }
-    if mode == Mode::Triangles && indices.len() % 3 != 0 {
-        let left = indices.len() % 3;
-        check.warn(format!(
-            "{}: {left} indices beyond the last triangle are left out",
-            item.place
-        ));
-    }
     let mut primitive = Primitive {
         positions,
         normals,
         texcoords,
         colors,
-        triangles: triangles(&indices, mode),
+        triangles,
     };
     mend(&mut primitive, item, check);
     Some(primitive)
+}
+
+/// Triangles of so many vertices, made sure to name no others.
+fn corners(
+    indices: &[u32],
+    mode: Mode,
+    count: usize,
+    item: &Item<'_>,
+    check: &mut Check,
+) -> Option<Vec<[u32; 3]>> {
+    let place = &item.place;
+    if let Some(at) = indices.iter().position(|&i| i as usize >= count) {
+        let index = indices[at];
+        let what = format!("index {at} is {index}, but there are {count} vertices");
+        check.problem(&format!("{place}, indices"), what, AGAIN);
+        return None;
+    }
+    if mode == Mode::Triangles && !indices.len().is_multiple_of(3) {
+        let left = indices.len() % 3;
+        check.warn(format!(
+            "{place}: {left} indices beyond the last triangle are left out"
+        ));
+    }
+    Some(triangles(indices, mode))
 }
 
 /// The problem was put on the list.
@@ -179,57 +189,59 @@ struct Reported;
 /// The unpacked Draco stream, if the primitive has one.
 fn draco(
     item: &Item<'_>,
-    attributes: &Item<'_>,
+    position: Index<Accessor>,
     accessors: &mut Accessors<'_>,
     most: usize,
     check: &mut Check,
 ) -> Result<Option<DracoMesh>, Reported> {
-    let Some(mut extension) = item.extension(compression::DRACO, check) else {
+    let Some(extension) = item.extended(compression::DRACO, check) else {
         return Ok(None);
     };
     if !compression::is_built_in(compression::DRACO) {
         // The accessors may have plain bytes too.
-        let position = attributes.index("POSITION", check);
         let place = format!("{}, POSITION", item.place);
-        let position = position.and_then(|index| accessors.layout(index, &place, check));
-        let (position, _) = position.ok_or(Reported)?;
-        if position.map.contains_key("bufferView") {
+        let layout = accessors.layout(position.value(), &place, check);
+        if !layout.ok_or(Reported)?.0.is_bare {
             return Ok(None);
         }
         let what = format!("needs {}, which this build leaves out", compression::DRACO);
         check.problem(&item.place, what, "export without this compression");
         return Err(Reported);
     }
-    extension.place = format!("{}, {}", item.place, compression::DRACO);
-    let Some(view) = extension.index("bufferView", check) else {
-        check.problem(&extension.place, "names no bufferView", AGAIN);
-        return Err(Reported);
-    };
-    let span = accessors
-        .views
-        .view(view, &extension.place, check)
-        .ok_or(Reported)?;
+    let Packed { buffer_view } = item.extension(compression::DRACO, check).ok_or(Reported)?;
+    let place = format!("{}, {}", item.place, compression::DRACO);
+    let span = accessors.views.view(buffer_view.value(), &place, check);
+    let span = span.ok_or(Reported)?;
+    // By name: a stream may hold attributes that the standard has no word for.
+    let attributes = item.child("attributes", check).ok_or(Reported)?;
+    let attributes = attributes.read::<BTreeMap<String, Index<Accessor>>>(check);
     let mut counts = Vec::new();
-    for semantic in attributes.map.keys() {
-        let Some(index) = attributes.index(semantic, check) else {
-            return Err(Reported);
-        };
+    for (semantic, index) in attributes.ok_or(Reported)? {
         let place = format!("{}, {semantic}", item.place);
-        let (_, layout) = accessors.layout(index, &place, check).ok_or(Reported)?;
-        counts.push((semantic.clone(), layout.count, layout.normalized));
+        let layout = accessors.layout(index.value(), &place, check);
+        let (_, layout) = layout.ok_or(Reported)?;
+        counts.push((semantic, layout.count, layout.normalized));
     }
     let extension_value = serde_json::Value::Object(extension.map.clone());
     compression::unpack_draco(span.bytes(), &extension_value, &counts, most)
         .map(Some)
         .map_err(|what| {
-            check.problem(&extension.place, what, "export without this compression");
+            check.problem(&place, what, "export without this compression");
             Reported
         })
 }
 
+/// Where KHR_draco_mesh_compression has its bytes; the rest of it is the decoder's.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Packed {
+    buffer_view: Index<View>,
+}
+
 /// The attributes of one primitive, packed or plain.
 struct Vertices<'a, 'b> {
-    attributes: &'a Item<'a>,
+    place: &'a str,
+    attributes: &'a BTreeMap<Checked<Semantic>, Index<Accessor>>,
     packed: Option<&'a DracoMesh>,
     accessors: &'a mut Accessors<'b>,
     check: &'a mut Check,
@@ -245,10 +257,12 @@ impl<'a> Vertices<'a, '_> {
 
     fn read<const N: usize>(
         &mut self,
-        semantic: &str,
+        semantic: Semantic,
+        accessor: Index<Accessor>,
         count: Option<usize>,
     ) -> Option<Vec<[f32; N]>> {
-        let place = format!("{}, {semantic}", self.attributes.place);
+        let semantic = &semantic.to_string();
+        let place = format!("{}, {semantic}", self.place);
         if let Some(plain) = self.unpacked(semantic) {
             if plain.width == N {
                 return Some(to_vectors(&plain.bytes, plain.component, plain.normalized));
@@ -257,25 +271,25 @@ impl<'a> Vertices<'a, '_> {
             self.check.problem(&place, what, AGAIN);
             return None;
         }
-        let accessor = self.attributes.index(semantic, self.check)?;
-        self.accessors.vectors(accessor, count, &place, self.check)
+        self.accessors
+            .vectors(accessor.value(), count, &place, self.check)
     }
 
     /// The inner none: the primitive does not have it; the outer one: it is broken, which was reported.
     fn optional<const N: usize>(
         &mut self,
-        semantic: &str,
+        semantic: Semantic,
         count: usize,
     ) -> Option<Option<Vec<[f32; N]>>> {
-        if !self.attributes.map.contains_key(semantic) {
+        let place = format!("{}, {}", self.place, semantic.to_string());
+        let Some(accessor) = self.attributes.get(&Valid(semantic.clone())) else {
             return Some(None);
-        }
-        let values = self.read::<N>(semantic, Some(count))?;
+        };
+        let values = self.read::<N>(semantic, *accessor, Some(count))?;
         if values.len() == count {
             return Some(Some(values));
         }
         // Only what Draco unpacked can come here.
-        let place = format!("{}, {semantic}", self.attributes.place);
         let what = format!("has {} elements for {count} vertices", values.len());
         self.check.problem(&place, what, AGAIN);
         None
@@ -284,22 +298,24 @@ impl<'a> Vertices<'a, '_> {
     /// COLOR_0, of three or four components.
     fn colors(&mut self, count: usize) -> Option<Option<Vec<[f32; 4]>>> {
         const NAME: &str = "COLOR_0";
-        if !self.attributes.map.contains_key(NAME) {
+        let semantic = Semantic::Colors(0);
+        let Some(accessor) = self.attributes.get(&Valid(semantic.clone())) else {
             return Some(None);
-        }
+        };
         let width = match self.unpacked(NAME) {
             Some(plain) => plain.width,
             None => {
-                let place = format!("{}, {NAME}", self.attributes.place);
-                let accessor = self.attributes.index(NAME, self.check)?;
-                let (_, layout) = self.accessors.layout(accessor, &place, self.check)?;
-                layout.width
+                let place = format!("{}, {NAME}", self.place);
+                let layout = self
+                    .accessors
+                    .layout(accessor.value(), &place, self.check)?;
+                layout.1.width
             }
         };
         if width == 4 {
-            return self.optional::<4>(NAME, count);
+            return self.optional::<4>(semantic, count);
         }
-        let rgb = self.optional::<3>(NAME, count)?;
+        let rgb = self.optional::<3>(semantic, count)?;
         Some(rgb.map(|rgb| rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()))
     }
 }
@@ -307,11 +323,7 @@ impl<'a> Vertices<'a, '_> {
 /// The corners of a list, strip or fan, in the standard's order (section 3.7.2.1), all turned the same way.
 fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
     match mode {
-        Mode::Triangles => indices
-            .chunks_exact(3)
-            .map(|c| [c[0], c[1], c[2]])
-            .collect(),
-        Mode::Strip => {
+        Mode::TriangleStrip => {
             let turn = |(i, c): (usize, &[u32])| {
                 if i % 2 == 0 {
                     [c[0], c[1], c[2]]
@@ -321,10 +333,14 @@ fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
             };
             indices.windows(3).enumerate().map(turn).collect()
         }
-        Mode::Fan => match indices {
+        Mode::TriangleFan => match indices {
             [hub, rim @ ..] => rim.windows(2).map(|c| [c[0], c[1], *hub]).collect(),
             [] => Vec::new(),
         },
+        _ => indices
+            .chunks_exact(3)
+            .map(|c| [c[0], c[1], c[2]])
+            .collect(),
     }
 }
 
@@ -359,12 +375,15 @@ mod tests {
     #[test]
     fn strips_and_fans_turn_as_the_standard_says() {
         assert_eq!(
-            triangles(&[5, 6, 7, 8, 9], Mode::Strip),
+            triangles(&[5, 6, 7, 8, 9], Mode::TriangleStrip),
             [[5, 6, 7], [6, 8, 7], [7, 8, 9]]
         );
-        assert_eq!(triangles(&[5, 6, 7, 8], Mode::Fan), [[6, 7, 5], [7, 8, 5]]);
+        assert_eq!(
+            triangles(&[5, 6, 7, 8], Mode::TriangleFan),
+            [[6, 7, 5], [7, 8, 5]]
+        );
         assert_eq!(triangles(&[0, 1, 2, 3, 4], Mode::Triangles), [[0, 1, 2]]);
-        for mode in [Mode::Triangles, Mode::Strip, Mode::Fan] {
+        for mode in [Mode::Triangles, Mode::TriangleStrip, Mode::TriangleFan] {
             for length in 0..3 {
                 assert!(triangles(&[0, 1, 2][..length], mode).is_empty());
             }

@@ -6,15 +6,24 @@
 
 use crate::scene::Texture;
 use crate::scene::check::Check;
-use crate::scene::json::{self, Item};
+use crate::scene::json::{self, Item, double};
 use crate::scene::luminaires::{IesNode, ies_node};
 use crate::scene::nodes::Placed;
 use crate::scene::texture_info::Slots;
 use glam::DMat4;
+use gltf::json::extensions::material::{
+    EmissiveStrength, Ior, PbrSpecularGlossiness, Transmission, Unlit, Volume,
+};
+use gltf::json::extensions::scene::khr_lights_punctual::{KhrLightsPunctual, Light, Type};
+pub use gltf::json::material::AlphaMode;
+use gltf::json::material::Material;
+use gltf::json::validation::Checked::{Invalid, Valid};
 use serde_json::Value;
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// A material, before spectra.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RawMaterial {
     /// Index in the document; none for glTF's default material.
     pub index: Option<usize>,
@@ -85,6 +94,7 @@ impl Default for RawMaterial {
 
 /// KHR_materials_volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct RawVolume {
     /// Thickness below the surface, the file's units; 0: none.
     pub thickness: f64,
@@ -94,19 +104,9 @@ pub struct RawVolume {
     pub colour: [f32; 3],
 }
 
-/// `alphaMode` of a material.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AlphaMode {
-    /// Alpha is not looked at.
-    Opaque,
-    /// Below the cutoff is a hole.
-    Mask,
-    /// Alpha is coverage.
-    Blend,
-}
-
 /// A punctual light at a node, before spectra.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RawLight {
     /// The light's name, or the node's if it has none.
     pub name: String,
@@ -134,6 +134,7 @@ pub struct RawLight {
 
 /// `type` of a punctual light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RawLightKind {
     /// Alike in all directions.
     Point,
@@ -180,65 +181,54 @@ fn material(
     slots: &mut Slots,
     check: &mut Check,
 ) -> RawMaterial {
+    let given = item.read::<Material>(check).unwrap_or_default();
     let mut out = RawMaterial {
         index: Some(index),
         name: item.name().to_owned(),
-        double_sided: item.flag("doubleSided", check),
-        unlit: item.extension("KHR_materials_unlit", check).is_some(),
+        alpha_cutoff: given.alpha_cutoff.unwrap_or_default().0.max(0.0),
+        double_sided: given.double_sided,
+        unlit: (item.extension::<Unlit>("KHR_materials_unlit", check)).is_some(),
         extras: item.map.get("extras").cloned(),
         extensions: item.extension_names(),
         ..RawMaterial::default()
     };
     if let Some(pbr) = item.child("pbrMetallicRoughness", check) {
-        if let Some(factor) = pbr.numbers::<4>("baseColorFactor", check) {
-            out.base_color_factor = factor.map(|x| unit(x, "baseColorFactor", item, check));
-        }
-        if let Some(metallic) = pbr.number("metallicFactor", check) {
-            out.metallic = unit(metallic, "metallicFactor", item, check);
-        }
-        if let Some(roughness) = pbr.number("roughnessFactor", check) {
-            out.roughness = Some(unit(roughness, "roughnessFactor", item, check));
-        }
-        let texture = pbr.child("baseColorTexture", check);
-        out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
+        let values = given.pbr_metallic_roughness;
+        let factor = values.base_color_factor.0;
+        out.base_color_factor = factor.map(|x| unit(x, "baseColorFactor", item, check));
+        out.metallic = unit(values.metallic_factor.0, "metallicFactor", item, check);
+        let rough = unit(values.roughness_factor.0, "roughnessFactor", item, check);
+        out.roughness = pbr.has("roughnessFactor").then_some(rough);
+        out.base_color_texture = slots.texture(json, &pbr, "baseColorTexture", check);
     }
-    if let Some(diffuse) = item.extension("KHR_materials_pbrSpecularGlossiness", check) {
+    const DIFFUSE: &str = "KHR_materials_pbrSpecularGlossiness";
+    if let Some(diffuse) = item.extended(DIFFUSE, check) {
         // Its diffuse part is all that a Lambertian surface has; glTF prefers it to the fallback beside it.
-        let factor = diffuse.numbers::<4>("diffuseFactor", check);
-        let factor = factor.unwrap_or([1.0; 4]);
+        let values = item.extension::<PbrSpecularGlossiness>(DIFFUSE, check);
+        let factor = values.unwrap_or_default().diffuse_factor.0;
         out.base_color_factor = factor.map(|x| unit(x, "diffuseFactor", item, check));
         out.metallic = 0.0;
-        let texture = diffuse.child("diffuseTexture", check);
-        out.base_color_texture = texture.and_then(|t| slots.texture(json, &t, check));
+        out.base_color_texture = slots.texture(json, &diffuse, "diffuseTexture", check);
     }
-    let texture = item.child("emissiveTexture", check);
-    out.emissive_texture = texture.and_then(|t| slots.texture(json, &t, check));
-    emission(item, &mut out, check);
+    out.emissive_texture = slots.texture(json, item, "emissiveTexture", check);
+    emission(item, given.emissive_factor.0, &mut out, check);
     transmission(json, item, &mut out, slots, check);
-    match item.text("alphaMode", check) {
-        None | Some("OPAQUE") => {}
-        Some("MASK") => out.alpha_mode = AlphaMode::Mask,
-        Some("BLEND") => out.alpha_mode = AlphaMode::Blend,
-        Some(other) => {
-            let what = format!("has the alphaMode '{}'", json::short(other));
+    match given.alpha_mode {
+        Valid(mode) => out.alpha_mode = mode,
+        Invalid => {
+            let what = format!("has the alphaMode '{}'", item.said("alphaMode"));
             let next = "use OPAQUE, MASK or BLEND";
             check.problem(&item.place, what, next);
         }
-    }
-    if let Some(cutoff) = item.number("alphaCutoff", check) {
-        out.alpha_cutoff = cutoff.max(0.0) as f32;
     }
     out
 }
 
 /// Emissive factor and strength. Exporters from before the extension wrote factors above 1; the excess is strength.
-fn emission(item: &Item<'_>, out: &mut RawMaterial, check: &mut Check) {
-    let strength = item.extension("KHR_materials_emissive_strength", check);
-    let strength = strength.and_then(|s| s.number("emissiveStrength", check));
-    let mut strength = strength.unwrap_or(1.0);
-    let mut factor = item
-        .numbers::<3>("emissiveFactor", check)
-        .unwrap_or_default();
+fn emission(item: &Item<'_>, factor: [f32; 3], out: &mut RawMaterial, check: &mut Check) {
+    let strength = item.extension::<EmissiveStrength>("KHR_materials_emissive_strength", check);
+    let mut strength = double(strength.unwrap_or_default().emissive_strength.0);
+    let mut factor = factor.map(double);
     if strength < 0.0 || factor.iter().any(|&x| x < 0.0) {
         check.warn(format!(
             "{}: negative emission is taken as none",
@@ -252,15 +242,14 @@ fn emission(item: &Item<'_>, out: &mut RawMaterial, check: &mut Check) {
         let text = "emissiveFactor is above 1; the excess is taken as emissive strength";
         check.warn(format!("{}: {text}", item.place));
     }
-    out.emissive_factor = factor.map(|x| (x / most) as f32);
-    out.emissive_strength = (strength * most) as f32;
-    if !out.emissive_strength.is_finite() {
-        check.problem(
-            &item.place,
-            "gives out more light than a number holds",
-            "lower it",
-        );
+    let brightest = (strength * most) as f32;
+    if !brightest.is_finite() {
+        let what = "gives out more light than a number holds";
+        check.problem(&item.place, what, "lower it");
+        return;
     }
+    out.emissive_factor = factor.map(|x| (x / most) as f32);
+    out.emissive_strength = brightest;
 }
 
 /// KHR_materials_transmission, _volume and _ior.
@@ -271,47 +260,47 @@ fn transmission(
     slots: &mut Slots,
     check: &mut Check,
 ) {
-    if let Some(pane) = item.extension("KHR_materials_transmission", check) {
-        let factor = pane.number("transmissionFactor", check).unwrap_or(0.0);
+    const PANE: &str = "KHR_materials_transmission";
+    if let Some(pane) = item.extended(PANE, check) {
+        let values = item.extension::<Transmission>(PANE, check);
+        let factor = values.unwrap_or_default().transmission_factor.0;
         out.transmission = Some(f64::from(unit(factor, "transmissionFactor", item, check)));
-        let texture = pane.child("transmissionTexture", check);
-        out.transmission_texture = texture.and_then(|t| slots.texture(json, &t, check));
+        out.transmission_texture = slots.texture(json, &pane, "transmissionTexture", check);
     }
-    if let Some(ior) = item.extension("KHR_materials_ior", check) {
-        out.ior = ior.number("ior", check);
-    }
-    if let Some(volume) = item.extension("KHR_materials_volume", check) {
-        let thickness = volume.number("thicknessFactor", check).unwrap_or(0.0);
-        let distance = volume.number("attenuationDistance", check);
-        if thickness < 0.0 || distance.is_some_and(|d| d <= 0.0) {
-            let what =
-                "KHR_materials_volume has a negative thickness, or a distance that is not positive";
-            match out.transmission {
-                Some(_) => check.problem(&item.place, what, "mend the material and export again"),
-                None => check.warn(format!("{}: {what}: it is passed over", item.place)),
-            }
-            return;
+    let ior = item.extension::<Ior>("KHR_materials_ior", check);
+    out.ior = ior.map(|ior| double(ior.ior.0));
+    let Some(volume) = item.extension::<Volume>("KHR_materials_volume", check) else {
+        return;
+    };
+    let thickness = double(volume.thickness_factor.0);
+    let distance = double(volume.attenuation_distance.0);
+    // Written so that what a number does not hold fails.
+    if !(0.0..f64::INFINITY).contains(&thickness) || distance <= 0.0 {
+        let what =
+            "KHR_materials_volume has a negative thickness, or a distance that is not positive";
+        match out.transmission {
+            Some(_) => check.problem(&item.place, what, "mend the material and export again"),
+            None => check.warn(format!("{}: {what}: it is passed over", item.place)),
         }
-        let colour = volume.numbers::<3>("attenuationColor", check);
-        out.volume = Some(RawVolume {
-            thickness,
-            distance,
-            colour: colour
-                .unwrap_or([1.0; 3])
-                .map(|x| unit(x, "attenuationColor", item, check)),
-        });
+        return;
     }
+    let colour = volume.attenuation_color.0;
+    out.volume = Some(RawVolume {
+        thickness,
+        distance: Some(distance).filter(|distance| distance.is_finite()),
+        colour: colour.map(|x| unit(x, "attenuationColor", item, check)),
+    });
 }
 
 /// Brought into [0, 1], with a warning.
-fn unit(value: f64, key: &str, item: &Item<'_>, check: &mut Check) -> f32 {
+fn unit(value: f32, key: &str, item: &Item<'_>, check: &mut Check) -> f32 {
     if !(0.0..=1.0).contains(&value) {
         check.warn(format!(
             "{}: {key} {value} is brought into 0 to 1",
             item.place
         ));
     }
-    value.clamp(0.0, 1.0) as f32
+    value.clamp(0.0, 1.0)
 }
 
 /// Bytes of names and extras that all lights together may carry.
@@ -340,12 +329,8 @@ pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<
         let Some(node) = json::item(json, "nodes", "node", place.node) else {
             continue;
         };
-        if !node.map.contains_key("extensions") {
-            continue;
-        }
-        let index = node
-            .extension(NAME, check)
-            .and_then(|e| e.index("light", check));
+        let index = node.extension::<KhrLightsPunctual>(NAME, check);
+        let index = index.map(|of| of.light.value());
         let ies = ies_node(json, &node, check);
         let light = match (index, ies) {
             (Some(index), ies) => {
@@ -392,52 +377,49 @@ fn measured(ies: IesNode, node: &Item<'_>, placed: &Placed) -> RawLight {
 }
 
 fn light(item: &Item<'_>, node: &Item<'_>, placed: &Placed, check: &mut Check) -> Option<RawLight> {
-    let kind = match item.text("type", check) {
-        Some("point") => RawLightKind::Point,
-        Some("spot") => RawLightKind::Spot,
-        Some("directional") => RawLightKind::Directional,
-        other => {
-            let kind = json::short(other.unwrap_or(""));
+    let given = item.read::<Light>(check)?;
+    let kind = match given.type_ {
+        Valid(Type::Point) => RawLightKind::Point,
+        Valid(Type::Spot) => RawLightKind::Spot,
+        Valid(Type::Directional) => RawLightKind::Directional,
+        Invalid => {
             check.warn(format!(
-                "{}: lights of type '{kind}' give no light here",
-                item.place
+                "{}: lights of type '{}' give no light here",
+                item.place,
+                item.said("type")
             ));
             return None;
         }
     };
-    let spot = item.child("spot", check);
-    let angle = |key: &str, otherwise: f64, check: &mut Check| {
-        let given = spot.as_ref().and_then(|s| s.number(key, check));
-        given.unwrap_or(otherwise)
-    };
-    let inner = angle("innerConeAngle", 0.0, check);
-    let outer = angle("outerConeAngle", std::f64::consts::FRAC_PI_4, check);
-    let straight = std::f64::consts::FRAC_PI_2 + 1e-6;
+    let (inner, outer) = given.spot.map_or((0.0, FRAC_PI_4), |spot| {
+        (spot.inner_cone_angle, spot.outer_cone_angle)
+    });
+    let straight = FRAC_PI_2 + 1e-6;
     if kind == RawLightKind::Spot && !(0.0 <= inner && inner < outer && outer <= straight) {
         let what = format!("has a cone from {inner} to {outer} radians");
         let next = "keep 0 <= innerConeAngle < outerConeAngle <= pi / 2";
         check.problem(&item.place, what, next);
     }
-    let color = item.numbers::<3>("color", check).unwrap_or([1.0; 3]);
-    let intensity = item.number("intensity", check).unwrap_or(1.0);
-    let range = item.number("range", check);
+    let Light {
+        color,
+        intensity,
+        range,
+        ..
+    } = given;
     if intensity < 0.0 || color.iter().any(|&x| x < 0.0) || range.is_some_and(|r| r <= 0.0) {
         let what = "has a negative colour or intensity, or a range that is not positive";
         check.problem(&item.place, what, "mend the light and export again");
     }
+    let names = [item.name(), node.name()];
+    let name = names.into_iter().find(|name| !name.is_empty());
     let mut light = RawLight {
-        name: if item.name().is_empty() {
-            node.name()
-        } else {
-            item.name()
-        }
-        .to_owned(),
+        name: name.unwrap_or_default().to_owned(),
         kind,
-        color: color.map(|x| x as f32),
-        intensity: intensity as f32,
-        range: range.map(|r| r as f32),
-        inner: inner as f32,
-        outer: outer as f32,
+        color,
+        intensity,
+        range,
+        inner,
+        outer,
         extras: item.map.get("extras").cloned(),
         node: placed.node,
         to_world: placed.to_world,

@@ -24,22 +24,18 @@
 
 use super::check::{Check, Unknown};
 use super::json::short;
-use super::known::{MaterialSpectra, Sampled};
+use super::known::{self, MaterialSpectra};
 use super::layers::Wish;
-use super::load::Options;
 use super::luminaires::{self, LampWish};
+use super::options::Options;
+use super::reader::Reader;
 use super::said;
 use super::sky::SkyWish;
-use super::transmittance;
 use super::uri;
 use crate::data::Grid;
-use crate::data::{Kind, Named, Outside, Table, named, nearest, nearest_of};
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// Above this a table of reflectances is taken for percent.
-const NOT_A_FRACTION: f64 = 2.0;
 
 /// The side file of a room; empty if there is none.
 #[derive(Debug, Default)]
@@ -102,7 +98,7 @@ impl SpectraFile {
         for (name, entry) in reader.entries(top, "materials", &place) {
             let place = format!("{place}: material '{}'", short(name));
             reader.known(name, materials, "material", &place);
-            let spectra = reader.material(entry, &place);
+            let spectra = known::read(&mut reader, entry, &place);
             file.materials.insert(name.clone(), spectra);
         }
         for (name, entry) in reader.entries(top, "layers", &place) {
@@ -137,7 +133,10 @@ impl SpectraFile {
         };
         let own = extras
             .filter(|extras| extras.is_object())
-            .map(|extras| reader.material(extras, &format!("material '{}', extras", short(name))))
+            .map(|extras| {
+                let place = format!("material '{}', extras", short(name));
+                known::read(&mut reader, extras, &place)
+            })
             .unwrap_or_default();
         self.materials
             .get(name)
@@ -177,225 +176,6 @@ fn beside(room: &Path) -> Option<PathBuf> {
     name.push(".spectra.json");
     let path = room.with_file_name(name);
     path.exists().then_some(path)
-}
-
-/// Reads the objects of a side file or of extras.
-pub(crate) struct Reader<'a> {
-    pub(super) folder: PathBuf,
-    grid: &'a Grid,
-    pub(super) check: &'a mut Check,
-    unknown: Unknown,
-}
-
-impl Reader<'_> {
-    fn material(&mut self, entry: &Value, place: &str) -> MaterialSpectra {
-        let Some(entry) = self.object(entry, place) else {
-            return MaterialSpectra::default();
-        };
-        self.keys(entry, &["reflectance", "emission", "transmittance"], place);
-        let mut spectra = MaterialSpectra::default();
-        if let Some(value) = entry.get("reflectance") {
-            let place = format!("{place}, reflectance");
-            if let Some(object) = self.object(value, &place) {
-                self.keys(object, &["name", "csv"], &place);
-                spectra.reflectance = self.sampled(object, Kind::Reflectance, &place);
-            }
-        }
-        if let Some(value) = entry.get("transmittance") {
-            spectra.transmittance = transmittance::read(self, entry, value, place);
-        }
-        if let Some(value) = entry.get("emission") {
-            let place = format!("{place}, emission");
-            if let Some(object) = self.object(value, &place) {
-                spectra.profile = luminaires::read_profile(self, object, &place);
-                self.keys(object, &luminaires::OF_EMISSION, &place);
-                let luminance = self.luminance(object, &place);
-                if luminaires::says_spectrum(object) || !object.contains_key("profile") {
-                    let sampled = self.sampled(object, Kind::Illuminant, &place);
-                    spectra.emission = sampled.map(|s| (s, luminance));
-                }
-            }
-        }
-        spectra
-    }
-
-    fn luminance(&mut self, object: &Map<String, Value>, place: &str) -> Option<f64> {
-        let value = object.get("luminance_cd_m2")?;
-        let number = value.as_f64().filter(|v| v.is_finite() && *v >= 0.0);
-        if number.is_none() {
-            let what = format!("luminance_cd_m2 is {value}, not a number of at least 0");
-            self.check
-                .problem(place, what, "give the luminance in cd/m2");
-        }
-        number
-    }
-
-    pub(super) fn sampled(
-        &mut self,
-        object: &Map<String, Value>,
-        kind: Kind,
-        place: &str,
-    ) -> Option<Sampled> {
-        let outside = match kind {
-            Kind::Reflectance => Outside::Hold,
-            Kind::Illuminant => Outside::Zero,
-        };
-        let text = |key: &str| object.get(key).map(|v| v.as_str().map(str::to_owned));
-        let (table, from, is_csv) = match (text("name"), text("csv")) {
-            (Some(Some(name)), None) => (self.named(&name, kind, place)?, name, false),
-            (None, Some(Some(path))) => (self.csv(&path, place)?, said::called(&path), true),
-            _ => {
-                let next = "give either \"name\" or \"csv\", a text";
-                self.check
-                    .problem(place, "does not say which spectrum", next);
-                return None;
-            }
-        };
-        if kind == Kind::Reflectance && table.values().iter().any(|v| *v > NOT_A_FRACTION) {
-            let what = format!("'{from}' holds reflectances above {NOT_A_FRACTION}");
-            self.check.problem(
-                place,
-                what,
-                "write reflectances from 0 to 1, not in percent",
-            );
-            return None;
-        }
-        let leaves = self.grid.means(&table, outside);
-        if kind == Kind::Illuminant && leaves.iter().all(|v| *v == 0.0) {
-            let (start, end) = (self.grid.start(), self.grid.end());
-            let what = format!("'{from}' gives no light from {start} to {end} nm");
-            self.check.problem(
-                place,
-                what,
-                "give a spectrum of visible light, in nanometres",
-            );
-            return None;
-        }
-        Some(Sampled {
-            from,
-            leaves,
-            is_csv,
-        })
-    }
-
-    fn named(&mut self, name: &str, kind: Kind, place: &str) -> Option<Table> {
-        match named(name) {
-            Some(Named { table, kind: found }) if found == kind => Some(table),
-            Some(_) => {
-                let (is, wanted) = match kind {
-                    Kind::Reflectance => ("the light of a lamp", "a reflectance"),
-                    Kind::Illuminant => ("a reflectance", "the light of a lamp"),
-                };
-                let what = format!("'{name}' is {is}, not {wanted}");
-                self.check.problem(place, what, format!("name {wanted}"));
-                None
-            }
-            None => {
-                let what = format!("no spectrum is named '{}'", short(name));
-                let next = format!("the nearest names are {}", nearest(name).join(", "));
-                self.check.problem(place, what, next);
-                None
-            }
-        }
-    }
-
-    fn csv(&mut self, path: &str, place: &str) -> Option<Table> {
-        let next = "give a CSV of wavelength_nm,value inside the folder of the file that names it";
-        let read = match said::is_rows(path) {
-            true => Ok(path.as_bytes().to_vec()),
-            false => uri::read(&self.folder, path),
-        };
-        let bytes = match read {
-            Ok(bytes) => bytes,
-            Err(why) => {
-                self.check.problem(place, why, next);
-                return None;
-            }
-        };
-        match Table::parse_csv(&String::from_utf8_lossy(&bytes)) {
-            Ok(table) => Some(table),
-            Err(why) => {
-                let what = format!("'{}', {why}", said::called(path));
-                self.check.problem(place, what, next);
-                None
-            }
-        }
-    }
-
-    /// A list of names, or one name.
-    fn names(&mut self, value: &Value, place: &str) -> Vec<String> {
-        let text = |v: &Value| v.as_str().map(str::to_owned);
-        let names = match value {
-            Value::Array(list) => list.iter().map(text).collect(),
-            one => text(one).map(|name| vec![name]),
-        };
-        let names = names.filter(|names: &Vec<String>| !names.is_empty());
-        if names.is_none() {
-            let next = "write [\"LAMP\", ...], names of lights, materials or nodes";
-            self.check.problem(place, "is no list of names", next);
-        }
-        names.unwrap_or_default()
-    }
-
-    /// An entry for a name that the room does not have.
-    fn known(&mut self, name: &str, names: &[String], kind: &str, place: &str) {
-        if names.iter().any(|n| n == name) {
-            return;
-        }
-        let near: Vec<String> = nearest_of(name, names).iter().map(|n| short(n)).collect();
-        let next = if near.is_empty() {
-            format!("the room has no {kind}s: take the entry out")
-        } else {
-            format!("the nearest names are {}", near.join(", "))
-        };
-        self.check.stranger(
-            self.unknown,
-            place,
-            format!("the room has no {kind} of that name"),
-            next,
-        );
-    }
-
-    /// The members of an object inside an object; none where it is missing.
-    fn entries<'v>(
-        &mut self,
-        top: &'v Map<String, Value>,
-        key: &str,
-        place: &str,
-    ) -> Vec<(&'v String, &'v Value)> {
-        top.get(key)
-            .and_then(|value| self.object(value, &format!("{place}: {key}")))
-            .map(|object| object.iter().collect())
-            .unwrap_or_default()
-    }
-
-    pub(crate) fn object<'v>(
-        &mut self,
-        value: &'v Value,
-        place: &str,
-    ) -> Option<&'v Map<String, Value>> {
-        let object = value.as_object();
-        match (object, self.unknown) {
-            (None, Unknown::Refuse | Unknown::Warn) => {
-                self.check
-                    .problem(place, "is not a JSON object", "write { ... }")
-            }
-            (None, Unknown::Ignore) => self
-                .check
-                .warn(format!("{place}: not an object, passed over")),
-            _ => {}
-        }
-        object
-    }
-
-    pub(crate) fn keys(&mut self, object: &Map<String, Value>, known: &[&str], place: &str) {
-        for key in object.keys().filter(|key| !known.contains(&key.as_str())) {
-            let near = nearest_of(key, known);
-            let what = format!("unknown key \"{}\"", short(key));
-            let next = format!("the nearest names are {}", near.join(", "));
-            self.check.stranger(self.unknown, place, what, next);
-        }
-    }
 }
 
 #[cfg(test)]

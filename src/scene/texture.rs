@@ -4,7 +4,7 @@
 //! (glTF 2.0, section 3.8.4). Values are linear light. Bilinear whatever the sampler's filter says: a mean over a
 //! surface does not depend on it.
 
-use crate::scene::{Image, Texture, Wrap};
+use crate::scene::Image;
 
 /// The most samples of a mean over a triangle; with that many, texels of a spread of 0.2 leave an error of 0.006.
 const MAX_SAMPLES: usize = 1024;
@@ -13,6 +13,30 @@ const MIN_SAMPLES: usize = 4;
 /// The R2 sequence: powers of the inverse of the plastic number, the real root of x^3 = x + 1
 /// (M. Roberts, The unreasonable effectiveness of quasirandom sequences, 2018).
 const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
+
+/// A texture reference: image, coordinates, sampler, KHR_texture_transform.
+#[derive(Debug, Clone)]
+pub struct Texture {
+    /// Index in [`Scene::images`].
+    pub image: usize,
+    /// Which set of coordinates.
+    pub texcoord: usize,
+    /// KHR_texture_transform as rows of a 2x3 matrix on (u, v, 1).
+    pub transform: [[f32; 3]; 2],
+    /// Wrapping in u and v.
+    pub wrap: [Wrap; 2],
+}
+
+/// Wrapping of texture coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wrap {
+    /// Tile.
+    Repeat,
+    /// Tile, every second one turned.
+    Mirror,
+    /// Hold the edge.
+    Clamp,
+}
 
 impl Texture {
     /// Linear RGBA at texture coordinates `uv`, bilinear. White where the image does not exist.

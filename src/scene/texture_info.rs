@@ -4,8 +4,11 @@
 //! one, so that a file cannot ask for one image to be decoded a thousand times.
 
 use crate::scene::check::Check;
-use crate::scene::json::{self, Item};
+use crate::scene::json::{self, Item, double};
 use crate::scene::{Texture, Wrap};
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::texture::{self, Info, Sampler, WrappingMode};
+use gltf::json::validation::Checked::{Invalid, Valid};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -19,55 +22,42 @@ pub(crate) struct Slots {
 }
 
 impl Slots {
-    /// Reads a `textureInfo`; none only where it refers to nothing (which is reported).
+    /// The texture at a key of an object, if there is one; none also where it refers to nothing (which is reported).
     pub(crate) fn texture(
         &mut self,
         json: &Value,
-        info: &Item<'_>,
+        of: &Item<'_>,
+        key: &str,
         check: &mut Check,
     ) -> Option<Texture> {
-        let Some(index) = info.index("index", check) else {
-            check.problem(
-                &info.place,
-                "has a texture without an index",
-                "export again",
-            );
-            return None;
+        let item = of.child(key, check)?;
+        let info = item.read::<Info>(check)?;
+        let index = info.index.value();
+        let found = json::referred(json, "textures", "texture", index, &item.place, check)?;
+        let texture = found.read::<texture::Texture>(check)?;
+        let source = texture.source.value();
+        let image = if found.has("source") {
+            // What gltf has in its place where it is wrong, which was told.
+            let source = Some(source).filter(|&image| image != u32::MAX as usize)?;
+            json::referred(json, "images", "image", source, &found.place, check)?;
+            Some(source)
+        } else {
+            let named = found.extension_names();
+            let named = json::short(&named[..named.len().min(3)].join(", "));
+            let why = match named.is_empty() {
+                true => "no image".to_owned(),
+                false => format!("an image only by {named}, which is not read"),
+            };
+            check.warn(format!("{}: has {why}; grey stands in", found.place));
+            None
         };
-        let texture = json::referred(json, "textures", "texture", index, &info.place, check)?;
-        let image = match texture.index("source", check) {
-            Some(image) => {
-                json::referred(json, "images", "image", image, &texture.place, check)?;
-                Some(image)
-            }
-            None => {
-                let named = texture.map.get("extensions").and_then(Value::as_object);
-                let named: Vec<&str> = named
-                    .into_iter()
-                    .flat_map(|m| m.keys().map(String::as_str))
-                    .take(3)
-                    .collect();
-                let named = json::short(&named.join(", "));
-                let why = if named.is_empty() {
-                    "no image".to_owned()
-                } else {
-                    format!("an image only by {named}, which is not read")
-                };
-                check.warn(format!("{}: has {why}; grey stands in", texture.place));
-                None
-            }
-        };
-        let mut texcoord = info.index("texCoord", check).unwrap_or(0);
-        let mut transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        if let Some(moved) = info.extension("KHR_texture_transform", check) {
-            transform = matrix(&moved, check);
-            texcoord = moved.index("texCoord", check).unwrap_or(texcoord);
-        }
+        let moved = item.extension::<TextureTransform>("KHR_texture_transform", check);
+        let moved = moved.unwrap_or_default();
         Some(Texture {
             image: self.slot(json, image),
-            texcoord,
-            transform,
-            wrap: wrap(json, &texture, check),
+            texcoord: moved.tex_coord.unwrap_or(info.tex_coord) as usize,
+            transform: matrix(&moved),
+            wrap: wrap(json, &texture, &found.place, check),
         })
     }
 
@@ -98,28 +88,28 @@ impl Slots {
 
 /// Offset * rotation * scale. A positive rotation turns the coordinates counter-clockwise as seen on the image, whose v
 /// runs down, so sin stands in the first row with a plus.
-fn matrix(moved: &Item<'_>, check: &mut Check) -> [[f32; 3]; 2] {
-    let [x, y] = moved.numbers::<2>("offset", check).unwrap_or([0.0; 2]);
-    let [sx, sy] = moved.numbers::<2>("scale", check).unwrap_or([1.0; 2]);
-    let (sin, cos) = moved.number("rotation", check).unwrap_or(0.0).sin_cos();
+fn matrix(moved: &TextureTransform) -> [[f32; 3]; 2] {
+    let [x, y] = moved.offset.0.map(double);
+    let [sx, sy] = moved.scale.0.map(double);
+    let (sin, cos) = double(moved.rotation.0).sin_cos();
     let rows = [[cos * sx, sin * sy, x], [-sin * sx, cos * sy, y]];
     rows.map(|row| row.map(|value| value as f32))
 }
 
-fn wrap(json: &Value, texture: &Item<'_>, check: &mut Check) -> [Wrap; 2] {
-    let Some(index) = texture.index("sampler", check) else {
+fn wrap(json: &Value, texture: &texture::Texture, place: &str, check: &mut Check) -> [Wrap; 2] {
+    let found = texture
+        .sampler
+        .and_then(|index| json::referred(json, "samplers", "sampler", index.value(), place, check));
+    let read = found.and_then(|item| Some((item.read::<Sampler>(check)?, item)));
+    let Some((sampler, item)) = read else {
         return [Wrap::Repeat; 2];
     };
-    let sampler = json::referred(json, "samplers", "sampler", index, &texture.place, check);
-    let Some(sampler) = sampler else {
-        return [Wrap::Repeat; 2];
-    };
-    ["wrapS", "wrapT"].map(|key| match sampler.index(key, check) {
-        None | Some(10497) => Wrap::Repeat,
-        Some(33648) => Wrap::Mirror,
-        Some(33071) => Wrap::Clamp,
-        Some(other) => {
-            let place = &sampler.place;
+    [("wrapS", sampler.wrap_s), ("wrapT", sampler.wrap_t)].map(|(key, mode)| match mode {
+        Valid(WrappingMode::Repeat) => Wrap::Repeat,
+        Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+        Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Invalid => {
+            let (place, other) = (&item.place, item.said(key));
             check.warn(format!(
                 "{place}: {key} {other} is unknown, taken as repeating"
             ));
@@ -135,11 +125,12 @@ mod tests {
 
     fn read(json: &Value, info: Value) -> (Option<Texture>, Slots, Check) {
         let (mut slots, mut check) = (Slots::default(), Check::new("f"));
+        let material = json!({"emissiveTexture": info});
         let item = Item {
-            map: info.as_object().unwrap(),
+            map: material.as_object().unwrap(),
             place: "material 0".into(),
         };
-        let texture = slots.texture(json, &item, &mut check);
+        let texture = slots.texture(json, &item, "emissiveTexture", &mut check);
         (texture, slots, check)
     }
 
@@ -172,13 +163,12 @@ mod tests {
         let (mut slots, mut check) = (Slots::default(), Check::new("f"));
         let used: Vec<usize> = (0..4)
             .map(|index| {
-                let info = json!({"index": index});
-                let map = info.as_object().unwrap();
-                let item = Item {
-                    map,
-                    place: String::new(),
-                };
-                slots.texture(&json, &item, &mut check).unwrap().image
+                let material = json!({"t": {"index": index}});
+                let map = material.as_object().unwrap();
+                let place = String::new();
+                let item = Item { map, place };
+                let texture = slots.texture(&json, &item, "t", &mut check);
+                texture.unwrap().image
             })
             .collect();
         assert_eq!(used, [0, 0, 1, 2]);

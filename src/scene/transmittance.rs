@@ -1,7 +1,6 @@
 //! What a side file says of panes: `"transmittance"`, of the whole pane at normal incidence.
 
-use super::known::Sampled;
-use super::spectra_file::Reader;
+use super::reader::{Reader, Sampled};
 use crate::data::{Kind, LEAVES};
 use serde_json::{Map, Value};
 

@@ -5,8 +5,7 @@
 //! (glTF 2.0, section 3.7.4).
 
 use crate::scene::Surface;
-use crate::scene::check::Check;
-use crate::scene::geometry::Tally;
+use crate::scene::check::{Check, Tally};
 use crate::scene::primitive::Primitive;
 use glam::{DMat3, DVec3, Vec3};
 

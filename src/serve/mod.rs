@@ -5,11 +5,14 @@
 //! | `http` | requests and answers over TCP, with limits on size and time |
 //! | `guard` | who may ask: the token, the host, the origin |
 //! | `board` | what is to be seen at present, and who waits for news of it |
+//! | `spectra` | the spectrum of the light at points of a picture, and its error |
 //! | `patches` | the patches of the hierarchy as meshes that only grow |
 //! | `picture` | a mesh with its light, and what a browser lacks of it in bytes |
 //! | `changes` | lamps and paints as they were changed |
 //! | `scratch` | a folder that is gone in the end |
+//! | `wishes` | what is to be done with the room |
 //! | `session` | the thread that solves, relights and saves |
+//! | `place` | so many connections at a time |
 //! | `routes` | which request gets which answer |
 //! | `server` | the listener |
 //!
@@ -23,9 +26,13 @@ mod guard;
 mod http;
 mod patches;
 mod picture;
+mod place;
 mod routes;
 mod scratch;
 mod server;
 mod session;
+mod spectra;
+mod wishes;
 
-pub use server::{Server, Wishes};
+pub use server::Server;
+pub use wishes::Wishes;

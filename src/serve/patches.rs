@@ -5,6 +5,7 @@
 //! normals those with its normal.
 
 use super::picture::{Grown, Shape};
+use super::spectra::Spectra;
 use crate::error::Result;
 use crate::gather::{BakedSurface, BakedVertex, Vertex};
 use crate::hierarchy::{Face, NONE};
@@ -266,8 +267,8 @@ impl Patches {
         out
     }
 
-    /// The patches under the light of a bake of this hierarchy.
-    pub(super) fn lit(&self, bake: &Bake) -> Vec<BakedSurface> {
+    /// The patches under the light of a bake of this hierarchy, and its spectra.
+    pub(super) fn lit(&self, bake: &Bake) -> (Vec<BakedSurface>, Spectra) {
         let (tree, light) = (bake.tree(), bake.light());
         let mut sums = vec![([0.0_f32; 64], 0.0_f64); self.groups as usize];
         let known = light.irradiance.len();
@@ -310,7 +311,10 @@ impl Patches {
                 map: None,
             }
         };
-        self.parts.iter().map(of_part).collect()
+        let surfaces = self.parts.iter().map(of_part).collect();
+        let rows = sums.into_iter().map(|(row, _)| row).collect();
+        let of = self.parts.iter().map(|part| part.group.clone()).collect();
+        (surfaces, Spectra::shared(bake.lanes(), rows, of))
     }
 
     /// The mesh as it is now.

@@ -14,6 +14,7 @@
 //!
 //! Parts are the primitives with light, in the order of the file.
 
+use super::spectra::Spectra;
 use crate::gather::BakedSurface;
 use crate::output::Exposure;
 use crate::output::gltf::{self, color_0};
@@ -67,6 +68,8 @@ pub(super) struct Picture {
     pub(super) shape: Arc<Shape>,
     light: u32,
     values: Vec<[f32; 4]>,
+    /// What stands behind the values.
+    pub(super) spectra: Arc<Spectra>,
 }
 
 impl Picture {
@@ -75,7 +78,7 @@ impl Picture {
         shape: Arc<Shape>,
         light: u32,
         scene: &Scene,
-        surfaces: &[BakedSurface],
+        (surfaces, spectra): (&[BakedSurface], Arc<Spectra>),
         exposure: &Exposure,
     ) -> Self {
         let mut values = Vec::new();
@@ -92,6 +95,7 @@ impl Picture {
             shape,
             light,
             values,
+            spectra,
         }
     }
 
@@ -150,6 +154,7 @@ mod tests {
 
     #[test]
     fn who_has_a_part_gets_the_rest() {
+        let lanes = crate::light::lanes::Lanes::dense(&[], &[[0.0; 64]; 3]);
         let shape = Shape {
             mesh: 3,
             glb: Arc::new([]),
@@ -164,6 +169,7 @@ mod tests {
             shape: Arc::new(shape),
             light: 9,
             values: vec![[0.0; 4]; 5],
+            spectra: Arc::new(Spectra::own(&lanes, Vec::new(), None)),
         };
         let words = |had| -> Vec<u32> {
             let bytes = picture.since(3, had).unwrap();

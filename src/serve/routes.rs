@@ -8,16 +8,19 @@
 //! | `GET /events` | server-sent events: the state, whole, whenever it is another |
 //! | `GET /mesh` | the GLB of the present mesh; its number in `X-Mesh` |
 //! | `GET /light?mesh=M&had=S` | what a browser lacks that has shape S of mesh M, see `picture`; 204: begin with `/mesh` |
+//! | `GET /point?mesh=M&part=P&vertices=A,B,C&weights=U,V,W` | JSON: the light at a point between vertices of a part, see `reading`; 204: there is no such point |
 //! | `POST /stop`, `/go`, `/save`, `/expose` | 202; what comes of it is told by events |
 //! | `POST /change` | 202, or 400 with what is wrong, see `changes` |
 
 use super::guard::Guard;
 use super::http::{Answer, Request, TAKING, stream_head};
 use super::picture::Picture;
-use super::server::Place;
+use super::place::Place;
 use super::session::{Command, Shared};
+use super::spectra::Reading;
 use crate::error::Error;
-use crate::report::page::{NOTICES, STYLE, VIEWER, escaped};
+use crate::report::page::{KEYS, NOTICES, PICTURE, STYLE, VIEWER, escaped};
+use serde_json::json;
 use std::io::Write;
 use std::net::TcpStream;
 use std::sync::Arc;
@@ -67,6 +70,7 @@ impl Routes {
             "/events",
             "/mesh",
             "/light",
+            "/point",
         ];
         let acts = ["/stop", "/go", "/save", "/expose", "/change"];
         let path = request.path.as_str();
@@ -94,6 +98,19 @@ impl Routes {
             "/room" => board.room().map_or_else(early, |room| {
                 Answer::of("application/json", room.as_bytes())
             }),
+            "/point" => match point_of(request) {
+                Some((mesh, part, vertices, weights)) => {
+                    board.picture().map_or_else(early, |picture| {
+                        let same = Some(&picture).filter(|p| p.numbers()[0] == mesh);
+                        let found = same.and_then(|p| p.spectra.at(part, vertices, weights));
+                        found.map_or_else(Answer::nothing, |found| reading(&picture, &found))
+                    })
+                }
+                None => Answer::refusal(
+                    400,
+                    "say mesh=M, part=P, vertices=A,B,C and weights=U,V,W from 0 to 1",
+                ),
+            },
             "/mesh" => board.picture().map_or_else(early, |picture| {
                 let [mesh, ..] = picture.numbers();
                 let glb = &picture.shape.glb[..];
@@ -143,7 +160,9 @@ impl Routes {
     }
 
     fn page(&self) -> String {
-        PAGE.replace("{{token}}", self.guard.token())
+        PAGE.replace("{{picture}}", PICTURE)
+            .replace("{{keys}}", KEYS)
+            .replace("{{token}}", self.guard.token())
             .replace("{{notices}}", &escaped(NOTICES))
     }
 
@@ -157,6 +176,37 @@ impl Routes {
         // Ends with an error when the other side is gone, or takes nothing.
         let _ = tell(&mut stream, shared);
     }
+}
+
+/// The point that is asked for: mesh, part, vertices and their weights.
+fn point_of(request: &Request) -> Option<(u64, usize, [usize; 3], [f64; 3])> {
+    let three = |key| -> Option<[&str; 3]> {
+        let list: Vec<&str> = request.asked(key)?.split(',').collect();
+        list.try_into().ok()
+    };
+    let [mesh, part] = ["mesh", "part"].map(|key| request.asked(key)?.parse::<u32>().ok());
+    let vertices = three("vertices")?.map(|v| v.parse::<u32>().ok());
+    let weights = three("weights")?.map(|w| w.parse().ok().filter(|w| (0.0..=1.0).contains(w)));
+    let ([Some(a), Some(b), Some(c)], [Some(u), Some(v), Some(w)]) = (vertices, weights) else {
+        return None;
+    };
+    let vertices = [a, b, c].map(|v| v as usize);
+    Some((mesh?.into(), part? as usize, vertices, [u, v, w]))
+}
+
+/// The light at a point: `light` (number of the light), `spectrum` (W/m2/nm on the 64 leaves), `xyz` (tristimulus
+/// irradiance; Y is lx), `error_de2000` (an estimate, or null) and whether that is the point's own (`error_here`) or the
+/// room's mean.
+fn reading(picture: &Picture, found: &Reading) -> Answer {
+    let [.., light] = picture.numbers();
+    let body = json!({
+        "light": light,
+        "spectrum": found.spectrum.to_vec(),
+        "xyz": found.xyz,
+        "error_de2000": found.error.map(|(error, _)| error),
+        "error_here": found.error.is_some_and(|(_, here)| here),
+    });
+    Answer::of("application/json", body.to_string())
 }
 
 fn tell(stream: &mut TcpStream, shared: &Shared) -> std::io::Result<()> {

@@ -3,39 +3,21 @@
 use super::board::Board;
 use super::changes::Reader;
 use super::guard::Guard;
+use super::place::Place;
 use super::routes::Routes;
 use super::scratch::Scratch;
 use super::session::{Command, Session, Shared};
+use super::wishes::Wishes;
 use crate::error::{Error, Result};
-use crate::output::{Balance, Brightness, Writing};
-use crate::scene::{Options, Scene};
-use crate::solve::Settings;
+use crate::scene::Scene;
 use std::net::{Ipv4Addr, TcpListener};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Connections at the most: each has a thread.
 const CONNECTIONS: usize = 64;
-
-/// What is to be done with the room.
-#[derive(Debug, Clone)]
-pub struct Wishes {
-    /// How it is solved.
-    pub settings: Settings,
-    /// How it is read again when it is changed.
-    pub options: Options,
-    /// Where it is saved.
-    pub output: PathBuf,
-    /// How bright it is shown.
-    pub brightness: Brightness,
-    /// Which light shows as white.
-    pub balance: Balance,
-    /// How it is stored.
-    pub writing: Writing,
-}
 
 /// A server that listens to this machine alone.
 pub struct Server {
@@ -138,23 +120,6 @@ impl Server {
         let _written = writing.unwrap_or_else(PoisonError::into_inner);
         self.scratch.remove();
         done.unwrap_or_else(|panic| resume_unwind(panic))
-    }
-}
-
-/// One of a number of places, given back in the end.
-pub(super) struct Place(Arc<AtomicUsize>);
-
-impl Place {
-    /// Takes one; none if all are taken.
-    pub(super) fn take(taken: &Arc<AtomicUsize>, all: usize) -> Option<Self> {
-        let place = Self(Arc::clone(taken));
-        (taken.fetch_add(1, Ordering::SeqCst) < all).then_some(place)
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::SeqCst);
     }
 }
 

@@ -9,11 +9,13 @@ use super::changes::kindled;
 use super::patches::Patches;
 use super::picture::{Picture, Shape};
 use super::scratch::Scratch;
-use super::server::Wishes;
+use super::spectra::{Error as PointError, Spectra};
+use super::wishes::Wishes;
 use crate::data::{Kind, named, names};
 use crate::error::Result;
 use crate::gather::Baked;
 use crate::keep::{Relighter, Relit};
+use crate::light::lanes::Lanes;
 use crate::mesh::Limits;
 use crate::output::gltf;
 use crate::output::{Exposure, baked_glb, camera};
@@ -79,17 +81,63 @@ pub(super) struct Session<'a> {
     /// Waiting commands.
     queue: VecDeque<Command>,
     /// The light at the vertices of the file and their mesh, of the last round that was gathered.
-    fine: Option<(Baked, Arc<Shape>)>,
+    fine: Option<Fine>,
+    /// The light of the last two rounds.
+    history: page::History,
     /// The present state with its rows, once it was asked for; with the vertices, if `fine` is there.
     kept: Option<Relighter>,
     /// Lamps and paints that differ from those of the bake.
     changed: Option<Scene>,
+    /// Mean colour difference of the light of the changed room, an estimate.
+    relit: Option<f64>,
     /// Where only a first answer was given to a change: when it was asked for, and seconds until then.
     rough: Option<(Instant, f64)>,
     exposure: Exposure,
     /// Numbers of meshes and pictures so far.
     meshes: u32,
     lights: u32,
+}
+
+/// The light at the vertices of the file.
+struct Fine {
+    /// Its irradiance rows are in `spectra`.
+    baked: Baked,
+    shape: Arc<Shape>,
+    spectra: Arc<Spectra>,
+    /// Where the error of the light is, see [`PointError`].
+    share: Option<Arc<[Vec<f32>]>>,
+}
+
+impl Fine {
+    /// Takes up light whose error is `mean`.
+    fn light(&mut self, scene: &Scene, lanes: &Lanes, mut baked: Baked, mean: Option<f64>) {
+        self.spectra = Arc::new(own_spectra(
+            scene,
+            lanes,
+            &mut baked,
+            mean,
+            self.share.clone(),
+        ));
+        self.baked = baked;
+    }
+}
+
+/// The rows of a baked mesh, in the order of the file, which it does not keep.
+fn own_spectra(
+    scene: &Scene,
+    lanes: &Lanes,
+    baked: &mut Baked,
+    mean: Option<f64>,
+    share: Option<Arc<[Vec<f32>]>>,
+) -> Spectra {
+    let mut rows = std::mem::take(&mut baked.irradiance);
+    let order = gltf::order(scene, &baked.surfaces).into_iter();
+    let parts = order.map(|k| rows.get_mut(k).map(std::mem::take).unwrap_or_default());
+    let error = mean.map(|mean| PointError {
+        mean,
+        share: share.unwrap_or_else(|| [].into()),
+    });
+    Spectra::own(lanes, parts.collect(), error)
 }
 
 impl<'a> Session<'a> {
@@ -116,8 +164,10 @@ impl<'a> Session<'a> {
             stage: Stage::Solving,
             queue: VecDeque::new(),
             fine: None,
+            history: page::History::default(),
             kept: None,
             changed: None,
+            relit: None,
             rough: None,
             exposure: Exposure::new(1.0),
             meshes: 1,
@@ -219,17 +269,26 @@ impl<'a> Session<'a> {
         });
     }
 
+    /// Mean colour difference of the last round, an estimate.
+    fn estimate(&self) -> Option<f64> {
+        self.bake.rounds().last()?.error.total_de2000.value
+    }
+
     /// One round, and its picture.
     fn round(&mut self) {
         self.bake.step();
         self.kept = None;
         self.fine = None;
+        self.history.note(&self.bake);
+        self.history.keep_last(2);
         self.patches.grow(&self.bake);
-        let lit = self.patches.lit(&self.bake);
+        let (lit, spectra) = self.patches.lit(&self.bake);
+        let spectra = Arc::new(spectra.with_mean(self.estimate()));
         self.exposure = self.metered(self.bake.scene(), &lit);
         let shape = Arc::new(self.patches.shape());
         self.lights += 1;
-        let picture = Picture::new(shape, self.lights, self.bake.scene(), &lit, &self.exposure);
+        let scene = self.bake.scene();
+        let picture = Picture::new(shape, self.lights, scene, (&lit, spectra), &self.exposure);
         let rounds = self.bake.rounds().iter().map(|r| RoundLine {
             round: r.round,
             de2000: r.error.total_de2000.value,
@@ -253,7 +312,7 @@ impl<'a> Session<'a> {
             late: &|| self.shared.stop.load(Ordering::SeqCst),
         };
         let told = Cell::new(Instant::now());
-        let baked = self.bake.baked_within(&limits, &|done, of| {
+        let mut baked = self.bake.baked_within(&limits, &|done, of| {
             if told.get().elapsed() > PROGRESS {
                 told.set(Instant::now());
                 self.board().set(|state| state.progress = Some((done, of)));
@@ -269,11 +328,20 @@ impl<'a> Session<'a> {
         self.meshes += 1;
         let shape = Arc::new(Shape::fixed(self.meshes, glb.bytes, counts));
         self.lights += 1;
+        let map = page::error_map(&self.bake, &baked, &self.history, &order);
+        let share = map.map(|(map, mean)| {
+            let mut rest = map.iter().map(|e| (e / mean.max(f64::MIN_POSITIVE)) as f32);
+            let parts = order.iter().map(|&k| baked.surfaces[k].vertices.len());
+            parts.map(|n| rest.by_ref().take(n).collect()).collect()
+        });
+        let (lanes, mean) = (self.bake.lanes(), self.estimate());
+        let spectra = own_spectra(scene, lanes, &mut baked, mean, Option::clone(&share));
+        let spectra = Arc::new(spectra);
         let picture = Picture::new(
             Arc::clone(&shape),
             self.lights,
             scene,
-            &baked.surfaces,
+            (&baked.surfaces, Arc::clone(&spectra)),
             &self.exposure,
         );
         let error = self.bake.error_of(&baked);
@@ -284,7 +352,12 @@ impl<'a> Session<'a> {
         });
         self.kept = None;
         let kept = self.keep(&baked);
-        self.fine = Some((baked, shape));
+        self.fine = Some(Fine {
+            baked,
+            shape,
+            spectra,
+            share,
+        });
         if let Err(problem) = kept {
             self.note(Some(format!("lamps cannot be changed: {problem}")));
         }
@@ -368,11 +441,12 @@ impl<'a> Session<'a> {
     fn show_relit(&mut self, relit: Relit, asked: Instant, first_s: Option<f64>) -> f64 {
         let r = &relit.record;
         let de2000 = r.error_de2000.value;
+        self.relit = de2000;
         let parts_s = [r.lanes_s, r.direct_s, r.solve_s, r.gather_s];
-        if let Some((baked, _)) = &mut self.fine {
-            *baked = relit.baked;
+        if let (Some(fine), Some(kept)) = (&mut self.fine, &self.kept) {
+            fine.light(kept.scene(), kept.lanes(), relit.baked, de2000);
         }
-        self.paint();
+        self.paint(de2000);
         let seconds = asked.elapsed().as_secs_f64();
         let fine = self.fine.is_some();
         self.board().set(|state| {
@@ -387,20 +461,26 @@ impl<'a> Session<'a> {
         seconds
     }
 
-    /// Shows the present light of the changed room.
-    fn paint(&mut self) {
+    /// Shows the present light of the changed room; `error`: mean colour difference, an estimate.
+    fn paint(&mut self, error: Option<f64>) {
         let scene = self.changed.as_ref().unwrap_or(self.bake.scene());
         let of_patches;
-        let (shape, lit) = match (&self.fine, &self.kept) {
-            (Some((baked, shape)), _) => (Arc::clone(shape), &baked.surfaces),
+        let (shape, lit, spectra) = match (&self.fine, &self.kept) {
+            (Some(fine), _) => (
+                Arc::clone(&fine.shape),
+                &fine.baked.surfaces,
+                Arc::clone(&fine.spectra),
+            ),
             (None, kept) => {
                 let relit = kept.as_ref().filter(|_| self.changed.is_some());
-                of_patches = self.patches.lit(relit.map_or(&self.bake, Relighter::bake));
-                (Arc::new(self.patches.shape()), &of_patches)
+                let (lit, spectra) = self.patches.lit(relit.map_or(&self.bake, Relighter::bake));
+                of_patches = lit;
+                let spectra = Arc::new(spectra.with_mean(error));
+                (Arc::new(self.patches.shape()), &of_patches, spectra)
             }
         };
         self.lights += 1;
-        let picture = Picture::new(shape, self.lights, scene, lit, &self.exposure);
+        let picture = Picture::new(shape, self.lights, scene, (lit, spectra), &self.exposure);
         self.board().show(picture, |_| {});
     }
 
@@ -408,6 +488,7 @@ impl<'a> Session<'a> {
     fn restart(&mut self, scene: Scene) -> Result<()> {
         self.doing(Doing::Preparing);
         (self.kept, self.fine, self.changed, self.rough) = (None, None, None, None);
+        (self.history, self.relit) = (page::History::default(), None);
         self.bake = begun(scene, self.wishes);
         self.meshes += 1;
         self.patches = Patches::new(&self.bake, self.meshes)?;
@@ -430,7 +511,7 @@ impl<'a> Session<'a> {
         }
         self.refine()?;
         self.doing(Doing::Saving);
-        let Some((baked, _)) = &self.fine else {
+        let Some(Fine { baked, .. }) = &self.fine else {
             return Ok(());
         };
         let scene = self.changed.as_ref().unwrap_or(self.bake.scene());
@@ -460,13 +541,13 @@ impl<'a> Session<'a> {
         }
         let scene = self.changed.as_ref().unwrap_or(self.bake.scene());
         self.exposure = match (&self.fine, &self.kept) {
-            (Some((baked, _)), _) => self.metered(scene, &baked.surfaces),
+            (Some(fine), _) => self.metered(scene, &fine.baked.surfaces),
             (None, Some(kept)) if self.changed.is_some() => {
-                self.metered(scene, &self.patches.lit(kept.bake()))
+                self.metered(scene, &self.patches.lit(kept.bake()).0)
             }
-            _ => self.metered(scene, &self.patches.lit(&self.bake)),
+            _ => self.metered(scene, &self.patches.lit(&self.bake).0),
         };
-        self.paint();
+        self.paint(self.relit.or_else(|| self.estimate()));
     }
 
     fn metered(&self, scene: &Scene, lit: &[crate::gather::BakedSurface]) -> Exposure {

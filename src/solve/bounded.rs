@@ -25,6 +25,49 @@ struct Lit {
     punctual: Vec<Option<Tree<Bounded>>>,
 }
 
+impl Lit {
+    /// What a bounce multiplies light by at the most: greatest albedo times greatest row sum.
+    fn ratio(&self, factors: &[Vec<(usize, f64)>]) -> f64 {
+        let albedo = self.reflectance.iter().map(|t| t.node(1).high);
+        let sums = factors.iter().map(|row| row.iter().map(|f| f.1).sum());
+        (albedo.fold(0.0, f64::max) * sums.fold(0.0, f64::max)).min(0.999)
+    }
+
+    /// Radiosity of every patch by the light that arrives, on intervals that are these nodes of a spectrum's tree.
+    fn reflect(&self, arrives: &[Vec<Bounded>], nodes: &[usize]) -> Vec<Vec<Bounded>> {
+        arrives
+            .iter()
+            .zip(&self.reflectance)
+            .map(|(row, rho)| {
+                row.iter()
+                    .zip(nodes)
+                    .map(|(x, &n)| x.times(rho.node(n), self.cmf.node(n)))
+                    .collect()
+            })
+            .collect()
+    }
+}
+
+/// `base + sum F from`, patch by patch.
+fn gather(
+    factors: &[Vec<(usize, f64)>],
+    base: &[Vec<Bounded>],
+    from: &[Vec<Bounded>],
+) -> Vec<Vec<Bounded>> {
+    base.iter()
+        .zip(factors)
+        .map(|(base, row)| {
+            let mut sum = base.clone();
+            for &(other, factor) in row {
+                for (s, x) in sum.iter_mut().zip(&from[other]) {
+                    *s = s.plus(factor, x);
+                }
+            }
+            sum
+        })
+        .collect()
+}
+
 impl Coarse {
     /// The shortest cuts found whose bound of the mean colour difference is within `tolerance`.
     pub(super) fn choose_bounded(
@@ -116,75 +159,38 @@ impl Coarse {
         (mean, worst.into_iter().map(|(_, l, f)| (l, f)).collect())
     }
 
-    /// Irradiance of every patch on the intervals of a cut, all bounces.
-    fn bounces(&self, lit: &Lit, cut: Partition) -> Vec<Vec<Bounded>> {
-        let nodes: Vec<usize> = cut.iter().map(|(first, len)| node(first, len)).collect();
-        let of = |tree: &Option<Tree<Bounded>>, n: usize| {
-            tree.as_ref()
-                .map_or_else(|| Bounded::constant(0.0), |t| *t.node(n))
-        };
-        // Factors F_ij by patch; the model's patches stand behind its root.
-        let factors: Vec<Vec<(usize, f64)>> = self
-            .leaves
+    /// Factors F_ij of every patch i: j and F_ij.
+    fn factors(&self) -> Vec<Vec<(usize, f64)>> {
+        self.leaves
             .iter()
             .map(|&leaf| {
                 let area = self.areas[leaf as usize];
                 let row = self.links.row(leaf as usize).iter();
+                // The model's patches stand behind its root.
                 row.map(|&(other, exchange)| (other as usize - 1, f64::from(exchange) / area))
                     .collect()
             })
-            .collect();
-        let gather = |base: &[Vec<Bounded>], from: &[Vec<Bounded>]| -> Vec<Vec<Bounded>> {
-            base.iter()
-                .zip(&factors)
-                .map(|(base, row)| {
-                    let mut sum = base.clone();
-                    for &(other, factor) in row {
-                        for (s, x) in sum.iter_mut().zip(&from[other]) {
-                            *s = s.plus(factor, x);
-                        }
-                    }
-                    sum
-                })
-                .collect()
-        };
+            .collect()
+    }
+
+    /// Irradiance of every patch on the intervals of a cut, all bounces.
+    fn bounces(&self, lit: &Lit, cut: Partition) -> Vec<Vec<Bounded>> {
+        let nodes: Vec<usize> = cut.iter().map(|(first, len)| node(first, len)).collect();
+        let factors = self.factors();
         let rows = |trees: &[Option<Tree<Bounded>>]| -> Vec<Vec<Bounded>> {
+            let dark = Bounded::constant(0.0);
+            let of = |tree: &Option<Tree<Bounded>>, n| tree.as_ref().map_or(dark, |t| *t.node(n));
             trees
                 .iter()
                 .map(|tree| nodes.iter().map(|&n| of(tree, n)).collect())
                 .collect()
         };
-        let first = gather(&rows(&lit.punctual), &rows(&lit.emission));
-        let greatest = |rows: &[Vec<Bounded>]| {
-            rows.iter()
-                .flatten()
-                .map(|b| b.high)
-                .fold(0.0_f64, f64::max)
-        };
-        let albedo = lit
-            .reflectance
-            .iter()
-            .map(|t| t.node(1).high)
-            .fold(0.0, f64::max);
-        let rowsum = factors
-            .iter()
-            .map(|row| row.iter().map(|f| f.1).sum::<f64>())
-            .fold(0.0, f64::max);
-        let ratio = (albedo * rowsum).min(0.999);
+        let first = gather(&factors, &rows(&lit.punctual), &rows(&lit.emission));
+        let ratio = lit.ratio(&factors);
         let mut all = first.clone();
         let mut tail = 0.0;
         for _ in 0..BOUNCES {
-            let reflected: Vec<Vec<Bounded>> = all
-                .iter()
-                .zip(&lit.reflectance)
-                .map(|(row, rho)| {
-                    row.iter()
-                        .zip(&nodes)
-                        .map(|(x, &n)| x.times(rho.node(n), lit.cmf.node(n)))
-                        .collect()
-                })
-                .collect();
-            let next = gather(&first, &reflected);
+            let next = gather(&factors, &first, &lit.reflect(&all, &nodes));
             let last = next
                 .iter()
                 .flatten()
@@ -193,7 +199,7 @@ impl Coarse {
                 .fold(0.0, f64::max);
             tail = last * ratio / (1.0 - ratio);
             all = next;
-            if tail <= TAIL * greatest(&all) {
+            if tail <= TAIL * all.iter().flatten().map(|b| b.high).fold(0.0, f64::max) {
                 break;
             }
         }

@@ -223,8 +223,9 @@ impl Coarse {
     }
 
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
-    /// padding would waste. `known` cuts are kept if they are good enough. `copies`: rows hold so many lights of each spectrum
-    /// by themselves, and must not become wider than they can be; none: one of each, and beyond 64 lanes the leaves.
+    /// padding would waste. `known` cuts are kept if they are good enough, and one for each light: where a lamp was given
+    /// another spectrum there may be more lights now, or fewer. `copies`: rows hold so many lights of each spectrum by
+    /// themselves, and must not become wider than they can be; none: one of each, and beyond 64 lanes the leaves.
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
@@ -252,7 +253,7 @@ impl Coarse {
         let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
         let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
         let tolerance = tolerance.max(UNSEEN);
-        if let Some(cuts) = known {
+        if let Some(cuts) = known.filter(|cuts| cuts.len() == spectra.len()) {
             let lanes = Lanes::ratio(spectra, &cuts, weights);
             let (error, _) = self.loss(&lanes, &references, &jacobians, total);
             if error <= tolerance {

@@ -73,63 +73,16 @@ impl System<'_> {
         tolerance: f64,
         pays: impl Fn(&[f64]) -> bool,
     ) -> Convergence {
-        let (tree, areas) = (self.operator.tree, self.operator.areas);
-        let leaves = self.operator.leaves;
-        let count = leaves.len();
-        let mut root = Rows::zero(count, L);
-        for ((root, rho), &leaf) in root
-            .all_mut::<L>()
-            .iter_mut()
-            .zip(self.reflectance.all::<L>())
-            .zip(leaves)
-        {
-            let area = areas[leaf as usize] as f32;
-            *root = rho.map(|x| (x * area).sqrt());
-        }
-        let mut work = Work {
-            radiosity: Rows::zero(count, L),
-            nodes: Rows::zero(tree.nodes.len(), L),
-            gathered: Rows::zero(tree.nodes.len(), L),
-        };
-        let mut b = Rows::zero(count, L);
-        for ((b, h), r) in b
-            .all_mut::<L>()
-            .iter_mut()
-            .zip(first.all::<L>())
-            .zip(root.all::<L>())
-        {
-            *b = std::array::from_fn(|l| h[l] * r[l]);
-        }
-        // y from the guess; 0 where nothing is reflected.
-        let mut y = Rows::zero(count, L);
-        for (((y, guess), r), &leaf) in y
-            .all_mut::<L>()
-            .iter_mut()
-            .zip(reflected.all::<L>())
-            .zip(root.all::<L>())
-            .zip(leaves)
-        {
-            let area = areas[leaf as usize] as f32;
-            *y = std::array::from_fn(|l| {
-                if r[l] > 0.0 {
-                    guess[l] * area / r[l]
-                } else {
-                    0.0
-                }
-            });
-        }
+        let count = self.operator.leaves.len();
+        let root = self.root::<L>();
+        let mut work = Work::new::<L>(&self.operator);
+        let b = product::<L>(first, &root);
+        let mut y = self.symmetric::<L>(reflected, &root);
         let norm = dot::<L>(&b, &b).map(|x| x.max(f64::MIN_POSITIVE));
         let mut applied = Rows::zero(count, L);
         self.apply::<L>(&y, &root, &mut work, &mut applied);
-        let mut residual = Rows::zero(count, L);
-        for ((r, b), a) in residual
-            .all_mut::<L>()
-            .iter_mut()
-            .zip(b.all::<L>())
-            .zip(applied.all::<L>())
-        {
-            *r = std::array::from_fn(|l| b[l] - a[l]);
-        }
+        let mut residual = b;
+        step::<L>(&mut residual, &applied, [-1.0; L]);
         let mut direction = residual.clone();
         let mut rr = dot::<L>(&residual, &residual);
         // The residual, preconditioned, and its product with itself.
@@ -139,15 +92,7 @@ impl System<'_> {
         let mut done = Convergence::default();
         let mut bounds = Vec::new();
         loop {
-            done.residual = 0.0;
-            done.bound = 0.0;
-            for l in 0..L {
-                let relative = (rr[l] / norm[l]).sqrt();
-                done.residual = done.residual.max(relative);
-                done.bound = done
-                    .bound
-                    .max(relative / (1.0 - f64::from(self.greatest[l])));
-            }
+            (done.residual, done.bound) = self.left(&rr, &norm);
             // Rounding ends progress: what is left is f32, not the method.
             let rounding = rr.iter().zip(&norm).all(|(r, b)| *r <= 1e-14 * b);
             if done.bound <= tolerance || done.iterations >= MAX_ITERATIONS || rounding {
@@ -164,14 +109,7 @@ impl System<'_> {
             }
             self.apply::<L>(&direction, &root, &mut work, &mut applied);
             done.iterations += 1;
-            let curvature = dot::<L>(&direction, &applied);
-            let alpha: [f32; L] = std::array::from_fn(|l| {
-                if curvature[l] > 0.0 {
-                    (rz[l] / curvature[l]) as f32
-                } else {
-                    0.0
-                }
-            });
+            let alpha = ratios(&rz, &dot::<L>(&direction, &applied));
             step::<L>(&mut y, &direction, alpha);
             step::<L>(&mut residual, &applied, alpha.map(|a| -a));
             rr = dot::<L>(&residual, &residual);
@@ -182,44 +120,57 @@ impl System<'_> {
                 }
                 None => (rr, &residual),
             };
-            let beta: [f32; L] = std::array::from_fn(|l| {
-                if rz[l] > 0.0 {
-                    (next[l] / rz[l]) as f32
-                } else {
-                    0.0
-                }
-            });
-            for (d, z) in direction.all_mut::<L>().iter_mut().zip(z.all::<L>()) {
-                *d = std::array::from_fn(|l| z[l] + beta[l] * d[l]);
-            }
+            turn::<L>(&mut direction, z, ratios(&next, &rz));
             rz = next;
         }
-        for (((out, y), r), &leaf) in reflected
-            .all_mut::<L>()
-            .iter_mut()
-            .zip(y.all::<L>())
-            .zip(root.all::<L>())
-            .zip(leaves)
-        {
-            let inverse = (1.0 / areas[leaf as usize]) as f32;
-            *out = std::array::from_fn(|l| y[l] * r[l] * inverse);
-        }
+        self.radiosity::<L>(&y, &root, reflected);
         done
+    }
+
+    /// `sqrt(A rho)` of each leaf: with `R = sqrt(rho / A) y` the system is symmetric.
+    fn root<const L: usize>(&self) -> Rows {
+        let mut root = self.reflectance.clone();
+        for (root, &leaf) in root.all_mut::<L>().iter_mut().zip(self.operator.leaves) {
+            let area = self.operator.areas[leaf as usize] as f32;
+            *root = root.map(|x| (x * area).sqrt());
+        }
+        root
+    }
+
+    /// `y` of a radiosity; 0 where nothing is reflected.
+    fn symmetric<const L: usize>(&self, radiosity: &Rows, root: &Rows) -> Rows {
+        let mut y = Rows::zero(root.len(), L);
+        let rows = y.all_mut::<L>().iter_mut().zip(radiosity.all::<L>());
+        for (((y, b), r), &leaf) in rows.zip(root.all::<L>()).zip(self.operator.leaves) {
+            let area = self.operator.areas[leaf as usize] as f32;
+            *y = std::array::from_fn(|l| if r[l] > 0.0 { b[l] * area / r[l] } else { 0.0 });
+        }
+        y
+    }
+
+    /// Radiosity of a `y`.
+    fn radiosity<const L: usize>(&self, y: &Rows, root: &Rows, out: &mut Rows) {
+        let rows = out.all_mut::<L>().iter_mut().zip(y.all::<L>());
+        for (((b, y), r), &leaf) in rows.zip(root.all::<L>()).zip(self.operator.leaves) {
+            let inverse = (1.0 / self.operator.areas[leaf as usize]) as f32;
+            *b = std::array::from_fn(|l| y[l] * r[l] * inverse);
+        }
+    }
+
+    /// Relative residual of the worst lane, and how large its error may still be, from squares of residual and right-hand side.
+    fn left(&self, rr: &[f64], norm: &[f64]) -> (f64, f64) {
+        let (mut residual, mut bound) = (0.0_f64, 0.0_f64);
+        for ((rr, norm), rho) in rr.iter().zip(norm).zip(self.greatest) {
+            let relative = (rr / norm).sqrt();
+            residual = residual.max(relative);
+            bound = bound.max(relative / (1.0 - f64::from(*rho)));
+        }
+        (residual, bound)
     }
 
     /// `(1 - K) y`.
     fn apply<const L: usize>(&self, y: &Rows, root: &Rows, work: &mut Work, out: &mut Rows) {
-        let areas = self.operator.areas;
-        let rows = work
-            .radiosity
-            .all_mut::<L>()
-            .iter_mut()
-            .zip(y.all::<L>())
-            .zip(root.all::<L>());
-        for (((b, y), r), &leaf) in rows.zip(self.operator.leaves) {
-            let inverse = (1.0 / areas[leaf as usize]) as f32;
-            *b = std::array::from_fn(|l| y[l] * r[l] * inverse);
-        }
+        self.radiosity::<L>(y, root, &mut work.radiosity);
         self.operator
             .irradiance::<L>(&work.radiosity, &mut work.nodes, &mut work.gathered, out);
         for ((o, y), r) in out
@@ -238,6 +189,44 @@ struct Work {
     radiosity: Rows,
     nodes: Rows,
     gathered: Rows,
+}
+
+impl Work {
+    fn new<const L: usize>(operator: &Operator) -> Self {
+        let nodes = operator.tree.nodes.len();
+        Self {
+            radiosity: Rows::zero(operator.leaves.len(), L),
+            nodes: Rows::zero(nodes, L),
+            gathered: Rows::zero(nodes, L),
+        }
+    }
+}
+
+/// Lane by lane, 0 where the divisor is not positive.
+fn ratios<const L: usize>(a: &[f64; L], b: &[f64; L]) -> [f32; L] {
+    std::array::from_fn(|l| {
+        if b[l] > 0.0 {
+            (a[l] / b[l]) as f32
+        } else {
+            0.0
+        }
+    })
+}
+
+/// `x y`, element by element.
+pub(super) fn product<const L: usize>(x: &Rows, y: &Rows) -> Rows {
+    let mut out = x.clone();
+    for (x, y) in out.all_mut::<L>().iter_mut().zip(y.all::<L>()) {
+        *x = std::array::from_fn(|l| x[l] * y[l]);
+    }
+    out
+}
+
+/// The next direction: `p = z + beta p`, lane by lane.
+pub(super) fn turn<const L: usize>(p: &mut Rows, z: &Rows, beta: [f32; L]) {
+    for (p, z) in p.all_mut::<L>().iter_mut().zip(z.all::<L>()) {
+        *p = std::array::from_fn(|l| z[l] + beta[l] * p[l]);
+    }
 }
 
 /// `x += alpha p`, lane by lane.

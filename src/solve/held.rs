@@ -3,7 +3,7 @@
 //! What lanes do to colours is seen by itself here: beside a solution on all 64 leaves of the same links, with direct
 //! light gathered at the same points of the same leaves.
 
-use super::{Bake, Direct, Representation, padded};
+use super::{Bake, Direct, Representation};
 use crate::light::lanes::Lanes;
 use crate::link::{Demand, LinkRows, balance};
 use std::time::Instant;
@@ -52,13 +52,7 @@ impl Bake {
         self.look_out();
         self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
         self.settings.error = CONVERGED;
-        let (convergence, _) = match padded(self.lanes.len()) {
-            4 => self.solve::<4>(&rows, &leaves),
-            8 => self.solve::<8>(&rows, &leaves),
-            16 => self.solve::<16>(&rows, &leaves),
-            32 => self.solve::<32>(&rows, &leaves),
-            _ => self.solve::<64>(&rows, &leaves),
-        };
+        let (convergence, _) = self.solve(&rows, &leaves);
         self.settings.error = error;
         self.light.white = white;
         Some(Held {

@@ -1,5 +1,6 @@
 //! What a solution is asked: light at receivers, and which of them something covers.
 
+use super::estimate::Distance;
 use super::{Bake, Care, Closed, DE_PER_PERCENT, by_rays, flux};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::light::Glass;
@@ -17,6 +18,22 @@ const MOSTLY_COVERED: f64 = 0.01;
 const PRESSED: f64 = 2e-3;
 
 impl Bake {
+    /// Looks at the watched points: how far they are from where they were a round ago, see [`super::estimate`].
+    pub(super) fn distance(&mut self) -> Option<Distance> {
+        let round = self.rounds.len();
+        let mut gathered = self.gather(&self.probes.receivers(&self.tree, round));
+        if self.keep {
+            let traces = gathered.iter_mut().map(|g| g.packed.take()).collect();
+            self.watched = [std::mem::take(&mut self.watched[1]), traces];
+        }
+        let seen: Vec<[f64; 3]> = gathered
+            .iter()
+            .map(|g| self.lanes.tristimulus(&g.irradiance))
+            .collect();
+        let by_rays = self.by_rays();
+        self.probes.compare(seen, self.light.white, round, by_rays)
+    }
+
     /// Gathers at receivers, in order.
     pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
         self.gather_with(receivers, Care::Full)
@@ -61,18 +78,31 @@ impl Bake {
 
     /// Which receivers does something lie upon, so near that nobody sees them? See [`PRESSED`].
     pub(crate) fn pressed(&self, receivers: &[Receiver]) -> Vec<bool> {
-        let height = PRESSED * self.mesh.half_size;
         self.with_sight(|_, sight| {
-            let pressed = |to: &Receiver| {
-                let above = Segment::new(
-                    to.point,
-                    to.point + height * to.normal,
-                    [to.plane, NO_PLANE],
-                );
-                sight.occlusion && sight.blocks_one(&above)
-            };
+            let pressed = |to: &Receiver| self.is_pressed(sight, to);
             receivers.par_iter().map(pressed).collect()
         })
+    }
+
+    fn is_pressed(&self, sight: &Sight, to: &Receiver) -> bool {
+        let height = PRESSED * self.mesh.half_size;
+        let above = Segment::new(
+            to.point,
+            to.point + height * to.normal,
+            [to.plane, NO_PLANE],
+        );
+        sight.occlusion && sight.blocks_one(&above)
+    }
+
+    /// Does something solid cover a receiver, or lie upon it?
+    pub(crate) fn is_under(&self, sight: &Sight, to: &Receiver) -> bool {
+        let covered = || {
+            self.closed != Closed::Yes
+                && flux::covered(
+                    &self.mesh, &self.tree, &self.rays, to.point, to.normal, to.plane, to.seed,
+                )
+        };
+        self.is_pressed(sight, to) || covered()
     }
 
     /// What of a leaf others see.

@@ -4,7 +4,7 @@
 //! becomes `(1 - K) y = sqrt(A M) first`, `K = sqrt(M) G sqrt(M) / A`: symmetric as for single lanes, but one system for
 //! all lanes, with one alpha and beta. A reflection costs m^2 multiplications where lanes of intervals cost m.
 
-use super::conjugate::{Convergence, MAX_ITERATIONS, dot, step};
+use super::conjugate::{Convergence, MAX_ITERATIONS, dot, step, turn};
 use super::operator::Operator;
 use super::rays::RaySystem;
 use crate::light::lanes::Lanes;
@@ -144,9 +144,7 @@ impl Mixed {
             step::<L>(&mut residual, &applied, [-alpha; L]);
             let next = all(&residual, &residual);
             let beta = (next / rr) as f32;
-            for (d, r) in direction.all_mut::<L>().iter_mut().zip(residual.all::<L>()) {
-                *d = std::array::from_fn(|l| r[l] + beta * d[l]);
-            }
+            turn::<L>(&mut direction, &residual, [beta; L]);
             rr = next;
         }
         *reflected = scaled(self.times::<L>(&self.root, &y), -1);

@@ -21,12 +21,14 @@ mod mixed;
 mod operator;
 mod outlook;
 mod outside;
+mod parting;
 pub(crate) mod punctual;
 mod rays;
 pub mod record;
 mod recording;
 pub mod reference;
 mod refining;
+mod reflection;
 mod representation;
 mod sent;
 mod shares;
@@ -42,9 +44,9 @@ pub(crate) use sources::weights_of;
 
 use crate::color::{Observer, Upsampler};
 use crate::geometry::RayIndex;
-use crate::hierarchy::{Glazing, Mesh, Panes, Tree, cuts, spaces};
+use crate::hierarchy::{Glazing, Mesh, Panes, Tree};
 use crate::light::lanes::Lanes;
-use crate::light::{Filters, Light, Rows, padded};
+use crate::light::{Filters, Light, Rows};
 use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance, is_small};
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
@@ -56,6 +58,7 @@ pub use flux::Closed;
 pub use held::Held;
 pub use operator::Operator;
 use outlook::Outlook;
+use parting::Parting;
 use shares::Shares;
 use sources::Sources;
 use std::time::Instant;
@@ -99,7 +102,8 @@ const LEAST_ROUNDS: usize = 3;
 /// Fewer rounds do where a mere preview is asked for, an error of so much, and the estimate is so many times smaller.
 const PREVIEW: f64 = 2.0;
 const EARLY: f64 = 4.0;
-/// A round that leaves this share of the error of the one before has stalled, if there are many links already.
+/// A round that leaves this share of the error of the one before has stalled, if there are many links already. One that finds it
+/// much greater has not: it found light that the rounds before it overlooked, as in the gap above a lamp.
 const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
 /// No round that would make more links than this, at four times those of the last: about 200 MB.
@@ -214,16 +218,6 @@ pub(crate) struct Given {
     pub(crate) tolerance: f64,
 }
 
-/// Cuts a mesh as it was cut before: the search casts no ray.
-fn recut(scene: &Scene, mesh: Mesh, parted: &[u32]) -> Mesh {
-    let cuts = cuts(&mesh, &mesh.index(scene));
-    let some: Vec<_> = parted
-        .iter()
-        .filter_map(|&k| cuts.get(k as usize).cloned())
-        .collect();
-    mesh.cut(&some)
-}
-
 impl Bake {
     /// Prepares a room: welds it, builds the hierarchy and the ray index, and decides what to simulate.
     pub fn new(scene: Scene, settings: Settings) -> Self {
@@ -234,40 +228,21 @@ impl Bake {
     pub(crate) fn with(scene: Scene, settings: Settings, known: Option<Known>) -> Self {
         let started = Instant::now();
         let plan = Plan::of(&scene);
-        let mut mesh = Mesh::new(&scene);
-        let (mut spaces_of_faces, mut parted) = (vec![0; mesh.faces.len()], Vec::new());
-        let (mut rays, mut closed) = (RayIndex::build(&[], &[], &[], &[]), None);
-        match known {
+        let mesh = Mesh::new(&scene);
+        let (parting, closed) = match known {
             Some(known) => {
-                if !known.parted.is_empty() {
-                    mesh = recut(&scene, mesh, &known.parted);
-                }
-                spaces_of_faces = known.spaces;
-                spaces_of_faces.resize(mesh.faces.len(), 0);
-                (parted, closed) = (known.parted, Some(known.closed));
+                let parting = Parting::again(&scene, mesh, known.spaces, known.parted);
+                (parting, Some(known.closed))
             }
-            None => {
-                rays = mesh.index(&scene);
-                if plan.runs(Kind::Occlusion) {
-                    let cuts = cuts(&mesh, &rays);
-                    let mut found = spaces(&mesh, &rays, &cuts, settings.seed);
-                    if is_small(&mesh) {
-                        // Here all are cut, and not only those that part spaces: a patch that something stands on
-                        // shows what is left of it as one, dark wedges along the contact.
-                        found.parted = (0..cuts.len()).collect();
-                    }
-                    if !found.parted.is_empty() {
-                        parted = found.parted.iter().map(|&k| k as u32).collect();
-                        let some: Vec<_> = found.parted.iter().map(|&k| cuts[k].clone()).collect();
-                        mesh = mesh.cut(&some);
-                        rays = mesh.index(&scene);
-                        found = spaces(&mesh, &rays, &[], settings.seed);
-                    }
-                    spaces_of_faces = found.of_face;
-                }
-            }
-        }
-        let tree = Tree::new(&mesh, &spaces_of_faces);
+            None => (Parting::find(&scene, mesh, &plan, settings.seed), None),
+        };
+        let Parting {
+            mesh,
+            rays,
+            spaces,
+            parted,
+        } = parting;
+        let tree = Tree::new(&mesh, &spaces);
         let weights = Observer::cie1931().weights(&scene.grid);
         let upsampler = Upsampler::new(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
@@ -308,27 +283,17 @@ impl Bake {
             lanes,
             probes,
             hemisphere,
-            spaces: spaces_of_faces,
+            spaces,
             parted,
             started,
         };
-        if let Some(closed) = closed {
-            [bake.closed, bake.sealed] = closed;
-            bake.look_outside(false);
-            return bake;
+        match closed {
+            Some(closed) => {
+                [bake.closed, bake.sealed] = closed;
+                bake.look_outside(false);
+            }
+            None => bake.look_around(),
         }
-        [bake.closed, bake.sealed] = bake.with_sight(|bake, sight| {
-            flux::closedness(
-                &bake.mesh,
-                &bake.tree,
-                &bake.rays,
-                sight,
-                bake.settings.seed,
-            )
-        });
-        bake.look_outside(true);
-        // In a closed room this is known without a ray.
-        bake.sent = bake.with_sight(|bake, sight| bake.sent(sight));
         bake
     }
 
@@ -350,12 +315,7 @@ impl Bake {
             least_area: LEAST_AREA * self.tree.nodes.first().map_or(0.0, |n| n.area),
             hidden: !by_rays,
         };
-        let mut tree = std::mem::take(&mut self.tree);
-        let mut graph = std::mem::take(&mut self.graph);
-        let seed = self.settings.seed;
-        let refined = self.with_sight(|_, sight| graph.refine(&mut tree, sight, seed, &demand));
-        self.tree = tree;
-        self.graph = graph;
+        let refined = self.refine_links(&demand);
         clock.lap("links");
 
         // The first links are coarse: look again once there are more. A room of many faces is not coarse even then, and
@@ -386,34 +346,17 @@ impl Bake {
         }
         clock.lap("balance");
 
-        let solved = match padded(self.lanes.len()) {
-            4 => self.solve::<4>(&rows, &leaves),
-            8 => self.solve::<8>(&rows, &leaves),
-            16 => self.solve::<16>(&rows, &leaves),
-            32 => self.solve::<32>(&rows, &leaves),
-            _ => self.solve::<64>(&rows, &leaves),
-        };
+        let (convergence, flux) = self.solve(&rows, &leaves);
         clock.lap("solve");
 
-        let receivers = self.probes.receivers(&self.tree, round);
-        let mut gathered = self.gather(&receivers);
-        if self.keep {
-            let traces = gathered.iter_mut().map(|g| g.packed.take()).collect();
-            self.watched = [std::mem::take(&mut self.watched[1]), traces];
-        }
-        let seen: Vec<[f64; 3]> = gathered
-            .iter()
-            .map(|g| self.lanes.tristimulus(&g.irradiance))
-            .collect();
-        let white = self.light.white;
-        let distance = self.probes.compare(seen, white, round, by_rays);
+        let distance = self.distance();
         clock.lap("estimate");
         let record = self.recorded(record::Measured {
             threshold,
             refined: &refined,
-            convergence: &solved.0,
+            convergence: &convergence,
             distance,
-            flux: solved.1,
+            flux,
             link_bytes: rows.bytes(),
             rays: refined.rays + escape_rays + self.direct.rays - direct_rays,
             clock: &clock,
@@ -448,7 +391,7 @@ impl Bake {
             .and_then(|k| estimate(&self.rounds[k]));
         let stalled = before
             .zip(estimate(last))
-            .is_some_and(|(before, now)| now > STALLED * before);
+            .is_some_and(|(before, now)| (STALLED..1.0 / STALLED).contains(&(now / before)));
         (4 * last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING))
             .then_some(Verdict::Exhausted)
     }

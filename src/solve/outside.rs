@@ -1,5 +1,6 @@
 //! What lies outside a room: its sky, if any of it is seen.
 
+use super::flux;
 use super::{Bake, Closed};
 use crate::light::lanes::Lanes;
 use crate::scene::effects::{Kind, Plan};
@@ -10,6 +11,17 @@ use crate::transport::openings::Openings;
 const CLOSED: &str = "the room is closed: no ray leaves it";
 
 impl Bake {
+    /// Finds out by rays what is closed, what is outside, and where the light of lamps goes first.
+    pub(super) fn look_around(&mut self) {
+        [self.closed, self.sealed] = self.with_sight(|bake, sight| {
+            let seed = bake.settings.seed;
+            flux::closedness(&bake.mesh, &bake.tree, &bake.rays, sight, seed)
+        });
+        self.look_outside(true);
+        // In a closed room this is known without a ray.
+        self.sent = self.with_sight(|bake, sight| bake.sent(sight));
+    }
+
     /// Looks for the openings of a room with a sky; takes the sky out of a room that is closed, which then costs nothing and is
     /// baked as if no sky were described.
     ///

@@ -36,6 +36,16 @@ pub(crate) struct RaySystem<'a> {
     pub(super) two_grid: Option<(&'a TwoGrid, &'a [[f64; 3]])>,
 }
 
+/// What a sweep changes, times areas.
+struct Change<const L: usize> {
+    /// By lane, whatever its sign.
+    change: [f64; L],
+    /// Reflected after it, by lane.
+    total: [f64; L],
+    /// By patch of the two grids, with its sign.
+    moved: Option<Vec<[f64; L]>>,
+}
+
 impl RaySystem<'_> {
     /// Reflected radiosity (from a guess) and irradiance by reflected light, both by leaf.
     pub(super) fn solve<const L: usize>(
@@ -47,7 +57,6 @@ impl RaySystem<'_> {
         let mut nodes = Rows::zero(self.tree.nodes.len(), L);
         let mut seen = Rows::zero(self.leaves.len(), L);
         let mut done = Convergence::default();
-        let area = |k: usize| self.areas[self.leaves[k] as usize];
         let mean_reflectance = self
             .two_grid
             .map(|(grid, _)| grid.means::<L>(&self.sums::<L>(grid, self.reflectance)));
@@ -56,55 +65,16 @@ impl RaySystem<'_> {
         let mut corrected = false;
         loop {
             self.receive::<L>(reflected, &mut nodes, &mut seen);
-            // What is reflected now, what of direct light, and what of that which a sweep brings.
-            let (mut now, mut once, mut again) = ([0.0; L], [0.0; L], [0.0; L]);
-            let rows = || {
-                reflected
-                    .all::<L>()
-                    .iter()
-                    .zip(seen.all::<L>())
-                    .zip(first.all::<L>().iter().zip(self.reflectance.all::<L>()))
-                    .enumerate()
-            };
-            for (k, ((r, h), (f, rho))) in rows() {
-                let a = area(k);
-                for l in 0..L {
-                    now[l] += a * f64::from(r[l]);
-                    once[l] += a * f64::from(rho[l] * f[l]);
-                    again[l] += a * f64::from(rho[l] * h[l]);
-                }
-            }
-            let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 1.0 };
-            let scale: [f64; L] = std::array::from_fn(|l| {
-                ratio(once[l], now[l] - again[l]).clamp(1.0 / GREATEST_SCALE, GREATEST_SCALE)
-            });
+            let scale = self.missing::<L>(reflected, &seen, first);
             let factor = scale.map(|x| x as f32);
             for h in seen.all_mut::<L>() {
                 *h = std::array::from_fn(|l| h[l] * factor[l]);
             }
-            let (mut change, mut total) = ([0.0; L], [0.0; L]);
-            let mut moved = self.two_grid.map(|(grid, _)| grid.sums::<L>());
-            for (k, (((r, h), f), rho)) in reflected
-                .all_mut::<L>()
-                .iter_mut()
-                .zip(seen.all::<L>())
-                .zip(first.all::<L>())
-                .zip(self.reflectance.all::<L>())
-                .enumerate()
-            {
-                let a = area(k);
-                let next: [f32; L] = std::array::from_fn(|l| rho[l] * (f[l] + h[l]));
-                if let (Some((grid, _)), Some(moved)) = (self.two_grid, &mut moved) {
-                    // From the scaled solution, which misses no light as a whole.
-                    let d = std::array::from_fn(|l| next[l] - scale[l] as f32 * r[l]);
-                    grid.add::<L>(k, a, &d, moved);
-                }
-                for l in 0..L {
-                    change[l] += a * f64::from((next[l] - r[l]).abs());
-                    total[l] += a * f64::from(next[l]);
-                }
-                *r = next;
-            }
+            let Change {
+                change,
+                total,
+                moved,
+            } = self.reflect::<L>(&seen, first, factor, reflected);
             done.iterations += 1;
             let before = done.residual;
             (done.residual, done.bound) = match self.two_grid {
@@ -133,6 +103,59 @@ impl RaySystem<'_> {
                 let received = [&seen, &means];
                 grid.correct::<L>(&change, rho, received, self.reflectance, reflected);
             }
+        }
+    }
+
+    /// What a sweep is to be scaled by, lane by lane, so that no light is missing: what direct light reflects, over what is
+    /// reflected now less what of it comes again.
+    fn missing<const L: usize>(&self, reflected: &Rows, seen: &Rows, first: &Rows) -> [f64; L] {
+        let (mut now, mut once, mut again) = ([0.0; L], [0.0; L], [0.0; L]);
+        let bounces = reflected.all::<L>().iter().zip(seen.all::<L>());
+        let direct = first.all::<L>().iter().zip(self.reflectance.all::<L>());
+        for (((r, h), (f, rho)), &leaf) in bounces.zip(direct).zip(self.leaves) {
+            let a = self.areas[leaf as usize];
+            for l in 0..L {
+                now[l] += a * f64::from(r[l]);
+                once[l] += a * f64::from(rho[l] * f[l]);
+                again[l] += a * f64::from(rho[l] * h[l]);
+            }
+        }
+        let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 1.0 };
+        std::array::from_fn(|l| {
+            ratio(once[l], now[l] - again[l]).clamp(1.0 / GREATEST_SCALE, GREATEST_SCALE)
+        })
+    }
+
+    /// Reflects what the leaves receive; `factor` is what it was scaled by.
+    fn reflect<const L: usize>(
+        &self,
+        seen: &Rows,
+        first: &Rows,
+        factor: [f32; L],
+        reflected: &mut Rows,
+    ) -> Change<L> {
+        let (mut change, mut total) = ([0.0; L], [0.0; L]);
+        let mut moved = self.two_grid.map(|(grid, _)| grid.sums::<L>());
+        let received = seen.all::<L>().iter().zip(first.all::<L>());
+        let rows = reflected.all_mut::<L>().iter_mut().zip(received);
+        for (k, ((r, (h, f)), rho)) in rows.zip(self.reflectance.all::<L>()).enumerate() {
+            let a = self.areas[self.leaves[k] as usize];
+            let next: [f32; L] = std::array::from_fn(|l| rho[l] * (f[l] + h[l]));
+            if let (Some((grid, _)), Some(moved)) = (self.two_grid, &mut moved) {
+                // From the scaled solution, which misses no light as a whole.
+                let d = std::array::from_fn(|l| next[l] - factor[l] * r[l]);
+                grid.add::<L>(k, a, &d, moved);
+            }
+            for l in 0..L {
+                change[l] += a * f64::from((next[l] - r[l]).abs());
+                total[l] += a * f64::from(next[l]);
+            }
+            *r = next;
+        }
+        Change {
+            change,
+            total,
+            moved,
         }
     }
 

@@ -1,5 +1,6 @@
 //! The record of a round, from what it measured and what it left.
 
+use super::estimate::Distance;
 use super::forecast::{forecast, next_round};
 use super::record::{Errors, Figure, Kind, Measured, Round};
 use super::{Bake, DE_PER_PERCENT, LIGHT_SHARE, Representation};
@@ -9,35 +10,18 @@ impl Bake {
     /// What is written down of a round.
     pub(super) fn recorded(&self, m: Measured) -> Round {
         let bake = self;
-        let estimate = Figure::estimate;
-        let spectrum = bake.spectrum_error.unwrap_or(0.0);
-        let convergence_de = m.convergence.bound * 100.0 * DE_PER_PERCENT;
-        // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
-        let all = |geometry: f64| {
-            (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt()
-        };
-        let white = bake.light.white;
         let light = &bake.light;
+        let errors = bake.errors(&m);
         let seconds = m.clock.total();
-        let error = m.distance.map(|d| all(d.de2000)).filter(|e| e.is_finite());
         let before = bake.rounds.iter();
         let curve: Vec<(f64, Option<f64>)> = before
             .map(|r| (r.round_s, r.error.total_de2000.value))
-            .chain([(seconds, error)])
+            .chain([(seconds, errors.total_de2000.value)])
             .collect();
         let times: Vec<f64> = curve.iter().map(|c| c.0).collect();
         let ahead = forecast(&curve, LIGHT_SHARE * bake.settings.error);
         let per = |bytes: usize, count: usize| bytes as f64 / count.max(1) as f64;
-        let of_links = m.link_bytes
-            + size_of_val(bake.graph.links.as_slice())
-            + size_of_val(bake.graph.blockers.as_slice())
-            + light.neighbours.bytes();
-        let of_elements = bake.tree.bytes()
-            + light.bytes()
-            + bake.direct.bytes()
-            + size_of_val(bake.areas.as_slice())
-            + size_of_val(bake.balance.factor.as_slice())
-            + bake.outlook.bytes();
+        let (of_links, of_elements) = (bake.bytes_of_links(&m), bake.bytes_of_elements());
         Round {
             record: "round",
             round: bake.rounds.len() + 1,
@@ -71,32 +55,61 @@ impl Bake {
             bytes_per_link: per(of_links, bake.graph.links.len()),
             bytes_per_element: per(of_elements, light.leaves.len()),
             iterations: m.convergence.iterations,
-            error: Errors {
-                total_de2000: estimate(error),
-                total_de_luv: estimate(m.distance.map(|d| all(d.de_luv))),
-                total_relative: estimate(m.distance.map(|d| d.relative.hypot(m.convergence.bound))),
-                geometry_chromaticity: estimate(m.distance.map(|d| d.chromaticity)),
-                geometry_de_luv: estimate(m.distance.map(|d| d.de_luv)),
-                spectrum_de_luv: Figure {
-                    value: bake.spectrum_error.filter(|e| e.is_finite()),
-                    kind: match bake.settings.representation {
-                        Representation::Guaranteed => Kind::Bound,
-                        _ => Kind::Estimate,
-                    },
-                },
-                convergence: Figure {
-                    value: Some(m.convergence.bound).filter(|e| e.is_finite()),
-                    kind: Kind::Bound,
-                },
-                convergence_de_luv: estimate(Some(convergence_de)),
-                total_xyz: estimate(
-                    m.distance
-                        .map(|d| d.relative * white.iter().sum::<f64>() / 6.0),
-                ),
-            },
+            error: errors,
             flux: m.flux,
             row_sum_defect: bake.balance.defect_before,
             row_sum_defect_after: bake.balance.defect_after,
+        }
+    }
+
+    /// Memory of links and what belongs to them, bytes.
+    fn bytes_of_links(&self, m: &Measured) -> usize {
+        m.link_bytes
+            + size_of_val(self.graph.links.as_slice())
+            + size_of_val(self.graph.blockers.as_slice())
+            + self.light.neighbours.bytes()
+    }
+
+    /// Memory of the hierarchy and the light on it, bytes.
+    fn bytes_of_elements(&self) -> usize {
+        self.tree.bytes()
+            + self.light.bytes()
+            + self.direct.bytes()
+            + size_of_val(self.areas.as_slice())
+            + size_of_val(self.balance.factor.as_slice())
+            + self.outlook.bytes()
+    }
+
+    /// What is known of the error, by source.
+    fn errors(&self, m: &Measured) -> Errors {
+        let estimate = Figure::estimate;
+        let spectrum = self.spectrum_error.unwrap_or(0.0);
+        let convergence_de = m.convergence.bound * 100.0 * DE_PER_PERCENT;
+        // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
+        let all = |geometry: f64| {
+            (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt()
+        };
+        let white = self.light.white.iter().sum::<f64>();
+        let of = |figure: &dyn Fn(Distance) -> f64| estimate(m.distance.map(figure));
+        Errors {
+            total_de2000: estimate(m.distance.map(|d| all(d.de2000)).filter(|e| e.is_finite())),
+            total_de_luv: of(&|d| all(d.de_luv)),
+            total_relative: of(&|d| d.relative.hypot(m.convergence.bound)),
+            geometry_chromaticity: of(&|d| d.chromaticity),
+            geometry_de_luv: of(&|d| d.de_luv),
+            spectrum_de_luv: Figure {
+                value: self.spectrum_error.filter(|e| e.is_finite()),
+                kind: match self.settings.representation {
+                    Representation::Guaranteed => Kind::Bound,
+                    _ => Kind::Estimate,
+                },
+            },
+            convergence: Figure {
+                value: Some(m.convergence.bound).filter(|e| e.is_finite()),
+                kind: Kind::Bound,
+            },
+            convergence_de_luv: estimate(Some(convergence_de)),
+            total_xyz: of(&|d| d.relative * white / 6.0),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Bake, by_rays, flux};
 use crate::light::{brightness, keenness};
-use crate::link::{Demand, MAX_DEPTH};
+use crate::link::{Demand, MAX_DEPTH, Refined};
 use rayon::prelude::*;
 
 /// Levels that a round splits leaves by where reflected light varies.
@@ -45,6 +45,16 @@ impl Bake {
             }
         }
         keen
+    }
+
+    /// Refines the links until none exceeds the demand.
+    pub(super) fn refine_links(&mut self, demand: &Demand) -> Refined {
+        let mut tree = std::mem::take(&mut self.tree);
+        let mut graph = std::mem::take(&mut self.graph);
+        let seed = self.settings.seed;
+        let refined = self.with_sight(|_, sight| graph.refine(&mut tree, sight, seed, demand));
+        (self.tree, self.graph) = (tree, graph);
+        refined
     }
 
     /// Learns how new leaves look out; returns the rays cast.

@@ -1,19 +1,29 @@
 //! The solve of a round: from direct light on the leaves to the light on every patch, with the flux that went where.
 
-use super::conjugate::{Convergence, System};
+use super::conjugate::{Convergence, System, step};
 use super::flux::{self, Closed};
 use super::linear;
-use super::mixed::Mixed;
 use super::operator::{self, Operator};
 use super::rays::RaySystem;
-use super::sources::{Painter, Sources};
+use super::reflection::Reflection;
+use super::sources::Painter;
 use super::{Bake, Given};
-use crate::light::{Arrival, Light, Neighbours, Rows, brightness, weighed};
+use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded, weighed};
 use crate::link::LinkRows;
 use crate::scene::effects::Kind;
 
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.002;
+
+/// The leaves under direct light, and how they reflect: what the bounces start from.
+struct Lit<'a> {
+    leaves: &'a [u32],
+    /// Direct irradiance by leaf.
+    first: &'a Rows,
+    reflection: &'a Reflection,
+    /// Relative error at which the solve ends.
+    tolerance: f64,
+}
 
 impl Bake {
     /// Turns materials into rows.
@@ -27,7 +37,22 @@ impl Bake {
     }
 
     /// Solves on the current links and measures the solution.
-    pub(super) fn solve<const L: usize>(
+    pub(super) fn solve(
+        &mut self,
+        rows: &LinkRows,
+        leaves: &[u32],
+    ) -> (Convergence, flux::Balance) {
+        match padded(self.lanes.len()) {
+            4 => self.solve_on::<4>(rows, leaves),
+            8 => self.solve_on::<8>(rows, leaves),
+            16 => self.solve_on::<16>(rows, leaves),
+            32 => self.solve_on::<32>(rows, leaves),
+            _ => self.solve_on::<64>(rows, leaves),
+        }
+    }
+
+    /// The same on rows of so many lanes.
+    fn solve_on<const L: usize>(
         &mut self,
         rows: &LinkRows,
         leaves: &[u32],
@@ -49,7 +74,7 @@ impl Bake {
         solved
     }
 
-    /// The same with what it starts from.
+    /// The solve itself, with what it starts from.
     pub(crate) fn solve_with<const L: usize>(
         &mut self,
         rows: &LinkRows,
@@ -57,166 +82,174 @@ impl Bake {
         given: Given,
     ) -> (Convergence, flux::Balance) {
         let Given {
-            sources:
-                Sources {
-                    mut reflectance,
-                    emission,
-                    greatest,
-                },
+            sources,
             mut first,
             mut reflected,
             emitted,
             tolerance,
         } = given;
-        let nodes = self.tree.nodes.len();
+        let emission = sources.emission;
         let by_rays = self.by_rays();
         self.outlook.tints.on(&self.scene, &self.filters);
         let mut scaled = flux::Scaled::default();
         if self.sealed == Closed::Yes && !by_rays {
-            let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);
-            let before = lumens(&first);
-            flux::conserve(&mut first, &emission, &self.lamps, &self.areas, leaves);
-            scaled.direct = flux::ratio(lumens(&first), before);
+            scaled.direct = self.conserve(&mut first, &emission, leaves);
         }
-        let mixed = self
-            .lanes
-            .is_mixed()
-            .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes));
-        let plus = |a: &Rows, b: &Rows| {
-            let mut sum = a.clone();
-            for (a, b) in sum.all_mut::<L>().iter_mut().zip(b.all::<L>()) {
-                *a = std::array::from_fn(|l| a[l] + b[l]);
-            }
-            sum
+        let reflection = Reflection {
+            rows: sources.reflectance,
+            greatest: sources.greatest,
+            mixed: (self.lanes.is_mixed())
+                .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes)),
         };
-        let reflect = |irradiance: &Rows| match &mixed {
-            Some(mixed) => mixed.reflect::<L>(irradiance),
-            None => {
-                let mut reflected = irradiance.clone();
-                for (r, rho) in reflected
-                    .all_mut::<L>()
-                    .iter_mut()
-                    .zip(reflectance.all::<L>())
-                {
-                    *r = std::array::from_fn(|l| r[l] * rho[l]);
-                }
-                reflected
-            }
+        let sums = if by_rays {
+            Vec::new()
+        } else {
+            let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
+            crate::link::row_sums(&self.tree, rows, &self.areas, &factor)
+        };
+        let lit = Lit {
+            leaves,
+            first: &first,
+            reflection: &reflection,
+            tolerance,
         };
         let runs = self.plan.runs(Kind::Interreflection);
-        let (convergence, mut irradiance, sums) = if by_rays {
-            let system = RaySystem {
-                tree: &self.tree,
-                outlook: &self.outlook,
-                leaves,
-                areas: &self.areas,
-                reflectance: &reflectance,
-                greatest: &greatest,
-                two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
-            };
-            let (convergence, seen) = match &mixed {
-                _ if !runs => (Convergence::default(), Rows::zero(leaves.len(), L)),
-                Some(mixed) => mixed.solve_by_rays::<L>(&system, &first, &mut reflected, tolerance),
-                None => system.solve::<L>(&first, &mut reflected, tolerance),
-            };
-            (convergence, seen, Vec::new())
+        let (convergence, mut irradiance) = if !runs {
+            (Convergence::default(), Rows::zero(leaves.len(), L))
+        } else if by_rays {
+            self.bounce_by_rays::<L>(&lit, &mut reflected)
         } else {
-            let system = System {
-                operator: Operator::new(
-                    &self.tree,
-                    rows,
-                    leaves,
-                    &self.areas,
-                    &self.balance.factor,
-                ),
-                reflectance: &reflectance,
-                greatest: &greatest,
-            };
-            let convergence = match &mixed {
-                _ if !runs => Convergence::default(),
-                Some(mixed) => {
-                    mixed.solve::<L>(&system.operator, &first, &mut reflected, tolerance)
-                }
-                None => system.solve::<L>(&first, &mut reflected, tolerance),
-            };
-            let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
-            let sums = crate::link::row_sums(&self.tree, rows, &self.areas, &factor);
-            let mut irradiance = Rows::zero(leaves.len(), L);
-            if runs {
-                let slopes = linear::Slopes::new(&self.tree, rows, &self.areas, leaves, &sums);
-                let bounced = reflect(&first);
-                for _ in 0..linear::PASSES {
-                    irradiance = slopes.irradiance::<L>(&reflected);
-                    let before = flux::lumens(&self.areas, &self.lanes, leaves, &irradiance);
-                    let again = reflect(&irradiance);
-                    let [over, without] = slopes.balance::<L>(&irradiance, &bounced, &again);
-                    if mixed.is_some() {
-                        // Lanes are no bands: it is each of the 64 leaves that keeps its energy.
-                        let leaves_of = |sum: [f64; L]| self.lanes.leaves(&sum.map(|x| x as f32));
-                        let (over, without) = (leaves_of(over), leaves_of(without));
-                        let scale = std::array::from_fn(|k| linear::amplitude(over[k], without[k]));
-                        let whole = vec![0; leaves.len()];
-                        irradiance =
-                            Mixed::new(&[scale], whole, &self.lanes, L).reflect::<L>(&irradiance);
-                    } else {
-                        let scale: [f32; L] =
-                            std::array::from_fn(|l| linear::amplitude(over[l], without[l]) as f32);
-                        for row in irradiance.all_mut::<L>() {
-                            *row = std::array::from_fn(|l| row[l] * scale[l]);
-                        }
-                    }
-                    let after = flux::lumens(&self.areas, &self.lanes, leaves, &irradiance);
-                    scaled.reflected = flux::ratio(after, before);
-                    reflected = reflect(&plus(&irradiance, &first));
-                }
-            }
-            (convergence, irradiance, sums)
+            let convergence = self.bounce_along_links::<L>(&lit, rows, &mut reflected);
+            let (irradiance, ratio) = self.slope::<L>(&lit, rows, &sums, &mut reflected);
+            scaled.reflected = ratio;
+            (convergence, irradiance)
         };
-        irradiance = plus(&irradiance, &first);
+        step::<L>(&mut irradiance, &first, [1.0; L]);
         if !runs {
-            reflected = reflect(&irradiance);
+            reflected = reflection.of::<L>(&irradiance);
         }
-        if mixed.is_some() {
-            // Seen lane by lane, albedo is what came back of what came in.
-            for ((rho, r), h) in reflectance
-                .all_mut::<L>()
-                .iter_mut()
-                .zip(reflected.all::<L>())
-                .zip(irradiance.all::<L>())
-            {
-                *rho = std::array::from_fn(|l| if h[l] == 0.0 { 0.0 } else { r[l] / h[l] });
-            }
-        }
+        let on_nodes = self.on_nodes::<L>(&reflected, leaves);
         let fluxes = flux::FluxRows {
             emission: &emission,
             reflected: &reflected,
             irradiance: &irradiance,
             first: &first,
-            reflectance: &reflectance,
+            reflectance: &reflection.albedo::<L>(&reflected, &irradiance),
         };
-        let on_nodes = self.on_nodes::<L>(&reflected, leaves);
         let mut flux = if by_rays {
-            let mut whole = Rows::zero(leaves.len(), L);
-            if runs {
-                self.outlook
-                    .irradiance_of_whole::<L>(leaves, &on_nodes, &mut whole);
-            }
-            let whole = flux::Whole {
-                indirect: &whole,
-                direct: &|leaf| f64::from(self.direct.whole(leaf)),
-                area: &|leaf| self.tree.node(leaf).area,
-            };
-            flux::flux_by_rays(&self.areas, &self.lanes, leaves, &fluxes, &whole)
+            self.flux_of_wholes::<L>(leaves, &fluxes, &on_nodes)
         } else {
             flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums)
         };
         (flux.sent, flux.scaled) = (self.sent, scaled);
+        let emitted = emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves));
+        self.shine(leaves, emitted, on_nodes, irradiance);
+        (convergence, flux)
+    }
+
+    /// Scales direct light so that all that lamps give out arrives; its flux after over before.
+    fn conserve(&self, first: &mut Rows, emission: &Rows, leaves: &[u32]) -> f64 {
+        let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);
+        let before = lumens(first);
+        flux::conserve(first, emission, &self.lamps, &self.areas, leaves);
+        flux::ratio(lumens(first), before)
+    }
+
+    /// All bounces where leaves look for themselves: how the solve went, and irradiance by reflected light.
+    fn bounce_by_rays<const L: usize>(
+        &self,
+        lit: &Lit,
+        reflected: &mut Rows,
+    ) -> (Convergence, Rows) {
+        let system = RaySystem {
+            tree: &self.tree,
+            outlook: &self.outlook,
+            leaves: lit.leaves,
+            areas: &self.areas,
+            reflectance: &lit.reflection.rows,
+            greatest: &lit.reflection.greatest,
+            two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
+        };
+        match &lit.reflection.mixed {
+            Some(mixed) => mixed.solve_by_rays::<L>(&system, lit.first, reflected, lit.tolerance),
+            None => system.solve::<L>(lit.first, reflected, lit.tolerance),
+        }
+    }
+
+    /// All bounces along links.
+    fn bounce_along_links<const L: usize>(
+        &self,
+        lit: &Lit,
+        rows: &LinkRows,
+        reflected: &mut Rows,
+    ) -> Convergence {
+        let factor = &self.balance.factor;
+        let system = System {
+            operator: Operator::new(&self.tree, rows, lit.leaves, &self.areas, factor),
+            reflectance: &lit.reflection.rows,
+            greatest: &lit.reflection.greatest,
+        };
+        match &lit.reflection.mixed {
+            Some(mixed) => mixed.solve::<L>(&system.operator, lit.first, reflected, lit.tolerance),
+            None => system.solve::<L>(lit.first, reflected, lit.tolerance),
+        }
+    }
+
+    /// Last passes over the links, see [`linear`]: irradiance by reflected light, and what its flux was multiplied by.
+    fn slope<const L: usize>(
+        &self,
+        lit: &Lit,
+        rows: &LinkRows,
+        sums: &[f64],
+        reflected: &mut Rows,
+    ) -> (Rows, f64) {
+        let (leaves, reflection) = (lit.leaves, lit.reflection);
+        let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);
+        let slopes = linear::Slopes::new(&self.tree, rows, &self.areas, leaves, sums);
+        let bounced = reflection.of::<L>(lit.first);
+        let (mut irradiance, mut ratio) = (Rows::default(), 1.0);
+        for _ in 0..linear::PASSES {
+            irradiance = slopes.irradiance::<L>(reflected);
+            let before = lumens(&irradiance);
+            let again = reflection.of::<L>(&irradiance);
+            let energy = slopes.balance::<L>(&irradiance, &bounced, &again);
+            reflection.scale::<L>(&self.lanes, &mut irradiance, energy);
+            ratio = flux::ratio(lumens(&irradiance), before);
+            let mut all = irradiance.clone();
+            step::<L>(&mut all, lit.first, [1.0; L]);
+            *reflected = reflection.of::<L>(&all);
+        }
+        (irradiance, ratio)
+    }
+
+    /// The flux where leaves look for themselves.
+    fn flux_of_wholes<const L: usize>(
+        &self,
+        leaves: &[u32],
+        rows: &flux::FluxRows,
+        on_nodes: &Rows,
+    ) -> flux::Balance {
+        let mut whole = Rows::zero(leaves.len(), L);
+        if self.plan.runs(Kind::Interreflection) {
+            self.outlook
+                .irradiance_of_whole::<L>(leaves, on_nodes, &mut whole);
+        }
+        let whole = flux::Whole {
+            indirect: &whole,
+            direct: &|leaf| f64::from(self.direct.whole(leaf)),
+            area: &|leaf| self.tree.node(leaf).area,
+        };
+        flux::flux_by_rays(&self.areas, &self.lanes, leaves, rows, &whole)
+    }
+
+    /// Takes over a solution: light by node, irradiance by leaf, and the white that eyes adapt to.
+    fn shine(&mut self, leaves: &[u32], emitted: Rows, reflected: Rows, irradiance: Rows) {
         self.light = Light {
-            reflected: on_nodes,
-            emitted: emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves)),
+            reflected,
+            emitted,
             irradiance,
             leaves: leaves.to_vec(),
-            neighbours: Neighbours::new(nodes, &self.graph),
+            neighbours: Neighbours::new(self.tree.nodes.len(), &self.graph),
             white: self.light.white,
             half_size: self.mesh.half_size,
             ..Light::default()
@@ -226,7 +259,6 @@ impl Bake {
             .white
             .unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
         self.light.measure(&self.tree, &self.lanes);
-        (convergence, flux)
     }
 
     /// What turns a row into brightness, share of the white's.

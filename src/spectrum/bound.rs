@@ -18,6 +18,7 @@ use super::interval::{Cmf, Estimate, Interval, Moment};
 
 /// An interval with a radius around its errors.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Bounded {
     /// Value and errors, as [`Moment`] has them, moved to the middle of what is possible.
     pub moment: Moment,

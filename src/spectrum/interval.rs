@@ -55,6 +55,7 @@ pub trait Interval: Copy + Default + std::fmt::Debug {
 /// The paper's record: a value and three errors, the neglected term left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[repr(C, align(32))]
+#[non_exhaustive]
 pub struct Estimate {
     /// The value held.
     pub value: f64,

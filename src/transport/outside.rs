@@ -254,7 +254,7 @@ impl Outside {
         .sum()
     }
 
-    /// By rays.
+    /// By rays over the hemisphere and to the openings.
     fn by_rays(
         &self,
         (sight, glass): (&Sight, Option<Glass>),
@@ -278,6 +278,14 @@ impl Outside {
                 wide
             }
         };
+        let around = look.open.len();
+        self.look_through_openings(sight, to, narrow, look);
+        let counts = [wide as f64, narrow as f64];
+        self.combine((sight, glass), to, (counts, around), look)
+    }
+
+    /// Rays to the openings: adds the directions that lead outside.
+    fn look_through_openings(&self, sight: &Sight, to: &Receiver, count: usize, look: &mut Look) {
         let sky = |d: DVec3| {
             if d.y > 0.0 {
                 PI * self.sky.radiance(d)
@@ -289,7 +297,7 @@ impl Outside {
             .weigh(to.point, to.normal, sky, &mut look.choice);
         look.segments.clear();
         let turn = hash(to.seed, 0x5c1);
-        for k in 0..narrow as u32 {
+        for k in 0..count as u32 {
             let at = self.openings.choose(&look.choice, sequence02(k, turn));
             let ahead = at.filter(|at| to.normal.dot(at - to.point) > 0.0);
             look.segments
@@ -297,11 +305,21 @@ impl Outside {
         }
         sight.blocked(&look.segments, &View::Crowded, &mut look.blocked);
         look.rays += look.segments.len() as u64;
-        let around = look.open.len();
         let ways = look.segments.iter().zip(&look.blocked);
         let free = ways.filter(|(_, blocked)| !**blocked);
         look.open
             .extend(free.map(|(s, _)| (s.to.as_dvec3() - to.point).normalize()));
+    }
+
+    /// Irradiance by the open directions, by the power heuristic: of so many rays over the hemisphere, whose open ones stand
+    /// first, and of so many to the openings.
+    fn combine(
+        &self,
+        (sight, glass): (&Sight, Option<Glass>),
+        to: &Receiver,
+        (counts, around): ([f64; 2], usize),
+        look: &mut Look,
+    ) -> [f64; 2] {
         let (mut seen, mut squares, mut sum) = ([0.0; 2], 0.0, 0.0);
         let mut tints = [Tint::default(); 2];
         let far = 4.0 * sight.mesh.half_size;
@@ -311,8 +329,8 @@ impl Outside {
                 continue;
             }
             let densities = [
-                wide as f64 * cosine / PI,
-                narrow as f64 * self.openings.density(&look.choice, to.point, d),
+                counts[0] * cosine / PI,
+                counts[1] * self.openings.density(&look.choice, to.point, d),
             ];
             let squared = densities[0] * densities[0] + densities[1] * densities[1];
             let own = densities[usize::from(k >= around)];
@@ -334,8 +352,7 @@ impl Outside {
                 (squares, sum) = (squares + left * left, sum + left);
             }
         }
-        let count = (wide + narrow) as f64;
-        look.noise = (squares - sum * sum / count).max(0.0);
+        look.noise = (squares - sum * sum / (counts[0] + counts[1])).max(0.0);
         look.tints = tints.map(|tint| tint.mean());
         seen
     }

@@ -129,7 +129,24 @@ struct Packed<'a> {
 }
 
 impl Packed<'_> {
+    #[inline]
     fn number(&mut self) -> Read<u64> {
+        // Nearly all differences take one byte or two.
+        match *self.rest {
+            [a @ 0..128, ref rest @ ..] => {
+                self.rest = rest;
+                Ok(a.into())
+            }
+            [a, b @ 0..128, ref rest @ ..] => {
+                self.rest = rest;
+                Ok(u64::from(b) << 7 | u64::from(a & 127))
+            }
+            _ => self.long_number(),
+        }
+    }
+
+    #[cold]
+    fn long_number(&mut self) -> Read<u64> {
         let mut x = 0;
         for (k, &byte) in self.rest.iter().enumerate().take(9) {
             x |= u64::from(byte & 127) << (7 * k);

@@ -3,6 +3,7 @@
 #[path = "../report/browser.rs"]
 mod browser;
 mod page;
+mod points;
 mod program;
 
 use program::{Program, answer, command, folder_with};
@@ -41,6 +42,7 @@ fn only_who_has_the_token_from_here_is_answered() {
         "/events",
         "/mesh",
         "/light?mesh=1&had=0",
+        "/point?mesh=1&part=0&vertices=0,0,0&weights=1,0,0",
         "/nothing",
     ] {
         let sign = if path.contains('?') { '&' } else { '?' };

@@ -127,6 +127,13 @@ fn the_page_shows_rounds_the_file_and_changes() {
         "{}",
         browser.text("point")
     );
+    // The rest comes from the program: colour, temperature, error and a plot.
+    browser.wait_for("document.querySelector('#point svg') !== null");
+    let point = browser.text("point");
+    for part in ["x, y", "CCT", " K ", "ΔE00", "Surface", "mW/m²/nm"] {
+        assert!(point.contains(part), "{part}: {point}");
+    }
+    browser.screen("point.b64");
     browser.press("2", "Digit2", 50);
     let lux = browser.pixels();
     assert!(differ(&last, &lux) > 500);
@@ -135,6 +142,12 @@ fn the_page_shows_rounds_the_file_and_changes() {
     assert!(differ(&lux, &browser.pixels()) > 200);
     browser.prefer_dark();
     browser.screen("dark.b64");
+    // A reading follows the light.
+    let before = browser.text("point");
+    browser.run(&slide(10));
+    browser.wait_for(&format!(
+        "document.getElementById('point').textContent !== {before:?}"
+    ));
 
     browser.run("document.getElementById('save').click()");
     program.wait("saved", |s| s["saved"].is_array());

@@ -32,6 +32,7 @@ const LEAST: f64 = 1.0;
 
 /// `NAME.maps.json`.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct Index {
     /// `haarlight.lightmaps`.
     pub format: &'static str,
@@ -60,6 +61,7 @@ pub struct Index {
 
 /// A page.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct PageEntry {
     /// Texels.
     pub width: usize,
@@ -82,6 +84,7 @@ pub struct LayerEntry {
 
 /// A primitive with light. Its place on the page is `uv_rect[0..2] + uv * (uv_rect[2..4] - uv_rect[0..2])`, uv its set `texcoord`.
 #[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
 pub struct MeshEntry {
     /// Node of the glb that shows it.
     pub node: usize,

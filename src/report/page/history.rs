@@ -45,6 +45,12 @@ impl History {
         });
     }
 
+    /// Forgets all but the last rounds.
+    pub(crate) fn keep_last(&mut self, rounds: usize) {
+        let gone = self.rounds.len().saturating_sub(rounds);
+        self.rounds.drain(..gone);
+    }
+
     /// Tristimulus irradiance of `count` vertices in each round that was kept, with the number of the round.
     pub(super) fn at(
         &self,

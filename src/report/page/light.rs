@@ -129,6 +129,22 @@ fn glows(bake: &Bake, baked: &Baked, part: usize) -> bool {
     scene.materials[surface.material].emission.is_some()
 }
 
+/// Error of the light at each vertex of a baked mesh, CIEDE2000, and its mean by area; `order`: its surfaces as the file has
+/// them. None where it is not known.
+pub(crate) fn error_map(
+    bake: &Bake,
+    baked: &Baked,
+    history: &History,
+    order: &[usize],
+) -> Option<(Vec<f64>, f64)> {
+    let corners = corners(bake, baked, order);
+    let count = order.iter().map(|&k| baked.surfaces[k].vertices.len());
+    let mut area = vec![0.0; count.sum()];
+    corners.iter().for_each(|c| area[c.vertex] += c.area);
+    let steps = history.at(bake.tree(), &corners, area.len());
+    errors(bake, &steps, &corners, &area)
+}
+
 /// Error of the light at each vertex, and its mean by area: how far the last two rounds are from each other there, evened out
 /// and scaled to have the mean that the last round states. None where a round has no estimate.
 fn errors(

@@ -9,6 +9,7 @@ mod light;
 mod room;
 
 pub use history::History;
+pub(crate) use light::error_map;
 pub use room::lamp_spectra;
 pub use room::of as room;
 
@@ -24,6 +25,9 @@ use std::io::Write;
 
 /// Around the data.
 const FRAME: &str = include_str!("page.html");
+/// The picture with what lies in it, and its keys: as live pages have them.
+pub(crate) const PICTURE: &str = include_str!("picture.html");
+pub(crate) const KEYS: &str = include_str!("keys.html");
 pub(crate) const STYLE: &str = include_str!("page.css");
 /// `tools/web`, bundled, gzip.
 pub(crate) const VIEWER: &[u8] = include_bytes!("viewer.js.gz");
@@ -67,6 +71,8 @@ impl Page<'_> {
         let parts = [
             ("{{title}}", escaped(name)),
             ("{{style}}", STYLE.to_owned()),
+            ("{{picture}}", PICTURE.to_owned()),
+            ("{{keys}}", KEYS.to_owned()),
             ("{{notices}}", escaped(NOTICES)),
             ("{{data}}", script(&data)),
             ("{{glb}}", base64(&deflated(self.glb)?)),

@@ -4,16 +4,24 @@
 //! carries a light of KHR_lights_punctual as well (some exporters write both), it is one lamp: the colours multiply.
 
 use super::super::Source;
-use super::super::buffers::{Buffers, Views};
 use super::super::check::Check;
 use super::super::json::{self, Item};
 use super::super::profile::Profile;
-use super::super::uri;
 use super::wish::checked;
+use serde::Deserialize;
 use serde_json::Value;
 use std::sync::Arc;
 
 const NAME: &str = "EXT_lights_ies";
+const TABLE: &str = "/extensions/EXT_lights_ies";
+
+/// The extension on a node.
+#[derive(Debug, Deserialize)]
+struct Ies {
+    light: Option<u32>,
+    multiplier: Option<f64>,
+    color: Option<[f64; 3]>,
+}
 
 /// What a node says.
 #[derive(Debug, Clone)]
@@ -28,19 +36,18 @@ pub struct IesNode {
 
 /// The profile at a node, if there is one.
 pub(in crate::scene) fn ies_node(json: &Value, node: &Item, check: &mut Check) -> Option<IesNode> {
-    let given = node.extension(NAME, check)?;
-    let light = given.index("light", check);
-    if light.is_none() {
+    let given = node.extension::<Ies>(NAME, check)?;
+    let Some(light) = given.light else {
         let what = format!("{NAME} does not say which light");
         check.problem(&node.place, what, "export the file again");
-    }
-    let light = light?;
-    let table = json.get("extensions").and_then(|e| e.get(NAME));
+        return None;
+    };
+    let light = light as usize;
     let nothing = Value::Null;
-    let table = table.unwrap_or(&nothing);
+    let table = json.pointer(TABLE).unwrap_or(&nothing);
     let item = json::referred(table, "lights", "profile", light, &node.place, check)?;
-    let multiplier = given.number("multiplier", check).unwrap_or(1.0);
-    let color = given.numbers::<3>("color", check).unwrap_or([1.0; 3]);
+    let multiplier = given.multiplier.unwrap_or(1.0);
+    let color = given.color.unwrap_or([1.0; 3]);
     if multiplier < 0.0 || color.iter().any(|&c| c < 0.0) {
         let what = format!("{NAME} has a negative multiplier or colour");
         check.problem(&node.place, what, "give numbers of at least 0");
@@ -60,8 +67,7 @@ pub(in crate::scene) fn profiles<'a>(
     check: &mut Check,
 ) -> Vec<Option<Arc<Profile>>> {
     let nothing = Value::Null;
-    let table = source.json.get("extensions").and_then(|e| e.get(NAME));
-    let table = table.unwrap_or(&nothing);
+    let table = source.json.pointer(TABLE).unwrap_or(&nothing);
     let mut used = vec![false; json::len(table, "lights")];
     for node in nodes {
         used[node.light] = true;
@@ -72,25 +78,8 @@ pub(in crate::scene) fn profiles<'a>(
             place: format!("{NAME}, {}", item.place),
             ..item
         };
-        let bytes = bytes(source, &item, check)?;
+        let bytes = source.bytes_of(&item, check)?;
         checked(&bytes, &item.place, check)
     };
     used.into_iter().enumerate().map(read).collect()
-}
-
-fn bytes(source: &Source, item: &Item, check: &mut Check) -> Option<Vec<u8>> {
-    if item.map.contains_key("uri") {
-        let given = item.text("uri", check)?;
-        let folder = uri::folder_of(&source.path);
-        let failed = |why| check.problem(&item.place, why, "put the file there");
-        return uri::read(&folder, given).map_err(failed).ok();
-    }
-    let Some(view) = item.index("bufferView", check) else {
-        let what = "has neither a URI nor a bufferView";
-        check.problem(&item.place, what, "export the file again");
-        return None;
-    };
-    let buffers = Buffers::sound(source.buffers.clone());
-    let span = Views::new(&source.json, &buffers).view(view, &item.place, check)?;
-    Some(span.bytes().to_vec())
 }

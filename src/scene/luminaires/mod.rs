@@ -23,7 +23,8 @@ mod wish;
 
 pub(super) use extension::{IesNode, ies_node, profiles};
 pub use mounted::Luminaire;
-pub(super) use surfaces::{add, remount, tilt_share};
+pub(super) use mounted::tilt_share;
+pub(super) use surfaces::{add, remount};
 pub(super) use wish::{
     LampWish, OF_EMISSION, ProfileWish, is_ours, read, read_profile, says_spectrum,
 };

@@ -230,6 +230,12 @@ impl Luminaire {
     }
 }
 
+/// Share of its light that a lamp has left, hung as it is.
+pub(in crate::scene) fn tilt_share(luminaire: &Luminaire) -> f64 {
+    let cosine = luminaire.nadir().dot(DVec3::NEG_Y).clamp(-1.0, 1.0);
+    luminaire.profile.at_tilt(cosine.acos().to_degrees())
+}
+
 /// Area times normal.
 fn normal(&[a, b, c]: &[DVec3; 3]) -> DVec3 {
     0.5 * (b - a).cross(c - a)

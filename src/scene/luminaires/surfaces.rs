@@ -5,9 +5,10 @@
 
 use super::super::check::Check;
 use super::super::json::short;
-use super::super::light::{GREATEST_SIZE, bearable};
+use super::super::lamps::{GREATEST_SIZE, bearable};
 use super::super::{LightKind, Material, PunctualLight, Scene, Sides, Surface};
-use super::{Luminaire, ProfileWish};
+use super::mounted::{Luminaire, tilt_share};
+use super::wish::ProfileWish;
 use crate::data::Leaves;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -62,22 +63,7 @@ pub(in crate::scene) fn add(
             };
             let tilt = tilt_share(&luminaire);
             lost = lost.max(1.0 - luminaire.reach());
-            let longest = luminaire.profile.opening_m.into_iter().fold(0.0, f64::max);
-            let across = 2.0 * scale * luminaire.radius();
-            if longest > 0.0 && across > TOO_LONG * longest {
-                check.warn(format!(
-                    "{place}: {} is {across:.2} m across, and its profile that of a lamp of {longest:.2} m; each surface \
-                     shines once, whatever its size",
-                    surface.name
-                ));
-            }
-            if lies_across(&luminaire) {
-                check.warn(format!(
-                    "{place}: the longer side of {} lies across the one of its profile's opening; \"turn_deg\": 90 \
-                     turns the profile",
-                    surface.name
-                ));
-            }
+            odd(&luminaire, surface, scale, &place, check);
             area += luminaire.area();
             flux += wish.flux * tilt;
             lights.push(PunctualLight {
@@ -108,6 +94,26 @@ pub(in crate::scene) fn add(
     }
 }
 
+/// Warns of a surface that has not the form of its profile's lamp.
+fn odd(luminaire: &Luminaire, surface: &Surface, scale: f64, place: &str, check: &mut Check) {
+    let longest = luminaire.profile.opening_m.into_iter().fold(0.0, f64::max);
+    let across = 2.0 * scale * luminaire.radius();
+    if longest > 0.0 && across > TOO_LONG * longest {
+        check.warn(format!(
+            "{place}: {} is {across:.2} m across, and its profile that of a lamp of {longest:.2} m; each surface \
+             shines once, whatever its size",
+            surface.name
+        ));
+    }
+    if lies_across(luminaire) {
+        check.warn(format!(
+            "{place}: the longer side of {} lies across the one of its profile's opening; \"turn_deg\": 90 \
+             turns the profile",
+            surface.name
+        ));
+    }
+}
+
 /// Is a surface long where the opening of its profile is short?
 fn lies_across(luminaire: &Luminaire) -> bool {
     let long = |[a, b]: [f64; 2]| match (a > LONG * b, b > LONG * a) {
@@ -118,12 +124,6 @@ fn lies_across(luminaire: &Luminaire) -> bool {
     let [a, b, _] = luminaire.profile.opening_m;
     let (own, opening) = (long(luminaire.extent()), long([a, b]));
     own.is_some() && opening.is_some() && own != opening
-}
-
-/// Share of its light that a lamp has left, hung as it is.
-pub(in crate::scene) fn tilt_share(luminaire: &Luminaire) -> f64 {
-    let cosine = luminaire.nadir().dot(glam::DVec3::NEG_Y).clamp(-1.0, 1.0);
-    luminaire.profile.at_tilt(cosine.acos().to_degrees())
 }
 
 /// Mounts the profiles of surfaces again, which were scaled or turned. A surface that shows nothing any more keeps its light as it was.

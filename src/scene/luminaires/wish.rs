@@ -6,9 +6,8 @@
 //! ```
 
 use super::super::json::short;
-use super::super::known::Sampled;
 use super::super::profile::Profile;
-use super::super::spectra_file::Reader;
+use super::super::reader::{Reader, Sampled};
 use super::super::uri;
 use crate::data::Kind;
 use serde_json::{Map, Value};

@@ -188,26 +188,7 @@ fn table(
         azimuth.push(azimuth[0] + 360.0);
         candela.push(candela[0].clone());
     }
-    // What a symmetry folds must reach to where it folds.
-    let folds = match kind {
-        Symmetry::Plane0 => Some([0.0, 180.0]),
-        Symmetry::Plane90 => Some([-90.0, 90.0]),
-        Symmetry::Quadrant => Some([0.0, 90.0]),
-        Symmetry::None | Symmetry::Axial => None,
-    };
-    let ends = [azimuth[0], azimuth[azimuth.len() - 1]];
-    if let Some(folds) = folds
-        && (0..2).any(|k| (ends[k] - folds[k]).abs() > 0.1)
-    {
-        let what = format!(
-            "planes with symmetry {symmetry} reach from {} to {}",
-            ends[0], ends[1]
-        );
-        return Err(lines.fault(
-            what,
-            format!("they must reach from {} to {}", folds[0], folds[1]),
-        ));
-    }
+    reaches(lines, kind, [azimuth[0], azimuth[azimuth.len() - 1]])?;
     Ok(Measured {
         angles: Angles::C,
         symmetry: kind,
@@ -215,6 +196,23 @@ fn table(
         azimuth,
         candela,
     })
+}
+
+/// What a symmetry folds must reach to where it folds.
+fn reaches(lines: &Lines, kind: Symmetry, ends: [f64; 2]) -> Result<(), Fault> {
+    let (number, folds) = match kind {
+        Symmetry::Plane0 => (2, [0.0, 180.0]),
+        Symmetry::Plane90 => (3, [-90.0, 90.0]),
+        Symmetry::Quadrant => (4, [0.0, 90.0]),
+        Symmetry::None | Symmetry::Axial => return Ok(()),
+    };
+    if (0..2).all(|k| (ends[k] - folds[k]).abs() <= 0.1) {
+        return Ok(());
+    }
+    let [from, to] = ends;
+    let what = format!("planes with symmetry {number} reach from {from} to {to}");
+    let next = format!("they must reach from {} to {}", folds[0], folds[1]);
+    Err(lines.fault(what, next))
 }
 
 fn rising(lines: &Lines, before: &[f64], angle: f64, most: f64, what: &str) -> Result<(), Fault> {

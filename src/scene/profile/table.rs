@@ -28,6 +28,7 @@ const SAME: f64 = 1e-3;
 
 /// The types of LM-63: where the axis of the goniometer lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Angles {
     /// Of headlamps: the axis upright, the lamp aimed across.
     A,
@@ -59,6 +60,7 @@ impl Angles {
 
 /// What a file leaves out because it is as the rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Symmetry {
     /// Nothing.
     None,

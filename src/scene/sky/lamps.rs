@@ -33,26 +33,7 @@ pub(crate) fn join(
     if wish.is_empty() {
         return None;
     }
-    let Some(kind) = wish.kind else {
-        let what = "something is said of sky or sun, but not what the sky is like";
-        check.problem(
-            "sky",
-            what,
-            "give --sky clear, or \"type\" in the file of spectra",
-        );
-        return None;
-    };
-    let sun = match sun_of(wish, nodes, lights, check) {
-        Ok(sun) => sun,
-        Err(()) => return None,
-    };
-    if sun.is_none() && Distribution::follows_sun(kind.0) {
-        let what = format!("a sky that is {} is brightest about the sun", kind.name());
-        let next =
-            "say where the sun stands: --sun ELEVATION,AZIMUTH or \"sun\" in the file of spectra";
-        check.problem("sky", what, next);
-        return None;
-    }
+    let (kind, sun) = asked(wish, nodes, lights, check)?;
     let dome = Distribution::new(kind.0, sun.as_ref().map_or(DVec3::Y, |sun| sun.toward));
     let [elevation, azimuth] = angles(dome.sun());
     let azimuth = (azimuth - wish.north.unwrap_or(0.0)).rem_euclid(360.0);
@@ -62,11 +43,7 @@ pub(crate) fn join(
         Some(Brightness::Luminance(zenith)) => zenith / dome.zenith(),
         None => usual[0],
     };
-    let kelvin = wish.kelvin.unwrap_or(match kind.name() {
-        "clear" => 12_000.0,
-        "intermediate" => 7500.0,
-        _ => 6504.0,
-    });
+    let kelvin = wish.kelvin.unwrap_or(usual_kelvin(kind));
     let ground = wish.ground.unwrap_or(USUAL_GROUND);
     let mut makes = Makes {
         grid,
@@ -111,6 +88,30 @@ pub(crate) fn join(
         ));
     }
     Some(sky)
+}
+
+/// What kind of sky is asked for, and its sun; none where what is said does not go together, which is told.
+fn asked(
+    wish: &SkyWish,
+    nodes: &[(String, String)],
+    lights: &[PunctualLight],
+    check: &mut Check,
+) -> Option<(SkyType, Option<Sun>)> {
+    let Some(kind) = wish.kind else {
+        let what = "something is said of sky or sun, but not what the sky is like";
+        let next = "give --sky clear, or \"type\" in the file of spectra";
+        check.problem("sky", what, next);
+        return None;
+    };
+    let sun = sun_of(wish, nodes, lights, check).ok()?;
+    if sun.is_none() && Distribution::follows_sun(kind.0) {
+        let what = format!("a sky that is {} is brightest about the sun", kind.name());
+        let next =
+            "say where the sun stands: --sun ELEVATION,AZIMUTH or \"sun\" in the file of spectra";
+        check.problem("sky", what, next);
+        return None;
+    }
+    Some((kind, sun))
 }
 
 /// Where the sun stands, and which light of the file it is.
@@ -185,6 +186,15 @@ fn usual(kind: SkyType, elevation: Option<f64>) -> [f64; 2] {
         "clear" => [800.0 + 15_500.0 * height.sqrt(), sun(0.21)],
         "intermediate" => [300.0 + 45_000.0 * height, sun(0.80)],
         _ => [300.0 + 21_000.0 * height, 0.0],
+    }
+}
+
+/// Correlated colour temperature of a sky of which nothing more is said, K.
+fn usual_kelvin(kind: SkyType) -> f64 {
+    match kind.name() {
+        "clear" => 12_000.0,
+        "intermediate" => 7500.0,
+        _ => 6504.0,
     }
 }
 

@@ -12,7 +12,7 @@
 //! across its rays.
 
 use super::sun::Hours;
-use crate::scene::spectra_file::Reader;
+use crate::scene::reader::Reader;
 use serde_json::{Map, Value};
 use std::str::FromStr;
 
@@ -58,6 +58,7 @@ impl FromStr for SkyType {
 
 /// How bright the sky is.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Brightness {
     /// Of open level ground, by the sky alone, lx.
     Illuminance(f64),
@@ -67,6 +68,7 @@ pub enum Brightness {
 
 /// Where the sun stands.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum SunPlace {
     /// Degrees above the horizon, and clockwise from north.
     Angles {

@@ -15,6 +15,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// One light and level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Row {
     /// Name of the light.
     pub light: &'static str,

@@ -15,6 +15,7 @@ pub const TERMS: [usize; 6] = [4, 6, 8, 10, 12, 16];
 
 /// One light, method and number of terms.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Row {
     /// Name of the light.
     pub light: &'static str,

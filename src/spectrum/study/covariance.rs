@@ -20,6 +20,7 @@ const LIMIT: f64 = 1.0;
 
 /// One light and level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Row {
     /// Name of the light.
     pub light: &'static str,

@@ -22,6 +22,7 @@ const STRIDE: usize = 16;
 
 /// Means of dE*uv (first order) over secondary reflections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Row {
     /// Name of the light.
     pub light: &'static str,

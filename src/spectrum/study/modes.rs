@@ -23,6 +23,7 @@ const SEARCH_RANGE: [f64; 2] = [1e-3, 1e2];
 
 /// One light, mode and level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Row {
     /// Name of the light, with the adaptation white if it is not the light's own.
     pub light: String,
@@ -48,6 +49,7 @@ pub struct Row {
 
 /// Mean, 95th percentile and greatest of a colour difference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Spread {
     /// Mean.
     pub mean: f64,

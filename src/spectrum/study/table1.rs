@@ -19,6 +19,7 @@ pub struct Source {
 
 /// One level of reflections. Shares in percent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Level {
     /// Average number of intervals.
     pub intervals_mean: f64,
@@ -44,6 +45,7 @@ pub struct Level {
 
 /// One column of Table 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Column {
     /// Refinement of the source.
     pub source: Source,

@@ -37,6 +37,7 @@ const ROUNDS: usize = 15;
 
 /// One row: ns a product.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Stage {
     /// What is timed.
     pub stage: &'static str,
@@ -310,95 +311,111 @@ fn weights_on<V: Lane, const N: usize>(cut: Partition, cmf: &CmfTree, a: usize) 
         .collect::<Vec<_>>())
 }
 
+/// A row of the table.
+fn stage(stage: &'static str, adaptive_ns: f64, dense_ns: Option<f64>) -> Stage {
+    Stage {
+        stage,
+        adaptive_ns,
+        dense_ns,
+        ratio: dense_ns.map(|dense| dense / adaptive_ns),
+    }
+}
+
 /// Times everything.
 pub fn measure(chart: &Chart) -> Vec<Stage> {
     let light = chart.light("D65");
     let paper = Work::<Estimate>::new(chart, &light);
-    let stage = |stage, adaptive_ns: f64, dense: Option<f64>| Stage {
-        stage,
-        adaptive_ns,
-        dense_ns: dense,
-        ratio: dense.map(|d| d / adaptive_ns),
-    };
-
     let preparation = paper.time(|| {
         black_box(Start::<Estimate>::new(black_box(chart), &light));
         black_box(CmfTree::new(*black_box(chart.cmf.leaves())));
     });
-
-    // Lists of up to 8 intervals run in 8 lanes, longer ones in 16; the mean is over all lists.
-    let (short, long) = (
-        paper.blocks::<f32x8, 1>(0, 8),
-        paper.blocks::<f32x16, 1>(8, 16),
-    );
-    let share = |blocks: usize| blocks as f64 / (short.len() + long.len()) as f64;
-    let (a, b) = (
-        paper.vectors(&short),
-        if long.is_empty() {
-            [0.0; 2]
-        } else {
-            paper.vectors(&long)
-        },
-    );
-    let mixed = |k: usize| a[k] * share(short.len()) + b[k] * share(long.len());
     let dense = paper.vectors(&paper.dense_blocks());
-    let (adaptive_columns, dense_columns) = (
-        paper.columns(&paper.sides()),
-        paper.columns(&paper.dense_sides()),
-    );
-
-    let with_errors = paper.lists(|_, _| ());
-    let controlled = paper.lists(|list, path| {
-        control(list, path, &chart.cmf, &Metric::Xyz, &Control::PAPER);
-    });
-    let whole = paper.lists(|list, path| {
-        control(list, path, &chart.cmf, &Metric::Xyz, &Control::PAPER);
-        black_box(list.xyz(&chart.cmf));
-    });
+    let mut stages = vec![stage("pre-processing", preparation, None)];
+    stages.extend(paper.on_given_partitions(dense));
+    stages.extend(paper.with_control(dense));
+    let total = Some(dense[1]);
     let estimated = perceptual::<Moment>(chart, &light);
     let bounded = perceptual::<Bounded>(chart, &light);
-    vec![
-        stage("pre-processing", preparation, None),
-        stage("product on a given partition", mixed(0), Some(dense[0])),
-        stage(
-            "change to XYZ",
-            mixed(1) - mixed(0),
-            Some(dense[1] - dense[0]),
-        ),
-        stage(
-            "product and XYZ on a given partition",
-            mixed(1),
-            Some(dense[1]),
-        ),
-        stage(
-            "product, 24 side by side",
-            adaptive_columns[0],
-            Some(dense_columns[0]),
-        ),
-        stage(
-            "change to XYZ, 24 side by side",
-            adaptive_columns[1] - adaptive_columns[0],
-            Some(dense_columns[1] - dense_columns[0]),
-        ),
-        stage(
-            "product with errors, from the trees",
-            with_errors,
-            Some(dense[0]),
-        ),
-        stage("control overhead (paper)", controlled - with_errors, None),
-        stage(
-            "change to XYZ of a list",
-            whole - controlled,
-            Some(dense[1] - dense[0]),
-        ),
-        stage("total with control (paper)", whole, Some(dense[1])),
-        stage("total with control (perceptual)", estimated, Some(dense[1])),
-        stage(
-            "total with control (perceptual bound)",
-            bounded,
-            Some(dense[1]),
-        ),
-    ]
+    stages.push(stage("total with control (perceptual)", estimated, total));
+    stages.push(stage(
+        "total with control (perceptual bound)",
+        bounded,
+        total,
+    ));
+    stages
+}
+
+impl<I: Interval> Work<'_, I> {
+    /// Products and XYZ of vectors whose cut is at hand, beside those of `dense`: products alone, and both.
+    fn on_given_partitions(&self, dense: [f64; 2]) -> [Stage; 5] {
+        // Lists of up to 8 intervals run in 8 lanes, longer ones in 16; the mean is over all lists.
+        let (short, long) = (
+            self.blocks::<f32x8, 1>(0, 8),
+            self.blocks::<f32x16, 1>(8, 16),
+        );
+        let share = |blocks: usize| blocks as f64 / (short.len() + long.len()) as f64;
+        let (a, b) = (
+            self.vectors(&short),
+            if long.is_empty() {
+                [0.0; 2]
+            } else {
+                self.vectors(&long)
+            },
+        );
+        let mixed = |k: usize| a[k] * share(short.len()) + b[k] * share(long.len());
+        let columns = self.columns(&self.sides());
+        let dense_columns = self.columns(&self.dense_sides());
+        [
+            stage("product on a given partition", mixed(0), Some(dense[0])),
+            stage(
+                "change to XYZ",
+                mixed(1) - mixed(0),
+                Some(dense[1] - dense[0]),
+            ),
+            stage(
+                "product and XYZ on a given partition",
+                mixed(1),
+                Some(dense[1]),
+            ),
+            stage(
+                "product, 24 side by side",
+                columns[0],
+                Some(dense_columns[0]),
+            ),
+            stage(
+                "change to XYZ, 24 side by side",
+                columns[1] - columns[0],
+                Some(dense_columns[1] - dense_columns[0]),
+            ),
+        ]
+    }
+
+    /// Products from the trees, with errors, the paper's control and XYZ.
+    fn with_control(&self, dense: [f64; 2]) -> [Stage; 4] {
+        let cmf = &self.chart.cmf;
+        let with_errors = self.lists(|_, _| ());
+        let controlled = self.lists(|list, path| {
+            control(list, path, cmf, &Metric::Xyz, &Control::PAPER);
+        });
+        let whole = self.lists(|list, path| {
+            control(list, path, cmf, &Metric::Xyz, &Control::PAPER);
+            black_box(list.xyz(cmf));
+        });
+        [
+            stage(
+                "product with errors, from the trees",
+                with_errors,
+                Some(dense[0]),
+            ),
+            stage("control overhead (paper)", controlled - with_errors, None),
+            stage(
+                "change to XYZ of a list",
+                whole - controlled,
+                Some(dense[1] - dense[0]),
+            ),
+            stage("total with control (paper)", whole, Some(dense[1])),
+        ]
+    }
 }
 
 /// Product, perceptual control within dE*uv 1 and corrected XYZ.

@@ -11,6 +11,7 @@ pub const LEVELS: [&str; 3] = ["primary", "secondary", "tertiary"];
 
 /// One reflection.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Sample {
     /// Intervals after control.
     pub intervals: usize,

@@ -29,7 +29,7 @@ fn make<'py>(py: Python<'py>, error: &Error) -> PyResult<Bound<'py, PyAny>> {
             let number = source.raw_os_error();
             module.call_method1("_file_error", (text, path, number))
         }
-        Error::Internal(_) => module.getattr("InternalError")?.call1((text,)),
+        _ => module.getattr("InternalError")?.call1((text,)),
     }
 }
 

@@ -10,6 +10,7 @@
 //! | `bake` | `Room.bake`: rounds, news of them, an end before the error |
 //! | `light` | what a bake or a relit bake knows |
 //! | `result` | `Result` |
+//! | `maps` | light maps
 //! | `relight` | the same room under other lamps |
 //! | `spectra` | spectra by name |
 //!
@@ -19,6 +20,7 @@ mod arrays;
 mod bake;
 mod errors;
 mod light;
+mod maps;
 mod records;
 mod relight;
 mod result;

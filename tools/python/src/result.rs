@@ -3,6 +3,7 @@
 use crate::arrays::{self, line, points, rows, sealed};
 use crate::errors::{raised, warn, wrong};
 use crate::light::{Light, Solved};
+use crate::maps;
 use crate::records::{flat, plain};
 use crate::relight::Change;
 use crate::room::Room;
@@ -417,6 +418,71 @@ impl Lit {
             Ok(glb.warnings)
         })?;
         warn(py, &warnings)
+    }
+
+    /// Writes light maps: the room's own mesh as .glb, and beside it the pages (`.map-0.exr` ...) and their index
+    /// (`.maps.json`), as `haarlight bake --light maps` does. Light at vertices (`mesh=True`) is not needed.
+    ///
+    /// Args:
+    ///     path: ends in .glb; not the room that was read.
+    ///     size: texels along an axis of a page at the most, 64 to 16384.
+    ///     texels: of all pages at the most, about; None: as many as the error of the bake needs.
+    ///     indirect: leave out what comes straight from lamps and the sky.
+    ///     exposure, white_balance: of the pages in the .glb, as for `save`; the .exr hold irradiance.
+    ///     on_progress: called with how many looks of the present pass are done, and of how many.
+    ///     stop: anything with `is_set()`: ends the gather; what was not looked at shows the solved light.
+    ///
+    /// Returns:
+    ///     {"files", "error"}: names of the files beside the .glb; mean colour difference (CIEDE2000) of a look-up, an
+    ///     estimate, None where it is not known.
+    ///
+    /// Raises:
+    ///     InputError: the light is a relit one; the size is out of range.
+    #[pyo3(signature = (path, *, size = 1024, texels = None, indirect = false, exposure = "auto".into(), white_balance = "none".into(), on_progress = None, stop = None), text_signature = "($self, path, *, size=1024, texels=None, indirect=False, exposure='auto', white_balance='none', on_progress=None, stop=None)")]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+    fn save_maps(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        size: usize,
+        texels: Option<usize>,
+        indirect: bool,
+        exposure: Text,
+        white_balance: Text,
+        on_progress: Option<Py<PyAny>>,
+        stop: Option<Py<PyAny>>,
+    ) -> PyResult<Py<PyAny>> {
+        let [least, most] = haarlight::cli::maps::PAGES;
+        if !(least..=most).contains(&size) {
+            let next = format!("give {least} to {most} texels along a side");
+            return Err(wrong(py, "size", format!("is {size}"), &next));
+        }
+        if path
+            .extension()
+            .is_none_or(|e| !e.eq_ignore_ascii_case("glb"))
+        {
+            let place = path.display().to_string();
+            return Err(wrong(
+                py,
+                &place,
+                "is not the name of a .glb",
+                "end it in .glb",
+            ));
+        }
+        let asked = maps::Asked {
+            path,
+            page: size,
+            texels,
+            indirect,
+            brightness: exposure.parse(py, "exposure")?,
+            balance: white_balance.parse(py, "white_balance")?,
+        };
+        let written = maps::save(py, Arc::clone(&self.light), asked, on_progress, stop)?;
+        warn(py, &written.warnings)?;
+        plain(
+            py,
+            &serde_json::json!({ "files": written.files, "error": written.error }),
+        )
     }
 
     fn __repr__(&self) -> String {

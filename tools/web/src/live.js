@@ -1,14 +1,14 @@
 // The live page: the state of the program by events, light as bytes when it says that there is other light.
 
-import { $, choice, digits, h, whole } from "./dom.js";
+import { around } from "./around.js";
+import { $, digits, h, whole } from "./dom.js";
 import { grow } from "./growth.js";
 import { lamps } from "./lamps.js";
 import { legend, luxScale, MAGMA, VIRIDIS } from "./maps.js";
-import { pad } from "./pad.js";
+import { pointCard } from "./point.js";
 import { Stage } from "./stage.js";
 
 const LOOKS = [["light", "Light"], ["lux", "Illuminance"]];
-const MOVES = [["orbit", "Orbit"], ["walk", "Walk"]];
 const DOING = {
   preparing: "Preparing the room", solving: "Solving", stopped: "Stopped", gathering: "Looking closely at every vertex",
   relighting: "Relighting", saving: "Saving", done: "Done",
@@ -147,6 +147,7 @@ class View {
     const { numbers, lux } = grow(this.stage, bytes);
     this.numbers = numbers;
     this.#scale(lux);
+    this.stage.pickAgain();
     this.say("");
     document.documentElement.dataset.ready = "yes";
   }
@@ -162,41 +163,35 @@ class View {
 
   async #open(glb) {
     const maps = { lux: luxScale(1, 100), error: { ...luxScale(1, 10), map: MAGMA } };
-    const picked = (spot) => {
-      $("point").textContent = spot ? `${digits(spot.lux)} lx on ${spot.material || "the surface"}` : "Click a surface to read its illuminance.";
-    };
     const { room } = this;
+    const card = pointCard(room);
+    const picked = (spot) => this.#read(spot, card);
     const stage = (this.stage = await Stage.open($("canvas"), glb, { room }, { steps: [], last: 0 }, maps, picked));
-    picked(null);
-    const look = (view) => {
-      check(view);
-      $("legends").hidden = view === "light";
-      stage.setView(view);
-    };
-    const check = choice($("looks"), "look", LOOKS, look);
-    const walk = (on) => {
-      checkMove(on ? "walk" : "orbit");
-      stage.controls.setWalking(on);
-      $("picture").classList.toggle("walking", on);
-    };
-    const checkMove = choice($("moves"), "move", MOVES, (value) => walk(value === "walk"));
-    $("views").append(...stage.views.map((v, k) => h("option", { value: k }, v.name)));
-    $("views").addEventListener("change", () => {
-      stage.goTo(Number($("views").value));
-      walk(stage.controls.walking);
-    });
-    $("canvas").addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
-      if (event.key === "1" || event.key === "2") look(LOOKS[event.key - 1][0]);
-      else if (event.key === "Enter") stage.pick();
-      else return;
-      event.preventDefault();
-    });
-    stage.onDrawn = () =>
-      $("marks").replaceChildren(...stage.spots().map(([x, y]) => h("i", { style: `left:${x}px;top:${y}px` })));
-    pad(stage.controls);
-    look("light");
-    walk(stage.controls.walking);
+    card(null);
+    around(stage, LOOKS, { looked: () => {} });
+  }
+
+  /** What falls on a spot: its illuminance is here, the program knows the rest. */
+  async #read(spot, card) {
+    this.spot = spot;
+    if (!spot) return card(null);
+    const { lux, material, point: place, part, corners, weights } = spot;
+    // Where the old reading stands it stays until the new one comes.
+    if (!$("point").classList.contains("measured")) card({ lux, material, place });
+    const share = weights.map((w) => Math.min(1, Math.max(0, w)));
+    try {
+      const answer = await this.ask("/point", `&mesh=${this.numbers[0]}&part=${part}&vertices=${corners}&weights=${share}`);
+      // Another spot was asked for meanwhile, or there is another mesh: it is read again then.
+      if (this.spot !== spot || answer.status === 204) return;
+      const found = await answer.json();
+      card({
+        lux: found.xyz[1], xyz: found.xyz, material, place,
+        error: found.error_de2000, errorIs: found.error_here ? "estimate" : "estimate, mean of the room",
+        values: found.spectrum.map((x) => 1000 * x), note: "Light that falls on the surface.",
+      });
+    } catch (problem) {
+      card({ lux, material, place, note: problem.message });
+    }
   }
 
   /** Fits the scale of illuminance to where most of the light lies. */

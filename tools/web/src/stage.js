@@ -268,10 +268,23 @@ export class Stage {
     this.camera.updateProjectionMatrix();
     const ray = new Raycaster();
     ray.setFromCamera(at, this.camera);
+    return this.#meet(ray);
+  }
+
+  /** Reads the picked spot again, in other light or on another mesh. */
+  pickAgain() {
+    if (this.again) this.#meet(this.again);
+  }
+
+  #meet(ray) {
     for (const part of this.parts) part.mesh.material = part.looks.light;
     const meshes = new Map(this.parts.map((part) => [part.mesh, part]));
     const hit = ray.intersectObjects([...meshes.keys()], false)[0];
-    if (!hit) return this.picked(null);
+    if (!hit) {
+      this.spot = this.again = null;
+      this.draw();
+      return this.picked(null);
+    }
     const part = meshes.get(hit.object);
     const corners = [hit.face.a, hit.face.b, hit.face.c];
     const position = hit.object.geometry.attributes.position;
@@ -279,11 +292,16 @@ export class Stage {
     const local = hit.object.worldToLocal(hit.point.clone());
     const weights = Triangle.getBarycoord(local, ...places, new Vector3())?.toArray() ?? [1, 0, 0];
     this.spot = hit.point.clone();
+    // From close before the spot: another mesh lies elsewhere by its rounding.
+    const { direction } = ray.ray;
+    this.again = new Raycaster(hit.point.clone().addScaledVector(direction, -1e-3 * this.size), direction.clone());
     this.draw();
     const { lux } = hit.object.geometry.attributes;
     return this.picked({
       vertices: corners.map((c) => c + part.at),
       weights,
+      part: [...this.parts].sort((a, b) => a.at - b.at).indexOf(part),
+      corners,
       lux: corners.reduce((sum, c, i) => sum + weights[i] * lux.getX(c), 0),
       point: hit.point.toArray(),
       material: part.name,

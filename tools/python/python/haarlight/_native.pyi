@@ -117,6 +117,19 @@ class Result:
         compress: Literal["none", "quantize", "meshopt"] = "none",
     ) -> None:
         """Writes the room with its light (.glb), or its arrays (.npz)."""
+    def save_maps(
+        self,
+        path: str | PathLike[str],
+        *,
+        size: int = 1024,
+        texels: int | None = None,
+        indirect: bool = False,
+        exposure: str | float = "auto",
+        white_balance: str | float = "none",
+        on_progress: Callable[[int, int], object] | None = None,
+        stop: _Event | None = None,
+    ) -> _Record:
+        """Writes light maps: a .glb with the room's own mesh, pages as .exr and their index beside it; `files`, `error`."""
 
 def load(
     path: str | PathLike[str],

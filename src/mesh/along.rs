@@ -1,0 +1,66 @@
+//! Splits what growing picks: along edges of shadows where there are any, else at edges that bend.
+
+use super::grow::{Growth, SHRINK};
+use super::shades::COVER;
+
+/// What edges of shadows may take when the error is met: share of the triangles, and triangles of a small room.
+const FOR_LINES: f64 = 0.02;
+const LINES: usize = 400;
+
+impl Growth<'_> {
+    /// Splits cells that were looked at; returns those that are new.
+    pub(super) fn split(&mut self, tested: &[usize]) -> Vec<usize> {
+        let wanted = match self.looking {
+            true => tested.iter().map(|&k| (k, self.lamps_of(k))).collect(),
+            false => Vec::new(),
+        };
+        let mut fresh = self.cells.split_along(&self.shades, wanted, SHRINK);
+        for &k in tested {
+            if fresh.binary_search(&k).is_err() {
+                self.mark(k);
+            }
+        }
+        let bisected = self.cells.split(SHRINK);
+        fresh.extend(self.cells.take_sides(&self.shades, bisected));
+        fresh.sort_unstable();
+        fresh.dedup();
+        fresh
+    }
+
+    /// Carries edges of shadows on to their ends, whatever the error is: half a line is seen. Takes at most [`FOR_LINES`] as many
+    /// triangles as there are.
+    pub(super) fn finish_lines(&mut self, progress: &dyn Fn(usize, usize)) {
+        let most = (FOR_LINES * self.cells.all.len() as f64) as usize + LINES;
+        let fresh = self.cells.finish_lines(&self.shades, most, SHRINK);
+        self.expect(&fresh, false, progress);
+    }
+
+    /// Lamps whose shadow would matter in a cell, and what covers it if anything does.
+    fn lamps_of(&self, k: usize) -> u64 {
+        let cell = &self.cells.all[k];
+        let sheet = &self.cells.sheets[cell.sheet as usize];
+        let light = self.light(k);
+        let mean = [0, 1, 2].map(|c| (light[0][c] + light[1][c] + light[2][c]) / 3.0);
+        let least = self.unknown.sqrt();
+        let shows = |more: [f64; 3]| {
+            let brighter = [0, 1, 2].map(|c| mean[c] + more[c]);
+            self.difference(mean, brighter) > least
+        };
+        let at = |w| self.shades.place(cell, sheet, cell.at(w));
+        let places = [
+            [0.8, 0.1, 0.1],
+            [0.1, 0.8, 0.1],
+            [0.1, 0.1, 0.8],
+            [1.0 / 3.0; 3],
+        ]
+        .map(at);
+        let hidden = |vertex: u32| {
+            let look = self.look(cell.sheet as usize, vertex);
+            look.is_some_and(|look| self.looks.at(look).is_none())
+        };
+        let mut around = cell.corners.iter().map(|c| c.vertex);
+        let middles = (0..3).filter_map(|e| self.cells.known_middle(cell, e));
+        let covered = around.any(hidden) || middles.into_iter().any(hidden);
+        self.shades.that_matter(&places, shows) | if covered { COVER } else { 0 }
+    }
+}

@@ -1,0 +1,554 @@
+//! Finds edges of shadows in a triangle that is to be split.
+//!
+//! Where light of a lamp begins or ends on the triangle's edges is found by halving, with rays alone. Between two such
+//! crossings the shadow's edge is a line if light differs to its left and right all along; if it is not, its corner is
+//! looked for where it would be if both ends ran on straight. What is neither is bisected, and looked at again.
+
+use super::cells::{Cell, Cells, End, within};
+use super::lines::Sharp;
+use super::shades::{COVER, Shades, each};
+use crate::link::Sight;
+use crate::transport::Receiver;
+use glam::{DVec2, DVec3, dvec2};
+use rayon::prelude::*;
+
+/// Parts of an edge that the beginning or end of light is looked for in; what begins and ends within one is found when
+/// triangles are smaller.
+const PARTS: usize = 8;
+/// The same along a line beside the edge, near a crossing.
+const FINE_PARTS: usize = 32;
+/// All lengths below are shares of the room's half diagonal, 5 m in a room of 6 m by 6 m by 3 m.
+/// Crossings are known to this: some micrometres, for what they tell is carried on to eight times as far.
+const FOUND: f64 = 1e-6;
+/// A line may be this far from the edge of the shadow: half of what triangles may be as small as.
+const STRAIGHT: f64 = 5e-4;
+/// Crossings this near to the end of an edge are that end. Nothing shorter becomes an edge by them.
+const NEAR: f64 = 4e-4;
+/// Light of a side is looked at so far from its edge, or up to that far where that is half shadow yet: wider ones are no
+/// edges.
+const BESIDE: f64 = 1e-3;
+const SHARP: f64 = 4e-3;
+/// But no further than this share of the way to the middle of a triangle.
+const INTO: f64 = 0.75;
+/// Where along a line its sides are looked at.
+const ALONG: [f64; 5] = [0.06, 0.27, 0.5, 0.73, 0.94];
+/// Depths at which an edge of a shadow is found once more, to see where it runs; share of the triangle.
+const DEPTHS: [f64; 3] = [0.125, 0.03125, 0.0078125];
+/// A triangle with more crossings is bisected first.
+const CROSSINGS: usize = 8;
+/// Edges of shadows are found once more only where they run away from a triangle's edge by more than one part in so many.
+const REACH: f64 = 4.0;
+/// What is left out at the ends of a line beside an edge, and at the least between a bend and the edges; shares.
+const END: f64 = 1e-4;
+const INSIDE: f64 = 1e-3;
+/// How often new triangles are looked into before light is.
+const TURNS: usize = 6;
+/// The same when lines are finished; and triangles are bisected for it down to this size: 2 cm.
+const FINISHING: usize = 24;
+const BISECTED: f64 = 4e-3;
+
+/// A place that light ends at on the edge of a cell: edge, share of it, weights of the corners of the triangle of the mesh.
+#[derive(Debug, Clone, Copy)]
+struct Crossing {
+    edge: usize,
+    at: f64,
+    weights: [f64; 3],
+}
+
+/// What an edge of a shadow runs between.
+#[derive(Debug, Clone, Copy)]
+enum Mark {
+    Crossing(Crossing),
+    Corner(usize),
+    Inside([f64; 3]),
+}
+
+/// The edge of a shadow in a cell.
+#[derive(Debug, Clone)]
+struct Plan {
+    inside: Option<[f64; 3]>,
+    /// With the lamps whose light ends there.
+    lines: Vec<([Mark; 2], u64)>,
+}
+
+/// What looking into a cell comes to.
+#[derive(Debug, Clone)]
+enum Found {
+    /// Nothing ends there, or too gently.
+    Even,
+    Edge(Plan),
+    /// Light ends there, but not along a line.
+    Other,
+}
+
+/// A cell, looked into.
+struct Look<'a> {
+    shades: &'a Shades<'a>,
+    sight: &'a Sight<'a>,
+    cells: &'a Cells,
+    cell: &'a Cell,
+    lamp: u64,
+    /// All that are of interest.
+    lamps: u64,
+    half_size: f64,
+}
+
+/// A place on the way between two.
+fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
+    std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
+}
+
+fn flat(w: [f64; 3]) -> DVec2 {
+    dvec2(w[1], w[2])
+}
+
+impl Look<'_> {
+    fn receiver(&self, weights: [f64; 3]) -> Receiver {
+        let sheet = &self.cells.sheets[self.cell.sheet as usize];
+        self.shades.place(self.cell, sheet, weights)
+    }
+
+    fn lit(&self, weights: [f64; 3]) -> bool {
+        self.shades
+            .lit(self.sight, self.lamp, &self.receiver(weights))
+    }
+
+    /// Corners of the triangle of the mesh.
+    fn corners(&self) -> [DVec3; 3] {
+        let mesh = self.shades.bake().mesh();
+        mesh.triangles[self.cell.of.0 as usize].map(|p| mesh.positions[p as usize])
+    }
+
+    fn point(&self, w: [f64; 3]) -> DVec3 {
+        let [a, b, c] = self.corners();
+        a * w[0] + b * w[1] + c * w[2]
+    }
+
+    /// Where light begins or ends between two places, as shares of the way, at least `margin` from both.
+    fn flips(&self, a: [f64; 3], b: [f64; 3], parts: usize, margin: f64) -> Vec<f64> {
+        let length = self.point(a).distance(self.point(b));
+        let share = |k: usize| margin + (1.0 - 2.0 * margin) * k as f64 / parts as f64;
+        let lit: Vec<bool> = (0..=parts)
+            .map(|k| self.lit(between(a, b, share(k))))
+            .collect();
+        let mut found = Vec::new();
+        for k in 0..parts {
+            if lit[k] == lit[k + 1] {
+                continue;
+            }
+            let (mut low, mut high) = (share(k), share(k + 1));
+            while (high - low) * length > FOUND * self.half_size {
+                let middle = 0.5 * (low + high);
+                if middle <= low || middle >= high {
+                    break;
+                }
+                match self.lit(between(a, b, middle)) == lit[k] {
+                    true => low = middle,
+                    false => high = middle,
+                }
+            }
+            found.push(0.5 * (low + high));
+        }
+        found
+    }
+
+    fn ends(&self, edge: usize) -> [[f64; 3]; 2] {
+        let corners = &self.cell.corners;
+        [corners[edge].weights, corners[(edge + 1) % 3].weights]
+    }
+
+    fn crossings(&self) -> Vec<Crossing> {
+        let mut found = Vec::new();
+        for edge in 0..3 {
+            let length = self.cells.edges[self.cell.edges[edge] as usize].length;
+            let margin = NEAR * self.half_size / length;
+            if self.cells.sharp_along(self.cell, edge) & self.lamp != 0 || margin > 0.25 {
+                continue;
+            }
+            let [a, b] = self.ends(edge);
+            for at in self.flips(a, b, PARTS, margin) {
+                let weights = between(a, b, at);
+                found.push(Crossing { edge, at, weights });
+            }
+        }
+        found
+    }
+
+    /// Does light differ to the left and to the right all along a line?
+    fn is_edge(&self, a: [f64; 3], b: [f64; 3]) -> bool {
+        let [p, q] = [self.point(a), self.point(b)];
+        let length = p.distance(q);
+        if length < 2.0 * NEAR * self.half_size {
+            return false;
+        }
+        let [k, l, m] = self.corners();
+        let across = (l - k).cross(m - k).cross(q - p).normalize_or_zero();
+        let beside = |t: f64, distance: f64| {
+            let at = p.lerp(q, t) + across * distance;
+            let w = crate::solve::weights_of(at, k, l, m);
+            w.iter().all(|w| *w >= 0.0).then_some(w)
+        };
+        let distance = (STRAIGHT * self.half_size).min(0.02 * length);
+        let (mut left, mut compared) = (None, 0);
+        for t in ALONG {
+            let (Some(a), Some(b)) = (beside(t, distance), beside(t, -distance)) else {
+                continue;
+            };
+            let lit = self.lit(a);
+            if self.lit(b) == lit || left.is_some_and(|left| left != lit) {
+                return false;
+            }
+            left = Some(lit);
+            compared += 1;
+        }
+        let sharp = |side: f64, expected: bool| {
+            let at = beside(0.5, side * SHARP * self.half_size);
+            let wholly = |w| self.shades.wholly(self.sight, self.lamp, &self.receiver(w));
+            at.is_none_or(|w| wholly(w) == Some(expected))
+        };
+        let is_hard = self.shades.is_hard(self.lamp);
+        compared > 1 && left.is_some_and(|left| is_hard || (sharp(1.0, left) && sharp(-1.0, !left)))
+    }
+
+    /// Where the edge of the shadow that begins at a mark runs on: a second place on it.
+    fn heading(&self, from: &Mark, depth: f64) -> Option<[f64; 3]> {
+        let corners = self.cell.corners.map(|c| c.weights);
+        let (a, b, middle) = match from {
+            Mark::Crossing(from) => {
+                let [a, b] = self.ends(from.edge);
+                let c = corners[(from.edge + 2) % 3];
+                let (a, b) = (between(a, c, depth), between(b, c, depth));
+                let reach = REACH * depth;
+                let [low, high] = [from.at - reach, from.at + reach].map(|t| t.clamp(0.0, 1.0));
+                let middle = (from.at - low) / (high - low);
+                (between(a, b, low), between(a, b, high), middle)
+            }
+            Mark::Corner(k) => {
+                let [a, b] = [1, 2].map(|e| between(corners[*k], corners[(k + e) % 3], depth));
+                (a, b, 0.5)
+            }
+            Mark::Inside(_) => return None,
+        };
+        let flips = self.flips(a, b, FINE_PARTS, END);
+        let nearest = flips
+            .into_iter()
+            .min_by(|x, y| (x - middle).abs().total_cmp(&(y - middle).abs()));
+        nearest.map(|t| between(a, b, t))
+    }
+
+    fn weights(&self, mark: &Mark) -> [f64; 3] {
+        match mark {
+            Mark::Crossing(c) => c.weights,
+            Mark::Corner(k) => self.cell.corners[*k].weights,
+            Mark::Inside(weights) => *weights,
+        }
+    }
+
+    /// Where two edges that begin at marks meet, if they do inside.
+    fn bend(&self, p: &Mark, q: &Mark, depth: f64) -> Option<[f64; 3]> {
+        let (from, to) = (self.weights(p), self.weights(q));
+        let (a, c) = (flat(from), flat(to));
+        let b = flat(self.heading(p, depth)?) - a;
+        let d = flat(self.heading(q, depth)?) - c;
+        let t = (c - a).perp_dot(d) / b.perp_dot(d);
+        let at = a + t * b;
+        let own = within(&self.cell.corners, at.to_array());
+        let inside = t.is_finite() && own.iter().all(|w| *w > INSIDE);
+        let weights = [1.0 - at.x - at.y, at.x, at.y];
+        (inside && self.is_edge(from, weights) && self.is_edge(weights, to)).then_some(weights)
+    }
+
+    /// A line, with all lamps whose light ends along it.
+    fn line(&self, marks: [Mark; 2]) -> ([Mark; 2], u64) {
+        let [a, b] = [0, 1].map(|k| self.weights(&marks[k]));
+        let others = each(self.lamps).filter(|&lamp| {
+            let look = Look { lamp, ..*self };
+            lamp == self.lamp || look.is_edge(a, b)
+        });
+        (marks, others.fold(0, |all, lamp| all | lamp))
+    }
+
+    fn look(&self) -> Found {
+        let crossings = self.crossings();
+        // Neighbours may have put both ends of an edge with a bend on corners.
+        let ends = (0..3).filter(|&k| self.cells.lamps_at(self.cell, k) & self.lamp != 0);
+        if crossings.is_empty() && ends.count() < 2 {
+            return Found::Even;
+        }
+        if crossings.len() > CROSSINGS {
+            return Found::Other;
+        }
+        let mut marks: Vec<Mark> = crossings.into_iter().map(Mark::Crossing).collect();
+        let found = marks.len();
+        marks.extend((0..3).map(Mark::Corner));
+        let pairs = || {
+            let count = marks.len();
+            let all = (0..count).flat_map(move |k| (k + 1..count).map(move |l| (k, l)));
+            all.map(|(k, l)| (marks[k], marks[l]))
+        };
+        let apart = |(p, q): &(Mark, Mark)| match (p, q) {
+            (Mark::Crossing(p), Mark::Crossing(q)) => p.edge != q.edge,
+            (Mark::Crossing(p), Mark::Corner(k)) => (p.edge + 2) % 3 == *k,
+            _ => false,
+        };
+        for (p, q) in pairs().filter(apart) {
+            if self.is_edge(self.weights(&p), self.weights(&q)) {
+                return Found::Edge(Plan {
+                    inside: None,
+                    lines: vec![self.line([p, q])],
+                });
+            }
+        }
+        if !self.shades.is_hard(self.lamp) {
+            return Found::Even;
+        }
+        for depth in DEPTHS {
+            for (p, q) in pairs() {
+                if let Some(at) = self.bend(&p, &q, depth) {
+                    let lines = [p, q].map(|end| self.line([end, Mark::Inside(at)]));
+                    return Found::Edge(Plan {
+                        inside: Some(at),
+                        lines: lines.to_vec(),
+                    });
+                }
+            }
+        }
+        match found {
+            0 => Found::Even,
+            _ => Found::Other,
+        }
+    }
+}
+
+impl Cells {
+    /// Lamps whose light ends at a corner of a cell.
+    fn lamps_at(&self, cell: &Cell, k: usize) -> u64 {
+        let point = cell.corners[k % 3].point;
+        self.sharp.get(&point).copied().unwrap_or(0)
+    }
+
+    /// Finds edges of cells that are edges of shadows without having been made for it: an end is known to lie on one.
+    fn find_edges(&mut self, shades: &Shades, wanted: &[(usize, u64)]) {
+        let half_size = shades.bake().mesh().half_size;
+        let cells = &*self;
+        let found: Vec<[u64; 3]> = shades.bake().with_sight(|_, sight| {
+            let look = |&(k, lamps): &(usize, u64)| {
+                let cell = &cells.all[k];
+                [0, 1, 2].map(|e| {
+                    let [a, b] = [e, (e + 1) % 3].map(|k| cell.corners[k].weights);
+                    let ends = cells.lamps_at(cell, e) | cells.lamps_at(cell, e + 1);
+                    let unknown = ends & !cells.sharp_along(cell, e);
+                    let along = each(unknown).filter(|&lamp| {
+                        let look = Look {
+                            shades,
+                            sight,
+                            cells,
+                            cell,
+                            lamp,
+                            lamps,
+                            half_size,
+                        };
+                        look.is_edge(a, b)
+                    });
+                    along.fold(0, |all, lamp| all | lamp)
+                })
+            };
+            wanted.par_iter().map(look).collect()
+        });
+        for ((k, _), lamps) in wanted.iter().zip(found) {
+            for (edge, lamps) in self.all[*k].edges.into_iter().zip(lamps) {
+                if lamps != 0 {
+                    self.edges[edge as usize].sharp |= lamps;
+                    let ends = self.edges[edge as usize].ends;
+                    for point in ends {
+                        self.sharpen(point, lamps);
+                    }
+                }
+            }
+        }
+    }
+
+    fn look_into(&mut self, shades: &Shades, wanted: &[(usize, u64)]) -> Vec<Found> {
+        self.find_edges(shades, wanted);
+        let half_size = shades.bake().mesh().half_size;
+        shades.bake().with_sight(|_, sight| {
+            let look = |&(k, lamps): &(usize, u64)| {
+                let mut best = Found::Even;
+                for lamp in each(lamps) {
+                    let look = Look {
+                        shades,
+                        sight,
+                        cells: self,
+                        cell: &self.all[k],
+                        lamp,
+                        lamps,
+                        half_size,
+                    };
+                    match look.look() {
+                        Found::Even => {}
+                        Found::Edge(plan) => return Found::Edge(plan),
+                        Found::Other => best = Found::Other,
+                    }
+                }
+                best
+            };
+            wanted.par_iter().map(look).collect()
+        })
+    }
+
+    /// Asks for what a plan says, unless something else was asked for before.
+    fn ask(&mut self, k: usize, plan: &Plan, near: f64) {
+        // Edges are known by their numbers before the cell becomes three.
+        let mut ends = Vec::new();
+        for mark in plan.lines.iter().flat_map(|(marks, _)| marks) {
+            ends.push(match mark {
+                Mark::Crossing(c) => match self.cross(k, c.edge, c.at, near) {
+                    Some(end) => Some(end),
+                    None => return,
+                },
+                Mark::Corner(c) => Some(End::Point(self.all[k].corners[*c].point)),
+                Mark::Inside(_) => None,
+            });
+        }
+        let inside = plan.inside.map(|at| self.star(k, at));
+        for (ends, (_, lamps)) in ends.chunks(2).zip(&plan.lines) {
+            if let (Some(a), Some(b)) = (ends[0].or(inside), ends[1].or(inside)) {
+                self.line([a, b], *lamps);
+            }
+        }
+    }
+
+    /// Splits cells along edges of shadows of lamps; returns the cells that are new. `shrink` is what remains of an expected
+    /// mean square.
+    pub(super) fn split_along(
+        &mut self,
+        shades: &Shades,
+        mut wanted: Vec<(usize, u64)>,
+        shrink: f64,
+    ) -> Vec<usize> {
+        let lamps = wanted.iter().fold(0, |all, (_, lamps)| all | lamps);
+        let mut fresh = Vec::new();
+        for _ in 0..TURNS {
+            let found = self.look_into(shades, &wanted);
+            let split = self.split_found(shades, &wanted, &found, f64::INFINITY, shrink);
+            if split.is_empty() {
+                break;
+            }
+            wanted = split.iter().map(|&k| (k, lamps)).collect();
+            fresh.extend(split);
+        }
+        fresh.sort_unstable();
+        fresh.dedup();
+        fresh
+    }
+
+    /// Carries edges of shadows on to where they end: through all triangles that have a corner on one, which are bisected where
+    /// there is no line and they are large enough for that to show. No more than `most` triangles come to be. Returns those that
+    /// are new.
+    pub(super) fn finish_lines(&mut self, shades: &Shades, most: usize, shrink: f64) -> Vec<usize> {
+        let least = BISECTED * shades.bake().mesh().half_size;
+        let full = self.all.len() + most;
+        let mut fresh = Vec::new();
+        let mut some: Vec<usize> = (0..self.all.len()).collect();
+        for _ in 0..FINISHING {
+            let lamps = |k: usize| {
+                let corners = self.all[k].corners.iter();
+                let of = |point| self.sharp.get(&point).copied().unwrap_or(0);
+                // What ends at a cover is carried on by what grows alone: there may be many, and little to be seen.
+                corners.fold(0, |all, corner| all | of(corner.point)) & !COVER
+            };
+            let all = some.iter().map(|&k| (k, lamps(k)));
+            let mut wanted: Vec<(usize, u64)> = all.filter(|(_, lamps)| *lamps != 0).collect();
+            wanted.truncate(full.saturating_sub(self.all.len()));
+            let found = self.look_into(shades, &wanted);
+            some = self.split_found(shades, &wanted, &found, least, shrink);
+            if some.is_empty() {
+                break;
+            }
+            fresh.extend_from_slice(&some);
+        }
+        fresh.sort_unstable();
+        fresh.dedup();
+        fresh
+    }
+
+    /// Splits cells along the lines found, and bisects those where light ends otherwise that are larger than `least`.
+    fn split_found(
+        &mut self,
+        shades: &Shades,
+        wanted: &[(usize, u64)],
+        found: &[Found],
+        least: f64,
+        shrink: f64,
+    ) -> Vec<usize> {
+        let near = NEAR * shades.bake().mesh().half_size;
+        for ((k, _), found) in wanted.iter().zip(found) {
+            if let Found::Edge(plan) = found {
+                self.ask(*k, plan, near);
+            }
+        }
+        for ((k, _), found) in wanted.iter().zip(found) {
+            let cell = &self.all[*k];
+            if matches!(found, Found::Other) && self.size(cell) > least {
+                self.mark(*k, self.longest(cell));
+            }
+        }
+        let split = self.split(shrink);
+        self.take_sides(shades, split)
+    }
+
+    /// Gives corners on edges of shadows the vertices of their sides, in new cells and wherever points were none before; returns
+    /// all of these cells.
+    pub(super) fn take_sides(&mut self, shades: &Shades, mut fresh: Vec<usize>) -> Vec<usize> {
+        let corners = self.sharp_corners(&fresh);
+        let half_size = shades.bake().mesh().half_size;
+        let cells = &*self;
+        let sides: Vec<(u64, [f64; 3])> = shades.bake().with_sight(|_, sight| {
+            let side = |sharp: &Sharp| cells.side(shades, sight, half_size, *sharp);
+            corners.par_iter().map(side).collect()
+        });
+        for (corner, (lit, beside)) in corners.into_iter().zip(sides) {
+            self.take_side(corner, lit, beside);
+            fresh.push(corner.0);
+        }
+        fresh.sort_unstable();
+        fresh.dedup();
+        fresh
+    }
+
+    /// Which lamps light a corner of a cell inside of it, and a place there that is out of half shadow, if there is one near.
+    fn side(
+        &self,
+        shades: &Shades,
+        sight: &Sight,
+        half_size: f64,
+        (k, corner, lamps): Sharp,
+    ) -> (u64, [f64; 3]) {
+        let cell = &self.all[k];
+        let sheet = &self.sheets[cell.sheet as usize];
+        let from = cell.corners[corner].weights;
+        let own = |k: usize, at: usize| cell.corners[at].weights[k] / 3.0;
+        let middle: [f64; 3] = std::array::from_fn(|k| own(k, 0) + own(k, 1) + own(k, 2));
+        // How far the middle is from the edges that meet here.
+        let near = [corner, (corner + 2) % 3].map(|e| {
+            let edge = &self.edges[cell.edges[e] as usize];
+            2.0 / 3.0 * cell.area / edge.length
+        });
+        let distance = near[0].min(near[1]);
+        let mut step = (BESIDE * half_size / distance).min(INTO);
+        let place = |step: f64| between(from, middle, step);
+        let first = shades.place(cell, sheet, place(step));
+        let lit = each(lamps)
+            .filter(|&lamp| shades.lit(sight, lamp, &first))
+            .fold(0, |all, lamp| all | lamp);
+        let wholly = |step: f64| {
+            let to = shades.place(cell, sheet, place(step));
+            let expected = |lamp: u64| Some(lit & lamp != 0);
+            each(lamps).all(|lamp| shades.wholly(sight, lamp, &to) == expected(lamp))
+        };
+        while !wholly(step) && 2.0 * step <= INTO && step * distance < SHARP * half_size {
+            step *= 2.0;
+        }
+        (lit, place(step))
+    }
+}

@@ -1,0 +1,302 @@
+//! Edges of shadows are lines of the mesh that is written: light on either side of them is its own.
+
+#[path = "common/built.rs"]
+mod built;
+
+use built::Room;
+use glam::{DVec3, dvec3};
+use haarlight::gather::Baked;
+use haarlight::gather::refined::position;
+use haarlight::scene::{LightKind, Scene};
+use haarlight::solve::{Bake, Settings};
+use std::collections::HashMap;
+
+/// How far from the edge a point may be on its wrong side.
+const NEAR: f64 = 0.02;
+
+fn baked(scene: Scene) -> (Bake, Baked) {
+    let settings = Settings {
+        error: 1.0,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(scene, settings);
+    bake.run();
+    let baked = bake.baked(&|_, _| {});
+    (bake, baked)
+}
+
+fn vertices(baked: &Baked) -> usize {
+    baked.surfaces.iter().map(|s| s.vertices.len()).sum()
+}
+
+/// Triangles that face `normal` and hold a place: irradiance there as a viewer draws it.
+fn held(bake: &Bake, baked: &Baked, at: DVec3, normal: DVec3) -> (f64, String) {
+    let mut best = (f64::NEG_INFINITY, 0.0, String::new());
+    for part in &baked.surfaces {
+        let surface = &bake.scene().surfaces[part.surface];
+        for t in &part.triangles {
+            let [a, b, c] = t.map(|v| position(surface, &part.vertices[v as usize]));
+            let n = (b - a).cross(c - a);
+            if n.dot(normal) < 0.99 * n.length() || (at - a).dot(normal).abs() > 1e-6 {
+                continue;
+            }
+            let weight = |p: DVec3, q: DVec3| (p - at).cross(q - at).dot(n) / n.length_squared();
+            let w = [weight(b, c), weight(c, a), weight(a, b)];
+            let least = w.into_iter().fold(f64::INFINITY, f64::min);
+            if least > best.0 {
+                let y = |k: usize| f64::from(part.vertices[t[k] as usize].irradiance[1]);
+                best = (
+                    least,
+                    (0..3).map(|k| w[k] * y(k)).sum(),
+                    format!("{a:.4} {:.0} {b:.4} {:.0} {c:.4} {:.0}", y(0), y(1), y(2)),
+                );
+            }
+        }
+    }
+    (best.1, best.2)
+}
+
+fn drawn(bake: &Bake, baked: &Baked, at: DVec3, normal: DVec3) -> f64 {
+    held(bake, baked, at, normal).0
+}
+
+fn show(bake: &Bake, baked: &Baked, at: DVec3, normal: DVec3) {
+    eprintln!("   in {}", held(bake, baked, at, normal).1);
+}
+
+/// Is every edge within an input surface shared by two triangles, or on the surface's border?
+fn no_cracks(bake: &Bake, baked: &Baked) {
+    for part in &baked.surfaces {
+        let surface = &bake.scene().surfaces[part.surface];
+        let mut edges: HashMap<[[u32; 3]; 2], (i32, DVec3, DVec3)> = HashMap::new();
+        for t in &part.triangles {
+            let at = t.map(|v| position(surface, &part.vertices[v as usize]));
+            for k in 0..3 {
+                let (p, q) = (at[k], at[(k + 1) % 3]);
+                let bits = |p: DVec3| (p.as_vec3() + 0.0).to_array().map(f32::to_bits);
+                let mut key = [bits(p), bits(q)];
+                let forward = key[0] < key[1];
+                key.sort_unstable();
+                edges.entry(key).or_insert((0, p, q)).0 += if forward { 1 } else { -1 };
+            }
+        }
+        for (sum, p, q) in edges.values().filter(|(sum, ..)| *sum != 0) {
+            let on_border = surface.triangles.iter().any(|t| {
+                let at = t.map(|v| surface.positions[v as usize]);
+                (0..3).any(|k| {
+                    let (a, b) = (at[k], at[(k + 1) % 3]);
+                    let off = |x: &DVec3| (*x - a).cross(b - a).length() / (b - a).length();
+                    off(p) < 1e-9 && off(q) < 1e-9
+                })
+            });
+            assert!(
+                on_border && sum.abs() == 1,
+                "{sum} {p} {q} of {}",
+                surface.name
+            );
+        }
+    }
+}
+
+/// A floor of 4 m by 4 m and a square of 1 m by 1 m at a height of 1 m, turned.
+fn square_above_floor() -> (Room, [DVec3; 4]) {
+    let mut room = Room::new();
+    let (floor, shade) = (room.paint(0.3), room.paint(0.0));
+    room.two_sided(shade);
+    let corner = dvec3(-2.0, 0.0, -2.0);
+    room.quad(corner, 4.0 * DVec3::Z, 4.0 * DVec3::X, floor);
+    let (u, v) = (dvec3(0.9, 0.0, 0.43), dvec3(-0.43, 0.0, 0.9));
+    let low = dvec3(-0.31, 1.0, -0.73);
+    let corners = [low, low + v, low + u + v, low + u];
+    room.quad(low, v, u, shade);
+    (room, corners)
+}
+
+/// How far inside a convex outline on the floor a place is; below 0 outside.
+fn inside(outline: &[DVec3], at: DVec3) -> f64 {
+    let middle = outline.iter().sum::<DVec3>() / outline.len() as f64;
+    let of = |k: usize| {
+        let (a, b) = (outline[k], outline[(k + 1) % outline.len()]);
+        let across = DVec3::Y.cross(b - a).normalize();
+        (at - a).dot(across) * (middle - a).dot(across).signum()
+    };
+    (0..outline.len()).map(of).fold(f64::INFINITY, f64::min)
+}
+
+/// Places on the floor further than [`NEAR`] from all outlines whose light is nearer to that of the other side. `expected` tells light
+/// without shadows of each lamp at a place.
+fn wrong(
+    (bake, baked): &(Bake, Baked),
+    outlines: &[Vec<DVec3>],
+    expected: impl Fn(usize, DVec3) -> f64,
+) -> usize {
+    let mut wrong = 0;
+    for k in 0..160 * 160 {
+        let (x, z) = (f64::from(k % 160) + 0.37, f64::from(k / 160) + 0.61);
+        let at = dvec3(-2.0 + x / 40.0, 0.0, -2.0 + z / 40.0);
+        let depths: Vec<f64> = outlines.iter().map(|o| inside(o, at)).collect();
+        if depths.iter().any(|d| d.abs() < NEAR) {
+            continue;
+        }
+        let all: Vec<f64> = (0..outlines.len()).map(|l| expected(l, at)).collect();
+        let least = all.iter().copied().fold(f64::INFINITY, f64::min);
+        let truth: f64 = (0..all.len())
+            .map(|l| if depths[l] > 0.0 { 0.0 } else { all[l] })
+            .sum();
+        let light = drawn(bake, baked, at, DVec3::Y);
+        if (light - truth).abs() > 0.5 * least {
+            eprintln!("{at} drawn {light} true {truth}");
+            show(bake, baked, at, DVec3::Y);
+            wrong += 1;
+        }
+    }
+    wrong
+}
+
+fn thrown(corners: &[DVec3; 4], lamp: DVec3) -> Vec<DVec3> {
+    let to_floor = |c: &DVec3| lamp + (*c - lamp) * (lamp.y / (lamp.y - c.y));
+    corners.iter().map(to_floor).collect()
+}
+
+/// The square's shadow under parallel light, a point and a spot, one line for each side, and few vertices.
+#[test]
+fn the_shadow_of_a_square() {
+    let toward = dvec3(-0.4, -1.0, 0.3).normalize();
+    let lamp = dvec3(0.6, 2.7, -0.5);
+    let cone = LightKind::Spot {
+        inner: 1.2,
+        outer: 1.4,
+    };
+    for kind in [LightKind::Directional, LightKind::Point, cone] {
+        let (mut room, corners) = square_above_floor();
+        let place = if kind.is_parallel() {
+            DVec3::ZERO
+        } else {
+            lamp
+        };
+        let direction = if kind.is_parallel() {
+            toward
+        } else {
+            DVec3::NEG_Y
+        };
+        room.punctual(kind, place, direction, 1000.0);
+        let outline = match kind.is_parallel() {
+            true => corners.map(|c| c - toward * (c.y / toward.y)).to_vec(),
+            false => thrown(&corners, lamp),
+        };
+        let light = |_: usize, at: DVec3| match kind {
+            LightKind::Directional => -1000.0 * toward.y,
+            _ => {
+                let d = lamp - at;
+                let along = d.y / d.length();
+                let spot = match kind {
+                    LightKind::Spot { inner, outer } => {
+                        let share = (along - outer.cos()) / (inner.cos() - outer.cos());
+                        share.clamp(0.0, 1.0).powi(2)
+                    }
+                    _ => 1.0,
+                };
+                1000.0 * spot * along / d.length_squared()
+            }
+        };
+        let out = baked(room.scene());
+        let count = vertices(&out.1);
+        let wrong = wrong(&out, &[outline], light);
+        eprintln!("{kind:?}: {count} vertices, {wrong} places wrong");
+        no_cracks(&out.0, &out.1);
+        assert_eq!(wrong, 0, "{kind:?}");
+        assert!(count < 2000, "{kind:?}: {count}");
+    }
+}
+
+/// Shadows of one square from two lamps cross.
+#[test]
+fn two_shadows_cross() {
+    let (mut room, corners) = square_above_floor();
+    let lamps = [dvec3(0.6, 2.7, -0.5), dvec3(-0.5, 2.4, 0.1)];
+    for lamp in lamps {
+        room.punctual(LightKind::Point, lamp, DVec3::NEG_Y, 1000.0);
+    }
+    let outlines: Vec<Vec<DVec3>> = lamps.iter().map(|l| thrown(&corners, *l)).collect();
+    let light = |l: usize, at: DVec3| {
+        let d = lamps[l] - at;
+        1000.0 * d.y / d.length().powi(3)
+    };
+    let out = baked(room.scene());
+    let count = vertices(&out.1);
+    let wrong = wrong(&out, &outlines, light);
+    eprintln!("two lamps: {count} vertices, {wrong} places wrong");
+    no_cracks(&out.0, &out.1);
+    assert_eq!(wrong, 0);
+    assert!(count < 2000, "{count}");
+}
+
+/// Light at random places of a floor and a wall that lie further than [`NEAR`] from where light ends, for a ray tells which.
+fn agrees(
+    out: &(Bake, Baked),
+    places: &[(DVec3, DVec3)],
+    hidden: impl Fn(DVec3) -> bool,
+    full: impl Fn(DVec3) -> f64,
+) -> usize {
+    let around = [DVec3::X, DVec3::Y, DVec3::Z].map(|d| [NEAR * d, -NEAR * d]);
+    let even = |p: DVec3, n: DVec3| {
+        let near = around.iter().flatten().filter(|d| d.dot(n) == 0.0);
+        near.map(|d| hidden(p + *d)).all(|h| h == hidden(p))
+    };
+    let wrong = places.iter().filter(|(p, n)| {
+        let truth = if hidden(*p) { 0.0 } else { full(*n) };
+        let light = drawn(&out.0, &out.1, *p, *n);
+        let off = even(*p, *n) && (light - truth).abs() > 0.25 * full(*n);
+        if off {
+            eprintln!("{p} facing {n}: drawn {light}, true {truth}");
+            show(&out.0, &out.1, *p, *n);
+        }
+        off
+    });
+    wrong.count()
+}
+
+/// A column that stands before a wall: its shadow begins at its base without a comb, runs over the floor and up the wall.
+#[test]
+fn from_the_base_of_a_column_around_the_corner() {
+    let mut room = Room::new();
+    let paint = room.paint(0.0);
+    room.quad(dvec3(-2.0, 0.0, 0.0), 3.0 * DVec3::Z, 4.0 * DVec3::X, paint);
+    room.quad(dvec3(-2.0, 0.0, 0.0), 4.0 * DVec3::X, 2.5 * DVec3::Y, paint);
+    let (low, high) = (dvec3(0.3, 0.0, 1.1), dvec3(0.55, 2.0, 1.37));
+    room.block(low, high, paint);
+    let toward = dvec3(-0.45, -0.5, -0.9).normalize();
+    room.punctual(LightKind::Directional, DVec3::ZERO, toward, 1000.0);
+    let out = baked(room.scene());
+    let count = vertices(&out.1);
+    // Slabs of the box that the ray to the sun passes.
+    let hidden = |p: DVec3| {
+        let d = -toward;
+        let (mut from, mut to) = (0.0f64, f64::INFINITY);
+        for k in 0..3 {
+            let (a, b) = ((low[k] - p[k]) / d[k], (high[k] - p[k]) / d[k]);
+            from = from.max(a.min(b));
+            to = to.min(a.max(b));
+        }
+        from < to
+    };
+    let mut places = Vec::new();
+    for k in 0..120 * 75 {
+        let (u, v) = (f64::from(k % 120) + 0.41, f64::from(k / 120) + 0.53);
+        let (x, y) = (-2.0 + u / 30.0, v / 30.0);
+        places.push((dvec3(x, y, 0.0), DVec3::Z));
+        let floor = dvec3(x, 0.0, y);
+        let below = floor.x > low.x && floor.x < high.x && floor.z > low.z && floor.z < high.z;
+        if !below {
+            places.push((floor, DVec3::Y));
+        }
+    }
+    let wrong = agrees(&out, &places, hidden, |n| -1000.0 * toward.dot(n));
+    eprintln!(
+        "column: {count} vertices, {wrong} of {} places wrong",
+        places.len()
+    );
+    no_cracks(&out.0, &out.1);
+    assert_eq!(wrong, 0);
+    assert!(count < 2000, "{count}");
+}
