@@ -12,11 +12,11 @@
 //! The ambient cube (Mitchell, McTaggart and Green 2006) is E to +X, -X, +Y, -Y, +Z and -Z.
 
 use super::LayerLanes;
-use crate::geometry::NO_PLANE;
 use crate::solve::Bake;
 use crate::survey::{Place, places};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Tristimulus values.
@@ -165,21 +165,14 @@ impl Bake {
         let aimless: Vec<(DVec3, DVec3)> = points.iter().map(|&p| (p, DVec3::ZERO)).collect();
         let places = places(self.scene(), &aimless);
         let directions = directions();
-        let lit = points
-            .iter()
-            .zip(&places)
-            .filter(|(_, place)| **place == Place::Room);
-        let receivers: Vec<Receiver> = lit
-            .flat_map(|(point, _)| {
-                directions.iter().map(|(normal, _)| Receiver {
-                    point: *point - self.mesh().centre,
-                    normal: *normal,
-                    plane: NO_PLANE,
-                    leaf: None,
-                    // One pattern for all: neighbours err alike, and that does not show.
-                    seed: 0,
-                })
-            })
+        let looking = |(point, _): (&DVec3, &Place)| {
+            let spot = self.spot(*point, |_| true);
+            // One pattern for all: neighbours err alike, and that does not show.
+            directions.map(|(normal, _)| self.receiver_at(&spot, normal, 0))
+        };
+        let receivers: Vec<Receiver> = (points.par_iter().zip(&places))
+            .filter(|(_, place)| **place == Place::Room)
+            .flat_map_iter(looking)
             .collect();
         let gathered = self.gather(&receivers);
         let mut gathered = gathered.chunks_exact(DIRECTIONS);

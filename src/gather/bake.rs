@@ -1,4 +1,4 @@
-//! The light of a vertex of the output, and of any point.
+//! The light of a vertex of the output.
 
 use super::refined as refined_mesh;
 use super::{BakedSurface, BakedVertex};
@@ -6,7 +6,7 @@ use crate::color::{LinearSrgb, Upsampler};
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
-use crate::transport::{Gathered, Receiver};
+use crate::transport::Receiver;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -15,8 +15,6 @@ const INSET: f64 = 2e-3;
 /// Texels nearer to an edge than this share of the room's half diagonal (1 mm in a room of 20 m), or than vertices would be, are
 /// drawn that far into the triangle.
 const TEXEL_INSET: f64 = 1e-4;
-/// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
-const PROBE_INSET: f64 = 1e-5;
 /// The baked mesh and what it took.
 #[derive(Debug, Default)]
 pub struct Baked {
@@ -325,89 +323,6 @@ pub(crate) fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> us
         }
         for (v, (sum, n)) in sums {
             rows[v as usize] = Some(sum.map(|x| x / n));
-        }
-    }
-}
-
-/// Light at any point, for probes.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct Probed {
-    /// Tristimulus irradiance; Y is lux.
-    pub xyz: [f64; 3],
-    /// Irradiance on the 64 leaves, W/m2/nm.
-    pub leaves: Leaves,
-    /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`](super::MOSTLY) a vertex there counts as covered.
-    pub backs: f64,
-}
-
-impl Bake {
-    /// Irradiance at points in world space with unit normals.
-    pub fn probe(&self, points: &[(DVec3, DVec3)]) -> Vec<Probed> {
-        self.gather_at(points)
-            .into_iter()
-            .map(
-                |Gathered {
-                     irradiance, backs, ..
-                 }| Probed {
-                    backs,
-                    xyz: self.lanes().tristimulus(&irradiance),
-                    leaves: self.lanes().leaves(&irradiance),
-                },
-            )
-            .collect()
-    }
-
-    /// Light at points in world space with unit normals, by lane.
-    pub(crate) fn gather_at(&self, points: &[(DVec3, DVec3)]) -> Vec<Gathered> {
-        let receivers: Vec<Receiver> = points
-            .iter()
-            .enumerate()
-            .map(|(k, &(point, normal))| self.place(point - self.mesh().centre, normal, k as u64))
-            .collect();
-        self.gather(&receivers)
-    }
-
-    /// Finds the face that a point lies on, if its normal agrees; a point in the air looks at the whole room.
-    fn place(&self, point: DVec3, normal: DVec3, seed: u64) -> Receiver {
-        let (mesh, tree) = (self.mesh(), self.tree());
-        let near = 1e-6 * mesh.half_size;
-        for (entry, face) in tree.faces.iter().enumerate() {
-            let n = tree.face_normal[entry];
-            if n.dot(normal) < 1.0 - 1e-6 {
-                continue;
-            }
-            let [a, b, c] = mesh.corners(*face);
-            if n.dot(point - a).abs() > near {
-                continue;
-            }
-            let w = crate::solve::weights_of(point, a, b, c);
-            if w.iter().all(|&x| x >= -1e-9) {
-                let w = w.map(|x| x.max(0.0));
-                // On an edge the point would lie in the neighbouring wall too, and see past it.
-                let edge = w.iter().any(|&x| x < PROBE_INSET);
-                let (w, point) = if edge {
-                    let w = w.map(|x| x * (1.0 - 3.0 * PROBE_INSET) + PROBE_INSET);
-                    (w, a * w[0] + b * w[1] + c * w[2])
-                } else {
-                    (w, point)
-                };
-                let leaf = tree.leaf_at(entry as u32, w);
-                return Receiver {
-                    point,
-                    normal,
-                    plane: tree.face_plane[entry],
-                    leaf: Some(leaf),
-                    seed,
-                };
-            }
-        }
-        Receiver {
-            point,
-            normal,
-            plane: crate::geometry::NO_PLANE,
-            leaf: None,
-            seed,
         }
     }
 }

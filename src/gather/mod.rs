@@ -3,14 +3,16 @@
 pub mod air;
 mod bake;
 mod layers;
+mod probe;
 pub mod refined;
 mod spectra;
 
 pub use crate::transport::MOSTLY;
 pub use air::{Air, Around};
-pub use bake::{Baked, Interpolation, Probed};
+pub use bake::{Baked, Interpolation};
 pub(crate) use bake::{KeptVertex, Look, Vertex, lend};
 pub(crate) use layers::LayerLanes;
+pub use probe::Probed;
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
 #[derive(Debug, Clone, Default)]
