@@ -7,6 +7,7 @@
 use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
 use super::maps::{self, Mapping};
 use super::options::{Common, Reading, Showing, Solving, Storing, positive};
+use super::parting::{self, Parting};
 use super::paths::text;
 use super::report::Report;
 use super::results::print;
@@ -74,6 +75,9 @@ pub struct BakeArgs {
     /// In vertices or in maps.
     #[command(flatten)]
     pub mapping: Mapping,
+    /// What is written beside it.
+    #[command(flatten)]
+    pub parting: Parting,
     /// The baked room has this many vertices at the most, but never fewer than the room itself.
     #[arg(long, value_name = "N")]
     pub vertices: Option<usize>,
@@ -143,9 +147,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         .unwrap_or_else(|| args.room.with_extension("baked.glb"));
     let cache = cache(args);
     talk.phase("reading");
-    let scene = load(&args.room, &args.reading, |parts| {
+    let mut scene = load(&args.room, &args.reading, |parts| {
         problems(args, &output, cache.as_deref(), parts)
     })?;
+    args.parting.part(&mut scene, &talk)?;
+    let grid = args.parting.grid(&scene)?;
     scene.warnings.iter().for_each(|w| talk.warn(w));
     let mut seconds = Seconds {
         load: stop.elapsed_s(),
@@ -270,6 +276,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     if let Some(maps) = &maps {
         let (room, ktx2) = (&args.room, args.mapping.ktx2);
         outputs.maps = maps::write(&output, room, scene, maps, &glb, &exposure, ktx2)?;
+    }
+    if let Some(grid) = &grid {
+        talk.phase("probing");
+        let names = (output.as_path(), args.room.as_path());
+        outputs.probes = parting::write_probes(&bake, grid, names, &exposure, &talk)?;
     }
     outputs.report = report.as_ref().map(|r| text(&r.path));
     if let Some(path) = &args.npz {
@@ -472,6 +483,7 @@ fn problems(
         ("--snapshots", args.snapshots.is_some()),
     ];
     problems.extend(args.mapping.problems(&of_vertices));
+    problems.extend(args.parting.problems(args.spectrum, args.cache.is_some()));
     if let Some(folder) = args
         .snapshots
         .as_deref()

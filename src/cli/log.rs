@@ -188,10 +188,35 @@ pub struct Outputs {
     pub report: Option<String>,
     /// The index of light maps, and their pages.
     pub maps: Vec<String>,
+    /// Light in the air: the list of probes, and their texture.
+    pub probes: Vec<String>,
     /// Pictures of all rounds.
     pub pictures: Vec<String>,
     /// High dynamic range pictures of the result.
     pub exr: Vec<String>,
+}
+
+/// A layer of lamps.
+#[derive(Debug, Clone, Serialize)]
+pub struct LayerRecord {
+    /// Its name.
+    pub name: String,
+    /// Of its light at points between vertices: mean CIEDE2000, measured.
+    pub interpolation_de2000: Figure,
+}
+
+impl LayerRecord {
+    fn of(bake: &Bake, baked: &Baked) -> Vec<Self> {
+        let names = bake.layers().into_iter().flat_map(|layers| &layers.names);
+        let one = |(name, found): (&String, &Interpolation)| Self {
+            name: name.clone(),
+            interpolation_de2000: Figure {
+                value: Some(found.mean),
+                kind: Kind::Measured,
+            },
+        };
+        names.zip(&baked.layers).map(one).collect()
+    }
 }
 
 /// Seconds of the parts of a bake, wall time.
@@ -238,6 +263,10 @@ pub struct VerdictRecord {
     pub interpolation_de2000: Figure,
     /// How that was measured, and what it may be.
     pub interpolation: Option<Interpolation>,
+    /// How far light between vertices is from what looking there shows, layer by layer, under the adaptation white of the whole; none
+    /// without `--layers`, and of maps.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerRecord>,
     /// Files.
     pub outputs: Outputs,
     /// Vertices written.
@@ -315,6 +344,7 @@ impl VerdictRecord {
                 kind: Kind::Measured,
             },
             interpolation: end.baked.interpolation,
+            layers: LayerRecord::of(end.bake, end.baked),
             outputs: end.outputs,
             vertices: end.glb.vertices,
             triangles: end.glb.triangles,

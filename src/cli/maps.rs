@@ -132,9 +132,12 @@ pub fn write(
     look: &Exposure,
     ktx2: bool,
 ) -> Result<Vec<String>> {
-    let page_path = |k: usize, ending: &str| output.with_extension(format!("map-{k}.{ending}"));
-    let name = |k: usize, ending: &str| {
-        let path = page_path(k, ending);
+    let page_path = |k: usize, layer: Option<usize>, ending: &str| {
+        let layer = layer.map_or(String::new(), |l| format!("layer-{}.", l + 1));
+        output.with_extension(format!("{layer}map-{k}.{ending}"))
+    };
+    let name = |k: usize, layer: Option<usize>, ending: &str| {
+        let path = page_path(k, layer, ending);
         path.file_name()
             .map_or(String::new(), |n| n.to_string_lossy().into_owned())
     };
@@ -142,13 +145,15 @@ pub fn write(
     let json = serde_json::to_vec_pretty(&index)
         .map_err(|problem| Error::Internal(format!("index of light maps: {problem}")))?;
     let mut files: Vec<(PathBuf, Vec<u8>)> = vec![(output.with_extension("maps.json"), json)];
-    for (k, page) in maps.pages.iter().enumerate() {
-        files.push((page_path(k, "exr"), maps::to_exr(page, index.lux_per_unit)?));
-        if ktx2 {
-            files.push((
-                page_path(k, "ktx2"),
-                maps::to_ktx2(page, index.lux_per_unit),
-            ));
+    let of_layers = (0..).zip(&maps.layers).map(|(l, pages)| (Some(l), pages));
+    for (layer, pages) in std::iter::once((None, &maps.pages)).chain(of_layers) {
+        for (k, page) in pages.iter().enumerate() {
+            let exr = maps::to_exr(page, index.lux_per_unit)?;
+            files.push((page_path(k, layer, "exr"), exr));
+            if ktx2 {
+                let ktx2 = maps::to_ktx2(page, index.lux_per_unit);
+                files.push((page_path(k, layer, "ktx2"), ktx2));
+            }
         }
     }
     for (path, bytes) in &files {

@@ -8,6 +8,7 @@
 //! | `log` | the log of a bake, field by field |
 //! | `report` | the page of a bake |
 //! | `snapshots` | pictures of the rounds |
+//! | `parting` | layers of lamps and probes of a bake |
 //! | `maps` | light maps of a bake, and what may be asked of them |
 //! | `metrics` | figures of lighting practice for `probe` |
 //! | `pictures` | plan and spectra of a room for `inspect` |
@@ -30,6 +31,7 @@ mod metrics;
 pub mod options;
 #[cfg(feature = "paper")]
 pub mod paper;
+mod parting;
 mod paths;
 mod pictures;
 pub mod points;

@@ -1,6 +1,6 @@
 //! The table at the end of a bake: what each round cost and how wrong it left the room.
 
-use super::log::VerdictRecord;
+use super::log::{LayerRecord, VerdictRecord};
 use crate::audit::{Honesty, Report};
 use crate::gather::Interpolation;
 use crate::report::{Align, Table};
@@ -79,6 +79,17 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
     ];
     if let Some(i) = &v.interpolation {
         lines.push(between_vertices(i));
+    }
+    if !v.layers.is_empty() {
+        let one = |l: &LayerRecord| {
+            let mean = l.interpolation_de2000.value.unwrap_or(0.0);
+            format!("{} {mean:.3}", l.name)
+        };
+        let all: Vec<String> = v.layers.iter().map(one).collect();
+        lines.push(format!(
+            "of which by layer, each alone: {} (mean)",
+            all.join(", ")
+        ));
     }
     if v.capped > 0 {
         lines.push(format!(

@@ -1,4 +1,4 @@
-//! The light of a vertex of the output, and of any point.
+//! The light of a vertex of the output.
 
 use super::refined as refined_mesh;
 use super::{BakedSurface, BakedVertex};
@@ -6,7 +6,7 @@ use crate::color::{LinearSrgb, Upsampler};
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
-use crate::transport::{Gathered, Receiver};
+use crate::transport::Receiver;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -15,8 +15,6 @@ const INSET: f64 = 2e-3;
 /// Texels nearer to an edge than this share of the room's half diagonal (1 mm in a room of 20 m), or than vertices would be, are
 /// drawn that far into the triangle.
 const TEXEL_INSET: f64 = 1e-4;
-/// Probes nearer to an edge than this share of a triangle's height are drawn that far into it, for the same reason.
-const PROBE_INSET: f64 = 1e-5;
 /// The baked mesh and what it took.
 #[derive(Debug, Default)]
 pub struct Baked {
@@ -34,6 +32,8 @@ pub struct Baked {
     pub of: Vec<Vec<u32>>,
     /// How far light between vertices is from what looking there shows; none in a sketch and after relighting.
     pub interpolation: Option<Interpolation>,
+    /// The same for each layer by itself, under the adaptation white of the whole; none without layers, and of maps.
+    pub layers: Vec<Interpolation>,
     /// Visibility rays cast.
     pub rays: u64,
 }
@@ -169,6 +169,20 @@ impl Bake {
         materials.map(|m| Look::new(self, m, upsampler)).collect()
     }
 
+    /// What a vertex gives out by itself; none of surfaces that do not shine.
+    pub(super) fn glow(&self, vertex: &Vertex, back: bool, look: &Look) -> Option<&[f32]> {
+        if !look.emits || vertex.entry == crate::hierarchy::NONE {
+            return None;
+        }
+        let w = if back {
+            [vertex.weights[0], vertex.weights[2], vertex.weights[1]]
+        } else {
+            vertex.weights
+        };
+        let leaf = self.tree().leaf_at(vertex.entry, w);
+        Some(self.light().emitted.row(leaf as usize))
+    }
+
     /// What a vertex shows.
     pub(crate) fn vertex(
         &self,
@@ -177,27 +191,11 @@ impl Bake {
         row: &[f32; 64],
         look: &Look,
     ) -> BakedVertex {
-        let glow = match (look.emits, vertex.entry) {
-            (true, entry) if entry != crate::hierarchy::NONE => {
-                let w = if back {
-                    [vertex.weights[0], vertex.weights[2], vertex.weights[1]]
-                } else {
-                    vertex.weights
-                };
-                let leaf = self.tree().leaf_at(entry, w);
-                let own = self.light().emitted.row(leaf as usize);
-                look.shown.unwrap_or_else(|| self.lanes().tristimulus(own))
-            }
-            _ => [0.0; 3],
+        let glow = match self.glow(vertex, back, look) {
+            Some(own) => look.shown.unwrap_or_else(|| self.lanes().tristimulus(own)),
+            None => [0.0; 3],
         };
-        let sum = |weights: &[[f64; 3]]| {
-            let mut xyz = [0.0; 3];
-            for (x, w) in row.iter().zip(weights) {
-                xyz = std::array::from_fn(|c| xyz[c] + f64::from(*x) * w[c]);
-            }
-            xyz
-        };
-        let reflected = sum(&look.reflected);
+        let reflected = look.reflect(row);
         let display = LinearSrgb::standard();
         let unpainted = look.unpainted.unwrap_or([1.0; 3]);
         let rgb = display.from_xyz(std::array::from_fn(|c| reflected[c] + glow[c]));
@@ -212,7 +210,7 @@ impl Bake {
             light: std::array::from_fn(|c| (rgb[c] / unpainted[c]) as f32),
         };
         if let Some(paint) = look.painted(&self.scene().surfaces[surface as usize], &out) {
-            let reflected = sum(&self.lanes().reflected(&paint));
+            let reflected = weighed(row, &self.lanes().reflected(&paint));
             out.radiosity = std::array::from_fn(|c| (reflected[c] + glow[c]) as f32);
         }
         out
@@ -229,10 +227,21 @@ pub(crate) struct Look<'a> {
     /// Tristimulus radiosity for a unit of each lane's irradiance.
     reflected: Vec<[f64; 3]>,
     /// Mean colour of the texture, which the display multiplies again.
-    unpainted: Option<[f64; 3]>,
+    pub(super) unpainted: Option<[f64; 3]>,
     emits: bool,
+    /// Light spectrum that it emits.
+    pub(super) light: Option<usize>,
     /// Exitance that a lamp with a profile is shown with.
-    shown: Option<[f64; 3]>,
+    pub(super) shown: Option<[f64; 3]>,
+}
+
+/// Sum of a row's lanes with tristimulus weights.
+fn weighed(row: &[f32; 64], weights: &[[f64; 3]]) -> [f64; 3] {
+    let mut xyz = [0.0; 3];
+    for (x, w) in row.iter().zip(weights) {
+        xyz = std::array::from_fn(|c| xyz[c] + f64::from(*x) * w[c]);
+    }
+    xyz
 }
 
 impl<'a> Look<'a> {
@@ -259,10 +268,16 @@ impl<'a> Look<'a> {
             upsampler,
             unpainted: mean,
             emits: material.emission.is_some(),
+            light: material.emission.as_ref().map(|e| e.light),
             shown: (material.emission.as_ref())
                 .filter(|e| e.profile.is_some())
                 .map(|e| bake.lanes().emission(e.light, &e.shape, PI)),
         }
+    }
+
+    /// Tristimulus radiosity that is reflected of a row of irradiance, vertex colours apart.
+    pub(super) fn reflect(&self, row: &[f32; 64]) -> [f64; 3] {
+        weighed(row, &self.reflected)
     }
 
     /// Reflectance on the leaves, of a texture its mean; vertex colours apart.
@@ -308,89 +323,6 @@ pub(crate) fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> us
         }
         for (v, (sum, n)) in sums {
             rows[v as usize] = Some(sum.map(|x| x / n));
-        }
-    }
-}
-
-/// Light at any point, for probes.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct Probed {
-    /// Tristimulus irradiance; Y is lux.
-    pub xyz: [f64; 3],
-    /// Irradiance on the 64 leaves, W/m2/nm.
-    pub leaves: Leaves,
-    /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`](super::MOSTLY) a vertex there counts as covered.
-    pub backs: f64,
-}
-
-impl Bake {
-    /// Irradiance at points in world space with unit normals.
-    pub fn probe(&self, points: &[(DVec3, DVec3)]) -> Vec<Probed> {
-        self.gather_at(points)
-            .into_iter()
-            .map(
-                |Gathered {
-                     irradiance, backs, ..
-                 }| Probed {
-                    backs,
-                    xyz: self.lanes().tristimulus(&irradiance),
-                    leaves: self.lanes().leaves(&irradiance),
-                },
-            )
-            .collect()
-    }
-
-    /// Light at points in world space with unit normals, by lane.
-    pub(crate) fn gather_at(&self, points: &[(DVec3, DVec3)]) -> Vec<Gathered> {
-        let receivers: Vec<Receiver> = points
-            .iter()
-            .enumerate()
-            .map(|(k, &(point, normal))| self.place(point - self.mesh().centre, normal, k as u64))
-            .collect();
-        self.gather(&receivers)
-    }
-
-    /// Finds the face that a point lies on, if its normal agrees; a point in the air looks at the whole room.
-    fn place(&self, point: DVec3, normal: DVec3, seed: u64) -> Receiver {
-        let (mesh, tree) = (self.mesh(), self.tree());
-        let near = 1e-6 * mesh.half_size;
-        for (entry, face) in tree.faces.iter().enumerate() {
-            let n = tree.face_normal[entry];
-            if n.dot(normal) < 1.0 - 1e-6 {
-                continue;
-            }
-            let [a, b, c] = mesh.corners(*face);
-            if n.dot(point - a).abs() > near {
-                continue;
-            }
-            let w = crate::solve::weights_of(point, a, b, c);
-            if w.iter().all(|&x| x >= -1e-9) {
-                let w = w.map(|x| x.max(0.0));
-                // On an edge the point would lie in the neighbouring wall too, and see past it.
-                let edge = w.iter().any(|&x| x < PROBE_INSET);
-                let (w, point) = if edge {
-                    let w = w.map(|x| x * (1.0 - 3.0 * PROBE_INSET) + PROBE_INSET);
-                    (w, a * w[0] + b * w[1] + c * w[2])
-                } else {
-                    (w, point)
-                };
-                let leaf = tree.leaf_at(entry as u32, w);
-                return Receiver {
-                    point,
-                    normal,
-                    plane: tree.face_plane[entry],
-                    leaf: Some(leaf),
-                    seed,
-                };
-            }
-        }
-        Receiver {
-            point,
-            normal,
-            plane: crate::geometry::NO_PLANE,
-            leaf: None,
-            seed,
         }
     }
 }

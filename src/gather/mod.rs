@@ -1,12 +1,18 @@
 //! What the light looks like at points and at the vertices of the refined mesh.
 
+pub mod air;
 mod bake;
+mod layers;
+mod probe;
 pub mod refined;
 mod spectra;
 
 pub use crate::transport::MOSTLY;
-pub use bake::{Baked, Interpolation, Probed};
+pub use air::{Air, Around};
+pub use bake::{Baked, Interpolation};
 pub(crate) use bake::{KeptVertex, Look, Vertex, lend};
+pub(crate) use layers::LayerLanes;
+pub use probe::Probed;
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
 #[derive(Debug, Clone, Default)]
@@ -19,6 +25,9 @@ pub struct BakedSurface {
     pub vertices: Vec<BakedVertex>,
     /// Triangles, counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
+    /// For each layer (see [`Layers`](crate::scene::layers::Layers)) what [`BakedVertex::light`] has of it, vertex by vertex; none
+    /// without layers.
+    pub layers: Vec<Vec<[f32; 3]>>,
     /// Where its light stands in light maps; none: at its vertices.
     pub map: Option<MapPlace>,
 }

@@ -116,6 +116,7 @@ impl Bake {
                 back: kept.back,
                 vertices: vertices.collect(),
                 triangles: kept.triangles.clone(),
+                layers: Vec::new(),
                 map: None,
             });
             out.irradiance.push(rows);

@@ -17,14 +17,12 @@ const MOVED: f64 = 1e-3;
 
 /// A texel by its chart and place in the lattice.
 pub(super) type Key = (u32, [u32; 2]);
+/// Means of the light around texels at edges.
+pub(super) type Smoothed = Vec<(Key, Vec<(f64, Sample)>)>;
 
 impl Growth<'_> {
     /// Looks around the texels of cells with edges; these texels with their places and weights.
-    pub(super) fn smooth(
-        &mut self,
-        allowed: f64,
-        progress: &dyn Fn(usize, usize),
-    ) -> Vec<(Key, Vec<(f64, Sample)>)> {
+    pub(super) fn smooth(&mut self, allowed: f64, progress: &dyn Fn(usize, usize)) -> Smoothed {
         let is_finest = |c: &Cell, l: &Lattice| !l.single && c.level == l.finest;
         let mut rough: Vec<usize> = (0..self.cells.len())
             .filter(|&k| {

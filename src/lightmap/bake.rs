@@ -1,6 +1,6 @@
 //! From the solved light to maps.
 
-use super::aliasing::Key;
+use super::aliasing::{Key, Smoothed};
 use super::cells::Cell;
 use super::charts::{Chart, charts};
 use super::grow::{Budget, Growth};
@@ -10,7 +10,7 @@ use super::sampler::{Sample, Sampler};
 use super::seams::close;
 use super::texels::{Corners, Patch, Texel, lend, patch};
 use super::unwrap::Conformal;
-use crate::gather::{Baked, BakedSurface, Look, MapPlace};
+use crate::gather::{Baked, BakedSurface, LayerLanes, Look, MapPlace};
 use crate::mesh::looks::Looks;
 use crate::mesh::measure::summed;
 use crate::mesh::turns::Turns;
@@ -48,8 +48,8 @@ impl Default for MapLimits<'_> {
     }
 }
 
-/// Means of the light around texels at edges.
-type Smoothed = Vec<(Key, Vec<(f64, Sample)>)>;
+/// Number and lanes of a layer.
+pub(super) type Part<'a> = (usize, &'a LayerLanes);
 
 impl Bake {
     /// The light of the room in maps, whose interpolation error, measured, is within its share of the error asked for.
@@ -75,22 +75,23 @@ impl Bake {
         growth.budget.texels = limits.texels.unwrap_or(most);
         let area = growth.seen_area();
         let points = growth.points(self, 0, progress);
-        let samples = growth.compared(&points, &self.placed(&growth, &Vec::new()).0);
+        let samples = growth.compared(&points, &self.placed(&growth, &Vec::new(), None).0);
         let before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
         let mut turns = Turns::new(allowed, area, growth.cells.len(), before);
         loop {
             let end = growth.grow(turns.aim, progress);
             let points = growth.points(self, turns.turn, progress);
-            let samples = growth.compared(&points, &self.placed(&growth, &Vec::new()).0);
+            let samples = growth.compared(&points, &self.placed(&growth, &Vec::new(), None).0);
             let found = summed(&samples, allowed, None);
             let ended = (end, (limits.late)());
             if turns.is_over(found, growth.cells.len(), ended, growth.sum()) {
                 let smoothed = growth.smooth(allowed, progress);
-                let (mut placed, covered) = self.placed(&growth, &smoothed);
+                let (mut placed, covered) = self.placed(&growth, &smoothed, None);
                 close(self, &growth.charts, &spaces, &mut placed);
                 let samples = growth.compared(&points, &placed);
-                let mut maps = self.written(growth, placed);
+                let layers = self.layers_of_maps(&growth, &smoothed, &spaces, &placed);
+                let mut maps = self.written(growth, placed, &layers);
                 maps.indirect = limits.indirect;
                 maps.baked.covered = covered;
                 maps.baked.interpolation = Some(summed(&samples, allowed, None));
@@ -101,8 +102,13 @@ impl Bake {
     }
 
     /// The charts' texels, and how many places something covers. Charts move out of the growth only at its end, so these are
-    /// copies.
-    fn placed(&self, growth: &Growth, smoothed: &Smoothed) -> (Placed, usize) {
+    /// copies. `part`: number and lanes of the layer whose light they have; none: all light.
+    pub(super) fn placed(
+        &self,
+        growth: &Growth,
+        smoothed: &Smoothed,
+        part: Option<Part>,
+    ) -> (Placed, usize) {
         let looks = self.looks(self.upsampler());
         let mut cells: Vec<Vec<&Cell>> = vec![Vec::new(); growth.charts.len()];
         for cell in &growth.cells {
@@ -115,7 +121,7 @@ impl Bake {
             .map(|k| {
                 let (chart, lattice) = (&growth.charts[k], &growth.lattices[k]);
                 let look = &looks[self.scene().surfaces[chart.surface].material];
-                let texel = |sample: &Sample| self.texel_of(growth, chart, look, sample);
+                let texel = |sample: &Sample| self.texel_of(growth, chart, look, part, sample);
                 let mut corners = Corners::new();
                 for point in cells[k].iter().flat_map(|cell| cell.corners()) {
                     corners.entry(point).or_insert_with(|| {
@@ -157,9 +163,18 @@ impl Bake {
         growth: &Growth,
         chart: &Chart,
         look: &Look,
+        part: Option<Part>,
         sample: &Sample,
     ) -> Option<Texel> {
         let seen = growth.sampler.looks.at(sample.look)?;
+        if let Some((k, lanes)) = part {
+            let shown = (&sample.vertex, chart.back, &*seen.row);
+            let irradiance = self.lanes().tristimulus(&lanes.of(&*seen.row));
+            return Some(Texel {
+                irradiance: irradiance.map(|x| x as f32),
+                light: self.layer(k, lanes, shown, look),
+            });
+        }
         let vertex = self.vertex(&sample.vertex, chart.back, &seen.row, look);
         Some(Texel {
             irradiance: vertex.irradiance,
@@ -168,7 +183,7 @@ impl Bake {
     }
 
     /// Pages, and the mesh with its coordinates on them.
-    fn written(&self, growth: Growth, mut placed: Placed) -> LightMaps {
+    fn written(&self, growth: Growth, mut placed: Placed, layers: &[Vec<Patch>]) -> LightMaps {
         placed.charts = growth.charts;
         let shares = placed.share_dark();
         let outer = |k: usize| {
@@ -187,21 +202,18 @@ impl Bake {
             surfaces: vec![u32::MAX; width * height],
         };
         let mut pages: Vec<Page> = pages.into_iter().map(page).collect();
-        for (k, [w, h]) in own.into_iter().zip(sizes) {
-            let (patch, place) = (&placed.patches[k], placed.places[k]);
-            let margin = margin(&placed.lattices[k]);
-            let page = &mut pages[place.page];
-            for y in 0..h {
-                for x in 0..w {
-                    // The margin goes on with the outermost texels.
-                    let inner = |at: usize, count: usize| at.saturating_sub(margin).min(count - 1);
-                    let from = inner(y, patch.height) * patch.width + inner(x, patch.width);
-                    let to = (place.y + y) * page.width + place.x + x;
-                    page.texels[to] = patch.texels[from];
-                    page.surfaces[to] = placed.charts[k].surface as u32;
-                }
-            }
+        for &k in &own {
+            placed.fill(
+                k,
+                &placed.patches[k],
+                margin(&placed.lattices[k]),
+                &mut pages,
+            );
         }
+        let layers = layers
+            .iter()
+            .map(|layer| super::layers::pages(&placed, &own, layer, &pages));
+        let layers = layers.collect();
         let mut baked = Baked {
             rays: growth.sampler.looks.rays,
             ..Baked::default()
@@ -212,6 +224,7 @@ impl Bake {
             indirect: false,
             looked: growth.sampler.looks.len(),
             pages,
+            layers,
             baked,
             placed,
         }

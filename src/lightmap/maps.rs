@@ -42,6 +42,8 @@ pub struct Page {
 pub struct LightMaps {
     /// The pages.
     pub pages: Vec<Page>,
+    /// The pages of each layer of lamps, which add up to the pages; none without layers.
+    pub layers: Vec<Vec<Page>>,
     /// One mesh for each side of a surface and page; light at its vertices is that of the map there.
     pub baked: Baked,
     /// Texels that light was looked at for, all others are interpolated.

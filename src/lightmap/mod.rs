@@ -9,6 +9,7 @@ mod cells;
 mod charts;
 mod finder;
 mod grow;
+mod layers;
 mod maps;
 mod measure;
 mod pack;

@@ -38,6 +38,9 @@ type Asked = ([u32; 3], u32, [f64; 3]);
 /// Sum of the light of neighbours of covered vertices, and how many there are.
 type Lent = HashMap<u32, ([f64; 3], f64)>;
 
+/// Cell, weights of its corners, and two looks at a random point.
+pub(super) type PointLooks = (usize, [f64; 3], [u32; 2]);
+
 /// A mesh that grows.
 pub(super) struct Growth<'a> {
     pub(super) cells: Cells,
@@ -59,6 +62,8 @@ pub(super) struct Growth<'a> {
     pub(super) unknown: f64,
     /// Variance of a look, by chance.
     pub(super) noise: f64,
+    /// Points of the last measurement.
+    pub(super) asked: Vec<PointLooks>,
     /// Is light looked at, or is the solved light believed?
     pub(super) looking: bool,
     /// Triangles that edges of shadows took to be finished.
@@ -86,6 +91,7 @@ impl<'a> Growth<'a> {
             strict: false,
             unknown: 0.0,
             noise: 0.0,
+            asked: Vec::new(),
             looking: true,
             for_lines: 0,
         }

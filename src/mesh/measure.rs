@@ -6,10 +6,10 @@
 //! least, i the error of interpolation: the rays of vertices may have more in common than chance. What is left when that is
 //! taken off scatters about i^2, below 0 as well as above: roots keep the sign, so that chance cancels in their mean.
 
-use super::grow::{Growth, mix};
+use super::grow::{Growth, PointLooks, mix};
 use super::write::Settled;
 use crate::color::seen_difference;
-use crate::gather::{Interpolation, Vertex};
+use crate::gather::{Interpolation, LayerLanes, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
 
@@ -98,15 +98,36 @@ impl Growth<'_> {
         self.looks.patient = true;
         self.looks.complete(progress);
         self.looks.patient = false;
+        self.asked = asked;
+        self.compared(bake, settled, None)
+    }
+
+    /// What the last measurement tells of each layer by itself, under the white of the whole.
+    pub(super) fn of_layers(
+        &self,
+        bake: &Bake,
+        settled: &[Settled],
+        allowed: f64,
+    ) -> Vec<Interpolation> {
+        let one = |lanes| summed(&self.compared(bake, settled, Some(lanes)), allowed, None);
+        bake.layer_lanes().iter().map(one).collect()
+    }
+
+    /// What is drawn at the points of the last measurement beside what was seen there: of all light, or of a layer's.
+    fn compared(&self, bake: &Bake, settled: &[Settled], part: Option<&LayerLanes>) -> Vec<Sample> {
         let white = bake.light().white;
+        let shown = |row: &[f32; 64]| match part {
+            Some(lanes) => bake.lanes().tristimulus(&lanes.of(row)),
+            None => bake.lanes().tristimulus(row),
+        };
         let difference = |a, b| seen_difference(a, b, white);
-        let sample = |(cell, weights, looks): (usize, [f64; 3], [u32; 2])| {
+        let sample = |&(cell, weights, looks): &PointLooks| {
             let of = &self.cells.all[cell];
-            let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| seen.xyz));
+            let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| shown(&seen.row)));
             let (one, two) = (one?, two?);
             let light = of.corners.map(|c| {
                 let row = settled[of.sheet as usize].rows[c.vertex as usize];
-                row.map_or([0.0; 3], |row| bake.lanes().tristimulus(&row))
+                row.map_or([0.0; 3], |row| shown(&row))
             });
             let drawn = mix(&light, weights);
             let noise = 0.5 * difference(one, two).powi(2);
@@ -119,7 +140,7 @@ impl Growth<'_> {
                 noise,
             })
         };
-        asked.into_iter().filter_map(sample).collect()
+        self.asked.iter().filter_map(sample).collect()
     }
 
     /// Takes what was seen at random points for what is to be expected of their triangles, where it is a surprise.

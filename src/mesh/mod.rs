@@ -92,7 +92,9 @@ impl Bake {
             let ended = (end, limits.is_late());
             if turns.is_over(interpolation, growth.cells.all.len(), ended, growth.sum()) {
                 let capped = growth.unfinished(allowed * allowed);
+                let layers = growth.of_layers(self, &settled, allowed);
                 let mut out = self.write_down(growth, settled);
+                out.layers = layers;
                 out.capped = if interpolation.is_met() { 0 } else { capped };
                 out.interpolation = Some(interpolation);
                 return out;

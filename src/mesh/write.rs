@@ -49,6 +49,7 @@ impl Bake {
     /// Vertices with their colours, as the writers want them.
     pub(super) fn write_down(&self, growth: Growth, settled: Vec<Settled>) -> Baked {
         let looks = self.looks(self.upsampler());
+        let layers = self.layer_lanes();
         let mut out = Baked {
             rays: growth.looks.rays,
             ..Baked::default()
@@ -59,6 +60,7 @@ impl Bake {
             let mut surface = BakedSurface {
                 surface: sheet.surface,
                 back: sheet.back,
+                layers: vec![Vec::new(); layers.len()],
                 ..BakedSurface::default()
             };
             let (mut spectra, mut kept) = (Vec::new(), Vec::new());
@@ -72,6 +74,8 @@ impl Bake {
                             (&sheet.vertices[v], settled.rows[v].unwrap_or([0.0; 64]));
                         let written = self.vertex(vertex, sheet.back, &row, look);
                         surface.vertices.push(written);
+                        let shown = (vertex, sheet.back, &row);
+                        self.add_layers(&layers, shown, look, &mut surface.layers);
                         spectra.push(row);
                         if self.keeps() {
                             let seen = (settled.looks[v] != UNSEEN)

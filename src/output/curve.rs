@@ -42,7 +42,7 @@ pub(crate) fn strongest(rgb: [f64; 3]) -> f64 {
 }
 
 /// Mixed with its grey, which keeps luminance, until no channel is below 0; black without luminance.
-fn into_gamut(rgb: [f64; 3]) -> [f64; 3] {
+pub(crate) fn into_gamut(rgb: [f64; 3]) -> [f64; 3] {
     let least = rgb.into_iter().fold(0.0, f64::min);
     if least >= 0.0 && !rgb.iter().any(|c| c.is_nan()) {
         return rgb;

@@ -10,6 +10,7 @@ mod lit_space;
 pub mod maps;
 pub mod npz;
 pub mod picture;
+pub mod probes;
 mod raster;
 mod viewpoint;
 

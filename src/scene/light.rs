@@ -22,6 +22,8 @@ pub struct PunctualLight {
     pub name: String,
     /// Kind and its parameters.
     pub kind: LightKind,
+    /// Index of its node in the document; none for lights of a sky and those of surfaces.
+    pub node: Option<usize>,
     /// World position.
     pub position: DVec3,
     /// World direction in which it shines, unit length.

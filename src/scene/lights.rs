@@ -47,6 +47,7 @@ pub(crate) fn punctual(
                 let lamp = measured(light, &wish, spectrum.as_ref(), &place, lamps, check)?;
                 return Some(PunctualLight {
                     name,
+                    node: Some(light.node),
                     position,
                     ..lamp
                 });
@@ -79,6 +80,7 @@ pub(crate) fn punctual(
             Some(PunctualLight {
                 name,
                 kind,
+                node: Some(light.node),
                 position,
                 direction,
                 light: lamp.light,
@@ -173,6 +175,7 @@ fn measured(
     Some(PunctualLight {
         name: String::new(),
         kind: LightKind::Profile,
+        node: None,
         position: DVec3::ZERO,
         direction: luminaire.nadir(),
         light: lamp.light,

@@ -1,12 +1,14 @@
 //! A room from its file: document, geometry, paint and lamps, and everything that is wrong with any of them together.
 
 use super::changes::Changes;
-use super::check::Check;
+use super::check::{Check, Unknown};
 use super::document::{Document, RawLight};
 use super::lamps::Lamps;
+use super::layers::Wish;
 use super::lights;
 use super::materials;
 use super::pane;
+use super::parting;
 use super::sky::{self, Sky, SkyWish};
 use super::spectra_file::SpectraFile;
 use super::{Image, LightSpectrum, Material, Options, PunctualLight, Scene, Surface};
@@ -45,6 +47,18 @@ impl Scene {
         let (surfaces, images) = (geometry.surfaces, geometry.images);
         let mut lit = Lit::of(&document, surfaces, &images, options, &mut check);
         let sky = lit.under_sky(&document, options, &mut check);
+        let unknown = match options.lenient {
+            true => Unknown::Warn,
+            false => Unknown::Refuse,
+        };
+        parting::check_names(
+            &lit.layers,
+            &document.source.json,
+            (&lit.surfaces, &lit.lights),
+            &lit.materials,
+            unknown,
+            &mut check,
+        );
         for warning in lacking::warnings(&document.source.json) {
             check.warn(warning);
         }
@@ -68,7 +82,10 @@ impl Scene {
             sky,
             cameras: geometry.cameras,
             warnings,
-            changes: Changes::default(),
+            changes: Changes {
+                layers_wished: lit.layers,
+                ..Changes::default()
+            },
         };
         Ok(scene.scaled(options.scale.unwrap_or(1.0)))
     }
@@ -83,6 +100,8 @@ struct Lit {
     spectra: Vec<LightSpectrum>,
     /// What the file of spectra says of the sky.
     sky: SkyWish,
+    /// And of layers.
+    layers: Vec<Wish>,
 }
 
 impl Lit {
@@ -130,6 +149,7 @@ impl Lit {
             lights,
             spectra,
             sky: file.sky,
+            layers: file.layers,
         }
     }
 

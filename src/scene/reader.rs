@@ -124,6 +124,21 @@ impl Reader<'_> {
         }
     }
 
+    /// A list of names, or one name.
+    pub(super) fn names(&mut self, value: &Value, place: &str) -> Vec<String> {
+        let text = |v: &Value| v.as_str().map(str::to_owned);
+        let names = match value {
+            Value::Array(list) => list.iter().map(text).collect(),
+            one => text(one).map(|name| vec![name]),
+        };
+        let names = names.filter(|names: &Vec<String>| !names.is_empty());
+        if names.is_none() {
+            let next = "write [\"LAMP\", ...], names of lights, materials or nodes";
+            self.check.problem(place, "is no list of names", next);
+        }
+        names.unwrap_or_default()
+    }
+
     /// An entry for a name that the room does not have.
     pub(super) fn known(&mut self, name: &str, names: &[String], kind: &str, place: &str) {
         if names.iter().any(|n| n == name) {

@@ -1,5 +1,6 @@
 //! A room in memory.
 
+use super::layers::{Layers, Wish};
 use super::sky::Sky;
 use super::{Camera, Image, LightSpectrum, Material, PunctualLight, Source, Surface};
 use crate::data::Grid;
@@ -44,6 +45,10 @@ pub struct Changes {
     pub scale: f64,
     /// Surfaces whose faces were turned.
     pub flipped: BTreeSet<usize>,
+    /// The lamps in groups, if they were parted.
+    pub layers: Option<Layers>,
+    /// Which groups the side file asks for.
+    pub(crate) layers_wished: Vec<Wish>,
 }
 
 impl Default for Changes {
@@ -51,6 +56,8 @@ impl Default for Changes {
         Self {
             scale: 1.0,
             flipped: BTreeSet::new(),
+            layers: None,
+            layers_wished: Vec::new(),
         }
     }
 }

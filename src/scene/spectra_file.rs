@@ -6,7 +6,8 @@
 //!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } },
 //!                  "glass": { "transmittance": { "csv": "spectra/glass.csv" } } },
 //!   "lights":    { "Spot": { "name": "cie/A" } },
-//!   "sky":       { "type": "overcast" } }
+//!   "sky":       { "type": "overcast" },
+//!   "layers":    { "desk": ["Spot", "bulb"] } }
 //! ```
 //!
 //! Materials and lights go by their glTF names; all that share a name get the entry. `extras` of a material hold the
@@ -24,6 +25,7 @@
 use super::check::{Check, Unknown};
 use super::json::short;
 use super::known::{self, MaterialSpectra};
+use super::layers::Wish;
 use super::luminaires::{self, LampWish};
 use super::options::Options;
 use super::reader::Reader;
@@ -42,6 +44,8 @@ pub(crate) struct SpectraFile {
     lights: BTreeMap<String, LampWish>,
     /// What is said of sky and sun.
     pub(crate) sky: SkyWish,
+    /// Which lamps are told apart, see [`layers`](super::layers).
+    pub(crate) layers: Vec<Wish>,
 }
 
 impl SpectraFile {
@@ -87,7 +91,7 @@ impl SpectraFile {
         let Some(top) = reader.object(&json, &place) else {
             return file;
         };
-        reader.keys(top, &["materials", "lights", "sky"], &place);
+        reader.keys(top, &["materials", "lights", "sky", "layers"], &place);
         if let Some(sky) = top.get("sky") {
             file.sky = SkyWish::read(sky, &format!("{place}: sky"), &mut reader);
         }
@@ -96,6 +100,11 @@ impl SpectraFile {
             reader.known(name, materials, "material", &place);
             let spectra = known::read(&mut reader, entry, &place);
             file.materials.insert(name.clone(), spectra);
+        }
+        for (name, entry) in reader.entries(top, "layers", &place) {
+            let place = format!("{place}: layer '{}'", short(name));
+            let lamps = reader.names(entry, &place);
+            file.layers.push((name.clone(), lamps));
         }
         for (name, entry) in reader.entries(top, "lights", &place) {
             let place = format!("{place}: light '{}'", short(name));

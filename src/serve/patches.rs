@@ -69,6 +69,7 @@ impl Patches {
             back,
             vertices: Vec::new(),
             triangles: vec![[0; 3]],
+            layers: Vec::new(),
             map: None,
         };
         let bare: Vec<BakedSurface> = sides.iter().map(bare).collect();
@@ -253,6 +254,7 @@ impl Patches {
                 back: part.back,
                 vertices: part.vertices.iter().map(unlit).collect(),
                 triangles: Vec::new(),
+                layers: Vec::new(),
                 map: None,
             })
             .collect();
@@ -305,6 +307,7 @@ impl Patches {
                 back: part.back,
                 vertices: vertices.collect(),
                 triangles: part.grown.triangles.clone(),
+                layers: Vec::new(),
                 map: None,
             }
         };

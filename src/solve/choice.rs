@@ -65,10 +65,14 @@ impl Bake {
             }
             Representation::Adaptive if !none => {
                 let mut model = self.model(coarse::PATCHES);
-                let (spectra, weights) = (&self.scene.spectra, &self.weights);
+                let kin = Kin::of(&self.scene);
+                model.join(&kin.of, kin.spectra.len());
+                let (spectra, weights) = (&kin.spectra, &self.weights);
                 let (known, white) = (self.lanes.cuts(), self.light.white);
+                let known = known.map(|cuts| kin.one_of_each(&cuts));
+                let copies = kin.copies.as_deref();
                 let choose = |model: &coarse::Coarse| {
-                    model.choose(spectra, weights, white, tolerance, known.clone())
+                    model.choose(spectra, weights, white, tolerance, known.clone(), copies)
                 };
                 let mut choice = choose(&model);
                 // What lies behind a pane has light of its own spectra: lanes serve all of them.
@@ -77,13 +81,16 @@ impl Bake {
                     (model.emission, model.punctual) = plain.clone();
                     model.behind(&filter);
                     let other = choose(&model);
-                    for (cut, more) in choice.cuts.iter_mut().zip(other.cuts) {
-                        *cut = cut.union(more);
+                    let both = choice.cuts.iter().zip(other.cuts);
+                    let both: Vec<Partition> = both.map(|(cut, more)| cut.union(more)).collect();
+                    if kin.fits(&both) {
+                        choice.cuts = both;
                     }
                 }
                 // Without light there is no white to see an error by.
                 self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
-                Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights)
+                let cuts: Vec<Partition> = kin.of.iter().map(|&k| choice.cuts[k]).collect();
+                Lanes::ratio(&self.scene.spectra, &cuts, &self.weights)
             }
             Representation::Guaranteed if !none => {
                 let model = self.model(BOUNDED_PATCHES);
@@ -134,6 +141,61 @@ impl Bake {
             self.scene.spectra.len(),
             patches,
         )
+    }
+}
+
+/// Light spectra of which a room with layers has copies: what is good for one is good for all of them, each of which may be
+/// shown alone.
+struct Kin {
+    /// The different ones.
+    spectra: Vec<LightSpectrum>,
+    /// Number of each of the scene's spectra among these.
+    of: Vec<usize>,
+    /// How many copies there are of each; none without layers.
+    copies: Option<Vec<usize>>,
+}
+
+impl Kin {
+    fn of(scene: &Scene) -> Self {
+        let all = &scene.spectra;
+        let Some(layers) = &scene.changes.layers else {
+            return Self {
+                spectra: all.clone(),
+                of: (0..all.len()).collect(),
+                copies: None,
+            };
+        };
+        let mut kinds: Vec<usize> = layers.kin.clone();
+        kinds.sort_unstable();
+        kinds.dedup();
+        let of: Vec<usize> = (layers.kin.iter())
+            .map(|kin| kinds.partition_point(|k| k < kin))
+            .collect();
+        let members = |kind: usize| of.iter().enumerate().filter(move |(_, k)| **k == kind);
+        let first = |kind: usize| members(kind).next().map(|(light, _)| all[light].clone());
+        Self {
+            spectra: (0..kinds.len()).filter_map(first).collect(),
+            copies: Some((0..kinds.len()).map(|kind| members(kind).count()).collect()),
+            of,
+        }
+    }
+
+    /// The cuts of the different spectra, given those of all.
+    fn one_of_each(&self, cuts: &[Partition]) -> Vec<Partition> {
+        let of = |kind| self.of.iter().position(|k| *k == kind);
+        let kinds = (0..self.spectra.len()).filter_map(of);
+        kinds.filter_map(|light| cuts.get(light).copied()).collect()
+    }
+
+    /// Do rows hold the lanes of all copies?
+    fn fits(&self, cuts: &[Partition]) -> bool {
+        let lanes = |copies: &[usize]| -> usize {
+            let each = cuts.iter().zip(copies);
+            each.map(|(cut, copies)| copies * cut.count()).sum()
+        };
+        self.copies
+            .as_deref()
+            .is_none_or(|copies| lanes(copies) <= LEAVES)
     }
 }
 

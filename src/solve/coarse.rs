@@ -143,6 +143,20 @@ impl Coarse {
         }
     }
 
+    /// Puts the light of lights together: `of` has for each its number among `count`.
+    pub(super) fn join(&mut self, of: &[usize], count: usize) {
+        for lights in [&mut self.emission, &mut self.punctual] {
+            let patches = lights.first().map_or(0, Vec::len);
+            let mut joined = vec![vec![[0.0; LEAVES]; patches]; count];
+            for (light, &to) in lights.iter().zip(of) {
+                for (sum, shape) in joined[to].iter_mut().zip(light) {
+                    add(sum, shape, 1.0);
+                }
+            }
+            *lights = joined;
+        }
+    }
+
     /// Irradiance of the model's patches on some lanes.
     fn irradiance(&self, lanes: &Lanes) -> Rows {
         match padded(lanes.len()) {
@@ -210,7 +224,8 @@ impl Coarse {
 
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
     /// padding would waste. `known` cuts are kept if they are good enough, and one for each light: where a lamp was given
-    /// another spectrum there may be more lights now, or fewer.
+    /// another spectrum there may be more lights now, or fewer. `copies`: rows hold so many lights of each spectrum by
+    /// themselves, and must not become wider than they can be; none: one of each, and beyond 64 lanes the leaves.
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
@@ -218,6 +233,7 @@ impl Coarse {
         white: [f64; 3],
         tolerance: f64,
         known: Option<Vec<Partition>>,
+        copies: Option<&[usize]>,
     ) -> Choice {
         let count = self.leaves.len();
         let references: Vec<(Lanes, Rows)> = (0..spectra.len())
@@ -248,7 +264,9 @@ impl Coarse {
         loop {
             let lanes = Lanes::ratio(spectra, &cuts, weights);
             let (error, mut worst) = self.loss(&lanes, &references, &jacobians, total);
-            let full = lanes.len() == padded(lanes.len());
+            let of = |light: usize| copies.map_or(1, |copies| copies[light]);
+            let mut size: usize = (0..cuts.len()).map(|l| of(l) * cuts[l].count()).sum();
+            let full = size == padded(size);
             let good = error <= tolerance;
             // Below a hundredth of the tolerance, spare lanes would carry nothing.
             if (good && (full || error < 0.01 * tolerance))
@@ -259,16 +277,21 @@ impl Coarse {
             }
             // Several at once: a split costs a solve, and 4, 8, 16 lanes are what rows hold. When padding is being
             // filled, no more than fit.
-            let room = if good {
-                padded(lanes.len()) - lanes.len()
-            } else {
-                lanes.len().div_ceil(BATCH)
+            let (most, room) = match (good, copies) {
+                (true, _) => (padded(size), padded(size) - size),
+                (false, None) => (usize::MAX, lanes.len().div_ceil(BATCH)),
+                (false, Some(_)) => (LEAVES, lanes.len().div_ceil(BATCH)),
             };
             worst.truncate(room.max(1));
+            let before = size;
             for lane in worst.into_iter().map(|l| lanes.lanes()[l]) {
-                if let Some(light) = lane.light {
+                if let Some(light) = lane.light.filter(|&l| size + of(l) <= most) {
                     cuts[light] = cuts[light].split(lane.first).unwrap_or(cuts[light]);
+                    size += of(light);
                 }
+            }
+            if size == before {
+                return Choice { cuts, error };
             }
         }
     }

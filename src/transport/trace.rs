@@ -282,6 +282,7 @@ mod tests {
             let lamp = PunctualLight {
                 name: String::new(),
                 kind: LightKind::Point,
+                node: None,
                 position: glam::DVec3::ZERO,
                 direction: glam::DVec3::X,
                 light: 0,

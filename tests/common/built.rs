@@ -189,6 +189,7 @@ impl Room {
         self.lights.push(PunctualLight {
             name: format!("light {}", self.lights.len()),
             kind,
+            node: None,
             position,
             direction: direction.normalize(),
             light: 0,

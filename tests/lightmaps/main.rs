@@ -58,12 +58,12 @@ fn written(bake: Bake, limits: &MapLimits) -> Written {
     let maps = bake.light_maps(limits, &|_, _| {});
     let look = Exposure::new(SCALE);
     let glb = mapped_glb(bake.scene(), &maps, &look).unwrap();
-    let name = |k: usize, ending: &str| format!("room.map-{k}.{ending}");
+    let name = |k: usize, _: Option<usize>, ending: &str| format!("room.map-{k}.{ending}");
     let index = maps::index(bake.scene(), &maps, &glb, &look, true, &name).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for (k, page) in maps.pages.iter().enumerate() {
         let exr = maps::to_exr(page, index.lux_per_unit).unwrap();
-        std::fs::write(folder.path().join(name(k, "exr")), exr).unwrap();
+        std::fs::write(folder.path().join(name(k, None, "exr")), exr).unwrap();
     }
     std::fs::write(folder.path().join("room.glb"), &glb.bytes).unwrap();
     let index = serde_json::to_value(&index).unwrap();

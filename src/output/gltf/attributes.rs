@@ -43,7 +43,9 @@ impl Writer<'_> {
                 Some(("TEXCOORD", _)) => input
                     .rows::<2>(baked, &name)
                     .map(|rows| self.bin.shares(&rows)),
-                Some(("COLOR", set)) if set != "0" => self.any_width(&input, baked, &name),
+                Some(("COLOR", set)) if set != "0" && baked.layers.is_empty() => {
+                    self.any_width(&input, baked, &name)
+                }
                 Some(("", _)) if name != "_XYZ" && input.is_float(&name) => {
                     self.any_width(&input, baked, &name)
                 }
@@ -66,6 +68,9 @@ impl Writer<'_> {
             }
             None => {
                 out.insert("COLOR_0".into(), json!(self.light(surface, baked)));
+                for (k, set) in self.layer_sets(surface, baked).into_iter().enumerate() {
+                    out.insert(format!("COLOR_{}", k + 1), json!(set));
+                }
             }
         }
         if self.writing.xyz {
@@ -128,7 +133,7 @@ impl Writer<'_> {
 }
 
 /// Exposed light times vertex paint, before the curve.
-fn exposed(
+pub(super) fn exposed(
     material: &Material,
     surface: &Surface,
     vertex: &BakedVertex,

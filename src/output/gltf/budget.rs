@@ -33,9 +33,11 @@ pub fn vertices_within(scene: &Scene, bytes: usize, writing: Writing) -> Result<
         vertices,
         ..
     } = size(writing)?;
+    // Layers are always floats.
+    let layers = 12 * layers(scene);
     let of_vertex = |index| {
         let sizes = scene.surfaces.iter().map(|s| of_vertex(s, writing, index));
-        sizes.max().unwrap_or(1) as f64
+        (sizes.max().unwrap_or(1) + layers) as f64
     };
     let mut share = 1.0;
     if writing.packing == Packing::Meshopt {
@@ -53,6 +55,12 @@ pub fn vertices_within(scene: &Scene, bytes: usize, writing: Writing) -> Result<
         true => short,
         false => all(4),
     })
+}
+
+/// Layers of the scene.
+fn layers(scene: &Scene) -> usize {
+    let layers = scene.changes.layers.as_ref();
+    layers.map_or(0, |layers| layers.names.len())
 }
 
 /// Bytes of a vertex of a surface and of its two triangles.
@@ -99,5 +107,6 @@ fn as_it_is(scene: &Scene, number: usize, back: bool) -> BakedSurface {
         }
         out.triangles.push(corners);
     }
+    out.layers = vec![vec![[0.0; 3]; out.vertices.len()]; layers(scene)];
     out
 }

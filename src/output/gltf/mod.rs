@@ -14,6 +14,7 @@ mod budget;
 mod buffer;
 mod image;
 mod keep;
+mod layers;
 mod maps;
 mod material;
 mod meshes;
@@ -139,6 +140,8 @@ struct Writer<'a> {
     writing: Writing,
     /// Distance of backs from their fronts, world units.
     apart: f64,
+    /// What colour sets of layers are multiplied by.
+    layer_scale: f64,
     /// What positions of the mesh at hand are rounded to; none: they are floats.
     grid: Option<Grid>,
     /// The refined meshes by (node, instance), then primitive.
@@ -188,6 +191,7 @@ impl<'a> Writer<'a> {
             look,
             writing,
             apart: steps * APART * 0.5 * (high - low).max(DVec3::ZERO).length(),
+            layer_scale: layers::scale(scene, surfaces, look),
             grid: None,
             baked,
             data: Data::new(&scene.source, buffers),
@@ -228,6 +232,11 @@ impl<'a> Writer<'a> {
                 "emissiveTexture": "sRGB; the same over the texture and vertex colours, as COLOR_0 would show it: for readers without KHR_materials_unlit",
             });
             facts["intensity"] = json!(intensity);
+        }
+        if let Some(layers) = self.layer_facts() {
+            let what = "linear sRGB, light of one layer: COLOR_0 = curve(layers.scale * sum), the curve as above";
+            facts["attributes"]["COLOR_1, ..."] = json!(what);
+            facts["layers"] = layers;
         }
         if self.writing.xyz {
             let what = "CIE 1931 tristimulus radiosity, lm/m2, not clipped";

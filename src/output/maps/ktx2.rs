@@ -1,4 +1,4 @@
-//! KTX 2.0 of a page: R16G16B16A16_SFLOAT, one level, not compressed (KTX File Format Specification 2.0.4, sections 3 and 5).
+//! KTX 2.0 of a page, or of slices: R16G16B16A16_SFLOAT, one level, not compressed (KTX File Format Specification 2.0.4, sections 3 and 5).
 
 use super::texels;
 use crate::PROGRAM;
@@ -21,20 +21,25 @@ const ALIGN: usize = 8;
 
 /// The file's bytes; alpha is 1. See the module above for the numbers.
 pub fn to_ktx2(page: &Page, lux_per_unit: f64) -> Vec<u8> {
+    ktx2([page.width, page.height, 0], &texels(page, lux_per_unit))
+}
+
+/// A file of texels in rows and slices; a depth of 0 is a flat texture's.
+pub(crate) fn ktx2([width, height, depth]: [usize; 3], texels: &[[f32; 3]]) -> Vec<u8> {
     let descriptor = descriptor();
     let values = key_value("KTXwriter", PROGRAM);
     let at = HEADER + LEVEL;
     let values_at = at + descriptor.len() as u32;
     let level_at = (values_at as usize + values.len()).next_multiple_of(ALIGN) as u64;
-    let level = page.texels.len() as u64 * u64::from(TEXEL);
+    let level = texels.len() as u64 * u64::from(TEXEL);
     let mut out = IDENTIFIER.to_vec();
     // Format, size of a number, width, height, depth, layers, faces, levels, supercompression.
     let header = [
         FORMAT,
         2,
-        page.width as u32,
-        page.height as u32,
-        0,
+        width as u32,
+        height as u32,
+        depth as u32,
         0,
         1,
         1,
@@ -51,7 +56,7 @@ pub fn to_ktx2(page: &Page, lux_per_unit: f64) -> Vec<u8> {
     out.extend(descriptor);
     out.extend(values);
     out.resize(level_at as usize, 0);
-    for [r, g, b] in texels(page, lux_per_unit) {
+    for &[r, g, b] in texels {
         out.extend(
             [r, g, b, 1.0]
                 .into_iter()

@@ -19,6 +19,7 @@ use crate::lightmap::{LightMaps, Page};
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::Scene;
 pub use exr::to_exr;
+pub(super) use ktx2::ktx2;
 pub use ktx2::to_ktx2;
 use serde::Serialize;
 use serde_json::Value;
@@ -51,6 +52,9 @@ pub struct Index {
     pub margin: usize,
     /// The pages.
     pub pages: Vec<PageEntry>,
+    /// The same pages for each layer of lamps, which add up to these; none without layers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerEntry>,
     /// Primitives of the glb with light.
     pub meshes: Vec<MeshEntry>,
 }
@@ -67,6 +71,15 @@ pub struct PageEntry {
     pub exr: String,
     /// File beside the index, if it was asked for.
     pub ktx2: Option<String>,
+}
+
+/// A layer of lamps.
+#[derive(Debug, Clone, Serialize)]
+pub struct LayerEntry {
+    /// Its name.
+    pub name: String,
+    /// Its pages, in the order of those of all light.
+    pub pages: Vec<PageEntry>,
 }
 
 /// A primitive with light. Its place on the page is `uv_rect[0..2] + uv * (uv_rect[2..4] - uv_rect[0..2])`, uv its set `texcoord`.
@@ -116,7 +129,7 @@ fn texels(page: &Page, lux_per_unit: f64) -> Vec<[f32; 3]> {
     page.texels.iter().map(texel).collect()
 }
 
-/// What belongs where; `name(page, ending)` is the name of a page's file.
+/// What belongs where; `name(page, layer, ending)` is the name of a page's file; layer none: all light.
 ///
 /// # Errors
 /// The glb cannot be read back (internal fault).
@@ -126,7 +139,7 @@ pub fn index(
     glb: &BakedGlb,
     look: &Exposure,
     ktx2: bool,
-    name: &dyn Fn(usize, &str) -> String,
+    name: &dyn Fn(usize, Option<usize>, &str) -> String,
 ) -> Result<Index> {
     let json = document(glb)?;
     let nodes = json["nodes"].as_array().map_or(&[][..], Vec::as_slice);
@@ -150,11 +163,19 @@ pub fn index(
             });
         }
     }
-    let page = |(k, page): (usize, &Page)| PageEntry {
-        width: page.width,
-        height: page.height,
-        exr: name(k, "exr"),
-        ktx2: ktx2.then(|| name(k, "ktx2")),
+    let pages = |pages: &[Page], layer: Option<usize>| -> Vec<PageEntry> {
+        let page = |(k, page): (usize, &Page)| PageEntry {
+            width: page.width,
+            height: page.height,
+            exr: name(k, layer, "exr"),
+            ktx2: ktx2.then(|| name(k, layer, "ktx2")),
+        };
+        pages.iter().enumerate().map(page).collect()
+    };
+    let names = scene.changes.layers.iter().flat_map(|l| &l.names);
+    let layer = |(l, (own, name)): (usize, (&Vec<Page>, &String))| LayerEntry {
+        name: name.clone(),
+        pages: pages(own, Some(l)),
     };
     Ok(Index {
         format: "haarlight.lightmaps",
@@ -169,7 +190,14 @@ pub fn index(
         lux_per_unit: lux_per_unit(maps),
         exposure: look.scale,
         margin: maps.margin(),
-        pages: maps.pages.iter().enumerate().map(page).collect(),
+        pages: pages(&maps.pages, None),
+        layers: maps
+            .layers
+            .iter()
+            .zip(names)
+            .enumerate()
+            .map(layer)
+            .collect(),
         meshes,
     })
 }

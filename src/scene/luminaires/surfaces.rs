@@ -69,6 +69,7 @@ pub(in crate::scene) fn add(
             lights.push(PunctualLight {
                 name: material.name.clone(),
                 kind: LightKind::Surface,
+                node: None,
                 position,
                 direction: luminaire.nadir(),
                 light: emission.light,

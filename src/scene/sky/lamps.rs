@@ -18,6 +18,8 @@ const USUAL_GROUND: f64 = 0.2;
 const SUN_KELVIN: f64 = 5500.0;
 /// Name of a sun that is no light of the file.
 const SUN_NAME: &str = "sun";
+/// What the ground is called as far as the sun lights it.
+pub(in crate::scene) const LIT_GROUND: &str = "ground in the sun";
 
 /// Adds the lamps of the sky that is wished for to those of the file. `nodes`: names of nodes with the names of their lights.
 pub(crate) fn join(
@@ -225,7 +227,7 @@ impl Makes<'_> {
         let light = self.spectrum(kelvin);
         let exitance = ground * lux * sun.toward.y;
         let kind = LightKind::Ground;
-        self.lamp("ground in the sun", kind, DVec3::Y, light, exitance);
+        self.lamp(LIT_GROUND, kind, DVec3::Y, light, exitance);
         match sun.light {
             None => self.lamp(SUN_NAME, LightKind::Sun, -sun.toward, light, lux),
             Some(k) => {
@@ -252,6 +254,7 @@ impl Makes<'_> {
             self.lights.push(PunctualLight {
                 name: name.into(),
                 kind,
+                node: None,
                 position: DVec3::ZERO,
                 direction,
                 light,

@@ -23,6 +23,7 @@ mod wish;
 
 pub use cie::Distribution;
 pub use dome::{SUN_RADIUS, Sky};
+pub(super) use lamps::LIT_GROUND;
 pub(crate) use lamps::join;
 pub use sun::{Hours, direction};
 pub use wish::{BRIGHT, KELVIN, TURN};

@@ -1,0 +1,120 @@
+//! The light of any point: on a face, whose links then serve it, or in the air.
+
+use crate::solve::{Bake, weights_of};
+use crate::spectrum::Leaves;
+use crate::transport::{Gathered, Receiver};
+use glam::DVec3;
+
+/// Probes nearer to an edge than this share of a triangle's height are drawn that far into it: a point on an edge lies on the
+/// neighbouring wall too.
+const PROBE_INSET: f64 = 1e-5;
+
+/// Light at any point, for probes.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Probed {
+    /// Tristimulus irradiance; Y is lux.
+    pub xyz: [f64; 3],
+    /// Irradiance on the 64 leaves, W/m2/nm.
+    pub leaves: Leaves,
+    /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`](super::MOSTLY) a vertex there counts as covered.
+    pub backs: f64,
+}
+
+/// A point and the faces that it lies on.
+pub(super) struct Spot {
+    /// Recentred.
+    point: DVec3,
+    /// Entries of the faces, and weights of their corners.
+    faces: Vec<(u32, [f64; 3])>,
+}
+
+impl Bake {
+    /// Irradiance at points in world space with unit normals.
+    pub fn probe(&self, points: &[(DVec3, DVec3)]) -> Vec<Probed> {
+        self.gather_at(points)
+            .into_iter()
+            .map(
+                |Gathered {
+                     irradiance, backs, ..
+                 }| Probed {
+                    backs,
+                    xyz: self.lanes().tristimulus(&irradiance),
+                    leaves: self.lanes().leaves(&irradiance),
+                },
+            )
+            .collect()
+    }
+
+    /// Light at points in world space with unit normals, by lane.
+    pub(crate) fn gather_at(&self, points: &[(DVec3, DVec3)]) -> Vec<Gathered> {
+        let receivers: Vec<Receiver> = points
+            .iter()
+            .enumerate()
+            .map(|(k, &(point, normal))| {
+                let agrees = |face: DVec3| looks_along(face, normal);
+                self.receiver_at(&self.spot(point, agrees), normal, k as u64)
+            })
+            .collect();
+        self.gather(&receivers)
+    }
+
+    /// Finds the faces that a point in world space lies on, of those whose normals are `wanted`.
+    pub(super) fn spot(&self, point: DVec3, wanted: impl Fn(DVec3) -> bool) -> Spot {
+        let (mesh, tree) = (self.mesh(), self.tree());
+        let point = point - mesh.centre;
+        let near = 1e-6 * mesh.half_size;
+        let on = |(entry, face): (usize, &crate::hierarchy::Face)| {
+            let n = tree.face_normal[entry];
+            if !wanted(n) {
+                return None;
+            }
+            let [a, b, c] = mesh.corners(*face);
+            if n.dot(point - a).abs() > near {
+                return None;
+            }
+            let w = weights_of(point, a, b, c);
+            w.iter().all(|&x| x >= -1e-9).then_some((entry as u32, w))
+        };
+        let faces = tree.faces.iter().enumerate().filter_map(on).collect();
+        Spot { point, faces }
+    }
+
+    /// Looks from a spot along a normal: from its face, if that looks the same way; a point in the air looks at the whole room.
+    pub(super) fn receiver_at(&self, spot: &Spot, normal: DVec3, seed: u64) -> Receiver {
+        let (mesh, tree) = (self.mesh(), self.tree());
+        let agrees =
+            |(entry, _): &&(u32, [f64; 3])| looks_along(tree.face_normal[*entry as usize], normal);
+        let Some(&(entry, w)) = spot.faces.iter().find(agrees) else {
+            return Receiver {
+                point: spot.point,
+                normal,
+                plane: crate::geometry::NO_PLANE,
+                leaf: None,
+                seed,
+            };
+        };
+        let w = w.map(|x| x.max(0.0));
+        // On an edge the point would lie in the neighbouring wall too, and see past it.
+        let edge = w.iter().any(|&x| x < PROBE_INSET);
+        let (w, point) = if edge {
+            let [a, b, c] = mesh.corners(tree.faces[entry as usize]);
+            let w = w.map(|x| x * (1.0 - 3.0 * PROBE_INSET) + PROBE_INSET);
+            (w, a * w[0] + b * w[1] + c * w[2])
+        } else {
+            (w, spot.point)
+        };
+        Receiver {
+            point,
+            normal,
+            plane: tree.face_plane[entry as usize],
+            leaf: Some(tree.leaf_at(entry, w)),
+            seed,
+        }
+    }
+}
+
+/// Does a face look the way of a normal?
+fn looks_along(face: DVec3, normal: DVec3) -> bool {
+    face.dot(normal) >= 1.0 - 1e-6
+}
