@@ -219,8 +219,11 @@ fn leaves(tree: &str, before: &[String], found: &mut Vec<(String, Vec<String>)>)
     }
 }
 
+/// Is it handed on? A name, and the path that it stands for.
+type Named = (bool, String, Vec<String>);
+
 /// What a file names of others: its `use` lines, said in public or not, and paths in its code.
-fn named(code: &str) -> Vec<(bool, String, Vec<String>)> {
+fn named(code: &str) -> Vec<Named> {
     let mut found = Vec::new();
     let mut rest = String::new();
     for statement in code.split_inclusive(';') {
@@ -256,7 +259,7 @@ fn named(code: &str) -> Vec<(bool, String, Vec<String>)> {
 /// The file that a path means, seen from a module; `Y` of `pub use x::Y` stands where `x` says.
 struct Resolver {
     files: BTreeMap<Vec<String>, PathBuf>,
-    names: BTreeMap<Vec<String>, Vec<(bool, String, Vec<String>)>>,
+    names: BTreeMap<Vec<String>, Vec<Named>>,
 }
 
 impl Resolver {

@@ -6,7 +6,7 @@
 //!
 //! `E(n) = sum A_l L_lm Y_lm(n)`, A_0 = pi, A_1 = 2 pi / 3, A_2 = pi / 4, A_3 = 0, A_4 = -pi / 24 ...
 //! (Ramamoorthi and Hanrahan, 2001), so that `L_lm = 4 pi / A_l sum w E(n) Y_lm(n)` for l up to 2 are the coefficients of
-//! *radiance*; orders 3 to 5 of E do not disturb them. What E has beyond order 2 is the truncation, up to some per cent of
+//! *radiance*; orders 3 to 5 of E do not disturb them; those beyond put order 2 off by up to 19 % for a lamp without extent. What E has beyond order 2 is the truncation, up to some per cent of
 //! E where light comes from one side; it is measured in the 26 directions.
 //!
 //! The ambient cube (Mitchell, McTaggart and Green 2006) is E to +X, -X, +Y, -Y, +Z and -Z.
@@ -267,7 +267,8 @@ mod tests {
     }
 
     /// Of a lamp without extent, E = max(0, cos), coefficients are Y in its direction. Orders 6 and more of E, which the quadrature
-    /// takes for lower ones, put the three of them off by no more than this share of the greatest.
+    /// takes for lower ones, put order 2 off the most where the lamp lies on an axis: there the rule has
+    /// 1/21 + 4 (4/105) / sqrt(2) / 4 = .07456 for the mean of c (3 c^2 - 1) / 2 over the lit half, which is 1/16: 19.3 %.
     #[test]
     fn a_lamp_is_its_direction() {
         for toward in [
@@ -279,7 +280,11 @@ mod tests {
             let exact = harmonics(toward);
             let greatest = exact.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
             for (c, y) in around.sh.iter().zip(exact) {
-                assert!((c[1] - y).abs() < 0.1 * greatest, "{toward}: {} {y}", c[1]);
+                assert!(
+                    (c[1] - y).abs() < 0.194 * greatest,
+                    "{toward}: {} {y}",
+                    c[1]
+                );
             }
         }
     }
