@@ -26,8 +26,8 @@ pub(crate) type Wish = (String, Vec<String>);
 pub struct Layers {
     /// Name of each layer.
     pub names: Vec<String>,
-    /// Layer of each of [`Scene::spectra`].
+    /// Layer of each of [`Scene::spectra`](crate::scene::Scene::spectra).
     pub of_light: Vec<usize>,
-    /// For each of [`Scene::spectra`] the number of the spectrum that it is a copy of; copies of one have one number.
+    /// For each of [`Scene::spectra`](crate::scene::Scene::spectra) the number of the spectrum that it is a copy of; copies of one have one number.
     pub kin: Vec<usize>,
 }

@@ -28,7 +28,7 @@ pub struct PunctualLight {
     pub position: DVec3,
     /// World direction in which it shines, unit length.
     pub direction: DVec3,
-    /// Index in [`Scene::spectra`].
+    /// Index in [`Scene::spectra`](crate::scene::Scene::spectra).
     pub light: usize,
     /// `intensity(leaf) = spectra[light].power[leaf] * shape[leaf]`.
     pub shape: Leaves,

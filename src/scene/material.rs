@@ -33,7 +33,7 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// Holes.
     pub alpha: Alpha,
-    /// What it lets straight through; then its surfaces stand in [`Scene::panes`].
+    /// What it lets straight through; then its surfaces stand in [`Scene::panes`](crate::scene::Scene::panes).
     pub pane: Option<Pane>,
 }
 
@@ -57,7 +57,7 @@ pub enum Alpha {
 /// texture the shape differs from point to point ([`Emission::shape_at`]).
 #[derive(Debug, Clone)]
 pub struct Emission {
-    /// Index in [`Scene::spectra`].
+    /// Index in [`Scene::spectra`](crate::scene::Scene::spectra).
     pub light: usize,
     /// Multiplier of the light's power per leaf, at the emissive factor.
     pub shape: Leaves,
@@ -70,7 +70,7 @@ pub struct Emission {
     /// Where the spectrum comes from, for `inspect`.
     pub from: String,
     /// How the light is spread, if not evenly: then `shape` only says how bright the surface is shown, and what it sends out is a
-    /// light of [`LightKind::Surface`].
+    /// light of [`LightKind::Surface`](crate::scene::LightKind::Surface).
     pub profile: Option<Arc<Profile>>,
 }
 

@@ -15,7 +15,7 @@ pub struct Surface {
     pub primitive: usize,
     /// Which instance of EXT_mesh_gpu_instancing this is.
     pub instance: Option<usize>,
-    /// Index in [`Scene::materials`].
+    /// Index in [`Scene::materials`](crate::scene::Scene::materials).
     pub material: usize,
     /// From the primitive's local space to world space (with the instance's transform, if any).
     pub to_world: DMat4,

@@ -17,7 +17,7 @@ const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
 /// A texture reference: image, coordinates, sampler, KHR_texture_transform.
 #[derive(Debug, Clone)]
 pub struct Texture {
-    /// Index in [`Scene::images`].
+    /// Index in [`Scene::images`](crate::scene::Scene::images).
     pub image: usize,
     /// Which set of coordinates.
     pub texcoord: usize,

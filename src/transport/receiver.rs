@@ -13,7 +13,7 @@ pub struct Receiver {
     pub point: DVec3,
     /// Unit normal for the cosine.
     pub normal: DVec3,
-    /// Plane of the face that the point lies on; [`NO_PLANE`] for a point in the air.
+    /// Plane of the face that the point lies on; [`NO_PLANE`](crate::geometry::NO_PLANE) for a point in the air.
     pub plane: u32,
     /// Leaf of the hierarchy whose links are used; none: the whole room is searched.
     pub leaf: Option<u32>,
