@@ -49,6 +49,7 @@ export function matrices({ nodes }) {
 const moved = (m, [x, y, z]) => [0, 1, 2].map((r) => m[r] * x + m[4 + r] * y + m[8 + r] * z + m[12 + r]);
 const minus = (a, b) => a.map((x, k) => x - b[k]);
 const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+const dot = (a, b) => a.reduce((sum, x, k) => sum + x * b[k], 0);
 const size = (v) => Math.hypot(...v);
 
 /** Numbers in [0, 1), always the same. */
@@ -71,10 +72,13 @@ export function pointsOf({ json, read }, entries, of, count) {
     const { attributes, indices } = json.meshes[mesh].primitives[primitive];
     const [places, values] = [read(attributes.POSITION).map((p) => moved(worlds[node], p)), read(attributes[of(more)])];
     const corners = read(indices).flat();
+    // A mirrored node turns its triangles over (glTF 2.0, 3.7.4).
+    const [x, y, z] = [0, 4, 8].map((k) => worlds[node].slice(k, k + 3));
+    const turn = Math.sign(dot(cross(x, y), z));
     return Array.from({ length: corners.length / 3 }, (_, t) => {
       const three = corners.slice(3 * t, 3 * t + 3);
       const [a, b, c] = three.map((v) => places[v]);
-      const facing = cross(minus(b, a), minus(c, a));
+      const facing = cross(minus(b, a), minus(c, a)).map((v) => turn * v);
       return { entry, corners: [a, b, c], values: three.map((v) => values[v]), facing, area: size(facing) };
     });
   });

@@ -32,6 +32,12 @@ const said = (what, good, text) => {
 };
 const share = (x) => `${(100 * x).toFixed(3)} %`;
 
+/** Base colour of a primitive, without its texture, which is taken off before points are drawn. */
+function paint({ json }, { mesh, primitive }) {
+  const { pbrMetallicRoughness: { baseColorFactor = [1, 1, 1] } = {} } = json.materials[json.meshes[mesh].primitives[primitive].material] ?? {};
+  return baseColorFactor;
+}
+
 /** Colours of vertices are those of the file, and drawn without lamps. */
 async function vertices(tab, name, file) {
   const all = await tab.run(`colours(${JSON.stringify(`/room/${name}`)})`);
@@ -47,20 +53,14 @@ async function vertices(tab, name, file) {
   const entries = shown(file.json);
   const points = pointsOf(file, entries, () => "COLOR_0", POINTS);
   const drawn = await tab.run(`drawn(${JSON.stringify(`/room/${name}`)}, ${JSON.stringify(entries)}, ${JSON.stringify(points)})`);
-  const off = apart(drawn, points.map(({ value }) => value.slice(0, 3)));
+  const off = apart(drawn, points.map(({ entry, value }) => [0, 1, 2].map((c) => value[c] * paint(file, entries[entry])[c])));
   said(`${name}, vertices drawn`, off.mean < 1e-4, `${POINTS} points differ by ${share(off.mean)} in the mean, ${share(off.most)} at most`);
 }
 
 /** Points of light maps show what the file holds there, and what `probe` finds. */
 async function maps(tab, name, file, index) {
   const points = pointsOf(file, index.meshes, ({ texcoord }) => `TEXCOORD_${texcoord}`, POINTS);
-  const paint = ({ entry }) => {
-    const { mesh, primitive } = index.meshes[entry];
-    const { pbrMetallicRoughness: { baseColorFactor = [1, 1, 1], baseColorTexture } = {} } = file.json.materials[file.json.meshes[mesh].primitives[primitive].material];
-    if (baseColorTexture) throw new Error("rooms with textures are not compared");
-    return baseColorFactor;
-  };
-  const exposed = (light) => light.map((row, k) => row.map((x, c) => x * index.exposure * paint(points[k])[c]));
+  const exposed = (light) => light.map((row, k) => row.map((x, c) => x * index.exposure * paint(file, index.meshes[points[k].entry])[c]));
   const folder = dirname(file.path);
   const written = index.pages[0].ktx2 && (await Promise.all(index.pages.map((p) => page(join(folder, p.ktx2)))));
   const texels = written && exposed(points.map(({ entry, value }) => written[index.meshes[entry].page](value).map((x) => x * index.lux_per_unit)));
