@@ -65,12 +65,15 @@ function generator() {
 export const shown = ({ nodes, meshes }) =>
   nodes.flatMap(({ mesh }, node) => (mesh === undefined ? [] : meshes[mesh].primitives.map((_, primitive) => ({ node, mesh, primitive }))));
 
-/** Random points of triangles of such entries, by area: `{ entry, at, normal, value }`, value what the attribute `of(entry)` has there. */
+/** Random points of triangles of such entries, by area: `{ entry, triangle, at, normal, value }`, triangle
+ * its number in the primitive, value what the attribute `of(entry)` has there, 1 where there is none. */
 export function pointsOf({ json, read }, entries, of, count) {
   const worlds = matrices(json);
   const triangles = entries.flatMap(({ node, mesh, primitive, ...more }, entry) => {
     const { attributes, indices } = json.meshes[mesh].primitives[primitive];
-    const [places, values] = [read(attributes.POSITION).map((p) => moved(worlds[node], p)), read(attributes[of(more)])];
+    const places = read(attributes.POSITION).map((p) => moved(worlds[node], p));
+    const own = attributes[of(more)];
+    const values = own === undefined ? places.map(() => [1, 1, 1]) : read(own);
     const corners = read(indices).flat();
     // A mirrored node turns its triangles over (glTF 2.0, 3.7.4).
     const [x, y, z] = [0, 4, 8].map((k) => worlds[node].slice(k, k + 3));
@@ -79,18 +82,18 @@ export function pointsOf({ json, read }, entries, of, count) {
       const three = corners.slice(3 * t, 3 * t + 3);
       const [a, b, c] = three.map((v) => places[v]);
       const facing = cross(minus(b, a), minus(c, a)).map((v) => turn * v);
-      return { entry, corners: [a, b, c], values: three.map((v) => values[v]), facing, area: size(facing) };
+      return { entry, triangle: t, corners: [a, b, c], values: three.map((v) => values[v]), facing, area: size(facing) };
     });
   });
   const whole = triangles.reduce((sum, { area }) => sum + area, 0);
   const random = generator();
   return Array.from({ length: count }, () => {
     let left = random() * whole;
-    const { entry, corners, values, facing, area } = triangles.find((t) => (left -= t.area) <= 0) ?? triangles[0];
+    const { entry, triangle, corners, values, facing, area } = triangles.find((t) => (left -= t.area) <= 0) ?? triangles[0];
     const [u, v] = [Math.sqrt(random()), random()];
     const weights = [1 - u, u * (1 - v), u * v];
     const mix = (rows) => rows[0].map((_, c) => weights.reduce((sum, w, k) => sum + w * rows[k][c], 0));
-    return { entry, at: mix(corners), normal: facing.map((x) => x / area), value: mix(values) };
+    return { entry, triangle, at: mix(corners), normal: facing.map((x) => x / area), value: mix(values) };
   });
 }
 

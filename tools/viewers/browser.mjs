@@ -60,7 +60,8 @@ async function vertices(tab, name, file) {
 /** Points of light maps show what the file holds there, and what `probe` finds. */
 async function maps(tab, name, file, index) {
   const points = pointsOf(file, index.meshes, ({ texcoord }) => `TEXCOORD_${texcoord}`, POINTS);
-  const exposed = (light) => light.map((row, k) => row.map((x, c) => x * index.exposure * paint(file, index.meshes[points[k].entry])[c]));
+  const colours = pointsOf(file, index.meshes, () => "COLOR_0", POINTS);
+  const exposed = (light) => light.map((row, k) => row.map((x, c) => x * index.exposure * paint(file, index.meshes[points[k].entry])[c] * colours[k].value[c]));
   const folder = dirname(file.path);
   const written = index.pages[0].ktx2 && (await Promise.all(index.pages.map((p) => page(join(folder, p.ktx2)))));
   const texels = written && exposed(points.map(({ entry, value }) => written[index.meshes[entry].page](value).map((x) => x * index.lux_per_unit)));
@@ -74,8 +75,8 @@ async function maps(tab, name, file, index) {
     if (off) said(`${name}, ${kind}`, off.mean < 1e-3, `${POINTS} points differ from the page's texels by ${share(off.mean)} in the mean, ${share(off.most)} at most`);
     if (!light) continue;
     const { mean } = apart(found, exposed(light));
-    // At --error 1 a bake is off by some 1 %; a page turned over or the wrong coordinates by tens.
-    said(`${name}, ${kind} and probe`, mean < 0.02, `differ by ${share(mean)} in the mean`);
+    // At --error 1 rooms are off by 1 to 5 %, most at edges of shadows; with a page turned over the Cornell box is by 75 %.
+    said(`${name}, ${kind} and probe`, mean < 0.1, `differ by ${share(mean)} in the mean`);
   }
 }
 

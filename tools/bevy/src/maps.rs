@@ -147,14 +147,14 @@ pub(crate) fn check(
         .collect();
     let places: Vec<(DVec3, DVec3)> = points.iter().map(|(p, n, ..)| (*p, *n)).collect();
     match file.probed(&places, options) {
-        // At --error 1 a bake is off by some 1 %; a page turned over or the wrong coordinates by tens.
+        // At --error 1 rooms are off by 1 to 5 %, most at edges of shadows; a page turned over by tens.
         Some(wanted) => {
             let (mean, _) = apart(&found, &wanted);
             let text = format!(
                 "{POINTS} points differ by {:.3} % in the mean",
                 100.0 * mean
             );
-            findings.say("Lightmap and probe", mean < 0.02, &text);
+            findings.say("Lightmap and probe", mean < 0.1, &text);
         }
         None => println!("SKIPPED: no HAARLIGHT to compare light with"),
     }
