@@ -40,16 +40,20 @@ function paint({ json }, { mesh, primitive }) {
 
 /** Colours of vertices are those of the file, and drawn without lamps. */
 async function vertices(tab, name, file) {
-  const all = await tab.run(`colours(${JSON.stringify(`/room/${name}`)})`);
-  let [count, most, plain] = [0, 0, true];
-  for (const { mesh, primitive, drawn, rows } of all) {
-    const wanted = file.read(file.json.meshes[mesh].primitives[primitive].attributes.COLOR_0);
-    if (rows.length !== wanted.length) throw new Error(`mesh ${mesh}: ${rows.length} vertices for ${wanted.length}`);
-    rows.forEach((row, k) => row.forEach((x, c) => { most = Math.max(most, Math.abs(x - wanted[k][c])); }));
-    count += rows.length;
-    plain &&= drawn;
+  // Babylon.js reads the first set alone.
+  const layers = library === "three" ? (file.json.asset.extras?.haarlight?.layers?.names ?? []) : [];
+  for (const set of [0, ...layers.map((_, k) => k + 1)]) {
+    const all = await tab.run(`colours(${JSON.stringify(`/room/${name}`)}, ${set})`);
+    let [count, most, plain] = [0, 0, true];
+    for (const { mesh, primitive, drawn, rows } of all) {
+      const wanted = file.read(file.json.meshes[mesh].primitives[primitive].attributes[`COLOR_${set}`]);
+      if (rows.length !== wanted.length) throw new Error(`mesh ${mesh}: ${rows.length} vertices for ${wanted.length}`);
+      rows.forEach((row, k) => row.forEach((x, c) => { most = Math.max(most, Math.abs(x - wanted[k][c])); }));
+      count += rows.length;
+      plain &&= drawn;
+    }
+    said(`${name}, COLOR_${set}`, count > 0 && most === 0 && plain, `${count} vertices, greatest difference ${most}, ${plain ? "unlit" : "not drawn by their colours"}`);
   }
-  said(`${name}, vertices`, count > 0 && most === 0 && plain, `${count} vertices, greatest difference ${most}, ${plain ? "unlit" : "not drawn by their colours"}`);
   const entries = shown(file.json);
   const points = pointsOf(file, entries, () => "COLOR_0", POINTS);
   const drawn = await tab.run(`drawn(${JSON.stringify(`/room/${name}`)}, ${JSON.stringify(entries)}, ${JSON.stringify(points)})`);

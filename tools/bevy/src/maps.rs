@@ -4,6 +4,7 @@ use crate::file::{Glb, number};
 use crate::load::{Assets, Texture};
 use crate::vertices::{corners, primitive};
 use crate::{Findings, apart};
+use bevy_camera::Exposure;
 use bevy_gltf::Gltf;
 use bevy_math::{DVec2, DVec3};
 use bevy_mesh::{Mesh, VertexAttributeValues};
@@ -138,6 +139,15 @@ pub(crate) fn check(
     );
     let lit: Vec<Lit> = parts.into_iter().flatten().flatten().collect();
     let points = points(&lit);
+    // What the camera makes of a luminance is what the glb shows of that light.
+    let display = index["exposure"].as_f64().expect("a number");
+    let ev100 = (1.0 / (1.2 * PI * display)).log2() as f32;
+    let shown = f64::from(Exposure { ev100 }.exposure()) / (PI * display);
+    findings.say(
+        "Exposure",
+        (shown - 1.0).abs() < 1e-5,
+        &format!("ev100 {ev100}: {shown} of the glb's brightness"),
+    );
     // On a white surface: luminance is the texel times lightmap_exposure, irradiance pi times that.
     let units = index["lux_per_unit"].as_f64().expect("a number");
     let exposure = units / PI;
