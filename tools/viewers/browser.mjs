@@ -21,7 +21,7 @@ const end = rest.includes("--") ? rest.indexOf("--") : rest.length;
 const [rooms, options] = [rest.slice(0, end), rest.slice(end + 1)];
 if (!["three", "babylon"].includes(library) || !rooms.length) throw new Error("usage: browser.mjs three|babylon ROOM.baked.glb... [-- OPTIONS]");
 if (!chromium()) {
-  console.log("skipped: no Chromium");
+  console.log("SKIPPED: no Chromium");
   process.exit(0);
 }
 

@@ -83,7 +83,7 @@ const said = (what, good, text) => {
   bad ||= !good;
 };
 if (spawnSync(GODOT, ["--version"]).error) {
-  console.log(`skipped: no ${GODOT}`);
+  console.log(`SKIPPED: no ${GODOT}`);
   process.exit(0);
 }
 for (const room of process.argv.slice(2)) {
