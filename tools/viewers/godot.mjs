@@ -39,7 +39,8 @@ async function found(room, pages) {
   writeFileSync(join(project, "room.glb.import"), `[remap]\n\nimporter="scene"\n\n[params]\n\n${settings}`);
   try {
     await imported(project, environment);
-    spawnSync(GODOT, ["--path", project, "-s", "godot.gd"], { env: environment, timeout: PATIENCE });
+    const run = spawnSync(GODOT, ["--path", project, "-s", "godot.gd"], { env: environment, timeout: PATIENCE, encoding: "utf8" });
+    if (!existsSync(join(project, "found.json"))) throw new Error(`${run.error ?? ""}${run.stdout}${run.stderr}`);
     const out = JSON.parse(readFileSync(join(project, "found.json"), "utf8"));
     const floats = (name) => {
       const bytes = readFileSync(join(project, name));
