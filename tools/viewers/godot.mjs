@@ -13,10 +13,11 @@ import { glb, page } from "./baked.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const GODOT = "godot3-server";
-// The editor may not end by itself after an import: it is ended when the scene is there.
-const PATIENCE = 120_000;
+// The editor does not end by itself after an import, as -q asks it to: it is ended when the scene is there. Some times in a hundred it does not
+// begin either, and is started anew.
+const [PATIENCE, TRIES] = [30_000, 4];
 
-/** Imports a project's files with the editor. */
+/** Imports a project's files with the editor; whether they are there. */
 async function imported(project, environment) {
   const editor = spawn(GODOT, ["--path", project, "-e", "-q"], { env: environment, stdio: "ignore" });
   const gone = new Promise((done) => editor.on("exit", done));
@@ -25,6 +26,7 @@ async function imported(project, environment) {
   for (const start = Date.now(); !isThere() && Date.now() - start < PATIENCE;) await new Promise((done) => setTimeout(done, 200));
   editor.kill("SIGKILL");
   await gone;
+  return isThere();
 }
 
 /** What godot.gd finds in a room. */
@@ -38,7 +40,9 @@ async function found(room, pages) {
   const settings = 'nodes/custom_script="res://godot_import.gd"\nmeshes/compress=false\nmaterials/storage=0\n';
   writeFileSync(join(project, "room.glb.import"), `[remap]\n\nimporter="scene"\n\n[params]\n\n${settings}`);
   try {
-    await imported(project, environment);
+    let tries = 1;
+    while (!(await imported(project, environment)) && tries < TRIES) tries += 1;
+    if (tries > 1) console.log(`imported at attempt ${tries}`);
     const run = spawnSync(GODOT, ["--path", project, "-s", "godot.gd"], { env: environment, timeout: PATIENCE, encoding: "utf8" });
     if (!existsSync(join(project, "found.json"))) throw new Error(`${run.error ?? ""}${run.stdout}${run.stderr}`);
     const out = JSON.parse(readFileSync(join(project, "found.json"), "utf8"));
