@@ -130,7 +130,10 @@ impl Team {
 
     /// What the first rank says, where clocks or files may tell ranks different things.
     pub fn first_says(self, own: bool) -> bool {
-        self.is_alone() || job::all_gather(self.ranks, &[u8::from(own)])[0] == [1]
+        match self.is_alone() {
+            true => own,
+            false => job::all_gather(self.ranks, &[u8::from(own)])[0] == [1],
+        }
     }
 }
 
@@ -154,5 +157,6 @@ mod tests {
         assert!(team.is_first() && team.owns(3));
         assert_eq!(team.map(&[1_u32, 2, 3], || (), |(), x| 2 * x), [2, 4, 6]);
         assert_eq!(team.union(vec![2, 5]), [2, 5]);
+        assert_eq!([false, true].map(|own| team.first_says(own)), [false, true]);
     }
 }
