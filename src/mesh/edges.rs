@@ -6,7 +6,7 @@
 
 use super::cells::{Cell, Cells, End, within};
 use super::lines::Sharp;
-use super::shades::{COVER, Shades, each};
+use super::shades::{COVER, FENCE, Shades, each};
 use super::shadow::{Crossing, Found, Mark, Plan};
 use crate::link::Sight;
 use crate::transport::Receiver;
@@ -301,7 +301,7 @@ impl Cells {
                 [0, 1, 2].map(|e| {
                     let [a, b] = [e, (e + 1) % 3].map(|k| cell.corners[k].weights);
                     let ends = cells.lamps_at(cell, e) | cells.lamps_at(cell, e + 1);
-                    let unknown = ends & !cells.sharp_along(cell, e);
+                    let unknown = ends & !cells.sharp_along(cell, e) & !FENCE;
                     let along = each(unknown).filter(|&lamp| {
                         let look = Look {
                             shades,
@@ -429,7 +429,7 @@ impl Cells {
                 let corners = self.all[k].corners.iter();
                 let of = |point| self.sharp.get(&point).copied().unwrap_or(0);
                 // What ends at a cover is carried on by what grows alone: there may be many, and little to be seen.
-                corners.fold(0, |all, corner| all | of(corner.point)) & !COVER
+                corners.fold(0, |all, corner| all | of(corner.point)) & !(COVER | FENCE)
             };
             let all = some.iter().map(|&k| (k, lamps(k)));
             let wanted: Vec<(usize, u64)> = all.filter(|(_, lamps)| *lamps != 0).collect();

@@ -259,12 +259,19 @@ impl<'a> Growth<'a> {
                 if !self.is_seen(k) {
                     return 0.0;
                 }
-                if first {
+                let range = || {
                     let range = (0..3).map(|k| self.difference(light[k], light[(k + 1) % 3]));
-                    let range = RANGE * range.fold(0.0, f64::max);
-                    return told.max(range * range).max(self.unknown);
+                    (RANGE * range.fold(0.0, f64::max)).powi(2)
+                };
+                if first {
+                    return told.max(range()).max(self.unknown);
                 }
-                square.max(told * f64::from(trust * trust))
+                let expected = square.max(told * f64::from(trust * trust));
+                // What was looked at before was not split there: beside a line light is known at corners only.
+                if self.is_beside_line(k) {
+                    return expected.max(range());
+                }
+                expected
             })
             .collect();
         for (&k, square) in fresh.iter().zip(expected) {
@@ -276,9 +283,19 @@ impl<'a> Growth<'a> {
         }
     }
 
+    /// Has a cell a corner on the edge of a shadow?
+    fn is_beside_line(&self, cell: usize) -> bool {
+        let cell = &self.cells.all[cell];
+        let beside = &self.cells.sheets[cell.sheet as usize].beside;
+        let mut corners = cell.corners.iter();
+        corners.any(|corner| beside.contains_key(&corner.vertex))
+    }
+
     /// The first vertices.
     pub(super) fn begin(&mut self, progress: &dyn Fn(usize, usize)) {
+        self.cells.fence(&self.shades);
         let all: Vec<usize> = (0..self.cells.all.len()).collect();
+        let all = self.cells.take_sides(&self.shades, all);
         self.expect(&all, true, progress);
     }
 

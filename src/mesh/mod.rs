@@ -5,6 +5,7 @@ mod along;
 mod cells;
 mod drawn;
 mod edges;
+mod fences;
 mod grow;
 pub(crate) mod hints;
 mod lines;

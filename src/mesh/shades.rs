@@ -13,8 +13,10 @@ use glam::DVec3;
 
 /// What covers a place is dealt with like a lamp: where it ends, light does.
 pub(super) const COVER: u64 = 1 << 63;
+/// So is what stands on an edge of the input; no place is lit or not by it.
+pub(super) const FENCE: u64 = 1 << 62;
 /// Lamps that edges of shadows are looked for of, at the most: those that give most.
-const LAMPS: usize = 63;
+const LAMPS: usize = 62;
 /// Places on the rim of a lamp.
 const RIM: u32 = 4;
 
@@ -110,6 +112,7 @@ impl<'a> Shades<'a> {
     pub(super) fn lit(&self, sight: &Sight, lamp: u64, to: &Receiver) -> bool {
         match lamp {
             COVER => !self.bake.is_under(sight, to),
+            FENCE => true,
             _ => self.reaches(sight, self.of(lamp).middle, to),
         }
     }
@@ -118,7 +121,7 @@ impl<'a> Shades<'a> {
     pub(super) fn wholly(&self, sight: &Sight, lamp: u64, to: &Receiver) -> Option<bool> {
         let lit = self.lit(sight, lamp, to);
         let rim = match lamp {
-            COVER => &[],
+            COVER | FENCE => &[],
             _ => self.of(lamp).rim.as_slice(),
         };
         let alike = rim.iter().all(|&aim| self.reaches(sight, aim, to) == lit);
@@ -127,7 +130,7 @@ impl<'a> Shades<'a> {
 
     /// Is its shadow without half shadow?
     pub(super) fn is_hard(&self, lamp: u64) -> bool {
-        lamp == COVER || self.of(lamp).rim.is_empty()
+        matches!(lamp, COVER | FENCE) || self.of(lamp).rim.is_empty()
     }
 
     fn of(&self, lamp: u64) -> &Lamp {

@@ -10,6 +10,7 @@ use super::outlook::Outlook;
 use super::two_grid::TwoGrid;
 use crate::hierarchy::Tree;
 use crate::light::rows::Rows;
+use rayon::prelude::*;
 
 /// Sweeps at the most.
 const SWEEPS: usize = 400;
@@ -20,6 +21,8 @@ const SLOWEST: f64 = 0.95;
 /// After a correction that left more than this share of the change, a sweep goes without: what few patches cannot tell
 /// apart must not build up.
 const WORTH_CORRECTING: f64 = 0.5;
+/// Leaves that a task sums over; fixed, so that results do not depend on the number of threads.
+const CHUNK: usize = 1024;
 
 /// What a solve by rays works on.
 pub(crate) struct RaySystem<'a> {
@@ -109,17 +112,25 @@ impl RaySystem<'_> {
     /// What a sweep is to be scaled by, lane by lane, so that no light is missing: what direct light reflects, over what is
     /// reflected now less what of it comes again.
     fn missing<const L: usize>(&self, reflected: &Rows, seen: &Rows, first: &Rows) -> [f64; L] {
-        let (mut now, mut once, mut again) = ([0.0; L], [0.0; L], [0.0; L]);
-        let bounces = reflected.all::<L>().iter().zip(seen.all::<L>());
-        let direct = first.all::<L>().iter().zip(self.reflectance.all::<L>());
-        for (((r, h), (f, rho)), &leaf) in bounces.zip(direct).zip(self.leaves) {
-            let a = self.areas[leaf as usize];
-            for l in 0..L {
-                now[l] += a * f64::from(r[l]);
-                once[l] += a * f64::from(rho[l] * f[l]);
-                again[l] += a * f64::from(rho[l] * h[l]);
+        let bounces =
+            (reflected.all::<L>().par_chunks(CHUNK)).zip(seen.all::<L>().par_chunks(CHUNK));
+        let direct =
+            (first.all::<L>().par_chunks(CHUNK)).zip(self.reflectance.all::<L>().par_chunks(CHUNK));
+        let parts = bounces.zip(direct).zip(self.leaves.par_chunks(CHUNK));
+        let parts = parts.map(|(((reflected, seen), (first, rho)), leaves)| {
+            let (mut now, mut once, mut again) = ([0.0; L], [0.0; L], [0.0; L]);
+            let rows = reflected.iter().zip(seen).zip(first.iter().zip(rho));
+            for (((r, h), (f, rho)), &leaf) in rows.zip(leaves) {
+                let a = self.areas[leaf as usize];
+                for l in 0..L {
+                    now[l] += a * f64::from(r[l]);
+                    once[l] += a * f64::from(rho[l] * f[l]);
+                    again[l] += a * f64::from(rho[l] * h[l]);
+                }
             }
-        }
+            [now, once, again]
+        });
+        let [now, once, again] = added(&parts.collect::<Vec<_>>());
         let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 1.0 };
         std::array::from_fn(|l| {
             ratio(once[l], now[l] - again[l]).clamp(1.0 / GREATEST_SCALE, GREATEST_SCALE)
@@ -134,24 +145,35 @@ impl RaySystem<'_> {
         factor: [f32; L],
         reflected: &mut Rows,
     ) -> Change<L> {
-        let (mut change, mut total) = ([0.0; L], [0.0; L]);
-        let mut moved = self.two_grid.map(|(grid, _)| grid.sums::<L>());
-        let received = seen.all::<L>().iter().zip(first.all::<L>());
-        let rows = reflected.all_mut::<L>().iter_mut().zip(received);
-        for (k, ((r, (h, f)), rho)) in rows.zip(self.reflectance.all::<L>()).enumerate() {
-            let a = self.areas[self.leaves[k] as usize];
-            let next: [f32; L] = std::array::from_fn(|l| rho[l] * (f[l] + h[l]));
-            if let (Some((grid, _)), Some(moved)) = (self.two_grid, &mut moved) {
-                // From the scaled solution, which misses no light as a whole.
-                let d = std::array::from_fn(|l| next[l] - factor[l] * r[l]);
-                grid.add::<L>(k, a, &d, moved);
+        let (seen, first) = (seen.all::<L>(), first.all::<L>());
+        let rho = self.reflectance.all::<L>();
+        let next = |k: usize| -> [f32; L] {
+            std::array::from_fn(|l| rho[k][l] * (first[k][l] + seen[k][l]))
+        };
+        let moved = self.two_grid.map(|(grid, _)| {
+            let now = reflected.all::<L>();
+            // From the scaled solution, which misses no light as a whole.
+            let change = |k: usize| {
+                let next = next(k);
+                std::array::from_fn(|l| next[l] - factor[l] * now[k][l])
+            };
+            grid.sums::<L>(|k| self.areas[self.leaves[k] as usize], change)
+        });
+        let parts = reflected.all_mut::<L>().par_chunks_mut(CHUNK).enumerate();
+        let parts = parts.map(|(chunk, rows)| {
+            let (mut change, mut total) = ([0.0; L], [0.0; L]);
+            for (k, r) in (chunk * CHUNK..).zip(rows) {
+                let a = self.areas[self.leaves[k] as usize];
+                let next = next(k);
+                for l in 0..L {
+                    change[l] += a * f64::from((next[l] - r[l]).abs());
+                    total[l] += a * f64::from(next[l]);
+                }
+                *r = next;
             }
-            for l in 0..L {
-                change[l] += a * f64::from((next[l] - r[l]).abs());
-                total[l] += a * f64::from(next[l]);
-            }
-            *r = next;
-        }
+            [change, total]
+        });
+        let [change, total] = added(&parts.collect::<Vec<_>>());
         Change {
             change,
             total,
@@ -161,11 +183,8 @@ impl RaySystem<'_> {
 
     /// Rows by leaf, times areas, summed over patches.
     fn sums<const L: usize>(&self, grid: &TwoGrid, rows: &Rows) -> Vec<[f64; L]> {
-        let mut sums = grid.sums::<L>();
-        for (k, (row, &leaf)) in rows.all::<L>().iter().zip(self.leaves).enumerate() {
-            grid.add::<L>(k, self.areas[leaf as usize], row, &mut sums);
-        }
-        sums
+        let rows = rows.all::<L>();
+        grid.sums::<L>(|k| self.areas[self.leaves[k] as usize], |k| rows[k])
     }
 
     /// Relative change of the worst lane, and how large its error may still be.
@@ -213,4 +232,15 @@ impl RaySystem<'_> {
         pull::<f32, L>(self.tree, self.areas, all);
         self.outlook.irradiance::<L>(self.leaves, nodes, seen);
     }
+}
+
+/// Sums lane by lane, in order.
+fn added<const L: usize, const N: usize>(parts: &[[[f64; L]; N]]) -> [[f64; L]; N] {
+    let mut sums = [[0.0; L]; N];
+    for part in parts {
+        for (sum, x) in sums.as_flattened_mut().iter_mut().zip(part.as_flattened()) {
+            *sum += x;
+        }
+    }
+    sums
 }

@@ -29,6 +29,8 @@ const DARK: f64 = 0.05;
 pub(crate) struct TwoGrid {
     /// Patch of each leaf, by leaf.
     patch: Vec<u32>,
+    /// The leaves of each patch, as their places in the list of leaves.
+    members: Vec<Vec<u32>>,
     /// Bare area of each patch.
     areas: Vec<f64>,
     /// For each patch, which patches its rays met and their shares.
@@ -42,14 +44,14 @@ impl TwoGrid {
         let patch: Vec<u32> = leaves.iter().map(|&k| of_node[k as usize]).collect();
         let count = patch.iter().map(|&p| p as usize + 1).max().unwrap_or(0);
         let mut members = vec![Vec::new(); count];
-        for (&leaf, &p) in leaves.iter().zip(&patch) {
-            members[p as usize].push(leaf);
+        for (k, &p) in (0_u32..).zip(&patch) {
+            members[p as usize].push(k);
         }
         let (areas, seen) = members
             .par_iter()
             .map(|members| {
                 let (mut sums, mut area) = (vec![0.0_f64; count], 0.0);
-                for &leaf in members {
+                for leaf in members.iter().map(|&k| leaves[k as usize]) {
                     let (met, fronts) = outlook.met(leaf);
                     area += areas[leaf as usize];
                     let each = areas[leaf as usize] / f64::from(fronts);
@@ -64,7 +66,12 @@ impl TwoGrid {
                 (area, row)
             })
             .unzip();
-        Self { patch, areas, seen }
+        Self {
+            patch,
+            members,
+            areas,
+            seen,
+        }
     }
 
     /// How many patches.
@@ -72,22 +79,22 @@ impl TwoGrid {
         self.areas.len()
     }
 
-    /// A sum for each patch, of nothing yet.
-    pub(super) fn sums<const L: usize>(&self) -> Vec<[f64; L]> {
-        vec![[0.0; L]; self.areas.len()]
-    }
-
-    /// Adds the row of the `k`-th leaf, times its area.
-    pub(super) fn add<const L: usize>(
+    /// Rows of leaves times their areas, summed over each patch; both by place in the list of leaves.
+    pub(super) fn sums<const L: usize>(
         &self,
-        k: usize,
-        area: f64,
-        row: &[f32; L],
-        sums: &mut [[f64; L]],
-    ) {
-        for (s, x) in sums[self.patch[k] as usize].iter_mut().zip(row) {
-            *s += area * f64::from(*x);
-        }
+        area: impl Fn(usize) -> f64 + Sync,
+        row: impl Fn(usize) -> [f32; L] + Sync,
+    ) -> Vec<[f64; L]> {
+        let sum = |members: &Vec<u32>| {
+            members.iter().fold([0.0; L], |mut sum, &k| {
+                let (a, row) = (area(k as usize), row(k as usize));
+                for (s, x) in sum.iter_mut().zip(row) {
+                    *s += a * f64::from(x);
+                }
+                sum
+            })
+        };
+        self.members.par_iter().map(sum).collect()
     }
 
     /// Means over the patches.
@@ -200,10 +207,14 @@ impl TwoGrid {
             for (k, row) in self.seen.iter().enumerate() {
                 // Several sums: none waits for another.
                 let mut sums = [f32x16::ZERO; 4];
-                for some in row.chunks(sums.len()) {
-                    for (sum, &(source, share)) in sums.iter_mut().zip(some) {
-                        *sum += f32x16::splat(share) * error[source as usize];
-                    }
+                let of =
+                    |&(source, share): &(u32, f32)| f32x16::splat(share) * error[source as usize];
+                let (fours, rest) = row.as_chunks::<4>();
+                for four in fours {
+                    sums = std::array::from_fn(|k| sums[k] + of(&four[k]));
+                }
+                for (sum, one) in sums.iter_mut().zip(rest) {
+                    *sum += of(one);
                 }
                 let [a, b, c, d] = sums;
                 sent[k] = (a + b) + (c + d);

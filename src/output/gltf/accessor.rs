@@ -3,7 +3,7 @@
 //! Every offset is checked: what does not fit its buffer reads as none. Normalised integers become
 //! c / 255, max(c / 127, -1) and so on (glTF 2.0, section 3.11).
 
-use super::{extension, index, list};
+use super::json::{extension, index, list};
 use crate::scene::Source;
 use crate::scene::buffers::{Buffers, Span, Views};
 use crate::scene::check::Check;

@@ -4,8 +4,9 @@
 //! back by the inverse transform) where the data sits in a Draco stream. Everything is written as f32.
 
 use super::accessor::{self, Data, Table};
+use super::json::index;
 use super::packing::Grid;
-use super::{Writer, index};
+use super::writer::Writer;
 use crate::error::{Error, Result};
 use crate::gather::refined;
 use crate::gather::{BakedSurface, BakedVertex};

@@ -4,8 +4,10 @@
 //! two triangles. So `(bytes - B) / per vertex + V` fit. Packed files are measured: their share of the plain size, and a
 //! quarter more, for new vertices are less alike than the input's.
 
+use super::asset::BakedGlb;
+use super::baked_glb;
 use super::packing::Packing;
-use super::{BakedGlb, Writing, baked_glb};
+use super::writer::Writing;
 use crate::error::Result;
 use crate::gather::{BakedSurface, BakedVertex};
 use crate::output::Exposure;

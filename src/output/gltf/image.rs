@@ -1,6 +1,8 @@
 //! Images of the output: all inside the file, so that it shows wherever it is put.
 
-use super::{Writer, buffer::Use, list};
+use super::buffer::Use;
+use super::json::list;
+use super::writer::Writer;
 use serde_json::{Value, json};
 
 /// The sRGB bytes nearest to the linear 0.5 that a scene takes for an image it cannot read.
@@ -30,7 +32,7 @@ impl Writer<'_> {
                 image.shift_remove("uri");
             }
         }
-        super::put_list(&mut self.json, "images", images);
+        super::json::put_list(&mut self.json, "images", images);
     }
 
     /// A texture reference like `texture`, to a white image with the alpha of a scene image.
@@ -48,7 +50,7 @@ impl Writer<'_> {
         let view = self.bin.view(&bytes, Use::Data);
         let name = format!("{} (alpha)", image.name);
         let new_image = json!({ "name": name, "bufferView": view, "mimeType": "image/png" });
-        let old = super::index(&texture, "index")
+        let old = super::json::index(&texture, "index")
             .and_then(|t| list(&self.scene.source.json, "textures").get(t));
         let mut new_texture = json!({});
         if let Some(sampler) = old.and_then(|t| t.get("sampler")) {

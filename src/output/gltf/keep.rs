@@ -4,7 +4,9 @@
 //! Data is copied without the gaps and neighbours of its old view, so nothing of the replaced meshes is dragged along.
 
 use super::accessor::Layout;
-use super::{Writer, buffer::Use, extension, index, list};
+use super::buffer::Use;
+use super::json::{extension, index, list};
+use super::writer::Writer;
 use crate::scene::buffers::Span;
 use serde_json::{Map, Value, json};
 
@@ -125,7 +127,7 @@ impl Writer<'_> {
                 }
             }
         }
-        super::put_list(&mut self.json, "animations", animations);
+        super::json::put_list(&mut self.json, "animations", animations);
     }
 
     /// Skins, and the instances of unbaked meshes.
@@ -136,7 +138,7 @@ impl Writer<'_> {
                 skin["inverseBindMatrices"] = json!(self.keep_accessor(old, Role::Data));
             }
         }
-        super::put_list(&mut self.json, "skins", skins);
+        super::json::put_list(&mut self.json, "skins", skins);
         let mut nodes = self
             .json
             .get("nodes")
@@ -154,7 +156,7 @@ impl Writer<'_> {
                 }
             }
         }
-        super::put_list(&mut self.json, "nodes", nodes);
+        super::json::put_list(&mut self.json, "nodes", nodes);
     }
 
     /// Copies what anything but accessors names by buffer view (images, unknown extensions).
@@ -219,7 +221,7 @@ impl Writer<'_> {
                 let missing: Vec<Value> = missing.map(|name| json!(name)).collect();
                 kept.extend(missing);
             }
-            super::put_list(&mut self.json, key, kept);
+            super::json::put_list(&mut self.json, key, kept);
         }
     }
 }

@@ -6,8 +6,8 @@
 //! whole. Layers are always stored as floats: a lamp that is in the picture is hundreds of times as bright as white, which
 //! leaves 16 bits too few for the rest.
 
-use super::Writer;
 use super::attributes::exposed;
+use super::writer::Writer;
 use crate::gather::{BakedSurface, BakedVertex};
 use crate::output::{Exposure, curve};
 use crate::scene::{Material, Scene, Surface};

@@ -7,7 +7,9 @@
 //! end at `MOST` times what shows as white on a white surface.
 //! The emissive slot holds the light as it shows on the mean of the paint's texture, in sRGB: unlit viewers ignore it, the others need it.
 
-use super::{Writer, buffer::Use, list};
+use super::buffer::Use;
+use super::json::list;
+use super::writer::Writer;
 use crate::color::encode;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
@@ -17,7 +19,6 @@ use glam::Vec3;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// The extension's name.
@@ -26,42 +27,6 @@ const LIGHTMAP: &str = "MOZ_lightmap";
 const MOST: f64 = 4.0;
 /// Base colours below this are black: what times them should show the light is taken from white.
 const BLACK: f64 = 1.0 / 255.0;
-
-/// A primitive with a light map, as it stands in the file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MapPart {
-    /// Index in `Scene::surfaces`, and whether it is the back of that.
-    pub surface: usize,
-    /// Is it the back?
-    pub back: bool,
-    /// Mesh and primitive of the written file.
-    pub mesh: usize,
-    /// Primitive of the mesh.
-    pub primitive: usize,
-    /// Number of the page.
-    pub page: usize,
-    /// Set of texture coordinates.
-    pub texcoord: usize,
-}
-
-/// The pages as textures of the file.
-#[derive(Default)]
-pub(super) struct Maps {
-    /// Textures of the light and of what is shown, by page.
-    textures: Vec<[usize; 2]>,
-    /// Of the light, see the module's words.
-    intensity: f64,
-    /// Material by scene material, page and set of coordinates.
-    materials: BTreeMap<(usize, usize, usize), usize>,
-    pub(super) parts: Vec<MapPart>,
-}
-
-impl Maps {
-    /// Factor of the light; none if the light is not in maps.
-    pub(super) fn intensity(&self) -> Option<f64> {
-        (!self.textures.is_empty()).then_some(self.intensity)
-    }
-}
 
 impl Writer<'_> {
     /// Adds the pages' images and textures.

@@ -4,27 +4,16 @@
 //! is one; only a texture that the light was divided by stays in the base colour. Alpha keeps working as in the input.
 //! Nothing is `doubleSided`: each side is a primitive of its own.
 
-use super::{Writer, extension, index, list};
+use super::json::{extension, index, list};
+use super::writer::Writer;
 use crate::scene::Alpha;
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// The extension that makes a viewer show COLOR_0 and nothing else.
 const UNLIT: &str = "KHR_materials_unlit";
 
 /// Roughness of viewers that do not know the extension, as its text recommends (no highlights).
 const FALLBACK_ROUGHNESS: f64 = 0.9;
-
-/// Baked materials so far.
-#[derive(Default)]
-pub(super) struct Unlit {
-    /// Scene material to output material.
-    done: BTreeMap<usize, usize>,
-    /// Output materials of the input that already became a baked one.
-    taken: BTreeSet<usize>,
-    /// Input materials that unbaked primitives (points, lines, other scenes) show: these stay.
-    pub(super) kept: BTreeSet<usize>,
-}
 
 impl Writer<'_> {
     /// The output material for a scene material: in the place of the input's where nobody else needs that, else a copy.

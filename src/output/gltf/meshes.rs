@@ -1,10 +1,11 @@
 //! Meshes and the nodes that show them: a mesh of its own for each node (the light differs), a child node for each
 //! instance of EXT_mesh_gpu_instancing.
 
+use super::accessor;
+use super::json::{extension, index, list, put_list, remove_below};
+use super::keep::Role;
 use super::packing::Packing;
-use super::{
-    MapPart, Writer, accessor, extension, index, keep::Role, list, put_list, remove_below,
-};
+use super::writer::{MapPart, Writer};
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use glam::DQuat;

@@ -107,7 +107,7 @@ pub(super) fn in_order(indices: Vec<u32>, _vertices: usize) -> Vec<u32> {
 pub(super) fn packed(bytes: &[u8], views: &mut [Value], modes: &[Option<Mode>]) -> Result<Vec<u8>> {
     let mut out = Vec::new();
     for (view, mode) in views.iter_mut().zip(modes) {
-        let number = |key: &str| super::index(view, key).unwrap_or(0);
+        let number = |key: &str| super::json::index(view, key).unwrap_or(0);
         let (start, length) = (number("byteOffset"), number("byteLength"));
         let plain = bytes.get(start..start + length).unwrap_or_default();
         let part = match mode {
