@@ -101,39 +101,14 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let points: Vec<Point> = (read.points.iter())
         .map(|&(place, normal)| (scale * place, normal))
         .collect();
-    let probed = bake.probe(&points);
-    let places = places(bake.scene(), &points);
-    let metrics = match args.metrics {
-        true => Some(measured(
-            args,
-            (common, &talk, &stop),
-            &bake,
-            &points,
-            (&probed, &places),
-        )?),
-        false => None,
-    };
-    let views: Vec<Glare> = (args.ugr.iter())
-        .map(|view| bake.glare(scale * view.eye, view.direction))
-        .collect();
+    let found = Found::at(args, (common, &talk, &stop), &bake, &points)?;
     talk.clear();
-    warn_of(&places, &talk);
-    if let Some(line) = metrics.as_ref().and_then(Metrics::line) {
-        talk.say(&line);
-    }
-    let relative = bake
-        .rounds()
-        .last()
-        .and_then(|r| r.error.total_relative.value);
-    let views = || args.ugr.iter().zip(&views);
-    for (view, glare) in views() {
-        talk.say(&glare::line(view, glare, relative));
-    }
+    found.tell(args, &talk);
 
     let columns = columns(args.bands, &bake.scene().grid);
-    let lines = read.points.iter().zip(&probed);
+    let lines = read.points.iter().zip(&found.probed);
     let rows: Vec<Vec<f64>> = lines.map(|(p, light)| row(p, light, args.bands)).collect();
-    let csv = || table(&columns, &rows, &places, metrics.as_ref());
+    let csv = || table(&columns, &rows, &found.places, found.metrics.as_ref());
     if let Some(path) = &args.output {
         file::write_atomic(path, Some(&args.room), |w| w.write_all(csv().as_bytes()))?;
     }
@@ -145,13 +120,14 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
             "error_de2000": bake.rounds().last().map(|r| r.error.total_de2000),
             "columns": columns,
             "rows": rows,
-            "places": places.iter().map(|p| p.name()).collect::<Vec<_>>(),
+            "places": found.places.iter().map(|p| p.name()).collect::<Vec<_>>(),
         });
-        if let Some(metrics) = &metrics {
+        if let Some(metrics) = &found.metrics {
             all["metrics"] = metrics.json();
         }
         if !args.ugr.is_empty() {
-            let entries = views().map(|(view, seen)| glare::entry(view, seen, relative));
+            let views = args.ugr.iter().zip(&found.views);
+            let entries = views.map(|(view, seen)| glare::entry(view, seen, found.relative));
             all["ugr"] = entries.collect();
         }
         print(&format!("{all}\n"))?;
@@ -159,6 +135,63 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
         print(&csv())?;
     }
     Ok(exit_code(verdict))
+}
+
+/// What was found.
+struct Found {
+    probed: Vec<Probed>,
+    places: Vec<Place>,
+    metrics: Option<Metrics>,
+    /// Of the viewpoints.
+    views: Vec<Glare>,
+    /// Relative error of the light, an estimate.
+    relative: Option<f64>,
+}
+
+impl Found {
+    /// Looks at points and from viewpoints.
+    fn at(
+        args: &ProbeArgs,
+        (common, talk, stop): (&Common, &Talk, &Stop),
+        bake: &Bake,
+        points: &[Point],
+    ) -> Result<Self> {
+        let probed = bake.probe(points);
+        let places = places(bake.scene(), points);
+        let metrics = match args.metrics {
+            true => Some(measured(
+                args,
+                (common, talk, stop),
+                bake,
+                points,
+                (&probed, &places),
+            )?),
+            false => None,
+        };
+        let scale = bake.scene().changes.scale;
+        let views = args.ugr.iter();
+        let last = bake.rounds().last();
+        Ok(Self {
+            probed,
+            places,
+            metrics,
+            views: views
+                .map(|view| bake.glare(scale * view.eye, view.direction))
+                .collect(),
+            relative: last.and_then(|round| round.error.total_relative.value),
+        })
+    }
+
+    /// Says what is to be said on stderr.
+    fn tell(&self, args: &ProbeArgs, talk: &Talk) {
+        warn_of(&self.places, talk);
+        if let Some(line) = self.metrics.as_ref().and_then(Metrics::line) {
+            talk.say(&line);
+        }
+        for (view, glare) in args.ugr.iter().zip(&self.views) {
+            talk.say(&glare::line(view, glare, self.relative));
+        }
+    }
 }
 
 /// The figures of all points, with the daylight factor where there is a sky.
