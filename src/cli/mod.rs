@@ -5,6 +5,8 @@
 //! | `command` | the command line as a whole, exit codes |
 //! | `options` | options that commands share |
 //! | `bake`, `relight`, `inspect`, `probe`, `spectra`, `cost`, `serve`, `paper` | the commands |
+//! | `bake_args`, `baking` | what a bake is asked for, and its steps |
+//! | `rooms` | reading and preparing rooms |
 //! | `log` | the log of a bake, field by field |
 //! | `report` | the page of a bake |
 //! | `snapshots` | pictures of the rounds |
@@ -21,6 +23,8 @@
 //! | `fault` | panics become exit code 3 |
 
 pub mod bake;
+mod bake_args;
+mod baking;
 mod command;
 #[cfg(feature = "paper")]
 pub mod cost;
@@ -41,6 +45,7 @@ pub mod probe;
 pub mod relight;
 mod report;
 mod results;
+mod rooms;
 pub mod serve;
 mod sky;
 mod snapshots;

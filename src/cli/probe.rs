@@ -10,7 +10,6 @@
 //! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see `metrics.rs`. `--ugr` puts `"ugr"` there:
 //! see `glare.rs`.
 
-use super::bake::{load, prepare};
 use super::glare::{self, Viewpoint};
 use super::log::exit_code;
 use super::metrics::Metrics;
@@ -18,6 +17,7 @@ use super::options::{Common, Reading, Solving};
 use super::paths;
 use super::points::{COLUMNS, Point, Points};
 use super::results::print;
+use super::rooms::{load, prepare};
 use super::stop::Stop;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
