@@ -15,7 +15,7 @@
 //! # Ok::<(), haarlight::Error>(())
 //! ```
 //!
-//! The chain: [`data`] -> [`color`] -> [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`link`] -> [`light`] ->
+//! The chain: [`data`] -> [`color`] -> [`spectrum`] -> [`scene`] -> [`geometry`] -> [`hierarchy`] -> [`team`] -> [`link`] -> [`light`] ->
 //! [`transport`] -> [`solve`] -> [`gather`] -> [`mesh`], [`lightmap`] -> [`keep`] -> [`output`] and [`report`], with [`audit`] beside it and
 //! [`cost`] and [`serve`] behind; [`survey`] looks at a room before [`solve`]. A module uses what stands to its left.
 //!
@@ -52,6 +52,7 @@ pub mod solve;
 pub mod spectrum;
 pub mod store;
 pub mod survey;
+pub mod team;
 pub mod transport;
 
 pub use error::{Error, Problem, Result};

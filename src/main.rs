@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use haarlight::cli::{Cli, guarded, run};
+use haarlight::team::Job;
 use std::process::ExitCode;
 
 /// What the compiler took for granted that this processor does not have; it would end at some instruction without a word.
@@ -29,6 +30,16 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     }
     // Ends the program by itself: 0 after --help, 2 after a mistake on the command line.
-    let cli = Cli::parse();
-    ExitCode::from(guarded(|| run(&cli)))
+    let mut cli = Cli::parse();
+    let mut job = Job::default();
+    let joined = guarded(job.team(), || {
+        job = Job::join()?;
+        Ok(0)
+    });
+    if joined != 0 {
+        return ExitCode::from(joined);
+    }
+    cli.common.team = job.team();
+    let code = guarded(job.team(), || run(&cli));
+    ExitCode::from(job.end(code))
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Folders and files of `src`, from the bottom to the top. `lib` and `main` hold them together.
-const ORDER: [&str; 23] = [
+const ORDER: [&str; 24] = [
     "error",
     "data",
     "color",
@@ -13,6 +13,7 @@ const ORDER: [&str; 23] = [
     "geometry",
     "hierarchy",
     "store",
+    "team",
     "link",
     "light",
     "transport",

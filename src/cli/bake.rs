@@ -26,6 +26,7 @@ use crate::scene::Scene;
 use crate::solve::{Bake, Representation, Settings, Verdict};
 use crate::store::file;
 use crate::survey::advise;
+use crate::team::Team;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -127,6 +128,16 @@ impl BakeArgs {
         self
     }
 
+    /// What a rank is to do: but for the first, it writes nothing that others need no part of.
+    fn of_rank(&self, team: Team) -> Self {
+        let mut args = self.clone();
+        if !team.is_first() {
+            (args.log, args.npz, args.report) = (None, None, None);
+            args.json = false;
+        }
+        args
+    }
+
     fn report(&self) -> Option<PathBuf> {
         let named = self.report.clone()?;
         Some(named.unwrap_or_else(|| paths::report_of(&self.room)))
@@ -138,9 +149,11 @@ impl BakeArgs {
 /// # Errors
 /// As [`Scene::load`]; outputs that would overwrite an input or each other; files that cannot be written.
 pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
-    let stop = Stop::new(args.solving.time);
+    let team = common.team;
+    let args = &args.of_rank(team);
+    let stop = Stop::new(args.solving.time).of_all(team);
     stop.listen()?;
-    let talk = Talk::new(common.quiet);
+    let talk = Talk::new(common.quiet || !team.is_first());
     let output = args
         .output
         .clone()
@@ -148,7 +161,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let cache = cache(args);
     talk.phase("reading");
     let mut scene = load(&args.room, &args.reading, |parts| {
-        problems(args, &output, cache.as_deref(), parts)
+        problems(args, &output, cache.as_deref(), parts, team)
     })?;
     args.parting.part(&mut scene, &talk)?;
     let grid = args.parting.grid(&scene)?;
@@ -165,7 +178,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let snapshots = args
         .snapshots
         .as_deref()
-        .map(|folder| Snapshots::new(folder, &cameras))
+        .map(|folder| Snapshots::new(folder, &cameras, team))
         .transpose()?;
     let mut log = args.log.as_deref().map(Log::create).transpose()?;
     let mut outputs = Outputs {
@@ -188,7 +201,8 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         .report()
         .map(|path| Report::new(path, &plan))
         .transpose()?;
-    if let Some(path) = args.checkpoint.as_deref().filter(|path| path.exists()) {
+    let resumed = args.checkpoint.as_deref();
+    if let Some(path) = resumed.filter(|path| team.first_says(path.exists())) {
         bake.resume(path)?;
         for round in bake.rounds() {
             write(&mut log, round)?;
@@ -215,7 +229,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         let affordable = PICTURES_SHARE * stop.elapsed_s().max(PICTURES_FREE_S / PICTURES_SHARE);
         if let Some(snapshots) = snapshots
             .as_ref()
-            .filter(|_| seconds.snapshots <= affordable)
+            .filter(|_| team.first_says(seconds.snapshots <= affordable))
         {
             let clock = Instant::now();
             let seen = snapshots.seen(bake.scene());
@@ -271,9 +285,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     };
     glb.warnings.iter().for_each(|w| talk.warn(w));
     over_budget(args, &glb).iter().for_each(|w| talk.warn(w));
-    file::write_atomic(&output, room, |w| w.write_all(&glb.bytes))?;
+    if team.is_first() {
+        file::write_atomic(&output, room, |w| w.write_all(&glb.bytes))?;
+    }
     outputs.glb = text(&output);
-    if let Some(maps) = &maps {
+    if let Some(maps) = maps.as_ref().filter(|_| team.is_first()) {
         let (room, ktx2) = (&args.room, args.mapping.ktx2);
         outputs.maps = maps::write(&output, room, scene, maps, &glb, &exposure, ktx2)?;
     }
@@ -433,6 +449,7 @@ pub(super) fn prepare(
         ..Settings::default()
     };
     let mut bake = Bake::new(scene, settings);
+    bake.spread_over(common.team);
     let parts = talk.parts();
     bake.watch(Arc::new(move |ended| {
         let place = PHASES.iter().position(|phase| *phase == ended);
@@ -454,6 +471,7 @@ fn problems(
     output: &Path,
     cache: Option<&Path>,
     parts: &[PathBuf],
+    team: Team,
 ) -> Vec<Problem> {
     let mut outputs = vec![("-o", output)];
     outputs.extend(args.npz.as_deref().map(|path| ("--npz", path)));
@@ -482,6 +500,13 @@ fn problems(
         ("--report", args.report.is_some()),
         ("--snapshots", args.snapshots.is_some()),
     ];
+    if args.cache.is_some() && !team.is_alone() {
+        problems.push(Problem::new(
+            "--cache",
+            "is made by one rank: it holds where all light comes from",
+            "leave it out, or bake without mpirun",
+        ));
+    }
     problems.extend(args.mapping.problems(&of_vertices));
     problems.extend(args.parting.problems(args.spectrum, args.cache.is_some()));
     if let Some(folder) = args

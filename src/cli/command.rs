@@ -70,6 +70,14 @@ pub fn run(cli: &Cli) -> Result<u8> {
             .build_global()
             .map_err(|problem| Error::Internal(format!("threads: {problem}")))?;
     }
+    let spread = matches!(cli.command, Command::Bake(_) | Command::Report(_));
+    if !spread && !cli.common.team.is_alone() {
+        return Err(Error::input(
+            format!("{} ranks", cli.common.team.ranks()),
+            "were started for a command that one does by itself: `bake` and `report` are spread over ranks",
+            "start it without mpirun",
+        ));
+    }
     match &cli.command {
         Command::Bake(args) => bake::run(args, &cli.common),
         Command::Report(args) => bake::run(&args.clone().with_report(), &cli.common),

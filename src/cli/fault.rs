@@ -2,11 +2,17 @@
 
 use super::talk::tell;
 use crate::error::Error;
+use crate::team::Team;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
-/// Runs a command; the exit code, after errors and panics have been told on stderr.
-pub fn guarded(run: impl FnOnce() -> crate::Result<u8>) -> u8 {
+/// Ranks but the first wait so long before they tell of a fault: where all have the same one, the first has told of it by then and ended
+/// the job.
+const FIRST_SPEAKS: Duration = Duration::from_secs(2);
+
+/// Runs a command on a rank; the exit code, after errors and panics have been told on stderr.
+pub fn guarded(team: Team, run: impl FnOnce() -> crate::Result<u8>) -> u8 {
     let said: Arc<Mutex<Option<String>>> = Arc::default();
     let heard = Arc::clone(&said);
     let before = panic::take_hook();
@@ -39,7 +45,12 @@ pub fn guarded(run: impl FnOnce() -> crate::Result<u8>) -> u8 {
             Error::Internal(what.unwrap_or_else(|| "panic".into()))
         }
     };
-    tell(&format!("haarlight: {error}"));
+    if team.is_first() {
+        tell(&format!("haarlight: {error}"));
+    } else {
+        std::thread::sleep(FIRST_SPEAKS);
+        tell(&format!("haarlight: rank {}: {error}", team.rank()));
+    }
     error.exit_code()
 }
 
@@ -49,15 +60,26 @@ mod tests {
 
     #[test]
     fn every_end_has_its_code() {
-        assert_eq!(guarded(|| Ok(1)), 1);
+        assert_eq!(guarded(Team::default(), || Ok(1)), 1);
         assert_eq!(
-            guarded(|| Err(Error::input("room.glb", "is empty", "export it again"))),
+            guarded(Team::default(), || Err(Error::input(
+                "room.glb",
+                "is empty",
+                "export it again"
+            ))),
             2
         );
-        assert_eq!(guarded(|| Err(Error::Internal("lost".into()))), 3);
-        assert_eq!(guarded(|| panic!("lost")), 3);
         assert_eq!(
-            guarded(|| rayon::join(|| panic!("lost in a thread"), || Ok(0)).1),
+            guarded(Team::default(), || Err(Error::Internal("lost".into()))),
+            3
+        );
+        assert_eq!(guarded(Team::default(), || panic!("lost")), 3);
+        assert_eq!(
+            guarded(Team::default(), || rayon::join(
+                || panic!("lost in a thread"),
+                || Ok(0)
+            )
+            .1),
             3
         );
     }

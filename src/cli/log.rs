@@ -31,6 +31,7 @@
 //! | `elements`, `nodes`, `links`, `links_clear` | | leaves of the hierarchy, all patches, links, links proved free of blockers |
 //! | `intervals_working`, `intervals_mean` | | wavelength intervals of the working partition (all lights), and mean over patches |
 //! | `memory_bytes` | B | hierarchy, links and rows |
+//! | `row_bytes` | B | of these, what the rays of leaves met where leaves look for themselves; of several ranks, the first rank's |
 //! | `bytes_per_link` | B | of these, for each link: 28 for itself, 4 for each blocker, 16 in the rows of the solve and 32 in those of the gather |
 //! | `bytes_per_element` | B | of these, for each leaf of the hierarchy: patches, rows of light, direct light |
 //! | `iterations` | | operator applications of the solve |
@@ -94,8 +95,10 @@ pub struct SettingsRecord {
     pub white: Option<[f64; 3]>,
     /// Seed of all sampling patterns.
     pub seed: u64,
-    /// Threads.
+    /// Threads, of each rank.
     pub threads: usize,
+    /// Ranks that bake the room together.
+    pub ranks: usize,
 }
 
 impl SettingsRecord {
@@ -111,6 +114,7 @@ impl SettingsRecord {
             white: settings.white,
             seed: settings.seed,
             threads: rayon::current_num_threads(),
+            ranks: bake.team().ranks(),
         }
     }
 }

@@ -11,6 +11,7 @@
 //! | `parting` | layers of lamps and probes of a bake |
 //! | `maps` | light maps of a bake, and what may be asked of them |
 //! | `metrics` | figures of lighting practice for `probe` |
+//! | `glare` | glare at viewpoints for `probe` |
 //! | `pictures` | plan and spectra of a room for `inspect` |
 //! | `points` | the CSV of points for `probe` |
 //! | `stop` | Ctrl-C and `--time` |
@@ -24,6 +25,7 @@ mod command;
 #[cfg(feature = "paper")]
 pub mod cost;
 mod fault;
+mod glare;
 pub mod inspect;
 pub mod log;
 pub mod maps;

@@ -6,6 +6,7 @@ use crate::output::{Balance, Brightness, Exposure, Packing, Writing};
 use crate::scene::{Camera, Options, Scene};
 use crate::spectrum::{Grid, LEAVES};
 use crate::survey::Wishes;
+use crate::team::Team;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -28,6 +29,9 @@ pub struct Common {
     /// Say nothing but errors.
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// The rank that this process is of a job; alone unless [`Job`](crate::team::Job) says otherwise.
+    #[arg(skip)]
+    pub team: Team,
 }
 
 /// Options of the commands that read a room.

@@ -96,8 +96,10 @@ pub(super) fn write_probes(
     ));
     let text = serde_json::to_vec(&probes)
         .map_err(|problem| Error::Internal(format!("probes: {problem}")))?;
-    for (path, bytes) in [(&json, text), (&ktx2, to_volume(&probes))] {
-        file::write_atomic(path, Some(room), |w| w.write_all(&bytes))?;
+    if bake.team().is_first() {
+        for (path, bytes) in [(&json, text), (&ktx2, to_volume(&probes))] {
+            file::write_atomic(path, Some(room), |w| w.write_all(&bytes))?;
+        }
     }
     Ok([json, ktx2].map(|path| text_of(&path)).to_vec())
 }

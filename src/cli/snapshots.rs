@@ -9,6 +9,7 @@ use crate::gather::BakedSurface;
 use crate::output::{Exposure, Format, Picture, exr, picture};
 use crate::scene::{Camera, Scene};
 use crate::store::file;
+use crate::team::Team;
 use std::path::{Path, PathBuf};
 
 /// Proportions that pictures may have.
@@ -19,17 +20,28 @@ pub(super) struct Snapshots {
     folder: PathBuf,
     /// Cameras with their file names.
     cameras: Vec<(String, Camera)>,
+    /// The first rank draws.
+    team: Team,
 }
 
 impl Snapshots {
     /// Makes the folder.
-    pub(super) fn new(folder: &Path, cameras: &[Camera]) -> Result<Self> {
+    pub(super) fn new(folder: &Path, cameras: &[Camera], team: Team) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(|problem| Error::io(folder, problem))?;
         let names = file_names(cameras.iter().map(|c| c.name.as_str()));
         Ok(Self {
             folder: folder.to_owned(),
             cameras: names.into_iter().zip(cameras.iter().cloned()).collect(),
+            team,
         })
+    }
+
+    /// The cameras that this rank draws for.
+    fn drawn(&self) -> &[(String, Camera)] {
+        match self.team.is_first() {
+            true => &self.cameras,
+            false => &[],
+        }
     }
 
     /// What the pictures show of each surface.
@@ -50,7 +62,7 @@ impl Snapshots {
             let picture = Picture::draw(scene, surfaces, camera, look, format(camera))?;
             self.write(&format!("{start}-{name}.png"), scene, &picture.to_png()?)
         };
-        self.cameras.iter().map(draw).collect()
+        self.drawn().iter().map(draw).collect()
     }
 
     /// PNGs and EXRs of the final mesh; their paths.
@@ -61,7 +73,7 @@ impl Snapshots {
         look: &Exposure,
     ) -> Result<(Vec<String>, Vec<String>)> {
         let (mut shown, mut measured) = (Vec::new(), Vec::new());
-        for (name, camera) in &self.cameras {
+        for (name, camera) in self.drawn() {
             let picture = Picture::draw(scene, surfaces, camera, look, format(camera))?;
             shown.push(self.write(&format!("final-{name}.png"), scene, &picture.to_png()?)?);
             measured.push(self.write(

@@ -7,6 +7,7 @@
 use super::talk::{Talk, tell};
 use crate::error::{Error, Result};
 use crate::solve::{Bake, Round, Verdict};
+use crate::team::Team;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -29,6 +30,8 @@ pub struct Stop {
     time: Option<f64>,
     /// Milliseconds from the start to Ctrl-C, and one; 0: there was none.
     interrupted: Arc<AtomicU64>,
+    /// Of several ranks the first says when it is time.
+    team: Team,
 }
 
 impl Stop {
@@ -38,7 +41,13 @@ impl Stop {
             started: Instant::now(),
             time,
             interrupted: Arc::default(),
+            team: Team::default(),
         }
+    }
+
+    /// The same for all ranks of a team; to be asked by all of them alike.
+    pub fn of_all(self, team: Team) -> Self {
+        Self { team, ..self }
     }
 
     /// Listens to Ctrl-C. To be called once in a process.
@@ -52,7 +61,9 @@ impl Stop {
                 std::process::exit(KILLED);
             }
             stop.interrupt();
-            tell("\nending after this round; Ctrl-C again ends at once");
+            if stop.team.is_first() {
+                tell("\nending after this round; Ctrl-C again ends at once");
+            }
         })
         .map_err(|problem| Error::Internal(format!("Ctrl-C: {problem}")))
     }
@@ -81,15 +92,16 @@ impl Stop {
         let now = self.elapsed_s();
         let (least, share) = AFTER;
         let interrupted = self.interrupted_s();
-        self.time.is_some_and(|time| now > GATHER * time - ahead)
-            || interrupted.is_some_and(|at| now > at + (share * at).max(least))
+        let late = self.time.is_some_and(|time| now > GATHER * time - ahead)
+            || interrupted.is_some_and(|at| now > at + (share * at).max(least));
+        self.team.first_says(late)
     }
 
     /// Why nothing more should be done, if there is a reason.
     pub fn reason(&self) -> Option<Verdict> {
-        match self.interrupted_s() {
-            Some(_) => Some(Verdict::Interrupted),
-            None => self.time.map(|_| Verdict::OutOfTime),
+        match self.team.first_says(self.interrupted_s().is_some()) {
+            true => Some(Verdict::Interrupted),
+            false => self.time.map(|_| Verdict::OutOfTime),
         }
     }
 
@@ -100,14 +112,14 @@ impl Stop {
 
     /// Should no further round begin?
     fn verdict(&self, rounds: &[Round]) -> Option<Verdict> {
-        if self.interrupted_s().is_some() {
+        if self.team.first_says(self.interrupted_s().is_some()) {
             return Some(Verdict::Interrupted);
         }
         let next = rounds.last().map_or(0.0, |r| r.next_round_s);
         let late = self
             .time
             .is_some_and(|time| self.elapsed_s() + next > ROUNDS * time);
-        late.then_some(Verdict::OutOfTime)
+        (self.team.first_says(late)).then_some(Verdict::OutOfTime)
     }
 
     /// Steps a bake to its end; `each` is told of every round. The first round is always done, so that there is a whole

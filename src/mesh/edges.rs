@@ -7,10 +7,10 @@
 use super::cells::{Cell, Cells, End, within};
 use super::lines::Sharp;
 use super::shades::{COVER, FENCE, Shades, each};
+use super::shadow::{Crossing, Found, Mark, Plan};
 use crate::link::Sight;
 use crate::transport::Receiver;
 use glam::{DVec2, DVec3, dvec2};
-use rayon::prelude::*;
 
 /// Parts of an edge that the beginning or end of light is looked for in; what begins and ends within one is found when
 /// triangles are smaller.
@@ -44,40 +44,6 @@ const INSIDE: f64 = 1e-3;
 /// The same when lines are finished; and triangles are bisected for it down to this size: 2 cm.
 const FINISHING: usize = 24;
 const BISECTED: f64 = 4e-3;
-
-/// A place that light ends at on the edge of a cell: edge, share of it, weights of the corners of the triangle of the mesh.
-#[derive(Debug, Clone, Copy)]
-struct Crossing {
-    edge: usize,
-    at: f64,
-    weights: [f64; 3],
-}
-
-/// What an edge of a shadow runs between.
-#[derive(Debug, Clone, Copy)]
-enum Mark {
-    Crossing(Crossing),
-    Corner(usize),
-    Inside([f64; 3]),
-}
-
-/// The edge of a shadow in a cell.
-#[derive(Debug, Clone)]
-struct Plan {
-    inside: Option<[f64; 3]>,
-    /// With the lamps whose light ends there.
-    lines: Vec<([Mark; 2], u64)>,
-}
-
-/// What looking into a cell comes to.
-#[derive(Debug, Clone)]
-enum Found {
-    /// Nothing ends there, or too gently.
-    Even,
-    Edge(Plan),
-    /// Light ends there, but not along a line.
-    Other,
-}
 
 /// A cell, looked into.
 struct Look<'a> {
@@ -330,7 +296,7 @@ impl Cells {
         let half_size = shades.bake().mesh().half_size;
         let cells = &*self;
         let found: Vec<[u64; 3]> = shades.bake().with_sight(|_, sight| {
-            let look = |&(k, lamps): &(usize, u64)| {
+            let look = |(): &mut (), &(k, lamps): &(usize, u64)| {
                 let cell = &cells.all[k];
                 [0, 1, 2].map(|e| {
                     let [a, b] = [e, (e + 1) % 3].map(|k| cell.corners[k].weights);
@@ -351,7 +317,7 @@ impl Cells {
                     along.fold(0, |all, lamp| all | lamp)
                 })
             };
-            wanted.par_iter().map(look).collect()
+            shades.bake().team().map(wanted, || (), look)
         });
         for ((k, _), lamps) in wanted.iter().zip(found) {
             for (edge, lamps) in self.all[*k].edges.into_iter().zip(lamps) {
@@ -370,7 +336,7 @@ impl Cells {
         self.find_edges(shades, wanted);
         let half_size = shades.bake().mesh().half_size;
         shades.bake().with_sight(|_, sight| {
-            let look = |&(k, lamps): &(usize, u64)| {
+            let look = |(): &mut (), &(k, lamps): &(usize, u64)| {
                 let mut best = Found::Even;
                 for lamp in each(lamps) {
                     let look = Look {
@@ -390,7 +356,7 @@ impl Cells {
                 }
                 best
             };
-            wanted.par_iter().map(look).collect()
+            shades.bake().team().map(wanted, || (), look)
         })
     }
 
@@ -521,8 +487,8 @@ impl Cells {
         let half_size = shades.bake().mesh().half_size;
         let cells = &*self;
         let sides: Vec<(u64, [f64; 3])> = shades.bake().with_sight(|_, sight| {
-            let side = |sharp: &Sharp| cells.side(shades, sight, half_size, *sharp);
-            corners.par_iter().map(side).collect()
+            let side = |(): &mut (), sharp: &Sharp| cells.side(shades, sight, half_size, *sharp);
+            shades.bake().team().map(&corners, || (), side)
         });
         for (corner, (lit, beside)) in corners.into_iter().zip(sides) {
             self.take_side(corner, lit, beside);

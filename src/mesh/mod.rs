@@ -12,6 +12,7 @@ mod lines;
 pub(crate) mod looks;
 pub(crate) mod measure;
 mod shades;
+mod shadow;
 mod skins;
 pub(crate) mod turns;
 mod write;

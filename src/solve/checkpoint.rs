@@ -6,7 +6,7 @@
 //! bytes as one that was never stopped; so a checkpoint is refused unless the room, the settings and the program are the
 //! same, with what changed.
 //!
-//! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (20 and 8 a ray where leaves look for
+//! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (16 and 8 a ray where leaves look for
 //! themselves), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 a ray and `4 padded lanes` a leaf:
 //! the rest follows from where light comes from.
 
@@ -31,19 +31,23 @@ const CROWDED: u16 = 1;
 const LISTED: u16 = 2;
 
 impl Bake {
-    /// Writes a checkpoint; its size in bytes.
+    /// Writes a checkpoint, the first rank alone; its size in bytes, 0 on other ranks.
     ///
     /// # Errors
     /// The file cannot be written, or the room has panes.
     pub fn save(&self, path: &Path) -> Result<u64> {
         self.can_be_kept("--checkpoint")?;
         let print = self.fingerprint();
-        container::write(path, Kind::Checkpoint, |out| {
+        let body = |out: &mut Encoder| {
             print.encode(out)?;
             self.encode_state(true, &self.balance.factor, out)?;
             out.put_all(&self.probes.last)?;
             out.put(self.elapsed().as_secs_f64())
-        })
+        };
+        match self.team.is_first() {
+            true => container::write(path, Kind::Checkpoint, body),
+            false => container::unwritten(path, body).map(|()| 0),
+        }
     }
 
     /// Can what this bake knows be written down, as `option` asks? What rays pass on their way is in no file.
@@ -212,7 +216,7 @@ impl Bake {
         let error: f64 = from.get()?;
         self.spectrum_error = (!error.is_nan()).then_some(error);
         let white = from.get()?;
-        self.outlook = Outlook::decode(&self.tree, whole, from)?;
+        self.outlook = Outlook::decode(&self.tree, self.team, whole, from)?;
         let factor: Vec<f32> = from.get_all()?;
         // Where leaves look for themselves nothing is balanced.
         let by_rays = self.by_rays();

@@ -121,6 +121,7 @@ impl Bake {
                         &bake.scene,
                         &bake.mesh,
                         bake.outside.as_ref(),
+                        bake.team,
                     )
                 });
                 let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);

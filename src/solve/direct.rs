@@ -11,9 +11,11 @@ use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::hierarchy::{NONE, Tree, stratified};
 use crate::light::weighed;
 use crate::link::{Demand, MAX_DEPTH};
+use crate::store::Decoder;
+use crate::store::codec::Read;
+use crate::team::{Packed, Team};
 use crate::transport::trace::Trace;
 use crate::transport::{Memory, Receiver};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points of a leaf, each with its weight: exact for polynomials of degree 4 (Cowper 1973; Dunavant 1985, table II, p = 4).
@@ -60,6 +62,26 @@ struct Found {
     /// Where the light comes from, if that is kept.
     traces: Vec<Option<Box<[u8]>>>,
     rays: u64,
+}
+
+impl Packed for Found {
+    fn pack(&self, to: &mut Vec<u8>) {
+        self.rows.pack(to);
+        self.spread.pack(to);
+        self.whole.pack(to);
+        self.traces.pack(to);
+        self.rays.pack(to);
+    }
+
+    fn unpack(from: &mut Decoder) -> Read<Self> {
+        Ok(Self {
+            rows: Packed::unpack(from)?,
+            spread: Packed::unpack(from)?,
+            whole: Packed::unpack(from)?,
+            traces: Packed::unpack(from)?,
+            rays: from.get()?,
+        })
+    }
 }
 
 /// Direct irradiance of nodes that are or were leaves.
@@ -205,7 +227,7 @@ impl Direct {
         }
     }
 
-    /// Gathers at all new leaves and splits them until direct light varies less than the demand allows.
+    /// Gathers at all new leaves, each rank of the team at its own, and splits them until direct light varies less than the demand allows.
     /// By a rule, no patch may misplace more than `coarsest` (share of white) of a leaf's light, however small the leaf: all
     /// small leaves would err alike.
     pub(super) fn refine(
@@ -214,6 +236,7 @@ impl Direct {
         demand: &Demand,
         coarsest: f64,
         look: &impl Look,
+        team: Team,
     ) {
         let mut open: Vec<u32> = tree.leaves().collect();
         self.width = look.weights().len();
@@ -233,23 +256,22 @@ impl Direct {
                     self.place[k] == NONE || f64::from(-self.spread[k]) * stake.split > 1.0
                 })
                 .collect();
-            let parts: Vec<Found> = fresh
-                .par_chunks(CHUNK)
-                .map(|chunk| {
-                    let (mut memory, mut found) = (Memory::default(), Found::default());
-                    for &(leaf, ref stake) in chunk {
-                        let mean = if look.by_chance() {
-                            by_chance(tree, leaf, look, stake, &mut memory)
-                        } else {
-                            let tolerance = stake.tolerance.min(coarsest);
-                            by_rule(tree, leaf, look, tolerance, stake.tiny, &mut memory)
-                        };
-                        mean.end(&mut found, look.weights().len());
-                    }
-                    found.rays = memory.rays;
-                    found
-                })
-                .collect();
+            let chunks: Vec<&[(u32, Stake)]> = fresh.chunks(CHUNK).collect();
+            let gather = |memory: &mut Memory, chunk: &&[(u32, Stake)]| {
+                let (mut found, before) = (Found::default(), memory.rays);
+                for &(leaf, ref stake) in *chunk {
+                    let mean = if look.by_chance() {
+                        by_chance(tree, leaf, look, stake, memory)
+                    } else {
+                        let tolerance = stake.tolerance.min(coarsest);
+                        by_rule(tree, leaf, look, tolerance, stake.tiny, memory)
+                    };
+                    mean.end(&mut found, look.weights().len());
+                }
+                found.rays = memory.rays - before;
+                found
+            };
+            let parts = team.map(&chunks, Memory::default, gather);
             for (part, leaves) in parts.iter().zip(fresh.chunks(CHUNK)) {
                 self.rays += part.rays;
                 for (k, &(leaf, _)) in leaves.iter().enumerate() {

@@ -121,7 +121,8 @@ impl Bake {
                 },
                 weights: bake.bright_weights(),
             };
-            direct.refine(&mut tree, demand, DIRECT_SHARE * bake.settings.error, &look);
+            let coarsest = DIRECT_SHARE * bake.settings.error;
+            direct.refine(&mut tree, demand, coarsest, &look, bake.team);
         });
         self.tree = tree;
         self.direct = direct;

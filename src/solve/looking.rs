@@ -7,7 +7,6 @@ use crate::light::Glass;
 use crate::link::Sight;
 use crate::transport::hemisphere::Hemisphere;
 use crate::transport::{Gathered, Gatherer, MOSTLY, Memory, Receiver};
-use rayon::prelude::*;
 
 /// What one patch may misplace in a gather, share of the asked-for error.
 const GATHER_SHARE: f64 = 0.1;
@@ -54,10 +53,8 @@ impl Bake {
             if care != Care::Full {
                 gatherer.most_backs = MOSTLY;
             }
-            receivers
-                .par_iter()
-                .map_init(Memory::default, |memory, r| gatherer.at(r, memory).pack())
-                .collect()
+            let at = |memory: &mut Memory, r: &Receiver| gatherer.at(r, memory).pack();
+            bake.team.map(receivers, Memory::default, at)
         })
     }
 
@@ -66,21 +63,19 @@ impl Bake {
         if self.closed == Closed::Yes {
             return vec![false; receivers.len()];
         }
-        receivers
-            .par_iter()
-            .map(|r| {
-                flux::covered(
-                    &self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed,
-                )
-            })
-            .collect()
+        let covered = |(): &mut (), r: &Receiver| {
+            flux::covered(
+                &self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed,
+            )
+        };
+        self.team.map(receivers, || (), covered)
     }
 
     /// Which receivers does something lie upon, so near that nobody sees them? See [`PRESSED`].
     pub(crate) fn pressed(&self, receivers: &[Receiver]) -> Vec<bool> {
         self.with_sight(|_, sight| {
-            let pressed = |to: &Receiver| self.is_pressed(sight, to);
-            receivers.par_iter().map(pressed).collect()
+            let pressed = |(): &mut (), to: &Receiver| self.is_pressed(sight, to);
+            self.team.map(receivers, || (), pressed)
         })
     }
 

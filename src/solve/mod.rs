@@ -51,6 +51,7 @@ use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance, is_s
 use crate::scene::effects::{Kind, Plan};
 use crate::scene::{PunctualLight, Scene};
 use crate::spectrum::Leaves;
+use crate::team::Team;
 use crate::transport::Outside;
 use crate::transport::hemisphere::Hemisphere;
 use direct::Direct;
@@ -193,6 +194,8 @@ pub struct Bake {
     /// Space of each face, and which cuts were made for them, see [`spaces`].
     pub(crate) spaces: Vec<u32>,
     pub(crate) parted: Vec<u32>,
+    /// The ranks that bake this room together.
+    pub(crate) team: Team,
     pub(crate) started: Instant,
 }
 
@@ -268,6 +271,7 @@ impl Bake {
             watched: Default::default(),
             frozen: None,
             two_grid: None,
+            team: Team::default(),
             spectrum_error: None,
             sent: flux::Sent::default(),
             panes: Panes::new(&scene, mesh.centre),
@@ -394,6 +398,17 @@ impl Bake {
             .is_some_and(|(before, now)| (STALLED..1.0 / STALLED).contains(&(now / before)));
         (4 * last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING))
             .then_some(Verdict::Exhausted)
+    }
+
+    /// Spreads the work over a team: all ranks are to be told the same from here on, and come to the same.
+    pub fn spread_over(&mut self, team: Team) {
+        self.team = team;
+        self.outlook.team = team;
+    }
+
+    /// The ranks that bake this room together.
+    pub fn team(&self) -> Team {
+        self.team
     }
 
     /// Tells `watch` of every phase of a round that ends, by the name that it has in [`Round::phases_s`].

@@ -12,14 +12,15 @@
 //! independently, and each counts if the other met a front. What leaves of these areas send to fronts, all of it, is what
 //! all leaves receive: nothing need be scaled.
 
+mod kept;
+
 use super::flux::Closed;
 use super::tinted::{Passed, Tints, passed};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::rows::Rows;
 use crate::link::Sight;
-use crate::store::codec::Read;
-use crate::store::{Broken, Decoder, Encoder};
+use crate::team::Team;
 use crate::transport::hemisphere::{BEAM, Hemisphere};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -68,11 +69,13 @@ pub(crate) struct Outlook {
     pub bare: Vec<f32>,
     /// For each node: is it as good as certain that all its light meets fronts?
     certain: Vec<bool>,
-    /// Where the rays of leaves ended, leaf after leaf.
+    /// The ranks among which the rows of leaves are shared out: rays of other ranks' leaves are not here.
+    pub(super) team: Team,
+    /// Where the rays of this rank's leaves ended, leaf after leaf.
     ends: Vec<End>,
     /// What panes they pass.
     pub(super) tints: Tints,
-    /// First end of each node's rays, and how many there are.
+    /// First end of each node's rays ([`NONE`] if they are another rank's), and how many there are.
     range: Vec<(u32, u32)>,
     /// The leaf of the present hierarchy at each end, maybe with the flag [`ALONE`]; [`NONE`] where there is none.
     met: Vec<u32>,
@@ -125,8 +128,8 @@ impl Outlook {
         cast
     }
 
-    /// Lets new leaves look for themselves, and looks up where the rays of all of them end in the present hierarchy.
-    /// Returns the rays cast.
+    /// Lets new leaves look for themselves, each rank its own, and looks up where the rays of all of them end in the present
+    /// hierarchy. Returns the rays cast by all ranks.
     pub(super) fn look(
         &mut self,
         tree: &Tree,
@@ -151,7 +154,10 @@ impl Outlook {
             .map(Hemisphere::new)
             .collect();
         let usual = LOOKING.0 * hemisphere.len() as f64 / mean;
-        let parts: Vec<Vec<Ends>> = new
+        let team = self.team;
+        let own = new.iter().copied().filter(|&k| team.owns(k as usize));
+        let own: Vec<u32> = own.collect();
+        let parts: Vec<Vec<Ends>> = own
             .par_chunks(CHUNK)
             .map(|chunk| {
                 let each = |&leaf: &u32| {
@@ -165,14 +171,22 @@ impl Outlook {
                 chunk.iter().map(each).collect()
             })
             .collect();
-        let mut cast = 0;
-        for ((ends, passed), &leaf) in parts.into_iter().flatten().zip(&new) {
-            let k = leaf as usize;
+        let counts = |(ends, _): &Ends| {
             let fronts = ends.iter().filter(|end| end.entry != NONE).count();
-            self.bare[k] = fronts as f32 / ends.len() as f32;
+            [fronts as u32, ends.len() as u32]
+        };
+        let counts: Vec<[u32; 2]> = parts.iter().flatten().map(counts).collect();
+        let counts = team.merge(new.iter().map(|&k| k as usize), counts);
+        let mut cast = 0;
+        for (&leaf, [fronts, count]) in new.iter().zip(counts) {
+            let k = leaf as usize;
+            self.bare[k] = fronts as f32 / count as f32;
             self.target[k] = 1.0;
-            self.range[k] = (self.ends.len() as u32, ends.len() as u32);
-            cast += ends.len() as u64;
+            self.range[k] = (NONE, count);
+            cast += u64::from(count);
+        }
+        for ((ends, passed), &leaf) in parts.into_iter().flatten().zip(&own) {
+            self.range[leaf as usize].0 = self.ends.len() as u32;
             if sight.panes.is_some() {
                 self.tints.extend(ends.len(), passed);
             }
@@ -200,70 +214,6 @@ impl Outlook {
     /// Have leaves looked for themselves?
     pub(crate) fn looks(&self) -> bool {
         !self.range.is_empty()
-    }
-
-    /// Writes it down: where the rays end, or only the leaves that they met, which is half as much and enough as long as
-    /// no leaf is split.
-    pub(super) fn encode(&self, whole: bool, out: &mut Encoder) -> std::io::Result<()> {
-        out.put_all(&self.target)?;
-        out.put_all(&self.bare)?;
-        out.put_list(
-            self.certain.len(),
-            self.certain.iter().map(|&c| u8::from(c)),
-        )?;
-        out.put_list(self.range.len(), self.range.iter().map(|r| [r.0, r.1]))?;
-        if whole {
-            out.put_list(self.ends.len(), self.ends.iter().map(|end| end.entry))?;
-            out.put_list(self.ends.len(), self.ends.iter().map(|end| end.at))
-        } else {
-            out.put_all(&self.met)
-        }
-    }
-
-    /// Reads it back, for the hierarchy that it was made for.
-    pub(super) fn decode(tree: &Tree, whole: bool, from: &mut Decoder) -> Read<Self> {
-        let nodes = tree.nodes.len();
-        let mut outlook = Self {
-            target: from.get_exactly(nodes)?,
-            bare: from.get_exactly(nodes)?,
-            certain: from.get_list::<u8>()?.map(|c| c == 1).collect(),
-            ..Self::default()
-        };
-        if !(outlook.certain.is_empty() || outlook.certain.len() == nodes) {
-            return Err(Broken::new("has patches that do not fit"));
-        }
-        let ranges = from.get_list::<[u32; 2]>()?;
-        if !(ranges.len() == 0 || ranges.len() == nodes) {
-            return Err(Broken::new("has rays in parts that do not fit"));
-        }
-        outlook.range = ranges.map(|[first, n]| (first, n)).collect();
-        if whole {
-            let entries = from.get_list::<u32>()?;
-            let places = from.get_list::<[u16; 2]>()?;
-            if places.len() != entries.len() {
-                return Err(Broken::new("has rays in parts that do not fit"));
-            }
-            let ends = entries.zip(places).map(|(entry, at)| End { entry, at });
-            outlook.ends = ends.collect();
-            let faces = tree.faces.len();
-            let there = |e: &End| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
-            if !outlook.ends.iter().all(there) {
-                return Err(Broken::new("has rays that end nowhere"));
-            }
-            outlook.find(tree);
-        } else {
-            outlook.met = from.get_all()?;
-            let there = |&k: &u32| k == NONE || ((k & !ALONE) as usize) < nodes;
-            if !outlook.met.iter().all(there) {
-                return Err(Broken::new("has rays that end nowhere"));
-            }
-        }
-        let count = outlook.met.len() as u64;
-        let within = |&(first, n): &(u32, u32)| u64::from(first) + u64::from(n) <= count;
-        if !outlook.range.iter().all(within) {
-            return Err(Broken::new("has rays in parts that do not fit"));
-        }
-        Ok(outlook)
     }
 
     /// Irradiance of each leaf by what its rays met, `nodes` being the radiosity of every patch: by leaf.
@@ -296,33 +246,53 @@ impl Outlook {
         counted: impl Fn(u32) -> Option<u32> + Sync,
     ) {
         let nodes = nodes.all::<L>();
-        out.all_mut::<L>()
-            .par_chunks_mut(CHUNK)
-            .zip(leaves.par_chunks(CHUNK))
-            .for_each(|(out, leaves)| {
-                for (row, &leaf) in out.iter_mut().zip(leaves) {
-                    let met = self.ends_of(leaf);
-                    let mut sum = [0.0_f32; L];
-                    if self.tints.is_empty() {
-                        for node in met.iter().filter_map(|&k| counted(k)) {
-                            for (s, x) in sum.iter_mut().zip(&nodes[node as usize]) {
-                                *s += x;
-                            }
-                        }
-                    } else {
-                        let first = self.range[leaf as usize].0 as usize;
-                        for (ray, &met) in (first..).zip(met) {
-                            let Some(node) = counted(met) else { continue };
-                            let tint = self.tints.row::<L>(ray).unwrap_or(&[1.0; L]);
-                            for ((s, x), t) in sum.iter_mut().zip(&nodes[node as usize]).zip(tint) {
-                                *s += x * t;
-                            }
-                        }
+        let row = |leaf: u32| {
+            let share = share(leaf);
+            self.sum::<L>(leaf, nodes, &counted).map(|x| x * share)
+        };
+        let out = out.all_mut::<L>();
+        if self.team.is_alone() {
+            out.par_chunks_mut(CHUNK)
+                .zip(leaves.par_chunks(CHUNK))
+                .for_each(|(out, leaves)| {
+                    for (out, &leaf) in out.iter_mut().zip(leaves) {
+                        *out = row(leaf);
                     }
-                    let share = share(leaf);
-                    *row = sum.map(|x| x * share);
+                });
+            return;
+        }
+        let own = leaves.iter().filter(|&&k| self.team.owns(k as usize));
+        let own: Vec<u32> = own.copied().collect();
+        let rows: Vec<[f32; L]> = own.par_iter().map(|&leaf| row(leaf)).collect();
+        self.team.merge_rows(leaves, &rows, out);
+    }
+
+    /// The sum over what the rays of one of this rank's leaves met, as far as it is counted.
+    fn sum<const L: usize>(
+        &self,
+        leaf: u32,
+        nodes: &[[f32; L]],
+        counted: impl Fn(u32) -> Option<u32>,
+    ) -> [f32; L] {
+        let met = self.ends_of(leaf);
+        let mut sum = [0.0_f32; L];
+        if self.tints.is_empty() {
+            for node in met.iter().filter_map(|&k| counted(k)) {
+                for (s, x) in sum.iter_mut().zip(&nodes[node as usize]) {
+                    *s += x;
                 }
-            });
+            }
+        } else {
+            let first = self.range[leaf as usize].0 as usize;
+            for (ray, &met) in (first..).zip(met) {
+                let Some(node) = counted(met) else { continue };
+                let tint = self.tints.row::<L>(ray).unwrap_or(&[1.0; L]);
+                for ((s, x), t) in sum.iter_mut().zip(&nodes[node as usize]).zip(tint) {
+                    *s += x * t;
+                }
+            }
+        }
+        sum
     }
 
     /// An outlook of leaves (ascending nodes) that met these.
@@ -392,11 +362,14 @@ impl Outlook {
         (between - noise / n).max(0.0).sqrt()
     }
 
+    /// Bytes of the rows of this rank's leaves.
+    pub(crate) fn row_bytes(&self) -> usize {
+        self.tints.bytes() + (size_of::<End>() + 4) * self.ends.len()
+    }
+
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.tints.bytes()
-            + (size_of::<End>() + 4) * self.ends.len()
-            + 8 * (self.range.len() + self.target.len())
+        self.row_bytes() + 8 * (self.range.len() + self.target.len())
     }
 
     /// Area of every node that takes part; never quite zero, so that nothing is divided by zero.

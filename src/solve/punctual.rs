@@ -5,9 +5,9 @@ use crate::hierarchy::{Mesh, Sample, Tree};
 use crate::light::lanes::Lanes;
 use crate::link::{Sight, View};
 use crate::scene::{LightKind, PunctualLight, Scene};
+use crate::team::Team;
 use crate::transport::{Look, Outside};
 use crate::transport::{Receiver, punctual_factor};
-use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Points of an element that a light is looked at from.
@@ -145,6 +145,7 @@ pub(super) fn factors(
     scene: &Scene,
     mesh: &Mesh,
     outside: Option<&Outside>,
+    team: Team,
 ) -> Shadowed {
     let lights = recentred(scene, mesh);
     if lights.is_empty() {
@@ -154,9 +155,11 @@ pub(super) fn factors(
         };
     }
     let total = tree.nodes.first().map_or(0.0, |n| n.area);
-    let parts: Vec<(Vec<Factors>, u64)> = leaves
-        .par_chunks(CHUNK)
-        .map(|chunk| {
+    let chunks: Vec<&[u32]> = leaves.chunks(CHUNK).collect();
+    let parts: Vec<(Vec<Factors>, u64)> = team.map(
+        &chunks,
+        || (),
+        |(), chunk| {
             let mut look = Look::default();
             let lists = chunk
                 .iter()
@@ -174,8 +177,8 @@ pub(super) fn factors(
                 })
                 .collect();
             (lists, look.rays)
-        })
-        .collect();
+        },
+    );
     let mut out = Shadowed::default();
     for (lists, rays) in parts {
         out.by_leaf.extend(lists);

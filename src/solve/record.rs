@@ -164,6 +164,9 @@ pub struct Round {
     pub intervals_mean: f64,
     /// Bytes in hierarchy, links and rows.
     pub memory_bytes: usize,
+    /// Bytes of these for the rows of leaves that look for themselves: of several ranks, those of the first.
+    #[serde(default)]
+    pub row_bytes: usize,
     /// Of which for each link: the link with its blockers, two entries of its rows, two for the gather.
     #[serde(default)]
     pub bytes_per_link: f64,

@@ -52,6 +52,7 @@ impl Bake {
             intervals_working: bake.lanes.len(),
             intervals_mean: bake.intervals_mean(),
             memory_bytes: of_links + of_elements,
+            row_bytes: self.outlook.row_bytes(),
             bytes_per_link: per(of_links, bake.graph.links.len()),
             bytes_per_element: per(of_elements, light.leaves.len()),
             iterations: m.convergence.iterations,

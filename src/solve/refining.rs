@@ -93,11 +93,12 @@ impl Bake {
                 keen.push(keen[self.tree.nodes[k].parent as usize]);
             }
             let seed = self.settings.seed;
-            let split: Vec<u32> = (0..nodes)
+            let split = (0..nodes)
                 .into_par_iter()
                 .filter(|&k| {
                     let node = self.tree.node(k);
                     node.is_leaf()
+                        && self.team.owns(k as usize)
                         && node.area > demand.least_area
                         && self.tree.elements[node.element as usize].depth < MAX_DEPTH
                         && self.outlook.variation(k, &bright, seed)
@@ -106,6 +107,7 @@ impl Bake {
                             > demand.threshold
                 })
                 .collect();
+            let split = self.team.union(split);
             for &leaf in &split {
                 self.tree.subdivide(leaf);
             }

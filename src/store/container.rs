@@ -49,7 +49,7 @@ impl Kind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint | Self::Cache => 4,
+            Self::Checkpoint | Self::Cache => 5,
         }
     }
 
@@ -90,6 +90,14 @@ pub fn write(
         Ok(())
     })?;
     Ok(size)
+}
+
+/// Makes the body of a file that another rank writes, as others may need this one's part of it.
+///
+/// # Errors
+/// Those of `body`.
+pub fn unwritten(path: &Path, body: impl FnOnce(&mut Encoder) -> io::Result<()>) -> Result<()> {
+    body(&mut Encoder::new(&mut io::sink())).map_err(|problem| Error::io(path, problem))
 }
 
 /// What is wrong with a header, if anything is.

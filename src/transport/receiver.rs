@@ -1,6 +1,9 @@
 //! A point that light comes to, and what it gets.
 
 use super::trace::Trace;
+use crate::store::Decoder;
+use crate::store::codec::Read;
+use crate::team::Packed;
 use glam::DVec3;
 
 /// A vertex that sees more black backs than this, share of its rays, lies inside something.
@@ -57,5 +60,30 @@ impl Gathered {
     pub(crate) fn pack(mut self) -> Self {
         self.packed = self.trace.take().map(Trace::pack);
         self
+    }
+}
+
+/// What is packed already; a trace that is not stays where it is.
+impl Packed for Gathered {
+    fn pack(&self, to: &mut Vec<u8>) {
+        self.irradiance.pack(to);
+        self.direct.pack(to);
+        [self.seen, self.backs].pack(to);
+        self.rays.pack(to);
+        self.packed.pack(to);
+    }
+
+    fn unpack(from: &mut Decoder) -> Read<Self> {
+        let (irradiance, direct) = (from.get()?, from.get()?);
+        let [seen, backs] = from.get()?;
+        Ok(Self {
+            irradiance,
+            direct,
+            seen,
+            backs,
+            rays: from.get()?,
+            trace: None,
+            packed: Packed::unpack(from)?,
+        })
     }
 }

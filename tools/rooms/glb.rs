@@ -255,6 +255,29 @@ impl Glb {
         }))
     }
 
+    /// The scene as it is once at each of these places, with its cameras at the first. Meshes are held once.
+    pub(crate) fn repeat(&mut self, places: &[DVec3]) {
+        let once = self.nodes.clone();
+        let roots: Vec<usize> = (0..once.len()).filter(|k| !self.held.contains(k)).collect();
+        self.triangles *= places.len();
+        for (k, place) in places.iter().enumerate() {
+            let first = if k == 0 { 0 } else { self.nodes.len() };
+            if k > 0 {
+                self.nodes
+                    .extend(once.iter().map(|node| again(node, first)));
+                let held = self.held.range(..once.len()).copied();
+                let held: Vec<usize> = held.map(|child| child + first).collect();
+                self.held.extend(held);
+            }
+            let children: Vec<usize> = roots.iter().map(|root| root + first).collect();
+            self.held.extend(&children);
+            let name = format!("place {}", k + 1);
+            let at = place.to_array();
+            self.nodes
+                .push(json!({"name": name, "translation": at, "children": children}));
+        }
+    }
+
     /// The file.
     pub(crate) fn finish(self, name: &str) -> Vec<u8> {
         let roots: Vec<usize> = (0..self.nodes.len())
@@ -377,6 +400,20 @@ impl Glb {
             3 * triangles.len(),
         )
     }
+}
+
+/// A node once more, whose children stand `first` further on; without its camera.
+fn again(node: &Value, first: usize) -> Value {
+    let mut node = node.clone();
+    if let Some(object) = node.as_object_mut() {
+        object.remove("camera");
+    }
+    if let Some(children) = node.get_mut("children").and_then(Value::as_array_mut) {
+        for child in children {
+            *child = json!(child.as_u64().unwrap_or(0) + first as u64);
+        }
+    }
+    node
 }
 
 /// A rough dielectric: the nearest thing to Lambertian that glTF has.

@@ -2,6 +2,7 @@
 //!
 //! No asset files: every room is made of numbers, and the same call writes the same bytes.
 
+mod building;
 mod cells;
 mod cie171;
 mod cornell;
@@ -28,7 +29,8 @@ struct Args {
     /// Write only the room of this name.
     #[arg(long)]
     only: Option<String>,
-    /// Triangles of the furnished room, about; 1 000 to 500 000 make sense.
+    /// Triangles of the furnished room, about, 1 000 to 500 000 make sense; or of the building, which is written only when it is named
+    /// (`--only building`), up to 2 000 000.
     #[arg(long, default_value_t = 1500)]
     triangles: usize,
 }
@@ -101,6 +103,10 @@ fn main() -> anyhow::Result<()> {
     }
     if wanted("furnished") {
         write(&args.dir, "furnished", furnished::room(args.triangles))?;
+        written += 1;
+    }
+    if args.only.as_deref() == Some("building") {
+        write(&args.dir, "building", building::room(args.triangles))?;
         written += 1;
     }
     anyhow::ensure!(written > 0, "no room has that name");

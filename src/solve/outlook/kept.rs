@@ -1,0 +1,130 @@
+//! How leaves look out, written down and read back.
+//!
+//! A file holds the rays of all leaves in the order of their numbers, whichever ranks have them: so a bake goes on with any number of
+//! ranks.
+
+use super::{ALONE, End, Outlook};
+use crate::hierarchy::{NONE, Tree};
+use crate::store::codec::{Plain, Read};
+use crate::store::{Broken, Decoder, Encoder};
+use crate::team::Team;
+
+/// Nodes whose rays ranks send each other at a time: some ten MB.
+const TOGETHER: usize = 1 << 16;
+
+impl Outlook {
+    /// Writes it down: where the rays end, or only the leaves that they met, which is half as much and enough as long as
+    /// no leaf is split.
+    pub(in crate::solve) fn encode(&self, whole: bool, out: &mut Encoder) -> std::io::Result<()> {
+        out.put_all(&self.target)?;
+        out.put_all(&self.bare)?;
+        out.put_list(
+            self.certain.len(),
+            self.certain.iter().map(|&c| u8::from(c)),
+        )?;
+        out.put_list(self.range.len(), self.range.iter().map(|r| r.1))?;
+        if whole {
+            self.encode_rays(out, |k| self.ends[k].entry)?;
+            self.encode_rays(out, |k| self.ends[k].at)
+        } else {
+            self.encode_rays(out, |k| self.met[k])
+        }
+    }
+
+    /// A list of what `of` says of each ray.
+    fn encode_rays<T: Plain>(
+        &self,
+        out: &mut Encoder,
+        of: impl Fn(usize) -> T,
+    ) -> std::io::Result<()> {
+        let count = self.range.iter().map(|r| r.1 as usize).sum();
+        let of_node = |node: usize| -> Vec<T> {
+            let (first, count) = self.range[node];
+            let first = first as usize;
+            (first..first + count as usize).map(&of).collect()
+        };
+        let blocks = (0..self.range.len()).step_by(TOGETHER);
+        let rays = blocks.flat_map(|first| {
+            let nodes = first..self.range.len().min(first + TOGETHER);
+            let nodes = nodes.filter(|&node| self.range[node].1 > 0);
+            let own = nodes.clone().filter(|&node| self.team.owns(node));
+            self.team.merge(nodes, own.map(of_node).collect())
+        });
+        out.put_list(count, rays.flatten())
+    }
+
+    /// Reads back what this rank needs, for the hierarchy that it was made for.
+    pub(in crate::solve) fn decode(
+        tree: &Tree,
+        team: Team,
+        whole: bool,
+        from: &mut Decoder,
+    ) -> Read<Self> {
+        let nodes = tree.nodes.len();
+        let mut outlook = Self {
+            team,
+            target: from.get_exactly(nodes)?,
+            bare: from.get_exactly(nodes)?,
+            certain: from.get_list::<u8>()?.map(|c| c == 1).collect(),
+            ..Self::default()
+        };
+        if !(outlook.certain.is_empty() || outlook.certain.len() == nodes) {
+            return Err(Broken::new("has patches that do not fit"));
+        }
+        let counts: Vec<u32> = from.get_all()?;
+        if !(counts.is_empty() || counts.len() == nodes) {
+            return Err(Broken::new("has rays in parts that do not fit"));
+        }
+        if whole {
+            let entries = outlook.own::<u32>(&counts, from)?;
+            let places = outlook.own::<[u16; 2]>(&counts, from)?;
+            let ends = entries.into_iter().zip(places);
+            outlook.ends = ends.map(|(entry, at)| End { entry, at }).collect();
+            let faces = tree.faces.len();
+            let there = |e: &End| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
+            if !outlook.ends.iter().all(there) {
+                return Err(Broken::new("has rays that end nowhere"));
+            }
+        } else {
+            outlook.met = outlook.own(&counts, from)?;
+            let there = |&k: &u32| k == NONE || ((k & !ALONE) as usize) < nodes;
+            if !outlook.met.iter().all(there) {
+                return Err(Broken::new("has rays that end nowhere"));
+            }
+        }
+        let mut held = 0;
+        outlook.range = (counts.iter().enumerate())
+            .map(|(node, &count)| {
+                if !team.owns(node) {
+                    return (NONE, count);
+                }
+                let first = held;
+                held += count;
+                (first, count)
+            })
+            .collect();
+        if whole {
+            outlook.find(tree);
+        }
+        Ok(outlook)
+    }
+
+    /// A list of something for each ray: what is said of the rays of this rank's leaves.
+    fn own<T: Plain>(&self, counts: &[u32], from: &mut Decoder) -> Read<Vec<T>> {
+        let mut all = from.get_list::<T>()?;
+        let told: u64 = counts.iter().map(|&count| u64::from(count)).sum();
+        if told != all.len() as u64 || u32::try_from(told).is_err() {
+            return Err(Broken::new("has rays in parts that do not fit"));
+        }
+        let mut own = Vec::with_capacity(all.len() / self.team.ranks());
+        for (node, &count) in counts.iter().enumerate() {
+            let rays = all.by_ref().take(count as usize);
+            if self.team.owns(node) {
+                own.extend(rays);
+            } else {
+                rays.for_each(drop);
+            }
+        }
+        Ok(own)
+    }
+}
