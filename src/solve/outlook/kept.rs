@@ -113,7 +113,7 @@ impl Outlook {
     fn own<T: Plain>(&self, counts: &[u32], from: &mut Decoder) -> Read<Vec<T>> {
         let mut all = from.get_list::<T>()?;
         let told: u64 = counts.iter().map(|&count| u64::from(count)).sum();
-        if told != all.len() as u64 || u32::try_from(told).is_err() {
+        if told != all.len() as u64 {
             return Err(Broken::new("has rays in parts that do not fit"));
         }
         let mut own = Vec::with_capacity(all.len() / self.team.ranks());
@@ -125,6 +125,10 @@ impl Outlook {
                 rays.for_each(drop);
             }
         }
-        Ok(own)
+        // The first ray of a leaf is a u32.
+        match u32::try_from(own.len()) {
+            Ok(_) => Ok(own),
+            Err(_) => Err(Broken::new("has more rays than one rank can hold")),
+        }
     }
 }
