@@ -145,9 +145,10 @@ fn daylight_and_glare_are_told_where_they_are_asked_for() {
     assert_eq!(views.len(), 2);
     for view in views {
         assert!(view["background_cd_m2"].as_f64().unwrap() > 1.0, "{view}");
-        assert_eq!(view["left_out"][0], "the sky itself", "{view}");
+        let left_out = view["left_out"][0].as_str().unwrap();
+        assert!(left_out.contains("the sky"), "{view}");
     }
-    assert!(said.contains("UGR at [0.278, 0.25, -0.2]"), "{said}");
+    assert!(!said.contains("UGR"), "{said}");
     let (csv, _) = probed(&["--metrics", "--error", "2", "--sky", "uniform"]);
     assert!(
         csv.lines()
@@ -155,4 +156,7 @@ fn daylight_and_glare_are_told_where_they_are_asked_for() {
             .unwrap()
             .ends_with("DF_percent,DF_percent_low,DF_percent_high")
     );
+    let (out, _) = probed(&["--error", "2", "--ugr", eye[1]]);
+    let last = out.lines().last().unwrap();
+    assert!(last.starts_with("UGR at [0.278, 0.25, -0.2]"), "{out}");
 }

@@ -65,10 +65,11 @@ fn reason(glare: &Glare) -> &'static str {
 pub(super) fn line(view: &Viewpoint, glare: &Glare, relative: Option<f64>) -> String {
     let rating = match range(glare, relative) {
         Some((rating, Some(range))) => {
-            format!(
-                "{rating:.1} ({:.1} to {:.1}, estimate)",
-                range.low, range.high
-            )
+            let high = match range.high.is_finite() {
+                true => format!("to {:.1}", range.high),
+                false => "or more".into(),
+            };
+            format!("{rating:.1} ({:.1} {high}, estimate)", range.low)
         }
         Some((rating, None)) => format!("{rating:.1}"),
         None => format!("not defined: {}", reason(glare)),

@@ -7,8 +7,8 @@
 //! [`places`]). `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
 //! "columns": [names], "rows": [[numbers]], "places": [texts]}`; the columns have all but `place`.
 //!
-//! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see `metrics.rs`. `--ugr` puts `"ugr"` there:
-//! see `glare.rs`.
+//! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see `metrics.rs`. `--ugr` puts `"ugr"` there,
+//! and lines after the CSV where there is no JSON: see `glare.rs`.
 
 use super::glare::{self, Viewpoint};
 use super::log::exit_code;
@@ -22,7 +22,7 @@ use super::stop::Stop;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::gather::{Glare, Probed};
-use crate::solve::{Bake, Representation};
+use crate::solve::{Bake, Representation, Verdict};
 use crate::spectrum::{Grid, LEAVES};
 use crate::store::file;
 use crate::survey::{Place, places};
@@ -55,7 +55,7 @@ pub struct ProbeArgs {
     /// there is a sky also the daylight factor, for which the room is solved once more under the sky alone.
     #[arg(long)]
     pub metrics: bool,
-    /// Unified glare rating (CIE 117) for an eye and the way it looks; may be said several times.
+    /// Unified glare rating (CIE 117) for an eye and the way it looks, a line each on stdout; may be said several times.
     #[arg(long, value_name = "X,Y,Z,DX,DY,DZ", allow_hyphen_values = true)]
     pub ugr: Vec<Viewpoint>,
     /// What to read.
@@ -103,7 +103,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
         .collect();
     let found = Found::at(args, (common, &talk, &stop), &bake, &points)?;
     talk.clear();
-    found.tell(args, &talk);
+    found.tell(&talk);
 
     let columns = columns(args.bands, &bake.scene().grid);
     let lines = read.points.iter().zip(&found.probed);
@@ -115,7 +115,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     if args.json {
         let mut all = json!({
             "version": VERSION,
-            "verdict": verdict,
+            "verdict": found.worse(verdict),
             "rounds": bake.rounds().len(),
             "error_de2000": bake.rounds().last().map(|r| r.error.total_de2000),
             "columns": columns,
@@ -131,10 +131,15 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
             all["ugr"] = entries.collect();
         }
         print(&format!("{all}\n"))?;
-    } else if args.output.is_none() && args.points.is_some() {
-        print(&csv())?;
+    } else {
+        if args.output.is_none() && args.points.is_some() {
+            print(&csv())?;
+        }
+        for (view, seen) in args.ugr.iter().zip(&found.views) {
+            print(&format!("{}\n", glare::line(view, seen, found.relative)))?;
+        }
     }
-    Ok(exit_code(verdict))
+    Ok(exit_code(found.worse(verdict)))
 }
 
 /// What was found.
@@ -146,6 +151,8 @@ struct Found {
     views: Vec<Glare>,
     /// Relative error of the light, an estimate.
     relative: Option<f64>,
+    /// How the solve under the sky alone ended, where there was one.
+    daylight: Option<Verdict>,
 }
 
 impl Found {
@@ -158,15 +165,10 @@ impl Found {
     ) -> Result<Self> {
         let probed = bake.probe(points);
         let places = places(bake.scene(), points);
-        let metrics = match args.metrics {
-            true => Some(measured(
-                args,
-                (common, talk, stop),
-                bake,
-                points,
-                (&probed, &places),
-            )?),
-            false => None,
+        let (metrics, daylight) = match args.metrics && !points.is_empty() {
+            true => measured(args, (common, talk, stop), bake, points, (&probed, &places))
+                .map(|(metrics, verdict)| (Some(metrics), verdict))?,
+            false => (None, None),
         };
         let scale = bake.scene().changes.scale;
         let views = args.ugr.iter();
@@ -179,17 +181,23 @@ impl Found {
                 .map(|view| bake.glare(scale * view.eye, view.direction))
                 .collect(),
             relative: last.and_then(|round| round.error.total_relative.value),
+            daylight,
         })
     }
 
+    /// The worse of how both solves ended.
+    fn worse(&self, verdict: Verdict) -> Verdict {
+        let other = self
+            .daylight
+            .filter(|other| exit_code(*other) > exit_code(verdict));
+        other.unwrap_or(verdict)
+    }
+
     /// Says what is to be said on stderr.
-    fn tell(&self, args: &ProbeArgs, talk: &Talk) {
+    fn tell(&self, talk: &Talk) {
         warn_of(&self.places, talk);
         if let Some(line) = self.metrics.as_ref().and_then(Metrics::line) {
             talk.say(&line);
-        }
-        for (view, glare) in args.ugr.iter().zip(&self.views) {
-            talk.say(&glare::line(view, glare, self.relative));
         }
     }
 }
@@ -201,11 +209,11 @@ fn measured(
     bake: &Bake,
     points: &[Point],
     (probed, places): (&[Probed], &[Place]),
-) -> Result<Metrics> {
+) -> Result<(Metrics, Option<Verdict>)> {
     let scene = bake.scene();
     let metrics = Metrics::new(&scene.grid, probed, places, bake.rounds().last());
     let Some(outside) = scene.sky_illuminance().filter(|&lux| lux > 0.0) else {
-        return Ok(metrics);
+        return Ok((metrics, None));
     };
     let relative = |bake: &Bake| bake.rounds().last()?.error.total_relative.value;
     let factors = |probed: &[Probed]| -> Vec<f64> {
@@ -215,14 +223,15 @@ fn measured(
             .collect()
     };
     Ok(match scene.under_sky_alone() {
-        None => metrics.with_daylight(factors(probed), relative(bake)),
+        None => (metrics.with_daylight(factors(probed), relative(bake)), None),
         Some(alone) => {
             talk.phase("daylight");
             let adaptive = Representation::Adaptive;
             let mut under_sky = prepare(alone, &args.solving, common, adaptive, talk);
-            stop.run(&mut under_sky, talk, |_, _| Ok(()))?;
+            let verdict = stop.run(&mut under_sky, talk, |_, _| Ok(()))?;
             let probed = under_sky.probe(points);
-            metrics.with_daylight(factors(&probed), relative(&under_sky))
+            let metrics = metrics.with_daylight(factors(&probed), relative(&under_sky));
+            (metrics, Some(verdict))
         }
     })
 }

@@ -7,7 +7,7 @@ use crate::color::{Bright, position_index, unified_glare_rating};
 use crate::geometry::{NO_PLANE, Segment, quarters};
 use crate::hierarchy::Node;
 use crate::link::Sight;
-use crate::scene::LightKind;
+use crate::scene::{LightKind, PunctualLight};
 use crate::solve::Bake;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -30,7 +30,8 @@ pub struct Glare {
     pub luminaires: Vec<(String, Bright)>,
     /// The unified glare rating; none where the background is black, negative infinity where no luminaire is seen.
     pub rating: Option<f64>,
-    /// What has no part in it: lights without extent, which have no luminance, and the sky where its light is not kept apart.
+    /// What has no part in it: lights without extent, which have no luminance; the sun; the sky where its light is not kept apart;
+    /// what panes take.
     pub left_out: Vec<String>,
 }
 
@@ -122,14 +123,28 @@ impl Bake {
         let gathered = self.gather_at(&[(eye, forward)]).swap_remove(0);
         let lights = &self.scene().lights;
         let sky = lights.iter().find(|l| l.kind == LightKind::Sky);
-        let lanes = self.lanes().lanes();
-        if sky.is_some() && !self.lanes().is_ratio() {
-            left_out.push("the sky itself".into());
+        // Rows keep apart light of several spectra, not lamps: a lamp of the sky's spectrum cannot be told from it.
+        let own = |sky: &&PunctualLight| {
+            let mut others = lights
+                .iter()
+                .filter(|l| l.name != sky.name && !l.kind.is_dome());
+            self.lanes().is_ratio() && !others.any(|l| l.light == sky.light)
+        };
+        let apart = sky.filter(own);
+        if sky.is_some() && apart.is_none() {
+            left_out.push("the sky as far as the eye sees it: its light is not kept apart".into());
         }
+        if lights.iter().any(|l| l.kind.is_parallel()) {
+            left_out.push("the sun, and ground that it lights as far as the eye sees it".into());
+        }
+        if !self.scene().panes.is_empty() {
+            left_out.push("what panes take from lamps behind them".into());
+        }
+        let lanes = self.lanes().lanes();
         let mut row = gathered.irradiance;
         for (l, (all, direct)) in row.iter_mut().zip(gathered.direct).enumerate() {
             let light = lanes.get(l).and_then(|lane| lane.light);
-            let of_sky = sky.is_some_and(|sky| light == Some(sky.light));
+            let of_sky = apart.is_some_and(|sky| light == Some(sky.light));
             if !of_sky {
                 *all = (*all - direct).max(0.0);
             }

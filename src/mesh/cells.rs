@@ -15,6 +15,9 @@ use std::collections::HashMap;
 /// needles may not turn up.
 const SLENDER: f64 = 0.25;
 
+/// What stands on an edge of the input is dealt with like a lamp that no place is lit by; light on either side is its own.
+pub(super) const FENCE: u64 = 1 << 62;
+
 /// A corner of a cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {
@@ -97,7 +100,8 @@ pub(super) struct Sheet {
     pub(super) vertices: Vec<Vertex>,
     pub(super) hints: Vec<Hint>,
     /// Vertex between two: in their middle (0), or at that share from the first to the second.
-    between: HashMap<(u32, u32, u64), u32>,
+    /// On an edge that something stands on, by which way the triangle runs along it.
+    between: HashMap<(u32, u32, u64, u8), u32>,
     /// Vertices on the edge of a shadow: the one before light there was known to be two, lamps that end there, and which of
     /// them light its side.
     pub(super) sides: HashMap<(u32, u64, u64), u32>,
@@ -286,9 +290,10 @@ impl Cells {
             sheet, of, corners, ..
         } = self.all[cell];
         let sharp = self.sharp_along(&self.all[cell], k) != 0;
+        let way = self.way_along(&self.all[cell], k);
         let [a, b, c] = [0, 1, 2].map(|e| corners[(k + e) % 3]);
         let sheet = &mut self.sheets[sheet as usize];
-        let middle = sheet.between(of, a, b, 0.5);
+        let middle = sheet.between(of, [a, b], 0.5, way);
         if sharp {
             sheet.beside_line(middle, of, [a, b, c]);
         }
@@ -299,7 +304,19 @@ impl Cells {
     pub(super) fn known_middle(&self, cell: &Cell, k: usize) -> Option<u32> {
         let [a, b] = [k, (k + 1) % 3].map(|k| cell.corners[k].vertex);
         let known = &self.sheets[cell.sheet as usize].between;
-        known.get(&(a.min(b), a.max(b), 0)).copied()
+        known
+            .get(&(a.min(b), a.max(b), 0, self.way_along(cell, k)))
+            .copied()
+    }
+
+    /// Which way a cell runs along an edge that something stands on; 0 along all others, where both sides are one.
+    fn way_along(&self, cell: &Cell, k: usize) -> u8 {
+        let edge = &self.edges[cell.edges[k] as usize];
+        match edge.sharp & FENCE {
+            0 => 0,
+            _ if edge.ends[0] == cell.corners[k].point => 1,
+            _ => 2,
+        }
     }
 
     /// Marks an edge of a cell to be split.
@@ -403,6 +420,7 @@ impl Cells {
             hints,
             doubt,
         } = self.all[k];
+        let way = self.way_along(&self.all[k], edge);
         let [a, b, c] = [0, 1, 2].map(|k| corners[(edge + k) % 3]);
         let [ab, bc, ca] = [0, 1, 2].map(|k| edges[(edge + k) % 3]);
         let Edge {
@@ -424,7 +442,7 @@ impl Cells {
         };
         let m = Corner {
             point,
-            vertex: self.sheets[sheet as usize].between(of, from, to, at),
+            vertex: self.sheets[sheet as usize].between(of, [from, to], at, way),
             weights: between(from.weights, to.weights, at),
         };
         let mc = self.edge(point, c.point);
@@ -461,12 +479,18 @@ impl Cells {
 }
 
 impl Sheet {
-    /// Vertex on the way from `a` to `b`.
-    fn between(&mut self, (triangle, entry): (u32, u32), a: Corner, b: Corner, at: f64) -> u32 {
+    /// Vertex on the way from `a` to `b`; `way`: see [`Cells::way_along`].
+    fn between(
+        &mut self,
+        (triangle, entry): (u32, u32),
+        [a, b]: [Corner; 2],
+        at: f64,
+        way: u8,
+    ) -> u32 {
         let vertices = &mut self.vertices;
         let name = match at == 0.5 {
-            true => (a.vertex.min(b.vertex), a.vertex.max(b.vertex), 0),
-            false => (a.vertex, b.vertex, at.to_bits()),
+            true => (a.vertex.min(b.vertex), a.vertex.max(b.vertex), 0, way),
+            false => (a.vertex, b.vertex, at.to_bits(), way),
         };
         *self.between.entry(name).or_insert_with(|| {
             vertices.push(Vertex {

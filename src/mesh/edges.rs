@@ -4,9 +4,9 @@
 //! crossings the shadow's edge is a line if light differs to its left and right all along; if it is not, its corner is
 //! looked for where it would be if both ends ran on straight. What is neither is bisected, and looked at again.
 
-use super::cells::{Cell, Cells, End, within};
+use super::cells::{Cell, Cells, End, FENCE, within};
 use super::lines::Sharp;
-use super::shades::{COVER, FENCE, Shades, each};
+use super::shades::{COVER, Shades, each};
 use super::shadow::{Crossing, Found, Mark, Plan};
 use crate::link::Sight;
 use crate::transport::Receiver;

@@ -3,14 +3,14 @@
 //! Light on both sides of such an edge has nothing to do with each other, though they are one plane and maybe one space. So
 //! each side gets vertices of its own, whose light is looked at beside the edge, as on edges of shadows.
 
-use super::cells::{Cell, Cells};
-use super::shades::{FENCE, Shades};
+use super::cells::{Cell, Cells, FENCE};
+use super::shades::Shades;
 use crate::gather::Vertex;
 use crate::geometry::Segment;
 use crate::link::Sight;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What stands on an edge is looked for this far from it, a share of the room's half diagonal: 2.5 mm in a room of 6 m by
 /// 6 m by 3 m, where lines are as far from what they stand for.
@@ -19,64 +19,102 @@ const ASIDE: f64 = 5e-4;
 const INTO: f64 = 0.2;
 /// And so many times higher than aside, so that the way passes above edges that are bent outwards.
 const ABOVE: f64 = 3.0;
+/// Of so many cells about an edge every two are looked at.
+const MOST: usize = 8;
 /// Where along an edge.
 const ALONG: [f64; 3] = [0.2, 0.5, 0.8];
 
+/// Normals whose cosine is above this are one direction to who looks: places there share what is seen.
+const ALIKE: f64 = 0.999;
+
+/// A corner of a cell, or the edge that begins there.
+type Of = (usize, usize);
+
+/// What becomes of a vertex: its sheet, and the corners about it in sectors, of which the first keeps it.
+struct Parted {
+    sheet: u32,
+    vertex: u32,
+    sectors: Vec<Vec<Of>>,
+}
+
 impl Cells {
-    /// Parts the vertices on edges that something stands on. To be called before any edge is split.
-    pub(super) fn fence(&mut self, shades: &Shades) {
-        let mut around = vec![[None::<(usize, usize)>; 2]; self.edges.len()];
-        for (k, cell) in self.all.iter().enumerate() {
-            for (e, &edge) in cell.edges.iter().enumerate() {
-                if let Some(free) = around[edge as usize].iter_mut().find(|side| side.is_none()) {
-                    *free = Some((k, e));
-                }
-            }
+    /// Parts the vertices on edges that something stands on, unless that takes more than `most` new ones. To be called before any
+    /// edge is split.
+    pub(super) fn fence(&mut self, shades: &Shades, most: usize) {
+        let fenced = self.fenced(shades);
+        let ends = fenced.iter().map(|&edge| self.edges[edge as usize].ends);
+        let points: BTreeSet<u32> = ends.flatten().collect();
+        let parted = self.parted(&fenced, &points);
+        if parted.iter().map(|p| p.sectors.len() - 1).sum::<usize>() > most {
+            return;
         }
-        let fenced: Vec<u32> = shades.bake().with_sight(|_, sight| {
-            let all = (0..self.edges.len() as u32).into_par_iter();
-            let stands = |&edge: &u32| match around[edge as usize] {
-                [Some(a), Some(b)] => self.stands_between(shades, sight, a, b),
-                _ => false,
-            };
-            all.filter(stands).collect()
-        });
         for edge in fenced {
-            let edge = &mut self.edges[edge as usize];
-            edge.sharp |= FENCE;
-            for point in edge.ends {
-                self.sharpen(point, FENCE);
+            self.edges[edge as usize].sharp |= FENCE;
+        }
+        for point in points {
+            self.sharpen(point, FENCE);
+        }
+        for Parted {
+            sheet,
+            vertex,
+            sectors,
+        } in parted
+        {
+            for (k, sector) in sectors.iter().enumerate() {
+                self.give_vertex(sheet, (k == 0).then_some(vertex), sector);
             }
         }
-        self.part_vertices();
     }
 
-    /// Does something stand on the edge that two cells share?
-    fn stands_between(
-        &self,
-        shades: &Shades,
-        sight: &Sight,
-        (a, e): (usize, usize),
-        (b, f): (usize, usize),
-    ) -> bool {
+    /// Edges that something stands on.
+    fn fenced(&self, shades: &Shades) -> BTreeSet<u32> {
+        let mut around: Vec<(u32, Of)> = Vec::with_capacity(3 * self.all.len());
+        for (k, cell) in self.all.iter().enumerate() {
+            around.extend(
+                cell.edges
+                    .iter()
+                    .enumerate()
+                    .map(|(e, &edge)| (edge, (k, e))),
+            );
+        }
+        around.sort_unstable();
+        let edges: Vec<&[(u32, Of)]> = around.chunk_by(|a, b| a.0 == b.0).collect();
+        shades.bake().with_sight(|_, sight| {
+            let stands = |cells: &[(u32, Of)]| {
+                let few = &cells[..cells.len().min(MOST)];
+                let all = few.iter().enumerate();
+                all.flat_map(|(k, a)| few[k + 1..].iter().map(move |b| (a.1, b.1)))
+                    .any(|(a, b)| self.stands_between(shades, sight, a, b))
+            };
+            let found = edges.into_par_iter().filter(|cells| stands(cells));
+            found.map(|cells| cells[0].0).collect()
+        })
+    }
+
+    /// Does something stand on the edge that two cells share? They must be of a sheet, or look the same way.
+    fn stands_between(&self, shades: &Shades, sight: &Sight, (a, e): Of, (b, f): Of) -> bool {
         let mesh = shades.bake().mesh();
         let [a, b] = [(a, e), (b, f)].map(|(k, e)| (&self.all[k], e));
-        let (Some(beside_a), Some(beside_b)) = (self.beside(shades, a), self.beside(shades, b))
+        let (Some((at_a, normal_a)), Some((at_b, normal_b))) =
+            (self.beside(shades, a), self.beside(shades, b))
         else {
             return false;
         };
+        if a.0.sheet != b.0.sheet && normal_a.dot(normal_b) < ALIKE {
+            return false;
+        }
         let planes = [a, b].map(|(cell, _)| mesh.plane[cell.of.0 as usize]);
         let ends = self.edges[a.0.edges[e] as usize].ends;
         let [from, to] = ends.map(|p| self.points[p as usize]);
         ALONG.into_iter().any(|t| {
             let at = from.lerp(to, t);
-            sight.blocks_one(&Segment::new(at + beside_a, at + beside_b, planes))
+            sight.blocks_one(&Segment::new(at + at_a, at + at_b, planes))
         })
     }
 
-    /// From the edge `e` of a cell to a place a little into it and above; none where it is too thin or smaller than what is
-    /// looked for.
-    fn beside(&self, shades: &Shades, (cell, e): (&Cell, usize)) -> Option<DVec3> {
+    /// From the edge `e` of a cell to a place a little into it and above, and the cell's normal; none where it is too thin or
+    /// smaller than what is looked for.
+    fn beside(&self, shades: &Shades, (cell, e): (&Cell, usize)) -> Option<(DVec3, DVec3)> {
         let aside = ASIDE * shades.bake().mesh().half_size;
         let [p, q, r] = [0, 1, 2].map(|k| self.points[cell.corners[(e + k) % 3].point as usize]);
         let normal = (q - p).cross(r - p).try_normalize()?;
@@ -84,51 +122,59 @@ impl Cells {
         let height = into.dot(r - p);
         let wide = p.distance(q) > aside && INTO * height > 0.1 * aside;
         let step = aside.min(INTO * height);
-        wide.then(|| step * (into + ABOVE * normal))
+        wide.then(|| (step * (into + ABOVE * normal), normal))
     }
 
-    /// Gives every sector of cells about a point on a fence vertices of its own.
-    fn part_vertices(&mut self) {
-        let mut corners: BTreeMap<(u32, u32), Vec<(usize, usize)>> = BTreeMap::new();
+    /// What becomes of the vertices at points where fenced edges end.
+    fn parted(&self, fenced: &BTreeSet<u32>, points: &BTreeSet<u32>) -> Vec<Parted> {
+        let mut corners: BTreeMap<(u32, u32), Vec<Of>> = BTreeMap::new();
         for (k, cell) in self.all.iter().enumerate() {
             for (c, corner) in cell.corners.iter().enumerate() {
-                if self.sharp.contains_key(&corner.point) {
+                if points.contains(&corner.point) {
                     let of = corners.entry((cell.sheet, corner.vertex)).or_default();
                     of.push((k, c));
                 }
             }
         }
-        for ((sheet, vertex), mut left) in corners {
-            let mut first = true;
-            while let Some(start) = left.pop() {
-                let mut sector = vec![start];
-                let mut next = 0;
-                while let Some(&one) = sector.get(next) {
-                    let joined = |other: &(usize, usize)| self.are_joined(one, *other);
-                    let (new, rest) = left.into_iter().partition(joined);
-                    left = rest;
-                    sector.extend::<Vec<_>>(new);
-                    next += 1;
-                }
-                self.give_vertex(sheet, if first { Some(vertex) } else { None }, &sector);
-                first = false;
-            }
-        }
+        let parted = corners.into_iter().map(|((sheet, vertex), about)| Parted {
+            sheet,
+            vertex,
+            sectors: self.sectors(&about, fenced),
+        });
+        parted.collect()
     }
 
-    /// Do two corners at a point share an edge there that nothing stands on?
-    fn are_joined(&self, (a, c): (usize, usize), (b, d): (usize, usize)) -> bool {
-        let about = |k: usize, c: usize| [c, (c + 2) % 3].map(|e| self.all[k].edges[e]);
-        let others = about(b, d);
-        let open = |edge: &u32| self.edges[*edge as usize].sharp & FENCE == 0;
-        about(a, c)
-            .iter()
-            .filter(|e| open(e))
-            .any(|edge| others.contains(edge))
+    /// Corners about a vertex in sets that reach each other over edges which nothing stands on.
+    fn sectors(&self, about: &[Of], fenced: &BTreeSet<u32>) -> Vec<Vec<Of>> {
+        let open = |(k, c): Of| {
+            let edges = [c, (c + 2) % 3].map(|e| self.all[k].edges[e]);
+            edges.into_iter().filter(|edge| !fenced.contains(edge))
+        };
+        let mut along: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (place, &corner) in about.iter().enumerate() {
+            open(corner).for_each(|edge| along.entry(edge).or_default().push(place));
+        }
+        let mut taken = vec![false; about.len()];
+        let mut sectors = Vec::new();
+        for start in 0..about.len() {
+            let (mut sector, mut next) = (Vec::new(), vec![start]);
+            while let Some(place) = next.pop() {
+                if !std::mem::replace(&mut taken[place], true) {
+                    sector.push(about[place]);
+                    // Asked for once: who shares an edge is then taken, or about to be.
+                    let beyond = open(about[place]).filter_map(|edge| along.remove(&edge));
+                    next.extend(beyond.flatten());
+                }
+            }
+            if !sector.is_empty() {
+                sectors.push(sector);
+            }
+        }
+        sectors
     }
 
     /// Gives the corners of a sector one vertex: `kept`, or a new one.
-    fn give_vertex(&mut self, sheet: u32, kept: Option<u32>, sector: &[(usize, usize)]) {
+    fn give_vertex(&mut self, sheet: u32, kept: Option<u32>, sector: &[Of]) {
         let (k, c) = sector[0];
         let Cell { of, corners, .. } = self.all[k];
         let own = Vertex {

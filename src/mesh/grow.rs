@@ -293,7 +293,13 @@ impl<'a> Growth<'a> {
 
     /// The first vertices.
     pub(super) fn begin(&mut self, progress: &dyn Fn(usize, usize)) {
-        self.cells.fence(&self.shades);
+        if self.looking {
+            let most = match self.strict {
+                true => self.most.saturating_sub(self.used()),
+                false => usize::MAX,
+            };
+            self.cells.fence(&self.shades, most);
+        }
         let all: Vec<usize> = (0..self.cells.all.len()).collect();
         let all = self.cells.take_sides(&self.shades, all);
         self.expect(&all, true, progress);

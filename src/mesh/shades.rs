@@ -1,6 +1,6 @@
 //! Whether light comes straight from a lamp at a place: rays to the middles of lamps, and to the rims of those with an extent.
 
-use super::cells::{Cell, Sheet};
+use super::cells::{Cell, FENCE, Sheet};
 use crate::gather::Vertex;
 use crate::geometry::sampling::around;
 use crate::geometry::{NO_PLANE, Segment};
@@ -13,8 +13,6 @@ use glam::DVec3;
 
 /// What covers a place is dealt with like a lamp: where it ends, light does.
 pub(super) const COVER: u64 = 1 << 63;
-/// So is what stands on an edge of the input; no place is lit or not by it.
-pub(super) const FENCE: u64 = 1 << 62;
 /// Lamps that edges of shadows are looked for of, at the most: those that give most.
 const LAMPS: usize = 62;
 /// Places on the rim of a lamp.
