@@ -4,7 +4,6 @@
 //! |---|---|
 //! | `ranks` | shares of receivers, and the exchange of what was found at them |
 //! | `packed` | results as bytes |
-//! | `message` | the one message of MPI |
 //! | `job` | joining and leaving the job of an MPI launcher (cargo feature `mpi`) |
 //!
 //! Scene, hierarchy and light are on every rank; the rows of a receiver (what its rays met) only on the one that owns it. A sum never
@@ -13,7 +12,6 @@
 //! nothing.
 
 mod job;
-mod message;
 mod packed;
 mod ranks;
 
