@@ -113,3 +113,46 @@ fn figures_hold_their_ranges_and_a_finer_solution() {
         assert_eq!(dark[name]["reason"], "no light", "{dark}");
     }
 }
+
+/// The open side of the box lets a sky in: the lamp has no part in its daylight factor.
+#[test]
+fn daylight_and_glare_are_told_where_they_are_asked_for() {
+    let options = [
+        "--metrics",
+        "--json",
+        "--error",
+        "2",
+        "--sky",
+        "uniform",
+        "--sky-lux",
+        "10000",
+    ];
+    let eye = [
+        "--ugr",
+        "0.278,0.25,-0.2,0,0,1",
+        "--ugr",
+        "0.278,0.25,0.1,0,1,0",
+    ];
+    let (out, said) = probed(&[&options[..], &eye].concat());
+    let out: Value = serde_json::from_str(&out).unwrap();
+    let factor = |k: usize| &out["metrics"]["points"][k]["DF_percent"];
+    for k in 0..3 {
+        let at = |key: &str| factor(k)[key].as_f64().unwrap();
+        assert!(0.5 < at("value") && at("value") < 60.0, "{}", factor(k));
+        assert!(at("low") < at("value") && at("value") < at("high"));
+    }
+    let views = out["ugr"].as_array().unwrap();
+    assert_eq!(views.len(), 2);
+    for view in views {
+        assert!(view["background_cd_m2"].as_f64().unwrap() > 1.0, "{view}");
+        assert_eq!(view["left_out"][0], "the sky itself", "{view}");
+    }
+    assert!(said.contains("UGR at [0.278, 0.25, -0.2]"), "{said}");
+    let (csv, _) = probed(&["--metrics", "--error", "2", "--sky", "uniform"]);
+    assert!(
+        csv.lines()
+            .next()
+            .unwrap()
+            .ends_with("DF_percent,DF_percent_low,DF_percent_high")
+    );
+}

@@ -4,9 +4,9 @@
 //! `--json` prints one object instead: `{"version": 1, "choice": {...}, "runs": [...], "held": [...], "balance": [...]}`
 //! with the fields of `cost::Run`, `cost::HeldRun` and `cost::Balance`.
 
-use super::bake::load;
 use super::options::{Common, Reading, positive};
 use super::results::print;
+use super::rooms::load;
 use super::talk::Talk;
 use crate::cost::{Knob, Sweep, choose, plots, tables};
 use crate::error::{Error, Problem, Result};

@@ -7,6 +7,7 @@
 //! | `CCT_K`, `Duv` | correlated colour temperature and distance from the Planckian locus (Ohno 2014) |
 //! | `Ra`, `R9` | colour rendering (CIE 13.3-1995) |
 //! | `Rf`, `Rg` | colour fidelity and gamut (ANSI/IES TM-30-20; Rf is CIE 224:2017) |
+//! | `DF_percent` | daylight factor, where there is a sky: illuminance under the sky alone (no sun, no lamps), over that of open level ground |
 //! | `EDI_sc`, `_mc`, `_lc`, `_rh`, `_mel` | alpha-opic equivalent daylight illuminance of the S-, M-, L-cones, rods, melanopsin, lx (CIE S 026) |
 //!
 //! The CSV has `NAME,NAME_low,NAME_high` of each after `place`, without a second `lux`; what is not defined is an empty cell. The
@@ -28,6 +29,8 @@ use crate::survey::Place;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+/// Name of the daylight factor.
+const DAYLIGHT: &str = "DF_percent";
 /// Place of Ra among the measures.
 const RA: usize = 3;
 
@@ -37,6 +40,8 @@ pub(super) struct Metrics {
     points: Vec<(Measured, [Option<Range>; MEASURES])>,
     /// Over the points in the room, and how many they are.
     uniformity: Option<(Uniformity, usize)>,
+    /// Daylight factors, per cent, and the relative error of the light under the sky, where there is one.
+    daylight: Option<(Vec<f64>, Option<f64>)>,
 }
 
 impl Metrics {
@@ -72,11 +77,31 @@ impl Metrics {
             stated,
             points,
             uniformity: Uniformity::of(&lux).map(|all| (all, lux.len())),
+            daylight: None,
         }
     }
 
+    /// The same with daylight factors, per cent, and the relative error of what they were taken from.
+    pub(super) fn with_daylight(self, factors: Vec<f64>, relative: Option<f64>) -> Self {
+        Self {
+            daylight: Some((factors, relative)),
+            ..self
+        }
+    }
+
+    /// Daylight factor of a point and its range.
+    fn daylight(&self, point: usize) -> Option<(f64, Option<Range>)> {
+        let (factors, relative) = self.daylight.as_ref()?;
+        let factor = factors[point];
+        let range = relative.map(|relative| Range {
+            low: factor * (1.0 - relative).max(0.0),
+            high: factor * (1.0 + relative),
+        });
+        Some((factor, range))
+    }
+
     /// Columns of the CSV.
-    pub(super) fn columns() -> Vec<String> {
+    pub(super) fn columns(&self) -> Vec<String> {
         let of = |name: &str| {
             [
                 name.to_owned(),
@@ -85,7 +110,9 @@ impl Metrics {
             ]
         };
         // Illuminance has its column already.
-        NAMES.iter().flat_map(|name| of(name)).skip(1).collect()
+        let daylight = self.daylight.iter().flat_map(|_| of(DAYLIGHT));
+        let all = NAMES.iter().flat_map(|name| of(name)).skip(1);
+        all.chain(daylight).collect()
     }
 
     /// Cells of the CSV of a point.
@@ -101,6 +128,13 @@ impl Metrics {
                 ]
             })
             .skip(1)
+            .chain(
+                self.daylight(point)
+                    .into_iter()
+                    .flat_map(|(factor, range)| {
+                        [Some(factor), range.map(|r| r.low), range.map(|r| r.high)].map(cell)
+                    }),
+            )
             .collect()
     }
 
@@ -127,7 +161,18 @@ impl Metrics {
 
     /// All as JSON.
     pub(super) fn json(&self) -> Value {
-        let points: Vec<Value> = self.points.iter().map(|(m, r)| point(m, r)).collect();
+        let points = self
+            .points
+            .iter()
+            .enumerate()
+            .map(|(k, (measured, ranges))| {
+                let mut point = point(measured, ranges);
+                if let Some((factor, range)) = self.daylight(k) {
+                    point[DAYLIGHT] = figure(Ok::<_, String>(factor), range);
+                }
+                point
+            });
+        let points: Vec<Value> = points.collect();
         let uniformity = self.uniformity.map(|(all, count)| {
             let ratio = |ratio: Option<f64>| {
                 let range = (ratio.zip(self.stated))

@@ -5,12 +5,15 @@
 //! | `command` | the command line as a whole, exit codes |
 //! | `options` | options that commands share |
 //! | `bake`, `relight`, `inspect`, `probe`, `spectra`, `cost`, `serve`, `paper` | the commands |
+//! | `bake_args`, `baking` | what a bake is asked for, and its steps |
+//! | `rooms` | reading and preparing rooms |
 //! | `log` | the log of a bake, field by field |
 //! | `report` | the page of a bake |
 //! | `snapshots` | pictures of the rounds |
 //! | `parting` | layers of lamps and probes of a bake |
 //! | `maps` | light maps of a bake, and what may be asked of them |
 //! | `metrics` | figures of lighting practice for `probe` |
+//! | `glare` | glare at viewpoints for `probe` |
 //! | `pictures` | plan and spectra of a room for `inspect` |
 //! | `points` | the CSV of points for `probe` |
 //! | `stop` | Ctrl-C and `--time` |
@@ -20,10 +23,13 @@
 //! | `fault` | panics become exit code 3 |
 
 pub mod bake;
+mod bake_args;
+mod baking;
 mod command;
 #[cfg(feature = "paper")]
 pub mod cost;
 mod fault;
+mod glare;
 pub mod inspect;
 pub mod log;
 pub mod maps;
@@ -39,6 +45,7 @@ pub mod probe;
 pub mod relight;
 mod report;
 mod results;
+mod rooms;
 pub mod serve;
 mod sky;
 mod snapshots;

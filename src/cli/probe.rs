@@ -7,20 +7,22 @@
 //! [`places`]). `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
 //! "columns": [names], "rows": [[numbers]], "places": [texts]}`; the columns have all but `place`.
 //!
-//! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see `metrics.rs`.
+//! `--metrics` puts further columns after `place`, and `"metrics"` into the JSON: see `metrics.rs`. `--ugr` puts `"ugr"` there:
+//! see `glare.rs`.
 
-use super::bake::{load, prepare};
+use super::glare::{self, Viewpoint};
 use super::log::exit_code;
 use super::metrics::Metrics;
 use super::options::{Common, Reading, Solving};
 use super::paths;
 use super::points::{COLUMNS, Point, Points};
 use super::results::print;
+use super::rooms::{load, prepare};
 use super::stop::Stop;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
-use crate::gather::Probed;
-use crate::solve::Representation;
+use crate::gather::{Glare, Probed};
+use crate::solve::{Bake, Representation};
 use crate::spectrum::{Grid, LEAVES};
 use crate::store::file;
 use crate::survey::{Place, places};
@@ -41,17 +43,21 @@ pub struct ProbeArgs {
     /// The room, .glb or .gltf.
     pub room: PathBuf,
     /// CSV with columns x,y,z,nx,ny,nz in glTF space.
-    #[arg(long, value_name = "POINTS.csv")]
-    pub points: PathBuf,
+    #[arg(long, value_name = "POINTS.csv", required_unless_present = "ugr")]
+    pub points: Option<PathBuf>,
     /// The CSV to write [default: stdout].
     #[arg(short, long, value_name = "OUT.csv")]
     pub output: Option<PathBuf>,
     /// Irradiance on the 64 leaves as well.
     #[arg(long)]
     pub bands: bool,
-    /// Colour temperature, rendering, fidelity and alpha-opic daylight as well, each with its range; solves on all leaves.
+    /// Colour temperature, rendering, fidelity and alpha-opic daylight as well, each with its range; solves on all leaves. Where
+    /// there is a sky also the daylight factor, for which the room is solved once more under the sky alone.
     #[arg(long)]
     pub metrics: bool,
+    /// Unified glare rating (CIE 117) for an eye and the way it looks; may be said several times.
+    #[arg(long, value_name = "X,Y,Z,DX,DY,DZ", allow_hyphen_values = true)]
+    pub ugr: Vec<Viewpoint>,
     /// What to read.
     #[command(flatten)]
     pub reading: Reading,
@@ -71,7 +77,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let stop = Stop::new(args.solving.time);
     stop.listen()?;
     let talk = Talk::new(common.quiet);
-    let mut read = read_points(&args.points);
+    let mut read = args.points.as_deref().map(read_points).unwrap_or_default();
     let wrong = std::mem::take(&mut read.problems);
     let scene = load(&args.room, &args.reading, |parts| {
         problems(args, parts, wrong)
@@ -95,46 +101,130 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let points: Vec<Point> = (read.points.iter())
         .map(|&(place, normal)| (scale * place, normal))
         .collect();
-    let probed = bake.probe(&points);
-    let places = places(bake.scene(), &points);
-    let metrics = (args.metrics)
-        .then(|| Metrics::new(&bake.scene().grid, &probed, &places, bake.rounds().last()));
+    let found = Found::at(args, (common, &talk, &stop), &bake, &points)?;
     talk.clear();
-    warn_of(&places, &talk);
-    if let Some(line) = metrics.as_ref().and_then(Metrics::line) {
-        talk.say(&line);
-    }
+    found.tell(args, &talk);
 
     let columns = columns(args.bands, &bake.scene().grid);
-    let rows: Vec<Vec<f64>> = read
-        .points
-        .iter()
-        .zip(&probed)
-        .map(|(p, light)| row(p, light, args.bands))
-        .collect();
-    let csv = || table(&columns, &rows, &places, metrics.as_ref());
+    let lines = read.points.iter().zip(&found.probed);
+    let rows: Vec<Vec<f64>> = lines.map(|(p, light)| row(p, light, args.bands)).collect();
+    let csv = || table(&columns, &rows, &found.places, found.metrics.as_ref());
     if let Some(path) = &args.output {
         file::write_atomic(path, Some(&args.room), |w| w.write_all(csv().as_bytes()))?;
     }
     if args.json {
-        let error = bake.rounds().last().map(|r| r.error.total_de2000);
         let mut all = json!({
             "version": VERSION,
             "verdict": verdict,
             "rounds": bake.rounds().len(),
-            "error_de2000": error,
+            "error_de2000": bake.rounds().last().map(|r| r.error.total_de2000),
             "columns": columns,
             "rows": rows,
-            "places": places.iter().map(|p| p.name()).collect::<Vec<_>>(),
+            "places": found.places.iter().map(|p| p.name()).collect::<Vec<_>>(),
         });
-        if let Some(metrics) = &metrics {
+        if let Some(metrics) = &found.metrics {
             all["metrics"] = metrics.json();
         }
+        if !args.ugr.is_empty() {
+            let views = args.ugr.iter().zip(&found.views);
+            let entries = views.map(|(view, seen)| glare::entry(view, seen, found.relative));
+            all["ugr"] = entries.collect();
+        }
         print(&format!("{all}\n"))?;
-    } else if args.output.is_none() {
+    } else if args.output.is_none() && args.points.is_some() {
         print(&csv())?;
     }
     Ok(exit_code(verdict))
+}
+
+/// What was found.
+struct Found {
+    probed: Vec<Probed>,
+    places: Vec<Place>,
+    metrics: Option<Metrics>,
+    /// Of the viewpoints.
+    views: Vec<Glare>,
+    /// Relative error of the light, an estimate.
+    relative: Option<f64>,
+}
+
+impl Found {
+    /// Looks at points and from viewpoints.
+    fn at(
+        args: &ProbeArgs,
+        (common, talk, stop): (&Common, &Talk, &Stop),
+        bake: &Bake,
+        points: &[Point],
+    ) -> Result<Self> {
+        let probed = bake.probe(points);
+        let places = places(bake.scene(), points);
+        let metrics = match args.metrics {
+            true => Some(measured(
+                args,
+                (common, talk, stop),
+                bake,
+                points,
+                (&probed, &places),
+            )?),
+            false => None,
+        };
+        let scale = bake.scene().changes.scale;
+        let views = args.ugr.iter();
+        let last = bake.rounds().last();
+        Ok(Self {
+            probed,
+            places,
+            metrics,
+            views: views
+                .map(|view| bake.glare(scale * view.eye, view.direction))
+                .collect(),
+            relative: last.and_then(|round| round.error.total_relative.value),
+        })
+    }
+
+    /// Says what is to be said on stderr.
+    fn tell(&self, args: &ProbeArgs, talk: &Talk) {
+        warn_of(&self.places, talk);
+        if let Some(line) = self.metrics.as_ref().and_then(Metrics::line) {
+            talk.say(&line);
+        }
+        for (view, glare) in args.ugr.iter().zip(&self.views) {
+            talk.say(&glare::line(view, glare, self.relative));
+        }
+    }
+}
+
+/// The figures of all points, with the daylight factor where there is a sky.
+fn measured(
+    args: &ProbeArgs,
+    (common, talk, stop): (&Common, &Talk, &Stop),
+    bake: &Bake,
+    points: &[Point],
+    (probed, places): (&[Probed], &[Place]),
+) -> Result<Metrics> {
+    let scene = bake.scene();
+    let metrics = Metrics::new(&scene.grid, probed, places, bake.rounds().last());
+    let Some(outside) = scene.sky_illuminance().filter(|&lux| lux > 0.0) else {
+        return Ok(metrics);
+    };
+    let relative = |bake: &Bake| bake.rounds().last()?.error.total_relative.value;
+    let factors = |probed: &[Probed]| -> Vec<f64> {
+        probed
+            .iter()
+            .map(|light| 100.0 * light.xyz[1] / outside)
+            .collect()
+    };
+    Ok(match scene.under_sky_alone() {
+        None => metrics.with_daylight(factors(probed), relative(bake)),
+        Some(alone) => {
+            talk.phase("daylight");
+            let adaptive = Representation::Adaptive;
+            let mut under_sky = prepare(alone, &args.solving, common, adaptive, talk);
+            stop.run(&mut under_sky, talk, |_, _| Ok(()))?;
+            let probed = under_sky.probe(points);
+            metrics.with_daylight(factors(&probed), relative(&under_sky))
+        }
+    })
 }
 
 /// The points; a file that cannot be read is a problem like those in it.
@@ -182,7 +272,8 @@ fn problems(args: &ProbeArgs, parts: &[PathBuf], mut problems: Vec<Problem>) -> 
         .into_iter()
         .collect();
     let beside = args.room.with_extension("spectra.json");
-    let mut inputs = vec![args.room.as_path(), &args.points];
+    let mut inputs = vec![args.room.as_path()];
+    inputs.extend(args.points.as_deref());
     inputs.push(args.reading.spectra.as_deref().unwrap_or(&beside));
     inputs.extend(parts.iter().map(PathBuf::as_path));
     problems.extend(paths::problems(&outputs, &inputs));
@@ -211,9 +302,7 @@ fn table(
 ) -> String {
     let mut header = columns.to_vec();
     header.push("place".into());
-    if metrics.is_some() {
-        header.extend(Metrics::columns());
-    }
+    header.extend(metrics.iter().flat_map(|metrics| metrics.columns()));
     let lines = rows
         .iter()
         .zip(places)

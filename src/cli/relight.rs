@@ -13,11 +13,11 @@
 //! | `load_s`, `open_s`, `write_s`, `total_s` | s | reading the room, the cache, writing, all together |
 //! | `glb`, `vertices`, `triangles`, `exposure`, `white` | | as in the verdict of a bake |
 
-use super::bake::{load, write_npz};
 use super::options::{Common, Reading, Showing, Storing};
 use super::paths;
 use super::paths::text;
 use super::results::print;
+use super::rooms::{load, write_npz};
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::keep::{Relighter, RelitRecord};

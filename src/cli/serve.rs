@@ -3,10 +3,10 @@
 //! The address goes to stdout, with the token that all requests need. Ctrl-C ends the program; nothing is left behind but
 //! files that were saved.
 
-use super::bake::load;
 use super::options::{Common, Reading, Showing, Storing, positive};
 use super::paths;
 use super::results::print;
+use super::rooms::load;
 use super::stop::KILLED;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};

@@ -2,6 +2,7 @@
 
 pub mod air;
 mod bake;
+mod glare;
 mod layers;
 mod probe;
 pub mod refined;
@@ -11,6 +12,7 @@ pub use crate::transport::MOSTLY;
 pub use air::{Air, Around};
 pub use bake::{Baked, Interpolation};
 pub(crate) use bake::{KeptVertex, Look, Vertex, lend};
+pub use glare::Glare;
 pub(crate) use layers::LayerLanes;
 pub use probe::Probed;
 

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `ranks` | shares of receivers, and the exchange of what was found at them |
 //! | `packed` | results as bytes |
+//! | `exchange` | the one message that ranks send |
 //! | `job` | joining and leaving the job of an MPI launcher (cargo feature `mpi`) |
 //!
 //! Scene, hierarchy and light are on every rank; the rows of a receiver (what its rays met) only on the one that owns it. A sum never
@@ -11,6 +12,7 @@
 //! to the same decisions, and the file is the same byte by byte for any number of ranks. A rank that is alone exchanges
 //! nothing.
 
+mod exchange;
 mod job;
 mod packed;
 mod ranks;

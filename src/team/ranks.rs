@@ -4,7 +4,7 @@
 //! without anyone keeping count, and who owns a leaf follows from its number alone: it does not change when others are split, and a checkpoint
 //! need not say.
 
-use super::job;
+use super::exchange;
 use super::packed::Packed;
 use crate::store::Decoder;
 use crate::store::codec::Read;
@@ -85,7 +85,7 @@ impl Team {
         let mut bytes = Vec::new();
         own.iter().for_each(|x| x.pack(&mut bytes));
         drop(own);
-        let found = job::all_gather(self.ranks, &bytes);
+        let found = exchange::all_gather(self.ranks, &bytes);
         let mut parts: Vec<Decoder> = found.iter().map(|part| Decoder::new(part)).collect();
         let merged: Read<Vec<R>> = keys
             .map(|k| R::unpack(&mut parts[k % self.ranks]))
@@ -102,7 +102,7 @@ impl Team {
     /// # Panics
     /// As [`Team::merge`].
     pub fn merge_rows<const L: usize>(self, keys: &[u32], own: &[[f32; L]], out: &mut [[f32; L]]) {
-        let found = job::all_gather(self.ranks, bytemuck::cast_slice(own.as_flattened()));
+        let found = exchange::all_gather(self.ranks, bytemuck::cast_slice(own.as_flattened()));
         let mut parts: Vec<_> = found.iter().map(|part| part.as_chunks::<4>().0).collect();
         for (row, &k) in out.iter_mut().zip(keys) {
             let part = &mut parts[k as usize % self.ranks];
@@ -121,7 +121,7 @@ impl Team {
         if self.is_alone() {
             return own;
         }
-        let found = job::all_gather(self.ranks, bytemuck::cast_slice(&own));
+        let found = exchange::all_gather(self.ranks, bytemuck::cast_slice(&own));
         let parts = found.iter().flat_map(|part| part.as_chunks::<4>().0);
         let mut all: Vec<u32> = parts.map(|bytes| u32::from_ne_bytes(*bytes)).collect();
         all.sort_unstable();
@@ -132,7 +132,7 @@ impl Team {
     pub fn first_says(self, own: bool) -> bool {
         match self.is_alone() {
             true => own,
-            false => job::all_gather(self.ranks, &[u8::from(own)])[0] == [1],
+            false => exchange::all_gather(self.ranks, &[u8::from(own)])[0] == [1],
         }
     }
 }

@@ -4,10 +4,12 @@
     python tools/viewers/blender.py ROOM.baked.glb...
 
 Every mesh has to have the attribute `Color`, which *Viewport Shading > Solid > Attribute* shows, with the numbers of COLOR_0, as
-far as Blender keeps them: it rounds to the 8 bits of sRGB.
+far as Blender keeps them: it rounds to the 8 bits of sRGB. Where ROOM.baked.maps.json lies beside a room, its second UV map has to
+be that of the file (v counts from the bottom there), and the EXR pages, opened in Blender, have to have the texels of the KTX2 ones.
 """
 
 import json
+import pathlib
 import struct
 import sys
 
@@ -15,8 +17,8 @@ import bpy
 import numpy as np
 
 
-def colours(path):
-    """COLOR_0 of each primitive of a GLB with float vertex colours, in order of its meshes."""
+def attributes(path, name):
+    """An attribute of floats of each primitive of a GLB, in order of its meshes."""
     data = open(path, "rb").read()
     (length,) = struct.unpack_from("<I", data, 12)
     gltf = json.loads(data[20 : 20 + length])
@@ -24,11 +26,11 @@ def colours(path):
     out = []
     for mesh in gltf["meshes"]:
         for primitive in mesh["primitives"]:
-            accessor = gltf["accessors"][primitive["attributes"]["COLOR_0"]]
-            assert accessor["componentType"] == 5126, "packed colours: bake without --compress"
+            accessor = gltf["accessors"][primitive["attributes"][name]]
+            assert accessor["componentType"] == 5126, "packed: bake without --compress"
             view = gltf["bufferViews"][accessor["bufferView"]]
             at = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-            width = {"VEC3": 3, "VEC4": 4}[accessor["type"]]
+            width = {"VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]
             values = np.frombuffer(body, "<f4", accessor["count"] * width, at)
             out.append(values.reshape(-1, width)[:, :3])
     return out
@@ -39,11 +41,51 @@ def encoded(linear):
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
+def texels(path):
+    """Red, green and blue of a page in KTX2, R16G16B16A16_SFLOAT in one level, its bottom row first."""
+    data = open(path, "rb").read()
+    width, height = struct.unpack_from("<2I", data, 20)
+    (start,) = struct.unpack_from("<Q", data, 80)
+    rows = np.frombuffer(data, "<f2", 4 * width * height, start).reshape(height, width, 4)
+    return rows[::-1, :, :3].astype(np.float32)
+
+
+def check_maps(path, beside):
+    """Light maps of an imported room; what differs, as text, or none."""
+    index = json.loads(beside.read_text())
+    if any(entry["texcoord"] != 1 for entry in index["meshes"]):
+        return "a mesh has its light elsewhere than in the second set"
+    places = np.unique(np.concatenate(attributes(path, "TEXCOORD_1")), axis=0)
+    found = []
+    for mesh in bpy.data.meshes:
+        layer = mesh.uv_layers[1]
+        values = np.zeros(2 * len(layer.data), np.float32)
+        layer.data.foreach_get("uv", values)
+        found.append(np.unique(values.reshape(-1, 2), axis=0))
+    found = np.unique(np.concatenate(found), axis=0)
+    found[:, 1] = 1 - found[:, 1]
+    # Vertices that no triangle uses do not arrive.
+    nearest = [np.abs(places - place).max(axis=1).min() for place in found]
+    if max(nearest) > 1e-6:
+        return f"texture coordinates differ by {max(nearest)}"
+    for page in filter(lambda page: page["ktx2"], index["pages"]):
+        image = bpy.data.images.load(str(beside.parent / page["exr"]))
+        pixels = np.zeros(4 * page["width"] * page["height"], np.float32)
+        image.pixels.foreach_get(pixels)
+        apart = np.abs(pixels.reshape(page["height"], page["width"], 4)[:, :, :3] - texels(beside.parent / page["ktx2"])).max()
+        if apart > 0:
+            return f"texels of {page['exr']} differ by {apart}"
+    return None
+
+
 def check(path):
     """Imports a room; what differs, as text, or none."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=path)
-    wanted = np.concatenate(colours(path))
+    beside = pathlib.Path(path).with_suffix(".maps.json")
+    if beside.exists():
+        return check_maps(path, beside)
+    wanted = np.concatenate(attributes(path, "COLOR_0"))
     found = []
     for mesh in bpy.data.meshes:
         attribute = mesh.color_attributes.get("Color")
@@ -76,7 +118,7 @@ def main(arguments):
     for path in arguments:
         problem = check(path)
         bad |= problem is not None
-        print(f"{path}: {problem or 'the colours are those of the file'} (Blender {bpy.app.version_string})")
+        print(f"{path}: {problem or 'the light is that of the file'} (Blender {bpy.app.version_string})")
     return int(bad)
 
 

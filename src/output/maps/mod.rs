@@ -48,6 +48,8 @@ pub struct Index {
     pub lux_per_unit: f64,
     /// Display value (1: white) of a radiosity of 1 lm/m2 in the glb.
     pub exposure: f64,
+    /// What colours of the pages are multiplied by in the glb for `--white-balance`, row by row; pages are as measured.
+    pub white_balance: [[f64; 3]; 3],
     /// Texels around every chart of more than one texel that hold its outermost light.
     pub margin: usize,
     /// The pages.
@@ -189,6 +191,7 @@ pub fn index(
         colour: "linear sRGB",
         lux_per_unit: lux_per_unit(maps),
         exposure: look.scale,
+        white_balance: look.balance,
         margin: maps.margin(),
         pages: pages(&maps.pages, None),
         layers: maps

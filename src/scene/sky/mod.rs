@@ -6,6 +6,7 @@
 //! | `sun` | where the sun stands |
 //! | `wish` | what a side file or a command line says of sky and sun |
 //! | `lamps` | the lamps that this makes: sky, ground below the horizon, sun |
+//! | `alone` | the room under its sky alone |
 //!
 //! Up is +Y, as glTF has it; north is -Z, so that east is +X, unless `north_deg` says otherwise. Azimuths run clockwise seen
 //! from above: from north over east.
@@ -14,6 +15,7 @@
 //! shape there is the illuminance of open level ground in lux; [`Sky`] says how that is spread over the dome. Rays that leave the
 //! room downwards meet open ground, lit by sky and sun and reflecting alike in all directions and wavelengths.
 
+mod alone;
 mod cie;
 mod dome;
 mod lamps;

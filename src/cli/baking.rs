@@ -1,0 +1,410 @@
+//! The steps of `haarlight bake`, in order: begin, rounds, gather, write, audit, end.
+
+use super::bake_args::BakeArgs;
+use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
+use super::maps;
+use super::options::Common;
+use super::parting;
+use super::paths::text;
+use super::report::Report;
+use super::results::print;
+use super::rooms::{prepare, write_npz};
+use super::snapshots::Snapshots;
+use super::stop::Stop;
+use super::summary;
+use super::talk::Talk;
+use crate::audit::{self, Reference};
+use crate::error::{Error, Result};
+use crate::gather::Baked;
+use crate::lightmap::LightMaps;
+use crate::mesh::Limits;
+use crate::output::gltf::{Packing, Writing};
+use crate::output::probes::Grid;
+use crate::output::{BakedGlb, Exposure, baked_glb, mapped_glb, vertices_within};
+use crate::report::Log;
+use crate::scene::{Camera, Scene};
+use crate::solve::{Bake, Round, Verdict};
+use crate::store::file;
+use std::fs::File;
+use std::path::Path;
+use std::time::Instant;
+
+/// Pictures of rounds take this share of the time so far at the most, once they have taken [`PICTURES_FREE_S`].
+const PICTURES_SHARE: f64 = 0.1;
+const PICTURES_FREE_S: f64 = 10.0;
+/// Distinguishes the audit's random numbers from the solver's.
+const AUDIT_SEED: u64 = 0x5eed_a0d1;
+/// Paths a point of the audit at the most.
+const AUDIT_PATHS: usize = 65_536;
+
+/// What a bake goes by: what was asked for, when to stop, whom to tell.
+#[derive(Clone, Copy)]
+pub(super) struct Order<'a> {
+    pub(super) args: &'a BakeArgs,
+    pub(super) common: &'a Common,
+    pub(super) stop: &'a Stop,
+    pub(super) talk: &'a Talk,
+    pub(super) output: &'a Path,
+    pub(super) cache: Option<&'a Path>,
+    pub(super) cameras: &'a [Camera],
+    /// Where probes stand.
+    pub(super) grid: Option<&'a Grid>,
+}
+
+/// What is kept of a bake while it goes on.
+pub(super) struct Kept {
+    log: Option<Log<File>>,
+    report: Option<Report>,
+    snapshots: Option<Snapshots>,
+    outputs: Outputs,
+    seconds: Seconds,
+    /// Seconds that pictures of the result will take: as long as those of the last round.
+    drawing: f64,
+}
+
+/// The light that is written.
+pub(super) struct Lit {
+    maps: Option<LightMaps>,
+    /// At vertices of the written mesh; with maps, what pictures are exposed by.
+    of_vertices: Baked,
+    verdict: Verdict,
+}
+
+impl Lit {
+    fn baked(&self) -> &Baked {
+        self.maps
+            .as_ref()
+            .map_or(&self.of_vertices, |maps| &maps.baked)
+    }
+}
+
+/// The written room.
+pub(super) struct Written {
+    glb: BakedGlb,
+    exposure: Exposure,
+    /// A cache that cannot be written is told of when all else is done.
+    uncached: Option<Error>,
+}
+
+impl Kept {
+    /// Opens what is written on the way; reading took `load_s` seconds.
+    pub(super) fn new(order: Order, load_s: f64) -> Result<Self> {
+        let Order { args, common, .. } = order;
+        let pictures = args.snapshots.as_deref();
+        let snapshots = pictures.map(|folder| Snapshots::new(folder, order.cameras, common.team));
+        Ok(Self {
+            log: args.log.as_deref().map(Log::create).transpose()?,
+            report: None,
+            snapshots: snapshots.transpose()?,
+            outputs: Outputs {
+                log: args.log.as_deref().map(text),
+                ..Outputs::default()
+            },
+            seconds: Seconds {
+                load: load_s,
+                ..Seconds::default()
+            },
+            drawing: 0.0,
+        })
+    }
+
+    fn log(&mut self, record: &impl serde::Serialize) -> Result<()> {
+        self.log.as_mut().map_or(Ok(()), |log| log.write(record))
+    }
+
+    /// Takes note of a round.
+    fn note(&mut self, bake: &Bake, round: &Round) -> Result<()> {
+        self.log(round)?;
+        if let Some(report) = &mut self.report {
+            report.note(bake);
+        }
+        Ok(())
+    }
+}
+
+impl Order<'_> {
+    /// Prepares the room, or goes on where a checkpoint ends.
+    pub(super) fn begin(self, scene: Scene, kept: &mut Kept) -> Result<Bake> {
+        let Self {
+            args, common, talk, ..
+        } = self;
+        let before = kept.seconds.load;
+        let mut bake = prepare(scene, &args.solving, common, args.spectrum, talk);
+        if args.checkpoint.is_some() {
+            bake.can_be_kept("--checkpoint")?;
+        }
+        if self.cache.is_some() {
+            bake.can_be_kept("--cache")?;
+            bake.keep();
+        }
+        let plan = PlanRecord::new(&bake, args.solving.time);
+        kept.log(&plan)?;
+        let report = args.report().map(|path| Report::new(path, &plan));
+        kept.report = report.transpose()?;
+        let resumed = args.checkpoint.as_deref();
+        if let Some(path) = resumed.filter(|path| common.team.first_says(path.exists())) {
+            bake.resume(path)?;
+            for round in bake.rounds() {
+                kept.log(round)?;
+            }
+            if let Some(report) = &mut kept.report {
+                report.note(&bake);
+            }
+            let rounds = bake.rounds().len();
+            talk.say(&format!("going on after round {rounds} of {}", text(path)));
+        }
+        kept.seconds.prepare = self.stop.elapsed_s() - before;
+        Ok(bake)
+    }
+
+    /// Rounds until it is enough.
+    pub(super) fn rounds(self, bake: &mut Bake, kept: &mut Kept) -> Result<Verdict> {
+        self.stop.run(bake, self.talk, |bake, round| {
+            kept.seconds.solve += round.round_s;
+            kept.note(bake, round)?;
+            if let Some(path) = &self.args.checkpoint {
+                bake.save(path)?;
+            }
+            self.pictures(bake, round, kept)
+        })
+    }
+
+    /// Pictures of a round, as long as they take little of the time.
+    fn pictures(self, bake: &Bake, round: &Round, kept: &mut Kept) -> Result<()> {
+        let (talk, stop) = (self.talk, self.stop);
+        let affordable = PICTURES_SHARE * stop.elapsed_s().max(PICTURES_FREE_S / PICTURES_SHARE);
+        let is_affordable = kept.seconds.snapshots <= affordable;
+        let Some(snapshots) = kept
+            .snapshots
+            .as_ref()
+            .filter(|_| self.common.team.first_says(is_affordable))
+        else {
+            return Ok(());
+        };
+        let clock = Instant::now();
+        let seen = snapshots.seen(bake.scene());
+        let light = bake.sketch(&seen, &|done, of| talk.progress("gathering", done, of));
+        talk.phase("drawing");
+        let drawn = Instant::now();
+        let (scene, surfaces) = (bake.scene(), &light.surfaces);
+        let exposure = self.args.showing.of(scene, surfaces, self.cameras);
+        let start = format!("round-{:02}", round.round);
+        let files = snapshots.pictures(&start, scene, surfaces, &exposure)?;
+        kept.log(&SnapshotsRecord::new(round.round, &files, exposure))?;
+        kept.outputs.pictures.extend(files);
+        kept.drawing = drawn.elapsed().as_secs_f64();
+        kept.seconds.snapshots += clock.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Looks up the light that is written: pictures on the way are sketches, the result is looked at more closely.
+    pub(super) fn gather(self, bake: &Bake, verdict: Verdict, kept: &mut Kept) -> Result<Lit> {
+        let Self {
+            args, stop, talk, ..
+        } = self;
+        let clock = Instant::now();
+        let limits = Limits {
+            vertices: most_vertices(args, bake.scene())?,
+            late: &|| stop.is_late(kept.drawing),
+        };
+        let maps = (args.mapping.is_wanted()).then(|| args.mapping.maps(bake, stop, talk));
+        let of_vertices = match &maps {
+            Some(_) => maps::metered(bake),
+            None => bake.baked_within(&limits, &|done, of| talk.progress("gathering", done, of)),
+        };
+        let mut lit = Lit {
+            maps,
+            of_vertices,
+            verdict,
+        };
+        let cut_short = stop.is_late(kept.drawing);
+        kept.seconds.gather = clock.elapsed().as_secs_f64();
+        // An error is reached when the file's is.
+        let error = bake.error_of(lit.baked());
+        let met = error.is_none_or(|e| e <= bake.settings().error);
+        lit.verdict = match verdict {
+            Verdict::Reached if !met && cut_short => stop.reason().unwrap_or(Verdict::Exhausted),
+            Verdict::Reached if !met => Verdict::Exhausted,
+            verdict => verdict,
+        };
+        Ok(lit)
+    }
+
+    /// Writes all but the page.
+    pub(super) fn write(self, bake: &Bake, lit: &Lit, kept: &mut Kept) -> Result<Written> {
+        let Self {
+            args, talk, output, ..
+        } = self;
+        let clock = Instant::now();
+        talk.phase("writing");
+        let (scene, baked) = (bake.scene(), lit.baked());
+        let exposure = args
+            .showing
+            .of(scene, &lit.of_vertices.surfaces, self.cameras);
+        let glb = match &lit.maps {
+            Some(maps) => mapped_glb(scene, maps, &exposure)?,
+            None => baked_glb(scene, &baked.surfaces, &exposure, args.storing.writing())?,
+        };
+        glb.warnings.iter().for_each(|w| talk.warn(w));
+        over_budget(args, &glb).iter().for_each(|w| talk.warn(w));
+        let is_first = self.common.team.is_first();
+        if is_first {
+            file::write_atomic(output, Some(&args.room), |w| w.write_all(&glb.bytes))?;
+        }
+        kept.outputs.glb = text(output);
+        if let Some(maps) = lit.maps.as_ref().filter(|_| is_first) {
+            let (room, ktx2) = (&args.room, args.mapping.ktx2);
+            kept.outputs.maps = maps::write(output, room, scene, maps, &glb, &exposure, ktx2)?;
+        }
+        if let Some(grid) = self.grid {
+            talk.phase("probing");
+            let names = (output, args.room.as_path());
+            kept.outputs.probes = parting::write_probes(bake, grid, names, &exposure, talk)?;
+        }
+        kept.outputs.report = kept.report.as_ref().map(|r| text(&r.path));
+        if let Some(path) = &args.npz {
+            write_npz(path, &args.room, bake, baked)?;
+            kept.outputs.npz = Some(text(path));
+        }
+        let uncached = self.write_cache(bake, baked, kept);
+        if let Some(snapshots) = &kept.snapshots {
+            let (files, exr) = snapshots.results(scene, &baked.surfaces, &exposure)?;
+            kept.outputs.pictures.extend(files);
+            kept.outputs.exr = exr;
+        }
+        kept.seconds.write = clock.elapsed().as_secs_f64();
+        Ok(Written {
+            glb,
+            exposure,
+            uncached,
+        })
+    }
+
+    /// Writes the cache, if one is asked for; what went wrong.
+    fn write_cache(self, bake: &Bake, baked: &Baked, kept: &mut Kept) -> Option<Error> {
+        let path = self.cache?;
+        match bake.write_cache(baked, path, self.args.cache_limit << 20) {
+            Ok(size) => {
+                let mb = size as f64 / f64::from(1 << 20);
+                self.talk.say(&format!("cache: {}, {mb:.1} MB", text(path)));
+                kept.outputs.cache = Some(text(path));
+                None
+            }
+            Err(error) => Some(error),
+        }
+    }
+
+    /// Measures the error, if that is asked for.
+    pub(super) fn audit(
+        self,
+        bake: &Bake,
+        lit: &Lit,
+        kept: &mut Kept,
+    ) -> Result<Option<audit::Report>> {
+        let clock = Instant::now();
+        let audit = self.args.audit.map(|points| {
+            self.talk.phase("auditing");
+            let seed = self.common.seed ^ AUDIT_SEED;
+            let reference = Reference::new(bake, points, AUDIT_PATHS, seed);
+            match &lit.maps {
+                Some(maps) => audit::Report::of_maps(bake, maps, &reference),
+                None => audit::Report::of_file(bake, lit.baked(), &reference),
+            }
+        });
+        if let Some(audit) = &audit {
+            kept.log(audit)?;
+        }
+        kept.seconds.audit = clock.elapsed().as_secs_f64();
+        Ok(audit)
+    }
+
+    /// Says what came of it; the exit code.
+    pub(super) fn end(
+        self,
+        bake: &Bake,
+        lit: &Lit,
+        written: Written,
+        audit: Option<&audit::Report>,
+        mut kept: Kept,
+    ) -> Result<u8> {
+        let Self {
+            args, stop, talk, ..
+        } = self;
+        kept.seconds.total = stop.elapsed_s();
+        let record = VerdictRecord::new(End {
+            bake,
+            verdict: lit.verdict,
+            baked: lit.baked(),
+            glb: &written.glb,
+            exposure: written.exposure,
+            outputs: std::mem::take(&mut kept.outputs),
+            seconds: kept.seconds,
+            warned: talk.warned(),
+        });
+        kept.log(&record)?;
+        if let Some(report) = &kept.report {
+            self.page(report, (&record, audit), (bake, lit), &written)?;
+        }
+        talk.clear();
+        talk.say(&format!("\n{}", summary::rounds(bake.rounds())));
+        talk.say(&summary::verdict(&record, audit));
+        talk.count_warnings();
+        if args.json {
+            let line = serde_json::to_string(&record)
+                .map_err(|problem| Error::Internal(format!("verdict: {problem}")))?;
+            print(&(line + "\n"))?;
+        }
+        written.uncached.map_or(Ok(exit_code(lit.verdict)), Err)
+    }
+
+    /// Writes the page.
+    fn page(
+        self,
+        report: &Report,
+        (record, audit): (&VerdictRecord, Option<&audit::Report>),
+        (bake, lit): (&Bake, &Lit),
+        written: &Written,
+    ) -> Result<()> {
+        let baked = lit.baked();
+        // The viewer opens no packed file, and knows vertices by their order.
+        let asked = self.args.storing.writing();
+        let plain = Writing {
+            packing: Packing::default(),
+            ..asked
+        };
+        let plain = match plain == asked {
+            true => None,
+            false => Some(baked_glb(
+                bake.scene(),
+                &baked.surfaces,
+                &written.exposure,
+                plain,
+            )?),
+        };
+        let glb = plain.as_ref().unwrap_or(&written.glb);
+        report.write(record, audit, baked, self.cameras, glb, bake)
+    }
+}
+
+/// Vertices that the budget allows.
+fn most_vertices(args: &BakeArgs, scene: &Scene) -> Result<Option<usize>> {
+    let of_bytes = args
+        .megabytes
+        .map(|mb| vertices_within(scene, (mb * 1e6) as usize, args.storing.writing()))
+        .transpose()?;
+    Ok(args.vertices.into_iter().chain(of_bytes).min())
+}
+
+/// What to say of a file that is larger than its budget.
+fn over_budget(args: &BakeArgs, glb: &BakedGlb) -> Vec<String> {
+    let mb = glb.bytes.len() as f64 / 1e6;
+    let vertices = args.vertices.filter(|most| glb.vertices > *most);
+    let megabytes = args.megabytes.filter(|most| mb > *most);
+    let of_vertices = vertices.map(|most| {
+        let count = glb.vertices;
+        format!("the baked room has {count} vertices and not {most}: the room itself needs as many")
+    });
+    let of_bytes =
+        megabytes.map(|most| format!("the baked room takes {mb:.2} MB, more than {most}"));
+    of_vertices.into_iter().chain(of_bytes).collect()
+}

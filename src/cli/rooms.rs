@@ -1,0 +1,94 @@
+//! Rooms as commands read and prepare them.
+
+use super::options::{Common, Reading, Solving};
+use super::paths;
+use super::talk::Talk;
+use crate::error::{Error, Problem, Result};
+use crate::gather::Baked;
+use crate::output::npz;
+use crate::scene::Scene;
+use crate::solve::{Bake, Representation, Settings};
+use crate::store::file;
+use crate::survey::advise;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Phases of a round, in order.
+const PHASES: [&str; 6] = [
+    "links", "spectrum", "direct", "balance", "solve", "estimate",
+];
+/// Reads a room and looks it over; its problems and those that `others` finds (given the files the room is made of) come together.
+pub(super) fn load(
+    room: &Path,
+    reading: &Reading,
+    others: impl FnOnce(&[PathBuf]) -> Vec<Problem>,
+) -> Result<Scene> {
+    match Scene::load(room, &reading.options()) {
+        Ok(mut scene) => {
+            let mut problems = advise(&mut scene, reading.wishes());
+            problems.extend(others(&paths::parts(&scene)));
+            if problems.is_empty() {
+                Ok(scene)
+            } else {
+                Err(Error::Input(problems))
+            }
+        }
+        Err(Error::Input(mut problems)) => {
+            problems.extend(others(&[]));
+            Err(Error::Input(problems))
+        }
+        Err(Error::Io { path, source }) => {
+            let mut problems = vec![Problem::new(
+                path,
+                source.to_string(),
+                "name a file that can be read",
+            )];
+            problems.extend(others(&[]));
+            Err(Error::Input(problems))
+        }
+        Err(fault) => Err(fault),
+    }
+}
+
+/// The bake of a scene, which tells `talk` of its phases.
+pub(super) fn prepare(
+    scene: Scene,
+    solving: &Solving,
+    common: &Common,
+    representation: Representation,
+    talk: &Talk,
+) -> Bake {
+    let settings = Settings {
+        error: solving.error,
+        representation,
+        seed: common.seed,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(scene, settings);
+    bake.spread_over(common.team);
+    let parts = talk.parts();
+    bake.watch(Arc::new(move |ended| {
+        let place = PHASES.iter().position(|phase| *phase == ended);
+        let next = place.and_then(|k| PHASES.get(k + 1)).unwrap_or(&"");
+        parts.begins("round", next);
+    }));
+    bake
+}
+
+/// Writes a baked mesh with its spectra for NumPy.
+pub(super) fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()> {
+    let spectra = bake.radiosity_spectra(baked);
+    // The writer's own error says more than what the system makes of it.
+    let mut problem = None;
+    let written = file::write_atomic(path, Some(room), |w| {
+        npz::write_baked(w, bake.scene(), &baked.surfaces, &spectra).map_err(|e| {
+            let text = e.to_string();
+            problem = Some(e);
+            std::io::Error::other(text)
+        })
+    });
+    match problem {
+        Some(Error::Internal(what)) => Err(Error::Internal(what)),
+        _ => written,
+    }
+}
