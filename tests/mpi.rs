@@ -242,6 +242,34 @@ fn a_fault_is_told_once() {
     assert!(!folder.path().join("b.glb").exists());
 }
 
+/// `srun --mpi=pmix` does not say how many ranks there are before MPI is started.
+#[test]
+fn a_launcher_need_not_tell_the_size() {
+    let folder = tempfile::tempdir().unwrap();
+    if mpirun(2).is_none() {
+        return;
+    }
+    let mut command = Command::new("mpirun");
+    command
+        .args([
+            "--oversubscribe",
+            "--allow-run-as-root",
+            "--bind-to",
+            "none",
+        ])
+        .args(["-n", "2", "env", "-u", "OMPI_COMM_WORLD_SIZE"])
+        .arg(env!("CARGO_BIN_EXE_haarlight"));
+    let out = bake(
+        &mut command,
+        "convex.glb",
+        &folder.path().join("a.glb"),
+        &[],
+    );
+    ended_well(&out);
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(text.matches("round 1:").count(), 1, "{text}");
+}
+
 /// Commands that one rank does by itself say so.
 #[test]
 fn other_commands_are_refused() {

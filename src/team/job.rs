@@ -7,6 +7,10 @@ use crate::error::{Error, Result};
 
 /// Variables by which launchers tell how many ranks there are: Open MPI's, and the process managers' of MPICH and Slurm.
 const SIZES: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
+/// `srun --mpi=pmix` tells a rank only its number, and Slurm beside it how many tasks the step has.
+const PMIX: &str = "PMIX_RANK";
+const PMIX_SIZE: &str = "SLURM_STEP_NUM_TASKS";
+
 /// The job that this process is part of, from its start to its end.
 #[derive(Default)]
 pub struct Job {
@@ -18,8 +22,12 @@ pub struct Job {
 
 /// How many ranks a launcher says there are; none where there is no launcher.
 fn launched() -> Option<usize> {
-    let size = |name: &&str| std::env::var(name).ok()?.parse().ok();
-    SIZES.iter().find_map(size)
+    let size = |name: &str| std::env::var(name).ok()?.parse().ok();
+    let pmix = || {
+        std::env::var_os(PMIX)?;
+        Some(size(PMIX_SIZE).unwrap_or(1))
+    };
+    SIZES.into_iter().find_map(size).or_else(pmix)
 }
 
 impl Job {
