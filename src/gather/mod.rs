@@ -5,6 +5,7 @@ mod bake;
 mod layers;
 mod probe;
 pub mod refined;
+mod shown;
 mod spectra;
 
 pub use crate::transport::MOSTLY;

@@ -2,7 +2,8 @@
 
 use super::pane::Pane;
 use super::profile::Profile;
-use super::{Sides, Texture};
+use super::sheet::Sheet;
+use super::{Image, Sides, Texture};
 use crate::color::Upsampler;
 use crate::data::Leaves;
 use std::sync::Arc;
@@ -35,6 +36,8 @@ pub struct Material {
     pub alpha: Alpha,
     /// What it lets straight through; then its surfaces stand in [`Scene::panes`](crate::scene::Scene::panes).
     pub pane: Option<Pane>,
+    /// What it lets through diffusely; then [`reflectance`](Self::reflectance) is what is left of the base colour.
+    pub sheet: Option<Sheet>,
 }
 
 /// Coverage.
@@ -94,6 +97,20 @@ impl Material {
             .map(|r| r.min(GREATEST_ALBEDO))
     }
 }
+
+impl Material {
+    /// The base colour with the mean of its texture, linear; none where it has no texture.
+    pub(crate) fn mean_color(&self, images: &[Image]) -> Option<[f32; 3]> {
+        let image = images.get(self.paint.as_ref()?.image)?;
+        let mean = image.mean();
+        Some(std::array::from_fn(|c| {
+            self.base_color[c] * mean[c].max(DARKEST_PAINT)
+        }))
+    }
+}
+
+/// Textures count as no darker than this in the mean, so that light may be divided by it.
+pub(crate) const DARKEST_PAINT: f32 = 1e-3;
 
 impl Emission {
     /// The shape at a point whose emissive texture has this linear value; `[1, 1, 1]` gives [`Emission::shape`].

@@ -36,6 +36,7 @@ mod raw;
 mod reader;
 mod room;
 mod said;
+pub mod sheet;
 pub mod sky;
 mod source;
 mod spectra_file;

@@ -32,6 +32,7 @@ mod reflection;
 mod representation;
 mod sent;
 mod shares;
+mod sheets;
 mod solving;
 mod sources;
 mod tinted;

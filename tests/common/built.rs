@@ -75,6 +75,7 @@ impl Room {
             emission: None,
             alpha: Alpha::Opaque,
             pane: None,
+            sheet: None,
         });
         self.materials.len() - 1
     }
