@@ -501,7 +501,32 @@ impl<'a> Audit<'a> {
         let color = self.color(material, triangle, weights);
         let weights = self.mesh.on_origin_f32(triangle, weights);
         let weave = sheet.weave(|texture| self.texel(texture, triangle, weights));
-        sheet.scatters(material, color, weave, back, &self.upsampler)
+        material.scatters(sheet, color, weave, back, &self.upsampler)
+    }
+
+    /// The shares of the light that meets a side of a sheet, and of that behind it, in what it is shown by: without the pattern of its
+    /// paint, which viewers add. None of what is no sheet.
+    pub(super) fn shares(
+        &self,
+        triangle: usize,
+        weights: [f32; 3],
+        back: bool,
+    ) -> Option<[Leaves; 2]> {
+        let material = &self.scene.materials[self.mesh.material[triangle] as usize];
+        let sheet = material.sheet.as_ref()?;
+        let weights = self.mesh.on_origin_f32(triangle, weights);
+        let weave = sheet.weave(|texture| self.texel(texture, triangle, weights));
+        let (color, up) = (material.mean_color(&self.scene.images), &self.upsampler);
+        let [own, across] = material.scatters(sheet, color, weave, back, up);
+        let whole = sheet.mean_weave(&self.scene.images);
+        let whole = material.shown(sheet, color, whole, up);
+        let share = |of: Leaves, none: f64| -> Leaves {
+            std::array::from_fn(|k| match whole[k] > 0.0 {
+                true => of[k] / whole[k],
+                false => none,
+            })
+        };
+        Some([share(own, 1.0), share(across, 0.0)])
     }
 
     /// The painted base colour at a point of a triangle; none where nothing paints it.

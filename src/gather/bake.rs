@@ -263,7 +263,7 @@ impl<'a> Look<'a> {
         let reflectance = match (&material.sheet, mean) {
             (Some(sheet), _) => {
                 let color = material.mean_color(images);
-                sheet.shown(material, color, sheet.mean_weave(images), upsampler)
+                material.shown(sheet, color, sheet.mean_weave(images), upsampler)
             }
             (None, Some(_)) => upsampler.reflectance(color),
             (None, None) => material.reflectance,

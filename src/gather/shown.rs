@@ -3,7 +3,7 @@
 use crate::hierarchy::NONE;
 use crate::light::mixed;
 use crate::solve::{Bake, Care};
-use crate::transport::{Gathered, Receiver};
+use crate::transport::{Gathered, Receiver, trace};
 
 impl Bake {
     /// Gathers at points of surfaces, in order; where these are diffuse sheets also behind them, see [`Through`](crate::light::Through).
@@ -24,23 +24,31 @@ impl Bake {
             mixed(shares, &mut shown.irradiance, &other.irradiance);
             mixed(shares, &mut shown.direct, &other.direct);
             shown.rays += other.rays;
+            if let (Some(own), Some(other)) = (&shown.packed, &other.packed) {
+                shown.packed = Some(trace::joined(own, other));
+            }
         }
         gathered
     }
 
     /// The place of the leaf of a point of a sheet among the leaves of the solution, and the point behind it.
     fn behind(&self, to: &Receiver) -> Option<(u32, Receiver)> {
-        let (tree, light) = (self.tree(), self.light());
-        if light.through.is_empty() {
-            return None;
-        }
-        let leaf = to.leaf.filter(|&leaf| tree.behind(leaf) != NONE)?;
-        let place = light.leaves.binary_search(&leaf).ok()?;
+        let leaf = to.leaf?;
+        let place = self.place_on_sheet(leaf)?;
         let other = Receiver {
             normal: -to.normal,
-            leaf: Some(tree.behind(leaf)),
+            leaf: Some(self.tree().behind(leaf)),
             ..*to
         };
-        Some((place as u32, other))
+        Some((place, other))
+    }
+
+    /// The place of a leaf among the leaves of the solution, if it is one of a sheet.
+    pub(crate) fn place_on_sheet(&self, leaf: u32) -> Option<u32> {
+        let light = self.light();
+        if light.through.is_empty() || self.tree().behind(leaf) == NONE {
+            return None;
+        }
+        light.leaves.binary_search(&leaf).ok().map(|k| k as u32)
     }
 }

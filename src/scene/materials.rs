@@ -13,7 +13,7 @@ use super::luminaires::ProfileWish;
 use super::pane;
 use super::raw::{AlphaMode, RawMaterial};
 use super::reader::Sampled;
-use super::sheet;
+use super::sheets;
 use super::spectra_file::SpectraFile;
 use super::{Alpha, Emission, GREATEST_ALBEDO, Material, Sides};
 use crate::color::Upsampler;
@@ -30,7 +30,7 @@ struct Said {
     metals: Vec<String>,
     unlit: Vec<String>,
     panes: pane::Said,
-    sheets: sheet::Said,
+    sheets: sheets::Said,
     bright: Vec<String>,
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn materials(
             let panes = &mut said.panes;
             material.pane = panes.pane(raw, &name, through, emits, &place, upsampler, check);
             let rho = &mut material.reflectance;
-            let sheet = sheet::of(raw, &spectra, rho, &place, grid, upsampler, check);
+            let sheet = sheets::sheet(raw, &spectra, rho, &place, grid, upsampler, check);
             if sheet.is_some() {
                 said.sheets.hear(raw, &name, material.pane.is_some(), emits);
             }

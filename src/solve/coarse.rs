@@ -6,9 +6,8 @@
 
 use super::conjugate::System;
 use super::operator::Operator;
-use super::reflection::Reflection;
+use super::reflection::{Reflection, Sheets};
 use super::sheets;
-use super::sources::Sheets;
 use crate::color::luv_jacobian;
 use crate::hierarchy::{NONE, Node, Tree};
 use crate::light::Through;
@@ -121,24 +120,7 @@ impl Coarse {
             *passes = passes.map(|x| x / area[pair[0] as usize]);
         }
         let matrix = exchanges(tree, links, factor, areas, &group, count);
-        let mut pairs = Vec::new();
-        for a in 0..count {
-            for b in a..count {
-                let g = matrix[a * count + b];
-                if g > 0.0 {
-                    // A patch of the model may light itself; the row holds it twice, so half is stored.
-                    let g = if a == b { 0.5 * g } else { g };
-                    pairs.push(Link {
-                        a: a as u32 + 1,
-                        b: b as u32 + 1,
-                        exchange: g as f32,
-                        open_exchange: g as f32,
-                        variation: 0.0,
-                        way: Way::Clear,
-                    });
-                }
-            }
-        }
+        let pairs = pairs(&matrix, count);
         Self {
             tree: flat_tree(&area),
             links: LinkRows::new(count + 1, &pairs),
@@ -513,6 +495,29 @@ fn exchanges(
         }
     }
     matrix
+}
+
+/// The exchanges of a model as links.
+fn pairs(matrix: &[f64], count: usize) -> Vec<Link> {
+    let mut pairs = Vec::new();
+    for a in 0..count {
+        for b in a..count {
+            let g = matrix[a * count + b];
+            if g > 0.0 {
+                // A patch of the model may light itself; the row holds it twice, so half is stored.
+                let g = if a == b { 0.5 * g } else { g };
+                pairs.push(Link {
+                    a: a as u32 + 1,
+                    b: b as u32 + 1,
+                    exchange: g as f32,
+                    open_exchange: g as f32,
+                    variation: 0.0,
+                    way: Way::Clear,
+                });
+            }
+        }
+    }
+    pairs
 }
 
 /// A root with one child a patch.

@@ -1,10 +1,9 @@
 //! How the leaves reflect: lane by lane, or by a matrix a paint where lanes reflect into each other; and what passes sheets.
 
 use super::mixed::Mixed;
-use super::sources::Sheets;
 use super::{conjugate, linear};
-use crate::light::Rows;
 use crate::light::lanes::Lanes;
+use crate::light::{Rows, Through};
 
 /// What turns irradiance of the leaves into radiosity.
 pub(super) struct Reflection {
@@ -16,6 +15,17 @@ pub(super) struct Reflection {
     pub(super) mixed: Option<Mixed>,
     /// What passes sheets; never where lanes are no bands.
     pub(super) sheets: Option<Sheets>,
+}
+
+/// What the leaves of diffuse sheets let through.
+#[derive(Debug, Clone)]
+pub(crate) struct Sheets {
+    /// Places among the leaves of a side and of the one behind it, ascending.
+    pub pairs: Vec<[u32; 2]>,
+    /// Transmittance of each pair.
+    pub through: Rows,
+    /// How their light is shown.
+    pub shown: Through,
 }
 
 impl Reflection {

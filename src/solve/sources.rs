@@ -1,6 +1,7 @@
 //! Reflectance and emission of patches, row by row, from the materials.
 
 use super::mixed::Mixed;
+use super::reflection::Sheets;
 use crate::color::Upsampler;
 use crate::hierarchy::{Element, Mesh, NONE, Tree};
 use crate::light::Through;
@@ -26,17 +27,6 @@ pub(crate) struct Sources {
     pub greatest: Vec<f32>,
     /// What passes sheets; none in a room without.
     pub sheets: Option<Sheets>,
-}
-
-/// What the leaves of diffuse sheets let through.
-#[derive(Debug, Clone)]
-pub(crate) struct Sheets {
-    /// Places among the leaves of a side and of the one behind it, ascending.
-    pub pairs: Vec<[u32; 2]>,
-    /// Transmittance of each pair.
-    pub through: Rows,
-    /// How their light is shown.
-    pub shown: Through,
 }
 
 /// Turns materials into rows.
@@ -172,11 +162,11 @@ impl<'a> Painter<'a> {
         let weave = sheet.weave(|texture| self.texel(texture, surface, triangle, &weights));
         let color = self.paint_of(m, triangle, element);
         let up = self.upsampler;
-        let [rho, through] = sheet.scatters(m, color, weave, face.back, up);
+        let [rho, through] = m.scatters(sheet, color, weave, face.back, up);
         let color = m.mean_color(&self.scene.images);
-        let [plain, _] = sheet.scatters(m, color, weave, face.back, up);
+        let [plain, _] = m.scatters(sheet, color, weave, face.back, up);
         let mean = sheet.mean_weave(&self.scene.images);
-        Some([rho, through, plain, sheet.shown(m, color, mean, up)])
+        Some([rho, through, plain, m.shown(sheet, color, mean, up)])
     }
 
     /// The matrices of the given leaves, where lanes reflect into each other.
