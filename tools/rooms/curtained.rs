@@ -1,4 +1,4 @@
-//! A room at dusk behind a curtain that is half drawn, with a paper shade around a bulb and an opal ball around a lamp.
+//! A room on a dull day behind a curtain that is half drawn, with a paper shade around a bulb and an opal ball around a lamp.
 
 use crate::cells::Cells;
 use crate::glb::{Glb, Mesh, matt};
@@ -26,12 +26,12 @@ pub(crate) fn room() -> Glb {
     glb.draw("curtain", &[(&curtain(), cloth)]);
     table(&mut glb);
     let opal = sheet(&mut glb, "opal glass", [0.9; 3], 0.5, [0.92, 0.92, 0.9]);
-    let ball = sphere([0.9, 2.05, 1.0], 0.16, AROUND);
+    let ball = sphere([0.9, 1.95, 1.0], 0.26, 16);
     glb.draw("ball", &[(&ball, opal)]);
     let dark = glb.paint("cord", [0.05; 3]);
     glb.draw("cord", &[(&tube([0.9, 2.21, 1.0], 0.006, 0.39, 6), dark)]);
-    let lamp = json!({"name": "in the ball", "type": "point", "intensity": 60.0, "color": [1.0, 0.86, 0.68]});
-    glb.light(lamp, dvec3(0.9, 2.05, 1.0), dvec3(0.9, 0.0, 1.0 + 1e-6));
+    let lamp = json!({"name": "in the ball", "type": "point", "intensity": 25.0, "color": [1.0, 0.86, 0.68]});
+    glb.light(lamp, dvec3(0.9, 1.95, 1.0), dvec3(0.9, 0.0, 1.0 + 1e-6));
     let picture = glb.paint("picture", [0.12, 0.2, 0.36]);
     let mut frame = block([4.37, 1.1, 0.7], [4.4, 1.9, 1.9]);
     let (positions, triangles) = (&frame.positions, &mut frame.triangles);
@@ -112,7 +112,7 @@ fn curtain() -> Mesh {
     mesh
 }
 
-/// A chest with a lamp on it: a bulb of 800 lm in a cone of paper, open above and below.
+/// A chest with a lamp on it: a bulb of 300 lm in a cone of paper, open above and below.
 fn table(glb: &mut Glb) {
     let wood = glb.paint("chest", [0.42, 0.27, 0.15]);
     let mut chest = block([3.4, 0.0, 2.4], [4.2, 0.62, 3.3]);
@@ -136,7 +136,7 @@ fn table(glb: &mut Glb) {
     glb.draw("lamp foot", &[(&foot, brass)]);
     let bulb: DVec3 = DVec3::from_array(at) + dvec3(0.0, 0.345, 0.0);
     let radius = 0.04;
-    let nits = 800.0 / (PI * 4.0 * PI * radius * radius);
+    let nits = 400.0 / (PI * 4.0 * PI * radius * radius);
     let glow = glb.lamp("bulb", [0.6; 3], [1.0, 0.78, 0.5], nits);
     let globe = sphere(bulb.to_array(), radius, 12);
     glb.draw("bulb", &[(&globe, glow)]);
@@ -149,7 +149,7 @@ fn table(glb: &mut Glb) {
     glb.draw("shade", &[(&shade, paper)]);
 }
 
-/// An overcast sky at dusk; paper by spectra, lighter inside than outside.
+/// A dull sky; paper by spectra, lighter inside than outside.
 pub(crate) fn spectra() -> Value {
     json!({
         "materials": {
@@ -159,6 +159,6 @@ pub(crate) fn spectra() -> Value {
                 "transmission": {"csv": "380,0.12\n450,0.26\n550,0.36\n650,0.41\n700,0.42"},
             },
         },
-        "sky": {"type": "overcast", "illuminance_lx": 900, "cct_k": 9000},
+        "sky": {"type": "overcast", "illuminance_lx": 4000, "cct_k": 7500},
     })
 }
