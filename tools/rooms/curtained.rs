@@ -26,12 +26,12 @@ pub(crate) fn room() -> Glb {
     glb.draw("curtain", &[(&curtain(), cloth)]);
     table(&mut glb);
     let opal = sheet(&mut glb, "opal glass", [0.9; 3], 0.5, [0.92, 0.92, 0.9]);
-    let ball = sphere([0.9, 1.95, 1.0], 0.26, 16);
+    let ball = sphere([3.2, 1.95, 1.3], 0.2, 16);
     glb.draw("ball", &[(&ball, opal)]);
     let dark = glb.paint("cord", [0.05; 3]);
-    glb.draw("cord", &[(&tube([0.9, 2.21, 1.0], 0.006, 0.39, 6), dark)]);
+    glb.draw("cord", &[(&tube([3.2, 2.15, 1.3], 0.006, 0.45, 6), dark)]);
     let lamp = json!({"name": "in the ball", "type": "point", "intensity": 25.0, "color": [1.0, 0.86, 0.68]});
-    glb.light(lamp, dvec3(0.9, 1.95, 1.0), dvec3(0.9, 0.0, 1.0 + 1e-6));
+    glb.light(lamp, dvec3(3.2, 1.95, 1.3), dvec3(3.2, 0.0, 1.3 + 1e-6));
     let picture = glb.paint("picture", [0.12, 0.2, 0.36]);
     let mut frame = block([4.37, 1.1, 0.7], [4.4, 1.9, 1.9]);
     let (positions, triangles) = (&frame.positions, &mut frame.triangles);
