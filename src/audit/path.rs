@@ -10,7 +10,7 @@ use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Face, Glazing, Mesh, Panes};
 use crate::scene::sky::SUN_RADIUS;
-use crate::scene::{Alpha, LightKind, PunctualLight, Scene, Sides, Texture};
+use crate::scene::{Alpha, LightKind, Material, PunctualLight, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -191,7 +191,14 @@ impl<'a> Audit<'a> {
                     sum[l] += throughput[l] * PI * radiance[l] * share;
                 }
             }
-            let albedo = self.albedo(triangle, weights);
+            let (albedo, normal) = match &material.sheet {
+                Some(_) => {
+                    let sides = self.both_sides(triangle, weights, hit.from_behind);
+                    let (albedo, passes) = one_side(sides, &throughput, rng);
+                    (albedo, if passes { -normal } else { normal })
+                }
+                None => (self.albedo(triangle, weights), normal),
+            };
             for (t, a) in throughput.iter_mut().zip(&albedo) {
                 *t *= a;
             }
@@ -478,10 +485,56 @@ impl<'a> Audit<'a> {
 
     fn albedo(&self, triangle: usize, weights: [f32; 3]) -> Leaves {
         let material = &self.scene.materials[self.mesh.material[triangle] as usize];
+        match self.color(material, triangle, weights) {
+            Some(color) => (self.upsampler.reflectance_fast(color))
+                .map(|x| x.min(crate::scene::GREATEST_ALBEDO)),
+            None => material.reflectance,
+        }
+    }
+
+    /// What one side of a sheet reflects, and what it lets through.
+    fn both_sides(&self, triangle: usize, weights: [f32; 3], back: bool) -> [Leaves; 2] {
+        let material = &self.scene.materials[self.mesh.material[triangle] as usize];
+        let Some(sheet) = &material.sheet else {
+            return [self.albedo(triangle, weights), [0.0; LEAVES]];
+        };
+        let color = self.color(material, triangle, weights);
+        let weights = self.mesh.on_origin_f32(triangle, weights);
+        let weave = sheet.weave(|texture| self.texel(texture, triangle, weights));
+        material.scatters(sheet, color, weave, back, &self.upsampler)
+    }
+
+    /// The shares of the light that meets a side of a sheet, and of that behind it, in what it is shown by: without the pattern of its
+    /// paint, which viewers add. None of what is no sheet.
+    pub(super) fn shares(
+        &self,
+        triangle: usize,
+        weights: [f32; 3],
+        back: bool,
+    ) -> Option<[Leaves; 2]> {
+        let material = &self.scene.materials[self.mesh.material[triangle] as usize];
+        let sheet = material.sheet.as_ref()?;
+        let weights = self.mesh.on_origin_f32(triangle, weights);
+        let weave = sheet.weave(|texture| self.texel(texture, triangle, weights));
+        let (color, up) = (material.mean_color(&self.scene.images), &self.upsampler);
+        let [own, across] = material.scatters(sheet, color, weave, back, up);
+        let whole = sheet.mean_weave(&self.scene.images);
+        let whole = material.shown(sheet, color, whole, up);
+        let share = |of: Leaves, none: f64| -> Leaves {
+            std::array::from_fn(|k| match whole[k] > 0.0 {
+                true => of[k] / whole[k],
+                false => none,
+            })
+        };
+        Some([share(own, 1.0), share(across, 0.0)])
+    }
+
+    /// The painted base colour at a point of a triangle; none where nothing paints it.
+    fn color(&self, material: &Material, triangle: usize, weights: [f32; 3]) -> Option<[f32; 3]> {
         let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
         let colors = surface.colors.as_ref().filter(|_| material.vertex_paint);
         if material.paint.is_none() && colors.is_none() {
-            return material.reflectance;
+            return None;
         }
         let weights = self.mesh.on_origin_f32(triangle, weights);
         let mut color = material.base_color;
@@ -497,9 +550,7 @@ impl<'a> Audit<'a> {
                     .sum::<f32>();
             }
         }
-        self.upsampler
-            .reflectance_fast(color)
-            .map(|x| x.min(crate::scene::GREATEST_ALBEDO))
+        Some(color)
     }
 
     fn texel(&self, texture: &Texture, triangle: usize, weights: [f32; 3]) -> [f32; 4] {
@@ -515,6 +566,25 @@ impl<'a> Audit<'a> {
                 .sum()
         });
         texture.sample(&self.scene.images, uv)
+    }
+}
+
+/// Which of two ways light goes on, and by what it is multiplied: by chance, each as often as it may carry on the most of what is left,
+/// so that weights do not grow.
+fn one_side(sides: [Leaves; 2], throughput: &Leaves, rng: &mut Pcg) -> (Leaves, bool) {
+    let [reflected, through] = sides.each_ref().map(|side| {
+        let carried = side.iter().zip(throughput).map(|(s, t)| s * t);
+        carried.fold(0.0, f64::max)
+    });
+    if reflected + through <= 0.0 {
+        return ([0.0; LEAVES], false);
+    }
+    let chance = through / (reflected + through);
+    let passes = rng.f64() < chance;
+    let [reflected, through] = sides;
+    match passes {
+        true => (through.map(|x| x / chance), true),
+        false => (reflected.map(|x| x / (1.0 - chance)), false),
     }
 }
 

@@ -12,6 +12,7 @@ use crate::solve::Bake;
 use crate::spectrum::Leaves;
 use crate::transport::Receiver;
 use glam::DVec3;
+use std::borrow::Cow;
 
 /// Paths of a point that tell how many more it takes.
 const PILOT: usize = 512;
@@ -42,6 +43,9 @@ pub struct Reference {
     pub truth: Vec<[f64; 3]>,
     /// The same by independent batches, of which `truth` is the mean.
     pub batches: Vec<[[f64; 3]; BATCHES]>,
+    /// What points of diffuse sheets show, with the light behind them, see [`Through`](crate::light::Through): number of the point and
+    /// what its batches come to. Empty without sheets.
+    pub(super) shown: Vec<(usize, [[f64; 3]; BATCHES])>,
     /// Random points that were left out, as something solid covers them.
     pub covered: usize,
     /// Paths traced, the pilot's too.
@@ -68,12 +72,12 @@ impl Reference {
         let weights = Observer::cie1931()
             .weights(&bake.scene().grid)
             .map(|w| w.map(|x| KM * x));
-        let trace = |paths: &[usize], seed: u64| -> Vec<[[f64; 3]; BATCHES]> {
-            let answers = audit.irradiance(&starts, paths, seed);
+        let tristimulus = |answers: &[Answer]| -> Vec<[[f64; 3]; BATCHES]> {
             answers.iter().map(|a| tristimulus(a, &weights)).collect()
         };
+        let trace = |paths: &[usize], seed: u64| audit.irradiance(&starts, paths, seed);
         let few = vec![PILOT.min(most_paths); starts.len()];
-        let pilot = trace(&few, seed ^ 0x9110);
+        let pilot = tristimulus(&trace(&few, seed ^ 0x9110));
         let white = bake.settings().white.unwrap_or_else(|| {
             let n = pilot.len().max(1) as f64;
             let all = pilot.iter().map(mean);
@@ -89,8 +93,12 @@ impl Reference {
                     .min(most_paths.max(1))
             })
             .collect();
-        let batches = trace(&wanted, seed);
+        let answers = trace(&wanted, seed);
+        let batches = tristimulus(&answers);
+        let (on_sheets, shown) = shown(&audit, &places, &starts, &wanted, (answers, seed));
+        let shown = on_sheets.into_iter().zip(tristimulus(&shown)).collect();
         Self {
+            shown,
             truth: batches.iter().map(mean).collect(),
             points: places,
             batches,
@@ -98,6 +106,19 @@ impl Reference {
             paths: few.iter().chain(&wanted).map(|&n| n as u64).sum(),
             seed,
         }
+    }
+
+    /// The same with what diffuse sheets show of both their sides, as files hold it.
+    pub(super) fn as_shown(&self) -> Cow<'_, Self> {
+        if self.shown.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let mut other = self.clone();
+        for (k, batches) in &self.shown {
+            other.truth[*k] = mean(batches);
+            other.batches[*k] = *batches;
+        }
+        Cow::Owned(other)
     }
 
     /// Where a bake of the same room receives light at the points.
@@ -125,6 +146,45 @@ impl Reference {
             .map(|b| (b[1] - self.truth[k][1]).powi(2));
         (squares.sum::<f64>() / (n * (n - 1.0))).sqrt()
     }
+}
+
+/// Which points lie on diffuse sheets, and what they show: what meets them, and with as many paths again what meets their other side.
+fn shown(
+    audit: &Audit,
+    places: &[Place],
+    starts: &[(DVec3, DVec3, u32)],
+    paths: &[usize],
+    (answers, seed): (Vec<Answer>, u64),
+) -> (Vec<usize>, Vec<Answer>) {
+    let shares = |place: &Place| {
+        let [a, b, c] = place.weights.map(|w| w as f32);
+        let weights = if place.face.back {
+            [a, c, b]
+        } else {
+            [a, b, c]
+        };
+        audit.shares(place.face.triangle as usize, weights, place.face.back)
+    };
+    let (on, shares): (Vec<usize>, Vec<[Leaves; 2]>) = (places.iter().enumerate())
+        .filter_map(|(k, place)| Some((k, shares(place)?)))
+        .unzip();
+    let behind: Vec<(DVec3, DVec3, u32)> = (on.iter())
+        .map(|&k| (starts[k].0, -starts[k].1, starts[k].2))
+        .collect();
+    let paths: Vec<usize> = on.iter().map(|&k| paths[k]).collect();
+    let behind = audit.irradiance(&behind, &paths, seed ^ 0xbe41);
+    let shown = on.iter().zip(&shares).zip(behind);
+    let shown = shown.map(|((&k, [own, across]), behind)| {
+        let mix =
+            |x: &Leaves, y: &Leaves| std::array::from_fn(|l| own[l] * x[l] + across[l] * y[l]);
+        let batches = answers[k].batches.iter().zip(&behind.batches);
+        Answer {
+            mean: mix(&answers[k].mean, &behind.mean),
+            batches: batches.map(|(x, y)| mix(x, y)).collect(),
+        }
+    });
+    let shown = shown.collect();
+    (on, shown)
 }
 
 /// Random points by area, one stratum each, those that are not covered; and how many are.

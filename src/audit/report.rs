@@ -112,6 +112,7 @@ impl Report {
 
     /// Compares a baked mesh with a reference of the same room: light as a viewer draws it, interpolated between vertices.
     pub fn of_file(bake: &Bake, baked: &Baked, reference: &Reference) -> Self {
+        let reference = &*reference.as_shown();
         let points = reference.points.iter();
         let places: Vec<_> = points.map(|p| (p.face, p.point)).collect();
         let light = bake.drawn(baked, &places).into_iter();
@@ -121,6 +122,7 @@ impl Report {
 
     /// Compares light maps with a reference of the same room: light as a bilinear look-up has it.
     pub fn of_maps(bake: &Bake, maps: &LightMaps, reference: &Reference) -> Self {
+        let reference = &*reference.as_shown();
         let points = reference.points.iter();
         let places: Vec<_> = points
             .map(|p| (p.face, p.point - bake.mesh().centre))

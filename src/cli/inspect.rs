@@ -147,13 +147,21 @@ fn materials(materials: &[MaterialFact]) -> Vec<Vec<String>> {
     ];
     let row = |material: &MaterialFact| {
         let textured = if material.textured { ", textured" } else { "" };
+        let through = material.sheet.as_ref().map(|sheet| {
+            let (through, from) = (sheet.transmittance_y, short(&sheet.transmission));
+            format!("; {through:.3} passes ({from})")
+        });
         vec![
             material.name.clone(),
             material.triangles.to_string(),
             format!("{:.3}", material.area_m2),
             format!("{:.3}", material.albedo_y),
             material.sides.into(),
-            format!("{}{textured}", material.reflectance),
+            format!(
+                "{}{textured}{}",
+                material.reflectance,
+                through.unwrap_or_default()
+            ),
         ]
     };
     let rows = materials.iter().map(row);

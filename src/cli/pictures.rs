@@ -35,9 +35,12 @@ pub(super) fn write(folder: &Path, scene: &Scene, facts: &Facts) -> Result<()> {
     let used = scene.materials.iter().zip(&facts.materials);
     let materials: Vec<(String, Leaves)> = used
         .filter(|(_, fact)| fact.triangles > 0)
-        .map(|(material, fact)| {
+        .flat_map(|(material, fact)| {
             let less = if fact.textured { " less texture" } else { "" };
-            (format!("{}{less}", fact.name), material.reflectance)
+            let reflected = (format!("{}{less}", fact.name), material.reflectance);
+            let sheet = material.sheet.as_ref();
+            let passes = sheet.map(|s| (format!("{}, what passes", fact.name), s.transmittance));
+            std::iter::once(reflected).chain(passes)
         })
         .collect();
     profiles(folder, scene)?;

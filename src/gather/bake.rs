@@ -219,8 +219,10 @@ impl Bake {
 
 /// How a material turns irradiance into what is seen.
 pub(crate) struct Look<'a> {
-    /// Reflectance on the leaves, vertex colours apart.
+    /// Reflectance on the leaves, vertex colours apart; of diffuse sheets with the transmittance.
     reflectance: Leaves,
+    /// Transmittance, and what share of the base colour is reflected beside it.
+    through: Option<(Leaves, f64)>,
     /// Base colour with the texture's mean, where vertex colours multiply it.
     base: Option<[f32; 3]>,
     upsampler: &'a Upsampler,
@@ -257,13 +259,22 @@ impl<'a> Look<'a> {
         let color: [f32; 3] = std::array::from_fn(|c| {
             material.base_color[c] * mean.map_or(1.0, |mean| mean[c] as f32)
         });
-        let reflectance = match mean {
-            Some(_) => upsampler.reflectance(color),
-            None => material.reflectance,
+        let images = &bake.scene().images;
+        let reflectance = match (&material.sheet, mean) {
+            (Some(sheet), _) => {
+                let color = material.mean_color(images);
+                material.shown(sheet, color, sheet.mean_weave(images), upsampler)
+            }
+            (None, Some(_)) => upsampler.reflectance(color),
+            (None, None) => material.reflectance,
         };
         Self {
             reflected: bake.lanes().reflected(&reflectance),
             reflectance,
+            through: material.sheet.as_ref().map(|sheet| {
+                let weave = sheet.mean_weave(images);
+                (sheet.transmittance_at(weave, upsampler), sheet.left(weave))
+            }),
             base: material.vertex_paint.then_some(color),
             upsampler,
             unpainted: mean,
@@ -290,7 +301,12 @@ impl<'a> Look<'a> {
         let base = self.base.filter(|_| surface.colors.is_some())?;
         let color = refined_mesh::vertex_color(surface, vertex);
         let color = std::array::from_fn(|c| base[c] * color[c]);
-        Some(self.upsampler.reflectance_fast(color))
+        let painted = self.upsampler.reflectance_fast(color);
+        Some(match &self.through {
+            // Vertex colours paint what is reflected.
+            Some((through, left)) => std::array::from_fn(|k| through[k] + left * painted[k]),
+            None => painted,
+        })
     }
 
     /// Reflectance at a vertex.

@@ -6,6 +6,7 @@ mod glare;
 mod layers;
 mod probe;
 pub mod refined;
+mod shown;
 mod spectra;
 
 pub use crate::transport::MOSTLY;
@@ -50,7 +51,8 @@ pub struct BakedVertex {
     pub triangle: u32,
     /// Barycentric weights of the triangle's three corners, each in [0, 1], sum 1.
     pub weights: [f64; 3],
-    /// Tristimulus irradiance on the front (Km = 683 lm/W: Y is lux).
+    /// Tristimulus irradiance on the front (Km = 683 lm/W: Y is lux); of diffuse sheets with the light behind them, as it is shown
+    /// ([`Through`](crate::light::Through)).
     pub irradiance: [f32; 3],
     /// Tristimulus radiosity that leaves the front, own emission included, in lm/m2 (Y); radiance is this over pi.
     pub radiosity: [f32; 3],

@@ -110,6 +110,7 @@ impl Tree {
             face_normal: Vec::new(),
             face_area: vec![0.0],
             entry: vec![[NONE; 2]; mesh.triangles.len()],
+            ..Tree::default()
         };
         if items.is_empty() {
             return tree;
@@ -145,6 +146,7 @@ impl Tree {
             tree.entry[face.triangle as usize][usize::from(face.back)] = k as u32;
         }
         finish(mesh, &mut tree);
+        tree.pair_sheets(mesh);
         tree
     }
 }

@@ -45,6 +45,8 @@ pub struct Mesh {
     pub area: Vec<f64>,
     /// All sides that take part.
     pub faces: Vec<Face>,
+    /// Materials that are diffuse sheets: light passes between the two faces of their triangles. Empty where none is.
+    pub(super) sheets: Vec<u32>,
     /// First triangle of each surface, then the end: triangles of a surface stand together, in its own order.
     pub first_triangle: Vec<u32>,
     /// For each triangle that is a part of its origin, its entry in `within`.
@@ -68,6 +70,10 @@ impl Mesh {
         let mut mesh = Self {
             centre,
             half_size: 0.5 * (high - low).length(),
+            sheets: (0_u32..)
+                .zip(&scene.materials)
+                .filter_map(|(k, m)| m.sheet.as_ref().map(|_| k))
+                .collect(),
             ..Self::empty()
         };
         let mut welded: HashMap<[u64; 3], u32> = HashMap::new();
@@ -137,6 +143,7 @@ impl Mesh {
             normal: Vec::new(),
             area: Vec::new(),
             faces: Vec::new(),
+            sheets: Vec::new(),
             first_triangle: vec![0],
             part: Vec::new(),
             within: Vec::new(),

@@ -4,7 +4,7 @@
 //! is one backward and *push* one forward sweep. Elements split one to four at their edge midpoints
 //! (Hanrahan, Salzman and Aupperle 1991); clusters split as built.
 
-use super::mesh::Face;
+use super::mesh::{Face, Mesh};
 use crate::geometry::sampling::triangle_weights;
 use crate::geometry::{Hit, quarters};
 use glam::DVec3;
@@ -166,6 +166,9 @@ pub struct Tree {
     pub face_area: Vec<f64>,
     /// For each triangle of the mesh, the entries of `faces` that are its front and its back.
     pub entry: Vec<[u32; 2]>,
+    /// For each element of a diffuse sheet the one behind it, on the same triangle; [`NONE`] for other nodes. Empty in a room
+    /// without sheets.
+    pub(crate) behind: Vec<u32>,
 }
 
 impl Tree {
@@ -197,11 +200,49 @@ impl Tree {
         self.elements.get(node.element as usize)
     }
 
-    /// Splits a leaf element into four; does nothing for a node with children. Every child is similar to its parent.
+    /// The element of a diffuse sheet that lies behind a node, with the same corners, facing the other way; [`NONE`] where light does
+    /// not pass. Both are leaves, or none of them is.
+    pub fn behind(&self, id: u32) -> u32 {
+        self.behind.get(id as usize).copied().unwrap_or(NONE)
+    }
+
+    /// Pairs the faces of triangles that light passes between.
+    pub(super) fn pair_sheets(&mut self, mesh: &Mesh) {
+        if mesh.sheets.is_empty() {
+            return;
+        }
+        self.behind = vec![NONE; self.nodes.len()];
+        for (entries, material) in self.entry.iter().zip(&mesh.material) {
+            if mesh.sheets.contains(material) && !entries.contains(&NONE) {
+                let [front, back] = entries.map(|entry| self.face_node[entry as usize]);
+                self.behind[front as usize] = back;
+                self.behind[back as usize] = front;
+            }
+        }
+    }
+
+    /// Splits a leaf element into four, and with it the one behind it in a diffuse sheet; does nothing for a node with children. Every child is similar to its parent.
     pub fn subdivide(&mut self, id: u32) {
+        let behind = self.behind(id);
+        let first = self.quarter(id);
+        if behind == NONE || first == NONE {
+            return;
+        }
+        let other = self.quarter(behind);
+        self.behind.resize(self.nodes.len(), NONE);
+        // Seen from behind the corners go round the other way: the parts at the second and the third change places.
+        for (k, part) in [0, 2, 1, 3].into_iter().enumerate() {
+            let [one, two] = [first + k as u32, other + part];
+            self.behind[one as usize] = two;
+            self.behind[two as usize] = one;
+        }
+    }
+
+    /// The first of the four parts that a leaf element is split into; [`NONE`] for what cannot be split.
+    fn quarter(&mut self, id: u32) -> u32 {
         let node = self.node(id).clone();
         if !node.is_leaf() || node.element == NONE {
-            return;
+            return NONE;
         }
         let Element {
             corners,
@@ -229,6 +270,7 @@ impl Tree {
         let node = &mut self.nodes[id as usize];
         node.child = first;
         node.children = 4;
+        first
     }
 
     /// Gives every node without a number ([`NONE`]) that of the nearest node above that has one.

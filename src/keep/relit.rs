@@ -3,7 +3,7 @@
 
 use crate::gather::{Baked, BakedSurface, KeptVertex, Vertex, lend};
 use crate::hierarchy::Mesh;
-use crate::light::padded;
+use crate::light::{mixed, padded};
 use crate::solve::Bake;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Packs};
@@ -87,16 +87,18 @@ impl Bake {
         let mut out = Baked::default();
         for kept in kept {
             let mut rows: Vec<[f32; 64]> = bytemuck::zeroed_vec(kept.vertices.len());
-            kept.traces.for_each(&mut rows, |packed, row| {
-                match packed {
-                    Some(packed) => {
-                        let lit = trace::replay::<L>(packed, self.light(), self.lamps())?;
-                        row[..L].copy_from_slice(&lit);
-                    }
-                    None => row[0] = f32::NAN,
-                }
-                Ok(())
-            })?;
+            if self.light().through.is_empty() {
+                kept.traces.for_each(&mut rows, |packed, row| {
+                    self.relit_row::<L>(packed, None, row)
+                })?;
+            } else {
+                let places = kept.vertices.iter().map(|vertex| self.place(kept, vertex));
+                let mut placed: Vec<(Option<u32>, [f32; 64])> = places.zip(rows).collect();
+                kept.traces.for_each(&mut placed, |packed, (place, row)| {
+                    self.relit_row::<L>(packed, *place, row)
+                })?;
+                rows = placed.into_iter().map(|(_, row)| row).collect();
+            }
             out.covered += lend_some(&mut rows, &kept.triangles);
             let look = &looks[self.scene().surfaces[kept.surface].material];
             let vertices =
@@ -122,6 +124,43 @@ impl Bake {
             out.irradiance.push(rows);
         }
         Ok(out)
+    }
+}
+
+impl Bake {
+    /// The place of the leaf of a vertex among the leaves of the solution, if it is one of a sheet: the leaf that it was gathered on.
+    fn place(&self, kept: &Kept, &(triangle, weights): &(u32, [f64; 3])) -> Option<u32> {
+        let vertex = Vertex {
+            triangle,
+            weights,
+            entry: self.tree().entry[triangle as usize][usize::from(kept.back)],
+        };
+        let to = self.receiver(&vertex, kept.surface, kept.back);
+        self.place_on_sheet(to.leaf?)
+    }
+
+    /// Light by a kept trace, of sheets (with the `place` of a leaf) by two; NaN without.
+    fn relit_row<const L: usize>(
+        &self,
+        packed: Option<&[u8]>,
+        place: Option<u32>,
+        row: &mut [f32; 64],
+    ) -> Read<()> {
+        let Some(packed) = packed else {
+            row[0] = f32::NAN;
+            return Ok(());
+        };
+        let lit = |packed| trace::replay::<L>(packed, self.light(), self.lamps());
+        let shares = place.and_then(|place| self.light().through.shares(place));
+        match shares {
+            Some(shares) => {
+                let [own, behind] = trace::parted(packed)?;
+                row[..L].copy_from_slice(&lit(own)?);
+                mixed(shares, &mut row[..L], &lit(behind)?);
+            }
+            None => row[..L].copy_from_slice(&lit(packed)?),
+        }
+        Ok(())
     }
 }
 

@@ -29,10 +29,14 @@ impl Descent {
     /// Of a whole hierarchy.
     pub(crate) fn new(tree: &Tree) -> Self {
         let whole = |&id: &u32| id != NONE && tree.node(id).faces.1 <= POLYGONS;
-        let steps = tree.nodes.iter().map(|node| Step {
+        let steps = (0_u32..).zip(&tree.nodes).map(|(k, node)| Step {
             child: node.child,
             above: Some(node.parent).filter(whole).unwrap_or(NONE),
-            near: (NEAR * node.area.sqrt()) as f32,
+            // What passes a sheet does not come from what its point can see.
+            near: match tree.behind(k) {
+                NONE => (NEAR * node.area.sqrt()) as f32,
+                _ => 0.0,
+            },
         });
         Self {
             steps: steps.collect(),
@@ -57,7 +61,7 @@ impl Descent {
         std::iter::successors(Some(leaf), above)
     }
 
-    /// What is nearer than this to a leaf is close by.
+    /// What is nearer than this to a leaf is close by; 0: nothing ever is.
     pub(crate) fn near(&self, leaf: u32) -> f32 {
         self.steps[leaf as usize].near
     }

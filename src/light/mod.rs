@@ -5,6 +5,7 @@ mod filters;
 pub mod lanes;
 pub(crate) mod rows;
 mod solution;
+mod through;
 
 pub use descent::Descent;
 pub(crate) use filters::accumulate;
@@ -12,3 +13,5 @@ pub use filters::{Filter, Filters, Glass, Tint};
 pub use rows::{Rows, padded};
 pub use solution::{Arrival, Light, Neighbours};
 pub(crate) use solution::{brightness, keenness, weighed};
+pub use through::Through;
+pub(crate) use through::mixed;

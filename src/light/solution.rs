@@ -3,6 +3,7 @@
 use super::descent::Descent;
 use super::lanes::Lanes;
 use super::rows::Rows;
+use super::through::Through;
 use crate::hierarchy::{NONE, Tree};
 use crate::link::{Graph, Way};
 use rayon::prelude::*;
@@ -26,8 +27,10 @@ pub struct Light {
     pub reflected: Rows,
     /// Exitance of every node (area mean), by lane.
     pub emitted: Rows,
-    /// Irradiance of every leaf of the hierarchy, in order of `leaves`.
+    /// Irradiance of every leaf of the hierarchy, in order of `leaves`; of diffuse sheets as it is shown, see [`Through`].
     pub irradiance: Rows,
+    /// What the sides of diffuse sheets show of each other's light.
+    pub through: Through,
     /// Leaves of the hierarchy, ascending.
     pub leaves: Vec<u32>,
     /// Brightness of what each node reflects, share of the white's.
@@ -74,6 +77,7 @@ impl Light {
             + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
             + size_of_val(self.arrival.as_slice())
             + self.descent.bytes()
+            + self.through.bytes()
             + 4 * (self.bright_lamps.len() + self.leaves.len() + self.lit.len())
     }
 

@@ -171,7 +171,7 @@ impl<'a> Looks<'a> {
         };
         let mut pressed = self.bake.pressed(&receivers(&places)).into_iter();
         places.retain(|_| pressed.next() == Some(false));
-        let gathered = self.bake.gather_with(&receivers(&places), self.care);
+        let gathered = self.bake.gather_shown(&receivers(&places), self.care);
         let dark =
             |g: &Gathered| g.backs <= MOSTLY && g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
         let in_doubt = places.iter().zip(&gathered).filter(|(_, g)| dark(g));

@@ -24,10 +24,11 @@ use std::sync::Arc;
 const AGAIN: &str = "export the file again";
 
 /// Extensions that are read. The packed ones count only where their decoder is built in.
-const READ: [&str; 11] = [
+const READ: [&str; 12] = [
     "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
+    "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",

@@ -6,7 +6,8 @@
 use super::check::listed;
 use super::json::short;
 use super::lacking::lacking;
-use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface};
+use super::sheet::Sheet;
+use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::Leaves;
 use glam::DVec3;
@@ -55,6 +56,8 @@ pub enum Kind {
     TwoSided,
     /// What lets light straight through.
     Panes,
+    /// What lets diffuse light through.
+    Sheets,
 }
 
 impl Kind {
@@ -76,6 +79,7 @@ impl Kind {
             Self::Sun => "sun",
             Self::TwoSided => "two-sided surfaces",
             Self::Panes => "panes",
+            Self::Sheets => "diffuse sheets",
         }
     }
 }
@@ -163,6 +167,7 @@ impl Plan {
             counted(used.iter().filter(|m| m.sides == Sides::Both), "material"),
         );
         plan.add(Kind::Panes, panes(scene));
+        plan.add(Kind::Sheets, sheets(&used));
         for lack in lacking(&scene.source.json) {
             plan.effects.push(Effect {
                 name: lack.effect,
@@ -219,7 +224,8 @@ fn is_textured(m: &Material) -> bool {
             ..
         }
     );
-    m.paint.is_some() || mask || m.emission.as_ref().is_some_and(|e| e.texture.is_some())
+    let woven = m.sheet.as_ref().is_some_and(Sheet::is_textured);
+    m.paint.is_some() || woven || mask || m.emission.as_ref().is_some_and(|e| e.texture.is_some())
 }
 
 impl fmt::Display for Plan {
@@ -300,7 +306,7 @@ fn counted<'a, 'b: 'a>(
 fn interreflection(used: &[&Material]) -> (bool, String) {
     let bright = used
         .iter()
-        .filter(|m| m.reflectance.iter().any(|r| *r > 0.0))
+        .filter(|m| m.reflectance.iter().any(|r| *r > 0.0) || m.sheet.is_some())
         .count();
     match bright {
         0 => (false, "every surface is black".into()),
@@ -331,6 +337,14 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
                 true,
                 format!("the texture of {} has colours", quoted(&material.name)),
             );
+        }
+        if let Some(sheet) = &material.sheet {
+            let tinted = |t: &Texture| !grey(t.image);
+            let flat = is_flat(&sheet.transmittance) && sheet.back.as_ref().is_none_or(is_flat);
+            if !flat || sheet.color_texture.as_ref().is_some_and(tinted) {
+                let name = quoted(&material.name);
+                return (true, format!("what {name} lets through has a colour"));
+            }
         }
         if let Some(emission) = &material.emission {
             let tinted = emission.texture.as_ref().is_some_and(|t| !grey(t.image));
@@ -395,6 +409,22 @@ fn panes(scene: &Scene) -> (bool, String) {
     match names.len() {
         0 => (false, "none".into()),
         _ => (true, format!("light passes {}", listed(&names))),
+    }
+}
+
+/// Materials that let diffuse light through.
+fn sheets(used: &[&Material]) -> (bool, String) {
+    let names: Vec<String> = (used.iter())
+        .filter(|m| m.sheet.is_some())
+        .map(|m| quoted(&m.name))
+        .collect();
+    match &names[..] {
+        [] => (false, "none".into()),
+        [one] => (true, format!("material {one} lets diffuse light through")),
+        many => {
+            let named = listed(many);
+            (true, format!("materials {named} let diffuse light through"))
+        }
     }
 }
 

@@ -139,6 +139,21 @@ pub struct MaterialFact {
     pub textured: bool,
     /// `front` or `both`.
     pub sides: &'static str,
+    /// What it lets through diffusely; none of what is no sheet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sheet: Option<SheetFact>,
+}
+
+/// A diffuse sheet.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct SheetFact {
+    /// Y of the transmittance under D65, in [0, 1], where textures are white.
+    pub transmittance_y: f64,
+    /// Y of the reflectance of the back, if it is not that of the front.
+    pub back_albedo_y: Option<f64>,
+    /// Where the transmittance comes from.
+    pub transmission: String,
 }
 
 /// An image.
@@ -286,6 +301,9 @@ impl<'a> Meter<'a> {
                     times(std::array::from_fn(|k| mean(k) / 3.0));
                 }
                 albedo = self.upsampler.luminance(rgb.map(|c| c.clamp(0.0, 1.0)));
+                if let Some(sheet) = material.sheet.as_ref().filter(|sheet| sheet.shares) {
+                    albedo *= 1.0 - sheet.strength;
+                }
             }
             let mut luminance = plain_luminance;
             if let Some((emission, texture)) = emission.and_then(|e| Some((e, e.texture.as_ref()?)))
@@ -375,6 +393,11 @@ impl<'a> Meter<'a> {
                 Sides::Front => "front",
                 Sides::Both => "both",
             },
+            sheet: material.sheet.as_ref().map(|sheet| SheetFact {
+                transmittance_y: self.upsampler.xyz(&sheet.transmittance)[1],
+                back_albedo_y: sheet.back.as_ref().map(|b| self.upsampler.xyz(b)[1]),
+                transmission: sheet.from.clone(),
+            }),
         }
     }
 }

@@ -319,10 +319,13 @@ impl<'a> Reader<'a> {
         check: &mut Check,
     ) {
         let material = &self.document.materials[material];
+        let sheet = material.sheet.as_ref();
         let textures = [
-            &material.base_color_texture,
-            &material.emissive_texture,
-            &material.transmission_texture,
+            material.base_color_texture.as_ref(),
+            material.emissive_texture.as_ref(),
+            material.transmission_texture.as_ref(),
+            sheet.and_then(|sheet| sheet.strength_texture.as_ref()),
+            sheet.and_then(|sheet| sheet.color_texture.as_ref()),
         ];
         let sets = textures.into_iter().flatten().map(|t| t.texcoord);
         let Some(last) = sets.max() else { return };

@@ -39,6 +39,20 @@ pub struct Image {
     pub pixels: Vec<[f32; 4]>,
 }
 
+impl Image {
+    /// Mean of all texels; white of none.
+    pub(crate) fn mean(&self) -> [f32; 4] {
+        if self.pixels.is_empty() {
+            return [1.0; 4];
+        }
+        let mut sum = [0.0_f64; 4];
+        for pixel in &self.pixels {
+            sum = std::array::from_fn(|c| sum[c] + f64::from(pixel[c]));
+        }
+        sum.map(|s| (s / self.pixels.len() as f64) as f32)
+    }
+}
+
 /// What stands in for an image that cannot be read: a grey that neither brightens nor darkens much.
 pub(crate) fn neutral(name: &str) -> Image {
     Image {

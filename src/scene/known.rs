@@ -17,6 +17,10 @@ pub(crate) struct MaterialSpectra {
     pub(crate) profile: Option<ProfileWish>,
     /// Transmittance of a pane at normal incidence, unit 1.
     pub(crate) transmittance: Option<Sampled>,
+    /// Diffuse transmittance of a sheet, unit 1.
+    pub(crate) transmission: Option<Sampled>,
+    /// Reflectance of the back of a sheet, unit 1.
+    pub(crate) back: Option<Sampled>,
 }
 
 impl MaterialSpectra {
@@ -27,6 +31,8 @@ impl MaterialSpectra {
             emission: self.emission.or(other.emission),
             profile: self.profile.or(other.profile),
             transmittance: self.transmittance.or(other.transmittance),
+            transmission: self.transmission.or(other.transmission),
+            back: self.back.or(other.back),
         }
     }
 }
@@ -36,17 +42,28 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
     let Some(entry) = reader.object(entry, place) else {
         return MaterialSpectra::default();
     };
-    reader.keys(entry, &["reflectance", "emission", "transmittance"], place);
+    const KEYS: [&str; 5] = [
+        "reflectance",
+        "back_reflectance",
+        "emission",
+        "transmission",
+        "transmittance",
+    ];
+    reader.keys(entry, &KEYS, place);
     let mut spectra = MaterialSpectra::default();
-    if let Some(value) = entry.get("reflectance") {
-        let place = format!("{place}, reflectance");
-        if let Some(object) = reader.object(value, &place) {
-            reader.keys(object, &["name", "csv"], &place);
-            spectra.reflectance = reader.sampled(object, Kind::Reflectance, &place);
-        }
-    }
+    let mut reflectance = |key: &str| {
+        let place = format!("{place}, {key}");
+        let object = reader.object(entry.get(key)?, &place)?;
+        reader.keys(object, &["name", "csv"], &place);
+        reader.sampled(object, Kind::Reflectance, &place)
+    };
+    spectra.reflectance = reflectance("reflectance");
+    spectra.back = reflectance("back_reflectance");
     if let Some(value) = entry.get("transmittance") {
         spectra.transmittance = transmittance::read(reader, entry, value, place);
+    }
+    if let Some(value) = entry.get("transmission") {
+        spectra.transmission = transmittance::share(reader, value, "transmission", place);
     }
     if let Some(value) = entry.get("emission") {
         let place = format!("{place}, emission");

@@ -25,7 +25,6 @@ const LACKING: &[(&str, &str)] = &[
     ("KHR_lights_environment", "sky"),
     ("KHR_materials_anisotropy", "gloss"),
     ("KHR_materials_clearcoat", "gloss (coat)"),
-    ("KHR_materials_diffuse_transmission", "diffuse transmission"),
     ("KHR_materials_dispersion", "dispersion"),
     ("KHR_materials_iridescence", "iridescence"),
     ("KHR_materials_sheen", "sheen"),

@@ -2,13 +2,11 @@
 
 use super::pane::Pane;
 use super::profile::Profile;
-use super::{Sides, Texture};
+use super::sheet::{Sheet, Weave, bounded};
+use super::{GREATEST_ALBEDO, Image, Sides, Texture};
 use crate::color::Upsampler;
 use crate::data::Leaves;
 use std::sync::Arc;
-
-/// Greatest albedo: at 1 a closed room that emits has no steady state, near it the condition is 1/(1 - albedo).
-pub const GREATEST_ALBEDO: f64 = 0.999;
 
 /// A Lambertian material, one- or two-sided.
 #[derive(Debug, Clone)]
@@ -35,6 +33,8 @@ pub struct Material {
     pub alpha: Alpha,
     /// What it lets straight through; then its surfaces stand in [`Scene::panes`](crate::scene::Scene::panes).
     pub pane: Option<Pane>,
+    /// What it lets through diffusely; then [`reflectance`](Self::reflectance) is what is left of the base colour.
+    pub sheet: Option<Sheet>,
 }
 
 /// Coverage.
@@ -94,6 +94,58 @@ impl Material {
             .map(|r| r.min(GREATEST_ALBEDO))
     }
 }
+
+impl Material {
+    /// What one side of a surface reflects and lets through, `sheet` being that of this material, where its textures have the values of
+    /// `weave` and the base colour is `color`, which none leaves as it is.
+    pub fn scatters(
+        &self,
+        sheet: &Sheet,
+        color: Option<[f32; 3]>,
+        weave: Weave,
+        back: bool,
+        upsampler: &Upsampler,
+    ) -> [Leaves; 2] {
+        let through = sheet.transmittance_at(weave, upsampler);
+        let own = sheet.back.filter(|_| back);
+        let reflected = match (own, color) {
+            (Some(own), _) => own,
+            (None, None) if weave == Weave::PLAIN || !sheet.shares => self.reflectance,
+            (None, color) => {
+                let left = sheet.left(weave);
+                let color = color.unwrap_or(self.base_color);
+                upsampler.reflectance_fast(color).map(|r| left * r)
+            }
+        };
+        [bounded(reflected, &through), through]
+    }
+
+    /// What leaves the side that reflects more, of the same light on both sides: reflectance and transmittance together. The light of
+    /// vertices is given as a share of it.
+    pub fn shown(
+        &self,
+        sheet: &Sheet,
+        color: Option<[f32; 3]>,
+        weave: Weave,
+        upsampler: &Upsampler,
+    ) -> Leaves {
+        let side = |back| self.scatters(sheet, color, weave, back, upsampler);
+        let ([front, through], [back, _]) = (side(false), side(true));
+        std::array::from_fn(|k| front[k].max(back[k]) + through[k])
+    }
+
+    /// The base colour with the mean of its texture, linear; none where it has no texture.
+    pub(crate) fn mean_color(&self, images: &[Image]) -> Option<[f32; 3]> {
+        let image = images.get(self.paint.as_ref()?.image)?;
+        let mean = image.mean();
+        Some(std::array::from_fn(|c| {
+            self.base_color[c] * mean[c].max(DARKEST_PAINT)
+        }))
+    }
+}
+
+/// Textures count as no darker than this in the mean, so that light may be divided by it.
+pub(crate) const DARKEST_PAINT: f32 = 1e-3;
 
 impl Emission {
     /// The shape at a point whose emissive texture has this linear value; `[1, 1, 1]` gives [`Emission::shape`].

@@ -13,6 +13,7 @@ use super::luminaires::ProfileWish;
 use super::pane;
 use super::raw::{AlphaMode, RawMaterial};
 use super::reader::Sampled;
+use super::sheets;
 use super::spectra_file::SpectraFile;
 use super::{Alpha, Emission, GREATEST_ALBEDO, Material, Sides};
 use crate::color::Upsampler;
@@ -29,6 +30,7 @@ struct Said {
     metals: Vec<String>,
     unlit: Vec<String>,
     panes: pane::Said,
+    sheets: sheets::Said,
     bright: Vec<String>,
 }
 
@@ -66,9 +68,20 @@ pub(crate) fn materials(
             let through = spectra.transmittance.as_ref();
             let panes = &mut said.panes;
             material.pane = panes.pane(raw, &name, through, emits, &place, upsampler, check);
+            let rho = &mut material.reflectance;
+            let sheet = sheets::sheet(raw, &spectra, rho, &place, grid, upsampler, check);
+            if sheet.is_some() {
+                said.sheets.hear(raw, &name, material.pane.is_some(), emits);
+            }
+            material.sheet = sheet.filter(|_| material.pane.is_none());
+            let is_sheet = material.sheet.is_some();
+            if is_sheet {
+                material.sides = Sides::Both;
+            }
             if material.pane.is_none() {
                 // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
                 let plain = !tinted && raw.base_color_texture.is_none();
+                let bright = bright && !is_sheet;
                 said.hear(raw, &name, bright && (measured.is_some() || plain));
             }
             (material, spectra.profile.take())
@@ -147,6 +160,7 @@ fn paint(
         vertex_paint: measured.is_none(),
         emission: None,
         pane: None,
+        sheet: None,
         alpha: match raw.alpha_mode {
             AlphaMode::Mask => Alpha::Mask {
                 cutoff: raw.alpha_cutoff,
@@ -285,6 +299,7 @@ impl Said {
             }
         }
         self.panes.warn(check);
+        self.sheets.warn(check);
     }
 }
 

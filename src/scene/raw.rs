@@ -18,6 +18,7 @@ use gltf::json::extensions::scene::khr_lights_punctual::{KhrLightsPunctual, Ligh
 pub use gltf::json::material::AlphaMode;
 use gltf::json::material::Material;
 use gltf::json::validation::Checked::{Invalid, Valid};
+use serde::Deserialize;
 use serde_json::Value;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
@@ -53,6 +54,8 @@ pub struct RawMaterial {
     pub transmission: Option<f64>,
     /// Multiplies it (red).
     pub transmission_texture: Option<Texture>,
+    /// KHR_materials_diffuse_transmission.
+    pub sheet: Option<RawSheet>,
     /// Refractive index of KHR_materials_ior.
     pub ior: Option<f64>,
     /// KHR_materials_volume.
@@ -83,6 +86,7 @@ impl Default for RawMaterial {
             unlit: false,
             transmission: None,
             transmission_texture: None,
+            sheet: None,
             ior: None,
             volume: None,
             roughness: None,
@@ -102,6 +106,37 @@ pub struct RawVolume {
     pub distance: Option<f64>,
     /// Linear, each in [0, 1].
     pub colour: [f32; 3],
+}
+
+/// KHR_materials_diffuse_transmission.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct RawSheet {
+    /// Share that is let through instead of reflected, in [0, 1].
+    pub strength: f32,
+    /// Multiplies the strength (alpha).
+    pub strength_texture: Option<Texture>,
+    /// Linear, each in [0, 1].
+    pub color: [f32; 3],
+    /// Multiplies the colour.
+    pub color_texture: Option<Texture>,
+}
+
+/// The extension's numbers, with its defaults.
+#[derive(Debug, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct DiffuseTransmission {
+    diffuse_transmission_factor: f32,
+    diffuse_transmission_color_factor: [f32; 3],
+}
+
+impl Default for DiffuseTransmission {
+    fn default() -> Self {
+        Self {
+            diffuse_transmission_factor: 0.0,
+            diffuse_transmission_color_factor: [1.0; 3],
+        }
+    }
 }
 
 /// A punctual light at a node, before spectra.
@@ -213,6 +248,7 @@ fn material(
     out.emissive_texture = slots.texture(json, item, "emissiveTexture", check);
     emission(item, given.emissive_factor.0, &mut out, check);
     transmission(json, item, &mut out, slots, check);
+    out.sheet = sheet(json, item, slots, check);
     match given.alpha_mode {
         Valid(mode) => out.alpha_mode = mode,
         Invalid => {
@@ -290,6 +326,21 @@ fn transmission(
         distance: Some(distance).filter(|distance| distance.is_finite()),
         colour: colour.map(|x| unit(x, "attenuationColor", item, check)),
     });
+}
+
+/// KHR_materials_diffuse_transmission.
+fn sheet(json: &Value, item: &Item<'_>, slots: &mut Slots, check: &mut Check) -> Option<RawSheet> {
+    const SHEET: &str = "KHR_materials_diffuse_transmission";
+    let sheet = item.extended(SHEET, check)?;
+    let values = item.extension::<DiffuseTransmission>(SHEET, check)?;
+    let factor = values.diffuse_transmission_factor;
+    let color = values.diffuse_transmission_color_factor;
+    Some(RawSheet {
+        strength: unit(factor, "diffuseTransmissionFactor", item, check),
+        strength_texture: slots.texture(json, &sheet, "diffuseTransmissionTexture", check),
+        color: color.map(|x| unit(x, "diffuseTransmissionColorFactor", item, check)),
+        color_texture: slots.texture(json, &sheet, "diffuseTransmissionColorTexture", check),
+    })
 }
 
 /// Brought into [0, 1], with a warning.

@@ -4,7 +4,9 @@
 //! { "materials": { "wall":  { "reflectance": { "csv": "spectra/wall.csv" } },
 //!                  "panel": { "reflectance": { "name": "macbeth/white" },
 //!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } },
-//!                  "glass": { "transmittance": { "csv": "spectra/glass.csv" } } },
+//!                  "glass": { "transmittance": { "csv": "spectra/glass.csv" } },
+//!                  "shade": { "reflectance": { "csv": "outside.csv" }, "back_reflectance": { "csv": "inside.csv" },
+//!                             "transmission": { "csv": "paper.csv" } } },
 //!   "lights":    { "Spot": { "name": "cie/A" } },
 //!   "sky":       { "type": "overcast" },
 //!   "layers":    { "desk": ["Spot", "bulb"] } }
@@ -270,7 +272,7 @@ mod tests {
             "climbs out of",
             "light 'Sun': the room has no light of that name; the nearest names are Spot",
             "light 'Sun': does not say which spectrum",
-            "material 'wall': unknown key \"emision\"; the nearest names are emission, reflectance",
+            "material 'wall': unknown key \"emision\"; the nearest names are emission, transmission, reflectance",
             "unknown key \"version\"",
         ] {
             assert!(all.contains(text), "{text}\n-- in --\n{all}");

@@ -32,6 +32,9 @@ pub struct Surface {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// Greatest albedo: at 1 a closed room that emits has no steady state, near it the condition is 1/(1 - albedo).
+pub const GREATEST_ALBEDO: f64 = 0.999;
+
 /// Which sides of a surface reflect and emit. The other side is black and blocks light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sides {

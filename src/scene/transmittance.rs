@@ -1,4 +1,4 @@
-//! What a side file says of panes: `"transmittance"`, of the whole pane at normal incidence.
+//! What a side file says of light that passes: `"transmittance"` of a whole pane at normal incidence, and `"transmission"` of a sheet.
 
 use super::reader::{Reader, Sampled};
 use crate::data::{Kind, LEAVES};
@@ -12,15 +12,23 @@ pub(super) fn read(
     value: &Value,
     place: &str,
 ) -> Option<Sampled> {
-    if ["reflectance", "emission"]
-        .iter()
-        .any(|key| entry.contains_key(*key))
-    {
+    const OTHERS: [&str; 4] = [
+        "reflectance",
+        "back_reflectance",
+        "emission",
+        "transmission",
+    ];
+    if OTHERS.iter().any(|key| entry.contains_key(*key)) {
         let what = "has a transmittance, and a reflectance or an emission beside it";
         let next = "a pane lets light through and does nothing else: take the other out";
         reader.check.problem(place, what, next);
     }
-    let place = format!("{place}, transmittance");
+    share(reader, value, "transmittance", place)
+}
+
+/// Reads a share of light under a key: by name or table as a reflectance, or one number for all wavelengths.
+pub(super) fn share(reader: &mut Reader, value: &Value, key: &str, place: &str) -> Option<Sampled> {
+    let place = format!("{place}, {key}");
     let sampled = match value.as_f64() {
         Some(plain) => Sampled {
             from: format!("{plain}"),

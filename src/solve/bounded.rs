@@ -21,6 +21,8 @@ const TAIL: f64 = 1e-6;
 struct Lit {
     cmf: CmfTree,
     reflectance: Vec<Tree<Bounded>>,
+    /// What passes sheets: a patch and one behind it.
+    through: Vec<([u32; 2], Tree<Bounded>)>,
     emission: Vec<Option<Tree<Bounded>>>,
     punctual: Vec<Option<Tree<Bounded>>>,
 }
@@ -28,23 +30,31 @@ struct Lit {
 impl Lit {
     /// What a bounce multiplies light by at the most: greatest albedo times greatest row sum.
     fn ratio(&self, factors: &[Vec<(usize, f64)>]) -> f64 {
-        let albedo = self.reflectance.iter().map(|t| t.node(1).high);
+        let mut albedo: Vec<f64> = self.reflectance.iter().map(|t| t.node(1).high).collect();
+        for ([patch, _], through) in &self.through {
+            albedo[*patch as usize] += through.node(1).high;
+        }
         let sums = factors.iter().map(|row| row.iter().map(|f| f.1).sum());
-        (albedo.fold(0.0, f64::max) * sums.fold(0.0, f64::max)).min(0.999)
+        (albedo.into_iter().fold(0.0, f64::max) * sums.fold(0.0, f64::max)).min(0.999)
     }
 
     /// Radiosity of every patch by the light that arrives, on intervals that are these nodes of a spectrum's tree.
     fn reflect(&self, arrives: &[Vec<Bounded>], nodes: &[usize]) -> Vec<Vec<Bounded>> {
-        arrives
-            .iter()
-            .zip(&self.reflectance)
-            .map(|(row, rho)| {
-                row.iter()
-                    .zip(nodes)
-                    .map(|(x, &n)| x.times(rho.node(n), self.cmf.node(n)))
-                    .collect()
-            })
-            .collect()
+        let times = |row: &[Bounded], by: &Tree<Bounded>| -> Vec<Bounded> {
+            let lanes = row.iter().zip(nodes);
+            lanes
+                .map(|(x, &n)| x.times(by.node(n), self.cmf.node(n)))
+                .collect()
+        };
+        let reflected = arrives.iter().zip(&self.reflectance);
+        let mut sent: Vec<Vec<Bounded>> = reflected.map(|(row, rho)| times(row, rho)).collect();
+        for ([patch, behind], through) in &self.through {
+            let passes = times(&arrives[*behind as usize], through);
+            for (s, x) in sent[*patch as usize].iter_mut().zip(&passes) {
+                *s = s.plus(1.0, x);
+            }
+        }
+        sent
     }
 }
 
@@ -89,7 +99,11 @@ impl Coarse {
                         .map(|row| row.iter().any(|&x| x > 0.0).then(|| Tree::new(row, &cmf)))
                         .collect()
                 };
+                let through = self.through.iter();
                 Lit {
+                    through: through
+                        .map(|(pair, t)| (*pair, Tree::new(t, &cmf)))
+                        .collect(),
                     reflectance: trees(&self.reflectance),
                     emission: shown(&self.emission[light]),
                     punctual: shown(&self.punctual[light]),

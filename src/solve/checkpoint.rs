@@ -11,11 +11,12 @@
 //! the rest follows from where light comes from.
 
 use super::outlook::Outlook;
+use super::sources::Sources;
 use super::{Bake, Representation, direct, punctual};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::{self, Lanes};
-use crate::light::{Light, Neighbours};
+use crate::light::{Light, Neighbours, Through};
 use crate::light::{Rows, padded};
 use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
 use crate::spectrum::LEAVES;
@@ -276,9 +277,10 @@ impl Bake {
     fn light_up_lanes<const L: usize>(&mut self, reflected: &Rows) {
         let mut light = std::mem::take(&mut self.light);
         let painter = self.painter();
-        let emission = painter
-            .paint(&self.tree, &light.leaves, &self.lanes)
-            .emission;
+        let Sources {
+            emission, sheets, ..
+        } = painter.paint(&self.tree, &light.leaves, &self.lanes);
+        light.through = sheets.map_or_else(Through::default, |sheets| sheets.shown);
         light.reflected = self.on_nodes::<L>(reflected, &light.leaves);
         light.emitted = self.on_nodes::<L>(&emission, &light.leaves);
         light.half_size = self.mesh.half_size;
@@ -290,8 +292,13 @@ impl Bake {
 
 /// Elements that were split, in the order in which it happened.
 fn splits(tree: &Tree) -> Vec<u32> {
+    // What lies behind an element of a sheet is split with it.
+    let leads = |k: u32| match tree.behind(k) {
+        NONE => true,
+        behind => tree.node(k).child < tree.node(behind).child,
+    };
     let mut split: Vec<u32> = (0..tree.nodes.len() as u32)
-        .filter(|&k| tree.node(k).element != NONE && !tree.node(k).is_leaf())
+        .filter(|&k| tree.node(k).element != NONE && !tree.node(k).is_leaf() && leads(k))
         .collect();
     split.sort_unstable_by_key(|&k| tree.node(k).child);
     split

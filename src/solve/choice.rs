@@ -9,6 +9,7 @@ use crate::color::normalization;
 use crate::light::Filters;
 use crate::light::lanes::Lanes;
 use crate::link::{LinkRows, balance};
+use crate::scene::effects::Kind;
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;
 use crate::spectrum::{
@@ -54,8 +55,10 @@ impl Bake {
                 let cut = paper_cut(&self.scene, weights, tolerance);
                 Lanes::absolute(spectra, cut, weights)
             }
-            // A filter would have to be a matrix there.
-            Representation::Characteristic(_) if self.panes.is_some() => {
+            // A filter would have to be a matrix there, and so would what passes a sheet.
+            Representation::Characteristic(_)
+                if self.panes.is_some() || self.plan.runs(Kind::Sheets) =>
+            {
                 Lanes::dense(spectra, weights)
             }
             Representation::Characteristic(n) if !none => {

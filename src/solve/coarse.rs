@@ -6,13 +6,17 @@
 
 use super::conjugate::System;
 use super::operator::Operator;
+use super::reflection::{Reflection, Sheets};
+use super::sheets;
 use crate::color::luv_jacobian;
 use crate::hierarchy::{NONE, Node, Tree};
+use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
 use crate::link::{Link, LinkRows, Way};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{LEAVES, Leaves, Partition};
+use std::collections::BTreeMap;
 
 /// Patches of the model at the most (fits the child count of its root).
 pub(super) const PATCHES: usize = 192;
@@ -35,6 +39,8 @@ pub(crate) struct Coarse {
     /// Exitance or first irradiance of each patch by light, as shape on the leaves.
     pub(super) emission: Vec<Vec<Leaves>>,
     pub(super) punctual: Vec<Vec<Leaves>>,
+    /// What passes sheets: a patch, one behind it, and how much of the light there leaves the patch.
+    pub(super) through: Vec<([u32; 2], Leaves)>,
 }
 
 /// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
@@ -45,6 +51,8 @@ pub(crate) trait Dense {
     fn emission(&self, leaf: u32, light: usize) -> Option<Leaves>;
     /// Irradiance from punctual lights of one spectrum.
     fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves>;
+    /// What a leaf node lets through from the one behind it; none of what is no sheet.
+    fn through(&self, leaf: u32) -> Option<Leaves>;
 }
 
 /// What a choice of cuts does.
@@ -80,10 +88,15 @@ impl Coarse {
         let mut reflectance = vec![[0.0; LEAVES]; count];
         let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
         let mut punctual = emission.clone();
+        let mut through: BTreeMap<[u32; 2], Leaves> = BTreeMap::new();
         for &leaf in leaves {
             let (g, a) = (group[leaf as usize] as usize, areas[leaf as usize]);
             area[g] += a;
             add(&mut reflectance[g], &dense.reflectance(leaf), a);
+            if let Some(passes) = dense.through(leaf) {
+                let pair = [leaf, tree.behind(leaf)].map(|k| group[k as usize]);
+                add(through.entry(pair).or_insert([0.0; LEAVES]), &passes, a);
+            }
             for light in 0..lights {
                 if let Some(e) = dense.emission(leaf, light) {
                     add(&mut emission[light][g], &e, a);
@@ -103,25 +116,11 @@ impl Coarse {
                 }
             }
         }
-        let matrix = exchanges(tree, links, factor, areas, &group, count);
-        let mut pairs = Vec::new();
-        for a in 0..count {
-            for b in a..count {
-                let g = matrix[a * count + b];
-                if g > 0.0 {
-                    // A patch of the model may light itself; the row holds it twice, so half is stored.
-                    let g = if a == b { 0.5 * g } else { g };
-                    pairs.push(Link {
-                        a: a as u32 + 1,
-                        b: b as u32 + 1,
-                        exchange: g as f32,
-                        open_exchange: g as f32,
-                        variation: 0.0,
-                        way: Way::Clear,
-                    });
-                }
-            }
+        for (pair, passes) in &mut through {
+            *passes = passes.map(|x| x / area[pair[0] as usize]);
         }
+        let matrix = exchanges(tree, links, factor, areas, &group, count);
+        let pairs = pairs(&matrix, count);
         Self {
             tree: flat_tree(&area),
             links: LinkRows::new(count + 1, &pairs),
@@ -133,6 +132,7 @@ impl Coarse {
             reflectance,
             emission,
             punctual,
+            through: through.into_iter().collect(),
         }
     }
 
@@ -204,22 +204,76 @@ impl Coarse {
             }
         }
         let mut reflected = Rows::zero(count, L);
-        let system = System {
-            operator,
-            reflectance: &rho,
-            greatest: &greatest,
-        };
-        system.solve::<L>(&first, &mut reflected, TOLERANCE);
         let mut more = Rows::zero(count, L);
-        system
-            .operator
-            .irradiance::<L>(&reflected, &mut nodes, &mut gathered, &mut more);
+        if self.through.is_empty() {
+            let system = System {
+                operator,
+                reflectance: &rho,
+                greatest: &greatest,
+            };
+            system.solve::<L>(&first, &mut reflected, TOLERANCE);
+            system
+                .operator
+                .irradiance::<L>(&reflected, &mut nodes, &mut gathered, &mut more);
+        } else {
+            more = self.through_sheets::<L>(lanes, &operator, (rho, greatest), &first);
+        }
         for k in 0..count {
             for (x, f) in more.row_mut(k).iter_mut().zip(first.row(k)) {
                 *x += f;
             }
         }
         more
+    }
+
+    /// Irradiance by reflected light where light passes sheets.
+    fn through_sheets<const L: usize>(
+        &self,
+        lanes: &Lanes,
+        operator: &Operator,
+        (rows, mut greatest): (Rows, Vec<f32>),
+        first: &Rows,
+    ) -> Rows {
+        let mut through = Rows::zero(self.through.len(), L);
+        let mut passing = vec![[0.0_f32; L]; self.leaves.len()];
+        for (k, ([patch, _], passes)) in self.through.iter().enumerate() {
+            lanes.averages(passes, through.row_mut(k));
+            let sum = passing[*patch as usize].iter_mut();
+            sum.zip(through.row(k)).for_each(|(s, t)| *s += t);
+        }
+        for (k, passing) in passing.iter().enumerate() {
+            let both = rows.row(k).iter().zip(passing);
+            for (g, (r, t)) in greatest.iter_mut().zip(both) {
+                *g = g.max(r + t);
+            }
+        }
+        let reflection = Reflection {
+            rows,
+            greatest,
+            mixed: None,
+            sheets: Some(Sheets {
+                pairs: self.through.iter().map(|(pair, _)| *pair).collect(),
+                through,
+                shown: Through::default(),
+            }),
+        };
+        let system = sheets::System {
+            reflection: &reflection,
+            areas: self
+                .leaves
+                .iter()
+                .map(|&k| self.areas[k as usize])
+                .collect(),
+            receive: &|radiosity| {
+                let nodes = self.tree.nodes.len();
+                let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
+                let mut seen = Rows::zero(self.leaves.len(), L);
+                operator.irradiance::<L>(radiosity, &mut means, &mut gathered, &mut seen);
+                seen
+            },
+        };
+        let mut reflected = Rows::zero(self.leaves.len(), L);
+        system.solve::<L>(first, &mut reflected, TOLERANCE).1
     }
 
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
@@ -443,6 +497,29 @@ fn exchanges(
     matrix
 }
 
+/// The exchanges of a model as links.
+fn pairs(matrix: &[f64], count: usize) -> Vec<Link> {
+    let mut pairs = Vec::new();
+    for a in 0..count {
+        for b in a..count {
+            let g = matrix[a * count + b];
+            if g > 0.0 {
+                // A patch of the model may light itself; the row holds it twice, so half is stored.
+                let g = if a == b { 0.5 * g } else { g };
+                pairs.push(Link {
+                    a: a as u32 + 1,
+                    b: b as u32 + 1,
+                    exchange: g as f32,
+                    open_exchange: g as f32,
+                    variation: 0.0,
+                    way: Way::Clear,
+                });
+            }
+        }
+    }
+    pairs
+}
+
 /// A root with one child a patch.
 fn flat_tree(areas: &[f64]) -> Tree {
     let mut nodes = vec![Node {
@@ -453,13 +530,7 @@ fn flat_tree(areas: &[f64]) -> Tree {
     nodes.extend(areas.iter().map(|&a| Node::bare(0, a)));
     Tree {
         nodes,
-        elements: Vec::new(),
-        faces: Vec::new(),
-        face_node: Vec::new(),
-        face_plane: Vec::new(),
-        face_normal: Vec::new(),
-        face_area: Vec::new(),
-        entry: Vec::new(),
+        ..Tree::default()
     }
 }
 

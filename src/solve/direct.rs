@@ -288,9 +288,17 @@ impl Direct {
                 .collect();
             open = Vec::new();
             for leaf in split {
+                // What lies behind a leaf of a sheet is split with it.
+                if !tree.node(leaf).is_leaf() {
+                    continue;
+                }
                 tree.subdivide(leaf);
-                self.forget(leaf as usize);
-                open.extend(tree.node(leaf).child_range());
+                for node in [leaf, tree.behind(leaf)] {
+                    if node != NONE {
+                        self.forget(node as usize);
+                        open.extend(tree.node(node).child_range());
+                    }
+                }
             }
         }
     }

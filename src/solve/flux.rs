@@ -146,12 +146,11 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         .materials
         .iter()
         .map(|m| {
-            m.reflectance
-                .iter()
-                .zip(&weights[1])
-                .map(|(r, w)| r * w)
-                .sum::<f64>()
-                / whole
+            let luminous = |spectrum: &Leaves| -> f64 {
+                spectrum.iter().zip(&weights[1]).map(|(r, w)| r * w).sum()
+            };
+            let through = m.sheet.as_ref().map_or(0.0, |s| luminous(&s.transmittance));
+            (luminous(&m.reflectance) + through) / whole
         })
         .collect();
     let material = |k: usize| mesh.material[tree.faces[k].triangle as usize] as usize;

@@ -32,6 +32,7 @@ mod reflection;
 mod representation;
 mod sent;
 mod shares;
+mod sheets;
 mod solving;
 mod sources;
 mod tinted;
@@ -114,6 +115,10 @@ const MANY_FACES: usize = 50_000;
 /// Rooms of few triangles with panes take directions for this share of the error: what is clipped exactly in others is found by rays
 /// there, and a ray costs next to nothing.
 const GLAZED_DIRECTIONS: f64 = 0.25;
+/// A shade around a bulb is as bright as a lamp, but found by rays like all that passes light on: rooms with sheets take directions for
+/// this share of the error. In a curtained room twice as fine directions and tolerances of points brought the estimate of the fifth round
+/// from .56 to .38 dE00, with half the elements.
+const SHEET_DIRECTIONS: f64 = 0.5;
 /// Elements are not split below this share of the area of all faces.
 const LEAST_AREA: f64 = 1e-7;
 /// The working partition may cause this share of the asked-for error. In the Cornell box under F2, .05 to .35 cost the
@@ -250,8 +255,12 @@ impl Bake {
         let upsampler = Upsampler::new(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
         let glazed = !scene.panes.is_empty() && is_small(&mesh);
-        let hemisphere =
-            Hemisphere::for_error(settings.error * if glazed { GLAZED_DIRECTIONS } else { 1.0 });
+        let directions = match (glazed, plan.runs(Kind::Sheets)) {
+            (true, _) => GLAZED_DIRECTIONS,
+            (_, true) => SHEET_DIRECTIONS,
+            _ => 1.0,
+        };
+        let hemisphere = Hemisphere::for_error(settings.error * directions);
         let probes = estimate::Probes::new(&tree, settings.seed);
         let mut bake = Self {
             closed: Closed::No,

@@ -1,9 +1,9 @@
-//! How the leaves reflect: lane by lane, or by a matrix a paint where lanes reflect into each other.
+//! How the leaves reflect: lane by lane, or by a matrix a paint where lanes reflect into each other; and what passes sheets.
 
 use super::mixed::Mixed;
 use super::{conjugate, linear};
-use crate::light::Rows;
 use crate::light::lanes::Lanes;
+use crate::light::{Rows, Through};
 
 /// What turns irradiance of the leaves into radiosity.
 pub(super) struct Reflection {
@@ -13,15 +13,38 @@ pub(super) struct Reflection {
     pub(super) greatest: Vec<f32>,
     /// Matrices of the paints, where lanes are no bands.
     pub(super) mixed: Option<Mixed>,
+    /// What passes sheets; never where lanes are no bands.
+    pub(super) sheets: Option<Sheets>,
+}
+
+/// What the leaves of diffuse sheets let through.
+#[derive(Debug, Clone)]
+pub(crate) struct Sheets {
+    /// Places among the leaves of a side and of the one behind it, ascending.
+    pub pairs: Vec<[u32; 2]>,
+    /// Transmittance of each pair.
+    pub through: Rows,
+    /// How their light is shown.
+    pub shown: Through,
 }
 
 impl Reflection {
     /// What is reflected of an irradiance.
     pub(super) fn of<const L: usize>(&self, irradiance: &Rows) -> Rows {
-        match &self.mixed {
+        let mut sent = match &self.mixed {
             Some(mixed) => mixed.reflect::<L>(irradiance),
             None => conjugate::product::<L>(irradiance, &self.rows),
+        };
+        if let Some(sheets) = &self.sheets {
+            let met = irradiance.all::<L>();
+            let passes = sheets.pairs.iter().zip(sheets.through.all::<L>());
+            for ([place, behind], through) in passes {
+                let row = &mut sent.all_mut::<L>()[*place as usize];
+                let met = &met[*behind as usize];
+                *row = std::array::from_fn(|l| row[l] + through[l] * met[l]);
+            }
         }
+        sent
     }
 
     /// Scales what arrives so that no energy goes missing: by the [`linear::amplitude`] of both sums, lane by lane.
@@ -47,13 +70,19 @@ impl Reflection {
         }
     }
 
-    /// The albedo of every leaf and lane under the light of the solution. Where lanes reflect into each other that is what
-    /// came back of what came in.
+    /// The albedo of every leaf and lane under the light of the solution: of what meets a sheet, the share that leaves it on either
+    /// side. Where lanes reflect into each other that is what came back of what came in.
     pub(super) fn albedo<const L: usize>(mut self, reflected: &Rows, irradiance: &Rows) -> Rows {
         if self.mixed.is_some() {
             let rows = self.rows.all_mut::<L>().iter_mut();
             for ((rho, r), h) in rows.zip(reflected.all::<L>()).zip(irradiance.all::<L>()) {
                 *rho = std::array::from_fn(|l| if h[l] == 0.0 { 0.0 } else { r[l] / h[l] });
+            }
+        }
+        if let Some(sheets) = &self.sheets {
+            for ([place, _], through) in sheets.pairs.iter().zip(sheets.through.all::<L>()) {
+                let rho = &mut self.rows.all_mut::<L>()[*place as usize];
+                *rho = std::array::from_fn(|l| rho[l] + through[l]);
             }
         }
         self.rows

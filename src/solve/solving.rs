@@ -6,9 +6,10 @@ use super::linear;
 use super::operator::{self, Operator};
 use super::rays::RaySystem;
 use super::reflection::Reflection;
+use super::sheets;
 use super::sources::Painter;
 use super::{Bake, Given};
-use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded, weighed};
+use crate::light::{Arrival, Light, Neighbours, Rows, Through, brightness, padded, weighed};
 use crate::link::LinkRows;
 use crate::scene::effects::Kind;
 
@@ -100,6 +101,7 @@ impl Bake {
             greatest: sources.greatest,
             mixed: (self.lanes.is_mixed())
                 .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes)),
+            sheets: sources.sheets,
         };
         let sums = if by_rays {
             Vec::new()
@@ -129,6 +131,8 @@ impl Bake {
             reflected = reflection.of::<L>(&irradiance);
         }
         let on_nodes = self.on_nodes::<L>(&reflected, leaves);
+        let through =
+            (reflection.sheets.as_ref()).map_or_else(Through::default, |s| s.shown.clone());
         let fluxes = flux::FluxRows {
             emission: &emission,
             reflected: &reflected,
@@ -143,6 +147,10 @@ impl Bake {
         };
         (flux.sent, flux.scaled) = (self.sent, scaled);
         let emitted = emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves));
+        if !through.is_empty() {
+            irradiance = through.shown(irradiance);
+        }
+        self.light.through = through;
         self.shine(leaves, emitted, on_nodes, irradiance);
         (convergence, flux)
     }
@@ -170,6 +178,19 @@ impl Bake {
             greatest: &lit.reflection.greatest,
             two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
         };
+        if lit.reflection.sheets.is_some() {
+            let receive = |radiosity: &Rows| {
+                let mut nodes = Rows::zero(self.tree.nodes.len(), L);
+                let mut seen = Rows::zero(lit.leaves.len(), L);
+                system.receive::<L>(radiosity, &mut nodes, &mut seen);
+                seen
+            };
+            return self.through_sheets(lit, &receive).solve::<L>(
+                lit.first,
+                reflected,
+                lit.tolerance,
+            );
+        }
         match &lit.reflection.mixed {
             Some(mixed) => mixed.solve_by_rays::<L>(&system, lit.first, reflected, lit.tolerance),
             None => system.solve::<L>(lit.first, reflected, lit.tolerance),
@@ -189,9 +210,35 @@ impl Bake {
             reflectance: &lit.reflection.rows,
             greatest: &lit.reflection.greatest,
         };
+        if lit.reflection.sheets.is_some() {
+            let receive = |radiosity: &Rows| {
+                let nodes = self.tree.nodes.len();
+                let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
+                let mut seen = Rows::zero(lit.leaves.len(), L);
+                let operator = &system.operator;
+                operator.irradiance::<L>(radiosity, &mut means, &mut gathered, &mut seen);
+                seen
+            };
+            let sheets = self.through_sheets(lit, &receive);
+            return sheets.solve::<L>(lit.first, reflected, lit.tolerance).0;
+        }
         match &lit.reflection.mixed {
             Some(mixed) => mixed.solve::<L>(&system.operator, lit.first, reflected, lit.tolerance),
             None => system.solve::<L>(lit.first, reflected, lit.tolerance),
+        }
+    }
+
+    /// The same room where light passes sheets.
+    fn through_sheets<'a>(
+        &self,
+        lit: &'a Lit,
+        receive: &'a dyn Fn(&Rows) -> Rows,
+    ) -> sheets::System<'a> {
+        let areas = lit.leaves.iter().map(|&leaf| self.areas[leaf as usize]);
+        sheets::System {
+            reflection: lit.reflection,
+            areas: areas.collect(),
+            receive,
         }
     }
 
@@ -250,6 +297,7 @@ impl Bake {
             irradiance,
             leaves: leaves.to_vec(),
             neighbours: Neighbours::new(self.tree.nodes.len(), &self.graph),
+            through: std::mem::take(&mut self.light.through),
             white: self.light.white,
             half_size: self.mesh.half_size,
             ..Light::default()

@@ -1,8 +1,10 @@
 //! Reflectance and emission of patches, row by row, from the materials.
 
 use super::mixed::Mixed;
+use super::reflection::Sheets;
 use crate::color::Upsampler;
-use crate::hierarchy::{Element, Mesh, Tree};
+use crate::hierarchy::{Element, Mesh, NONE, Tree};
+use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
 use crate::scene::{Emission, Material, Scene, Surface, Texture};
@@ -21,8 +23,10 @@ pub(crate) struct Sources {
     pub reflectance: Rows,
     /// Exitance by leaf: pi times radiance.
     pub emission: Rows,
-    /// Greatest reflectance of each lane.
+    /// Greatest reflectance of each lane, with what passes sheets.
     pub greatest: Vec<f32>,
+    /// What passes sheets; none in a room without.
+    pub sheets: Option<Sheets>,
 }
 
 /// Turns materials into rows.
@@ -94,11 +98,75 @@ impl<'a> Painter<'a> {
                 || vec![0.0_f32; width],
                 |a, b| a.iter().zip(&b).map(|(a, b)| a.max(*b)).collect(),
             );
-        Sources {
+        let mut sources = Sources {
             reflectance,
             emission,
             greatest,
+            sheets: None,
+        };
+        if self.scene.materials.iter().any(|m| m.sheet.is_some()) {
+            self.weave(tree, leaves, lanes, &mut sources);
         }
+        sources
+    }
+
+    /// Adds what sheets let through, and what is left for their sides to reflect.
+    fn weave(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes, sources: &mut Sources) {
+        let pairs: Vec<[u32; 2]> = (0_u32..)
+            .zip(leaves)
+            .filter_map(|(place, &leaf)| {
+                let behind = leaves.binary_search(&tree.behind(leaf)).ok()?;
+                Some([place, behind as u32])
+            })
+            .collect();
+        if pairs.is_empty() {
+            return;
+        }
+        let width = sources.reflectance.width();
+        let mut rows = [(); 4].map(|()| Rows::zero(pairs.len(), width));
+        for (k, [place, _]) in pairs.iter().enumerate() {
+            let element = tree.elements[tree.node(leaves[*place as usize]).element as usize];
+            let Some(woven) = self.woven(tree, &element) else {
+                continue;
+            };
+            for (rows, spectrum) in rows.iter_mut().zip(&woven) {
+                lanes.averages(spectrum, rows.row_mut(k));
+            }
+            let [rho, through, ..] = &rows;
+            sources
+                .reflectance
+                .row_mut(*place as usize)
+                .copy_from_slice(rho.row(k));
+            let both = rho.row(k).iter().zip(through.row(k));
+            for (g, (rho, through)) in sources.greatest.iter_mut().zip(both) {
+                *g = g.max(rho + through);
+            }
+        }
+        let [_, through, plain, whole] = rows;
+        sources.sheets = Some(Sheets {
+            shown: Through::new(pairs.clone(), [&plain, &through, &whole]),
+            pairs,
+            through,
+        });
+    }
+
+    /// What an element of a sheet reflects and lets through; what it reflects without the pattern of its paint, which viewers add, and
+    /// what its light is shown by. None of what is no sheet.
+    pub(super) fn woven(&self, tree: &Tree, element: &Element) -> Option<[Leaves; 4]> {
+        let face = tree.faces[element.face as usize];
+        let triangle = face.triangle as usize;
+        let m = &self.scene.materials[self.mesh.material[triangle] as usize];
+        let sheet = m.sheet.as_ref()?;
+        let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
+        let weights = self.corner_weights(triangle, element);
+        let weave = sheet.weave(|texture| self.texel(texture, surface, triangle, &weights));
+        let color = self.paint_of(m, triangle, element);
+        let up = self.upsampler;
+        let [rho, through] = m.scatters(sheet, color, weave, face.back, up);
+        let color = m.mean_color(&self.scene.images);
+        let [plain, _] = m.scatters(sheet, color, weave, face.back, up);
+        let mean = sheet.mean_weave(&self.scene.images);
+        Some([rho, through, plain, m.shown(sheet, color, mean, up)])
     }
 
     /// The matrices of the given leaves, where lanes reflect into each other.
@@ -252,10 +320,20 @@ impl<'a> DenseSources<'a> {
 impl super::coarse::Dense for DenseSources<'_> {
     fn reflectance(&self, leaf: u32) -> Leaves {
         let (m, triangle, element) = self.of(leaf);
+        if let Some([rho, ..]) = self.painter.woven(self.tree, &element) {
+            return rho;
+        }
         match self.painter.paint_of(m, triangle, &element) {
             Some(color) => self.painter.clamped(color),
             None => m.reflectance,
         }
+    }
+
+    fn through(&self, leaf: u32) -> Option<Leaves> {
+        let element = self.tree.elements[self.tree.node(leaf).element as usize];
+        (self.tree.behind(leaf) != NONE)
+            .then(|| self.painter.woven(self.tree, &element))?
+            .map(|[_, through, ..]| through)
     }
 
     fn emission(&self, leaf: u32, light: usize) -> Option<Leaves> {

@@ -138,6 +138,22 @@ impl Fingerprint {
             if let Some(texture) = &m.paint {
                 mix.texture(texture, &images);
             }
+            if let Some(sheet) = &m.sheet {
+                mix.add(sheet.transmittance)
+                    .add(sheet.strength)
+                    .add(u8::from(sheet.shares))
+                    .add(sheet.color.unwrap_or_default());
+                if let Some(back) = sheet.back {
+                    mix.add(back);
+                }
+                for texture in [&sheet.strength_texture, &sheet.color_texture] {
+                    // Which of the two it is shows by its place.
+                    mix.add(u8::from(texture.is_some()));
+                    if let Some(texture) = texture {
+                        mix.texture(texture, &images);
+                    }
+                }
+            }
             if let Some(e) = &m.emission {
                 mix.add(e.light as u64)
                     .add(e.shape)

@@ -41,7 +41,8 @@ struct Path {
 impl Gatherer<'_> {
     /// Is a hit so near that its leaf says little about it? `backs`: share of the rays that met black backs.
     pub(super) fn is_near(&self, leaf: u32, hit: &Hit, backs: f64) -> bool {
-        backs > WITHIN || hit.t < self.light.descent.near(leaf)
+        let near = self.light.descent.near(leaf);
+        hit.t < near || backs > WITHIN && near > 0.0
     }
 
     /// What the points that rays met close by reflect, together, as a share of what their leaves do.

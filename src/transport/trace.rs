@@ -182,6 +182,26 @@ fn broken() -> Broken {
     Broken::new("has weights that do not read")
 }
 
+/// Two packed traces as one: of a point of a diffuse sheet and of the point behind it.
+pub(crate) fn joined(own: &[u8], behind: &[u8]) -> Box<[u8]> {
+    let mut out = Vec::with_capacity(own.len() + behind.len() + 4);
+    number(own.len() as u64, &mut out);
+    out.extend(own);
+    out.extend(behind);
+    out.into_boxed_slice()
+}
+
+/// The two of [`joined`].
+///
+/// # Errors
+/// [`Broken`]: the bytes are no two traces.
+pub(crate) fn parted(both: &[u8]) -> Read<[&[u8]; 2]> {
+    let mut from = Packed { rest: both };
+    let own = usize::try_from(from.number()?).unwrap_or(usize::MAX);
+    let (own, behind) = from.rest.split_at_checked(own).ok_or_else(broken)?;
+    Ok([own, behind])
+}
+
 /// Irradiance of a packed trace under a light, `L` lanes wide. Where nothing is reflected yet `light.reflected` may be empty.
 ///
 /// # Errors

@@ -8,6 +8,7 @@
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
 use haarlight::scene::pane::{Pane, PaneKind};
+use haarlight::scene::sheet::Sheet;
 use haarlight::scene::sky::Sky;
 use haarlight::scene::{
     Alpha, Emission, GREATEST_ALBEDO, LightKind, LightSpectrum, Material, PunctualLight, Scene,
@@ -75,6 +76,7 @@ impl Room {
             emission: None,
             alpha: Alpha::Opaque,
             pane: None,
+            sheet: None,
         });
         self.materials.len() - 1
     }
@@ -111,6 +113,23 @@ impl Room {
                 share: 1.0,
             },
             texture: None,
+            from: "given".into(),
+        });
+        material
+    }
+
+    /// A diffuse sheet by what its front and its back reflect, and what it lets through; returns its index.
+    pub(crate) fn sheet(&mut self, front: Leaves, back: Leaves, through: Leaves) -> usize {
+        let material = self.spectral_paint(front);
+        self.materials[material].sides = Sides::Both;
+        self.materials[material].sheet = Some(Sheet {
+            transmittance: through,
+            back: Some(back),
+            strength: 0.0,
+            strength_texture: None,
+            color: None,
+            color_texture: None,
+            shares: false,
             from: "given".into(),
         });
         material

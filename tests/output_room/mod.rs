@@ -142,6 +142,7 @@ fn material(name: &str, index: usize) -> Material {
         emission: None,
         alpha: Alpha::Opaque,
         pane: None,
+        sheet: None,
     }
 }
 

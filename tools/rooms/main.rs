@@ -6,6 +6,7 @@ mod building;
 mod cells;
 mod cie171;
 mod cornell;
+mod curtained;
 mod daylit;
 mod furnished;
 mod gallery;
@@ -68,6 +69,7 @@ const ROOMS: &[Room] = &[
     ("corridor", simple::corridor, None),
     ("daylit", daylit::room, Some(daylit::spectra)),
     ("glazed", glazed::room, Some(glazed::spectra)),
+    ("curtained", curtained::room, Some(curtained::spectra)),
     ("furnace", simple::furnace, None),
     ("gallery", gallery::room, Some(gallery::spectra)),
     ("cie171-5.2", cie171::case_5_2, None),

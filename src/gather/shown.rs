@@ -1,0 +1,54 @@
+//! The light of points of surfaces as it is shown: on diffuse sheets, with what passes from behind.
+
+use crate::hierarchy::NONE;
+use crate::light::mixed;
+use crate::solve::{Bake, Care};
+use crate::transport::{Gathered, Receiver, trace};
+
+impl Bake {
+    /// Gathers at points of surfaces, in order; where these are diffuse sheets also behind them, see [`Through`](crate::light::Through).
+    pub(crate) fn gather_shown(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
+        let mut gathered = self.gather_with(receivers, care);
+        let behind: Vec<(usize, u32, Receiver)> = (receivers.iter().enumerate())
+            .filter_map(|(k, to)| self.behind(to).map(|(place, other)| (k, place, other)))
+            .collect();
+        if behind.is_empty() {
+            return gathered;
+        }
+        let others: Vec<Receiver> = behind.iter().map(|&(.., other)| other).collect();
+        for ((k, place, _), other) in behind.iter().zip(self.gather_with(&others, care)) {
+            let Some(shares) = self.light().through.shares(*place) else {
+                continue;
+            };
+            let shown = &mut gathered[*k];
+            mixed(shares, &mut shown.irradiance, &other.irradiance);
+            mixed(shares, &mut shown.direct, &other.direct);
+            shown.rays += other.rays;
+            if let (Some(own), Some(other)) = (&shown.packed, &other.packed) {
+                shown.packed = Some(trace::joined(own, other));
+            }
+        }
+        gathered
+    }
+
+    /// The place of the leaf of a point of a sheet among the leaves of the solution, and the point behind it.
+    fn behind(&self, to: &Receiver) -> Option<(u32, Receiver)> {
+        let leaf = to.leaf?;
+        let place = self.place_on_sheet(leaf)?;
+        let other = Receiver {
+            normal: -to.normal,
+            leaf: Some(self.tree().behind(leaf)),
+            ..*to
+        };
+        Some((place, other))
+    }
+
+    /// The place of a leaf among the leaves of the solution, if it is one of a sheet.
+    pub(crate) fn place_on_sheet(&self, leaf: u32) -> Option<u32> {
+        let light = self.light();
+        if light.through.is_empty() || self.tree().behind(leaf) == NONE {
+            return None;
+        }
+        light.leaves.binary_search(&leaf).ok().map(|k| k as u32)
+    }
+}

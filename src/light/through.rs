@@ -1,0 +1,106 @@
+//! What the two sides of diffuse sheets show of each other's light.
+//!
+//! One number a lane says how bright light is on an opaque surface: its irradiance. A side of a sheet sends out
+//! `rho E + tau E'`, E' behind it. So that it looks like any other surface downstream, its light is given as the irradiance that the
+//! sheet's whole reflectance and transmittance, s, would turn into that: `(rho / s) E + (tau / s) E'`, lane by lane.
+
+use super::rows::Rows;
+
+/// The shares of both irradiances in the light of a side, for the leaves of sheets.
+#[derive(Debug, Clone, Default)]
+pub struct Through {
+    /// Places among the leaves of a side and of the one behind it, ascending.
+    pairs: Vec<[u32; 2]>,
+    /// `rho / s` of each pair; 1 where s is 0.
+    own: Rows,
+    /// `tau / s`.
+    across: Rows,
+}
+
+impl Through {
+    /// Of pairs of leaves, with what their sides reflect, let through, and are shown by.
+    pub(crate) fn new(pairs: Vec<[u32; 2]>, [rho, tau, shown]: [&Rows; 3]) -> Self {
+        let (mut own, mut across) = (rho.clone(), tau.clone());
+        for k in 0..pairs.len() {
+            let lanes = own.row_mut(k).iter_mut().zip(across.row_mut(k));
+            for ((own, across), &shown) in lanes.zip(shown.row(k)) {
+                (*own, *across) = match shown > 0.0 {
+                    true => (*own / shown, *across / shown),
+                    false => (1.0, 0.0),
+                };
+            }
+        }
+        Self { pairs, own, across }
+    }
+
+    /// Are there sheets?
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty()
+    }
+
+    /// The shares of its own irradiance and of that behind it in the light of a leaf, by its place among the leaves; none of what is
+    /// no sheet.
+    pub fn shares(&self, place: u32) -> Option<[&[f32]; 2]> {
+        let k = self.pairs.binary_search_by_key(&place, |pair| pair[0]);
+        k.ok().map(|k| [self.own.row(k), self.across.row(k)])
+    }
+
+    /// Irradiance by leaf, of sheets as it is shown.
+    pub(crate) fn shown(&self, mut irradiance: Rows) -> Rows {
+        let met = irradiance.clone();
+        for (k, [place, behind]) in self.pairs.iter().map(|p| p.map(|x| x as usize)).enumerate() {
+            let shares = [self.own.row(k), self.across.row(k)];
+            mixed(shares, irradiance.row_mut(place), met.row(behind));
+        }
+        irradiance
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        8 * self.pairs.len() + self.own.bytes() + self.across.bytes()
+    }
+}
+
+/// Turns the irradiance of a side into what it is shown by, with that behind it.
+pub(crate) fn mixed([own, across]: [&[f32]; 2], light: &mut [f32], behind: &[f32]) {
+    let shares = own.iter().zip(across);
+    for ((light, behind), (own, across)) in light.iter_mut().zip(behind).zip(shares) {
+        *light = own * *light + across * behind;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Times s, what is shown is what the side sends out; a side that sends out nothing keeps its own light.
+    #[test]
+    fn what_is_shown_times_the_whole_is_what_leaves() {
+        let rows = |values: [[f32; 4]; 2]| {
+            let mut rows = Rows::zero(2, 4);
+            for (k, row) in values.iter().enumerate() {
+                rows.row_mut(k).copy_from_slice(row);
+            }
+            rows
+        };
+        let (rho, tau) = (
+            [[0.5, 0.0, 0.2, 0.0], [0.3, 0.0, 0.2, 0.0]],
+            [0.25, 0.4, 0.0, 0.0],
+        );
+        let whole = [0.75, 0.4, 0.2, 0.0];
+        let through = Through::new(
+            vec![[0, 1], [1, 0]],
+            [&rows(rho), &rows([tau; 2]), &rows([whole; 2])],
+        );
+        let light = [[1.0, 2.0, 3.0, 4.0], [10.0, 20.0, 30.0, 40.0]];
+        let shown = through.shown(rows(light));
+        for k in 0..2 {
+            for l in 0..3 {
+                let sent = rho[k][l] * light[k][l] + tau[l] * light[1 - k][l];
+                assert!((whole[l] * shown.row(k)[l] - sent).abs() < 1e-5);
+            }
+            assert_eq!(shown.row(k)[3], light[k][3]);
+        }
+        assert!(through.shares(1).is_some() && through.shares(2).is_none());
+    }
+}

@@ -1,0 +1,174 @@
+//! The solve in rooms with diffuse sheets: what leaves one side depends on the light of both,
+//! `R = rho (f + F R) + tau (f' + F' R)`, where ' is the side behind.
+//!
+//! With M for both terms that is `(1 - M F) R = M f`. M is symmetric, but where more light passes a sheet than it sends back it has
+//! negative eigenvalues, and conjugate gradients on its root are out. So light is found by BiCGSTAB (van der Vorst 1992), all lanes
+//! side by side, which asks for no symmetry; then plain sweeps, `R = M (f + F R)`, tell how far it got and go on where it did not get
+//! far enough. In the norm `sum A R^2` M shrinks by the greatest `rho + tau`, s, and F does not grow: what a sweep changes by d leaves
+//! an error of `d s / (1 - s)` at the most.
+
+use super::conjugate::{Convergence, step, turn};
+use super::reflection::Reflection;
+use crate::light::rows::Rows;
+use rayon::prelude::*;
+
+/// Applications of the operator to find the light, at the most: bright rooms take some 20.
+const MOST: usize = 100;
+/// What is sought this way is this share of the tolerance: the norm says little of what is closed in.
+const SHARE: f64 = 0.1;
+/// Sweeps at the most.
+const SWEEPS: usize = 400;
+/// Rows a partial sum covers; fixed, so that sums do not depend on the number of threads.
+const CHUNK: usize = 1024;
+
+/// A room whose leaves reflect so, with what turns radiosity into irradiance.
+pub(super) struct System<'a> {
+    pub(super) reflection: &'a Reflection,
+    /// Area of each leaf.
+    pub(super) areas: Vec<f64>,
+    /// From radiosity by leaf to irradiance by leaf.
+    pub(super) receive: &'a dyn Fn(&Rows) -> Rows,
+}
+
+impl System<'_> {
+    /// Reflected radiosity (from a guess) by direct irradiance, and irradiance by reflected light, all by leaf.
+    pub(super) fn solve<const L: usize>(
+        &self,
+        first: &Rows,
+        reflected: &mut Rows,
+        tolerance: f64,
+    ) -> (Convergence, Rows) {
+        let mut done = Convergence::default();
+        self.approach::<L>(first, reflected, tolerance, &mut done);
+        let greatest = self.reflection.greatest.iter();
+        let tails: Vec<f64> = greatest
+            .map(|&s| f64::from(s) / (1.0 - f64::from(s)))
+            .collect();
+        loop {
+            let seen = (self.receive)(reflected);
+            let mut next = seen.clone();
+            step::<L>(&mut next, first, [1.0; L]);
+            let next = self.reflection.of::<L>(&next);
+            step::<L>(reflected, &next, [-1.0; L]);
+            let (moved, whole) = (
+                self.dot::<L>(reflected, reflected),
+                self.dot::<L>(&next, &next),
+            );
+            *reflected = next;
+            done.iterations += 1;
+            (done.residual, done.bound) = (0.0, 0.0);
+            for l in 0..L {
+                let change = (moved[l] / whole[l].max(f64::MIN_POSITIVE)).sqrt();
+                done.residual = done.residual.max(change);
+                done.bound = done
+                    .bound
+                    .max(change * tails.get(l).copied().unwrap_or(0.0));
+            }
+            if done.bound <= tolerance || done.iterations >= MOST + SWEEPS {
+                return (done, seen);
+            }
+        }
+    }
+
+    /// BiCGSTAB. What it leaves is no worse than the guess.
+    fn approach<const L: usize>(
+        &self,
+        first: &Rows,
+        reflected: &mut Rows,
+        tolerance: f64,
+        done: &mut Convergence,
+    ) {
+        let guess = reflected.clone();
+        let mut residual = self.reflection.of::<L>(first);
+        let norm = self.dot::<L>(&residual, &residual);
+        step::<L>(&mut residual, &self.apply::<L>(reflected), [-1.0; L]);
+        let start = self.dot::<L>(&residual, &residual);
+        let shadow = residual.clone();
+        let (mut direction, mut applied) = (residual.clone(), Rows::zero(residual.len(), L));
+        let mut rho = start;
+        let mut left = start;
+        done.iterations += 1;
+        while self.bound(&left, &norm) > SHARE * tolerance && done.iterations + 2 <= MOST {
+            applied.clone_from(&self.apply::<L>(&direction));
+            let alpha = ratios(&rho, &self.dot::<L>(&shadow, &applied));
+            step::<L>(reflected, &direction, alpha);
+            step::<L>(&mut residual, &applied, alpha.map(|a| -a));
+            let next = self.apply::<L>(&residual);
+            let omega = ratios(
+                &self.dot::<L>(&next, &residual),
+                &self.dot::<L>(&next, &next),
+            );
+            step::<L>(reflected, &residual, omega);
+            step::<L>(&mut residual, &next, omega.map(|w| -w));
+            done.iterations += 2;
+            left = self.dot::<L>(&residual, &residual);
+            let after = self.dot::<L>(&shadow, &residual);
+            // p = r + beta (p - omega v).
+            let ratio = ratios(&after, &rho);
+            let beta = std::array::from_fn(|l| match omega[l] {
+                0.0 => 0.0,
+                w => ratio[l] * alpha[l] / w,
+            });
+            step::<L>(&mut direction, &applied, omega.map(|w| -w));
+            turn::<L>(&mut direction, &residual, beta);
+            rho = after;
+        }
+        // A lane that broke down keeps its guess; light is nowhere below 0.
+        for (row, guess) in reflected.all_mut::<L>().iter_mut().zip(guess.all::<L>()) {
+            for l in 0..L {
+                if left[l].is_nan() || left[l] > start[l] {
+                    row[l] = guess[l];
+                }
+                row[l] = row[l].max(0.0);
+            }
+        }
+    }
+
+    /// `(1 - M F) x`.
+    fn apply<const L: usize>(&self, x: &Rows) -> Rows {
+        let again = self.reflection.of::<L>(&(self.receive)(x));
+        let mut out = x.clone();
+        step::<L>(&mut out, &again, [-1.0; L]);
+        out
+    }
+
+    /// How large the error of the worst lane may still be, from squares of residual and right-hand side.
+    fn bound(&self, left: &[f64], norm: &[f64]) -> f64 {
+        let lanes = left.iter().zip(norm).zip(&self.reflection.greatest);
+        lanes
+            .filter(|((_, norm), _)| **norm > 0.0)
+            .map(|((left, norm), &s)| (left / norm).sqrt() / (1.0 - f64::from(s)))
+            .fold(0.0, f64::max)
+    }
+
+    /// Inner products by area, lane by lane.
+    fn dot<const L: usize>(&self, x: &Rows, y: &Rows) -> [f64; L] {
+        let rows = x
+            .all::<L>()
+            .par_chunks(CHUNK)
+            .zip(y.all::<L>().par_chunks(CHUNK));
+        let parts: Vec<[f64; L]> = rows
+            .zip(self.areas.par_chunks(CHUNK))
+            .map(|((x, y), areas)| {
+                let mut sum = [0.0; L];
+                for ((x, y), area) in x.iter().zip(y).zip(areas) {
+                    for l in 0..L {
+                        sum[l] += area * f64::from(x[l]) * f64::from(y[l]);
+                    }
+                }
+                sum
+            })
+            .collect();
+        parts.iter().fold([0.0; L], |sum, part| {
+            std::array::from_fn(|l| sum[l] + part[l])
+        })
+    }
+}
+
+/// Lane by lane; 0 where that is no number.
+fn ratios<const L: usize>(a: &[f64; L], b: &[f64; L]) -> [f32; L] {
+    std::array::from_fn(|l| {
+        let ratio = (a[l] / b[l]) as f32;
+        if ratio.is_finite() { ratio } else { 0.0 }
+    })
+}

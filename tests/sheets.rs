@@ -1,0 +1,580 @@
+//! Diffuse sheets: what meets one side leaves both.
+
+#[path = "common/built.rs"]
+mod built;
+mod common;
+
+use built::{Room, sphere};
+use glam::{DVec3, dvec3};
+use haarlight::audit::{Reference, Report};
+use haarlight::keep::Relighter;
+use haarlight::scene::effects::Kind;
+use haarlight::scene::{LightKind, Options, Scene, Sides};
+use haarlight::solve::{Bake, Settings};
+use haarlight::spectrum::{LEAVES, Leaves};
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+
+/// The same at all wavelengths.
+fn even(x: f64) -> Leaves {
+    [x; LEAVES]
+}
+
+/// Asked for less than the default: closed forms are held to half a per cent.
+fn baked(room: Room) -> Bake {
+    let settings = Settings {
+        error: 0.2,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(room.scene(), settings);
+    bake.run();
+    bake
+}
+
+/// Mean lux at points.
+fn mean_lux(bake: &Bake, points: &[(DVec3, DVec3)]) -> f64 {
+    let all = bake.probe(points).iter().map(|p| p.xyz[1]).sum::<f64>();
+    all / points.len() as f64
+}
+
+fn lux(bake: &Bake, point: DVec3, normal: DVec3) -> f64 {
+    bake.probe(&[(point, normal)])[0].xyz[1]
+}
+
+fn close(a: f64, b: f64, tolerance: f64, what: &str) {
+    assert!(
+        (a - b).abs() <= tolerance * b.abs(),
+        "{what}: {a} for {b}, off by {:e}",
+        a / b - 1.0
+    );
+}
+
+/// Many small triangles far away that see nothing of a room: leaves and points then look for themselves.
+fn crowd(room: &mut Room) {
+    let black = room.paint(0.0);
+    let (corners, triangles) = sphere(dvec3(0.0, -50.0, 0.0), 0.2, 2);
+    room.mesh(corners, triangles, black);
+}
+
+/// Three plates one above the other, very near: a lamp looking down, a sheet, a floor. Between plates without end every one sees
+/// nothing but the next, `B1 = e + r1 Bf`, `Bf = rf B1 + t B2`, `Bb = rb B2 + t B1`, `B2 = r2 Bb`.
+#[test]
+fn two_slabs_exchange_light_through_a_sheet() {
+    let (e, r1, r2) = (100.0, 0.4, 0.6);
+    for (rf, rb, t) in [(0.5, 0.3, 0.2), (0.1, 0.0, 0.8), (0.0, 0.7, 0.25)] {
+        let mut room = Room::new();
+        let lamp = room.lamp(r1, e);
+        let sheet = room.sheet(even(rf), even(rb), even(t));
+        let floor = room.paint(r2);
+        let (size, gap) = (100.0, 0.1);
+        let (x, z) = (DVec3::X * size, DVec3::Z * size);
+        room.quad(dvec3(0.0, 2.0 * gap, 0.0), x, z, lamp);
+        room.quad(dvec3(0.0, gap, 0.0), z, x, sheet);
+        room.quad(DVec3::ZERO, z, x, floor);
+        let bake = baked(room);
+        // B2 = r2 (rb B2 + t B1), so B2 = q B1.
+        let q = r2 * t / (1.0 - r2 * rb);
+        let b1 = e / (1.0 - r1 * (rf + t * q));
+        let at = |height: f64| dvec3(0.47 * size, height, 0.52 * size);
+        close(lux(&bake, at(0.0), DVec3::Y), q / r2 * b1, 0.005, "floor");
+        close(lux(&bake, at(gap), DVec3::Y), b1, 0.005, "front");
+        close(lux(&bake, at(gap), DVec3::NEG_Y), q * b1, 0.005, "back");
+        close(
+            lux(&bake, at(2.0 * gap), DVec3::NEG_Y),
+            (rf + t * q) * b1,
+            0.005,
+            "lamp",
+        );
+    }
+}
+
+/// A lamp in the middle of a ball of paper in the middle of a hollow ball: all is even, and the two cavities exchange light through
+/// the paper.
+#[test]
+fn a_ball_of_paper_around_a_lamp() {
+    // By polygons; by rays, of which those of all walls together find the ball to about 1 %.
+    ball_of_paper(1, 5e-3);
+    ball_of_paper(2, 0.02);
+}
+
+fn ball_of_paper(depth: u32, tolerance: f64) {
+    let (flux, wall, front, back, through) = (1000.0, 0.5, 0.4, 0.3, 0.45);
+    let mut room = Room::new();
+    let paper = room.sheet(even(front), even(back), even(through));
+    let paint = room.paint(wall);
+    let (corners, triangles) = sphere(DVec3::ZERO, 0.6, depth);
+    room.mesh(corners, triangles, paper);
+    let (corners, mut triangles) = sphere(DVec3::ZERO, 1.0, depth);
+    triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    room.mesh(corners, triangles, paint);
+    room.point(DVec3::ZERO, flux);
+    let bake = baked(room);
+    let area = |surface: u32| -> f64 {
+        let all = bake.mesh().origin.iter().zip(&bake.mesh().area);
+        all.filter(|(from, _)| from.0 == surface)
+            .map(|(_, a)| a)
+            .sum()
+    };
+    let (paper, walls) = (area(0), area(1));
+    // Inside: h = flux / A + rho_back h + tau k; outside: k = wall x; on the wall: x = s (front k + tau h) + (1 - s) wall x.
+    let s = paper / walls;
+    let first = flux / paper;
+    let solve = |h: f64| {
+        // k from h: k / wall = s front k + s tau h + (1 - s) k.
+        s * through * h / (1.0 / wall - s * front - (1.0 - s))
+    };
+    let k = solve(1.0);
+    let h = first / (1.0 - back - through * k);
+    let k = k * h;
+    let mean = |surface: u32, back: bool| {
+        let light = bake.light();
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (row, &leaf) in light.leaves.iter().enumerate() {
+            let node = bake.tree().node(leaf);
+            let face = bake.tree().faces[node.faces.0 as usize];
+            if bake.mesh().origin[face.triangle as usize].0 == surface && face.back == back {
+                sum += node.area * bake.lanes().tristimulus(light.irradiance.row(row))[1];
+                all += node.area;
+            }
+        }
+        sum / all
+    };
+    // Sides of the paper are shown by front + through, the greater of both.
+    let shown = front + through;
+    close(
+        mean(0, true),
+        (back * h + through * k) / shown,
+        tolerance,
+        "inside",
+    );
+    close(
+        mean(0, false),
+        (front * k + through * h) / shown,
+        tolerance,
+        "outside",
+    );
+    close(mean(1, false), k / wall, tolerance, "wall");
+}
+
+/// Parallel light on a black sheet: below it is a Lambertian lamp of exitance tau E. By polygons and by rays.
+#[test]
+fn a_black_sheet_sends_out_what_passes() {
+    let (lux_above, through) = (2000.0, 0.95);
+    for crowded in [false, true] {
+        let mut room = Room::new();
+        let sheet = room.sheet(even(0.0), even(0.0), even(through));
+        let black = room.paint(0.0);
+        room.quad(dvec3(-0.5, 1.0, -0.5), DVec3::Z, DVec3::X, sheet);
+        room.quad(
+            dvec3(-2.0, 0.0, -2.0),
+            DVec3::Z * 4.0,
+            DVec3::X * 4.0,
+            black,
+        );
+        room.punctual(LightKind::Directional, DVec3::ZERO, DVec3::NEG_Y, lux_above);
+        if crowded {
+            crowd(&mut room);
+        }
+        let bake = baked(room);
+        // Point to a parallel rectangle over its corner (Howell, B-3).
+        let corner = |a: f64, b: f64| {
+            let (x, y) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+            (a / x * (b / x).atan() + b / y * (a / y).atan()) / (2.0 * PI)
+        };
+        let wanted = |x: f64, z: f64| {
+            let sides = [[0.5 - x, 0.5 + x], [0.5 - z, 0.5 + z]];
+            let factor: f64 = sides[0]
+                .iter()
+                .flat_map(|a| sides[1].map(|b| corner(*a, b)))
+                .sum();
+            through * lux_above * factor
+        };
+        if crowded {
+            // Each point looks with rays of its own: their noise is less in the mean.
+            let at = |k: usize| -0.4 + 0.1 * k as f64;
+            let places: Vec<(f64, f64)> = (0..81).map(|k| (at(k % 9), at(k / 9))).collect();
+            let want: f64 = places.iter().map(|&(x, z)| wanted(x, z)).sum();
+            let points: Vec<_> = (places.iter())
+                .map(|&(x, z)| (dvec3(x, 0.0, z), DVec3::Y))
+                .collect();
+            let mean = mean_lux(&bake, &points);
+            close(mean, want / 81.0, 5e-3, "below the sheet, by rays");
+            continue;
+        }
+        for (x, z) in [(0.0, 0.0), (0.25, -0.1), (-0.4, 0.3)] {
+            let got = lux(&bake, dvec3(x, 0.0, z), DVec3::Y);
+            close(got, wanted(x, z), 1e-3, "below the sheet");
+        }
+    }
+}
+
+/// A box that a sheet divides, with a lamp in one half: all that the lamp gives out is absorbed, also where nearly nothing is.
+fn divided(front: f64, back: f64, through: f64, wall: f64, crowded: bool) -> Bake {
+    let mut room = Room::new();
+    let paint = room.paint(wall);
+    let sheet = room.sheet(even(front), even(back), even(through));
+    for (from, to) in [(0.0, 1.5), (1.5, 3.0)] {
+        let faces = built::faces(dvec3(from, 0.0, 0.0), dvec3(to, 2.5, 3.0));
+        let ends = [from == 0.0, to == 3.0, true, true, true, true];
+        for (corners, _) in faces.iter().zip(ends).filter(|(_, there)| *there) {
+            room.polygon(corners, paint);
+        }
+    }
+    let [y, z] = [DVec3::Y * 2.5, DVec3::Z * 3.0];
+    // Its front looks at the lamp.
+    room.quad(DVec3::X * 1.5, z, y, sheet);
+    room.point(dvec3(0.6, 1.3, 1.4), 1000.0);
+    if crowded {
+        let (corners, triangles) = sphere(dvec3(0.6, 0.5, 2.3), 0.1, 2);
+        room.mesh(corners, triangles, paint);
+    }
+    baked(room)
+}
+
+#[test]
+fn what_is_given_out_is_absorbed() {
+    for (front, back, through, wall) in [
+        (0.5, 0.5, 0.3, 0.6),
+        (0.2, 0.4, 0.55, 0.5),
+        (0.59, 0.59, 0.4, 0.99),
+        (0.1, 0.1, 0.89, 0.7),
+    ] {
+        for crowded in [false, true] {
+            let bake = divided(front, back, through, wall, crowded);
+            let flux = bake.rounds().last().unwrap().flux;
+            let what = format!("{front} {back} {through} {wall} {crowded}");
+            let tolerance = if crowded { 0.02 } else { 1e-3 };
+            close(flux.received_lm, 1000.0, tolerance, &what);
+            close(flux.absorbed_lm, flux.received_lm, tolerance, &what);
+            assert!(
+                flux.escaped_lm.abs() < 1000.0 * tolerance,
+                "{what}: {flux:?}"
+            );
+        }
+    }
+}
+
+/// Walls of albedo r that emit e, and a sheet that emits as much more as it absorbs more: light is `e / (1 - r)` everywhere.
+#[test]
+fn a_furnace_with_a_sheet_is_even() {
+    let (r, e) = (0.7, 100.0);
+    let want = e / (1.0 - r);
+    for (front, through) in [(0.3, 0.4), (0.0, 0.9), (0.69, 0.3)] {
+        for crowded in [false, true] {
+            let mut room = Room::new();
+            let wall = room.lamp(r, e);
+            room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 3.0), [wall; 6]);
+            let sheet = room.sheet(even(front), even(front), even(through));
+            room.glow(sheet, 0, want * (1.0 - front - through));
+            room.quad(dvec3(1.5, 0.5, 0.5), DVec3::Z * 2.0, DVec3::Y * 1.5, sheet);
+            if crowded {
+                let (corners, triangles) = sphere(dvec3(0.6, 1.0, 1.5), 0.3, 2);
+                room.mesh(corners, triangles, wall);
+            }
+            let bake = baked(room);
+            // Rows of rays sum to 1, but the light of lamps has noise: it is less in the mean of points.
+            let mut all = Vec::new();
+            for k in 0..16 {
+                let (x, z) = (0.35 + 0.77 * f64::from(k % 4), 0.3 + 0.8 * f64::from(k / 4));
+                all.push((dvec3(x, 0.0, z), DVec3::Y));
+                let on_sheet = dvec3(1.5, 0.6 + 0.08 * f64::from(k), 0.7 + 0.1 * f64::from(k));
+                all.extend([DVec3::X, DVec3::NEG_X].map(|n| (on_sheet, n)));
+            }
+            close(mean_lux(&bake, &all), want, 3e-3, "furnace");
+            if !crowded {
+                for (point, normal) in all {
+                    close(lux(&bake, point, normal), want, 5e-3, "furnace, a point");
+                }
+            }
+        }
+    }
+}
+
+/// Vertices of a sheet show what leaves their side: `rho E + tau E'`.
+#[test]
+fn vertices_show_both_lights() {
+    let (front, back, through) = (0.35, 0.2, 0.45);
+    let bake = divided(front, back, through, 0.6, false);
+    let sheet = bake.scene().surfaces.len() - 1;
+    let baked = bake.baked(&|_, _| {});
+    let mut seen = [0; 2];
+    for side in baked.surfaces.iter().filter(|s| s.surface == sheet) {
+        for vertex in side.vertices.iter().step_by(7) {
+            let surface = &bake.scene().surfaces[sheet];
+            let corners = surface.triangles[vertex.triangle as usize];
+            let place: DVec3 = (0..3)
+                .map(|k| surface.positions[corners[k] as usize] * vertex.weights[k])
+                .sum();
+            let middle = dvec3(1.5, 1.25, 1.5);
+            if (place - middle).abs().max_element() > 1.2 {
+                continue;
+            }
+            let [left, right] = [DVec3::NEG_X, DVec3::X].map(|n| lux(&bake, place, n));
+            let want = match side.back {
+                false => front * left + through * right,
+                true => back * right + through * left,
+            };
+            close(f64::from(vertex.radiosity[1]), want, 0.02, "vertex");
+            seen[usize::from(side.back)] += 1;
+        }
+    }
+    assert!(seen.iter().all(|n| *n > 1), "{seen:?}");
+}
+
+/// The plan says why it runs.
+#[test]
+fn the_plan_names_the_material() {
+    let bake = divided(0.5, 0.5, 0.3, 0.6, false);
+    assert!(bake.plan().runs(Kind::Sheets));
+    let text = bake.plan().to_string();
+    let line = "material 'material 1' lets diffuse light through";
+    assert!(text.contains(line), "{text}");
+}
+
+/// A room of one triangle with this material and side file, read from files.
+fn read(material: &Value, side: &Value) -> Result<Scene, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = common::Room::triangle();
+    file.json["extensionsUsed"] = json!(["KHR_materials_diffuse_transmission"]);
+    file.json["materials"] = json!([material]);
+    file.primitive()["material"] = json!(0);
+    let path = folder.path().join("room.glb");
+    std::fs::write(&path, file.glb()).unwrap();
+    std::fs::write(folder.path().join("room.spectra.json"), side.to_string()).unwrap();
+    Scene::load(&path, &Options::default()).map_err(|error| error.to_string())
+}
+
+/// A curtain of glTF's own words.
+fn curtain(base: [f64; 3], factor: Value, color: Value) -> Value {
+    json!({
+        "name": "curtain",
+        "pbrMetallicRoughness": {"baseColorFactor": [base[0], base[1], base[2], 1.0], "metallicFactor": 0.0},
+        "extensions": {"KHR_materials_diffuse_transmission": {
+            "diffuseTransmissionFactor": factor,
+            "diffuseTransmissionColorFactor": color,
+        }},
+    })
+}
+
+/// `(1 - f) b` is reflected, `f c` passes, and the sheet has two sides whatever the file says.
+#[test]
+fn what_gltf_says_of_a_sheet() {
+    let material = curtain([0.6; 3], json!(0.25), json!([0.8, 0.8, 0.8]));
+    let scene = read(&material, &json!({})).unwrap();
+    let curtain = &scene.materials[0];
+    let sheet = curtain.sheet.as_ref().unwrap();
+    for k in 0..LEAVES {
+        close(curtain.reflectance[k], 0.45, 1e-6, "reflected");
+        close(sheet.transmittance[k], 0.2, 1e-6, "passes");
+    }
+    assert_eq!(curtain.sides, Sides::Both);
+    assert_eq!(scene.warnings, Vec::<String>::new());
+    // White on white keeps a thousandth.
+    let white = read(
+        &self::curtain([1.0; 3], json!(0.5), json!([1, 1, 1])),
+        &json!({}),
+    )
+    .unwrap();
+    let sheet = white.materials[0].sheet.as_ref().unwrap();
+    let sum = white.materials[0].reflectance[20] + sheet.transmittance[20];
+    assert!((0.99..=0.999_000_1).contains(&sum), "{sum}");
+    // Nothing passes: no sheet.
+    let none = self::curtain([0.6; 3], json!(0.0), json!([1, 1, 1]));
+    let scene = read(&none, &json!({})).unwrap();
+    assert!(scene.materials[0].sheet.is_none() && scene.materials[0].sides == Sides::Front);
+    assert_eq!(scene.materials[0].reflectance, [f64::from(0.6_f32); LEAVES]);
+}
+
+/// A side file takes the place of what glTF says; both sides may reflect by spectra of their own.
+#[test]
+fn what_a_side_file_says_of_a_sheet() {
+    let material = curtain([0.6; 3], json!(0.25), json!([1.0, 0.5, 0.5]));
+    let side = json!({"materials": {"curtain": {
+        "transmission": {"csv": "380,0.1\n780,0.3"},
+        "reflectance": {"csv": "380,0.4\n780,0.4"},
+        "back_reflectance": {"csv": "380,0.6\n780,0.6"},
+    }}});
+    let scene = read(&material, &side).unwrap();
+    let curtain = &scene.materials[0];
+    let sheet = curtain.sheet.as_ref().unwrap();
+    close(curtain.reflectance[10], 0.4, 1e-6, "front");
+    close(sheet.back.unwrap()[10], 0.6, 1e-6, "back");
+    close(sheet.transmittance[0], 0.1015, 0.01, "passes");
+    assert!(sheet.transmittance[63] > 0.29);
+    let plain = json!({"materials": {"curtain": {"transmission": 0.3}}});
+    let scene = read(&json!({"name": "curtain"}), &plain);
+    assert!(
+        scene.is_err_and(|e| e.contains("come to")),
+        "a white base colour"
+    );
+}
+
+/// Whatever is wrong is told with the file, the material and, where more leaves than comes, the wavelengths.
+#[test]
+fn wrong_sheets_are_refused_by_name() {
+    let grey = curtain([0.6; 3], json!(0.25), json!([1, 1, 1]));
+    let with = |entry: Value| json!({"materials": {"curtain": entry}});
+    for (material, side, wanted) in [
+        (
+            &grey,
+            with(json!({"transmission": {"csv": "500,0.1\n600,0.7\n780,0.7"}})),
+            vec![
+                "room.glb",
+                "material 'curtain'",
+                "its front",
+                "come to",
+                "nm",
+                "below 1",
+            ],
+        ),
+        (
+            &grey,
+            with(json!({"transmission": 0.5, "back_reflectance": {"csv": "400,0.7\n700,0.7"}})),
+            vec!["its back", "come to 1.200 between 380 and 780 nm"],
+        ),
+        (
+            &grey,
+            with(json!({"transmission": 1.5})),
+            vec!["transmission: '1.5' goes beyond 0 to 1"],
+        ),
+        (
+            &json!({"name": "curtain"}),
+            with(json!({"back_reflectance": {"name": "macbeth/white"}})),
+            vec!["material 'curtain'", "back_reflectance", "no sheet"],
+        ),
+        (
+            &grey,
+            with(json!({"transmission": 0.5, "transmittance": 0.5})),
+            vec!["a pane lets light through and does nothing else"],
+        ),
+        (
+            &curtain([0.6; 3], json!("much"), json!([1, 1, 1])),
+            json!({}),
+            vec!["diffuseTransmissionFactor"],
+        ),
+        (
+            &curtain([0.6; 3], json!(0.3), json!([1, 1])),
+            json!({}),
+            vec!["diffuseTransmissionColorFactor"],
+        ),
+    ] {
+        let text = read(material, &side).expect_err("is refused");
+        for part in wanted {
+            assert!(text.contains(part), "{part}\n-- in --\n{text}");
+        }
+    }
+}
+
+/// What a path tracer finds on both sides of sheets, with colours, in the room of `scenes`.
+#[test]
+fn the_path_tracer_agrees() {
+    let bake = curtained(0.5);
+    let reference = Reference::new(&bake, 150, 1 << 14, 3);
+    let written = bake.baked(&|_, _| {});
+    for report in [
+        Report::against(&bake, &reference),
+        Report::of_file(&bake, &written, &reference),
+    ] {
+        println!(
+            "dE00 {:?}, bias {:?}, noise {:.3}, estimate {:?}",
+            report.de2000.mean, report.bias, report.noise_de2000, report.estimate_de2000
+        );
+        assert!(report.de2000.mean.value < 0.6, "{:?}", report.de2000);
+        assert!(report.bias.value.abs() < 0.01, "{:?}", report.bias);
+    }
+}
+
+fn curtained(error: f64) -> Bake {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/curtained.glb");
+    let scene = Scene::load(path, &Options::default()).unwrap();
+    let settings = Settings {
+        error,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(scene, settings);
+    bake.run();
+    bake
+}
+
+/// Relit without a change, a room is what it was; a checkpoint goes on to the same bytes.
+#[test]
+fn what_is_kept_knows_sheets() {
+    let room = || {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/curtained.glb");
+        Scene::load(path, &Options::default()).unwrap()
+    };
+    let settings = Settings {
+        error: 2.0,
+        rounds: 3,
+        ..Settings::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let [cache, checkpoint] = ["cache", "checkpoint"].map(|name| folder.path().join(name));
+    let mut bake = Bake::new(room(), settings.clone());
+    bake.keep();
+    bake.step();
+    bake.step();
+    bake.save(&checkpoint).unwrap();
+    bake.step();
+    let mut resumed = Bake::new(room(), settings.clone());
+    resumed.keep();
+    resumed.resume(&checkpoint).unwrap();
+    resumed.step();
+    let baked = bake.baked(&|_, _| {});
+    let again = resumed.baked(&|_, _| {});
+    for (one, two) in baked.surfaces.iter().zip(&again.surfaces) {
+        assert_eq!(one.vertices, two.vertices);
+    }
+    bake.write_cache(&baked, &cache, u64::MAX).unwrap();
+    // At half the brightness of all lamps everything is half as bright.
+    let mut dimmed = room();
+    let lamps = haarlight::scene::facts::Facts::of(&dimmed).lights;
+    for lamp in lamps {
+        dimmed.dim(&lamp.name, 0.5).unwrap();
+    }
+    let mut relighter = Relighter::open(&cache, dimmed).unwrap();
+    let relit = relighter.relight().unwrap().baked;
+    let (mut gap, mut whole, mut on_sheets) = (0.0, 0.0, 0);
+    for (one, two) in baked.surfaces.iter().zip(&relit.surfaces) {
+        let material = bake.scene().surfaces[one.surface].material;
+        if bake.scene().materials[material].sheet.is_none() {
+            continue;
+        }
+        for (one, two) in one.vertices.iter().zip(&two.vertices) {
+            gap += f64::from((0.5 * one.radiosity[1] - two.radiosity[1]).abs());
+            whole += f64::from(two.radiosity[1]);
+            on_sheets += 1;
+        }
+    }
+    assert!(
+        on_sheets > 100 && gap < 2e-3 * whole,
+        "{on_sheets} {gap} {whole}"
+    );
+}
+
+/// A sheet that nothing shows, and one that nothing passes, change no byte and cast no ray.
+#[test]
+fn sheets_that_are_not_there_cost_nothing() {
+    let room = |extra: &dyn Fn(&mut Room)| {
+        let mut room = Room::new();
+        let paint = room.paint(0.5);
+        room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 3.0), [paint; 6]);
+        room.block(dvec3(1.0, 0.0, 1.0), dvec3(1.5, 1.0, 1.4), paint);
+        room.point(dvec3(0.6, 1.3, 1.4), 1000.0);
+        extra(&mut room);
+        let bake = baked(room);
+        let rays: u64 = bake.rounds().iter().map(|r| r.rays).sum();
+        let written = bake.baked(&|_, _| {});
+        let vertices: Vec<_> = written
+            .surfaces
+            .iter()
+            .map(|s| s.vertices.clone())
+            .collect();
+        (rays, written.rays, vertices, bake.tree().nodes.len())
+    };
+    let plain = room(&|_| {});
+    let unused = room(&|room| {
+        room.sheet(even(0.3), even(0.3), even(0.4));
+    });
+    assert!(plain == unused);
+}
