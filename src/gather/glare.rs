@@ -180,30 +180,26 @@ impl Bake {
         let mut found = Vec::new();
         for (lamp, row) in self.lamps() {
             let flux = self.lanes().tristimulus(row)[1];
-            match (&lamp.luminaire, lamp.kind) {
-                _ if flux <= 0.0 => {}
-                (Some(luminaire), LightKind::Surface) => {
-                    let mut bright = Bright::NONE;
-                    for triangle in luminaire.triangles() {
-                        let corners = triangle.map(|p| p + lamp.position);
-                        let [a, b, c] = corners;
-                        let normal = (b - a).cross(c - a).normalize_or_zero();
-                        let towards = |way: DVec3| {
-                            let cosine = normal.dot(way).max(f64::MIN_POSITIVE);
-                            flux * luminaire.per_area(way, normal) / cosine
-                        };
-                        eye.add(corners, &towards, &mut bright);
-                    }
-                    if bright.solid_angle > 0.0 {
-                        found.push((lamp.name.clone(), bright));
-                    }
+            if flux <= 0.0 {
+                continue;
+            }
+            if let (Some(luminaire), LightKind::Surface) = (&lamp.luminaire, lamp.kind) {
+                let mut bright = Bright::NONE;
+                for triangle in luminaire.triangles() {
+                    let corners = triangle.map(|p| p + lamp.position);
+                    let [a, b, c] = corners;
+                    let normal = (b - a).cross(c - a).normalize_or_zero();
+                    let towards = |way: DVec3| {
+                        let cosine = normal.dot(way).max(f64::MIN_POSITIVE);
+                        flux * luminaire.per_area(way, normal) / cosine
+                    };
+                    eye.add(corners, &towards, &mut bright);
                 }
-                (_, LightKind::Point | LightKind::Spot { .. } | LightKind::Profile) => {
-                    if eye.sees(lamp.position) {
-                        left_out.push(format!("{}: it has no extent", lamp.name));
-                    }
+                if bright.solid_angle > 0.0 {
+                    found.push((lamp.name.clone(), bright));
                 }
-                _ => {}
+            } else if !lamp.kind.is_parallel() && !lamp.kind.is_dome() && eye.sees(lamp.position) {
+                left_out.push(format!("{}: it has no extent", lamp.name));
             }
         }
         found

@@ -168,7 +168,7 @@ pub struct Tree {
     pub entry: Vec<[u32; 2]>,
     /// For each element of a diffuse sheet the one behind it, on the same triangle; [`NONE`] for other nodes. Empty in a room
     /// without sheets.
-    pub(crate) behind: Vec<u32>,
+    pub behind: Vec<u32>,
 }
 
 impl Tree {
