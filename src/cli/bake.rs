@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// Bakes; the exit code.
 ///
 /// # Errors
-/// As [`Scene::load`]; outputs that would overwrite an input or each other; files that cannot be written.
+/// As [`Scene::load`](crate::scene::Scene::load); outputs that would overwrite an input or each other; files that cannot be written.
 pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let team = common.team;
     let args = &args.of_rank(team);

@@ -46,6 +46,7 @@ impl History {
     }
 
     /// Forgets all but the last rounds.
+    #[cfg(feature = "cli")]
     pub(crate) fn keep_last(&mut self, rounds: usize) {
         let gone = self.rounds.len().saturating_sub(rounds);
         self.rounds.drain(..gone);

@@ -131,6 +131,7 @@ fn glows(bake: &Bake, baked: &Baked, part: usize) -> bool {
 
 /// Error of the light at each vertex of a baked mesh, CIEDE2000, and its mean by area; `order`: its surfaces as the file has
 /// them. None where it is not known.
+#[cfg(feature = "cli")]
 pub(crate) fn error_map(
     bake: &Bake,
     baked: &Baked,

@@ -9,6 +9,7 @@ mod light;
 mod room;
 
 pub use history::History;
+#[cfg(feature = "cli")]
 pub(crate) use light::error_map;
 pub use room::lamp_spectra;
 pub use room::of as room;
