@@ -552,6 +552,68 @@ fn what_is_kept_knows_sheets() {
     );
 }
 
+/// A panel flush in an opaque ceiling, lit from above alone: what both have in common, edge and plane, has light of its own on each. The room
+/// is kept and relit as it was, and no sheet any more it is refused by name.
+#[test]
+fn a_flush_panel_leaves_the_ceiling_its_own_light() {
+    let room = |through: f64| {
+        let mut room = Room::new();
+        let paint = room.paint(0.5);
+        let panel = match through > 0.0 {
+            true => room.sheet(even(0.3), even(0.3), even(through)),
+            false => room.paint(0.3),
+        };
+        room.two_sided(paint);
+        room.two_sided(panel);
+        let z = 2.0 * DVec3::Z;
+        room.quad(DVec3::ZERO, z, 4.0 * DVec3::X, paint);
+        room.quad(dvec3(0.0, 2.0, 0.0), 2.0 * DVec3::X, z, paint);
+        room.quad(dvec3(2.0, 2.0, 0.0), 2.0 * DVec3::X, z, panel);
+        room.point(dvec3(3.0, 3.0, 1.0), 1000.0);
+        room.scene()
+    };
+    let settings = Settings {
+        error: 1.0,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(room(0.6), settings);
+    bake.keep();
+    bake.run();
+    let baked = bake.baked(&|_, _| {});
+    // Of the ceiling's lower side.
+    let ceiling = baked
+        .surfaces
+        .iter()
+        .find(|s| s.surface == 1 && !s.back)
+        .unwrap();
+    let lit: Vec<f64> = (ceiling.vertices.iter())
+        .map(|v| f64::from(v.irradiance[1]))
+        .collect();
+    let at = |x: f64| (dvec3(x, 2.0, 1.0), DVec3::NEG_Y);
+    let [far, near] = [0.2, 1.9].map(|x| mean_lux(&bake, &[at(x)]));
+    // The panel shows more than ten times as much, for the lamp is behind it.
+    let most = 1.5 * far.max(near);
+    assert!(lit.iter().all(|&e| e < most), "{lit:?} {far} {near}");
+    let folder = tempfile::tempdir().unwrap();
+    let cache = folder.path().join("cache");
+    bake.write_cache(&baked, &cache, u64::MAX).unwrap();
+    let relit = Relighter::open(&cache, room(0.6))
+        .unwrap()
+        .relight()
+        .unwrap();
+    for (one, two) in baked.surfaces.iter().zip(&relit.baked.surfaces) {
+        for (one, two) in one.vertices.iter().zip(&two.vertices) {
+            let (one, two) = (f64::from(one.radiosity[1]), f64::from(two.radiosity[1]));
+            assert!((one - two).abs() < 1e-3 * one.max(1.0), "{one} {two}");
+        }
+    }
+    let refused = Relighter::open(&cache, room(0.0))
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(refused.contains("another shape"), "{refused}");
+}
+
 /// A sheet that nothing shows, and one that nothing passes, change no byte and cast no ray.
 #[test]
 fn sheets_that_are_not_there_cost_nothing() {

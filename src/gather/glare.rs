@@ -137,6 +137,9 @@ impl Bake {
         if lights.iter().any(|l| l.kind.is_parallel()) {
             left_out.push("the sun, and ground that it lights as far as the eye sees it".into());
         }
+        if self.scene().materials.iter().any(|m| m.sheet.is_some()) {
+            left_out.push("sheets that lamps shine through, as what is bright".into());
+        }
         if !self.scene().panes.is_empty() {
             left_out.push("what panes take from lamps behind them".into());
         }

@@ -22,7 +22,8 @@ impl Bake {
             };
             let shown = &mut gathered[*k];
             mixed(shares, &mut shown.irradiance, &other.irradiance);
-            mixed(shares, &mut shown.direct, &other.direct);
+            // What passes a sheet has arrived by way of it: who keeps the lamps lights a side from its own side alone.
+            mixed(shares, &mut shown.direct, &[0.0; 64]);
             shown.rays += other.rays;
             if let (Some(own), Some(other)) = (&shown.packed, &other.packed) {
                 shown.packed = Some(trace::joined(own, other));

@@ -27,8 +27,9 @@ pub(crate) struct Seen {
     pub(crate) trace: Option<Box<[u8]>>,
 }
 
-/// Place and normal, rounded; space; is the light of its leaf taken as it is?
-type Key = ([i64; 6], (u32, bool), bool);
+/// Place and normal, rounded; space; is the light of its leaf taken as it is? And the material of a diffuse sheet, whose light is
+/// shown with what passes it.
+type Key = ([i64; 6], (u32, bool), bool, Option<u32>);
 
 /// All looks so far.
 pub(crate) struct Looks<'a> {
@@ -92,7 +93,15 @@ impl<'a> Looks<'a> {
         let ([x, y, z], [i, j, k]) = (round(place), round(to.normal / SAME_NORMAL));
         let space = self.spaces.get(vertex.entry as usize);
         let (space, believing) = (space.copied().unwrap_or_default(), self.believing);
-        let (key, places) = (([x, y, z, i, j, k], space, believing), &mut self.places);
+        let material = mesh.material[vertex.triangle as usize];
+        let is_sheet = self.bake.scene().materials[material as usize]
+            .sheet
+            .is_some();
+        let sheet = is_sheet.then_some(material);
+        let (key, places) = (
+            ([x, y, z, i, j, k], space, believing, sheet),
+            &mut self.places,
+        );
         *self.known.entry(key).or_insert_with(|| {
             places.push((to, believing));
             places.len() as u32 - 1

@@ -69,7 +69,9 @@ pub(crate) fn materials(
             let panes = &mut said.panes;
             material.pane = panes.pane(raw, &name, through, emits, &place, upsampler, check);
             let rho = &mut material.reflectance;
-            let sheet = sheets::sheet(raw, &spectra, rho, &place, grid, upsampler, check);
+            let textured = *tinted || raw.base_color_texture.is_some();
+            let raw_sheet = (raw, textured);
+            let sheet = sheets::sheet(raw_sheet, &spectra, rho, &place, grid, upsampler, check);
             if sheet.is_some() {
                 said.sheets.hear(raw, &name, material.pane.is_some(), emits);
             }

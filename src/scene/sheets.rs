@@ -13,9 +13,9 @@ use crate::color::Upsampler;
 use crate::data::{Grid, LEAVES, Leaves};
 
 /// The sheet that a material is, if it is one; what both sides reflect goes into `reflectance`, which holds the whole base colour or
-/// what was measured.
+/// what was measured. `textured`: is the base colour multiplied by a texture or by vertex colours?
 pub(super) fn sheet(
-    raw: &RawMaterial,
+    (raw, textured): (&RawMaterial, bool),
     spectra: &MaterialSpectra,
     reflectance: &mut Leaves,
     place: &str,
@@ -51,7 +51,9 @@ pub(super) fn sheet(
     };
     let front = (&*reflectance, spectra.reflectance.as_ref(), "front");
     let other = back.map(|b| (&b.leaves, Some(b), "back"));
-    for (rho, known, side) in [Some(front), other].into_iter().flatten() {
+    // Under a texture or vertex colours a base colour says nothing of the albedo; what they come to is bounded place by place.
+    let front = Some(front).filter(|_| spectra.reflectance.is_some() || !textured);
+    for (rho, known, side) in [front, other].into_iter().flatten() {
         let of = known.map_or("its base colour", |known| known.from.as_str());
         exceeds([rho, &transmittance], [of, &from], side, place, grid, check);
     }

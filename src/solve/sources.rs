@@ -7,7 +7,7 @@ use crate::hierarchy::{Element, Mesh, NONE, Tree};
 use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
-use crate::scene::{Emission, Material, Scene, Surface, Texture};
+use crate::scene::{Emission, GREATEST_ALBEDO, Material, Scene, Surface, Texture};
 use crate::spectrum::Leaves;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -34,15 +34,41 @@ pub(crate) struct Painter<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
     upsampler: &'a Upsampler,
+    /// By material; none of what is no sheet.
+    sheets: Vec<Option<SheetMeans>>,
+}
+
+/// What a sheet is in the mean of its textures.
+#[derive(Debug)]
+struct SheetMeans {
+    color: Option<[f32; 3]>,
+    /// What its light is shown by.
+    shown: Leaves,
+}
+
+impl SheetMeans {
+    fn new(material: &Material, scene: &Scene, upsampler: &Upsampler) -> Option<Self> {
+        let sheet = material.sheet.as_ref()?;
+        let color = material.mean_color(&scene.images);
+        let weave = sheet.mean_weave(&scene.images);
+        Some(Self {
+            color,
+            shown: material.shown(sheet, color, weave, upsampler),
+        })
+    }
 }
 
 impl<'a> Painter<'a> {
     /// A painter for the materials of a scene.
     pub(crate) fn new(scene: &'a Scene, mesh: &'a Mesh, upsampler: &'a Upsampler) -> Self {
+        let sheets = scene.materials.iter();
         Self {
             scene,
             mesh,
             upsampler,
+            sheets: sheets
+                .map(|material| SheetMeans::new(material, scene, upsampler))
+                .collect(),
         }
     }
 
@@ -132,6 +158,11 @@ impl<'a> Painter<'a> {
             for (rows, spectrum) in rows.iter_mut().zip(&woven) {
                 lanes.averages(spectrum, rows.row_mut(k));
             }
+            // As colours both may come to more than their spectra do.
+            let [rho, through, ..] = &mut rows;
+            for (rho, through) in rho.row_mut(k).iter_mut().zip(through.row(k)) {
+                *rho = rho.min(GREATEST_ALBEDO as f32 - through).max(0.0);
+            }
             let [rho, through, ..] = &rows;
             sources
                 .reflectance
@@ -155,18 +186,17 @@ impl<'a> Painter<'a> {
     pub(super) fn woven(&self, tree: &Tree, element: &Element) -> Option<[Leaves; 4]> {
         let face = tree.faces[element.face as usize];
         let triangle = face.triangle as usize;
-        let m = &self.scene.materials[self.mesh.material[triangle] as usize];
-        let sheet = m.sheet.as_ref()?;
+        let material = self.mesh.material[triangle] as usize;
+        let m = &self.scene.materials[material];
+        let (sheet, means) = (m.sheet.as_ref()?, self.sheets[material].as_ref()?);
         let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
         let weights = self.corner_weights(triangle, element);
         let weave = sheet.weave(|texture| self.texel(texture, surface, triangle, &weights));
         let color = self.paint_of(m, triangle, element);
         let up = self.upsampler;
         let [rho, through] = m.scatters(sheet, color, weave, face.back, up);
-        let color = m.mean_color(&self.scene.images);
-        let [plain, _] = m.scatters(sheet, color, weave, face.back, up);
-        let mean = sheet.mean_weave(&self.scene.images);
-        Some([rho, through, plain, m.shown(sheet, color, mean, up)])
+        let [plain, _] = m.scatters(sheet, means.color, weave, face.back, up);
+        Some([rho, through, plain, means.shown])
     }
 
     /// The matrices of the given leaves, where lanes reflect into each other.
@@ -193,7 +223,7 @@ impl<'a> Painter<'a> {
     fn clamped(&self, color: [f32; 3]) -> Leaves {
         self.upsampler
             .reflectance_fast(color)
-            .map(|r| r.min(crate::scene::GREATEST_ALBEDO))
+            .map(|r| r.min(GREATEST_ALBEDO))
     }
 
     /// Mean linear base colour over an element, if it varies: factor times texture times vertex colours.

@@ -71,6 +71,10 @@ impl Fingerprint {
                 mix.all(&normals);
             }
             mix.add(u8::from(material.sides == Sides::Both));
+            // Both sides of a sheet are split together.
+            if material.sheet.is_some() {
+                mix.add(2_u8);
+            }
             if let Alpha::Mask {
                 cutoff,
                 factor,
