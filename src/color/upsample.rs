@@ -108,7 +108,7 @@ impl Upsampler {
         if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
             return [rgb[0]; LEAVES];
         }
-        let table = self.table.get_or_init(|| self.make_table());
+        let table = self.table();
         // Cell and place in the cell along each axis; rounding to a neighbouring cell puts the place on its edge.
         let mut cell = [0; 3];
         let mut place = [0.0; 3];
@@ -139,6 +139,11 @@ impl Upsampler {
                 + wc * f64::from(c[leaf])
                 + wd * f64::from(d[leaf])
         })
+    }
+
+    /// The table, which is made at the first call.
+    pub(crate) fn table(&self) -> &[[f32; LEAVES]] {
+        self.table.get_or_init(|| self.make_table())
     }
 
     fn make_table(&self) -> Vec<[f32; LEAVES]> {

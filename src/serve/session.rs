@@ -383,7 +383,9 @@ impl<'a> Session<'a> {
             bake.write_cache(baked, path, KEPT)?;
             Relighter::open(path, bake.scene().clone())
         });
-        self.kept = Some(kept?);
+        let kept = kept?;
+        kept.prepare();
+        self.kept = Some(kept);
         Ok(())
     }
 
