@@ -84,7 +84,7 @@ pub struct RelitRecord {
     /// the gathers of its last two rounds differ under this light than under its own; wavelengths and the solve as they
     /// are now.
     pub error_de2000: crate::solve::record::Figure,
-    /// Where the light went.
+    /// Where the light went; all 0 of a first answer, which does not count it.
     pub flux: flux::Balance,
     /// Seconds: choice of lanes, direct light, solve, light of the vertices.
     pub lanes_s: f64,
@@ -474,6 +474,8 @@ impl Relighter {
             reflected,
             emitted,
             tolerance,
+            // A sweep more, which a first answer does without.
+            counted: tolerance <= bake.tolerance(),
         };
         let (convergence, flux) = bake.solve_with::<L>(links, &leaves, given);
         bake.graph = graph;

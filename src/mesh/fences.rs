@@ -38,10 +38,11 @@ struct Parted {
 }
 
 impl Cells {
-    /// Parts the vertices on edges that something stands on, unless that takes more than `most` new ones. To be called before any
-    /// edge is split.
-    pub(super) fn fence(&mut self, shades: &Shades, most: usize) {
-        let fenced = self.fenced(shades);
+    /// Parts the vertices on edges that something stands on, unless that takes more than `most` new ones. Not where it is what lies
+    /// upon one side: that side is lent the light of the other. `spaces` holds the space of each entry and whether something
+    /// covers it. To be called before any edge is split.
+    pub(super) fn fence(&mut self, shades: &Shades, spaces: &[(u32, bool)], most: usize) {
+        let fenced = self.fenced(shades, spaces);
         let ends = fenced.iter().map(|&edge| self.edges[edge as usize].ends);
         let points: BTreeSet<u32> = ends.flatten().collect();
         let parted = self.parted(&fenced, &points);
@@ -67,9 +68,11 @@ impl Cells {
     }
 
     /// Edges that something stands on.
-    fn fenced(&self, shades: &Shades) -> BTreeSet<u32> {
+    fn fenced(&self, shades: &Shades, spaces: &[(u32, bool)]) -> BTreeSet<u32> {
         let mut around: Vec<(u32, Of)> = Vec::with_capacity(3 * self.all.len());
-        for (k, cell) in self.all.iter().enumerate() {
+        let is_bare = |cell: &Cell| !spaces.get(cell.of.1 as usize).is_some_and(|space| space.1);
+        let bare = self.all.iter().enumerate();
+        for (k, cell) in bare.filter(|(_, cell)| is_bare(cell)) {
             around.extend(
                 cell.edges
                     .iter()

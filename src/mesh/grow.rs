@@ -298,7 +298,7 @@ impl<'a> Growth<'a> {
                 true => self.most.saturating_sub(self.used()),
                 false => usize::MAX,
             };
-            self.cells.fence(&self.shades, most);
+            self.cells.fence(&self.shades, self.looks.spaces(), most);
         }
         let all: Vec<usize> = (0..self.cells.all.len()).collect();
         let all = self.cells.take_sides(&self.shades, all);

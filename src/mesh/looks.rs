@@ -139,6 +139,11 @@ impl<'a> Looks<'a> {
         self.places.len() as u32 - 1
     }
 
+    /// The space of each entry, and whether something covers it.
+    pub(crate) fn spaces(&self) -> &[(u32, bool)] {
+        &self.spaces
+    }
+
     pub(crate) fn is_late(&self) -> bool {
         (self.late)()
     }

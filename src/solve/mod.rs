@@ -224,6 +224,8 @@ pub(crate) struct Given {
     pub(crate) emitted: Option<Rows>,
     /// Relative error at which the solve ends.
     pub(crate) tolerance: f64,
+    /// Is it asked for where the light went?
+    pub(crate) counted: bool,
 }
 
 impl Bake {

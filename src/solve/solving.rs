@@ -69,6 +69,7 @@ impl Bake {
             reflected: self.guess::<L>(leaves),
             emitted: None,
             tolerance: self.tolerance(),
+            counted: true,
         };
         let solved = self.solve_with::<L>(rows, leaves, given);
         self.light_arrives();
@@ -88,6 +89,7 @@ impl Bake {
             mut reflected,
             emitted,
             tolerance,
+            counted,
         } = given;
         let emission = sources.emission;
         let by_rays = self.by_rays();
@@ -133,18 +135,21 @@ impl Bake {
         let on_nodes = self.on_nodes::<L>(&reflected, leaves);
         let through =
             (reflection.sheets.as_ref()).map_or_else(Through::default, |s| s.shown.clone());
-        let fluxes = flux::FluxRows {
-            emission: &emission,
-            reflected: &reflected,
-            irradiance: &irradiance,
-            first: &first,
-            reflectance: &reflection.albedo::<L>(&reflected, &irradiance),
-        };
-        let mut flux = if by_rays {
-            self.flux_of_wholes::<L>(leaves, &fluxes, &on_nodes)
-        } else {
-            flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums)
-        };
+        let mut flux = flux::Balance::default();
+        if counted {
+            let fluxes = flux::FluxRows {
+                emission: &emission,
+                reflected: &reflected,
+                irradiance: &irradiance,
+                first: &first,
+                reflectance: &reflection.albedo::<L>(&reflected, &irradiance),
+            };
+            flux = if by_rays {
+                self.flux_of_wholes::<L>(leaves, &fluxes, &on_nodes)
+            } else {
+                flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums)
+            };
+        }
         (flux.sent, flux.scaled) = (self.sent, scaled);
         let emitted = emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves));
         if !through.is_empty() {
