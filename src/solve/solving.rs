@@ -105,11 +105,9 @@ impl Bake {
                 .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes)),
             sheets: sources.sheets,
         };
-        let sums = if by_rays {
-            Vec::new()
-        } else {
-            let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
-            crate::link::row_sums(&self.tree, rows, &self.areas, &factor)
+        let sums = match by_rays {
+            true => Vec::new(),
+            false => self.sums_of(rows),
         };
         let lit = Lit {
             leaves,
@@ -158,6 +156,12 @@ impl Bake {
         self.light.through = through;
         self.shine(leaves, emitted, on_nodes, irradiance);
         (convergence, flux)
+    }
+
+    /// What rows of links sum to.
+    fn sums_of(&self, rows: &LinkRows) -> Vec<f64> {
+        let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
+        crate::link::row_sums(&self.tree, rows, &self.areas, &factor)
     }
 
     /// Scales direct light so that all that lamps give out arrives; its flux after over before.
