@@ -125,6 +125,7 @@ fn room(leaves: usize) -> (Tree, Vec<Link>) {
         mesh: bake.mesh(),
         opaque: None,
         panes: None,
+        mirrors: None,
         occlusion: false,
     };
     let mut tree = Tree::new(bake.mesh(), &vec![0; bake.mesh().faces.len()]);

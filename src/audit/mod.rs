@@ -3,7 +3,9 @@
 //! It shares the scene, the welded triangles and the ray index with the solver, and nothing else: no links, no lanes,
 //! no form factors, no balance.
 
+mod mirrors;
 mod path;
+mod rays;
 mod reference;
 mod report;
 mod spread;

@@ -4,11 +4,12 @@
 //! by the balance heuristic (Veach and Guibas 1995). Paths end by Russian roulette, so no bounce is cut off.
 //! Figures are *measured*: each comes with the standard error of independent batches.
 
+use super::mirrors::ByImage;
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
-use crate::hierarchy::{Face, Glazing, Mesh, Panes};
+use crate::hierarchy::{Face, Mesh, Mirrors, Panes};
 use crate::scene::sky::SUN_RADIUS;
 use crate::scene::{Alpha, LightKind, Material, PunctualLight, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
@@ -23,15 +24,16 @@ const SURE_BOUNCES: usize = 3;
 
 /// The estimator.
 pub struct Audit<'a> {
-    scene: &'a Scene,
-    mesh: &'a Mesh,
-    rays: &'a RayIndex,
+    pub(super) scene: &'a Scene,
+    pub(super) mesh: &'a Mesh,
+    pub(super) rays: &'a RayIndex,
     upsampler: Upsampler,
     /// Faces that emit, and the running sum of what they are chosen by.
     lamps: Vec<(Face, f64)>,
     total: f64,
-    masked: bool,
-    panes: Option<Panes>,
+    pub(super) masked: bool,
+    pub(super) panes: Option<Panes>,
+    pub(super) mirrors: Option<Mirrors>,
 }
 
 /// Irradiance at a point: mean and standard error per leaf, W/m2/nm, and the batch means for anything derived.
@@ -61,10 +63,10 @@ impl Answer {
 }
 
 /// A place that light scatters at.
-struct Vertex {
-    point: DVec3,
-    normal: DVec3,
-    plane: u32,
+pub(super) struct Vertex {
+    pub(super) point: DVec3,
+    pub(super) normal: DVec3,
+    pub(super) plane: u32,
 }
 
 impl<'a> Audit<'a> {
@@ -100,6 +102,7 @@ impl<'a> Audit<'a> {
             total,
             masked,
             panes: Panes::new(scene, mesh.centre),
+            mirrors: Mirrors::new(scene, mesh),
         }
     }
 
@@ -156,11 +159,10 @@ impl<'a> Audit<'a> {
         let (mut toward_lamp, mut toward_any) = (first[0], first[1]);
         for bounce in 0.. {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
-            self.punctual(&at, toward_lamp, rng, &throughput, sum);
-            let direction = cosine_direction(at.normal, toward_any);
-            let hit = self.closest(at.point, direction, at.plane);
-            let reach = hit.map_or(4.0 * self.mesh.half_size, |hit| f64::from(hit.t));
-            throughput = self.filtered(&throughput, at.point, at.point + direction * reach);
+            self.punctual(&at, None, toward_lamp, rng, &throughput, sum);
+            self.punctual_in_mirrors(&at, toward_lamp, rng, &throughput, sum);
+            let mut direction = cosine_direction(at.normal, toward_any);
+            let (hit, mirrors) = self.met(&at, &mut direction, &mut throughput, rng);
             let Some(hit) = hit else {
                 self.outside(direction, &throughput, sum);
                 return;
@@ -186,7 +188,11 @@ impl<'a> Audit<'a> {
                 let by_direction = at.normal.dot(direction).max(0.0) / PI;
                 let cosine = -normal.dot(d) / r2.sqrt();
                 let by_area = self.chance(triangle) * r2 / cosine.max(1e-300);
-                let share = by_direction / (by_direction + by_area);
+                // No path straight to the lamp is one by mirrors.
+                let share = match mirrors {
+                    0 => by_direction / (by_direction + by_area),
+                    _ => 1.0,
+                };
                 for l in 0..LEAVES {
                     sum[l] += throughput[l] * PI * radiance[l] * share;
                 }
@@ -320,14 +326,17 @@ impl<'a> Audit<'a> {
         }
     }
 
-    fn punctual(
+    /// Light of lights without extent, as from a point straight, or as it looks by an image.
+    pub(super) fn punctual(
         &self,
         at: &Vertex,
+        by: Option<ByImage>,
         square: [f64; 2],
         rng: &mut Pcg,
         throughput: &Leaves,
         sum: &mut Leaves,
     ) {
+        let size = by.map_or(1.0, |by| by.size);
         for light in &self.scene.lights {
             if light.kind.is_dome() {
                 continue;
@@ -345,7 +354,7 @@ impl<'a> Audit<'a> {
                 };
                 (
                     at.normal.dot(toward),
-                    at.point + toward * (4.0 * self.mesh.half_size),
+                    at.point + toward * (4.0 * self.mesh.half_size * size),
                 )
             } else if light.kind == LightKind::Surface {
                 self.shining(light, at, square, rng)
@@ -375,11 +384,10 @@ impl<'a> Audit<'a> {
                 to: end.as_vec3(),
                 planes: [at.plane, NO_PLANE],
             };
-            if self.blocked(&segment) {
+            let Some(throughput) = self.arriving(by, &segment, throughput) else {
                 continue;
-            }
+            };
             let power = &self.scene.spectra[light.light].power;
-            let throughput = self.filtered(throughput, at.point, end);
             for l in 0..LEAVES {
                 sum[l] += throughput[l] * factor * power[l] * light.shape[l];
             }
@@ -415,56 +423,6 @@ impl<'a> Audit<'a> {
         let sent = luminaire.per_area(-way, own) * luminaire.area();
         let end = from + own * (1e-5 * self.mesh.half_size);
         (sent * at.normal.dot(way) / r2, end)
-    }
-
-    /// What panes between two points leave of light, leaf by leaf.
-    fn filtered(&self, throughput: &Leaves, from: DVec3, to: DVec3) -> Leaves {
-        let mut left = *throughput;
-        let Some(panes) = &self.panes else {
-            return left;
-        };
-        let scene = self.scene;
-        let glazing = Glazing { panes, scene };
-        for crossing in glazing.crossings(from.as_vec3(), to.as_vec3()) {
-            let Some(pane) = &scene.materials[crossing.material as usize].pane else {
-                continue;
-            };
-            let [cosine, thickness, texel] =
-                [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
-            let passing = pane.passing(cosine, thickness, texel);
-            for (x, spectrum) in left.iter_mut().zip(pane.spectrum()) {
-                *x *= passing(*spectrum);
-            }
-        }
-        left
-    }
-
-    fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<crate::geometry::Hit> {
-        let reach = (4.0 * self.mesh.half_size) as f32;
-        if self.masked {
-            let opaque = |t: u32, u: f32, v: f32| {
-                !crate::hierarchy::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
-            };
-            return self.rays.closest_with(
-                from.as_vec3(),
-                direction.as_vec3(),
-                reach,
-                plane,
-                &opaque,
-            );
-        }
-        self.rays
-            .closest(from.as_vec3(), direction.as_vec3(), reach, plane)
-    }
-
-    fn blocked(&self, segment: &Segment) -> bool {
-        if self.masked {
-            let opaque = |t: u32, u: f32, v: f32| {
-                !crate::hierarchy::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
-            };
-            return self.rays.occluded_with(segment, &opaque);
-        }
-        self.rays.occluded(segment)
     }
 
     /// Emitted radiance at a point of a triangle, W/m2/sr/nm.

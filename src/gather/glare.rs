@@ -7,6 +7,7 @@ use crate::color::{Bright, position_index, unified_glare_rating};
 use crate::geometry::{NO_PLANE, Segment, quarters};
 use crate::hierarchy::Node;
 use crate::link::Sight;
+use crate::scene::effects::Kind;
 use crate::scene::{LightKind, PunctualLight};
 use crate::solve::Bake;
 use glam::DVec3;
@@ -31,7 +32,7 @@ pub struct Glare {
     /// The unified glare rating; none where the background is black, negative infinity where no luminaire is seen.
     pub rating: Option<f64>,
     /// What has no part in it: lights without extent, which have no luminance; the sun; the sky where its light is not kept apart;
-    /// what panes take.
+    /// what panes take; what mirrors show.
     pub left_out: Vec<String>,
 }
 
@@ -142,6 +143,9 @@ impl Bake {
         }
         if !self.scene().panes.is_empty() {
             left_out.push("what panes take from lamps behind them".into());
+        }
+        if self.plan().runs(Kind::Mirrors) {
+            left_out.push("lamps as mirrors show them".into());
         }
         let lanes = self.lanes().lanes();
         let mut row = gathered.irradiance;

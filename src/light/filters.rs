@@ -1,21 +1,23 @@
-//! What panes leave of light, lane by lane.
+//! What panes and mirrors leave of light, lane by lane.
 //!
 //! A lane of a filter is the pane's transmittance for the mean (eq. 3 under the lane's light) of what its inside lets through, so that
-//! filters multiply rows as reflectances do. Neutral panes are exact on any lanes.
+//! filters multiply rows as reflectances do. Neutral panes are exact on any lanes. The same of mirrors, with what they reflect at
+//! normal incidence.
 
 use super::lanes::Lanes;
-use crate::hierarchy::{Crossing, Glazing};
+use crate::hierarchy::{Crossing, Glazing, Route};
 use crate::scene::Scene;
+use crate::scene::mirror::Mirror;
 use crate::spectrum::LEAVES;
 use glam::Vec3;
 
 /// What passes, by lane.
 pub type Filter = [f32; LEAVES];
 
-/// The spectra of panes on some lanes.
+/// The spectra of panes and mirrors on some lanes.
 #[derive(Debug, Clone, Default)]
 pub struct Filters {
-    /// By material: what the inside of its pane lets through, lane by lane; empty for what is no pane.
+    /// By material: what the inside of its pane lets through or its mirror reflects, lane by lane; empty for what is neither.
     inside: Vec<Vec<f32>>,
     /// How much each lane counts in brightness.
     weights: Vec<f64>,
@@ -31,15 +33,16 @@ pub struct Glass<'a> {
 }
 
 impl Filters {
-    /// For the panes of a scene.
+    /// For the panes and mirrors of a scene.
     pub fn new(scene: &Scene, lanes: &Lanes) -> Self {
         let inside = scene.materials.iter().map(|material| {
-            let Some(pane) = &material.pane else {
-                return Vec::new();
+            let (spectrum, neutral) = match (&material.pane, &material.mirror) {
+                (Some(pane), _) => (pane.spectrum(), pane.is_neutral()),
+                (_, Some(mirror)) => (&mirror.reflectance, mirror.is_neutral()),
+                _ => return Vec::new(),
             };
-            let spectrum = pane.spectrum();
             let mut row = vec![spectrum[0] as f32; lanes.len()];
-            if !pane.is_neutral() {
+            if !neutral {
                 lanes.averages(spectrum, &mut row);
             }
             row
@@ -73,7 +76,16 @@ impl Filters {
         };
         let [cosine, thickness, texel] =
             [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
-        let passing = pane.passing(cosine, thickness, texel);
+        self.multiply(material, pane.passing(cosine, thickness, texel), filter);
+    }
+
+    /// Multiplies a filter by what one mirror reflects.
+    pub fn mirror(&self, material: u32, cosine: f32, filter: &mut Filter) {
+        let reflects = |normal| Mirror::reflects(normal, f64::from(cosine));
+        self.multiply(material as usize, reflects, filter);
+    }
+
+    fn multiply(&self, material: usize, passing: impl Fn(f64) -> f64, filter: &mut Filter) {
         let mut last = (f32::NAN, 1.0);
         for (x, &inside) in filter.iter_mut().zip(&self.inside[material]) {
             if inside != last.0 {
@@ -81,6 +93,23 @@ impl Filters {
             }
             *x *= last.1;
         }
+    }
+
+    /// What is left of light by way of mirrors, and of panes between them.
+    pub fn along(&self, glazing: Option<Glazing>, route: &Route) -> Filter {
+        let mut filter = [1.0; LEAVES];
+        for &(material, cosine) in route.bounces() {
+            self.mirror(material, cosine, &mut filter);
+        }
+        let Some(glazing) = glazing else {
+            return filter;
+        };
+        for ends in route.points().windows(2) {
+            for crossing in glazing.crossings(ends[0].as_vec3(), ends[1].as_vec3()) {
+                self.pass(glazing.scene, &crossing, &mut filter);
+            }
+        }
+        filter
     }
 
     /// About how bright light is that has passed, as a share: the mean over lanes by luminance.

@@ -27,6 +27,9 @@ pub struct Light {
     pub reflected: Rows,
     /// Exitance of every node (area mean), by lane.
     pub emitted: Rows,
+    /// Radiosity of every leaf that is a mirror, for rays that met too many, by node: for all others mirrors are dark. Empty in a room
+    /// without.
+    pub mirrors: Rows,
     /// Irradiance of every leaf of the hierarchy, in order of `leaves`; of diffuse sheets as it is shown, see [`Through`].
     pub irradiance: Rows,
     /// What the sides of diffuse sheets show of each other's light.
@@ -72,7 +75,12 @@ impl Light {
             &self.brightest,
             &self.spread,
         ];
-        let rows = [&self.reflected, &self.emitted, &self.irradiance];
+        let rows = [
+            &self.reflected,
+            &self.emitted,
+            &self.mirrors,
+            &self.irradiance,
+        ];
         rows.iter().map(|rows| rows.bytes()).sum::<usize>()
             + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
             + size_of_val(self.arrival.as_slice())

@@ -3,6 +3,7 @@
 mod balance;
 mod contour;
 mod kernel;
+mod mirrored;
 mod refine;
 mod store;
 mod visibility;
@@ -12,6 +13,7 @@ pub use balance::{Balance, balance};
 pub use contour::exchange;
 pub(crate) use kernel::{POLYGONS, in_front_of, open_weight, pattern, polygons};
 pub use kernel::{Scratch, evaluate, facing, point_factors};
+pub use mirrored::Mirrored;
 pub use refine::{Demand, Graph, MAX_DEPTH, Refined, blockers_of};
 pub use store::LinkRows;
 pub use visibility::{Opaque, Sight, View};

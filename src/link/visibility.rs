@@ -1,7 +1,7 @@
 //! Is the way between two patches clear? Exactly where the shaft between them is empty, by rays elsewhere.
 
 use crate::geometry::{Hit, Patch, RayIndex, Segment, Shaft, ShaftContents};
-use crate::hierarchy::{Blocker, Glazing, Mesh, Node, Sample, Tree};
+use crate::hierarchy::{Blocker, Glazing, Mesh, Mirrors, Node, Sample, Tree};
 use glam::{DVec3, Vec3};
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
@@ -24,6 +24,8 @@ pub struct Sight<'a> {
     pub mesh: &'a Mesh,
     /// What light passes through on its way; none where the room has no panes.
     pub panes: Option<Glazing<'a>>,
+    /// What sends light on in one direction; none where the room has no mirrors. They block as other things do.
+    pub mirrors: Option<&'a Mirrors>,
     /// False where nothing can block (a convex room): then no ray is cast and no shaft is built.
     pub occlusion: bool,
 }

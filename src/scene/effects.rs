@@ -58,6 +58,8 @@ pub enum Kind {
     Panes,
     /// What lets diffuse light through.
     Sheets,
+    /// What sends light on in one direction.
+    Mirrors,
 }
 
 impl Kind {
@@ -80,6 +82,7 @@ impl Kind {
             Self::TwoSided => "two-sided surfaces",
             Self::Panes => "panes",
             Self::Sheets => "diffuse sheets",
+            Self::Mirrors => "mirrors",
         }
     }
 }
@@ -168,6 +171,7 @@ impl Plan {
         );
         plan.add(Kind::Panes, panes(scene));
         plan.add(Kind::Sheets, sheets(&used));
+        plan.add(Kind::Mirrors, mirrors(scene, &used));
         for lack in lacking(&scene.source.json) {
             plan.effects.push(Effect {
                 name: lack.effect,
@@ -194,6 +198,14 @@ impl Plan {
         let mut named = self.effects.iter_mut().filter(|e| e.name == kind.name());
         if let Some(effect) = named.next() {
             (effect.runs, effect.reason) = (false, reason.into());
+        }
+    }
+
+    /// Says more of an effect.
+    pub(crate) fn say(&mut self, kind: Kind, more: &str) {
+        let mut named = self.effects.iter_mut().filter(|e| e.name == kind.name());
+        if let Some(effect) = named.next() {
+            effect.reason += &format!("; {more}");
         }
     }
 
@@ -428,10 +440,34 @@ fn sheets(used: &[&Material]) -> (bool, String) {
     }
 }
 
+/// Materials that mirror, with the share of white (D65) that they reflect at normal incidence.
+fn mirrors(scene: &Scene, used: &[&Material]) -> (bool, String) {
+    if used.iter().all(|m| m.mirror.is_none()) {
+        return (false, "none".into());
+    }
+    let upsampler = Upsampler::new(&scene.grid);
+    let names: Vec<String> = (used.iter())
+        .filter_map(|m| Some((m, m.mirror.as_ref()?)))
+        .map(|(m, mirror)| {
+            let share = upsampler.xyz(&mirror.reflectance)[1];
+            let (name, from) = (quoted(&m.name), short(&mirror.from));
+            format!("{name} ({from}: {share:.2} reflected)")
+        })
+        .collect();
+    (true, format!("light is mirrored by {}", listed(&names)))
+}
+
 /// Off where nothing can stand between two points that see each other's front, nor between a point and a light.
 fn occlusion(scene: &Scene) -> (bool, String) {
     if !scene.panes.is_empty() {
         return (true, "panes stand in the way of light".into());
+    }
+    let mirrors = |s: &Surface| {
+        let material = scene.materials.get(s.material);
+        material.is_some_and(|m| m.mirror.is_some())
+    };
+    if scene.surfaces.iter().any(mirrors) {
+        return (true, "mirrors stand in the way of light".into());
     }
     match blocked(&scene.surfaces, &scene.lights) {
         None => (

@@ -1,5 +1,6 @@
 //! What side files and extras say of a material.
 
+use super::json::short;
 use super::luminaires::{self, ProfileWish};
 use super::reader::{Reader, Sampled};
 use super::transmittance;
@@ -21,6 +22,8 @@ pub(crate) struct MaterialSpectra {
     pub(crate) transmission: Option<Sampled>,
     /// Reflectance of the back of a sheet, unit 1.
     pub(crate) back: Option<Sampled>,
+    /// Is it a mirror? None: as its roughness says.
+    pub(crate) mirror: Option<bool>,
 }
 
 impl MaterialSpectra {
@@ -33,6 +36,7 @@ impl MaterialSpectra {
             transmittance: self.transmittance.or(other.transmittance),
             transmission: self.transmission.or(other.transmission),
             back: self.back.or(other.back),
+            mirror: self.mirror.or(other.mirror),
         }
     }
 }
@@ -42,10 +46,11 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
     let Some(entry) = reader.object(entry, place) else {
         return MaterialSpectra::default();
     };
-    const KEYS: [&str; 5] = [
+    const KEYS: [&str; 6] = [
         "reflectance",
         "back_reflectance",
         "emission",
+        "mirror",
         "transmission",
         "transmittance",
     ];
@@ -64,6 +69,14 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
     }
     if let Some(value) = entry.get("transmission") {
         spectra.transmission = transmittance::share(reader, value, "transmission", place);
+    }
+    if let Some(value) = entry.get("mirror") {
+        spectra.mirror = value.as_bool();
+        if spectra.mirror.is_none() {
+            let what = format!("mirror is {}, not true or false", short(&value.to_string()));
+            let next = "write \"mirror\": true, or false for a matt surface";
+            reader.check.problem(place, what, next);
+        }
     }
     if let Some(value) = entry.get("emission") {
         let place = format!("{place}, emission");

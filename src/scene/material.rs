@@ -1,5 +1,6 @@
 //! A material: what a surface reflects, gives out and lets through.
 
+use super::mirror::Mirror;
 use super::pane::Pane;
 use super::profile::Profile;
 use super::sheet::{Sheet, Weave, bounded};
@@ -35,6 +36,8 @@ pub struct Material {
     pub pane: Option<Pane>,
     /// What it lets through diffusely; then [`reflectance`](Self::reflectance) is what is left of the base colour.
     pub sheet: Option<Sheet>,
+    /// How it mirrors; then it reflects nothing diffusely.
+    pub mirror: Option<Mirror>,
 }
 
 /// Coverage.

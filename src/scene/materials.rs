@@ -3,13 +3,14 @@
 //! `reflectance(leaf) = min(upsample(base colour factor), 0.999)`, or the measured table. Metals reflect by their base
 //! colour as albedo, unlit materials are painted with it; each is said in a warning.
 //! Emission: luminance = emissive strength (nits) times Y of the linear emissive factor, unless a side file says more.
-//! No gloss. What lets light through is a pane, see [`pane`].
+//! No gloss, but for mirrors, see [`mirror`]. What lets light through is a pane, see [`pane`].
 
 use super::check::{Check, listed};
 use super::json::short;
 use super::known::MaterialSpectra;
 use super::lamps::{Lamp, Lamps, bearable};
 use super::luminaires::ProfileWish;
+use super::mirror;
 use super::pane;
 use super::raw::{AlphaMode, RawMaterial};
 use super::reader::Sampled;
@@ -31,6 +32,7 @@ struct Said {
     unlit: Vec<String>,
     panes: pane::Said,
     sheets: sheets::Said,
+    mirrors: mirror::Said,
     bright: Vec<String>,
 }
 
@@ -80,11 +82,18 @@ pub(crate) fn materials(
             if is_sheet {
                 material.sides = Sides::Both;
             }
+            material.mirror = said.mirrors.mirror(raw, spectra.mirror, &material);
             if material.pane.is_none() {
                 // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
                 let plain = !tinted && raw.base_color_texture.is_none();
                 let bright = bright && !is_sheet;
-                said.hear(raw, &name, bright && (measured.is_some() || plain));
+                let is_mirror = material.mirror.is_some();
+                said.hear(
+                    raw,
+                    &name,
+                    bright && (measured.is_some() || plain),
+                    is_mirror,
+                );
             }
             (material, spectra.profile.take())
         })
@@ -163,6 +172,7 @@ fn paint(
         emission: None,
         pane: None,
         sheet: None,
+        mirror: None,
         alpha: match raw.alpha_mode {
             AlphaMode::Mask => Alpha::Mask {
                 cutoff: raw.alpha_cutoff,
@@ -269,12 +279,12 @@ fn shining(
 }
 
 impl Said {
-    fn hear(&mut self, raw: &RawMaterial, name: &str, bright: bool) {
+    fn hear(&mut self, raw: &RawMaterial, name: &str, bright: bool, is_mirror: bool) {
         if bright {
             self.bright.push(name.into());
         }
         // glTF's default material is a metal on paper only.
-        if raw.metallic > METALLIC && raw.index.is_some() {
+        if raw.metallic > METALLIC && raw.index.is_some() && !is_mirror {
             self.metals.push(name.into());
         }
         if raw.unlit {
@@ -302,6 +312,7 @@ impl Said {
         }
         self.panes.warn(check);
         self.sheets.warn(check);
+        self.mirrors.warn(check);
     }
 }
 

@@ -26,6 +26,7 @@ pub mod luminaires;
 mod material;
 mod materials;
 mod meshes;
+pub mod mirror;
 mod nodes;
 mod options;
 pub mod pane;

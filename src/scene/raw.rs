@@ -62,6 +62,8 @@ pub struct RawMaterial {
     pub volume: Option<RawVolume>,
     /// Roughness, if it is said.
     pub roughness: Option<f32>,
+    /// Does a texture multiply metallic and roughness?
+    pub metal_texture: bool,
     /// The material's extras.
     pub extras: Option<Value>,
     /// Names of all extensions on the material, sorted.
@@ -90,6 +92,7 @@ impl Default for RawMaterial {
             ior: None,
             volume: None,
             roughness: None,
+            metal_texture: false,
             extras: None,
             extensions: Vec::new(),
         }
@@ -234,6 +237,7 @@ fn material(
         out.metallic = unit(values.metallic_factor.0, "metallicFactor", item, check);
         let rough = unit(values.roughness_factor.0, "roughnessFactor", item, check);
         out.roughness = pbr.has("roughnessFactor").then_some(rough);
+        out.metal_texture = pbr.has("metallicRoughnessTexture");
         out.base_color_texture = slots.texture(json, &pbr, "baseColorTexture", check);
     }
     const DIFFUSE: &str = "KHR_materials_pbrSpecularGlossiness";

@@ -6,7 +6,8 @@
 //!                             "emission": { "name": "cie/F2", "luminance_cd_m2": 5000 } },
 //!                  "glass": { "transmittance": { "csv": "spectra/glass.csv" } },
 //!                  "shade": { "reflectance": { "csv": "outside.csv" }, "back_reflectance": { "csv": "inside.csv" },
-//!                             "transmission": { "csv": "paper.csv" } } },
+//!                             "transmission": { "csv": "paper.csv" } },
+//!                  "silver": { "reflectance": { "csv": "silver.csv" }, "mirror": true } },
 //!   "lights":    { "Spot": { "name": "cie/A" } },
 //!   "sky":       { "type": "overcast" },
 //!   "layers":    { "desk": ["Spot", "bulb"] } }

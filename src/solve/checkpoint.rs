@@ -35,7 +35,7 @@ impl Bake {
     /// Writes a checkpoint, the first rank alone; its size in bytes, 0 on other ranks.
     ///
     /// # Errors
-    /// The file cannot be written, or the room has panes.
+    /// The file cannot be written, or the room has panes or mirrors.
     pub fn save(&self, path: &Path) -> Result<u64> {
         self.can_be_kept("--checkpoint")?;
         let print = self.fingerprint();
@@ -54,14 +54,16 @@ impl Bake {
     /// Can what this bake knows be written down, as `option` asks? What rays pass on their way is in no file.
     ///
     /// # Errors
-    /// The room has panes.
+    /// The room has panes or mirrors.
     pub fn can_be_kept(&self, option: &str) -> Result<()> {
-        if self.panes.is_none() {
-            return Ok(());
-        }
+        let rooms = match (&self.panes, &self.mirrors) {
+            (Some(_), _) => "rooms that light passes panes in",
+            (_, Some(_)) => "rooms with mirrors",
+            _ => return Ok(()),
+        };
         Err(Error::input(
             self.scene.source.path.display().to_string(),
-            format!("{option} does not go with rooms that light passes panes in"),
+            format!("{option} does not go with {rooms}"),
             format!("bake without {option}"),
         ))
     }

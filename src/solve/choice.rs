@@ -21,7 +21,7 @@ use crate::spectrum::{
 const PAPER_DE_LUV: f64 = 0.29;
 /// Materials whose first and second reflections the paper's control looks at, and that train a basis.
 const MATERIALS: usize = 32;
-/// Tinted panes that the choice of lanes looks at.
+/// Tinted panes and mirrors that the choice of lanes looks at.
 const TINTS: usize = 8;
 /// Patches of the model on which bounds are worked out: they take a dozen numbers a lane and a hundred bounces.
 const BOUNDED_PATCHES: usize = 48;
@@ -57,7 +57,9 @@ impl Bake {
             }
             // A filter would have to be a matrix there, and so would what passes a sheet.
             Representation::Characteristic(_)
-                if self.panes.is_some() || self.plan.runs(Kind::Sheets) =>
+                if self.panes.is_some()
+                    || self.mirrors.is_some()
+                    || self.plan.runs(Kind::Sheets) =>
             {
                 Lanes::dense(spectra, weights)
             }
@@ -203,14 +205,20 @@ impl Kin {
     }
 }
 
-/// What the tinted panes of a scene let through, without those that come twice, and what all of them do together.
+/// What the tinted panes of a scene let through and its tinted mirrors reflect, without those that come twice, and what all of them do
+/// together.
 fn tints(scene: &Scene) -> Vec<Leaves> {
     let mut tints: Vec<Leaves> = Vec::new();
     let panes = scene.panes.iter();
-    for pane in panes.filter_map(|s| scene.materials[s.material].pane.as_ref()) {
-        let normal = pane.normal();
-        if tints.len() < TINTS && !pane.is_neutral() && !tints.contains(&normal) {
-            tints.push(normal);
+    let panes = panes.filter_map(|s| scene.materials[s.material].pane.as_ref());
+    let panes = panes.filter(|pane| !pane.is_neutral());
+    let mirrors = scene.surfaces.iter();
+    let mirrors = mirrors.filter_map(|s| scene.materials[s.material].mirror.as_ref());
+    let mirrors = mirrors.filter(|mirror| !mirror.is_neutral());
+    let all = panes.map(|pane| pane.normal());
+    for tint in all.chain(mirrors.map(|mirror| mirror.reflectance)) {
+        if tints.len() < TINTS && !tints.contains(&tint) {
+            tints.push(tint);
         }
     }
     if tints.len() > 1 {

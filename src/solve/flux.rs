@@ -365,6 +365,8 @@ pub(crate) struct Whole<'a> {
     pub(super) direct: &'a dyn Fn(u32) -> f64,
     /// Area of a leaf, all of it.
     pub(super) area: &'a dyn Fn(u32) -> f64,
+    /// Is a leaf a mirror? Of light that falls on it counts only what it keeps: the rest is received where it is sent.
+    pub(super) mirror: &'a dyn Fn(u32) -> bool,
 }
 
 /// The flux where leaves look for themselves: nothing is scaled, and what the rays of leaves find more or less than leaves
@@ -379,11 +381,16 @@ pub(super) fn flux_by_rays(
     let mut fluxes = vec![[0.0; 4]; lanes.len()];
     for (k, &leaf) in leaves.iter().enumerate() {
         let (area, seen) = ((whole.area)(leaf), areas[leaf as usize]);
-        let more = (whole.direct)(leaf);
+        let (more, mirror) = ((whole.direct)(leaf), (whole.mirror)(leaf));
         for (l, sums) in fluxes.iter_mut().enumerate() {
             let get = |r: &Rows| f64::from(r.row(k)[l]);
             let (rho, first) = (get(rows.reflectance), more * get(rows.first));
             let all = first + get(whole.indirect);
+            if mirror {
+                let kept = 1.0 - rho;
+                add(sums, area, [0.0, kept * first, kept * all, 0.0]);
+                continue;
+            }
             let out = rho * all - seen / area * get(rows.reflected);
             add(
                 sums,

@@ -23,6 +23,9 @@ const PLACES: [[f64; 3]; 4] = [
     [0.05, 0.05, 0.9],
 ];
 
+/// As if every lamp were seen in so many mirrors besides.
+const MIRRORED: f64 = 2.0;
+
 /// Looks at points of leaves while the hierarchy is being refined.
 struct Looker<'a> {
     bake: &'a Bake,
@@ -74,7 +77,11 @@ impl Look for Looker<'_> {
             let row = gatherer.direct(&receiver(tree, leaf, at, 0), &mut memory);
             weighed(&row, &self.weights)
         };
-        PLACES.map(bright).into_iter().fold(0.0, f64::max)
+        let most = PLACES.map(bright).into_iter().fold(0.0, f64::max);
+        match self.sight.mirrors {
+            Some(_) => MIRRORED * most,
+            None => most,
+        }
     }
 
     fn by_chance(&self) -> bool {
@@ -117,6 +124,7 @@ impl Bake {
                 clear: Sight {
                     occlusion: false,
                     panes: None,
+                    mirrors: None,
                     ..*sight
                 },
                 weights: bake.bright_weights(),

@@ -128,6 +128,8 @@ impl Bake {
                 glazing,
                 filters: &self.filters,
             }),
+            filters: &self.filters,
+            via: None,
             tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
             closed: self.closed == Closed::Yes,
             hemisphere: by_rays(sight).then_some(&self.hemisphere),

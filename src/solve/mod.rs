@@ -45,7 +45,7 @@ pub(crate) use sources::weights_of;
 
 use crate::color::{Observer, Upsampler};
 use crate::geometry::RayIndex;
-use crate::hierarchy::{Glazing, Mesh, Panes, Tree};
+use crate::hierarchy::{Glazing, Mesh, Mirrors, Panes, Tree};
 use crate::light::lanes::Lanes;
 use crate::light::{Filters, Light, Rows};
 use crate::link::{Balance, Demand, Graph, LinkRows, Opaque, Sight, balance, is_small};
@@ -112,7 +112,7 @@ const WORTH_STALLING: usize = 100_000;
 const MOST_LINKS: usize = 4_000_000;
 /// Rooms of this many faces choose their lanes once.
 const MANY_FACES: usize = 50_000;
-/// Rooms of few triangles with panes take directions for this share of the error: what is clipped exactly in others is found by rays
+/// Rooms of few triangles with panes or mirrors take directions for this share of the error: what is clipped exactly in others is found by rays
 /// there, and a ray costs next to nothing.
 const GLAZED_DIRECTIONS: f64 = 0.25;
 /// A shade around a bulb is as bright as a lamp, but found by rays like all that passes light on: rooms with sheets take directions for
@@ -144,9 +144,10 @@ pub(crate) enum Care {
 }
 
 /// Do leaves and points of this room look for themselves? In a room of few triangles exact clipping is better, but it knows no
-/// filters: where there are panes rays do all.
+/// filters: where there are panes or mirrors rays do all.
 fn by_rays(sight: &Sight) -> bool {
-    sight.occlusion && !(sight.small() && sight.panes.is_none())
+    let plain = sight.panes.is_none() && sight.mirrors.is_none();
+    sight.occlusion && !(sight.small() && plain)
 }
 
 /// A room being baked.
@@ -159,7 +160,9 @@ pub struct Bake {
     pub(crate) rays: RayIndex,
     /// What light passes through; none where the room has no panes.
     pub(crate) panes: Option<Panes>,
-    /// The spectra of the panes on the present lanes.
+    /// What sends light on in one direction; none where the room has no mirrors.
+    pub(crate) mirrors: Option<Mirrors>,
+    /// The spectra of panes and mirrors on the present lanes.
     pub(crate) filters: Filters,
     pub(crate) graph: Graph,
     pub(crate) closed: Closed,
@@ -237,7 +240,7 @@ impl Bake {
     /// The same where rays have told already which faces share a space, and what is closed.
     pub(crate) fn with(scene: Scene, settings: Settings, known: Option<Known>) -> Self {
         let started = Instant::now();
-        let plan = Plan::of(&scene);
+        let mut plan = Plan::of(&scene);
         let mesh = Mesh::new(&scene);
         let (parting, closed) = match known {
             Some(known) => {
@@ -256,7 +259,12 @@ impl Bake {
         let weights = Observer::cie1931().weights(&scene.grid);
         let upsampler = Upsampler::new(&scene.grid);
         let lanes = Lanes::dense(&scene.spectra, &weights);
-        let glazed = !scene.panes.is_empty() && is_small(&mesh);
+        let mirrors = Mirrors::new(&scene, &mesh);
+        if let Some(mirrors) = &mirrors {
+            plan.say(Kind::Mirrors, &mirrors.said());
+        }
+        let filtered = !scene.panes.is_empty() || mirrors.is_some();
+        let glazed = filtered && is_small(&mesh);
         let directions = match (glazed, plan.runs(Kind::Sheets)) {
             (true, _) => GLAZED_DIRECTIONS,
             (_, true) => SHEET_DIRECTIONS,
@@ -286,6 +294,7 @@ impl Bake {
             spectrum_error: None,
             sent: flux::Sent::default(),
             panes: Panes::new(&scene, mesh.centre),
+            mirrors,
             filters: Filters::new(&scene, &lanes),
             scene,
             settings,
@@ -464,6 +473,7 @@ impl Bake {
                 mesh: &self.mesh,
                 opaque,
                 panes: self.glazing(),
+                mirrors: self.mirrors.as_ref(),
                 occlusion: self.plan.runs(Kind::Occlusion),
             },
         )

@@ -12,16 +12,18 @@
 //! independently, and each counts if the other met a front. What leaves of these areas send to fronts, all of it, is what
 //! all leaves receive: nothing need be scaled.
 
+mod found;
 mod kept;
 
 use super::flux::Closed;
-use super::tinted::{Passed, Tints, passed};
-use crate::geometry::sampling::{cosine_direction, hash, sequence02, tangents, triangle_weights};
+use super::tinted::Tints;
+use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::rows::Rows;
 use crate::link::Sight;
 use crate::team::Team;
 use crate::transport::hemisphere::{BEAM, Hemisphere};
+use found::{Found, look_from};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -56,9 +58,6 @@ impl End {
     };
 }
 
-/// Where the rays of a leaf ended, and what those pass that pass panes.
-type Ends = (Vec<End>, Vec<(u32, Passed)>);
-
 /// How the leaves of a hierarchy look out.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Outlook {
@@ -73,8 +72,10 @@ pub(crate) struct Outlook {
     pub(super) team: Team,
     /// Where the rays of this rank's leaves ended, leaf after leaf.
     ends: Vec<End>,
-    /// What panes they pass.
+    /// What panes they pass and mirrors they meet.
     pub(super) tints: Tints,
+    /// Rays that went by mirrors in which lamps have no image, ascending: they bring what their ends emit, too.
+    lamps: Vec<u32>,
     /// First end of each node's rays ([`NONE`] if they are another rank's), and how many there are.
     range: Vec<(u32, u32)>,
     /// The leaf of the present hierarchy at each end, maybe with the flag [`ALONE`]; [`NONE`] where there is none.
@@ -157,7 +158,7 @@ impl Outlook {
         let team = self.team;
         let own = new.iter().copied().filter(|&k| team.owns(k as usize));
         let own: Vec<u32> = own.collect();
-        let parts: Vec<Vec<Ends>> = own
+        let parts: Vec<Vec<Found>> = own
             .par_chunks(CHUNK)
             .map(|chunk| {
                 let each = |&leaf: &u32| {
@@ -171,9 +172,9 @@ impl Outlook {
                 chunk.iter().map(each).collect()
             })
             .collect();
-        let counts = |(ends, _): &Ends| {
-            let fronts = ends.iter().filter(|end| end.entry != NONE).count();
-            [fronts as u32, ends.len() as u32]
+        let counts = |found: &Found| {
+            let fronts = found.ends.iter().filter(|end| end.entry != NONE).count();
+            [fronts as u32, found.ends.len() as u32]
         };
         let counts: Vec<[u32; 2]> = parts.iter().flatten().map(counts).collect();
         let counts = team.merge(new.iter().map(|&k| k as usize), counts);
@@ -185,12 +186,14 @@ impl Outlook {
             self.range[k] = (NONE, count);
             cast += u64::from(count);
         }
-        for ((ends, passed), &leaf) in parts.into_iter().flatten().zip(&own) {
-            self.range[leaf as usize].0 = self.ends.len() as u32;
-            if sight.panes.is_some() {
-                self.tints.extend(ends.len(), passed);
+        for (found, &leaf) in parts.into_iter().flatten().zip(&own) {
+            let first = self.ends.len() as u32;
+            self.range[leaf as usize].0 = first;
+            if sight.panes.is_some() || sight.mirrors.is_some() {
+                self.tints.extend(found.ends.len(), found.passed);
             }
-            self.ends.extend(ends);
+            self.lamps.extend(found.lamps.iter().map(|ray| first + ray));
+            self.ends.extend(found.ends);
         }
         self.find(tree);
         cast
@@ -219,9 +222,29 @@ impl Outlook {
     /// Irradiance of each leaf by what its rays met, `nodes` being the radiosity of every patch: by leaf.
     pub(super) fn irradiance<const L: usize>(&self, leaves: &[u32], nodes: &Rows, out: &mut Rows) {
         // The flag is the highest bit, and part of what stands for no leaf.
-        let counted = |k: u32| Some(k).filter(|k| k & ALONE == 0);
+        let counted = |_, k: u32| Some(k).filter(|k| k & ALONE == 0);
         let share = |leaf| 1.0 / self.met(leaf).1;
         self.means::<L>(leaves, nodes, out, share, counted);
+    }
+
+    /// Irradiance of each leaf by lamps that only rays find, in mirrors, `emitted` being what every patch emits: by leaf; none where
+    /// there are no such rays.
+    pub(super) fn lamps_in_mirrors<const L: usize>(
+        &self,
+        leaves: &[u32],
+        emitted: &Rows,
+    ) -> Option<Rows> {
+        if self.team.is_alone() && self.lamps.is_empty() {
+            return None;
+        }
+        let counted = |ray: usize, k: u32| {
+            let own = k & ALONE == 0 && self.lamps.binary_search(&(ray as u32)).is_ok();
+            own.then_some(k)
+        };
+        let share = |leaf| 1.0 / self.met(leaf).1;
+        let mut out = Rows::zero(leaves.len(), L);
+        self.means::<L>(leaves, emitted, &mut out, share, counted);
+        Some(out)
     }
 
     /// Irradiance of each leaf as a whole, whatever others see of it: by leaf, for the record of fluxes.
@@ -231,7 +254,7 @@ impl Outlook {
         nodes: &Rows,
         out: &mut Rows,
     ) {
-        let counted = |k: u32| (k != NONE).then_some(k & !ALONE);
+        let counted = |_, k: u32| (k != NONE).then_some(k & !ALONE);
         let share = |leaf| 1.0 / self.ends_of(leaf).len().max(1) as f32;
         self.means::<L>(leaves, nodes, out, share, counted);
     }
@@ -243,7 +266,7 @@ impl Outlook {
         nodes: &Rows,
         out: &mut Rows,
         share: impl Fn(u32) -> f32 + Sync,
-        counted: impl Fn(u32) -> Option<u32> + Sync,
+        counted: impl Fn(usize, u32) -> Option<u32> + Sync,
     ) {
         let nodes = nodes.all::<L>();
         let row = |leaf: u32| {
@@ -267,17 +290,18 @@ impl Outlook {
         self.team.merge_rows(leaves, &rows, out);
     }
 
-    /// The sum over what the rays of one of this rank's leaves met, as far as it is counted.
+    /// The sum over what the rays of one of this rank's leaves met, as far as it is counted; in rooms without panes and mirrors rays
+    /// have no number.
     fn sum<const L: usize>(
         &self,
         leaf: u32,
         nodes: &[[f32; L]],
-        counted: impl Fn(u32) -> Option<u32>,
+        counted: impl Fn(usize, u32) -> Option<u32>,
     ) -> [f32; L] {
         let met = self.ends_of(leaf);
         let mut sum = [0.0_f32; L];
         if self.tints.is_empty() {
-            for node in met.iter().filter_map(|&k| counted(k)) {
+            for node in met.iter().filter_map(|&k| counted(0, k)) {
                 for (s, x) in sum.iter_mut().zip(&nodes[node as usize]) {
                     *s += x;
                 }
@@ -285,7 +309,9 @@ impl Outlook {
         } else {
             let first = self.range[leaf as usize].0 as usize;
             for (ray, &met) in (first..).zip(met) {
-                let Some(node) = counted(met) else { continue };
+                let Some(node) = counted(ray, met) else {
+                    continue;
+                };
                 let tint = self.tints.row::<L>(ray).unwrap_or(&[1.0; L]);
                 for ((s, x), t) in sum.iter_mut().zip(&nodes[node as usize]).zip(tint) {
                     *s += x * t;
@@ -418,53 +444,6 @@ fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64)
         }
     }
     [count, misses, covered]
-}
-
-/// Casts the rays of a leaf: a turned pattern of directions, two from each of points all over it.
-fn look_from(tree: &Tree, leaf: u32, sight: &Sight, pattern: &Hemisphere, seed: u64) -> Ends {
-    let node = tree.node(leaf);
-    let element = &tree.elements[node.element as usize];
-    let plane = tree.face_plane[element.face as usize];
-    let pairs = Pairs::new(leaf, pattern.len(), seed);
-    let turn = hash(seed ^ 1, u64::from(leaf));
-    let (sin, cos) = (std::f64::consts::TAU * sequence02(0, turn)[0]).sin_cos();
-    let [x, y] = tangents(node.normal);
-    let [x, y] = [x * cos + y * sin, y * cos - x * sin];
-    let (mut ends, mut tints) = (Vec::with_capacity(pattern.len()), Vec::new());
-    let mut hits = [None; BEAM];
-    let (mut from, mut directions) = ([Vec3::ZERO; BEAM], [Vec3::ZERO; BEAM]);
-    for beam in pattern.beams() {
-        for (k, d) in beam.iter().enumerate() {
-            directions[k] = (x * d.x + y * d.y + node.normal * d.z).as_vec3();
-            from[k] = element.at(pairs.start(ends.len() + k)).as_vec3();
-        }
-        sight.meet(&from, &directions, plane, &mut hits);
-        if let Some(glazing) = &sight.panes {
-            for (k, hit) in hits.iter().enumerate() {
-                let end = hit.map(|hit| from[k] + hit.t * directions[k]);
-                let passed = end.map_or(Vec::new(), |end| passed(glazing, from[k], end));
-                if !passed.is_empty() {
-                    tints.push(((ends.len() + k) as u32, passed));
-                }
-            }
-        }
-        ends.extend(hits.iter().map(|hit| {
-            let Some(hit) = hit else { return End::NOWHERE };
-            let [u, v] = hit.uv.map(|x| (x * 65536.0).clamp(0.0, 65535.0) as u16);
-            let at = if hit.from_behind { [v, u] } else { [u, v] };
-            match tree.met(hit) {
-                NONE => End::NOWHERE,
-                entry => End { entry, at },
-            }
-        }));
-    }
-    let fronts: Vec<bool> = ends.iter().map(|end| end.entry != NONE).collect();
-    for (k, end) in ends.iter_mut().enumerate() {
-        if fronts[k] && !fronts[pairs.fellow(k)] {
-            end.entry |= ALONE;
-        }
-    }
-    (ends, tints)
 }
 
 /// Which two rays of a leaf start from the same point: k and `k ^ mask`. The mask differs from leaf to leaf, so that the

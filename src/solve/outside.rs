@@ -47,6 +47,9 @@ impl Bake {
             self.scene.shut_out_sky();
             self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
             self.plan = Plan::of(&self.scene);
+            if let Some(mirrors) = &self.mirrors {
+                self.plan.say(Kind::Mirrors, &mirrors.said());
+            }
             self.plan.off(Kind::Sky, CLOSED);
             self.plan.off(Kind::Sun, CLOSED);
             return;

@@ -94,6 +94,12 @@ impl Bake {
         let emission = sources.emission;
         let by_rays = self.by_rays();
         self.outlook.tints.on(&self.scene, &self.filters);
+        if by_rays && self.mirrors.is_some() {
+            let emitted = self.on_nodes::<L>(&emission, leaves);
+            let more = self.outlook.lamps_in_mirrors::<L>(leaves, &emitted);
+            more.iter()
+                .for_each(|more| step::<L>(&mut first, more, [1.0; L]));
+        }
         let mut scaled = flux::Scaled::default();
         if self.sealed == Closed::Yes && !by_rays {
             scaled.direct = self.conserve(&mut first, &emission, leaves);
@@ -150,6 +156,7 @@ impl Bake {
         }
         (flux.sent, flux.scaled) = (self.sent, scaled);
         let emitted = emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves));
+        let on_nodes = self.without_mirrors::<L>(reflected, on_nodes, leaves);
         if !through.is_empty() {
             irradiance = through.shown(irradiance);
         }
@@ -294,8 +301,39 @@ impl Bake {
             indirect: &whole,
             direct: &|leaf| f64::from(self.direct.whole(leaf)),
             area: &|leaf| self.tree.node(leaf).area,
+            mirror: &|leaf| self.is_mirror(leaf),
         };
         flux::flux_by_rays(&self.areas, &self.lanes, leaves, rows, &whole)
+    }
+
+    /// Is a leaf a mirror?
+    fn is_mirror(&self, leaf: u32) -> bool {
+        self.mirrors.as_ref().is_some_and(|mirrors| {
+            let element = &self.tree.elements[self.tree.node(leaf).element as usize];
+            let face = self.tree.faces[element.face as usize];
+            mirrors.is_side(face.triangle, face.back)
+        })
+    }
+
+    /// Takes what mirrors are read as out of what leaves reflect, and keeps it for rays that met too many; what all nodes reflect.
+    fn without_mirrors<const L: usize>(
+        &mut self,
+        mut reflected: Rows,
+        on_nodes: Rows,
+        leaves: &[u32],
+    ) -> Rows {
+        if self.mirrors.is_none() {
+            return on_nodes;
+        }
+        let mut mirrors = Rows::zero(self.tree.nodes.len(), L);
+        for (row, &leaf) in reflected.all_mut::<L>().iter_mut().zip(leaves) {
+            if self.is_mirror(leaf) {
+                mirrors.all_mut::<L>()[leaf as usize] = *row;
+                *row = [0.0; L];
+            }
+        }
+        self.light.mirrors = mirrors;
+        self.on_nodes::<L>(&reflected, leaves)
     }
 
     /// Takes over a solution: light by node, irradiance by leaf, and the white that eyes adapt to.
@@ -307,6 +345,7 @@ impl Bake {
             leaves: leaves.to_vec(),
             neighbours: Neighbours::new(self.tree.nodes.len(), &self.graph),
             through: std::mem::take(&mut self.light.through),
+            mirrors: std::mem::take(&mut self.light.mirrors),
             white: self.light.white,
             half_size: self.mesh.half_size,
             ..Light::default()

@@ -7,6 +7,7 @@ use crate::hierarchy::{Element, Mesh, NONE, Tree};
 use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
+use crate::scene::mirror::Mirror;
 use crate::scene::{Emission, GREATEST_ALBEDO, Material, Scene, Surface, Texture};
 use crate::spectrum::Leaves;
 use glam::DVec3;
@@ -82,7 +83,9 @@ impl<'a> Painter<'a> {
             .iter()
             .map(|m| {
                 let (mut rho, mut emission) = (vec![0.0; width], vec![0.0; width]);
-                lanes.averages(&m.reflectance, &mut rho);
+                // A mirror is read as a matt surface by rays that met too many.
+                let mirror = m.mirror.as_ref().map(Mirror::overall);
+                lanes.averages(mirror.as_ref().unwrap_or(&m.reflectance), &mut rho);
                 if let Some(e) = m.even_emission() {
                     lanes.add_emission(e.light, &e.shape, PI, &mut emission);
                 }
@@ -230,7 +233,7 @@ impl<'a> Painter<'a> {
     fn paint_of(&self, m: &Material, triangle: usize, element: &Element) -> Option<[f32; 3]> {
         let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
         let vertex_paint = m.vertex_paint && surface.colors.is_some();
-        if m.paint.is_none() && !vertex_paint {
+        if m.mirror.is_some() || (m.paint.is_none() && !vertex_paint) {
             return None;
         }
         let weights = self.corner_weights(triangle, element);

@@ -1,9 +1,9 @@
-//! Panes between leaves that look for themselves: which of their rays pass what, and what that leaves of each lane.
+//! Panes and mirrors between leaves that look for themselves: which of their rays pass what, and what that leaves of each lane.
 //!
 //! Rays are kept from round to round and lanes are not, so what is kept of a ray is what it passes. Angles and thicknesses are rounded:
-//! a room has few panes, and thousands of rays then share one filter.
+//! a room has few panes and mirrors, and thousands of rays then share one filter.
 
-use crate::hierarchy::{Crossing, Glazing};
+use crate::hierarchy::{Crossing, Glazing, Route};
 use crate::light::{Filters, Rows, padded};
 use crate::scene::Scene;
 use crate::spectrum::LEAVES;
@@ -16,13 +16,13 @@ const STEPS: f32 = 128.0;
 /// Steps of thickness to a doubling: 2 % of what is absorbed.
 const OCTAVE: f32 = 32.0;
 
-/// What a ray passes, rounded: material, cosine, thickness, texture's value of each pane.
+/// What a ray passes, rounded: material, cosine, thickness, texture's value of each pane; of a mirror the first two.
 pub(super) type Passed = Vec<[i32; 4]>;
 
 /// What the rays of leaves pass.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tints {
-    /// For each ray the filter that it passes, counted from 1; 0: none. Empty in a room without panes.
+    /// For each ray the filter that it passes, counted from 1; 0: none. Empty in a room without panes and mirrors.
     of: Vec<u32>,
     /// The filters that rays pass.
     known: BTreeMap<Passed, u32>,
@@ -36,6 +36,26 @@ pub(super) fn passed(glazing: &Glazing, from: Vec3, to: Vec3) -> Passed {
     let mut passed: Passed = crossings.iter().map(rounded).collect();
     passed.sort_unstable();
     passed
+}
+
+/// What a ray meets and passes that mirrors send on.
+pub(super) fn met(glazing: Option<&Glazing>, route: &Route) -> Passed {
+    let mirror = |&(material, cosine): &(u32, f32)| {
+        rounded(&Crossing {
+            material,
+            cosine,
+            thickness: 0.0,
+            texel: 1.0,
+        })
+    };
+    let mut all: Passed = route.bounces().iter().map(mirror).collect();
+    if let Some(glazing) = glazing {
+        for ends in route.points().windows(2) {
+            all.extend(passed(glazing, ends[0].as_vec3(), ends[1].as_vec3()));
+        }
+    }
+    all.sort_unstable();
+    all
 }
 
 fn rounded(crossing: &Crossing) -> [i32; 4] {
@@ -96,7 +116,11 @@ impl Tints {
         for (passed, &number) in &self.known {
             let mut filter = [1.0; LEAVES];
             for &one in passed {
-                filters.pass(scene, &crossing(one), &mut filter);
+                let one = crossing(one);
+                match scene.materials[one.material as usize].mirror {
+                    Some(_) => filters.mirror(one.material, one.cosine, &mut filter),
+                    None => filters.pass(scene, &one, &mut filter),
+                }
             }
             let row = self.rows.row_mut(number as usize - 1);
             row.copy_from_slice(&filter[..row.len()]);

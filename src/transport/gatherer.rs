@@ -1,13 +1,14 @@
 //! What gathering looks at, and the memory of one thread that does.
 
 use super::hemisphere::Hemisphere;
+use super::mirrored::{Arrived, Via};
 use super::outside::{Look, Outside};
 use super::receiver::Gathered;
 use super::shadows::Shadows;
 use super::trace::Trace;
 use crate::geometry::{Clipper, Hit, Segment};
 use crate::hierarchy::{Sample, Tree};
-use crate::light::{Filter, Glass, Light};
+use crate::light::{Filter, Filters, Glass, Light};
 use crate::link::{Sight, Way};
 use crate::scene::PunctualLight;
 use glam::DVec3;
@@ -61,6 +62,8 @@ pub struct Memory {
     pub(super) lamps: Vec<Lamp>,
     /// Which path each segment to a lamp belongs to, and what it brings.
     pub(super) to_lamps: Vec<(usize, f64)>,
+    /// What the rays of a point met by way of mirrors.
+    pub(super) mirrored: Vec<Arrived>,
     /// What a look outside takes.
     pub(super) look: Look,
     /// Directions in which the rays of a point leave the room.
@@ -101,6 +104,10 @@ pub struct Gatherer<'a> {
     pub(crate) sky: Option<&'a Outside>,
     /// What light passes through on its way; none where the room has no panes.
     pub(crate) glass: Option<Glass<'a>>,
+    /// What mirrors leave of light.
+    pub(crate) filters: &'a Filters,
+    /// By which mirrors it is looked from a receiver that is where the true one would look from; none: straight.
+    pub(crate) via: Option<Via>,
     /// What one patch may misplace, share of the white's irradiance.
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
@@ -124,14 +131,22 @@ impl Gatherer<'_> {
         }
     }
 
-    /// What panes leave of light on a segment; none where all passes.
+    /// Does nothing change light on its way but what blocks it? Then it is clipped exactly.
+    pub(super) fn is_plain(&self) -> bool {
+        self.glass.is_none() && self.via.is_none()
+    }
+
+    /// What panes and mirrors leave of light on a free segment; none where all passes.
     pub(super) fn through(&self, segment: &Segment) -> Option<Filter> {
-        self.glass?.through(segment.from, segment.to)
+        match self.via {
+            Some(via) => self.by_way_of(via, segment),
+            None => self.glass?.through(segment.from, segment.to),
+        }
     }
 
     /// How bright light is that has passed a segment, as a share.
     pub(super) fn dimmed(&self, segment: &Segment) -> f64 {
-        let glass = self.glass.as_ref();
-        glass.map_or(1.0, |glass| glass.brightness(segment.from, segment.to))
+        let filter = self.through(segment);
+        filter.map_or(1.0, |filter| self.filters.brightness(&filter))
     }
 }

@@ -12,7 +12,7 @@ use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
 use crate::light::{Filter, Tint, keenness};
-use crate::link::{View, open_weight};
+use crate::link::open_weight;
 use crate::scene::LightKind;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -112,8 +112,7 @@ impl Gatherer<'_> {
         let all: f64 = lamps.iter().map(|lamp| lamp.carries).sum();
         if all > 0.0 {
             let owners = self.aim(to, &lamps, all, memory);
-            self.sight
-                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            self.blocked(&memory.segments, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
             let total: f64 = memory.weights.iter().sum();
             let open = open_weight(&memory.weights, &memory.blocked);
@@ -143,16 +142,16 @@ impl Gatherer<'_> {
     /// What panes leave of each lamp's light, by the rays that reached it, and last of all lamps' light together, which stands for
     /// those that no ray went to. Empty in a room without panes.
     pub(super) fn tints(&self, owners: &[usize], lamps: usize, memory: &Memory) -> Vec<Filter> {
-        let Some(glass) = &self.glass else {
+        if self.is_plain() {
             return Vec::new();
-        };
+        }
         let mut sums = vec![Tint::default(); lamps + 1];
         let rays = memory.segments.iter().zip(&memory.weights);
         for (((segment, &weight), _), &lamp) in (rays.zip(&memory.blocked))
             .zip(owners)
             .filter(|((_, blocked), _)| !**blocked)
         {
-            let filter = glass.through(segment.from, segment.to);
+            let filter = self.through(segment);
             let filter = filter.unwrap_or([1.0; 64]);
             for k in [lamp, lamps] {
                 sums[k].add(&filter, weight);
@@ -165,10 +164,7 @@ impl Gatherer<'_> {
 
     /// How bright light is that has passed a filter, as a share.
     pub(super) fn left_by(&self, filter: Option<&Filter>) -> f64 {
-        match (&self.glass, filter) {
-            (Some(glass), Some(filter)) => glass.filters.brightness(filter),
-            _ => 1.0,
-        }
+        filter.map_or(1.0, |filter| self.filters.brightness(filter))
     }
 
     /// How many rays lamps are worth that would bring `all`, share of white.
@@ -247,7 +243,7 @@ impl Gatherer<'_> {
                 continue;
             };
             memory.rays += 1;
-            if !self.sight.blocks_one(&chosen.segment) {
+            if !self.blocks_one(&chosen.segment) {
                 let tint = self.through(&chosen.segment);
                 let factor = chosen.factor / count as f64;
                 self.add_emitted(chosen.element, factor, tint.as_ref(), out);
@@ -280,7 +276,7 @@ impl Gatherer<'_> {
                 let (factor, end) = match (lamp.kind, far) {
                     (LightKind::Sky | LightKind::Ground, Some((d, factors))) => {
                         let factor = factors[usize::from(lamp.kind == LightKind::Ground)];
-                        (factor, to.point + d * (4.0 * self.light.half_size))
+                        (factor, to.point + d * self.reach())
                     }
                     (LightKind::Surface, _) => {
                         // Which lamp is chosen must not tell which of its points.
@@ -288,7 +284,7 @@ impl Gatherer<'_> {
                         let at = sequence02(1, turn);
                         luminaire::whole(lamp, to, self.light.half_size, at)?
                     }
-                    _ => punctual_factor(lamp, to, self.light.half_size)?,
+                    _ => punctual_factor(lamp, to, self.far())?,
                 };
                 Some((factor * f64::from(bright), end))
             })

@@ -213,7 +213,7 @@ impl Gatherer<'_> {
         let (mut seen, mut parts) = (0.0, Vec::new());
         // Panes are found by rays.
         let by_rays = self.sight.occlusion || self.glass.is_some();
-        let exact = self.shafts && self.glass.is_none() && luminaire.triangles().len() <= FEW;
+        let exact = self.shafts && self.is_plain() && luminaire.triangles().len() <= FEW;
         for triangle in facing(lamp, luminaire, to, self.light.half_size) {
             let known = match by_rays {
                 true if exact => self.past_blockers(luminaire, triangle, to, memory),
@@ -300,8 +300,7 @@ impl Gatherer<'_> {
                 .push(Segment::new(to.point, end, [to.plane, NO_PLANE]));
             memory.weights.push(weight);
         }
-        self.sight
-            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+        self.blocked(&memory.segments, &mut memory.blocked);
         memory.rays += memory.segments.len() as u64;
         let total: f64 = memory.weights.iter().sum();
         if total <= 0.0 {

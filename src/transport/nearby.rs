@@ -102,6 +102,7 @@ impl Gatherer<'_> {
                 memory.segments.push(segment);
                 to_lamps.push((k, path.through * bright));
             }
+            path.sum += path.through * self.one_in_mirrors(&to, sample);
         }
         self.sight
             .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
@@ -130,16 +131,21 @@ impl Gatherer<'_> {
             };
             let way = cosine_direction(to.normal, sequence02(path.sample, samples));
             // One by one: in packets such rays share too little of their way.
-            let next = self
-                .sight
-                .meet_one(to.point.as_vec3(), way.as_vec3(), to.plane);
+            let (start, ahead) = (to.point.as_vec3(), way.as_vec3());
+            let mut next = self.sight.meet_one(start, ahead, to.plane);
             memory.rays += 1;
+            let mirrored = next.and_then(|hit| self.sight.mirrored(start, ahead, &hit));
+            if let Some(mirrored) = mirrored {
+                let glazing = self.glass.map(|glass| glass.glazing);
+                let filter = self.filters.along(glazing, &mirrored.route);
+                path.through *= self.filters.brightness(&filter);
+                next = mirrored.hit;
+            }
             let Some((leaf, hit)) = next.and_then(|hit| Some((self.met(&hit)?, hit))) else {
                 continue;
             };
-            if let Some(glass) = &self.glass {
-                let from = to.point.as_vec3();
-                path.through *= glass.brightness(from, from + way.as_vec3() * hit.t);
+            if let (Some(glass), None) = (&self.glass, mirrored) {
+                path.through *= glass.brightness(start, start + ahead * hit.t);
             }
             if last(leaf, &hit) {
                 path.sum += path.through * f64::from(self.light.bright_reflected[leaf as usize]);

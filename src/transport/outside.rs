@@ -5,13 +5,14 @@
 //! and toward the [`Openings`], both together by the power heuristic (Veach and Guibas 1995): by the balance heuristic the few rays
 //! of the hemisphere that find a small opening brought 2 % of noise to what those toward it know.
 
+use super::gatherer::Gatherer;
 use super::openings::{Choice, Openings};
 use super::receiver::Receiver;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::geometry::{
     Clipper, NO_PLANE, Patch, Segment, Shaft, ShaftContents, lambert_edges_x8, quarters,
 };
-use crate::light::{Filter, Glass, Tint};
+use crate::light::{Filter, Tint};
 use crate::link::{Sight, View};
 use crate::scene::sky::Sky;
 use glam::{DVec3, Vec3};
@@ -69,6 +70,8 @@ pub(super) enum Way<'a> {
     Rays(usize),
     /// These directions, of so many over the hemisphere, lead out of the room.
     Known(&'a [DVec3], usize),
+    /// The same of one of many points, for which few rays to the openings do.
+    Glanced(&'a [DVec3], usize),
     /// As if nothing stood in the way.
     Unshadowed,
 }
@@ -77,7 +80,7 @@ impl Outside {
     /// Irradiance of a point by the sky, where open level ground has 1, and by the ground below, where that sends out 1.
     pub(super) fn seen(
         &self,
-        (sight, glass): (&Sight, Option<Glass>),
+        (sight, by): (&Sight, Option<&Gatherer>),
         to: &Receiver,
         way: Way,
         look: &mut Look,
@@ -96,13 +99,13 @@ impl Outside {
         if Self::is_exact(sight) {
             self.exactly(sight, to, look)
         } else {
-            self.by_rays((sight, glass), to, way, look)
+            self.by_rays((sight, by), to, way, look)
         }
     }
 
     /// Is the sky of this room seen exactly, without openings?
     pub(crate) fn is_exact(sight: &Sight) -> bool {
-        sight.small() && sight.opaque.is_none() && sight.panes.is_none()
+        sight.small() && sight.opaque.is_none() && sight.panes.is_none() && sight.mirrors.is_none()
     }
 
     /// The same as one of many points sees it.
@@ -257,18 +260,23 @@ impl Outside {
     /// By rays over the hemisphere and to the openings.
     fn by_rays(
         &self,
-        (sight, glass): (&Sight, Option<Glass>),
+        (sight, by): (&Sight, Option<&Gatherer>),
         to: &Receiver,
         way: Way,
         look: &mut Look,
     ) -> [f64; 2] {
-        let (wide, mut narrow) = RAYS[if let Way::Rays(k) = way { k } else { 3 }];
+        let kind = match way {
+            Way::Rays(kind) => kind,
+            Way::Glanced(..) => 0,
+            _ => 3,
+        };
+        let (wide, mut narrow) = RAYS[kind];
         if let (Way::Known(..), true) = (way, sight.small()) {
-            // Rooms of few triangles come here for their panes; a ray costs next to nothing there.
+            // Rooms of few triangles come here for their panes and mirrors; a ray costs next to nothing there.
             narrow *= FEW;
         }
         let wide = match way {
-            Way::Known(open, of) => {
+            Way::Known(open, of) | Way::Glanced(open, of) => {
                 look.open.clear();
                 look.open.extend_from_slice(open);
                 of
@@ -279,13 +287,19 @@ impl Outside {
             }
         };
         let around = look.open.len();
-        self.look_through_openings(sight, to, narrow, look);
+        self.look_through_openings((sight, by), to, narrow, look);
         let counts = [wide as f64, narrow as f64];
-        self.combine((sight, glass), to, (counts, around), look)
+        self.combine((sight, by), to, (counts, around), look)
     }
 
     /// Rays to the openings: adds the directions that lead outside.
-    fn look_through_openings(&self, sight: &Sight, to: &Receiver, count: usize, look: &mut Look) {
+    fn look_through_openings(
+        &self,
+        (sight, by): (&Sight, Option<&Gatherer>),
+        to: &Receiver,
+        count: usize,
+        look: &mut Look,
+    ) {
         let sky = |d: DVec3| {
             if d.y > 0.0 {
                 PI * self.sky.radiance(d)
@@ -303,7 +317,10 @@ impl Outside {
             look.segments
                 .extend(ahead.map(|at| Segment::new(to.point, at, [to.plane, NO_PLANE])));
         }
-        sight.blocked(&look.segments, &View::Crowded, &mut look.blocked);
+        match by {
+            Some(by) => by.blocked(&look.segments, &mut look.blocked),
+            None => sight.blocked(&look.segments, &View::Crowded, &mut look.blocked),
+        }
         look.rays += look.segments.len() as u64;
         let ways = look.segments.iter().zip(&look.blocked);
         let free = ways.filter(|(_, blocked)| !**blocked);
@@ -315,14 +332,14 @@ impl Outside {
     /// first, and of so many to the openings.
     fn combine(
         &self,
-        (sight, glass): (&Sight, Option<Glass>),
+        (sight, by): (&Sight, Option<&Gatherer>),
         to: &Receiver,
         (counts, around): ([f64; 2], usize),
         look: &mut Look,
     ) -> [f64; 2] {
         let (mut seen, mut squares, mut sum) = ([0.0; 2], 0.0, 0.0);
         let mut tints = [Tint::default(); 2];
-        let far = 4.0 * sight.mesh.half_size;
+        let far = by.map_or(4.0 * sight.mesh.half_size, Gatherer::reach);
         for (k, &d) in look.open.iter().enumerate() {
             let cosine = to.normal.dot(d);
             if cosine <= 0.0 {
@@ -342,10 +359,10 @@ impl Outside {
             let brings = radiance * cosine * own / squared;
             seen[place] += brings;
             let mut left = brings;
-            if let Some(glass) = glass {
-                let filter = glass.through(to.point.as_vec3(), (to.point + d * far).as_vec3());
-                let filter = filter.unwrap_or([1.0; 64]);
-                left *= glass.filters.brightness(&filter);
+            if let Some(by) = by.filter(|by| !by.is_plain()) {
+                let way = Segment::new(to.point, to.point + d * far, [NO_PLANE; 2]);
+                let filter = by.through(&way).unwrap_or([1.0; 64]);
+                left *= by.filters.brightness(&filter);
                 tints[place].add(&filter, brings);
             }
             if place == 0 {

@@ -174,16 +174,18 @@ impl Gatherer<'_> {
 
     /// Is nothing on the way? A way that links proved clear may lead through a pane.
     fn is_clear(&self, way: Way) -> bool {
-        self.glass.is_none() && (way == Way::Clear || !self.sight.occlusion)
+        self.is_plain() && (way == Way::Clear || !self.sight.occlusion)
     }
 
     /// What panes leave of what the last rays bring, where they are not blocked; none where no pane is passed.
     pub(super) fn tint(&self, memory: &Memory) -> Option<Filter> {
-        let glass = self.glass?;
+        if self.is_plain() {
+            return None;
+        }
         let (mut tint, mut any) = (Tint::default(), false);
         let rays = memory.segments.iter().zip(&memory.weights);
         for ((segment, &weight), _) in (rays.zip(&memory.blocked)).filter(|(_, b)| !**b) {
-            let filter = glass.through(segment.from, segment.to);
+            let filter = self.through(segment);
             any |= filter.is_some();
             tint.add(&filter.unwrap_or([1.0; 64]), weight);
         }
@@ -353,7 +355,7 @@ impl Gatherer<'_> {
         };
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
-        let clips = self.glass.is_none();
+        let clips = self.is_plain();
         if clips && let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {

@@ -15,6 +15,11 @@ impl Gatherer<'_> {
         self.lamps_of(to, memory, &mut out);
         self.punctual(to, memory, &mut out);
         self.outside(to, None, false, memory, &mut out);
+        if self.sight.mirrors.is_some() {
+            self.lamps_in_mirrors(to, memory, &mut out);
+            let of = self.glance(to, memory);
+            self.lights_in_mirrors(to, of, memory, &mut out);
+        }
         memory.trace = out.trace;
         out.direct
     }

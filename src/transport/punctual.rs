@@ -42,7 +42,7 @@ impl Gatherer<'_> {
         lamp: &PunctualLight,
         memory: &mut Memory,
     ) -> (f64, Option<Filter>) {
-        let Some((factor, end)) = punctual_factor(lamp, to, self.light.half_size) else {
+        let Some((factor, end)) = punctual_factor(lamp, to, self.far()) else {
             return (0.0, None);
         };
         let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
@@ -50,7 +50,7 @@ impl Gatherer<'_> {
             LightKind::Sun => self.sun_seen(to, lamp, memory),
             _ if self.sight.occlusion => {
                 memory.rays += 1;
-                f64::from(u8::from(!self.sight.blocks_one(&way)))
+                f64::from(u8::from(!self.blocks_one(&way)))
             }
             _ => 1.0,
         };

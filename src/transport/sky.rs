@@ -6,7 +6,6 @@ use super::receiver::{Gathered, Receiver};
 use crate::geometry::sampling::{around, cosine_direction, hash, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::light::accumulate;
-use crate::link::View;
 use crate::scene::sky::SUN_RADIUS;
 use crate::scene::{LightKind, PunctualLight};
 use glam::DVec3;
@@ -29,6 +28,7 @@ impl Gatherer<'_> {
         let Some(outside) = self.sky else { return };
         let way = match known {
             _ if self.hemisphere.is_some() && !self.sight.occlusion => Way::Unshadowed,
+            Some((open, of)) if !self.shafts => Way::Glanced(open, of),
             Some((open, of)) => Way::Known(open, of),
             None if !self.shafts => Way::Rays(0),
             None => Way::Rays(if own { 2 } else { 1 }),
@@ -41,7 +41,7 @@ impl Gatherer<'_> {
         };
         let to = &Receiver { seed, ..*to };
         let before = memory.look.rays;
-        let seen = outside.seen((self.sight, self.glass), to, way, &mut memory.look);
+        let seen = outside.seen((self.sight, Some(self)), to, way, &mut memory.look);
         memory.rays += memory.look.rays - before;
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
             let factor = match lamp.kind {
@@ -76,13 +76,12 @@ impl Gatherer<'_> {
         for k in 0..count {
             let [u, v] = sequence02(k, turn);
             let toward = around(-sun.direction, 1.0 - u * least, v);
-            let end = to.point + toward * (4.0 * self.light.half_size);
+            let end = to.point + toward * self.reach();
             memory
                 .segments
                 .push(Segment::new(to.point, end, [to.plane, NO_PLANE]));
         }
-        self.sight
-            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+        self.blocked(&memory.segments, &mut memory.blocked);
         memory.rays += u64::from(count);
         let open = memory.blocked.iter().filter(|blocked| !**blocked);
         open.count() as f64 / f64::from(count)

@@ -2,6 +2,7 @@
 
 use super::gatherer::{Gatherer, Memory, Of};
 use super::hemisphere::{BEAM, Hemisphere};
+use super::mirrored::Arrived;
 use super::receiver::{Gathered, Receiver};
 use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
@@ -28,14 +29,18 @@ impl Gatherer<'_> {
         let share = 1.0 / hemisphere.len() as f64;
         let mut escaped = std::mem::take(&mut memory.escaped);
         let mut tints = std::mem::take(&mut memory.tints);
-        let backs = self.cast(to, hemisphere, &mut met, &mut tints, &mut escaped);
+        let mut mirrored = std::mem::take(&mut memory.mirrored);
+        let ends = (&mut met, &mut mirrored);
+        let backs = self.cast(to, hemisphere, ends, &mut tints, &mut escaped);
         out.backs = share * backs as f64;
         (memory.met, memory.tints, memory.escaped) = (met, tints, escaped);
+        memory.mirrored = mirrored;
         memory.rays += hemisphere.len() as u64;
         if out.backs > self.most_backs {
             return;
         }
         self.lamps_of(to, memory, out);
+        self.lamps_in_mirrors(to, memory, out);
         // A ray must not carry more than this.
         self.bright(
             to,
@@ -48,6 +53,10 @@ impl Gatherer<'_> {
         }
         self.punctual(to, memory, out);
         self.look(to, share as f32, memory, out);
+        if self.sight.mirrors.is_some() {
+            self.patches_in_mirrors(share as f32, memory, out);
+            self.lights_in_mirrors(to, hemisphere.len(), memory, out);
+        }
         let escaped = std::mem::take(&mut memory.escaped);
         self.outside(to, Some((&escaped, hemisphere.len())), true, memory, out);
         memory.escaped = escaped;
@@ -118,17 +127,18 @@ impl Gatherer<'_> {
         (memory.met, memory.near, memory.tints) = (met, near, tints);
     }
 
-    /// Casts the rays of a point. Which leaves they met, in which directions they left the room, and how many met black backs.
+    /// Casts the rays of a point. Which leaves they met, straight or by way of mirrors, in which directions they left the room, and how many met black backs.
     fn cast(
         &self,
         to: &Receiver,
         hemisphere: &Hemisphere,
-        met: &mut Vec<(u32, Hit)>,
+        (met, mirrored): (&mut Vec<(u32, Hit)>, &mut Vec<Arrived>),
         tints: &mut Vec<Option<Box<Filter>>>,
         escaped: &mut Vec<DVec3>,
     ) -> usize {
         escaped.clear();
         tints.clear();
+        mirrored.clear();
         // Another seed turns the pattern.
         let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
         let [x, y] = tangents(to.normal);
@@ -149,6 +159,9 @@ impl Gatherer<'_> {
                     }
                     continue;
                 };
+                if self.follow(from[0], *d, hit, mirrored) {
+                    continue;
+                }
                 match self.met(hit) {
                     Some(leaf) => {
                         met.push((leaf, *hit));

@@ -7,6 +7,7 @@
 
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
+use haarlight::scene::mirror::Mirror;
 use haarlight::scene::pane::{Pane, PaneKind};
 use haarlight::scene::sheet::Sheet;
 use haarlight::scene::sky::Sky;
@@ -77,6 +78,7 @@ impl Room {
             alpha: Alpha::Opaque,
             pane: None,
             sheet: None,
+            mirror: None,
         });
         self.materials.len() - 1
     }
@@ -130,6 +132,17 @@ impl Room {
             color: None,
             color_texture: None,
             shares: false,
+            from: "given".into(),
+        });
+        material
+    }
+
+    /// A mirror by what it reflects at normal incidence, leaf by leaf; returns its index.
+    pub(crate) fn mirror(&mut self, reflectance: Leaves) -> usize {
+        let material = self.spectral_paint(reflectance);
+        let reflectance = self.materials[material].reflectance;
+        self.materials[material].mirror = Some(Mirror {
+            reflectance,
             from: "given".into(),
         });
         material

@@ -12,6 +12,7 @@ mod furnished;
 mod gallery;
 mod glazed;
 mod glb;
+mod mirrored;
 mod shapes;
 mod simple;
 mod textures;
@@ -70,6 +71,7 @@ const ROOMS: &[Room] = &[
     ("daylit", daylit::room, Some(daylit::spectra)),
     ("glazed", glazed::room, Some(glazed::spectra)),
     ("curtained", curtained::room, Some(curtained::spectra)),
+    ("mirrored", mirrored::room, Some(mirrored::spectra)),
     ("furnace", simple::furnace, None),
     ("gallery", gallery::room, Some(gallery::spectra)),
     ("cie171-5.2", cie171::case_5_2, None),

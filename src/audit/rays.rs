@@ -1,0 +1,59 @@
+//! What stands in the way of paths, and what panes leave of them.
+
+use super::path::Audit;
+use crate::geometry::{Hit, Segment};
+use crate::hierarchy::{Glazing, alpha};
+use crate::spectrum::Leaves;
+use glam::DVec3;
+
+impl Audit<'_> {
+    /// What panes between two points leave of light, leaf by leaf.
+    pub(super) fn filtered(&self, throughput: &Leaves, from: DVec3, to: DVec3) -> Leaves {
+        let mut left = *throughput;
+        let Some(panes) = &self.panes else {
+            return left;
+        };
+        let scene = self.scene;
+        let glazing = Glazing { panes, scene };
+        for crossing in glazing.crossings(from.as_vec3(), to.as_vec3()) {
+            let Some(pane) = &scene.materials[crossing.material as usize].pane else {
+                continue;
+            };
+            let [cosine, thickness, texel] =
+                [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
+            let passing = pane.passing(cosine, thickness, texel);
+            for (x, spectrum) in left.iter_mut().zip(pane.spectrum()) {
+                *x *= passing(*spectrum);
+            }
+        }
+        left
+    }
+
+    pub(super) fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<Hit> {
+        let reach = (4.0 * self.mesh.half_size) as f32;
+        if self.masked {
+            let opaque = |t: u32, u: f32, v: f32| {
+                !alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
+            };
+            return self.rays.closest_with(
+                from.as_vec3(),
+                direction.as_vec3(),
+                reach,
+                plane,
+                &opaque,
+            );
+        }
+        self.rays
+            .closest(from.as_vec3(), direction.as_vec3(), reach, plane)
+    }
+
+    pub(super) fn blocked(&self, segment: &Segment) -> bool {
+        if self.masked {
+            let opaque = |t: u32, u: f32, v: f32| {
+                !alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])
+            };
+            return self.rays.occluded_with(segment, &opaque);
+        }
+        self.rays.occluded(segment)
+    }
+}

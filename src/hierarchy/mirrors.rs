@@ -1,0 +1,431 @@
+//! Where mirrors are, and in which of them, one after the other, things have images.
+//!
+//! All triangles of a material in one plane that look the same way are one plane mirror. What a point sees by way of plane
+//! mirrors `m1, m2, ..` it would see straight from where `.. R2 R1` takes it, `Ri` being the reflection in `mi`, through the mirrors as
+//! windows. So lamps are looked for from there, with the factors that they have for any other point. Which mirrors may follow one another
+//! is found once; an [`Image`] is such a sequence.
+//!
+//! Surfaces of many small planes are curved mirrors: rays find what is seen in them, and nothing has images there.
+
+use super::{Mesh, NONE};
+use crate::geometry::Hit;
+use crate::scene::{Scene, Sides};
+use glam::{DMat3, DVec3};
+use std::collections::BTreeMap;
+
+/// Mirrors that light meets one after the other; the next is read as a matt surface.
+pub const BOUNCES: usize = 4;
+/// A plane counts for itself that has this share of the mirroring area of a surface: beyond 16 sides a prism is a tube.
+const PLANE_SHARE: f64 = 1.0 / 16.0;
+/// Plane mirrors at the most, the largest.
+const PLANES: usize = 32;
+/// Images at the most, those of few mirrors first: a box of six mirrors has 156 of up to three.
+const IMAGES: usize = 256;
+/// In [`Mirrors::of`]: a mirror that nothing has an image in.
+const CURVED: u32 = NONE - 1;
+/// Nearer than this to a plane, share of half the room, a point lies in it: ten roundings of f32.
+const IN_PLANE: f64 = 1e-6;
+
+/// Mirrors one after the other, the first that a ray from a point meets first; the rest [`NONE`].
+type Sequence = [u32; BOUNCES];
+
+/// A plane mirror, or where it appears to be, behind others.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    normal: DVec3,
+    /// `normal . x = offset` in it.
+    offset: f64,
+    /// All of it lies in this ball.
+    centre: DVec3,
+    radius: f64,
+    material: u32,
+}
+
+impl Plane {
+    fn height(&self, p: DVec3) -> f64 {
+        self.normal.dot(p) - self.offset
+    }
+
+    fn reflected(&self, p: DVec3) -> DVec3 {
+        p - 2.0 * self.height(p) * self.normal
+    }
+
+    /// Where this plane appears to be in a mirror.
+    fn seen_in(&self, mirror: &Self) -> Self {
+        let normal = self.normal - 2.0 * self.normal.dot(mirror.normal) * mirror.normal;
+        let on = mirror.reflected(self.offset * self.normal);
+        Self {
+            normal,
+            offset: normal.dot(on),
+            centre: mirror.reflected(self.centre),
+            ..*self
+        }
+    }
+}
+
+/// A sequence of plane mirrors in which something may be seen.
+#[derive(Debug, Clone)]
+pub struct Image {
+    planes: Sequence,
+    /// Takes a point that looks to where it would look from without the mirrors.
+    turn: DMat3,
+    shift: DVec3,
+    /// The mirrors as windows, as the point that looks sees them.
+    windows: Vec<Plane>,
+}
+
+impl Image {
+    /// Where a point looks from as if there were no mirrors.
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        self.turn * p + self.shift
+    }
+
+    /// The same for a direction.
+    pub fn direction(&self, d: DVec3) -> DVec3 {
+        self.turn * d
+    }
+
+    /// How many mirrors.
+    pub fn depth(&self) -> usize {
+        self.windows.len()
+    }
+
+    /// Could a point with a normal see anything this way? It lies before all windows, they are above its horizon, and two by two
+    /// in one line of sight.
+    fn is_open_to(&self, point: DVec3, normal: DVec3, least: f64) -> bool {
+        let mut cones = [(DVec3::ZERO, 0.0); BOUNCES];
+        for (k, window) in self.windows.iter().enumerate() {
+            let way = window.centre - point;
+            if window.height(point) <= least || normal.dot(way) + window.radius <= 0.0 {
+                return false;
+            }
+            let distance = way.length();
+            let half = (window.radius / distance).min(1.0).asin();
+            cones[k] = (way / distance.max(f64::MIN_POSITIVE), half);
+            let apart = |(axis, other): &(DVec3, f64)| axis.dot(cones[k].0) < (half + other).cos();
+            // Cones of more than a right angle together miss nothing.
+            let wide = |(_, other): &(DVec3, f64)| half + other >= std::f64::consts::FRAC_PI_2;
+            if cones[..k].iter().any(|cone| !wide(cone) && apart(cone)) {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// The way of light by mirrors.
+#[derive(Debug, Clone, Copy)]
+pub struct Route {
+    points: [DVec3; BOUNCES + 2],
+    bounces: [(u32, f32); BOUNCES],
+    count: usize,
+}
+
+impl Route {
+    /// Begins at a point.
+    pub(crate) fn new(start: DVec3) -> Self {
+        Self {
+            points: [start; BOUNCES + 2],
+            bounces: [(NONE, 0.0); BOUNCES],
+            count: 0,
+        }
+    }
+
+    /// Goes on by a mirror of a material, met at a place under a cosine.
+    pub(crate) fn bounce(&mut self, at: DVec3, material: u32, cosine: f64) {
+        self.bounces[self.count] = (material, cosine as f32);
+        self.count += 1;
+        self.points[self.count] = at;
+    }
+
+    /// Ends at a point.
+    pub(crate) fn end(&mut self, at: DVec3) {
+        self.points[self.count + 1] = at;
+    }
+
+    /// Can it meet another mirror?
+    pub(crate) fn goes_on(&self) -> bool {
+        self.count < BOUNCES
+    }
+
+    /// Material of each mirror that it meets, and the cosine of incidence.
+    pub fn bounces(&self) -> &[(u32, f32)] {
+        &self.bounces[..self.count]
+    }
+
+    /// Where it starts, meets mirrors, and ends.
+    pub fn points(&self) -> &[DVec3] {
+        &self.points[..self.count + 2]
+    }
+}
+
+/// All mirrors of a room.
+#[derive(Debug, Clone)]
+pub struct Mirrors {
+    /// By triangle, its front and its back: number of its plane, [`CURVED`], or [`NONE`] of what is no mirror.
+    of: Vec<[u32; 2]>,
+    planes: Vec<Plane>,
+    images: Vec<Image>,
+    numbers: BTreeMap<Sequence, u32>,
+    left_out: usize,
+    curved: bool,
+    least: f64,
+}
+
+/// A plane mirror being put together.
+#[derive(Default)]
+struct Part {
+    area: f64,
+    /// Greatest share that it has in the mirroring area of a surface.
+    share: f64,
+    sides: Vec<(usize, usize)>,
+}
+
+impl Mirrors {
+    /// The mirrors of a scene, where its mesh is; none where it has none.
+    pub fn new(scene: &Scene, mesh: &Mesh) -> Option<Self> {
+        let is_mirror = |m: &u32| scene.materials[*m as usize].mirror.is_some();
+        if !mesh.material.iter().any(is_mirror) {
+            return None;
+        }
+        let mut mirrors = Self {
+            of: vec![[NONE; 2]; mesh.triangles.len()],
+            planes: Vec::new(),
+            images: Vec::new(),
+            numbers: BTreeMap::new(),
+            left_out: 0,
+            curved: false,
+            least: IN_PLANE * mesh.half_size,
+        };
+        let mut parts: BTreeMap<(u32, u32, bool), Part> = BTreeMap::new();
+        let mut surfaces: BTreeMap<u32, f64> = BTreeMap::new();
+        let all = || (0..mesh.triangles.len()).filter(|&t| is_mirror(&mesh.material[t]));
+        for t in all() {
+            *surfaces.entry(mesh.origin[t].0).or_default() += mesh.area[t];
+        }
+        let mut within: BTreeMap<(u32, u32), f64> = BTreeMap::new();
+        let mut towards: BTreeMap<u32, DVec3> = BTreeMap::new();
+        for t in all() {
+            *within.entry((mesh.origin[t].0, mesh.plane[t])).or_default() += mesh.area[t];
+            towards.entry(mesh.plane[t]).or_insert(mesh.normal[t]);
+        }
+        for t in all() {
+            let both = scene.materials[mesh.material[t] as usize].sides == Sides::Both;
+            let surface = mesh.origin[t].0;
+            let share = within[&(surface, mesh.plane[t])] / surfaces[&surface];
+            for side in 0..1 + usize::from(both) {
+                mirrors.of[t][side] = CURVED;
+                let normal = mesh.normal[t] * [1.0, -1.0][side];
+                let along = normal.dot(towards[&mesh.plane[t]]) > 0.0;
+                let key = (mesh.material[t], mesh.plane[t], along);
+                let part = parts.entry(key).or_default();
+                part.area += mesh.area[t];
+                part.share = part.share.max(share);
+                part.sides.push((t, side));
+            }
+        }
+        mirrors.find_planes(mesh, parts.into_values().collect());
+        mirrors.find_images(mesh);
+        Some(mirrors)
+    }
+
+    /// Takes the largest planes.
+    fn find_planes(&mut self, mesh: &Mesh, mut parts: Vec<Part>) {
+        let all = parts.len();
+        parts.retain(|part| part.share >= PLANE_SHARE && part.area > 0.0);
+        parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.sides.cmp(&b.sides)));
+        parts.truncate(PLANES);
+        self.curved = parts.len() < all;
+        for part in parts {
+            let corners = || {
+                let triangles = part.sides.iter().map(|&(t, _)| mesh.triangles[t]);
+                triangles.flatten().map(|v| mesh.positions[v as usize])
+            };
+            let turned =
+                |&(t, side): &(usize, usize)| mesh.area[t] * mesh.normal[t] * [1.0, -1.0][side];
+            let normal = part
+                .sides
+                .iter()
+                .map(turned)
+                .sum::<DVec3>()
+                .normalize_or_zero();
+            let low = corners().fold(DVec3::INFINITY, DVec3::min);
+            let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+            let centre = 0.5 * (low + high);
+            let radius = corners().map(|p| p.distance(centre)).fold(0.0, f64::max);
+            let heights = corners().map(|p| normal.dot(p));
+            let offset = heights.sum::<f64>() / corners().count().max(1) as f64;
+            for &(t, side) in &part.sides {
+                self.of[t][side] = self.planes.len() as u32;
+            }
+            self.planes.push(Plane {
+                normal,
+                offset,
+                centre,
+                radius,
+                material: mesh.material[part.sides[0].0],
+            });
+        }
+    }
+
+    /// Finds which mirrors may follow one another.
+    fn find_images(&mut self, mesh: &Mesh) {
+        let mut corners = vec![Vec::new(); self.planes.len()];
+        for (t, sides) in self.of.iter().enumerate() {
+            for &k in sides {
+                if let Some(corners) = corners.get_mut(k as usize) {
+                    corners.extend(mesh.triangles[t].map(|v| mesh.positions[v as usize]));
+                }
+            }
+        }
+        let sees = |a: usize, b: usize| {
+            let before = |p: &DVec3| self.planes[a].height(*p) > self.least;
+            corners[b].iter().any(before)
+        };
+        let count = self.planes.len();
+        let meet: Vec<Vec<bool>> = (0..count)
+            .map(|a| {
+                (0..count)
+                    .map(|b| a != b && sees(a, b) && sees(b, a))
+                    .collect()
+            })
+            .collect();
+        let mut images: Vec<Image> = Vec::new();
+        let start = Image {
+            planes: [NONE; BOUNCES],
+            turn: DMat3::IDENTITY,
+            shift: DVec3::ZERO,
+            windows: Vec::new(),
+        };
+        let mut level = vec![start];
+        for depth in 0..BOUNCES {
+            let mut next = Vec::new();
+            for image in &level {
+                let after = |k: &usize| {
+                    let last = depth.checked_sub(1).map(|last| image.planes[last] as usize);
+                    last.is_none_or(|last| meet[last][*k])
+                };
+                let more = (0..count).filter(after);
+                next.extend(more.filter_map(|k| self.followed(image, k as u32)));
+            }
+            let room = IMAGES - images.len();
+            self.left_out += next.len().saturating_sub(room);
+            next.truncate(room);
+            images.extend(next.iter().cloned());
+            level = next;
+        }
+        let numbers = images.iter().zip(0..).map(|(image, k)| (image.planes, k));
+        self.numbers = numbers.collect();
+        self.images = images;
+    }
+
+    /// A sequence with one more mirror, if light can go that way.
+    fn followed(&self, image: &Image, k: u32) -> Option<Image> {
+        let mirror = &self.planes[k as usize];
+        let depth = image.depth();
+        let earlier = image.planes[..depth].iter().rev();
+        let window = earlier.fold(*mirror, |seen, &k| seen.seen_in(&self.planes[k as usize]));
+        // Behind all windows before it.
+        let behind = |w: &Plane| w.height(window.centre) - window.radius < -self.least;
+        if !image.windows.iter().all(behind) {
+            return None;
+        }
+        let mut planes = image.planes;
+        planes[depth] = k;
+        let mut windows = image.windows.clone();
+        windows.push(window);
+        let n = mirror.normal;
+        let across = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+        let turn = DMat3::IDENTITY - 2.0 * across;
+        Some(Image {
+            planes,
+            turn: turn * image.turn,
+            shift: turn * image.shift + 2.0 * mirror.offset * n,
+            windows,
+        })
+    }
+
+    /// Does a ray meet a mirror there?
+    pub fn is_mirror(&self, hit: &Hit) -> bool {
+        self.side(hit) != NONE
+    }
+
+    /// Number of the plane that a ray met; none of what is curved or no mirror.
+    fn side(&self, hit: &Hit) -> u32 {
+        self.of[hit.triangle as usize][usize::from(hit.from_behind)]
+    }
+
+    /// Is a triangle a mirror, from its front or its back?
+    pub fn is_side(&self, triangle: u32, back: bool) -> bool {
+        self.of[triangle as usize][usize::from(back)] != NONE
+    }
+
+    /// All images of what may be seen.
+    pub fn images(&self) -> &[Image] {
+        &self.images
+    }
+
+    /// Number of the image in the mirrors that were met, in order; none if nothing has one there.
+    pub fn image_of(&self, met: &[Hit]) -> Option<u32> {
+        let mut planes = [NONE; BOUNCES];
+        for (plane, hit) in planes.iter_mut().zip(met) {
+            *plane = self.side(hit);
+        }
+        self.numbers.get(&planes).copied()
+    }
+
+    /// Numbers of the images that a point with a normal may see something in.
+    pub fn seen_from(&self, point: DVec3, normal: DVec3) -> impl Iterator<Item = u32> {
+        let open = move |image: &Image| image.is_open_to(point, normal, self.least);
+        let images = (0..).zip(&self.images);
+        images.filter(move |(_, image)| open(image)).map(|(k, _)| k)
+    }
+
+    /// The way from a point by an image's mirrors to a place, as if nothing else stood about; none where it misses one.
+    pub fn route(&self, image: u32, from: DVec3, to: DVec3) -> Option<Route> {
+        let image = &self.images[image as usize];
+        let plane = |k: usize| &self.planes[image.planes[k] as usize];
+        // Where the place appears to be, from behind the last mirror on.
+        let mut aims = [to; BOUNCES + 1];
+        for k in (0..image.depth()).rev() {
+            aims[k] = plane(k).reflected(aims[k + 1]);
+        }
+        let mut route = Route::new(from);
+        let mut at = from;
+        for (k, aim) in aims.into_iter().take(image.depth()).enumerate() {
+            let plane = plane(k);
+            let (here, there) = (plane.height(at), plane.height(aim));
+            if here <= 0.0 || there >= 0.0 {
+                return None;
+            }
+            let way = aim - at;
+            at += way * (here / (here - there));
+            if at.distance_squared(plane.centre) > plane.radius * plane.radius {
+                return None;
+            }
+            route.bounce(at, plane.material, -plane.normal.dot(way) / way.length());
+        }
+        route.end(to);
+        Some(route)
+    }
+
+    /// Is this the `k`-th mirror of an image?
+    pub fn is_next(&self, image: u32, k: usize, hit: &Hit) -> bool {
+        self.images[image as usize].planes[k] == self.side(hit)
+    }
+
+    /// What is looked for in them, in words.
+    pub fn said(&self) -> String {
+        let (planes, images) = (self.planes.len(), self.images.len());
+        let mut said = format!("{planes} plane mirrors, {images} images");
+        if self.curved {
+            said +=
+                "; in curved ones rays alone find lamps, and lights without extent are not found";
+        }
+        if self.left_out > 0 {
+            let more = self.left_out;
+            said += &format!("; {more} further images and those behind them are left to rays");
+        }
+        said
+    }
+}

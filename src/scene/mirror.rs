@@ -1,0 +1,149 @@
+//! Mirrors: materials that send light on in one direction.
+//!
+//! Two things make a mirror: `"mirror": true` of the side file, and a metal (metallic 1) with a roughness below [`SMOOTH`].
+//! At normal incidence it reflects the material's reflectance, at an angle `F = F0 + (1 - F0) (1 - cos)^5` of it (Schlick, An
+//! inexpensive BRDF model for physically-based rendering, 1994, eq. 15), wavelength by wavelength. Roughness below the limit counts
+//! as none.
+
+use super::check::{Check, listed};
+use super::json::short;
+use super::raw::RawMaterial;
+use super::{GREATEST_ALBEDO, Image, Material};
+use crate::color::Upsampler;
+use crate::data::Leaves;
+
+/// Metals smoother than this are mirrors: GGX of alpha = roughness^2 = .01 has half its light within 1 degree of the mirrored
+/// direction.
+const SMOOTH: f32 = 0.1;
+/// Metallic from here on is a metal: bytes round 1 to no less.
+const METAL: f32 = 0.995;
+
+/// How a material mirrors.
+#[derive(Debug, Clone)]
+pub struct Mirror {
+    /// Reflectance at normal incidence, in [0, 0.999].
+    pub reflectance: Leaves,
+    /// What makes it a mirror, for `inspect`.
+    pub from: String,
+}
+
+impl Mirror {
+    /// What is reflected at a cosine of incidence, `normal` being that at normal incidence. Never all, so that light ends.
+    pub fn reflects(normal: f64, cosine: f64) -> f64 {
+        let more = (1.0 - normal) * (1.0 - cosine.clamp(0.0, 1.0)).powi(5);
+        (normal + more).min(GREATEST_ALBEDO)
+    }
+
+    /// What of diffuse light is reflected: the mean of [`reflects`](Self::reflects) over the cosine, `2 int F cos dcos`.
+    pub fn overall(&self) -> Leaves {
+        let mean = |r: f64| r + (1.0 - r) / 21.0;
+        self.reflectance.map(|r| mean(r).min(GREATEST_ALBEDO))
+    }
+
+    /// Does it reflect all wavelengths alike?
+    pub fn is_neutral(&self) -> bool {
+        self.reflectance.iter().all(|x| *x == self.reflectance[0])
+    }
+}
+
+/// What is said once about all mirrors.
+#[derive(Default)]
+pub(super) struct Said {
+    mirrors: Vec<String>,
+    other: Vec<String>,
+    glowing: Vec<String>,
+    textured: Vec<String>,
+}
+
+impl Said {
+    /// The mirror that a material is, if it is one. `wanted`: what the side file says.
+    pub(super) fn mirror(
+        &mut self,
+        raw: &RawMaterial,
+        wanted: Option<bool>,
+        made: &Material,
+    ) -> Option<Mirror> {
+        let rough = raw.roughness.unwrap_or(1.0);
+        let smooth = raw.metallic >= METAL && rough < SMOOTH;
+        if wanted.is_none() && smooth && raw.metal_texture {
+            self.textured.push(made.name.clone());
+        }
+        if !wanted.unwrap_or(smooth && !raw.metal_texture && !raw.unlit) {
+            return None;
+        }
+        if made.pane.is_some() || made.sheet.is_some() {
+            self.other.push(made.name.clone());
+            return None;
+        }
+        if made.emission.is_some() {
+            self.glowing.push(made.name.clone());
+            return None;
+        }
+        self.mirrors.push(made.name.clone());
+        let from = match wanted {
+            Some(_) => "side file".into(),
+            None => format!("metallic, roughness {rough:.3}"),
+        };
+        Some(Mirror {
+            reflectance: made.reflectance,
+            from,
+        })
+    }
+
+    pub(super) fn warn(&self, check: &mut Check) {
+        let warnings = [
+            (
+                &self.mirrors,
+                "mirrors: light is followed by way of them; as seen in the output they are matt, with the light that falls on them",
+            ),
+            (
+                &self.other,
+                "a mirror that lets light through: taken for what it lets through, no mirror",
+            ),
+            (&self.glowing, "a mirror that emits: a lamp, no mirror"),
+            (
+                &self.textured,
+                "a smooth metal with a metallicRoughnessTexture: matt, as the texture is not looked at; \"mirror\": true in the \
+                 side file makes it a mirror",
+            ),
+        ];
+        for (names, what) in warnings {
+            if !names.is_empty() {
+                let names: Vec<String> = names.iter().map(|n| format!("'{}'", short(n))).collect();
+                check.warn(format!("{what} ({})", listed(&names)));
+            }
+        }
+    }
+}
+
+/// Mirrors under a texture reflect by its mean.
+pub(super) fn tint(materials: &mut [Material], images: &[Image], upsampler: &Upsampler) {
+    for material in materials {
+        let mean = material.mean_color(images);
+        if let (Some(mirror), Some(mean)) = (&mut material.mirror, mean) {
+            mirror.reflectance = upsampler.reflectance(mean).map(|r| r.min(GREATEST_ALBEDO));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::LEAVES;
+
+    /// By plain quadrature.
+    #[test]
+    fn diffuse_light_is_reflected_by_the_mean_over_angles() {
+        for normal in [0.0, 0.04, 0.5, 0.9] {
+            let mirror = Mirror {
+                reflectance: [normal; LEAVES],
+                from: String::new(),
+            };
+            let n = 10_000;
+            let cosine = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
+            let at = |k| 2.0 * cosine(k) * Mirror::reflects(normal, cosine(k)) / f64::from(n);
+            let mean: f64 = (0..n).map(at).sum();
+            assert!((mean - mirror.overall()[0]).abs() < 1e-6, "{normal}");
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Light by way of mirrors.
+//!
+//! Rays over the hemisphere that meet mirrors go on, and bring what they meet at last, tinted. Lamps, sun and openings are looked for in
+//! each image besides, from where the point would look from ([`Image::point`](crate::hierarchy::Image::point)): with the factors that
+//! they have for any point, but for what is in the way. So what lamps emit counts for rays only where nothing has an image.
+
+use super::gatherer::{Gatherer, Memory};
+use super::receiver::{Gathered, Receiver};
+use crate::geometry::sampling::{cosine_direction, hash, sequence02};
+use crate::geometry::{Hit, Segment};
+use crate::light::{Filter, accumulate};
+use crate::link::View;
+use crate::scene::LightKind;
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
+
+/// Rays of one of many points that look for the sky in mirrors.
+const RAYS: usize = 16;
+
+/// By which mirrors a receiver looks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Via {
+    image: u32,
+    /// Where the true receiver is, and on which plane.
+    point: DVec3,
+    plane: u32,
+}
+
+/// What a ray met by way of mirrors.
+#[derive(Debug, Clone)]
+pub(super) struct Arrived {
+    end: End,
+    /// None where nothing has an image.
+    image: Option<u32>,
+    filter: Box<Filter>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum End {
+    Leaf(u32),
+    /// One mirror too many: it is read as a matt surface.
+    Mirror(u32),
+    /// It left the room in this direction.
+    Outside(DVec3),
+}
+
+impl Gatherer<'_> {
+    /// For each segment: is it blocked, by whatever way it is looked?
+    pub(super) fn blocked(&self, segments: &[Segment], out: &mut Vec<bool>) {
+        let Some(via) = self.via else {
+            return self.sight.blocked(segments, &View::Crowded, out);
+        };
+        out.clear();
+        out.extend(segments.iter().map(|s| !self.is_open(via, s)));
+    }
+
+    /// Is one segment blocked?
+    pub(super) fn blocks_one(&self, segment: &Segment) -> bool {
+        match self.via {
+            Some(via) => !self.is_open(via, segment),
+            None => self.sight.blocks_one(segment),
+        }
+    }
+
+    fn is_open(&self, via: Via, segment: &Segment) -> bool {
+        let from = (via.point, via.plane);
+        self.sight.is_open(via.image, from, segment)
+    }
+
+    /// What is left of light on a segment that is looked along by way of mirrors.
+    pub(super) fn by_way_of(&self, via: Via, segment: &Segment) -> Option<Filter> {
+        let mirrors = self.sight.mirrors?;
+        let route = mirrors.route(via.image, via.point, segment.to.as_dvec3())?;
+        let glazing = self.glass.map(|glass| glass.glazing);
+        Some(self.filters.along(glazing, &route))
+    }
+
+    /// What is so far away lies outside the room, by whatever way it is looked.
+    pub(super) fn reach(&self) -> f64 {
+        4.0 * self.far()
+    }
+
+    /// Half the size of the room; with all images by way of which it is looked.
+    pub(super) fn far(&self) -> f64 {
+        let depth = match (self.via, self.sight.mirrors) {
+            (Some(via), Some(mirrors)) => mirrors.images()[via.image as usize].depth(),
+            _ => 0,
+        };
+        self.light.half_size * (1 + depth) as f64
+    }
+
+    /// Looks in each mirror, and mirrors in mirrors, that a receiver may see something in.
+    fn in_each(&self, to: &Receiver, mut look: impl FnMut(&Gatherer, &Receiver, u32)) {
+        let Some(mirrors) = self.sight.mirrors else {
+            return;
+        };
+        for image in mirrors.seen_from(to.point, to.normal) {
+            self.in_image(to, image, &mut look);
+        }
+    }
+
+    fn in_image(
+        &self,
+        to: &Receiver,
+        image: u32,
+        look: &mut impl FnMut(&Gatherer, &Receiver, u32),
+    ) {
+        let Some(mirrors) = self.sight.mirrors else {
+            return;
+        };
+        let known = &mirrors.images()[image as usize];
+        let from = Receiver {
+            point: known.point(to.point),
+            normal: known.direction(to.normal),
+            // What lies in its plane may well be seen.
+            plane: crate::geometry::NO_PLANE,
+            leaf: to.leaf,
+            seed: hash(to.seed, u64::from(image)),
+        };
+        let gatherer = Gatherer {
+            via: Some(Via {
+                image,
+                point: to.point,
+                plane: to.plane,
+            }),
+            ..*self
+        };
+        look(&gatherer, &from, image);
+    }
+
+    /// The direct light of a point by one lamp in one image, each by chance: brightness.
+    pub(super) fn one_in_mirrors(&self, to: &Receiver, [u, v]: [f64; 2]) -> f64 {
+        let Some(mirrors) = self.sight.mirrors else {
+            return 0.0;
+        };
+        let images: Vec<u32> = mirrors.seen_from(to.point, to.normal).collect();
+        let share = u * images.len() as f64;
+        let Some(&image) = images.get(share as usize) else {
+            return 0.0;
+        };
+        let mut sum = 0.0;
+        self.in_image(to, image, &mut |gatherer, from, _| {
+            let lamps = gatherer.one_lamp(from, [share.fract(), v]);
+            for (bright, segment) in lamps.into_iter().flatten() {
+                if !gatherer.blocks_one(&segment) {
+                    sum += bright * gatherer.dimmed(&segment);
+                }
+            }
+        });
+        sum * images.len() as f64
+    }
+
+    /// Emitting surfaces in mirrors.
+    pub(super) fn lamps_in_mirrors(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
+        self.in_each(to, |gatherer, from, _| gatherer.lamps_of(from, memory, out));
+    }
+
+    /// Lights without extent and those with a profile in mirrors, sky and ground. `of`: of how many rays over the hemisphere the
+    /// memory holds what they met by way of mirrors.
+    pub(super) fn lights_in_mirrors(
+        &self,
+        to: &Receiver,
+        of: usize,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
+        let mirrored = std::mem::take(&mut memory.mirrored);
+        let mut seen = Vec::new();
+        self.in_each(to, |gatherer, from, image| {
+            gatherer.punctual(from, memory, out);
+            if gatherer.sky.is_some() {
+                seen.push(image);
+                let own = |a: &&Arrived| a.image == Some(image);
+                let open = mirrored.iter().filter(own).filter_map(Arrived::outside);
+                let open: Vec<DVec3> = open.collect();
+                gatherer.outside(from, Some((&open, of)), true, memory, out);
+            }
+        });
+        let share = 1.0 / of.max(1) as f64;
+        let other = |a: &&Arrived| a.image.is_none_or(|image| !seen.contains(&image));
+        for arrived in mirrored.iter().filter(other) {
+            if let Some(direction) = arrived.outside() {
+                self.escapes(direction, share, &arrived.filter, out);
+            }
+        }
+        memory.mirrored = mirrored;
+    }
+
+    /// Adds what comes from outside in one direction.
+    fn escapes(&self, direction: DVec3, share: f64, filter: &Filter, out: &mut Gathered) {
+        let Some(outside) = self.sky else { return };
+        for (lamp, row) in self.lamps {
+            let factor = match lamp.kind {
+                LightKind::Sky if direction.y > 0.0 => PI * outside.sky.radiance(direction),
+                LightKind::Ground if direction.y <= 0.0 => 1.0,
+                _ => continue,
+            };
+            let factor = (share * factor) as f32;
+            accumulate(&mut out.irradiance, factor, row, Some(filter));
+            accumulate(&mut out.direct, factor, row, Some(filter));
+        }
+    }
+
+    /// Follows a ray that met a mirror; false if it met none.
+    pub(super) fn follow(
+        &self,
+        from: Vec3,
+        direction: Vec3,
+        hit: &Hit,
+        mirrored: &mut Vec<Arrived>,
+    ) -> bool {
+        let Some(way) = self.sight.mirrored(from, direction, hit) else {
+            return false;
+        };
+        let end = match way.hit {
+            None => Some(End::Outside(way.direction)),
+            Some(hit) => self.met(&hit).map(|leaf| match self.is_mirror(&hit) {
+                true => End::Mirror(leaf),
+                false => End::Leaf(leaf),
+            }),
+        };
+        if let Some(end) = end {
+            let glazing = self.glass.map(|glass| glass.glazing);
+            mirrored.push(Arrived {
+                end,
+                image: way.image,
+                filter: Box::new(self.filters.along(glazing, &way.route)),
+            });
+        }
+        true
+    }
+
+    fn is_mirror(&self, hit: &Hit) -> bool {
+        self.sight.mirrors.is_some_and(|m| m.is_mirror(hit))
+    }
+
+    /// Looks for the sky in mirrors by a few rays; how many.
+    pub(super) fn glance(&self, to: &Receiver, memory: &mut Memory) -> usize {
+        memory.mirrored.clear();
+        if self.sight.mirrors.is_none() || self.sky.is_none() {
+            return 0;
+        }
+        let shift = hash(to.seed, 0x91a);
+        let directions: [Vec3; RAYS] = std::array::from_fn(|k| {
+            cosine_direction(to.normal, sequence02(k as u32, shift)).as_vec3()
+        });
+        let mut hits = [None; RAYS];
+        let from = [to.point.as_vec3(); RAYS];
+        self.sight.meet(&from, &directions, to.plane, &mut hits);
+        memory.rays += RAYS as u64;
+        for (hit, direction) in hits.iter().zip(directions) {
+            let way = hit.and_then(|hit| self.sight.mirrored(from[0], direction, &hit));
+            if let Some(way) = way.filter(|way| way.hit.is_none()) {
+                let glazing = self.glass.map(|glass| glass.glazing);
+                memory.mirrored.push(Arrived {
+                    end: End::Outside(way.direction),
+                    image: way.image,
+                    filter: Box::new(self.filters.along(glazing, &way.route)),
+                });
+            }
+        }
+        RAYS
+    }
+
+    /// Adds what rays of a `share` each met by way of mirrors; what it emits where lamps have no image.
+    pub(super) fn patches_in_mirrors(&self, share: f32, memory: &Memory, out: &mut Gathered) {
+        let width = self.light.width();
+        for arrived in &memory.mirrored {
+            let filter = Some(&*arrived.filter);
+            let (leaf, row) = match arrived.end {
+                End::Leaf(leaf) => (leaf, self.light.reflected.row(leaf as usize)),
+                End::Mirror(leaf) => (leaf, self.light.mirrors.row(leaf as usize)),
+                End::Outside(_) => continue,
+            };
+            out.seen += f64::from(share);
+            accumulate(&mut out.irradiance[..width], share, row, filter);
+            if arrived.image.is_none() && self.light.bright_emitted[leaf as usize] > 0.0 {
+                let row = self.light.emitted.row(leaf as usize);
+                accumulate(&mut out.irradiance[..width], share, row, filter);
+                accumulate(&mut out.direct[..width], share, row, filter);
+            }
+        }
+    }
+}
+
+impl Arrived {
+    fn outside(&self) -> Option<DVec3> {
+        match self.end {
+            End::Outside(direction) => Some(direction),
+            _ => None,
+        }
+    }
+}
