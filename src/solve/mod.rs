@@ -150,6 +150,16 @@ fn by_rays(sight: &Sight) -> bool {
     sight.occlusion && !(sight.small() && plain)
 }
 
+/// For what share of the error a room takes directions.
+fn directions(plan: &Plan, mesh: &Mesh) -> f64 {
+    let filtered = plan.runs(Kind::Panes) || plan.runs(Kind::Mirrors);
+    match (filtered && is_small(mesh), plan.runs(Kind::Sheets)) {
+        (true, _) => GLAZED_DIRECTIONS,
+        (_, true) => SHEET_DIRECTIONS,
+        _ => 1.0,
+    }
+}
+
 /// A room being baked.
 pub struct Bake {
     pub(crate) scene: Scene,
@@ -263,14 +273,7 @@ impl Bake {
         if let Some(mirrors) = &mirrors {
             plan.say(Kind::Mirrors, &mirrors.said());
         }
-        let filtered = !scene.panes.is_empty() || mirrors.is_some();
-        let glazed = filtered && is_small(&mesh);
-        let directions = match (glazed, plan.runs(Kind::Sheets)) {
-            (true, _) => GLAZED_DIRECTIONS,
-            (_, true) => SHEET_DIRECTIONS,
-            _ => 1.0,
-        };
-        let hemisphere = Hemisphere::for_error(settings.error * directions);
+        let hemisphere = Hemisphere::for_error(settings.error * directions(&plan, &mesh));
         let probes = estimate::Probes::new(&tree, settings.seed);
         let mut bake = Self {
             closed: Closed::No,

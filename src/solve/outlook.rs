@@ -23,7 +23,7 @@ use crate::light::rows::Rows;
 use crate::link::Sight;
 use crate::team::Team;
 use crate::transport::hemisphere::{BEAM, Hemisphere};
-use found::{Found, look_from};
+use found::{ALONE, End, Found, Pairs, look_from, start};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -39,25 +39,6 @@ const LEAST_BARE: f64 = 1e-3;
 const CHUNK: usize = 64;
 /// Rays that tell whether a point is covered.
 const COVER_RAYS: usize = 4;
-/// Flag of a face or leaf that was met by a ray whose fellow from the same point met no front.
-const ALONE: u32 = 1 << 31;
-
-/// Where a ray ended.
-#[derive(Debug, Clone, Copy)]
-struct End {
-    /// Entry of the face, maybe with the flag [`ALONE`]; [`NONE`]: the ray left the room or met a black back.
-    entry: u32,
-    /// Weights of the second and third corner, in 1/65536.
-    at: [u16; 2],
-}
-
-impl End {
-    const NOWHERE: Self = Self {
-        entry: NONE,
-        at: [0; 2],
-    };
-}
-
 /// How the leaves of a hierarchy look out.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Outlook {
@@ -446,42 +427,6 @@ fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64)
     [count, misses, covered]
 }
 
-/// Which two rays of a leaf start from the same point: k and `k ^ mask`. The mask differs from leaf to leaf, so that the
-/// directions of the two have nothing in common.
-struct Pairs {
-    mask: usize,
-    shift: u64,
-}
-
-impl Pairs {
-    /// Of `count` rays, a power of two.
-    pub(crate) fn new(leaf: u32, count: usize, seed: u64) -> Self {
-        let shift = hash(seed, u64::from(leaf));
-        let others = (count as u64).saturating_sub(1).max(1);
-        Self {
-            mask: 1 + (hash(seed ^ 2, u64::from(leaf)) % others) as usize,
-            shift,
-        }
-    }
-
-    fn fellow(&self, k: usize) -> usize {
-        k ^ self.mask
-    }
-
-    /// Which of the points: 0 to half the number of rays.
-    fn pair(&self, k: usize) -> usize {
-        let top = 1 << self.mask.ilog2();
-        let first = if k & top == 0 { k } else { self.fellow(k) };
-        // Without the bit that is 0 in the first of every pair.
-        first & (top - 1) | first >> 1 & !(top - 1)
-    }
-
-    /// Weights of the point of the leaf that ray `k` starts from.
-    fn start(&self, k: usize) -> [f64; 3] {
-        start(self.pair(k), self.shift)
-    }
-}
-
 /// Does everything that a point sees turn its black back on it? Then something solid stands on the point, or holds it.
 fn is_covered(tree: &Tree, sight: &Sight, from: Vec3, normal: DVec3, plane: u32) -> bool {
     let mut hits = [None; COVER_RAYS];
@@ -490,11 +435,6 @@ fn is_covered(tree: &Tree, sight: &Sight, from: Vec3, normal: DVec3, plane: u32)
     sight.meet(&[from; COVER_RAYS], &directions, plane, &mut hits);
     hits.iter()
         .all(|hit| hit.is_some_and(|hit| tree.met(&hit) == NONE))
-}
-
-/// Weights of the `k`-th point of a leaf.
-fn start(k: usize, shift: u64) -> [f64; 3] {
-    triangle_weights(sequence02(k as u32, shift))
 }
 
 #[cfg(test)]

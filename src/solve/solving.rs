@@ -94,12 +94,7 @@ impl Bake {
         let emission = sources.emission;
         let by_rays = self.by_rays();
         self.outlook.tints.on(&self.scene, &self.filters);
-        if by_rays && self.mirrors.is_some() {
-            let emitted = self.on_nodes::<L>(&emission, leaves);
-            let more = self.outlook.lamps_in_mirrors::<L>(leaves, &emitted);
-            more.iter()
-                .for_each(|more| step::<L>(&mut first, more, [1.0; L]));
-        }
+        self.add_lamps_in_mirrors::<L>(&emission, leaves, &mut first);
         let mut scaled = flux::Scaled::default();
         if self.sealed == Closed::Yes && !by_rays {
             scaled.direct = self.conserve(&mut first, &emission, leaves);
@@ -111,10 +106,7 @@ impl Bake {
                 .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes)),
             sheets: sources.sheets,
         };
-        let sums = match by_rays {
-            true => Vec::new(),
-            false => self.sums_of(rows),
-        };
+        let sums = (!by_rays).then(|| self.sums_of(rows)).unwrap_or_default();
         let lit = Lit {
             leaves,
             first: &first,
@@ -163,6 +155,22 @@ impl Bake {
         self.light.through = through;
         self.shine(leaves, emitted, on_nodes, irradiance);
         (convergence, flux)
+    }
+
+    /// Adds the light of lamps in curved mirrors.
+    fn add_lamps_in_mirrors<const L: usize>(
+        &self,
+        emission: &Rows,
+        leaves: &[u32],
+        first: &mut Rows,
+    ) {
+        if self.mirrors.is_none() {
+            return;
+        }
+        let emitted = self.on_nodes::<L>(emission, leaves);
+        if let Some(more) = self.outlook.lamps_in_mirrors::<L>(leaves, &emitted) {
+            step::<L>(first, &more, [1.0; L]);
+        }
     }
 
     /// What rows of links sum to.

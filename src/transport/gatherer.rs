@@ -1,11 +1,11 @@
 //! What gathering looks at, and the memory of one thread that does.
 
 use super::hemisphere::Hemisphere;
-use super::mirrored::{Arrived, Via};
 use super::outside::{Look, Outside};
 use super::receiver::Gathered;
 use super::shadows::Shadows;
 use super::trace::Trace;
+use super::via::{Arrived, Via};
 use crate::geometry::{Clipper, Hit, Segment};
 use crate::hierarchy::{Sample, Tree};
 use crate::light::{Filter, Filters, Glass, Light};

@@ -276,7 +276,7 @@ impl Gatherer<'_> {
                 let (factor, end) = match (lamp.kind, far) {
                     (LightKind::Sky | LightKind::Ground, Some((d, factors))) => {
                         let factor = factors[usize::from(lamp.kind == LightKind::Ground)];
-                        (factor, to.point + d * self.reach())
+                        (factor, to.point + d * self.distance())
                     }
                     (LightKind::Surface, _) => {
                         // Which lamp is chosen must not tell which of its points.

@@ -6,6 +6,7 @@
 
 use super::gatherer::{Gatherer, Memory};
 use super::receiver::{Gathered, Receiver};
+use super::via::{Arrived, End, Via};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::geometry::{Hit, Segment};
 use crate::light::{Filter, accumulate};
@@ -16,33 +17,6 @@ use std::f64::consts::PI;
 
 /// Rays of one of many points that look for the sky in mirrors.
 const RAYS: usize = 16;
-
-/// By which mirrors a receiver looks.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Via {
-    image: u32,
-    /// Where the true receiver is, and on which plane.
-    point: DVec3,
-    plane: u32,
-}
-
-/// What a ray met by way of mirrors.
-#[derive(Debug, Clone)]
-pub(super) struct Arrived {
-    end: End,
-    /// None where nothing has an image.
-    image: Option<u32>,
-    filter: Box<Filter>,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum End {
-    Leaf(u32),
-    /// One mirror too many: it is read as a matt surface.
-    Mirror(u32),
-    /// It left the room in this direction.
-    Outside(DVec3),
-}
 
 impl Gatherer<'_> {
     /// For each segment: is it blocked, by whatever way it is looked?
@@ -76,7 +50,7 @@ impl Gatherer<'_> {
     }
 
     /// What is so far away lies outside the room, by whatever way it is looked.
-    pub(super) fn reach(&self) -> f64 {
+    pub(super) fn distance(&self) -> f64 {
         4.0 * self.far()
     }
 
@@ -279,15 +253,6 @@ impl Gatherer<'_> {
                 accumulate(&mut out.irradiance[..width], share, row, filter);
                 accumulate(&mut out.direct[..width], share, row, filter);
             }
-        }
-    }
-}
-
-impl Arrived {
-    fn outside(&self) -> Option<DVec3> {
-        match self.end {
-            End::Outside(direction) => Some(direction),
-            _ => None,
         }
     }
 }

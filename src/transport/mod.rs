@@ -8,7 +8,7 @@
 //! | `lamp` | parts of lamps near a point, and lamps chosen by chance |
 //! | `punctual`, `luminaire` | lights without extent, and lamps that shine from a surface by a profile |
 //! | `hemisphere`, `sweep` | beams of rays that find the patches they end on |
-//! | `mirrored` | the same lamps and patches by way of mirrors |
+//! | `via`, `mirrored` | the same lamps and patches by way of mirrors |
 //! | `nearby` | short paths where rays end close by |
 //! | `openings`, `outside`, `sky` | where rays leave the room, and what comes in there: sky, ground, the sun's disc |
 //! | `trace` | what a point gets its light from, kept for relighting |
@@ -30,6 +30,7 @@ mod sky;
 mod slope;
 mod sweep;
 pub(crate) mod trace;
+mod via;
 
 pub use gatherer::{Gatherer, Memory};
 pub(crate) use outside::{Look, Outside};

@@ -5,7 +5,6 @@
 //! and toward the [`Openings`], both together by the power heuristic (Veach and Guibas 1995): by the balance heuristic the few rays
 //! of the hemisphere that find a small opening brought 2 % of noise to what those toward it know.
 
-use super::gatherer::Gatherer;
 use super::openings::{Choice, Openings};
 use super::receiver::Receiver;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
@@ -63,6 +62,18 @@ pub(crate) struct Look {
     pub(super) tints: [Option<Filter>; 2],
 }
 
+/// What is on ways of light.
+pub(super) trait Ways {
+    /// For each segment: is it blocked?
+    fn block(&self, segments: &[Segment], out: &mut Vec<bool>);
+    /// May light change on its way?
+    fn change_light(&self) -> bool;
+    /// What is left of light on a free segment, and how bright that is, as a share.
+    fn leave(&self, segment: &Segment) -> (Filter, f64);
+    /// What is so far away lies outside the room.
+    fn reach(&self) -> f64;
+}
+
 /// How a point looks outside.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Way<'a> {
@@ -80,7 +91,7 @@ impl Outside {
     /// Irradiance of a point by the sky, where open level ground has 1, and by the ground below, where that sends out 1.
     pub(super) fn seen(
         &self,
-        (sight, by): (&Sight, Option<&Gatherer>),
+        (sight, by): (&Sight, Option<&dyn Ways>),
         to: &Receiver,
         way: Way,
         look: &mut Look,
@@ -260,7 +271,7 @@ impl Outside {
     /// By rays over the hemisphere and to the openings.
     fn by_rays(
         &self,
-        (sight, by): (&Sight, Option<&Gatherer>),
+        (sight, by): (&Sight, Option<&dyn Ways>),
         to: &Receiver,
         way: Way,
         look: &mut Look,
@@ -295,7 +306,7 @@ impl Outside {
     /// Rays to the openings: adds the directions that lead outside.
     fn look_through_openings(
         &self,
-        (sight, by): (&Sight, Option<&Gatherer>),
+        (sight, by): (&Sight, Option<&dyn Ways>),
         to: &Receiver,
         count: usize,
         look: &mut Look,
@@ -318,7 +329,7 @@ impl Outside {
                 .extend(ahead.map(|at| Segment::new(to.point, at, [to.plane, NO_PLANE])));
         }
         match by {
-            Some(by) => by.blocked(&look.segments, &mut look.blocked),
+            Some(by) => by.block(&look.segments, &mut look.blocked),
             None => sight.blocked(&look.segments, &View::Crowded, &mut look.blocked),
         }
         look.rays += look.segments.len() as u64;
@@ -332,14 +343,14 @@ impl Outside {
     /// first, and of so many to the openings.
     fn combine(
         &self,
-        (sight, by): (&Sight, Option<&Gatherer>),
+        (sight, by): (&Sight, Option<&dyn Ways>),
         to: &Receiver,
         (counts, around): ([f64; 2], usize),
         look: &mut Look,
     ) -> [f64; 2] {
         let (mut seen, mut squares, mut sum) = ([0.0; 2], 0.0, 0.0);
         let mut tints = [Tint::default(); 2];
-        let far = by.map_or(4.0 * sight.mesh.half_size, Gatherer::reach);
+        let far = by.map_or(4.0 * sight.mesh.half_size, |by| by.reach());
         for (k, &d) in look.open.iter().enumerate() {
             let cosine = to.normal.dot(d);
             if cosine <= 0.0 {
@@ -359,10 +370,10 @@ impl Outside {
             let brings = radiance * cosine * own / squared;
             seen[place] += brings;
             let mut left = brings;
-            if let Some(by) = by.filter(|by| !by.is_plain()) {
+            if let Some(by) = by.filter(|by| by.change_light()) {
                 let way = Segment::new(to.point, to.point + d * far, [NO_PLANE; 2]);
-                let filter = by.through(&way).unwrap_or([1.0; 64]);
-                left *= by.filters.brightness(&filter);
+                let (filter, share) = by.leave(&way);
+                left *= share;
                 tints[place].add(&filter, brings);
             }
             if place == 0 {

@@ -1,18 +1,40 @@
 //! Sky, ground below the horizon and the sun's disc at a point.
 
 use super::gatherer::{Gatherer, Memory};
-use super::outside::Way;
+use super::outside::{Way, Ways};
 use super::receiver::{Gathered, Receiver};
 use crate::geometry::sampling::{around, cosine_direction, hash, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
-use crate::light::accumulate;
+use crate::light::{Filter, accumulate};
 use crate::scene::sky::SUN_RADIUS;
 use crate::scene::{LightKind, PunctualLight};
+use crate::spectrum::LEAVES;
 use glam::DVec3;
 use std::f64::consts::PI;
 
 /// Rays to the sun's disc: of a random point of a leaf, and of others.
 const SUN_RAYS: [u32; 2] = [4, 16];
+
+impl Ways for Gatherer<'_> {
+    fn block(&self, segments: &[Segment], out: &mut Vec<bool>) {
+        self.blocked(segments, out);
+    }
+
+    fn change_light(&self) -> bool {
+        !self.is_plain()
+    }
+
+    fn leave(&self, segment: &Segment) -> (Filter, f64) {
+        match self.through(segment) {
+            Some(filter) => (filter, self.filters.brightness(&filter)),
+            None => ([1.0; LEAVES], 1.0),
+        }
+    }
+
+    fn reach(&self) -> f64 {
+        self.distance()
+    }
+}
 
 impl Gatherer<'_> {
     /// Adds what comes from outside. `known`: which directions, of how many over the hemisphere, lead there, if rays told already.
@@ -76,7 +98,7 @@ impl Gatherer<'_> {
         for k in 0..count {
             let [u, v] = sequence02(k, turn);
             let toward = around(-sun.direction, 1.0 - u * least, v);
-            let end = to.point + toward * self.reach();
+            let end = to.point + toward * self.distance();
             memory
                 .segments
                 .push(Segment::new(to.point, end, [to.plane, NO_PLANE]));

@@ -2,8 +2,8 @@
 
 use super::gatherer::{Gatherer, Memory, Of};
 use super::hemisphere::{BEAM, Hemisphere};
-use super::mirrored::Arrived;
 use super::receiver::{Gathered, Receiver};
+use super::via::Arrived;
 use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
 use crate::hierarchy::NONE;

@@ -1,13 +1,31 @@
 //! What the rays of a leaf that looks for itself find.
 
-use super::{ALONE, End, Pairs};
 use crate::geometry::Hit;
-use crate::geometry::sampling::{hash, sequence02, tangents};
+use crate::geometry::sampling::{hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
 use crate::link::Sight;
 use crate::solve::tinted::{self, Passed, passed};
 use crate::transport::hemisphere::{BEAM, Hemisphere};
 use glam::Vec3;
+
+/// Flag of a face or leaf that was met by a ray whose fellow from the same point met no front.
+pub(super) const ALONE: u32 = 1 << 31;
+
+/// Where a ray ended.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct End {
+    /// Entry of the face, maybe with the flag [`ALONE`]; [`NONE`]: the ray left the room or met a black back.
+    pub(super) entry: u32,
+    /// Weights of the second and third corner, in 1/65536.
+    pub(super) at: [u16; 2],
+}
+
+impl End {
+    const NOWHERE: Self = Self {
+        entry: NONE,
+        at: [0; 2],
+    };
+}
 
 /// What the rays of a leaf found.
 #[derive(Default)]
@@ -93,4 +111,45 @@ impl Found {
             self.passed.push((ray, passed));
         }
     }
+}
+
+/// Which two rays of a leaf start from the same point: k and `k ^ mask`. The mask differs from leaf to leaf, so that the
+/// directions of the two have nothing in common.
+pub(super) struct Pairs {
+    mask: usize,
+    shift: u64,
+}
+
+impl Pairs {
+    /// Of `count` rays, a power of two.
+    pub(super) fn new(leaf: u32, count: usize, seed: u64) -> Self {
+        let shift = hash(seed, u64::from(leaf));
+        let others = (count as u64).saturating_sub(1).max(1);
+        Self {
+            mask: 1 + (hash(seed ^ 2, u64::from(leaf)) % others) as usize,
+            shift,
+        }
+    }
+
+    pub(super) fn fellow(&self, k: usize) -> usize {
+        k ^ self.mask
+    }
+
+    /// Which of the points: 0 to half the number of rays.
+    pub(super) fn pair(&self, k: usize) -> usize {
+        let top = 1 << self.mask.ilog2();
+        let first = if k & top == 0 { k } else { self.fellow(k) };
+        // Without the bit that is 0 in the first of every pair.
+        first & (top - 1) | first >> 1 & !(top - 1)
+    }
+
+    /// Weights of the point of the leaf that ray `k` starts from.
+    pub(super) fn start(&self, k: usize) -> [f64; 3] {
+        start(self.pair(k), self.shift)
+    }
+}
+
+/// Weights of the `k`-th point of a leaf.
+pub(super) fn start(k: usize, shift: u64) -> [f64; 3] {
+    triangle_weights(sequence02(k as u32, shift))
 }

@@ -3,7 +3,8 @@
 //! A file holds the rays of all leaves in the order of their numbers, whichever ranks have them: so a bake goes on with any number of
 //! ranks.
 
-use super::{ALONE, End, Outlook};
+use super::Outlook;
+use super::found::{ALONE, End};
 use crate::hierarchy::{NONE, Tree};
 use crate::store::codec::{Plain, Read};
 use crate::store::{Broken, Decoder, Encoder};
