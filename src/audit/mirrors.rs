@@ -1,7 +1,7 @@
 //! Paths by way of mirrors: each goes on in one direction until it meets something else, however often; lights without extent, which no
 //! path meets, are looked for in their images.
 
-use super::path::{Audit, Vertex};
+use super::path::{Audit, ByImage, Vertex};
 use crate::geometry::sampling::Pcg;
 use crate::geometry::{Hit, NO_PLANE, Segment};
 use crate::hierarchy::Route;
@@ -11,14 +11,6 @@ use glam::DVec3;
 
 /// Mirrors after which roulette decides.
 const SURE: usize = 8;
-
-/// By which image a point looks, where it is itself, and how many times its own size the room is that way.
-#[derive(Clone, Copy)]
-pub(super) struct ByImage<'a> {
-    image: u32,
-    at: &'a Vertex,
-    pub(super) size: f64,
-}
 
 impl Audit<'_> {
     /// What a ray meets at last, and how often mirrors sent it on.

@@ -4,7 +4,6 @@
 //! by the balance heuristic (Veach and Guibas 1995). Paths end by Russian roulette, so no bounce is cut off.
 //! Figures are *measured*: each comes with the standard error of independent batches.
 
-use super::mirrors::ByImage;
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
@@ -67,6 +66,14 @@ pub(super) struct Vertex {
     pub(super) point: DVec3,
     pub(super) normal: DVec3,
     pub(super) plane: u32,
+}
+
+/// By which image a point looks, where it is itself, and how many times its own size the room is that way.
+#[derive(Clone, Copy)]
+pub(super) struct ByImage<'a> {
+    pub(super) image: u32,
+    pub(super) at: &'a Vertex,
+    pub(super) size: f64,
 }
 
 impl<'a> Audit<'a> {

@@ -90,26 +90,50 @@ impl Image {
         self.windows.len()
     }
 
+    /// Where a place appears to be to who looks into the mirrors.
+    fn appears(&self, p: DVec3) -> DVec3 {
+        self.turn.transpose() * (p - self.shift)
+    }
+
     /// Could a point with a normal see anything this way? It lies before all windows, they are above its horizon, and two by two
     /// in one line of sight.
     fn is_open_to(&self, point: DVec3, normal: DVec3, least: f64) -> bool {
-        let mut cones = [(DVec3::ZERO, 0.0); BOUNCES];
+        let mut cones = [Cone::default(); BOUNCES];
         for (k, window) in self.windows.iter().enumerate() {
             let way = window.centre - point;
             if window.height(point) <= least || normal.dot(way) + window.radius <= 0.0 {
                 return false;
             }
-            let distance = way.length();
-            let half = (window.radius / distance).min(1.0).asin();
-            cones[k] = (way / distance.max(f64::MIN_POSITIVE), half);
-            let apart = |(axis, other): &(DVec3, f64)| axis.dot(cones[k].0) < (half + other).cos();
-            // Cones of more than a right angle together miss nothing.
-            let wide = |(_, other): &(DVec3, f64)| half + other >= std::f64::consts::FRAC_PI_2;
-            if cones[..k].iter().any(|cone| !wide(cone) && apart(cone)) {
+            cones[k] = Cone::new(point, window.centre, window.radius);
+            if cones[..k].iter().any(|cone| cone.is_apart(&cones[k])) {
                 return false;
             }
         }
         true
+    }
+}
+
+/// The directions from a point to a ball.
+#[derive(Debug, Clone, Copy, Default)]
+struct Cone {
+    axis: DVec3,
+    half: f64,
+}
+
+impl Cone {
+    fn new(point: DVec3, centre: DVec3, radius: f64) -> Self {
+        let way = centre - point;
+        let distance = way.length().max(f64::MIN_POSITIVE);
+        Self {
+            axis: way / distance,
+            half: (radius / distance).min(1.0).asin(),
+        }
+    }
+
+    /// Have two no direction in common?
+    fn is_apart(&self, other: &Self) -> bool {
+        let both = self.half + other.half;
+        both < std::f64::consts::PI && self.axis.dot(other.axis) < both.cos()
     }
 }
 
@@ -379,6 +403,15 @@ impl Mirrors {
         let open = move |image: &Image| image.is_open_to(point, normal, self.least);
         let images = (0..).zip(&self.images);
         images.filter(move |(_, image)| open(image)).map(|(k, _)| k)
+    }
+
+    /// Could a ball, or any of it, be seen from a point by an image's mirrors?
+    pub fn may_show(&self, image: u32, from: DVec3, (centre, radius): (DVec3, f64)) -> bool {
+        let image = &self.images[image as usize];
+        let ball = Cone::new(from, image.appears(centre), radius);
+        let cone = |window: &Plane| Cone::new(from, window.centre, window.radius);
+        let mut windows = image.windows.iter().map(cone);
+        windows.all(|window| !window.is_apart(&ball))
     }
 
     /// The way from a point by an image's mirrors to a place, as if nothing else stood about; none where it misses one.

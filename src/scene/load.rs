@@ -7,7 +7,6 @@ use super::lamps::Lamps;
 use super::layers::Wish;
 use super::lights;
 use super::materials;
-use super::mirror;
 use super::pane;
 use super::parting;
 use super::sky::{self, Sky, SkyWish};
@@ -125,7 +124,9 @@ impl Lit {
         let (mut materials, shining) = materials::materials(
             raw, &tinted, &file, path, grid, &upsampler, &mut lamps, check,
         );
-        mirror::tint(&mut materials, images, &upsampler);
+        for material in &mut materials {
+            material.tint_mirror(images, &upsampler);
+        }
         let nodes = raw_lights.iter().filter_map(|raw| raw.ies.as_ref());
         let profiles = luminaires::profiles(&document.source, nodes, check);
         let mut lights = lights::punctual(raw_lights, &profiles, &file, path, &mut lamps, check);

@@ -137,6 +137,15 @@ impl Material {
         std::array::from_fn(|k| front[k].max(back[k]) + through[k])
     }
 
+    /// A mirror under a texture reflects by its mean.
+    pub(super) fn tint_mirror(&mut self, images: &[Image], upsampler: &Upsampler) {
+        let mean = self.mean_color(images);
+        if let (Some(mirror), Some(mean)) = (&mut self.mirror, mean) {
+            let tint = upsampler.reflectance(mean);
+            mirror.reflectance = tint.map(|r| r.min(GREATEST_ALBEDO));
+        }
+    }
+
     /// The base colour with the mean of its texture, linear; none where it has no texture.
     pub(crate) fn mean_color(&self, images: &[Image]) -> Option<[f32; 3]> {
         let image = images.get(self.paint.as_ref()?.image)?;

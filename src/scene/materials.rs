@@ -82,7 +82,11 @@ pub(crate) fn materials(
             if is_sheet {
                 material.sides = Sides::Both;
             }
-            material.mirror = said.mirrors.mirror(raw, spectra.mirror, &material);
+            material.mirror = {
+                let passes = material.pane.is_some() || is_sheet;
+                let rho = &material.reflectance;
+                (said.mirrors).mirror((raw, &name), spectra.mirror, [passes, emits], rho)
+            };
             if material.pane.is_none() {
                 // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
                 let plain = !tinted && raw.base_color_texture.is_none();

@@ -5,11 +5,10 @@
 //! inexpensive BRDF model for physically-based rendering, 1994, eq. 15), wavelength by wavelength. Roughness below the limit counts
 //! as none.
 
+use super::GREATEST_ALBEDO;
 use super::check::{Check, listed};
 use super::json::short;
 use super::raw::RawMaterial;
-use super::{GREATEST_ALBEDO, Image, Material};
-use crate::color::Upsampler;
 use crate::data::Leaves;
 
 /// Metals smoother than this are mirrors: GGX of alpha = roughness^2 = .01 has half its light within 1 degree of the mirrored
@@ -56,36 +55,38 @@ pub(super) struct Said {
 }
 
 impl Said {
-    /// The mirror that a material is, if it is one. `wanted`: what the side file says.
+    /// The mirror that a material of a reflectance is, if it is one. `wanted`: what the side file says; does it let light through, does
+    /// it emit?
     pub(super) fn mirror(
         &mut self,
-        raw: &RawMaterial,
+        (raw, name): (&RawMaterial, &str),
         wanted: Option<bool>,
-        made: &Material,
+        [passes, emits]: [bool; 2],
+        reflectance: &Leaves,
     ) -> Option<Mirror> {
         let rough = raw.roughness.unwrap_or(1.0);
         let smooth = raw.metallic >= METAL && rough < SMOOTH;
         if wanted.is_none() && smooth && raw.metal_texture {
-            self.textured.push(made.name.clone());
+            self.textured.push(name.into());
         }
         if !wanted.unwrap_or(smooth && !raw.metal_texture && !raw.unlit) {
             return None;
         }
-        if made.pane.is_some() || made.sheet.is_some() {
-            self.other.push(made.name.clone());
+        if passes {
+            self.other.push(name.into());
             return None;
         }
-        if made.emission.is_some() {
-            self.glowing.push(made.name.clone());
+        if emits {
+            self.glowing.push(name.into());
             return None;
         }
-        self.mirrors.push(made.name.clone());
+        self.mirrors.push(name.into());
         let from = match wanted {
             Some(_) => "side file".into(),
             None => format!("metallic, roughness {rough:.3}"),
         };
         Some(Mirror {
-            reflectance: made.reflectance,
+            reflectance: *reflectance,
             from,
         })
     }
@@ -112,16 +113,6 @@ impl Said {
                 let names: Vec<String> = names.iter().map(|n| format!("'{}'", short(n))).collect();
                 check.warn(format!("{what} ({})", listed(&names)));
             }
-        }
-    }
-}
-
-/// Mirrors under a texture reflect by its mean.
-pub(super) fn tint(materials: &mut [Material], images: &[Image], upsampler: &Upsampler) {
-    for material in materials {
-        let mean = material.mean_color(images);
-        if let (Some(mirror), Some(mean)) = (&mut material.mirror, mean) {
-            mirror.reflectance = upsampler.reflectance(mean).map(|r| r.min(GREATEST_ALBEDO));
         }
     }
 }

@@ -365,7 +365,8 @@ pub(crate) struct Whole<'a> {
     pub(super) direct: &'a dyn Fn(u32) -> f64,
     /// Area of a leaf, all of it.
     pub(super) area: &'a dyn Fn(u32) -> f64,
-    /// Is a leaf a mirror? Of light that falls on it counts only what it keeps: the rest is received where it is sent.
+    /// Is a leaf a mirror? Of light that falls on it counts only what it keeps, by its mean over angles: the rest is received where it
+    /// is sent.
     pub(super) mirror: &'a dyn Fn(u32) -> bool,
 }
 

@@ -17,7 +17,7 @@ mod kept;
 
 use super::flux::Closed;
 use super::tinted::Tints;
-use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
+use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::rows::Rows;
 use crate::link::Sight;

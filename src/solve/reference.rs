@@ -5,7 +5,7 @@
 //! 1760) times the share of rays to j that nothing blocks. `A_i F_ij` and `A_j F_ji` are made equal by their mean; rows are
 //! not balanced, [`Reference::row_sums`] tells what they miss. Solved by LU for every distinct set of reflectances.
 //!
-//! It knows no panes: what they keep of a ray is no factor between patches. It shares triangles, Lambert's formula and the ray index with the solver: no hierarchy, no links, no lanes, no
+//! It knows no panes and no mirrors: what they keep of a ray is no factor between patches. It shares triangles, Lambert's formula and the ray index with the solver: no hierarchy, no links, no lanes, no
 //! iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
 
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};

@@ -106,7 +106,7 @@ impl Bake {
                 .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes)),
             sheets: sources.sheets,
         };
-        let sums = (!by_rays).then(|| self.sums_of(rows)).unwrap_or_default();
+        let sums = self.sums_of(rows);
         let lit = Lit {
             leaves,
             first: &first,
@@ -173,8 +173,11 @@ impl Bake {
         }
     }
 
-    /// What rows of links sum to.
+    /// What rows of links sum to; nothing where leaves look for themselves.
     fn sums_of(&self, rows: &LinkRows) -> Vec<f64> {
+        if self.by_rays() {
+            return Vec::new();
+        }
         let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
         crate::link::row_sums(&self.tree, rows, &self.areas, &factor)
     }

@@ -41,6 +41,14 @@ impl Gatherer<'_> {
         self.sight.is_open(via.image, from, segment)
     }
 
+    /// Could any of a ball be seen, by whatever way it is looked?
+    pub(super) fn may_show(&self, centre: DVec3, radius: f64) -> bool {
+        let (Some(via), Some(mirrors)) = (self.via, self.sight.mirrors) else {
+            return true;
+        };
+        mirrors.may_show(via.image, via.point, (centre, radius))
+    }
+
     /// What is left of light on a segment that is looked along by way of mirrors.
     pub(super) fn by_way_of(&self, via: Via, segment: &Segment) -> Option<Filter> {
         let mirrors = self.sight.mirrors?;
@@ -138,16 +146,18 @@ impl Gatherer<'_> {
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
+        let Some(mirrors) = self.sight.mirrors else {
+            return;
+        };
         let mirrored = std::mem::take(&mut memory.mirrored);
-        let mut seen = Vec::new();
+        let seen: Vec<u32> = mirrors.seen_from(to.point, to.normal).collect();
         self.in_each(to, |gatherer, from, image| {
             gatherer.punctual(from, memory, out);
             if gatherer.sky.is_some() {
-                seen.push(image);
                 let own = |a: &&Arrived| a.image == Some(image);
                 let open = mirrored.iter().filter(own).filter_map(Arrived::outside);
                 let open: Vec<DVec3> = open.collect();
-                gatherer.outside(from, Some((&open, of)), true, memory, out);
+                gatherer.outside_in_mirrors(from, (&open, of), seen.len(), memory, out);
             }
         });
         let share = 1.0 / of.max(1) as f64;

@@ -81,6 +81,8 @@ pub(super) enum Way<'a> {
     Rays(usize),
     /// These directions, of so many over the hemisphere, lead out of the room.
     Known(&'a [DVec3], usize),
+    /// The same for one of so many images, which share the rays to the openings.
+    Shared(&'a [DVec3], usize, usize),
     /// The same of one of many points, for which few rays to the openings do.
     Glanced(&'a [DVec3], usize),
     /// As if nothing stood in the way.
@@ -282,12 +284,15 @@ impl Outside {
             _ => 3,
         };
         let (wide, mut narrow) = RAYS[kind];
-        if let (Way::Known(..), true) = (way, sight.small()) {
+        if let (Way::Known(..) | Way::Shared(..), true) = (way, sight.small()) {
             // Rooms of few triangles come here for their panes and mirrors; a ray costs next to nothing there.
             narrow *= FEW;
         }
+        if let Way::Shared(.., images) = way {
+            narrow = (narrow / images.max(1)).max(RAYS[1].1);
+        }
         let wide = match way {
-            Way::Known(open, of) | Way::Glanced(open, of) => {
+            Way::Known(open, of) | Way::Glanced(open, of) | Way::Shared(open, of, _) => {
                 look.open.clear();
                 look.open.extend_from_slice(open);
                 of

@@ -284,7 +284,7 @@ impl Gatherer<'_> {
         let reach = (0.5 * (node.high - node.low))
             .dot(to.normal.abs())
             .min(node.radius);
-        if to.normal.dot(from) + reach <= 0.0 {
+        if to.normal.dot(from) + reach <= 0.0 || !self.may_show(node.centre, node.radius) {
             return false;
         }
         if node.flat {

@@ -47,14 +47,34 @@ impl Gatherer<'_> {
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        let Some(outside) = self.sky else { return };
         let way = match known {
             _ if self.hemisphere.is_some() && !self.sight.occlusion => Way::Unshadowed,
-            Some((open, of)) if !self.shafts => Way::Glanced(open, of),
             Some((open, of)) => Way::Known(open, of),
             None if !self.shafts => Way::Rays(0),
             None => Way::Rays(if own { 2 } else { 1 }),
         };
+        self.come_in(to, way, own, memory, out);
+    }
+
+    /// The same by one of so many images, of which these directions, of so many over the hemisphere, lead out of the room.
+    pub(super) fn outside_in_mirrors(
+        &self,
+        to: &Receiver,
+        (open, of): (&[DVec3], usize),
+        images: usize,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
+        let way = match self.shafts {
+            true => Way::Shared(open, of, images),
+            false => Way::Glanced(open, of),
+        };
+        self.come_in(to, way, true, memory, out);
+    }
+
+    /// Adds what is found outside one way or another.
+    fn come_in(&self, to: &Receiver, way: Way, own: bool, memory: &mut Memory, out: &mut Gathered) {
+        let Some(outside) = self.sky else { return };
         // Points for their own sake share one pattern where links serve them: what is left of its error is smooth.
         let seed = if self.hemisphere.is_some() || !own {
             to.seed
