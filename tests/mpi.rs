@@ -10,6 +10,13 @@ use std::time::{Duration, Instant};
 
 /// The machine may have fewer cores than there are ranks.
 fn mpirun(ranks: usize) -> Option<Command> {
+    let mut command = launcher(ranks)?;
+    command.arg(env!("CARGO_BIN_EXE_haarlight"));
+    Some(command)
+}
+
+/// The same before the program is named.
+fn launcher(ranks: usize) -> Option<Command> {
     let found = Command::new("mpirun").arg("--version").output();
     if !found.is_ok_and(|out| String::from_utf8_lossy(&out.stdout).contains("Open MPI")) {
         eprintln!("SKIPPED: bakes over ranks (no Open MPI)");
@@ -17,15 +24,9 @@ fn mpirun(ranks: usize) -> Option<Command> {
     }
     let mut command = Command::new("mpirun");
     command
-        .args([
-            "--oversubscribe",
-            "--allow-run-as-root",
-            "--bind-to",
-            "none",
-            "-n",
-        ])
-        .arg(ranks.to_string())
-        .arg(env!("CARGO_BIN_EXE_haarlight"));
+        .args(["--oversubscribe", "--allow-run-as-root"])
+        .args(["--bind-to", "none", "-n"])
+        .arg(ranks.to_string());
     Some(command)
 }
 
@@ -246,18 +247,11 @@ fn a_fault_is_told_once() {
 #[test]
 fn a_launcher_need_not_tell_the_size() {
     let folder = tempfile::tempdir().unwrap();
-    if mpirun(2).is_none() {
+    let Some(mut command) = launcher(2) else {
         return;
-    }
-    let mut command = Command::new("mpirun");
+    };
     command
-        .args([
-            "--oversubscribe",
-            "--allow-run-as-root",
-            "--bind-to",
-            "none",
-        ])
-        .args(["-n", "2", "env", "-u", "OMPI_COMM_WORLD_SIZE"])
+        .args(["env", "-u", "OMPI_COMM_WORLD_SIZE"])
         .arg(env!("CARGO_BIN_EXE_haarlight"));
     let out = bake(
         &mut command,

@@ -173,14 +173,7 @@ fn probes_in_solids_are_marked_and_lent_light() {
             point.x > 2.0 && point.x < 4.0 && point.y < 2.0 && point.z > 1.0 && point.z < 3.0;
         assert_eq!(air.place == Place::Inside, inside, "{point}");
     }
-    let probes = Probes::new(
-        bake.scene(),
-        &grid,
-        air,
-        &Exposure::new(1.0),
-        None,
-        "k".into(),
-    );
+    let probes = unscaled(&bake, &grid, air);
     assert_eq!(
         probes.places.iter().filter(|p| **p == "inside").count(),
         4 * 4 * 4
@@ -221,14 +214,7 @@ fn the_texture_has_bevys_layout() {
     let bake = hall();
     let grid = Grid::within([DVec3::ZERO, dvec3(6.0, 3.0, 4.0)], 2.0).unwrap();
     let air = bake.air(&grid.points());
-    let probes = Probes::new(
-        bake.scene(),
-        &grid,
-        air,
-        &Exposure::new(1.0),
-        None,
-        "k".into(),
-    );
+    let probes = unscaled(&bake, &grid, air);
     let bytes = to_volume(&probes);
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let [nx, ny, nz] = probes.counts;
@@ -361,4 +347,10 @@ fn the_file_says_what_probe_prints() {
             "{side}: {own} {lux}"
         );
     }
+}
+
+/// Probes as they are written at an exposure of 1.
+fn unscaled(bake: &Bake, grid: &Grid, air: Vec<Air>) -> Probes {
+    let exposure = Exposure::new(1.0);
+    Probes::new(bake.scene(), grid, air, &exposure, None, "k".into())
 }

@@ -9,6 +9,7 @@ use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Face, Mesh, Mirrors, Panes};
+use crate::scene::sheet::SheetMeans;
 use crate::scene::sky::SUN_RADIUS;
 use crate::scene::{Alpha, LightKind, Material, PunctualLight, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
@@ -33,6 +34,8 @@ pub struct Audit<'a> {
     pub(super) masked: bool,
     pub(super) panes: Option<Panes>,
     pub(super) mirrors: Option<Mirrors>,
+    /// By material; none of what is no sheet.
+    sheets: Vec<Option<SheetMeans>>,
 }
 
 /// Irradiance at a point: mean and standard error per leaf, W/m2/nm, and the batch means for anything derived.
@@ -100,11 +103,16 @@ impl<'a> Audit<'a> {
             .materials
             .iter()
             .any(|m| matches!(m.alpha, Alpha::Mask { .. }));
+        let upsampler = Upsampler::new(&scene.grid);
+        let sheets = scene.materials.iter();
         Self {
             scene,
             mesh,
             rays,
-            upsampler: Upsampler::new(&scene.grid),
+            sheets: sheets
+                .map(|m| m.sheet_means(&scene.images, &upsampler))
+                .collect(),
+            upsampler,
             lamps,
             total,
             masked,
@@ -477,17 +485,15 @@ impl<'a> Audit<'a> {
         weights: [f32; 3],
         back: bool,
     ) -> Option<[Leaves; 2]> {
-        let material = &self.scene.materials[self.mesh.material[triangle] as usize];
-        let sheet = material.sheet.as_ref()?;
+        let number = self.mesh.material[triangle] as usize;
+        let material = &self.scene.materials[number];
+        let (sheet, means) = (material.sheet.as_ref()?, self.sheets[number].as_ref()?);
         let weights = self.mesh.on_origin_f32(triangle, weights);
         let weave = sheet.weave(|texture| self.texel(texture, triangle, weights));
-        let (color, up) = (material.mean_color(&self.scene.images), &self.upsampler);
-        let [own, across] = material.scatters(sheet, color, weave, back, up);
-        let whole = sheet.mean_weave(&self.scene.images);
-        let whole = material.shown(sheet, color, whole, up);
+        let [own, across] = material.scatters(sheet, means.color, weave, back, &self.upsampler);
         let share = |of: Leaves, none: f64| -> Leaves {
-            std::array::from_fn(|k| match whole[k] > 0.0 {
-                true => of[k] / whole[k],
+            std::array::from_fn(|k| match means.shown[k] > 0.0 {
+                true => of[k] / means.shown[k],
                 false => none,
             })
         };

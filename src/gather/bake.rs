@@ -248,36 +248,21 @@ fn weighed(row: &[f32; 64], weights: &[[f64; 3]]) -> [f64; 3] {
 
 impl<'a> Look<'a> {
     pub(crate) fn new(bake: &Bake, material: &Material, upsampler: &'a Upsampler) -> Self {
-        let mean = material.paint.as_ref().map(|texture| {
-            let image = &bake.scene().images[texture.image];
-            let n = image.pixels.len().max(1) as f64;
-            let sum = image.pixels.iter().fold([0.0; 3], |s: [f64; 3], p| {
-                std::array::from_fn(|c| s[c] + f64::from(p[c]))
-            });
-            sum.map(|x| (x / n).max(1e-3))
-        });
-        let color: [f32; 3] = std::array::from_fn(|c| {
-            material.base_color[c] * mean.map_or(1.0, |mean| mean[c] as f32)
-        });
         let images = &bake.scene().images;
-        let reflectance = match (&material.sheet, mean) {
-            (Some(sheet), _) => {
-                let color = material.mean_color(images);
-                material.shown(sheet, color, sheet.mean_weave(images), upsampler)
-            }
-            (None, Some(_)) => upsampler.reflectance(color),
+        let color = material.mean_color(images);
+        let sheet = material.sheet_means(images, upsampler);
+        let reflectance = match (&sheet, color) {
+            (Some(sheet), _) => sheet.shown,
+            (None, Some(color)) => upsampler.reflectance(color),
             (None, None) => material.reflectance,
         };
         Self {
             reflected: bake.lanes().reflected(&reflectance),
             reflectance,
-            through: material.sheet.as_ref().map(|sheet| {
-                let weave = sheet.mean_weave(images);
-                (sheet.transmittance_at(weave, upsampler), sheet.left(weave))
-            }),
-            base: material.vertex_paint.then_some(color),
+            through: sheet.map(|sheet| (sheet.transmittance, sheet.left)),
+            base: (material.vertex_paint).then(|| color.unwrap_or(material.base_color)),
             upsampler,
-            unpainted: mean,
+            unpainted: (material.mean_paint(images)).map(|mean| mean.map(f64::from)),
             emits: material.emission.is_some(),
             light: material.emission.as_ref().map(|e| e.light),
             shown: (material.emission.as_ref())

@@ -18,4 +18,4 @@ pub use mirrors::{BOUNCES, Image, Mirrors, Route};
 pub use panes::{Crossing, Glazing, Panes};
 pub use spaces::{Spaces, spaces};
 pub use tree::{Element, NONE, Node, Sample, Tree};
-pub(crate) use tree::{quarter, stratified};
+pub(crate) use tree::{leaf_below, stratified};

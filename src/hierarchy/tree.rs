@@ -288,12 +288,10 @@ impl Tree {
     }
 
     /// The leaf element that holds a point of a face, given by barycentric weights on the whole face.
-    pub fn leaf_at(&self, entry: u32, mut w: [f64; 3]) -> u32 {
-        let mut id = self.face_node[entry as usize];
-        while !self.node(id).is_leaf() {
-            id = self.node(id).child + quarter(&mut w);
-        }
-        id
+    pub fn leaf_at(&self, entry: u32, weights: [f64; 3]) -> u32 {
+        leaf_below(self.face_node[entry as usize], weights, |k| {
+            self.node(k).child
+        })
     }
 
     /// `count` points of a node, each standing for an equal share of its area, stratified over the faces of a cluster.
@@ -336,8 +334,19 @@ impl Tree {
     }
 }
 
+/// The leaf that holds a point of a face, `first` being the first of the children of a node, [`NONE`] for a leaf.
+pub(crate) fn leaf_below(face: u32, mut weights: [f64; 3], first: impl Fn(u32) -> u32) -> u32 {
+    let mut id = face;
+    loop {
+        match first(id) {
+            NONE => return id,
+            child => id = child + quarter(&mut weights),
+        }
+    }
+}
+
 /// Which child of an element holds a point, given by barycentric weights, which become those on the child.
-pub(crate) fn quarter(w: &mut [f64; 3]) -> u32 {
+fn quarter(w: &mut [f64; 3]) -> u32 {
     // Children 0, 1, 2 hold the corners, child 3 the middle (turned around).
     match w.iter().position(|&x| x >= 0.5) {
         Some(k) => {

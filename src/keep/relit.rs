@@ -68,6 +68,16 @@ impl Kept {
             traces,
         })
     }
+
+    /// A vertex on its element.
+    fn on_element(&self, &(triangle, weights): &(u32, [f64; 3]), bake: &Bake) -> Vertex {
+        let entry = bake.tree().entry[triangle as usize][usize::from(self.back)];
+        Vertex {
+            triangle,
+            weights,
+            entry,
+        }
+    }
 }
 
 impl Bake {
@@ -101,18 +111,10 @@ impl Bake {
             }
             out.covered += lend_some(&mut rows, &kept.triangles);
             let look = &looks[self.scene().surfaces[kept.surface].material];
-            let vertices =
-                kept.vertices
-                    .par_iter()
-                    .zip(&rows)
-                    .map(|(&(triangle, weights), row)| {
-                        let vertex = Vertex {
-                            triangle,
-                            weights,
-                            entry: self.tree().entry[triangle as usize][usize::from(kept.back)],
-                        };
-                        self.vertex(&vertex, kept.back, row, look)
-                    });
+            let lit = kept.vertices.par_iter().zip(&rows);
+            let vertices = lit.map(|(vertex, row)| {
+                self.vertex(&kept.on_element(vertex, self), kept.back, row, look)
+            });
             out.surfaces.push(BakedSurface {
                 surface: kept.surface,
                 back: kept.back,
@@ -125,16 +127,10 @@ impl Bake {
         }
         Ok(out)
     }
-}
 
-impl Bake {
     /// The place of the leaf of a vertex among the leaves of the solution, if it is one of a sheet: the leaf that it was gathered on.
-    fn place(&self, kept: &Kept, &(triangle, weights): &(u32, [f64; 3])) -> Option<u32> {
-        let vertex = Vertex {
-            triangle,
-            weights,
-            entry: self.tree().entry[triangle as usize][usize::from(kept.back)],
-        };
+    fn place(&self, kept: &Kept, vertex: &(u32, [f64; 3])) -> Option<u32> {
+        let vertex = kept.on_element(vertex, self);
         let to = self.receiver(&vertex, kept.surface, kept.back);
         self.place_on_sheet(to.leaf?)
     }

@@ -3,7 +3,7 @@
 //! Every ray goes this way, and the patches themselves lie far apart in memory: what rays ask of them stands here, 12 bytes a
 //! patch.
 
-use crate::hierarchy::{NONE, Tree, quarter};
+use crate::hierarchy::{NONE, Tree, leaf_below};
 use crate::link::POLYGONS;
 
 /// What is nearer than this many times the square root of a leaf's area is close by.
@@ -44,15 +44,9 @@ impl Descent {
     }
 
     /// The leaf that holds a point of a face, as [`Tree::leaf_at`] when the solution was made.
-    pub(crate) fn leaf_at(&self, tree: &Tree, entry: u32, mut weights: [f64; 3]) -> u32 {
-        let mut id = tree.face_node[entry as usize];
-        loop {
-            let child = self.steps[id as usize].child;
-            if child == NONE {
-                return id;
-            }
-            id = child + quarter(&mut weights);
-        }
+    pub(crate) fn leaf_at(&self, tree: &Tree, entry: u32, weights: [f64; 3]) -> u32 {
+        let face = tree.face_node[entry as usize];
+        leaf_below(face, weights, |k| self.steps[k as usize].child)
     }
 
     /// A patch and those above it that may be gathered whole.

@@ -3,7 +3,7 @@
 use super::mirror::Mirror;
 use super::pane::Pane;
 use super::profile::Profile;
-use super::sheet::{Sheet, Weave, bounded};
+use super::sheet::{Sheet, SheetMeans, Weave, bounded};
 use super::{GREATEST_ALBEDO, Image, Sides, Texture};
 use crate::color::Upsampler;
 use crate::data::Leaves;
@@ -123,18 +123,19 @@ impl Material {
         [bounded(reflected, &through), through]
     }
 
-    /// What leaves the side that reflects more, of the same light on both sides: reflectance and transmittance together. The light of
-    /// vertices is given as a share of it.
-    pub fn shown(
-        &self,
-        sheet: &Sheet,
-        color: Option<[f32; 3]>,
-        weave: Weave,
-        upsampler: &Upsampler,
-    ) -> Leaves {
+    /// What the material is as a sheet, in the mean of its textures; none of what is no sheet.
+    pub fn sheet_means(&self, images: &[Image], upsampler: &Upsampler) -> Option<SheetMeans> {
+        let sheet = self.sheet.as_ref()?;
+        let color = self.mean_color(images);
+        let weave = sheet.mean_weave(images);
         let side = |back| self.scatters(sheet, color, weave, back, upsampler);
-        let ([front, through], [back, _]) = (side(false), side(true));
-        std::array::from_fn(|k| front[k].max(back[k]) + through[k])
+        let ([front, transmittance], [back, _]) = (side(false), side(true));
+        Some(SheetMeans {
+            color,
+            transmittance,
+            left: sheet.left(weave),
+            shown: std::array::from_fn(|k| front[k].max(back[k]) + transmittance[k]),
+        })
     }
 
     /// A mirror under a texture reflects by its mean.
@@ -146,13 +147,16 @@ impl Material {
         }
     }
 
-    /// The base colour with the mean of its texture, linear; none where it has no texture.
+    /// Mean of the texture that multiplies the base colour, linear; none where there is none.
+    pub(crate) fn mean_paint(&self, images: &[Image]) -> Option<[f32; 3]> {
+        let [r, g, b, _] = images.get(self.paint.as_ref()?.image)?.mean();
+        Some([r, g, b].map(|x| x.max(DARKEST_PAINT)))
+    }
+
+    /// The base colour with it.
     pub(crate) fn mean_color(&self, images: &[Image]) -> Option<[f32; 3]> {
-        let image = images.get(self.paint.as_ref()?.image)?;
-        let mean = image.mean();
-        Some(std::array::from_fn(|c| {
-            self.base_color[c] * mean[c].max(DARKEST_PAINT)
-        }))
+        let mean = self.mean_paint(images)?;
+        Some(std::array::from_fn(|c| self.base_color[c] * mean[c]))
     }
 }
 

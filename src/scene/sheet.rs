@@ -48,6 +48,20 @@ impl Weave {
     };
 }
 
+/// What a sheet is in the mean of its textures.
+#[derive(Debug, Clone)]
+pub struct SheetMeans {
+    /// Base colour, linear; none where it has no texture.
+    pub color: Option<[f32; 3]>,
+    /// Share of light that leaves on the other side.
+    pub transmittance: Leaves,
+    /// Share of the base colour that is reflected.
+    pub left: f64,
+    /// What leaves the side that reflects more, of the same light on both sides: reflectance and transmittance together. The light of
+    /// both sides is shown by it.
+    pub shown: Leaves,
+}
+
 impl Sheet {
     /// Transmittance where textures have these values, each in [0, 0.999].
     pub fn transmittance_at(&self, weave: Weave, upsampler: &Upsampler) -> Leaves {

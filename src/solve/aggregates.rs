@@ -19,6 +19,7 @@
 //! Aggregates hold only leaves that exchange light, over whatever detours: what is dark stays exactly dark.
 
 use super::operator::{Operator, pull};
+use super::sums::add_products;
 use crate::hierarchy::{NONE, Tree};
 use crate::light::rows::Rows;
 use crate::link::LinkRows;
@@ -448,13 +449,5 @@ fn add_shared(sum: &mut [f64], g: f32, x: &[f32], y: &[f64]) {
 fn add_scaled(sum: &mut [f64], x: &[f64], y: &[f64]) {
     for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
         *s += x * y;
-    }
-}
-
-/// `sum += x y`. Slices of a length that the compiler does not know: of arrays it makes single numbers.
-#[inline(never)]
-pub(super) fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
-    for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
-        *s += f64::from(*x) * f64::from(*y);
     }
 }

@@ -195,29 +195,24 @@ impl Coarse {
             &self.areas,
             &self.factor,
         );
-        let (mut nodes, mut gathered) = (Rows::zero(count + 1, L), Rows::zero(count + 1, L));
-        let mut first = Rows::zero(count, L);
-        operator.irradiance::<L>(&e, &mut nodes, &mut gathered, &mut first);
+        let mut first = operator.received::<L>(&e);
         for k in 0..count {
             for (x, p) in first.row_mut(k).iter_mut().zip(p.row(k)) {
                 *x += p;
             }
         }
-        let mut reflected = Rows::zero(count, L);
-        let mut more = Rows::zero(count, L);
-        if self.through.is_empty() {
+        let mut more = if self.through.is_empty() {
+            let mut reflected = Rows::zero(count, L);
             let system = System {
                 operator,
                 reflectance: &rho,
                 greatest: &greatest,
             };
             system.solve::<L>(&first, &mut reflected, TOLERANCE);
-            system
-                .operator
-                .irradiance::<L>(&reflected, &mut nodes, &mut gathered, &mut more);
+            system.operator.received::<L>(&reflected)
         } else {
-            more = self.through_sheets::<L>(lanes, &operator, (rho, greatest), &first);
-        }
+            self.through_sheets::<L>(lanes, &operator, (rho, greatest), &first)
+        };
         for k in 0..count {
             for (x, f) in more.row_mut(k).iter_mut().zip(first.row(k)) {
                 *x += f;
@@ -264,13 +259,7 @@ impl Coarse {
                 .iter()
                 .map(|&k| self.areas[k as usize])
                 .collect(),
-            receive: &|radiosity| {
-                let nodes = self.tree.nodes.len();
-                let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
-                let mut seen = Rows::zero(self.leaves.len(), L);
-                operator.irradiance::<L>(radiosity, &mut means, &mut gathered, &mut seen);
-                seen
-            },
+            receive: &|radiosity| operator.received::<L>(radiosity),
         };
         let mut reflected = Rows::zero(self.leaves.len(), L);
         system.solve::<L>(first, &mut reflected, TOLERANCE).1

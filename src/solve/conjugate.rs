@@ -4,10 +4,10 @@
 //! `|error| <= |residual| / (1 - rho_max)` in the norm `sum A R^2 / rho`: a *bound*, given exact row sums. Where that
 //! takes long, [`Aggregates`] precondition it.
 
-use super::aggregates::{Aggregates, add_products};
+use super::aggregates::Aggregates;
 use super::operator::Operator;
+use super::sums::dot;
 use crate::light::rows::Rows;
-use rayon::prelude::*;
 
 /// Iterations at the most. Corridors of albedo .99 take about 20.
 pub(super) const MAX_ITERATIONS: usize = 400;
@@ -17,8 +17,6 @@ const BRIGHT: f64 = 0.98;
 const LOOK: usize = 6;
 /// let fear more than so many others.
 const MANY: f64 = 12.0;
-/// Rows a partial sum covers; fixed, so that sums do not depend on the number of threads.
-const CHUNK: usize = 1024;
 
 /// Is the coarse step worth building, given the greatest albedo and the bounds of the error so far?
 fn pays(greatest: f64, bounds: &[f64], tolerance: f64) -> bool {
@@ -236,25 +234,6 @@ pub(super) fn step<const L: usize>(x: &mut Rows, p: &Rows, alpha: [f32; L]) {
             x[l] += alpha[l] * p[l];
         }
     }
-}
-
-/// Inner products lane by lane, f64, summed in fixed chunks.
-pub(super) fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
-    let parts: Vec<[f64; L]> = x
-        .all::<L>()
-        .par_chunks(CHUNK)
-        .zip(y.all::<L>().par_chunks(CHUNK))
-        .map(|(x, y)| {
-            let mut sum = [0.0; L];
-            for (x, y) in x.iter().zip(y) {
-                add_products(&mut sum, x, y);
-            }
-            sum
-        })
-        .collect();
-    parts.iter().fold([0.0; L], |acc, part| {
-        std::array::from_fn(|l| acc[l] + part[l])
-    })
 }
 
 #[cfg(test)]

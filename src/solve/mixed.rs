@@ -4,9 +4,10 @@
 //! becomes `(1 - K) y = sqrt(A M) first`, `K = sqrt(M) G sqrt(M) / A`: symmetric as for single lanes, but one system for
 //! all lanes, with one alpha and beta. A reflection costs m^2 multiplications where lanes of intervals cost m.
 
-use super::conjugate::{Convergence, MAX_ITERATIONS, dot, step, turn};
+use super::conjugate::{Convergence, MAX_ITERATIONS, step, turn};
 use super::operator::Operator;
 use super::rays::RaySystem;
+use super::sums::dot;
 use crate::light::lanes::Lanes;
 use crate::light::rows::Rows;
 use crate::spectrum::Leaves;
@@ -160,11 +161,9 @@ impl Mixed {
         reflected: &mut Rows,
         tolerance: f64,
     ) -> (Convergence, Rows) {
-        let mut nodes = Rows::zero(system.tree.nodes.len(), L);
-        let mut seen = Rows::zero(reflected.len(), L);
         let mut done = Convergence::default();
         loop {
-            system.receive::<L>(reflected, &mut nodes, &mut seen);
+            let seen = system.received::<L>(reflected);
             let mut all = seen.clone();
             step::<L>(&mut all, first, [1.0; L]);
             let mut change = self.reflect::<L>(&all);

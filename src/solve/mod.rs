@@ -35,6 +35,7 @@ mod shares;
 mod sheets;
 mod solving;
 mod sources;
+mod sums;
 mod tinted;
 pub(crate) mod two_grid;
 

@@ -105,7 +105,15 @@ impl<'a> Operator<'a> {
     }
 
     /// Irradiance on the leaves (by leaf) from radiosity on the leaves (by leaf), both balanced.
-    /// `nodes` and `gathered` are scratch with a row a node; `nodes` holds every patch's mean radiosity afterwards.
+    pub fn received<const L: usize>(&self, radiosity: &Rows) -> Rows {
+        let nodes = self.tree.nodes.len();
+        let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
+        let mut seen = Rows::zero(self.leaves.len(), L);
+        self.irradiance::<L>(radiosity, &mut means, &mut gathered, &mut seen);
+        seen
+    }
+
+    /// The same with room for it: `nodes` and `gathered` are scratch with a row a node; `nodes` holds every patch's mean radiosity afterwards.
     pub fn irradiance<const L: usize>(
         &self,
         radiosity: &Rows,

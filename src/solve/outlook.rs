@@ -18,7 +18,7 @@ mod kept;
 use super::flux::Closed;
 use super::tinted::Tints;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
-use crate::hierarchy::{NONE, Tree};
+use crate::hierarchy::{NONE, Tree, leaf_below};
 use crate::light::rows::Rows;
 use crate::link::Sight;
 use crate::team::Team;
@@ -180,19 +180,25 @@ impl Outlook {
         cast
     }
 
-    /// Looks up which leaf stands at each end.
+    /// Looks up which leaf stands at each end; what was found before stays where the leaf was not split.
     fn find(&mut self, tree: &Tree) {
-        self.met = self
-            .ends
-            .par_iter()
-            .map(|end| {
-                if end.entry == NONE {
-                    return NONE;
-                }
-                let [v, w] = end.at.map(|x| f64::from(x) / 65536.0);
-                tree.leaf_at(end.entry & !ALONE, [1.0 - v - w, v, w]) | end.entry & ALONE
-            })
-            .collect();
+        // Patches lie far apart in memory, and rays ask of them only for their children.
+        let children: Vec<u32> = tree.nodes.iter().map(|node| node.child).collect();
+        let stands = |met: u32| children[(met & !ALONE) as usize] == NONE;
+        let leaf_at = |end: &End| {
+            let [v, w] = end.at.map(|x| f64::from(x) / 65536.0);
+            let face = tree.face_node[(end.entry & !ALONE) as usize];
+            let leaf = leaf_below(face, [1.0 - v - w, v, w], |k| children[k as usize]);
+            leaf | end.entry & ALONE
+        };
+        let known = self.met.len();
+        self.met.resize(self.ends.len(), NONE);
+        let rays = self.met.par_iter_mut().zip(&self.ends).enumerate();
+        rays.for_each(|(k, (met, end))| {
+            if end.entry != NONE && !(k < known && stands(*met)) {
+                *met = leaf_at(end);
+            }
+        });
     }
 
     /// Have leaves looked for themselves?

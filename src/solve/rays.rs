@@ -7,6 +7,7 @@
 use super::conjugate::Convergence;
 use super::operator::pull;
 use super::outlook::Outlook;
+use super::sums::{CHUNK, added, chunks};
 use super::two_grid::TwoGrid;
 use crate::hierarchy::Tree;
 use crate::light::rows::Rows;
@@ -21,8 +22,6 @@ const SLOWEST: f64 = 0.95;
 /// After a correction that left more than this share of the change, a sweep goes without: what few patches cannot tell
 /// apart must not build up.
 const WORTH_CORRECTING: f64 = 0.5;
-/// Leaves that a task sums over; fixed, so that results do not depend on the number of threads.
-const CHUNK: usize = 1024;
 
 /// What a solve by rays works on.
 pub(crate) struct RaySystem<'a> {
@@ -112,10 +111,8 @@ impl RaySystem<'_> {
     /// What a sweep is to be scaled by, lane by lane, so that no light is missing: what direct light reflects, over what is
     /// reflected now less what of it comes again.
     fn missing<const L: usize>(&self, reflected: &Rows, seen: &Rows, first: &Rows) -> [f64; L] {
-        let bounces =
-            (reflected.all::<L>().par_chunks(CHUNK)).zip(seen.all::<L>().par_chunks(CHUNK));
-        let direct =
-            (first.all::<L>().par_chunks(CHUNK)).zip(self.reflectance.all::<L>().par_chunks(CHUNK));
+        let bounces = chunks::<L>(reflected).zip(chunks::<L>(seen));
+        let direct = chunks::<L>(first).zip(chunks::<L>(self.reflectance));
         let parts = bounces.zip(direct).zip(self.leaves.par_chunks(CHUNK));
         let parts = parts.map(|(((reflected, seen), (first, rho)), leaves)| {
             let (mut now, mut once, mut again) = ([0.0; L], [0.0; L], [0.0; L]);
@@ -130,7 +127,7 @@ impl RaySystem<'_> {
             }
             [now, once, again]
         });
-        let [now, once, again] = added(&parts.collect::<Vec<_>>());
+        let [now, once, again] = added(parts);
         let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 1.0 };
         std::array::from_fn(|l| {
             ratio(once[l], now[l] - again[l]).clamp(1.0 / GREATEST_SCALE, GREATEST_SCALE)
@@ -173,7 +170,7 @@ impl RaySystem<'_> {
             }
             [change, total]
         });
-        let [change, total] = added(&parts.collect::<Vec<_>>());
+        let [change, total] = added(parts);
         Change {
             change,
             total,
@@ -218,13 +215,16 @@ impl RaySystem<'_> {
         (residual, bound)
     }
 
-    /// What leaves receive of reflected light.
-    pub(super) fn receive<const L: usize>(
-        &self,
-        reflected: &Rows,
-        nodes: &mut Rows,
-        seen: &mut Rows,
-    ) {
+    /// Irradiance of the leaves by radiosity.
+    pub(super) fn received<const L: usize>(&self, radiosity: &Rows) -> Rows {
+        let mut nodes = Rows::zero(self.tree.nodes.len(), L);
+        let mut seen = Rows::zero(self.leaves.len(), L);
+        self.receive::<L>(radiosity, &mut nodes, &mut seen);
+        seen
+    }
+
+    /// The same with room for it, `nodes` for a row a node.
+    fn receive<const L: usize>(&self, reflected: &Rows, nodes: &mut Rows, seen: &mut Rows) {
         let all = nodes.all_mut::<L>();
         for (row, &leaf) in reflected.all::<L>().iter().zip(self.leaves) {
             all[leaf as usize] = *row;
@@ -232,15 +232,4 @@ impl RaySystem<'_> {
         pull::<f32, L>(self.tree, self.areas, all);
         self.outlook.irradiance::<L>(self.leaves, nodes, seen);
     }
-}
-
-/// Sums lane by lane, in order.
-fn added<const L: usize, const N: usize>(parts: &[[[f64; L]; N]]) -> [[f64; L]; N] {
-    let mut sums = [[0.0; L]; N];
-    for part in parts {
-        for (sum, x) in sums.as_flattened_mut().iter_mut().zip(part.as_flattened()) {
-            *sum += x;
-        }
-    }
-    sums
 }

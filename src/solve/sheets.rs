@@ -9,8 +9,8 @@
 
 use super::conjugate::{Convergence, step, turn};
 use super::reflection::Reflection;
+use super::sums::dot_by_area;
 use crate::light::rows::Rows;
-use rayon::prelude::*;
 
 /// Applications of the operator to find the light, at the most: bright rooms take some 20.
 const MOST: usize = 100;
@@ -18,8 +18,6 @@ const MOST: usize = 100;
 const SHARE: f64 = 0.1;
 /// Sweeps at the most.
 const SWEEPS: usize = 400;
-/// Rows a partial sum covers; fixed, so that sums do not depend on the number of threads.
-const CHUNK: usize = 1024;
 
 /// A room whose leaves reflect so, with what turns radiosity into irradiance.
 pub(super) struct System<'a> {
@@ -51,8 +49,8 @@ impl System<'_> {
             let next = self.reflection.of::<L>(&next);
             step::<L>(reflected, &next, [-1.0; L]);
             let (moved, whole) = (
-                self.dot::<L>(reflected, reflected),
-                self.dot::<L>(&next, &next),
+                dot_by_area::<L>(&self.areas, reflected, reflected),
+                dot_by_area::<L>(&self.areas, &next, &next),
             );
             *reflected = next;
             done.iterations += 1;
@@ -80,9 +78,9 @@ impl System<'_> {
     ) {
         let guess = reflected.clone();
         let mut residual = self.reflection.of::<L>(first);
-        let norm = self.dot::<L>(&residual, &residual);
+        let norm = dot_by_area::<L>(&self.areas, &residual, &residual);
         step::<L>(&mut residual, &self.apply::<L>(reflected), [-1.0; L]);
-        let start = self.dot::<L>(&residual, &residual);
+        let start = dot_by_area::<L>(&self.areas, &residual, &residual);
         let shadow = residual.clone();
         let (mut direction, mut applied) = (residual.clone(), Rows::zero(residual.len(), L));
         let mut rho = start;
@@ -90,19 +88,19 @@ impl System<'_> {
         done.iterations += 1;
         while self.bound(&left, &norm) > SHARE * tolerance && done.iterations + 2 <= MOST {
             applied.clone_from(&self.apply::<L>(&direction));
-            let alpha = ratios(&rho, &self.dot::<L>(&shadow, &applied));
+            let alpha = ratios(&rho, &dot_by_area::<L>(&self.areas, &shadow, &applied));
             step::<L>(reflected, &direction, alpha);
             step::<L>(&mut residual, &applied, alpha.map(|a| -a));
             let next = self.apply::<L>(&residual);
             let omega = ratios(
-                &self.dot::<L>(&next, &residual),
-                &self.dot::<L>(&next, &next),
+                &dot_by_area::<L>(&self.areas, &next, &residual),
+                &dot_by_area::<L>(&self.areas, &next, &next),
             );
             step::<L>(reflected, &residual, omega);
             step::<L>(&mut residual, &next, omega.map(|w| -w));
             done.iterations += 2;
-            left = self.dot::<L>(&residual, &residual);
-            let after = self.dot::<L>(&shadow, &residual);
+            left = dot_by_area::<L>(&self.areas, &residual, &residual);
+            let after = dot_by_area::<L>(&self.areas, &shadow, &residual);
             // p = r + beta (p - omega v).
             let ratio = ratios(&after, &rho);
             let beta = std::array::from_fn(|l| match omega[l] {
@@ -139,29 +137,6 @@ impl System<'_> {
             .filter(|((_, norm), _)| **norm > 0.0)
             .map(|((left, norm), &s)| (left / norm).sqrt() / (1.0 - f64::from(s)))
             .fold(0.0, f64::max)
-    }
-
-    /// Inner products by area, lane by lane.
-    fn dot<const L: usize>(&self, x: &Rows, y: &Rows) -> [f64; L] {
-        let rows = x
-            .all::<L>()
-            .par_chunks(CHUNK)
-            .zip(y.all::<L>().par_chunks(CHUNK));
-        let parts: Vec<[f64; L]> = rows
-            .zip(self.areas.par_chunks(CHUNK))
-            .map(|((x, y), areas)| {
-                let mut sum = [0.0; L];
-                for ((x, y), area) in x.iter().zip(y).zip(areas) {
-                    for l in 0..L {
-                        sum[l] += area * f64::from(x[l]) * f64::from(y[l]);
-                    }
-                }
-                sum
-            })
-            .collect();
-        parts.iter().fold([0.0; L], |sum, part| {
-            std::array::from_fn(|l| sum[l] + part[l])
-        })
     }
 }
 

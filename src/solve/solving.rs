@@ -206,17 +206,9 @@ impl Bake {
             two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
         };
         if lit.reflection.sheets.is_some() {
-            let receive = |radiosity: &Rows| {
-                let mut nodes = Rows::zero(self.tree.nodes.len(), L);
-                let mut seen = Rows::zero(lit.leaves.len(), L);
-                system.receive::<L>(radiosity, &mut nodes, &mut seen);
-                seen
-            };
-            return self.through_sheets(lit, &receive).solve::<L>(
-                lit.first,
-                reflected,
-                lit.tolerance,
-            );
+            let receive = |radiosity: &Rows| system.received::<L>(radiosity);
+            let sheets = self.through_sheets(lit, &receive);
+            return sheets.solve::<L>(lit.first, reflected, lit.tolerance);
         }
         match &lit.reflection.mixed {
             Some(mixed) => mixed.solve_by_rays::<L>(&system, lit.first, reflected, lit.tolerance),
@@ -238,14 +230,7 @@ impl Bake {
             greatest: &lit.reflection.greatest,
         };
         if lit.reflection.sheets.is_some() {
-            let receive = |radiosity: &Rows| {
-                let nodes = self.tree.nodes.len();
-                let (mut means, mut gathered) = (Rows::zero(nodes, L), Rows::zero(nodes, L));
-                let mut seen = Rows::zero(lit.leaves.len(), L);
-                let operator = &system.operator;
-                operator.irradiance::<L>(radiosity, &mut means, &mut gathered, &mut seen);
-                seen
-            };
+            let receive = |radiosity: &Rows| system.operator.received::<L>(radiosity);
             let sheets = self.through_sheets(lit, &receive);
             return sheets.solve::<L>(lit.first, reflected, lit.tolerance).0;
         }

@@ -8,6 +8,7 @@ use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
 use crate::scene::mirror::Mirror;
+use crate::scene::sheet::SheetMeans;
 use crate::scene::{Emission, GREATEST_ALBEDO, Material, Scene, Surface, Texture};
 use crate::spectrum::Leaves;
 use glam::DVec3;
@@ -39,26 +40,6 @@ pub(crate) struct Painter<'a> {
     sheets: Vec<Option<SheetMeans>>,
 }
 
-/// What a sheet is in the mean of its textures.
-#[derive(Debug)]
-struct SheetMeans {
-    color: Option<[f32; 3]>,
-    /// What its light is shown by.
-    shown: Leaves,
-}
-
-impl SheetMeans {
-    fn new(material: &Material, scene: &Scene, upsampler: &Upsampler) -> Option<Self> {
-        let sheet = material.sheet.as_ref()?;
-        let color = material.mean_color(&scene.images);
-        let weave = sheet.mean_weave(&scene.images);
-        Some(Self {
-            color,
-            shown: material.shown(sheet, color, weave, upsampler),
-        })
-    }
-}
-
 impl<'a> Painter<'a> {
     /// A painter for the materials of a scene.
     pub(crate) fn new(scene: &'a Scene, mesh: &'a Mesh, upsampler: &'a Upsampler) -> Self {
@@ -68,7 +49,7 @@ impl<'a> Painter<'a> {
             mesh,
             upsampler,
             sheets: sheets
-                .map(|material| SheetMeans::new(material, scene, upsampler))
+                .map(|material| material.sheet_means(&scene.images, upsampler))
                 .collect(),
         }
     }

@@ -2,13 +2,16 @@
 
 mod file;
 mod room;
-mod three;
+mod shown;
 
 #[path = "../report/browser.rs"]
 mod browser;
 
 #[path = "../common/built.rs"]
 mod built;
+
+#[path = "../common/three.rs"]
+mod three;
 
 use file::{Mapped, Texels};
 use glam::{DVec2, DVec3, dvec3};
@@ -199,9 +202,9 @@ fn three_js_shows_what_probe_finds() {
     let points = random(&all, 1000);
     let places: Vec<_> = points
         .iter()
-        .map(|p| (p.of.entry, p.at, three::facing(p.of)))
+        .map(|p| (p.of.entry, p.at, shown::facing(p.of)))
         .collect();
-    let Some(seen) = three::shown(file.folder.path(), &file.index, &places) else {
+    let Some(seen) = shown::shown(file.folder.path(), &file.index, &places) else {
         return;
     };
     let places: Vec<_> = points.iter().map(|p| (p.at, p.normal)).collect();

@@ -1,12 +1,15 @@
 //! Layers: the light of groups of lamps adds up to the whole, and is what the group alone would give.
 
-mod three;
+mod dimmed;
 
 #[path = "../report/browser.rs"]
 mod browser;
 
 #[path = "../common/built.rs"]
 mod built;
+
+#[path = "../common/three.rs"]
+mod three;
 
 use built::Room;
 use glam::{DVec3, dvec3};
@@ -594,7 +597,7 @@ fn what_does_not_go_together_is_refused() {
 fn three_js_shows_the_sum_of_dimmed_layers() {
     let bake = parted(loaded("two-rooms.glb", None), 2.0);
     let glb = written(&bake, Packing::Floats);
-    let Some(seen) = three::seen(&glb.bytes, &[0.25, 0.6]) else {
+    let Some(seen) = dimmed::seen(&glb.bytes, &[0.25, 0.6]) else {
         return;
     };
     assert!(seen.len() > 20, "{}", seen.len());

@@ -2,7 +2,7 @@
 
 use crate::light::Solved;
 use crate::records::flat;
-use crate::room::Data;
+use crate::data::Data;
 use crate::work::{Listener, Tell, answer, told};
 use haarlight::Error;
 use haarlight::cli::stop::Stop;

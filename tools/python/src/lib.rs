@@ -18,6 +18,7 @@
 
 mod arrays;
 mod bake;
+mod data;
 mod errors;
 mod light;
 mod maps;
@@ -34,7 +35,7 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("PROGRAM", haarlight::PROGRAM)?;
-    module.add_class::<room::Room>()?;
+    module.add_class::<data::Room>()?;
     module.add_class::<result::Lit>()?;
     module.add_function(wrap_pyfunction!(room::load, module)?)?;
     module.add_function(wrap_pyfunction!(spectra::spectra, module)?)?;

@@ -1,6 +1,6 @@
 //! What a bake knows, or the same room under other lamps.
 
-use crate::room::Data;
+use crate::data::Data;
 use glam::DVec3;
 use haarlight::audit::{self, Reference};
 use haarlight::gather::{Baked, BakedSurface, Probed};

@@ -1,12 +1,12 @@
 //! The light of a room: arrays of its mesh, probes, audits, files.
 
 use crate::arrays::{self, line, points, rows, sealed};
+use crate::data::Room;
 use crate::errors::{raised, warn, wrong};
 use crate::light::{Light, Solved};
 use crate::maps;
 use crate::records::{flat, plain};
 use crate::relight::Change;
-use crate::room::Room;
 use crate::work::done;
 use haarlight::Error;
 use haarlight::gather::{Baked, BakedSurface, BakedVertex, refined};

@@ -1,57 +1,21 @@
 //! A room that was read: what it holds, and what the program will do with it.
 
 use crate::bake::{self, Wanted};
+use crate::data::{Data, Room, json_of};
 use crate::errors::{warn, wrong};
 use crate::records::plain;
 use crate::result::Lit;
 use crate::work::done;
-use haarlight::Error;
 use haarlight::cli::options::Range;
 use haarlight::scene::effects::Plan;
 use haarlight::scene::facts::Facts;
-use haarlight::scene::{Options, Scene};
-use haarlight::survey::{Wishes, advise};
+use haarlight::scene::Options;
+use haarlight::survey::Wishes;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// A room with what it was read by.
-#[derive(Clone)]
-pub(crate) struct Data {
-    pub(crate) path: PathBuf,
-    pub(crate) options: Options,
-    pub(crate) wishes: Wishes,
-    pub(crate) scene: Scene,
-    /// Lamps whose light was multiplied since the room was read, and by what.
-    pub(crate) dimmed: BTreeMap<String, f64>,
-}
-
-impl Data {
-    /// Reads a room and looks it over.
-    pub(crate) fn read(path: PathBuf, options: Options, wishes: Wishes) -> haarlight::Result<Self> {
-        let mut scene = Scene::load(&path, &options)?;
-        let problems = advise(&mut scene, wishes);
-        if !problems.is_empty() {
-            return Err(Error::Input(problems));
-        }
-        Ok(Self {
-            path,
-            options,
-            wishes,
-            scene,
-            dimmed: BTreeMap::new(),
-        })
-    }
-}
-
-/// A room, read and checked. Made by `load`.
-#[pyclass(frozen, module = "haarlight")]
-pub(crate) struct Room {
-    pub(crate) data: Arc<Data>,
-}
 
 /// Reads a room, .glb or .gltf.
 ///
@@ -117,19 +81,6 @@ pub(crate) fn load(
     Ok(Room {
         data: Arc::new(data),
     })
-}
-
-/// A dictionary in the words of a file of spectra.
-pub(crate) fn json_of(given: &Bound<'_, PyAny>, name: &str) -> PyResult<Value> {
-    let py = given.py();
-    let text = py
-        .import("haarlight._types")?
-        .call_method1("_json", (given,));
-    let next = "give a dictionary as in a file of spectra";
-    let text: String = text
-        .and_then(|text| text.extract())
-        .map_err(|problem| wrong(py, name, problem.value(py).to_string(), next))?;
-    serde_json::from_str(&text).map_err(|problem| wrong(py, name, problem.to_string(), next))
 }
 
 #[pymethods]
