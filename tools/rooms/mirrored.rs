@@ -41,8 +41,9 @@ pub(crate) fn room() -> Glb {
     leaning(&mut glb);
     let eye = dvec3(0.3, 1.5, 2.7);
     glb.camera("door", eye, dvec3(2.4, 0.9, 0.4), 1.1, 4.0 / 3.0);
-    let eye = dvec3(3.2, 1.6, 0.7);
-    glb.camera("wall", eye, dvec3(0.2, 1.0, 2.2), 1.0, 4.0 / 3.0);
+    // The leaning mirror and what it throws on the wall.
+    let eye = dvec3(3.3, 1.9, 0.35);
+    glb.camera("across", eye, dvec3(1.4, 0.7, 2.5), 1.3, 4.0 / 3.0);
     glb
 }
 
@@ -91,9 +92,15 @@ fn leaning(glb: &mut Glb) {
     glb.draw("leaning mirror", &[(&mesh, bronze)]);
     let back = glb.paint("board", [0.25, 0.18, 0.12]);
     let off = dvec3(0.015, -0.005, 0.0);
+    let front = [low, low + across, high + across, high];
+    let middle = 0.5 * (low + high + across);
     let mut mesh = Mesh::default();
-    let corners = [low, low + across, high + across, high].map(|p| p + off);
-    mesh.quad(corners, dvec3(9.0, -1.0, 1.9));
+    mesh.quad(front.map(|p| p + off), middle + 9.0 * off);
+    for k in 0..4 {
+        let [a, b] = [front[k], front[(k + 1) % 4]];
+        let outside = 5.0 * (0.5 * (a + b) - middle) + middle;
+        mesh.quad([a, b, b + off, a + off], outside);
+    }
     glb.draw("board", &[(&mesh, back)]);
     let spot = json!({
         "name": "spot", "type": "spot", "intensity": 700.0, "color": [1.0, 0.9, 0.75],
