@@ -9,7 +9,7 @@ use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Face, Glazing, Mesh, Panes};
-use crate::scene::sky::SUN_RADIUS;
+use crate::scene::sky::{SUN_RADIUS, Sky};
 use crate::scene::{Alpha, LightKind, Material, PunctualLight, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
@@ -157,12 +157,13 @@ impl<'a> Audit<'a> {
         for bounce in 0.. {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
             self.punctual(&at, toward_lamp, rng, &throughput, sum);
+            self.spot(&at, toward_lamp, &throughput, sum);
             let direction = cosine_direction(at.normal, toward_any);
             let hit = self.closest(at.point, direction, at.plane);
             let reach = hit.map_or(4.0 * self.mesh.half_size, |hit| f64::from(hit.t));
             throughput = self.filtered(&throughput, at.point, at.point + direction * reach);
             let Some(hit) = hit else {
-                self.outside(direction, &throughput, sum);
+                self.outside(&at, direction, &throughput, sum);
                 return;
             };
             let triangle = hit.triangle as usize;
@@ -304,18 +305,61 @@ impl<'a> Audit<'a> {
         }
     }
 
-    /// What a path that leaves the room brings from there.
-    fn outside(&self, direction: DVec3, throughput: &Leaves, sum: &mut Leaves) {
+    /// What a path that leaves the room in a direction chosen by the cosine brings from there.
+    fn outside(&self, at: &Vertex, direction: DVec3, throughput: &Leaves, sum: &mut Leaves) {
         let Some(sky) = &self.scene.sky else { return };
+        let by_cosine = at.normal.dot(direction).max(0.0) / PI;
+        let by_spot = sky.spot_density(direction);
+        if by_cosine > 0.0 {
+            let weight = by_cosine / (by_cosine + by_spot) / by_cosine;
+            self.far(sky, at, direction, weight, throughput, sum);
+        }
+    }
+
+    /// Light straight from a bright spot of a map.
+    fn spot(&self, at: &Vertex, square: [f64; 2], throughput: &Leaves, sum: &mut Leaves) {
+        let Some((sky, direction)) = self
+            .scene
+            .sky
+            .as_ref()
+            .and_then(|s| Some((s, s.spot(square)?)))
+        else {
+            return;
+        };
+        let by_cosine = at.normal.dot(direction) / PI;
+        let end = at.point + direction * (4.0 * self.mesh.half_size);
+        let way = Segment::new(at.point, end, [at.plane, NO_PLANE]);
+        if by_cosine <= 0.0 || self.blocked(&way) {
+            return;
+        }
+        let weight = 1.0 / (by_cosine + sky.spot_density(direction));
+        let throughput = self.filtered(throughput, at.point, end);
+        self.far(sky, at, direction, weight, &throughput, sum);
+    }
+
+    /// Adds a weight times what comes from a direction outside, by its cosine.
+    fn far(
+        &self,
+        sky: &Sky,
+        at: &Vertex,
+        direction: DVec3,
+        weight: f64,
+        throughput: &Leaves,
+        sum: &mut Leaves,
+    ) {
+        let (first, radiance) = sky.radiance(direction);
+        let weight = weight * at.normal.dot(direction);
         for light in &self.scene.lights {
-            let radiance = match light.kind {
-                LightKind::Sky if direction.y > 0.0 => sky.radiance(direction),
-                LightKind::Ground if direction.y <= 0.0 => 1.0 / PI,
-                _ => continue,
+            let part = light
+                .kind
+                .place()
+                .and_then(|place| place.checked_sub(first));
+            let Some(radiance) = part.and_then(|k| radiance.get(k)) else {
+                continue;
             };
             let power = &self.scene.spectra[light.light].power;
             for l in 0..LEAVES {
-                sum[l] += throughput[l] * PI * radiance * power[l] * light.shape[l];
+                sum[l] += throughput[l] * weight * radiance * power[l] * light.shape[l];
             }
         }
     }

@@ -277,10 +277,10 @@ impl Gatherer<'_> {
         let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
         let each: Vec<(f64, DVec3)> = lamps
             .filter_map(|((lamp, _), &bright)| {
-                let (factor, end) = match (lamp.kind, far) {
-                    (LightKind::Sky | LightKind::Ground, Some((d, factors))) => {
-                        let factor = factors[usize::from(lamp.kind == LightKind::Ground)];
-                        (factor, to.point + d * (4.0 * self.light.half_size))
+                let (factor, end) = match (lamp.kind, lamp.kind.place().zip(far)) {
+                    (_, Some((place, (d, factors)))) => {
+                        let end = to.point + d * (4.0 * self.light.half_size);
+                        (factors[place], end)
                     }
                     (LightKind::Surface, _) => {
                         // Which lamp is chosen must not tell which of its points.
