@@ -1,8 +1,6 @@
 //! What is outside, as typed.
 
-use crate::scene::sky::{
-    BRIGHT, Brightness, KELVIN, SkyName, SkyWish, SunPlace, SunWish, TURN,
-};
+use crate::scene::sky::{BRIGHT, Brightness, KELVIN, SkyName, SkyWish, SunPlace, SunWish, TURN};
 
 /// Options of sky and sun. Each wins over what the file of spectra says.
 #[derive(Debug, Clone, Default, clap::Args)]
