@@ -17,6 +17,9 @@ use std::f64::consts::{PI, TAU};
 
 /// Greatest error of a point.
 const POINT: f64 = 5e-3;
+/// And of light that comes from a mask, more: where nothing else is seen, below a canopy, patches of the canopy are known to .8 %, with
+/// a smaller `--error` as well.
+const MASK: f64 = 5e-3;
 /// Reflectance of ground and masks.
 const RHO: f64 = 0.3;
 
@@ -76,7 +79,7 @@ struct Mask {
 }
 
 /// Points along the sides of a mask that its light is worked out at; linear between.
-const NODES: [usize; 2] = [41, 13];
+const NODES: [usize; 2] = [121, 13];
 
 impl Mask {
     fn new(corner: DVec3, sides: [DVec3; 2], sky: &Distribution) -> Self {
@@ -126,7 +129,7 @@ impl Mask {
 
 /// Irradiance of a point outside past the black room, under a sky of 1, by the midpoint rule over the disc.
 fn lit(point: DVec3, normal: DVec3, sky: &Distribution) -> f64 {
-    const N: usize = 160;
+    const N: usize = 240;
     let x = normal.any_orthonormal_vector();
     let y = normal.cross(x);
     let mut sum = 0.0;
@@ -162,9 +165,12 @@ fn masked(corner: DVec3, sides: [DVec3; 2], kind: u8) {
     let places = places_beside();
     for (probed, place) in bake.probe(&places).iter().zip(places) {
         let seen = |d: DVec3| mask.met(place.0, d).unwrap_or_else(|| outside(&sky, d));
+        let passed_on = |d: DVec3| mask.met(place.0, d).unwrap_or(0.0);
         let (got, want) = (probed.xyz[1], LUX * whole(seen, window, place));
-        println!("type {kind}, {place:?}: {got:.4} for {want:.4}");
-        assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
+        let of_mask = LUX * whole(passed_on, window, place);
+        println!("type {kind}, {place:?}: {got:.4} for {want:.4}, {of_mask:.4} of the mask");
+        let most = POINT * want + MASK * of_mask;
+        assert!((got - want).abs() <= most, "{got} should be {want}");
     }
 }
 

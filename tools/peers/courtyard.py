@@ -130,7 +130,7 @@ def theirs(mi, picture, paths, seed):
         sampler.seed(seed + k, paths)
         n = mi.Vector3f(*normal)
         here = dr.zeros(mi.SurfaceInteraction3f, paths)
-        here.p, here.n, here.sh_frame = mi.Point3f(*(np.array(point) + 1e-4 * np.array(normal))), mi.Normal3f(n), mi.Frame3f(n)
+        here.p, here.n, here.sh_frame = mi.Point3f(*(p + 1e-4 * q for p, q in zip(point, normal))), mi.Normal3f(n), mi.Frame3f(n)
         to = here.sh_frame.to_world(mi.warp.square_to_cosine_hemisphere(sampler.next_2d()))
         light = rest(mi, dr, scene, integrator, sampler, here, to)
         lamp, sent = scene.sample_emitter_direction(here, sampler.next_2d(), True)
