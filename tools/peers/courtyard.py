@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A courtyard under a coloured sky: haarlight against Mitsuba 3, which get the same picture of the sky. See README.md.
 
-    courtyard.py [--haarlight target/release/haarlight] [--variant llvm_ad_rgb] [--paths 65536] [--sun]
+    courtyard.py [--haarlight target/release/haarlight] [--variant llvm_ad_rgb] [--paths 65536] [--sun | --formula]
 """
 
 import argparse
@@ -59,8 +59,8 @@ def directions():
     return np.stack([np.sin(down) * np.cos(along), np.cos(down), np.sin(down) * np.sin(along)], -1)
 
 
-def sky(sun):
-    """The clear sky of ISO 15469, type 12, bluer toward the zenith, some 10 klx; with its sun if asked for."""
+def sky(sun=False, white=False):
+    """The clear sky of ISO 15469, type 12, bluer toward the zenith unless it is white, some 10 klx; with its sun if asked for."""
     d = directions()
     h, a = np.radians(SUN)
     toward = np.array([np.cos(h) * np.sin(a), np.sin(h), -np.cos(h) * np.cos(a)])
@@ -69,11 +69,18 @@ def sky(sun):
     light = 1 - np.exp(-0.32 / up)
     light *= 1 + 10 * (np.exp(-3 * np.arccos(cosine)) - np.exp(-1.5 * np.pi)) + 0.45 * cosine**2
     blue = np.array([0.6, 0.95, 2.0]) * up[..., None] + np.array([1.0, 1.0, 1.0]) * (1 - up[..., None])
-    picture = 3000 * light[..., None] * blue
+    picture = 3000 * light[..., None] * (np.ones(3) if white else blue)
     if sun:
         picture[cosine > np.cos(np.radians(1.0))] += np.array([6.0e7, 5.5e7, 4.5e7])
     picture[d[..., 1] < 0] = 0
     return picture.astype(np.float32)
+
+
+def level(picture):
+    """Illuminance of open ground."""
+    edges = np.sin(np.pi * np.arange(WIDTH // 2 + 1) / (WIDTH // 2)) ** 2
+    weight = np.where(np.arange(WIDTH // 2) < WIDTH // 4, np.diff(edges), 0) * np.pi / WIDTH
+    return float((picture.astype(float) @ TO_XYZ[1] * weight[:, None]).sum())
 
 
 def glb(path):
@@ -97,12 +104,13 @@ def glb(path):
     write_glb(path, document, buffers)
 
 
-def ours(program, folder, picture):
+def ours(program, folder, sky):
+    """`sky`: the words that ask for it."""
     room, points = (os.path.join(folder, name) for name in ("room.glb", "points.csv"))
     glb(room)
     with open(points, "w") as out:
         out.write("x,y,z,nx,ny,nz\n" + "".join(",".join(map(str, p + n)) + "\n" for p, n in places()))
-    words = [program, "probe", room, "--points", points, "--sky", picture, "-q"]
+    words = [program, "probe", room, "--points", points, "-q", *sky]
     run = subprocess.run(words, capture_output=True, text=True)
     if run.returncode not in (0, 1):
         sys.exit(run.stderr)
@@ -135,7 +143,7 @@ def theirs(mi, picture, paths, seed):
         light = rest(mi, dr, scene, integrator, sampler, here, to)
         lamp, sent = scene.sample_emitter_direction(here, sampler.next_2d(), True)
         cosine = dr.maximum(dr.dot(n, lamp.d), 0)
-        light += sent * cosine * lamp.pdf / (lamp.pdf + cosine / dr.pi)
+        light += sent * cosine * lamp.pdf / dr.maximum(lamp.pdf + cosine / dr.pi, 1e-30)
         found.append([float(dr.mean(light[c])[0]) for c in range(3)])
     return np.array(found) @ TO_XYZ.T
 
@@ -150,7 +158,7 @@ def rest(mi, dr, scene, integrator, sampler, here, to):
     target.d = to
     target.emitter = scene.environment()
     other = scene.pdf_emitter_direction(here, target)
-    share = dr.select(hit.is_valid(), 1, density / (density + other))
+    share = dr.select(hit.is_valid(), 1, density / dr.maximum(density + other, 1e-30))
     return light * dr.pi * share
 
 
@@ -159,16 +167,21 @@ def main():
     parser.add_argument("--haarlight", default="target/release/haarlight")
     parser.add_argument("--variant", default="llvm_ad_rgb")
     parser.add_argument("--paths", type=int, default=65536)
-    parser.add_argument("--sun", action="store_true", help="a disc of 2 degrees, 60 klx")
+    parser.add_argument("--sun", action="store_true", help="a disc of 2 degrees, 50 klx")
+    parser.add_argument("--formula", action="store_true", help="haarlight's own sky of type 12, for Mitsuba tabulated; white")
     args = parser.parse_args()
     import mitsuba as mi
 
     mi.set_variant(args.variant)
-    picture = sky(args.sun)
+    picture = sky(args.sun, args.formula)
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "sky.exr")
         mi.Bitmap(picture).write(path)
-        a = ours(os.path.abspath(args.haarlight), folder, path)
+        words = ["--sky", path]
+        if args.formula:
+            where = ["--sun", ",".join(map(str, SUN)), "--sun-lux", "0", "--ground", "0"]
+            words = ["--sky", "clear", "--sky-cct", "6504", "--sky-lux", str(level(picture)), *where]
+        a = ours(os.path.abspath(args.haarlight), folder, words)
     runs = [theirs(mi, picture, args.paths, 1 + 1000 * k) for k in range(4)]
     b, noise = np.mean(runs, 0), np.std(runs, 0, ddof=1) / 2
     for (point, _), x, y, e in zip(places(), a, b, noise):

@@ -44,37 +44,26 @@ pub(crate) fn join(
         lights,
         spectra,
     };
-    // Of a map nothing is known: the sun shines as it does in a clear sky.
-    let usual_sun = |elevation| usual(kind.unwrap_or(CLEAR), Some(elevation))[1];
-    let sun_lux = sun.as_ref().map_or(0.0, |sun| {
-        let own = sun.light.map(|k| makes.size_of(k));
-        let usual = usual_sun(angles(sun.toward)[0]);
-        wish.sun.illuminance.or(own).unwrap_or(usual)
-    });
-    let ground = light.ground;
-    let mut sky = makes.sky(light);
-    sky.sun_of_file = sun.as_ref().is_some_and(|sun| sun.light.is_some());
-    if sun_lux <= 0.0
-        && let Some(Sun { light: Some(k), .. }) = sun
-    {
-        // A sun of the file without light is none.
-        makes.lights.remove(k);
-        sky.sun_of_file = false;
-    }
-    if let Some(sun) = sun.filter(|_| sun_lux > 0.0) {
-        let kelvin = wish.sun.kelvin.unwrap_or(SUN_KELVIN);
-        if let (Some(k), None) = (sun.light, wish.sun.kelvin) {
-            let name = short(&makes.lights[k].name);
-            check.warn(format!(
-                "light '{name}' is the sun: its colour gives way to daylight of {kelvin:.0} K (\"cct_k\" sets another)"
-            ));
+    let (ground, own_sun) = (light.ground, light.sun);
+    let (mut sky, spectrum) = makes.sky(light);
+    let shining = match sun {
+        Some(sun) => {
+            // Of a map nothing is known: the sun shines as it does in a clear sky.
+            let usual = usual(kind.unwrap_or(CLEAR), Some(angles(sun.toward)[0]));
+            makes.placed(wish, &sun, usual[1], check)
         }
-        makes.sun(&sun, sun_lux, kelvin, ground);
+        None => own_sun.and_then(|(toward, shape)| makes.of_map(wish, toward, spectrum, shape)),
+    };
+    if let Some(sun) = shining {
+        let lux = makes.size(sun.spectrum, &sun.shape);
         let [elevation, azimuth] = angles(sun.toward);
         let azimuth = (azimuth - wish.north.unwrap_or(0.0)).rem_euclid(360.0);
         sky.sun_said = Some(format!(
-            "{elevation:.1} deg high, azimuth {azimuth:.1} deg, {sun_lux:.0} lx across its rays, {kelvin:.0} K"
+            "{elevation:.1} deg high, azimuth {azimuth:.1} deg, {lux:.0} lx across its rays, {}",
+            sun.said
         ));
+        sky.sun_of_file = sun.light.is_some();
+        makes.sun(&sun, ground);
     }
     sky.bright = makes.bright();
     Some(sky)
@@ -166,6 +155,17 @@ fn sun_of(
     Ok(Some(Sun { toward, light }))
 }
 
+/// A sun that shines.
+struct Shining {
+    toward: DVec3,
+    /// The light of the file that it is.
+    light: Option<usize>,
+    spectrum: usize,
+    shape: Leaves,
+    /// Its colour, in words.
+    said: String,
+}
+
 /// Where lamps and spectra go.
 struct Makes<'a> {
     grid: &'a Grid,
@@ -183,8 +183,8 @@ impl Makes<'_> {
         })
     }
 
-    /// Adds the lamps of a sky and of what lies below the horizon.
-    fn sky(&mut self, light: Light) -> Sky {
+    /// Adds the lamps of a sky and of what lies below the horizon; also returns the index of their spectrum.
+    fn sky(&mut self, light: Light) -> (Sky, usize) {
         let spectrum = self.add_spectrum(light.spectrum);
         let mut below = light.below;
         if let Some(rho) = light.ground {
@@ -200,39 +200,108 @@ impl Makes<'_> {
             let (name, kind) = (format!("ground{suffix}"), LightKind::Ground(k as u8));
             self.lamp(&name, kind, DVec3::Y, spectrum, below[k]);
         }
-        Sky {
+        let sky = Sky {
             dome: light.dome,
             said: light.said,
             sun_said: None,
             sun_of_file: false,
             below: light.ground.is_none(),
             bright: [0.0; PLACES],
+        };
+        (sky, spectrum)
+    }
+
+    /// The sun where it was asked for. A light of the file that has none is taken out.
+    fn placed(
+        &mut self,
+        wish: &SkyWish,
+        sun: &Sun,
+        usual: f64,
+        check: &mut Check,
+    ) -> Option<Shining> {
+        let own = sun.light.map(|k| self.size_of(k));
+        let lux = wish.sun.illuminance.or(own).unwrap_or(usual);
+        if lux <= 0.0 {
+            if let Some(k) = sun.light {
+                self.lights.remove(k);
+            }
+            return None;
         }
+        let kelvin = wish.sun.kelvin.unwrap_or(SUN_KELVIN);
+        if let (Some(k), None) = (sun.light, wish.sun.kelvin) {
+            let name = short(&self.lights[k].name);
+            check.warn(format!(
+                "light '{name}' is the sun: its colour gives way to daylight of {kelvin:.0} K (\"cct_k\" sets another)"
+            ));
+        }
+        Some(Shining {
+            toward: sun.toward,
+            light: sun.light,
+            spectrum: self.add_spectrum(of_daylight(kelvin, self.grid)),
+            shape: [lux; LEAVES],
+            said: format!("{kelvin:.0} K"),
+        })
+    }
+
+    /// The sun of a map, as it is there or as it was asked for.
+    fn of_map(
+        &mut self,
+        wish: &SkyWish,
+        toward: DVec3,
+        spectrum: usize,
+        shape: Leaves,
+    ) -> Option<Shining> {
+        let own = self.size(spectrum, &shape);
+        let lux = wish.sun.illuminance.unwrap_or(own);
+        if lux <= 0.0 {
+            return None;
+        }
+        let (spectrum, shape, said) = match wish.sun.kelvin {
+            Some(kelvin) => {
+                let spectrum = self.add_spectrum(of_daylight(kelvin, self.grid));
+                (spectrum, [lux; LEAVES], format!("{kelvin:.0} K"))
+            }
+            None => (spectrum, shape.map(|x| x * lux / own), "of the map".into()),
+        };
+        Some(Shining {
+            toward,
+            light: None,
+            spectrum,
+            shape,
+            said,
+        })
     }
 
     /// Adds the sun, or makes it of a light of the file; and the ground that it shines on.
-    fn sun(&mut self, sun: &Sun, lux: f64, kelvin: f64, ground: Option<f64>) {
-        let light = self.add_spectrum(of_daylight(kelvin, self.grid));
-        let exitance = ground.unwrap_or(0.0) * lux * sun.toward.y;
-        let (kind, shape) = (LightKind::Ground(0), [exitance; LEAVES]);
-        self.lamp(LIT_GROUND, kind, DVec3::Y, light, shape);
+    fn sun(&mut self, sun: &Shining, ground: Option<f64>) {
+        let rho = ground.unwrap_or(0.0) * sun.toward.y;
+        let (kind, shape) = (LightKind::Ground(0), sun.shape.map(|x| rho * x));
+        self.lamp(LIT_GROUND, kind, DVec3::Y, sun.spectrum, shape);
         match sun.light {
-            None => self.lamp(SUN_NAME, LightKind::Sun, -sun.toward, light, [lux; LEAVES]),
+            None => {
+                let kind = LightKind::Sun;
+                self.lamp(SUN_NAME, kind, -sun.toward, sun.spectrum, sun.shape);
+            }
             Some(k) => {
                 let lamp = &mut self.lights[k];
                 lamp.kind = LightKind::Sun;
-                (lamp.light, lamp.shape) = (light, [lux; LEAVES]);
+                (lamp.light, lamp.shape) = (sun.spectrum, sun.shape);
             }
         }
     }
 
     /// Luminous size of a light of the file.
     fn size_of(&self, light: usize) -> f64 {
-        let luminous = Observer::cie1931().weights(self.grid)[1];
         let light = &self.lights[light];
-        let power = &self.spectra[light.light].power;
+        self.size(light.light, &light.shape)
+    }
+
+    /// Luminous size of a spectrum times a shape.
+    fn size(&self, spectrum: usize, shape: &Leaves) -> f64 {
+        let luminous = Observer::cie1931().weights(self.grid)[1];
+        let power = &self.spectra[spectrum].power;
         (0..LEAVES)
-            .map(|l| KM * power[l] * light.shape[l] * luminous[l])
+            .map(|l| KM * power[l] * shape[l] * luminous[l])
             .sum()
     }
 

@@ -2,7 +2,7 @@
 
 use super::Distribution;
 use super::dome::{Dome, PARTS, Tinted};
-use super::map::Map;
+use super::map::{Map, Wanted};
 use super::picture::Picture;
 use super::sun::angles;
 use super::wish::{BRIGHT, Brightness, SkyType, SkyWish};
@@ -38,6 +38,8 @@ pub(super) struct Light {
     pub(super) below: [Leaves; PARTS],
     /// Reflectance of open ground below the horizon, where that is what is seen there.
     pub(super) ground: Option<f64>,
+    /// A sun of its own: toward it, and the share of the spectrum across its rays.
+    pub(super) sun: Option<(DVec3, Leaves)>,
 }
 
 impl Light {
@@ -89,6 +91,7 @@ impl Light {
             above,
             below: [[0.0; LEAVES]; PARTS],
             ground: Some(ground),
+            sun: None,
         })
     }
 
@@ -121,7 +124,11 @@ impl Light {
             [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|c| upsampler.luminance(c));
         let north = wish.north.unwrap_or(0.0).to_radians();
         let [width, file_width] = [picture.width, picture.file_width];
-        let map = Map::new(picture, luminance, north, wish.ground.is_none());
+        let wanted = Wanted {
+            sun: wish.sun.place.is_none(),
+            below: wish.ground.is_none(),
+        };
+        let (map, sun) = Map::new(picture, luminance, north, wanted);
         let [above, below] = map.levels();
         let lux = |levels: [f64; PARTS]| -> f64 {
             levels.iter().zip(&luminance).map(|(e, y)| e * y).sum()
@@ -132,7 +139,7 @@ impl Light {
             None => 1.0,
         };
         let [up, down] = [above, below].map(|levels| white * lux(levels));
-        if lux(above) + lux(below) <= 0.0 {
+        if lux(above) + lux(below) <= 0.0 && sun.is_none() {
             check.problem(&place, "is black", "give one that shines");
             return None;
         }
@@ -165,6 +172,7 @@ impl Light {
             above: shapes(above),
             below: shapes(below),
             ground: wish.ground,
+            sun: sun.map(|sun| (sun.toward, sum_of(shapes(sun.across)))),
         })
     }
 }
@@ -196,6 +204,10 @@ fn usual_kelvin(kind: SkyType) -> f64 {
 /// The spectrum of daylight, luminous size 1.
 pub(super) fn of_daylight(kelvin: f64, grid: &Grid) -> LightSpectrum {
     sized(format!("daylight/{kelvin:.0}"), &daylight(kelvin), grid)
+}
+
+fn sum_of(parts: [Leaves; PARTS]) -> Leaves {
+    std::array::from_fn(|l| parts.iter().map(|part| part[l]).sum())
 }
 
 /// The spectrum of a map's white, luminous size 1.

@@ -7,22 +7,32 @@
 //! row and then within the row: by the excess alone, since rays that look everywhere find the rest (Karlik et al. 2019, "MIS
 //! compensation").
 
+use super::disc::Disc;
 use super::dome::PARTS;
 use super::picture::Picture;
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+/// What is wanted of a picture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    /// Its sun by itself.
+    pub(super) sun: bool,
+    /// What it shows below the horizon.
+    pub(super) below: bool,
+}
+
 /// A picture of all directions.
 #[derive(Debug)]
 pub struct Map {
-    width: usize,
-    height: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
     /// Red, green and blue.
-    texels: Vec<[f32; 3]>,
+    pub(super) texels: Vec<[f32; 3]>,
     /// Where north is, radians clockwise from -Z.
     turn: f64,
     /// Luminance of red, green and blue.
-    luminance: [f64; PARTS],
+    pub(super) luminance: [f64; PARTS],
     /// Irradiance by each above the horizon of a plane that looks up, and below it of one that looks down.
     levels: [[f64; PARTS]; 2],
     is_even: bool,
@@ -34,9 +44,14 @@ pub struct Map {
 }
 
 impl Map {
-    /// Of a picture. `luminance`: of red, green and blue; `north`: where it is, radians clockwise from -Z; `below`: does what is below the
-    /// horizon count?
-    pub(super) fn new(picture: Picture, luminance: [f64; PARTS], north: f64, below: bool) -> Self {
+    /// Of a picture, with what is taken out of it as its sun where one is looked for. `luminance`: of red, green and blue; `north`: where it is,
+    /// radians clockwise from -Z.
+    pub(super) fn new(
+        picture: Picture,
+        luminance: [f64; PARTS],
+        north: f64,
+        wanted: Wanted,
+    ) -> (Self, Option<Disc>) {
         let mut map = Self {
             width: picture.width,
             height: picture.height,
@@ -49,7 +64,8 @@ impl Map {
             rows: Vec::new(),
             columns: Vec::new(),
         };
-        if !below {
+        let sun = if wanted.sun { map.take_sun() } else { None };
+        if !wanted.below {
             // A row that the horizon crosses stays.
             let first = map.height.div_ceil(2) * map.width;
             map.texels[first..].fill([0.0; PARTS]);
@@ -59,7 +75,7 @@ impl Map {
         let alike = |texels: &[[f32; PARTS]]| texels.windows(2).all(|two| two[0] == two[1]);
         map.is_even = alike(&map.texels[..half]) && alike(&map.texels[map.texels.len() - half..]);
         map.find_spots();
-        map
+        (map, sun)
     }
 
     /// Irradiance by red, green and blue of what is above the horizon (0) or below it (1), of a plane that faces it.
@@ -155,7 +171,16 @@ impl Map {
         row * self.width + column.min(self.width - 1)
     }
 
-    fn bright(&self, texel: usize) -> f64 {
+    /// The direction of the middle of a texel.
+    pub(super) fn middle(&self, texel: usize) -> DVec3 {
+        let (row, column) = (texel / self.width, texel % self.width);
+        let (out, height) = (PI * (row as f64 + 0.5) / self.height as f64).sin_cos();
+        let along = (column as f64 + 0.5) / self.width as f64 - 0.5;
+        let (sin, cos) = (TAU * along + self.turn).sin_cos();
+        DVec3::new(out * cos, height, out * sin)
+    }
+
+    pub(super) fn bright(&self, texel: usize) -> f64 {
         let parts = self.texels[texel].iter().zip(&self.luminance);
         parts.map(|(x, y)| f64::from(*x) * y).sum()
     }
@@ -166,7 +191,7 @@ impl Map {
     }
 
     /// Of a texel of a row.
-    fn solid_angle(&self, row: usize) -> f64 {
+    pub(super) fn solid_angle(&self, row: usize) -> f64 {
         let [top, bottom] = self.edges(row);
         TAU / self.width as f64 * (top.cos() - bottom.cos())
     }
@@ -175,7 +200,7 @@ impl Map {
         &self.columns[row * self.width..(row + 1) * self.width]
     }
 
-    fn level(&self, half: usize) -> [f64; PARTS] {
+    pub(super) fn level(&self, half: usize) -> [f64; PARTS] {
         let ends = [[0.0, FRAC_PI_2], [FRAC_PI_2, PI]][half];
         let mut sum = [0.0; PARTS];
         for (row, texels) in self.texels.chunks(self.width).enumerate() {
@@ -235,7 +260,11 @@ mod tests {
         let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let texels = places.map(|(x, y)| texel(x, y)).collect();
         let picture = Picture::shrunk(width, height, texels);
-        Map::new(picture, [0.2, 0.7, 0.1], north, true)
+        let wanted = Wanted {
+            sun: false,
+            below: true,
+        };
+        Map::new(picture, [0.2, 0.7, 0.1], north, wanted).0
     }
 
     #[test]
@@ -245,6 +274,9 @@ mod tests {
         // East, south, west, north, each a little clockwise of it and above the horizon.
         for (azimuth, column) in [(91.0, 4.0), (181.0, 6.0), (271.0, 0.0), (1.0, 2.0)] {
             assert_eq!(at(direction(10.0, azimuth))[0], column, "{azimuth}");
+        }
+        for k in 0..32 {
+            assert_eq!(map.texel(map.middle(k)), k);
         }
         assert_eq!(at(DVec3::Y)[1], 0.0);
         assert_eq!(at(DVec3::NEG_Y)[1], 3.0);

@@ -3,7 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `cie` | how luminance lies over the dome: ISO 15469 |
-//! | `picture`, `map` | a picture of all directions in its place |
+//! | `picture`, `map`, `disc` | a picture of all directions in its place, and the sun in it |
 //! | `dome` | both: what comes from each direction |
 //! | `sun` | where the sun stands |
 //! | `wish` | what a side file or a command line says of sky and sun |
@@ -21,6 +21,7 @@
 
 mod alone;
 mod cie;
+mod disc;
 mod dome;
 mod lamps;
 mod light;
