@@ -9,7 +9,7 @@ use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Face, Glazing, Mesh, Panes};
-use crate::scene::sky::{SUN_RADIUS, Sky};
+use crate::scene::sky::SUN_RADIUS;
 use crate::scene::{Alpha, LightKind, Material, PunctualLight, Scene, Sides, Texture};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
@@ -23,8 +23,8 @@ const SURE_BOUNCES: usize = 3;
 
 /// The estimator.
 pub struct Audit<'a> {
-    scene: &'a Scene,
-    mesh: &'a Mesh,
+    pub(super) scene: &'a Scene,
+    pub(super) mesh: &'a Mesh,
     rays: &'a RayIndex,
     upsampler: Upsampler,
     /// Faces that emit, and the running sum of what they are chosen by.
@@ -61,10 +61,10 @@ impl Answer {
 }
 
 /// A place that light scatters at.
-struct Vertex {
-    point: DVec3,
-    normal: DVec3,
-    plane: u32,
+pub(super) struct Vertex {
+    pub(super) point: DVec3,
+    pub(super) normal: DVec3,
+    pub(super) plane: u32,
 }
 
 impl<'a> Audit<'a> {
@@ -305,65 +305,6 @@ impl<'a> Audit<'a> {
         }
     }
 
-    /// What a path that leaves the room in a direction chosen by the cosine brings from there.
-    fn outside(&self, at: &Vertex, direction: DVec3, throughput: &Leaves, sum: &mut Leaves) {
-        let Some(sky) = &self.scene.sky else { return };
-        let by_cosine = at.normal.dot(direction).max(0.0) / PI;
-        let by_spot = sky.spot_density(direction);
-        if by_cosine > 0.0 {
-            let weight = by_cosine / (by_cosine + by_spot) / by_cosine;
-            self.far(sky, at, direction, weight, throughput, sum);
-        }
-    }
-
-    /// Light straight from a bright spot of a map.
-    fn spot(&self, at: &Vertex, square: [f64; 2], throughput: &Leaves, sum: &mut Leaves) {
-        let Some((sky, direction)) = self
-            .scene
-            .sky
-            .as_ref()
-            .and_then(|s| Some((s, s.spot(square)?)))
-        else {
-            return;
-        };
-        let by_cosine = at.normal.dot(direction) / PI;
-        let end = at.point + direction * (4.0 * self.mesh.half_size);
-        let way = Segment::new(at.point, end, [at.plane, NO_PLANE]);
-        if by_cosine <= 0.0 || self.blocked(&way) {
-            return;
-        }
-        let weight = 1.0 / (by_cosine + sky.spot_density(direction));
-        let throughput = self.filtered(throughput, at.point, end);
-        self.far(sky, at, direction, weight, &throughput, sum);
-    }
-
-    /// Adds a weight times what comes from a direction outside, by its cosine.
-    fn far(
-        &self,
-        sky: &Sky,
-        at: &Vertex,
-        direction: DVec3,
-        weight: f64,
-        throughput: &Leaves,
-        sum: &mut Leaves,
-    ) {
-        let (first, radiance) = sky.radiance(direction);
-        let weight = weight * at.normal.dot(direction);
-        for light in &self.scene.lights {
-            let part = light
-                .kind
-                .place()
-                .and_then(|place| place.checked_sub(first));
-            let Some(radiance) = part.and_then(|k| radiance.get(k)) else {
-                continue;
-            };
-            let power = &self.scene.spectra[light.light].power;
-            for l in 0..LEAVES {
-                sum[l] += throughput[l] * weight * radiance * power[l] * light.shape[l];
-            }
-        }
-    }
-
     fn punctual(
         &self,
         at: &Vertex,
@@ -462,7 +403,7 @@ impl<'a> Audit<'a> {
     }
 
     /// What panes between two points leave of light, leaf by leaf.
-    fn filtered(&self, throughput: &Leaves, from: DVec3, to: DVec3) -> Leaves {
+    pub(super) fn filtered(&self, throughput: &Leaves, from: DVec3, to: DVec3) -> Leaves {
         let mut left = *throughput;
         let Some(panes) = &self.panes else {
             return left;
@@ -501,7 +442,7 @@ impl<'a> Audit<'a> {
             .closest(from.as_vec3(), direction.as_vec3(), reach, plane)
     }
 
-    fn blocked(&self, segment: &Segment) -> bool {
+    pub(super) fn blocked(&self, segment: &Segment) -> bool {
         if self.masked {
             let opaque = |t: u32, u: f32, v: f32| {
                 !crate::hierarchy::alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])

@@ -5,7 +5,7 @@
 use crate::scene::uri;
 use image::codecs::{hdr::HdrDecoder, openexr::OpenExrDecoder};
 use image::{DynamicImage, ImageDecoder, ImageResult, Limits};
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// Texels across that are kept.
@@ -15,8 +15,9 @@ const MOST: u64 = 1 << 25;
 /// Texels that a byte of a file can stand for at the most: deflate (RFC 1951) makes no more than 1032 bytes of one, run lengths of
 /// RGBE 16 texels.
 const RATIO: u64 = 1032;
-/// First bytes of the formats.
-const RGBE: &[u8] = b"#?RADIANCE";
+/// First bytes of the formats. Some write the second in the place of the first, which the decoder wants.
+const RADIANCE: &[u8] = b"#?RADIANCE";
+const RGBE: &[u8] = b"#?RGBE";
 const OPEN_EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 /// Chromaticities of red, green and blue (ITU-R BT.709), and how far off others may be that are still the same.
 const CHROMATICITIES: [[f32; 2]; 3] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]];
@@ -43,8 +44,11 @@ impl Picture {
         let next = "give an equirectangular map as .hdr or .exr";
         let bytes = uri::read_file(path).map_err(|why| (why, next))?;
         let bad = |e: image::ImageError| (format!("cannot be read: {e}"), next);
-        let ([width, height], numbers) = if bytes.starts_with(RGBE) {
-            let decoder = HdrDecoder::new(Cursor::new(&bytes)).map_err(bad)?;
+        let named = [RADIANCE, RGBE]
+            .iter()
+            .find_map(|name| bytes.strip_prefix(*name));
+        let ([width, height], numbers) = if let Some(rest) = named {
+            let decoder = HdrDecoder::new(RADIANCE.chain(rest)).map_err(bad)?;
             checked(&decoder, bytes.len())?;
             decoded(decoder).map_err(bad)?
         } else if bytes.starts_with(OPEN_EXR) {
