@@ -2,8 +2,11 @@
 
 #[path = "common/built.rs"]
 mod built;
+#[path = "common/daylit.rs"]
+mod daylit;
 
 use built::Room;
+use daylit::glass_of_the_report;
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, de2000};
@@ -483,16 +486,6 @@ fn panes_that_are_not_there_take_nothing() {
     assert!((0.02..0.2).contains(&sent.in_panes), "{sent:?}");
     let all = sent.to_fronts + sent.to_backs + sent.outside + sent.in_panes;
     close(all, 1.0, 1e-6, "sum of shares");
-}
-
-/// Clear glass of 6 mm as the report gives it, by the cosine of incidence.
-fn glass_of_the_report(cosine: f64) -> f64 {
-    [
-        -0.028378, 3.156075, -3.058376, -1.428919, 4.014235, -1.775827,
-    ]
-    .into_iter()
-    .rev()
-    .fold(0.0, |sum, k| sum * cosine + k)
 }
 
 /// The room of CIE 171:2006, 5.10: black, 4 x 4 x 3 m, a roof opening of a width, glazed, under a uniform sky of 100 lx.

@@ -2,8 +2,11 @@
 
 #[path = "common/built.rs"]
 mod built;
+#[path = "common/daylit.rs"]
+mod daylit;
 
 use built::Room;
+use daylit::{LUX, bake, bake_at, beside, cie, places_beside, points, roof, room, through, wish};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
@@ -19,118 +22,6 @@ use std::f64::consts::PI;
 const POINT: f64 = 5e-3;
 /// Paths from a point.
 const PATHS: usize = 65_536;
-/// Illuminance of open ground in these tests: per cent are lux.
-const LUX: f64 = 100.0;
-
-fn cie(x: f64, y: f64, z: f64) -> DVec3 {
-    dvec3(x, z, -y)
-}
-
-/// A sky of a CIE type with the sun at 60 degrees over y = 4 of the report (north here), without its direct light.
-fn wish(kind: u8) -> SkyWish {
-    SkyWish {
-        kind: Some(SkyType(kind)),
-        brightness: Some(Brightness::Illuminance(LUX)),
-        ground: Some(0.3),
-        sun: SunWish {
-            place: Some(SunPlace::Angles {
-                elevation: 60.0,
-                azimuth: 0.0,
-            }),
-            illuminance: Some(0.0),
-            kelvin: None,
-        },
-        ..SkyWish::default()
-    }
-}
-
-fn bake(room: Room, wish: &SkyWish) -> Bake {
-    bake_at(room, wish, 0.5)
-}
-
-fn bake_at(room: Room, wish: &SkyWish, error: f64) -> Bake {
-    let settings = Settings {
-        error,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(room.scene().under(wish).unwrap(), settings);
-    bake.run();
-    bake
-}
-
-/// The room of 5.9 with an opening of a width in the middle of its roof, every panel cut into `cuts` x `cuts` squares.
-fn room(rho: f64, opening: f64, cuts: usize) -> Room {
-    let mut room = Room::new();
-    let paint = room.paint(rho);
-    let mut panel = |corner: DVec3, u: DVec3, v: DVec3| {
-        let n = cuts as f64;
-        for j in 0..cuts {
-            for i in 0..cuts {
-                let at = corner + u * (i as f64 / n) + v * (j as f64 / n);
-                room.quad(at, u / n, v / n, paint);
-            }
-        }
-    };
-    let (x, y, z) = (cie(1.0, 0.0, 0.0), cie(0.0, 1.0, 0.0), cie(0.0, 0.0, 1.0));
-    panel(DVec3::ZERO, 4.0 * x, 4.0 * y);
-    panel(DVec3::ZERO, 3.0 * z, 4.0 * x);
-    panel(4.0 * y, 4.0 * x, 3.0 * z);
-    panel(DVec3::ZERO, 4.0 * y, 3.0 * z);
-    panel(4.0 * x, 3.0 * z, 4.0 * y);
-    let rim = 0.5 * (4.0 - opening);
-    if rim > 0.0 {
-        let top = 3.0 * z;
-        panel(top, rim * y, 4.0 * x);
-        panel(top + (4.0 - rim) * y, rim * y, 4.0 * x);
-        panel(top + rim * y, opening * y, rim * x);
-        panel(top + rim * y + (4.0 - rim) * x, opening * y, rim * x);
-    }
-    room
-}
-
-/// Points A to F of the wall and G to N of the floor, with their normals, in the room.
-fn points() -> Vec<(DVec3, DVec3)> {
-    let wall = (0..6).map(|k| (cie(2.0, 0.0, 2.75 - 0.5 * f64::from(k)), cie(0.0, 1.0, 0.0)));
-    let floor = (0..8).map(|k| (cie(2.0, 0.25 + 0.5 * f64::from(k), 0.0), DVec3::Y));
-    wall.chain(floor).collect()
-}
-
-/// Irradiance at a point through a parallelogram, lit by a sky of 1 (and ground of `ground`), by plain quadrature.
-fn through(
-    sky: &Distribution,
-    ground: f64,
-    [corner, u, v]: [DVec3; 3],
-    (point, normal): (DVec3, DVec3),
-) -> f64 {
-    const N: usize = 800;
-    let (area, across) = (u.cross(v).length(), u.cross(v).normalize());
-    let mut sum = 0.0;
-    for j in 0..N {
-        for i in 0..N {
-            let at = |k: usize| (k as f64 + 0.5) / N as f64;
-            let way = corner + u * at(i) + v * at(j) - point;
-            let r2 = way.length_squared();
-            let d = way / r2.sqrt();
-            let radiance = if d.y > 0.0 {
-                sky.radiance(d)
-            } else {
-                ground / PI
-            };
-            sum += radiance * normal.dot(d).max(0.0) * across.dot(d).abs() / r2;
-        }
-    }
-    sum * area / (N * N) as f64
-}
-
-fn roof(opening: f64) -> [DVec3; 3] {
-    let rim = 0.5 * (4.0 - opening);
-    [
-        cie(rim, rim, 3.0),
-        cie(opening, 0.0, 0.0),
-        cie(0.0, opening, 0.0),
-    ]
-}
-
 /// Figures of the report at A, C, G, J, N (CIE 171:2006 through published validations).
 const TABLES: [(u8, f64, [f64; 5]); 8] = [
     (1, 1.0, [0.46, 2.34, 2.33, 4.29, 2.33]),
@@ -152,7 +43,7 @@ fn check(kind: u8, opening: f64, cuts: usize, slack: f64) {
     let each = if cuts == 1 { slack } else { 3.0 * slack };
     let (mut worst, mut squares) = (0.0_f64, 0.0);
     for (k, (got, at)) in lux.iter().zip(points()).enumerate() {
-        let want = LUX * through(&sky, 0.0, roof(opening), at);
+        let want = LUX * through(|d| sky.radiance(d), 0.0, roof(opening), at);
         let off = got / want - 1.0;
         (worst, squares) = (worst.max(off.abs()), squares + off * off);
         println!("type {kind}, {opening} m, point {k}: {got:.4} for {want:.4}");
@@ -217,32 +108,15 @@ fn rays_through_an_opening_agree_with_polygons() {
 #[test]
 fn ground_below_the_horizon_lights_a_ceiling() {
     let mut room = Room::new();
-    let paint = room.paint(0.0);
-    let (x, y, z) = (cie(1.0, 0.0, 0.0), cie(0.0, 1.0, 0.0), cie(0.0, 0.0, 1.0));
-    room.quad(DVec3::ZERO, 4.0 * x, 4.0 * y, paint);
-    room.quad(3.0 * z, 4.0 * y, 4.0 * x, paint);
-    room.quad(DVec3::ZERO, 3.0 * z, 4.0 * x, paint);
-    room.quad(DVec3::ZERO, 4.0 * y, 3.0 * z, paint);
-    room.quad(4.0 * x, 3.0 * z, 4.0 * y, paint);
-    // The wall y = 4 with a window of 2 m x 1 m, its sill at 1 m.
-    let wall = 4.0 * y;
-    room.quad(wall, 4.0 * x, 1.0 * z, paint);
-    room.quad(wall + 2.0 * z, 4.0 * x, 1.0 * z, paint);
-    room.quad(wall + 1.0 * z, 1.0 * x, 1.0 * z, paint);
-    room.quad(wall + 1.0 * z + 3.0 * x, 1.0 * x, 1.0 * z, paint);
+    let window = beside(&mut room);
     let bake = bake(room, &wish(12));
     let sky = Distribution::new(12, direction(60.0, 0.0));
-    let window = [wall + 1.0 * z + 1.0 * x, 2.0 * x, 1.0 * z];
-    let places = [
-        (cie(2.0, 2.0, 0.0), DVec3::Y),
-        (cie(2.0, 3.5, 0.0), DVec3::Y),
-        (cie(2.0, 2.0, 3.0), DVec3::NEG_Y),
-        (cie(1.0, 3.0, 3.0), DVec3::NEG_Y),
-        (cie(2.0, 0.0, 1.5), cie(0.0, 1.0, 0.0)),
-        (cie(0.0, 2.0, 1.0), cie(1.0, 0.0, 0.0)),
-    ];
+    let places = places_beside();
     for (probed, place) in bake.probe(&places).iter().zip(places) {
-        let (got, want) = (probed.xyz[1], LUX * through(&sky, 0.3, window, place));
+        let (got, want) = (
+            probed.xyz[1],
+            LUX * through(|d| sky.radiance(d), 0.3, window, place),
+        );
         println!("{place:?}: {got:.4} for {want:.4}");
         assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
     }

@@ -4,6 +4,7 @@
 //! no form factors, no balance.
 
 mod mirrors;
+mod outside;
 mod path;
 mod rays;
 mod reference;

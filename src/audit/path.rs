@@ -176,10 +176,11 @@ impl<'a> Audit<'a> {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
             self.punctual(&at, None, toward_lamp, rng, &throughput, sum);
             self.punctual_in_mirrors(&at, toward_lamp, rng, &throughput, sum);
+            self.spot(&at, toward_lamp, &throughput, sum);
             let mut direction = cosine_direction(at.normal, toward_any);
             let (hit, mirrors) = self.met(&at, &mut direction, &mut throughput, rng);
             let Some(hit) = hit else {
-                self.outside(direction, &throughput, sum);
+                self.outside(&at, (direction, mirrors), &throughput, sum);
                 return;
             };
             let triangle = hit.triangle as usize;
@@ -322,22 +323,6 @@ impl<'a> Audit<'a> {
         let throughput = &self.filtered(throughput, at.point, q);
         for l in 0..LEAVES {
             sum[l] += throughput[l] * radiance[l] * factor;
-        }
-    }
-
-    /// What a path that leaves the room brings from there.
-    fn outside(&self, direction: DVec3, throughput: &Leaves, sum: &mut Leaves) {
-        let Some(sky) = &self.scene.sky else { return };
-        for light in &self.scene.lights {
-            let radiance = match light.kind {
-                LightKind::Sky if direction.y > 0.0 => sky.radiance(direction),
-                LightKind::Ground if direction.y <= 0.0 => 1.0 / PI,
-                _ => continue,
-            };
-            let power = &self.scene.spectra[light.light].power;
-            for l in 0..LEAVES {
-                sum[l] += throughput[l] * PI * radiance * power[l] * light.shape[l];
-            }
         }
     }
 

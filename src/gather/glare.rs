@@ -123,7 +123,7 @@ impl Bake {
     fn background(&self, eye: DVec3, forward: DVec3, left_out: &mut Vec<String>) -> f64 {
         let gathered = self.gather_at(&[(eye, forward)]).swap_remove(0);
         let lights = &self.scene().lights;
-        let sky = lights.iter().find(|l| l.kind == LightKind::Sky);
+        let sky = lights.iter().find(|l| matches!(l.kind, LightKind::Sky(_)));
         // Rows keep apart light of several spectra, not lamps: a lamp of the sky's spectrum cannot be told from it.
         let own = |sky: &&PunctualLight| {
             let mut others = lights

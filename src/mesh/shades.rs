@@ -49,7 +49,7 @@ impl<'a> Shades<'a> {
         let mut lamps: Vec<Lamp> = (bake.lamps().iter().enumerate())
             .filter_map(|(number, (lamp, row))| {
                 let (middle, rim) = match lamp.kind {
-                    LightKind::Sky | LightKind::Ground | LightKind::Surface => return None,
+                    LightKind::Sky(_) | LightKind::Ground(_) | LightKind::Surface => return None,
                     LightKind::Directional => (Aim::Far(-lamp.direction), Vec::new()),
                     LightKind::Sun => {
                         let turn = |k| f64::from(k) / f64::from(RIM);

@@ -175,8 +175,8 @@ impl<'a> Room<'a> {
             let place = light.position - mesh.centre;
             match light.kind {
                 LightKind::Directional | LightKind::Sun => suns.push(Start::Sun(light.direction)),
-                LightKind::Sky => suns.extend(dome(DVec3::Y)),
-                LightKind::Ground => suns.extend(dome(DVec3::NEG_Y)),
+                LightKind::Sky(_) => suns.extend(dome(DVec3::Y)),
+                LightKind::Ground(_) => suns.extend(dome(DVec3::NEG_Y)),
                 LightKind::Point | LightKind::Profile => near.push(Start::Lamp(place)),
                 // Its faces are among those that emit.
                 LightKind::Surface => {}

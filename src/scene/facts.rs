@@ -361,8 +361,8 @@ impl<'a> Meter<'a> {
             LightKind::Profile | LightKind::Surface => ("measured", Some(size)),
             LightKind::Directional => ("directional", None),
             LightKind::Sun => ("sun", None),
-            LightKind::Sky => ("sky", None),
-            LightKind::Ground => ("ground", None),
+            LightKind::Sky(_) => ("sky", None),
+            LightKind::Ground(_) => ("ground", None),
         };
         let profile = light.luminaire.as_ref().map(|l| &l.profile);
         LightFact {

@@ -1,6 +1,7 @@
 //! Lights: the spectra that lamps share, and lights without extent.
 
 use super::luminaires::Luminaire;
+use super::sky::PARTS;
 use crate::data::Leaves;
 use glam::DVec3;
 use std::sync::Arc;
@@ -57,10 +58,10 @@ pub enum LightKind {
     Surface,
     /// The sun: light from a disc of [`SUN_RADIUS`](super::sky::SUN_RADIUS), infinitely far away.
     Sun,
-    /// The sky above the horizon, spread as [`Scene::sky`](super::Scene::sky) says.
-    Sky,
-    /// Open ground below the horizon, alike in all directions.
-    Ground,
+    /// The sky above the horizon, spread as this part of [`Scene::sky`](super::Scene::sky) says.
+    Sky(u8),
+    /// What lies below the horizon, open ground alike in all directions or spread as this part says.
+    Ground(u8),
 }
 
 impl LightKind {
@@ -71,6 +72,15 @@ impl LightKind {
 
     /// Does it shine from half of all directions?
     pub fn is_dome(self) -> bool {
-        matches!(self, Self::Sky | Self::Ground)
+        self.place().is_some()
+    }
+
+    /// Of sky and ground, their place among the parts of a [`Sky`](super::sky::Sky).
+    pub fn place(self) -> Option<usize> {
+        match self {
+            Self::Sky(part) => Some(usize::from(part)),
+            Self::Ground(part) => Some(PARTS + usize::from(part)),
+            _ => None,
+        }
     }
 }

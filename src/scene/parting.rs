@@ -53,8 +53,8 @@ fn names_of_light<'a>(
     nodes: &'a Nodes,
 ) -> Vec<&'a str> {
     let mut names: Vec<&str> = match light.kind {
-        LightKind::Ground if light.name == LIT_GROUND => return vec![SUN],
-        LightKind::Sky | LightKind::Ground => return vec![SKY],
+        LightKind::Ground(_) if light.name == LIT_GROUND => return vec![SUN],
+        LightKind::Sky(_) | LightKind::Ground(_) => return vec![SKY],
         LightKind::Sun => vec![SUN],
         _ => Vec::new(),
     };

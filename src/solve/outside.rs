@@ -57,11 +57,14 @@ impl Bake {
         if !rays {
             return;
         }
-        let is_exact = self.with_sight(|_, sight| Outside::is_exact(sight));
+        let Some(sky) = self.scene.sky.clone() else {
+            return;
+        };
+        let is_exact = self.with_sight(|_, sight| Outside::is_exact(&sky, sight));
         let openings = match is_exact {
             true => Openings::default(),
             false => found.unwrap_or_else(|| find(self)),
         };
-        self.outside = self.scene.sky.clone().map(|sky| Outside { sky, openings });
+        self.outside = Some(Outside { sky, openings });
     }
 }

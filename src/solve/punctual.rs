@@ -4,6 +4,7 @@ use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Mesh, Sample, Tree};
 use crate::light::lanes::Lanes;
 use crate::link::{Sight, View};
+use crate::scene::sky::PLACES;
 use crate::scene::{LightKind, PunctualLight, Scene};
 use crate::team::Team;
 use crate::transport::{Look, Outside};
@@ -97,14 +98,12 @@ fn at_samples(
         leaf: None,
         seed: u64::from(leaf),
     };
-    let dome = outside.map_or([0.0; 2], |o| o.lightly(sight, &middle, look));
+    let dome = outside.map_or([0.0; PLACES], |o| o.lightly(sight, &middle, look));
     lights
         .iter()
         .map(|light| {
-            match light.kind {
-                LightKind::Sky => return [dome[0]; POINTS],
-                LightKind::Ground => return [dome[1]; POINTS],
-                _ => {}
+            if let Some(place) = light.kind.place() {
+                return [dome[place]; POINTS];
             }
             let mut factors = [0.0; POINTS];
             let mut segments = Vec::with_capacity(POINTS);
@@ -197,6 +196,6 @@ pub(super) fn solid_angle(kind: LightKind) -> Option<f64> {
             Some(2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0))
         }
         LightKind::Profile | LightKind::Surface => Some(1.0),
-        LightKind::Directional | LightKind::Sun | LightKind::Sky | LightKind::Ground => None,
+        LightKind::Directional | LightKind::Sun | LightKind::Sky(_) | LightKind::Ground(_) => None,
     }
 }

@@ -360,8 +360,8 @@ fn punctual_at(
     let mut sum = [0.0; LEAVES];
     for light in &scene.lights {
         let (toward, end) = match light.kind {
-            LightKind::Sky | LightKind::Ground => {
-                let factor = dome_at(scene, mesh, ways, at, normal, plane, light.kind);
+            LightKind::Sky(_) | LightKind::Ground(_) => {
+                let factor = dome_at(scene, mesh, ways, at, normal, plane, light.kind.place());
                 let power = &scene.spectra[light.light].power;
                 for l in 0..LEAVES {
                     sum[l] += factor * power[l] * light.shape[l];
@@ -387,7 +387,7 @@ fn punctual_at(
         };
         let spread = match light.kind {
             LightKind::Directional | LightKind::Sun => 1.0,
-            LightKind::Point | LightKind::Sky | LightKind::Ground | LightKind::Surface => {
+            LightKind::Point | LightKind::Sky(_) | LightKind::Ground(_) | LightKind::Surface => {
                 1.0 / end.distance_squared(at)
             }
             LightKind::Profile => {
@@ -449,21 +449,22 @@ fn dome_at(
     at: DVec3,
     normal: DVec3,
     plane: u32,
-    kind: LightKind,
+    place: Option<usize>,
 ) -> f64 {
-    let Some(sky) = &scene.sky else { return 0.0 };
+    let (Some(sky), Some(place)) = (&scene.sky, place) else {
+        return 0.0;
+    };
     let brings = |k: u32| {
         let d = cosine_direction(normal, sequence02(k, 0));
-        let factor = match kind {
-            LightKind::Sky if d.y > 0.0 => PI * sky.radiance(d),
-            LightKind::Ground if d.y <= 0.0 => 1.0,
-            _ => return 0.0,
+        let (first, radiance) = sky.radiance(d);
+        let Some(radiance) = place.checked_sub(first).and_then(|k| radiance.get(k)) else {
+            return 0.0;
         };
         let end = at + d * (4.0 * mesh.half_size);
         if ways.blocked(at, end, [plane, NO_PLANE]) {
             0.0
         } else {
-            factor
+            PI * radiance
         }
     };
     (0..DOME_RAYS).map(brings).sum::<f64>() / f64::from(DOME_RAYS)

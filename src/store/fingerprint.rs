@@ -6,6 +6,7 @@
 //! is the same part.
 
 use super::codec::{Decoder, Encoder, Plain, Read};
+use crate::scene::sky::Dome;
 use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
 use std::collections::BTreeMap;
 use std::io;
@@ -102,15 +103,22 @@ impl Fingerprint {
                 LightKind::Profile => [6.0, 0.0, 0.0],
                 LightKind::Surface => [7.0, 0.0, 0.0],
                 LightKind::Sun => [3.0, 0.0, 0.0],
-                LightKind::Sky => [4.0, 0.0, 0.0],
-                LightKind::Ground => [5.0, 0.0, 0.0],
+                LightKind::Sky(part) => [4.0, f64::from(part), 0.0],
+                LightKind::Ground(part) => [5.0, f64::from(part), 0.0],
             };
             mix.add(kind).add(light.direction.to_array());
             if !light.kind.is_parallel() {
                 mix.add(light.position.to_array());
             }
-            if let (LightKind::Sky, Some(sky)) = (light.kind, &scene.sky) {
-                mix.add(sky.dome.kind()).add(sky.dome.sun().to_array());
+            match (light.kind, scene.sky.as_ref().map(|sky| &sky.dome)) {
+                (LightKind::Sky(_), Some(Dome::Cie(sky))) => {
+                    let spread = sky.luminance();
+                    mix.add(spread.kind()).add(spread.sun().to_array());
+                }
+                (LightKind::Sky(_) | LightKind::Ground(_), Some(Dome::Map(map))) => {
+                    mix.all(map.texels()).add(map.north());
+                }
+                _ => {}
             }
             let mut what = "place";
             if let Some(luminaire) = &light.luminaire {

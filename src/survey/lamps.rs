@@ -179,7 +179,7 @@ fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
                 let (_, direction, _) = ray.unwrap_or((DVec3::ZERO, light.direction, 0.0));
                 (light.position, direction)
             }
-            LightKind::Directional | LightKind::Sun | LightKind::Sky | LightKind::Ground => {
+            LightKind::Directional | LightKind::Sun | LightKind::Sky(_) | LightKind::Ground(_) => {
                 let from = if light.kind.is_dome() {
                     // Two shifts of one sequence depend on each other.
                     let mut random = Pcg::new(hash(1, u64::from(k)));
@@ -276,7 +276,7 @@ fn kind(light: &PunctualLight) -> &'static str {
         LightKind::Profile => "measured",
         LightKind::Surface => "surface",
         LightKind::Sun => "sun",
-        LightKind::Sky => "sky",
-        LightKind::Ground => "ground",
+        LightKind::Sky(_) => "sky",
+        LightKind::Ground(_) => "ground",
     }
 }

@@ -273,10 +273,9 @@ impl Gatherer<'_> {
         let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
         let each: Vec<(f64, DVec3)> = lamps
             .filter_map(|((lamp, _), &bright)| {
-                let (factor, end) = match (lamp.kind, far) {
-                    (LightKind::Sky | LightKind::Ground, Some((d, factors))) => {
-                        let factor = factors[usize::from(lamp.kind == LightKind::Ground)];
-                        (factor, to.point + d * self.distance())
+                let (factor, end) = match (lamp.kind, lamp.kind.place().zip(far)) {
+                    (_, Some((place, (d, factors)))) => {
+                        (factors[place], to.point + d * self.distance())
                     }
                     (LightKind::Surface, _) => {
                         // Which lamp is chosen must not tell which of its points.

@@ -11,7 +11,6 @@ use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::geometry::{Hit, Segment};
 use crate::light::{Filter, accumulate};
 use crate::link::View;
-use crate::scene::LightKind;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -173,13 +172,13 @@ impl Gatherer<'_> {
     /// Adds what comes from outside in one direction.
     fn escapes(&self, direction: DVec3, share: f64, filter: &Filter, out: &mut Gathered) {
         let Some(outside) = self.sky else { return };
+        let (first, radiance) = outside.sky.radiance(direction);
         for (lamp, row) in self.lamps {
-            let factor = match lamp.kind {
-                LightKind::Sky if direction.y > 0.0 => PI * outside.sky.radiance(direction),
-                LightKind::Ground if direction.y <= 0.0 => 1.0,
-                _ => continue,
+            let part = lamp.kind.place().and_then(|place| place.checked_sub(first));
+            let Some(radiance) = part.and_then(|part| radiance.get(part)) else {
+                continue;
             };
-            let factor = (share * factor) as f32;
+            let factor = (share * PI * radiance) as f32;
             accumulate(&mut out.irradiance, factor, row, Some(filter));
             accumulate(&mut out.direct, factor, row, Some(filter));
         }

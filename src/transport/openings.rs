@@ -7,6 +7,7 @@
 use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02, triangle_weights};
 use crate::hierarchy::{Mesh, Tree};
 use crate::link::Sight;
+use crate::scene::sky;
 use crate::transport::hemisphere::BEAM;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -283,7 +284,8 @@ impl Openings {
         }
         let mut sum = 0.0;
         for &part in &choice.parts {
-            sum += self.parts[part as usize].worth(point, normal, &brightness);
+            let toward = self.parts[part as usize].toward(point, normal);
+            sum += toward.map_or(0.0, |(direction, factor)| factor * brightness(direction));
             choice.sums.push(sum);
         }
         sum
@@ -294,12 +296,16 @@ impl Openings {
         &self,
         point: DVec3,
         normal: DVec3,
-        brightness: impl Fn(DVec3) -> f64,
-    ) -> f64 {
-        let parts = self.parts.iter();
-        parts
-            .map(|part| part.worth(point, normal, &brightness))
-            .sum()
+        brightness: impl Fn(DVec3) -> [f64; sky::PLACES],
+    ) -> [f64; sky::PLACES] {
+        let mut sum = [0.0; sky::PLACES];
+        for part in &self.parts {
+            if let Some((direction, factor)) = part.toward(point, normal) {
+                let each = brightness(direction);
+                sum = std::array::from_fn(|k| sum[k] + factor * each[k]);
+            }
+        }
+        sum
     }
 
     /// A place on a part, chosen by what the parts may bring.
@@ -344,7 +350,8 @@ impl Openings {
 }
 
 impl Part {
-    fn worth(&self, point: DVec3, normal: DVec3, brightness: impl Fn(DVec3) -> f64) -> f64 {
+    /// The direction of its middle, and about its form factor; none if it is behind.
+    fn toward(&self, point: DVec3, normal: DVec3) -> Option<(DVec3, f64)> {
         // Nothing of it in front?
         let [u, v] = across(self.axis);
         let behind = |a: DVec3, b: DVec3| {
@@ -354,7 +361,7 @@ impl Part {
         };
         let ends = [self.low, self.high];
         if ends.iter().all(|&a| ends.iter().all(|&b| behind(a, b))) {
-            return 0.0;
+            return None;
         }
         let way = 0.5 * (self.low + self.high) - point;
         let r2 = way.length_squared();
@@ -362,7 +369,7 @@ impl Part {
         let here = normal.dot(direction).max(LEAST_COSINE);
         let there = direction[self.axis].abs().max(LEAST_COSINE);
         let factor = self.area * here * there / (PI * r2 + self.area);
-        self.filled * factor * brightness(direction)
+        Some((direction, self.filled * factor))
     }
 }
 

@@ -1,9 +1,10 @@
 //! What comes in from outside: sky, and ground below the horizon.
 //!
 //! In rooms of few triangles exactly: the directions fall into eight triangles, far away, less the shadows of what stands before them;
-//! what is left is cut until the sky is even over each part, whose factor is exact. Elsewhere by rays over the hemisphere
-//! and toward the [`Openings`], both together by the power heuristic (Veach and Guibas 1995): by the balance heuristic the few rays
-//! of the hemisphere that find a small opening brought 2 % of noise to what those toward it know.
+//! what is left is cut until the sky is even over each part, whose factor is exact. Elsewhere, and under a map, by rays over the hemisphere,
+//! toward the [`Openings`] and toward bright spots of a map, all together by the power heuristic (Veach and Guibas 1995): by the balance
+//! heuristic the few rays of the hemisphere that find a small opening brought 2 % of noise to what those toward it know. A ray serves all
+//! parts of the sky.
 
 use super::openings::{Choice, Openings};
 use super::receiver::Receiver;
@@ -13,13 +14,13 @@ use crate::geometry::{
 };
 use crate::light::{Filter, Tint};
 use crate::link::{Sight, View};
-use crate::scene::sky::Sky;
+use crate::scene::sky::{PARTS, PLACES, Sky};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// Rays over the hemisphere and to the openings: of a random point of a leaf, of a point by a rule, of one for its own sake, and of
-/// one whose rays over the hemisphere are known.
-const RAYS: [(usize, usize); 4] = [(16, 16), (64, 64), (512, 1024), (0, 256)];
+/// Rays over the hemisphere, to the openings, and toward spots where there are some: of a random point of a leaf, of a point by a rule, of
+/// one for its own sake, and of one whose rays over the hemisphere are known.
+const RAYS: [[usize; 3]; 4] = [[16, 16, 16], [64, 64, 64], [512, 1024, 1024], [0, 256, 256]];
 /// So many times more to the openings in rooms of few triangles. With 4, one of the points of CIE 171 5.10 is off by .6 %.
 const FEW: usize = 16;
 /// The far triangles stand this many half sizes of the room away: all of it lies before their planes.
@@ -52,14 +53,22 @@ pub(crate) struct Look {
     clipper: Clipper,
     choice: Choice,
     segments: Vec<Segment>,
-    open: Vec<DVec3>,
+    open: Vec<(Search, DVec3)>,
     blocked: Vec<bool>,
     /// Rays cast.
     pub(crate) rays: u64,
-    /// Variance of the first factor.
-    pub(super) noise: f64,
-    /// Mean filters of sky and ground where light comes through panes; none where none does.
-    pub(super) tints: [Option<Filter>; 2],
+    /// Variance of the factors.
+    pub(super) noise: [f64; PLACES],
+    /// Mean filters of the parts of sky and ground where light comes through panes; none where none does.
+    pub(super) tints: [Option<Filter>; PLACES],
+}
+
+/// How a direction was found.
+#[derive(Debug, Clone, Copy)]
+enum Search {
+    Hemisphere,
+    Openings,
+    Spots,
 }
 
 /// What is on ways of light.
@@ -90,45 +99,70 @@ pub(super) enum Way<'a> {
 }
 
 impl Outside {
-    /// Irradiance of a point by the sky, where open level ground has 1, and by the ground below, where that sends out 1.
+    /// Irradiance of a point by each part of the sky, where open level ground has 1, and of what is below the horizon, where a plane
+    /// that looks down has 1.
     pub(super) fn seen(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
         to: &Receiver,
         way: Way,
         look: &mut Look,
-    ) -> [f64; 2] {
-        (look.noise, look.tints) = (0.0, [None; 2]);
+    ) -> [f64; PLACES] {
+        (look.noise, look.tints) = ([0.0; PLACES], [None; PLACES]);
         if let Way::Unshadowed = way {
-            let up = |d: DVec3| match d.y > 0.0 {
-                true => PI * self.sky.radiance(d),
-                false => 0.0,
-            };
-            let down = |d: DVec3| f64::from(u8::from(d.y <= 0.0));
-            let most =
-                |radiance: &dyn Fn(DVec3) -> f64| self.openings.most(to.point, to.normal, radiance);
-            return [most(&up), most(&down).min(1.0)];
+            return self.unshadowed(to);
         }
-        if Self::is_exact(sight) {
+        if Self::is_exact(&self.sky, sight) {
             self.exactly(sight, to, look)
         } else {
             self.by_rays((sight, by), to, way, look)
         }
     }
 
-    /// Is the sky of this room seen exactly, without openings?
-    pub(crate) fn is_exact(sight: &Sight) -> bool {
-        sight.small() && sight.opaque.is_none() && sight.panes.is_none() && sight.mirrors.is_none()
+    /// The same as if nothing stood in the way, about: by the middles of the openings, and by some directions toward spots.
+    fn unshadowed(&self, to: &Receiver) -> [f64; PLACES] {
+        let mut seen = self.openings.most(to.point, to.normal, |d| {
+            let mut each = [0.0; PLACES];
+            let (first, radiance) = self.sky.radiance(d);
+            let plain = 1.0 - self.sky.excess_share(d);
+            for (each, radiance) in each[first..].iter_mut().zip(radiance) {
+                *each = PI * radiance * plain;
+            }
+            each
+        });
+        let count = RAYS[0][2] as u32;
+        let spots = (0..count).filter_map(|k| self.sky.spot(sequence02(k, to.seed)));
+        for d in spots {
+            let (first, radiance) = self.sky.radiance(d);
+            let density = f64::from(count) * self.sky.spot_density(d);
+            let weight = to.normal.dot(d).max(0.0) * self.sky.excess_share(d) / density;
+            for (seen, radiance) in seen[first..].iter_mut().zip(radiance) {
+                *seen += weight * radiance;
+            }
+        }
+        if self.sky.has_even_ground() {
+            seen[PARTS..].iter_mut().for_each(|s| *s = s.min(1.0));
+        }
+        seen
+    }
+
+    /// Is a sky seen exactly in this room, without openings?
+    pub(crate) fn is_exact(sky: &Sky, sight: &Sight) -> bool {
+        sky.is_smooth()
+            && sight.small()
+            && sight.opaque.is_none()
+            && sight.panes.is_none()
+            && sight.mirrors.is_none()
     }
 
     /// The same as one of many points sees it.
-    pub(crate) fn lightly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; 2] {
+    pub(crate) fn lightly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; PLACES] {
         self.seen((sight, None), to, Way::Rays(0), look)
     }
 
     /// By clipped polygons.
-    fn exactly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; 2] {
-        let mut seen = [0.0; 2];
+    fn exactly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; PLACES] {
+        let mut seen = [0.0; PLACES];
         let far = FAR * sight.mesh.half_size;
         for octant in 0..8_u32 {
             let sign = |bit: u32| if octant >> bit & 1 == 1 { -far } else { far };
@@ -161,7 +195,7 @@ impl Outside {
         cell: &Cell,
         candidates: Option<&[u32]>,
         look: &mut Look,
-        seen: &mut [f64; 2],
+        seen: &mut [f64; PLACES],
     ) {
         let point = Patch::Point {
             at: to.point,
@@ -220,7 +254,7 @@ impl Outside {
         let share = open.count() as f64 / f64::from(LAST_RAYS);
         look.rays += u64::from(LAST_RAYS);
         if share > 0.0 {
-            let mut whole = [0.0; 2];
+            let mut whole = [0.0; PLACES];
             let corners = cell.corners.map(|c| c - to.point);
             self.add(to.normal, cell.up, &corners, &mut whole);
             *seen = std::array::from_fn(|k| seen[k] + share * whole[k]);
@@ -228,34 +262,56 @@ impl Outside {
     }
 
     /// Adds a polygon of directions, any lengths.
-    fn add(&self, normal: DVec3, up: bool, polygon: &[DVec3], seen: &mut [f64; 2]) {
-        if !up || self.sky.dome.is_even() {
+    fn add(&self, normal: DVec3, up: bool, polygon: &[DVec3], seen: &mut [f64; PLACES]) {
+        if !up || self.sky.is_even() {
             let factor = lambert_edges_x8(DVec3::ZERO, normal, polygon);
-            seen[usize::from(!up)] += factor;
+            let first = if up { 0 } else { PARTS };
+            seen[first..][..PARTS].iter_mut().for_each(|s| *s += factor);
             return;
         }
         let first = polygon[0].normalize();
         for two in polygon[1..].windows(2) {
             let corners = [first, two[0].normalize(), two[1].normalize()];
-            let radiance = corners.map(|d| self.sky.radiance(d));
-            seen[0] += self.triangle(normal, corners, radiance, DEPTH);
+            let radiance = corners.map(|d| self.overhead(d));
+            self.triangle(normal, corners, radiance, DEPTH, seen);
         }
     }
 
-    /// Irradiance by a triangle of sky, of which the radiance at the corners is known.
-    fn triangle(&self, normal: DVec3, corners: [DVec3; 3], radiance: [f64; 3], depth: u32) -> f64 {
+    /// Radiance of the parts of the sky from a direction that looks up, or level.
+    fn overhead(&self, direction: DVec3) -> [f64; PARTS] {
+        let least = DVec3::new(direction.x, direction.y.max(f64::MIN_POSITIVE), direction.z);
+        self.sky.radiance(least).1
+    }
+
+    /// Adds the irradiance by a triangle of sky, of which the radiance at the corners is known.
+    fn triangle(
+        &self,
+        normal: DVec3,
+        corners: [DVec3; 3],
+        radiance: [[f64; PARTS]; 3],
+        depth: u32,
+        seen: &mut [f64; PLACES],
+    ) {
         let [a, b, c] = corners;
         if corners.iter().all(|d| d.dot(normal) <= 0.0) {
-            return 0.0;
+            return;
         }
         let middles = [a + b, b + c, c + a].map(|d| d.normalize());
-        let halfway = middles.map(|d| self.sky.radiance(d));
-        let mean = |values: [f64; 3]| values.iter().sum::<f64>() / 3.0;
+        let halfway = middles.map(|d| self.overhead(d));
+        let mean = |[x, y, z]: [[f64; PARTS]; 3]| -> [f64; PARTS] {
+            std::array::from_fn(|k| (x[k] + y[k] + z[k]) / 3.0)
+        };
         // Exact for quadratic variation, and what is exact for linear.
         let (fine, coarse) = (mean(halfway), mean(radiance));
+        let apart = std::array::from_fn(|k| (fine[k] - coarse[k]).abs());
+        let is_even = self.sky.brightness(apart) <= EVEN * self.sky.brightness(fine);
         let narrow = a.dot(b).min(b.dot(c)).min(c.dot(a)) > NARROW;
-        if depth == 0 || (narrow && (fine - coarse).abs() <= EVEN * fine) {
-            return PI * fine * lambert_edges_x8(DVec3::ZERO, normal, &corners);
+        if depth == 0 || (narrow && is_even) {
+            let factor = lambert_edges_x8(DVec3::ZERO, normal, &corners);
+            for (seen, fine) in seen.iter_mut().zip(fine) {
+                *seen += PI * fine * factor;
+            }
+            return;
         }
         let ([ab, bc, ca], [u, v, w]) = (middles, halfway);
         let [x, y, z] = radiance;
@@ -266,35 +322,35 @@ impl Outside {
             ([ab, bc, ca], halfway),
         ]
         .into_iter()
-        .map(|(part, radiance)| self.triangle(normal, part, radiance, depth - 1))
-        .sum()
+        .for_each(|(part, radiance)| self.triangle(normal, part, radiance, depth - 1, seen));
     }
 
-    /// By rays over the hemisphere and to the openings.
+    /// By rays over the hemisphere, to the openings and to spots.
     fn by_rays(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
         to: &Receiver,
         way: Way,
         look: &mut Look,
-    ) -> [f64; 2] {
+    ) -> [f64; PLACES] {
         let kind = match way {
             Way::Rays(kind) => kind,
             Way::Glanced(..) => 0,
             _ => 3,
         };
-        let (wide, mut narrow) = RAYS[kind];
+        let [wide, mut narrow, spots] = RAYS[kind];
         if let (Way::Known(..) | Way::Shared(..), true) = (way, sight.small()) {
             // Rooms of few triangles come here for their panes and mirrors; a ray costs next to nothing there.
             narrow *= FEW;
         }
         if let Way::Shared(.., images) = way {
-            narrow = (narrow / images.max(1)).max(RAYS[1].1);
+            narrow = (narrow / images.max(1)).max(RAYS[1][1]);
         }
         let wide = match way {
             Way::Known(open, of) | Way::Glanced(open, of) | Way::Shared(open, of, _) => {
                 look.open.clear();
-                look.open.extend_from_slice(open);
+                look.open
+                    .extend(open.iter().map(|&d| (Search::Hemisphere, d)));
                 of
             }
             _ => {
@@ -302,10 +358,38 @@ impl Outside {
                 wide
             }
         };
-        let around = look.open.len();
         self.look_through_openings((sight, by), to, narrow, look);
-        let counts = [wide as f64, narrow as f64];
-        self.combine((sight, by), to, (counts, around), look)
+        let spots = if self.sky.has_spots() { spots } else { 0 };
+        self.look_at_spots((sight, by), to, spots, look);
+        let counts = [wide, narrow, spots].map(|count| count as f64);
+        self.combine((sight, by), to, counts, look)
+    }
+
+    /// Rays to bright spots of a map: adds the directions that lead outside.
+    fn look_at_spots(
+        &self,
+        (sight, by): (&Sight, Option<&dyn Ways>),
+        to: &Receiver,
+        count: usize,
+        look: &mut Look,
+    ) {
+        look.segments.clear();
+        let turn = hash(to.seed, 0x5c3);
+        let far = by.map_or(4.0 * sight.mesh.half_size, |by| by.reach());
+        let ahead: Vec<DVec3> = (0..count as u32)
+            .filter_map(|k| self.sky.spot(sequence02(k, turn)))
+            .filter(|d| to.normal.dot(*d) > 0.0)
+            .collect();
+        let way = |d: &DVec3| Segment::new(to.point, to.point + *d * far, [to.plane, NO_PLANE]);
+        look.segments.extend(ahead.iter().map(way));
+        match by {
+            Some(by) => by.block(&look.segments, &mut look.blocked),
+            None => sight.blocked(&look.segments, &View::Crowded, &mut look.blocked),
+        }
+        look.rays += look.segments.len() as u64;
+        let ways = ahead.into_iter().zip(&look.blocked);
+        let free = ways.filter(|(_, blocked)| !**blocked);
+        look.open.extend(free.map(|(d, _)| (Search::Spots, d)));
     }
 
     /// Rays to the openings: adds the directions that lead outside.
@@ -316,15 +400,9 @@ impl Outside {
         count: usize,
         look: &mut Look,
     ) {
-        let sky = |d: DVec3| {
-            if d.y > 0.0 {
-                PI * self.sky.radiance(d)
-            } else {
-                0.2
-            }
-        };
+        let plain = |d: DVec3| self.sky.plain(d);
         self.openings
-            .weigh(to.point, to.normal, sky, &mut look.choice);
+            .weigh(to.point, to.normal, plain, &mut look.choice);
         look.segments.clear();
         let turn = hash(to.seed, 0x5c1);
         for k in 0..count as u32 {
@@ -340,23 +418,23 @@ impl Outside {
         look.rays += look.segments.len() as u64;
         let ways = look.segments.iter().zip(&look.blocked);
         let free = ways.filter(|(_, blocked)| !**blocked);
+        let toward = |s: &Segment| (s.to.as_dvec3() - to.point).normalize();
         look.open
-            .extend(free.map(|(s, _)| (s.to.as_dvec3() - to.point).normalize()));
+            .extend(free.map(|(s, _)| (Search::Openings, toward(s))));
     }
 
-    /// Irradiance by the open directions, by the power heuristic: of so many rays over the hemisphere, whose open ones stand
-    /// first, and of so many to the openings.
+    /// Irradiance by the open directions, by the power heuristic: of so many rays of each search.
     fn combine(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
         to: &Receiver,
-        (counts, around): ([f64; 2], usize),
+        counts: [f64; 3],
         look: &mut Look,
-    ) -> [f64; 2] {
-        let (mut seen, mut squares, mut sum) = ([0.0; 2], 0.0, 0.0);
-        let mut tints = [Tint::default(); 2];
+    ) -> [f64; PLACES] {
+        let [mut seen, mut squares, mut sum] = [[0.0; PLACES]; 3];
+        let mut tints = [Tint::default(); PLACES];
         let far = by.map_or(4.0 * sight.mesh.half_size, |by| by.reach());
-        for (k, &d) in look.open.iter().enumerate() {
+        for &(search, d) in &look.open {
             let cosine = to.normal.dot(d);
             if cosine <= 0.0 {
                 continue;
@@ -364,28 +442,32 @@ impl Outside {
             let densities = [
                 counts[0] * cosine / PI,
                 counts[1] * self.openings.density(&look.choice, to.point, d),
+                counts[2] * self.sky.spot_density(d),
             ];
-            let squared = densities[0] * densities[0] + densities[1] * densities[1];
-            let own = densities[usize::from(k >= around)];
-            let (place, radiance) = if d.y > 0.0 {
-                (0, self.sky.radiance(d))
-            } else {
-                (1, 1.0 / PI)
-            };
-            let brings = radiance * cosine * own / squared;
-            seen[place] += brings;
-            let mut left = brings;
-            if let Some(by) = by.filter(|by| by.change_light()) {
+            let squared: f64 = densities.iter().map(|d| d * d).sum();
+            let own = densities[search as usize];
+            let (first, radiance) = self.sky.radiance(d);
+            let filter = by.filter(|by| by.change_light()).map(|by| {
                 let way = Segment::new(to.point, to.point + d * far, [NO_PLANE; 2]);
-                let (filter, share) = by.leave(&way);
-                left *= share;
-                tints[place].add(&filter, brings);
-            }
-            if place == 0 {
-                (squares, sum) = (squares + left * left, sum + left);
+                by.leave(&way)
+            });
+            for (place, radiance) in (first..).zip(radiance) {
+                let brings = radiance * cosine * own / squared;
+                seen[place] += brings;
+                let mut left = brings;
+                if let (Some((filter, bright)), true) = (&filter, brings > 0.0) {
+                    left *= bright;
+                    tints[place].add(filter, brings);
+                }
+                // Light of open ground is as even as that of a lamp.
+                if first == 0 || !self.sky.has_even_ground() {
+                    squares[place] += left * left;
+                    sum[place] += left;
+                }
             }
         }
-        look.noise = (squares - sum * sum / (counts[0] + counts[1])).max(0.0);
+        let rays: f64 = counts.iter().sum();
+        look.noise = std::array::from_fn(|k| (squares[k] - sum[k] * sum[k] / rays).max(0.0));
         look.tints = tints.map(|tint| tint.mean());
         seen
     }
@@ -404,7 +486,8 @@ impl Outside {
             let ways: [Vec3; TOGETHER] = directions.map(|d| d.as_vec3());
             sight.meet(&from, &ways, to.plane, &mut hits);
             let open = directions.iter().zip(hits).filter(|(_, hit)| hit.is_none());
-            look.open.extend(open.map(|(d, _)| d));
+            look.open
+                .extend(open.map(|(d, _)| (Search::Hemisphere, *d)));
         }
         look.rays += count as u64;
     }

@@ -6,8 +6,8 @@ use super::receiver::{Gathered, Receiver};
 use crate::geometry::sampling::{around, cosine_direction, hash, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::light::{Filter, accumulate};
-use crate::scene::sky::SUN_RADIUS;
-use crate::scene::{LightKind, PunctualLight};
+use crate::scene::PunctualLight;
+use crate::scene::sky::{PLACES, SUN_RADIUS};
 use crate::spectrum::LEAVES;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -85,26 +85,23 @@ impl Gatherer<'_> {
         let before = memory.look.rays;
         let seen = outside.seen((self.sight, Some(self)), to, way, &mut memory.look);
         memory.rays += memory.look.rays - before;
+        let mut noise = 0.0;
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
-            let factor = match lamp.kind {
-                LightKind::Sky => seen[0],
-                LightKind::Ground => seen[1],
-                _ => continue,
-            };
-            if factor <= 0.0 {
+            let Some(place) = lamp.kind.place().filter(|&place| seen[place] > 0.0) else {
                 continue;
-            }
-            if lamp.kind == LightKind::Sky {
-                let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
-                memory.noise += memory.look.noise * f64::from(bright).powi(2);
-            }
+            };
+            let factor = seen[place];
+            let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
+            noise += memory.look.noise[place].sqrt() * f64::from(bright);
             if let Some(trace) = &mut out.trace {
                 trace.lamp(k, factor as f32);
             }
-            let tint = memory.look.tints[usize::from(lamp.kind == LightKind::Ground)];
+            let tint = memory.look.tints[place];
             accumulate(&mut out.irradiance, factor as f32, row, tint.as_ref());
             accumulate(&mut out.direct, factor as f32, row, tint.as_ref());
         }
+        // Parts are seen by the same rays, so that what is too much of one is too much of all.
+        memory.noise += noise * noise;
     }
 
     /// How much of the sun's disc a point sees.
@@ -129,20 +126,36 @@ impl Gatherer<'_> {
         open.count() as f64 / f64::from(count)
     }
 
-    /// One direction of sky or ground by chance: what it stands for, as a factor, and whether it looks up.
+    /// One direction of sky or ground by chance, and what it stands for, as factors of the parts.
     pub(super) fn one_direction(
         &self,
         to: &Receiver,
         sample: [f64; 2],
-    ) -> Option<(DVec3, [f64; 2])> {
+    ) -> Option<(DVec3, [f64; PLACES])> {
         let outside = self.sky?;
         let seed = hash(sample[0].to_bits(), sample[1].to_bits());
-        let d = cosine_direction(to.normal, sequence02(0, seed));
-        let factors = if d.y > 0.0 {
-            [PI * outside.sky.radiance(d), 0.0]
-        } else {
-            [0.0, 1.0]
+        let sky = &outside.sky;
+        // Of a map every second one toward its spots.
+        let spots = sky.has_spots();
+        let square = sequence02(0, seed);
+        let by_cosine = || cosine_direction(to.normal, square);
+        let d = match spots && seed >> 63 == 1 {
+            true => sky.spot(square)?,
+            false => by_cosine(),
         };
+        let cosine = to.normal.dot(d);
+        if cosine <= 0.0 {
+            return None;
+        }
+        let density = match spots {
+            true => 0.5 * (cosine / PI + sky.spot_density(d)),
+            false => cosine / PI,
+        };
+        let mut factors = [0.0; PLACES];
+        let (first, radiance) = sky.radiance(d);
+        for (factor, radiance) in factors[first..].iter_mut().zip(radiance) {
+            *factor = radiance * cosine / density;
+        }
         Some((d, factors))
     }
 }

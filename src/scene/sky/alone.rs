@@ -14,11 +14,15 @@ impl Scene {
     /// Illuminance of open level ground by the sky without the sun, lx; none without a sky.
     pub fn sky_illuminance(&self) -> Option<f64> {
         self.sky.as_ref()?;
-        let sky = self.lights.iter().find(|l| l.kind == LightKind::Sky)?;
         let y = Observer::cie1931().weights(&self.grid)[1];
-        let power = &self.spectra[sky.light].power;
-        let leaves = power.iter().zip(&sky.shape).zip(&y);
-        Some(leaves.map(|((p, s), y)| KM * p * s * y).sum())
+        let lux = |light: &PunctualLight| {
+            let power = &self.spectra[light.light].power;
+            let leaves = power.iter().zip(&light.shape).zip(&y);
+            leaves.map(|((p, s), y)| KM * p * s * y).sum::<f64>()
+        };
+        let is_sky = |light: &&PunctualLight| matches!(light.kind, LightKind::Sky(_));
+        let parts: Vec<f64> = self.lights.iter().filter(is_sky).map(lux).collect();
+        (!parts.is_empty()).then(|| parts.iter().sum())
     }
 
     /// The room with all lamps dark but the sky and the ground that it lights; none where there are no others.

@@ -90,6 +90,27 @@ impl Distribution {
         self.radiance(DVec3::Y)
     }
 
+    /// How far light from a direction that looks up has the colour of the horizon, 0 at the zenith to 1 there: by the gradation,
+    /// `(phi(Z) - phi(0)) / (phi(pi/2) - phi(0)) = 1 - exp(b / cos Z - b)`, of which the type's a has no part.
+    pub(super) fn toward_horizon(&self, direction: DVec3) -> f64 {
+        let height = direction.y.max(0.0);
+        match TYPES.get(self.kind as usize - 1) {
+            Some([_, b, ..]) => 1.0 - (b / height - b).exp(),
+            None => 1.0 - height,
+        }
+    }
+
+    /// How far it has the colour of the haze about the sun: by the share of the indicatrix that is its exponential, which stands for
+    /// forward scattering.
+    pub(super) fn toward_sun(&self, direction: DVec3) -> f64 {
+        let Some([_, _, c, d, e]) = TYPES.get(self.kind as usize - 1) else {
+            return 0.0;
+        };
+        let cosine = direction.dot(self.sun).clamp(-1.0, 1.0);
+        let haze = c * ((d * cosine.acos()).exp() - (d * FRAC_PI_2).exp());
+        haze.max(0.0) / (1.0 + haze + e * cosine * cosine)
+    }
+
     fn shape(&self, direction: DVec3) -> f64 {
         let height = direction.y.max(0.0);
         if self.kind == TRADITIONAL {
@@ -111,21 +132,26 @@ impl Distribution {
 
     /// Irradiance of open level ground, by the midpoint rule.
     fn level(&self) -> f64 {
-        if self.is_even() {
-            return PI;
+        match self.is_even() {
+            true => PI,
+            false => level(|direction| [self.shape(direction)])[0],
         }
-        let [up, around] = STEPS;
-        let mut sum = 0.0;
-        for k in 0..up {
-            let (height, out) = (FRAC_PI_2 * (k as f64 + 0.5) / up as f64).sin_cos();
-            for j in 0..around {
-                let (sin, cos) = (TAU * (j as f64 + 0.5) / around as f64).sin_cos();
-                let direction = DVec3::new(out * cos, height, out * sin);
-                sum += height * out * self.shape(direction);
-            }
-        }
-        sum * FRAC_PI_2 * TAU / (up * around) as f64
     }
+}
+
+/// Irradiance of open level ground by radiances that depend on the direction, by the midpoint rule.
+pub(super) fn level<const N: usize>(radiance: impl Fn(DVec3) -> [f64; N]) -> [f64; N] {
+    let [up, around] = STEPS;
+    let mut sum = [0.0; N];
+    for k in 0..up {
+        let (height, out) = (FRAC_PI_2 * (k as f64 + 0.5) / up as f64).sin_cos();
+        for j in 0..around {
+            let (sin, cos) = (TAU * (j as f64 + 0.5) / around as f64).sin_cos();
+            let each = radiance(DVec3::new(out * cos, height, out * sin));
+            sum = std::array::from_fn(|k| sum[k] + height * out * each[k]);
+        }
+    }
+    sum.map(|sum| sum * FRAC_PI_2 * TAU / (up * around) as f64)
 }
 
 #[cfg(test)]
@@ -193,6 +219,21 @@ mod tests {
             }
             let level = sum * FRAC_PI_2 / f64::from(n) / 3.0 * TAU / f64::from(m);
             assert!((level - 1.0).abs() < 2e-4, "{kind}: {level}");
+        }
+    }
+
+    #[test]
+    fn colours_go_from_the_zenith_to_the_horizon_and_the_sun() {
+        for kind in 1..=16 {
+            let sky = Distribution::new(kind, sun(40.0));
+            assert_eq!(sky.toward_horizon(DVec3::Y), 0.0);
+            assert_eq!(sky.toward_horizon(DVec3::X), 1.0);
+            let at = |elevation| sky.toward_horizon(sun(elevation));
+            assert!(at(60.0) < at(30.0) && at(30.0) < at(10.0), "{kind}");
+            let [there, beside] = [40.0, 70.0].map(|elevation| sky.toward_sun(sun(elevation)));
+            assert_eq!(there > 0.0, Distribution::follows_sun(kind), "{kind}");
+            assert!(there <= 1.0 && (there > beside || there == 0.0));
+            assert_eq!(sky.toward_sun(-sun(40.0)), 0.0);
         }
     }
 

@@ -1,29 +1,181 @@
-//! The sky of a room.
+//! The sky of a room: what comes from each direction.
+//!
+//! Its light is a sum of up to three spectra, each spread over the dome in its own way: daylight of one or several colours, or red, green and
+//! blue of a map. Above the horizon a part is brought to an irradiance of 1 of open level ground, below it to the same of a plane that looks
+//! down; how much of each there is, and of which spectrum, lamps of the kinds [`LightKind::Sky`](crate::scene::LightKind::Sky) and
+//! [`LightKind::Ground`](crate::scene::LightKind::Ground) say.
 
-use super::cie::Distribution;
+use super::cie::{Distribution, level};
+use super::map::Map;
 use glam::DVec3;
+use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Radius of the sun's disc, radians: .53 degrees across.
 pub const SUN_RADIUS: f64 = 0.5 * 0.53 * std::f64::consts::PI / 180.0;
+/// Spectra of a sky at the most.
+pub const PARTS: usize = 3;
+/// The same above the horizon and, after these, below it.
+pub const PLACES: usize = 2 * PARTS;
+
+/// How light is spread over the dome.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Dome {
+    /// By ISO 15469.
+    Cie(Tinted),
+    /// By a picture of all directions.
+    Map(Arc<Map>),
+}
+
+/// A sky of ISO 15469 with a colour at the zenith, one at the horizon and one about the sun, in this order.
+#[derive(Debug, Clone, Copy)]
+pub struct Tinted {
+    luminance: Distribution,
+    /// Have horizon and sun colours of their own?
+    own: [bool; 2],
+    /// Irradiance of open level ground by each part, together 1.
+    levels: [f64; PARTS],
+}
+
+impl Tinted {
+    /// A sky in which the horizon and what is about the sun may have colours of their own.
+    pub(super) fn new(luminance: Distribution, own: [bool; 2]) -> Self {
+        let mut tinted = Self {
+            luminance,
+            own,
+            levels: [1.0; PARTS],
+        };
+        tinted.levels = match own {
+            [false, false] => [1.0, 0.0, 0.0],
+            _ => level(|d| tinted.shares(d).map(|share| share * luminance.radiance(d))),
+        };
+        tinted
+    }
+
+    /// How luminance is spread.
+    pub fn luminance(&self) -> &Distribution {
+        &self.luminance
+    }
+
+    /// Irradiance of open level ground by each part, together 1.
+    pub(super) fn levels(&self) -> [f64; PARTS] {
+        self.levels
+    }
+
+    /// Shares of the parts in the luminance of a direction.
+    fn shares(&self, direction: DVec3) -> [f64; PARTS] {
+        let of = |own: bool, share: f64| if own { share } else { 0.0 };
+        let sun = of(self.own[1], self.luminance.toward_sun(direction));
+        let horizon = of(self.own[0], self.luminance.toward_horizon(direction));
+        [(1.0 - horizon) * (1.0 - sun), horizon * (1.0 - sun), sun]
+    }
+
+    /// Radiance of each part, of which open level ground has an irradiance of 1.
+    #[inline]
+    fn radiance(&self, direction: DVec3) -> [f64; PARTS] {
+        let radiance = self.luminance.radiance(direction);
+        if self.own == [false, false] {
+            return [radiance, 0.0, 0.0];
+        }
+        let shares = self.shares(direction);
+        std::array::from_fn(|k| match self.levels[k] > 0.0 {
+            true => radiance * shares[k] / self.levels[k],
+            false => 0.0,
+        })
+    }
+}
 
 /// The sky of a room.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Sky {
     /// How its light is spread.
-    pub dome: Distribution,
+    pub dome: Dome,
     /// In words, for plans and logs.
     pub said: String,
     /// The same of the sun; none where no direct light of it is asked for.
     pub sun_said: Option<String>,
     /// Is the sun a light of the file?
     pub sun_of_file: bool,
+    /// Does a map say what is below the horizon? Else it is open ground, alike in all directions.
+    pub(super) below: bool,
+    /// Brightness of each part, about: irradiances, together 1.
+    pub(super) bright: [f64; PLACES],
 }
 
 impl Sky {
-    /// Radiance from a direction that looks up, where open level ground has an irradiance of 1.
+    /// Radiance of each part from a direction, and the place of the first of them: 0 from above the horizon, [`PARTS`] from below.
     #[inline]
-    pub fn radiance(&self, direction: DVec3) -> f64 {
-        self.dome.radiance(direction)
+    pub fn radiance(&self, direction: DVec3) -> (usize, [f64; PARTS]) {
+        let up = direction.y > 0.0;
+        let first = if up { 0 } else { PARTS };
+        let radiance = match &self.dome {
+            Dome::Cie(sky) if up => sky.radiance(direction),
+            Dome::Map(map) if up || self.below => map.radiance(direction),
+            _ => [1.0 / PI, 0.0, 0.0],
+        };
+        (first, radiance)
+    }
+
+    /// Is what lies below the horizon open ground, alike in all directions?
+    pub(crate) fn has_even_ground(&self) -> bool {
+        !self.below
+    }
+
+    /// About how bright it is in a direction, as a radiance under a whole irradiance of 1, less what [`Self::spot`] finds.
+    pub(crate) fn plain(&self, direction: DVec3) -> f64 {
+        let (first, radiance) = self.radiance(direction);
+        let bright = self.bright[first..].iter().zip(radiance);
+        let bright: f64 = bright.map(|(bright, radiance)| bright * radiance).sum();
+        bright * (1.0 - self.excess_share(direction))
+    }
+
+    /// How much of what comes from a direction [`spot`](Self::spot) finds, a share.
+    pub(crate) fn excess_share(&self, direction: DVec3) -> f64 {
+        match &self.dome {
+            Dome::Map(map) if direction.y > 0.0 || self.below => map.excess_share(direction),
+            _ => 0.0,
+        }
+    }
+
+    /// How bright these radiances of parts above the horizon are, about.
+    pub(crate) fn brightness(&self, radiance: [f64; PARTS]) -> f64 {
+        let bright = self.bright.iter().zip(radiance);
+        bright.map(|(bright, radiance)| bright * radiance).sum()
+    }
+
+    /// Is each half as bright in all directions?
+    pub(crate) fn is_even(&self) -> bool {
+        match &self.dome {
+            Dome::Cie(sky) => sky.luminance.is_even() && sky.own == [false, false],
+            Dome::Map(map) => map.is_even(),
+        }
+    }
+
+    /// Does it change so slowly, but for where the sun stands, that parts of it can be cut until each is even?
+    pub(crate) fn is_smooth(&self) -> bool {
+        matches!(self.dome, Dome::Cie(_)) || self.is_even()
+    }
+
+    /// Has it spots that are best looked for?
+    pub(crate) fn has_spots(&self) -> bool {
+        matches!(&self.dome, Dome::Map(map) if map.has_spots())
+    }
+
+    /// A direction toward what is brighter than the mean of a map, by how much it is; none where nothing is.
+    pub(crate) fn spot(&self, sample: [f64; 2]) -> Option<DVec3> {
+        match &self.dome {
+            Dome::Map(map) => map.spot(sample),
+            Dome::Cie(_) => None,
+        }
+    }
+
+    /// Density, by solid angle, with which [`spot`](Self::spot) finds a direction.
+    pub(crate) fn spot_density(&self, direction: DVec3) -> f64 {
+        match &self.dome {
+            Dome::Map(map) => map.spot_density(direction),
+            Dome::Cie(_) => 0.0,
+        }
     }
 }

@@ -1,19 +1,19 @@
 //! The lamps that a sky makes.
 
+use super::Distribution;
+use super::dome::{PLACES, Sky};
+use super::light::{Light, of_daylight, usual};
 use super::sun::{angles, direction, position};
-use super::wish::{Brightness, SkyType, SkyWish, SunPlace};
-use super::{Distribution, Sky};
+use super::wish::{SkyType, SkyWish, SunPlace};
 use crate::color::{KM, Observer};
-use crate::data::{Grid, LEAVES, Outside, daylight, nearest_of};
+use crate::data::{Grid, LEAVES, Leaves, nearest_of};
 use crate::scene::check::Check;
 use crate::scene::json::short;
 use crate::scene::{LightKind, LightSpectrum, PunctualLight};
 use glam::{DQuat, DVec3};
 
-/// Illuminance of open ground under a sky of which nothing more is said, not even where the sun stands: an overcast day, lx.
-const USUAL_LUX: f64 = 10_000.0;
-/// Reflectance of open ground, of which nothing more is said: grass, earth and asphalt mixed, as daylight calculations take it.
-const USUAL_GROUND: f64 = 0.2;
+/// The type that is meant by clear.
+const CLEAR: SkyType = SkyType(12);
 /// Correlated colour temperature of sunlight, K.
 const SUN_KELVIN: f64 = 5500.0;
 /// Name of a sun that is no light of the file.
@@ -34,84 +34,65 @@ pub(crate) fn join(
         return None;
     }
     let (kind, sun) = asked(wish, nodes, lights, check)?;
-    let dome = Distribution::new(kind.0, sun.as_ref().map_or(DVec3::Y, |sun| sun.toward));
-    let [elevation, azimuth] = angles(dome.sun());
-    let azimuth = (azimuth - wish.north.unwrap_or(0.0)).rem_euclid(360.0);
-    let usual = usual(kind, sun.as_ref().map(|_| elevation));
-    let lux = match wish.brightness {
-        Some(Brightness::Illuminance(lux)) => lux,
-        Some(Brightness::Luminance(zenith)) => zenith / dome.zenith(),
-        None => usual[0],
+    let light = match (kind, &wish.map) {
+        (Some(kind), _) => Light::of_type(wish, kind, sun.as_ref().map(|s| s.toward), grid, check)?,
+        (None, Some(path)) => Light::of_map(wish, path, grid, check)?,
+        (None, None) => return None,
     };
-    let kelvin = wish.kelvin.unwrap_or(usual_kelvin(kind));
-    let ground = wish.ground.unwrap_or(USUAL_GROUND);
     let mut makes = Makes {
         grid,
         lights,
         spectra,
     };
-    let light = makes.spectrum(kelvin);
-    let sun_lux = sun.as_ref().map_or(0.0, |sun| {
-        let own = sun.light.map(|k| makes.size_of(k));
-        wish.sun.illuminance.or(own).unwrap_or(usual[1])
-    });
-    let mut sky = Sky {
-        dome,
-        said: format!(
-            "CIE {} ({}), {lux:.0} lx on open ground, {kelvin:.0} K; ground {ground}",
-            kind.0,
-            kind.name()
-        ),
-        sun_said: None,
-        sun_of_file: sun.as_ref().is_some_and(|sun| sun.light.is_some()),
-    };
-    makes.lamp("sky", LightKind::Sky, DVec3::NEG_Y, light, lux);
-    makes.lamp("ground", LightKind::Ground, DVec3::Y, light, ground * lux);
-    if sun_lux <= 0.0
-        && let Some(Sun { light: Some(k), .. }) = sun
-    {
-        // A sun of the file without light is none.
-        makes.lights.remove(k);
-        sky.sun_of_file = false;
-    }
-    if let Some(sun) = sun.filter(|_| sun_lux > 0.0) {
-        let kelvin = wish.sun.kelvin.unwrap_or(SUN_KELVIN);
-        if let (Some(k), None) = (sun.light, wish.sun.kelvin) {
-            let name = short(&makes.lights[k].name);
-            check.warn(format!(
-                "light '{name}' is the sun: its colour gives way to daylight of {kelvin:.0} K (\"cct_k\" sets another)"
-            ));
+    let (ground, own_sun) = (light.ground, light.sun);
+    let (mut sky, spectrum) = makes.sky(light);
+    let shining = match sun {
+        Some(sun) => {
+            // Of a map nothing is known: the sun shines as it does in a clear sky.
+            let usual = usual(kind.unwrap_or(CLEAR), Some(angles(sun.toward)[0]));
+            makes.placed(wish, &sun, usual[1], check)
         }
-        makes.sun(&sun, sun_lux, kelvin, ground);
+        None => own_sun.and_then(|(toward, shape)| makes.of_map(wish, toward, spectrum, shape)),
+    };
+    if let Some(sun) = shining {
+        let lux = makes.size(sun.spectrum, &sun.shape);
+        let [elevation, azimuth] = angles(sun.toward);
+        let azimuth = (azimuth - wish.north.unwrap_or(0.0)).rem_euclid(360.0);
         sky.sun_said = Some(format!(
-            "{elevation:.1} deg high, azimuth {azimuth:.1} deg, {sun_lux:.0} lx across its rays, {kelvin:.0} K"
+            "{elevation:.1} deg high, azimuth {azimuth:.1} deg, {lux:.0} lx across its rays, {}",
+            sun.said
         ));
+        sky.sun_of_file = sun.light.is_some();
+        makes.sun(&sun, ground);
     }
+    sky.bright = makes.bright();
     Some(sky)
 }
 
-/// What kind of sky is asked for, and its sun; none where what is said does not go together, which is told.
+/// What kind of sky is asked for, if it is no map, and its sun; none where what is said does not go together, which is told.
 fn asked(
     wish: &SkyWish,
     nodes: &[(String, String)],
     lights: &[PunctualLight],
     check: &mut Check,
-) -> Option<(SkyType, Option<Sun>)> {
-    let Some(kind) = wish.kind else {
+) -> Option<(Option<SkyType>, Option<Sun>)> {
+    if wish.kind.is_none() && wish.map.is_none() {
         let what = "something is said of sky or sun, but not what the sky is like";
         let next = "give --sky clear, or \"type\" in the file of spectra";
         check.problem("sky", what, next);
         return None;
-    };
+    }
     let sun = sun_of(wish, nodes, lights, check).ok()?;
-    if sun.is_none() && Distribution::follows_sun(kind.0) {
+    if let (Some(kind), None) = (wish.kind, &sun)
+        && Distribution::follows_sun(kind.0)
+    {
         let what = format!("a sky that is {} is brightest about the sun", kind.name());
         let next =
             "say where the sun stands: --sun ELEVATION,AZIMUTH or \"sun\" in the file of spectra";
         check.problem("sky", what, next);
         return None;
     }
-    Some((kind, sun))
+    Some((wish.kind, sun))
 }
 
 /// Where the sun stands, and which light of the file it is.
@@ -174,28 +155,15 @@ fn sun_of(
     Ok(Some(Sun { toward, light }))
 }
 
-/// Illuminance of open level ground by the sky, and of a plane across the sun's rays: IES RP-21 (Calculation of daylight
-/// availability, 1984), lx.
-fn usual(kind: SkyType, elevation: Option<f64>) -> [f64; 2] {
-    let Some(elevation) = elevation else {
-        return [USUAL_LUX, 0.0];
-    };
-    let height = elevation.to_radians().sin().max(1e-3);
-    let sun = |extinction: f64| 127_500.0 * (-extinction / height).exp();
-    match kind.name() {
-        "clear" => [800.0 + 15_500.0 * height.sqrt(), sun(0.21)],
-        "intermediate" => [300.0 + 45_000.0 * height, sun(0.80)],
-        _ => [300.0 + 21_000.0 * height, 0.0],
-    }
-}
-
-/// Correlated colour temperature of a sky of which nothing more is said, K.
-fn usual_kelvin(kind: SkyType) -> f64 {
-    match kind.name() {
-        "clear" => 12_000.0,
-        "intermediate" => 7500.0,
-        _ => 6504.0,
-    }
+/// A sun that shines.
+struct Shining {
+    toward: DVec3,
+    /// The light of the file that it is.
+    light: Option<usize>,
+    spectrum: usize,
+    shape: Leaves,
+    /// Its colour, in words.
+    said: String,
 }
 
 /// Where lamps and spectra go.
@@ -206,51 +174,155 @@ struct Makes<'a> {
 }
 
 impl Makes<'_> {
-    /// Index of the spectrum of daylight, luminous size 1.
-    fn spectrum(&mut self, kelvin: f64) -> usize {
-        let luminous = Observer::cie1931().weights(self.grid)[1];
-        let power = self.grid.means(&daylight(kelvin), Outside::Hold);
-        let size: f64 = power.iter().zip(luminous).map(|(p, y)| KM * p * y).sum();
-        let power = power.map(|p| p / size);
-        let same = self.spectra.iter().position(|s| s.power == power);
+    /// Index of a spectrum.
+    fn add_spectrum(&mut self, spectrum: LightSpectrum) -> usize {
+        let same = self.spectra.iter().position(|s| s.power == spectrum.power);
         same.unwrap_or_else(|| {
-            self.spectra.push(LightSpectrum {
-                name: format!("daylight/{kelvin:.0}"),
-                power,
-            });
+            self.spectra.push(spectrum);
             self.spectra.len() - 1
         })
     }
 
+    /// Adds the lamps of a sky and of what lies below the horizon; also returns the index of their spectrum.
+    fn sky(&mut self, light: Light) -> (Sky, usize) {
+        let spectrum = self.add_spectrum(light.spectrum);
+        let mut below = light.below;
+        if let Some(rho) = light.ground {
+            let all = |l: usize| light.above.iter().map(|part| rho * part[l]).sum();
+            below[0] = std::array::from_fn(all);
+        }
+        for (k, suffix) in light.names.iter().enumerate() {
+            let (name, kind) = (format!("sky{suffix}"), LightKind::Sky(k as u8));
+            self.lamp(&name, kind, DVec3::NEG_Y, spectrum, light.above[k]);
+        }
+        for (k, suffix) in light.names.iter().enumerate() {
+            let suffix = if light.ground.is_some() { "" } else { suffix };
+            let (name, kind) = (format!("ground{suffix}"), LightKind::Ground(k as u8));
+            self.lamp(&name, kind, DVec3::Y, spectrum, below[k]);
+        }
+        let sky = Sky {
+            dome: light.dome,
+            said: light.said,
+            sun_said: None,
+            sun_of_file: false,
+            below: light.ground.is_none(),
+            bright: [0.0; PLACES],
+        };
+        (sky, spectrum)
+    }
+
+    /// The sun where it was asked for. A light of the file that has none is taken out.
+    fn placed(
+        &mut self,
+        wish: &SkyWish,
+        sun: &Sun,
+        usual: f64,
+        check: &mut Check,
+    ) -> Option<Shining> {
+        let own = sun.light.map(|k| self.size_of(k));
+        let lux = wish.sun.illuminance.or(own).unwrap_or(usual);
+        if lux <= 0.0 {
+            if let Some(k) = sun.light {
+                self.lights.remove(k);
+            }
+            return None;
+        }
+        let kelvin = wish.sun.kelvin.unwrap_or(SUN_KELVIN);
+        if let (Some(k), None) = (sun.light, wish.sun.kelvin) {
+            let name = short(&self.lights[k].name);
+            check.warn(format!(
+                "light '{name}' is the sun: its colour gives way to daylight of {kelvin:.0} K (\"cct_k\" sets another)"
+            ));
+        }
+        Some(Shining {
+            toward: sun.toward,
+            light: sun.light,
+            spectrum: self.add_spectrum(of_daylight(kelvin, self.grid)),
+            shape: [lux; LEAVES],
+            said: format!("{kelvin:.0} K"),
+        })
+    }
+
+    /// The sun of a map, as it is there or as it was asked for.
+    fn of_map(
+        &mut self,
+        wish: &SkyWish,
+        toward: DVec3,
+        spectrum: usize,
+        shape: Leaves,
+    ) -> Option<Shining> {
+        let own = self.size(spectrum, &shape);
+        let lux = wish.sun.illuminance.unwrap_or(own);
+        if lux <= 0.0 {
+            return None;
+        }
+        let (spectrum, shape, said) = match wish.sun.kelvin {
+            Some(kelvin) => {
+                let spectrum = self.add_spectrum(of_daylight(kelvin, self.grid));
+                (spectrum, [lux; LEAVES], format!("{kelvin:.0} K"))
+            }
+            None => (spectrum, shape.map(|x| x * lux / own), "of the map".into()),
+        };
+        Some(Shining {
+            toward,
+            light: None,
+            spectrum,
+            shape,
+            said,
+        })
+    }
+
     /// Adds the sun, or makes it of a light of the file; and the ground that it shines on.
-    fn sun(&mut self, sun: &Sun, lux: f64, kelvin: f64, ground: f64) {
-        let light = self.spectrum(kelvin);
-        let exitance = ground * lux * sun.toward.y;
-        let kind = LightKind::Ground;
-        self.lamp(LIT_GROUND, kind, DVec3::Y, light, exitance);
+    fn sun(&mut self, sun: &Shining, ground: Option<f64>) {
+        let rho = ground.unwrap_or(0.0) * sun.toward.y;
+        let (kind, shape) = (LightKind::Ground(0), sun.shape.map(|x| rho * x));
+        self.lamp(LIT_GROUND, kind, DVec3::Y, sun.spectrum, shape);
         match sun.light {
-            None => self.lamp(SUN_NAME, LightKind::Sun, -sun.toward, light, lux),
+            None => {
+                let kind = LightKind::Sun;
+                self.lamp(SUN_NAME, kind, -sun.toward, sun.spectrum, sun.shape);
+            }
             Some(k) => {
                 let lamp = &mut self.lights[k];
                 lamp.kind = LightKind::Sun;
-                (lamp.light, lamp.shape) = (light, [lux; LEAVES]);
+                (lamp.light, lamp.shape) = (sun.spectrum, sun.shape);
             }
         }
     }
 
     /// Luminous size of a light of the file.
     fn size_of(&self, light: usize) -> f64 {
-        let luminous = Observer::cie1931().weights(self.grid)[1];
         let light = &self.lights[light];
-        let power = &self.spectra[light.light].power;
+        self.size(light.light, &light.shape)
+    }
+
+    /// Luminous size of a spectrum times a shape.
+    fn size(&self, spectrum: usize, shape: &Leaves) -> f64 {
+        let luminous = Observer::cie1931().weights(self.grid)[1];
+        let power = &self.spectra[spectrum].power;
         (0..LEAVES)
-            .map(|l| KM * power[l] * light.shape[l] * luminous[l])
+            .map(|l| KM * power[l] * shape[l] * luminous[l])
             .sum()
     }
 
+    /// How bright the parts of sky and ground are, together 1.
+    fn bright(&self) -> [f64; PLACES] {
+        let mut bright = [0.0; PLACES];
+        for (k, light) in self.lights.iter().enumerate() {
+            if let Some(place) = light.kind.place() {
+                bright[place] += self.size_of(k);
+            }
+        }
+        let all: f64 = bright.iter().sum();
+        match all > 0.0 {
+            true => bright.map(|b| b / all),
+            false => bright,
+        }
+    }
+
     /// Adds a lamp, if it shines.
-    fn lamp(&mut self, name: &str, kind: LightKind, direction: DVec3, light: usize, lux: f64) {
-        if lux > 0.0 {
+    fn lamp(&mut self, name: &str, kind: LightKind, direction: DVec3, light: usize, shape: Leaves) {
+        if shape.iter().any(|&x| x > 0.0) {
             self.lights.push(PunctualLight {
                 name: name.into(),
                 kind,
@@ -258,7 +330,7 @@ impl Makes<'_> {
                 position: DVec3::ZERO,
                 direction,
                 light,
-                shape: [lux; LEAVES],
+                shape,
                 luminaire: None,
             });
         }

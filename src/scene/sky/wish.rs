@@ -6,14 +6,21 @@
 //! ```
 //!
 //! `type` is overcast (CIE 1), intermediate (10), clear (12), uniform (5), or cie:1 to cie:16 (16: traditional overcast).
-//! `illuminance_lx` is that of open level ground by the sky alone; `luminance_cd_m2` in its place is that of the zenith. The sun
+//! `illuminance_lx` is that of open level ground by the sky alone; `luminance_cd_m2` in its place is that of the zenith. `cct_k` is the
+//! colour of the whole sky, or where `horizon_cct_k` or `sunward_cct_k` say what it is at the horizon and about the sun, of the zenith.
+//!
+//! `map` in place of `type` names a picture of all directions (`.hdr`, `.exr`, see `map`) in the folder of the file that names it;
+//! `luminance_cd_m2` is then that of white, (1, 1, 1), by default 1. What it shows below the horizon counts, unless
+//! `ground_reflectance` puts open ground there. The sun
 //! stands at an elevation and azimuth, or where it is seen at `latitude_deg`, `longitude_deg` (east) and `time`
 //! (`2026-06-21T12:00:00+02:00`); or `"sun"` is the name of a directional light of the file. Its `illuminance_lx` is that of a plane
 //! across its rays.
 
 use super::sun::Hours;
 use crate::scene::reader::Reader;
+use crate::scene::uri::{self, Place};
 use serde_json::{Map, Value};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// Type of a sky: 1 to 16.
@@ -53,6 +60,30 @@ impl FromStr for SkyType {
             .ok_or_else(|| {
                 "a sky is overcast, intermediate, clear, uniform, or cie:1 to cie:16".into()
             })
+    }
+}
+
+/// What a command line names: a type of sky, or a picture of all directions.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum SkyName {
+    /// Of ISO 15469.
+    Type(SkyType),
+    /// A file.
+    Map(PathBuf),
+}
+
+impl FromStr for SkyName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let path = PathBuf::from(text);
+        let ending = path.extension().map(|e| e.to_ascii_lowercase());
+        match text.parse() {
+            Ok(kind) => Ok(Self::Type(kind)),
+            Err(_) if ending.is_some_and(|e| e == "hdr" || e == "exr") => Ok(Self::Map(path)),
+            Err(why) => Err(format!("{why}, or a map of all directions as .hdr or .exr")),
+        }
     }
 }
 
@@ -136,10 +167,16 @@ pub struct SunWish {
 pub struct SkyWish {
     /// What kind of sky.
     pub kind: Option<SkyType>,
-    /// How bright.
+    /// How bright: of a map, its white.
     pub brightness: Option<Brightness>,
-    /// Correlated colour temperature, K.
+    /// A picture of all directions in the place of a kind.
+    pub map: Option<PathBuf>,
+    /// Correlated colour temperature, K: of the zenith where others are said.
     pub kelvin: Option<f64>,
+    /// The same at the horizon.
+    pub horizon_kelvin: Option<f64>,
+    /// The same about the sun.
+    pub sunward_kelvin: Option<f64>,
     /// Reflectance of the ground below the horizon.
     pub ground: Option<f64>,
     /// Where north is, degrees clockwise from -Z.
@@ -157,10 +194,17 @@ impl SkyWish {
     /// These, and where they say nothing the others.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
+        let (kind, map) = match (self.kind, self.map) {
+            (None, None) => (other.kind, other.map),
+            said => said,
+        };
         Self {
-            kind: self.kind.or(other.kind),
+            kind,
+            map,
             brightness: self.brightness.or(other.brightness),
             kelvin: self.kelvin.or(other.kelvin),
+            horizon_kelvin: self.horizon_kelvin.or(other.horizon_kelvin),
+            sunward_kelvin: self.sunward_kelvin.or(other.sunward_kelvin),
             ground: self.ground.or(other.ground),
             north: self.north.or(other.north),
             sun: SunWish {
@@ -178,9 +222,12 @@ impl SkyWish {
         };
         let known = [
             "type",
+            "map",
             "illuminance_lx",
             "luminance_cd_m2",
             "cct_k",
+            "horizon_cct_k",
+            "sunward_cct_k",
             "ground_reflectance",
             "north_deg",
             "sun",
@@ -188,11 +235,18 @@ impl SkyWish {
         reader.keys(sky, &known, place);
         let mut wish = Self {
             kind: parsed(sky, "type", place, reader),
+            map: map(sky, place, reader),
             kelvin: number(sky, "cct_k", KELVIN, place, reader),
+            horizon_kelvin: number(sky, "horizon_cct_k", KELVIN, place, reader),
+            sunward_kelvin: number(sky, "sunward_cct_k", KELVIN, place, reader),
             ground: number(sky, "ground_reflectance", [0.0, 1.0], place, reader),
             north: number(sky, "north_deg", TURN, place, reader),
             ..Self::default()
         };
+        if sky.contains_key("type") && sky.contains_key("map") {
+            let what = "says twice what it is like";
+            reader.check.problem(place, what, "give either type or map");
+        }
         let lux = number(sky, "illuminance_lx", BRIGHT, place, reader);
         let luminance = number(sky, "luminance_cd_m2", BRIGHT, place, reader);
         wish.brightness = match (lux, luminance) {
@@ -279,6 +333,22 @@ impl SunWish {
     }
 }
 
+/// Where the picture of all directions lies that an object names.
+fn map(sky: &Map<String, Value>, place: &str, reader: &mut Reader) -> Option<PathBuf> {
+    let value = sky.get("map")?;
+    let located = match value.as_str() {
+        Some(name) => uri::locate(&reader.folder, name),
+        None => Err(format!("map is {value}")),
+    };
+    let next = "name a .hdr or .exr inside the folder of the file that names it";
+    match located {
+        Ok(Place::File(path)) => return Some(path),
+        Ok(Place::Here(_)) => reader.check.problem(place, "map is a data URI", next),
+        Err(why) => reader.check.problem(place, why, next),
+    }
+    None
+}
+
 /// A number within bounds.
 fn number(
     object: &Map<String, Value>,
@@ -341,6 +411,9 @@ mod tests {
         for bad in ["cie:0", "cie:17", "cie:", "cloudy", ""] {
             assert!(bad.parse::<SkyType>().is_err(), "{bad}");
         }
+        assert_eq!("a/b.HDR".parse(), Ok(SkyName::Map("a/b.HDR".into())));
+        assert_eq!("cie:3".parse(), Ok(SkyName::Type(SkyType(3))));
+        assert!("cloudy.png".parse::<SkyName>().is_err());
         assert_eq!(
             "40,200".parse(),
             Ok(SunPlace::Angles {

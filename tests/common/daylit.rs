@@ -1,0 +1,158 @@
+//! The rooms of CIE 171:2006, 5.9 and what follows, and light through their openings by quadrature.
+
+#![allow(dead_code, reason = "no test file uses all of it")]
+
+use crate::built::Room;
+use glam::{DVec3, dvec3};
+use haarlight::scene::sky::{Brightness, SkyType, SkyWish, SunPlace, SunWish};
+use haarlight::solve::{Bake, Settings};
+use std::f64::consts::PI;
+
+/// Illuminance of open ground in these tests: per cent are lux.
+pub(crate) const LUX: f64 = 100.0;
+
+/// A place of the report, z up, in glTF's space.
+pub(crate) fn cie(x: f64, y: f64, z: f64) -> DVec3 {
+    dvec3(x, z, -y)
+}
+
+/// A sky of a CIE type with the sun at 60 degrees over y = 4 of the report (north here), without its direct light.
+pub(crate) fn wish(kind: u8) -> SkyWish {
+    SkyWish {
+        kind: Some(SkyType(kind)),
+        brightness: Some(Brightness::Illuminance(LUX)),
+        ground: Some(0.3),
+        sun: SunWish {
+            place: Some(SunPlace::Angles {
+                elevation: 60.0,
+                azimuth: 0.0,
+            }),
+            illuminance: Some(0.0),
+            kelvin: None,
+        },
+        ..SkyWish::default()
+    }
+}
+
+pub(crate) fn bake(room: Room, wish: &SkyWish) -> Bake {
+    bake_at(room, wish, 0.5)
+}
+
+pub(crate) fn bake_at(room: Room, wish: &SkyWish, error: f64) -> Bake {
+    let settings = Settings {
+        error,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(room.scene().under(wish).unwrap(), settings);
+    bake.run();
+    bake
+}
+
+/// The room of 5.9 with an opening of a width in the middle of its roof, every panel cut into `cuts` x `cuts` squares.
+pub(crate) fn room(rho: f64, opening: f64, cuts: usize) -> Room {
+    let mut room = Room::new();
+    let paint = room.paint(rho);
+    let mut panel = |corner: DVec3, u: DVec3, v: DVec3| {
+        let n = cuts as f64;
+        for j in 0..cuts {
+            for i in 0..cuts {
+                let at = corner + u * (i as f64 / n) + v * (j as f64 / n);
+                room.quad(at, u / n, v / n, paint);
+            }
+        }
+    };
+    let (x, y, z) = (cie(1.0, 0.0, 0.0), cie(0.0, 1.0, 0.0), cie(0.0, 0.0, 1.0));
+    panel(DVec3::ZERO, 4.0 * x, 4.0 * y);
+    panel(DVec3::ZERO, 3.0 * z, 4.0 * x);
+    panel(4.0 * y, 4.0 * x, 3.0 * z);
+    panel(DVec3::ZERO, 4.0 * y, 3.0 * z);
+    panel(4.0 * x, 3.0 * z, 4.0 * y);
+    let rim = 0.5 * (4.0 - opening);
+    if rim > 0.0 {
+        let top = 3.0 * z;
+        panel(top, rim * y, 4.0 * x);
+        panel(top + (4.0 - rim) * y, rim * y, 4.0 * x);
+        panel(top + rim * y, opening * y, rim * x);
+        panel(top + rim * y + (4.0 - rim) * x, opening * y, rim * x);
+    }
+    room
+}
+
+/// The same room with a window of 2 m x 1 m in the wall y = 4, its sill at 1 m; returns the window.
+pub(crate) fn beside(room: &mut Room) -> [DVec3; 3] {
+    let paint = room.paint(0.0);
+    let (x, y, z) = (cie(1.0, 0.0, 0.0), cie(0.0, 1.0, 0.0), cie(0.0, 0.0, 1.0));
+    room.quad(DVec3::ZERO, 4.0 * x, 4.0 * y, paint);
+    room.quad(3.0 * z, 4.0 * y, 4.0 * x, paint);
+    room.quad(DVec3::ZERO, 3.0 * z, 4.0 * x, paint);
+    room.quad(DVec3::ZERO, 4.0 * y, 3.0 * z, paint);
+    room.quad(4.0 * x, 3.0 * z, 4.0 * y, paint);
+    let wall = 4.0 * y;
+    room.quad(wall, 4.0 * x, 1.0 * z, paint);
+    room.quad(wall + 2.0 * z, 4.0 * x, 1.0 * z, paint);
+    room.quad(wall + 1.0 * z, 1.0 * x, 1.0 * z, paint);
+    room.quad(wall + 1.0 * z + 3.0 * x, 1.0 * x, 1.0 * z, paint);
+    [wall + 1.0 * z + 1.0 * x, 2.0 * x, 1.0 * z]
+}
+
+/// Places in that room that see the window.
+pub(crate) fn places_beside() -> [(DVec3, DVec3); 6] {
+    [
+        (cie(2.0, 2.0, 0.0), DVec3::Y),
+        (cie(2.0, 3.5, 0.0), DVec3::Y),
+        (cie(2.0, 2.0, 3.0), DVec3::NEG_Y),
+        (cie(1.0, 3.0, 3.0), DVec3::NEG_Y),
+        (cie(2.0, 0.0, 1.5), cie(0.0, 1.0, 0.0)),
+        (cie(0.0, 2.0, 1.0), cie(1.0, 0.0, 0.0)),
+    ]
+}
+
+/// Points A to F of the wall and G to N of the floor, with their normals, in the room.
+pub(crate) fn points() -> Vec<(DVec3, DVec3)> {
+    let wall = (0..6).map(|k| (cie(2.0, 0.0, 2.75 - 0.5 * f64::from(k)), cie(0.0, 1.0, 0.0)));
+    let floor = (0..8).map(|k| (cie(2.0, 0.25 + 0.5 * f64::from(k), 0.0), DVec3::Y));
+    wall.chain(floor).collect()
+}
+
+/// Irradiance at a point through a parallelogram, lit by a sky of 1 (and ground of `ground`), by plain quadrature.
+pub(crate) fn through(
+    sky: impl Fn(DVec3) -> f64,
+    ground: f64,
+    [corner, u, v]: [DVec3; 3],
+    (point, normal): (DVec3, DVec3),
+) -> f64 {
+    const N: usize = 800;
+    let (area, across) = (u.cross(v).length(), u.cross(v).normalize());
+    let mut sum = 0.0;
+    for j in 0..N {
+        for i in 0..N {
+            let at = |k: usize| (k as f64 + 0.5) / N as f64;
+            let way = corner + u * at(i) + v * at(j) - point;
+            let r2 = way.length_squared();
+            let d = way / r2.sqrt();
+            let radiance = if d.y > 0.0 { sky(d) } else { ground / PI };
+            sum += radiance * normal.dot(d).max(0.0) * across.dot(d).abs() / r2;
+        }
+    }
+    sum * area / (N * N) as f64
+}
+
+/// The opening in the roof: a corner and two sides.
+pub(crate) fn roof(opening: f64) -> [DVec3; 3] {
+    let rim = 0.5 * (4.0 - opening);
+    [
+        cie(rim, rim, 3.0),
+        cie(opening, 0.0, 0.0),
+        cie(0.0, opening, 0.0),
+    ]
+}
+
+/// Clear glass of 6 mm as the report gives it, by the cosine of incidence.
+pub(crate) fn glass_of_the_report(cosine: f64) -> f64 {
+    [
+        -0.028378, 3.156075, -3.058376, -1.428919, 4.014235, -1.775827,
+    ]
+    .into_iter()
+    .rev()
+    .fold(0.0, |sum, k| sum * cosine + k)
+}
