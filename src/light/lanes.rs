@@ -8,6 +8,9 @@
 //! Other ways to hold spectra are here to be compared with: radiosity itself on intervals (the paper's way), linear
 //! sRGB, and coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
 //!
+//! Where surfaces fluoresce, light counts also for what it excites: averages and refinement then follow [`Lanes::guided`] weights, by
+//! which ultraviolet light has tristimulus values, too.
+//!
 //! Units: ratio lanes are numbers that multiply S (W/m2/nm of radiosity per unit of `LightSpectrum::power`);
 //! absolute lanes are W/m2/nm; lanes of linear sRGB are W/m2 weighted by the observer, (1, 1, 1) has Y = 1 / KM lm/m2.
 
@@ -49,6 +52,8 @@ pub struct Lanes {
     xyz: Vec<[f64; 3]>,
     power: Vec<Leaves>,
     weights: [Leaves; 3],
+    /// What light counts for, where that is more than what is seen of it: weights, and the tristimulus value of each lane by them.
+    guide: Option<Box<([Leaves; 3], Vec<[f64; 3]>)>>,
 }
 
 impl Lanes {
@@ -137,6 +142,7 @@ impl Lanes {
             xyz: xyz.to_vec(),
             power: spectra.iter().map(|s| s.power).collect(),
             weights: *weights,
+            guide: None,
         }
     }
 
@@ -151,6 +157,7 @@ impl Lanes {
             xyz,
             power: spectra.iter().map(|s| s.power).collect(),
             weights: *weights,
+            guide: None,
         }
     }
 
@@ -174,7 +181,24 @@ impl Lanes {
             xyz,
             power,
             weights: *weights,
+            guide: None,
         }
+    }
+
+    /// The same lanes, whose averages and whose brightness follow other weights than the observer's.
+    #[must_use]
+    pub fn guided(mut self, guide: &[Leaves; 3]) -> Self {
+        let xyz = self.lanes().iter().map(|lane| {
+            guide.each_ref().map(|w| {
+                let leaves = lane.first..lane.first + lane.count;
+                KM * leaves.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
+            })
+        });
+        let xyz: Vec<[f64; 3]> = xyz.collect();
+        if !xyz.is_empty() {
+            self.guide = Some(Box::new((*guide, xyz)));
+        }
+        self
     }
 
     /// Number of lanes in use.
@@ -243,6 +267,27 @@ impl Lanes {
         &self.xyz
     }
 
+    /// What each lane at 1 counts for: its tristimulus value, by the guide's weights where there are some.
+    pub fn noticed(&self) -> &[[f64; 3]] {
+        self.guide.as_ref().map_or(&self.xyz, |guide| &guide.1)
+    }
+
+    /// Tristimulus values of a row as it counts.
+    pub fn notice(&self, row: &[f32]) -> [f64; 3] {
+        summed(row, self.noticed())
+    }
+
+    /// What each lane at 1 brings a surface that takes so much of each leaf, the `width` of a leaf in nm: W/m2. Nothing where lanes are no
+    /// intervals.
+    pub fn taken(&self, share: &Leaves, width: f64) -> Vec<f32> {
+        let lanes = self.lanes().iter().map(|lane| {
+            let leaves = lane.first..lane.first + lane.count;
+            let sum: f64 = leaves.map(|k| share[k] * self.shape(lane, k)).sum();
+            (sum * width) as f32
+        });
+        lanes.collect()
+    }
+
     /// What each lane holds of a smooth factor (a reflectance, a lamp's shape): eq. 3 under the lane's light. Where
     /// lanes mix this says nothing; [`Lanes::matrix`] does.
     pub fn averages(&self, f: &Leaves, out: &mut [f32]) {
@@ -284,7 +329,8 @@ impl Lanes {
             return first;
         }
         let (mut over, mut under) = (0.0, 0.0);
-        for w in &self.weights {
+        let weights = (self.guide.as_ref()).map_or(&self.weights, |guide| &guide.0);
+        for w in weights {
             let (mut whole, mut part) = (0.0, 0.0);
             for k in leaves.clone() {
                 let weight = w[k] * lane.light.map_or(1.0, |l| self.power[l][k]);
@@ -352,13 +398,7 @@ impl Lanes {
 
     /// Tristimulus values of a row.
     pub fn tristimulus(&self, row: &[f32]) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for (x, w) in row.iter().zip(&self.xyz) {
-            for (s, w) in sum.iter_mut().zip(w) {
-                *s += f64::from(*x) * w;
-            }
-        }
-        sum
+        summed(row, &self.xyz)
     }
 
     /// Tristimulus values of a row after one more reflection, with the reflectance at full resolution as far as lanes
@@ -428,6 +468,17 @@ impl Lanes {
         }
         out
     }
+}
+
+/// Sum of a row's lanes by tristimulus values.
+fn summed(row: &[f32], xyz: &[[f64; 3]]) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for (x, w) in row.iter().zip(xyz) {
+        for (s, w) in sum.iter_mut().zip(w) {
+            *s += f64::from(*x) * w;
+        }
+    }
+    sum
 }
 
 fn dot(a: &Leaves, b: &Leaves) -> f64 {

@@ -58,6 +58,8 @@ pub enum Kind {
     Panes,
     /// What lets diffuse light through.
     Sheets,
+    /// What gives light out again at other wavelengths.
+    Fluorescence,
 }
 
 impl Kind {
@@ -80,6 +82,7 @@ impl Kind {
             Self::TwoSided => "two-sided surfaces",
             Self::Panes => "panes",
             Self::Sheets => "diffuse sheets",
+            Self::Fluorescence => "fluorescence",
         }
     }
 }
@@ -168,6 +171,7 @@ impl Plan {
         );
         plan.add(Kind::Panes, panes(scene));
         plan.add(Kind::Sheets, sheets(&used));
+        plan.add(Kind::Fluorescence, fluorescence(&used));
         for lack in lacking(&scene.source.json) {
             plan.effects.push(Effect {
                 name: lack.effect,
@@ -306,7 +310,10 @@ fn counted<'a, 'b: 'a>(
 fn interreflection(used: &[&Material]) -> (bool, String) {
     let bright = used
         .iter()
-        .filter(|m| m.reflectance.iter().any(|r| *r > 0.0) || m.sheet.is_some())
+        .filter(|m| {
+            let sends = m.sheet.is_some() || m.fluorescence.is_some();
+            sends || m.reflectance.iter().any(|r| *r > 0.0)
+        })
         .count();
     match bright {
         0 => (false, "every surface is black".into()),
@@ -345,6 +352,9 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
                 let name = quoted(&material.name);
                 return (true, format!("what {name} lets through has a colour"));
             }
+        }
+        if material.fluorescence.is_some() {
+            return (true, format!("{} fluoresces", quoted(&material.name)));
         }
         if let Some(emission) = &material.emission {
             let tinted = emission.texture.as_ref().is_some_and(|t| !grey(t.image));
@@ -426,6 +436,15 @@ fn sheets(used: &[&Material]) -> (bool, String) {
             (true, format!("materials {named} let diffuse light through"))
         }
     }
+}
+
+/// Materials that give light out again at other wavelengths, and by what.
+fn fluorescence(used: &[&Material]) -> (bool, String) {
+    let names: Vec<String> = (used.iter())
+        .filter_map(|m| Some((m, m.fluorescence.as_ref()?)))
+        .map(|(m, f)| format!("{} ({})", quoted(&m.name), f.from))
+        .collect();
+    number_of(&names, "material")
 }
 
 /// Off where nothing can stand between two points that see each other's front, nor between a point and a light.

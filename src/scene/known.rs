@@ -1,5 +1,6 @@
 //! What side files and extras say of a material.
 
+use super::fluorescence;
 use super::luminaires::{self, ProfileWish};
 use super::reader::{Reader, Sampled};
 use super::transmittance;
@@ -21,6 +22,8 @@ pub(crate) struct MaterialSpectra {
     pub(crate) transmission: Option<Sampled>,
     /// Reflectance of the back of a sheet, unit 1.
     pub(crate) back: Option<Sampled>,
+    /// What it fluoresces.
+    pub(crate) fluorescence: Option<fluorescence::Wish>,
 }
 
 impl MaterialSpectra {
@@ -33,6 +36,7 @@ impl MaterialSpectra {
             transmittance: self.transmittance.or(other.transmittance),
             transmission: self.transmission.or(other.transmission),
             back: self.back.or(other.back),
+            fluorescence: self.fluorescence.or(other.fluorescence),
         }
     }
 }
@@ -42,10 +46,11 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
     let Some(entry) = reader.object(entry, place) else {
         return MaterialSpectra::default();
     };
-    const KEYS: [&str; 5] = [
+    const KEYS: [&str; 6] = [
         "reflectance",
         "back_reflectance",
         "emission",
+        "fluorescence",
         "transmission",
         "transmittance",
     ];
@@ -59,6 +64,25 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
     };
     spectra.reflectance = reflectance("reflectance");
     spectra.back = reflectance("back_reflectance");
+    if let Some(value) = entry.get("fluorescence") {
+        spectra.fluorescence = fluorescence::read(reader, value, place);
+        let diagonal = (spectra.fluorescence.as_ref()).and_then(|wish| wish.diagonal);
+        match (&spectra.reflectance, diagonal) {
+            (Some(_), Some(_)) => {
+                let what = "has a reflectance, and a matrix whose diagonal is one";
+                let next = "take the reflectance out, or leave the diagonal at 0";
+                reader.check.problem(place, what, next);
+            }
+            (None, Some(leaves)) => {
+                spectra.reflectance = Some(Sampled {
+                    from: "the matrix's diagonal".into(),
+                    leaves,
+                    is_csv: true,
+                });
+            }
+            _ => {}
+        }
+    }
     if let Some(value) = entry.get("transmittance") {
         spectra.transmittance = transmittance::read(reader, entry, value, place);
     }

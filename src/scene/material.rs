@@ -1,9 +1,10 @@
 //! A material: what a surface reflects, gives out and lets through.
 
+use super::fluorescence::Fluorescence;
 use super::pane::Pane;
 use super::profile::Profile;
 use super::sheet::{Sheet, Weave, bounded};
-use super::{GREATEST_ALBEDO, Image, Sides, Texture};
+use super::{Image, Sides, Texture};
 use crate::color::Upsampler;
 use crate::data::Leaves;
 use std::sync::Arc;
@@ -35,6 +36,8 @@ pub struct Material {
     pub pane: Option<Pane>,
     /// What it lets through diffusely; then [`reflectance`](Self::reflectance) is what is left of the base colour.
     pub sheet: Option<Sheet>,
+    /// What it gives out again at other wavelengths; then [`reflectance`](Self::reflectance) leaves room for it.
+    pub fluorescence: Option<Fluorescence>,
 }
 
 /// Coverage.
@@ -89,9 +92,7 @@ impl Material {
             return self.reflectance;
         }
         let rgb = std::array::from_fn(|i| self.base_color[i] * paint[i]);
-        upsampler
-            .reflectance_fast(rgb)
-            .map(|r| r.min(GREATEST_ALBEDO))
+        self.bounded(upsampler.reflectance_fast(rgb))
     }
 }
 

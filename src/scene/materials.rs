@@ -6,6 +6,7 @@
 //! No gloss. What lets light through is a pane, see [`pane`].
 
 use super::check::{Check, listed};
+use super::fluorescence;
 use super::json::short;
 use super::known::MaterialSpectra;
 use super::lamps::{Lamp, Lamps, bearable};
@@ -79,6 +80,11 @@ pub(crate) fn materials(
             let is_sheet = material.sheet.is_some();
             if is_sheet {
                 material.sides = Sides::Both;
+            }
+            if let Some(wish) = &spectra.fluorescence {
+                let measured = spectra.reflectance.as_ref().map(|r| r.from.as_str());
+                let excited = &mut lamps.excited;
+                fluorescence::kindle(&mut material, wish, measured, &place, grid, excited, check);
             }
             if material.pane.is_none() {
                 // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
@@ -163,6 +169,7 @@ fn paint(
         emission: None,
         pane: None,
         sheet: None,
+        fluorescence: None,
         alpha: match raw.alpha_mode {
             AlphaMode::Mask => Alpha::Mask {
                 cutoff: raw.alpha_cutoff,

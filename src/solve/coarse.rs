@@ -41,6 +41,8 @@ pub(crate) struct Coarse {
     pub(super) punctual: Vec<Vec<Leaves>>,
     /// What passes sheets: a patch, one behind it, and how much of the light there leaves the patch.
     pub(super) through: Vec<([u32; 2], Leaves)>,
+    /// What excites each patch to give out a light; none of lights that are lamps'.
+    excitation: Vec<Option<Vec<Leaves>>>,
 }
 
 /// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
@@ -53,6 +55,8 @@ pub(crate) trait Dense {
     fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves>;
     /// What a leaf node lets through from the one behind it; none of what is no sheet.
     fn through(&self, leaf: u32) -> Option<Leaves>;
+    /// What excites a leaf node to give out a light; none if nothing does.
+    fn excitation(&self, leaf: u32, light: usize) -> Option<Leaves>;
 }
 
 /// What a choice of cuts does.
@@ -89,6 +93,7 @@ impl Coarse {
         let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
         let mut punctual = emission.clone();
         let mut through: BTreeMap<[u32; 2], Leaves> = BTreeMap::new();
+        let mut excitation: Vec<Option<Vec<Leaves>>> = vec![None; lights];
         for &leaf in leaves {
             let (g, a) = (group[leaf as usize] as usize, areas[leaf as usize]);
             area[g] += a;
@@ -104,12 +109,21 @@ impl Coarse {
                 if let Some(p) = dense.punctual(leaf, light) {
                     add(&mut punctual[light][g], &p, a);
                 }
+                if let Some(x) = dense.excitation(leaf, light) {
+                    let all = &mut excitation[light];
+                    add(
+                        &mut all.get_or_insert_with(|| vec![[0.0; LEAVES]; count])[g],
+                        &x,
+                        a,
+                    );
+                }
             }
         }
         for (g, a) in area.iter().enumerate() {
             let all = std::iter::once(&mut reflectance)
                 .chain(&mut emission)
-                .chain(&mut punctual);
+                .chain(&mut punctual)
+                .chain(excitation.iter_mut().flatten());
             for row in all.map(|rows| &mut rows[g]) {
                 for x in row.iter_mut() {
                     *x /= a;
@@ -133,6 +147,26 @@ impl Coarse {
             emission,
             punctual,
             through: through.into_iter().collect(),
+            excitation,
+        }
+    }
+
+    /// Lights what fluoresces by the light of lamps: enough to choose wavelengths by, as it excites little itself. `width` of a leaf, nm.
+    pub(super) fn kindle(&mut self, spectra: &[LightSpectrum], weights: &[Leaves; 3], width: f64) {
+        let mut brought = vec![[0.0; LEAVES]; self.leaves.len()];
+        for light in (0..spectra.len()).filter(|&k| self.excitation[k].is_none()) {
+            let lanes = Lanes::only(spectra, light, weights);
+            let rows = self.irradiance(&lanes);
+            for (k, sum) in brought.iter_mut().enumerate() {
+                add(sum, &lanes.leaves(rows.row(k)), 1.0);
+            }
+        }
+        for (light, excitation) in self.excitation.iter().enumerate() {
+            for (k, excitation) in excitation.iter().flatten().enumerate() {
+                let taken = excitation.iter().zip(&brought[k]);
+                let power = taken.map(|(g, e)| g * e).sum::<f64>() * width;
+                self.emission[light][k] = [power; LEAVES];
+            }
         }
     }
 
@@ -155,6 +189,12 @@ impl Coarse {
             }
             *lights = joined;
         }
+        // Copies of what fluoresces are excited alike, each by its own layer.
+        let mut joined = vec![None; count];
+        for (excitation, &to) in self.excitation.iter().zip(of) {
+            joined[to] = joined[to].take().or_else(|| excitation.clone());
+        }
+        self.excitation = joined;
     }
 
     /// Irradiance of the model's patches on some lanes.

@@ -10,6 +10,7 @@ mod coarse;
 pub(crate) mod conjugate;
 mod direct;
 mod estimate;
+mod fluorescing;
 pub(crate) mod flux;
 pub mod forecast;
 mod held;

@@ -143,6 +143,7 @@ fn material(name: &str, index: usize) -> Material {
         alpha: Alpha::Opaque,
         pane: None,
         sheet: None,
+        fluorescence: None,
     }
 }
 
