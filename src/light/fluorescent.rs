@@ -74,8 +74,8 @@ impl Fluorescent {
     }
 }
 
-/// The observer's weights and what light counts for by what it excites: for each leaf the tristimulus values that a surface fluoresces
-/// under it, the greatest of all materials; none where nothing fluoresces.
+/// What light counts for by what it excites, as weights beside the observer's: for each leaf the tristimulus values that a surface
+/// fluoresces under it, the greatest of all materials; none where nothing fluoresces.
 pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]> {
     let width = scene.grid.width();
     let mut more = [[0.0_f64; LEAVES]; 3];
@@ -100,5 +100,5 @@ pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]>
             *most = most.max(*own);
         }
     }
-    any.then(|| std::array::from_fn(|c| std::array::from_fn(|k| weights[c][k] + more[c][k])))
+    any.then_some(more)
 }

@@ -8,8 +8,8 @@
 //! Other ways to hold spectra are here to be compared with: radiosity itself on intervals (the paper's way), linear
 //! sRGB, and coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
 //!
-//! Where surfaces fluoresce, light counts also for what it excites: averages and refinement then follow [`Lanes::guided`] weights, by
-//! which ultraviolet light has tristimulus values, too.
+//! Where surfaces fluoresce, light counts also for what it excites, see [`Lanes::guided`]: averages and refinement then follow further
+//! weights beside the observer's, by which ultraviolet light has tristimulus values, too.
 //!
 //! Units: ratio lanes are numbers that multiply S (W/m2/nm of radiosity per unit of `LightSpectrum::power`);
 //! absolute lanes are W/m2/nm; lanes of linear sRGB are W/m2 weighted by the observer, (1, 1, 1) has Y = 1 / KM lm/m2.
@@ -52,8 +52,19 @@ pub struct Lanes {
     xyz: Vec<[f64; 3]>,
     power: Vec<Leaves>,
     weights: [Leaves; 3],
-    /// What light counts for, where that is more than what is seen of it: weights, and the tristimulus value of each lane by them.
-    guide: Option<Box<([Leaves; 3], Vec<[f64; 3]>)>>,
+    /// What light counts for beside what is seen of it.
+    guide: Option<Box<Guide>>,
+}
+
+/// What light counts for beside what is seen of it.
+#[derive(Debug, Clone)]
+struct Guide {
+    /// Weights as the observer's.
+    weights: [Leaves; 3],
+    /// Tristimulus value of a lane at 1 by them.
+    xyz: Vec<[f64; 3]>,
+    /// The same with what is seen.
+    both: Vec<[f64; 3]>,
 }
 
 impl Lanes {
@@ -185,18 +196,25 @@ impl Lanes {
         }
     }
 
-    /// The same lanes, whose averages and whose brightness follow other weights than the observer's.
+    /// The same lanes, whose averages and whose brightness follow further weights beside the observer's: what a surface sends out for a
+    /// unit of each leaf at other wavelengths.
     #[must_use]
-    pub fn guided(mut self, guide: &[Leaves; 3]) -> Self {
+    pub fn guided(mut self, weights: &[Leaves; 3]) -> Self {
         let xyz = self.lanes().iter().map(|lane| {
-            guide.each_ref().map(|w| {
+            weights.each_ref().map(|w| {
                 let leaves = lane.first..lane.first + lane.count;
                 KM * leaves.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
             })
         });
         let xyz: Vec<[f64; 3]> = xyz.collect();
+        let both = xyz.iter().zip(&self.xyz);
+        let both = both.map(|(a, b)| std::array::from_fn(|c| a[c] + b[c]));
         if !xyz.is_empty() {
-            self.guide = Some(Box::new((*guide, xyz)));
+            self.guide = Some(Box::new(Guide {
+                weights: *weights,
+                both: both.collect(),
+                xyz,
+            }));
         }
         self
     }
@@ -267,9 +285,14 @@ impl Lanes {
         &self.xyz
     }
 
-    /// What each lane at 1 counts for: its tristimulus value, by the guide's weights where there are some.
+    /// What each lane at 1 counts for: its tristimulus value, with what it excites.
     pub fn noticed(&self) -> &[[f64; 3]] {
-        self.guide.as_ref().map_or(&self.xyz, |guide| &guide.1)
+        self.guide.as_ref().map_or(&self.xyz, |guide| &guide.both)
+    }
+
+    /// Tristimulus value of what each lane at 1 excites; none where nothing fluoresces.
+    pub fn excites(&self) -> Option<&[[f64; 3]]> {
+        self.guide.as_ref().map(|guide| &*guide.xyz)
     }
 
     /// Tristimulus values of a row as it counts.
@@ -329,8 +352,8 @@ impl Lanes {
             return first;
         }
         let (mut over, mut under) = (0.0, 0.0);
-        let weights = (self.guide.as_ref()).map_or(&self.weights, |guide| &guide.0);
-        for w in weights {
+        let more = self.guide.iter().flat_map(|guide| &guide.weights);
+        for w in self.weights.iter().chain(more) {
             let (mut whole, mut part) = (0.0, 0.0);
             for k in leaves.clone() {
                 let weight = w[k] * lane.light.map_or(1.0, |l| self.power[l][k]);

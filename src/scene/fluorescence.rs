@@ -14,7 +14,8 @@
 //! `excitation` is the share of the light that the dye absorbs, 0 to 1, of photons and of power alike; `emission` is relative spectral
 //! power; `yield` counts photons. A photon of wavelength mu that is given out again at the mean of the emission,
 //! `l = integral of lambda e`, keeps mu / l of its energy, so `g(mu) = excitation(mu) yield mu / l`, and never more than is absorbed.
-//! Several dyes are a list. Beyond their rows all three are 0. The matrix: see [`bispectral`](super::bispectral).
+//! Several dyes are a list. Beyond their rows both spectra are 0. The matrix: rows of emission, columns of excitation, the unit (`per_nm` or
+//! `per_band`) in the first cell, the reflectance where both wavelengths are equal; see `scene/bispectral.rs`.
 //!
 //! No more power leaves a surface than comes at any wavelength: `rho + g` above 1 is a problem where both are measured; a base colour,
 //! painted or not, reflects what the dye leaves of [`GREATEST_ALBEDO`]. Light does not wait: no phosphorescence.
@@ -208,10 +209,11 @@ fn dye(
     // At the table's rows and the edges of the leaves: between them both factors are smooth.
     let excitation = power(&absorbed, &grid, out);
     outside(reader.check, &absorbed, &grid, place);
+    let most = absorbed.wavelengths().iter().zip(absorbed.values());
+    let most = most.max_by(|a, b| a.1.total_cmp(b.1));
+    let peak = most.map_or(0.0, |(nm, _)| *nm);
     let from = format!(
-        "{} excites {}, yield {quantum}",
-        short(&taken),
-        short(&given)
+        "light of {peak:.0} nm above all, given out at {mean:.0} nm in the mean, yield {quantum}"
     );
     Some(([spectrum, excitation], from))
 }

@@ -4,6 +4,7 @@ use super::check::{Check, Unknown};
 use super::json::short;
 use super::said;
 use super::uri;
+use crate::color::Observer;
 use crate::data::{Grid, Kind, Leaves, Named, Outside, Table, named, nearest, nearest_of};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -104,6 +105,14 @@ impl Reader<'_> {
                 what,
                 "give a spectrum of visible light, in nanometres",
             );
+            return None;
+        }
+        let luminous = || Observer::cie1931().weights(self.grid)[1];
+        let seen = |y: Leaves| leaves.iter().zip(y).any(|(x, y)| x * y > 0.0);
+        if kind == Kind::Illuminant && !seen(luminous()) {
+            let what = format!("'{from}' gives no light that an eye sees");
+            let next = "lamps are measured by what is seen of them: give the trace of visible light that it has";
+            self.check.problem(place, what, next);
             return None;
         }
         self.note_ultraviolet(&table, kind, &from);

@@ -57,6 +57,7 @@ impl Bake {
             | Representation::Guaranteed
                 if guide.is_some() =>
             {
+                self.spectrum_error = Some(0.0);
                 Lanes::dense(spectra, weights)
             }
             Representation::Uniform(n) if !none => {
@@ -82,7 +83,7 @@ impl Bake {
                 let mut model = self.model(coarse::PATCHES);
                 let kin = Kin::of(&self.scene);
                 model.join(&kin.of, kin.spectra.len());
-                let (spectra, weights) = (&kin.spectra, guide.as_ref().unwrap_or(&self.weights));
+                let (spectra, weights) = (&kin.spectra, &self.weights);
                 if guide.is_some() {
                     model.kindle(spectra, weights, self.scene.grid.width());
                 }
@@ -90,7 +91,8 @@ impl Bake {
                 let known = known.map(|cuts| kin.one_of_each(&cuts));
                 let copies = kin.copies.as_deref();
                 let choose = |model: &coarse::Coarse| {
-                    model.choose(spectra, weights, white, tolerance, known.clone(), copies)
+                    let seen = (weights, guide.as_ref());
+                    model.choose(spectra, seen, white, tolerance, known.clone(), copies)
                 };
                 let mut choice = choose(&model);
                 // What lies behind a pane has light of its own spectra: lanes serve all of them.

@@ -107,7 +107,11 @@ fn back(scene: &Scene) -> f64 {
                 most.max(out[k] / (1.0 - rho))
             })
     };
-    fluorescent().map(of).fold(0.0, f64::max)
+    // What is read is bounded; what is made in code may not be.
+    fluorescent()
+        .map(of)
+        .fold(0.0, f64::max)
+        .min(GREATEST_ALBEDO)
 }
 
 /// What takes part in a round.

@@ -8,6 +8,7 @@ mod checkpoint;
 mod choice;
 mod coarse;
 pub(crate) mod conjugate;
+mod cuts;
 mod direct;
 mod estimate;
 mod fluorescing;

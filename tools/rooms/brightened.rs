@@ -149,9 +149,9 @@ pub(crate) fn spectra() -> Value {
     });
     json!({
         "materials": {
-            "daylight": {"reflectance": {"csv": "300,0.6\n780,0.6"}, "emission": {"name": "cie/D65", "luminance_cd_m2": 2500}},
-            "incandescent": {"reflectance": {"csv": "300,0.6\n780,0.6"}, "emission": {"csv": incandescent(), "luminance_cd_m2": 2500}},
-            "ultraviolet": {"reflectance": {"csv": "300,0.6\n780,0.6"}, "emission": {"csv": ultraviolet, "luminance_cd_m2": 25}},
+            "daylight": {"reflectance": {"csv": "300,0.6\n780,0.6"}, "emission": {"name": "cie/D65", "luminance_cd_m2": 800}},
+            "incandescent": {"reflectance": {"csv": "300,0.6\n780,0.6"}, "emission": {"csv": incandescent(), "luminance_cd_m2": 800}},
+            "ultraviolet": {"reflectance": {"csv": "300,0.6\n780,0.6"}, "emission": {"csv": ultraviolet, "luminance_cd_m2": 40}},
             "plain paper": {"reflectance": {"csv": paper}},
             "brightened paper": {
                 "reflectance": {"csv": paper},
