@@ -3,6 +3,7 @@
 //! It shares the scene, the welded triangles and the ray index with the solver, and nothing else: no links, no lanes,
 //! no form factors, no balance.
 
+mod fluorescence;
 mod mirrors;
 mod outside;
 mod path;

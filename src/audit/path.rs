@@ -4,6 +4,7 @@
 //! by the balance heuristic (Veach and Guibas 1995). Paths end by Russian roulette, so no bounce is cut off.
 //! Figures are *measured*: each comes with the standard error of independent batches.
 
+use super::fluorescence::{Tally, goes_on};
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
@@ -169,10 +170,17 @@ impl<'a> Audit<'a> {
 
     /// Adds one path's irradiance.
     fn path(&self, start: &Vertex, first: [[f64; 2]; 2], rng: &mut Pcg, sum: &mut Leaves) {
+        let mut tally = Tally::new(sum);
+        self.walk(start, first, rng, &mut tally);
+        tally.settle();
+    }
+
+    fn walk(&self, start: &Vertex, first: [[f64; 2]; 2], rng: &mut Pcg, tally: &mut Tally) {
         let mut throughput = [1.0; LEAVES];
         let mut at = Vertex { ..*start };
         let (mut toward_lamp, mut toward_any) = (first[0], first[1]);
         for bounce in 0.. {
+            let sum = &mut tally.found;
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
             self.punctual(&at, None, toward_lamp, rng, &throughput, sum);
             self.punctual_in_mirrors(&at, toward_lamp, rng, &throughput, sum);
@@ -210,7 +218,7 @@ impl<'a> Audit<'a> {
                     _ => 1.0,
                 };
                 for l in 0..LEAVES {
-                    sum[l] += throughput[l] * PI * radiance[l] * share;
+                    tally.found[l] += throughput[l] * PI * radiance[l] * share;
                 }
             }
             let (albedo, normal) = match &material.sheet {
@@ -221,9 +229,7 @@ impl<'a> Audit<'a> {
                 }
                 None => (self.albedo(triangle, weights), normal),
             };
-            for (t, a) in throughput.iter_mut().zip(&albedo) {
-                *t *= a;
-            }
+            goes_on(self.scene, material, albedo, &mut throughput, rng, tally);
             let greatest = throughput.iter().copied().fold(0.0, f64::max);
             if greatest <= 0.0 {
                 return;
@@ -444,8 +450,7 @@ impl<'a> Audit<'a> {
     fn albedo(&self, triangle: usize, weights: [f32; 3]) -> Leaves {
         let material = &self.scene.materials[self.mesh.material[triangle] as usize];
         match self.color(material, triangle, weights) {
-            Some(color) => (self.upsampler.reflectance_fast(color))
-                .map(|x| x.min(crate::scene::GREATEST_ALBEDO)),
+            Some(color) => material.bounded(self.upsampler.reflectance_fast(color)),
             None => material.reflectance,
         }
     }

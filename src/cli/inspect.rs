@@ -151,6 +151,7 @@ fn materials(materials: &[MaterialFact]) -> Vec<Vec<String>> {
             let (through, from) = (sheet.transmittance_y, short(&sheet.transmission));
             format!("; {through:.3} passes ({from})")
         });
+        let again = (material.fluorescence.as_ref()).map(|from| format!("; fluoresces ({from})"));
         vec![
             material.name.clone(),
             material.triangles.to_string(),
@@ -158,9 +159,10 @@ fn materials(materials: &[MaterialFact]) -> Vec<Vec<String>> {
             format!("{:.3}", material.albedo_y),
             material.sides.into(),
             format!(
-                "{}{textured}{}",
+                "{}{textured}{}{}",
                 material.reflectance,
-                through.unwrap_or_default()
+                through.unwrap_or_default(),
+                again.unwrap_or_default()
             ),
         ]
     };

@@ -35,6 +35,7 @@
 //! | `bytes_per_link` | B | of these, for each link: 28 for itself, 4 for each blocker, 16 in the rows of the solve and 32 in those of the gather |
 //! | `bytes_per_element` | B | of these, for each leaf of the hierarchy: patches, rows of light, direct light |
 //! | `iterations` | | operator applications of the solve |
+//! | `fluorescence_rounds` | | how often all bounces were found, until what fluoresces changed no more; 0 where nothing does |
 //! | `error.total_de2000`, `.total_de_luv` | dE00, dE*uv | all sources; `null` in the first round, as two are compared |
 //! | `error.total_relative` | 1 | root mean square relative error of illuminance |
 //! | `error.total_xyz` | lm/m2 | root mean square error of tristimulus irradiance |
@@ -43,7 +44,8 @@
 //! | `error.convergence` | 1 | of the solve, relative, in the solver's norm |
 //! | `flux.emitted_lm`, `.received_lm` | lm | given out by surfaces; what fronts receive straight from lamps of any kind |
 //! | `flux.absorbed_lm`, `.escaped_lm` | lm | absorbed by fronts; left the room or met a black back |
-//! | `flux.worst_band` | 1 | worst relative difference of received and absorbed + escaped light over all bands |
+//! | `flux.fluoresced_lm` | lm | given out at other wavelengths than excite it; of the flux that is absorbed |
+//! | `flux.worst_band` | 1 | worst relative difference of received (with what is fluoresced) and absorbed + escaped light over all bands |
 //! | `flux.sent` | 1 | where the light of lamps goes first, by rays from them: `to_fronts`, `to_backs`, `outside`, `in_panes` (absorbed or reflected by panes), shares (estimates, to .1 %) of `lamps_lm`, the flux of all but directional lamps, lm |
 //! | `flux.scaled` | 1 | what light on leaves was multiplied by so that none goes missing, `direct` and `reflected`; 1: nothing was |
 //! | `row_sum_defect`, `row_sum_defect_after` | 1 | distance of row sums from what each leaf looks out on: mean by area and greatest, before and after balancing |

@@ -11,8 +11,9 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Shortest and longest wavelength that the observer's table knows, nm (CIE 018:2019, table 6).
-const KNOWN_NM: [f64; 2] = [360.0, 830.0];
+/// Shortest wavelength that the tables of daylight and of illuminant A know (CIE 015:2004, table T.1), which is there to excite what
+/// fluoresces, and longest that the observer's table knows (CIE 018:2019, table 6), nm.
+const KNOWN_NM: [f64; 2] = [300.0, 830.0];
 /// Narrowest leaf, nm: the step of the finest tables.
 const LEAST_LEAF_NM: f64 = 1.0;
 
@@ -41,7 +42,7 @@ pub struct Reading {
     /// Spectra of materials and lights [default: ROOM's name with .spectra.json, if it is there].
     #[arg(long, value_name = "FILE")]
     pub spectra: Option<PathBuf>,
-    /// Wavelengths to work on, nm; 64 leaves divide them.
+    /// Wavelengths to work on, nm; 64 leaves divide them. From 300 on where ultraviolet light excites what fluoresces.
     #[arg(long, value_name = "FROM..TO", default_value = "380..780")]
     pub range: Range,
     /// Only warn of keys and names in the file of spectra that mean nothing.
@@ -209,8 +210,9 @@ mod tests {
         let range: Range = "380..700".parse().unwrap();
         assert_eq!(range.grid(), Grid::paper());
         assert_eq!(Range::default().grid(), Grid::default());
+        assert!("300..780".parse::<Range>().is_ok());
         for bad in [
-            "380", "380-780", "780..380", "NaN..780", "300..780", "380..400", "a..b",
+            "380", "380-780", "780..380", "NaN..780", "290..780", "380..400", "a..b",
         ] {
             assert!(bad.parse::<Range>().is_err(), "{bad}");
         }

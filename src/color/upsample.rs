@@ -41,6 +41,8 @@ pub struct Upsampler {
     /// XYZ of D65 on the grid.
     white: Xyz,
     srgb: LinearSrgb,
+    /// First leaf that the observer sees: what a colour says of shorter waves is that they are reflected like it.
+    first: usize,
     table: OnceLock<Vec<[f32; LEAVES]>>,
 }
 
@@ -61,6 +63,9 @@ impl Upsampler {
             weights,
             white,
             srgb: LinearSrgb::with_white(white),
+            first: (0..LEAVES)
+                .find(|&k| weights.iter().any(|row| row[k] > 0.0))
+                .unwrap_or(0),
             table: OnceLock::new(),
         }
     }
@@ -165,9 +170,18 @@ impl Upsampler {
         let brightest = rgb.iter().fold(0.0f64, |m, &c| m.max(c));
         if brightest < DARKEST {
             let scale = brightest / DARKEST;
-            return evaluate(&self.coefficients(rgb.map(|c| c / scale))).map(|r| r * scale);
+            let brighter = self.evaluate(&self.coefficients(rgb.map(|c| c / scale)));
+            return brighter.map(|r| r * scale);
         }
-        evaluate(&self.coefficients(rgb))
+        self.evaluate(&self.coefficients(rgb))
+    }
+
+    /// The spectrum of coefficients, held below what the observer sees.
+    fn evaluate(&self, c: &[f64; 3]) -> Leaves {
+        let mut leaves = evaluate(c);
+        let held = leaves[self.first];
+        leaves[..self.first].fill(held);
+        leaves
     }
 
     /// Levenberg-Marquardt on the three L*a*b* residuals, from the grey of the same luminance.
@@ -322,7 +336,12 @@ mod tests {
     /// The lattice holds black, white, all corners, edges and faces of the sRGB cube; finer toward the dark.
     #[test]
     fn round_trip_over_the_whole_gamut() {
-        for grid in [Grid::default(), Grid::paper(), Grid::new(360.0, 830.0)] {
+        for grid in [
+            Grid::default(),
+            Grid::paper(),
+            Grid::new(360.0, 830.0),
+            Grid::new(300.0, 780.0),
+        ] {
             let upsampler = Upsampler::new(&grid);
             let n = 12;
             let level = |i: usize| (i as f32 / n as f32).powi(2);

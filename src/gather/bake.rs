@@ -3,9 +3,11 @@
 use super::refined as refined_mesh;
 use super::{BakedSurface, BakedVertex};
 use crate::color::{LinearSrgb, Upsampler};
+use crate::light::Fluorescent;
+use crate::light::lanes::Lanes;
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
-use crate::spectrum::Leaves;
+use crate::spectrum::{LEAVES, Leaves};
 use crate::transport::Receiver;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -210,7 +212,7 @@ impl Bake {
             light: std::array::from_fn(|c| (rgb[c] / unpainted[c]) as f32),
         };
         if let Some(paint) = look.painted(&self.scene().surfaces[surface as usize], &out) {
-            let reflected = weighed(row, &self.lanes().reflected(&paint));
+            let reflected = weighed(row, &look.sent(self.lanes(), &paint));
             out.radiosity = std::array::from_fn(|c| (reflected[c] + glow[c]) as f32);
         }
         out
@@ -226,8 +228,12 @@ pub(crate) struct Look<'a> {
     /// Base colour with the texture's mean, where vertex colours multiply it.
     base: Option<[f32; 3]>,
     upsampler: &'a Upsampler,
-    /// Tristimulus radiosity for a unit of each lane's irradiance.
+    /// Tristimulus radiosity for a unit of each lane's irradiance, with what fluoresces.
     reflected: Vec<[f64; 3]>,
+    /// What fluoresces, and its tristimulus radiosity for a unit of each lane's irradiance.
+    fluorescent: Option<(Fluorescent, Vec<[f64; 3]>)>,
+    /// Greatest reflectance beside it.
+    room: Option<Leaves>,
     /// Mean colour of the texture, which the display multiplies again.
     pub(super) unpainted: Option<[f64; 3]>,
     emits: bool,
@@ -256,8 +262,15 @@ impl<'a> Look<'a> {
             (None, Some(color)) => upsampler.reflectance(color),
             (None, None) => material.reflectance,
         };
-        Self {
-            reflected: bake.lanes().reflected(&reflectance),
+        let fluorescent = material.fluorescence.as_ref().map(|fluorescence| {
+            let fluorescent = Fluorescent::new(fluorescence, bake.lanes(), bake.scene());
+            let xyz = fluorescent.tristimulus(bake.lanes());
+            (fluorescent, xyz)
+        });
+        let mut look = Self {
+            reflected: Vec::new(),
+            room: (fluorescent.is_some()).then(|| material.bounded([1.0; LEAVES])),
+            fluorescent,
             reflectance,
             through: sheet.map(|sheet| (sheet.transmittance, sheet.left)),
             base: (material.vertex_paint).then(|| color.unwrap_or(material.base_color)),
@@ -268,7 +281,36 @@ impl<'a> Look<'a> {
             shown: (material.emission.as_ref())
                 .filter(|e| e.profile.is_some())
                 .map(|e| bake.lanes().emission(e.light, &e.shape, PI)),
+        };
+        look.reflectance = look.beside(look.reflectance);
+        look.reflected = look.sent(bake.lanes(), &look.reflectance);
+        look
+    }
+
+    /// A reflectance, no greater than what fluoresces leaves.
+    fn beside(&self, reflectance: Leaves) -> Leaves {
+        match &self.room {
+            Some(room) => std::array::from_fn(|k| reflectance[k].min(room[k])),
+            None => reflectance,
         }
+    }
+
+    /// Tristimulus radiosity for a unit of each lane's irradiance, of a reflectance and of what fluoresces.
+    fn sent(&self, lanes: &Lanes, reflectance: &Leaves) -> Vec<[f64; 3]> {
+        let mut all = lanes.reflected(reflectance);
+        for (all, more) in all
+            .iter_mut()
+            .zip(self.fluorescent.iter().flat_map(|f| &f.1))
+        {
+            *all = std::array::from_fn(|c| all[c] + more[c]);
+        }
+        all
+    }
+
+    /// Spectral exitance of what fluoresces under a row of irradiance, W/m2/nm; none where nothing does.
+    pub(super) fn fluoresced(&self, lanes: &Lanes, row: &[f32; 64]) -> Option<Leaves> {
+        let (fluorescent, _) = self.fluorescent.as_ref()?;
+        Some(fluorescent.leaves(lanes, row))
     }
 
     /// Tristimulus radiosity that is reflected of a row of irradiance, vertex colours apart.
@@ -290,7 +332,7 @@ impl<'a> Look<'a> {
         Some(match &self.through {
             // Vertex colours paint what is reflected.
             Some((through, left)) => std::array::from_fn(|k| through[k] + left * painted[k]),
-            None => painted,
+            None => self.beside(painted),
         })
     }
 

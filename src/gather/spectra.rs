@@ -1,4 +1,4 @@
-//! Spectra at the vertices of the refined mesh: `B(leaf) = rho(leaf) H(leaf) + pi L(leaf)`, W/m2/nm.
+//! Spectra at the vertices of the refined mesh: `B(leaf) = rho(leaf) H(leaf) + pi L(leaf)`, W/m2/nm, and what fluoresces.
 //!
 //! The reflectance is the one behind [`BakedVertex::radiosity`](super::BakedVertex::radiosity): a paint texture enters
 //! with its mean colour. An emissive texture is looked up at the vertex.
@@ -26,7 +26,10 @@ impl Bake {
                 let irradiance = self.lanes().leaves(row);
                 let radiance = self.radiance(surface, material, vertex, upsampler);
                 let reflectance = look.reflectance_at(surface, vertex);
-                std::array::from_fn(|k| (reflectance[k] * irradiance[k] + PI * radiance[k]) as f32)
+                let again = look.fluoresced(self.lanes(), row).unwrap_or([0.0; LEAVES]);
+                std::array::from_fn(|k| {
+                    (reflectance[k] * irradiance[k] + again[k] + PI * radiance[k]) as f32
+                })
             };
             baked.vertices.par_iter().zip(rows).map(vertex).collect()
         };

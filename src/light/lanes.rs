@@ -8,6 +8,9 @@
 //! Other ways to hold spectra are here to be compared with: radiosity itself on intervals (the paper's way), linear
 //! sRGB, and coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
 //!
+//! Where surfaces fluoresce, light counts also for what it excites, see [`Lanes::guided`]: averages and refinement then follow further
+//! weights beside the observer's, by which ultraviolet light has tristimulus values, too.
+//!
 //! Units: ratio lanes are numbers that multiply S (W/m2/nm of radiosity per unit of `LightSpectrum::power`);
 //! absolute lanes are W/m2/nm; lanes of linear sRGB are W/m2 weighted by the observer, (1, 1, 1) has Y = 1 / KM lm/m2.
 
@@ -49,6 +52,19 @@ pub struct Lanes {
     xyz: Vec<[f64; 3]>,
     power: Vec<Leaves>,
     weights: [Leaves; 3],
+    /// What light counts for beside what is seen of it.
+    guide: Option<Box<Guide>>,
+}
+
+/// What light counts for beside what is seen of it.
+#[derive(Debug, Clone)]
+struct Guide {
+    /// Weights as the observer's.
+    weights: [Leaves; 3],
+    /// Tristimulus value of a lane at 1 by them.
+    xyz: Vec<[f64; 3]>,
+    /// The same with what is seen.
+    both: Vec<[f64; 3]>,
 }
 
 impl Lanes {
@@ -137,6 +153,7 @@ impl Lanes {
             xyz: xyz.to_vec(),
             power: spectra.iter().map(|s| s.power).collect(),
             weights: *weights,
+            guide: None,
         }
     }
 
@@ -151,6 +168,7 @@ impl Lanes {
             xyz,
             power: spectra.iter().map(|s| s.power).collect(),
             weights: *weights,
+            guide: None,
         }
     }
 
@@ -174,7 +192,31 @@ impl Lanes {
             xyz,
             power,
             weights: *weights,
+            guide: None,
         }
+    }
+
+    /// The same lanes, whose averages and whose brightness follow further weights beside the observer's: what a surface sends out for a
+    /// unit of each leaf at other wavelengths.
+    #[must_use]
+    pub fn guided(mut self, weights: &[Leaves; 3]) -> Self {
+        let xyz = self.lanes().iter().map(|lane| {
+            weights.each_ref().map(|w| {
+                let leaves = lane.first..lane.first + lane.count;
+                KM * leaves.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
+            })
+        });
+        let xyz: Vec<[f64; 3]> = xyz.collect();
+        let both = xyz.iter().zip(&self.xyz);
+        let both = both.map(|(a, b)| std::array::from_fn(|c| a[c] + b[c]));
+        if !xyz.is_empty() {
+            self.guide = Some(Box::new(Guide {
+                weights: *weights,
+                both: both.collect(),
+                xyz,
+            }));
+        }
+        self
     }
 
     /// Number of lanes in use.
@@ -243,6 +285,32 @@ impl Lanes {
         &self.xyz
     }
 
+    /// What each lane at 1 counts for: its tristimulus value, with what it excites.
+    pub fn noticed(&self) -> &[[f64; 3]] {
+        self.guide.as_ref().map_or(&self.xyz, |guide| &guide.both)
+    }
+
+    /// Tristimulus value of what each lane at 1 excites; none where nothing fluoresces.
+    pub fn excites(&self) -> Option<&[[f64; 3]]> {
+        self.guide.as_ref().map(|guide| &*guide.xyz)
+    }
+
+    /// Tristimulus values of a row as it counts.
+    pub fn notice(&self, row: &[f32]) -> [f64; 3] {
+        summed(row, self.noticed())
+    }
+
+    /// What each lane at 1 brings a surface that takes so much of each leaf, the `width` of a leaf in nm: W/m2. Nothing where lanes are no
+    /// intervals.
+    pub fn taken(&self, share: &Leaves, width: f64) -> Vec<f32> {
+        let lanes = self.lanes().iter().map(|lane| {
+            let leaves = lane.first..lane.first + lane.count;
+            let sum: f64 = leaves.map(|k| share[k] * self.shape(lane, k)).sum();
+            (sum * width) as f32
+        });
+        lanes.collect()
+    }
+
     /// What each lane holds of a smooth factor (a reflectance, a lamp's shape): eq. 3 under the lane's light. Where
     /// lanes mix this says nothing; [`Lanes::matrix`] does.
     pub fn averages(&self, f: &Leaves, out: &mut [f32]) {
@@ -284,7 +352,8 @@ impl Lanes {
             return first;
         }
         let (mut over, mut under) = (0.0, 0.0);
-        for w in &self.weights {
+        let more = self.guide.iter().flat_map(|guide| &guide.weights);
+        for w in self.weights.iter().chain(more) {
             let (mut whole, mut part) = (0.0, 0.0);
             for k in leaves.clone() {
                 let weight = w[k] * lane.light.map_or(1.0, |l| self.power[l][k]);
@@ -352,13 +421,7 @@ impl Lanes {
 
     /// Tristimulus values of a row.
     pub fn tristimulus(&self, row: &[f32]) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for (x, w) in row.iter().zip(&self.xyz) {
-            for (s, w) in sum.iter_mut().zip(w) {
-                *s += f64::from(*x) * w;
-            }
-        }
-        sum
+        summed(row, &self.xyz)
     }
 
     /// Tristimulus values of a row after one more reflection, with the reflectance at full resolution as far as lanes
@@ -428,6 +491,17 @@ impl Lanes {
         }
         out
     }
+}
+
+/// Sum of a row's lanes by tristimulus values.
+fn summed(row: &[f32], xyz: &[[f64; 3]]) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for (x, w) in row.iter().zip(xyz) {
+        for (s, w) in sum.iter_mut().zip(w) {
+            *s += f64::from(*x) * w;
+        }
+    }
+    sum
 }
 
 fn dot(a: &Leaves, b: &Leaves) -> f64 {

@@ -2,6 +2,7 @@
 
 mod descent;
 mod filters;
+mod fluorescent;
 pub mod lanes;
 pub(crate) mod rows;
 mod solution;
@@ -10,6 +11,8 @@ mod through;
 pub use descent::Descent;
 pub(crate) use filters::accumulate;
 pub use filters::{Filter, Filters, Glass, Tint};
+pub use fluorescent::Fluorescent;
+pub(crate) use fluorescent::guide;
 pub use rows::{Rows, padded};
 pub use solution::{Arrival, Light, Neighbours};
 pub(crate) use solution::{brightness, keenness, weighed};

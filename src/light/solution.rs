@@ -92,7 +92,7 @@ impl Light {
     /// Works out brightness and its spread from the rows, and what rays ask of the patches.
     pub fn measure(&mut self, tree: &Tree, lanes: &Lanes) {
         let white = self.white;
-        let scalar = |row: &[f32]| brightness(lanes.tristimulus(row), white) as f32;
+        let scalar = |row: &[f32]| brightness(lanes.notice(row), white) as f32;
         let n = tree.nodes.len();
         self.descent = Descent::new(tree);
         let each = |rows: &Rows| -> Vec<f32> {

@@ -110,7 +110,7 @@ impl<'a> Looks<'a> {
 
     fn seen_as(&self, row: [f32; 64], trace: Option<Box<[u8]>>) -> Seen {
         Seen {
-            xyz: self.bake.lanes().tristimulus(&row),
+            xyz: self.bake.lanes().notice(&row),
             row: Box::new(row),
             trace,
         }

@@ -60,6 +60,8 @@ pub enum Kind {
     Sheets,
     /// What sends light on in one direction.
     Mirrors,
+    /// What gives light out again at other wavelengths.
+    Fluorescence,
 }
 
 impl Kind {
@@ -83,6 +85,7 @@ impl Kind {
             Self::Panes => "panes",
             Self::Sheets => "diffuse sheets",
             Self::Mirrors => "mirrors",
+            Self::Fluorescence => "fluorescence",
         }
     }
 }
@@ -172,6 +175,7 @@ impl Plan {
         plan.add(Kind::Panes, panes(scene));
         plan.add(Kind::Sheets, sheets(&used));
         plan.add(Kind::Mirrors, mirrors(scene, &used));
+        plan.add(Kind::Fluorescence, fluorescence(&used));
         for lack in lacking(&scene.source.json) {
             plan.effects.push(Effect {
                 name: lack.effect,
@@ -318,7 +322,10 @@ fn counted<'a, 'b: 'a>(
 fn interreflection(used: &[&Material]) -> (bool, String) {
     let bright = used
         .iter()
-        .filter(|m| m.reflectance.iter().any(|r| *r > 0.0) || m.sheet.is_some())
+        .filter(|m| {
+            let sends = m.sheet.is_some() || m.fluorescence.is_some();
+            sends || m.reflectance.iter().any(|r| *r > 0.0)
+        })
         .count();
     match bright {
         0 => (false, "every surface is black".into()),
@@ -357,6 +364,9 @@ fn colour(scene: &Scene, used: &[&Material]) -> (bool, String) {
                 let name = quoted(&material.name);
                 return (true, format!("what {name} lets through has a colour"));
             }
+        }
+        if material.fluorescence.is_some() {
+            return (true, format!("{} fluoresces", quoted(&material.name)));
         }
         if let Some(emission) = &material.emission {
             let tinted = emission.texture.as_ref().is_some_and(|t| !grey(t.image));
@@ -455,6 +465,15 @@ fn mirrors(scene: &Scene, used: &[&Material]) -> (bool, String) {
         })
         .collect();
     (true, format!("light is mirrored by {}", listed(&names)))
+}
+
+/// Materials that give light out again at other wavelengths, and by what.
+fn fluorescence(used: &[&Material]) -> (bool, String) {
+    let names: Vec<String> = (used.iter())
+        .filter_map(|m| Some((m, m.fluorescence.as_ref()?)))
+        .map(|(m, f)| format!("{} ({})", quoted(&m.name), f.from))
+        .collect();
+    number_of(&names, "material")
 }
 
 /// Off where nothing can stand between two points that see each other's front, nor between a point and a light.

@@ -142,6 +142,9 @@ pub struct MaterialFact {
     /// What it lets through diffusely; none of what is no sheet.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sheet: Option<SheetFact>,
+    /// What it fluoresces, in words; none of what does not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fluorescence: Option<String>,
 }
 
 /// A diffuse sheet.
@@ -398,6 +401,7 @@ impl<'a> Meter<'a> {
                 back_albedo_y: sheet.back.as_ref().map(|b| self.upsampler.xyz(b)[1]),
                 transmission: sheet.from.clone(),
             }),
+            fluorescence: material.fluorescence.as_ref().map(|f| f.from.clone()),
         }
     }
 }

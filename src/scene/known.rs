@@ -1,5 +1,6 @@
 //! What side files and extras say of a material.
 
+use super::fluorescence;
 use super::json::short;
 use super::luminaires::{self, ProfileWish};
 use super::reader::{Reader, Sampled};
@@ -24,6 +25,8 @@ pub(crate) struct MaterialSpectra {
     pub(crate) back: Option<Sampled>,
     /// Is it a mirror? None: as its roughness says.
     pub(crate) mirror: Option<bool>,
+    /// What it fluoresces.
+    pub(crate) fluorescence: Option<fluorescence::Wish>,
 }
 
 impl MaterialSpectra {
@@ -37,6 +40,7 @@ impl MaterialSpectra {
             transmission: self.transmission.or(other.transmission),
             back: self.back.or(other.back),
             mirror: self.mirror.or(other.mirror),
+            fluorescence: self.fluorescence.or(other.fluorescence),
         }
     }
 }
@@ -46,11 +50,12 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
     let Some(entry) = reader.object(entry, place) else {
         return MaterialSpectra::default();
     };
-    const KEYS: [&str; 6] = [
+    const KEYS: [&str; 7] = [
         "reflectance",
         "back_reflectance",
         "emission",
         "mirror",
+        "fluorescence",
         "transmission",
         "transmittance",
     ];
@@ -64,6 +69,25 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
     };
     spectra.reflectance = reflectance("reflectance");
     spectra.back = reflectance("back_reflectance");
+    if let Some(value) = entry.get("fluorescence") {
+        spectra.fluorescence = fluorescence::read(reader, value, place);
+        let diagonal = (spectra.fluorescence.as_ref()).and_then(|wish| wish.diagonal);
+        match (&spectra.reflectance, diagonal) {
+            (Some(_), Some(_)) => {
+                let what = "has a reflectance, and a matrix whose diagonal is one";
+                let next = "take the reflectance out, or leave the diagonal at 0";
+                reader.check.problem(place, what, next);
+            }
+            (None, Some(leaves)) => {
+                spectra.reflectance = Some(Sampled {
+                    from: "the matrix's diagonal".into(),
+                    leaves,
+                    is_csv: true,
+                });
+            }
+            _ => {}
+        }
+    }
     if let Some(value) = entry.get("transmittance") {
         spectra.transmittance = transmittance::read(reader, entry, value, place);
     }

@@ -61,6 +61,8 @@ pub(crate) struct Lamps<'a> {
     /// KM times the nm-integrals of y_bar.
     luminous: Leaves,
     spectra: Vec<LightSpectrum>,
+    /// What materials fluoresce: no lamp's, and not of size 1.
+    pub(crate) excited: Vec<LightSpectrum>,
 }
 
 impl<'a> Lamps<'a> {
@@ -72,6 +74,7 @@ impl<'a> Lamps<'a> {
             upsampler,
             luminous,
             spectra: Vec::new(),
+            excited: Vec::new(),
         }
     }
 

@@ -3,6 +3,7 @@
 use super::changes::Changes;
 use super::check::{Check, Unknown};
 use super::document::{Document, RawLight};
+use super::fluorescence;
 use super::lamps::Lamps;
 use super::layers::Wish;
 use super::lights;
@@ -47,6 +48,7 @@ impl Scene {
         let (surfaces, images) = (geometry.surfaces, geometry.images);
         let mut lit = Lit::of(&document, surfaces, &images, options, &mut check);
         let sky = lit.under_sky(&document, options, &mut check);
+        lit.calm();
         let unknown = match options.lenient {
             true => Unknown::Warn,
             false => Unknown::Refuse,
@@ -131,7 +133,9 @@ impl Lit {
         let profiles = luminaires::profiles(&document.source, nodes, check);
         let mut lights = lights::punctual(raw_lights, &profiles, &file, path, &mut lamps, check);
         let luminous = lamps.luminous();
-        let spectra = lamps.finish(&mut materials, &mut lights);
+        let excited = std::mem::take(&mut lamps.excited);
+        let mut spectra = lamps.finish(&mut materials, &mut lights);
+        fluorescence::join(&mut materials, &mut spectra, excited);
         let size = |light: usize, shape: &Leaves| luminous(&spectra[light], shape);
         let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
         let (panes, surfaces): (Vec<_>, Vec<_>) = surfaces.into_iter().partition(is_pane);
@@ -153,6 +157,17 @@ impl Lit {
             spectra,
             sky: file.sky,
             layers: file.layers,
+        }
+    }
+
+    /// Where no lamp is, nothing fluoresces.
+    fn calm(&mut self) {
+        let shines = self.materials.iter().any(|m| m.emission.is_some());
+        if self.lights.is_empty() && !shines {
+            self.spectra.clear();
+            self.materials
+                .iter_mut()
+                .for_each(|m| m.fluorescence = None);
         }
     }
 
@@ -184,17 +199,12 @@ fn prune(
     lights: &mut [PunctualLight],
     spectra: &mut Vec<LightSpectrum>,
 ) {
-    let emissions = |m: &mut [Material]| -> Vec<usize> {
-        m.iter()
-            .filter_map(|m| Some(m.emission.as_ref()?.light))
-            .collect()
-    };
-    let mut used = emissions(materials);
+    let mut used: Vec<usize> = materials.iter().flat_map(Material::lights).collect();
     used.extend(lights.iter().map(|l| l.light));
     let kept: Vec<usize> = (0..spectra.len()).filter(|k| used.contains(k)).collect();
     let place = |light: &mut usize| *light = kept.partition_point(|k| k < light);
-    let emissions = materials.iter_mut().filter_map(|m| m.emission.as_mut());
-    emissions.for_each(|e| place(&mut e.light));
+    let given = materials.iter_mut().flat_map(Material::lights_mut);
+    given.for_each(place);
     lights.iter_mut().for_each(|l| place(&mut l.light));
     *spectra = kept.iter().map(|&k| spectra[k].clone()).collect();
 }

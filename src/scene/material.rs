@@ -1,5 +1,6 @@
 //! A material: what a surface reflects, gives out and lets through.
 
+use super::fluorescence::Fluorescence;
 use super::mirror::Mirror;
 use super::pane::Pane;
 use super::profile::Profile;
@@ -38,6 +39,8 @@ pub struct Material {
     pub sheet: Option<Sheet>,
     /// How it mirrors; then it reflects nothing diffusely.
     pub mirror: Option<Mirror>,
+    /// What it gives out again at other wavelengths; then [`reflectance`](Self::reflectance) leaves room for it.
+    pub fluorescence: Option<Fluorescence>,
 }
 
 /// Coverage.
@@ -92,9 +95,7 @@ impl Material {
             return self.reflectance;
         }
         let rgb = std::array::from_fn(|i| self.base_color[i] * paint[i]);
-        upsampler
-            .reflectance_fast(rgb)
-            .map(|r| r.min(GREATEST_ALBEDO))
+        self.bounded(upsampler.reflectance_fast(rgb))
     }
 }
 

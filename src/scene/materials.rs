@@ -6,6 +6,7 @@
 //! No gloss, but for mirrors, see [`mirror`]. What lets light through is a pane, see [`pane`].
 
 use super::check::{Check, listed};
+use super::fluorescence;
 use super::json::short;
 use super::known::MaterialSpectra;
 use super::lamps::{Lamp, Lamps, bearable};
@@ -87,6 +88,11 @@ pub(crate) fn materials(
                 let rho = &material.reflectance;
                 (said.mirrors).mirror((raw, &name), spectra.mirror, [passes, emits], rho)
             };
+            if let Some(wish) = &spectra.fluorescence {
+                let measured = spectra.reflectance.as_ref().map(|r| r.from.as_str());
+                let excited = &mut lamps.excited;
+                fluorescence::kindle(&mut material, wish, measured, &place, grid, excited, check);
+            }
             if material.pane.is_none() {
                 // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
                 let plain = !tinted && raw.base_color_texture.is_none();
@@ -177,6 +183,7 @@ fn paint(
         pane: None,
         sheet: None,
         mirror: None,
+        fluorescence: None,
         alpha: match raw.alpha_mode {
             AlphaMode::Mask => Alpha::Mask {
                 cutoff: raw.alpha_cutoff,

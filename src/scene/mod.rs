@@ -1,6 +1,7 @@
 //! What the light is worked out for: surfaces in world space, paint, lamps, cameras, and the document they came from.
 
 mod accessor;
+mod bispectral;
 pub(crate) mod buffers;
 mod camera;
 pub mod changes;
@@ -11,6 +12,7 @@ mod container;
 pub mod document;
 pub mod effects;
 pub mod facts;
+pub mod fluorescence;
 pub mod geometry;
 mod image;
 mod instances;

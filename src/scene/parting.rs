@@ -1,6 +1,7 @@
 //! Parts the lamps of a room into [layers](super::layers): which lamp goes by which names, and whose copy of a spectrum it gets.
 
 use super::check::{Check, Unknown};
+use super::fluorescence::Term;
 use super::json::short;
 use super::layers::{Layers, MOST_LAYERS, Wish};
 use super::sky::LIT_GROUND;
@@ -179,10 +180,13 @@ impl Scene {
             let to = split.light(&names_of_light(light, surfaces, &nodes), light.light);
             light.light = to;
         }
-        let Split { names, pairs, .. } = split;
+        let Split {
+            names, mut pairs, ..
+        } = split;
         if pairs.is_empty() {
             return Ok(());
         }
+        self.part_fluorescence(names.len(), &mut pairs);
         // What no surface shows gives no light: it keeps its spectrum where there is a copy of it.
         for k in unseen {
             if let Some(emission) = &mut self.materials[k].emission {
@@ -216,6 +220,29 @@ impl Scene {
             kin,
         });
         Ok(())
+    }
+
+    /// What fluoresces does so for each layer by itself: with copies of its spectra, each excited by light of its layer alone.
+    fn part_fluorescence(&mut self, layers: usize, pairs: &mut Vec<(usize, usize)>) {
+        let materials = self.materials.iter_mut();
+        for fluorescence in materials.filter_map(|m| m.fluorescence.as_mut()) {
+            let as_read = std::mem::take(&mut fluorescence.terms);
+            for layer in 0..layers {
+                for term in &as_read {
+                    let pair = (layer, term.light);
+                    let known = pairs.iter().position(|p| *p == pair);
+                    let light = known.unwrap_or_else(|| {
+                        pairs.push(pair);
+                        pairs.len() - 1
+                    });
+                    fluorescence.terms.push(Term {
+                        light,
+                        layer: Some(layer),
+                        ..term.clone()
+                    });
+                }
+            }
+        }
     }
 
     /// Gives surfaces that shine the spectra of their layers; a material in several layers gets copies. Returns the materials

@@ -4,10 +4,14 @@ use super::check::{Check, Unknown};
 use super::json::short;
 use super::said;
 use super::uri;
+use crate::color::Observer;
 use crate::data::{Grid, Kind, Leaves, Named, Outside, Table, named, nearest, nearest_of};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
+/// Where the observer's table begins, nm (CIE 018:2019, table 6): shorter wavelengths are there to excite only, and a table without them
+/// says nothing of the light that is seen.
+const VISIBLE_NM: f64 = 360.0;
 /// Above this a table of reflectances is taken for percent.
 const NOT_A_FRACTION: f64 = 2.0;
 
@@ -31,6 +35,52 @@ pub(crate) struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// The table that an object names, and what it is called.
+    pub(super) fn table(
+        &mut self,
+        object: &Map<String, Value>,
+        kind: Kind,
+        place: &str,
+    ) -> Option<(Table, String)> {
+        let (table, from, _) = self.given(object, kind, place)?;
+        self.is_share(&table, kind, &from, place)
+            .then_some((table, from))
+    }
+
+    /// The same, and whether it is a CSV.
+    fn given(
+        &mut self,
+        object: &Map<String, Value>,
+        kind: Kind,
+        place: &str,
+    ) -> Option<(Table, String, bool)> {
+        let text = |key: &str| object.get(key).map(|v| v.as_str().map(str::to_owned));
+        match (text("name"), text("csv")) {
+            (Some(Some(name)), None) => Some((self.named(&name, kind, place)?, name, false)),
+            (None, Some(Some(path))) => Some((self.csv(&path, place)?, said::called(&path), true)),
+            _ => {
+                let next = "give either \"name\" or \"csv\", a text";
+                self.check
+                    .problem(place, "does not say which spectrum", next);
+                None
+            }
+        }
+    }
+
+    /// Reflectances are shares, not percent; what is none is said.
+    fn is_share(&mut self, table: &Table, kind: Kind, from: &str, place: &str) -> bool {
+        let wrong = kind == Kind::Reflectance && table.values().iter().any(|v| *v > NOT_A_FRACTION);
+        if wrong {
+            let what = format!("'{from}' holds reflectances above {NOT_A_FRACTION}");
+            self.check.problem(
+                place,
+                what,
+                "write reflectances from 0 to 1, not in percent",
+            );
+        }
+        !wrong
+    }
+
     /// The spectrum that an object names, on the grid.
     pub(super) fn sampled(
         &mut self,
@@ -42,24 +92,8 @@ impl Reader<'_> {
             Kind::Reflectance => Outside::Hold,
             Kind::Illuminant => Outside::Zero,
         };
-        let text = |key: &str| object.get(key).map(|v| v.as_str().map(str::to_owned));
-        let (table, from, is_csv) = match (text("name"), text("csv")) {
-            (Some(Some(name)), None) => (self.named(&name, kind, place)?, name, false),
-            (None, Some(Some(path))) => (self.csv(&path, place)?, said::called(&path), true),
-            _ => {
-                let next = "give either \"name\" or \"csv\", a text";
-                self.check
-                    .problem(place, "does not say which spectrum", next);
-                return None;
-            }
-        };
-        if kind == Kind::Reflectance && table.values().iter().any(|v| *v > NOT_A_FRACTION) {
-            let what = format!("'{from}' holds reflectances above {NOT_A_FRACTION}");
-            self.check.problem(
-                place,
-                what,
-                "write reflectances from 0 to 1, not in percent",
-            );
+        let (table, from, is_csv) = self.given(object, kind, place)?;
+        if !self.is_share(&table, kind, &from, place) {
             return None;
         }
         let leaves = self.grid.means(&table, outside);
@@ -73,11 +107,65 @@ impl Reader<'_> {
             );
             return None;
         }
+        let luminous = || Observer::cie1931().weights(self.grid)[1];
+        let seen = |y: Leaves| leaves.iter().zip(y).any(|(x, y)| x * y > 0.0);
+        if kind == Kind::Illuminant && !seen(luminous()) {
+            let what = format!("'{from}' gives no light that an eye sees");
+            let next = "lamps are measured by what is seen of them: give the trace of visible light that it has";
+            self.check.problem(place, what, next);
+            return None;
+        }
+        self.note_ultraviolet(&table, kind, &from);
         Some(Sampled {
             from,
             leaves,
             is_csv,
         })
+    }
+
+    /// Says where a spectrum has no data in the ultraviolet that is asked for.
+    fn note_ultraviolet(&mut self, table: &Table, kind: Kind, from: &str) {
+        let (start, first) = (self.grid.start(), table.range()[0]);
+        if start < VISIBLE_NM && first > start {
+            let taken = match kind {
+                Kind::Reflectance => "held at its first value",
+                Kind::Illuminant => "taken as 0",
+            };
+            let from = short(from);
+            self.check.warn(format!(
+                "'{from}' has no data below {first} nm: {taken} from {start} nm on"
+            ));
+        }
+    }
+
+    /// The text of the CSV that an object names, and what it is called.
+    pub(super) fn text(
+        &mut self,
+        object: &Map<String, Value>,
+        place: &str,
+    ) -> Option<(String, String)> {
+        let next = "give a CSV inside the folder of the file that names it";
+        let Some(path) = object.get("csv").and_then(Value::as_str) else {
+            self.check.problem(place, "its csv is no text", next);
+            return None;
+        };
+        match self.bytes(path) {
+            Ok(bytes) => {
+                let text = String::from_utf8_lossy(&bytes).into_owned();
+                Some((text, said::called(path)))
+            }
+            Err(why) => {
+                self.check.problem(place, why, next);
+                None
+            }
+        }
+    }
+
+    fn bytes(&self, path: &str) -> Result<Vec<u8>, String> {
+        match said::is_rows(path) {
+            true => Ok(path.as_bytes().to_vec()),
+            false => uri::read(&self.folder, path),
+        }
     }
 
     fn named(&mut self, name: &str, kind: Kind, place: &str) -> Option<Table> {
@@ -103,11 +191,7 @@ impl Reader<'_> {
 
     fn csv(&mut self, path: &str, place: &str) -> Option<Table> {
         let next = "give a CSV of wavelength_nm,value inside the folder of the file that names it";
-        let read = match said::is_rows(path) {
-            true => Ok(path.as_bytes().to_vec()),
-            false => uri::read(&self.folder, path),
-        };
-        let bytes = match read {
+        let bytes = match self.bytes(path) {
             Ok(bytes) => bytes,
             Err(why) => {
                 self.check.problem(place, why, next);

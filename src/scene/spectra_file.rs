@@ -22,6 +22,8 @@
 //! luminance keeps the brightness that glTF gives the material. The spectrum of a *light* is a shape always: glTF's
 //! candela or lux, times the luminance of its colour, say how bright it is. `"profile"`: see `luminaires`.
 //!
+//! `"fluorescence"`: see [`fluorescence`](super::fluorescence).
+//!
 //! Unknown keys of the file, and names that the room does not have, are problems that come with the nearest names; a
 //! lenient reader is only warned of them. Unknown keys of `extras` belong to other programs and are passed over.
 

@@ -12,10 +12,11 @@ pub(super) fn read(
     value: &Value,
     place: &str,
 ) -> Option<Sampled> {
-    const OTHERS: [&str; 4] = [
+    const OTHERS: [&str; 5] = [
         "reflectance",
         "back_reflectance",
         "emission",
+        "fluorescence",
         "transmission",
     ];
     if OTHERS.iter().any(|key| entry.contains_key(*key)) {

@@ -7,7 +7,8 @@
 //! greatest row sum. It is a bound of what the *lanes* do to the colours of the model (to first order in CIELUV), not of
 //! anything else; beside the truth it is some 3 to 6 times too careful, as in the paper's own tests.
 
-use super::coarse::{Choice, Coarse, split_worst};
+use super::coarse::Coarse;
+use super::cuts::{Choice, split_worst};
 use crate::color::{KM, luv_jacobian};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{Bounded, CmfTree, Interval, LEAVES, Leaves, Metric, Partition, Tree, node};

@@ -214,7 +214,7 @@ impl Bake {
                 self.chosen_lanes()
             }
             _ if lanes.is_empty() => return Err(Broken::new("has no lanes")),
-            _ => Lanes::with(lanes, &self.scene.spectra, &self.weights),
+            _ => self.guided(Lanes::with(lanes, &self.scene.spectra, &self.weights)),
         };
         let error: f64 = from.get()?;
         self.spectrum_error = (!error.is_nan()).then_some(error);

@@ -6,8 +6,8 @@
 use super::sources::DenseSources;
 use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
-use crate::light::Filters;
 use crate::light::lanes::Lanes;
+use crate::light::{Filters, guide};
 use crate::link::{LinkRows, balance};
 use crate::scene::effects::Kind;
 use crate::scene::{LightSpectrum, Scene};
@@ -48,8 +48,21 @@ impl Bake {
         let none = spectra.is_empty() || self.tree.nodes.is_empty();
         let share = SPECTRUM_SHARE * self.settings.error;
         let tolerance = self.settings.spectrum.unwrap_or(share);
+        let guide = guide(&self.scene, weights);
         match self.settings.representation {
-            Representation::Uniform(n) if !none => Lanes::uniform(spectra, n.into(), weights),
+            // What excites lies where these ways are blind, or mixes their lanes.
+            Representation::Rgb
+            | Representation::Paper
+            | Representation::Characteristic(_)
+            | Representation::Guaranteed
+                if guide.is_some() =>
+            {
+                self.spectrum_error = Some(0.0);
+                Lanes::dense(spectra, weights)
+            }
+            Representation::Uniform(n) if !none => {
+                self.guided(Lanes::uniform(spectra, n.into(), weights))
+            }
             Representation::Rgb if !none => Lanes::rgb(spectra, &self.upsampler, weights),
             Representation::Paper if !none => {
                 let cut = paper_cut(&self.scene, weights, tolerance);
@@ -73,11 +86,15 @@ impl Bake {
                 let kin = Kin::of(&self.scene);
                 model.join(&kin.of, kin.spectra.len());
                 let (spectra, weights) = (&kin.spectra, &self.weights);
+                if guide.is_some() {
+                    model.kindle(spectra, weights, self.scene.grid.width());
+                }
                 let (known, white) = (self.lanes.cuts(), self.light.white);
                 let known = known.map(|cuts| kin.one_of_each(&cuts));
                 let copies = kin.copies.as_deref();
                 let choose = |model: &coarse::Coarse| {
-                    model.choose(spectra, weights, white, tolerance, known.clone(), copies)
+                    let seen = (weights, guide.as_ref());
+                    model.choose(spectra, seen, white, tolerance, known.clone(), copies)
                 };
                 let mut choice = choose(&model);
                 // What lies behind a pane has light of its own spectra: lanes serve all of them.
@@ -95,7 +112,7 @@ impl Bake {
                 // Without light there is no white to see an error by.
                 self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
                 let cuts: Vec<Partition> = kin.of.iter().map(|&k| choice.cuts[k]).collect();
-                Lanes::ratio(&self.scene.spectra, &cuts, &self.weights)
+                self.guided(Lanes::ratio(&self.scene.spectra, &cuts, &self.weights))
             }
             Representation::Guaranteed if !none => {
                 let model = self.model(BOUNDED_PATCHES);
@@ -109,6 +126,14 @@ impl Bake {
                 self.spectrum_error = Some(0.0);
                 Lanes::dense(spectra, weights)
             }
+        }
+    }
+
+    /// Lanes that light counts in for what it excites, too, where surfaces fluoresce.
+    pub(super) fn guided(&self, lanes: Lanes) -> Lanes {
+        match guide(&self.scene, &self.weights) {
+            Some(guide) => lanes.guided(&guide),
+            None => lanes,
         }
     }
 

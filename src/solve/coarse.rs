@@ -8,28 +8,23 @@ use super::conjugate::System;
 use super::operator::Operator;
 use super::reflection::{Reflection, Sheets};
 use super::sheets;
-use crate::color::luv_jacobian;
 use crate::hierarchy::{NONE, Node, Tree};
 use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
 use crate::link::{Link, LinkRows, Way};
 use crate::scene::LightSpectrum;
-use crate::spectrum::{LEAVES, Leaves, Partition};
+use crate::spectrum::{LEAVES, Leaves};
 use std::collections::BTreeMap;
 
 /// Patches of the model at the most (fits the child count of its root).
 pub(super) const PATCHES: usize = 192;
-/// One lane in this many is split at a time.
-const BATCH: usize = 3;
 /// The model is solved to this relative error: far below what is asked of wavelengths.
 const TOLERANCE: f64 = 1e-4;
-/// What that leaves undone and rounding may look like a colour difference of this size, CIELUV: no lane is split for less.
-const UNSEEN: f64 = 1e-3;
 
 /// The model.
 pub(crate) struct Coarse {
-    tree: Tree,
+    pub(super) tree: Tree,
     pub(super) links: LinkRows,
     pub(super) leaves: Vec<u32>,
     factor: Vec<f32>,
@@ -41,6 +36,8 @@ pub(crate) struct Coarse {
     pub(super) punctual: Vec<Vec<Leaves>>,
     /// What passes sheets: a patch, one behind it, and how much of the light there leaves the patch.
     pub(super) through: Vec<([u32; 2], Leaves)>,
+    /// What excites each patch to give out a light; none of lights that are lamps'.
+    excitation: Vec<Option<Vec<Leaves>>>,
 }
 
 /// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
@@ -53,15 +50,8 @@ pub(crate) trait Dense {
     fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves>;
     /// What a leaf node lets through from the one behind it; none of what is no sheet.
     fn through(&self, leaf: u32) -> Option<Leaves>;
-}
-
-/// What a choice of cuts does.
-#[derive(Debug, Clone)]
-pub(crate) struct Choice {
-    /// One cut a light.
-    pub cuts: Vec<Partition>,
-    /// Area-weighted mean CIELUV difference of irradiance that they cause on the model.
-    pub error: f64,
+    /// What excites a leaf node to give out a light; none if nothing does.
+    fn excitation(&self, leaf: u32, light: usize) -> Option<Leaves>;
 }
 
 impl Coarse {
@@ -89,6 +79,7 @@ impl Coarse {
         let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
         let mut punctual = emission.clone();
         let mut through: BTreeMap<[u32; 2], Leaves> = BTreeMap::new();
+        let mut excitation: Vec<Option<Vec<Leaves>>> = vec![None; lights];
         for &leaf in leaves {
             let (g, a) = (group[leaf as usize] as usize, areas[leaf as usize]);
             area[g] += a;
@@ -104,12 +95,21 @@ impl Coarse {
                 if let Some(p) = dense.punctual(leaf, light) {
                     add(&mut punctual[light][g], &p, a);
                 }
+                if let Some(x) = dense.excitation(leaf, light) {
+                    let all = &mut excitation[light];
+                    add(
+                        &mut all.get_or_insert_with(|| vec![[0.0; LEAVES]; count])[g],
+                        &x,
+                        a,
+                    );
+                }
             }
         }
         for (g, a) in area.iter().enumerate() {
             let all = std::iter::once(&mut reflectance)
                 .chain(&mut emission)
-                .chain(&mut punctual);
+                .chain(&mut punctual)
+                .chain(excitation.iter_mut().flatten());
             for row in all.map(|rows| &mut rows[g]) {
                 for x in row.iter_mut() {
                     *x /= a;
@@ -133,6 +133,26 @@ impl Coarse {
             emission,
             punctual,
             through: through.into_iter().collect(),
+            excitation,
+        }
+    }
+
+    /// Lights what fluoresces by the light of lamps: enough to choose wavelengths by, as it excites little itself. `width` of a leaf, nm.
+    pub(super) fn kindle(&mut self, spectra: &[LightSpectrum], weights: &[Leaves; 3], width: f64) {
+        let mut brought = vec![[0.0; LEAVES]; self.leaves.len()];
+        for light in (0..spectra.len()).filter(|&k| self.excitation[k].is_none()) {
+            let lanes = Lanes::only(spectra, light, weights);
+            let rows = self.irradiance(&lanes);
+            for (k, sum) in brought.iter_mut().enumerate() {
+                add(sum, &lanes.leaves(rows.row(k)), 1.0);
+            }
+        }
+        for (light, excitation) in self.excitation.iter().enumerate() {
+            for (k, excitation) in excitation.iter().flatten().enumerate() {
+                let taken = excitation.iter().zip(&brought[k]);
+                let power = taken.map(|(g, e)| g * e).sum::<f64>() * width;
+                self.emission[light][k] = [power; LEAVES];
+            }
         }
     }
 
@@ -155,10 +175,16 @@ impl Coarse {
             }
             *lights = joined;
         }
+        // Copies of what fluoresces are excited alike, each by its own layer.
+        let mut joined = vec![None; count];
+        for (excitation, &to) in self.excitation.iter().zip(of) {
+            joined[to] = joined[to].take().or_else(|| excitation.clone());
+        }
+        self.excitation = joined;
     }
 
     /// Irradiance of the model's patches on some lanes.
-    fn irradiance(&self, lanes: &Lanes) -> Rows {
+    pub(super) fn irradiance(&self, lanes: &Lanes) -> Rows {
         match padded(lanes.len()) {
             4 => self.solve::<4>(lanes),
             8 => self.solve::<8>(lanes),
@@ -264,135 +290,6 @@ impl Coarse {
         let mut reflected = Rows::zero(self.leaves.len(), L);
         system.solve::<L>(first, &mut reflected, TOLERANCE).1
     }
-
-    /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
-    /// padding would waste. `known` cuts are kept if they are good enough, and one for each light: where a lamp was given
-    /// another spectrum there may be more lights now, or fewer. `copies`: rows hold so many lights of each spectrum by
-    /// themselves, and must not become wider than they can be; none: one of each, and beyond 64 lanes the leaves.
-    pub(super) fn choose(
-        &self,
-        spectra: &[LightSpectrum],
-        weights: &[Leaves; 3],
-        white: [f64; 3],
-        tolerance: f64,
-        known: Option<Vec<Partition>>,
-        copies: Option<&[usize]>,
-    ) -> Choice {
-        let count = self.leaves.len();
-        let references: Vec<(Lanes, Rows)> = (0..spectra.len())
-            .map(|light| {
-                let lanes = Lanes::only(spectra, light, weights);
-                let rows = self.irradiance(&lanes);
-                (lanes, rows)
-            })
-            .collect();
-        let truth: Vec<[f64; 3]> = (0..count)
-            .map(|k| {
-                references.iter().fold([0.0; 3], |sum, (lanes, rows)| {
-                    plus(sum, lanes.tristimulus(rows.row(k)))
-                })
-            })
-            .collect();
-        let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
-        let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
-        let tolerance = tolerance.max(UNSEEN);
-        if let Some(cuts) = known.filter(|cuts| cuts.len() == spectra.len()) {
-            let lanes = Lanes::ratio(spectra, &cuts, weights);
-            let (error, _) = self.loss(&lanes, &references, &jacobians, total);
-            if error <= tolerance {
-                return Choice { cuts, error };
-            }
-        }
-        let mut cuts = vec![Partition::ROOT; spectra.len()];
-        loop {
-            let lanes = Lanes::ratio(spectra, &cuts, weights);
-            let (error, mut worst) = self.loss(&lanes, &references, &jacobians, total);
-            let of = |light: usize| copies.map_or(1, |copies| copies[light]);
-            let mut size: usize = (0..cuts.len()).map(|l| of(l) * cuts[l].count()).sum();
-            let full = size == padded(size);
-            let good = error <= tolerance;
-            // Below a hundredth of the tolerance, spare lanes would carry nothing.
-            if (good && (full || error < 0.01 * tolerance))
-                || worst.is_empty()
-                || lanes.lanes()[0].light.is_none()
-            {
-                return Choice { cuts, error };
-            }
-            // Several at once: a split costs a solve, and 4, 8, 16 lanes are what rows hold. When padding is being
-            // filled, no more than fit.
-            let (most, room) = match (good, copies) {
-                (true, _) => (padded(size), padded(size) - size),
-                (false, None) => (usize::MAX, lanes.len().div_ceil(BATCH)),
-                (false, Some(_)) => (LEAVES, lanes.len().div_ceil(BATCH)),
-            };
-            worst.truncate(room.max(1));
-            let before = size;
-            for lane in worst.into_iter().map(|l| lanes.lanes()[l]) {
-                if let Some(light) = lane.light.filter(|&l| size + of(l) <= most) {
-                    cuts[light] = cuts[light].split(lane.first).unwrap_or(cuts[light]);
-                    size += of(light);
-                }
-            }
-            if size == before {
-                return Choice { cuts, error };
-            }
-        }
-    }
-
-    /// Mean difference that the lanes cause, and the lanes (of more than one leaf) by what they cause, the worst first.
-    fn loss(
-        &self,
-        lanes: &Lanes,
-        references: &[(Lanes, Rows)],
-        jacobians: &[[[f64; 3]; 3]],
-        total: f64,
-    ) -> (f64, Vec<usize>) {
-        let rows = self.irradiance(lanes);
-        let mut harm = vec![0.0; lanes.len()];
-        let mut mean = 0.0;
-        for (k, jacobian) in jacobians.iter().enumerate() {
-            let area = self.tree.node(self.leaves[k]).area / total;
-            let mut all = [0.0; 3];
-            for (l, lane) in lanes.lanes().iter().enumerate() {
-                // Leaf lanes are exact.
-                let Some(light) = lane.light else { continue };
-                let (fine, reference) = &references[light];
-                let mut lost = [0.0; 3];
-                for leaf in lane.first..lane.first + lane.count {
-                    let difference = f64::from(reference.row(k)[leaf] - rows.row(k)[l]);
-                    lost = plus(lost, fine.xyz()[leaf].map(|w| w * difference));
-                }
-                harm[l] += area * length(jacobian, lost);
-                all = plus(all, lost);
-            }
-            mean += area * length(jacobian, all);
-        }
-        let mut worst: Vec<usize> = (0..harm.len())
-            .filter(|&l| lanes.lanes()[l].count > 1 && harm[l] > 0.0)
-            .collect();
-        worst.sort_by(|&a, &b| harm[b].total_cmp(&harm[a]));
-        (mean, worst)
-    }
-}
-
-/// Splits a share of the intervals (light, first leaf) that stand first, several at once: each step costs a solve.
-pub(super) fn split_worst(cuts: &mut [Partition], worst: Vec<(usize, usize)>, count: usize) {
-    let most = count.div_ceil(BATCH).max(1);
-    for (light, first) in worst.into_iter().take(most) {
-        cuts[light] = cuts[light].split(first).unwrap_or(cuts[light]);
-    }
-}
-
-fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-fn length(matrix: &[[f64; 3]; 3], v: [f64; 3]) -> f64 {
-    matrix
-        .iter()
-        .map(|row| (row[0] * v[0] + row[1] * v[1] + row[2] * v[2]).powi(2))
-        .sum::<f64>()
-        .sqrt()
 }
 
 fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {

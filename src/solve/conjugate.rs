@@ -36,6 +36,8 @@ pub(crate) struct Convergence {
     pub residual: f64,
     /// Bound of the relative error in the norm above: residual / (1 - rho_max), worst lane.
     pub bound: f64,
+    /// How often all bounces were found for what fluoresces; 0 where nothing does.
+    pub fluorescence: usize,
 }
 
 /// The system `(1 - K) y = b`.

@@ -255,11 +255,14 @@ pub struct Balance {
     pub emitted_lm: f64,
     /// Luminous flux that fronts receive straight from lamps of any kind, lm.
     pub received_lm: f64,
+    /// Luminous flux that fronts give out at other wavelengths than excite it, lm; lit by it, they absorb it as any other light.
+    #[serde(default)]
+    pub fluoresced_lm: f64,
     /// Luminous flux absorbed by fronts, lm.
     pub absorbed_lm: f64,
     /// Luminous flux that left the room or met a black back, lm: by row sums below 1.
     pub escaped_lm: f64,
-    /// Worst relative difference of received and absorbed + escaped over all bands that carry light: what the solve
+    /// Worst relative difference of received (with what is fluoresced) and absorbed + escaped over all bands that carry light: what the solve
     /// itself lost. Emitted and received differ by what direct light misses the room.
     pub worst_band: f64,
     /// Where the light of lamps goes first, by rays from the lamps.
@@ -270,17 +273,17 @@ pub struct Balance {
     pub scaled: Scaled,
 }
 
-/// Adds fluxes that are given out, received, absorbed and escape, each as a density on an area.
-fn add(sums: &mut [f64; 4], area: f64, densities: [f64; 4]) {
+/// Adds fluxes that are given out, received, absorbed, escape and are fluoresced, each as a density on an area.
+fn add(sums: &mut [f64; 5], area: f64, densities: [f64; 5]) {
     for (sum, density) in sums.iter_mut().zip(densities) {
         *sum += area * density;
     }
 }
 
 impl Balance {
-    /// Of fluxes by lane that are given out, received, absorbed and escape.
-    fn of(fluxes: &[[f64; 4]], lanes: &Lanes) -> Self {
-        let lit = fluxes.iter().filter(|sums| sums[1] > 0.0);
+    /// Of fluxes by lane that are given out, received, absorbed, escape and are fluoresced.
+    fn of(fluxes: &[[f64; 5]], lanes: &Lanes) -> Self {
+        let lit = fluxes.iter().filter(|sums| sums[1] + sums[4] > 0.0);
         let lumens = |k: usize| {
             let by_lane = fluxes.iter().zip(lanes.xyz());
             by_lane.map(|(sums, xyz)| sums[k] * xyz[1]).sum()
@@ -290,9 +293,10 @@ impl Balance {
             received_lm: lumens(1),
             absorbed_lm: lumens(2),
             escaped_lm: lumens(3),
+            fluoresced_lm: lumens(4),
             worst_band: lit
-                .map(|[_, received, absorbed, escaped]| {
-                    ((absorbed + escaped) / received - 1.0).abs()
+                .map(|[_, received, absorbed, escaped, fluoresced]| {
+                    ((absorbed + escaped) / (received + fluoresced) - 1.0).abs()
                 })
                 .fold(0.0, f64::max),
             ..Self::default()
@@ -338,7 +342,7 @@ pub(super) fn flux(
     rows: &FluxRows,
     row_sums: &[f64],
 ) -> Balance {
-    let mut fluxes = vec![[0.0; 4]; lanes.len()];
+    let mut fluxes = vec![[0.0; 5]; lanes.len()];
     for (k, &leaf) in leaves.iter().enumerate() {
         let area = areas[leaf as usize];
         for (l, sums) in fluxes.iter_mut().enumerate() {
@@ -350,8 +354,9 @@ pub(super) fn flux(
                 get(rows.first),
                 get(rows.reflectance),
             );
-            let out = r * (1.0 - row_sums[leaf as usize]);
-            add(sums, area, [e, f, (1.0 - rho) * h, out]);
+            let given = rows.fluoresced.map_or(0.0, get);
+            let out = (r + given) * (1.0 - row_sums[leaf as usize]);
+            add(sums, area, [e, f, (1.0 - rho) * h, out, given]);
         }
     }
     Balance::of(&fluxes, lanes)
@@ -379,7 +384,7 @@ pub(super) fn flux_by_rays(
     rows: &FluxRows,
     whole: &Whole,
 ) -> Balance {
-    let mut fluxes = vec![[0.0; 4]; lanes.len()];
+    let mut fluxes = vec![[0.0; 5]; lanes.len()];
     for (k, &leaf) in leaves.iter().enumerate() {
         let (area, seen) = ((whole.area)(leaf), areas[leaf as usize]);
         let (more, mirror) = ((whole.direct)(leaf), (whole.mirror)(leaf));
@@ -389,14 +394,16 @@ pub(super) fn flux_by_rays(
             let all = first + get(whole.indirect);
             if mirror {
                 let kept = 1.0 - rho;
-                add(sums, area, [0.0, kept * first, kept * all, 0.0]);
+                add(sums, area, [0.0, kept * first, kept * all, 0.0, 0.0]);
                 continue;
             }
             let out = rho * all - seen / area * get(rows.reflected);
+            let given = seen / area * rows.fluoresced.map_or(0.0, get);
+            let absorbed = (1.0 - rho) * all;
             add(
                 sums,
                 area,
-                [get(rows.emission), first, (1.0 - rho) * all, out],
+                [get(rows.emission), first, absorbed, out, given],
             );
         }
     }
@@ -409,5 +416,7 @@ pub(crate) struct FluxRows<'a> {
     pub(super) reflected: &'a Rows,
     pub(super) irradiance: &'a Rows,
     pub(super) first: &'a Rows,
+    /// None where nothing fluoresces.
+    pub(super) fluoresced: Option<&'a Rows>,
     pub(super) reflectance: &'a Rows,
 }

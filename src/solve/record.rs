@@ -175,6 +175,9 @@ pub struct Round {
     pub bytes_per_element: f64,
     /// Operator applications of the solve.
     pub iterations: usize,
+    /// How often all bounces were found, until what fluoresces changed no more; 0 where nothing does.
+    #[serde(default)]
+    pub fluorescence_rounds: usize,
     /// Errors by source.
     pub error: Errors,
     /// Where the light went.

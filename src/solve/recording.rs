@@ -56,6 +56,7 @@ impl Bake {
             bytes_per_link: per(of_links, bake.graph.links.len()),
             bytes_per_element: per(of_elements, light.leaves.len()),
             iterations: m.convergence.iterations,
+            fluorescence_rounds: m.convergence.fluorescence,
             error: errors,
             flux: m.flux,
             row_sum_defect: bake.balance.defect_before,

@@ -5,6 +5,7 @@
 //! 1760) times the share of rays to j that nothing blocks. `A_i F_ij` and `A_j F_ji` are made equal by their mean; rows are
 //! not balanced, [`Reference::row_sums`] tells what they miss. Solved by LU for every distinct set of reflectances.
 //!
+//! What fluoresces adds the 64 x 64 Donaldson matrix of its material times its irradiance, found in rounds; each loses energy.
 //! It knows no panes and no mirrors: what they keep of a ray is no factor between patches. It shares triangles, Lambert's formula and the ray index with the solver: no hierarchy, no links, no lanes, no
 //! iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
 
@@ -21,6 +22,8 @@ use std::f64::consts::PI;
 
 /// Points of a triangle of a lamp with a profile: where a shadow's edge crosses it they are off by about .3 %.
 const SHINING_POINTS: u32 = 1024;
+/// What is fluoresced has settled when no leaf changes by more than this share of the brightest.
+const SETTLED: f64 = 1e-12;
 /// Rays for the sky of a point: .1 % of open ground's.
 const DOME_RAYS: u32 = 1024;
 
@@ -61,6 +64,8 @@ pub struct Patch {
     pub exitance: Leaves,
     /// Irradiance from punctual lights, W/m2/nm.
     pub punctual: Leaves,
+    /// Its material.
+    pub material: usize,
 }
 
 /// The patches of a room and who sees whom.
@@ -70,6 +75,8 @@ pub struct Reference {
     pub patches: Vec<Patch>,
     /// `F_ij`: share of the light leaving i that reaches j.
     pub factors: DMatrix<f64>,
+    /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a leaf by irradiance on another.
+    pub donaldson: Vec<Option<Vec<Leaves>>>,
 }
 
 /// What leaves and meets the patches, W/m2/nm, in order of the patches.
@@ -165,7 +172,16 @@ impl Reference {
             let (a, b) = (patches[i].area, patches[j].area);
             0.5 * (rows[i][j] + rows[j][i] * b / a)
         });
-        Self { patches, factors }
+        let width = scene.grid.width();
+        let donaldson = scene.materials.iter().map(|m| {
+            let fluorescence = m.fluorescence.as_ref()?;
+            Some(fluorescence.matrix(&scene.spectra, width))
+        });
+        Self {
+            donaldson: donaldson.collect(),
+            patches,
+            factors,
+        }
     }
 
     /// Sum of every patch's factors: 1 in a closed room, but for the rule's error.
@@ -173,8 +189,37 @@ impl Reference {
         self.factors.row_iter().map(|row| row.sum()).collect()
     }
 
-    /// Solves all leaves.
+    /// Solves all leaves; where surfaces fluoresce as often as it takes until what they give out stays as it is.
     pub fn solve(&self) -> Solution {
+        let mut glow = vec![[0.0; LEAVES]; self.patches.len()];
+        loop {
+            let solution = self.solve_with(&glow);
+            let next = self.fluoresced(&solution.irradiance);
+            let pairs = next.iter().flatten().zip(glow.iter().flatten());
+            let moved = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let most = next.iter().flatten().copied().fold(0.0, f64::max);
+            if moved <= SETTLED * most {
+                return solution;
+            }
+            glow = next;
+        }
+    }
+
+    /// What the patches fluoresce under an irradiance.
+    fn fluoresced(&self, irradiance: &[Leaves]) -> Vec<Leaves> {
+        let all = self.patches.iter().zip(irradiance);
+        let each = all.map(|(patch, light)| match &self.donaldson[patch.material] {
+            Some(matrix) => std::array::from_fn(|l| {
+                let row = matrix[l].iter().zip(light);
+                row.map(|(m, x)| m * x).sum()
+            }),
+            None => [0.0; LEAVES],
+        });
+        each.collect()
+    }
+
+    /// Solves all leaves, given what the patches fluoresce.
+    fn solve_with(&self, glow: &[Leaves]) -> Solution {
         let n = self.patches.len();
         let mut radiosity = vec![[0.0; LEAVES]; n];
         let mut solved = [false; LEAVES];
@@ -192,7 +237,8 @@ impl Reference {
                 })
                 .collect();
             let right = DMatrix::from_fn(n, alike.len(), |i, k| {
-                self.patches[i].exitance[alike[k]] + rho[i] * self.patches[i].punctual[alike[k]]
+                let (patch, leaf) = (&self.patches[i], alike[k]);
+                patch.exitance[leaf] + glow[i][leaf] + rho[i] * patch.punctual[leaf]
             });
             let answer = solve(&self.factors, &rho, right);
             for (k, &l) in alike.iter().enumerate() {
@@ -311,6 +357,7 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
             reflectance: material.reflectance,
             exitance,
             punctual: [0.0; LEAVES],
+            material: mesh.material[triangle] as usize,
         }));
     }
     out

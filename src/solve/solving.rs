@@ -1,6 +1,7 @@
 //! The solve of a round: from direct light on the leaves to the light on every patch, with the flux that went where.
 
 use super::conjugate::{Convergence, System, step};
+use super::fluorescing::{Glow, Rounds};
 use super::flux::{self, Closed};
 use super::linear;
 use super::operator::{self, Operator};
@@ -12,6 +13,7 @@ use super::{Bake, Given};
 use crate::light::{Arrival, Light, Neighbours, Rows, Through, brightness, padded, weighed};
 use crate::link::LinkRows;
 use crate::scene::effects::Kind;
+use crate::spectrum::LEAVES;
 
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.002;
@@ -106,6 +108,7 @@ impl Bake {
                 .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes)),
             sheets: sources.sheets,
         };
+        let glow = sources.glow.as_ref();
         let sums = self.sums_of(rows);
         let lit = Lit {
             leaves,
@@ -114,21 +117,36 @@ impl Bake {
             tolerance,
         };
         let runs = self.plan.runs(Kind::Interreflection);
+        // What fluoresces, by leaf; none where nothing does.
+        let mut given = None;
         let (convergence, mut irradiance) = if !runs {
             (Convergence::default(), Rows::zero(leaves.len(), L))
-        } else if by_rays {
-            self.bounce_by_rays::<L>(&lit, &mut reflected)
         } else {
-            let convergence = self.bounce_along_links::<L>(&lit, rows, &mut reflected);
-            let (irradiance, ratio) = self.slope::<L>(&lit, rows, &sums, &mut reflected);
-            scaled.reflected = ratio;
+            let (convergence, mut irradiance) = match glow {
+                Some(glow) => {
+                    let (done, out, seen) = self.fluoresce::<L>(&lit, rows, glow, &mut reflected);
+                    given = Some(out);
+                    (done, seen)
+                }
+                None => self.bounce::<L>(&lit, rows, &mut reflected),
+            };
+            if !by_rays {
+                let glow = glow.zip(given.as_mut());
+                (irradiance, scaled.reflected) =
+                    self.slope::<L>(&lit, rows, &sums, &mut reflected, glow);
+            }
             (convergence, irradiance)
         };
         step::<L>(&mut irradiance, &first, [1.0; L]);
         if !runs {
             reflected = reflection.of::<L>(&irradiance);
         }
-        let on_nodes = self.on_nodes::<L>(&reflected, leaves);
+        let whole = given.as_ref().map(|given| {
+            let mut whole = reflected.clone();
+            step::<L>(&mut whole, given, [1.0; L]);
+            whole
+        });
+        let on_nodes = self.on_nodes::<L>(whole.as_ref().unwrap_or(&reflected), leaves);
         let through =
             (reflection.sheets.as_ref()).map_or_else(Through::default, |s| s.shown.clone());
         let mut flux = flux::Balance::default();
@@ -138,6 +156,7 @@ impl Bake {
                 reflected: &reflected,
                 irradiance: &irradiance,
                 first: &first,
+                fluoresced: given.as_ref(),
                 reflectance: &reflection.albedo::<L>(&reflected, &irradiance),
             };
             flux = if by_rays {
@@ -173,6 +192,74 @@ impl Bake {
         }
     }
 
+    /// All bounces, before links are looked at once more: how the solve went, and irradiance by reflected light where it is at hand.
+    fn bounce<const L: usize>(
+        &self,
+        lit: &Lit,
+        rows: &LinkRows,
+        reflected: &mut Rows,
+    ) -> (Convergence, Rows) {
+        match self.by_rays() {
+            true => self.bounce_by_rays::<L>(lit, reflected),
+            false => {
+                let convergence = self.bounce_along_links::<L>(lit, rows, reflected);
+                (convergence, Rows::default())
+            }
+        }
+    }
+
+    /// The same where surfaces fluoresce: with what they give out, and irradiance by both.
+    fn fluoresce<const L: usize>(
+        &self,
+        lit: &Lit,
+        rows: &LinkRows,
+        glow: &Glow,
+        reflected: &mut Rows,
+    ) -> (Convergence, Rows, Rows) {
+        let areas = lit.leaves.iter().map(|&leaf| self.areas[leaf as usize]);
+        let one = [1.0; LEAVES];
+        let power = self.lanes.taken(&one, self.scene.grid.width());
+        let rounds = Rounds {
+            glow,
+            areas: areas.collect(),
+            power: power.into_iter().map(f64::from).collect(),
+            tolerance: lit.tolerance,
+        };
+        let receive = |radiosity: &Rows| self.received::<L>(lit, rows, radiosity);
+        let by_rays = self.by_rays();
+        rounds.solve::<L>(lit.first, reflected, receive, |first, reflected| {
+            let lit = Lit { first, ..*lit };
+            let (convergence, seen) = self.bounce::<L>(&lit, rows, reflected);
+            let seen = match by_rays {
+                true => seen,
+                false => receive(reflected),
+            };
+            (convergence, seen)
+        })
+    }
+
+    /// What radiosity of the leaves brings them.
+    fn received<const L: usize>(&self, lit: &Lit, rows: &LinkRows, radiosity: &Rows) -> Rows {
+        if self.by_rays() {
+            return self.ray_system(lit).received::<L>(radiosity);
+        }
+        let factor = &self.balance.factor;
+        Operator::new(&self.tree, rows, lit.leaves, &self.areas, factor).received::<L>(radiosity)
+    }
+
+    /// The leaves as they look for themselves.
+    fn ray_system<'a>(&'a self, lit: &'a Lit) -> RaySystem<'a> {
+        RaySystem {
+            tree: &self.tree,
+            outlook: &self.outlook,
+            leaves: lit.leaves,
+            areas: &self.areas,
+            reflectance: &lit.reflection.rows,
+            greatest: &lit.reflection.greatest,
+            two_grid: (self.two_grid.as_ref()).map(|grid| (grid, self.lanes.noticed())),
+        }
+    }
+
     /// What rows of links sum to; nothing where leaves look for themselves.
     fn sums_of(&self, rows: &LinkRows) -> Vec<f64> {
         if self.by_rays() {
@@ -196,15 +283,7 @@ impl Bake {
         lit: &Lit,
         reflected: &mut Rows,
     ) -> (Convergence, Rows) {
-        let system = RaySystem {
-            tree: &self.tree,
-            outlook: &self.outlook,
-            leaves: lit.leaves,
-            areas: &self.areas,
-            reflectance: &lit.reflection.rows,
-            greatest: &lit.reflection.greatest,
-            two_grid: self.two_grid.as_ref().map(|grid| (grid, self.lanes.xyz())),
-        };
+        let system = self.ray_system(lit);
         if lit.reflection.sheets.is_some() {
             let receive = |radiosity: &Rows| system.received::<L>(radiosity);
             let sheets = self.through_sheets(lit, &receive);
@@ -254,13 +333,15 @@ impl Bake {
         }
     }
 
-    /// Last passes over the links, see [`linear`]: irradiance by reflected light, and what its flux was multiplied by.
+    /// Last passes over the links, see [`linear`]: irradiance by reflected light, and what its flux was multiplied by. What fluoresces is
+    /// found anew with them.
     fn slope<const L: usize>(
         &self,
         lit: &Lit,
         rows: &LinkRows,
         sums: &[f64],
         reflected: &mut Rows,
+        mut glow: Option<(&Glow, &mut Rows)>,
     ) -> (Rows, f64) {
         let (leaves, reflection) = (lit.leaves, lit.reflection);
         let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);
@@ -268,15 +349,26 @@ impl Bake {
         let bounced = reflection.of::<L>(lit.first);
         let (mut irradiance, mut ratio) = (Rows::default(), 1.0);
         for _ in 0..linear::PASSES {
-            irradiance = slopes.irradiance::<L>(reflected);
+            // What is given out at other wavelengths comes of no irradiance of its lane: it counts with direct light.
+            let with = |rows: &Rows, glow: &Option<(&Glow, &mut Rows)>| {
+                let mut rows = rows.clone();
+                if let Some((_, given)) = glow {
+                    step::<L>(&mut rows, given, [1.0; L]);
+                }
+                rows
+            };
+            irradiance = slopes.irradiance::<L>(&with(reflected, &glow));
             let before = lumens(&irradiance);
             let again = reflection.of::<L>(&irradiance);
-            let energy = slopes.balance::<L>(&irradiance, &bounced, &again);
+            let energy = slopes.balance::<L>(&irradiance, &with(&bounced, &glow), &again);
             reflection.scale::<L>(&self.lanes, &mut irradiance, energy);
             ratio = flux::ratio(lumens(&irradiance), before);
             let mut all = irradiance.clone();
             step::<L>(&mut all, lit.first, [1.0; L]);
             *reflected = reflection.of::<L>(&all);
+            if let Some((glow, given)) = &mut glow {
+                **given = glow.of::<L>(&all);
+            }
         }
         (irradiance, ratio)
     }
@@ -356,7 +448,7 @@ impl Bake {
     /// What turns a row into brightness, share of the white's.
     pub(super) fn bright_weights(&self) -> Vec<f64> {
         let white = self.light.white;
-        let xyz = self.lanes.xyz().iter();
+        let xyz = self.lanes.noticed().iter();
         xyz.map(|&xyz| brightness(xyz, white)).collect()
     }
 

@@ -1,5 +1,6 @@
 //! Reflectance and emission of patches, row by row, from the materials.
 
+use super::fluorescing::Glow;
 use super::mixed::Mixed;
 use super::reflection::Sheets;
 use crate::color::Upsampler;
@@ -29,6 +30,8 @@ pub(crate) struct Sources {
     pub greatest: Vec<f32>,
     /// What passes sheets; none in a room without.
     pub sheets: Option<Sheets>,
+    /// What fluoresces; none in a room without.
+    pub glow: Option<Glow>,
 }
 
 /// Turns materials into rows.
@@ -52,6 +55,16 @@ impl<'a> Painter<'a> {
                 .map(|material| material.sheet_means(&scene.images, upsampler))
                 .collect(),
         }
+    }
+
+    /// The scene.
+    pub(super) fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
+    /// Number of the material of a triangle.
+    pub(super) fn material_of(&self, triangle: u32) -> usize {
+        self.mesh.material[triangle as usize] as usize
     }
 
     /// Rows for the given leaves of `tree`.
@@ -92,7 +105,7 @@ impl<'a> Painter<'a> {
                     emission.copy_from_slice(&plain[material].1);
                     let m = &self.scene.materials[material];
                     if let Some(color) = self.paint_of(m, triangle, &element) {
-                        lanes.averages(&self.clamped(color), rho);
+                        lanes.averages(&self.clamped(m, color), rho);
                     }
                     if let Some((e, shape)) = self.glow_of(m, triangle, &element) {
                         emission.fill(0.0);
@@ -113,6 +126,7 @@ impl<'a> Painter<'a> {
             emission,
             greatest,
             sheets: None,
+            glow: Glow::new(self, tree, leaves, lanes),
         };
         if self.scene.materials.iter().any(|m| m.sheet.is_some()) {
             self.weave(tree, leaves, lanes, &mut sources);
@@ -194,7 +208,7 @@ impl<'a> Painter<'a> {
             let m = &self.scene.materials[material as usize];
             of.push(match self.paint_of(m, triangle, &element) {
                 Some(color) => {
-                    paints.push(self.clamped(color));
+                    paints.push(self.clamped(m, color));
                     paints.len() as u32 - 1
                 }
                 None => material,
@@ -203,11 +217,9 @@ impl<'a> Painter<'a> {
         Mixed::new(&paints, of, lanes, padded(lanes.len()))
     }
 
-    /// Albedo of a linear colour: bounded below 1, so that light ends.
-    fn clamped(&self, color: [f32; 3]) -> Leaves {
-        self.upsampler
-            .reflectance_fast(color)
-            .map(|r| r.min(GREATEST_ALBEDO))
+    /// Albedo of a linear colour on a material: bounded below 1, so that light ends.
+    fn clamped(&self, m: &Material, color: [f32; 3]) -> Leaves {
+        m.bounded(self.upsampler.reflectance_fast(color))
     }
 
     /// Mean linear base colour over an element, if it varies: factor times texture times vertex colours.
@@ -338,7 +350,7 @@ impl super::coarse::Dense for DenseSources<'_> {
             return rho;
         }
         match self.painter.paint_of(m, triangle, &element) {
-            Some(color) => self.painter.clamped(color),
+            Some(color) => self.painter.clamped(m, color),
             None => m.reflectance,
         }
     }
@@ -357,6 +369,13 @@ impl super::coarse::Dense for DenseSources<'_> {
             Some((e, shape)) => shape.map(|x| PI * e.scale * x),
             None => e.shape.map(|x| PI * x),
         })
+    }
+
+    fn excitation(&self, leaf: u32, light: usize) -> Option<Leaves> {
+        let (m, ..) = self.of(leaf);
+        let terms = m.fluorescence.iter().flat_map(|f| &f.terms);
+        let excited = terms.filter(|t| t.light == light).map(|t| t.excitation);
+        excited.reduce(|a, b| std::array::from_fn(|k| a[k] + b[k]))
     }
 
     fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves> {

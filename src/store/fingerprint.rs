@@ -175,6 +175,9 @@ impl Fingerprint {
                     mix.texture(texture, &images);
                 }
             }
+            for term in m.fluorescence.iter().flat_map(|f| &f.terms) {
+                mix.add(term.light as u64).add(term.excitation);
+            }
             print.add(format!("material '{}'", m.name), &mix);
         }
         for light in &scene.lights {

@@ -7,6 +7,7 @@
 
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
+use haarlight::scene::fluorescence::{Fluorescence, Term};
 use haarlight::scene::mirror::Mirror;
 use haarlight::scene::pane::{Pane, PaneKind};
 use haarlight::scene::sheet::Sheet;
@@ -31,8 +32,13 @@ pub(crate) struct Room {
 impl Room {
     /// Nothing yet, but the spectrum of equal energy.
     pub(crate) fn new() -> Self {
+        Self::over(Grid::default())
+    }
+
+    /// The same on other wavelengths.
+    pub(crate) fn over(grid: Grid) -> Self {
         let mut room = Self {
-            grid: Grid::default(),
+            grid,
             surfaces: Vec::new(),
             materials: Vec::new(),
             spectra: Vec::new(),
@@ -79,6 +85,7 @@ impl Room {
             pane: None,
             sheet: None,
             mirror: None,
+            fluorescence: None,
         });
         self.materials.len() - 1
     }
@@ -146,6 +153,26 @@ impl Room {
             from: "given".into(),
         });
         material
+    }
+
+    /// Makes a paint fluoresce: an emission whose leaves times their width sum to 1, and the power given out for each that comes.
+    pub(crate) fn fluoresces(&mut self, paint: usize, emission: Leaves, excitation: Leaves) {
+        let light = self.spectra.len();
+        self.spectra.push(LightSpectrum {
+            name: format!("fluorescence {light}"),
+            power: emission,
+        });
+        let fluorescence = self.materials[paint]
+            .fluorescence
+            .get_or_insert(Fluorescence {
+                terms: Vec::new(),
+                from: "given".into(),
+            });
+        fluorescence.terms.push(Term {
+            light,
+            excitation,
+            layer: None,
+        });
     }
 
     /// Lets the back of a material take part.
@@ -238,6 +265,7 @@ impl Room {
                     .materials
                     .iter()
                     .any(|m| m.emission.as_ref().is_some_and(|e| e.light == k))
+                || terms(&self.materials).any(|t| t.light == k)
         };
         let kept: Vec<usize> = (0..self.spectra.len()).filter(|&k| used(k)).collect();
         let place = |old: usize| kept.iter().position(|&k| k == old).unwrap_or(0);
@@ -250,6 +278,13 @@ impl Room {
             .filter_map(|m| m.emission.as_mut())
         {
             emission.light = place(emission.light);
+        }
+        let fluorescent = self.materials.iter_mut();
+        for term in fluorescent
+            .filter_map(|m| m.fluorescence.as_mut())
+            .flat_map(|f| &mut f.terms)
+        {
+            term.light = place(term.light);
         }
         let is_pane = |s: &Surface| self.materials[s.material].pane.is_some();
         let (panes, surfaces) = self.surfaces.into_iter().partition(is_pane);
@@ -272,6 +307,12 @@ impl Room {
             changes: Default::default(),
         }
     }
+}
+
+/// What materials fluoresce.
+fn terms(materials: &[Material]) -> impl Iterator<Item = &Term> {
+    let all = materials.iter().filter_map(|m| m.fluorescence.as_ref());
+    all.flat_map(|f| &f.terms)
 }
 
 /// `Km sum of power ybar`: lm for W.

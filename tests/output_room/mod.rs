@@ -144,6 +144,7 @@ fn material(name: &str, index: usize) -> Material {
         pane: None,
         sheet: None,
         mirror: None,
+        fluorescence: None,
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! No asset files: every room is made of numbers, and the same call writes the same bytes.
 
+mod brightened;
 mod building;
 mod cells;
 mod cie171;
@@ -72,6 +73,7 @@ const ROOMS: &[Room] = &[
     ("glazed", glazed::room, Some(glazed::spectra)),
     ("curtained", curtained::room, Some(curtained::spectra)),
     ("mirrored", mirrored::room, Some(mirrored::spectra)),
+    ("brightened", brightened::room, Some(brightened::spectra)),
     ("furnace", simple::furnace, None),
     ("gallery", gallery::room, Some(gallery::spectra)),
     ("cie171-5.2", cie171::case_5_2, None),

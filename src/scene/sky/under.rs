@@ -4,7 +4,7 @@ use super::SkyWish;
 use super::lamps::join;
 use crate::error::{Error, Result};
 use crate::scene::check::Check;
-use crate::scene::{LightKind, Scene};
+use crate::scene::{LightKind, Material, Scene};
 
 impl Scene {
     /// The same room under a sky, instead of the one it had; names of nodes are not known here, those of lights are.
@@ -33,10 +33,8 @@ impl Scene {
         });
         // Their spectra stand last.
         while let Some(last) = self.spectra.len().checked_sub(1) {
-            let emissions = self.materials.iter().filter_map(|m| m.emission.as_ref());
-            let mut used = emissions
-                .map(|e| e.light)
-                .chain(self.lights.iter().map(|l| l.light));
+            let given = self.materials.iter().flat_map(Material::lights);
+            let mut used = given.chain(self.lights.iter().map(|l| l.light));
             if used.any(|light| light == last) {
                 break;
             }

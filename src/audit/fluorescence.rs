@@ -1,0 +1,109 @@
+//! Paths that change their wavelength.
+//!
+//! A path carries all leaves at once, backwards: what it finds on a leaf counts for that leaf. Where a surface fluoresces it may go on by
+//! a term, `B(l) = e(l) sum over j of g(j) E(j) w` with leaves of w nm: from there on whatever it finds, on any leaf, counts for all leaves
+//! that it came with, in the fixed proportion `t(l) e(l)`, t being what was left of them. So it needs one spectrum more, whatever the
+//! number of changes.
+
+use crate::geometry::sampling::Pcg;
+use crate::scene::{LightSpectrum, Material, Scene};
+use crate::spectrum::{LEAVES, Leaves};
+
+/// What a path has found.
+pub(super) struct Tally<'a> {
+    /// By the leaf that light was found on.
+    pub(super) found: Leaves,
+    /// What counts leaf by leaf, once wavelengths were changed: all that was found before.
+    sum: &'a mut Leaves,
+    /// How much of what is found counts for each leaf; none: all of it, for its own.
+    spread: Option<Leaves>,
+}
+
+impl<'a> Tally<'a> {
+    /// Goes on from a sum.
+    pub(super) fn new(sum: &'a mut Leaves) -> Self {
+        Self {
+            found: *sum,
+            sum,
+            spread: None,
+        }
+    }
+
+    /// Adds what was found to the sum.
+    pub(super) fn settle(self) {
+        match self.spread {
+            None => *self.sum = self.found,
+            Some(spread) => {
+                let all: f64 = self.found.iter().sum();
+                (self.sum.iter_mut().zip(&spread)).for_each(|(sum, share)| *sum += share * all);
+            }
+        }
+    }
+
+    /// From now on what is found on any leaf counts by these shares.
+    fn change(&mut self, spread: Leaves) {
+        if self.spread.is_none() {
+            *self.sum = std::mem::replace(&mut self.found, [0.0; LEAVES]);
+            self.spread = Some(spread);
+        }
+    }
+}
+
+/// What a path is multiplied by at a surface of an `albedo`: of reflection, or of one of the terms that fluoresce by chance, each as often
+/// as it may carry the most power.
+pub(super) fn goes_on(
+    scene: &Scene,
+    material: &Material,
+    albedo: Leaves,
+    throughput: &mut Leaves,
+    rng: &mut Pcg,
+    tally: &mut Tally,
+) {
+    let width = scene.grid.width();
+    let reflected = |throughput: &Leaves, chance: f64| -> Leaves {
+        std::array::from_fn(|l| throughput[l] * albedo[l] / chance)
+    };
+    let Some(fluorescence) = &material.fluorescence else {
+        *throughput = reflected(throughput, 1.0);
+        return;
+    };
+    let emission = |light: &LightSpectrum, t: &Leaves| -> Leaves {
+        std::array::from_fn(|l| t[l] * light.power[l] * width)
+    };
+    let greatest = |x: &Leaves| x.iter().copied().fold(0.0, f64::max);
+    let mut ways = vec![greatest(&reflected(throughput, 1.0))];
+    let layer = fluorescence.terms.first().and_then(|t| t.layer);
+    let terms = fluorescence.terms.iter().filter(|t| t.layer == layer);
+    let terms: Vec<_> = terms.collect();
+    for term in &terms {
+        let out: f64 = emission(&scene.spectra[term.light], throughput)
+            .iter()
+            .sum();
+        ways.push(out * greatest(&term.excitation));
+    }
+    let all: f64 = ways.iter().sum();
+    let mut left = rng.f64() * all;
+    let chosen = ways.iter().position(|way| {
+        left -= way;
+        left < 0.0
+    });
+    // Nothing goes on, or rounding passed the last.
+    let chosen = chosen.unwrap_or(0);
+    let chance = match all > 0.0 {
+        true => ways[chosen] / all,
+        false => 1.0,
+    };
+    if chosen == 0 {
+        // By rounding it may be one that is never chosen.
+        *throughput = match chance > 0.0 {
+            true => reflected(throughput, chance),
+            false => [0.0; LEAVES],
+        };
+        return;
+    }
+    let term = terms[chosen - 1];
+    let out = emission(&scene.spectra[term.light], throughput);
+    let whole: f64 = out.iter().sum();
+    tally.change(out.map(|x| x / whole));
+    *throughput = term.excitation.map(|g| g * whole / chance);
+}

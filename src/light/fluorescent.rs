@@ -1,0 +1,104 @@
+//! What a material fluoresces, on lanes: each lane of its irradiance excites its terms by so much, each term fills the lanes of its own
+//! light spectrum.
+
+use super::lanes::Lanes;
+use crate::scene::Scene;
+use crate::scene::fluorescence::Fluorescence;
+use crate::spectrum::{LEAVES, Leaves};
+
+/// A material's terms.
+#[derive(Debug, Clone)]
+pub struct Fluorescent {
+    /// What a lane of irradiance at 1 excites, and the row that excitation 1 gives out; padded with 0.
+    terms: Vec<([f32; LEAVES], [f32; LEAVES])>,
+}
+
+impl Fluorescent {
+    /// On some lanes.
+    pub fn new(fluorescence: &Fluorescence, lanes: &Lanes, scene: &Scene) -> Self {
+        let layers = scene.changes.layers.as_ref();
+        let terms = fluorescence.terms.iter().map(|term| {
+            let (mut taken, mut given) = ([0.0; LEAVES], [0.0; LEAVES]);
+            let all = lanes.taken(&term.excitation, scene.grid.width());
+            for ((to, share), lane) in taken.iter_mut().zip(all).zip(lanes.lanes()) {
+                let layer = lane
+                    .light
+                    .zip(layers)
+                    .map(|(light, all)| all.of_light[light]);
+                // Lanes of all lights together excite the first copy, as a whole.
+                let own = match (term.layer, layer) {
+                    (Some(own), Some(layer)) => own == layer,
+                    (Some(own), None) => own == 0,
+                    (None, _) => true,
+                };
+                *to = if own { share } else { 0.0 };
+            }
+            lanes.add_emission(term.light, &[1.0; LEAVES], 1.0, &mut given);
+            (taken, given)
+        });
+        Self {
+            terms: terms.collect(),
+        }
+    }
+
+    /// What is given out under an irradiance.
+    pub fn of<const L: usize>(&self, irradiance: &[f32; L]) -> [f32; L] {
+        let mut out = [0.0; L];
+        for (taken, given) in &self.terms {
+            let excited: f32 = irradiance.iter().zip(taken).map(|(x, t)| x * t).sum();
+            out.iter_mut()
+                .zip(given)
+                .for_each(|(o, g)| *o += excited * g);
+        }
+        out
+    }
+
+    /// Tristimulus exitance for each lane of irradiance at 1.
+    pub fn tristimulus(&self, lanes: &Lanes) -> Vec<[f64; 3]> {
+        let terms = self.terms.iter();
+        let terms: Vec<_> = terms
+            .map(|(t, given)| (t, lanes.tristimulus(given)))
+            .collect();
+        let lane = |l: usize| {
+            let add = |sum: [f64; 3], (taken, xyz): &(&[f32; LEAVES], [f64; 3])| {
+                std::array::from_fn(|c| sum[c] + f64::from(taken[l]) * xyz[c])
+            };
+            terms.iter().fold([0.0; 3], add)
+        };
+        (0..lanes.len()).map(lane).collect()
+    }
+
+    /// Spectral exitance under an irradiance, W/m2/nm.
+    pub fn leaves(&self, lanes: &Lanes, irradiance: &[f32; LEAVES]) -> Leaves {
+        lanes.leaves(&self.of(irradiance))
+    }
+}
+
+/// What light counts for by what it excites, as weights beside the observer's: for each leaf the tristimulus values that a surface
+/// fluoresces under it, the greatest of all materials; none where nothing fluoresces.
+pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]> {
+    let width = scene.grid.width();
+    let mut more = [[0.0_f64; LEAVES]; 3];
+    let mut any = false;
+    let used = scene.surfaces.iter().map(|s| s.material);
+    let used: std::collections::BTreeSet<usize> = used.collect();
+    for fluorescence in used
+        .iter()
+        .filter_map(|&m| scene.materials[m].fluorescence.as_ref())
+    {
+        any = true;
+        let layer = fluorescence.terms.first().and_then(|t| t.layer);
+        let mut own = [[0.0; LEAVES]; 3];
+        for term in fluorescence.terms.iter().filter(|t| t.layer == layer) {
+            let power = &scene.spectra[term.light].power;
+            for (own, w) in own.iter_mut().zip(weights) {
+                let seen: f64 = power.iter().zip(w).map(|(p, w)| p * w).sum();
+                (own.iter_mut().zip(&term.excitation)).for_each(|(x, g)| *x += g * width * seen);
+            }
+        }
+        for (most, own) in more.iter_mut().flatten().zip(own.iter().flatten()) {
+            *most = most.max(*own);
+        }
+    }
+    any.then_some(more)
+}

@@ -1,0 +1,404 @@
+//! Fluorescence: surfaces that take in light of some wavelengths and give a part of it out again at others, evenly to all sides.
+//!
+//! With the irradiance E a surface sends out `B(leaf) = rho(leaf) E(leaf) + sum over terms of e(leaf) q`,
+//! `q = integral of g(mu) E(mu) d mu`: a Donaldson matrix (Donaldson 1954, British Journal of Applied Physics 5, 210) as a diagonal and few
+//! products of an emission spectrum e (1/nm, its integral is 1) and an excitation g, the power that leaves for a unit of power that comes.
+//!
+//! A side file says it by what a dye absorbs and by its quantum yield, or as a whole matrix:
+//!
+//! ```json
+//! { "materials": { "sheet": { "fluorescence": { "excitation": { "csv": "taken.csv" }, "emission": { "csv": "given.csv" }, "yield": 0.8 } },
+//!                  "card":  { "fluorescence": { "csv": "card.csv" } } } }
+//! ```
+//!
+//! `excitation` is the share of the light that the dye absorbs, 0 to 1, of photons and of power alike; `emission` is relative spectral
+//! power; `yield` counts photons. A photon of wavelength mu that is given out again at the mean of the emission,
+//! `l = integral of lambda e`, keeps mu / l of its energy, so `g(mu) = excitation(mu) yield mu / l`, and never more than is absorbed.
+//! Several dyes are a list. Beyond their rows both spectra are 0. The matrix: rows of emission, columns of excitation, the unit (`per_nm` or
+//! `per_band`) in the first cell, the reflectance where both wavelengths are equal; see `scene/bispectral.rs`.
+//!
+//! No more power leaves a surface than comes at any wavelength: `rho + g` above 1 is a problem where both are measured; a base colour,
+//! painted or not, reflects what the dye leaves of [`GREATEST_ALBEDO`]. Light does not wait: no phosphorescence.
+
+use super::bispectral::Bispectral;
+use super::check::Check;
+use super::json::short;
+use super::reader::Reader;
+use super::{GREATEST_ALBEDO, LightSpectrum, Material};
+use crate::data::{Grid, Kind, LEAVES, Leaves, Outside, Table};
+use serde_json::{Map, Value};
+
+/// Rounding of measured reflectances and excitations may let their sum exceed 1 by so much.
+const ROUNDING: f64 = 1e-6;
+
+/// What a material fluoresces.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fluorescence {
+    /// Emission spectra with what excites them.
+    pub terms: Vec<Term>,
+    /// Where it comes from, for the plan and for `inspect`.
+    pub from: String,
+}
+
+/// One emission spectrum.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Index in [`Scene::spectra`](crate::scene::Scene::spectra): the emission, whose power there is 1/nm, with an integral of at most 1
+    /// over the grid.
+    pub light: usize,
+    /// Power given out for a unit of power that comes, by leaf, in [0, 1): what the text above calls g.
+    pub excitation: Leaves,
+    /// Of which layer light must be to excite it; none: any.
+    pub layer: Option<usize>,
+}
+
+impl Fluorescence {
+    /// Power given out for a unit of power that comes, by leaf, all terms together.
+    pub fn efficiency(&self) -> Leaves {
+        let mut sum = [0.0; LEAVES];
+        // Copies of a term for the layers are excited by light of their own.
+        let first = self.terms.first().and_then(|t| t.layer);
+        for term in self.terms.iter().filter(|t| t.layer == first) {
+            (sum.iter_mut().zip(&term.excitation)).for_each(|(s, g)| *s += g);
+        }
+        sum
+    }
+
+    /// The Donaldson matrix without its diagonal of reflection: element `[i][j]` is the spectral exitance on leaf i for a unit of
+    /// spectral irradiance on leaf j, `width` the width of a leaf, nm.
+    pub fn matrix(&self, spectra: &[LightSpectrum], width: f64) -> Vec<Leaves> {
+        let first = self.terms.first().and_then(|t| t.layer);
+        let terms = || self.terms.iter().filter(|t| t.layer == first);
+        let element = |i: usize, j: usize| {
+            let each = terms().map(|t| spectra[t.light].power[i] * t.excitation[j]);
+            each.sum::<f64>() * width
+        };
+        let row = |i: usize| std::array::from_fn(|j| element(i, j));
+        (0..LEAVES).map(row).collect()
+    }
+}
+
+impl Material {
+    /// A reflectance brought down to what the albedo may be, beside what fluoresces.
+    pub(crate) fn bounded(&self, reflectance: Leaves) -> Leaves {
+        match &self.fluorescence {
+            None => reflectance.map(|r| r.min(GREATEST_ALBEDO)),
+            Some(fluorescence) => {
+                let out = fluorescence.efficiency();
+                std::array::from_fn(|k| reflectance[k].min(GREATEST_ALBEDO - out[k]).max(0.0))
+            }
+        }
+    }
+
+    /// Light spectra that it gives out, as lamp or excited.
+    pub(crate) fn lights_mut(&mut self) -> impl Iterator<Item = &mut usize> {
+        let own = self.emission.as_mut().map(|e| &mut e.light);
+        let excited = self.fluorescence.as_mut().map(|f| f.terms.iter_mut());
+        own.into_iter()
+            .chain(excited.into_iter().flatten().map(|t| &mut t.light))
+    }
+
+    /// The same, to be looked at.
+    pub(crate) fn lights(&self) -> impl Iterator<Item = usize> {
+        let own = self.emission.as_ref().map(|e| e.light);
+        let excited = self.fluorescence.as_ref().map(|f| f.terms.iter());
+        own.into_iter()
+            .chain(excited.into_iter().flatten().map(|t| t.light))
+    }
+}
+
+/// What a side file says of fluorescence.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Wish {
+    /// Emission (1/nm) and excitation of each term.
+    pub(crate) terms: Vec<[Leaves; 2]>,
+    /// In words.
+    pub(crate) from: String,
+    /// Diagonal of a matrix: the reflectance, if it holds one.
+    pub(crate) diagonal: Option<Leaves>,
+}
+
+/// Reads the fluorescence of a material's entry: an object, or a list of them.
+pub(super) fn read(reader: &mut Reader, value: &Value, place: &str) -> Option<Wish> {
+    let place = format!("{place}, fluorescence");
+    let list = match value {
+        Value::Array(list) => list.iter().collect(),
+        one => vec![one],
+    };
+    let mut wish = Wish::default();
+    let mut said = Vec::new();
+    for (k, value) in list.iter().enumerate() {
+        let place = match list.len() {
+            1 => place.clone(),
+            _ => format!("{place} {}", k + 1),
+        };
+        let object = reader.object(value, &place)?;
+        if object.contains_key("csv") {
+            let matrix = matrix(reader, object, &place)?;
+            if wish.diagonal.is_some() && matrix.diagonal.is_some() {
+                let what = "two matrices hold a reflectance on their diagonals";
+                (reader.check).problem(&place, what, "leave the diagonal of one at 0");
+            }
+            wish.diagonal = wish.diagonal.or(matrix.diagonal);
+            wish.terms.extend(matrix.terms);
+            said.push(matrix.from);
+        } else {
+            let (term, from) = dye(reader, object, &place)?;
+            wish.terms.push(term);
+            said.push(from);
+        }
+    }
+    wish.terms
+        .retain(|[_, excitation]| excitation.iter().any(|g| *g > 0.0));
+    wish.from = said.join("; ");
+    Some(wish)
+}
+
+/// A dye by what it absorbs, what it gives out, and its quantum yield.
+fn dye(
+    reader: &mut Reader,
+    object: &Map<String, Value>,
+    place: &str,
+) -> Option<([Leaves; 2], String)> {
+    reader.keys(object, &["excitation", "emission", "yield", "csv"], place);
+    let quantum = object.get("yield").and_then(Value::as_f64);
+    let quantum = quantum.filter(|q| (0.0..=1.0).contains(q));
+    if quantum.is_none() {
+        let what = match object.get("yield") {
+            Some(value) => format!("its yield is {}", short(&value.to_string())),
+            None => "says no yield".into(),
+        };
+        let next =
+            "give the quantum yield, photons given out for each that is absorbed, from 0 to 1";
+        reader.check.problem(place, what, next);
+    }
+    let mut table = |key: &str, kind: Kind| {
+        let place = format!("{place}, {key}");
+        let Some(value) = object.get(key) else {
+            let next = "say {\"excitation\": {\"csv\": ...}, \"emission\": {\"csv\": ...}, \"yield\": ...}";
+            reader.check.problem(&place, "is missing", next);
+            return None;
+        };
+        let object = reader.object(value, &place)?;
+        reader.keys(object, &["name", "csv"], &place);
+        reader.table(object, kind, &place)
+    };
+    let absorbed = table("excitation", Kind::Reflectance);
+    let emission = table("emission", Kind::Illuminant);
+    let ((absorbed, taken), (emission, given), quantum) = (absorbed?, emission?, quantum?);
+    if let Some(most) = absorbed.values().iter().copied().find(|x| *x > 1.0) {
+        let what = format!("'{}' goes up to {most}", short(&taken));
+        let next = "write the share of light that the dye absorbs, from 0 to 1";
+        (reader.check).problem(&format!("{place}, excitation"), what, next);
+        return None;
+    }
+    let grid = *reader.grid;
+    let spectrum = normalised(&emission, &grid);
+    let Some(spectrum) = spectrum.filter(|e| e.iter().any(|x| *x > 0.0)) else {
+        let (start, end) = (grid.start(), grid.end());
+        let what = format!(
+            "'{}' gives no light from {start} to {end} nm",
+            short(&given)
+        );
+        let next = "give the emission in nanometres, or widen --range";
+        (reader.check).problem(&format!("{place}, emission"), what, next);
+        return None;
+    };
+    let mean = mean_wavelength(&emission);
+    let out = |nm: f64, share: f64| share * (quantum * nm / mean).min(1.0);
+    // At the table's rows and the edges of the leaves: between them both factors are smooth.
+    let excitation = power(&absorbed, &grid, out);
+    outside(reader.check, &absorbed, &grid, place);
+    let most = absorbed.wavelengths().iter().zip(absorbed.values());
+    let most = most.max_by(|a, b| a.1.total_cmp(b.1));
+    let peak = most.map_or(0.0, |(nm, _)| *nm);
+    let from = format!(
+        "light of {peak:.0} nm above all, given out at {mean:.0} nm in the mean, yield {quantum}"
+    );
+    Some(([spectrum, excitation], from))
+}
+
+/// Says what share of an excitation lies beyond the grid.
+fn outside(check: &mut Check, absorbed: &Table, grid: &Grid, place: &str) {
+    let [first, last] = absorbed.range();
+    let all = absorbed.integral(first, last, Outside::Zero);
+    let seen = absorbed.integral(grid.start(), grid.end(), Outside::Zero);
+    let share = 1.0 - seen / all;
+    // Less is nothing to speak of.
+    if all > 0.0 && share > 0.01 {
+        check.warn(format!(
+            "{place}: {:.0} % of its excitation lies outside of {} to {} nm and is left out (--range 300..780 takes in the \
+             ultraviolet)",
+            100.0 * share,
+            grid.start(),
+            grid.end()
+        ));
+    }
+}
+
+/// A matrix from a CSV.
+fn matrix(reader: &mut Reader, object: &Map<String, Value>, place: &str) -> Option<Wish> {
+    reader.keys(object, &["csv"], place);
+    let (text, from) = reader.text(object, place)?;
+    match Bispectral::parse(&text) {
+        Ok(matrix) => {
+            let terms = matrix.terms();
+            let said = format!(
+                "{}: {} of emission, off by {:.2} % of the matrix",
+                short(&from),
+                match terms.all.len() {
+                    1 => "1 spectrum".to_owned(),
+                    n => format!("{n} spectra"),
+                },
+                100.0 * terms.error
+            );
+            if terms.error > super::bispectral::TOLERABLE {
+                reader.check.warn(format!("{place}: {said}"));
+            }
+            let on_grid = |[emission, excitation]: &[Table; 2]| {
+                let spectrum = normalised(emission, reader.grid)?;
+                Some([spectrum, reader.grid.means(excitation, Outside::Zero)])
+            };
+            let diagonal = matrix.diagonal();
+            Some(Wish {
+                terms: terms.all.iter().filter_map(on_grid).collect(),
+                from: said,
+                diagonal: diagonal.map(|table| reader.grid.means(&table, Outside::Hold)),
+            })
+        }
+        Err(why) => {
+            let next = "rows are wavelengths of emission, columns of excitation; the first cell says per_nm or per_band";
+            let what = format!("'{}', {why}", short(&from));
+            reader.check.problem(place, what, next);
+            None
+        }
+    }
+}
+
+/// An emission on the grid, 1/nm, the integral of its whole table 1; none of a table of zeros.
+fn normalised(table: &Table, grid: &Grid) -> Option<Leaves> {
+    let [first, last] = table.range();
+    let all = table.integral(first, last, Outside::Zero);
+    (all > 0.0).then(|| grid.means(table, Outside::Zero).map(|x| x / all))
+}
+
+/// Mean wavelength of an emission by power, nm: that of its mean photon, `h c / l` being its energy.
+fn mean_wavelength(table: &Table) -> f64 {
+    let [first, last] = table.range();
+    let all = table.integral(first, last, Outside::Zero);
+    // Simpson's rule, exact for the product of two linear functions on each segment.
+    let rows = table.wavelengths().iter().zip(table.values());
+    let rows: Vec<(f64, f64)> = rows.map(|(w, v)| (*w, *v)).collect();
+    let moment: f64 = (rows.windows(2))
+        .map(|pair| {
+            let [(a, x), (b, y)] = [pair[0], pair[1]];
+            (b - a) / 6.0 * (a * x + (a + b) * (x + y) + b * y)
+        })
+        .sum();
+    moment / all
+}
+
+/// Means over the leaves of a share that depends on the table's value and the wavelength.
+fn power(table: &Table, grid: &Grid, share: impl Fn(f64, f64) -> f64) -> Leaves {
+    std::array::from_fn(|leaf| {
+        let (from, to) = (grid.left(leaf), grid.left(leaf + 1));
+        let mut ends = vec![from];
+        ends.extend(
+            table
+                .wavelengths()
+                .iter()
+                .filter(|w| **w > from && **w < to),
+        );
+        ends.push(to);
+        let at = |nm: f64| share(nm, table.at(nm, Outside::Zero));
+        let part = |pair: &[f64]| {
+            let (a, b) = (pair[0], pair[1]);
+            // Just inside, for the table ends abruptly.
+            let inset = 1e-9 * (b - a);
+            (b - a) / 6.0 * (at(a + inset) + 4.0 * at(0.5 * (a + b)) + at(b - inset))
+        };
+        ends.windows(2).map(part).sum::<f64>() / grid.width()
+    })
+}
+
+/// Makes a material fluoresce as it is wished; its reflectance, `measured` or not, leaves room for what is given out.
+pub(super) fn kindle(
+    material: &mut Material,
+    wish: &Wish,
+    measured: Option<&str>,
+    place: &str,
+    grid: &Grid,
+    spectra: &mut Vec<LightSpectrum>,
+    check: &mut Check,
+) {
+    if wish.terms.is_empty() {
+        return;
+    }
+    if material.sheet.is_some() || material.pane.is_some() {
+        let what = "fluoresces and lets light through";
+        let next = "take one of them out: what light passes does not fluoresce here";
+        check.problem(place, what, next);
+        return;
+    }
+    if material.mirror.is_some() {
+        let what = "fluoresces and is a mirror";
+        check.problem(
+            place,
+            what,
+            "say \"mirror\": false, or take the fluorescence out",
+        );
+        return;
+    }
+    let terms = wish.terms.iter().map(|[emission, excitation]| {
+        let known = spectra.iter().position(|s| s.power == *emission);
+        let light = known.unwrap_or_else(|| {
+            spectra.push(LightSpectrum {
+                name: format!("fluorescence of '{}'", short(&material.name)),
+                power: *emission,
+            });
+            spectra.len() - 1
+        });
+        Term {
+            light,
+            excitation: *excitation,
+            layer: None,
+        }
+    });
+    let fluorescence = Fluorescence {
+        terms: terms.collect(),
+        from: wish.from.clone(),
+    };
+    let out = fluorescence.efficiency();
+    let rho = measured.map_or([0.0; LEAVES], |_| material.reflectance);
+    let over: Vec<usize> = (0..LEAVES)
+        .filter(|&k| rho[k] + out[k] > 1.0 + ROUNDING)
+        .collect();
+    if let (Some(first), Some(last)) = (over.first(), over.last()) {
+        let most = over.iter().map(|&k| rho[k] + out[k]).fold(0.0, f64::max);
+        let what = format!(
+            "reflectance ({}) and fluorescence come to {most:.3} of the power that arrives between {:.0} and {:.0} nm",
+            short(measured.unwrap_or("none")),
+            grid.left(*first),
+            grid.left(*last + 1)
+        );
+        let next = "lower one of them: no more leaves than comes; a measured reflectance must not hold what fluoresces";
+        check.problem(place, what, next);
+        return;
+    }
+    material.fluorescence = Some(fluorescence);
+    material.reflectance = material.bounded(material.reflectance);
+}
+
+/// Puts the spectra that materials fluoresce behind those of lamps.
+pub(super) fn join(
+    materials: &mut [Material],
+    spectra: &mut Vec<LightSpectrum>,
+    excited: Vec<LightSpectrum>,
+) {
+    let first = spectra.len();
+    let fluorescent = materials.iter_mut().filter_map(|m| m.fluorescence.as_mut());
+    for term in fluorescent.flat_map(|f| &mut f.terms) {
+        term.light += first;
+    }
+    spectra.extend(excited);
+}

@@ -1,0 +1,182 @@
+//! The solve where surfaces fluoresce: `R = rho (f + F R) + Q (f + F R)`, Q from the lanes that excite to those of what is given out.
+//!
+//! Lanes reflect by themselves, so what is given out is found in rounds: with Q's part as it is, `G`, all bounces of it and of all other
+//! light as ever, `R' = rho (f + F G + F R')`; from the light that this brings, G anew. A round that changes the power of G by d leaves
+//! an error of `d / (1 - k)` at the most: of what is given out at a wavelength no more than k comes back as G, k the greatest
+//! `g / (1 - rho)` at wavelengths of emissions, since every meeting with a surface that fluoresces reflects rho and gives out g. As
+//! emissions mostly excite nothing, the second round mostly finds what the first found.
+
+use super::conjugate::{Convergence, step};
+use super::sources::Painter;
+use crate::hierarchy::Tree;
+use crate::light::lanes::Lanes;
+use crate::light::{Fluorescent, Rows};
+use crate::scene::{GREATEST_ALBEDO, Material, Scene};
+use crate::spectrum::LEAVES;
+use rayon::prelude::*;
+
+/// Rounds at the most; a dye whose emission excites it with a yield of .9 took 9 in a white room.
+const ROUNDS: usize = 60;
+/// Rounds end at this change whatever the bound: what is left is f32.
+const ROUNDING: f64 = 1e-6;
+/// Leaves that a task looks at.
+const CHUNK: usize = 1024;
+
+/// What fluoresces, and how.
+#[derive(Debug, Clone)]
+pub(crate) struct Glow {
+    /// Materials that fluoresce.
+    kinds: Vec<Fluorescent>,
+    /// For each leaf its number among these; none of what does not.
+    of: Vec<Option<u8>>,
+    /// Greatest share of the power that is given out that comes back as such.
+    back: f64,
+}
+
+impl Glow {
+    /// Of the leaves of a hierarchy; none where nothing fluoresces.
+    pub(super) fn new(
+        painter: &Painter,
+        tree: &Tree,
+        leaves: &[u32],
+        lanes: &Lanes,
+    ) -> Option<Self> {
+        let scene = painter.scene();
+        let mut kinds = Vec::new();
+        let of_material: Vec<Option<u8>> = (scene.materials.iter())
+            .map(|m| {
+                let kind = Fluorescent::new(m.fluorescence.as_ref()?, lanes, scene);
+                // More kinds than a byte counts would take more light spectra than rows hold: those count as dark.
+                let number = u8::try_from(kinds.len()).ok()?;
+                kinds.push(kind);
+                Some(number)
+            })
+            .collect();
+        if kinds.is_empty() {
+            return None;
+        }
+        let of = leaves.iter().map(|&leaf| {
+            let element = tree.elements[tree.node(leaf).element as usize];
+            let triangle = tree.faces[element.face as usize].triangle;
+            of_material[painter.material_of(triangle)]
+        });
+        let of: Vec<Option<u8>> = of.collect();
+        of.iter().any(Option::is_some).then(|| Self {
+            of,
+            kinds,
+            back: back(scene),
+        })
+    }
+
+    /// What the leaves give out under an irradiance, both by leaf.
+    pub(super) fn of<const L: usize>(&self, irradiance: &Rows) -> Rows {
+        let mut out = Rows::zero(irradiance.len(), L);
+        let rows = out.all_mut::<L>().par_iter_mut();
+        rows.zip(irradiance.all::<L>())
+            .zip(&self.of)
+            .for_each(|((out, row), kind)| {
+                if let Some(kind) = kind {
+                    *out = self.kinds[usize::from(*kind)].of(row);
+                }
+            });
+        out
+    }
+}
+
+/// The greatest `g / (1 - rho)` of a material at a wavelength that something gives out.
+fn back(scene: &Scene) -> f64 {
+    let fluorescent = || {
+        let used = scene.materials.iter();
+        used.filter_map(|m| Some((m, m.fluorescence.as_ref()?)))
+    };
+    let mut emitted = [false; LEAVES];
+    for term in fluorescent().flat_map(|(_, f)| &f.terms) {
+        let power = &scene.spectra[term.light].power;
+        (emitted.iter_mut().zip(power)).for_each(|(e, p)| *e |= *p > 0.0);
+    }
+    let of = |(m, f): (&Material, &crate::scene::fluorescence::Fluorescence)| {
+        let out = f.efficiency();
+        let painted = m.paint.is_some() || m.vertex_paint;
+        (0..LEAVES)
+            .filter(|&k| emitted[k])
+            .fold(0.0, |most: f64, k| {
+                let rho = match painted {
+                    true => GREATEST_ALBEDO - out[k],
+                    false => m.reflectance[k],
+                };
+                most.max(out[k] / (1.0 - rho))
+            })
+    };
+    // What is read is bounded; what is made in code may not be.
+    fluorescent()
+        .map(of)
+        .fold(0.0, f64::max)
+        .min(GREATEST_ALBEDO)
+}
+
+/// What takes part in a round.
+pub(super) struct Rounds<'a> {
+    pub(super) glow: &'a Glow,
+    /// Area of each leaf.
+    pub(super) areas: Vec<f64>,
+    /// Power (W/m2) of each lane at 1.
+    pub(super) power: Vec<f64>,
+    /// Relative error at which they end.
+    pub(super) tolerance: f64,
+}
+
+impl Rounds<'_> {
+    /// Reflected radiosity, what is given out, and irradiance by both, by leaf. `receive` turns radiosity into irradiance, `bounce` finds
+    /// from direct irradiance what is reflected of it and the irradiance by that.
+    pub(super) fn solve<const L: usize>(
+        &self,
+        first: &Rows,
+        reflected: &mut Rows,
+        receive: impl Fn(&Rows) -> Rows,
+        mut bounce: impl FnMut(&Rows, &mut Rows) -> (Convergence, Rows),
+    ) -> (Convergence, Rows, Rows) {
+        let mut given = self.glow.of::<L>(first);
+        let mut done = Convergence::default();
+        loop {
+            let brought = receive(&given);
+            let mut lit = first.clone();
+            step::<L>(&mut lit, &brought, [1.0; L]);
+            let (solved, mut seen) = bounce(&lit, reflected);
+            done.iterations += solved.iterations;
+            done.fluorescence += 1;
+            step::<L>(&mut lit, &seen, [1.0; L]);
+            let next = self.glow.of::<L>(&lit);
+            let (changed, all) = self.change::<L>(&given, &next);
+            let change = if all > 0.0 { changed / all } else { 0.0 };
+            done.residual = solved.residual.max(change);
+            done.bound = solved.bound.max(change / (1.0 - self.glow.back));
+            let settled = change / (1.0 - self.glow.back) <= self.tolerance || change <= ROUNDING;
+            if settled || done.fluorescence >= ROUNDS {
+                step::<L>(&mut seen, &brought, [1.0; L]);
+                return (done, given, seen);
+            }
+            given = next;
+        }
+    }
+
+    /// Power that the second gives out more or less than the first, and that it gives out.
+    fn change<const L: usize>(&self, before: &Rows, now: &Rows) -> (f64, f64) {
+        let rows = (before.all::<L>().par_chunks(CHUNK)).zip(now.all::<L>().par_chunks(CHUNK));
+        let parts: Vec<[f64; 2]> = rows
+            .zip(self.areas.par_chunks(CHUNK))
+            .map(|((before, now), areas)| {
+                let mut sums = [0.0; 2];
+                for ((before, now), area) in before.iter().zip(now).zip(areas) {
+                    let lanes = before.iter().zip(now).zip(&self.power);
+                    for ((before, now), power) in lanes {
+                        sums[0] += area * power * f64::from((now - before).abs());
+                        sums[1] += area * power * f64::from(*now);
+                    }
+                }
+                sums
+            })
+            .collect();
+        let add = |a: [f64; 2], b: &[f64; 2]| [a[0] + b[0], a[1] + b[1]];
+        parts.iter().fold([0.0; 2], add).into()
+    }
+}
