@@ -102,3 +102,28 @@ pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]>
     }
     any.then_some(more)
 }
+
+/// The share of what is excited that counts in brightness beside what is seen: so much that the lamp that excites most counts no more
+/// than the one that is seen most, or errors of either would be nothing beside the other.
+pub(crate) fn balance(scene: &Scene, weights: &[Leaves; 3], guide: &[Leaves; 3]) -> f64 {
+    let surfaces = scene.materials.iter().filter_map(|m| m.emission.as_ref());
+    let surfaces = surfaces.map(|e| (e.light, &e.shape));
+    let lights = scene.lights.iter().map(|l| (l.light, &l.shape));
+    let share = |lamps: &mut dyn Iterator<Item = (usize, &Leaves)>| {
+        let mut most = [0.0_f64; 2];
+        for (light, shape) in lamps {
+            let power = shape.iter().zip(&scene.spectra[light].power);
+            let power: Vec<f64> = power.map(|(s, p)| s * p).collect();
+            for (most, w) in most.iter_mut().zip([weights, guide]) {
+                let sum: f64 = power.iter().zip(&w[1]).map(|(p, w)| p * w).sum();
+                *most = most.max(sum);
+            }
+        }
+        if most[1] > most[0] {
+            most[0] / most[1]
+        } else {
+            1.0
+        }
+    };
+    share(&mut { surfaces }).min(share(&mut { lights }))
+}

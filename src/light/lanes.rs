@@ -8,8 +8,7 @@
 //! Other ways to hold spectra are here to be compared with: radiosity itself on intervals (the paper's way), linear
 //! sRGB, and coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
 //!
-//! Where surfaces fluoresce, light counts also for what it excites, see [`Lanes::guided`]: averages and refinement then follow further
-//! weights beside the observer's, by which ultraviolet light has tristimulus values, too.
+//! Where surfaces fluoresce light counts also for what it excites, by weights as the observer's: see [`Lanes::guided`].
 //!
 //! Units: ratio lanes are numbers that multiply S (W/m2/nm of radiosity per unit of `LightSpectrum::power`);
 //! absolute lanes are W/m2/nm; lanes of linear sRGB are W/m2 weighted by the observer, (1, 1, 1) has Y = 1 / KM lm/m2.
@@ -63,7 +62,7 @@ struct Guide {
     weights: [Leaves; 3],
     /// Tristimulus value of a lane at 1 by them.
     xyz: Vec<[f64; 3]>,
-    /// The same with what is seen.
+    /// A share of it, with what is seen.
     both: Vec<[f64; 3]>,
 }
 
@@ -196,26 +195,25 @@ impl Lanes {
         }
     }
 
-    /// The same lanes, whose averages and whose brightness follow further weights beside the observer's: what a surface sends out for a
-    /// unit of each leaf at other wavelengths.
+    /// The same lanes, whose averages follow further weights beside the observer's, what a surface sends out for a unit of each leaf at
+    /// other wavelengths, and whose brightness a `share` of it.
     #[must_use]
-    pub fn guided(mut self, weights: &[Leaves; 3]) -> Self {
-        let xyz = self.lanes().iter().map(|lane| {
-            weights.each_ref().map(|w| {
-                let leaves = lane.first..lane.first + lane.count;
-                KM * leaves.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
-            })
-        });
-        let xyz: Vec<[f64; 3]> = xyz.collect();
+    pub fn guided(mut self, weights: &[Leaves; 3], share: f64) -> Self {
+        let of = |lane: &Lane, w: &Leaves| {
+            let leaves = lane.first..lane.first + lane.count;
+            KM * leaves.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
+        };
+        let xyz = self.lanes().iter();
+        let xyz: Vec<_> = xyz.map(|l| weights.each_ref().map(|w| of(l, w))).collect();
         let both = xyz.iter().zip(&self.xyz);
-        let both = both.map(|(a, b)| std::array::from_fn(|c| a[c] + b[c]));
-        if !xyz.is_empty() {
-            self.guide = Some(Box::new(Guide {
+        let both = both.map(|(a, b)| std::array::from_fn(|c| share * a[c] + b[c]));
+        self.guide = (!xyz.is_empty()).then(|| {
+            Box::new(Guide {
                 weights: *weights,
                 both: both.collect(),
-                xyz,
-            }));
-        }
+                xyz: xyz.clone(),
+            })
+        });
         self
     }
 
@@ -285,7 +283,7 @@ impl Lanes {
         &self.xyz
     }
 
-    /// What each lane at 1 counts for: its tristimulus value, with what it excites.
+    /// What each lane at 1 counts for in brightness: its tristimulus value, with a share of what it excites.
     pub fn noticed(&self) -> &[[f64; 3]] {
         self.guide.as_ref().map_or(&self.xyz, |guide| &guide.both)
     }
@@ -295,9 +293,14 @@ impl Lanes {
         self.guide.as_ref().map(|guide| &*guide.xyz)
     }
 
-    /// Tristimulus values of a row as it counts.
+    /// Tristimulus values of a row as it counts in brightness.
     pub fn notice(&self, row: &[f32]) -> [f64; 3] {
         summed(row, self.noticed())
+    }
+
+    /// Tristimulus values of what a row excites; 0 where nothing fluoresces.
+    pub fn excited(&self, row: &[f32]) -> [f64; 3] {
+        summed(row, self.excites().unwrap_or_default())
     }
 
     /// What each lane at 1 brings a surface that takes so much of each leaf, the `width` of a leaf in nm: W/m2. Nothing where lanes are no

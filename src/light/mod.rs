@@ -12,7 +12,7 @@ pub use descent::Descent;
 pub(crate) use filters::accumulate;
 pub use filters::{Filter, Filters, Glass, Tint};
 pub use fluorescent::Fluorescent;
-pub(crate) use fluorescent::guide;
+pub(crate) use fluorescent::{balance, guide};
 pub use rows::{Rows, padded};
 pub use solution::{Arrival, Light, Neighbours};
 pub(crate) use solution::{brightness, keenness, weighed};

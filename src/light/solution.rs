@@ -59,6 +59,8 @@ pub struct Light {
     pub white: [f64; 3],
     /// Half the diagonal of the room.
     pub half_size: f64,
+    /// Does light count for what it excites beside what is seen of it? Then what is faint by both together may be bright by one.
+    pub apart: bool,
 }
 
 impl Light {

@@ -28,7 +28,7 @@ pub(crate) struct Seen {
 }
 
 /// Place and normal, rounded; space; is the light of its leaf taken as it is? And the material of a diffuse sheet, whose light is
-/// shown with what passes it.
+/// shown with what passes it, or of what fluoresces, on which light counts for more.
 type Key = ([i64; 6], (u32, bool), bool, Option<u32>);
 
 /// All looks so far.
@@ -94,10 +94,9 @@ impl<'a> Looks<'a> {
         let space = self.spaces.get(vertex.entry as usize);
         let (space, believing) = (space.copied().unwrap_or_default(), self.believing);
         let material = mesh.material[vertex.triangle as usize];
-        let is_sheet = self.bake.scene().materials[material as usize]
-            .sheet
-            .is_some();
-        let sheet = is_sheet.then_some(material);
+        let of = &self.bake.scene().materials[material as usize];
+        let apart = of.sheet.is_some() || of.fluorescence.is_some();
+        let sheet = apart.then_some(material);
         let (key, places) = (
             ([x, y, z, i, j, k], space, believing, sheet),
             &mut self.places,
@@ -108,12 +107,29 @@ impl<'a> Looks<'a> {
         })
     }
 
-    fn seen_as(&self, row: [f32; 64], trace: Option<Box<[u8]>>) -> Seen {
+    fn seen_as(&self, to: &Receiver, row: [f32; 64], trace: Option<Box<[u8]>>) -> Seen {
+        let lanes = self.bake.lanes();
+        let mut xyz = lanes.tristimulus(&row);
+        if lanes.excites().is_some() && self.fluoresces(to) {
+            let excited = lanes.excited(&row);
+            xyz = std::array::from_fn(|c| xyz[c] + excited[c]);
+        }
         Seen {
-            xyz: self.bake.lanes().notice(&row),
+            xyz,
             row: Box::new(row),
             trace,
         }
+    }
+
+    /// Does a place lie on what fluoresces?
+    fn fluoresces(&self, to: &Receiver) -> bool {
+        let (tree, mesh) = (self.bake.tree(), self.bake.mesh());
+        let element = to.leaf.and_then(|leaf| tree.element(tree.node(leaf)));
+        element.is_some_and(|element| {
+            let triangle = tree.faces[element.face as usize].triangle as usize;
+            let material = &self.bake.scene().materials[mesh.material[triangle] as usize];
+            material.fluorescence.is_some()
+        })
     }
 
     /// Asks for a vertex once more, with a pattern of rays of its own, to be looked at in any case; the number of the look.
@@ -195,10 +211,11 @@ impl<'a> Looks<'a> {
             self.rays += gathered.rays;
             let covered = dark(&gathered) && covered.next() == Some(true);
             let hidden = covered || gathered.backs > MOSTLY;
-            let seen = self.seen_as(gathered.irradiance, gathered.packed);
-            let shown = !hidden && !self.is_inside(&self.places[k].0, &seen);
+            let to = &self.places[k].0;
+            let seen = self.seen_as(to, gathered.irradiance, gathered.packed);
+            let shown = !hidden && !self.is_inside(to, &seen);
             self.seen[k] = shown.then(|| match self.indirect {
-                true => self.seen_as(less(gathered.irradiance, &gathered.direct), seen.trace),
+                true => self.seen_as(to, less(gathered.irradiance, &gathered.direct), seen.trace),
                 false => seen,
             });
         }
@@ -223,7 +240,7 @@ impl<'a> Looks<'a> {
             .row(light.leaves.binary_search(&to.leaf?).ok()?);
         let mut row = [0.0; 64];
         row[..known.len()].copy_from_slice(known);
-        Some(self.seen_as(row, None))
+        Some(self.seen_as(to, row, None))
     }
 }
 

@@ -286,6 +286,7 @@ impl Bake {
         light.reflected = self.on_nodes::<L>(reflected, &light.leaves);
         light.emitted = self.on_nodes::<L>(&emission, &light.leaves);
         light.half_size = self.mesh.half_size;
+        light.apart = self.lanes.excites().is_some();
         light.measure(&self.tree, &self.lanes);
         self.light = light;
         self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);

@@ -7,7 +7,7 @@ use super::sources::DenseSources;
 use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
 use crate::light::lanes::Lanes;
-use crate::light::{Filters, guide};
+use crate::light::{self, Filters, guide};
 use crate::link::{LinkRows, balance};
 use crate::scene::effects::Kind;
 use crate::scene::{LightSpectrum, Scene};
@@ -39,6 +39,7 @@ impl Bake {
             }
         }
         self.lanes = lanes;
+        self.light.apart = self.lanes.excites().is_some();
         self.filters = Filters::new(&self.scene, &self.lanes);
     }
 
@@ -81,39 +82,7 @@ impl Bake {
                 let basis = basis(&lights, &paints(&self.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
-            Representation::Adaptive if !none => {
-                let mut model = self.model(coarse::PATCHES);
-                let kin = Kin::of(&self.scene);
-                model.join(&kin.of, kin.spectra.len());
-                let (spectra, weights) = (&kin.spectra, &self.weights);
-                if guide.is_some() {
-                    model.kindle(spectra, weights, self.scene.grid.width());
-                }
-                let (known, white) = (self.lanes.cuts(), self.light.white);
-                let known = known.map(|cuts| kin.one_of_each(&cuts));
-                let copies = kin.copies.as_deref();
-                let choose = |model: &coarse::Coarse| {
-                    let seen = (weights, guide.as_ref());
-                    model.choose(spectra, seen, white, tolerance, known.clone(), copies)
-                };
-                let mut choice = choose(&model);
-                // What lies behind a pane has light of its own spectra: lanes serve all of them.
-                let plain = (model.emission.clone(), model.punctual.clone());
-                for filter in tints(&self.scene) {
-                    (model.emission, model.punctual) = plain.clone();
-                    model.behind(&filter);
-                    let other = choose(&model);
-                    let both = choice.cuts.iter().zip(other.cuts);
-                    let both: Vec<Partition> = both.map(|(cut, more)| cut.union(more)).collect();
-                    if kin.fits(&both) {
-                        choice.cuts = both;
-                    }
-                }
-                // Without light there is no white to see an error by.
-                self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
-                let cuts: Vec<Partition> = kin.of.iter().map(|&k| choice.cuts[k]).collect();
-                self.guided(Lanes::ratio(&self.scene.spectra, &cuts, &self.weights))
-            }
+            Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance),
             Representation::Guaranteed if !none => {
                 let model = self.model(BOUNDED_PATCHES);
                 let (spectra, weights) = (&self.scene.spectra, &self.weights);
@@ -129,10 +98,45 @@ impl Bake {
         }
     }
 
+    /// The ratio to each light on as few intervals as the model of the room asks for.
+    fn perceptual(&mut self, guide: Option<&[Leaves; 3]>, tolerance: f64) -> Lanes {
+        let mut model = self.model(coarse::PATCHES);
+        let kin = Kin::of(&self.scene);
+        model.join(&kin.of, kin.spectra.len());
+        let (spectra, weights) = (&kin.spectra, &self.weights);
+        if guide.is_some() {
+            model.kindle(spectra, weights, self.scene.grid.width());
+        }
+        let (known, white) = (self.lanes.cuts(), self.light.white);
+        let known = known.map(|cuts| kin.one_of_each(&cuts));
+        let copies = kin.copies.as_deref();
+        let choose = |model: &coarse::Coarse| {
+            let seen = (weights, guide);
+            model.choose(spectra, seen, white, tolerance, known.clone(), copies)
+        };
+        let mut choice = choose(&model);
+        // What lies behind a pane has light of its own spectra: lanes serve all of them.
+        let plain = (model.emission.clone(), model.punctual.clone());
+        for filter in tints(&self.scene) {
+            (model.emission, model.punctual) = plain.clone();
+            model.behind(&filter);
+            let other = choose(&model);
+            let both = choice.cuts.iter().zip(other.cuts);
+            let both: Vec<Partition> = both.map(|(cut, more)| cut.union(more)).collect();
+            if kin.fits(&both) {
+                choice.cuts = both;
+            }
+        }
+        // Without light there is no white to see an error by.
+        self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
+        let cuts: Vec<Partition> = kin.of.iter().map(|&k| choice.cuts[k]).collect();
+        self.guided(Lanes::ratio(&self.scene.spectra, &cuts, &self.weights))
+    }
+
     /// Lanes that light counts in for what it excites, too, where surfaces fluoresce.
     pub(super) fn guided(&self, lanes: Lanes) -> Lanes {
         match guide(&self.scene, &self.weights) {
-            Some(guide) => lanes.guided(&guide),
+            Some(guide) => lanes.guided(&guide, light::balance(&self.scene, &self.weights, &guide)),
             None => lanes,
         }
     }

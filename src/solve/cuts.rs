@@ -37,7 +37,7 @@ impl Coarse {
     ) -> Choice {
         let count = self.leaves.len();
         let guided = |lanes: Lanes| match guide {
-            Some(guide) => lanes.guided(guide),
+            Some(guide) => lanes.guided(guide, 1.0),
             None => lanes,
         };
         let references: Vec<(Lanes, Rows)> = (0..spectra.len())

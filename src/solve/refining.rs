@@ -29,7 +29,7 @@ impl Bake {
         let mut keen = vec![0.0_f32; self.tree.nodes.len()];
         for (k, &leaf) in self.light.leaves.iter().enumerate() {
             let h = brightness(
-                self.lanes.notice(self.light.irradiance.row(k)),
+                self.lanes.tristimulus(self.light.irradiance.row(k)),
                 self.light.white,
             );
             keen[leaf as usize] = keenness(h) as f32;

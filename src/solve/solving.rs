@@ -14,6 +14,7 @@ use crate::light::{Arrival, Light, Neighbours, Rows, Through, brightness, padded
 use crate::link::LinkRows;
 use crate::scene::effects::Kind;
 use crate::spectrum::LEAVES;
+use std::borrow::Cow;
 
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.002;
@@ -26,6 +27,37 @@ struct Lit<'a> {
     reflection: &'a Reflection,
     /// Relative error at which the solve ends.
     tolerance: f64,
+}
+
+/// What the bounces come to.
+struct Bounced {
+    convergence: Convergence,
+    /// Irradiance by reflected light, and by what fluoresces.
+    irradiance: Rows,
+    /// What fluoresces, by leaf; none where nothing does.
+    given: Option<Rows>,
+    /// What the flux of reflected light was multiplied by.
+    ratio: f64,
+}
+
+impl Default for Bounced {
+    fn default() -> Self {
+        Self {
+            convergence: Convergence::default(),
+            irradiance: Rows::default(),
+            given: None,
+            ratio: 1.0,
+        }
+    }
+}
+
+/// Rows with what fluoresces, if anything does.
+fn with<'a, const L: usize>(rows: &'a Rows, given: Option<&Rows>) -> Cow<'a, Rows> {
+    let mut rows = Cow::Borrowed(rows);
+    if let Some(given) = given {
+        step::<L>(rows.to_mut(), given, [1.0; L]);
+    }
+    rows
 }
 
 impl Bake {
@@ -108,7 +140,6 @@ impl Bake {
                 .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes)),
             sheets: sources.sheets,
         };
-        let glow = sources.glow.as_ref();
         let sums = self.sums_of(rows);
         let lit = Lit {
             leaves,
@@ -117,36 +148,24 @@ impl Bake {
             tolerance,
         };
         let runs = self.plan.runs(Kind::Interreflection);
-        // What fluoresces, by leaf; none where nothing does.
-        let mut given = None;
-        let (convergence, mut irradiance) = if !runs {
-            (Convergence::default(), Rows::zero(leaves.len(), L))
-        } else {
-            let (convergence, mut irradiance) = match glow {
-                Some(glow) => {
-                    let (done, out, seen) = self.fluoresce::<L>(&lit, rows, glow, &mut reflected);
-                    given = Some(out);
-                    (done, seen)
-                }
-                None => self.bounce::<L>(&lit, rows, &mut reflected),
-            };
-            if !by_rays {
-                let glow = glow.zip(given.as_mut());
-                (irradiance, scaled.reflected) =
-                    self.slope::<L>(&lit, rows, &sums, &mut reflected, glow);
-            }
-            (convergence, irradiance)
+        let Bounced {
+            convergence,
+            mut irradiance,
+            given,
+            ratio,
+        } = match runs {
+            true => self.all_bounces::<L>(&lit, rows, &sums, sources.glow.as_ref(), &mut reflected),
+            false => Bounced {
+                irradiance: Rows::zero(leaves.len(), L),
+                ..Bounced::default()
+            },
         };
+        scaled.reflected = ratio;
         step::<L>(&mut irradiance, &first, [1.0; L]);
         if !runs {
             reflected = reflection.of::<L>(&irradiance);
         }
-        let whole = given.as_ref().map(|given| {
-            let mut whole = reflected.clone();
-            step::<L>(&mut whole, given, [1.0; L]);
-            whole
-        });
-        let on_nodes = self.on_nodes::<L>(whole.as_ref().unwrap_or(&reflected), leaves);
+        let on_nodes = self.on_nodes::<L>(&with::<L>(&reflected, given.as_ref()), leaves);
         let through =
             (reflection.sheets.as_ref()).map_or_else(Through::default, |s| s.shown.clone());
         let mut flux = flux::Balance::default();
@@ -189,6 +208,37 @@ impl Bake {
         let emitted = self.on_nodes::<L>(emission, leaves);
         if let Some(more) = self.outlook.lamps_in_mirrors::<L>(leaves, &emitted) {
             step::<L>(first, &more, [1.0; L]);
+        }
+    }
+
+    /// All bounces, and what fluoresces.
+    fn all_bounces<const L: usize>(
+        &self,
+        lit: &Lit,
+        rows: &LinkRows,
+        sums: &[f64],
+        glow: Option<&Glow>,
+        reflected: &mut Rows,
+    ) -> Bounced {
+        let mut given = None;
+        let (convergence, mut irradiance) = match glow {
+            Some(glow) => {
+                let (done, out, seen) = self.fluoresce::<L>(lit, rows, glow, reflected);
+                given = Some(out);
+                (done, seen)
+            }
+            None => self.bounce::<L>(lit, rows, reflected),
+        };
+        let mut ratio = 1.0;
+        if !self.by_rays() {
+            let glow = glow.zip(given.as_mut());
+            (irradiance, ratio) = self.slope::<L>(lit, rows, sums, reflected, glow);
+        }
+        Bounced {
+            convergence,
+            irradiance,
+            given,
+            ratio,
         }
     }
 
@@ -249,6 +299,8 @@ impl Bake {
 
     /// The leaves as they look for themselves.
     fn ray_system<'a>(&'a self, lit: &'a Lit) -> RaySystem<'a> {
+        // Two grids end by what is seen; what excites is not, and each lane has to tell for itself.
+        let seen_only = self.lanes.excites().is_none();
         RaySystem {
             tree: &self.tree,
             outlook: &self.outlook,
@@ -256,7 +308,9 @@ impl Bake {
             areas: &self.areas,
             reflectance: &lit.reflection.rows,
             greatest: &lit.reflection.greatest,
-            two_grid: (self.two_grid.as_ref()).map(|grid| (grid, self.lanes.noticed())),
+            two_grid: (self.two_grid.as_ref())
+                .filter(|_| seen_only)
+                .map(|grid| (grid, self.lanes.xyz())),
         }
     }
 
@@ -350,17 +404,12 @@ impl Bake {
         let (mut irradiance, mut ratio) = (Rows::default(), 1.0);
         for _ in 0..linear::PASSES {
             // What is given out at other wavelengths comes of no irradiance of its lane: it counts with direct light.
-            let with = |rows: &Rows, glow: &Option<(&Glow, &mut Rows)>| {
-                let mut rows = rows.clone();
-                if let Some((_, given)) = glow {
-                    step::<L>(&mut rows, given, [1.0; L]);
-                }
-                rows
-            };
-            irradiance = slopes.irradiance::<L>(&with(reflected, &glow));
+            let given = glow.as_ref().map(|(_, given)| &**given);
+            irradiance = slopes.irradiance::<L>(&with::<L>(reflected, given));
             let before = lumens(&irradiance);
             let again = reflection.of::<L>(&irradiance);
-            let energy = slopes.balance::<L>(&irradiance, &with(&bounced, &glow), &again);
+            let first = with::<L>(&bounced, given);
+            let energy = slopes.balance::<L>(&irradiance, &first, &again);
             reflection.scale::<L>(&self.lanes, &mut irradiance, energy);
             ratio = flux::ratio(lumens(&irradiance), before);
             let mut all = irradiance.clone();
@@ -436,6 +485,7 @@ impl Bake {
             mirrors: std::mem::take(&mut self.light.mirrors),
             white: self.light.white,
             half_size: self.mesh.half_size,
+            apart: self.lanes.excites().is_some(),
             ..Light::default()
         };
         self.light.white = self

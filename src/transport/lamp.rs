@@ -125,6 +125,9 @@ impl Gatherer<'_> {
                     seen[lamp] += weight / total * all / lamps[lamp].carries;
                 }
             }
+            if self.light.apart && visible >= 1.0 {
+                self.look_at_each(to, &lamps, &owners, &mut seen, memory);
+            }
             let tints = self.tints(&owners, lamps.len(), memory);
             let left = all * self.left_by(tints.last());
             memory.noise +=
@@ -137,6 +140,33 @@ impl Gatherer<'_> {
         }
         memory.lamps = lamps;
         memory.lamps.clear();
+    }
+
+    /// Where every ray found its lamp, a lamp that none went to counts as seen, too: it is faint beside the others. Not so where brightness
+    /// has two meanings, what is seen and what is excited: a lamp behind a wall that is faint beside one of ultraviolet light doubled what is
+    /// seen in its booth. Such lamps get a ray each.
+    fn look_at_each(
+        &self,
+        to: &Receiver,
+        lamps: &[Lamp],
+        owners: &[usize],
+        seen: &mut [f64],
+        memory: &mut Memory,
+    ) {
+        for (k, lamp) in lamps.iter().enumerate() {
+            let node = self.tree.node(lamp.id);
+            let Some(element) = self.tree.element(node).filter(|_| !owners.contains(&k)) else {
+                continue;
+            };
+            let parts = parts_of(to, element.corners, lamp.factor);
+            let sample = sequence02(k as u32, hash(to.seed ^ 2, u64::from(lamp.id)));
+            if let Some((point, _)) = point_of(to, node.normal, &parts, sample) {
+                let planes = [to.plane, self.tree.face_plane[element.face as usize]];
+                memory.rays += 1;
+                let hidden = (self.sight).blocks_one(&Segment::new(to.point, point, planes));
+                seen[k] = if hidden { 0.0 } else { 1.0 };
+            }
+        }
     }
 
     /// What panes leave of each lamp's light, by the rays that reached it, and last of all lamps' light together, which stands for

@@ -53,7 +53,7 @@ pub(crate) fn room() -> Glb {
     triangles.retain(|t| t.iter().any(|&v| positions[v as usize].z < DEEP));
     glb.draw("cabinet", &[(&shell, outside)]);
     let eye = dvec3(0.0, 0.5, 2.35);
-    glb.camera("front", eye, dvec3(0.0, 0.24, 0.2), 0.62, 16.0 / 9.0);
+    glb.camera("front", eye, dvec3(0.0, 0.27, 0.2), 0.51, 2.25);
     let x = -(WIDE + BOARD);
     glb.camera(
         "daylight",
