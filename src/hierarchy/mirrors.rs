@@ -462,3 +462,68 @@ impl Mirrors {
         said
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At x = 0 and x = 2, facing each other.
+    fn parallel() -> Mirrors {
+        let plane = |x: f64, way: f64| Plane {
+            normal: way * DVec3::X,
+            offset: way * x,
+            centre: x * DVec3::X,
+            radius: 1.0,
+            material: 7,
+        };
+        Mirrors {
+            of: Vec::new(),
+            planes: vec![plane(0.0, 1.0), plane(2.0, -1.0)],
+            images: Vec::new(),
+            numbers: BTreeMap::new(),
+            left_out: 0,
+            curved: false,
+            least: 1e-9,
+        }
+    }
+
+    #[test]
+    fn images_between_parallel_mirrors_stand_in_a_row() {
+        let mut mirrors = parallel();
+        let start = Image {
+            planes: [NONE; BOUNCES],
+            turn: DMat3::IDENTITY,
+            shift: DVec3::ZERO,
+            windows: Vec::new(),
+        };
+        let once = mirrors.followed(&start, 0).unwrap();
+        let twice = mirrors.followed(&once, 1).unwrap();
+        let (eye, place) = (0.5 * DVec3::X, DVec3::new(1.0, 0.7, 0.0));
+        let near = |a: DVec3, b: DVec3| assert!(a.distance(b) < 1e-12, "{a} {b}");
+        near(once.point(eye), -0.5 * DVec3::X);
+        near(twice.point(eye), 4.5 * DVec3::X);
+        near(twice.appears(place), DVec3::new(-3.0, 0.7, 0.0));
+        near(twice.windows[1].centre, -2.0 * DVec3::X);
+        assert!(twice.is_open_to(eye, DVec3::NEG_X, 1e-9));
+        assert!(
+            !twice.is_open_to(-eye, DVec3::NEG_X, 1e-9),
+            "behind the mirror"
+        );
+        assert!(
+            !twice.is_open_to(eye - 9.0 * DVec3::Y, DVec3::NEG_Y, 1e-9),
+            "looks away"
+        );
+        mirrors.images = vec![twice];
+        // As long as the way unfolded.
+        let route = mirrors.route(0, eye, place).unwrap();
+        assert_eq!(route.bounces().len(), 2);
+        let legs = route
+            .points()
+            .windows(2)
+            .map(|ends| ends[0].distance(ends[1]));
+        assert!((legs.sum::<f64>() - 3.5_f64.hypot(0.7)).abs() < 1e-12);
+        assert!(mirrors.route(0, eye, place + 9.0 * DVec3::Y).is_none());
+        assert!(mirrors.may_show(0, eye, (place, 0.1)));
+        assert!(!mirrors.may_show(0, eye, (place + 9.0 * DVec3::Y, 0.1)));
+    }
+}

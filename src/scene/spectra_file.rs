@@ -275,7 +275,7 @@ mod tests {
             "climbs out of",
             "light 'Sun': the room has no light of that name; the nearest names are Spot",
             "light 'Sun': does not say which spectrum",
-            "material 'wall': unknown key \"emision\"; the nearest names are emission, transmission, reflectance",
+            "material 'wall': unknown key \"emision\"; the nearest names are emission, mirror, transmission",
             "unknown key \"version\"",
         ] {
             assert!(all.contains(text), "{text}\n-- in --\n{all}");
