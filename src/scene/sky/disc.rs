@@ -4,8 +4,8 @@
 //! its light; the picture keeps the brightness of the ring there. As a lamp it is a disc of .53 degrees, however blurred the picture
 //! has it.
 
-use super::dome::PARTS;
-use super::map::Map;
+use super::map::{Disc, Map};
+use super::parts::PARTS;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -18,15 +18,6 @@ const CONTRAST: f64 = 100.0;
 const SHARE: f64 = 0.1;
 /// Texels across from which the ring has some: a texel is a degree.
 const WIDTH: usize = 360;
-
-/// What was taken out of a map.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Disc {
-    /// Toward the sun.
-    pub(super) toward: DVec3,
-    /// Irradiance by red, green and blue of a plane across its rays, in the unit of the map.
-    pub(super) across: [f64; PARTS],
-}
 
 impl Map {
     /// Takes the sun out, if it is there.

@@ -7,16 +7,13 @@
 
 use super::cie::{Distribution, level};
 use super::map::Map;
+use super::parts::{PARTS, PLACES};
 use glam::DVec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Radius of the sun's disc, radians: .53 degrees across.
 pub const SUN_RADIUS: f64 = 0.5 * 0.53 * std::f64::consts::PI / 180.0;
-/// Spectra of a sky at the most.
-pub const PARTS: usize = 3;
-/// The same above the horizon and, after these, below it.
-pub const PLACES: usize = 2 * PARTS;
 
 /// How light is spread over the dome.
 #[derive(Debug, Clone)]

@@ -1,8 +1,9 @@
 //! The lamps that a sky makes.
 
 use super::Distribution;
-use super::dome::{PLACES, Sky};
+use super::dome::Sky;
 use super::light::{Light, of_daylight, usual};
+use super::parts::PLACES;
 use super::sun::{angles, direction, position};
 use super::wish::{SkyType, SkyWish, SunPlace};
 use crate::color::{KM, Observer};

@@ -1,8 +1,9 @@
 //! What a sky shines with: how much, of which spectra, and how that is spread.
 
 use super::Distribution;
-use super::dome::{Dome, PARTS, Tinted};
+use super::dome::{Dome, Tinted};
 use super::map::{Map, Wanted};
+use super::parts::PARTS;
 use super::picture::Picture;
 use super::sun::angles;
 use super::wish::{BRIGHT, Brightness, SkyType, SkyWish};

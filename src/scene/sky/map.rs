@@ -7,8 +7,7 @@
 //! row and then within the row: by the excess alone, since rays that look everywhere find the rest (Karlik et al. 2019, "MIS
 //! compensation").
 
-use super::disc::Disc;
-use super::dome::PARTS;
+use super::parts::PARTS;
 use super::picture::Picture;
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -20,6 +19,15 @@ pub(super) struct Wanted {
     pub(super) sun: bool,
     /// What it shows below the horizon.
     pub(super) below: bool,
+}
+
+/// The sun that was taken out of a picture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Disc {
+    /// Toward it.
+    pub(super) toward: DVec3,
+    /// Irradiance by red, green and blue of a plane across its rays, in the unit of the map.
+    pub(super) across: [f64; PARTS],
 }
 
 /// A picture of all directions.

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `cie` | how luminance lies over the dome: ISO 15469 |
 //! | `picture`, `map`, `disc` | a picture of all directions in its place, and the sun in it |
+//! | `parts` | of how many spectra |
 //! | `dome` | both: what comes from each direction |
 //! | `sun` | where the sun stands |
 //! | `wish` | what a side file or a command line says of sky and sun |
@@ -26,16 +27,18 @@ mod dome;
 mod lamps;
 mod light;
 mod map;
+mod parts;
 mod picture;
 mod sun;
 mod under;
 mod wish;
 
 pub use cie::Distribution;
-pub use dome::{Dome, PARTS, PLACES, SUN_RADIUS, Sky, Tinted};
+pub use dome::{Dome, SUN_RADIUS, Sky, Tinted};
 pub(super) use lamps::LIT_GROUND;
 pub(crate) use lamps::join;
 pub use map::Map;
+pub use parts::{PARTS, PLACES};
 pub use sun::{Hours, direction};
 pub use wish::{BRIGHT, KELVIN, TURN};
 pub use wish::{Brightness, SkyName, SkyType, SkyWish, SunPlace, SunWish};
