@@ -4,7 +4,7 @@ use super::fluorescence::Fluorescence;
 use super::pane::Pane;
 use super::profile::Profile;
 use super::sheet::{Sheet, Weave, bounded};
-use super::{Image, Sides, Texture};
+use super::{GREATEST_ALBEDO, Image, Sides, Texture};
 use crate::color::Upsampler;
 use crate::data::Leaves;
 use std::sync::Arc;
@@ -142,6 +142,35 @@ impl Material {
         Some(std::array::from_fn(|c| {
             self.base_color[c] * mean[c].max(DARKEST_PAINT)
         }))
+    }
+}
+
+impl Material {
+    /// A reflectance brought down to what the albedo may be, beside what fluoresces.
+    pub(crate) fn bounded(&self, reflectance: Leaves) -> Leaves {
+        match &self.fluorescence {
+            None => reflectance.map(|r| r.min(GREATEST_ALBEDO)),
+            Some(fluorescence) => {
+                let out = fluorescence.efficiency();
+                std::array::from_fn(|k| reflectance[k].min(GREATEST_ALBEDO - out[k]).max(0.0))
+            }
+        }
+    }
+
+    /// Light spectra that it gives out, as lamp or excited.
+    pub(crate) fn lights_mut(&mut self) -> impl Iterator<Item = &mut usize> {
+        let own = self.emission.as_mut().map(|e| &mut e.light);
+        let excited = self.fluorescence.as_mut().map(|f| f.terms.iter_mut());
+        own.into_iter()
+            .chain(excited.into_iter().flatten().map(|t| &mut t.light))
+    }
+
+    /// The same, to be looked at.
+    pub(crate) fn lights(&self) -> impl Iterator<Item = usize> {
+        let own = self.emission.as_ref().map(|e| e.light);
+        let excited = self.fluorescence.as_ref().map(|f| f.terms.iter());
+        own.into_iter()
+            .chain(excited.into_iter().flatten().map(|t| t.light))
     }
 }
 
