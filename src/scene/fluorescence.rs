@@ -18,18 +18,15 @@
 //! `per_band`) in the first cell, the reflectance where both wavelengths are equal; see `scene/bispectral.rs`.
 //!
 //! No more power leaves a surface than comes at any wavelength: `rho + g` above 1 is a problem where both are measured; a base colour,
-//! painted or not, reflects what the dye leaves of [`GREATEST_ALBEDO`]. Light does not wait: no phosphorescence.
+//! painted or not, reflects what the dye leaves of [`GREATEST_ALBEDO`](super::GREATEST_ALBEDO). Light does not wait: no phosphorescence.
 
+use super::LightSpectrum;
 use super::bispectral::Bispectral;
 use super::check::Check;
 use super::json::short;
 use super::reader::Reader;
-use super::{GREATEST_ALBEDO, LightSpectrum, Material};
 use crate::data::{Grid, Kind, LEAVES, Leaves, Outside, Table};
 use serde_json::{Map, Value};
-
-/// Rounding of measured reflectances and excitations may let their sum exceed 1 by so much.
-const ROUNDING: f64 = 1e-6;
 
 /// What a material fluoresces.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,35 +72,6 @@ impl Fluorescence {
         };
         let row = |i: usize| std::array::from_fn(|j| element(i, j));
         (0..LEAVES).map(row).collect()
-    }
-}
-
-impl Material {
-    /// A reflectance brought down to what the albedo may be, beside what fluoresces.
-    pub(crate) fn bounded(&self, reflectance: Leaves) -> Leaves {
-        match &self.fluorescence {
-            None => reflectance.map(|r| r.min(GREATEST_ALBEDO)),
-            Some(fluorescence) => {
-                let out = fluorescence.efficiency();
-                std::array::from_fn(|k| reflectance[k].min(GREATEST_ALBEDO - out[k]).max(0.0))
-            }
-        }
-    }
-
-    /// Light spectra that it gives out, as lamp or excited.
-    pub(crate) fn lights_mut(&mut self) -> impl Iterator<Item = &mut usize> {
-        let own = self.emission.as_mut().map(|e| &mut e.light);
-        let excited = self.fluorescence.as_mut().map(|f| f.terms.iter_mut());
-        own.into_iter()
-            .chain(excited.into_iter().flatten().map(|t| &mut t.light))
-    }
-
-    /// The same, to be looked at.
-    pub(crate) fn lights(&self) -> impl Iterator<Item = usize> {
-        let own = self.emission.as_ref().map(|e| e.light);
-        let excited = self.fluorescence.as_ref().map(|f| f.terms.iter());
-        own.into_iter()
-            .chain(excited.into_iter().flatten().map(|t| t.light))
     }
 }
 
@@ -319,86 +287,4 @@ fn power(table: &Table, grid: &Grid, share: impl Fn(f64, f64) -> f64) -> Leaves 
         };
         ends.windows(2).map(part).sum::<f64>() / grid.width()
     })
-}
-
-/// Makes a material fluoresce as it is wished; its reflectance, `measured` or not, leaves room for what is given out.
-pub(super) fn kindle(
-    material: &mut Material,
-    wish: &Wish,
-    measured: Option<&str>,
-    place: &str,
-    grid: &Grid,
-    spectra: &mut Vec<LightSpectrum>,
-    check: &mut Check,
-) {
-    if wish.terms.is_empty() {
-        return;
-    }
-    if material.sheet.is_some() || material.pane.is_some() {
-        let what = "fluoresces and lets light through";
-        let next = "take one of them out: what light passes does not fluoresce here";
-        check.problem(place, what, next);
-        return;
-    }
-    if material.mirror.is_some() {
-        let what = "fluoresces and is a mirror";
-        check.problem(
-            place,
-            what,
-            "say \"mirror\": false, or take the fluorescence out",
-        );
-        return;
-    }
-    let terms = wish.terms.iter().map(|[emission, excitation]| {
-        let known = spectra.iter().position(|s| s.power == *emission);
-        let light = known.unwrap_or_else(|| {
-            spectra.push(LightSpectrum {
-                name: format!("fluorescence of '{}'", short(&material.name)),
-                power: *emission,
-            });
-            spectra.len() - 1
-        });
-        Term {
-            light,
-            excitation: *excitation,
-            layer: None,
-        }
-    });
-    let fluorescence = Fluorescence {
-        terms: terms.collect(),
-        from: wish.from.clone(),
-    };
-    let out = fluorescence.efficiency();
-    let rho = measured.map_or([0.0; LEAVES], |_| material.reflectance);
-    let over: Vec<usize> = (0..LEAVES)
-        .filter(|&k| rho[k] + out[k] > 1.0 + ROUNDING)
-        .collect();
-    if let (Some(first), Some(last)) = (over.first(), over.last()) {
-        let most = over.iter().map(|&k| rho[k] + out[k]).fold(0.0, f64::max);
-        let what = format!(
-            "reflectance ({}) and fluorescence come to {most:.3} of the power that arrives between {:.0} and {:.0} nm",
-            short(measured.unwrap_or("none")),
-            grid.left(*first),
-            grid.left(*last + 1)
-        );
-        let next = "lower one of them: no more leaves than comes; a measured reflectance must not hold what fluoresces";
-        check.problem(place, what, next);
-        return;
-    }
-    material.fluorescence = Some(fluorescence);
-    material.reflectance = material.bounded(material.reflectance);
-}
-
-/// Puts the spectra that materials fluoresce behind those of lamps.
-pub(super) fn join(
-    materials: &mut [Material],
-    spectra: &mut Vec<LightSpectrum>,
-    excited: Vec<LightSpectrum>,
-) {
-    let first = spectra.len();
-    let fluorescent = materials.iter_mut().filter_map(|m| m.fluorescence.as_mut());
-    for term in fluorescent.flat_map(|f| &mut f.terms) {
-        term.light += first;
-    }
-    spectra.extend(excited);
 }

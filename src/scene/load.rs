@@ -3,7 +3,7 @@
 use super::changes::Changes;
 use super::check::{Check, Unknown};
 use super::document::{Document, RawLight};
-use super::fluorescence;
+use super::kindled;
 use super::lamps::Lamps;
 use super::layers::Wish;
 use super::lights;
@@ -135,7 +135,7 @@ impl Lit {
         let luminous = lamps.luminous();
         let excited = std::mem::take(&mut lamps.excited);
         let mut spectra = lamps.finish(&mut materials, &mut lights);
-        fluorescence::join(&mut materials, &mut spectra, excited);
+        kindled::join(&mut materials, &mut spectra, excited);
         let size = |light: usize, shape: &Leaves| luminous(&spectra[light], shape);
         let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
         let (panes, surfaces): (Vec<_>, Vec<_>) = surfaces.into_iter().partition(is_pane);

@@ -161,6 +161,35 @@ impl Material {
     }
 }
 
+impl Material {
+    /// A reflectance brought down to what the albedo may be, beside what fluoresces.
+    pub(crate) fn bounded(&self, reflectance: Leaves) -> Leaves {
+        match &self.fluorescence {
+            None => reflectance.map(|r| r.min(GREATEST_ALBEDO)),
+            Some(fluorescence) => {
+                let out = fluorescence.efficiency();
+                std::array::from_fn(|k| reflectance[k].min(GREATEST_ALBEDO - out[k]).max(0.0))
+            }
+        }
+    }
+
+    /// Light spectra that it gives out, as lamp or excited.
+    pub(crate) fn lights_mut(&mut self) -> impl Iterator<Item = &mut usize> {
+        let own = self.emission.as_mut().map(|e| &mut e.light);
+        let excited = self.fluorescence.as_mut().map(|f| f.terms.iter_mut());
+        own.into_iter()
+            .chain(excited.into_iter().flatten().map(|t| &mut t.light))
+    }
+
+    /// The same, to be looked at.
+    pub(crate) fn lights(&self) -> impl Iterator<Item = usize> {
+        let own = self.emission.as_ref().map(|e| e.light);
+        let excited = self.fluorescence.as_ref().map(|f| f.terms.iter());
+        own.into_iter()
+            .chain(excited.into_iter().flatten().map(|t| t.light))
+    }
+}
+
 /// Textures count as no darker than this in the mean, so that light may be divided by it.
 pub(crate) const DARKEST_PAINT: f32 = 1e-3;
 

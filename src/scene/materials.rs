@@ -6,8 +6,8 @@
 //! No gloss, but for mirrors, see [`mirror`]. What lets light through is a pane, see [`pane`].
 
 use super::check::{Check, listed};
-use super::fluorescence;
 use super::json::short;
+use super::kindled;
 use super::known::MaterialSpectra;
 use super::lamps::{Lamp, Lamps, bearable};
 use super::luminaires::ProfileWish;
@@ -91,7 +91,7 @@ pub(crate) fn materials(
             if let Some(wish) = &spectra.fluorescence {
                 let measured = spectra.reflectance.as_ref().map(|r| r.from.as_str());
                 let excited = &mut lamps.excited;
-                fluorescence::kindle(&mut material, wish, measured, &place, grid, excited, check);
+                kindled::kindle(&mut material, wish, measured, &place, grid, excited, check);
             }
             if material.pane.is_none() {
                 // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.

@@ -17,6 +17,7 @@ pub mod geometry;
 mod image;
 mod instances;
 mod json;
+mod kindled;
 mod known;
 pub mod lacking;
 mod lamps;

@@ -7,8 +7,7 @@
 //! emissions mostly excite nothing, the second round mostly finds what the first found.
 
 use super::conjugate::{Convergence, step};
-use super::sources::Painter;
-use crate::hierarchy::Tree;
+use crate::hierarchy::{Mesh, Tree};
 use crate::light::lanes::Lanes;
 use crate::light::{Fluorescent, Rows};
 use crate::scene::{GREATEST_ALBEDO, Material, Scene};
@@ -36,12 +35,11 @@ pub(crate) struct Glow {
 impl Glow {
     /// Of the leaves of a hierarchy; none where nothing fluoresces.
     pub(super) fn new(
-        painter: &Painter,
+        (scene, mesh): (&Scene, &Mesh),
         tree: &Tree,
         leaves: &[u32],
         lanes: &Lanes,
     ) -> Option<Self> {
-        let scene = painter.scene();
         let mut kinds = Vec::new();
         let of_material: Vec<Option<u8>> = (scene.materials.iter())
             .map(|m| {
@@ -58,7 +56,7 @@ impl Glow {
         let of = leaves.iter().map(|&leaf| {
             let element = tree.elements[tree.node(leaf).element as usize];
             let triangle = tree.faces[element.face as usize].triangle;
-            of_material[painter.material_of(triangle)]
+            of_material[mesh.material[triangle as usize] as usize]
         });
         let of: Vec<Option<u8>> = of.collect();
         of.iter().any(Option::is_some).then(|| Self {

@@ -10,7 +10,7 @@ use super::reflection::Reflection;
 use super::sheets;
 use super::sources::Painter;
 use super::{Bake, Given};
-use crate::light::{Arrival, Light, Neighbours, Rows, Through, brightness, padded, weighed};
+use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded, weighed};
 use crate::link::LinkRows;
 use crate::scene::effects::Kind;
 use crate::spectrum::LEAVES;
@@ -40,11 +40,12 @@ struct Bounced {
     ratio: f64,
 }
 
-impl Default for Bounced {
-    fn default() -> Self {
+impl Bounced {
+    /// Of leaves that reflect nothing.
+    fn none<const L: usize>(leaves: usize) -> Self {
         Self {
             convergence: Convergence::default(),
-            irradiance: Rows::default(),
+            irradiance: Rows::zero(leaves, L),
             given: None,
             ratio: 1.0,
         }
@@ -148,26 +149,19 @@ impl Bake {
             tolerance,
         };
         let runs = self.plan.runs(Kind::Interreflection);
-        let Bounced {
-            convergence,
-            mut irradiance,
-            given,
-            ratio,
-        } = match runs {
+        let bounced = match runs {
             true => self.all_bounces::<L>(&lit, rows, &sums, sources.glow.as_ref(), &mut reflected),
-            false => Bounced {
-                irradiance: Rows::zero(leaves.len(), L),
-                ..Bounced::default()
-            },
+            false => Bounced::none::<L>(leaves.len()),
         };
-        scaled.reflected = ratio;
+        scaled.reflected = bounced.ratio;
+        let (mut irradiance, given) = (bounced.irradiance, bounced.given);
         step::<L>(&mut irradiance, &first, [1.0; L]);
         if !runs {
             reflected = reflection.of::<L>(&irradiance);
         }
         let on_nodes = self.on_nodes::<L>(&with::<L>(&reflected, given.as_ref()), leaves);
-        let through =
-            (reflection.sheets.as_ref()).map_or_else(Through::default, |s| s.shown.clone());
+        let through = reflection.sheets.as_ref();
+        let through = through.map(|s| s.shown.clone()).unwrap_or_default();
         let mut flux = flux::Balance::default();
         if counted {
             let fluxes = flux::FluxRows {
@@ -192,7 +186,7 @@ impl Bake {
         }
         self.light.through = through;
         self.shine(leaves, emitted, on_nodes, irradiance);
-        (convergence, flux)
+        (bounced.convergence, flux)
     }
 
     /// Adds the light of lamps in curved mirrors.

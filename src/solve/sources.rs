@@ -57,16 +57,6 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// The scene.
-    pub(super) fn scene(&self) -> &'a Scene {
-        self.scene
-    }
-
-    /// Number of the material of a triangle.
-    pub(super) fn material_of(&self, triangle: u32) -> usize {
-        self.mesh.material[triangle as usize] as usize
-    }
-
     /// Rows for the given leaves of `tree`.
     pub(crate) fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
         let width = padded(lanes.len());
@@ -126,7 +116,7 @@ impl<'a> Painter<'a> {
             emission,
             greatest,
             sheets: None,
-            glow: Glow::new(self, tree, leaves, lanes),
+            glow: Glow::new((self.scene, self.mesh), tree, leaves, lanes),
         };
         if self.scene.materials.iter().any(|m| m.sheet.is_some()) {
             self.weave(tree, leaves, lanes, &mut sources);
