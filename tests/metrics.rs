@@ -160,3 +160,38 @@ fn daylight_and_glare_are_told_where_they_are_asked_for() {
     let last = out.lines().last().unwrap();
     assert!(last.starts_with("UGR at [0.278, 0.25, -0.2]"), "{out}");
 }
+
+/// The verdict of a bake has the figures of the mean light on all surfaces.
+#[test]
+fn the_log_measures_the_light_of_the_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    for name in ["furnace.glb", "cornell-d65.glb", "cornell-d65.spectra.json"] {
+        std::fs::copy(scenes.join(name), folder.path().join(name)).unwrap();
+    }
+    let metrics = |name: &str| -> Value {
+        let output = Command::new(env!("CARGO_BIN_EXE_haarlight"))
+            .args(["bake", "-q", "--json", "--error", "2"])
+            .arg(folder.path().join(name))
+            .output()
+            .unwrap();
+        let verdict: Value = serde_json::from_slice(&output.stdout).unwrap();
+        verdict["metrics"].clone()
+    };
+    // 200 cd/m2 everywhere, so 628.3 lm/m2 sent out, of which 10 pi are emitted and the rest is .95 of what comes.
+    let furnace = metrics("furnace.glb");
+    let lux = furnace["lux"]["value"].as_f64().unwrap();
+    let expected = 10.0 * std::f64::consts::PI / (1.0 - 0.95);
+    assert!((lux / expected - 1.0).abs() < 0.01, "{lux} {expected}");
+    let box_under_d65 = metrics("cornell-d65.glb");
+    for name in NAMES {
+        let [low, value, high] = ["low", "value", "high"].map(|k| &box_under_d65[name][k]);
+        let [Some(low), Some(value), Some(high)] = [low, value, high].map(Value::as_f64) else {
+            panic!("{name}: {}", box_under_d65[name]);
+        };
+        assert!(low <= value && value <= high, "{name}");
+    }
+    // White and coloured walls make it warmer than the lamp's 6504 K, and leave it near daylight.
+    let cct = box_under_d65["CCT_K"]["value"].as_f64().unwrap();
+    assert!((4000.0..6504.0).contains(&cct), "{cct}");
+}

@@ -70,6 +70,7 @@
 //!
 //! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
 
+use super::metrics;
 use crate::PROGRAM;
 use crate::gather::{Baked, Interpolation};
 use crate::output::{BakedGlb, Exposure};
@@ -293,6 +294,9 @@ pub struct VerdictRecord {
     pub exposure: Exposure,
     /// Tristimulus irradiance of the adaptation white, lm/m2.
     pub white: [f64; 3],
+    /// Illuminance, colour temperature, rendering, fidelity and alpha-opic daylight of the mean light on all surfaces, each with the range
+    /// that the error of light at points allows; names as of `probe --metrics`.
+    pub metrics: serde_json::Value,
     /// Visibility rays of all rounds and of the gather.
     pub rays: u64,
     /// Rays a second, in rounds and gather.
@@ -361,6 +365,7 @@ impl VerdictRecord {
             ev100: end.exposure.ev(),
             exposure: end.exposure,
             white: end.bake.light().white,
+            metrics: metrics::of_room(end.bake),
             rays,
             rays_per_s: rate(rays, end.seconds.solve + end.seconds.gather),
             links_per_s: rate(links, links_s),

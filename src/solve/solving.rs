@@ -13,7 +13,7 @@ use super::{Bake, Given};
 use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded, weighed};
 use crate::link::LinkRows;
 use crate::scene::effects::Kind;
-use crate::spectrum::LEAVES;
+use crate::spectrum::{LEAVES, Leaves};
 use std::borrow::Cow;
 
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
@@ -532,6 +532,20 @@ impl Bake {
             area += a;
         }
         sum.map(|x| if area > 0.0 { x / area } else { 0.0 })
+    }
+
+    /// The spectrum of the mean irradiance, W/m2/nm on the 64 leaves.
+    pub fn mean_spectrum(&self) -> Leaves {
+        let (mut sum, mut area) = ([0.0; LEAVES], 0.0);
+        for (k, &leaf) in self.light.leaves.iter().enumerate() {
+            let a = self.areas[leaf as usize];
+            for (sum, x) in sum.iter_mut().zip(self.light.irradiance.row(k)) {
+                *sum += a * f64::from(*x);
+            }
+            area += a;
+        }
+        let mean = sum.map(|x| if area > 0.0 { (x / area) as f32 } else { 0.0 });
+        self.lanes.leaves(&mean)
     }
 
     /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.
