@@ -1,6 +1,6 @@
 //! Mirrors: materials that send light on in one direction.
 //!
-//! Two things make a mirror: `"mirror": true` of the side file, and a metal (metallic 1) with a roughness below [`SMOOTH`].
+//! Two things make a mirror: `"mirror": true` of the side file, and a metal (metallic 1) with a roughness below `SMOOTH`.
 //! At normal incidence it reflects the material's reflectance, at an angle `F = F0 + (1 - F0) (1 - cos)^5` of it (Schlick, An
 //! inexpensive BRDF model for physically-based rendering, 1994, eq. 15), wavelength by wavelength. Roughness below the limit counts
 //! as none.
