@@ -608,6 +608,29 @@ fn the_path_tracer_agrees() {
     assert!(bias.abs() < 0.01, "{bias}");
 }
 
+/// What fluoresces lights a room with a mirror, too.
+#[test]
+fn mirrors_and_what_fluoresces_go_together() {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-d65.glb");
+    let dye = dye("380,0.9\n480,0.9", "500,1\n600,1", 1.0);
+    let options = Options {
+        said: Some(json!({"materials": {
+            "green": {"reflectance": null, "fluorescence": dye},
+            "red": {"mirror": true},
+        }})),
+        ..Options::default()
+    };
+    let bake = baked(Scene::load(path, &options).unwrap(), 1.0);
+    assert!(bake.plan().runs(Kind::Mirrors) && bake.plan().runs(Kind::Fluorescence));
+    let flux = &bake.rounds().last().unwrap().flux;
+    assert!(flux.fluoresced_lm > 0.03 * flux.emitted_lm, "{flux:?}");
+    let reference = Traced::new(&bake, 100, 1 << 13, 3);
+    let report = Report::against(&bake, &reference);
+    println!("dE00 {:?}, bias {:?}", report.de2000.mean, report.bias);
+    assert!(report.bias.value.abs() < 0.015, "{:?}", report.bias);
+    assert!(report.de2000.mean.value < 0.8, "{:?}", report.de2000);
+}
+
 /// The same bytes at 1 and 4 threads.
 #[test]
 fn threads_change_nothing() {

@@ -72,9 +72,7 @@ pub(super) fn goes_on(
     };
     let greatest = |x: &Leaves| x.iter().copied().fold(0.0, f64::max);
     let mut ways = vec![greatest(&reflected(throughput, 1.0))];
-    let layer = fluorescence.terms.first().and_then(|t| t.layer);
-    let terms = fluorescence.terms.iter().filter(|t| t.layer == layer);
-    let terms: Vec<_> = terms.collect();
+    let terms: Vec<_> = fluorescence.once().collect();
     for term in &terms {
         let out: f64 = emission(&scene.spectra[term.light], throughput)
             .iter()

@@ -1,7 +1,7 @@
 //! Paths by way of mirrors: each goes on in one direction until it meets something else, however often; lights without extent, which no
 //! path meets, are looked for in their images.
 
-use super::path::{Audit, ByImage, Vertex};
+use super::path::{Audit, ByImage, Vertex, survives};
 use crate::geometry::sampling::Pcg;
 use crate::geometry::{Hit, NO_PLANE, Segment};
 use crate::hierarchy::Route;
@@ -33,13 +33,9 @@ impl Audit<'_> {
             let triangle = on.triangle as usize;
             let along = self.mesh.normal[triangle].dot(*direction);
             self.reflected(self.mesh.material[triangle], along.abs(), throughput);
-            let greatest = throughput.iter().copied().fold(0.0, f64::max);
-            if count >= SURE {
-                if rng.f64() >= greatest.min(1.0) {
-                    *throughput = [0.0; crate::spectrum::LEAVES];
-                    return (None, count);
-                }
-                throughput.iter_mut().for_each(|t| *t /= greatest.min(1.0));
+            if count >= SURE && !survives(throughput, rng) {
+                *throughput = [0.0; crate::spectrum::LEAVES];
+                return (None, count);
             }
             let [v, w] = on.uv.map(f64::from);
             from = self.mesh.at(triangle, [1.0 - v - w, v, w]);

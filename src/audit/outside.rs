@@ -59,13 +59,8 @@ impl Audit<'_> {
 
     /// Adds a weight times what comes from a direction outside.
     fn far(&self, sky: &Sky, direction: DVec3, weight: f64, throughput: &Leaves, sum: &mut Leaves) {
-        let (first, radiance) = sky.radiance(direction);
         for light in &self.scene.lights {
-            let part = light
-                .kind
-                .place()
-                .and_then(|place| place.checked_sub(first));
-            let Some(radiance) = part.and_then(|k| radiance.get(k)) else {
+            let Some(radiance) = sky.part(light.kind.place(), direction) else {
                 continue;
             };
             let power = &self.scene.spectra[light.light].power;

@@ -80,6 +80,18 @@ pub(super) struct ByImage<'a> {
     pub(super) size: f64,
 }
 
+/// Does a path go on? If so it stands for those that end, too.
+pub(super) fn survives(throughput: &mut Leaves, rng: &mut Pcg) -> bool {
+    // Exactly what is left: a smaller chance would let weights grow without bound where albedos are near 1. Paths end, as no albedo
+    // exceeds 0.999.
+    let chance = throughput.iter().copied().fold(0.0, f64::max).min(1.0);
+    if rng.f64() >= chance {
+        return false;
+    }
+    throughput.iter_mut().for_each(|t| *t /= chance);
+    true
+}
+
 impl<'a> Audit<'a> {
     /// Prepares the lamps of a room.
     pub fn new(scene: &'a Scene, mesh: &'a Mesh, rays: &'a RayIndex) -> Self {
@@ -234,16 +246,8 @@ impl<'a> Audit<'a> {
             if greatest <= 0.0 {
                 return;
             }
-            if bounce >= SURE_BOUNCES {
-                // Exactly what is left: a smaller chance would let weights grow without bound where albedos are near 1.
-                // Paths end, as no albedo exceeds 0.999.
-                let survive = greatest.min(1.0);
-                if rng.f64() >= survive {
-                    return;
-                }
-                for t in &mut throughput {
-                    *t /= survive;
-                }
+            if bounce >= SURE_BOUNCES && !survives(&mut throughput, rng) {
+                return;
             }
             at = Vertex {
                 point,

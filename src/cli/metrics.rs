@@ -26,7 +26,7 @@ use crate::color::{
 };
 use crate::gather::Probed;
 use crate::solve::{Bake, Round};
-use crate::spectrum::Grid;
+use crate::spectrum::{Grid, Leaves};
 use crate::survey::Place;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -57,13 +57,7 @@ impl Metrics {
         let meter = Meter::new(&Bands::leaves(grid));
         let stated = stated(last);
         let points: Vec<_> = (probed.par_iter())
-            .map(|light| {
-                let measured = meter.measure(&light.leaves);
-                let ranges = stated.map_or([None; MEASURES], |stated| {
-                    meter.ranges(&light.leaves, &measured, stated)
-                });
-                (measured, ranges)
-            })
+            .map(|light| measured(&meter, &light.leaves, stated))
             .collect();
         let inside = probed.iter().zip(places);
         let lux: Vec<f64> = inside
@@ -207,12 +201,22 @@ fn stated(last: Option<&Round>) -> Option<Stated> {
 /// The figures of the mean light on all surfaces of a room, as JSON; ranges are those of a point, and the mean errs less.
 pub(super) fn of_room(bake: &Bake) -> Value {
     let meter = Meter::new(&Bands::leaves(&bake.scene().grid));
-    let light = bake.mean_spectrum();
-    let measured = meter.measure(&light);
-    let ranges = stated(bake.rounds().last()).map_or([None; MEASURES], |stated| {
-        meter.ranges(&light, &measured, stated)
-    });
+    let stated = stated(bake.rounds().last());
+    let (measured, ranges) = measured(&meter, &bake.mean_spectrum(), stated);
     point(&measured, &ranges)
+}
+
+/// The figures of a light, and the ranges that the stated error allows.
+fn measured(
+    meter: &Meter,
+    light: &Leaves,
+    stated: Option<Stated>,
+) -> (Measured, [Option<Range>; MEASURES]) {
+    let measured = meter.measure(light);
+    let ranges = stated.map_or([None; MEASURES], |stated| {
+        meter.ranges(light, &measured, stated)
+    });
+    (measured, ranges)
 }
 
 fn point(measured: &Measured, ranges: &[Option<Range>; MEASURES]) -> Value {

@@ -75,6 +75,16 @@ pub struct Image {
 }
 
 impl Image {
+    /// Of no mirrors: to go on from.
+    fn straight() -> Self {
+        Self {
+            planes: [NONE; BOUNCES],
+            turn: DMat3::IDENTITY,
+            shift: DVec3::ZERO,
+            windows: Vec::new(),
+        }
+    }
+
     /// Where a point looks from as if there were no mirrors.
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.turn * p + self.shift
@@ -224,12 +234,10 @@ impl Mirrors {
         let mut parts: BTreeMap<(u32, u32, bool), Part> = BTreeMap::new();
         let mut surfaces: BTreeMap<u32, f64> = BTreeMap::new();
         let all = || (0..mesh.triangles.len()).filter(|&t| is_mirror(&mesh.material[t]));
-        for t in all() {
-            *surfaces.entry(mesh.origin[t].0).or_default() += mesh.area[t];
-        }
         let mut within: BTreeMap<(u32, u32), f64> = BTreeMap::new();
         let mut towards: BTreeMap<u32, DVec3> = BTreeMap::new();
         for t in all() {
+            *surfaces.entry(mesh.origin[t].0).or_default() += mesh.area[t];
             *within.entry((mesh.origin[t].0, mesh.plane[t])).or_default() += mesh.area[t];
             towards.entry(mesh.plane[t]).or_insert(mesh.normal[t]);
         }
@@ -315,12 +323,7 @@ impl Mirrors {
             })
             .collect();
         let mut images: Vec<Image> = Vec::new();
-        let start = Image {
-            planes: [NONE; BOUNCES],
-            turn: DMat3::IDENTITY,
-            shift: DVec3::ZERO,
-            windows: Vec::new(),
-        };
+        let start = Image::straight();
         let mut level = vec![start];
         for depth in 0..BOUNCES {
             let mut next = Vec::new();
@@ -490,12 +493,7 @@ mod tests {
     #[test]
     fn images_between_parallel_mirrors_stand_in_a_row() {
         let mut mirrors = parallel();
-        let start = Image {
-            planes: [NONE; BOUNCES],
-            turn: DMat3::IDENTITY,
-            shift: DVec3::ZERO,
-            windows: Vec::new(),
-        };
+        let start = Image::straight();
         let once = mirrors.followed(&start, 0).unwrap();
         let twice = mirrors.followed(&once, 1).unwrap();
         let (eye, place) = (0.5 * DVec3::X, DVec3::new(1.0, 0.7, 0.0));

@@ -282,6 +282,12 @@ impl Tree {
         }
     }
 
+    /// The face that an element is part of.
+    pub fn face_of(&self, leaf: u32) -> Face {
+        let element = &self.elements[self.node(leaf).element as usize];
+        self.faces[element.face as usize]
+    }
+
     /// Entry of the face that a ray met; [`NONE`] for a black back.
     pub fn met(&self, hit: &Hit) -> u32 {
         self.entry[hit.triangle as usize][usize::from(hit.from_behind)]

@@ -87,9 +87,8 @@ pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]>
         .filter_map(|&m| scene.materials[m].fluorescence.as_ref())
     {
         any = true;
-        let layer = fluorescence.terms.first().and_then(|t| t.layer);
         let mut own = [[0.0; LEAVES]; 3];
-        for term in fluorescence.terms.iter().filter(|t| t.layer == layer) {
+        for term in fluorescence.once() {
             let power = &scene.spectra[term.light].power;
             for (own, w) in own.iter_mut().zip(weights) {
                 let seen: f64 = power.iter().zip(w).map(|(p, w)| p * w).sum();

@@ -96,9 +96,9 @@ impl<'a> Looks<'a> {
         let material = mesh.material[vertex.triangle as usize];
         let of = &self.bake.scene().materials[material as usize];
         let apart = of.sheet.is_some() || of.fluorescence.is_some();
-        let sheet = apart.then_some(material);
+        let own = apart.then_some(material);
         let (key, places) = (
-            ([x, y, z, i, j, k], space, believing, sheet),
+            ([x, y, z, i, j, k], space, believing, own),
             &mut self.places,
         );
         *self.known.entry(key).or_insert_with(|| {
@@ -124,9 +124,8 @@ impl<'a> Looks<'a> {
     /// Does a place lie on what fluoresces?
     fn fluoresces(&self, to: &Receiver) -> bool {
         let (tree, mesh) = (self.bake.tree(), self.bake.mesh());
-        let element = to.leaf.and_then(|leaf| tree.element(tree.node(leaf)));
-        element.is_some_and(|element| {
-            let triangle = tree.faces[element.face as usize].triangle as usize;
+        to.leaf.is_some_and(|leaf| {
+            let triangle = tree.face_of(leaf).triangle as usize;
             let material = &self.bake.scene().materials[mesh.material[triangle] as usize];
             material.fluorescence.is_some()
         })

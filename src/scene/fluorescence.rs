@@ -50,12 +50,16 @@ pub struct Term {
 }
 
 impl Fluorescence {
+    /// Each term once: copies of a term for the layers are excited by light of their own.
+    pub(crate) fn once(&self) -> impl Iterator<Item = &Term> {
+        let first = self.terms.first().and_then(|t| t.layer);
+        self.terms.iter().filter(move |t| t.layer == first)
+    }
+
     /// Power given out for a unit of power that comes, by leaf, all terms together.
     pub fn efficiency(&self) -> Leaves {
         let mut sum = [0.0; LEAVES];
-        // Copies of a term for the layers are excited by light of their own.
-        let first = self.terms.first().and_then(|t| t.layer);
-        for term in self.terms.iter().filter(|t| t.layer == first) {
+        for term in self.once() {
             (sum.iter_mut().zip(&term.excitation)).for_each(|(s, g)| *s += g);
         }
         sum
@@ -64,10 +68,10 @@ impl Fluorescence {
     /// The Donaldson matrix without its diagonal of reflection: element `[i][j]` is the spectral exitance on leaf i for a unit of
     /// spectral irradiance on leaf j, `width` the width of a leaf, nm.
     pub fn matrix(&self, spectra: &[LightSpectrum], width: f64) -> Vec<Leaves> {
-        let first = self.terms.first().and_then(|t| t.layer);
-        let terms = || self.terms.iter().filter(|t| t.layer == first);
         let element = |i: usize, j: usize| {
-            let each = terms().map(|t| spectra[t.light].power[i] * t.excitation[j]);
+            let each = self
+                .once()
+                .map(|t| spectra[t.light].power[i] * t.excitation[j]);
             each.sum::<f64>() * width
         };
         let row = |i: usize| std::array::from_fn(|j| element(i, j));

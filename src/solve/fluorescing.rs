@@ -7,6 +7,7 @@
 //! emissions mostly excite nothing, the second round mostly finds what the first found.
 
 use super::conjugate::{Convergence, step};
+use super::sums::{CHUNK, added, chunks};
 use crate::hierarchy::{Mesh, Tree};
 use crate::light::lanes::Lanes;
 use crate::light::{Fluorescent, Rows};
@@ -18,8 +19,6 @@ use rayon::prelude::*;
 const ROUNDS: usize = 60;
 /// Rounds end at this change whatever the bound: what is left is f32.
 const ROUNDING: f64 = 1e-6;
-/// Leaves that a task looks at.
-const CHUNK: usize = 1024;
 
 /// What fluoresces, and how.
 #[derive(Debug, Clone)]
@@ -53,11 +52,9 @@ impl Glow {
         if kinds.is_empty() {
             return None;
         }
-        let of = leaves.iter().map(|&leaf| {
-            let element = tree.elements[tree.node(leaf).element as usize];
-            let triangle = tree.faces[element.face as usize].triangle;
-            of_material[mesh.material[triangle as usize] as usize]
-        });
+        let of = leaves
+            .iter()
+            .map(|&leaf| of_material[mesh.material[tree.face_of(leaf).triangle as usize] as usize]);
         let of: Vec<Option<u8>> = of.collect();
         of.iter().any(Option::is_some).then(|| Self {
             of,
@@ -144,7 +141,7 @@ impl Rounds<'_> {
             done.fluorescence += 1;
             step::<L>(&mut lit, &seen, [1.0; L]);
             let next = self.glow.of::<L>(&lit);
-            let (changed, all) = self.change::<L>(&given, &next);
+            let [changed, all] = self.change::<L>(&given, &next);
             let change = if all > 0.0 { changed / all } else { 0.0 };
             done.residual = solved.residual.max(change);
             done.bound = solved.bound.max(change / (1.0 - self.glow.back));
@@ -158,23 +155,20 @@ impl Rounds<'_> {
     }
 
     /// Power that the second gives out more or less than the first, and that it gives out.
-    fn change<const L: usize>(&self, before: &Rows, now: &Rows) -> (f64, f64) {
-        let rows = (before.all::<L>().par_chunks(CHUNK)).zip(now.all::<L>().par_chunks(CHUNK));
-        let parts: Vec<[f64; 2]> = rows
-            .zip(self.areas.par_chunks(CHUNK))
-            .map(|((before, now), areas)| {
-                let mut sums = [0.0; 2];
-                for ((before, now), area) in before.iter().zip(now).zip(areas) {
-                    let lanes = before.iter().zip(now).zip(&self.power);
-                    for ((before, now), power) in lanes {
-                        sums[0] += area * power * f64::from((now - before).abs());
-                        sums[1] += area * power * f64::from(*now);
-                    }
+    fn change<const L: usize>(&self, before: &Rows, now: &Rows) -> [f64; 2] {
+        let rows = chunks::<L>(before).zip(chunks::<L>(now));
+        let parts = (rows.zip(self.areas.par_chunks(CHUNK))).map(|((before, now), areas)| {
+            let mut sums = [0.0; 2];
+            for ((before, now), area) in before.iter().zip(now).zip(areas) {
+                let lanes = before.iter().zip(now).zip(&self.power);
+                for ((before, now), power) in lanes {
+                    sums[0] += area * power * f64::from((now - before).abs());
+                    sums[1] += area * power * f64::from(*now);
                 }
-                sums
-            })
-            .collect();
-        let add = |a: [f64; 2], b: &[f64; 2]| [a[0] + b[0], a[1] + b[1]];
-        parts.iter().fold([0.0; 2], add).into()
+            }
+            [sums]
+        });
+        let [sums] = added(parts);
+        sums
     }
 }

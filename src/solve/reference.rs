@@ -498,13 +498,10 @@ fn dome_at(
     plane: u32,
     place: Option<usize>,
 ) -> f64 {
-    let (Some(sky), Some(place)) = (&scene.sky, place) else {
-        return 0.0;
-    };
+    let Some(sky) = &scene.sky else { return 0.0 };
     let brings = |k: u32| {
         let d = cosine_direction(normal, sequence02(k, 0));
-        let (first, radiance) = sky.radiance(d);
-        let Some(radiance) = place.checked_sub(first).and_then(|k| radiance.get(k)) else {
+        let Some(radiance) = sky.part(place, d) else {
             return 0.0;
         };
         let end = at + d * (4.0 * mesh.half_size);

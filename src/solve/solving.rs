@@ -159,7 +159,8 @@ impl Bake {
         if !runs {
             reflected = reflection.of::<L>(&irradiance);
         }
-        let on_nodes = self.on_nodes::<L>(&with::<L>(&reflected, given.as_ref()), leaves);
+        let sent = with::<L>(&reflected, given.as_ref());
+        let on_nodes = self.on_nodes::<L>(&sent, leaves);
         let through = reflection.sheets.as_ref();
         let through = through.map(|s| s.shown.clone()).unwrap_or_default();
         let mut flux = flux::Balance::default();
@@ -180,7 +181,7 @@ impl Bake {
         }
         (flux.sent, flux.scaled) = (self.sent, scaled);
         let emitted = emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves));
-        let on_nodes = self.without_mirrors::<L>(reflected, on_nodes, leaves);
+        let on_nodes = self.without_mirrors::<L>(sent, on_nodes, leaves);
         if !through.is_empty() {
             irradiance = through.shown(irradiance);
         }
@@ -440,31 +441,30 @@ impl Bake {
     /// Is a leaf a mirror?
     fn is_mirror(&self, leaf: u32) -> bool {
         self.mirrors.as_ref().is_some_and(|mirrors| {
-            let element = &self.tree.elements[self.tree.node(leaf).element as usize];
-            let face = self.tree.faces[element.face as usize];
+            let face = self.tree.face_of(leaf);
             mirrors.is_side(face.triangle, face.back)
         })
     }
 
-    /// Takes what mirrors are read as out of what leaves reflect, and keeps it for rays that met too many; what all nodes reflect.
+    /// Takes what mirrors are read as out of what leaves send, and keeps it for rays that met too many; what all nodes send.
     fn without_mirrors<const L: usize>(
         &mut self,
-        mut reflected: Rows,
+        sent: Cow<Rows>,
         on_nodes: Rows,
         leaves: &[u32],
     ) -> Rows {
         if self.mirrors.is_none() {
             return on_nodes;
         }
-        let mut mirrors = Rows::zero(self.tree.nodes.len(), L);
-        for (row, &leaf) in reflected.all_mut::<L>().iter_mut().zip(leaves) {
+        let (mut sent, mut mirrors) = (sent.into_owned(), Rows::zero(self.tree.nodes.len(), L));
+        for (row, &leaf) in sent.all_mut::<L>().iter_mut().zip(leaves) {
             if self.is_mirror(leaf) {
                 mirrors.all_mut::<L>()[leaf as usize] = *row;
                 *row = [0.0; L];
             }
         }
         self.light.mirrors = mirrors;
-        self.on_nodes::<L>(&reflected, leaves)
+        self.on_nodes::<L>(&sent, leaves)
     }
 
     /// Takes over a solution: light by node, irradiance by leaf, and the white that eyes adapt to.
@@ -524,28 +524,24 @@ impl Bake {
 
     /// Area-weighted mean irradiance, tristimulus.
     pub fn mean_irradiance(&self) -> [f64; 3] {
-        let (mut sum, mut area) = ([0.0; 3], 0.0);
-        for (k, &leaf) in self.light.leaves.iter().enumerate() {
-            let a = self.areas[leaf as usize];
-            let xyz = self.lanes.tristimulus(self.light.irradiance.row(k));
-            sum = std::array::from_fn(|c| sum[c] + a * xyz[c]);
-            area += a;
-        }
-        sum.map(|x| if area > 0.0 { x / area } else { 0.0 })
+        self.mean_over_leaves(|row| self.lanes.tristimulus(row))
     }
 
     /// The spectrum of the mean irradiance, W/m2/nm on the 64 leaves.
     pub fn mean_spectrum(&self) -> Leaves {
-        let (mut sum, mut area) = ([0.0; LEAVES], 0.0);
+        self.mean_over_leaves(|row| self.lanes.leaves(row))
+    }
+
+    /// The mean of what irradiance comes to, by area; 0 where there is none.
+    fn mean_over_leaves<const N: usize>(&self, of: impl Fn(&[f32]) -> [f64; N]) -> [f64; N] {
+        let (mut sum, mut area) = ([0.0; N], 0.0);
         for (k, &leaf) in self.light.leaves.iter().enumerate() {
             let a = self.areas[leaf as usize];
-            for (sum, x) in sum.iter_mut().zip(self.light.irradiance.row(k)) {
-                *sum += a * f64::from(*x);
-            }
+            let each = of(self.light.irradiance.row(k));
+            sum = std::array::from_fn(|c| sum[c] + a * each[c]);
             area += a;
         }
-        let mean = sum.map(|x| if area > 0.0 { (x / area) as f32 } else { 0.0 });
-        self.lanes.leaves(&mean)
+        sum.map(|x| if area > 0.0 { x / area } else { 0.0 })
     }
 
     /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.

@@ -9,6 +9,7 @@ use super::receiver::{Gathered, Receiver};
 use super::via::{Arrived, End, Via};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::geometry::{Hit, Segment};
+use crate::hierarchy::Route;
 use crate::light::{Filter, accumulate};
 use crate::link::View;
 use glam::{DVec3, Vec3};
@@ -52,8 +53,13 @@ impl Gatherer<'_> {
     pub(super) fn by_way_of(&self, via: Via, segment: &Segment) -> Option<Filter> {
         let mirrors = self.sight.mirrors?;
         let route = mirrors.route(via.image, via.point, segment.to.as_dvec3())?;
+        Some(self.along(&route))
+    }
+
+    /// What is left of light by a way by mirrors, and past panes between them.
+    pub(super) fn along(&self, route: &Route) -> Filter {
         let glazing = self.glass.map(|glass| glass.glazing);
-        Some(self.filters.along(glazing, &route))
+        self.filters.along(glazing, route)
     }
 
     /// What is so far away lies outside the room, by whatever way it is looked.
@@ -172,10 +178,8 @@ impl Gatherer<'_> {
     /// Adds what comes from outside in one direction.
     fn escapes(&self, direction: DVec3, share: f64, filter: &Filter, out: &mut Gathered) {
         let Some(outside) = self.sky else { return };
-        let (first, radiance) = outside.sky.radiance(direction);
         for (lamp, row) in self.lamps {
-            let part = lamp.kind.place().and_then(|place| place.checked_sub(first));
-            let Some(radiance) = part.and_then(|part| radiance.get(part)) else {
+            let Some(radiance) = outside.sky.part(lamp.kind.place(), direction) else {
                 continue;
             };
             let factor = (share * PI * radiance) as f32;
@@ -203,11 +207,10 @@ impl Gatherer<'_> {
             }),
         };
         if let Some(end) = end {
-            let glazing = self.glass.map(|glass| glass.glazing);
             mirrored.push(Arrived {
                 end,
                 image: way.image,
-                filter: Box::new(self.filters.along(glazing, &way.route)),
+                filter: Box::new(self.along(&way.route)),
             });
         }
         true
@@ -234,11 +237,10 @@ impl Gatherer<'_> {
         for (hit, direction) in hits.iter().zip(directions) {
             let way = hit.and_then(|hit| self.sight.mirrored(from[0], direction, &hit));
             if let Some(way) = way.filter(|way| way.hit.is_none()) {
-                let glazing = self.glass.map(|glass| glass.glazing);
                 memory.mirrored.push(Arrived {
                     end: End::Outside(way.direction),
                     image: way.image,
-                    filter: Box::new(self.filters.along(glazing, &way.route)),
+                    filter: Box::new(self.along(&way.route)),
                 });
             }
         }

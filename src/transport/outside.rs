@@ -63,6 +63,22 @@ pub(crate) struct Look {
     pub(super) tints: [Option<Filter>; PLACES],
 }
 
+impl Look {
+    /// Finds which segments are blocked.
+    fn block(&mut self, (sight, by): (&Sight, Option<&dyn Ways>)) {
+        match by {
+            Some(by) => by.block(&self.segments, &mut self.blocked),
+            None => sight.blocked(&self.segments, &View::Crowded, &mut self.blocked),
+        }
+        self.rays += self.segments.len() as u64;
+    }
+}
+
+/// What is so far away lies outside the room.
+fn reach((sight, by): (&Sight, Option<&dyn Ways>)) -> f64 {
+    by.map_or(4.0 * sight.mesh.half_size, |by| by.reach())
+}
+
 /// How a direction was found.
 #[derive(Debug, Clone, Copy)]
 enum Search {
@@ -375,18 +391,14 @@ impl Outside {
     ) {
         look.segments.clear();
         let turn = hash(to.seed, 0x5c3);
-        let far = by.map_or(4.0 * sight.mesh.half_size, |by| by.reach());
+        let far = reach((sight, by));
         let ahead: Vec<DVec3> = (0..count as u32)
             .filter_map(|k| self.sky.spot(sequence02(k, turn)))
             .filter(|d| to.normal.dot(*d) > 0.0)
             .collect();
         let way = |d: &DVec3| Segment::new(to.point, to.point + *d * far, [to.plane, NO_PLANE]);
         look.segments.extend(ahead.iter().map(way));
-        match by {
-            Some(by) => by.block(&look.segments, &mut look.blocked),
-            None => sight.blocked(&look.segments, &View::Crowded, &mut look.blocked),
-        }
-        look.rays += look.segments.len() as u64;
+        look.block((sight, by));
         let ways = ahead.into_iter().zip(&look.blocked);
         let free = ways.filter(|(_, blocked)| !**blocked);
         look.open.extend(free.map(|(d, _)| (Search::Spots, d)));
@@ -411,11 +423,7 @@ impl Outside {
             look.segments
                 .extend(ahead.map(|at| Segment::new(to.point, at, [to.plane, NO_PLANE])));
         }
-        match by {
-            Some(by) => by.block(&look.segments, &mut look.blocked),
-            None => sight.blocked(&look.segments, &View::Crowded, &mut look.blocked),
-        }
-        look.rays += look.segments.len() as u64;
+        look.block((sight, by));
         let ways = look.segments.iter().zip(&look.blocked);
         let free = ways.filter(|(_, blocked)| !**blocked);
         let toward = |s: &Segment| (s.to.as_dvec3() - to.point).normalize();
@@ -433,7 +441,7 @@ impl Outside {
     ) -> [f64; PLACES] {
         let [mut seen, mut squares, mut sum] = [[0.0; PLACES]; 3];
         let mut tints = [Tint::default(); PLACES];
-        let far = by.map_or(4.0 * sight.mesh.half_size, |by| by.reach());
+        let far = reach((sight, by));
         for &(search, d) in &look.open {
             let cosine = to.normal.dot(d);
             if cosine <= 0.0 {

@@ -45,7 +45,7 @@ impl Map {
             }
         }
         let base = ring.map(|sum| sum / around);
-        let of_ring: f64 = base.iter().zip(&self.luminance).map(|(x, y)| x * y).sum();
+        let of_ring = self.luminous(base);
         if self.bright(brightest) <= CONTRAST * of_ring {
             return None;
         }
@@ -54,12 +54,11 @@ impl Map {
             let solid = self.solid_angle(k / self.width);
             let more: [f64; PARTS] =
                 std::array::from_fn(|c| solid * (f64::from(self.texels[k][c]) - base[c]).max(0.0));
-            let bright: f64 = more.iter().zip(&self.luminance).map(|(x, y)| x * y).sum();
+            let bright = self.luminous(more);
             toward += bright * self.middle(k);
             across = std::array::from_fn(|c| across[c] + more[c]);
         }
-        let all = self.level(0);
-        let all: f64 = all.iter().zip(&self.luminance).map(|(x, y)| x * y).sum();
+        let all = self.luminous(self.level(0));
         // Its length is the luminous irradiance across the rays, but for the width of the disc.
         if toward.y <= SHARE * all {
             return None;

@@ -115,6 +115,12 @@ impl Sky {
         (first, radiance)
     }
 
+    /// Radiance of one part from a direction, by its place; none where it is not seen there.
+    pub(crate) fn part(&self, place: Option<usize>, direction: DVec3) -> Option<f64> {
+        let (first, radiance) = self.radiance(direction);
+        radiance.get(place?.checked_sub(first)?).copied()
+    }
+
     /// Is what lies below the horizon open ground, alike in all directions?
     pub(crate) fn has_even_ground(&self) -> bool {
         !self.below

@@ -189,8 +189,13 @@ impl Map {
     }
 
     pub(super) fn bright(&self, texel: usize) -> f64 {
-        let parts = self.texels[texel].iter().zip(&self.luminance);
-        parts.map(|(x, y)| f64::from(*x) * y).sum()
+        self.luminous(self.texels[texel].map(f64::from))
+    }
+
+    /// Luminance of red, green and blue together.
+    pub(super) fn luminous(&self, parts: [f64; PARTS]) -> f64 {
+        let each = parts.iter().zip(&self.luminance);
+        each.map(|(x, y)| x * y).sum()
     }
 
     /// Angles from the zenith between which a row lies.
