@@ -60,7 +60,8 @@ impl Bake {
         let Some(sky) = self.scene.sky.clone() else {
             return;
         };
-        let is_exact = self.with_sight(|_, sight| Outside::is_exact(&sky, sight));
+        let is_exact =
+            self.panes.is_none() && self.with_sight(|_, sight| Outside::is_exact(&sky, sight));
         let openings = match is_exact {
             true => Openings::default(),
             false => found.unwrap_or_else(|| find(self)),

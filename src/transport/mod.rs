@@ -13,6 +13,7 @@
 //! | `openings`, `outside`, `sky` | where rays leave the room, and what comes in there: sky, ground, the sun's disc |
 //! | `trace` | what a point gets its light from, kept for relighting |
 
+mod clipped_sky;
 mod gatherer;
 pub mod hemisphere;
 mod lamp;

@@ -1,17 +1,15 @@
 //! What comes in from outside: sky, and ground below the horizon.
 //!
-//! In rooms of few triangles exactly: the directions fall into eight triangles, far away, less the shadows of what stands before them;
-//! what is left is cut until the sky is even over each part, whose factor is exact. Elsewhere, and under a map, by rays over the hemisphere,
+//! In rooms of few triangles exactly (`clipped_sky`). Elsewhere, and under a map, by rays over the hemisphere,
 //! toward the [`Openings`] and toward bright spots of a map, all together by the power heuristic (Veach and Guibas 1995): by the balance
 //! heuristic the few rays of the hemisphere that find a small opening brought 2 % of noise to what those toward it know. A ray serves all
 //! parts of the sky.
 
+use super::clipped_sky::Parts;
 use super::openings::{Choice, Openings};
 use super::receiver::Receiver;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
-use crate::geometry::{
-    Clipper, NO_PLANE, Patch, Segment, Shaft, ShaftContents, lambert_edges_x8, quarters,
-};
+use crate::geometry::{Clipper, NO_PLANE, Segment};
 use crate::light::{Filter, Tint};
 use crate::link::{Sight, View};
 use crate::scene::sky::{PARTS, PLACES, Sky};
@@ -21,24 +19,11 @@ use std::f64::consts::PI;
 /// Rays over the hemisphere, to the openings, and toward spots where there are some: of a random point of a leaf, of a point by a rule, of
 /// one for its own sake, and of one whose rays over the hemisphere are known.
 const RAYS: [[usize; 3]; 4] = [[16, 16, 16], [64, 64, 64], [512, 1024, 1024], [0, 256, 256]];
-/// So many times more to the openings in rooms of few triangles. With 4, one of the points of CIE 171 5.10 is off by .6 %.
+/// So many times more to the openings in rooms of few triangles. With 4, a sky in a periscope is off by more than 1 %.
 const FEW: usize = 16;
-/// The far triangles stand this many half sizes of the room away: all of it lies before their planes.
-const FAR: f64 = 8.0;
-/// Blockers of a far triangle at the most, and pieces it may fall into, before it is cut.
-const LISTED: usize = 64;
-const PIECES: usize = 64;
-/// How often a far triangle is cut before rays decide: to 3 degrees.
-const CUTS: u32 = 5;
-/// Rays into what is left then.
-const LAST_RAYS: u32 = 16;
-/// A part is even where two means of the sky over it differ by less than this share. With .005 points of CIE 171 5.9 are off by
-/// .1 %.
-const EVEN: f64 = 0.005;
-/// And whose corners are less than this far apart, cosine: 25 degrees.
-const NARROW: f64 = 0.9;
-/// How often a part is cut for the sky's sake: about the sun it changes within a degree.
-const DEPTH: u32 = 6;
+
+/// Directions in which it is asked what panes leave where all else is exact, in the same order.
+const TINTED: [usize; 4] = [16, 64, 256, 256];
 
 /// What is outside a room.
 #[derive(Debug, Clone)]
@@ -50,7 +35,8 @@ pub(crate) struct Outside {
 /// What a look outside takes.
 #[derive(Debug, Default)]
 pub(crate) struct Look {
-    clipper: Clipper,
+    pub(super) clipper: Clipper,
+    pub(super) parts: Parts,
     choice: Choice,
     segments: Vec<Segment>,
     open: Vec<(Search, DVec3)>,
@@ -114,6 +100,17 @@ pub(super) enum Way<'a> {
     Unshadowed,
 }
 
+impl Way<'_> {
+    /// Which of [`RAYS`].
+    fn kind(self) -> usize {
+        match self {
+            Way::Rays(kind) => kind,
+            Way::Glanced(..) | Way::Unshadowed => 0,
+            Way::Known(..) | Way::Shared(..) => 3,
+        }
+    }
+}
+
 impl Outside {
     /// Irradiance of a point by each part of the sky, where open level ground has 1, and of what is below the horizon, where a plane
     /// that looks down has 1.
@@ -128,8 +125,10 @@ impl Outside {
         if let Way::Unshadowed = way {
             return self.unshadowed(to);
         }
-        if Self::is_exact(&self.sky, sight) {
-            self.exactly(sight, to, look)
+        // Many points stand for a leaf that looks for itself: rays do there.
+        let one_of_many = sight.panes.is_some() && way.kind() == 0;
+        if Self::is_exact(&self.sky, sight) && !one_of_many {
+            self.exactly((sight, by), to, TINTED[way.kind()], look)
         } else {
             self.by_rays((sight, by), to, way, look)
         }
@@ -164,11 +163,7 @@ impl Outside {
 
     /// Is a sky seen exactly in this room, without openings?
     pub(crate) fn is_exact(sky: &Sky, sight: &Sight) -> bool {
-        sky.is_smooth()
-            && sight.small()
-            && sight.opaque.is_none()
-            && sight.panes.is_none()
-            && sight.mirrors.is_none()
+        sky.is_smooth() && sight.small() && sight.opaque.is_none() && sight.mirrors.is_none()
     }
 
     /// The same as one of many points sees it.
@@ -176,187 +171,17 @@ impl Outside {
         self.seen((sight, None), to, Way::Rays(0), look)
     }
 
-    /// By clipped polygons.
-    fn exactly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; PLACES] {
-        let mut seen = [0.0; PLACES];
-        let far = FAR * sight.mesh.half_size;
-        for octant in 0..8_u32 {
-            let sign = |bit: u32| if octant >> bit & 1 == 1 { -far } else { far };
-            let [x, y, z] = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
-            if [x, y, z].iter().all(|d| d.dot(to.normal) <= 0.0) {
-                continue;
-            }
-            // Their fronts are inside.
-            let corners = if octant.count_ones() % 2 == 0 {
-                [x, z, y]
-            } else {
-                [x, y, z]
-            };
-            let corners = corners.map(|d| to.point + d);
-            let cell = Cell {
-                corners,
-                up: y.y > 0.0,
-                cuts: CUTS,
-            };
-            self.cell(sight, to, &cell, None, look, &mut seen);
-        }
-        seen
-    }
-
-    /// Adds what is seen of a far triangle; of its blockers nothing is known but that they are among the candidates.
-    fn cell(
-        &self,
-        sight: &Sight,
-        to: &Receiver,
-        cell: &Cell,
-        candidates: Option<&[u32]>,
-        look: &mut Look,
-        seen: &mut [f64; PLACES],
-    ) {
-        let point = Patch::Point {
-            at: to.point,
-            normal: to.normal,
-            plane: to.plane,
-        };
-        let far = Patch::Triangle {
-            corners: cell.corners,
-            plane: NO_PLANE,
-        };
-        let shaft = Shaft::between(&point, &far);
-        let list = match sight.rays.blockers(&shaft, candidates, LISTED) {
-            ShaftContents::Clear => Some(Vec::new()),
-            ShaftContents::Few(list) => Some(list),
-            ShaftContents::Many => None,
-        };
-        if let Some(list) = &list {
-            let clipper = &mut look.clipper;
-            clipper.begin(to.point, &cell.corners);
-            let planes = [to.plane, NO_PLANE];
-            let blockers = sight.blockers(list, planes).into_iter().flatten();
-            let fits = blockers.into_iter().all(|blocker| {
-                let outline = sight.mesh.outline(blocker);
-                let shadow = crate::geometry::Shadow::new(to.point, outline.as_ref());
-                clipper.cut(&shadow, PIECES)
-            });
-            if fits {
-                let whole = lambert_edges_x8(to.point, to.normal, &cell.corners);
-                if clipper.factor(to.normal, whole) > 0.0 {
-                    for piece in clipper.visible() {
-                        self.add(to.normal, cell.up, piece, seen);
-                    }
-                }
-                return;
-            }
-        }
-        if cell.cuts > 0 {
-            for corners in quarters(cell.corners) {
-                let part = Cell {
-                    corners,
-                    cuts: cell.cuts - 1,
-                    ..*cell
-                };
-                self.cell(sight, to, &part, list.as_deref().or(candidates), look, seen);
-            }
-            return;
-        }
-        let [a, b, c] = cell.corners;
-        let open = (0..LAST_RAYS).filter(|&k| {
-            let w = crate::geometry::sampling::triangle_weights(sequence02(k, to.seed));
-            let end = a * w[0] + b * w[1] + c * w[2];
-            !sight
-                .rays
-                .occluded(&Segment::new(to.point, end, [to.plane, NO_PLANE]))
-        });
-        let share = open.count() as f64 / f64::from(LAST_RAYS);
-        look.rays += u64::from(LAST_RAYS);
-        if share > 0.0 {
-            let mut whole = [0.0; PLACES];
-            let corners = cell.corners.map(|c| c - to.point);
-            self.add(to.normal, cell.up, &corners, &mut whole);
-            *seen = std::array::from_fn(|k| seen[k] + share * whole[k]);
-        }
-    }
-
-    /// Adds a polygon of directions, any lengths.
-    fn add(&self, normal: DVec3, up: bool, polygon: &[DVec3], seen: &mut [f64; PLACES]) {
-        if !up || self.sky.is_even() {
-            let factor = lambert_edges_x8(DVec3::ZERO, normal, polygon);
-            let first = if up { 0 } else { PARTS };
-            seen[first..][..PARTS].iter_mut().for_each(|s| *s += factor);
-            return;
-        }
-        let first = polygon[0].normalize();
-        for two in polygon[1..].windows(2) {
-            let corners = [first, two[0].normalize(), two[1].normalize()];
-            let radiance = corners.map(|d| self.overhead(d));
-            self.triangle(normal, corners, radiance, DEPTH, seen);
-        }
-    }
-
-    /// Radiance of the parts of the sky from a direction that looks up, or level.
-    fn overhead(&self, direction: DVec3) -> [f64; PARTS] {
-        let least = DVec3::new(direction.x, direction.y.max(f64::MIN_POSITIVE), direction.z);
-        self.sky.radiance(least).1
-    }
-
-    /// Adds the irradiance by a triangle of sky, of which the radiance at the corners is known.
-    fn triangle(
-        &self,
-        normal: DVec3,
-        corners: [DVec3; 3],
-        radiance: [[f64; PARTS]; 3],
-        depth: u32,
-        seen: &mut [f64; PLACES],
-    ) {
-        let [a, b, c] = corners;
-        if corners.iter().all(|d| d.dot(normal) <= 0.0) {
-            return;
-        }
-        let middles = [a + b, b + c, c + a].map(|d| d.normalize());
-        let halfway = middles.map(|d| self.overhead(d));
-        let mean = |[x, y, z]: [[f64; PARTS]; 3]| -> [f64; PARTS] {
-            std::array::from_fn(|k| (x[k] + y[k] + z[k]) / 3.0)
-        };
-        // Exact for quadratic variation, and what is exact for linear.
-        let (fine, coarse) = (mean(halfway), mean(radiance));
-        let apart = std::array::from_fn(|k| (fine[k] - coarse[k]).abs());
-        let is_even = self.sky.brightness(apart) <= EVEN * self.sky.brightness(fine);
-        let narrow = a.dot(b).min(b.dot(c)).min(c.dot(a)) > NARROW;
-        if depth == 0 || (narrow && is_even) {
-            let factor = lambert_edges_x8(DVec3::ZERO, normal, &corners);
-            for (seen, fine) in seen.iter_mut().zip(fine) {
-                *seen += PI * fine * factor;
-            }
-            return;
-        }
-        let ([ab, bc, ca], [u, v, w]) = (middles, halfway);
-        let [x, y, z] = radiance;
-        [
-            ([a, ab, ca], [x, u, w]),
-            ([ab, b, bc], [u, y, v]),
-            ([ca, bc, c], [w, v, z]),
-            ([ab, bc, ca], halfway),
-        ]
-        .into_iter()
-        .for_each(|(part, radiance)| self.triangle(normal, part, radiance, depth - 1, seen));
-    }
-
     /// By rays over the hemisphere, to the openings and to spots.
-    fn by_rays(
+    pub(super) fn by_rays(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
         to: &Receiver,
         way: Way,
         look: &mut Look,
     ) -> [f64; PLACES] {
-        let kind = match way {
-            Way::Rays(kind) => kind,
-            Way::Glanced(..) => 0,
-            _ => 3,
-        };
-        let [wide, mut narrow, spots] = RAYS[kind];
+        let [wide, mut narrow, spots] = RAYS[way.kind()];
         if let (Way::Known(..) | Way::Shared(..), true) = (way, sight.small()) {
-            // Rooms of few triangles come here for their panes and mirrors; a ray costs next to nothing there.
+            // Rooms of few triangles come here for mirrors and maps; a ray costs next to nothing there.
             narrow *= FEW;
         }
         if let Way::Shared(.., images) = way {
@@ -499,13 +324,4 @@ impl Outside {
         }
         look.rays += count as u64;
     }
-}
-
-/// A far triangle.
-struct Cell {
-    corners: [DVec3; 3],
-    /// Is it above the horizon?
-    up: bool,
-    /// How often it may still be cut.
-    cuts: u32,
 }

@@ -142,9 +142,10 @@ impl Sky {
         }
     }
 
-    /// How bright these radiances of parts above the horizon are, about.
-    pub(crate) fn brightness(&self, radiance: [f64; PARTS]) -> f64 {
-        let bright = self.bright.iter().zip(radiance);
+    /// How bright these radiances of the parts above the horizon, or of those below, are, about.
+    pub(crate) fn brightness(&self, up: bool, radiance: [f64; PARTS]) -> f64 {
+        let first = if up { 0 } else { PARTS };
+        let bright = self.bright[first..].iter().zip(radiance);
         bright.map(|(bright, radiance)| bright * radiance).sum()
     }
 

@@ -1,0 +1,382 @@
+//! Sky and ground at a point of a room of few triangles, exactly.
+//!
+//! The directions fall into eight triangles, far away, less the shadows of what stands before them; what is left is cut until the sky is
+//! even over each part, whose factor is exact. Panes are no shadows: what they leave is a mean over directions among these parts.
+
+use super::outside::{Look, Outside, Ways};
+use super::receiver::Receiver;
+use crate::geometry::sampling::{hash, sequence02, triangle_weights};
+use crate::geometry::{
+    NO_PLANE, Patch, Segment, Shadow, Shaft, ShaftContents, lambert_edges_x8, quarters,
+};
+use crate::light::{Filter, Tint};
+use crate::link::Sight;
+use crate::scene::sky::{PARTS, PLACES};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// The far triangles stand this many half sizes of the room away: all of it lies before their planes.
+const FAR: f64 = 8.0;
+/// Blockers of a far triangle at the most, and pieces it may fall into, before it is cut.
+const LISTED: usize = 64;
+const PIECES: usize = 64;
+/// How often a far triangle is cut before rays decide: to 3 degrees.
+const CUTS: u32 = 5;
+/// Rays into what is left then.
+const LAST_RAYS: u32 = 16;
+/// A part is even where two means of the sky over it differ by less than this share. With .005 points of CIE 171 5.9 are off by
+/// .1 %.
+const EVEN: f64 = 0.005;
+/// And whose corners are less than this far apart, cosine: 25 degrees.
+const NARROW: f64 = 0.9;
+/// How often a part is cut for the sky's sake: about the sun it changes within a degree.
+const DEPTH: u32 = 6;
+
+impl Outside {
+    /// By clipped polygons.
+    pub(super) fn exactly(
+        &self,
+        (sight, by): (&Sight, Option<&dyn Ways>),
+        to: &Receiver,
+        samples: usize,
+        look: &mut Look,
+    ) -> [f64; PLACES] {
+        let by = by.filter(|by| by.change_light());
+        let mut seen = [0.0; PLACES];
+        look.parts.of_each(by.is_some());
+        let far = FAR * sight.mesh.half_size;
+        for octant in 0..8_u32 {
+            let sign = |bit: u32| if octant >> bit & 1 == 1 { -far } else { far };
+            let [x, y, z] = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
+            if [x, y, z].iter().all(|d| d.dot(to.normal) <= 0.0) {
+                continue;
+            }
+            // Their fronts are inside.
+            let corners = if octant.count_ones() % 2 == 0 {
+                [x, z, y]
+            } else {
+                [x, y, z]
+            };
+            let corners = corners.map(|d| to.point + d);
+            let cell = Cell {
+                corners,
+                up: y.y > 0.0,
+                cuts: CUTS,
+            };
+            self.cell(sight, to, &cell, None, look, &mut seen);
+        }
+        if let Some(by) = by {
+            look.tints = self.tinted(by, to, samples, &look.parts);
+        }
+        seen
+    }
+
+    /// Adds what is seen of a far triangle; of its blockers nothing is known but that they are among the candidates.
+    fn cell(
+        &self,
+        sight: &Sight,
+        to: &Receiver,
+        cell: &Cell,
+        candidates: Option<&[u32]>,
+        look: &mut Look,
+        seen: &mut [f64; PLACES],
+    ) {
+        let point = Patch::Point {
+            at: to.point,
+            normal: to.normal,
+            plane: to.plane,
+        };
+        let far = Patch::Triangle {
+            corners: cell.corners,
+            plane: NO_PLANE,
+        };
+        let shaft = Shaft::between(&point, &far);
+        let list = match sight.rays.blockers(&shaft, candidates, LISTED) {
+            ShaftContents::Clear => Some(Vec::new()),
+            ShaftContents::Few(list) => Some(list),
+            ShaftContents::Many => None,
+        };
+        if let Some(list) = &list {
+            let clipper = &mut look.clipper;
+            clipper.begin(to.point, &cell.corners);
+            let planes = [to.plane, NO_PLANE];
+            let blockers = sight.blockers(list, planes).into_iter().flatten();
+            let fits = blockers.into_iter().all(|blocker| {
+                let outline = sight.mesh.outline(blocker);
+                let shadow = Shadow::new(to.point, outline.as_ref());
+                clipper.cut(&shadow, PIECES)
+            });
+            if fits {
+                let whole = lambert_edges_x8(to.point, to.normal, &cell.corners);
+                if clipper.factor(to.normal, whole) > 0.0 {
+                    for piece in clipper.visible() {
+                        let sum = &mut Sum {
+                            up: cell.up,
+                            share: 1.0,
+                            seen,
+                            parts: &mut look.parts,
+                        };
+                        self.add(to.normal, piece, sum);
+                    }
+                }
+                return;
+            }
+        }
+        if cell.cuts > 0 {
+            for corners in quarters(cell.corners) {
+                let part = Cell {
+                    corners,
+                    cuts: cell.cuts - 1,
+                    ..*cell
+                };
+                self.cell(sight, to, &part, list.as_deref().or(candidates), look, seen);
+            }
+            return;
+        }
+        let [a, b, c] = cell.corners;
+        let open = (0..LAST_RAYS).filter(|&k| {
+            let w = triangle_weights(sequence02(k, to.seed));
+            let end = a * w[0] + b * w[1] + c * w[2];
+            !sight
+                .rays
+                .occluded(&Segment::new(to.point, end, [to.plane, NO_PLANE]))
+        });
+        let share = open.count() as f64 / f64::from(LAST_RAYS);
+        look.rays += u64::from(LAST_RAYS);
+        if share > 0.0 {
+            let corners = cell.corners.map(|c| c - to.point);
+            let sum = &mut Sum {
+                up: cell.up,
+                share,
+                seen,
+                parts: &mut look.parts,
+            };
+            self.add(to.normal, &corners, sum);
+        }
+    }
+
+    /// Adds a polygon of directions, any lengths.
+    fn add(&self, normal: DVec3, polygon: &[DVec3], sum: &mut Sum) {
+        if sum.parts.0.is_none() && (!sum.up || self.sky.is_even()) {
+            let factor = sum.share * lambert_edges_x8(DVec3::ZERO, normal, polygon);
+            return sum.add([factor; PARTS]);
+        }
+        let first = polygon[0].normalize();
+        for two in polygon[1..].windows(2) {
+            let corners = [first, two[0].normalize(), two[1].normalize()];
+            let radiance = corners.map(|d| self.half(sum.up, d));
+            self.triangle(normal, corners, radiance, DEPTH, sum);
+        }
+    }
+
+    /// Radiance of the parts of the sky from a direction that looks up, or of those of the ground from one that looks down; level is either.
+    fn half(&self, up: bool, direction: DVec3) -> [f64; PARTS] {
+        let y = match up {
+            true => direction.y.max(f64::MIN_POSITIVE),
+            false => direction.y.min(0.0),
+        };
+        self.sky.radiance(DVec3 { y, ..direction }).1
+    }
+
+    /// Adds the irradiance by a triangle, of which the radiance at the corners is known.
+    fn triangle(
+        &self,
+        normal: DVec3,
+        corners: [DVec3; 3],
+        radiance: [[f64; PARTS]; 3],
+        depth: u32,
+        sum: &mut Sum,
+    ) {
+        let [a, b, c] = corners;
+        if corners.iter().all(|d| d.dot(normal) <= 0.0) {
+            return;
+        }
+        let middles = [a + b, b + c, c + a].map(|d| d.normalize());
+        let halfway = middles.map(|d| self.half(sum.up, d));
+        let mean = |[x, y, z]: [[f64; PARTS]; 3]| -> [f64; PARTS] {
+            std::array::from_fn(|k| (x[k] + y[k] + z[k]) / 3.0)
+        };
+        // Exact for quadratic variation, and what is exact for linear.
+        let (fine, coarse) = (mean(halfway), mean(radiance));
+        let apart = std::array::from_fn(|k| (fine[k] - coarse[k]).abs());
+        let is_even =
+            self.sky.brightness(sum.up, apart) <= EVEN * self.sky.brightness(sum.up, fine);
+        let narrow = a.dot(b).min(b.dot(c)).min(c.dot(a)) > NARROW;
+        if depth == 0 || (narrow && is_even) {
+            let factor = sum.share * lambert_edges_x8(DVec3::ZERO, normal, &corners);
+            let brings = fine.map(|fine| PI * fine * factor);
+            sum.add(brings);
+            if let Some(parts) = &mut sum.parts.0 {
+                let brings = self.sky.brightness(sum.up, brings);
+                parts.push(Part {
+                    corners,
+                    up: sum.up,
+                    brings,
+                });
+            }
+            return;
+        }
+        let ([ab, bc, ca], [u, v, w]) = (middles, halfway);
+        let [x, y, z] = radiance;
+        [
+            ([a, ab, ca], [x, u, w]),
+            ([ab, b, bc], [u, y, v]),
+            ([ca, bc, c], [w, v, z]),
+            ([ab, bc, ca], halfway),
+        ]
+        .into_iter()
+        .for_each(|(part, radiance)| self.triangle(normal, part, radiance, depth - 1, sum));
+    }
+
+    /// What panes leave of each part of the sky and of the ground, in the mean, by so many directions among what is free.
+    fn tinted(
+        &self,
+        by: &dyn Ways,
+        to: &Receiver,
+        samples: usize,
+        parts: &Parts,
+    ) -> [Option<Filter>; PLACES] {
+        let (mut tints, mut all) = ([Tint::default(); PLACES], Tint::default());
+        let parts = parts.0.as_deref().unwrap_or_default();
+        let step = parts.iter().map(|p| p.brings).sum::<f64>() / samples as f64;
+        let (mut number, mut until) = (0, 0.0);
+        let turn = hash(to.seed, 0x5c4);
+        for part in parts.iter().filter(|p| p.brings > 0.0) {
+            until += part.brings;
+            while number < samples && (f64::from(number as u32) + 0.5) * step < until {
+                let [u, v, w] = triangle_weights(sequence02(number as u32, turn));
+                let [a, b, c] = part.corners;
+                let at = a * u + b * v + c * w;
+                let direction = at.normalize();
+                number += 1;
+                let end = to.point + direction * by.reach();
+                let (filter, _) = by.leave(&Segment::new(to.point, end, [NO_PLANE; 2]));
+                // Solid angle of the part, were it all as far, over how often it is chosen.
+                let angle = a.dot(b.cross(c)).abs() / at.length().powi(3);
+                let weight = to.normal.dot(direction).max(0.0) * angle / part.brings;
+                let first = if part.up { 0 } else { PARTS };
+                let radiance = self.half(part.up, direction);
+                for (tint, radiance) in tints[first..].iter_mut().zip(radiance) {
+                    tint.add(&filter, weight * radiance);
+                    all.add(&filter, weight * radiance);
+                }
+            }
+        }
+        // What is so dim that no direction was for it is taken to pass as the rest does.
+        tints.map(|tint| tint.mean().or(all.mean()))
+    }
+}
+
+/// A far triangle.
+struct Cell {
+    corners: [DVec3; 3],
+    /// Is it above the horizon?
+    up: bool,
+    /// How often it may still be cut.
+    cuts: u32,
+}
+
+/// A triangle of directions over which sky or ground is even.
+#[derive(Debug)]
+struct Part {
+    corners: [DVec3; 3],
+    /// Is it above the horizon?
+    up: bool,
+    /// How bright is what comes of it, about.
+    brings: f64,
+}
+
+/// What a point sees of sky and ground, in even parts; none where nobody asks for them.
+#[derive(Debug, Default)]
+pub(super) struct Parts(Option<Vec<Part>>);
+
+impl Parts {
+    /// Another point; are parts asked for?
+    fn of_each(&mut self, asked: bool) {
+        let mut parts = self.0.take().unwrap_or_default();
+        parts.clear();
+        self.0 = asked.then_some(parts);
+    }
+}
+
+/// Irradiance being summed: of one half, of which so much is free.
+struct Sum<'a> {
+    up: bool,
+    share: f64,
+    seen: &'a mut [f64; PLACES],
+    parts: &'a mut Parts,
+}
+
+impl Sum<'_> {
+    fn add(&mut self, brings: [f64; PARTS]) {
+        let first = if self.up { 0 } else { PARTS };
+        for (seen, brings) in self.seen[first..].iter_mut().zip(brings) {
+            *seen += brings;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gatherer::Memory;
+    use super::super::outside::Way;
+    use super::*;
+    use crate::scene::{Options, Scene};
+    use crate::solve::{Bake, Settings};
+    use std::path::Path;
+
+    /// The plain way is by rays: the same factors, and the same is left behind three kinds of panes.
+    #[test]
+    fn rays_find_the_same_sky_behind_panes() {
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/glazed.glb");
+        let settings = Settings {
+            rounds: 1,
+            ..Settings::default()
+        };
+        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
+        bake.run();
+        let [mut clipped, mut cast] = [[[0.0; 4]; 2]; 2];
+        bake.with_sight(|bake, sight| {
+            let gatherer = bake.gatherer(sight);
+            let (outside, tree) = (gatherer.sky.unwrap(), bake.tree());
+            let mut look = Memory::default().look;
+            for leaf in tree.leaves() {
+                let element = tree.element(tree.node(leaf)).unwrap();
+                let to = Receiver {
+                    point: element.at([1.0 / 3.0; 3]),
+                    normal: tree.face_normal[element.face as usize],
+                    plane: tree.face_plane[element.face as usize],
+                    leaf: Some(leaf),
+                    seed: u64::from(leaf),
+                };
+                let ways = (sight, Some(&gatherer as &dyn Ways));
+                let area = tree.node(leaf).area;
+                let seen = outside.seen(ways, &to, Way::Rays(2), &mut look);
+                add(&mut clipped, area, seen, &look.tints);
+                let seen = outside.by_rays(ways, &to, Way::Rays(2), &mut look);
+                add(&mut cast, area, seen, &look.tints);
+            }
+        });
+        for (a, b) in clipped.as_flattened().iter().zip(cast.as_flattened()) {
+            assert!(*b > 0.0 && (a - b).abs() < 0.01 * b, "{clipped:?} {cast:?}");
+        }
+    }
+
+    /// Adds what is seen above and below the horizon, and what is left of it in three lanes.
+    fn add(
+        sums: &mut [[f64; 4]; 2],
+        area: f64,
+        seen: [f64; PLACES],
+        tints: &[Option<Filter>; PLACES],
+    ) {
+        for (sum, first) in sums.iter_mut().zip([0, PARTS]) {
+            for place in first..first + PARTS {
+                let share = area * seen[place];
+                sum[0] += share;
+                for (sum, lane) in sum[1..].iter_mut().zip([5, 30, 50]) {
+                    *sum += share * tints[place].map_or(1.0, |tint| f64::from(tint[lane]));
+                }
+            }
+        }
+    }
+}
