@@ -148,7 +148,7 @@ pub struct Sample {
 }
 
 /// The hierarchy of one room.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Tree {
     /// All nodes; the root is node 0; children after parents.
     pub nodes: Vec<Node>,

@@ -57,7 +57,7 @@ impl Demand<'_> {
 }
 
 /// All links of a room.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Graph {
     /// The links, in an order that depends on the input only.
     pub links: Vec<Link>,
