@@ -19,7 +19,7 @@ use crate::link::LinkRows;
 use crate::scene::Scene;
 use crate::solve::conjugate::Convergence;
 use crate::solve::two_grid::TwoGrid;
-use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, Settings, flux, punctual};
+use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, NOBODY, Settings, flux, punctual};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
@@ -416,7 +416,7 @@ impl Relighter {
         let shadowed = punctual::Shadowed { by_leaf, rays: 0 };
         bake.refinement.frozen = Some((shadowed, bake.refinement.balance.factor.clone()));
         let before = bake.solution.lanes.clone();
-        bake.choose_lanes();
+        bake.choose_lanes().expect(NOBODY);
         bake.refinement.frozen = None;
         if !bake.solution.lanes.same_meaning(&before) {
             self.start = None;

@@ -12,7 +12,7 @@
 
 use super::outlook::Outlook;
 use super::sources::Sources;
-use super::{Bake, Representation, direct};
+use super::{Bake, NOBODY, Representation, direct};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::{self, Lanes};
@@ -226,7 +226,7 @@ impl Bake {
         }
         self.solution.lanes = match self.room.settings.representation {
             Representation::Rgb | Representation::Characteristic(_) if lanes.is_empty() => {
-                self.chosen_lanes()
+                self.chosen_lanes().expect(NOBODY)
             }
             _ if lanes.is_empty() => return Err(Broken::new("has no lanes")),
             _ => self.guided(Lanes::with(

@@ -15,6 +15,7 @@ use crate::spectrum::{
     CmfTree, Control, Estimate, LEAVES, Leaves, List, Metric, Partition, Path, Tree, control,
     represent,
 };
+use crate::team::Interrupted;
 
 /// The paper's error limits leave its light sources (Table 1) this colour difference, CIELUV: mean of .26, .33 and .27.
 const PAPER_DE_LUV: f64 = 0.29;
@@ -27,8 +28,8 @@ const BOUNDED_PATCHES: usize = 48;
 
 impl Bake {
     /// Chooses the lanes of the rounds to come.
-    pub(crate) fn choose_lanes(&mut self) {
-        let lanes = self.chosen_lanes();
+    pub(crate) fn choose_lanes(&mut self) -> Result<(), Interrupted> {
+        let lanes = self.chosen_lanes()?;
         if !lanes.same_meaning(&self.solution.lanes) {
             // The lanes of an earlier round mean something else: the next solve starts afresh.
             self.solution.light.reflected = Rows::default();
@@ -42,16 +43,17 @@ impl Bake {
         self.solution.lanes = lanes;
         self.solution.light.apart = self.solution.lanes.excites().is_some();
         self.solution.filters = Filters::new(&self.room.scene, &self.solution.lanes);
+        Ok(())
     }
 
-    pub(super) fn chosen_lanes(&mut self) -> Lanes {
+    pub(super) fn chosen_lanes(&mut self) -> Result<Lanes, Interrupted> {
         self.solution.spectrum_error = None;
         let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);
         let none = spectra.is_empty() || self.refinement.tree.nodes.is_empty();
         let share = SPECTRUM_SHARE * self.room.settings.error;
         let tolerance = self.room.settings.spectrum.unwrap_or(share);
         let guide = guide(&self.room.scene, weights);
-        match self.room.settings.representation {
+        Ok(match self.room.settings.representation {
             // What excites lies where these ways are blind, or mixes their lanes.
             Representation::Rgb
             | Representation::Paper
@@ -83,9 +85,9 @@ impl Bake {
                 let basis = basis(&lights, &paints(&self.room.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
-            Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance),
+            Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance)?,
             Representation::Guaranteed if !none => {
-                let model = self.model(BOUNDED_PATCHES);
+                let model = self.model(BOUNDED_PATCHES)?;
                 let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);
                 let choice =
                     model.choose_bounded(spectra, weights, self.solution.light.white, tolerance);
@@ -97,12 +99,16 @@ impl Bake {
                 self.solution.spectrum_error = Some(0.0);
                 Lanes::dense(spectra, weights)
             }
-        }
+        })
     }
 
     /// The ratio to each light on as few intervals as the model of the room asks for.
-    fn perceptual(&mut self, guide: Option<&[Leaves; 3]>, tolerance: f64) -> Lanes {
-        let mut model = self.model(coarse::PATCHES);
+    fn perceptual(
+        &mut self,
+        guide: Option<&[Leaves; 3]>,
+        tolerance: f64,
+    ) -> Result<Lanes, Interrupted> {
+        let mut model = self.model(coarse::PATCHES)?;
         let kin = Kin::of(&self.room.scene);
         model.join(&kin.of, kin.spectra.len());
         let (spectra, weights) = (&kin.spectra, &self.room.weights);
@@ -120,6 +126,7 @@ impl Bake {
         // What lies behind a pane has light of its own spectra: lanes serve all of them.
         let plain = (model.emission.clone(), model.punctual.clone());
         for filter in tints(&self.room.scene) {
+            self.room.interrupt.check()?;
             (model.emission, model.punctual) = plain.clone();
             model.behind(&filter);
             let other = choose(&model);
@@ -132,11 +139,8 @@ impl Bake {
         // Without light there is no white to see an error by.
         self.solution.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
         let cuts: Vec<Partition> = kin.of.iter().map(|&k| choice.cuts[k]).collect();
-        self.guided(Lanes::ratio(
-            &self.room.scene.spectra,
-            &cuts,
-            &self.room.weights,
-        ))
+        let lanes = Lanes::ratio(&self.room.scene.spectra, &cuts, &self.room.weights);
+        Ok(self.guided(lanes))
     }
 
     /// Lanes that light counts in for what it excites, too, where surfaces fluoresce.
@@ -151,7 +155,7 @@ impl Bake {
     }
 
     /// The model of the room on its present links.
-    fn model(&mut self, patches: usize) -> coarse::Coarse {
+    fn model(&mut self, patches: usize) -> Result<coarse::Coarse, Interrupted> {
         let (room, refinement) = (&self.room, &mut self.refinement);
         let leaves = refinement.leaves();
         let (shadowed, factor) = match refinement.frozen.take() {
@@ -166,17 +170,17 @@ impl Bake {
                         &room.scene,
                         &room.mesh,
                         room.outside.as_ref(),
-                        room.team,
+                        (room.team, &room.interrupt),
                     )
-                });
-                refinement.look_out(room);
+                })?;
+                refinement.look_out(room)?;
                 let balance = refinement.balanced(&refinement.link_rows());
                 (shadowed, balance.factor)
             }
         };
         let painter = room.painter();
         let dense = DenseSources::new(&painter, &refinement.tree, &shadowed, &leaves);
-        coarse::Coarse::new(
+        Ok(coarse::Coarse::new(
             &refinement.tree,
             &refinement.graph.links,
             &factor,
@@ -185,7 +189,7 @@ impl Bake {
             &dense,
             room.scene.spectra.len(),
             patches,
-        )
+        ))
     }
 }
 

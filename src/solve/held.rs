@@ -4,7 +4,7 @@
 //! light gathered at the same points of the same leaves.
 
 use super::direct::Direct;
-use super::{Bake, Representation};
+use super::{Bake, NOBODY, Representation};
 use crate::link::Demand;
 use std::time::Instant;
 
@@ -35,7 +35,7 @@ impl Bake {
         (self.room.settings.representation, self.room.settings.error) = (representation, error);
         // Nothing is kept of the lanes before: what was good enough for another error would be taken again.
         self.solution.lanes = self.room.dense_lanes();
-        self.choose_lanes();
+        self.choose_lanes().expect(NOBODY);
         let chosen = started.elapsed();
         self.refinement.direct = Direct::default();
         self.gather_direct(&Demand {
@@ -45,11 +45,12 @@ impl Bake {
             threshold,
             least_area: f64::INFINITY,
             hidden: true,
-        });
+        })
+        .expect(NOBODY);
         let started = Instant::now();
         let leaves = self.refinement.leaves();
         let rows = self.refinement.link_rows();
-        self.refinement.look_out(&self.room);
+        self.refinement.look_out(&self.room).expect(NOBODY);
         self.refinement.balance = self.refinement.balanced(&rows);
         self.room.settings.error = CONVERGED;
         let (convergence, _) = self.solve(&rows, &leaves);

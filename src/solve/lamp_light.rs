@@ -10,6 +10,7 @@ use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::{Neighbours, Rows, padded, weighed};
 use crate::link::{Demand, Sight};
+use crate::team::Interrupted;
 use crate::transport::{Gatherer, Memory, Receiver};
 use glam::Vec3;
 
@@ -106,14 +107,14 @@ impl Look for Looker<'_> {
 
 impl Bake {
     /// Gathers direct light on all leaves, splitting those that it varies over.
-    pub(super) fn gather_direct(&mut self, demand: &Demand) {
+    pub(super) fn gather_direct(&mut self, demand: &Demand) -> Result<(), Interrupted> {
         match padded(self.solution.lanes.len()) {
             4 => self.place_emission::<4>(),
             8 => self.place_emission::<8>(),
             16 => self.place_emission::<16>(),
             32 => self.place_emission::<32>(),
             _ => self.place_emission::<64>(),
-        }
+        }?;
         let (room, solution) = (&self.room, &mut self.solution);
         solution.light_lamps(room);
         solution.light.bright_lamps = solution.bright_lamps();
@@ -132,17 +133,18 @@ impl Bake {
                 weights: solution.bright_weights(),
             };
             let coarsest = DIRECT_SHARE * room.settings.error;
-            direct.refine(tree, demand, coarsest, &look, room.team);
-        });
+            let spread = (room.team, &room.interrupt);
+            direct.refine(tree, demand, coarsest, &look, spread)
+        })
     }
 
     /// Puts emission and links in place for a gather.
-    fn place_emission<const L: usize>(&mut self) {
+    fn place_emission<const L: usize>(&mut self) -> Result<(), Interrupted> {
         let (room, refinement, solution) = (&self.room, &mut self.refinement, &mut self.solution);
         let leaves = refinement.leaves();
         let painter = room.painter();
         let sources = painter.paint(&refinement.tree, &leaves, &solution.lanes);
-        refinement.look_out(room);
+        refinement.look_out(room)?;
         let nodes = refinement.tree.nodes.len();
         let light = &mut solution.light;
         light.emitted = refinement.on_nodes::<L>(&sources.emission, &leaves);
@@ -150,5 +152,6 @@ impl Bake {
         light.half_size = room.mesh.half_size;
         solution.previous = std::mem::replace(&mut light.reflected, Rows::zero(nodes, L));
         light.measure(&refinement.tree, &solution.lanes);
+        Ok(())
     }
 }

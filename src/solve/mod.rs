@@ -56,7 +56,7 @@ use crate::light::{Light, Rows};
 use crate::link::{Demand, is_small};
 use crate::scene::effects::Plan;
 use crate::scene::{PunctualLight, Scene};
-use crate::team::Team;
+use crate::team::{Asked, Interrupt, Interrupted, Team};
 pub use flux::Closed;
 pub use held::Held;
 pub use operator::Operator;
@@ -95,6 +95,9 @@ const SPECTRUM_SHARE: f64 = 0.2;
 /// more.
 pub(crate) const LIGHT_SHARE: f64 = 0.8;
 pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
+/// Why a step that nobody is asked about is always done.
+pub(crate) const NOBODY: &str = "nobody interrupts it";
+
 /// What a gather is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Care {
@@ -114,6 +117,8 @@ pub struct Bake {
     pub(crate) rounds: Vec<Round>,
     pub(crate) watch: Option<record::Watch>,
     pub(crate) started: Instant,
+    /// Seconds that the last step took, if it was taken back.
+    taken_back_s: Option<f64>,
 }
 
 /// What a solve starts from, by leaf.
@@ -151,11 +156,53 @@ impl Bake {
             rounds: Vec::new(),
             watch: None,
             started,
+            taken_back_s: None,
         }
     }
 
     /// One round: a finer hierarchy, its links, a solution, and what is known of its error.
     pub fn step(&mut self) -> &Round {
+        let record = self.round().expect(NOBODY);
+        self.taken_back_s = None;
+        self.rounds.push(record);
+        &self.rounds[self.rounds.len() - 1]
+    }
+
+    /// The same, unless it is `asked` for an end before the round is done: then the bake is what it was before, and there is no
+    /// round. The first round is always done, so that there is light; and so is every round of a bake by several ranks, each of
+    /// which would have to be asked at the very same place.
+    ///
+    /// What a round works on is kept as it was: in a restaurant of ... that takes so much memory.
+    pub fn step_unless(&mut self, asked: Asked) -> Option<&Round> {
+        if self.rounds.is_empty() || !self.room.team.is_alone() {
+            return Some(self.step());
+        }
+        let begun = Instant::now();
+        let before = (self.refinement.clone(), self.solution.clone());
+        self.room.interrupt = Interrupt::by(asked);
+        let record = self.round();
+        self.room.interrupt = Interrupt::default();
+        match record {
+            Ok(record) => {
+                self.taken_back_s = None;
+                self.rounds.push(record);
+                self.rounds.last()
+            }
+            Err(Interrupted) => {
+                (self.refinement, self.solution) = before;
+                self.taken_back_s = Some(begun.elapsed().as_secs_f64());
+                None
+            }
+        }
+    }
+
+    /// Seconds that the last step took, if it was taken back: see [`Bake::step_unless`].
+    pub fn taken_back_s(&self) -> Option<f64> {
+        self.taken_back_s
+    }
+
+    /// A round, and its record. Where it was given up, what it worked on is of no use any more.
+    fn round(&mut self) -> Result<Round, Interrupted> {
         let mut clock = record::Clock::start(self.watch.clone());
         let round = self.rounds.len();
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
@@ -173,13 +220,13 @@ impl Bake {
             least_area: LEAST_AREA * total_area,
             hidden: !by_rays,
         };
-        let refined = self.refinement.refine_links(&self.room, &demand);
+        let refined = self.refinement.refine_links(&self.room, &demand)?;
         clock.lap("links");
 
         // The first links are coarse: look again once there are more. A room of many faces is not coarse even then, and
         // new lanes would ask for all direct light anew.
         if round == 0 || (round == 1 && faces < MANY_FACES) {
-            self.choose_lanes();
+            self.choose_lanes()?;
         }
         clock.lap("spectrum");
 
@@ -190,17 +237,18 @@ impl Bake {
                 ..demand
             };
             let light = &self.solution.light;
-            escape_rays += (self.refinement).split_where_light_varies(&self.room, light, &demand);
+            escape_rays +=
+                (self.refinement).split_where_light_varies(&self.room, light, &demand)?;
         }
         let direct_rays = self.refinement.direct.rays;
         self.gather_direct(&Demand {
             threshold: threshold * shares.direct,
             ..demand
-        });
+        })?;
         clock.lap("direct");
 
         let (leaves, rows) = (self.refinement.leaves(), self.refinement.link_rows());
-        escape_rays += self.refinement.look_out(&self.room);
+        escape_rays += self.refinement.look_out(&self.room)?;
         // Rays need no balance: their rows sum to what they must as they are.
         if !by_rays {
             self.refinement.balance = self.refinement.balanced(&rows);
@@ -208,11 +256,13 @@ impl Bake {
         clock.lap("balance");
 
         let (convergence, flux) = self.solve(&rows, &leaves);
+        // A solve that was given up ends early.
+        self.room.interrupt.check()?;
         clock.lap("solve");
 
         let distance = self.distance();
         clock.lap("estimate");
-        let record = self.recorded(record::Measured {
+        Ok(self.recorded(record::Measured {
             threshold,
             refined: &refined,
             convergence: &convergence,
@@ -221,9 +271,7 @@ impl Bake {
             link_bytes: rows.bytes(),
             rays: refined.rays + escape_rays + self.refinement.direct.rays - direct_rays,
             clock: &clock,
-        });
-        self.rounds.push(record);
-        &self.rounds[round]
+        }))
     }
 
     /// How bright every node is beside the white, and how much lightness a change of irradiance makes there: from the last

@@ -8,6 +8,7 @@ use super::{operator, two_grid};
 use crate::hierarchy::Tree;
 use crate::light::{Light, Rows};
 use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Refined, balance};
+use crate::team::Interrupted;
 use rayon::prelude::*;
 
 /// Levels that a round splits leaves by where reflected light varies.
@@ -46,23 +47,28 @@ impl Refinement {
     }
 
     /// Refines the links until none exceeds the demand.
-    pub(super) fn refine_links(&mut self, room: &Room, demand: &Demand) -> Refined {
+    pub(super) fn refine_links(
+        &mut self,
+        room: &Room,
+        demand: &Demand,
+    ) -> Result<Refined, Interrupted> {
         let (tree, graph, seed) = (&mut self.tree, &mut self.graph, room.settings.seed);
-        room.with_sight(|sight| graph.refine(tree, sight, seed, demand))
+        room.with_sight(|sight| graph.refine(tree, sight, seed, demand, &room.interrupt))
     }
 
     /// Learns how new leaves look out; returns the rays cast.
-    pub(super) fn look_out(&mut self, room: &Room) -> u64 {
+    pub(super) fn look_out(&mut self, room: &Room) -> Result<u64, Interrupted> {
         let (tree, outlook, seed) = (&self.tree, &mut self.outlook, room.settings.seed);
+        let interrupt = &room.interrupt;
         let rays = room.with_sight(|sight| {
             if by_rays(sight) {
-                outlook.look(tree, sight, &room.hemisphere, seed)
+                outlook.look(tree, sight, &room.hemisphere, seed, interrupt)
             } else {
-                outlook.extend(tree, sight, room.closed, seed)
+                outlook.extend(tree, sight, room.closed, seed, interrupt)
             }
-        });
+        })?;
         self.areas = outlook.areas(tree);
-        rays
+        Ok(rays)
     }
 
     /// Splits leaves that look for themselves and see reflected light vary in the last solution, and lets the parts look; the rays
@@ -72,13 +78,13 @@ impl Refinement {
         room: &Room,
         light: &Light,
         demand: &Demand,
-    ) -> u64 {
+    ) -> Result<u64, Interrupted> {
         if !room.by_rays() {
-            return 0;
+            return Ok(0);
         }
         let mut rays = 0;
         for _ in 0..LEVELS {
-            rays += self.look_out(room);
+            rays += self.look_out(room)?;
             let known = light.bright_reflected.len();
             let nodes = self.tree.nodes.len() as u32;
             // Parts of a patch that was a leaf in the last solution are as bright as it.
@@ -113,7 +119,7 @@ impl Refinement {
                 break;
             }
         }
-        rays
+        Ok(rays)
     }
 
     /// Leaf rows on all nodes, by area.

@@ -13,7 +13,7 @@ use crate::link::{Opaque, Sight, is_small};
 use crate::scene::Scene;
 use crate::scene::effects::{Kind, Plan};
 use crate::spectrum::Leaves;
-use crate::team::Team;
+use crate::team::{Interrupt, Team};
 use crate::transport::Outside;
 use crate::transport::hemisphere::Hemisphere;
 
@@ -89,6 +89,8 @@ pub(crate) struct Room {
     pub(crate) keep: bool,
     /// The ranks that bake this room together.
     pub(crate) team: Team,
+    /// What ends a round before it is done.
+    pub(crate) interrupt: Interrupt,
 }
 
 /// What rays have told of a room before the first round.
@@ -153,6 +155,7 @@ impl Room {
             probes: Probes::new(&tree, settings.seed),
             keep: false,
             team: Team::default(),
+            interrupt: Interrupt::default(),
             scene,
             settings,
             plan,

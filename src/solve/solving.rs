@@ -271,6 +271,7 @@ impl Bake {
             areas: areas.collect(),
             power: power.into_iter().map(f64::from).collect(),
             tolerance: lit.tolerance,
+            interrupt: &self.room.interrupt,
         };
         let receive = |radiosity: &Rows| self.received::<L>(lit, rows, radiosity);
         let by_rays = self.room.by_rays();
@@ -315,6 +316,7 @@ impl Bake {
             two_grid: (self.refinement.two_grid.as_ref())
                 .filter(|_| seen_only)
                 .map(|grid| (grid, self.solution.lanes.xyz())),
+            interrupt: &self.room.interrupt,
         }
     }
 
@@ -384,6 +386,7 @@ impl Bake {
             ),
             reflectance: &lit.reflection.rows,
             greatest: &lit.reflection.greatest,
+            interrupt: &self.room.interrupt,
         };
         if lit.reflection.sheets.is_some() {
             let receive = |radiosity: &Rows| system.operator.received::<L>(radiosity);
@@ -398,7 +401,7 @@ impl Bake {
 
     /// The same room where light passes sheets.
     fn through_sheets<'a>(
-        &self,
+        &'a self,
         lit: &'a Lit,
         receive: &'a dyn Fn(&Rows) -> Rows,
     ) -> sheets::System<'a> {
@@ -410,6 +413,7 @@ impl Bake {
             reflection: lit.reflection,
             areas: areas.collect(),
             receive,
+            interrupt: &self.room.interrupt,
         }
     }
 
@@ -450,6 +454,9 @@ impl Bake {
             *reflected = reflection.of::<L>(&all);
             if let Some((glow, given)) = &mut glow {
                 **given = glow.of::<L>(&all);
+            }
+            if self.room.interrupt.is_raised() {
+                break;
             }
         }
         (irradiance, ratio)
