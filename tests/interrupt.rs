@@ -107,7 +107,7 @@ fn by_links() {
 
 #[test]
 fn by_rays() {
-    given_up("furnished.glb", 1000);
+    given_up("furnished.glb", 300);
 }
 
 #[test]

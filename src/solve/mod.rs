@@ -3,6 +3,7 @@
 //! [`Bake::step`] is the loop on one screen; everything it calls stands in a file of its own.
 
 mod aggregates;
+mod before;
 mod bounded;
 mod checkpoint;
 mod choice;
@@ -171,14 +172,12 @@ impl Bake {
     /// The same, unless it is `asked` for an end before the round is done: then the bake is what it was before, and there is no
     /// round. The first round is always done, so that there is light; and so is every round of a bake by several ranks, each of
     /// which would have to be asked at the very same place.
-    ///
-    /// What a round works on is kept as it was: in a restaurant of ... that takes so much memory.
     pub fn step_unless(&mut self, asked: Asked) -> Option<&Round> {
         if self.rounds.is_empty() || !self.room.team.is_alone() {
             return Some(self.step());
         }
         let begun = Instant::now();
-        let before = (self.refinement.clone(), self.solution.clone());
+        let before = self.before();
         self.room.interrupt = Interrupt::by(asked);
         let record = self.round();
         self.room.interrupt = Interrupt::default();
@@ -189,7 +188,7 @@ impl Bake {
                 self.rounds.last()
             }
             Err(Interrupted) => {
-                (self.refinement, self.solution) = before;
+                self.take_back(before);
                 self.taken_back_s = Some(begun.elapsed().as_secs_f64());
                 None
             }
@@ -258,6 +257,7 @@ impl Bake {
         let (convergence, flux) = self.solve(&rows, &leaves);
         // A solve that was given up ends early.
         self.room.interrupt.check()?;
+        self.solution.previous = Rows::default();
         clock.lap("solve");
 
         let distance = self.distance();

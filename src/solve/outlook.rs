@@ -63,6 +63,14 @@ pub(crate) struct Outlook {
     met: Vec<u32>,
 }
 
+/// How much was known of how leaves look out: nodes, rays, and of these what goes by mirrors and how many filters they pass.
+pub(super) struct Grown {
+    nodes: usize,
+    ends: usize,
+    lamps: usize,
+    filters: usize,
+}
+
 impl Outlook {
     /// Looks out of new leaves. A leaf below one of which very many rays all met fronts is not looked at again. Returns
     /// the rays cast.
@@ -211,6 +219,36 @@ impl Outlook {
             if end.entry != NONE && !(k < known && stands(*met)) {
                 *met = leaf_at(end);
             }
+        });
+    }
+
+    /// How much there is, for [`Outlook::shrink`].
+    pub(super) fn grown(&self) -> Grown {
+        Grown {
+            nodes: self.target.len(),
+            ends: self.ends.len(),
+            lamps: self.lamps.len(),
+            filters: self.tints.filters(),
+        }
+    }
+
+    /// Forgets what was looked at since; `tree` is the hierarchy as it was refined since, too.
+    pub(super) fn shrink(&mut self, tree: &Tree, to: &Grown) {
+        self.target.truncate(to.nodes);
+        self.bare.truncate(to.nodes);
+        self.certain.truncate(to.nodes);
+        self.range.truncate(to.nodes);
+        self.ends.truncate(to.ends);
+        self.lamps.truncate(to.lamps);
+        self.tints.shrink(to.ends, to.filters);
+        self.met.truncate(to.ends);
+        let met = self.met.par_iter_mut().filter(|met| **met != NONE);
+        met.for_each(|met| {
+            let mut leaf = *met & !ALONE;
+            while leaf as usize >= to.nodes {
+                leaf = tree.node(leaf).parent;
+            }
+            *met = leaf | *met & ALONE;
         });
     }
 

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 const LEVELS: usize = 4;
 
 /// A room divided as finely as the rounds so far asked for.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(crate) struct Refinement {
     pub(crate) tree: Tree,
     pub(crate) graph: Graph,

@@ -18,7 +18,6 @@ pub(crate) const DE_PER_PERCENT: f64 = 0.35;
 pub(crate) type Traces = Vec<Option<Box<[u8]>>>;
 
 /// The light of the last round.
-#[derive(Clone)]
 pub(crate) struct Solution {
     pub(crate) lanes: Lanes,
     /// Colour difference (CIELUV) that the lanes cause, as far as it is known.

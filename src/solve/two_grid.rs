@@ -26,7 +26,6 @@ const BLOCK: usize = 16;
 const DARK: f64 = 0.05;
 
 /// The cut, and who sees whom on it.
-#[derive(Clone)]
 pub(crate) struct TwoGrid {
     /// Patch of each leaf, by leaf.
     patch: Vec<u32>,
