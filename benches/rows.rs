@@ -14,6 +14,7 @@ use haarlight::light::Rows;
 use haarlight::link::{Demand, Graph, Link, LinkRows, Sight, Way};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Operator, Settings};
+use haarlight::team::NEVER;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -142,7 +143,9 @@ fn room(leaves: usize) -> (Tree, Vec<Link>) {
             least_area: 0.0,
             hidden: true,
         };
-        graph.refine(&mut tree, &sight, 0, &demand);
+        graph
+            .refine(&mut tree, &sight, 0, &demand, &NEVER)
+            .expect("nobody interrupts it");
         threshold *= 0.7;
     }
     (tree, graph.links)

@@ -159,14 +159,16 @@ impl Order<'_> {
 
     /// Rounds until it is enough.
     pub(super) fn rounds(self, bake: &mut Bake, kept: &mut Kept) -> Result<Verdict> {
-        self.stop.run(bake, self.talk, |bake, round| {
+        let verdict = self.stop.run(bake, self.talk, |bake, round| {
             kept.seconds.solve += round.round_s;
             kept.note(bake, round)?;
             if let Some(path) = &self.args.checkpoint {
                 bake.save(path)?;
             }
             self.pictures(bake, round, kept)
-        })
+        })?;
+        kept.seconds.solve += bake.taken_back_s().unwrap_or(0.0);
+        Ok(verdict)
     }
 
     /// Pictures of a round, as long as they take little of the time.

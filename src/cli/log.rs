@@ -234,7 +234,7 @@ pub struct Seconds {
     pub load: f64,
     /// Cameras, hierarchy and ray index.
     pub prepare: f64,
-    /// Rounds.
+    /// Rounds, with one that was taken back.
     pub solve: f64,
     /// Gather at the vertices of the output.
     pub gather: f64,
@@ -260,6 +260,8 @@ pub struct VerdictRecord {
     pub exit_code: u8,
     /// Rounds done.
     pub rounds: usize,
+    /// Seconds of a further round that was not done when the bake had to end, and was taken back; none if there was none.
+    pub taken_back_s: Option<f64>,
     /// Mean CIEDE2000 asked for.
     pub asked_de2000: f64,
     /// Error of the file, CIEDE2000: light at points and straight lines between vertices, whose squares add.
@@ -346,6 +348,7 @@ impl VerdictRecord {
             verdict: end.verdict,
             exit_code: exit_code(end.verdict),
             rounds: rounds.len(),
+            taken_back_s: end.bake.taken_back_s(),
             asked_de2000: end.bake.settings().error,
             error_de2000: Figure::estimate(end.bake.error_of(end.baked)),
             light_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),

@@ -1,8 +1,9 @@
 //! When to stop early: Ctrl-C, and the time given.
 //!
-//! The first Ctrl-C asks for an end after the current round, with everything written; the second ends the program at
-//! once with code 130 (128 + SIGINT), which may leave hidden temporary files. The gather that follows the rounds ends in
-//! time as well: what it did not come to shows the solved light as it is.
+//! The first Ctrl-C asks for an end with everything written: a round that is not done is taken back, save the first, without
+//! which there is no light. The second ends the program at once with code 130 (128 + SIGINT), which may leave hidden temporary
+//! files. Where time runs out in a round that was expected to fit, it is taken back as well. The gather that follows the rounds
+//! ends in time, too: what it did not come to shows the solved light as it is. Several ranks end after the round that they are in.
 
 use super::talk::{Talk, tell};
 use crate::error::{Error, Result};
@@ -17,6 +18,9 @@ pub(super) const KILLED: i32 = 130;
 
 /// Share of the time given after which no round may end: the gather takes as long as the rounds, as a rule.
 const ROUNDS: f64 = 0.45;
+/// Share of the time given at which a round that took longer than was expected is taken back: the gather can do with what is left,
+/// and a round that is all but done is worth more than the light between vertices.
+const ROUND_ENDS: f64 = 0.6;
 /// Share of the time given by which the gather ends: measuring what came of it and writing take the rest.
 const GATHER: f64 = 0.85;
 /// After Ctrl-C the gather may take so many seconds or this share of the time before, whichever is more.
@@ -62,13 +66,13 @@ impl Stop {
             }
             stop.interrupt();
             if stop.team.is_first() {
-                tell("\nending after this round; Ctrl-C again ends at once");
+                tell("\nending with what is solved; Ctrl-C again ends at once");
             }
         })
         .map_err(|problem| Error::Internal(format!("Ctrl-C: {problem}")))
     }
 
-    /// Asks for an end after the current round, as the first Ctrl-C does; from any thread, on any clone.
+    /// Asks for an end with the last whole round, as the first Ctrl-C does; from any thread, on any clone.
     pub fn interrupt(&self) {
         // Half a thousand million years of milliseconds fit.
         let now = self.started.elapsed().as_millis() as u64 + 1;
@@ -122,8 +126,15 @@ impl Stop {
         (self.team.first_says(late)).then_some(Verdict::OutOfTime)
     }
 
+    /// Is it time for a round to end that is not done?
+    fn ends_round(&self) -> bool {
+        let late = |time| self.elapsed_s() > ROUND_ENDS * time;
+        self.interrupted_s().is_some() || self.time.is_some_and(late)
+    }
+
     /// Steps a bake to its end; `each` is told of every round. The first round is always done, so that there is a whole
-    /// solution; a bake that was resumed has one.
+    /// solution; a bake that was resumed has one. Others are taken back where they would take too long, see
+    /// [`Bake::taken_back_s`].
     ///
     /// # Errors
     /// What `each` returns.
@@ -141,7 +152,13 @@ impl Stop {
             let left = bake.rounds().last().and_then(ahead);
             let left = left.map_or(String::new(), |left| format!(" ({left})"));
             talk.phase(&format!("round {number}{left}"));
-            let round = bake.step().clone();
+            let stop = self.clone();
+            let Some(round) = bake.step_unless(Arc::new(move || stop.ends_round())) else {
+                let seconds = bake.taken_back_s().unwrap_or(0.0);
+                talk.say(&format!("round {number}: taken back after {seconds:.1} s"));
+                return Ok(self.reason().unwrap_or(Verdict::Interrupted));
+            };
+            let round = round.clone();
             talk.say(&line(&round));
             each(bake, &round)?;
             // A reached error counts even when the time is up.

@@ -77,6 +77,12 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
             v.seconds.write
         ),
     ];
+    if let Some(seconds) = v.taken_back_s {
+        lines.push(format!(
+            "of which {seconds:.2} in round {}, which was not done in time and was taken back",
+            v.rounds + 1
+        ));
+    }
     if let Some(i) = &v.interpolation {
         lines.push(between_vertices(i));
     }

@@ -98,7 +98,7 @@ impl Bake {
         let up = up.or_else(|| across(DVec3::NEG_Z)).unwrap_or(DVec3::Y);
         let mut left_out = Vec::new();
         let background = self.background(eye, forward, &mut left_out);
-        let luminaires = self.with_sight(|_, sight| {
+        let luminaires = self.room.with_sight(|sight| {
             let eye = Eye {
                 sight,
                 at: eye - self.mesh().centre,

@@ -17,5 +17,5 @@ pub use mesh::{Face, Mesh};
 pub use mirrors::{BOUNCES, Image, Mirrors, Route};
 pub use panes::{Crossing, Glazing, Panes};
 pub use spaces::{Spaces, spaces};
-pub use tree::{Element, NONE, Node, Sample, Tree};
+pub use tree::{Element, Grown, NONE, Node, Sample, Tree};
 pub(crate) use tree::{leaf_below, stratified};

@@ -171,6 +171,14 @@ pub struct Tree {
     pub behind: Vec<u32>,
 }
 
+/// How far a hierarchy had grown: parts are only ever added behind what there was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Grown {
+    nodes: usize,
+    elements: usize,
+    behind: usize,
+}
+
 impl Tree {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
@@ -235,6 +243,27 @@ impl Tree {
             let [one, two] = [first + k as u32, other + part];
             self.behind[one as usize] = two;
             self.behind[two as usize] = one;
+        }
+    }
+
+    /// How far the hierarchy has grown, for [`Tree::shrink`].
+    pub fn grown(&self) -> Grown {
+        Grown {
+            nodes: self.nodes.len(),
+            elements: self.elements.len(),
+            behind: self.behind.len(),
+        }
+    }
+
+    /// Takes back every split since.
+    pub fn shrink(&mut self, to: &Grown) {
+        self.nodes.truncate(to.nodes);
+        self.elements.truncate(to.elements);
+        self.behind.truncate(to.behind);
+        for node in &mut self.nodes {
+            if node.child != NONE && node.child as usize >= to.nodes {
+                (node.child, node.children) = (NONE, 0);
+            }
         }
     }
 

@@ -15,11 +15,11 @@ use crate::error::{Error, Result};
 use crate::gather::Baked;
 use crate::light::lanes::Lanes;
 use crate::light::{Light, Rows, padded};
-use crate::link::{LinkRows, balance};
+use crate::link::LinkRows;
 use crate::scene::Scene;
 use crate::solve::conjugate::Convergence;
 use crate::solve::two_grid::TwoGrid;
-use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, Settings, flux, punctual};
+use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, NOBODY, Settings, flux, punctual};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
@@ -99,12 +99,12 @@ pub struct RelitRecord {
 impl Bake {
     /// Keeps where light comes from, for [`Bake::write_cache`]. To be called before the first round.
     pub fn keep(&mut self) {
-        self.keep = true;
+        self.room.keep = true;
     }
 
     /// Is it kept where light comes from?
     pub fn keeps(&self) -> bool {
-        self.keep
+        self.room.keep
     }
 
     /// Writes what relighting needs beside the baked mesh; the size in bytes.
@@ -113,10 +113,10 @@ impl Bake {
     /// The room is dark; the cache would be larger than `limit` bytes; the file cannot be written; a bake that did not [`Bake::keep`].
     pub fn write_cache(&self, baked: &Baked, path: &Path, limit: u64) -> Result<u64> {
         self.can_be_kept("--cache")?;
-        if !self.keep || baked.kept.len() != baked.surfaces.len() {
+        if !self.room.keep || baked.kept.len() != baked.surfaces.len() {
             return Err(Error::Internal("a bake that kept nothing".into()));
         }
-        if self.light.white == [0.0; 3] {
+        if self.solution.light.white == [0.0; 3] {
             return Err(Error::input(
                 path.display().to_string(),
                 "a room without light has nothing to keep: no patch is worth looking at",
@@ -135,29 +135,30 @@ impl Bake {
                 "raise --cache-limit, or ask for a larger --error",
             ));
         }
-        let guess = flux::guess(&self.scene, &self.mesh, &self.tree, &self.weights).white;
+        let guess = self.room.guess(&self.refinement.tree).white;
         let distance = self
             .watched_distance()
             .map_err(|Broken(what)| Error::Internal(what))?;
         // Where leaves look for themselves, only the choice of lanes needs a balance.
-        let factor = if self.balance.factor.is_empty() {
-            let links = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
-            balance(&self.tree, &links, &self.areas, &self.outlook.target).factor
+        let factor = if self.refinement.balance.factor.is_empty() {
+            self.refinement
+                .balanced(&self.refinement.link_rows())
+                .factor
         } else {
-            self.balance.factor.clone()
+            self.refinement.balance.factor.clone()
         };
-        let settings = serde_json::to_string(&self.settings)
+        let settings = serde_json::to_string(&self.room.settings)
             .map_err(|problem| Error::Internal(format!("settings: {problem}")))?;
         container::write(path, Kind::Cache, |out| {
-            Fingerprint::shape(&self.scene).encode(out)?;
-            Fingerprint::paint(&self.scene).encode(out)?;
+            Fingerprint::shape(&self.room.scene).encode(out)?;
+            Fingerprint::paint(&self.room.scene).encode(out)?;
             out.put_text(&settings)?;
-            out.put_all(&self.spaces)?;
-            out.put_all(&self.parted)?;
-            out.put([self.closed, self.sealed].map(|c| u8::from(c == Closed::Yes)))?;
+            out.put_all(&self.room.spaces)?;
+            out.put_all(&self.room.parted)?;
+            out.put([self.room.closed, self.room.sealed].map(|c| u8::from(c == Closed::Yes)))?;
             out.put(guess)?;
             out.put(distance.unwrap_or(0.0))?;
-            out.put_all(&lit(&self.scene))?;
+            out.put_all(&lit(&self.room.scene))?;
             self.encode_state(false, &factor, out)?;
             out.put(baked.surfaces.len() as u64)?;
             for (surface, kept) in baked.surfaces.iter().zip(&baked.kept) {
@@ -172,31 +173,34 @@ impl Bake {
     fn watched_distance(&self) -> Read<Option<f64>> {
         let seen = |round: &[Option<Box<[u8]>>]| -> Read<Vec<[f64; 3]>> {
             let rows = round.iter().map(|packed| self.replayed(packed.as_deref()));
-            rows.map(|row| Ok(self.lanes.tristimulus(&row?))).collect()
+            rows.map(|row| Ok(self.solution.lanes.tristimulus(&row?)))
+                .collect()
         };
-        let [before, last] = &self.watched;
+        let [before, last] = &self.solution.watched;
         if before.is_empty() || before.len() != last.len() {
             return Ok(None);
         }
         let (a, b) = (seen(before)?, seen(last)?);
         // Equal light is no difference, also in the dark, where there is no white.
         let pairs = a.iter().zip(&b).filter(|(a, b)| a != b);
-        let sum: f64 = pairs.map(|(a, b)| de2000(*a, *b, self.light.white)).sum();
+        let sum: f64 = pairs
+            .map(|(a, b)| de2000(*a, *b, self.solution.light.white))
+            .sum();
         Ok(Some(sum / a.len() as f64))
     }
 
     /// About how many bytes a cache takes.
     pub fn cache_bytes(&self, baked: &Baked) -> u64 {
-        let leaves = &self.light.leaves;
+        let leaves = &self.solution.light.leaves;
         let of_leaves: usize = leaves
             .iter()
-            .map(|&leaf| self.direct.trace(leaf).map_or(0, <[u8]>::len))
+            .map(|&leaf| self.refinement.direct.trace(leaf).map_or(0, <[u8]>::len))
             .sum();
         let vertices: usize = baked.kept.iter().map(Vec::len).sum();
         let of_vertices: usize = (baked.kept.iter().flatten())
             .map(|v| v.trace.as_ref().map_or(0, |t| t.len()))
             .sum();
-        let rows = leaves.len() * (4 * self.light.width() + 8);
+        let rows = leaves.len() * (4 * self.solution.light.width() + 8);
         (of_leaves
             + of_vertices
             + 32 * vertices
@@ -206,11 +210,11 @@ impl Bake {
                 .map(|s| s.triangles.len())
                 .sum::<usize>()
             + rows
-            + 12 * self.tree.nodes.len()
-            + self.outlook.bytes()
-            + 22 * self.graph.links.len()
-            + 4 * self.graph.blockers.len()
-            + 4 * self.spaces.len()) as u64
+            + 12 * self.refinement.tree.nodes.len()
+            + self.refinement.outlook.bytes()
+            + 22 * self.refinement.graph.links.len()
+            + 4 * self.refinement.graph.blockers.len()
+            + 4 * self.room.spaces.len()) as u64
     }
 }
 
@@ -235,7 +239,7 @@ impl Relighter {
         })?;
         let place = cache.display().to_string();
         let opened = opened.map_err(|what| refused(&place, &what.unwrap_or_default()))?;
-        match opened.kindled(&opened.bake.scene) {
+        match opened.kindled(&opened.bake.room.scene) {
             None => Ok(opened),
             Some(what) => Err(refused(&place, &what)),
         }
@@ -263,16 +267,16 @@ impl Relighter {
             closed,
         };
         let mut bake = Bake::with(scene, settings, Some(known));
-        bake.keep = true;
+        bake.room.keep = true;
         let guess: [f64; 3] = from.get()?;
         let distance: f64 = from.get()?;
-        let lit = from.get_exactly(bake.scene.surfaces.len())?;
+        let lit = from.get_exactly(bake.room.scene.surfaces.len())?;
         let (reflected, leaves) = bake.decode_state(false, from)?;
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
-            kept.push(Kept::decode(&bake.mesh, from)?);
+            kept.push(Kept::decode(&bake.room.mesh, from)?);
         }
-        let white = bake.light.white;
+        let white = bake.solution.light.white;
         Ok(Self {
             guess: over(white, guess, [1.0; 3]),
             geometry: (bake.rounds.last())
@@ -306,14 +310,14 @@ impl Relighter {
         if let Some(what) = changed.or_else(|| self.kindled(&scene)) {
             return Err(refused(&scene.source.path.display().to_string(), &what));
         }
-        self.bake.scene = scene;
-        self.bake.plan = crate::scene::effects::Plan::of(&self.bake.scene);
+        self.bake.room.scene = scene;
+        self.bake.room.plan = crate::scene::effects::Plan::of(&self.bake.room.scene);
         Ok(())
     }
 
     /// Makes what a first change would have to wait for: the table of colours as spectra, 45 ms.
     pub fn prepare(&self) {
-        self.bake.upsampler.table();
+        self.bake.room.upsampler.table();
     }
 
     /// Light for the lamps and paints that the room has now.
@@ -321,7 +325,7 @@ impl Relighter {
     /// # Errors
     /// The cache is damaged in a way that its checksum does not show.
     pub fn relight(&mut self) -> Result<Relit> {
-        self.relit_within(self.bake.tolerance())
+        self.relit_within(self.bake.room.tolerance())
     }
 
     /// The same as a first answer, with what takes a solve longest left out; [`Relighter::relight`] goes on from there.
@@ -329,7 +333,7 @@ impl Relighter {
     /// # Errors
     /// As [`Relighter::relight`].
     pub fn relight_roughly(&mut self) -> Result<Relit> {
-        self.relit_within(self.bake.tolerance().max(ROUGH))
+        self.relit_within(self.bake.room.tolerance().max(ROUGH))
     }
 
     fn relit_within(&mut self, tolerance: f64) -> Result<Relit> {
@@ -339,7 +343,7 @@ impl Relighter {
 
     fn relit(&mut self, tolerance: f64) -> Read<Relit> {
         let clock = Instant::now();
-        let paint = Fingerprint::paint(&self.bake.scene);
+        let paint = Fingerprint::paint(&self.bake.room.scene);
         let other = paint.change(&self.paint).is_some();
         let changed = other || self.rough;
         if other {
@@ -351,7 +355,8 @@ impl Relighter {
             self.bake.light_up(&reflected);
         }
         let lanes_s = clock.elapsed().as_secs_f64();
-        let (convergence, flux, [direct_s, solve_s]) = match padded(self.bake.lanes.len()) {
+        let (convergence, flux, [direct_s, solve_s]) = match padded(self.bake.solution.lanes.len())
+        {
             // The light is there already.
             _ if !changed => (self.solved, self.flux, [0.0; 2]),
             4 => self.solve::<4>(tolerance)?,
@@ -361,7 +366,7 @@ impl Relighter {
             _ => self.solve::<64>(tolerance)?,
         };
         (self.solved, self.flux) = (convergence, flux);
-        self.rough = changed && tolerance > self.bake.tolerance();
+        self.rough = changed && tolerance > self.bake.room.tolerance();
         let clock = Instant::now();
         let baked = self.bake.relit(&self.kept)?;
         let bake = &self.bake;
@@ -369,13 +374,14 @@ impl Relighter {
         let error = self.geometry.zip(distance).map(|(share, distance)| {
             let geometry = share * distance;
             let solve = convergence.bound * 100.0 * DE_PER_PERCENT;
-            (geometry.powi(2) + bake.spectrum_error.unwrap_or(0.0).powi(2) + solve.powi(2)).sqrt()
+            (geometry.powi(2) + bake.solution.spectrum_error.unwrap_or(0.0).powi(2) + solve.powi(2))
+                .sqrt()
         });
         Ok(Relit {
             record: RelitRecord {
                 record: "relit",
                 changed,
-                intervals_working: bake.lanes.len(),
+                intervals_working: bake.solution.lanes.len(),
                 iterations: if changed { convergence.iterations } else { 0 },
                 error_de2000: crate::solve::record::Figure::estimate(error),
                 flux,
@@ -391,10 +397,13 @@ impl Relighter {
     /// Lanes for the present lamps and paints.
     fn choose_lanes(&mut self) -> Read<()> {
         let bake = &mut self.bake;
-        let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
+        let guess = bake.room.guess(&bake.refinement.tree).white;
         let white = std::array::from_fn(|c| self.guess[c] * guess[c]);
-        bake.light.white = bake.settings.white.unwrap_or(white);
-        let (nodes, lights) = (bake.tree.nodes.len(), bake.scene.lights.len());
+        bake.solution.light.white = bake.room.settings.white.unwrap_or(white);
+        let (nodes, lights) = (
+            bake.refinement.tree.nodes.len(),
+            bake.room.scene.lights.len(),
+        );
         let mut by_leaf = vec![Vec::new(); self.leaves.len()];
         if lights > 0 {
             self.leaves.for_each(&mut by_leaf, |packed, list| {
@@ -405,11 +414,11 @@ impl Relighter {
             })?;
         }
         let shadowed = punctual::Shadowed { by_leaf, rays: 0 };
-        bake.frozen = Some((shadowed, bake.balance.factor.clone()));
-        let before = bake.lanes.clone();
-        bake.choose_lanes();
-        bake.frozen = None;
-        if !bake.lanes.same_meaning(&before) {
+        bake.refinement.frozen = Some((shadowed, bake.refinement.balance.factor.clone()));
+        let before = bake.solution.lanes.clone();
+        bake.choose_lanes().expect(NOBODY);
+        bake.refinement.frozen = None;
+        if !bake.solution.lanes.same_meaning(&before) {
             self.start = None;
         }
         Ok(())
@@ -422,11 +431,11 @@ impl Relighter {
     ) -> Read<(Convergence, flux::Balance, [f64; 2])> {
         let clock = Instant::now();
         let bake = &mut self.bake;
-        let leaves = bake.light.leaves.clone();
-        bake.lamps = punctual::lamps(&bake.scene, &bake.mesh, &bake.lanes);
-        let painter = bake.painter();
-        let sources = painter.paint(&bake.tree, &leaves, &bake.lanes);
-        let mut light = std::mem::take(&mut bake.light);
+        let leaves = bake.solution.light.leaves.clone();
+        bake.solution.light_lamps(&bake.room);
+        let painter = bake.room.painter();
+        let sources = painter.paint(&bake.refinement.tree, &leaves, &bake.solution.lanes);
+        let mut light = std::mem::take(&mut bake.solution.light);
         let reflected = match self.start.take() {
             Some(rows) => rows,
             None => {
@@ -441,33 +450,38 @@ impl Relighter {
         };
         // What leaves get straight from lamps asks for nothing that is reflected.
         light.reflected = Rows::zero(0, L);
-        light.emitted = bake.on_nodes::<L>(&sources.emission, &leaves);
+        light.emitted = bake.refinement.on_nodes::<L>(&sources.emission, &leaves);
         let shines = |row: &[f32; L]| f32::from(u8::from(row.iter().any(|&x| x > 0.0)));
         light.bright_emitted = light.emitted.all::<L>().iter().map(shines).collect();
         let mut first = Rows::zero(leaves.len(), L);
         self.leaves.for_each(first.all_mut::<L>(), |packed, row| {
             if let Some(packed) = packed {
-                *row = trace::replay::<L>(packed, &light, &bake.lamps)?;
+                *row = trace::replay::<L>(packed, &light, &bake.solution.lamps)?;
             }
             Ok(())
         })?;
         let emitted = Some(std::mem::take(&mut light.emitted));
-        bake.light = light;
+        bake.solution.light = light;
         let direct_s = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
-        let looks = bake.outlook.looks();
-        if looks && bake.two_grid.is_none() {
-            let (tree, outlook) = (&bake.tree, &bake.outlook);
-            bake.two_grid = Some(TwoGrid::new(tree, outlook, &leaves, &bake.areas));
+        let looks = bake.refinement.outlook.looks();
+        if looks && bake.refinement.two_grid.is_none() {
+            let (tree, outlook) = (&bake.refinement.tree, &bake.refinement.outlook);
+            bake.refinement.two_grid =
+                Some(TwoGrid::new(tree, outlook, &leaves, &bake.refinement.areas));
         }
         // Where leaves look for themselves a solve asks for no links.
         let links = self.links.get_or_insert_with(|| {
-            let links = if looks { &[] } else { &bake.graph.links[..] };
-            LinkRows::new(bake.tree.nodes.len(), links)
+            let links = if looks {
+                &[]
+            } else {
+                &bake.refinement.graph.links[..]
+            };
+            LinkRows::new(bake.refinement.tree.nodes.len(), links)
         });
         // Nobody asks for neighbours without casting rays.
-        let graph = std::mem::take(&mut bake.graph);
+        let graph = std::mem::take(&mut bake.refinement.graph);
         let given = Given {
             sources,
             first,
@@ -475,12 +489,12 @@ impl Relighter {
             emitted,
             tolerance,
             // A sweep more, which a first answer does without.
-            counted: tolerance <= bake.tolerance(),
+            counted: tolerance <= bake.room.tolerance(),
         };
         let (convergence, flux) = bake.solve_with::<L>(links, &leaves, given);
-        bake.graph = graph;
-        let guess = flux::guess(&bake.scene, &bake.mesh, &bake.tree, &bake.weights).white;
-        self.guess = over(bake.light.white, guess, self.guess);
+        bake.refinement.graph = graph;
+        let guess = bake.room.guess(&bake.refinement.tree).white;
+        self.guess = over(bake.solution.light.white, guess, self.guess);
         Ok((convergence, flux, [direct_s, clock.elapsed().as_secs_f64()]))
     }
 
@@ -491,18 +505,18 @@ impl Relighter {
 
     /// The room as it is lit now.
     pub fn scene(&self) -> &Scene {
-        &self.bake.scene
+        &self.bake.room.scene
     }
 
     /// What the lanes of the present light stand for.
     pub fn lanes(&self) -> &Lanes {
-        &self.bake.lanes
+        &self.bake.solution.lanes
     }
 
     /// The present light on the patches, from the first [`Relighter::relight`] on. Of a room that was not changed since its
     /// bake it tells no irradiance.
     pub fn light(&self) -> &Light {
-        &self.bake.light
+        &self.bake.solution.light
     }
 
     /// Radiosity on the 64 leaves at every vertex of a relit mesh, see [`Bake::radiosity_spectra`].

@@ -8,6 +8,7 @@
 use super::visibility::View;
 use super::{Link, Room, Scratch, Sight, Way, evaluate, facing};
 use crate::hierarchy::{NONE, Node, Tree};
+use crate::team::{Interrupt, Interrupted};
 use rayon::prelude::*;
 
 /// Deepest quartering of a face: side lengths shrink to 1/4096.
@@ -57,7 +58,7 @@ impl Demand<'_> {
 }
 
 /// All links of a room.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Graph {
     /// The links, in an order that depends on the input only.
     pub links: Vec<Link>,
@@ -88,13 +89,17 @@ impl Graph {
     }
 
     /// Refines until no link exceeds the demand; the first call also makes the first links.
+    ///
+    /// # Errors
+    /// It was given up: the links are of no use any more.
     pub fn refine(
         &mut self,
         tree: &mut Tree,
         sight: &Sight,
         seed: u64,
         demand: &Demand,
-    ) -> Refined {
+        interrupt: &Interrupt,
+    ) -> Result<Refined, Interrupted> {
         let mut done = Refined::default();
         let mut open = Vec::new();
         if self.links.is_empty() {
@@ -103,18 +108,19 @@ impl Graph {
                 .map(|(a, b)| (a, b, 0))
                 .collect();
             let room = Room { tree, sight, seed };
-            let fresh = evaluate_all(&room, &pairs, &[View::Crowded], &mut done);
+            let fresh = evaluate_all(&room, &pairs, &[View::Crowded], interrupt, &mut done)?;
             self.sort_out(tree, demand, fresh, &mut open, &mut done);
         } else {
             open = self.open(tree, demand, &mut done);
         }
         while !open.is_empty() {
             let (pairs, views) = split(tree, demand, open);
-            let fresh = evaluate_all(&Room { tree, sight, seed }, &pairs, &views, &mut done);
+            let room = Room { tree, sight, seed };
+            let fresh = evaluate_all(&room, &pairs, &views, interrupt, &mut done)?;
             open = Vec::new();
             self.sort_out(tree, demand, fresh, &mut open, &mut done);
         }
-        done
+        Ok(done)
     }
 
     /// Takes out the links that exceed the demand and can be split, with their views.
@@ -246,11 +252,13 @@ fn evaluate_all(
     room: &Room,
     pairs: &[(u32, u32, u32)],
     views: &[View],
+    interrupt: &Interrupt,
     done: &mut Refined,
-) -> Vec<(Link, View)> {
-    let parts: Vec<(Vec<(Link, View)>, u64)> = pairs
+) -> Result<Vec<(Link, View)>, Interrupted> {
+    let parts: Result<Vec<(Vec<(Link, View)>, u64)>, _> = pairs
         .par_chunks(CHUNK)
         .map(|chunk| {
+            interrupt.check()?;
             let mut scratch = Scratch::default();
             let mut out = Vec::with_capacity(chunk.len());
             for &(a, b, v) in chunk {
@@ -260,14 +268,14 @@ fn evaluate_all(
                 }
                 out.extend(evaluate(room, a, b, &views[v as usize], &mut scratch));
             }
-            (out, scratch.rays)
+            Ok((out, scratch.rays))
         })
         .collect();
     done.evaluated += pairs.len() as u64;
     let mut all = Vec::with_capacity(pairs.len());
-    for (part, rays) in parts {
+    for (part, rays) in parts? {
         done.rays += rays;
         all.extend(part);
     }
-    all
+    Ok(all)
 }

@@ -469,14 +469,20 @@ impl Cells {
             .push(half([m, b, c], [halves[1], bc, mc], 1.0 - of_a, rest));
     }
 
-    /// Triangles of a sheet by their vertices, with the triangle of the mesh that each is part of.
-    pub(super) fn triangles(&self, sheet: usize) -> (Vec<[u32; 3]>, Vec<u32>) {
-        let cells = self.all.iter().filter(|c| c.sheet as usize == sheet);
-        cells
-            .map(|c| (c.corners.map(|corner| corner.vertex), c.of.0))
-            .unzip()
+    /// The triangles of each sheet.
+    pub(super) fn triangles(&self) -> Vec<Triangles> {
+        let mut sheets = vec![(Vec::new(), Vec::new()); self.sheets.len()];
+        for cell in &self.all {
+            let (triangles, of) = &mut sheets[cell.sheet as usize];
+            triangles.push(cell.corners.map(|corner| corner.vertex));
+            of.push(cell.of.0);
+        }
+        sheets
     }
 }
+
+/// Triangles of a sheet by their vertices, with the triangle of the mesh that each is part of.
+pub(super) type Triangles = (Vec<[u32; 3]>, Vec<u32>);
 
 impl Sheet {
     /// Vertex on the way from `a` to `b`; `way`: see [`Cells::way_along`].

@@ -295,7 +295,7 @@ impl Cells {
     fn find_edges(&mut self, shades: &Shades, wanted: &[(usize, u64)]) {
         let half_size = shades.bake().mesh().half_size;
         let cells = &*self;
-        let found: Vec<[u64; 3]> = shades.bake().with_sight(|_, sight| {
+        let found: Vec<[u64; 3]> = shades.bake().room.with_sight(|sight| {
             let look = |(): &mut (), &(k, lamps): &(usize, u64)| {
                 let cell = &cells.all[k];
                 [0, 1, 2].map(|e| {
@@ -335,7 +335,7 @@ impl Cells {
     fn look_into(&mut self, shades: &Shades, wanted: &[(usize, u64)]) -> Vec<Found> {
         self.find_edges(shades, wanted);
         let half_size = shades.bake().mesh().half_size;
-        shades.bake().with_sight(|_, sight| {
+        shades.bake().room.with_sight(|sight| {
             let look = |(): &mut (), &(k, lamps): &(usize, u64)| {
                 let mut best = Found::Even;
                 for lamp in each(lamps) {
@@ -486,7 +486,7 @@ impl Cells {
         let corners = self.sharp_corners(&fresh);
         let half_size = shades.bake().mesh().half_size;
         let cells = &*self;
-        let sides: Vec<(u64, [f64; 3])> = shades.bake().with_sight(|_, sight| {
+        let sides: Vec<(u64, [f64; 3])> = shades.bake().room.with_sight(|sight| {
             let side = |(): &mut (), sharp: &Sharp| cells.side(shades, sight, half_size, *sharp);
             shades.bake().team().map(&corners, || (), side)
         });

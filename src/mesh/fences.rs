@@ -82,7 +82,7 @@ impl Cells {
         }
         around.sort_unstable();
         let edges: Vec<&[(u32, Of)]> = around.chunk_by(|a, b| a.0 == b.0).collect();
-        shades.bake().with_sight(|_, sight| {
+        shades.bake().room.with_sight(|sight| {
             let stands = |cells: &[(u32, Of)]| {
                 let few = &cells[..cells.len().min(MOST)];
                 let all = few.iter().enumerate();

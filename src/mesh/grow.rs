@@ -14,6 +14,7 @@ use crate::gather::Vertex;
 use crate::geometry::sampling::{hash, triangle_weights};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::time::Instant;
 
 /// Not asked for yet.
 const UNKNOWN: u32 = u32::MAX;
@@ -66,6 +67,8 @@ pub(super) struct Growth<'a> {
     pub(super) asked: Vec<PointLooks>,
     /// Is light looked at, or is the solved light believed?
     pub(super) looking: bool,
+    /// When growing ends where nothing is looked at any more.
+    pub(super) until: Option<Instant>,
     /// Triangles that edges of shadows took to be finished.
     pub(super) for_lines: usize,
 }
@@ -93,6 +96,7 @@ impl<'a> Growth<'a> {
             noise: 0.0,
             asked: Vec::new(),
             looking: true,
+            until: None,
             for_lines: 0,
         }
     }
@@ -293,7 +297,7 @@ impl<'a> Growth<'a> {
 
     /// The first vertices.
     pub(super) fn begin(&mut self, progress: &dyn Fn(usize, usize)) {
-        if self.looking {
+        if self.looking && !self.looks.is_late() {
             let most = match self.strict {
                 true => self.most.saturating_sub(self.used()),
                 false => usize::MAX,
@@ -320,7 +324,11 @@ impl<'a> Growth<'a> {
                 }
                 return End::Reached;
             }
-            if self.looking && self.looks.is_late() {
+            let is_late = match self.until {
+                Some(until) => Instant::now() > until,
+                None => self.looking && self.looks.is_late(),
+            };
+            if is_late {
                 return End::Late;
             }
             let left = self.most.saturating_sub(self.used());

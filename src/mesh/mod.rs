@@ -24,6 +24,7 @@ use grow::Growth;
 use looks::Looks;
 use measure::summed;
 use shades::Shades;
+use std::time::{Duration, Instant};
 use turns::{End, Turns};
 
 /// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error. At 1 a
@@ -35,6 +36,10 @@ const AT: f64 = 0.5;
 /// a bright wall is off by 16 in the mean.
 const SKETCH: f64 = 4.0;
 const SKETCH_MOST: f64 = 4.0;
+
+/// Where there is no time to look, the mesh grows for so long as the solved light tells: half a million vertices are written in twice
+/// that time.
+const UNSEEN: Duration = Duration::from_secs(1);
 
 /// What bounds the mesh of the output besides its error.
 pub struct Limits<'a> {
@@ -77,6 +82,7 @@ impl Bake {
         }
         growth.begin(progress);
         if limits.is_late() {
+            growth.until = Some(Instant::now() + UNSEEN);
             self.grow_unseen(&mut growth, progress);
         }
         let area = growth.seen_area();

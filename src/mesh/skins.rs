@@ -6,7 +6,7 @@
 
 use crate::hierarchy::Mesh;
 use crate::scene::{Scene, Sides};
-use std::collections::HashMap;
+use rayon::prelude::*;
 
 /// Sides in sets; side 2 t is the front of triangle t, 2 t + 1 its back.
 pub(super) struct Skins {
@@ -19,25 +19,30 @@ impl Skins {
         let mut skins = Self {
             parent: (0..count).collect(),
         };
-        let mut along: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
+        // Sides by the edge that they run along, in its sense; sorted, as a list for each of a million edges is slow to make.
+        let mut along: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * mesh.triangles.len());
         for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
             let both = scene.materials[mesh.material[t] as usize].sides == Sides::Both;
             for [p, q] in [[a, b], [b, c], [c, a]] {
                 let front = 2 * t as u32;
-                along.entry([p, q]).or_default().push(front);
+                along.push(([p, q], front));
                 if both {
-                    along.entry([q, p]).or_default().push(front + 1);
+                    along.push(([q, p], front + 1));
                 }
             }
         }
+        along.par_sort_unstable();
+        let of = |edge: [u32; 2]| {
+            let first = along.partition_point(|(other, _)| *other < edge);
+            let same = along[first..].iter();
+            same.take_while(move |(other, _)| *other == edge)
+        };
         // In any order: the least side of a set stands for it.
-        for ([p, q], sides) in &along {
-            for &side in sides {
-                for &other in along.get(&[*q, *p]).into_iter().flatten() {
-                    // The two sides of one triangle are never seen together.
-                    if side / 2 != other / 2 {
-                        skins.join(side, other);
-                    }
+        for &([p, q], side) in along.iter().filter(|([p, q], _)| p <= q) {
+            for &(_, other) in of([q, p]) {
+                // The two sides of one triangle are never seen together.
+                if side / 2 != other / 2 {
+                    skins.join(side, other);
                 }
             }
         }

@@ -1,5 +1,6 @@
 //! The vertices that are written; covered ones are lent their neighbours' light.
 
+use super::cells::{Sheet, Triangles};
 use super::grow::Growth;
 use crate::gather::{Baked, BakedSurface, KeptVertex, lend};
 use crate::solve::Bake;
@@ -22,9 +23,8 @@ pub(super) struct Settled {
 impl Bake {
     /// The light of a mesh as it is written.
     pub(super) fn settled(&self, growth: &Growth) -> Vec<Settled> {
-        let sheets = growth.cells.sheets.iter().enumerate();
-        let settle = |(number, sheet): (usize, &super::cells::Sheet)| {
-            let (triangles, of) = growth.cells.triangles(number);
+        let sheets = growth.cells.sheets.iter().zip(growth.cells.triangles());
+        let settle = |(number, (sheet, (triangles, of))): (usize, (&Sheet, Triangles))| {
             let mut looks = vec![UNSEEN; sheet.vertices.len()];
             for &v in triangles.iter().flatten() {
                 looks[v as usize] = growth.look(number, v).unwrap_or(UNSEEN);
@@ -43,7 +43,7 @@ impl Bake {
                 covered,
             }
         };
-        sheets.map(settle).collect()
+        sheets.enumerate().map(settle).collect()
     }
 
     /// Vertices with their colours, as the writers want them.

@@ -12,7 +12,7 @@
 
 use super::outlook::Outlook;
 use super::sources::Sources;
-use super::{Bake, Representation, direct, punctual};
+use super::{Bake, NOBODY, Representation, direct};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::{self, Lanes};
@@ -41,11 +41,11 @@ impl Bake {
         let print = self.fingerprint();
         let body = |out: &mut Encoder| {
             print.encode(out)?;
-            self.encode_state(true, &self.balance.factor, out)?;
-            out.put_all(&self.probes.last)?;
+            self.encode_state(true, &self.refinement.balance.factor, out)?;
+            out.put_all(&self.solution.seen)?;
             out.put(self.elapsed().as_secs_f64())
         };
-        match self.team.is_first() {
+        match self.room.team.is_first() {
             true => container::write(path, Kind::Checkpoint, body),
             false => container::unwritten(path, body).map(|()| 0),
         }
@@ -56,13 +56,13 @@ impl Bake {
     /// # Errors
     /// The room has panes or mirrors.
     pub fn can_be_kept(&self, option: &str) -> Result<()> {
-        let rooms = match (&self.panes, &self.mirrors) {
+        let rooms = match (&self.room.panes, &self.room.mirrors) {
             (Some(_), _) => "rooms that light passes panes in",
             (_, Some(_)) => "rooms with mirrors",
             _ => return Ok(()),
         };
         Err(Error::input(
-            self.scene.source.path.display().to_string(),
+            self.room.scene.source.path.display().to_string(),
             format!("{option} does not go with {rooms}"),
             format!("bake without {option}"),
         ))
@@ -85,13 +85,16 @@ impl Bake {
             let (reflected, traces) = self.decode_state(true, from)?;
             self.light_up(&reflected);
             self.light_arrives();
-            self.direct.keep(&self.light.leaves, traces.to_vec()?);
-            self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
+            self.refinement
+                .direct
+                .keep(&self.solution.light.leaves, traces.to_vec()?);
+            self.solution.light.neighbours =
+                Neighbours::new(self.refinement.tree.nodes.len(), &self.refinement.graph);
             let seen: Vec<[f64; 3]> = from.get_all()?;
-            if !seen.is_empty() && seen.len() != self.probes.points.len() {
+            if !seen.is_empty() && seen.len() != self.room.probes.points.len() {
                 return Err(Broken::new("has another number of watched points"));
             }
-            self.probes.last = seen;
+            self.solution.seen = seen;
             let elapsed: f64 = from.get()?;
             let elapsed = Duration::try_from_secs_f64(elapsed)
                 .map_err(|_| Broken::new("has been worked on for no time"))?;
@@ -114,18 +117,18 @@ impl Bake {
     fn fingerprint(&self) -> Fingerprint {
         let mut print = Fingerprint::default();
         print.set_text("program", crate::PROGRAM);
-        print.set("--cache", &[u8::from(self.keep)]);
-        print.set("error asked for", &[self.settings.error]);
-        print.set("seed", &[self.settings.seed]);
-        let representation = format!("{:?}", self.settings.representation);
+        print.set("--cache", &[u8::from(self.room.keep)]);
+        print.set("error asked for", &[self.room.settings.error]);
+        print.set("seed", &[self.room.settings.seed]);
+        let representation = format!("{:?}", self.room.settings.representation);
         print.set_text("representation", &representation);
         print.set(
             "share of spectra",
-            &[self.settings.spectrum.unwrap_or(f64::NAN)],
+            &[self.room.settings.spectrum.unwrap_or(f64::NAN)],
         );
-        print.set("white", &self.settings.white.unwrap_or([f64::NAN; 3]));
-        print.extend(Fingerprint::shape(&self.scene));
-        print.extend(Fingerprint::paint(&self.scene));
+        print.set("white", &self.room.settings.white.unwrap_or([f64::NAN; 3]));
+        print.extend(Fingerprint::shape(&self.room.scene));
+        print.extend(Fingerprint::paint(&self.room.scene));
         print
     }
 
@@ -140,10 +143,10 @@ impl Bake {
         factor: &[f32],
         out: &mut Encoder,
     ) -> io::Result<()> {
-        out.put_all(&splits(&self.tree))?;
-        encode_graph(&self.graph, out)?;
+        out.put_all(&splits(&self.refinement.tree))?;
+        encode_graph(&self.refinement.graph, out)?;
         // Lanes that are no intervals follow from the room.
-        let intervals = self.lanes.lanes();
+        let intervals = self.solution.lanes.lanes();
         out.put_list(
             intervals.len(),
             intervals.iter().map(|l| {
@@ -151,14 +154,20 @@ impl Bake {
                 [light, l.first as u32, l.count as u32]
             }),
         )?;
-        out.put(self.spectrum_error.unwrap_or(f64::NAN))?;
-        out.put(self.light.white)?;
-        self.outlook.encode(whole, out)?;
+        out.put(self.solution.spectrum_error.unwrap_or(f64::NAN))?;
+        out.put(self.solution.light.white)?;
+        self.refinement.outlook.encode(whole, out)?;
         out.put_all(factor)?;
-        out.put([self.balance.defect_before, self.balance.defect_after])?;
-        out.put(self.balance.limited as u64)?;
-        let leaves = &self.light.leaves;
-        let (reflected, irradiance) = (&self.light.reflected, &self.light.irradiance);
+        out.put([
+            self.refinement.balance.defect_before,
+            self.refinement.balance.defect_after,
+        ])?;
+        out.put(self.refinement.balance.limited as u64)?;
+        let leaves = &self.solution.light.leaves;
+        let (reflected, irradiance) = (
+            &self.solution.light.reflected,
+            &self.solution.light.irradiance,
+        );
         out.put_list(
             leaves.len() * reflected.width(),
             leaves
@@ -171,17 +180,23 @@ impl Bake {
                 (0..leaves.len()).flat_map(|k| irradiance.row(k).iter().copied()),
             )?;
             out.put_list(
-                leaves.len() * self.lanes.len(),
+                leaves.len() * self.solution.lanes.len(),
                 leaves
                     .iter()
-                    .flat_map(|&k| self.direct.row(k).iter().copied()),
+                    .flat_map(|&k| self.refinement.direct.row(k).iter().copied()),
             )?;
-            out.put_list(leaves.len(), leaves.iter().map(|&k| self.direct.figures(k)))?;
+            out.put_list(
+                leaves.len(),
+                leaves.iter().map(|&k| self.refinement.direct.figures(k)),
+            )?;
         }
-        out.put(self.direct.rays)?;
-        let traces: Vec<_> = leaves.iter().map(|&k| self.direct.trace(k)).collect();
+        out.put(self.refinement.direct.rays)?;
+        let traces: Vec<_> = leaves
+            .iter()
+            .map(|&k| self.refinement.direct.trace(k))
+            .collect();
         Packs::encode(&traces, out)?;
-        for round in &self.watched {
+        for round in &self.solution.watched {
             let traces: Vec<_> = round.iter().map(Option::as_deref).collect();
             Packs::encode(&traces, out)?;
         }
@@ -193,14 +208,14 @@ impl Bake {
     /// and where the direct light of each leaf comes from, if that was kept.
     pub(crate) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
         let splits = from.get_list::<u32>()?;
-        self.tree.nodes.reserve(4 * splits.len());
-        self.tree.elements.reserve(4 * splits.len());
+        self.refinement.tree.nodes.reserve(4 * splits.len());
+        self.refinement.tree.elements.reserve(4 * splits.len());
         for id in splits {
-            split(&mut self.tree, id)?;
+            split(&mut self.refinement.tree, id)?;
         }
-        let nodes = self.tree.nodes.len();
-        self.graph = decode_graph(nodes, self.mesh.triangles.len(), from)?;
-        let lights = self.scene.spectra.len();
+        let nodes = self.refinement.tree.nodes.len();
+        self.refinement.graph = decode_graph(nodes, self.room.mesh.triangles.len(), from)?;
+        let lights = self.room.scene.spectra.len();
         let lanes = from
             .get_all::<[u32; 3]>()?
             .into_iter()
@@ -209,46 +224,51 @@ impl Bake {
         if lanes.len() > LEAVES {
             return Err(Broken::new("has an impossible number of lanes"));
         }
-        self.lanes = match self.settings.representation {
+        self.solution.lanes = match self.room.settings.representation {
             Representation::Rgb | Representation::Characteristic(_) if lanes.is_empty() => {
-                self.chosen_lanes()
+                self.chosen_lanes().expect(NOBODY)
             }
             _ if lanes.is_empty() => return Err(Broken::new("has no lanes")),
-            _ => self.guided(Lanes::with(lanes, &self.scene.spectra, &self.weights)),
+            _ => self.guided(Lanes::with(
+                lanes,
+                &self.room.scene.spectra,
+                &self.room.weights,
+            )),
         };
         let error: f64 = from.get()?;
-        self.spectrum_error = (!error.is_nan()).then_some(error);
+        self.solution.spectrum_error = (!error.is_nan()).then_some(error);
         let white = from.get()?;
-        self.outlook = Outlook::decode(&self.tree, self.team, whole, from)?;
+        self.refinement.outlook =
+            Outlook::decode(&self.refinement.tree, self.room.team, whole, from)?;
         let factor: Vec<f32> = from.get_all()?;
         // Where leaves look for themselves nothing is balanced.
-        let by_rays = self.by_rays();
+        let by_rays = self.room.by_rays();
         let wanted = if by_rays && whole { 0 } else { nodes };
-        if factor.len() != wanted || self.outlook.looks() != by_rays {
+        if factor.len() != wanted || self.refinement.outlook.looks() != by_rays {
             return Err(Broken::new("does not know what its leaves see"));
         }
         let [defect_before, defect_after] = from.get()?;
-        self.balance = Balance {
+        self.refinement.balance = Balance {
             factor,
             defect_before,
             defect_after,
             limited: from.get::<u64>()? as usize,
         };
-        self.areas = self.outlook.areas(&self.tree);
-        let leaves: Vec<u32> = self.tree.leaves().collect();
-        let (count, width) = (leaves.len(), padded(self.lanes.len()));
+        self.refinement.areas = self.refinement.outlook.areas(&self.refinement.tree);
+        let leaves = self.refinement.leaves();
+        let (count, width) = (leaves.len(), padded(self.solution.lanes.len()));
         let reflected = rows(from, count, width)?;
         let mut irradiance = Rows::default();
         if whole {
             irradiance = rows(from, count, width)?;
-            let lanes = self.lanes.len();
+            let lanes = self.solution.lanes.len();
             let known: Vec<f32> = from.get_exactly(count * lanes)?;
             let figures: Vec<[f32; 2]> = from.get_exactly(count)?;
-            self.direct = direct::Direct::known(&leaves, nodes, lanes, &known, &figures);
+            self.refinement.direct = direct::Direct::known(&leaves, nodes, lanes, &known, &figures);
         }
-        self.direct.rays = from.get()?;
+        self.refinement.direct.rays = from.get()?;
         let traces = Packs::decode(from)?;
-        for round in &mut self.watched {
+        for round in &mut self.solution.watched {
             *round = Packs::decode(from)?.to_vec()?;
         }
         if traces.len() != count {
@@ -256,7 +276,7 @@ impl Bake {
         }
         self.rounds = serde_json::from_str(&from.get_text()?)
             .map_err(|problem| Broken::new(format!("has records that do not read: {problem}")))?;
-        self.light = Light {
+        self.solution.light = Light {
             irradiance,
             leaves,
             white,
@@ -277,19 +297,19 @@ impl Bake {
     }
 
     fn light_up_lanes<const L: usize>(&mut self, reflected: &Rows) {
-        let mut light = std::mem::take(&mut self.light);
-        let painter = self.painter();
+        let mut light = std::mem::take(&mut self.solution.light);
+        let painter = self.room.painter();
         let Sources {
             emission, sheets, ..
-        } = painter.paint(&self.tree, &light.leaves, &self.lanes);
+        } = painter.paint(&self.refinement.tree, &light.leaves, &self.solution.lanes);
         light.through = sheets.map_or_else(Through::default, |sheets| sheets.shown);
-        light.reflected = self.on_nodes::<L>(reflected, &light.leaves);
-        light.emitted = self.on_nodes::<L>(&emission, &light.leaves);
-        light.half_size = self.mesh.half_size;
-        light.apart = self.lanes.excites().is_some();
-        light.measure(&self.tree, &self.lanes);
-        self.light = light;
-        self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
+        light.reflected = self.refinement.on_nodes::<L>(reflected, &light.leaves);
+        light.emitted = self.refinement.on_nodes::<L>(&emission, &light.leaves);
+        light.half_size = self.room.mesh.half_size;
+        light.apart = self.solution.lanes.excites().is_some();
+        light.measure(&self.refinement.tree, &self.solution.lanes);
+        self.solution.light = light;
+        self.solution.light_lamps(&self.room);
     }
 }
 

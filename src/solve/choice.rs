@@ -4,11 +4,10 @@
 //! lights and materials alone.
 
 use super::sources::DenseSources;
-use super::{Bake, Representation, Rows, SPECTRUM_SHARE, coarse, direct, punctual};
+use super::{Bake, Representation, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
 use crate::light::lanes::Lanes;
-use crate::light::{self, Filters, guide};
-use crate::link::{LinkRows, balance};
+use crate::light::{self, Filters, Rows, guide};
 use crate::scene::effects::Kind;
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;
@@ -16,6 +15,7 @@ use crate::spectrum::{
     CmfTree, Control, Estimate, LEAVES, Leaves, List, Metric, Partition, Path, Tree, control,
     represent,
 };
+use crate::team::Interrupted;
 
 /// The paper's error limits leave its light sources (Table 1) this colour difference, CIELUV: mean of .26, .33 and .27.
 const PAPER_DE_LUV: f64 = 0.29;
@@ -28,29 +28,32 @@ const BOUNDED_PATCHES: usize = 48;
 
 impl Bake {
     /// Chooses the lanes of the rounds to come.
-    pub(crate) fn choose_lanes(&mut self) {
-        let lanes = self.chosen_lanes();
-        if !lanes.same_meaning(&self.lanes) {
+    pub(crate) fn choose_lanes(&mut self) -> Result<(), Interrupted> {
+        let lanes = self.chosen_lanes()?;
+        if !lanes.same_meaning(&self.solution.lanes) {
             // The lanes of an earlier round mean something else: the next solve starts afresh.
-            self.light.reflected = Rows::default();
-            match lanes.places_in(&self.lanes) {
-                Some(places) if lamps_are_flat(&self.scene) => self.direct.relabel(&places),
-                _ => self.direct = direct::Direct::default(),
+            self.solution.light.reflected = Rows::default();
+            match lanes.places_in(&self.solution.lanes) {
+                Some(places) if lamps_are_flat(&self.room.scene) => {
+                    self.refinement.direct.relabel(&places)
+                }
+                _ => self.refinement.direct = direct::Direct::default(),
             }
         }
-        self.lanes = lanes;
-        self.light.apart = self.lanes.excites().is_some();
-        self.filters = Filters::new(&self.scene, &self.lanes);
+        self.solution.lanes = lanes;
+        self.solution.light.apart = self.solution.lanes.excites().is_some();
+        self.solution.filters = Filters::new(&self.room.scene, &self.solution.lanes);
+        Ok(())
     }
 
-    pub(super) fn chosen_lanes(&mut self) -> Lanes {
-        self.spectrum_error = None;
-        let (spectra, weights) = (&self.scene.spectra, &self.weights);
-        let none = spectra.is_empty() || self.tree.nodes.is_empty();
-        let share = SPECTRUM_SHARE * self.settings.error;
-        let tolerance = self.settings.spectrum.unwrap_or(share);
-        let guide = guide(&self.scene, weights);
-        match self.settings.representation {
+    pub(super) fn chosen_lanes(&mut self) -> Result<Lanes, Interrupted> {
+        self.solution.spectrum_error = None;
+        let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);
+        let none = spectra.is_empty() || self.refinement.tree.nodes.is_empty();
+        let share = SPECTRUM_SHARE * self.room.settings.error;
+        let tolerance = self.room.settings.spectrum.unwrap_or(share);
+        let guide = guide(&self.room.scene, weights);
+        Ok(match self.room.settings.representation {
             // What excites lies where these ways are blind, or mixes their lanes.
             Representation::Rgb
             | Representation::Paper
@@ -58,56 +61,61 @@ impl Bake {
             | Representation::Guaranteed
                 if guide.is_some() =>
             {
-                self.spectrum_error = Some(0.0);
+                self.solution.spectrum_error = Some(0.0);
                 Lanes::dense(spectra, weights)
             }
             Representation::Uniform(n) if !none => {
                 self.guided(Lanes::uniform(spectra, n.into(), weights))
             }
-            Representation::Rgb if !none => Lanes::rgb(spectra, &self.upsampler, weights),
+            Representation::Rgb if !none => Lanes::rgb(spectra, &self.room.upsampler, weights),
             Representation::Paper if !none => {
-                let cut = paper_cut(&self.scene, weights, tolerance);
+                let cut = paper_cut(&self.room.scene, weights, tolerance);
                 Lanes::absolute(spectra, cut, weights)
             }
             // A filter would have to be a matrix there, and so would what passes a sheet.
             Representation::Characteristic(_)
-                if self.panes.is_some()
-                    || self.mirrors.is_some()
-                    || self.plan.runs(Kind::Sheets) =>
+                if self.room.panes.is_some()
+                    || self.room.mirrors.is_some()
+                    || self.room.plan.runs(Kind::Sheets) =>
             {
                 Lanes::dense(spectra, weights)
             }
             Representation::Characteristic(n) if !none => {
                 let lights: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
-                let basis = basis(&lights, &paints(&self.scene), n.into());
+                let basis = basis(&lights, &paints(&self.room.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
-            Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance),
+            Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance)?,
             Representation::Guaranteed if !none => {
-                let model = self.model(BOUNDED_PATCHES);
-                let (spectra, weights) = (&self.scene.spectra, &self.weights);
-                let choice = model.choose_bounded(spectra, weights, self.light.white, tolerance);
+                let model = self.model(BOUNDED_PATCHES)?;
+                let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);
+                let choice =
+                    model.choose_bounded(spectra, weights, self.solution.light.white, tolerance);
                 // Without light there is no white to see an error by.
-                self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
-                Lanes::ratio(&self.scene.spectra, &choice.cuts, &self.weights)
+                self.solution.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
+                Lanes::ratio(&self.room.scene.spectra, &choice.cuts, &self.room.weights)
             }
             _ => {
-                self.spectrum_error = Some(0.0);
+                self.solution.spectrum_error = Some(0.0);
                 Lanes::dense(spectra, weights)
             }
-        }
+        })
     }
 
     /// The ratio to each light on as few intervals as the model of the room asks for.
-    fn perceptual(&mut self, guide: Option<&[Leaves; 3]>, tolerance: f64) -> Lanes {
-        let mut model = self.model(coarse::PATCHES);
-        let kin = Kin::of(&self.scene);
+    fn perceptual(
+        &mut self,
+        guide: Option<&[Leaves; 3]>,
+        tolerance: f64,
+    ) -> Result<Lanes, Interrupted> {
+        let mut model = self.model(coarse::PATCHES)?;
+        let kin = Kin::of(&self.room.scene);
         model.join(&kin.of, kin.spectra.len());
-        let (spectra, weights) = (&kin.spectra, &self.weights);
+        let (spectra, weights) = (&kin.spectra, &self.room.weights);
         if guide.is_some() {
-            model.kindle(spectra, weights, self.scene.grid.width());
+            model.kindle(spectra, weights, self.room.scene.grid.width());
         }
-        let (known, white) = (self.lanes.cuts(), self.light.white);
+        let (known, white) = (self.solution.lanes.cuts(), self.solution.light.white);
         let known = known.map(|cuts| kin.one_of_each(&cuts));
         let copies = kin.copies.as_deref();
         let choose = |model: &coarse::Coarse| {
@@ -117,7 +125,8 @@ impl Bake {
         let mut choice = choose(&model);
         // What lies behind a pane has light of its own spectra: lanes serve all of them.
         let plain = (model.emission.clone(), model.punctual.clone());
-        for filter in tints(&self.scene) {
+        for filter in tints(&self.room.scene) {
+            self.room.interrupt.check()?;
             (model.emission, model.punctual) = plain.clone();
             model.behind(&filter);
             let other = choose(&model);
@@ -128,54 +137,59 @@ impl Bake {
             }
         }
         // Without light there is no white to see an error by.
-        self.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
+        self.solution.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
         let cuts: Vec<Partition> = kin.of.iter().map(|&k| choice.cuts[k]).collect();
-        self.guided(Lanes::ratio(&self.scene.spectra, &cuts, &self.weights))
+        let lanes = Lanes::ratio(&self.room.scene.spectra, &cuts, &self.room.weights);
+        Ok(self.guided(lanes))
     }
 
     /// Lanes that light counts in for what it excites, too, where surfaces fluoresce.
     pub(super) fn guided(&self, lanes: Lanes) -> Lanes {
-        match guide(&self.scene, &self.weights) {
-            Some(guide) => lanes.guided(&guide, light::balance(&self.scene, &self.weights, &guide)),
+        match guide(&self.room.scene, &self.room.weights) {
+            Some(guide) => lanes.guided(
+                &guide,
+                light::balance(&self.room.scene, &self.room.weights, &guide),
+            ),
             None => lanes,
         }
     }
 
     /// The model of the room on its present links.
-    fn model(&mut self, patches: usize) -> coarse::Coarse {
-        let leaves: Vec<u32> = self.tree.leaves().collect();
-        let (shadowed, factor) = match self.frozen.take() {
+    fn model(&mut self, patches: usize) -> Result<coarse::Coarse, Interrupted> {
+        let (room, refinement) = (&self.room, &mut self.refinement);
+        let leaves = refinement.leaves();
+        let (shadowed, factor) = match refinement.frozen.take() {
             Some(known) => known,
             None => {
-                let shadowed = self.with_sight(|bake, sight| {
+                let tree = &refinement.tree;
+                let shadowed = room.with_sight(|sight| {
                     punctual::factors(
-                        &bake.tree,
+                        tree,
                         &leaves,
                         sight,
-                        &bake.scene,
-                        &bake.mesh,
-                        bake.outside.as_ref(),
-                        bake.team,
+                        &room.scene,
+                        &room.mesh,
+                        room.outside.as_ref(),
+                        (room.team, &room.interrupt),
                     )
-                });
-                let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
-                self.look_out();
-                let balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
+                })?;
+                refinement.look_out(room)?;
+                let balance = refinement.balanced(&refinement.link_rows());
                 (shadowed, balance.factor)
             }
         };
-        let painter = self.painter();
-        let dense = DenseSources::new(&painter, &self.tree, &shadowed, &leaves);
-        coarse::Coarse::new(
-            &self.tree,
-            &self.graph.links,
+        let painter = room.painter();
+        let dense = DenseSources::new(&painter, &refinement.tree, &shadowed, &leaves);
+        Ok(coarse::Coarse::new(
+            &refinement.tree,
+            &refinement.graph.links,
             &factor,
-            &self.areas,
+            &refinement.areas,
             &leaves,
             &dense,
-            self.scene.spectra.len(),
+            room.scene.spectra.len(),
             patches,
-        )
+        ))
     }
 }
 

@@ -15,6 +15,7 @@ use crate::light::rows::{Rows, padded};
 use crate::link::{Link, LinkRows, Way};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{LEAVES, Leaves};
+use crate::team::NEVER;
 use std::collections::BTreeMap;
 
 /// Patches of the model at the most (fits the child count of its root).
@@ -233,6 +234,7 @@ impl Coarse {
                 operator,
                 reflectance: &rho,
                 greatest: &greatest,
+                interrupt: &NEVER,
             };
             system.solve::<L>(&first, &mut reflected, TOLERANCE);
             system.operator.received::<L>(&reflected)
@@ -286,6 +288,7 @@ impl Coarse {
                 .map(|&k| self.areas[k as usize])
                 .collect(),
             receive: &|radiosity| operator.received::<L>(radiosity),
+            interrupt: &NEVER,
         };
         let mut reflected = Rows::zero(self.leaves.len(), L);
         system.solve::<L>(first, &mut reflected, TOLERANCE).1

@@ -8,6 +8,7 @@ use super::aggregates::Aggregates;
 use super::operator::Operator;
 use super::sums::dot;
 use crate::light::rows::Rows;
+use crate::team::Interrupt;
 
 /// Iterations at the most. Corridors of albedo .99 take about 20.
 pub(super) const MAX_ITERATIONS: usize = 400;
@@ -49,6 +50,8 @@ pub(crate) struct System<'a> {
     pub reflectance: &'a Rows,
     /// Greatest reflectance of each lane.
     pub greatest: &'a [f32],
+    /// Ends the iterations wherever they are.
+    pub interrupt: &'a Interrupt,
 }
 
 impl System<'_> {
@@ -95,7 +98,8 @@ impl System<'_> {
             (done.residual, done.bound) = self.left(&rr, &norm);
             // Rounding ends progress: what is left is f32, not the method.
             let rounding = rr.iter().zip(&norm).all(|(r, b)| *r <= 1e-14 * b);
-            if done.bound <= tolerance || done.iterations >= MAX_ITERATIONS || rounding {
+            let ended = done.iterations >= MAX_ITERATIONS || self.interrupt.is_raised();
+            if done.bound <= tolerance || rounding || ended {
                 break;
             }
             bounds.push(done.bound);
@@ -314,6 +318,7 @@ mod tests {
             operator: Operator::new(&tree, &rows, &leaves, &areas, &factor),
             reflectance: &rho,
             greatest: &[0.99, 0.5, 0.9, 0.0],
+            interrupt: &crate::team::NEVER,
         };
         let mut first = Rows::zero(leaves.len(), 4);
         first.row_mut(0).fill(1.0);

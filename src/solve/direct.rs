@@ -13,7 +13,7 @@ use crate::light::weighed;
 use crate::link::{Demand, MAX_DEPTH};
 use crate::store::Decoder;
 use crate::store::codec::Read;
-use crate::team::{Packed, Team};
+use crate::team::{Interrupt, Interrupted, Packed, Team};
 use crate::transport::trace::Trace;
 use crate::transport::{Memory, Receiver};
 use std::ops::Range;
@@ -236,8 +236,8 @@ impl Direct {
         demand: &Demand,
         coarsest: f64,
         look: &impl Look,
-        team: Team,
-    ) {
+        (team, interrupt): (Team, &Interrupt),
+    ) -> Result<(), Interrupted> {
         let mut open: Vec<u32> = tree.leaves().collect();
         self.width = look.weights().len();
         for k in 0..self.place.len() {
@@ -271,7 +271,7 @@ impl Direct {
                 found.rays = memory.rays - before;
                 found
             };
-            let parts = team.map(&chunks, Memory::default, gather);
+            let parts = team.map_unless(interrupt, &chunks, Memory::default, gather)?;
             for (part, leaves) in parts.iter().zip(fresh.chunks(CHUNK)) {
                 self.rays += part.rays;
                 for (k, &(leaf, _)) in leaves.iter().enumerate() {
@@ -301,6 +301,7 @@ impl Direct {
                 }
             }
         }
+        Ok(())
     }
 }
 

@@ -23,11 +23,10 @@ const SHARE_OF_FIRST: f64 = 0.75;
 /// Measured with 600 points in two furnished rooms: 0.94 and 1.01.
 const SHARE_OF_RAYS: f64 = 0.95;
 
-/// Watched points and what was seen there last.
+/// Watched points.
 pub(crate) struct Probes {
     /// Face entry, weights on the face, point and normal.
     pub(super) points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
-    pub(super) last: Vec<[f64; 3]>,
 }
 
 /// Distance between two rounds, turned into error.
@@ -69,10 +68,7 @@ impl Probes {
                 ));
             }
         }
-        Self {
-            points,
-            last: Vec::new(),
-        }
+        Self { points }
     }
 
     /// The points as receivers in the present hierarchy.
@@ -89,61 +85,55 @@ impl Probes {
             })
             .collect()
     }
+}
 
-    /// Takes what is seen now in round `round` (from 0); returns the estimated error, none after the first round and none
-    /// where light is no number. `by_rays`: do points look for themselves?
-    pub(super) fn compare(
-        &mut self,
-        now: Vec<[f64; 3]>,
-        white: [f64; 3],
-        round: usize,
-        by_rays: bool,
-    ) -> Option<Distance> {
-        let share = match (by_rays, round) {
-            // The first two rounds are coarse alike: what they share is not noise of rays.
-            (true, 0 | 1) => SHARE,
-            (true, _) => SHARE_OF_RAYS,
-            (false, 0 | 1) => SHARE_OF_FIRST,
-            (false, _) => SHARE,
+/// The estimated error of round `round` (from 0), by what was seen `before` and what is seen `now`; none after the first round
+/// and none where light is no number. `by_rays`: do points look for themselves?
+pub(super) fn compare(
+    before: &[[f64; 3]],
+    now: &[[f64; 3]],
+    white: [f64; 3],
+    round: usize,
+    by_rays: bool,
+) -> Option<Distance> {
+    let share = match (by_rays, round) {
+        // The first two rounds are coarse alike: what they share is not noise of rays.
+        (true, 0 | 1) => SHARE,
+        (true, _) => SHARE_OF_RAYS,
+        (false, 0 | 1) => SHARE_OF_FIRST,
+        (false, _) => SHARE,
+    };
+    // A difference of colours that are no numbers would read as none.
+    let sound = now.iter().chain(before).flatten().all(|x| x.is_finite());
+    let result = (sound && !before.is_empty()).then(|| {
+        let n = now.len() as f64;
+        // What is the same has no difference, also in a room without light, where there is no white to see it by.
+        let pairs = || before.iter().zip(now).filter(|(a, b)| a != b);
+        let mean = |differ: &dyn Fn([f64; 3], [f64; 3]) -> f64| {
+            // An empty sum would be -0.
+            pairs().fold(0.0, |sum, (a, b)| sum + differ(*a, *b)) / n
         };
-        // A difference of colours that are no numbers would read as none.
-        let sound = now
-            .iter()
-            .chain(&self.last)
-            .flatten()
-            .all(|x| x.is_finite());
-        let result = (sound && !self.last.is_empty()).then(|| {
-            let n = now.len() as f64;
-            // What is the same has no difference, also in a room without light, where there is no white to see it by.
-            let pairs = || self.last.iter().zip(&now).filter(|(a, b)| a != b);
-            let mean = |differ: &dyn Fn([f64; 3], [f64; 3]) -> f64| {
-                // An empty sum would be -0.
-                pairs().fold(0.0, |sum, (a, b)| sum + differ(*a, *b)) / n
-            };
-            let floor = 1e-4 * white[1];
-            // The colour of what is as good as black is not looked at.
-            let shift = |a: &[f64; 3], b: &[f64; 3]| match (uv_1960(*a), uv_1960(*b)) {
-                (Some(p), Some(q)) if a[1].min(b[1]) > floor => {
-                    (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)
-                }
-                _ => 0.0,
-            };
-            Distance {
-                de2000: share * mean(&|a, b| de2000(a, b, white)),
-                de_luv: share * mean(&|a, b| de_luv(a, b, white)),
-                relative: share
-                    * (pairs()
-                        .map(|(a, b)| ((a[1] - b[1]) / (0.5 * (a[1] + b[1])).max(floor)).powi(2))
-                        .sum::<f64>()
-                        / n)
-                        .sqrt(),
-                chromaticity: share * (pairs().map(|(a, b)| shift(a, b)).sum::<f64>() / n).sqrt(),
+        let floor = 1e-4 * white[1];
+        // The colour of what is as good as black is not looked at.
+        let shift = |a: &[f64; 3], b: &[f64; 3]| match (uv_1960(*a), uv_1960(*b)) {
+            (Some(p), Some(q)) if a[1].min(b[1]) > floor => {
+                (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)
             }
-        });
-        let result = result.filter(Distance::is_known);
-        self.last = now;
-        result
-    }
+            _ => 0.0,
+        };
+        Distance {
+            de2000: share * mean(&|a, b| de2000(a, b, white)),
+            de_luv: share * mean(&|a, b| de_luv(a, b, white)),
+            relative: share
+                * (pairs()
+                    .map(|(a, b)| ((a[1] - b[1]) / (0.5 * (a[1] + b[1])).max(floor)).powi(2))
+                    .sum::<f64>()
+                    / n)
+                    .sqrt(),
+            chromaticity: share * (pairs().map(|(a, b)| shift(a, b)).sum::<f64>() / n).sqrt(),
+        }
+    });
+    result.filter(Distance::is_known)
 }
 
 #[cfg(test)]
@@ -152,12 +142,11 @@ mod tests {
 
     #[test]
     fn light_that_is_no_number_has_no_estimate() {
-        let mut probes = Probes {
-            points: Vec::new(),
-            last: Vec::new(),
-        };
+        let mut before = Vec::new();
         let mut error = |light: f64, round: usize| {
-            let distance = probes.compare(vec![[light; 3]], [1.0; 3], round, false);
+            let now = vec![[light; 3]];
+            let distance = compare(&before, &now, [1.0; 3], round, false);
+            before = now;
             distance.map(|d| d.de2000)
         };
         assert!(error(0.5, 0).is_none());
@@ -166,11 +155,10 @@ mod tests {
         assert!(error(0.5, 3).is_none());
         assert_eq!(error(0.5, 4), Some(0.0));
         // Dark rooms: no white, no difference; and no estimate where light comes and there is no white for it.
-        let mut dark = |light: f64| {
-            let distance = probes.compare(vec![[light; 3]], [0.0; 3], 4, false);
+        let dark = |light: f64| {
+            let distance = compare(&[[0.0; 3]], &[[light; 3]], [0.0; 3], 4, false);
             distance.map(|d| (d.de2000, d.de_luv, d.relative))
         };
-        dark(0.0);
         assert_eq!(dark(0.0), Some((0.0, 0.0, 0.0)));
         assert_eq!(dark(1.0), None);
     }

@@ -13,6 +13,7 @@ use crate::light::lanes::Lanes;
 use crate::light::{Fluorescent, Rows};
 use crate::scene::{GREATEST_ALBEDO, Material, Scene};
 use crate::spectrum::LEAVES;
+use crate::team::Interrupt;
 use rayon::prelude::*;
 
 /// Rounds at the most; a dye whose emission excites it with a yield of .9 took 9 in a white room.
@@ -118,6 +119,8 @@ pub(super) struct Rounds<'a> {
     pub(super) power: Vec<f64>,
     /// Relative error at which they end.
     pub(super) tolerance: f64,
+    /// Ends them wherever they are.
+    pub(super) interrupt: &'a Interrupt,
 }
 
 impl Rounds<'_> {
@@ -146,7 +149,7 @@ impl Rounds<'_> {
             done.residual = solved.residual.max(change);
             done.bound = solved.bound.max(change / (1.0 - self.glow.back));
             let settled = change / (1.0 - self.glow.back) <= self.tolerance || change <= ROUNDING;
-            if settled || done.fluorescence >= ROUNDS {
+            if settled || done.fluorescence >= ROUNDS || self.interrupt.is_raised() {
                 step::<L>(&mut seen, &brought, [1.0; L]);
                 return (done, given, seen);
             }

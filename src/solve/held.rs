@@ -3,9 +3,9 @@
 //! What lanes do to colours is seen by itself here: beside a solution on all 64 leaves of the same links, with direct
 //! light gathered at the same points of the same leaves.
 
-use super::{Bake, Direct, Representation};
-use crate::light::lanes::Lanes;
-use crate::link::{Demand, LinkRows, balance};
+use super::direct::Direct;
+use super::{Bake, NOBODY, Representation};
+use crate::link::Demand;
 use std::time::Instant;
 
 /// Held solutions are brought to the error that a bake would be brought to if it were asked for this little.
@@ -30,34 +30,35 @@ impl Bake {
     /// first round.
     pub fn hold(&mut self, representation: Representation, error: f64) -> Option<Held> {
         let threshold = self.rounds.last()?.threshold;
-        let white = self.light.white;
+        let white = self.solution.light.white;
         let started = Instant::now();
-        (self.settings.representation, self.settings.error) = (representation, error);
+        (self.room.settings.representation, self.room.settings.error) = (representation, error);
         // Nothing is kept of the lanes before: what was good enough for another error would be taken again.
-        self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
-        self.choose_lanes();
+        self.solution.lanes = self.room.dense_lanes();
+        self.choose_lanes().expect(NOBODY);
         let chosen = started.elapsed();
-        self.direct = Direct::default();
+        self.refinement.direct = Direct::default();
         self.gather_direct(&Demand {
             bright: &[],
             keen: &[],
-            total_area: self.tree.nodes.first().map_or(0.0, |n| n.area),
+            total_area: self.refinement.tree.nodes.first().map_or(0.0, |n| n.area),
             threshold,
             least_area: f64::INFINITY,
             hidden: true,
-        });
+        })
+        .expect(NOBODY);
         let started = Instant::now();
-        let leaves: Vec<u32> = self.tree.leaves().collect();
-        let rows = LinkRows::new(self.tree.nodes.len(), &self.graph.links);
-        self.look_out();
-        self.balance = balance(&self.tree, &rows, &self.areas, &self.outlook.target);
-        self.settings.error = CONVERGED;
+        let leaves = self.refinement.leaves();
+        let rows = self.refinement.link_rows();
+        self.refinement.look_out(&self.room).expect(NOBODY);
+        self.refinement.balance = self.refinement.balanced(&rows);
+        self.room.settings.error = CONVERGED;
         let (convergence, _) = self.solve(&rows, &leaves);
-        self.settings.error = error;
-        self.light.white = white;
+        self.room.settings.error = error;
+        self.solution.light.white = white;
         Some(Held {
-            lanes: self.lanes.len(),
-            spectrum_de_luv: self.spectrum_error,
+            lanes: self.solution.lanes.len(),
+            spectrum_de_luv: self.solution.spectrum_error,
             iterations: convergence.iterations,
             seconds: (chosen + started.elapsed()).as_secs_f64(),
         })
@@ -65,13 +66,17 @@ impl Bake {
 
     /// Tristimulus irradiance of the leaves of the hierarchy, lx for Y, each with its area.
     pub fn leaf_colours(&self) -> Vec<([f64; 3], f64)> {
-        self.light
+        self.solution
+            .light
             .leaves
             .iter()
             .enumerate()
             .map(|(k, &leaf)| {
-                let xyz = self.lanes.tristimulus(self.light.irradiance.row(k));
-                (xyz, self.areas[leaf as usize])
+                let xyz = self
+                    .solution
+                    .lanes
+                    .tristimulus(self.solution.light.irradiance.row(k));
+                (xyz, self.refinement.areas[leaf as usize])
             })
             .collect()
     }

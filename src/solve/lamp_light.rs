@@ -1,12 +1,16 @@
 //! Direct light on the leaves of a bake: what [`Direct`](super::direct::Direct) asks of points.
 
+use super::Bake;
 use super::direct::{Look, receiver};
 use super::flux::{self, Closed};
-use super::{Bake, by_rays, punctual};
+use super::refinement::Refinement;
+use super::room::{Room, by_rays};
+use super::solution::Solution;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::{Neighbours, Rows, padded, weighed};
 use crate::link::{Demand, Sight};
+use crate::team::Interrupted;
 use crate::transport::{Gatherer, Memory, Receiver};
 use glam::Vec3;
 
@@ -28,7 +32,8 @@ const MIRRORED: f64 = 2.0;
 
 /// Looks at points of leaves while the hierarchy is being refined.
 struct Looker<'a> {
-    bake: &'a Bake,
+    room: &'a Room,
+    solution: &'a Solution,
     sight: &'a Sight<'a>,
     /// The same without anything in the way.
     clear: Sight<'a>,
@@ -47,30 +52,28 @@ impl Look for Looker<'_> {
         tolerance: f64,
         memory: &mut Memory,
     ) -> Option<[f32; 64]> {
-        let (bake, by_rays) = (self.bake, by_rays(self.sight));
+        let (room, by_rays) = (self.room, by_rays(self.sight));
         let gatherer = Gatherer {
-            tree,
             tolerance,
             shafts: !by_rays,
-            ..bake.gatherer(self.sight)
+            ..self.solution.gatherer(room, tree, self.sight)
         };
         let row = gatherer.direct(to, memory);
         let hidden = !by_rays
-            && bake.closed == Closed::No
+            && room.closed == Closed::No
             && row.iter().all(|&x| x == 0.0)
             && flux::covered(
-                &bake.mesh, tree, &bake.rays, to.point, to.normal, to.plane, to.seed,
+                &room.mesh, tree, &room.rays, to.point, to.normal, to.plane, to.seed,
             );
         (!hidden).then_some(row)
     }
 
     fn unshadowed(&self, tree: &Tree, leaf: u32, tolerance: f64) -> f64 {
         let gatherer = Gatherer {
-            tree,
             tolerance,
             sight: &self.clear,
             glass: None,
-            ..self.bake.gatherer(self.sight)
+            ..self.solution.gatherer(self.room, tree, self.sight)
         };
         let mut memory = Memory::default();
         let bright = |at: [f64; 3]| {
@@ -104,22 +107,22 @@ impl Look for Looker<'_> {
 
 impl Bake {
     /// Gathers direct light on all leaves, splitting those that it varies over.
-    pub(super) fn gather_direct(&mut self, demand: &Demand) {
-        let width = padded(self.lanes.len());
-        match width {
+    pub(super) fn gather_direct(&mut self, demand: &Demand) -> Result<(), Interrupted> {
+        match padded(self.solution.lanes.len()) {
             4 => self.place_emission::<4>(),
             8 => self.place_emission::<8>(),
             16 => self.place_emission::<16>(),
             32 => self.place_emission::<32>(),
             _ => self.place_emission::<64>(),
-        }
-        self.lamps = punctual::lamps(&self.scene, &self.mesh, &self.lanes);
-        self.light.bright_lamps = self.bright_lamps();
-        let mut tree = std::mem::take(&mut self.tree);
-        let mut direct = std::mem::take(&mut self.direct);
-        self.with_sight(|bake, sight| {
+        }?;
+        let (room, solution) = (&self.room, &mut self.solution);
+        solution.light_lamps(room);
+        solution.light.bright_lamps = solution.bright_lamps();
+        let Refinement { tree, direct, .. } = &mut self.refinement;
+        room.with_sight(|sight| {
             let look = Looker {
-                bake,
+                room,
+                solution,
                 sight,
                 clear: Sight {
                     occlusion: false,
@@ -127,32 +130,28 @@ impl Bake {
                     mirrors: None,
                     ..*sight
                 },
-                weights: bake.bright_weights(),
+                weights: solution.bright_weights(),
             };
-            let coarsest = DIRECT_SHARE * bake.settings.error;
-            direct.refine(&mut tree, demand, coarsest, &look, bake.team);
-        });
-        self.tree = tree;
-        self.direct = direct;
+            let coarsest = DIRECT_SHARE * room.settings.error;
+            let spread = (room.team, &room.interrupt);
+            direct.refine(tree, demand, coarsest, &look, spread)
+        })
     }
 
     /// Puts emission and links in place for a gather.
-    fn place_emission<const L: usize>(&mut self) {
-        let leaves: Vec<u32> = self.tree.leaves().collect();
-        let emission = self
-            .painter()
-            .paint(&self.tree, &leaves, &self.lanes)
-            .emission;
-        self.look_out();
-        self.light.emitted = self.on_nodes::<L>(&emission, &leaves);
-        self.light.neighbours = Neighbours::new(self.tree.nodes.len(), &self.graph);
-        self.light.half_size = self.mesh.half_size;
-        self.previous = std::mem::replace(
-            &mut self.light.reflected,
-            Rows::zero(self.tree.nodes.len(), L),
-        );
-        let mut light = std::mem::take(&mut self.light);
-        light.measure(&self.tree, &self.lanes);
-        self.light = light;
+    fn place_emission<const L: usize>(&mut self) -> Result<(), Interrupted> {
+        let (room, refinement, solution) = (&self.room, &mut self.refinement, &mut self.solution);
+        let leaves = refinement.leaves();
+        let painter = room.painter();
+        let sources = painter.paint(&refinement.tree, &leaves, &solution.lanes);
+        refinement.look_out(room)?;
+        let nodes = refinement.tree.nodes.len();
+        let light = &mut solution.light;
+        light.emitted = refinement.on_nodes::<L>(&sources.emission, &leaves);
+        light.neighbours = Neighbours::new(nodes, &refinement.graph);
+        light.half_size = room.mesh.half_size;
+        solution.previous = std::mem::replace(&mut light.reflected, Rows::zero(nodes, L));
+        light.measure(&refinement.tree, &solution.lanes);
+        Ok(())
     }
 }

@@ -92,7 +92,14 @@ const LISTED_LEAVES: usize = 4096;
 impl Bake {
     /// Mean number of intervals that a patch needs, over evenly chosen leaves.
     pub(super) fn intervals_mean(&self) -> f64 {
-        let lists = self.lists(self.light.leaves.len().div_ceil(LISTED_LEAVES).max(1));
+        let lists = self.lists(
+            self.solution
+                .light
+                .leaves
+                .len()
+                .div_ceil(LISTED_LEAVES)
+                .max(1),
+        );
         let sum: usize = lists.iter().map(PatchList::intervals).sum();
         if lists.is_empty() {
             0.0
@@ -104,20 +111,22 @@ impl Bake {
     /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
     /// [`Light::leaves`](crate::light::Light::leaves); empty where the rows hold the 64 leaves.
     pub fn lists(&self, step: usize) -> Vec<PatchList> {
-        if !self.lanes.is_ratio() {
+        if !self.solution.lanes.is_ratio() {
             return Vec::new();
         }
-        let limit = SPECTRUM_SHARE * self.settings.error;
+        let limit = SPECTRUM_SHARE * self.room.settings.error;
         let lister = Lister::new(
-            &self.lanes,
-            &self.scene.spectra,
-            &self.weights,
-            self.light.white,
+            &self.solution.lanes,
+            &self.room.scene.spectra,
+            &self.room.weights,
+            self.solution.light.white,
             limit,
         );
-        let rows: Vec<usize> = (0..self.light.leaves.len()).step_by(step.max(1)).collect();
+        let rows: Vec<usize> = (0..self.solution.light.leaves.len())
+            .step_by(step.max(1))
+            .collect();
         rows.into_par_iter()
-            .map(|k| lister.list(self.light.irradiance.row(k)))
+            .map(|k| lister.list(self.solution.light.irradiance.row(k)))
             .collect()
     }
 }

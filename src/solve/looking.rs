@@ -1,15 +1,12 @@
 //! What a solution is asked: light at receivers, and which of them something covers.
 
-use super::estimate::Distance;
-use super::{Bake, Care, Closed, DE_PER_PERCENT, by_rays, flux};
+use super::estimate::{self, Distance};
+use super::{Bake, Care, Closed, flux};
 use crate::geometry::{NO_PLANE, Segment};
-use crate::light::Glass;
 use crate::link::Sight;
 use crate::transport::hemisphere::Hemisphere;
 use crate::transport::{Gathered, Gatherer, MOSTLY, Memory, Receiver};
 
-/// What one patch may misplace in a gather, share of the asked-for error.
-const GATHER_SHARE: f64 = 0.1;
 /// A face that has less of its area bare lies below something.
 const MOSTLY_COVERED: f64 = 0.01;
 /// A place with something right above it, within this share of the room's half diagonal, is not seen: a centimetre in a
@@ -20,17 +17,24 @@ impl Bake {
     /// Looks at the watched points: how far they are from where they were a round ago, see [`super::estimate`].
     pub(super) fn distance(&mut self) -> Option<Distance> {
         let round = self.rounds.len();
-        let mut gathered = self.gather(&self.probes.receivers(&self.tree, round));
-        if self.keep {
+        let mut gathered = self.gather(&self.room.probes.receivers(&self.refinement.tree, round));
+        if self.room.keep {
             let traces = gathered.iter_mut().map(|g| g.packed.take()).collect();
-            self.watched = [std::mem::take(&mut self.watched[1]), traces];
+            self.solution.watched = [std::mem::take(&mut self.solution.watched[1]), traces];
         }
         let seen: Vec<[f64; 3]> = gathered
             .iter()
-            .map(|g| self.lanes.tristimulus(&g.irradiance))
+            .map(|g| self.solution.lanes.tristimulus(&g.irradiance))
             .collect();
-        let by_rays = self.by_rays();
-        self.probes.compare(seen, self.light.white, round, by_rays)
+        let by_rays = self.room.by_rays();
+        let before = std::mem::replace(&mut self.solution.seen, seen);
+        estimate::compare(
+            &before,
+            &self.solution.seen,
+            self.solution.light.white,
+            round,
+            by_rays,
+        )
     }
 
     /// Gathers at receivers, in order.
@@ -40,13 +44,13 @@ impl Bake {
 
     /// Gathers with care, or just for a picture.
     pub(crate) fn gather_with(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
-        if self.light.width() == 0 || self.light.white == [0.0; 3] {
+        if self.solution.light.width() == 0 || self.solution.light.white == [0.0; 3] {
             // A room without light: nothing to look for.
             return vec![Gathered::dark(); receivers.len()];
         }
-        self.with_sight(|bake, sight| {
+        self.room.with_sight(|sight| {
             let sketched = Hemisphere::sketch();
-            let mut gatherer = bake.gatherer(sight);
+            let mut gatherer = self.gatherer(sight);
             if let (Care::Sketch, Some(hemisphere)) = (care, &mut gatherer.hemisphere) {
                 *hemisphere = &sketched;
             }
@@ -54,33 +58,39 @@ impl Bake {
                 gatherer.most_backs = MOSTLY;
             }
             let at = |memory: &mut Memory, r: &Receiver| gatherer.at(r, memory).pack();
-            bake.team.map(receivers, Memory::default, at)
+            self.room.team.map(receivers, Memory::default, at)
         })
     }
 
     /// Which receivers does something solid cover?
     pub(crate) fn covered(&self, receivers: &[Receiver]) -> Vec<bool> {
-        if self.closed == Closed::Yes {
+        if self.room.closed == Closed::Yes {
             return vec![false; receivers.len()];
         }
         let covered = |(): &mut (), r: &Receiver| {
             flux::covered(
-                &self.mesh, &self.tree, &self.rays, r.point, r.normal, r.plane, r.seed,
+                &self.room.mesh,
+                &self.refinement.tree,
+                &self.room.rays,
+                r.point,
+                r.normal,
+                r.plane,
+                r.seed,
             )
         };
-        self.team.map(receivers, || (), covered)
+        self.room.team.map(receivers, || (), covered)
     }
 
     /// Which receivers does something lie upon, so near that nobody sees them? See [`PRESSED`].
     pub(crate) fn pressed(&self, receivers: &[Receiver]) -> Vec<bool> {
-        self.with_sight(|_, sight| {
+        self.room.with_sight(|sight| {
             let pressed = |(): &mut (), to: &Receiver| self.is_pressed(sight, to);
-            self.team.map(receivers, || (), pressed)
+            self.room.team.map(receivers, || (), pressed)
         })
     }
 
     fn is_pressed(&self, sight: &Sight, to: &Receiver) -> bool {
-        let height = PRESSED * self.mesh.half_size;
+        let height = PRESSED * self.room.mesh.half_size;
         let above = Segment::new(
             to.point,
             to.point + height * to.normal,
@@ -92,9 +102,15 @@ impl Bake {
     /// Does something solid cover a receiver, or lie upon it?
     pub(crate) fn is_under(&self, sight: &Sight, to: &Receiver) -> bool {
         let covered = || {
-            self.closed != Closed::Yes
+            self.room.closed != Closed::Yes
                 && flux::covered(
-                    &self.mesh, &self.tree, &self.rays, to.point, to.normal, to.plane, to.seed,
+                    &self.room.mesh,
+                    &self.refinement.tree,
+                    &self.room.rays,
+                    to.point,
+                    to.normal,
+                    to.plane,
+                    to.seed,
                 )
         };
         self.is_pressed(sight, to) || covered()
@@ -102,40 +118,23 @@ impl Bake {
 
     /// What of a leaf others see.
     pub(crate) fn openness(&self, leaf: u32) -> f64 {
-        f64::from(self.outlook.bare[leaf as usize])
+        f64::from(self.refinement.outlook.bare[leaf as usize])
     }
 
     /// Of each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.
     pub(crate) fn spaces(&self) -> Vec<(u32, bool)> {
-        let mut spaces = vec![(0, false); self.tree.faces.len()];
-        for (face, space) in self.mesh.faces.iter().zip(&self.spaces) {
-            let entry = self.tree.entry[face.triangle as usize][usize::from(face.back)];
-            let node = self.tree.face_node[entry as usize];
-            let covered = self.areas[node as usize] < MOSTLY_COVERED * self.tree.node(node).area;
+        let mut spaces = vec![(0, false); self.refinement.tree.faces.len()];
+        for (face, space) in self.room.mesh.faces.iter().zip(&self.room.spaces) {
+            let entry = self.refinement.tree.entry[face.triangle as usize][usize::from(face.back)];
+            let node = self.refinement.tree.face_node[entry as usize];
+            let covered = self.refinement.areas[node as usize]
+                < MOSTLY_COVERED * self.refinement.tree.node(node).area;
             spaces[entry as usize] = (*space, covered);
         }
         spaces
     }
 
     pub(crate) fn gatherer<'a>(&'a self, sight: &'a Sight<'a>) -> Gatherer<'a> {
-        Gatherer {
-            tree: &self.tree,
-            light: &self.light,
-            sight,
-            lamps: &self.lamps,
-            sky: self.outside.as_ref(),
-            glass: sight.panes.map(|glazing| Glass {
-                glazing,
-                filters: &self.filters,
-            }),
-            filters: &self.filters,
-            via: None,
-            tolerance: GATHER_SHARE * self.settings.error / DE_PER_PERCENT * 0.01,
-            closed: self.closed == Closed::Yes,
-            hemisphere: by_rays(sight).then_some(&self.hemisphere),
-            shafts: true,
-            keep: self.keep,
-            most_backs: 1.0,
-        }
+        (self.solution).gatherer(&self.room, &self.refinement.tree, sight)
     }
 }

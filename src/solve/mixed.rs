@@ -173,7 +173,8 @@ impl Mixed {
             let length = |x: &Rows| dot::<L>(x, x).iter().sum::<f64>().sqrt();
             done.residual = length(&change) / length(reflected).max(f64::MIN_POSITIVE);
             done.bound = done.residual * self.greatest / (1.0 - self.greatest);
-            if done.bound <= tolerance || done.iterations >= MAX_ITERATIONS {
+            let ended = done.iterations >= MAX_ITERATIONS || system.interrupt.is_raised();
+            if done.bound <= tolerance || ended {
                 return (done, seen);
             }
         }

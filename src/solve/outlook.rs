@@ -21,7 +21,7 @@ use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::hierarchy::{NONE, Tree, leaf_below};
 use crate::light::rows::Rows;
 use crate::link::Sight;
-use crate::team::Team;
+use crate::team::{Interrupt, Interrupted, Team};
 use crate::transport::hemisphere::{BEAM, Hemisphere};
 use found::{ALONE, End, Found, Pairs, look_from, start};
 use glam::{DVec3, Vec3};
@@ -63,17 +63,32 @@ pub(crate) struct Outlook {
     met: Vec<u32>,
 }
 
+/// How much was known of how leaves look out: nodes, rays, and of these what goes by mirrors and how many filters they pass.
+pub(super) struct Grown {
+    nodes: usize,
+    ends: usize,
+    lamps: usize,
+    filters: usize,
+}
+
 impl Outlook {
     /// Looks out of new leaves. A leaf below one of which very many rays all met fronts is not looked at again. Returns
     /// the rays cast.
-    pub(super) fn extend(&mut self, tree: &Tree, sight: &Sight, closed: Closed, seed: u64) -> u64 {
+    pub(super) fn extend(
+        &mut self,
+        tree: &Tree,
+        sight: &Sight,
+        closed: Closed,
+        seed: u64,
+        interrupt: &Interrupt,
+    ) -> Result<u64, Interrupted> {
         let old = self.target.len();
         self.target.resize(tree.nodes.len(), f32::NAN);
         self.bare.resize(tree.nodes.len(), f32::NAN);
         if closed == Closed::Yes {
             self.target[old..].fill(1.0);
             self.bare[old..].fill(1.0);
-            return 0;
+            return Ok(0);
         }
         self.certain.resize(tree.nodes.len(), false);
         let mut open = Vec::new();
@@ -89,25 +104,28 @@ impl Outlook {
             }
         }
         let mean = mean_area(tree);
-        let found: Vec<[usize; 3]> = open
+        let escape = |&k: &usize| {
+            let wanted = LEAF_RAYS[0] as f64 * (tree.nodes[k].area / mean);
+            let wanted = (wanted as usize).clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
+            escape_from(tree, k, sight, wanted.next_multiple_of(BEAM), seed)
+        };
+        let found: Result<Vec<Vec<[usize; 3]>>, _> = open
             .par_chunks(CHUNK)
-            .flat_map_iter(|chunk| {
-                chunk.iter().map(|&k| {
-                    let wanted = LEAF_RAYS[0] as f64 * (tree.nodes[k].area / mean);
-                    let wanted = (wanted as usize).clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
-                    escape_from(tree, k, sight, wanted.next_multiple_of(BEAM), seed)
-                })
+            .map(|chunk| {
+                interrupt
+                    .check()
+                    .map(|()| chunk.iter().map(escape).collect())
             })
             .collect();
         let mut cast = 0;
-        for (k, [count, misses, covered]) in open.into_iter().zip(found) {
+        for (k, [count, misses, covered]) in open.into_iter().zip(found?.into_iter().flatten()) {
             let bare = count - covered;
             self.bare[k] = bare as f32 / count as f32;
             self.target[k] = (bare - misses) as f32 / bare.max(1) as f32;
             self.certain[k] = misses + covered == 0 && count >= CERTAIN;
             cast += count as u64;
         }
-        cast
+        Ok(cast)
     }
 
     /// Lets new leaves look for themselves, each rank its own, and looks up where the rays of all of them end in the present
@@ -118,10 +136,11 @@ impl Outlook {
         sight: &Sight,
         hemisphere: &Hemisphere,
         seed: u64,
-    ) -> u64 {
+        interrupt: &Interrupt,
+    ) -> Result<u64, Interrupted> {
         if self.range.len() == tree.nodes.len() {
             // A hierarchy only grows: this one has been looked out of.
-            return 0;
+            return Ok(0);
         }
         self.target.resize(tree.nodes.len(), f32::NAN);
         self.bare.resize(tree.nodes.len(), f32::NAN);
@@ -139,9 +158,10 @@ impl Outlook {
         let team = self.team;
         let own = new.iter().copied().filter(|&k| team.owns(k as usize));
         let own: Vec<u32> = own.collect();
-        let parts: Vec<Vec<Found>> = own
+        let parts: Result<Vec<Vec<Found>>, _> = own
             .par_chunks(CHUNK)
             .map(|chunk| {
+                interrupt.check()?;
                 let each = |&leaf: &u32| {
                     let wanted = usual * tree.node(leaf).area;
                     let pattern = patterns
@@ -150,9 +170,10 @@ impl Outlook {
                         .unwrap_or(hemisphere);
                     look_from(tree, leaf, sight, pattern, seed)
                 };
-                chunk.iter().map(each).collect()
+                Ok(chunk.iter().map(each).collect())
             })
             .collect();
+        let parts = parts?;
         let counts = |found: &Found| {
             let fronts = found.ends.iter().filter(|end| end.entry != NONE).count();
             [fronts as u32, found.ends.len() as u32]
@@ -177,7 +198,7 @@ impl Outlook {
             self.ends.extend(found.ends);
         }
         self.find(tree);
-        cast
+        Ok(cast)
     }
 
     /// Looks up which leaf stands at each end; what was found before stays where the leaf was not split.
@@ -198,6 +219,36 @@ impl Outlook {
             if end.entry != NONE && !(k < known && stands(*met)) {
                 *met = leaf_at(end);
             }
+        });
+    }
+
+    /// How much there is, for [`Outlook::shrink`].
+    pub(super) fn grown(&self) -> Grown {
+        Grown {
+            nodes: self.target.len(),
+            ends: self.ends.len(),
+            lamps: self.lamps.len(),
+            filters: self.tints.filters(),
+        }
+    }
+
+    /// Forgets what was looked at since; `tree` is the hierarchy as it was refined since, too.
+    pub(super) fn shrink(&mut self, tree: &Tree, to: &Grown) {
+        self.target.truncate(to.nodes);
+        self.bare.truncate(to.nodes);
+        self.certain.truncate(to.nodes);
+        self.range.truncate(to.nodes);
+        self.ends.truncate(to.ends);
+        self.lamps.truncate(to.lamps);
+        self.tints.shrink(to.ends, to.filters);
+        self.met.truncate(to.ends);
+        let met = self.met.par_iter_mut().filter(|met| **met != NONE);
+        met.for_each(|met| {
+            let mut leaf = *met & !ALONE;
+            while leaf as usize >= to.nodes {
+                leaf = tree.node(leaf).parent;
+            }
+            *met = leaf | *met & ALONE;
         });
     }
 

@@ -1,8 +1,9 @@
 //! What lies outside a room: its sky, if any of it is seen.
 
-use super::flux;
-use super::{Bake, Closed};
-use crate::light::lanes::Lanes;
+use super::flux::{self, Closed};
+use super::room::Room;
+use crate::hierarchy::Tree;
+use crate::light::Filters;
 use crate::scene::effects::{Kind, Plan};
 use crate::transport::Outside;
 use crate::transport::openings::Openings;
@@ -10,30 +11,30 @@ use crate::transport::openings::Openings;
 /// Why a closed room has neither.
 const CLOSED: &str = "the room is closed: no ray leaves it";
 
-impl Bake {
+impl Room {
     /// Finds out by rays what is closed, what is outside, and where the light of lamps goes first.
-    pub(super) fn look_around(&mut self) {
-        [self.closed, self.sealed] = self.with_sight(|bake, sight| {
-            let seed = bake.settings.seed;
-            flux::closedness(&bake.mesh, &bake.tree, &bake.rays, sight, seed)
+    pub(super) fn look_around(&mut self, tree: &Tree) {
+        [self.closed, self.sealed] = self.with_sight(|sight| {
+            flux::closedness(&self.mesh, tree, &self.rays, sight, self.settings.seed)
         });
-        self.look_outside(true);
+        self.look_outside(tree, true);
+        let lanes = self.dense_lanes();
+        let filters = Filters::new(&self.scene, &lanes);
         // In a closed room this is known without a ray.
-        self.sent = self.with_sight(|bake, sight| bake.sent(sight));
+        self.sent = self.with_sight(|sight| self.sent(tree, &lanes, &filters, sight));
     }
 
     /// Looks for the openings of a room with a sky; takes the sky out of a room that is closed, which then costs nothing and is
     /// baked as if no sky were described.
     ///
     /// A room that is only relit has no rays to look with, and asks for no openings.
-    pub(super) fn look_outside(&mut self, rays: bool) {
+    pub(super) fn look_outside(&mut self, tree: &Tree, rays: bool) {
         if self.scene.sky.is_none() {
             return;
         }
         let seed = self.settings.seed;
-        let find = |bake: &Self| {
-            bake.with_sight(|bake, sight| Openings::find(&bake.mesh, &bake.tree, sight, seed))
-        };
+        let find =
+            |room: &Self| room.with_sight(|sight| Openings::find(&room.mesh, tree, sight, seed));
         // The few rays that tell whether a room is closed may miss a slit. Those that are relit were looked at.
         let mut found = None;
         if rays && self.sealed == Closed::Yes {
@@ -45,7 +46,6 @@ impl Bake {
         // Where only black backs are met besides fronts no ray leaves it either.
         if self.sealed == Closed::Yes {
             self.scene.shut_out_sky();
-            self.lanes = Lanes::dense(&self.scene.spectra, &self.weights);
             self.plan = Plan::of(&self.scene);
             if let Some(mirrors) = &self.mirrors {
                 self.plan.say(Kind::Mirrors, &mirrors.said());
@@ -61,7 +61,7 @@ impl Bake {
             return;
         };
         let is_exact =
-            self.panes.is_none() && self.with_sight(|_, sight| Outside::is_exact(&sky, sight));
+            self.panes.is_none() && self.with_sight(|sight| Outside::is_exact(&sky, sight));
         let openings = match is_exact {
             true => Openings::default(),
             false => found.unwrap_or_else(|| find(self)),

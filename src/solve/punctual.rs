@@ -6,7 +6,7 @@ use crate::light::lanes::Lanes;
 use crate::link::{Sight, View};
 use crate::scene::sky::PLACES;
 use crate::scene::{LightKind, PunctualLight, Scene};
-use crate::team::Team;
+use crate::team::{Interrupt, Interrupted, Team};
 use crate::transport::{Look, Outside};
 use crate::transport::{Receiver, punctual_factor};
 use std::f64::consts::PI;
@@ -144,18 +144,19 @@ pub(super) fn factors(
     scene: &Scene,
     mesh: &Mesh,
     outside: Option<&Outside>,
-    team: Team,
-) -> Shadowed {
+    (team, interrupt): (Team, &Interrupt),
+) -> Result<Shadowed, Interrupted> {
     let lights = recentred(scene, mesh);
     if lights.is_empty() {
-        return Shadowed {
+        return Ok(Shadowed {
             by_leaf: vec![Vec::new(); leaves.len()],
             rays: 0,
-        };
+        });
     }
     let total = tree.nodes.first().map_or(0.0, |n| n.area);
     let chunks: Vec<&[u32]> = leaves.chunks(CHUNK).collect();
-    let parts: Vec<(Vec<Factors>, u64)> = team.map(
+    let parts: Vec<(Vec<Factors>, u64)> = team.map_unless(
+        interrupt,
         &chunks,
         || (),
         |(), chunk| {
@@ -177,13 +178,13 @@ pub(super) fn factors(
                 .collect();
             (lists, look.rays)
         },
-    );
+    )?;
     let mut out = Shadowed::default();
     for (lists, rays) in parts {
         out.by_leaf.extend(lists);
         out.rays += rays;
     }
-    out
+    Ok(out)
 }
 
 /// Integral of a light's angular distribution, so that flux is intensity times this (1 where the flux itself is what is known); none

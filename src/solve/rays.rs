@@ -11,6 +11,7 @@ use super::sums::{CHUNK, added, chunks};
 use super::two_grid::TwoGrid;
 use crate::hierarchy::Tree;
 use crate::light::rows::Rows;
+use crate::team::Interrupt;
 use rayon::prelude::*;
 
 /// Sweeps at the most.
@@ -36,6 +37,8 @@ pub(crate) struct RaySystem<'a> {
     pub(super) greatest: &'a [f32],
     /// Few patches that stand for the room, and tristimulus values of each lane.
     pub(super) two_grid: Option<(&'a TwoGrid, &'a [[f64; 3]])>,
+    /// Ends the sweeps wherever they are.
+    pub(super) interrupt: &'a Interrupt,
 }
 
 /// What a sweep changes, times areas.
@@ -93,7 +96,7 @@ impl RaySystem<'_> {
                     grid.left(&earlier, &steps, &all, ratio) <= tolerance
                 };
             }
-            if settled || done.iterations >= SWEEPS {
+            if settled || done.iterations >= SWEEPS || self.interrupt.is_raised() {
                 return (done, seen);
             }
             corrected = !(corrected && done.residual > WORTH_CORRECTING * before);

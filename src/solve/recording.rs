@@ -10,7 +10,7 @@ impl Bake {
     /// What is written down of a round.
     pub(super) fn recorded(&self, m: Measured) -> Round {
         let bake = self;
-        let light = &bake.light;
+        let light = &bake.solution.light;
         let errors = bake.errors(&m);
         let seconds = m.clock.total();
         let before = bake.rounds.iter();
@@ -19,7 +19,7 @@ impl Bake {
             .chain([(seconds, errors.total_de2000.value)])
             .collect();
         let times: Vec<f64> = curve.iter().map(|c| c.0).collect();
-        let ahead = forecast(&curve, LIGHT_SHARE * bake.settings.error);
+        let ahead = forecast(&curve, LIGHT_SHARE * bake.room.settings.error);
         let per = |bytes: usize, count: usize| bytes as f64 / count.max(1) as f64;
         let (of_links, of_elements) = (bake.bytes_of_links(&m), bake.bytes_of_elements());
         Round {
@@ -41,57 +41,58 @@ impl Bake {
             links_evaluated: m.refined.evaluated,
             links_capped: m.refined.capped,
             elements: light.leaves.len(),
-            nodes: bake.tree.nodes.len(),
-            links: bake.graph.links.len(),
+            nodes: bake.refinement.tree.nodes.len(),
+            links: bake.refinement.graph.links.len(),
             links_clear: bake
+                .refinement
                 .graph
                 .links
                 .iter()
                 .filter(|l| l.way == Way::Clear)
                 .count(),
-            intervals_working: bake.lanes.len(),
+            intervals_working: bake.solution.lanes.len(),
             intervals_mean: bake.intervals_mean(),
             memory_bytes: of_links + of_elements,
-            row_bytes: self.outlook.row_bytes(),
-            bytes_per_link: per(of_links, bake.graph.links.len()),
+            row_bytes: self.refinement.outlook.row_bytes(),
+            bytes_per_link: per(of_links, bake.refinement.graph.links.len()),
             bytes_per_element: per(of_elements, light.leaves.len()),
             iterations: m.convergence.iterations,
             fluorescence_rounds: m.convergence.fluorescence,
             error: errors,
             flux: m.flux,
-            row_sum_defect: bake.balance.defect_before,
-            row_sum_defect_after: bake.balance.defect_after,
+            row_sum_defect: bake.refinement.balance.defect_before,
+            row_sum_defect_after: bake.refinement.balance.defect_after,
         }
     }
 
     /// Memory of links and what belongs to them, bytes.
     fn bytes_of_links(&self, m: &Measured) -> usize {
         m.link_bytes
-            + size_of_val(self.graph.links.as_slice())
-            + size_of_val(self.graph.blockers.as_slice())
-            + self.light.neighbours.bytes()
+            + size_of_val(self.refinement.graph.links.as_slice())
+            + size_of_val(self.refinement.graph.blockers.as_slice())
+            + self.solution.light.neighbours.bytes()
     }
 
     /// Memory of the hierarchy and the light on it, bytes.
     fn bytes_of_elements(&self) -> usize {
-        self.tree.bytes()
-            + self.light.bytes()
-            + self.direct.bytes()
-            + size_of_val(self.areas.as_slice())
-            + size_of_val(self.balance.factor.as_slice())
-            + self.outlook.bytes()
+        self.refinement.tree.bytes()
+            + self.solution.light.bytes()
+            + self.refinement.direct.bytes()
+            + size_of_val(self.refinement.areas.as_slice())
+            + size_of_val(self.refinement.balance.factor.as_slice())
+            + self.refinement.outlook.bytes()
     }
 
     /// What is known of the error, by source.
     fn errors(&self, m: &Measured) -> Errors {
         let estimate = Figure::estimate;
-        let spectrum = self.spectrum_error.unwrap_or(0.0);
+        let spectrum = self.solution.spectrum_error.unwrap_or(0.0);
         let convergence_de = m.convergence.bound * 100.0 * DE_PER_PERCENT;
         // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
         let all = |geometry: f64| {
             (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt()
         };
-        let white = self.light.white.iter().sum::<f64>();
+        let white = self.solution.light.white.iter().sum::<f64>();
         let of = |figure: &dyn Fn(Distance) -> f64| estimate(m.distance.map(figure));
         Errors {
             total_de2000: estimate(m.distance.map(|d| all(d.de2000)).filter(|e| e.is_finite())),
@@ -100,8 +101,8 @@ impl Bake {
             geometry_chromaticity: of(&|d| d.chromaticity),
             geometry_de_luv: of(&|d| d.de_luv),
             spectrum_de_luv: Figure {
-                value: self.spectrum_error.filter(|e| e.is_finite()),
-                kind: match self.settings.representation {
+                value: self.solution.spectrum_error.filter(|e| e.is_finite()),
+                kind: match self.room.settings.representation {
                     Representation::Guaranteed => Kind::Bound,
                     _ => Kind::Estimate,
                 },

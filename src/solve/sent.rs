@@ -3,13 +3,15 @@
 //! By rays from the lamps themselves: nothing that receives light has a part in it, so that what leaves are found to receive
 //! can be held against it.
 
-use super::flux::Sent;
-use super::{Bake, Closed};
+use super::flux::{Closed, Sent};
+use super::room::Room;
 use crate::geometry::NO_PLANE;
 use crate::geometry::sampling::{
     Pcg, around, cosine_direction, hash, sequence02, sphere_direction, triangle_weights,
 };
-use crate::hierarchy::NONE;
+use crate::hierarchy::{NONE, Tree};
+use crate::light::lanes::Lanes;
+use crate::light::{Filters, Glass};
 use crate::link::Sight;
 use crate::scene::{LightKind, PunctualLight};
 use glam::{DVec3, Vec3};
@@ -21,10 +23,16 @@ const OFF: f64 = 1e-5;
 /// Rays that go together.
 const TOGETHER: usize = 16;
 
-impl Bake {
+impl Room {
     /// Follows the light of lamps.
-    pub(super) fn sent(&self, sight: &Sight) -> Sent {
-        let lamps = self.sending();
+    pub(super) fn sent(
+        &self,
+        tree: &Tree,
+        lanes: &Lanes,
+        filters: &Filters,
+        sight: &Sight,
+    ) -> Sent {
+        let lamps = self.sending(tree, lanes);
         let all: f64 = lamps.iter().map(|lamp| lamp.0).sum();
         if all <= 0.0 {
             return Sent::default();
@@ -40,14 +48,14 @@ impl Bake {
             lamps_lm: all,
             ..Sent::default()
         };
-        let glass = self.gatherer(sight).glass;
+        let glass = (sight.panes).map(|glazing| Glass { glazing, filters });
         let mut first = 0;
         for (flux, lamp) in lamps {
             // At least a packet, so that no lamp goes without.
             let count = (f64::from(RAYS) * flux / all).ceil() as usize;
             let count = count.next_multiple_of(TOGETHER);
             let rays: Vec<_> = (first..first + count)
-                .map(|k| lamp.ray(self, k as u32))
+                .map(|k| lamp.ray(self, tree, k as u32))
                 .collect();
             let weights: f64 = rays.iter().map(|ray| ray.3).sum();
             let each = flux / all / weights.max(f64::MIN_POSITIVE);
@@ -62,7 +70,7 @@ impl Bake {
                     let through = glass.map_or(1.0, |glass| glass.brightness(from[k], end));
                     let to = match hit {
                         None => &mut sent.outside,
-                        Some(hit) if self.tree.met(&hit) == NONE => &mut sent.to_backs,
+                        Some(hit) if tree.met(&hit) == NONE => &mut sent.to_backs,
                         Some(_) => &mut sent.to_fronts,
                     };
                     *to += each * rays[k].3 * through;
@@ -75,12 +83,12 @@ impl Bake {
     }
 
     /// Lamps with their luminous flux.
-    fn sending(&self) -> Vec<(f64, Lamp<'_>)> {
+    fn sending(&self, tree: &Tree, lanes: &Lanes) -> Vec<(f64, Lamp<'_>)> {
         let exitance: Vec<f64> = (self.scene.materials.iter())
-            .map(|m| self.lanes.exitance(m.even_emission())[1])
+            .map(|m| lanes.exitance(m.even_emission())[1])
             .collect();
-        let faces = (0..self.tree.faces.len()).filter_map(|entry| {
-            let triangle = self.tree.faces[entry].triangle as usize;
+        let faces = (0..tree.faces.len()).filter_map(|entry| {
+            let triangle = tree.faces[entry].triangle as usize;
             let flux = exitance[self.mesh.material[triangle] as usize] * self.mesh.area[triangle];
             (flux > 0.0).then_some((flux, Lamp::Face(entry)))
         });
@@ -89,7 +97,7 @@ impl Bake {
             let Some(solid) = super::punctual::solid_angle(light.kind) else {
                 continue;
             };
-            let flux = solid * self.lanes.emission(light.light, &light.shape, 1.0)[1];
+            let flux = solid * lanes.emission(light.light, &light.shape, 1.0)[1];
             if flux > 0.0 {
                 lamps.push((flux, Lamp::Punctual(light)));
             }
@@ -108,11 +116,10 @@ enum Lamp<'a> {
 
 impl Lamp<'_> {
     /// Start, direction and plane of its `k`-th ray, and what it counts for: 1 in the mean.
-    fn ray(self, bake: &Bake, k: u32) -> (DVec3, DVec3, u32, f64) {
+    fn ray(self, room: &Room, tree: &Tree, k: u32) -> (DVec3, DVec3, u32, f64) {
         // Two shifts of one sequence depend on each other.
         let mut random = Pcg::new(hash(13, u64::from(k)));
         let (u, v) = (sequence02(k, 11), [random.f64(), random.f64()]);
-        let tree = &bake.tree;
         match self {
             Lamp::Face(entry) => {
                 let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
@@ -125,12 +132,12 @@ impl Lamp<'_> {
                 )
             }
             Lamp::Punctual(light) => {
-                let place = light.position - bake.mesh.centre;
+                let place = light.position - room.mesh.centre;
                 if let Some(luminaire) = &light.luminaire {
                     let ray = luminaire.ray(u, v);
                     let (start, direction, weight) = ray.unwrap_or((DVec3::ZERO, DVec3::Y, 0.0));
                     // Off the surface, so that it is not met.
-                    let start = start + direction * (OFF * bake.mesh.half_size);
+                    let start = start + direction * (OFF * room.mesh.half_size);
                     return (place + start, direction, NO_PLANE, weight);
                 }
                 let direction = match light.kind {

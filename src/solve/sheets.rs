@@ -11,6 +11,7 @@ use super::conjugate::{Convergence, step, turn};
 use super::reflection::Reflection;
 use super::sums::dot_by_area;
 use crate::light::rows::Rows;
+use crate::team::Interrupt;
 
 /// Applications of the operator to find the light, at the most: bright rooms take some 20.
 const MOST: usize = 100;
@@ -26,6 +27,8 @@ pub(super) struct System<'a> {
     pub(super) areas: Vec<f64>,
     /// From radiosity by leaf to irradiance by leaf.
     pub(super) receive: &'a dyn Fn(&Rows) -> Rows,
+    /// Ends the solve wherever it is.
+    pub(super) interrupt: &'a Interrupt,
 }
 
 impl System<'_> {
@@ -62,7 +65,8 @@ impl System<'_> {
                     .bound
                     .max(change * tails.get(l).copied().unwrap_or(0.0));
             }
-            if done.bound <= tolerance || done.iterations >= MOST + SWEEPS {
+            let ended = done.iterations >= MOST + SWEEPS || self.interrupt.is_raised();
+            if done.bound <= tolerance || ended {
                 return (done, seen);
             }
         }
@@ -86,7 +90,9 @@ impl System<'_> {
         let mut rho = start;
         let mut left = start;
         done.iterations += 1;
-        while self.bound(&left, &norm) > SHARE * tolerance && done.iterations + 2 <= MOST {
+        let goes_on =
+            |done: &Convergence| done.iterations + 2 <= MOST && !self.interrupt.is_raised();
+        while self.bound(&left, &norm) > SHARE * tolerance && goes_on(done) {
             applied.clone_from(&self.apply::<L>(&direction));
             let alpha = ratios(&rho, &dot_by_area::<L>(&self.areas, &shadow, &applied));
             step::<L>(reflected, &direction, alpha);

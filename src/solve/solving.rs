@@ -4,20 +4,17 @@ use super::conjugate::{Convergence, System, step};
 use super::fluorescing::{Glow, Rounds};
 use super::flux::{self, Closed};
 use super::linear;
-use super::operator::{self, Operator};
+use super::mixed::Mixed;
+use super::operator::Operator;
 use super::rays::RaySystem;
 use super::reflection::Reflection;
 use super::sheets;
-use super::sources::Painter;
 use super::{Bake, Given};
-use crate::light::{Arrival, Light, Neighbours, Rows, brightness, padded, weighed};
+use crate::light::{Arrival, Light, Neighbours, Rows, padded, weighed};
 use crate::link::LinkRows;
 use crate::scene::effects::Kind;
 use crate::spectrum::{LEAVES, Leaves};
 use std::borrow::Cow;
-
-/// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
-const SOLVE_SHARE: f64 = 0.002;
 
 /// The leaves under direct light, and how they reflect: what the bounces start from.
 struct Lit<'a> {
@@ -62,23 +59,13 @@ fn with<'a, const L: usize>(rows: &'a Rows, given: Option<&Rows>) -> Cow<'a, Row
 }
 
 impl Bake {
-    /// Turns materials into rows.
-    pub(crate) fn painter(&self) -> Painter<'_> {
-        Painter::new(&self.scene, &self.mesh, &self.upsampler)
-    }
-
-    /// Relative error at which a solve ends.
-    pub(crate) fn tolerance(&self) -> f64 {
-        SOLVE_SHARE * self.settings.error
-    }
-
     /// Solves on the current links and measures the solution.
     pub(super) fn solve(
         &mut self,
         rows: &LinkRows,
         leaves: &[u32],
     ) -> (Convergence, flux::Balance) {
-        match padded(self.lanes.len()) {
+        match padded(self.solution.lanes.len()) {
             4 => self.solve_on::<4>(rows, leaves),
             8 => self.solve_on::<8>(rows, leaves),
             16 => self.solve_on::<16>(rows, leaves),
@@ -95,15 +82,18 @@ impl Bake {
     ) -> (Convergence, flux::Balance) {
         let mut first = Rows::zero(leaves.len(), L);
         for (k, &leaf) in leaves.iter().enumerate() {
-            let row = self.direct.row(leaf);
+            let row = self.refinement.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
         }
         let given = Given {
-            sources: self.painter().paint(&self.tree, leaves, &self.lanes),
+            sources: self
+                .room
+                .painter()
+                .paint(&self.refinement.tree, leaves, &self.solution.lanes),
             first,
-            reflected: self.guess::<L>(leaves),
+            reflected: self.solution.guess::<L>(&self.refinement.tree, leaves),
             emitted: None,
-            tolerance: self.tolerance(),
+            tolerance: self.room.tolerance(),
             counted: true,
         };
         let solved = self.solve_with::<L>(rows, leaves, given);
@@ -127,18 +117,18 @@ impl Bake {
             counted,
         } = given;
         let emission = sources.emission;
-        let by_rays = self.by_rays();
-        self.outlook.tints.on(&self.scene, &self.filters);
+        let by_rays = self.room.by_rays();
+        let tints = &mut self.refinement.outlook.tints;
+        tints.on(&self.room.scene, &self.solution.filters);
         self.add_lamps_in_mirrors::<L>(&emission, leaves, &mut first);
         let mut scaled = flux::Scaled::default();
-        if self.sealed == Closed::Yes && !by_rays {
+        if self.room.sealed == Closed::Yes && !by_rays {
             scaled.direct = self.conserve(&mut first, &emission, leaves);
         }
         let reflection = Reflection {
             rows: sources.reflectance,
             greatest: sources.greatest,
-            mixed: (self.lanes.is_mixed())
-                .then(|| self.painter().mixed(&self.tree, leaves, &self.lanes)),
+            mixed: self.mixed(leaves),
             sheets: sources.sheets,
         };
         let sums = self.sums_of(rows);
@@ -148,7 +138,7 @@ impl Bake {
             reflection: &reflection,
             tolerance,
         };
-        let runs = self.plan.runs(Kind::Interreflection);
+        let runs = self.room.plan.runs(Kind::Interreflection);
         let bounced = match runs {
             true => self.all_bounces::<L>(&lit, rows, &sums, sources.glow.as_ref(), &mut reflected),
             false => Bounced::none::<L>(leaves.len()),
@@ -160,7 +150,7 @@ impl Bake {
             reflected = reflection.of::<L>(&irradiance);
         }
         let sent = with::<L>(&reflected, given.as_ref());
-        let on_nodes = self.on_nodes::<L>(&sent, leaves);
+        let on_nodes = self.refinement.on_nodes::<L>(&sent, leaves);
         let through = reflection.sheets.as_ref();
         let through = through.map(|s| s.shown.clone()).unwrap_or_default();
         let mut flux = flux::Balance::default();
@@ -173,21 +163,23 @@ impl Bake {
                 fluoresced: given.as_ref(),
                 reflectance: &reflection.albedo::<L>(&reflected, &irradiance),
             };
-            flux = if by_rays {
-                self.flux_of_wholes::<L>(leaves, &fluxes, &on_nodes)
-            } else {
-                flux::flux(&self.areas, &self.lanes, leaves, &fluxes, &sums)
-            };
+            flux = self.flux::<L>(leaves, &fluxes, &on_nodes, &sums);
         }
-        (flux.sent, flux.scaled) = (self.sent, scaled);
-        let emitted = emitted.unwrap_or_else(|| self.on_nodes::<L>(&emission, leaves));
+        (flux.sent, flux.scaled) = (self.room.sent, scaled);
+        let emitted = emitted.unwrap_or_else(|| self.refinement.on_nodes::<L>(&emission, leaves));
         let on_nodes = self.without_mirrors::<L>(sent, on_nodes, leaves);
         if !through.is_empty() {
             irradiance = through.shown(irradiance);
         }
-        self.light.through = through;
+        self.solution.light.through = through;
         self.shine(leaves, emitted, on_nodes, irradiance);
         (bounced.convergence, flux)
+    }
+
+    /// Matrices of the paints, where lanes are no bands.
+    fn mixed(&self, leaves: &[u32]) -> Option<Mixed> {
+        let (tree, lanes) = (&self.refinement.tree, &self.solution.lanes);
+        (lanes.is_mixed()).then(|| self.room.painter().mixed(tree, leaves, lanes))
     }
 
     /// Adds the light of lamps in curved mirrors.
@@ -197,11 +189,15 @@ impl Bake {
         leaves: &[u32],
         first: &mut Rows,
     ) {
-        if self.mirrors.is_none() {
+        if self.room.mirrors.is_none() {
             return;
         }
-        let emitted = self.on_nodes::<L>(emission, leaves);
-        if let Some(more) = self.outlook.lamps_in_mirrors::<L>(leaves, &emitted) {
+        let emitted = self.refinement.on_nodes::<L>(emission, leaves);
+        if let Some(more) = self
+            .refinement
+            .outlook
+            .lamps_in_mirrors::<L>(leaves, &emitted)
+        {
             step::<L>(first, &more, [1.0; L]);
         }
     }
@@ -225,7 +221,7 @@ impl Bake {
             None => self.bounce::<L>(lit, rows, reflected),
         };
         let mut ratio = 1.0;
-        if !self.by_rays() {
+        if !self.room.by_rays() {
             let glow = glow.zip(given.as_mut());
             (irradiance, ratio) = self.slope::<L>(lit, rows, sums, reflected, glow);
         }
@@ -244,7 +240,7 @@ impl Bake {
         rows: &LinkRows,
         reflected: &mut Rows,
     ) -> (Convergence, Rows) {
-        match self.by_rays() {
+        match self.room.by_rays() {
             true => self.bounce_by_rays::<L>(lit, reflected),
             false => {
                 let convergence = self.bounce_along_links::<L>(lit, rows, reflected);
@@ -261,17 +257,24 @@ impl Bake {
         glow: &Glow,
         reflected: &mut Rows,
     ) -> (Convergence, Rows, Rows) {
-        let areas = lit.leaves.iter().map(|&leaf| self.areas[leaf as usize]);
+        let areas = lit
+            .leaves
+            .iter()
+            .map(|&leaf| self.refinement.areas[leaf as usize]);
         let one = [1.0; LEAVES];
-        let power = self.lanes.taken(&one, self.scene.grid.width());
+        let power = self
+            .solution
+            .lanes
+            .taken(&one, self.room.scene.grid.width());
         let rounds = Rounds {
             glow,
             areas: areas.collect(),
             power: power.into_iter().map(f64::from).collect(),
             tolerance: lit.tolerance,
+            interrupt: &self.room.interrupt,
         };
         let receive = |radiosity: &Rows| self.received::<L>(lit, rows, radiosity);
-        let by_rays = self.by_rays();
+        let by_rays = self.room.by_rays();
         rounds.solve::<L>(lit.first, reflected, receive, |first, reflected| {
             let lit = Lit { first, ..*lit };
             let (convergence, seen) = self.bounce::<L>(&lit, rows, reflected);
@@ -285,44 +288,65 @@ impl Bake {
 
     /// What radiosity of the leaves brings them.
     fn received<const L: usize>(&self, lit: &Lit, rows: &LinkRows, radiosity: &Rows) -> Rows {
-        if self.by_rays() {
+        if self.room.by_rays() {
             return self.ray_system(lit).received::<L>(radiosity);
         }
-        let factor = &self.balance.factor;
-        Operator::new(&self.tree, rows, lit.leaves, &self.areas, factor).received::<L>(radiosity)
+        let factor = &self.refinement.balance.factor;
+        Operator::new(
+            &self.refinement.tree,
+            rows,
+            lit.leaves,
+            &self.refinement.areas,
+            factor,
+        )
+        .received::<L>(radiosity)
     }
 
     /// The leaves as they look for themselves.
     fn ray_system<'a>(&'a self, lit: &'a Lit) -> RaySystem<'a> {
         // Two grids end by what is seen; what excites is not, and each lane has to tell for itself.
-        let seen_only = self.lanes.excites().is_none();
+        let seen_only = self.solution.lanes.excites().is_none();
         RaySystem {
-            tree: &self.tree,
-            outlook: &self.outlook,
+            tree: &self.refinement.tree,
+            outlook: &self.refinement.outlook,
             leaves: lit.leaves,
-            areas: &self.areas,
+            areas: &self.refinement.areas,
             reflectance: &lit.reflection.rows,
             greatest: &lit.reflection.greatest,
-            two_grid: (self.two_grid.as_ref())
+            two_grid: (self.refinement.two_grid.as_ref())
                 .filter(|_| seen_only)
-                .map(|grid| (grid, self.lanes.xyz())),
+                .map(|grid| (grid, self.solution.lanes.xyz())),
+            interrupt: &self.room.interrupt,
         }
     }
 
     /// What rows of links sum to; nothing where leaves look for themselves.
     fn sums_of(&self, rows: &LinkRows) -> Vec<f64> {
-        if self.by_rays() {
+        if self.room.by_rays() {
             return Vec::new();
         }
-        let factor: Vec<f64> = self.balance.factor.iter().map(|&f| f64::from(f)).collect();
-        crate::link::row_sums(&self.tree, rows, &self.areas, &factor)
+        let factor: Vec<f64> = self
+            .refinement
+            .balance
+            .factor
+            .iter()
+            .map(|&f| f64::from(f))
+            .collect();
+        crate::link::row_sums(&self.refinement.tree, rows, &self.refinement.areas, &factor)
     }
 
     /// Scales direct light so that all that lamps give out arrives; its flux after over before.
     fn conserve(&self, first: &mut Rows, emission: &Rows, leaves: &[u32]) -> f64 {
-        let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);
+        let lumens =
+            |rows: &Rows| flux::lumens(&self.refinement.areas, &self.solution.lanes, leaves, rows);
         let before = lumens(first);
-        flux::conserve(first, emission, &self.lamps, &self.areas, leaves);
+        flux::conserve(
+            first,
+            emission,
+            &self.solution.lamps,
+            &self.refinement.areas,
+            leaves,
+        );
         flux::ratio(lumens(first), before)
     }
 
@@ -351,11 +375,18 @@ impl Bake {
         rows: &LinkRows,
         reflected: &mut Rows,
     ) -> Convergence {
-        let factor = &self.balance.factor;
+        let factor = &self.refinement.balance.factor;
         let system = System {
-            operator: Operator::new(&self.tree, rows, lit.leaves, &self.areas, factor),
+            operator: Operator::new(
+                &self.refinement.tree,
+                rows,
+                lit.leaves,
+                &self.refinement.areas,
+                factor,
+            ),
             reflectance: &lit.reflection.rows,
             greatest: &lit.reflection.greatest,
+            interrupt: &self.room.interrupt,
         };
         if lit.reflection.sheets.is_some() {
             let receive = |radiosity: &Rows| system.operator.received::<L>(radiosity);
@@ -370,15 +401,19 @@ impl Bake {
 
     /// The same room where light passes sheets.
     fn through_sheets<'a>(
-        &self,
+        &'a self,
         lit: &'a Lit,
         receive: &'a dyn Fn(&Rows) -> Rows,
     ) -> sheets::System<'a> {
-        let areas = lit.leaves.iter().map(|&leaf| self.areas[leaf as usize]);
+        let areas = lit
+            .leaves
+            .iter()
+            .map(|&leaf| self.refinement.areas[leaf as usize]);
         sheets::System {
             reflection: lit.reflection,
             areas: areas.collect(),
             receive,
+            interrupt: &self.room.interrupt,
         }
     }
 
@@ -393,8 +428,15 @@ impl Bake {
         mut glow: Option<(&Glow, &mut Rows)>,
     ) -> (Rows, f64) {
         let (leaves, reflection) = (lit.leaves, lit.reflection);
-        let lumens = |rows: &Rows| flux::lumens(&self.areas, &self.lanes, leaves, rows);
-        let slopes = linear::Slopes::new(&self.tree, rows, &self.areas, leaves, sums);
+        let lumens =
+            |rows: &Rows| flux::lumens(&self.refinement.areas, &self.solution.lanes, leaves, rows);
+        let slopes = linear::Slopes::new(
+            &self.refinement.tree,
+            rows,
+            &self.refinement.areas,
+            leaves,
+            sums,
+        );
         let bounced = reflection.of::<L>(lit.first);
         let (mut irradiance, mut ratio) = (Rows::default(), 1.0);
         for _ in 0..linear::PASSES {
@@ -405,7 +447,7 @@ impl Bake {
             let again = reflection.of::<L>(&irradiance);
             let first = with::<L>(&bounced, given);
             let energy = slopes.balance::<L>(&irradiance, &first, &again);
-            reflection.scale::<L>(&self.lanes, &mut irradiance, energy);
+            reflection.scale::<L>(&self.solution.lanes, &mut irradiance, energy);
             ratio = flux::ratio(lumens(&irradiance), before);
             let mut all = irradiance.clone();
             step::<L>(&mut all, lit.first, [1.0; L]);
@@ -413,35 +455,42 @@ impl Bake {
             if let Some((glow, given)) = &mut glow {
                 **given = glow.of::<L>(&all);
             }
+            if self.room.interrupt.is_raised() {
+                break;
+            }
         }
         (irradiance, ratio)
     }
 
-    /// The flux where leaves look for themselves.
-    fn flux_of_wholes<const L: usize>(
+    /// Where the light went; where leaves look for themselves, by whole leaves.
+    fn flux<const L: usize>(
         &self,
         leaves: &[u32],
         rows: &flux::FluxRows,
         on_nodes: &Rows,
+        sums: &[f64],
     ) -> flux::Balance {
+        let (refinement, lanes) = (&self.refinement, &self.solution.lanes);
+        if !self.room.by_rays() {
+            return flux::flux(&refinement.areas, lanes, leaves, rows, sums);
+        }
         let mut whole = Rows::zero(leaves.len(), L);
-        if self.plan.runs(Kind::Interreflection) {
-            self.outlook
-                .irradiance_of_whole::<L>(leaves, on_nodes, &mut whole);
+        if self.room.plan.runs(Kind::Interreflection) {
+            (refinement.outlook).irradiance_of_whole::<L>(leaves, on_nodes, &mut whole);
         }
         let whole = flux::Whole {
             indirect: &whole,
-            direct: &|leaf| f64::from(self.direct.whole(leaf)),
-            area: &|leaf| self.tree.node(leaf).area,
+            direct: &|leaf| f64::from(refinement.direct.whole(leaf)),
+            area: &|leaf| refinement.tree.node(leaf).area,
             mirror: &|leaf| self.is_mirror(leaf),
         };
-        flux::flux_by_rays(&self.areas, &self.lanes, leaves, rows, &whole)
+        flux::flux_by_rays(&refinement.areas, lanes, leaves, rows, &whole)
     }
 
     /// Is a leaf a mirror?
     fn is_mirror(&self, leaf: u32) -> bool {
-        self.mirrors.as_ref().is_some_and(|mirrors| {
-            let face = self.tree.face_of(leaf);
+        self.room.mirrors.as_ref().is_some_and(|mirrors| {
+            let face = self.refinement.tree.face_of(leaf);
             mirrors.is_side(face.triangle, face.back)
         })
     }
@@ -453,120 +502,84 @@ impl Bake {
         on_nodes: Rows,
         leaves: &[u32],
     ) -> Rows {
-        if self.mirrors.is_none() {
+        if self.room.mirrors.is_none() {
             return on_nodes;
         }
-        let (mut sent, mut mirrors) = (sent.into_owned(), Rows::zero(self.tree.nodes.len(), L));
+        let (mut sent, mut mirrors) = (
+            sent.into_owned(),
+            Rows::zero(self.refinement.tree.nodes.len(), L),
+        );
         for (row, &leaf) in sent.all_mut::<L>().iter_mut().zip(leaves) {
             if self.is_mirror(leaf) {
                 mirrors.all_mut::<L>()[leaf as usize] = *row;
                 *row = [0.0; L];
             }
         }
-        self.light.mirrors = mirrors;
-        self.on_nodes::<L>(&sent, leaves)
+        self.solution.light.mirrors = mirrors;
+        self.refinement.on_nodes::<L>(&sent, leaves)
     }
 
     /// Takes over a solution: light by node, irradiance by leaf, and the white that eyes adapt to.
     fn shine(&mut self, leaves: &[u32], emitted: Rows, reflected: Rows, irradiance: Rows) {
-        self.light = Light {
+        self.solution.light = Light {
             reflected,
             emitted,
             irradiance,
             leaves: leaves.to_vec(),
-            neighbours: Neighbours::new(self.tree.nodes.len(), &self.graph),
-            through: std::mem::take(&mut self.light.through),
-            mirrors: std::mem::take(&mut self.light.mirrors),
-            white: self.light.white,
-            half_size: self.mesh.half_size,
-            apart: self.lanes.excites().is_some(),
+            neighbours: Neighbours::new(self.refinement.tree.nodes.len(), &self.refinement.graph),
+            through: std::mem::take(&mut self.solution.light.through),
+            mirrors: std::mem::take(&mut self.solution.light.mirrors),
+            white: self.solution.light.white,
+            half_size: self.room.mesh.half_size,
+            apart: self.solution.lanes.excites().is_some(),
             ..Light::default()
         };
-        self.light.white = self
+        self.solution.light.white = self
+            .room
             .settings
             .white
             .unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
-        self.light.measure(&self.tree, &self.lanes);
-    }
-
-    /// What turns a row into brightness, share of the white's.
-    pub(super) fn bright_weights(&self) -> Vec<f64> {
-        let white = self.light.white;
-        let xyz = self.lanes.noticed().iter();
-        xyz.map(|&xyz| brightness(xyz, white)).collect()
+        self.solution
+            .light
+            .measure(&self.refinement.tree, &self.solution.lanes);
     }
 
     /// Notes how bright what arrives on leaves is.
     pub(super) fn light_arrives(&mut self) {
-        let light = &self.light;
-        let weights = self.bright_weights();
+        let light = &self.solution.light;
+        let weights = self.solution.bright_weights();
         let bright = |row: &[f32]| weighed(row, &weights) as f32;
-        let mut arrival = vec![Arrival::default(); self.tree.nodes.len()];
+        let mut arrival = vec![Arrival::default(); self.refinement.tree.nodes.len()];
         for (k, &leaf) in light.leaves.iter().enumerate() {
             arrival[leaf as usize] = Arrival {
                 all: bright(light.irradiance.row(k)),
-                direct: bright(self.direct.row(leaf)),
-                spread: self.direct.spread(leaf),
+                direct: bright(self.refinement.direct.row(leaf)),
+                spread: self.refinement.direct.spread(leaf),
             };
         }
-        self.light.arrival = arrival;
-        self.light.bright_lamps = self.bright_lamps();
-    }
-
-    /// How bright each lamp is for a factor of 1, share of the white's.
-    pub(super) fn bright_lamps(&self) -> Vec<f32> {
-        let weights = self.bright_weights();
-        let lamps = self.lamps.iter();
-        lamps
-            .map(|(_, row)| weighed(row, &weights) as f32)
-            .collect()
+        self.solution.light.arrival = arrival;
+        self.solution.light.bright_lamps = self.solution.bright_lamps();
     }
 
     /// Area-weighted mean irradiance, tristimulus.
     pub fn mean_irradiance(&self) -> [f64; 3] {
-        self.mean_over_leaves(|row| self.lanes.tristimulus(row))
+        self.mean_over_leaves(|row| self.solution.lanes.tristimulus(row))
     }
 
     /// The spectrum of the mean irradiance, W/m2/nm on the 64 leaves.
     pub fn mean_spectrum(&self) -> Leaves {
-        self.mean_over_leaves(|row| self.lanes.leaves(row))
+        self.mean_over_leaves(|row| self.solution.lanes.leaves(row))
     }
 
     /// The mean of what irradiance comes to, by area; 0 where there is none.
     fn mean_over_leaves<const N: usize>(&self, of: impl Fn(&[f32]) -> [f64; N]) -> [f64; N] {
         let (mut sum, mut area) = ([0.0; N], 0.0);
-        for (k, &leaf) in self.light.leaves.iter().enumerate() {
-            let a = self.areas[leaf as usize];
-            let each = of(self.light.irradiance.row(k));
+        for (k, &leaf) in self.solution.light.leaves.iter().enumerate() {
+            let a = self.refinement.areas[leaf as usize];
+            let each = of(self.solution.light.irradiance.row(k));
             sum = std::array::from_fn(|c| sum[c] + a * each[c]);
             area += a;
         }
         sum.map(|x| if area > 0.0 { x / area } else { 0.0 })
-    }
-
-    /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.
-    pub(crate) fn guess<const L: usize>(&self, leaves: &[u32]) -> Rows {
-        let mut rows = Rows::zero(leaves.len(), L);
-        if self.previous.width() == L {
-            let known = self.previous.len();
-            for (row, &leaf) in rows.all_mut::<L>().iter_mut().zip(leaves) {
-                let mut id = leaf;
-                while id as usize >= known {
-                    id = self.tree.node(id).parent;
-                }
-                *row = self.previous.all::<L>()[id as usize];
-            }
-        }
-        rows
-    }
-
-    /// Leaf rows on all nodes, by area.
-    pub(crate) fn on_nodes<const L: usize>(&self, by_leaf: &Rows, leaves: &[u32]) -> Rows {
-        let mut rows = Rows::zero(self.tree.nodes.len(), L);
-        for (row, &leaf) in by_leaf.all::<L>().iter().zip(leaves) {
-            rows.all_mut::<L>()[leaf as usize] = *row;
-        }
-        operator::pull::<f32, L>(&self.tree, &self.areas, rows.all_mut::<L>());
-        rows
     }
 }

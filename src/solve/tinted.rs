@@ -107,6 +107,17 @@ impl Tints {
         }
     }
 
+    /// How many filters rays pass.
+    pub(super) fn filters(&self) -> usize {
+        self.known.len()
+    }
+
+    /// Forgets all rays but the first, and all but the first filters.
+    pub(super) fn shrink(&mut self, rays: usize, filters: usize) {
+        self.of.truncate(rays);
+        self.known.retain(|_, number| *number as usize <= filters);
+    }
+
     /// Works the filters out for these lanes.
     pub(super) fn on(&mut self, scene: &Scene, filters: &Filters) {
         if self.is_empty() {

@@ -345,6 +345,7 @@ mod tests {
                 reflectance: &reflectance,
                 greatest: &[0.3, 0.6, 0.9, 0.95],
                 two_grid,
+                interrupt: &crate::team::NEVER,
             };
             let mut reflected = Rows::zero(leaves.len(), L);
             let (done, _) = system.solve::<L>(&first, &mut reflected, 1e-5);

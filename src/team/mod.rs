@@ -5,6 +5,7 @@
 //! | `ranks` | shares of receivers, and the exchange of what was found at them |
 //! | `packed` | results as bytes |
 //! | `exchange` | the one message that ranks send |
+//! | `interrupt` | work that is given up |
 //! | `job` | joining and leaving the job of an MPI launcher (cargo feature `mpi`) |
 //!
 //! Scene, hierarchy and light are on every rank; the rows of a receiver (what its rays met) only on the one that owns it. A sum never
@@ -13,10 +14,12 @@
 //! nothing.
 
 mod exchange;
+mod interrupt;
 mod job;
 mod packed;
 mod ranks;
 
+pub use interrupt::{Asked, Interrupt, Interrupted, NEVER};
 pub use job::Job;
 pub use packed::Packed;
 pub use ranks::Team;

@@ -5,6 +5,7 @@
 //! need not say.
 
 use super::exchange;
+use super::interrupt::{Interrupt, Interrupted};
 use super::packed::Packed;
 use crate::store::Decoder;
 use crate::store::codec::Read;
@@ -72,6 +73,24 @@ impl Team {
             .par_iter()
             .map_init(memory, |memory, item| f(memory, item));
         self.merge(0..items.len(), found.collect())
+    }
+
+    /// The same, given up where that is asked for. Ranks that are not alone go on: one that gave up would leave the others waiting.
+    ///
+    /// # Errors
+    /// It was given up.
+    pub fn map_unless<T: Sync, R: Packed + Send, M>(
+        self,
+        interrupt: &Interrupt,
+        items: &[T],
+        memory: impl Fn() -> M + Sync + Send,
+        f: impl Fn(&mut M, &T) -> R + Sync + Send,
+    ) -> Result<Vec<R>, Interrupted> {
+        if !self.is_alone() {
+            return Ok(self.map(items, memory, f));
+        }
+        let one = |memory: &mut M, item| interrupt.check().map(|()| f(memory, item));
+        items.par_iter().map_init(memory, one).collect()
     }
 
     /// What was found at receivers, in the order of their numbers `keys`, from what this rank found at its own, in order.

@@ -471,7 +471,7 @@ mod tests {
         bake.run();
         assert!(!bake.lamps().is_empty());
         let (mut off, mut all) = (0.0, 0.0);
-        bake.with_sight(|bake, sight| {
+        bake.room.with_sight(|sight| {
             // So many rays that their noise is none.
             let gatherer = Gatherer {
                 tolerance: 1e-6,

@@ -15,7 +15,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, Weak};
 
 /// What is said at the first Ctrl-C.
-const ENDING: &str = "ending after this round; Ctrl-C again ends at once\n";
+const ENDING: &str = "ending with what is solved; Ctrl-C again ends at once\n";
 
 /// What is asked for.
 pub(crate) struct Wanted {

@@ -129,7 +129,7 @@ impl Room {
 
     /// Bakes light into the room, round by round, until the error asked for.
     ///
-    /// Ctrl-C ends it after the present round with a whole, if coarser, result (`verdict` is then `"interrupted"`); a second
+    /// Ctrl-C takes the present round back, save the first, and ends with a whole, if coarser, result (`verdict` is then `"interrupted"`); a second
     /// Ctrl-C raises `KeyboardInterrupt` at once.
     ///
     /// Args:

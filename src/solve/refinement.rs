@@ -1,0 +1,134 @@
+//! What rounds refine: the hierarchy, its links, and what its leaves see.
+
+use super::direct::Direct;
+use super::outlook::Outlook;
+use super::punctual::Shadowed;
+use super::room::{Room, by_rays};
+use super::{operator, two_grid};
+use crate::hierarchy::Tree;
+use crate::light::{Light, Rows};
+use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Refined, balance};
+use crate::team::Interrupted;
+use rayon::prelude::*;
+
+/// Levels that a round splits leaves by where reflected light varies.
+const LEVELS: usize = 4;
+
+/// A room divided as finely as the rounds so far asked for.
+#[derive(Default)]
+pub(crate) struct Refinement {
+    pub(crate) tree: Tree,
+    pub(crate) graph: Graph,
+    pub(crate) outlook: Outlook,
+    /// Area of each node that takes part.
+    pub(crate) areas: Vec<f64>,
+    pub(crate) balance: Balance,
+    pub(crate) direct: Direct,
+    /// What the choice of lanes may take for granted when lamps and paints change: shadows of punctual lights, balance.
+    pub(crate) frozen: Option<(Shadowed, Vec<f32>)>,
+    /// Few patches that stand for the room in a solve by rays.
+    pub(crate) two_grid: Option<two_grid::TwoGrid>,
+}
+
+impl Refinement {
+    /// The leaves of the hierarchy, ascending.
+    pub(crate) fn leaves(&self) -> Vec<u32> {
+        self.tree.leaves().collect()
+    }
+
+    /// The links of each node.
+    pub(crate) fn link_rows(&self) -> LinkRows {
+        LinkRows::new(self.tree.nodes.len(), &self.graph.links)
+    }
+
+    /// What makes rows of links sum to what they must.
+    pub(crate) fn balanced(&self, rows: &LinkRows) -> Balance {
+        balance(&self.tree, rows, &self.areas, &self.outlook.target)
+    }
+
+    /// Refines the links until none exceeds the demand.
+    pub(super) fn refine_links(
+        &mut self,
+        room: &Room,
+        demand: &Demand,
+    ) -> Result<Refined, Interrupted> {
+        let (tree, graph, seed) = (&mut self.tree, &mut self.graph, room.settings.seed);
+        room.with_sight(|sight| graph.refine(tree, sight, seed, demand, &room.interrupt))
+    }
+
+    /// Learns how new leaves look out; returns the rays cast.
+    pub(super) fn look_out(&mut self, room: &Room) -> Result<u64, Interrupted> {
+        let (tree, outlook, seed) = (&self.tree, &mut self.outlook, room.settings.seed);
+        let interrupt = &room.interrupt;
+        let rays = room.with_sight(|sight| {
+            if by_rays(sight) {
+                outlook.look(tree, sight, &room.hemisphere, seed, interrupt)
+            } else {
+                outlook.extend(tree, sight, room.closed, seed, interrupt)
+            }
+        })?;
+        self.areas = outlook.areas(tree);
+        Ok(rays)
+    }
+
+    /// Splits leaves that look for themselves and see reflected light vary in the last solution, and lets the parts look; the rays
+    /// cast.
+    pub(super) fn split_where_light_varies(
+        &mut self,
+        room: &Room,
+        light: &Light,
+        demand: &Demand,
+    ) -> Result<u64, Interrupted> {
+        if !room.by_rays() {
+            return Ok(0);
+        }
+        let mut rays = 0;
+        for _ in 0..LEVELS {
+            rays += self.look_out(room)?;
+            let known = light.bright_reflected.len();
+            let nodes = self.tree.nodes.len() as u32;
+            // Parts of a patch that was a leaf in the last solution are as bright as it.
+            let mut bright = light.bright_reflected.clone();
+            for k in known..nodes as usize {
+                bright.push(bright[self.tree.nodes[k].parent as usize]);
+            }
+            let mut keen = demand.keen.to_vec();
+            for k in keen.len()..nodes as usize {
+                keen.push(keen[self.tree.nodes[k].parent as usize]);
+            }
+            let seed = room.settings.seed;
+            let split = (0..nodes)
+                .into_par_iter()
+                .filter(|&k| {
+                    let node = self.tree.node(k);
+                    node.is_leaf()
+                        && room.team.owns(k as usize)
+                        && node.area > demand.least_area
+                        && self.tree.elements[node.element as usize].depth < MAX_DEPTH
+                        && self.outlook.variation(k, &bright, seed)
+                            * f64::from(keen[k as usize])
+                            * (node.area / demand.total_area).sqrt()
+                            > demand.threshold
+                })
+                .collect();
+            let split = room.team.union(split);
+            for &leaf in &split {
+                self.tree.subdivide(leaf);
+            }
+            if split.is_empty() {
+                break;
+            }
+        }
+        Ok(rays)
+    }
+
+    /// Leaf rows on all nodes, by area.
+    pub(crate) fn on_nodes<const L: usize>(&self, by_leaf: &Rows, leaves: &[u32]) -> Rows {
+        let mut rows = Rows::zero(self.tree.nodes.len(), L);
+        for (row, &leaf) in by_leaf.all::<L>().iter().zip(leaves) {
+            rows.all_mut::<L>()[leaf as usize] = *row;
+        }
+        operator::pull::<f32, L>(&self.tree, &self.areas, rows.all_mut::<L>());
+        rows
+    }
+}

@@ -1,0 +1,141 @@
+//! What a round solves for: the light on the hierarchy, on the lanes that were chosen for it.
+
+use super::punctual;
+use super::room::{Room, by_rays};
+use crate::hierarchy::Tree;
+use crate::light::lanes::Lanes;
+use crate::light::{Filters, Glass, Light, Rows, brightness, keenness, weighed};
+use crate::link::Sight;
+use crate::scene::PunctualLight;
+use crate::transport::Gatherer;
+
+/// What one patch may misplace in a gather, share of the asked-for error.
+const GATHER_SHARE: f64 = 0.1;
+/// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
+pub(crate) const DE_PER_PERCENT: f64 = 0.35;
+
+/// Where light of the watched points came from in a round, if that is kept.
+pub(crate) type Traces = Vec<Option<Box<[u8]>>>;
+
+/// The light of the last round.
+pub(crate) struct Solution {
+    pub(crate) lanes: Lanes,
+    /// Colour difference (CIELUV) that the lanes cause, as far as it is known.
+    pub(crate) spectrum_error: Option<f64>,
+    /// The spectra of panes and mirrors on the present lanes.
+    pub(crate) filters: Filters,
+    /// Punctual lights, recentred, with their rows.
+    pub(crate) lamps: Vec<(PunctualLight, Vec<f32>)>,
+    pub(crate) light: Light,
+    /// Reflected radiosity of the round before, by node: where a solve starts.
+    pub(crate) previous: Rows,
+    /// What was seen at the watched points, X, Y, Z; empty before the first round.
+    pub(crate) seen: Vec<[f64; 3]>,
+    /// Where it came from in the last two rounds, if that is kept.
+    pub(crate) watched: [Traces; 2],
+}
+
+impl Solution {
+    /// No light yet, on the 64 leaves.
+    pub(super) fn new(room: &Room) -> Self {
+        let lanes = room.dense_lanes();
+        Self {
+            filters: Filters::new(&room.scene, &lanes),
+            lanes,
+            spectrum_error: None,
+            lamps: Vec::new(),
+            light: Light::default(),
+            previous: Rows::default(),
+            seen: Vec::new(),
+            watched: Default::default(),
+        }
+    }
+
+    /// Looks up the punctual lights on the present lanes.
+    pub(crate) fn light_lamps(&mut self, room: &Room) {
+        self.lamps = punctual::lamps(&room.scene, &room.mesh, &self.lanes);
+    }
+
+    /// What turns a row into brightness, share of the white's.
+    pub(super) fn bright_weights(&self) -> Vec<f64> {
+        let white = self.light.white;
+        let xyz = self.lanes.noticed().iter();
+        xyz.map(|&xyz| brightness(xyz, white)).collect()
+    }
+
+    /// How bright each lamp is for a factor of 1, share of the white's.
+    pub(super) fn bright_lamps(&self) -> Vec<f32> {
+        let weights = self.bright_weights();
+        let lamps = self.lamps.iter();
+        lamps
+            .map(|(_, row)| weighed(row, &weights) as f32)
+            .collect()
+    }
+
+    /// How much lightness a change of irradiance makes at every node.
+    pub(super) fn keenness(&self, tree: &Tree) -> Vec<f32> {
+        let mut keen = vec![0.0_f32; tree.nodes.len()];
+        for (k, &leaf) in self.light.leaves.iter().enumerate() {
+            let h = brightness(
+                self.lanes.tristimulus(self.light.irradiance.row(k)),
+                self.light.white,
+            );
+            keen[leaf as usize] = keenness(h) as f32;
+        }
+        for k in (0..keen.len()).rev() {
+            let node = &tree.nodes[k];
+            if !node.is_leaf() {
+                let sum: f64 = node
+                    .child_range()
+                    .map(|c| f64::from(keen[c as usize]) * tree.node(c).area)
+                    .sum();
+                keen[k] = (sum / node.area) as f32;
+            }
+        }
+        keen
+    }
+
+    /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.
+    pub(super) fn guess<const L: usize>(&self, tree: &Tree, leaves: &[u32]) -> Rows {
+        let mut rows = Rows::zero(leaves.len(), L);
+        if self.previous.width() == L {
+            let known = self.previous.len();
+            for (row, &leaf) in rows.all_mut::<L>().iter_mut().zip(leaves) {
+                let mut id = leaf;
+                while id as usize >= known {
+                    id = tree.node(id).parent;
+                }
+                *row = self.previous.all::<L>()[id as usize];
+            }
+        }
+        rows
+    }
+
+    /// What finds light at points.
+    pub(crate) fn gatherer<'a>(
+        &'a self,
+        room: &'a Room,
+        tree: &'a Tree,
+        sight: &'a Sight<'a>,
+    ) -> Gatherer<'a> {
+        Gatherer {
+            tree,
+            light: &self.light,
+            sight,
+            lamps: &self.lamps,
+            sky: room.outside.as_ref(),
+            glass: sight.panes.map(|glazing| Glass {
+                glazing,
+                filters: &self.filters,
+            }),
+            filters: &self.filters,
+            via: None,
+            tolerance: GATHER_SHARE * room.settings.error / DE_PER_PERCENT * 0.01,
+            closed: room.closed == super::flux::Closed::Yes,
+            hemisphere: by_rays(sight).then_some(&room.hemisphere),
+            shafts: true,
+            keep: room.keep,
+            most_backs: 1.0,
+        }
+    }
+}

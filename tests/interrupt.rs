@@ -1,0 +1,131 @@
+//! A round that is given up leaves the bake as it was, wherever it is given up, and asking changes nothing.
+
+use haarlight::output::{Exposure, Writing, baked_glb};
+use haarlight::scene::{Options, Scene};
+use haarlight::solve::{Bake, Settings};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Rounds before the one that is given up.
+const BEFORE: usize = 2;
+
+fn bake(name: &str) -> Bake {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenes")
+        .join(name);
+    let scene = Scene::load(path, &Options::default()).unwrap();
+    let settings = Settings {
+        error: 1.0,
+        ..Settings::default()
+    };
+    Bake::new(scene, settings)
+}
+
+/// The records without their times, the light of every patch to the last bit, and what the hierarchy has become.
+fn state(bake: &Bake) -> (Vec<String>, Vec<u8>, usize) {
+    let records = bake.rounds().iter().map(|round| {
+        let mut record = serde_json::to_value(round).unwrap();
+        let fields = record.as_object_mut().unwrap();
+        fields.retain(|key, _| !key.ends_with("_s"));
+        record.to_string()
+    });
+    let light = bake.light();
+    let mut bytes = Vec::new();
+    for rows in [&light.reflected, &light.emitted, &light.irradiance] {
+        let all = (0..rows.len()).flat_map(|k| rows.row(k));
+        bytes.extend(all.flat_map(|x| x.to_le_bytes()));
+    }
+    (records.collect(), bytes, bake.tree().nodes.len())
+}
+
+/// The file, as a sketch of it.
+fn file(bake: &Bake) -> Vec<u8> {
+    let scene = bake.scene();
+    let all: Vec<Vec<bool>> = (scene.surfaces.iter())
+        .map(|s| vec![true; s.triangles.len()])
+        .collect();
+    let baked = bake.sketch(&all, &|_, _| {});
+    let look = Exposure::auto(scene, &baked.surfaces);
+    baked_glb(scene, &baked.surfaces, &look, Writing::default())
+        .unwrap()
+        .bytes
+}
+
+/// Steps until the bake was asked `after` times; was the round done, and how often was it asked?
+fn step(bake: &mut Bake, after: usize) -> (bool, usize) {
+    let asked = Arc::new(AtomicUsize::new(0));
+    let count = asked.clone();
+    let done = bake.step_unless(Arc::new(move || {
+        count.fetch_add(1, Ordering::Relaxed) >= after
+    }));
+    (done.is_some(), asked.load(Ordering::Relaxed))
+}
+
+/// Wherever a round is given up, what is left is the bake of one round fewer, to the last bit; and it can go on from there.
+fn given_up(name: &str, least: usize) {
+    let mut whole = bake(name);
+    for _ in 0..BEFORE {
+        whole.step();
+    }
+    let (before, written) = (state(&whole), file(&whole));
+    whole.step();
+    let after = state(&whole);
+
+    let mut other = bake(name);
+    // Nobody can give up the first round.
+    assert!(step(&mut other, 0).0);
+    for _ in 1..BEFORE {
+        assert!(step(&mut other, usize::MAX).0);
+    }
+    assert!(state(&other) == before, "{name}: asking changes a round");
+    let mut probed = bake(name);
+    (0..BEFORE).for_each(|_| {
+        probed.step();
+    });
+    let (done, times) = step(&mut probed, usize::MAX);
+    assert!(done && state(&probed) == after, "{name}");
+    assert!(times >= least, "{name}: asked {times} times only");
+    for after in [0, 1, times / 4, times / 2, 3 * times / 4, times - 1] {
+        assert!(
+            !step(&mut other, after).0,
+            "{name}: not after {after} of {times}"
+        );
+        assert!(other.taken_back_s().is_some_and(|s| s >= 0.0));
+        assert!(state(&other) == before, "{name}: after {after} of {times}");
+    }
+    assert!(file(&other) == written, "{name}: another file");
+    other.step();
+    assert!(other.taken_back_s().is_none());
+    assert!(state(&other) == after, "{name}: goes on to something else");
+}
+
+#[test]
+fn by_links() {
+    given_up("cornell-f2.glb", 100);
+}
+
+#[test]
+fn by_rays() {
+    given_up("furnished.glb", 300);
+}
+
+#[test]
+fn through_panes() {
+    given_up("glazed.glb", 100);
+}
+
+#[test]
+fn by_mirrors() {
+    given_up("mirrored.glb", 100);
+}
+
+#[test]
+fn through_sheets() {
+    given_up("curtained.glb", 100);
+}
+
+#[test]
+fn where_paints_fluoresce() {
+    given_up("brightened.glb", 100);
+}
