@@ -23,7 +23,7 @@ use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, Settings, flux, p
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
-use crate::transport::trace;
+use crate::transport::trace::{self, Stains};
 use std::path::Path;
 use std::time::Instant;
 
@@ -112,7 +112,6 @@ impl Bake {
     /// # Errors
     /// The room is dark; the cache would be larger than `limit` bytes; the file cannot be written; a bake that did not [`Bake::keep`].
     pub fn write_cache(&self, baked: &Baked, path: &Path, limit: u64) -> Result<u64> {
-        self.can_be_kept("--cache")?;
         if !self.keep || baked.kept.len() != baked.surfaces.len() {
             return Err(Error::Internal("a bake that kept nothing".into()));
         }
@@ -170,8 +169,11 @@ impl Bake {
     /// Mean colour difference between what the traces of the last two rounds give at the watched points under the present
     /// light; none before there are two.
     fn watched_distance(&self) -> Read<Option<f64>> {
+        let stains = Stains::new(&self.filters);
         let seen = |round: &[Option<Box<[u8]>>]| -> Read<Vec<[f64; 3]>> {
-            let rows = round.iter().map(|packed| self.replayed(packed.as_deref()));
+            let rows = round
+                .iter()
+                .map(|packed| self.replayed(packed.as_deref(), &stains));
             rows.map(|row| Ok(self.lanes.tristimulus(&row?))).collect()
         };
         let [before, last] = &self.watched;
@@ -445,9 +447,10 @@ impl Relighter {
         let shines = |row: &[f32; L]| f32::from(u8::from(row.iter().any(|&x| x > 0.0)));
         light.bright_emitted = light.emitted.all::<L>().iter().map(shines).collect();
         let mut first = Rows::zero(leaves.len(), L);
+        let stains = Stains::new(&bake.filters);
         self.leaves.for_each(first.all_mut::<L>(), |packed, row| {
             if let Some(packed) = packed {
-                *row = trace::replay::<L>(packed, &light, &bake.lamps)?;
+                *row = trace::replay::<L>(packed, &light, &bake.lamps, &stains)?;
             }
             Ok(())
         })?;

@@ -7,7 +7,7 @@ use crate::light::{mixed, padded};
 use crate::solve::Bake;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Packs};
-use crate::transport::trace;
+use crate::transport::trace::{self, Stains};
 use rayon::prelude::*;
 use std::io;
 
@@ -94,18 +94,19 @@ impl Bake {
 
     fn relit_lanes<const L: usize>(&self, kept: &[Kept]) -> Read<Baked> {
         let looks = self.looks(self.upsampler());
+        let stains = Stains::new(&self.filters);
         let mut out = Baked::default();
         for kept in kept {
             let mut rows: Vec<[f32; 64]> = bytemuck::zeroed_vec(kept.vertices.len());
             if self.light().through.is_empty() {
                 kept.traces.for_each(&mut rows, |packed, row| {
-                    self.relit_row::<L>(packed, None, row)
+                    self.relit_row::<L>(packed, None, &stains, row)
                 })?;
             } else {
                 let places = kept.vertices.iter().map(|vertex| self.place(kept, vertex));
                 let mut placed: Vec<(Option<u32>, [f32; 64])> = places.zip(rows).collect();
                 kept.traces.for_each(&mut placed, |packed, (place, row)| {
-                    self.relit_row::<L>(packed, *place, row)
+                    self.relit_row::<L>(packed, *place, &stains, row)
                 })?;
                 rows = placed.into_iter().map(|(_, row)| row).collect();
             }
@@ -140,13 +141,14 @@ impl Bake {
         &self,
         packed: Option<&[u8]>,
         place: Option<u32>,
+        stains: &Stains,
         row: &mut [f32; 64],
     ) -> Read<()> {
         let Some(packed) = packed else {
             row[0] = f32::NAN;
             return Ok(());
         };
-        let lit = |packed| trace::replay::<L>(packed, self.light(), self.lamps());
+        let lit = |packed| trace::replay::<L>(packed, self.light(), self.lamps(), stains);
         let shares = place.and_then(|place| self.light().through.shares(place));
         match shares {
             Some(shares) => {

@@ -7,7 +7,7 @@
 //! same, with what changed.
 //!
 //! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (16 and 8 a ray where leaves look for
-//! themselves), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 a ray and `4 padded lanes` a leaf:
+//! themselves, 12 in rooms with panes or mirrors), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 (8) a ray and `4 padded lanes` a leaf:
 //! the rest follows from where light comes from.
 
 use super::outlook::Outlook;
@@ -16,12 +16,12 @@ use super::{Bake, Representation, direct, punctual};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::{self, Lanes};
-use crate::light::{Light, Neighbours, Through};
-use crate::light::{Rows, padded};
+use crate::light::{Filters, Light, Neighbours, Rows, Through, padded};
 use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Fingerprint, Kind, Packs, container};
+use std::borrow::Cow;
 use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -35,9 +35,8 @@ impl Bake {
     /// Writes a checkpoint, the first rank alone; its size in bytes, 0 on other ranks.
     ///
     /// # Errors
-    /// The file cannot be written, or the room has panes or mirrors.
+    /// The file cannot be written.
     pub fn save(&self, path: &Path) -> Result<u64> {
-        self.can_be_kept("--checkpoint")?;
         let print = self.fingerprint();
         let body = |out: &mut Encoder| {
             print.encode(out)?;
@@ -49,23 +48,6 @@ impl Bake {
             true => container::write(path, Kind::Checkpoint, body),
             false => container::unwritten(path, body).map(|()| 0),
         }
-    }
-
-    /// Can what this bake knows be written down, as `option` asks? What rays pass on their way is in no file.
-    ///
-    /// # Errors
-    /// The room has panes or mirrors.
-    pub fn can_be_kept(&self, option: &str) -> Result<()> {
-        let rooms = match (&self.panes, &self.mirrors) {
-            (Some(_), _) => "rooms that light passes panes in",
-            (_, Some(_)) => "rooms with mirrors",
-            _ => return Ok(()),
-        };
-        Err(Error::input(
-            self.scene.source.path.display().to_string(),
-            format!("{option} does not go with {rooms}"),
-            format!("bake without {option}"),
-        ))
     }
 
     /// Takes up a checkpoint: this bake, which has done no round, goes on where that one stood.
@@ -108,6 +90,12 @@ impl Bake {
                 Kind::Checkpoint.next(),
             )),
         }
+    }
+
+    /// What panes and mirrors leave of light; none in a room without.
+    fn filtered(&self) -> Option<&Filters> {
+        let any = self.panes.is_some() || self.mirrors.is_some();
+        any.then_some(&self.filters)
     }
 
     /// Everything that the outcome depends on.
@@ -153,17 +141,20 @@ impl Bake {
         )?;
         out.put(self.spectrum_error.unwrap_or(f64::NAN))?;
         out.put(self.light.white)?;
-        self.outlook.encode(whole, out)?;
+        self.outlook.encode(whole, self.filtered(), out)?;
         out.put_all(factor)?;
         out.put([self.balance.defect_before, self.balance.defect_after])?;
         out.put(self.balance.limited as u64)?;
         let leaves = &self.light.leaves;
         let (reflected, irradiance) = (&self.light.reflected, &self.light.irradiance);
+        // What mirrors are read as stands apart.
+        let row = |&leaf: &u32| match self.is_mirror(leaf) {
+            true => self.light.mirrors.row(leaf as usize),
+            false => reflected.row(leaf as usize),
+        };
         out.put_list(
             leaves.len() * reflected.width(),
-            leaves
-                .iter()
-                .flat_map(|&k| reflected.row(k as usize).iter().copied()),
+            leaves.iter().flat_map(row).copied(),
         )?;
         if whole {
             out.put_list(
@@ -216,10 +207,11 @@ impl Bake {
             _ if lanes.is_empty() => return Err(Broken::new("has no lanes")),
             _ => self.guided(Lanes::with(lanes, &self.scene.spectra, &self.weights)),
         };
+        self.filters = Filters::new(&self.scene, &self.lanes);
         let error: f64 = from.get()?;
         self.spectrum_error = (!error.is_nan()).then_some(error);
         let white = from.get()?;
-        self.outlook = Outlook::decode(&self.tree, self.team, whole, from)?;
+        self.outlook = Outlook::decode(&self.tree, self.team, whole, self.filtered(), from)?;
         let factor: Vec<f32> = from.get_all()?;
         // Where leaves look for themselves nothing is balanced.
         let by_rays = self.by_rays();
@@ -283,7 +275,10 @@ impl Bake {
             emission, sheets, ..
         } = painter.paint(&self.tree, &light.leaves, &self.lanes);
         light.through = sheets.map_or_else(Through::default, |sheets| sheets.shown);
-        light.reflected = self.on_nodes::<L>(reflected, &light.leaves);
+        let on_nodes = self.on_nodes::<L>(reflected, &light.leaves);
+        light.reflected =
+            self.without_mirrors::<L>(Cow::Borrowed(reflected), on_nodes, &light.leaves);
+        light.mirrors = std::mem::take(&mut self.light.mirrors);
         light.emitted = self.on_nodes::<L>(&emission, &light.leaves);
         light.half_size = self.mesh.half_size;
         light.apart = self.lanes.excites().is_some();

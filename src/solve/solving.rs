@@ -128,7 +128,7 @@ impl Bake {
         } = given;
         let emission = sources.emission;
         let by_rays = self.by_rays();
-        self.outlook.tints.on(&self.scene, &self.filters);
+        self.outlook.tints.on(&self.filters);
         self.add_lamps_in_mirrors::<L>(&emission, leaves, &mut first);
         let mut scaled = flux::Scaled::default();
         if self.sealed == Closed::Yes && !by_rays {
@@ -439,7 +439,7 @@ impl Bake {
     }
 
     /// Is a leaf a mirror?
-    fn is_mirror(&self, leaf: u32) -> bool {
+    pub(super) fn is_mirror(&self, leaf: u32) -> bool {
         self.mirrors.as_ref().is_some_and(|mirrors| {
             let face = self.tree.face_of(leaf);
             mirrors.is_side(face.triangle, face.back)
@@ -447,7 +447,7 @@ impl Bake {
     }
 
     /// Takes what mirrors are read as out of what leaves send, and keeps it for rays that met too many; what all nodes send.
-    fn without_mirrors<const L: usize>(
+    pub(super) fn without_mirrors<const L: usize>(
         &mut self,
         sent: Cow<Rows>,
         on_nodes: Rows,
