@@ -7,7 +7,7 @@
 //! that was dark beside the others are as coarse as they were worth then.
 //!
 //! A cache belongs to a shape: surfaces, sides, holes, places of lights. Where that changed it is refused with what
-//! changed; so is a room in which a surface gives out light that did not (lamps may go out).
+//! changed; so is a room in which a surface gives out light that did not (lamps may go out). A bake with layers is relit with layers.
 
 use super::relit::Kept;
 use crate::color::de2000;
@@ -149,6 +149,7 @@ impl Bake {
             .map_err(|problem| Error::Internal(format!("settings: {problem}")))?;
         container::write(path, Kind::Cache, |out| {
             Fingerprint::shape(&self.scene).encode(out)?;
+            out.put(u8::from(self.scene.changes.layers.is_some()))?;
             Fingerprint::paint(&self.scene).encode(out)?;
             out.put_text(&settings)?;
             out.put_all(&self.spaces)?;
@@ -220,23 +221,29 @@ impl Relighter {
     /// Opens the cache of a room, which may have other lamps and paints by now.
     ///
     /// # Errors
-    /// The file cannot be read, is none of ours, is damaged, or belongs to a room of another shape.
+    /// The file cannot be read, is none of ours, is damaged, or belongs to a room of another shape; it has layers, and the lamps of the
+    /// room now make more than rows hold.
     pub fn open(cache: &Path, scene: Scene) -> Result<Self> {
         let now = Fingerprint::shape(&scene);
-        let mut opened = Err(None);
+        let place = cache.display().to_string();
+        let mut opened = Err(Error::Internal("a cache that was not read".into()));
         container::read(cache, Kind::Cache, |from| {
-            opened = match Fingerprint::decode(from)?.change(&now) {
-                None => Ok(Self::decode(scene, now, from)?),
-                Some(what) => {
+            let changed = Fingerprint::decode(from)?.change(&now);
+            let ready = match changed {
+                None => parted(scene, from.get::<u8>()? == 1),
+                Some(what) => Err(refused(&place, &what)),
+            };
+            opened = match ready {
+                Ok(scene) => Ok(Self::decode(scene, now, from)?),
+                Err(error) => {
                     // What follows belongs to something else.
                     from.skip();
-                    Err(Some(what))
+                    Err(error)
                 }
             };
             Ok(())
         })?;
-        let place = cache.display().to_string();
-        let opened = opened.map_err(|what| refused(&place, &what.unwrap_or_default()))?;
+        let opened = opened?;
         match opened.kindled(&opened.bake.scene) {
             None => Ok(opened),
             Some(what) => Err(refused(&place, &what)),
@@ -270,6 +277,10 @@ impl Relighter {
         let distance: f64 = from.get()?;
         let lit = from.get_exactly(bake.scene.surfaces.len())?;
         let (reflected, leaves) = bake.decode_state(false, from)?;
+        let same = paint.change(&Fingerprint::paint(&bake.scene)).is_none();
+        if same && reflected.width() == 0 {
+            return Err(Broken::new("has lanes of light that is not there"));
+        }
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
             kept.push(Kept::decode(&bake.mesh, from)?);
@@ -283,7 +294,7 @@ impl Relighter {
             shape,
             lit,
             paint,
-            start: Some(reflected),
+            start: Some(reflected).filter(|rows| rows.width() > 0),
             links: None,
             rough: false,
             solved: Convergence {
@@ -302,13 +313,14 @@ impl Relighter {
     /// The room, to be relit under other lamps and paints.
     ///
     /// # Errors
-    /// Its shape is another.
+    /// Its shape is another; its lamps make more layers than rows hold.
     pub fn change(&mut self, scene: Scene) -> Result<()> {
         let changed = self.shape.change(&Fingerprint::shape(&scene));
         if let Some(what) = changed.or_else(|| self.kindled(&scene)) {
             return Err(refused(&scene.source.path.display().to_string(), &what));
         }
-        self.bake.scene = scene;
+        let layers = self.bake.scene.changes.layers.is_some();
+        self.bake.scene = parted(scene, layers)?;
         self.bake.plan = crate::scene::effects::Plan::of(&self.bake.scene);
         Ok(())
     }
@@ -512,6 +524,14 @@ impl Relighter {
     pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
         self.bake.radiosity_spectra(baked)
     }
+}
+
+/// The room with its lamps parted where those of the bake were, see [`Scene::part_lamps`].
+fn parted(mut scene: Scene, layers: bool) -> Result<Scene> {
+    if layers {
+        scene.part_lamps()?;
+    }
+    Ok(scene)
 }
 
 /// White over guess, channel by channel; `otherwise` where nothing was guessed.

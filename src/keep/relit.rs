@@ -1,7 +1,7 @@
 //! The output mesh kept with where its light comes from, and its light under other lamps and paints:
 //! one sparse product, no ray.
 
-use crate::gather::{Baked, BakedSurface, KeptVertex, Vertex, lend};
+use crate::gather::{Baked, BakedSurface, KeptVertex, LayerLanes, Vertex, lend};
 use crate::hierarchy::Mesh;
 use crate::light::{mixed, padded};
 use crate::solve::Bake;
@@ -93,7 +93,7 @@ impl Bake {
     }
 
     fn relit_lanes<const L: usize>(&self, kept: &[Kept]) -> Read<Baked> {
-        let looks = self.looks(self.upsampler());
+        let (looks, layers) = (self.looks(self.upsampler()), self.layer_lanes());
         let stains = Stains::new(&self.filters);
         let mut out = Baked::default();
         for kept in kept {
@@ -116,12 +116,20 @@ impl Bake {
             let vertices = lit.map(|(vertex, row)| {
                 self.vertex(&kept.on_element(vertex, self), kept.back, row, look)
             });
+            let layer = |(k, lanes): (usize, &LayerLanes)| {
+                let lit = kept.vertices.par_iter().zip(&rows);
+                let shown = lit.map(|(vertex, row)| {
+                    let vertex = kept.on_element(vertex, self);
+                    self.layer(k, lanes, (&vertex, kept.back, row), look)
+                });
+                shown.collect()
+            };
             out.surfaces.push(BakedSurface {
+                layers: layers.iter().enumerate().map(layer).collect(),
                 surface: kept.surface,
                 back: kept.back,
                 vertices: vertices.collect(),
                 triangles: kept.triangles.clone(),
-                layers: Vec::new(),
                 map: None,
             });
             out.irradiance.push(rows);

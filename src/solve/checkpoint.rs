@@ -181,7 +181,7 @@ impl Bake {
     }
 
     /// Takes them up, except for what is behind `light.irradiance` (if `whole`) and `light.leaves`: what the leaves reflect,
-    /// and where the direct light of each leaf comes from, if that was kept.
+    /// and where the direct light of each leaf comes from, if that was kept. If lamps are gone since it is not known what leaves reflect.
     pub(crate) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
         let splits = from.get_list::<u32>()?;
         self.tree.nodes.reserve(4 * splits.len());
@@ -191,20 +191,28 @@ impl Bake {
         }
         let nodes = self.tree.nodes.len();
         self.graph = decode_graph(nodes, self.mesh.triangles.len(), from)?;
-        let lights = self.scene.spectra.len();
-        let lanes = from
+        let mut lanes = from
             .get_all::<[u32; 3]>()?
             .into_iter()
-            .map(|lane| lane_of(lane, lights))
+            .map(lane_of)
             .collect::<Read<Vec<lanes::Lane>>>()?;
-        if lanes.len() > LEAVES {
+        let written = lanes.len();
+        if written > LEAVES {
             return Err(Broken::new("has an impossible number of lanes"));
         }
+        let there = |lane: &lanes::Lane| lane.light.is_none_or(|k| k < self.scene.spectra.len());
+        if whole && !lanes.iter().all(there) {
+            return Err(Broken::new("has lanes of light that is not there"));
+        }
+        // Lamps may have gone since.
+        lanes.retain(there);
+        let gone = lanes.len() < written;
         self.lanes = match self.settings.representation {
             Representation::Rgb | Representation::Characteristic(_) if lanes.is_empty() => {
                 self.chosen_lanes()
             }
-            _ if lanes.is_empty() => return Err(Broken::new("has no lanes")),
+            _ if lanes.is_empty() && !gone => return Err(Broken::new("has no lanes")),
+            _ if lanes.is_empty() => Lanes::dense(&self.scene.spectra, &self.weights),
             _ => self.guided(Lanes::with(lanes, &self.scene.spectra, &self.weights)),
         };
         self.filters = Filters::new(&self.scene, &self.lanes);
@@ -228,8 +236,12 @@ impl Bake {
         };
         self.areas = self.outlook.areas(&self.tree);
         let leaves: Vec<u32> = self.tree.leaves().collect();
-        let (count, width) = (leaves.len(), padded(self.lanes.len()));
-        let reflected = rows(from, count, width)?;
+        let kept = if gone { written } else { self.lanes.len() };
+        let (count, width) = (leaves.len(), padded(kept));
+        let mut reflected = rows(from, count, width)?;
+        if gone {
+            reflected = Rows::default();
+        }
         let mut irradiance = Rows::default();
         if whole {
             irradiance = rows(from, count, width)?;
@@ -388,11 +400,10 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
     Ok(Graph { links, blockers })
 }
 
-fn lane_of([light, first, count]: [u32; 3], lights: usize) -> Read<lanes::Lane> {
+fn lane_of([light, first, count]: [u32; 3]) -> Read<lanes::Lane> {
     let (first, count) = (first as usize, count as usize);
     let light = (light != u32::MAX).then_some(light as usize);
-    if light.is_some_and(|l| l >= lights) || count == 0 || first >= LEAVES || count > LEAVES - first
-    {
+    if count == 0 || first >= LEAVES || count > LEAVES - first {
         return Err(Broken::new("has an impossible lane"));
     }
     Ok(lanes::Lane {
