@@ -430,6 +430,40 @@ mod tests {
         assert_eq!(seen(&renamed), (None, None));
     }
 
+    /// Where panes and mirrors are is shape, what they do to light is paint.
+    #[test]
+    fn panes_and_mirrors_are_known() {
+        let of = |name: &str| Scene::load(name, &Options::default()).unwrap();
+        let changes = |name: &str, change: &dyn Fn(&mut Scene)| {
+            let mut other = of(name);
+            change(&mut other);
+            let shape = Fingerprint::shape(&of(name)).change(&Fingerprint::shape(&other));
+            let paint = Fingerprint::paint(&of(name)).change(&Fingerprint::paint(&other));
+            [shape.is_some(), paint.is_some()]
+        };
+        let glazed = |change: &dyn Fn(&mut Pane)| {
+            changes("scenes/glazed.glb", &|scene| {
+                let used = scene.panes[0].material;
+                change(scene.materials[used].pane.as_mut().unwrap());
+            })
+        };
+        let moved = |scene: &mut Scene| scene.panes[0].positions[1].y += 0.1;
+        assert_eq!(changes("scenes/glazed.glb", &moved), [true, false]);
+        let tinted = glazed(&|pane| match &mut pane.kind {
+            PaneKind::Glass { inside, .. } => inside[7] *= 0.5,
+            PaneKind::Cover { colour, .. } => colour[7] *= 0.5,
+        });
+        assert_eq!(tinted, [false, true]);
+        let dull = |scene: &mut Scene| scene.materials.iter_mut().for_each(|m| m.mirror = None);
+        assert_eq!(changes("scenes/mirrored.glb", &dull), [true, true]);
+        let dim = |scene: &mut Scene| {
+            for mirror in scene.materials.iter_mut().filter_map(|m| m.mirror.as_mut()) {
+                mirror.reflectance[7] *= 0.5;
+            }
+        };
+        assert_eq!(changes("scenes/mirrored.glb", &dim), [false, true]);
+    }
+
     proptest! {
         #[test]
         fn it_survives_being_written(names in prop::collection::vec(("\\PC{0,8}", any::<u64>()), 0..9)) {

@@ -317,6 +317,7 @@ fn lamps_are_dimmed_in_the_page() {
                  return ''; }})()"
             ));
         }
+        browser.drawn();
     };
     set(&mut browser, "0");
     let mean = |pixels: &[f64]| pixels.iter().sum::<f64>() / pixels.len() as f64;
@@ -335,6 +336,7 @@ fn lamps_are_dimmed_in_the_page() {
     set(&mut browser, "200");
     assert!(mean(&browser.pixels()) > mean(&first));
     browser.run("document.querySelector('#layers button').click()");
+    browser.drawn();
     assert_eq!(
         browser.pixels(),
         first,
