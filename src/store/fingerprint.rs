@@ -133,17 +133,7 @@ impl Fingerprint {
             }
             print.add(format!("surface {}", surface.name), &mix);
         }
-        for pane in &scene.panes {
-            let mut mix = Mix::default();
-            let positions: Vec<[f64; 3]> = pane.positions.iter().map(|p| p.to_array()).collect();
-            mix.all(&positions)
-                .all(&pane.triangles)
-                .add(pane.material as u64);
-            if let Some(of) = &scene.materials[pane.material].pane {
-                mix.pane_places(of, pane, &images);
-            }
-            print.add(format!("pane {}", pane.name), &mix);
-        }
+        print.panes(scene, &images);
         for light in &scene.lights {
             let mut mix = Mix::default();
             let kind = match light.kind {
@@ -182,6 +172,21 @@ impl Fingerprint {
             print.add(format!("{what} of light '{}'", light.name), &mix);
         }
         print
+    }
+
+    /// Adds where panes are, and what of them is found where a ray passes them.
+    fn panes(&mut self, scene: &Scene, images: &[u64]) {
+        for pane in &scene.panes {
+            let mut mix = Mix::default();
+            let positions: Vec<[f64; 3]> = pane.positions.iter().map(|p| p.to_array()).collect();
+            mix.all(&positions)
+                .all(&pane.triangles)
+                .add(pane.material as u64);
+            if let Some(of) = &scene.materials[pane.material].pane {
+                mix.pane_places(of, pane, images);
+            }
+            self.add(format!("pane {}", pane.name), &mix);
+        }
     }
 
     /// What else decides the light.
