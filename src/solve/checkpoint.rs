@@ -191,21 +191,7 @@ impl Bake {
         }
         let nodes = self.tree.nodes.len();
         self.graph = decode_graph(nodes, self.mesh.triangles.len(), from)?;
-        let mut lanes = from
-            .get_all::<[u32; 3]>()?
-            .into_iter()
-            .map(lane_of)
-            .collect::<Read<Vec<lanes::Lane>>>()?;
-        let written = lanes.len();
-        if written > LEAVES {
-            return Err(Broken::new("has an impossible number of lanes"));
-        }
-        let there = |lane: &lanes::Lane| lane.light.is_none_or(|k| k < self.scene.spectra.len());
-        if whole && !lanes.iter().all(there) {
-            return Err(Broken::new("has lanes of light that is not there"));
-        }
-        // Lamps may have gone since.
-        lanes.retain(there);
+        let (lanes, written) = self.read_lanes(whole, from)?;
         let gone = lanes.len() < written;
         self.lanes = match self.settings.representation {
             Representation::Rgb | Representation::Characteristic(_) if lanes.is_empty() => {
@@ -267,6 +253,26 @@ impl Bake {
             ..Light::default()
         };
         Ok((reflected, traces))
+    }
+
+    /// Intervals of the lanes whose lamps are still there, and how many lanes there were.
+    fn read_lanes(&self, whole: bool, from: &mut Decoder) -> Read<(Vec<lanes::Lane>, usize)> {
+        let mut lanes = from
+            .get_all::<[u32; 3]>()?
+            .into_iter()
+            .map(lane_of)
+            .collect::<Read<Vec<lanes::Lane>>>()?;
+        let written = lanes.len();
+        if written > LEAVES {
+            return Err(Broken::new("has an impossible number of lanes"));
+        }
+        let there = |lane: &lanes::Lane| lane.light.is_none_or(|k| k < self.scene.spectra.len());
+        if whole && !lanes.iter().all(there) {
+            return Err(Broken::new("has lanes of light that is not there"));
+        }
+        // Lamps may have gone since.
+        lanes.retain(there);
+        Ok((lanes, written))
     }
 
     /// The last solution from what the leaves reflect.
