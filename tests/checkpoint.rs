@@ -34,7 +34,12 @@ fn state(bake: &Bake) -> (Vec<String>, Vec<u8>) {
     });
     let light = bake.light();
     let mut bytes = Vec::new();
-    for rows in [&light.reflected, &light.emitted, &light.irradiance] {
+    for rows in [
+        &light.reflected,
+        &light.mirrors,
+        &light.emitted,
+        &light.irradiance,
+    ] {
         let all = (0..rows.len()).flat_map(|k| rows.row(k));
         bytes.extend(all.flat_map(|x| x.to_le_bytes()));
     }
@@ -56,7 +61,7 @@ fn files(bake: &Bake) -> [Vec<u8>; 2] {
     [glb.bytes, arrays]
 }
 
-/// Masks, textures, point and spot lights, several light spectra: whatever a round leaves behind is in the file.
+/// Masks, textures, point and spot lights, several light spectra, panes, mirrors: whatever a round leaves behind is in the file.
 #[test]
 fn a_resumed_bake_ends_with_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
@@ -65,6 +70,8 @@ fn a_resumed_bake_ends_with_the_same_bytes() {
         ("two-rooms.glb", 3, true),
         ("cornell-f2.glb", 4, true),
         ("convex.glb", 3, true),
+        ("glazed.glb", 2, true),
+        ("mirrored.glb", 2, true),
     ] {
         let settings = settings(0.5, rounds);
         let mut whole = Bake::new(room(name), settings.clone());

@@ -5,6 +5,7 @@ use haarlight::color::de2000;
 use haarlight::gather::{Baked, BakedVertex, MOSTLY};
 use haarlight::geometry::{NO_PLANE, Segment};
 use haarlight::keep::{Relighter, Relit};
+use haarlight::scene::pane::PaneKind;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::store::container;
@@ -142,6 +143,8 @@ fn without_a_change_the_bake_comes_out() {
         ("cornell-closed.glb", settings(2.0, 9)),
         ("two-rooms.glb", settings(2.0, 9)),
         ("furnished.glb", settings(3.0, 2)),
+        ("glazed.glb", settings(3.0, 2)),
+        ("mirrored.glb", settings(3.0, 2)),
     ] {
         let cached = Cached::new(room(name), settings);
         let (relighter, relit) = cached.relit(room(name));
@@ -239,6 +242,92 @@ fn lamps_go_out_in_a_furnished_room() {
         "{measured} {stated}"
     );
     assert!(difference(&fresh, &cached.baked, 1) > 3.0 * measured);
+}
+
+/// Lamps behind panes and in mirrors, the colours of panes and mirrors themselves: what a fresh bake finds.
+#[test]
+fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
+    for name in ["glazed.glb", "mirrored.glb"] {
+        let changed = || {
+            let mut scene = room(name);
+            for (k, light) in scene.spectra.iter_mut().enumerate() {
+                // Redder, and the second half as strong.
+                let power = light.power.iter().zip(0..);
+                let power = power.map(|(x, l)| x * f64::from(l) / (32.0 * (k + 1) as f64));
+                light.power = power.collect::<Vec<f64>>().try_into().unwrap();
+            }
+            for material in &mut scene.materials {
+                if let Some(pane) = &mut material.pane {
+                    let (PaneKind::Glass { inside: colour, .. } | PaneKind::Cover { colour, .. }) =
+                        &mut pane.kind
+                    else {
+                        continue;
+                    };
+                    (colour[20..40].iter_mut()).for_each(|x| *x *= 0.5);
+                }
+                if let Some(mirror) = &mut material.mirror {
+                    (mirror.reflectance[20..40].iter_mut()).for_each(|x| *x *= 0.5);
+                }
+            }
+            scene
+        };
+        let cached = Cached::new(room(name), settings(2.0, 4));
+        let (_, relit) = cached.relit(changed());
+        assert!(relit.record.changed);
+        let mut fresh = Bake::new(changed(), settings(2.0, 4));
+        fresh.run();
+        let stated = relit.record.error_de2000.value.unwrap();
+        let measured = difference(&fresh, &relit.baked, 1);
+        println!(
+            "{name}: measured {measured}, stated {stated} and {}",
+            estimate(&fresh)
+        );
+        assert!(
+            measured < stated.hypot(estimate(&fresh)),
+            "{name}: {measured} {stated}"
+        );
+        assert!(
+            difference(&fresh, &cached.baked, 1) > 3.0 * measured,
+            "{name}"
+        );
+    }
+}
+
+/// Another pane, or a mirror that is none any more, is another shape: where light goes is in the cache.
+#[test]
+fn moved_panes_and_dull_mirrors_are_refused() {
+    let refused = |name: &str, change: &dyn Fn(&mut Scene)| {
+        let cached = Cached::new(room(name), settings(9.0, 1));
+        let mut other = room(name);
+        change(&mut other);
+        let error = Relighter::open(&cached.path, other).err().unwrap();
+        assert_eq!(error.exit_code(), 2);
+        error.to_string()
+    };
+    let text = refused("glazed.glb", &|scene| scene.panes[0].positions[0].x += 0.01);
+    assert!(text.contains("another shape: pane"), "{text}");
+    let text = refused("mirrored.glb", &|scene| {
+        scene.materials.iter_mut().for_each(|m| m.mirror = None);
+    });
+    assert!(text.contains("another shape: surface"), "{text}");
+}
+
+/// Relit from a cache, a room with panes or mirrors does not depend on the number of threads.
+#[test]
+fn caches_are_the_same_on_any_number_of_threads() {
+    for name in ["glazed.glb", "mirrored.glb"] {
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let cached = Cached::new(room(name), settings(6.0, 1));
+                let mut dimmed = room(name);
+                dimmed.spectra[0].power.iter_mut().for_each(|x| *x *= 0.5);
+                let (_, relit) = cached.relit(dimmed);
+                irradiance(&relit.baked)
+            })
+        };
+        assert!(on(1) == on(16), "{name}");
+    }
 }
 
 /// Light adds up: the room under all lamps is the sum of the rooms under one lamp each; twice the power is twice the light.
@@ -357,9 +446,17 @@ fn a_resumed_bake_writes_the_same_cache() {
     assert_eq!(light("a"), light("b"));
 }
 
-static SMALL: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    let cached = Cached::new(room("two-rooms.glb"), settings(5.0, 2));
-    std::fs::read(&cached.path).unwrap()
+/// Rooms and their caches: one of few triangles, and such with panes and mirrors.
+static SMALL: LazyLock<[(&str, Vec<u8>); 3]> = LazyLock::new(|| {
+    let of = |name: &'static str, settings| {
+        let cached = Cached::new(room(name), settings);
+        (name, std::fs::read(&cached.path).unwrap())
+    };
+    [
+        of("two-rooms.glb", settings(5.0, 2)),
+        of("glazed.glb", settings(9.0, 1)),
+        of("mirrored.glb", settings(9.0, 1)),
+    ]
 });
 
 proptest! {
@@ -371,8 +468,10 @@ proptest! {
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<[u8; 8]>(), 1_usize..9), 1..4),
         cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
         early in any::<bool>(),
+        which in prop::sample::select(vec![0, 0, 1, 2]),
     ) {
-        let mut bytes = SMALL.clone();
+        let (name, bytes) = &SMALL[which];
+        let mut bytes = bytes.clone();
         bytes.truncate(bytes.len() - 8);
         for (at, with, count) in changes {
             let at = at.index(if early { 4096 } else { bytes.len() });
@@ -392,7 +491,7 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("c");
         std::fs::write(&path, &bytes).unwrap();
-        let done = Relighter::open(&path, room("two-rooms.glb")).and_then(|mut r| r.relight());
+        let done = Relighter::open(&path, room(name)).and_then(|mut r| r.relight());
         if let Err(error) = done {
             prop_assert_eq!(error.exit_code(), 2);
         }

@@ -111,7 +111,7 @@ fn problems(
         ));
     }
     problems.extend(args.mapping.problems(&of_vertices));
-    problems.extend(args.parting.problems(args.spectrum, args.cache.is_some()));
+    problems.extend(args.parting.problem(args.spectrum));
     if let Some(folder) = args
         .snapshots
         .as_deref()

@@ -130,11 +130,7 @@ impl Order<'_> {
         } = self;
         let before = kept.seconds.load;
         let mut bake = prepare(scene, &args.solving, common, args.spectrum, talk);
-        if args.checkpoint.is_some() {
-            bake.can_be_kept("--checkpoint")?;
-        }
         if self.cache.is_some() {
-            bake.can_be_kept("--cache")?;
             bake.keep();
         }
         let plan = PlanRecord::new(&bake, args.solving.time);

@@ -47,27 +47,12 @@ impl Parting {
         spacing.map(|spacing| Grid::of(scene, spacing)).transpose()
     }
 
-    /// Options that do not go together: how spectra are carried, and whether a cache is kept.
-    pub(super) fn problems(self, spectrum: Representation, cache: bool) -> Vec<Problem> {
-        let refused = [
-            (
-                "--spectrum",
-                spectrum != Representation::Adaptive,
-                "does not hold the light of each lamp by itself",
-            ),
-            (
-                "--cache",
-                cache,
-                "is for changing lamps without layers: `relight` knows none",
-            ),
-        ];
+    /// How spectra are carried that does not go with layers.
+    pub(super) fn problem(self, spectrum: Representation) -> Option<Problem> {
+        let what = "does not hold the light of each lamp by itself";
         let next = "leave it out, or leave --layers out";
-        let given = refused
-            .into_iter()
-            .filter(|(_, given, _)| *given && self.layers);
-        given
-            .map(|(option, _, what)| Problem::new(option, what, next))
-            .collect()
+        let given = self.layers && spectrum != Representation::Adaptive;
+        given.then(|| Problem::new("--spectrum", what, next))
     }
 }
 

@@ -78,10 +78,13 @@ pub(super) fn prepare(
 /// Writes a baked mesh with its spectra for NumPy.
 pub(super) fn write_npz(path: &Path, room: &Path, bake: &Bake, baked: &Baked) -> Result<()> {
     let spectra = bake.radiosity_spectra(baked);
+    let names = bake.layers().map_or(&[][..], |layers| &layers.names);
+    let layer = |k: usize| bake.layer_spectra(baked, k);
     // The writer's own error says more than what the system makes of it.
     let mut problem = None;
     let written = file::write_atomic(path, Some(room), |w| {
-        npz::write_baked(w, bake.scene(), &baked.surfaces, &spectra).map_err(|e| {
+        let (scene, parts) = (bake.scene(), (names, &layer as &dyn Fn(usize) -> _));
+        npz::write_parted(w, scene, &baked.surfaces, &spectra, parts).map_err(|e| {
             let text = e.to_string();
             problem = Some(e);
             std::io::Error::other(text)

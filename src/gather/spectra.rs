@@ -4,6 +4,7 @@
 //! with its mean colour. An emissive texture is looked up at the vertex.
 
 use super::bake::Baked;
+use super::layers::LayerLanes;
 use super::refined;
 use super::{BakedSurface, BakedVertex};
 use crate::color::Upsampler;
@@ -16,15 +17,40 @@ use std::f64::consts::PI;
 impl Bake {
     /// Radiosity on the 64 leaves at every vertex, W/m2/nm, surface by surface, own emission included.
     pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
+        self.spectra_of(baked, None)
+    }
+
+    /// Of which by layer `k` of [`Bake::layers`]: those of all layers add up to the whole. Nothing where there is no such layer.
+    pub fn layer_spectra(&self, baked: &Baked, k: usize) -> Vec<Vec<[f32; LEAVES]>> {
+        match self.layer_lanes().get(k) {
+            Some(lanes) => self.spectra_of(baked, Some((k, lanes))),
+            None => Vec::new(),
+        }
+    }
+
+    fn spectra_of(
+        &self,
+        baked: &Baked,
+        layer: Option<(usize, &LayerLanes)>,
+    ) -> Vec<Vec<[f32; LEAVES]>> {
         let scene = self.scene();
         let upsampler = self.upsampler();
         let looks = self.looks(upsampler);
+        let emits = |material: &Material| match (&material.emission, layer, self.layers()) {
+            (Some(own), Some((k, _)), Some(layers)) => layers.of_light[own.light] == k,
+            _ => true,
+        };
         let surface = |(baked, rows): (&BakedSurface, &Vec<[f32; LEAVES]>)| {
             let surface = &scene.surfaces[baked.surface];
             let (material, look) = (&scene.materials[surface.material], &looks[surface.material]);
+            let emits = emits(material);
             let vertex = |(vertex, row): (&BakedVertex, &[f32; LEAVES])| {
+                let row = &layer.map_or(*row, |(_, lanes)| lanes.of(row));
                 let irradiance = self.lanes().leaves(row);
-                let radiance = self.radiance(surface, material, vertex, upsampler);
+                let radiance = match emits {
+                    true => self.radiance(surface, material, vertex, upsampler),
+                    false => [0.0; LEAVES],
+                };
                 let reflectance = look.reflectance_at(surface, vertex);
                 let again = look.fluoresced(self.lanes(), row).unwrap_or([0.0; LEAVES]);
                 std::array::from_fn(|k| {

@@ -6,23 +6,23 @@ use crate::gather::Probed;
 use crate::solve::Bake;
 use crate::store::codec::Read;
 use crate::store::{Broken, Kind};
-use crate::transport::trace;
+use crate::transport::trace::{self, Stains};
 use glam::DVec3;
 
 impl Bake {
     /// Irradiance by lane of a packed trace under the present light; dark where there is none.
-    pub(super) fn replayed(&self, packed: Option<&[u8]>) -> Read<[f32; 64]> {
+    pub(super) fn replayed(&self, packed: Option<&[u8]>, stains: &Stains) -> Read<[f32; 64]> {
         let Some(packed) = packed else {
             return Ok([0.0; 64]);
         };
         let (light, lamps) = (self.light(), self.lamps());
         let mut row = [0.0; 64];
         match light.width() {
-            4 => row[..4].copy_from_slice(&trace::replay::<4>(packed, light, lamps)?),
-            8 => row[..8].copy_from_slice(&trace::replay::<8>(packed, light, lamps)?),
-            16 => row[..16].copy_from_slice(&trace::replay::<16>(packed, light, lamps)?),
-            32 => row[..32].copy_from_slice(&trace::replay::<32>(packed, light, lamps)?),
-            _ => row = trace::replay::<64>(packed, light, lamps)?,
+            4 => row[..4].copy_from_slice(&trace::replay::<4>(packed, light, lamps, stains)?),
+            8 => row[..8].copy_from_slice(&trace::replay::<8>(packed, light, lamps, stains)?),
+            16 => row[..16].copy_from_slice(&trace::replay::<16>(packed, light, lamps, stains)?),
+            32 => row[..32].copy_from_slice(&trace::replay::<32>(packed, light, lamps, stains)?),
+            _ => row = trace::replay::<64>(packed, light, lamps, stains)?,
         }
         Ok(row)
     }
@@ -69,8 +69,9 @@ impl Relighter {
         }
         let lit = self.bake();
         let gathered = bake.gather_at(points);
+        let stains = Stains::new(&lit.solution.filters);
         let probed = gathered.into_iter().map(|found| {
-            let row = lit.replayed(found.packed.as_deref())?;
+            let row = lit.replayed(found.packed.as_deref(), &stains)?;
             Ok(Probed {
                 xyz: lit.lanes().tristimulus(&row),
                 leaves: lit.lanes().leaves(&row),

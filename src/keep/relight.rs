@@ -7,7 +7,7 @@
 //! that was dark beside the others are as coarse as they were worth then.
 //!
 //! A cache belongs to a shape: surfaces, sides, holes, places of lights. Where that changed it is refused with what
-//! changed; so is a room in which a surface gives out light that did not (lamps may go out).
+//! changed; so is a room in which a surface gives out light that did not (lamps may go out). A bake with layers is relit with layers.
 
 use super::relit::Kept;
 use crate::color::de2000;
@@ -23,7 +23,7 @@ use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, NOBODY, Settings,
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
-use crate::transport::trace;
+use crate::transport::trace::{self, Stains};
 use std::path::Path;
 use std::time::Instant;
 
@@ -112,7 +112,6 @@ impl Bake {
     /// # Errors
     /// The room is dark; the cache would be larger than `limit` bytes; the file cannot be written; a bake that did not [`Bake::keep`].
     pub fn write_cache(&self, baked: &Baked, path: &Path, limit: u64) -> Result<u64> {
-        self.can_be_kept("--cache")?;
         if !self.room.keep || baked.kept.len() != baked.surfaces.len() {
             return Err(Error::Internal("a bake that kept nothing".into()));
         }
@@ -151,6 +150,7 @@ impl Bake {
             .map_err(|problem| Error::Internal(format!("settings: {problem}")))?;
         container::write(path, Kind::Cache, |out| {
             Fingerprint::shape(&self.room.scene).encode(out)?;
+            out.put(u8::from(self.room.scene.changes.layers.is_some()))?;
             Fingerprint::paint(&self.room.scene).encode(out)?;
             out.put_text(&settings)?;
             out.put_all(&self.room.spaces)?;
@@ -171,8 +171,11 @@ impl Bake {
     /// Mean colour difference between what the traces of the last two rounds give at the watched points under the present
     /// light; none before there are two.
     fn watched_distance(&self) -> Read<Option<f64>> {
+        let stains = Stains::new(&self.solution.filters);
         let seen = |round: &[Option<Box<[u8]>>]| -> Read<Vec<[f64; 3]>> {
-            let rows = round.iter().map(|packed| self.replayed(packed.as_deref()));
+            let rows = round
+                .iter()
+                .map(|packed| self.replayed(packed.as_deref(), &stains));
             rows.map(|row| Ok(self.solution.lanes.tristimulus(&row?)))
                 .collect()
         };
@@ -222,23 +225,29 @@ impl Relighter {
     /// Opens the cache of a room, which may have other lamps and paints by now.
     ///
     /// # Errors
-    /// The file cannot be read, is none of ours, is damaged, or belongs to a room of another shape.
+    /// The file cannot be read, is none of ours, is damaged, or belongs to a room of another shape; it has layers, and the lamps of the
+    /// room now make more than rows hold.
     pub fn open(cache: &Path, scene: Scene) -> Result<Self> {
         let now = Fingerprint::shape(&scene);
-        let mut opened = Err(None);
+        let place = cache.display().to_string();
+        let mut opened = Err(Error::Internal("a cache that was not read".into()));
         container::read(cache, Kind::Cache, |from| {
-            opened = match Fingerprint::decode(from)?.change(&now) {
-                None => Ok(Self::decode(scene, now, from)?),
-                Some(what) => {
+            let changed = Fingerprint::decode(from)?.change(&now);
+            let ready = match changed {
+                None => parted(scene, from.get::<u8>()? == 1),
+                Some(what) => Err(refused(&place, &what)),
+            };
+            opened = match ready {
+                Ok(scene) => Ok(Self::decode(scene, now, from)?),
+                Err(error) => {
                     // What follows belongs to something else.
                     from.skip();
-                    Err(Some(what))
+                    Err(error)
                 }
             };
             Ok(())
         })?;
-        let place = cache.display().to_string();
-        let opened = opened.map_err(|what| refused(&place, &what.unwrap_or_default()))?;
+        let opened = opened?;
         match opened.kindled(&opened.bake.room.scene) {
             None => Ok(opened),
             Some(what) => Err(refused(&place, &what)),
@@ -272,6 +281,12 @@ impl Relighter {
         let distance: f64 = from.get()?;
         let lit = from.get_exactly(bake.room.scene.surfaces.len())?;
         let (reflected, leaves) = bake.decode_state(false, from)?;
+        let same = paint
+            .change(&Fingerprint::paint(&bake.room.scene))
+            .is_none();
+        if same && reflected.width() == 0 {
+            return Err(Broken::new("has lanes of light that is not there"));
+        }
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
             kept.push(Kept::decode(&bake.room.mesh, from)?);
@@ -285,7 +300,7 @@ impl Relighter {
             shape,
             lit,
             paint,
-            start: Some(reflected),
+            start: Some(reflected).filter(|rows| rows.width() > 0),
             links: None,
             rough: false,
             solved: Convergence {
@@ -304,13 +319,14 @@ impl Relighter {
     /// The room, to be relit under other lamps and paints.
     ///
     /// # Errors
-    /// Its shape is another.
+    /// Its shape is another; its lamps make more layers than rows hold.
     pub fn change(&mut self, scene: Scene) -> Result<()> {
         let changed = self.shape.change(&Fingerprint::shape(&scene));
         if let Some(what) = changed.or_else(|| self.kindled(&scene)) {
             return Err(refused(&scene.source.path.display().to_string(), &what));
         }
-        self.bake.room.scene = scene;
+        let layers = self.bake.room.scene.changes.layers.is_some();
+        self.bake.room.scene = parted(scene, layers)?;
         self.bake.room.plan = crate::scene::effects::Plan::of(&self.bake.room.scene);
         Ok(())
     }
@@ -454,9 +470,10 @@ impl Relighter {
         let shines = |row: &[f32; L]| f32::from(u8::from(row.iter().any(|&x| x > 0.0)));
         light.bright_emitted = light.emitted.all::<L>().iter().map(shines).collect();
         let mut first = Rows::zero(leaves.len(), L);
+        let stains = Stains::new(&bake.solution.filters);
         self.leaves.for_each(first.all_mut::<L>(), |packed, row| {
             if let Some(packed) = packed {
-                *row = trace::replay::<L>(packed, &light, &bake.solution.lamps)?;
+                *row = trace::replay::<L>(packed, &light, &bake.solution.lamps, &stains)?;
             }
             Ok(())
         })?;
@@ -523,6 +540,14 @@ impl Relighter {
     pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
         self.bake.radiosity_spectra(baked)
     }
+}
+
+/// The room with its lamps parted where those of the bake were, see [`Scene::part_lamps`].
+fn parted(mut scene: Scene, layers: bool) -> Result<Scene> {
+    if layers {
+        scene.part_lamps()?;
+    }
+    Ok(scene)
 }
 
 /// White over guess, channel by channel; `otherwise` where nothing was guessed.

@@ -1,13 +1,13 @@
 //! The output mesh kept with where its light comes from, and its light under other lamps and paints:
 //! one sparse product, no ray.
 
-use crate::gather::{Baked, BakedSurface, KeptVertex, Vertex, lend};
+use crate::gather::{Baked, BakedSurface, KeptVertex, LayerLanes, Vertex, lend};
 use crate::hierarchy::Mesh;
 use crate::light::{mixed, padded};
 use crate::solve::Bake;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Packs};
-use crate::transport::trace;
+use crate::transport::trace::{self, Stains};
 use rayon::prelude::*;
 use std::io;
 
@@ -93,19 +93,20 @@ impl Bake {
     }
 
     fn relit_lanes<const L: usize>(&self, kept: &[Kept]) -> Read<Baked> {
-        let looks = self.looks(self.upsampler());
+        let (looks, layers) = (self.looks(self.upsampler()), self.layer_lanes());
+        let stains = Stains::new(&self.solution.filters);
         let mut out = Baked::default();
         for kept in kept {
             let mut rows: Vec<[f32; 64]> = bytemuck::zeroed_vec(kept.vertices.len());
             if self.light().through.is_empty() {
                 kept.traces.for_each(&mut rows, |packed, row| {
-                    self.relit_row::<L>(packed, None, row)
+                    self.relit_row::<L>(packed, None, &stains, row)
                 })?;
             } else {
                 let places = kept.vertices.iter().map(|vertex| self.place(kept, vertex));
                 let mut placed: Vec<(Option<u32>, [f32; 64])> = places.zip(rows).collect();
                 kept.traces.for_each(&mut placed, |packed, (place, row)| {
-                    self.relit_row::<L>(packed, *place, row)
+                    self.relit_row::<L>(packed, *place, &stains, row)
                 })?;
                 rows = placed.into_iter().map(|(_, row)| row).collect();
             }
@@ -115,12 +116,20 @@ impl Bake {
             let vertices = lit.map(|(vertex, row)| {
                 self.vertex(&kept.on_element(vertex, self), kept.back, row, look)
             });
+            let layer = |(k, lanes): (usize, &LayerLanes)| {
+                let lit = kept.vertices.par_iter().zip(&rows);
+                let shown = lit.map(|(vertex, row)| {
+                    let vertex = kept.on_element(vertex, self);
+                    self.layer(k, lanes, (&vertex, kept.back, row), look)
+                });
+                shown.collect()
+            };
             out.surfaces.push(BakedSurface {
+                layers: layers.iter().enumerate().map(layer).collect(),
                 surface: kept.surface,
                 back: kept.back,
                 vertices: vertices.collect(),
                 triangles: kept.triangles.clone(),
-                layers: Vec::new(),
                 map: None,
             });
             out.irradiance.push(rows);
@@ -140,13 +149,14 @@ impl Bake {
         &self,
         packed: Option<&[u8]>,
         place: Option<u32>,
+        stains: &Stains,
         row: &mut [f32; 64],
     ) -> Read<()> {
         let Some(packed) = packed else {
             row[0] = f32::NAN;
             return Ok(());
         };
-        let lit = |packed| trace::replay::<L>(packed, self.light(), self.lamps());
+        let lit = |packed| trace::replay::<L>(packed, self.light(), self.lamps(), stains);
         let shares = place.and_then(|place| self.light().through.shares(place));
         match shares {
             Some(shares) => {

@@ -5,9 +5,11 @@
 //! normal incidence.
 
 use super::lanes::Lanes;
+use super::passed::{self, Passed, Steps};
 use crate::hierarchy::{Crossing, Glazing, Route};
 use crate::scene::Scene;
 use crate::scene::mirror::Mirror;
+use crate::scene::pane::Pane;
 use crate::spectrum::LEAVES;
 use glam::Vec3;
 
@@ -19,6 +21,8 @@ pub type Filter = [f32; LEAVES];
 pub struct Filters {
     /// By material: what the inside of its pane lets through or its mirror reflects, lane by lane; empty for what is neither.
     inside: Vec<Vec<f32>>,
+    /// By material: its pane.
+    panes: Vec<Option<Pane>>,
     /// How much each lane counts in brightness.
     weights: Vec<f64>,
 }
@@ -54,6 +58,7 @@ impl Filters {
             .map(|xyz| xyz[1].abs() / all.max(f64::MIN_POSITIVE));
         Self {
             inside: inside.collect(),
+            panes: scene.materials.iter().map(|m| m.pane.clone()).collect(),
             weights: weights.collect(),
         }
     }
@@ -69,9 +74,9 @@ impl Filters {
     }
 
     /// Multiplies a filter by what one pane lets through.
-    pub fn pass(&self, scene: &Scene, crossing: &Crossing, filter: &mut Filter) {
+    pub fn pass(&self, crossing: &Crossing, filter: &mut Filter) {
         let material = crossing.material as usize;
-        let Some(pane) = &scene.materials[material].pane else {
+        let Some(pane) = &self.panes[material] else {
             return;
         };
         let [cosine, thickness, texel] =
@@ -85,6 +90,27 @@ impl Filters {
         self.multiply(material as usize, reflects, filter);
     }
 
+    /// What is left of light that passes this.
+    pub(crate) fn of(&self, passed: &[[i32; 4]]) -> Filter {
+        let mut filter = [1.0; LEAVES];
+        for &one in passed {
+            let one = passed::crossing(one);
+            match self.panes[one.material as usize] {
+                Some(_) => self.pass(&one, &mut filter),
+                None => self.mirror(one.material, one.cosine, &mut filter),
+            }
+        }
+        filter
+    }
+
+    /// Is it something that light of a room with these panes and mirrors can pass?
+    pub(crate) fn knows(&self, passed: &[[i32; 4]]) -> bool {
+        let known = |material: u32| self.inside.get(material as usize);
+        passed::is_possible(passed, |material| {
+            known(material).is_some_and(|inside| !inside.is_empty())
+        })
+    }
+
     fn multiply(&self, material: usize, passing: impl Fn(f64) -> f64, filter: &mut Filter) {
         let mut last = (f32::NAN, 1.0);
         for (x, &inside) in filter.iter_mut().zip(&self.inside[material]) {
@@ -95,21 +121,36 @@ impl Filters {
         }
     }
 
-    /// What is left of light by way of mirrors, and of panes between them.
-    pub fn along(&self, glazing: Option<Glazing>, route: &Route) -> Filter {
+    /// What is left of light by way of mirrors, and of panes between them; as `kept` asks.
+    pub(crate) fn along(
+        &self,
+        glazing: Option<Glazing>,
+        route: &Route,
+        kept: Option<Steps>,
+    ) -> Passage {
+        if let Some(steps) = kept {
+            return self.past(passed::met(glazing.as_ref(), route, steps));
+        }
         let mut filter = [1.0; LEAVES];
         for &(material, cosine) in route.bounces() {
             self.mirror(material, cosine, &mut filter);
         }
-        let Some(glazing) = glazing else {
-            return filter;
-        };
-        for ends in route.points().windows(2) {
-            for crossing in glazing.crossings(ends[0].as_vec3(), ends[1].as_vec3()) {
-                self.pass(glazing.scene, &crossing, &mut filter);
+        if let Some(glazing) = glazing {
+            for ends in route.points().windows(2) {
+                for crossing in glazing.crossings(ends[0].as_vec3(), ends[1].as_vec3()) {
+                    self.pass(&crossing, &mut filter);
+                }
             }
         }
-        filter
+        Passage::plain(filter)
+    }
+
+    /// What is left of light that passes this, and what it passes.
+    fn past(&self, passed: Passed) -> Passage {
+        Passage {
+            filter: self.of(&passed),
+            by: vec![(passed, 1.0)],
+        }
     }
 
     /// About how bright light is that has passed, as a share: the mean over lanes by luminance.
@@ -119,11 +160,36 @@ impl Filters {
     }
 }
 
-/// A weighted mean of filters, being summed.
-#[derive(Debug, Clone, Copy)]
-pub struct Tint {
+/// What is left of light on its way.
+#[derive(Debug, Clone)]
+pub(crate) struct Passage {
+    /// By lane.
+    pub(crate) filter: Filter,
+    /// Where it is kept where light comes from: what it passes, by shares, so that the filter is the mean of theirs. Else nothing.
+    pub(crate) by: Vec<(Passed, f32)>,
+}
+
+impl Passage {
+    /// Of which nothing else is kept.
+    fn plain(filter: Filter) -> Self {
+        let by = Vec::new();
+        Self { filter, by }
+    }
+
+    /// Past nothing.
+    pub(crate) fn free() -> Self {
+        Self::plain([1.0; LEAVES])
+    }
+}
+
+/// A weighted mean of what is left of light on several ways, being summed.
+#[derive(Debug, Clone)]
+pub(crate) struct Tint {
     sum: [f64; LEAVES],
     all: f64,
+    by: Vec<(Passed, f64)>,
+    /// Weight of ways on which all is left.
+    free: f64,
 }
 
 impl Default for Tint {
@@ -131,43 +197,68 @@ impl Default for Tint {
         Self {
             sum: [0.0; LEAVES],
             all: 0.0,
+            by: Vec::new(),
+            free: 0.0,
         }
     }
 }
 
 impl Tint {
-    /// Adds a filter.
-    pub fn add(&mut self, filter: &Filter, weight: f64) {
+    /// Adds a way; none: all is left.
+    pub(crate) fn add(&mut self, passage: Option<&Passage>, weight: f64) {
         self.all += weight;
+        let Some(Passage { filter, by }) = passage else {
+            self.free += weight;
+            self.sum.iter_mut().for_each(|sum| *sum += weight);
+            return;
+        };
         for (sum, x) in self.sum.iter_mut().zip(filter) {
             *sum += weight * f64::from(*x);
         }
+        let times = |(passed, share): &(Passed, f32)| (passed.clone(), weight * f64::from(*share));
+        self.by.extend(by.iter().map(times));
     }
 
     /// The mean; none of nothing.
-    pub fn mean(&self) -> Option<Filter> {
-        (self.all > 0.0).then(|| self.sum.map(|x| (x / self.all) as f32))
+    pub(crate) fn mean(self) -> Option<Passage> {
+        if self.all <= 0.0 {
+            return None;
+        }
+        let share = |weight: f64| (weight / self.all) as f32;
+        let by = self.by.into_iter().map(|(p, weight)| (p, share(weight)));
+        let mut by: Vec<(Passed, f32)> = by.collect();
+        if self.free > 0.0 && !by.is_empty() {
+            by.push((Passed::new(), share(self.free)));
+        }
+        Some(Passage {
+            filter: self.sum.map(|x| (x / self.all) as f32),
+            by,
+        })
     }
 }
 
 impl Glass<'_> {
-    /// What panes leave of light on a segment; none if it passes none.
-    pub fn through(&self, from: Vec3, to: Vec3) -> Option<Filter> {
+    /// What panes leave of light on a segment, as `kept` asks; none if it passes none.
+    pub(crate) fn through(&self, from: Vec3, to: Vec3, kept: Option<Steps>) -> Option<Passage> {
+        if let Some(steps) = kept {
+            let passed = passed::passed(&self.glazing, from, to, steps);
+            return (!passed.is_empty()).then(|| self.filters.past(passed));
+        }
         let crossings = self.glazing.crossings(from, to);
         if crossings.is_empty() {
             return None;
         }
         let mut filter = [1.0; LEAVES];
         for crossing in &crossings {
-            self.filters.pass(self.glazing.scene, crossing, &mut filter);
+            self.filters.pass(crossing, &mut filter);
         }
-        Some(filter)
+        Some(Passage::plain(filter))
     }
 
     /// How bright light is that has passed the segment, as a share.
-    pub fn brightness(&self, from: Vec3, to: Vec3) -> f64 {
-        let filter = self.through(from, to);
-        filter.map_or(1.0, |filter| self.filters.brightness(&filter))
+    pub(crate) fn brightness(&self, from: Vec3, to: Vec3) -> f64 {
+        let passage = self.through(from, to, None);
+        passage.map_or(1.0, |passage| self.filters.brightness(&passage.filter))
     }
 }
 

@@ -4,13 +4,14 @@ mod descent;
 mod filters;
 mod fluorescent;
 pub mod lanes;
+pub(crate) mod passed;
 pub(crate) mod rows;
 mod solution;
 mod through;
 
 pub use descent::Descent;
-pub(crate) use filters::accumulate;
-pub use filters::{Filter, Filters, Glass, Tint};
+pub use filters::{Filter, Filters, Glass};
+pub(crate) use filters::{Passage, Tint, accumulate};
 pub use fluorescent::Fluorescent;
 pub(crate) use fluorescent::{balance, guide};
 pub use rows::{Rows, padded};

@@ -3,7 +3,9 @@
 //! `numpy.load("room.npz")` gives the arrays of [`write_baked`]:
 //! `positions` (N, 3) f64, world space, the file's units; `normals` (N, 3) f32, unit; `surface` (N,) u32, index of the
 //! surface; `triangles` (T, 3) u32, rows of `positions`; `radiosity` (N, 64) f32, W/m2/nm on the leaves;
-//! `wavelengths` (65,) f64, the leaves' edges in nm; `xyz` (N, 3) f32, tristimulus radiosity, Y in lm/m2.
+//! `wavelengths` (65,) f64, the leaves' edges in nm; `xyz` (N, 3) f32, tristimulus radiosity, Y in lm/m2. With layers (see
+//! [`scene::layers`](crate::scene::layers)) also `layers` (L,) text, their names, and `radiosity_0`, `radiosity_1`, ... of each by
+//! itself, which add up to `radiosity`.
 
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
@@ -11,7 +13,7 @@ use crate::gather::refined;
 use crate::scene::Scene;
 use crate::spectrum::LEAVES;
 use std::io::{self, Write};
-use zip::write::SimpleFileOptions;
+use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 /// The length of a `.npy` header is a multiple of this, so that the data is aligned.
@@ -28,6 +30,8 @@ pub enum Values<'a> {
     F64(&'a [f64]),
     /// `<u4`
     U32(&'a [u32]),
+    /// `<U` and the length of the longest, in code points.
+    Text(&'a [String]),
 }
 
 impl Values<'_> {
@@ -36,14 +40,21 @@ impl Values<'_> {
             Self::F32(v) => v.len(),
             Self::F64(v) => v.len(),
             Self::U32(v) => v.len(),
+            Self::Text(v) => v.len(),
         }
     }
 
-    fn kind(&self) -> (&'static str, usize) {
+    /// Type in NumPy, and bytes of a value.
+    fn kind(&self) -> (String, usize) {
         match self {
-            Self::F32(_) => ("<f4", 4),
-            Self::F64(_) => ("<f8", 8),
-            Self::U32(_) => ("<u4", 4),
+            Self::F32(_) => ("<f4".into(), 4),
+            Self::F64(_) => ("<f8".into(), 8),
+            Self::U32(_) => ("<u4".into(), 4),
+            Self::Text(v) => {
+                let longest = v.iter().map(|text| text.chars().count()).max();
+                let longest = longest.unwrap_or(0).max(1);
+                (format!("<U{longest}"), 4 * longest)
+            }
         }
     }
 
@@ -64,6 +75,17 @@ impl Values<'_> {
             Self::F32(values) => pieces!(values),
             Self::F64(values) => pieces!(values),
             Self::U32(values) => pieces!(values),
+            Self::Text(values) => {
+                // UTF-32, each filled up with zeros.
+                let (_, width) = self.kind();
+                for text in *values {
+                    bytes.clear();
+                    let letters = text.chars().map(u32::from);
+                    letters.for_each(|c| bytes.extend(c.to_le_bytes()));
+                    bytes.resize(width, 0);
+                    out.write_all(&bytes)?;
+                }
+            }
         }
         Ok(())
     }
@@ -80,13 +102,18 @@ pub struct Array<'a> {
     pub values: Values<'a>,
 }
 
-/// Writes an `.npz`.
-///
-/// # Errors
-/// The writer fails, or a shape does not fit its values.
-pub fn write(out: &mut dyn Write, arrays: &[Array]) -> io::Result<()> {
-    let mut archive = ZipWriter::new_stream(out);
-    for array in arrays {
+/// An `.npz` in the making.
+struct Archive<W: Write> {
+    zip: ZipWriter<StreamWriter<W>>,
+}
+
+impl<W: Write> Archive<W> {
+    fn new(out: W) -> Self {
+        let zip = ZipWriter::new_stream(out);
+        Self { zip }
+    }
+
+    fn put(&mut self, array: &Array) -> io::Result<()> {
         let header = header(array)?;
         let (_, width) = array.values.kind();
         let options = SimpleFileOptions::default()
@@ -94,13 +121,33 @@ pub fn write(out: &mut dyn Write, arrays: &[Array]) -> io::Result<()> {
             // The first date of the format: the bytes must not depend on the clock.
             .last_modified_time(DateTime::default())
             .large_file(header.len() + array.values.len() * width >= LARGE);
-        archive.start_file(format!("{}.npy", array.name), options)?;
-        archive.write_all(&header)?;
-        array.values.write(&mut archive)?;
+        self.zip
+            .start_file(format!("{}.npy", array.name), options)?;
+        self.zip.write_all(&header)?;
+        array.values.write(&mut self.zip)
     }
-    archive.finish()?;
-    Ok(())
+
+    fn end(self) -> io::Result<()> {
+        self.zip.finish()?;
+        Ok(())
+    }
 }
+
+/// Writes an `.npz`.
+///
+/// # Errors
+/// The writer fails, or a shape does not fit its values.
+pub fn write(out: &mut dyn Write, arrays: &[Array]) -> io::Result<()> {
+    let mut archive = Archive::new(out);
+    arrays.iter().try_for_each(|array| archive.put(array))?;
+    archive.end()
+}
+
+/// Radiosity of the vertices of each surface, W/m2/nm on the leaves.
+pub type Spectra = Vec<Vec<[f32; LEAVES]>>;
+
+/// Names of layers, and the spectra of each: asked for one after the other, for those of a large room take a gigabyte.
+pub type Parts<'a> = (&'a [String], &'a dyn Fn(usize) -> Spectra);
 
 /// Writes the refined mesh with its spectra: see the module's words.
 ///
@@ -114,19 +161,67 @@ pub fn write_baked(
     surfaces: &[BakedSurface],
     spectra: &[Vec<[f32; LEAVES]>],
 ) -> Result<()> {
+    write_parted(out, scene, surfaces, spectra, (&[], &|_| Vec::new()))
+}
+
+/// The same with its layers.
+///
+/// # Errors
+/// As [`write_baked`].
+pub fn write_parted(
+    out: &mut dyn Write,
+    scene: &Scene,
+    surfaces: &[BakedSurface],
+    spectra: &[Vec<[f32; LEAVES]>],
+    (names, layer): Parts,
+) -> Result<()> {
     refined::check(scene, surfaces)?;
-    let fits = surfaces.len() == spectra.len()
-        && surfaces
-            .iter()
-            .zip(spectra)
-            .all(|(surface, spectra)| surface.vertices.len() == spectra.len());
-    if !fits {
+    let radiosity = flat(surfaces, spectra)?;
+    let io = |problem| Error::Io {
+        path: "npz".into(),
+        source: problem,
+    };
+    let mut archive = Archive::new(out);
+    whole(&mut archive, scene, surfaces, &radiosity).map_err(io)?;
+    if !names.is_empty() {
+        let array = Array {
+            name: "layers",
+            shape: &[names.len()],
+            values: Values::Text(names),
+        };
+        archive.put(&array).map_err(io)?;
+    }
+    for k in 0..names.len() {
+        let radiosity = flat(surfaces, &layer(k))?;
+        let array = Array {
+            name: &format!("radiosity_{k}"),
+            shape: &[radiosity.len() / LEAVES, LEAVES],
+            values: Values::F32(&radiosity),
+        };
+        archive.put(&array).map_err(io)?;
+    }
+    archive.end().map_err(io)
+}
+
+/// Spectra of all vertices, one after the other.
+fn flat(surfaces: &[BakedSurface], spectra: &[Vec<[f32; LEAVES]>]) -> Result<Vec<f32>> {
+    let of = |(surface, spectra): (&BakedSurface, &Vec<_>)| surface.vertices.len() == spectra.len();
+    if surfaces.len() != spectra.len() || !surfaces.iter().zip(spectra).all(of) {
         return Err(Error::Internal(
             "spectra do not match the refined mesh".into(),
         ));
     }
+    Ok(spectra.iter().flatten().flatten().copied().collect())
+}
+
+/// The arrays of a mesh under all its light.
+fn whole(
+    archive: &mut Archive<impl Write>,
+    scene: &Scene,
+    surfaces: &[BakedSurface],
+    radiosity: &[f32],
+) -> io::Result<()> {
     let columns = Columns::of(scene, surfaces);
-    let radiosity: Vec<f32> = spectra.iter().flatten().flatten().copied().collect();
     let mut edges: Vec<f64> = (0..LEAVES).map(|leaf| scene.grid.left(leaf)).collect();
     edges.push(scene.grid.left(LEAVES - 1) + scene.grid.width());
     let count = columns.surface.len();
@@ -135,26 +230,21 @@ pub fn write_baked(
         shape,
         values,
     };
-    write(
-        out,
-        &[
-            array("positions", &[count, 3], Values::F64(&columns.positions)),
-            array("normals", &[count, 3], Values::F32(&columns.normals)),
-            array("surface", &[count], Values::U32(&columns.surface)),
-            array(
-                "triangles",
-                &[columns.triangles.len() / 3, 3],
-                Values::U32(&columns.triangles),
-            ),
-            array("radiosity", &[count, LEAVES], Values::F32(&radiosity)),
-            array("wavelengths", &[LEAVES + 1], Values::F64(&edges)),
-            array("xyz", &[count, 3], Values::F32(&columns.xyz)),
-        ],
-    )
-    .map_err(|problem| Error::Io {
-        path: "npz".into(),
-        source: problem,
-    })
+    [
+        array("positions", &[count, 3], Values::F64(&columns.positions)),
+        array("normals", &[count, 3], Values::F32(&columns.normals)),
+        array("surface", &[count], Values::U32(&columns.surface)),
+        array(
+            "triangles",
+            &[columns.triangles.len() / 3, 3],
+            Values::U32(&columns.triangles),
+        ),
+        array("radiosity", &[count, LEAVES], Values::F32(radiosity)),
+        array("wavelengths", &[LEAVES + 1], Values::F64(&edges)),
+        array("xyz", &[count, 3], Values::F32(&columns.xyz)),
+    ]
+    .iter()
+    .try_for_each(|array| archive.put(array))
 }
 
 /// The refined mesh of all surfaces, column by column: as the arrays of their names.
@@ -216,6 +306,19 @@ fn header(array: &Array) -> io::Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// As NumPy writes `np.array(["ab", "\u00e9\u5f00"])`: UTF-32, two code points each.
+    #[test]
+    fn texts_are_utf_32() {
+        let texts = ["ab".to_owned(), "\u{e9}".to_owned(), String::new()];
+        let values = Values::Text(&texts);
+        assert_eq!(values.kind(), ("<U2".to_owned(), 8));
+        let mut bytes = Vec::new();
+        values.write(&mut bytes).unwrap();
+        let want = [97, 98, 0xe9, 0, 0, 0_u32].map(u32::to_le_bytes);
+        assert_eq!(bytes, want.concat());
+        assert_eq!(Values::Text(&[]).kind().0, "<U1");
+    }
 
     #[test]
     fn headers_are_aligned_and_python_reads_one_tuple() {

@@ -73,7 +73,7 @@ impl Bake {
         refinement.direct = before.direct;
         self.solution = before.solution;
         let tints = &mut refinement.outlook.tints;
-        tints.on(&self.room.scene, &self.solution.filters);
+        tints.on(&self.solution.filters);
         self.light_up(&before.reflected);
         self.light_arrives();
         self.solution.light.neighbours =

@@ -7,7 +7,7 @@
 //! same, with what changed.
 //!
 //! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (16 and 8 a ray where leaves look for
-//! themselves), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 a ray and `4 padded lanes` a leaf:
+//! themselves, 12 in rooms with panes or mirrors), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 (8) a ray and `4 padded lanes` a leaf:
 //! the rest follows from where light comes from.
 
 use super::outlook::Outlook;
@@ -16,12 +16,12 @@ use super::{Bake, NOBODY, Representation, direct};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::{self, Lanes};
-use crate::light::{Light, Neighbours, Through};
-use crate::light::{Rows, padded};
+use crate::light::{Filters, Light, Neighbours, Rows, Through, padded};
 use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, Fingerprint, Kind, Packs, container};
+use std::borrow::Cow;
 use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -35,9 +35,8 @@ impl Bake {
     /// Writes a checkpoint, the first rank alone; its size in bytes, 0 on other ranks.
     ///
     /// # Errors
-    /// The file cannot be written, or the room has panes or mirrors.
+    /// The file cannot be written.
     pub fn save(&self, path: &Path) -> Result<u64> {
-        self.can_be_kept("--checkpoint")?;
         let print = self.fingerprint();
         let body = |out: &mut Encoder| {
             print.encode(out)?;
@@ -49,23 +48,6 @@ impl Bake {
             true => container::write(path, Kind::Checkpoint, body),
             false => container::unwritten(path, body).map(|()| 0),
         }
-    }
-
-    /// Can what this bake knows be written down, as `option` asks? What rays pass on their way is in no file.
-    ///
-    /// # Errors
-    /// The room has panes or mirrors.
-    pub fn can_be_kept(&self, option: &str) -> Result<()> {
-        let rooms = match (&self.room.panes, &self.room.mirrors) {
-            (Some(_), _) => "rooms that light passes panes in",
-            (_, Some(_)) => "rooms with mirrors",
-            _ => return Ok(()),
-        };
-        Err(Error::input(
-            self.room.scene.source.path.display().to_string(),
-            format!("{option} does not go with {rooms}"),
-            format!("bake without {option}"),
-        ))
     }
 
     /// Takes up a checkpoint: this bake, which has done no round, goes on where that one stood.
@@ -113,6 +95,12 @@ impl Bake {
         }
     }
 
+    /// What panes and mirrors leave of light; none in a room without.
+    fn filtered(&self) -> Option<&Filters> {
+        let any = self.room.panes.is_some() || self.room.mirrors.is_some();
+        any.then_some(&self.solution.filters)
+    }
+
     /// Everything that the outcome depends on.
     fn fingerprint(&self) -> Fingerprint {
         let mut print = Fingerprint::default();
@@ -156,7 +144,9 @@ impl Bake {
         )?;
         out.put(self.solution.spectrum_error.unwrap_or(f64::NAN))?;
         out.put(self.solution.light.white)?;
-        self.refinement.outlook.encode(whole, out)?;
+        self.refinement
+            .outlook
+            .encode(whole, self.filtered(), out)?;
         out.put_all(factor)?;
         out.put([
             self.refinement.balance.defect_before,
@@ -168,11 +158,14 @@ impl Bake {
             &self.solution.light.reflected,
             &self.solution.light.irradiance,
         );
+        // What mirrors are read as stands apart.
+        let row = |&leaf: &u32| match self.is_mirror(leaf) {
+            true => self.solution.light.mirrors.row(leaf as usize),
+            false => reflected.row(leaf as usize),
+        };
         out.put_list(
             leaves.len() * reflected.width(),
-            leaves
-                .iter()
-                .flat_map(|&k| reflected.row(k as usize).iter().copied()),
+            leaves.iter().flat_map(row).copied(),
         )?;
         if whole {
             out.put_list(
@@ -205,7 +198,7 @@ impl Bake {
     }
 
     /// Takes them up, except for what is behind `light.irradiance` (if `whole`) and `light.leaves`: what the leaves reflect,
-    /// and where the direct light of each leaf comes from, if that was kept.
+    /// and where the direct light of each leaf comes from, if that was kept. If lamps are gone since it is not known what leaves reflect.
     pub(crate) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
         let splits = from.get_list::<u32>()?;
         self.refinement.tree.nodes.reserve(4 * splits.len());
@@ -215,31 +208,31 @@ impl Bake {
         }
         let nodes = self.refinement.tree.nodes.len();
         self.refinement.graph = decode_graph(nodes, self.room.mesh.triangles.len(), from)?;
-        let lights = self.room.scene.spectra.len();
-        let lanes = from
-            .get_all::<[u32; 3]>()?
-            .into_iter()
-            .map(|lane| lane_of(lane, lights))
-            .collect::<Read<Vec<lanes::Lane>>>()?;
-        if lanes.len() > LEAVES {
-            return Err(Broken::new("has an impossible number of lanes"));
-        }
+        let (lanes, written) = self.read_lanes(whole, from)?;
+        let gone = lanes.len() < written;
         self.solution.lanes = match self.room.settings.representation {
             Representation::Rgb | Representation::Characteristic(_) if lanes.is_empty() => {
                 self.chosen_lanes().expect(NOBODY)
             }
-            _ if lanes.is_empty() => return Err(Broken::new("has no lanes")),
+            _ if lanes.is_empty() && !gone => return Err(Broken::new("has no lanes")),
+            _ if lanes.is_empty() => Lanes::dense(&self.room.scene.spectra, &self.room.weights),
             _ => self.guided(Lanes::with(
                 lanes,
                 &self.room.scene.spectra,
                 &self.room.weights,
             )),
         };
+        self.solution.filters = Filters::new(&self.room.scene, &self.solution.lanes);
         let error: f64 = from.get()?;
         self.solution.spectrum_error = (!error.is_nan()).then_some(error);
         let white = from.get()?;
-        self.refinement.outlook =
-            Outlook::decode(&self.refinement.tree, self.room.team, whole, from)?;
+        self.refinement.outlook = Outlook::decode(
+            &self.refinement.tree,
+            self.room.team,
+            whole,
+            self.filtered(),
+            from,
+        )?;
         let factor: Vec<f32> = from.get_all()?;
         // Where leaves look for themselves nothing is balanced.
         let by_rays = self.room.by_rays();
@@ -255,9 +248,17 @@ impl Bake {
             limited: from.get::<u64>()? as usize,
         };
         self.refinement.areas = self.refinement.outlook.areas(&self.refinement.tree);
-        let leaves = self.refinement.leaves();
-        let (count, width) = (leaves.len(), padded(self.solution.lanes.len()));
-        let reflected = rows(from, count, width)?;
+        let leaves: Vec<u32> = self.refinement.leaves();
+        let kept = if gone {
+            written
+        } else {
+            self.solution.lanes.len()
+        };
+        let (count, width) = (leaves.len(), padded(kept));
+        let mut reflected = rows(from, count, width)?;
+        if gone {
+            reflected = Rows::default();
+        }
         let mut irradiance = Rows::default();
         if whole {
             irradiance = rows(from, count, width)?;
@@ -285,6 +286,27 @@ impl Bake {
         Ok((reflected, traces))
     }
 
+    /// Intervals of the lanes whose lamps are still there, and how many lanes there were.
+    fn read_lanes(&self, whole: bool, from: &mut Decoder) -> Read<(Vec<lanes::Lane>, usize)> {
+        let mut lanes = from
+            .get_all::<[u32; 3]>()?
+            .into_iter()
+            .map(lane_of)
+            .collect::<Read<Vec<lanes::Lane>>>()?;
+        let written = lanes.len();
+        if written > LEAVES {
+            return Err(Broken::new("has an impossible number of lanes"));
+        }
+        let there =
+            |lane: &lanes::Lane| lane.light.is_none_or(|k| k < self.room.scene.spectra.len());
+        if whole && !lanes.iter().all(there) {
+            return Err(Broken::new("has lanes of light that is not there"));
+        }
+        // Lamps may have gone since.
+        lanes.retain(there);
+        Ok((lanes, written))
+    }
+
     /// The last solution from what the leaves reflect.
     pub(crate) fn light_up(&mut self, reflected: &Rows) {
         match reflected.width() {
@@ -303,7 +325,10 @@ impl Bake {
             emission, sheets, ..
         } = painter.paint(&self.refinement.tree, &light.leaves, &self.solution.lanes);
         light.through = sheets.map_or_else(Through::default, |sheets| sheets.shown);
-        light.reflected = self.refinement.on_nodes::<L>(reflected, &light.leaves);
+        let on_nodes = self.refinement.on_nodes::<L>(reflected, &light.leaves);
+        light.reflected =
+            self.without_mirrors::<L>(Cow::Borrowed(reflected), on_nodes, &light.leaves);
+        light.mirrors = std::mem::take(&mut self.solution.light.mirrors);
         light.emitted = self.refinement.on_nodes::<L>(&emission, &light.leaves);
         light.half_size = self.room.mesh.half_size;
         light.apart = self.solution.lanes.excites().is_some();
@@ -413,11 +438,10 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
     Ok(Graph { links, blockers })
 }
 
-fn lane_of([light, first, count]: [u32; 3], lights: usize) -> Read<lanes::Lane> {
+fn lane_of([light, first, count]: [u32; 3]) -> Read<lanes::Lane> {
     let (first, count) = (first as usize, count as usize);
     let light = (light != u32::MAX).then_some(light as usize);
-    if light.is_some_and(|l| l >= lights) || count == 0 || first >= LEAVES || count > LEAVES - first
-    {
+    if count == 0 || first >= LEAVES || count > LEAVES - first {
         return Err(Broken::new("has an impossible lane"));
     }
     Ok(lanes::Lane {

@@ -118,8 +118,7 @@ impl Bake {
         } = given;
         let emission = sources.emission;
         let by_rays = self.room.by_rays();
-        let tints = &mut self.refinement.outlook.tints;
-        tints.on(&self.room.scene, &self.solution.filters);
+        self.refinement.outlook.tints.on(&self.solution.filters);
         self.add_lamps_in_mirrors::<L>(&emission, leaves, &mut first);
         let mut scaled = flux::Scaled::default();
         if self.room.sealed == Closed::Yes && !by_rays {
@@ -488,7 +487,7 @@ impl Bake {
     }
 
     /// Is a leaf a mirror?
-    fn is_mirror(&self, leaf: u32) -> bool {
+    pub(super) fn is_mirror(&self, leaf: u32) -> bool {
         self.room.mirrors.as_ref().is_some_and(|mirrors| {
             let face = self.refinement.tree.face_of(leaf);
             mirrors.is_side(face.triangle, face.back)
@@ -496,7 +495,7 @@ impl Bake {
     }
 
     /// Takes what mirrors are read as out of what leaves send, and keeps it for rays that met too many; what all nodes send.
-    fn without_mirrors<const L: usize>(
+    pub(super) fn without_mirrors<const L: usize>(
         &mut self,
         sent: Cow<Rows>,
         on_nodes: Rows,

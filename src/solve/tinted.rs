@@ -3,21 +3,11 @@
 //! Rays are kept from round to round and lanes are not, so what is kept of a ray is what it passes. Angles and thicknesses are rounded:
 //! a room has few panes and mirrors, and thousands of rays then share one filter.
 
-use crate::hierarchy::{Crossing, Glazing, Route};
+use crate::light::passed::{self, Passed};
 use crate::light::{Filters, Rows, padded};
-use crate::scene::Scene;
-use crate::spectrum::LEAVES;
-use glam::Vec3;
-use std::collections::BTreeMap;
-
-/// Steps of the cosine of incidence and of a texture's value from 0 to 1, each taken at its middle: transmittance bends by less than 1e-3
-/// over a step but for the last 2 degrees before grazing.
-const STEPS: f32 = 128.0;
-/// Steps of thickness to a doubling: 2 % of what is absorbed.
-const OCTAVE: f32 = 32.0;
-
-/// What a ray passes, rounded: material, cosine, thickness, texture's value of each pane; of a mirror the first two.
-pub(super) type Passed = Vec<[i32; 4]>;
+use crate::store::Broken;
+use crate::store::codec::Read;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What the rays of leaves pass.
 #[derive(Debug, Clone, Default)]
@@ -28,67 +18,6 @@ pub(crate) struct Tints {
     known: BTreeMap<Passed, u32>,
     /// What they leave, by lane.
     rows: Rows,
-}
-
-/// What a ray to `to` passes.
-pub(super) fn passed(glazing: &Glazing, from: Vec3, to: Vec3) -> Passed {
-    let crossings = glazing.crossings(from, to);
-    let mut passed: Passed = crossings.iter().map(rounded).collect();
-    passed.sort_unstable();
-    passed
-}
-
-/// What a ray meets and passes that mirrors send on.
-pub(super) fn met(glazing: Option<&Glazing>, route: &Route) -> Passed {
-    let mirror = |&(material, cosine): &(u32, f32)| {
-        rounded(&Crossing {
-            material,
-            cosine,
-            thickness: 0.0,
-            texel: 1.0,
-        })
-    };
-    let mut all: Passed = route.bounces().iter().map(mirror).collect();
-    if let Some(glazing) = glazing {
-        for ends in route.points().windows(2) {
-            all.extend(passed(glazing, ends[0].as_vec3(), ends[1].as_vec3()));
-        }
-    }
-    all.sort_unstable();
-    all
-}
-
-fn rounded(crossing: &Crossing) -> [i32; 4] {
-    let step = |x: f32| ((x * STEPS) as i32).clamp(0, STEPS as i32 - 1);
-    let thickness = match crossing.thickness > 0.0 {
-        true => (OCTAVE * crossing.thickness.log2()).round() as i32,
-        false => i32::MIN,
-    };
-    // A plain pane has the value 1, whole.
-    let texel = if crossing.texel >= 1.0 {
-        STEPS as i32
-    } else {
-        step(crossing.texel)
-    };
-    [
-        crossing.material as i32,
-        step(crossing.cosine),
-        thickness,
-        texel,
-    ]
-}
-
-fn crossing([material, cosine, thickness, texel]: [i32; 4]) -> Crossing {
-    let middle = |k: i32| ((k as f32 + 0.5) / STEPS).min(1.0);
-    Crossing {
-        material: material as u32,
-        cosine: middle(cosine),
-        thickness: match thickness {
-            i32::MIN => 0.0,
-            k => (k as f32 / OCTAVE).exp2(),
-        },
-        texel: middle(texel),
-    }
 }
 
 impl Tints {
@@ -118,21 +47,49 @@ impl Tints {
         self.known.retain(|_, number| *number as usize <= filters);
     }
 
+    /// The number of what a ray passes, counted from 1; 0: nothing.
+    pub(super) fn of(&self, ray: usize) -> u32 {
+        self.of[ray]
+    }
+
+    /// All that rays pass, as numbers for [`all_of`].
+    pub(super) fn numbers(&self) -> Vec<u64> {
+        listed(self.known.keys())
+    }
+
+    /// The numbers that what rays pass here has in a list of all, counted from 1, by its own less 1.
+    pub(super) fn places_in(&self, all: &BTreeSet<Passed>) -> Vec<u32> {
+        let place: BTreeMap<&Passed, u32> = all.iter().zip(1..).collect();
+        let mut places = vec![0; self.known.len()];
+        for (passed, &number) in &self.known {
+            places[number as usize - 1] = place[passed];
+        }
+        places
+    }
+
+    /// Rays that pass these of a list of all, by number.
+    ///
+    /// # Errors
+    /// [`Broken`]: the list has no such number.
+    pub(super) fn known(all: BTreeSet<Passed>, of: Vec<u32>) -> Read<Self> {
+        if of.iter().any(|&number| number as usize > all.len()) {
+            return Err(Broken::new("has rays that pass nothing known"));
+        }
+        Ok(Self {
+            of,
+            known: all.into_iter().zip(1..).collect(),
+            rows: Rows::default(),
+        })
+    }
+
     /// Works the filters out for these lanes.
-    pub(super) fn on(&mut self, scene: &Scene, filters: &Filters) {
+    pub(super) fn on(&mut self, filters: &Filters) {
         if self.is_empty() {
             return;
         }
         self.rows = Rows::zero(self.known.len(), padded(filters.len()));
         for (passed, &number) in &self.known {
-            let mut filter = [1.0; LEAVES];
-            for &one in passed {
-                let one = crossing(one);
-                match scene.materials[one.material as usize].mirror {
-                    Some(_) => filters.mirror(one.material, one.cosine, &mut filter),
-                    None => filters.pass(scene, &one, &mut filter),
-                }
-            }
+            let filter = filters.of(passed);
             let row = self.rows.row_mut(number as usize - 1);
             row.copy_from_slice(&filter[..row.len()]);
         }
@@ -148,4 +105,35 @@ impl Tints {
     pub(super) fn bytes(&self) -> usize {
         4 * self.of.len() + self.rows.bytes()
     }
+}
+
+/// What rays pass, as numbers: how many panes and mirrors, and each of them.
+pub(super) fn listed<'a>(all: impl Iterator<Item = &'a Passed>) -> Vec<u64> {
+    let one = |passed: &'a Passed| {
+        let count = passed.len() as u64;
+        std::iter::once(count).chain(passed::numbers(passed))
+    };
+    all.flat_map(one).collect()
+}
+
+/// What such numbers stand for, if light of this room can pass it.
+///
+/// # Errors
+/// [`Broken`]: it cannot, or they stand for nothing.
+pub(super) fn all_of(mut numbers: &[u64], filters: &Filters) -> Read<BTreeSet<Passed>> {
+    let broken = || Broken::new("has rays that pass what is not there");
+    let mut all = BTreeSet::new();
+    while let Some((&count, rest)) = numbers.split_first() {
+        let count = usize::try_from(count).ok().and_then(|n| n.checked_mul(4));
+        let (one, rest) = count
+            .and_then(|n| rest.split_at_checked(n))
+            .ok_or_else(broken)?;
+        let passed = passed::from_numbers(one)?;
+        if !filters.knows(&passed) {
+            return Err(broken());
+        }
+        all.insert(passed);
+        numbers = rest;
+    }
+    Ok(all)
 }

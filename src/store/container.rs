@@ -49,7 +49,7 @@ impl Kind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint | Self::Cache => 5,
+            Self::Checkpoint | Self::Cache => 6,
         }
     }
 

@@ -1,13 +1,14 @@
 //! What a room is made of, part by part, as hashes: is it the same room, and if not, what changed?
 //!
-//! Two lists: *shape* is what decides who sees whom (surfaces in world space with their normals, sides and holes, places
-//! and cones of lights); *paint* is everything else that decides the light
-//! (reflectances, textures, spectra, powers, wavelengths). Names are kept for messages only: a part that was renamed
+//! Two lists: *shape* is what decides who sees whom (surfaces in world space with their normals, sides and holes, which of them are
+//! mirrors, panes and their thickness, places and cones of lights); *paint* is everything else that decides the light
+//! (reflectances, textures, spectra of panes and lights, powers, wavelengths). Names are kept for messages only: a part that was renamed
 //! is the same part.
 
 use super::codec::{Decoder, Encoder, Plain, Read};
+use crate::scene::pane::{Pane, PaneKind};
 use crate::scene::sky::Dome;
-use crate::scene::{Alpha, LightKind, Scene, Sides, Texture};
+use crate::scene::{Alpha, LightKind, Scene, Sides, Surface, Texture};
 use std::collections::BTreeMap;
 use std::io;
 use xxhash_rust::xxh64::Xxh64;
@@ -57,6 +58,40 @@ impl Mix {
     }
 }
 
+impl Mix {
+    /// What of a pane is found where a ray passes it: thickness, value of the texture.
+    fn pane_places(&mut self, pane: &Pane, surface: &Surface, images: &[u64]) {
+        match &pane.kind {
+            // How far light goes through a solid depends on how it is refracted.
+            PaneKind::Glass {
+                ior,
+                unit,
+                thickness,
+                ..
+            } => self.add([*ior, unit.unwrap_or(0.0), *thickness]),
+            PaneKind::Cover { .. } => {
+                let alpha = surface.colors.iter().flatten().map(|c| c[3]);
+                self.all(&alpha.collect::<Vec<f32>>())
+            }
+        };
+        if let Some(texture) = &pane.texture {
+            self.texture(texture, images);
+            if let Some(uvs) = surface.texcoords.get(texture.texcoord) {
+                self.all(uvs);
+            }
+        }
+    }
+
+    /// What a pane leaves of light that passes it there.
+    fn pane_colour(&mut self, pane: &Pane) {
+        self.add(*pane.spectrum());
+        match pane.kind {
+            PaneKind::Glass { share, .. } => self.add(share),
+            PaneKind::Cover { alpha, .. } => self.add(alpha),
+        };
+    }
+}
+
 impl Fingerprint {
     /// What decides who sees whom.
     pub fn shape(scene: &Scene) -> Self {
@@ -92,8 +127,13 @@ impl Fingerprint {
                     }
                 }
             }
+            // What light passes is kept by the numbers of materials.
+            if material.mirror.is_some() {
+                mix.add(3_u8).add(surface.material as u64);
+            }
             print.add(format!("surface {}", surface.name), &mix);
         }
+        print.panes(scene, &images);
         for light in &scene.lights {
             let mut mix = Mix::default();
             let kind = match light.kind {
@@ -132,6 +172,21 @@ impl Fingerprint {
             print.add(format!("{what} of light '{}'", light.name), &mix);
         }
         print
+    }
+
+    /// Adds where panes are, and what of them is found where a ray passes them.
+    fn panes(&mut self, scene: &Scene, images: &[u64]) {
+        for pane in &scene.panes {
+            let mut mix = Mix::default();
+            let positions: Vec<[f64; 3]> = pane.positions.iter().map(|p| p.to_array()).collect();
+            mix.all(&positions)
+                .all(&pane.triangles)
+                .add(pane.material as u64);
+            if let Some(of) = &scene.materials[pane.material].pane {
+                mix.pane_places(of, pane, images);
+            }
+            self.add(format!("pane {}", pane.name), &mix);
+        }
     }
 
     /// What else decides the light.
@@ -177,6 +232,12 @@ impl Fingerprint {
             }
             for term in m.fluorescence.iter().flat_map(|f| &f.terms) {
                 mix.add(term.light as u64).add(term.excitation);
+            }
+            if let Some(pane) = &m.pane {
+                mix.pane_colour(pane);
+            }
+            if let Some(mirror) = &m.mirror {
+                mix.add(mirror.reflectance);
             }
             print.add(format!("material '{}'", m.name), &mix);
         }
@@ -372,6 +433,40 @@ mod tests {
         let mut renamed = room();
         renamed.surfaces[0].name = "other".into();
         assert_eq!(seen(&renamed), (None, None));
+    }
+
+    /// Where panes and mirrors are is shape, what they do to light is paint.
+    #[test]
+    fn panes_and_mirrors_are_known() {
+        let of = |name: &str| Scene::load(name, &Options::default()).unwrap();
+        let changes = |name: &str, change: &dyn Fn(&mut Scene)| {
+            let mut other = of(name);
+            change(&mut other);
+            let shape = Fingerprint::shape(&of(name)).change(&Fingerprint::shape(&other));
+            let paint = Fingerprint::paint(&of(name)).change(&Fingerprint::paint(&other));
+            [shape.is_some(), paint.is_some()]
+        };
+        let glazed = |change: &dyn Fn(&mut Pane)| {
+            changes("scenes/glazed.glb", &|scene| {
+                let used = scene.panes[0].material;
+                change(scene.materials[used].pane.as_mut().unwrap());
+            })
+        };
+        let moved = |scene: &mut Scene| scene.panes[0].positions[1].y += 0.1;
+        assert_eq!(changes("scenes/glazed.glb", &moved), [true, false]);
+        let tinted = glazed(&|pane| match &mut pane.kind {
+            PaneKind::Glass { inside, .. } => inside[7] *= 0.5,
+            PaneKind::Cover { colour, .. } => colour[7] *= 0.5,
+        });
+        assert_eq!(tinted, [false, true]);
+        let dull = |scene: &mut Scene| scene.materials.iter_mut().for_each(|m| m.mirror = None);
+        assert_eq!(changes("scenes/mirrored.glb", &dull), [true, true]);
+        let dim = |scene: &mut Scene| {
+            for mirror in scene.materials.iter_mut().filter_map(|m| m.mirror.as_mut()) {
+                mirror.reflectance[7] *= 0.5;
+            }
+        };
+        assert_eq!(changes("scenes/mirrored.glb", &dim), [false, true]);
     }
 
     proptest! {

@@ -9,7 +9,7 @@ use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{
     NO_PLANE, Patch, Segment, Shadow, Shaft, ShaftContents, lambert_edges_x8, quarters,
 };
-use crate::light::{Filter, Tint};
+use crate::light::{Passage, Tint};
 use crate::link::Sight;
 use crate::scene::sky::{PARTS, PLACES};
 use glam::DVec3;
@@ -235,8 +235,8 @@ impl Outside {
         to: &Receiver,
         samples: usize,
         parts: &Parts,
-    ) -> [Option<Filter>; PLACES] {
-        let (mut tints, mut all) = ([Tint::default(); PLACES], Tint::default());
+    ) -> [Option<Passage>; PLACES] {
+        let (mut tints, mut all): ([Tint; PLACES], Tint) = Default::default();
         let parts = parts.0.as_deref().unwrap_or_default();
         let step = parts.iter().map(|p| p.brings).sum::<f64>() / samples as f64;
         let (mut number, mut until) = (0, 0.0);
@@ -250,20 +250,21 @@ impl Outside {
                 let direction = at.normalize();
                 number += 1;
                 let end = to.point + direction * by.reach();
-                let (filter, _) = by.leave(&Segment::new(to.point, end, [NO_PLANE; 2]));
+                let (passage, _) = by.leave(&Segment::new(to.point, end, [NO_PLANE; 2]));
                 // Solid angle of the part, were it all as far, over how often it is chosen.
                 let angle = a.dot(b.cross(c)).abs() / at.length().powi(3);
                 let weight = to.normal.dot(direction).max(0.0) * angle / part.brings;
                 let first = if part.up { 0 } else { PARTS };
                 let radiance = self.half(part.up, direction);
                 for (tint, radiance) in tints[first..].iter_mut().zip(radiance) {
-                    tint.add(&filter, weight * radiance);
-                    all.add(&filter, weight * radiance);
+                    tint.add(passage.as_ref(), weight * radiance);
+                    all.add(passage.as_ref(), weight * radiance);
                 }
             }
         }
         // What is so dim that no direction was for it is taken to pass as the rest does.
-        tints.map(|tint| tint.mean().or(all.mean()))
+        let all = all.mean();
+        tints.map(|tint| tint.mean().or_else(|| all.clone()))
     }
 }
 
@@ -367,7 +368,7 @@ mod tests {
         sums: &mut [[f64; 4]; 2],
         area: f64,
         seen: [f64; PLACES],
-        tints: &[Option<Filter>; PLACES],
+        tints: &[Option<Passage>; PLACES],
     ) {
         for (sum, first) in sums.iter_mut().zip([0, PARTS]) {
             for place in first..first + PARTS {

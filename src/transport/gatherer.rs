@@ -8,7 +8,8 @@ use super::trace::Trace;
 use super::via::{Arrived, Via};
 use crate::geometry::{Clipper, Hit, Segment};
 use crate::hierarchy::{Sample, Tree};
-use crate::light::{Filter, Filters, Glass, Light};
+use crate::light::passed::Steps;
+use crate::light::{Filters, Glass, Light, Passage};
 use crate::link::{Sight, Way};
 use crate::scene::PunctualLight;
 use glam::DVec3;
@@ -55,7 +56,7 @@ pub struct Memory {
     /// What the rays of a point met.
     pub(super) met: Vec<(u32, Hit)>,
     /// What panes leave of what these bring, in order; empty in a room without.
-    pub(super) tints: Vec<Option<Box<Filter>>>,
+    pub(super) tints: Vec<Option<Box<Passage>>>,
     /// Of which close by.
     pub(super) near: Vec<(u32, Hit)>,
     /// Lamps that are put off until all of them are known.
@@ -137,16 +138,24 @@ impl Gatherer<'_> {
     }
 
     /// What panes and mirrors leave of light on a free segment; none where all passes.
-    pub(super) fn through(&self, segment: &Segment) -> Option<Filter> {
+    pub(super) fn through(&self, segment: &Segment) -> Option<Passage> {
         match self.via {
             Some(via) => self.by_way_of(via, segment),
-            None => self.glass?.through(segment.from, segment.to),
+            None => (self.glass?).through(segment.from, segment.to, self.steps()),
+        }
+    }
+
+    /// How what light passes is kept, if it is: of many points that stand for a leaf less finely.
+    pub(super) fn steps(&self) -> Option<Steps> {
+        match (self.keep, self.shafts) {
+            (false, _) => None,
+            (true, true) => Some(Steps::Fine),
+            (true, false) => Some(Steps::Coarse),
         }
     }
 
     /// How bright light is that has passed a segment, as a share.
     pub(super) fn dimmed(&self, segment: &Segment) -> f64 {
-        let filter = self.through(segment);
-        filter.map_or(1.0, |filter| self.filters.brightness(&filter))
+        self.left_by(self.through(segment).as_ref())
     }
 }

@@ -11,7 +11,7 @@ use super::receiver::{Gathered, Receiver};
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
-use crate::light::{Filter, Tint, keenness};
+use crate::light::{Passage, Tint, keenness};
 use crate::link::open_weight;
 use crate::scene::LightKind;
 use glam::DVec3;
@@ -171,7 +171,7 @@ impl Gatherer<'_> {
 
     /// What panes leave of each lamp's light, by the rays that reached it, and last of all lamps' light together, which stands for
     /// those that no ray went to. Empty in a room without panes.
-    pub(super) fn tints(&self, owners: &[usize], lamps: usize, memory: &Memory) -> Vec<Filter> {
+    pub(super) fn tints(&self, owners: &[usize], lamps: usize, memory: &Memory) -> Vec<Passage> {
         if self.is_plain() {
             return Vec::new();
         }
@@ -181,20 +181,21 @@ impl Gatherer<'_> {
             .zip(owners)
             .filter(|((_, blocked), _)| !**blocked)
         {
-            let filter = self.through(segment);
-            let filter = filter.unwrap_or([1.0; 64]);
+            let passage = self.through(segment);
             for k in [lamp, lamps] {
-                sums[k].add(&filter, weight);
+                sums[k].add(passage.as_ref(), weight);
             }
         }
-        let whole = sums[lamps].mean().unwrap_or([1.0; 64]);
-        let each = sums.iter();
-        each.map(|sum| sum.mean().unwrap_or(whole)).collect()
+        let mut means: Vec<Option<Passage>> = sums.into_iter().map(Tint::mean).collect();
+        let whole = means.pop().flatten().unwrap_or_else(Passage::free);
+        let each = means.into_iter();
+        let each = each.map(|mean| mean.unwrap_or_else(|| whole.clone()));
+        each.chain([whole.clone()]).collect()
     }
 
-    /// How bright light is that has passed a filter, as a share.
-    pub(super) fn left_by(&self, filter: Option<&Filter>) -> f64 {
-        filter.map_or(1.0, |filter| self.filters.brightness(filter))
+    /// How bright light is of which so much is left, as a share.
+    pub(super) fn left_by(&self, passage: Option<&Passage>) -> f64 {
+        passage.map_or(1.0, |passage| self.filters.brightness(&passage.filter))
     }
 
     /// How many rays lamps are worth that would bring `all`, share of white.

@@ -9,7 +9,7 @@ use super::gatherer::{Gatherer, Memory};
 use super::receiver::Receiver;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_polygon, quarters};
-use crate::light::Filter;
+use crate::light::Passage;
 use crate::link::{PIECES, View, open_weight};
 use crate::scene::PunctualLight;
 use crate::scene::luminaires::Luminaire;
@@ -206,7 +206,7 @@ impl Gatherer<'_> {
         lamp: &PunctualLight,
         bright: f64,
         memory: &mut Memory,
-    ) -> (f64, Option<Filter>) {
+    ) -> (f64, Option<Passage>) {
         let Some(luminaire) = lamp.luminaire.as_deref() else {
             return (0.0, None);
         };
@@ -233,9 +233,9 @@ impl Gatherer<'_> {
             return (seen, None);
         }
         let (more, noise) = self.by_lamp_rays(luminaire, &parts, to, bright, memory);
-        let filter = self.tint(memory);
-        memory.noise += noise * self.left_by(filter.as_ref()).powi(2);
-        (seen + more, filter)
+        let passage = self.tint(memory);
+        memory.noise += noise * self.left_by(passage.as_ref()).powi(2);
+        (seen + more, passage)
     }
 
     /// What a triangle of a lamp brings, less the shadows of what stands between; none where that is too much.

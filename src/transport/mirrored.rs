@@ -10,7 +10,7 @@ use super::via::{Arrived, End, Via};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::geometry::{Hit, Segment};
 use crate::hierarchy::Route;
-use crate::light::{Filter, accumulate};
+use crate::light::{Passage, accumulate};
 use crate::link::View;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -50,16 +50,16 @@ impl Gatherer<'_> {
     }
 
     /// What is left of light on a segment that is looked along by way of mirrors.
-    pub(super) fn by_way_of(&self, via: Via, segment: &Segment) -> Option<Filter> {
+    pub(super) fn by_way_of(&self, via: Via, segment: &Segment) -> Option<Passage> {
         let mirrors = self.sight.mirrors?;
         let route = mirrors.route(via.image, via.point, segment.to.as_dvec3())?;
         Some(self.along(&route))
     }
 
     /// What is left of light by a way by mirrors, and past panes between them.
-    pub(super) fn along(&self, route: &Route) -> Filter {
+    pub(super) fn along(&self, route: &Route) -> Passage {
         let glazing = self.glass.map(|glass| glass.glazing);
-        self.filters.along(glazing, route)
+        self.filters.along(glazing, route, self.steps())
     }
 
     /// What is so far away lies outside the room, by whatever way it is looked.
@@ -169,22 +169,25 @@ impl Gatherer<'_> {
         let other = |a: &&Arrived| a.image.is_none_or(|image| !seen.contains(&image));
         for arrived in mirrored.iter().filter(other) {
             if let Some(direction) = arrived.outside() {
-                self.escapes(direction, share, &arrived.filter, out);
+                self.escapes(direction, share, &arrived.passage, out);
             }
         }
         memory.mirrored = mirrored;
     }
 
     /// Adds what comes from outside in one direction.
-    fn escapes(&self, direction: DVec3, share: f64, filter: &Filter, out: &mut Gathered) {
+    fn escapes(&self, direction: DVec3, share: f64, passage: &Passage, out: &mut Gathered) {
         let Some(outside) = self.sky else { return };
-        for (lamp, row) in self.lamps {
+        for (k, (lamp, row)) in self.lamps.iter().enumerate() {
             let Some(radiance) = outside.sky.part(lamp.kind.place(), direction) else {
                 continue;
             };
             let factor = (share * PI * radiance) as f32;
-            accumulate(&mut out.irradiance, factor, row, Some(filter));
-            accumulate(&mut out.direct, factor, row, Some(filter));
+            if let Some(trace) = &mut out.trace {
+                trace.lamp(k, factor, Some(passage));
+            }
+            accumulate(&mut out.irradiance, factor, row, Some(&passage.filter));
+            accumulate(&mut out.direct, factor, row, Some(&passage.filter));
         }
     }
 
@@ -210,7 +213,7 @@ impl Gatherer<'_> {
             mirrored.push(Arrived {
                 end,
                 image: way.image,
-                filter: Box::new(self.along(&way.route)),
+                passage: Box::new(self.along(&way.route)),
             });
         }
         true
@@ -240,7 +243,7 @@ impl Gatherer<'_> {
                 memory.mirrored.push(Arrived {
                     end: End::Outside(way.direction),
                     image: way.image,
-                    filter: Box::new(self.along(&way.route)),
+                    passage: Box::new(self.along(&way.route)),
                 });
             }
         }
@@ -251,7 +254,8 @@ impl Gatherer<'_> {
     pub(super) fn patches_in_mirrors(&self, share: f32, memory: &Memory, out: &mut Gathered) {
         let width = self.light.width();
         for arrived in &memory.mirrored {
-            let filter = Some(&*arrived.filter);
+            let passage = &*arrived.passage;
+            let filter = Some(&passage.filter);
             let (leaf, row) = match arrived.end {
                 End::Leaf(leaf) => (leaf, self.light.reflected.row(leaf as usize)),
                 End::Mirror(leaf) => (leaf, self.light.mirrors.row(leaf as usize)),
@@ -259,8 +263,17 @@ impl Gatherer<'_> {
             };
             out.seen += f64::from(share);
             accumulate(&mut out.irradiance[..width], share, row, filter);
+            if let Some(trace) = &mut out.trace {
+                match arrived.end {
+                    End::Mirror(_) => trace.mirror(leaf, share, passage),
+                    _ => trace.hit(leaf, share, Some(passage)),
+                }
+            }
             if arrived.image.is_none() && self.light.bright_emitted[leaf as usize] > 0.0 {
                 let row = self.light.emitted.row(leaf as usize);
+                if let Some(trace) = &mut out.trace {
+                    trace.emitted(leaf, share, Some(passage));
+                }
                 accumulate(&mut out.irradiance[..width], share, row, filter);
                 accumulate(&mut out.direct[..width], share, row, filter);
             }

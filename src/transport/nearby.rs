@@ -136,7 +136,7 @@ impl Gatherer<'_> {
             memory.rays += 1;
             let mirrored = next.and_then(|hit| self.sight.mirrored(start, ahead, &hit));
             if let Some(mirrored) = mirrored {
-                path.through *= self.filters.brightness(&self.along(&mirrored.route));
+                path.through *= self.left_by(Some(&self.along(&mirrored.route)));
                 next = mirrored.hit;
             }
             let Some((leaf, hit)) = next.and_then(|hit| Some((self.met(&hit)?, hit))) else {

@@ -10,7 +10,7 @@ use super::openings::{Choice, Openings};
 use super::receiver::Receiver;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::geometry::{Clipper, NO_PLANE, Segment};
-use crate::light::{Filter, Tint};
+use crate::light::{Passage, Tint};
 use crate::link::{Sight, View};
 use crate::scene::sky::{PARTS, PLACES, Sky};
 use glam::{DVec3, Vec3};
@@ -46,7 +46,7 @@ pub(crate) struct Look {
     /// Variance of the factors.
     pub(super) noise: [f64; PLACES],
     /// Mean filters of the parts of sky and ground where light comes through panes; none where none does.
-    pub(super) tints: [Option<Filter>; PLACES],
+    pub(super) tints: [Option<Passage>; PLACES],
 }
 
 impl Look {
@@ -79,8 +79,8 @@ pub(super) trait Ways {
     fn block(&self, segments: &[Segment], out: &mut Vec<bool>);
     /// May light change on its way?
     fn change_light(&self) -> bool;
-    /// What is left of light on a free segment, and how bright that is, as a share.
-    fn leave(&self, segment: &Segment) -> (Filter, f64);
+    /// What is left of light on a free segment (none: all), and how bright that is, as a share.
+    fn leave(&self, segment: &Segment) -> (Option<Passage>, f64);
     /// What is so far away lies outside the room.
     fn reach(&self) -> f64;
 }
@@ -121,7 +121,7 @@ impl Outside {
         way: Way,
         look: &mut Look,
     ) -> [f64; PLACES] {
-        (look.noise, look.tints) = ([0.0; PLACES], [None; PLACES]);
+        (look.noise, look.tints) = ([0.0; PLACES], Default::default());
         if let Way::Unshadowed = way {
             return self.unshadowed(to);
         }
@@ -265,7 +265,7 @@ impl Outside {
         look: &mut Look,
     ) -> [f64; PLACES] {
         let [mut seen, mut squares, mut sum] = [[0.0; PLACES]; 3];
-        let mut tints = [Tint::default(); PLACES];
+        let mut tints: [Tint; PLACES] = Default::default();
         let far = reach((sight, by));
         for &(search, d) in &look.open {
             let cosine = to.normal.dot(d);
@@ -280,7 +280,7 @@ impl Outside {
             let squared: f64 = densities.iter().map(|d| d * d).sum();
             let own = densities[search as usize];
             let (first, radiance) = self.sky.radiance(d);
-            let filter = by.filter(|by| by.change_light()).map(|by| {
+            let passage = by.filter(|by| by.change_light()).map(|by| {
                 let way = Segment::new(to.point, to.point + d * far, [NO_PLANE; 2]);
                 by.leave(&way)
             });
@@ -288,9 +288,9 @@ impl Outside {
                 let brings = radiance * cosine * own / squared;
                 seen[place] += brings;
                 let mut left = brings;
-                if let (Some((filter, bright)), true) = (&filter, brings > 0.0) {
+                if let (Some((passage, bright)), true) = (&passage, brings > 0.0) {
                     left *= bright;
-                    tints[place].add(filter, brings);
+                    tints[place].add(passage.as_ref(), brings);
                 }
                 // Light of open ground is as even as that of a lamp.
                 if first == 0 || !self.sky.has_even_ground() {
@@ -301,7 +301,7 @@ impl Outside {
         }
         let rays: f64 = counts.iter().sum();
         look.noise = std::array::from_fn(|k| (squares[k] - sum[k] * sum[k] / rays).max(0.0));
-        look.tints = tints.map(|tint| tint.mean());
+        look.tints = tints.map(Tint::mean);
         seen
     }
 

@@ -8,7 +8,7 @@ use super::gatherer::{CLOSE, Gatherer, Lamp, Linked, Memory, Of};
 use super::receiver::{Gathered, Receiver};
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
-use crate::light::{Filter, Tint, accumulate};
+use crate::light::{Passage, Tint, accumulate};
 use crate::link::{
     PIECES, POLYGONS, View, Way, blockers_of, in_front_of, open_weight, pattern, polygons,
 };
@@ -178,16 +178,16 @@ impl Gatherer<'_> {
     }
 
     /// What panes leave of what the last rays bring, where they are not blocked; none where no pane is passed.
-    pub(super) fn tint(&self, memory: &Memory) -> Option<Filter> {
+    pub(super) fn tint(&self, memory: &Memory) -> Option<Passage> {
         if self.is_plain() {
             return None;
         }
         let (mut tint, mut any) = (Tint::default(), false);
         let rays = memory.segments.iter().zip(&memory.weights);
         for ((segment, &weight), _) in (rays.zip(&memory.blocked)).filter(|(_, b)| !**b) {
-            let filter = self.through(segment);
-            any |= filter.is_some();
-            tint.add(&filter.unwrap_or([1.0; 64]), weight);
+            let passage = self.through(segment);
+            any |= passage.is_some();
+            tint.add(passage.as_ref(), weight);
         }
         tint.mean().filter(|_| any)
     }
@@ -200,7 +200,7 @@ impl Gatherer<'_> {
         id: u32,
         factor: f64,
         visible: f64,
-        tint: Option<&Filter>,
+        tint: Option<&Passage>,
         of: Of,
         out: &mut Gathered,
     ) {
@@ -239,30 +239,28 @@ impl Gatherer<'_> {
         id: u32,
         factor: f64,
         visible: f64,
-        tint: Option<&Filter>,
+        tint: Option<&Passage>,
         of: Of,
         out: &mut Gathered,
     ) {
         let seen = (factor * visible) as f32;
         let k = id as usize;
         let width = self.light.width();
+        let filter = tint.map(|passage| &passage.filter);
         if of != Of::Emitted {
             out.seen += factor * visible;
             let row = self.light.reflected.row(k);
-            accumulate(&mut out.irradiance[..width], seen, row, tint);
+            accumulate(&mut out.irradiance[..width], seen, row, filter);
         }
         if of != Of::Reflected && self.light.bright_emitted[k] > 0.0 {
             let row = self.light.emitted.row(k);
-            accumulate(&mut out.direct[..width], seen, row, tint);
+            accumulate(&mut out.direct[..width], seen, row, filter);
         }
         if let Some(trace) = &mut out.trace {
             match of {
-                Of::All => trace.patch(id, seen),
-                Of::Reflected => trace.slope(id, seen),
-                Of::Emitted => {
-                    trace.patch(id, seen);
-                    trace.slope(id, -seen);
-                }
+                Of::All => trace.patch(id, seen, tint),
+                Of::Reflected => trace.slope(id, seen, tint),
+                Of::Emitted => trace.emitted(id, seen, tint),
             }
         }
     }
@@ -272,7 +270,7 @@ impl Gatherer<'_> {
         &self,
         id: u32,
         factor: f64,
-        tint: Option<&Filter>,
+        tint: Option<&Passage>,
         out: &mut Gathered,
     ) {
         self.add(id, factor, 1.0, tint, Of::Emitted, out);

@@ -5,7 +5,7 @@ use super::luminaire;
 use super::receiver::{Gathered, Receiver};
 use crate::geometry::sampling::sequence02;
 use crate::geometry::{NO_PLANE, Segment};
-use crate::light::Filter;
+use crate::light::{Passage, accumulate};
 use crate::scene::{LightKind, PunctualLight};
 use glam::DVec3;
 
@@ -13,7 +13,7 @@ impl Gatherer<'_> {
     /// Light of punctual lights, one ray each.
     pub(super) fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
-            let (factor, filter) = match lamp.kind {
+            let (factor, passage) = match lamp.kind {
                 LightKind::Surface => {
                     let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
                     self.of_surface(to, lamp, f64::from(bright), memory)
@@ -24,13 +24,11 @@ impl Gatherer<'_> {
                 continue;
             }
             if let Some(trace) = &mut out.trace {
-                trace.lamp(k, factor as f32);
+                trace.lamp(k, factor as f32, passage.as_ref());
             }
-            for (l, r) in row.iter().enumerate() {
-                let more = factor as f32 * r * filter.map_or(1.0, |filter| filter[l]);
-                out.irradiance[l] += more;
-                out.direct[l] += more;
-            }
+            let filter = passage.as_ref().map(|passage| &passage.filter);
+            accumulate(&mut out.irradiance, factor as f32, row, filter);
+            accumulate(&mut out.direct, factor as f32, row, filter);
         }
     }
 
@@ -41,7 +39,7 @@ impl Gatherer<'_> {
         to: &Receiver,
         lamp: &PunctualLight,
         memory: &mut Memory,
-    ) -> (f64, Option<Filter>) {
+    ) -> (f64, Option<Passage>) {
         let Some((factor, end)) = punctual_factor(lamp, to, self.far()) else {
             return (0.0, None);
         };

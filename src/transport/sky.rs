@@ -5,10 +5,9 @@ use super::outside::{Way, Ways};
 use super::receiver::{Gathered, Receiver};
 use crate::geometry::sampling::{around, cosine_direction, hash, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
-use crate::light::{Filter, accumulate};
+use crate::light::{Passage, accumulate};
 use crate::scene::PunctualLight;
 use crate::scene::sky::{PLACES, SUN_RADIUS};
-use crate::spectrum::LEAVES;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -24,11 +23,10 @@ impl Ways for Gatherer<'_> {
         !self.is_plain()
     }
 
-    fn leave(&self, segment: &Segment) -> (Filter, f64) {
-        match self.through(segment) {
-            Some(filter) => (filter, self.filters.brightness(&filter)),
-            None => ([1.0; LEAVES], 1.0),
-        }
+    fn leave(&self, segment: &Segment) -> (Option<Passage>, f64) {
+        let passage = self.through(segment);
+        let bright = self.left_by(passage.as_ref());
+        (passage, bright)
     }
 
     fn reach(&self) -> f64 {
@@ -93,12 +91,13 @@ impl Gatherer<'_> {
             let factor = seen[place];
             let bright = self.light.bright_lamps.get(k).copied().unwrap_or(0.0);
             noise += memory.look.noise[place].sqrt() * f64::from(bright);
+            let tint = memory.look.tints[place].as_ref();
             if let Some(trace) = &mut out.trace {
-                trace.lamp(k, factor as f32);
+                trace.lamp(k, factor as f32, tint);
             }
-            let tint = memory.look.tints[place];
-            accumulate(&mut out.irradiance, factor as f32, row, tint.as_ref());
-            accumulate(&mut out.direct, factor as f32, row, tint.as_ref());
+            let filter = tint.map(|passage| &passage.filter);
+            accumulate(&mut out.irradiance, factor as f32, row, filter);
+            accumulate(&mut out.direct, factor as f32, row, filter);
         }
         // Parts are seen by the same rays, so that what is too much of one is too much of all.
         memory.noise += noise * noise;

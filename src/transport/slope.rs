@@ -60,7 +60,7 @@ impl Gatherer<'_> {
         moment(to, element.corners, unit, factor, limit, 0, &mut moments);
         let weights = moments.map(|w| sign * scale * visible * (w - factor / 3.0));
         if let Some(trace) = &mut out.trace {
-            (0..3).for_each(|k| trace.slope(first + k, weights[k as usize] as f32));
+            (0..3).for_each(|k| trace.slope(first + k, weights[k as usize] as f32, None));
         }
         let width = self.light.width();
         let rows = [0, 1, 2].map(|k| self.light.reflected.row((first + k) as usize));

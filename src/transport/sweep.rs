@@ -7,7 +7,7 @@ use super::via::Arrived;
 use crate::geometry::Hit;
 use crate::geometry::sampling::tangents;
 use crate::hierarchy::NONE;
-use crate::light::{Filter, accumulate};
+use crate::light::{Passage, accumulate};
 use crate::link::{POLYGONS, pattern};
 use glam::{DVec3, Vec3};
 
@@ -95,10 +95,11 @@ impl Gatherer<'_> {
         let met = std::mem::take(&mut memory.met);
         let width = self.light.width();
         let tints = std::mem::take(&mut memory.tints);
+        let tint = |ray: usize| tints.get(ray).and_then(Option::as_deref);
         let mut add = |leaf: u32, share: f32, ray: usize| {
             let row = self.light.reflected.row(leaf as usize);
-            let tint = tints.get(ray).and_then(Option::as_deref);
-            accumulate(&mut out.irradiance[..width], share, row, tint);
+            let filter = tint(ray).map(|passage| &passage.filter);
+            accumulate(&mut out.irradiance[..width], share, row, filter);
         };
         let (mut near, mut near_rays) = (std::mem::take(&mut memory.near), Vec::new());
         near.clear();
@@ -116,14 +117,14 @@ impl Gatherer<'_> {
             }
             add(leaf, share, ray);
             if let Some(trace) = &mut out.trace {
-                trace.hit(leaf, share);
+                trace.hit(leaf, share, tint(ray));
             }
         }
         let near_share = share * self.nearby(&near, out.backs, to.seed, memory) as f32;
         for (&(leaf, _), ray) in near.iter().zip(near_rays) {
             add(leaf, near_share, ray);
             if let Some(trace) = &mut out.trace {
-                trace.slope(leaf, near_share);
+                trace.slope(leaf, near_share, tint(ray));
             }
         }
         (memory.met, memory.near, memory.tints) = (met, near, tints);
@@ -135,7 +136,7 @@ impl Gatherer<'_> {
         to: &Receiver,
         hemisphere: &Hemisphere,
         (met, mirrored): (&mut Vec<(u32, Hit)>, &mut Vec<Arrived>),
-        tints: &mut Vec<Option<Box<Filter>>>,
+        tints: &mut Vec<Option<Box<Passage>>>,
         escaped: &mut Vec<DVec3>,
     ) -> usize {
         escaped.clear();
@@ -168,7 +169,8 @@ impl Gatherer<'_> {
                     Some(leaf) => {
                         met.push((leaf, *hit));
                         if let Some(glass) = &self.glass {
-                            let tint = glass.through(from[0], from[0] + *d * hit.t);
+                            let end = from[0] + *d * hit.t;
+                            let tint = glass.through(from[0], end, self.steps());
                             tints.push(tint.map(Box::new));
                         }
                     }

@@ -4,12 +4,19 @@
 //! `H(p) = scale sum (w_k + s_k) R_k + sum w_k E_k + sum f_l I_l + share sum n_j R_j` over patches (reflected R, emitted E,
 //! slopes s over their siblings), lamps (factor f, intensity I) and the leaves j that n_j of its rays over the hemisphere met.
 //!
+//! What came through panes or by way of mirrors has each term times what these leave; see [`tinted`].
+//!
 //! Packed, ids stand sorted as differences in base 128: a patch takes about 6 bytes, a leaf that rays met about 2.
 
-use crate::light::Light;
+mod bytes;
+mod tinted;
+
+use crate::light::{Light, Passage};
 use crate::scene::PunctualLight;
-use crate::store::Broken;
 use crate::store::codec::Read;
+use bytes::{Packed, broken, number};
+pub(crate) use tinted::Stains;
+use tinted::{Entry, Kind, Tinted};
 
 /// Weights of patches, lamps and rays, as they are gathered.
 #[derive(Debug, Clone, Default)]
@@ -23,6 +30,8 @@ pub(crate) struct Trace {
     share: f32,
     /// What reflected light of patches is multiplied by at last.
     scale: f32,
+    /// What came through panes or by way of mirrors.
+    tinted: Tinted,
 }
 
 impl Trace {
@@ -34,25 +43,66 @@ impl Trace {
         }
     }
 
-    /// A patch with its visible factor.
-    pub(super) fn patch(&mut self, id: u32, seen: f32) {
-        self.patches.push((id, seen));
+    /// A patch with its visible factor. `tint`: what is left of the light on its way, here and below; none: all.
+    pub(super) fn patch(&mut self, id: u32, seen: f32, tint: Option<&Passage>) {
+        self.add(Kind::Patch, id, seen, tint);
+    }
+
+    /// The same of what the patch emits.
+    pub(super) fn emitted(&mut self, id: u32, seen: f32, tint: Option<&Passage>) {
+        self.add(Kind::Emitted, id, seen, tint);
     }
 
     /// A punctual light with what turns its intensity into irradiance.
-    pub(super) fn lamp(&mut self, lamp: usize, factor: f32) {
-        self.lamps.push((lamp as u32, factor));
+    pub(super) fn lamp(&mut self, lamp: usize, factor: f32, tint: Option<&Passage>) {
+        self.add(Kind::Lamp, lamp as u32, factor, tint);
     }
 
     /// More (or less) of what a patch reflects.
-    pub(super) fn slope(&mut self, id: u32, more: f32) {
-        self.slopes.push((id, more));
+    pub(super) fn slope(&mut self, id: u32, more: f32, tint: Option<&Passage>) {
+        self.add(Kind::Slope, id, more, tint);
     }
 
     /// A ray that carries `share` met a leaf.
-    pub(super) fn hit(&mut self, leaf: u32, share: f32) {
-        self.hits.push(leaf);
+    pub(super) fn hit(&mut self, leaf: u32, share: f32, tint: Option<&Passage>) {
         self.share = share;
+        self.add(Kind::Hit, leaf, 1.0, tint);
+    }
+
+    /// A ray that carries `share` met a leaf of a mirror, one mirror too many.
+    pub(super) fn mirror(&mut self, leaf: u32, share: f32, tint: &Passage) {
+        self.share = share;
+        self.add(Kind::Mirror, leaf, 1.0, Some(tint));
+    }
+
+    fn add(&mut self, kind: Kind, id: u32, weight: f32, tint: Option<&Passage>) {
+        match tint.map(|tint| &*tint.by).filter(|by| !by.is_empty()) {
+            None => self.add_plain(kind, id, weight),
+            Some(by) => {
+                for (passed, share) in by {
+                    let weight = weight * share;
+                    match passed.is_empty() {
+                        true => self.add_plain(kind, id, weight),
+                        false => self.tinted.add(passed, Entry { kind, id, weight }),
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_plain(&mut self, kind: Kind, id: u32, weight: f32) {
+        match kind {
+            Kind::Patch => self.patches.push((id, weight)),
+            Kind::Emitted => {
+                self.patches.push((id, weight));
+                self.slopes.push((id, -weight));
+            }
+            Kind::Lamp => self.lamps.push((id, weight)),
+            Kind::Slope => self.slopes.push((id, weight)),
+            Kind::Hit => self.hits.push(id),
+            // Who meets a mirror at last has met others before.
+            Kind::Mirror => {}
+        }
     }
 
     /// Reflected light of patches is multiplied by this.
@@ -65,6 +115,7 @@ impl Trace {
         let times = |&(id, w): &(u32, f32)| (id, weight * w);
         self.patches.extend(other.patches.iter().map(times));
         self.lamps.extend(other.lamps.iter().map(times));
+        self.tinted.absorb(&other.tinted, weight);
     }
 
     /// All weights of patches and lamps times `factor`.
@@ -72,6 +123,7 @@ impl Trace {
         for (_, w) in self.patches.iter_mut().chain(&mut self.lamps) {
             *w *= factor;
         }
+        self.tinted.times(factor);
         self
     }
 
@@ -110,76 +162,9 @@ impl Trace {
             }
             last = group[0];
         }
+        self.tinted.pack(&mut out);
         out.into_boxed_slice()
     }
-}
-
-/// A number in base 128, least digits first; the high bit says that more follow.
-fn number(mut x: u64, out: &mut Vec<u8>) {
-    while x >= 128 {
-        out.push(x as u8 | 128);
-        x >>= 7;
-    }
-    out.push(x as u8);
-}
-
-/// A packed trace being read.
-struct Packed<'a> {
-    rest: &'a [u8],
-}
-
-impl Packed<'_> {
-    #[inline]
-    fn number(&mut self) -> Read<u64> {
-        // Nearly all differences take one byte or two.
-        match *self.rest {
-            [a @ 0..128, ref rest @ ..] => {
-                self.rest = rest;
-                Ok(a.into())
-            }
-            [a, b @ 0..128, ref rest @ ..] => {
-                self.rest = rest;
-                Ok(u64::from(b) << 7 | u64::from(a & 127))
-            }
-            _ => self.long_number(),
-        }
-    }
-
-    #[cold]
-    fn long_number(&mut self) -> Read<u64> {
-        let mut x = 0;
-        for (k, &byte) in self.rest.iter().enumerate().take(9) {
-            x |= u64::from(byte & 127) << (7 * k);
-            if byte < 128 {
-                self.rest = &self.rest[k + 1..];
-                return Ok(x);
-            }
-        }
-        Err(broken())
-    }
-
-    fn float(&mut self) -> Read<f32> {
-        let (bytes, rest) = self.rest.split_first_chunk::<4>().ok_or_else(broken)?;
-        self.rest = rest;
-        Ok(f32::from_le_bytes(*bytes))
-    }
-
-    /// Calls `each` with the ids (below `end`) and weights of a list.
-    fn weights(&mut self, end: usize, mut each: impl FnMut(usize, f32)) -> Read<()> {
-        let mut id = 0;
-        for _ in 0..self.number()? {
-            id += self.number()?;
-            if id >= end as u64 {
-                return Err(broken());
-            }
-            each(id as usize, self.float()?);
-        }
-        Ok(())
-    }
-}
-
-fn broken() -> Broken {
-    Broken::new("has weights that do not read")
 }
 
 /// Two packed traces as one: of a point of a diffuse sheet and of the point behind it.
@@ -202,7 +187,7 @@ pub(crate) fn parted(both: &[u8]) -> Read<[&[u8]; 2]> {
     Ok([own, behind])
 }
 
-/// Irradiance of a packed trace under a light, `L` lanes wide. Where nothing is reflected yet `light.reflected` may be empty.
+/// Irradiance of a packed trace under a light, `L` lanes wide; `stains` tell what panes and mirrors leave of it. Where nothing is reflected yet `light.reflected` may be empty.
 ///
 /// # Errors
 /// [`Broken`]: the bytes are no trace of this room.
@@ -210,6 +195,7 @@ pub(crate) fn replay<const L: usize>(
     packed: &[u8],
     light: &Light,
     lamps: &[(PunctualLight, Vec<f32>)],
+    stains: &Stains,
 ) -> Read<[f32; L]> {
     let (reflected, emitted) = (light.reflected.all::<L>(), light.emitted.all::<L>());
     let dark = reflected.is_empty();
@@ -248,11 +234,17 @@ pub(crate) fn replay<const L: usize>(
             add(&mut met, &reflected[id as usize], count as f32);
         }
     }
+    let mut sums = tinted::Sums {
+        bounced,
+        straight,
+        met,
+    };
+    tinted::replay(&mut from, light, lamps, stains, &mut sums)?;
     if !from.rest.is_empty() {
         return Err(broken());
     }
     Ok(std::array::from_fn(|l| {
-        scale * bounced[l] + straight[l] + share * met[l]
+        scale * sums.bounced[l] + sums.straight[l] + share * sums.met[l]
     }))
 }
 
@@ -262,7 +254,7 @@ fn add<const L: usize>(sum: &mut [f32; L], row: &[f32; L], w: f32) {
     }
 }
 
-/// Weights of the lamps of a packed trace: (lamp, factor), in order.
+/// Weights of the lamps of a packed trace: (lamp, factor), in order, as if nothing were left out on the way.
 ///
 /// # Errors
 /// As [`replay`].
@@ -272,15 +264,67 @@ pub(crate) fn lamps_of(packed: &[u8], nodes: usize, lamps: usize) -> Read<Vec<(u
     from.weights(nodes, |_, _| {})?;
     let mut list = Vec::new();
     from.weights(lamps, |lamp, w| list.push((lamp as u32, w)))?;
+    from.weights(nodes, |_, _| {})?;
+    from.float()?;
+    for _ in 0..from.number()? {
+        if from.number()? & 1 == 1 {
+            from.number()?;
+        }
+    }
+    tinted::entries(&mut from, |entry| {
+        if let Kind::Lamp = entry.kind {
+            list.push((entry.id, entry.weight));
+        }
+        Ok(())
+    })?;
+    if list.iter().any(|&(lamp, _)| lamp as usize >= lamps) {
+        return Err(broken());
+    }
+    list.sort_by_key(|lamp| lamp.0);
+    list.dedup_by(|next, kept| {
+        let same = next.0 == kept.0;
+        if same {
+            kept.1 += next.1;
+        }
+        same
+    });
     Ok(list)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::Rows;
-    use crate::scene::LightKind;
+    use crate::light::passed::Passed;
+    use crate::light::{Filters, Rows};
+    use crate::scene::{LightKind, Options, Scene};
+    use crate::solve::{Bake, Settings};
     use proptest::prelude::*;
+    use std::sync::LazyLock;
+
+    /// What the panes of a room leave of light.
+    static FILTERS: LazyLock<Filters> = LazyLock::new(|| {
+        let room = Scene::load("scenes/glazed.glb", &Options::default()).unwrap();
+        let filters = Bake::new(room, Settings::default()).filters.clone();
+        assert!(!PASSED[1].is_empty() && filters.knows(&PASSED[1]) && filters.knows(&PASSED[3]));
+        filters
+    });
+
+    /// Ways past nothing, one pane at two angles, and two panes.
+    static PASSED: LazyLock<[Passed; 4]> = LazyLock::new(|| {
+        let room = Scene::load("scenes/glazed.glb", &Options::default()).unwrap();
+        let [a, b] = [0, 1].map(|k| room.panes[k].material as i32);
+        let one = |cosine: i32| [a, 0, 2048, cosine];
+        let two = vec![one(77), [b, i32::MIN, 3, 2047]];
+        [Vec::new(), vec![one(77)], vec![one(1500)], two]
+    });
+
+    fn passage(by: &[(usize, f32)]) -> Passage {
+        let by = by.iter().map(|&(k, share)| (PASSED[k].clone(), share));
+        Passage {
+            by: by.collect(),
+            ..Passage::free()
+        }
+    }
 
     const NODES: usize = 400;
 
@@ -288,6 +332,7 @@ mod tests {
         let mut light = Light {
             reflected: Rows::zero(NODES, 8),
             emitted: Rows::zero(NODES, 8),
+            mirrors: Rows::zero(NODES, 8),
             bright_emitted: vec![0.0; NODES],
             ..Light::default()
         };
@@ -295,6 +340,7 @@ mod tests {
             for l in 0..8 {
                 light.reflected.row_mut(k)[l] = (k + 3 * l) as f32;
                 light.emitted.row_mut(k)[l] = (2 * k + l) as f32;
+                light.mirrors.row_mut(k)[l] = (k + l) as f32;
             }
             light.bright_emitted[k] = (k % 3) as f32;
         }
@@ -325,11 +371,12 @@ mod tests {
             scale in 0.5_f32..2.0,
         ) {
             let (light, all) = light();
+            let stains = Stains::new(&FILTERS);
             let mut expected = [0.0_f64; 8];
             let mut trace = Trace::new();
             trace.scale(scale);
             for &(id, w) in &patches {
-                trace.patch(id, w);
+                trace.patch(id, w, None);
                 for (l, x) in expected.iter_mut().enumerate() {
                     let k = id as usize;
                     *x += f64::from(w * scale * light.reflected.row(k)[l]);
@@ -339,32 +386,32 @@ mod tests {
                 }
             }
             for &(lamp, w) in &lamps {
-                trace.lamp(lamp as usize, w);
+                trace.lamp(lamp as usize, w, None);
                 for x in &mut expected[..5] {
                     *x += f64::from(w) * f64::from(lamp + 1);
                 }
             }
             for &(id, more) in &slopes {
-                trace.slope(id, more);
+                trace.slope(id, more, None);
                 for (l, x) in expected.iter_mut().enumerate() {
                     *x += f64::from(more * scale * light.reflected.row(id as usize)[l]);
                 }
             }
             for &leaf in &hits {
-                trace.hit(leaf, 0.25);
+                trace.hit(leaf, 0.25, None);
                 for (l, x) in expected.iter_mut().enumerate() {
                     *x += 0.25 * f64::from(light.reflected.row(leaf as usize)[l]);
                 }
             }
             let packed = trace.pack();
-            let got = replay::<8>(&packed, &light, &all).unwrap();
+            let got = replay::<8>(&packed, &light, &all, &stains).unwrap();
             for (got, want) in got.iter().zip(expected) {
                 prop_assert!((f64::from(*got) - want).abs() <= 0.02 + 1e-5 * want.abs(), "{got} {want}");
             }
             // Nothing reflected: what comes from lamps alone.
             let unlit = Light { reflected: Rows::zero(NODES, 8), ..light.clone() };
             let unknown = Light { reflected: Rows::zero(0, 8), ..light.clone() };
-            prop_assert_eq!(replay::<8>(&packed, &unlit, &all), replay::<8>(&packed, &unknown, &all));
+            prop_assert_eq!(replay::<8>(&packed, &unlit, &all, &stains), replay::<8>(&packed, &unknown, &all, &stains));
             let factors = lamps_of(&packed, NODES, 3).unwrap();
             let sum: f32 = factors.iter().map(|f| f.1).sum();
             prop_assert!((sum - lamps.iter().map(|l| l.1).sum::<f32>()).abs() < 1e-5);
@@ -376,14 +423,76 @@ mod tests {
             };
             let both = patches.iter().chain(&slopes).map(|p| p.0);
             let beyond = both.chain(hits.iter().copied()).any(|k| k > 0);
-            prop_assert_eq!(replay::<8>(&packed, &fewer, &all).is_err(), beyond);
-            prop_assert!(replay::<8>(&packed[..packed.len() - 1], &light, &all).is_err());
+            prop_assert_eq!(replay::<8>(&packed, &fewer, &all, &stains).is_err(), beyond);
+            prop_assert!(replay::<8>(&packed[..packed.len() - 1], &light, &all, &stains).is_err());
+        }
+
+        /// What came past panes is what is left of it, term by term.
+        #[test]
+        fn a_trace_knows_what_was_passed(
+            terms in prop::collection::vec((0_usize..6, 0..NODES as u32, 0.1_f32..1.0, 1_usize..4, 0.0_f32..1.0), 1..40),
+            cut in any::<prop::sample::Index>(),
+            flip in any::<u8>(),
+        ) {
+            let (light, all) = light();
+            let stains = Stains::new(&FILTERS);
+            let mut trace = Trace::new();
+            trace.scale(0.5);
+            let mut expected = [0.0_f64; 8];
+            for &(kind, id, w, passed, share) in &terms {
+                let (k, lamp) = (id as usize, id as usize % 3);
+                // A ray takes one way, all else the mean of some.
+                let ways = match kind {
+                    0 | 1 => vec![(passed, 1.0)],
+                    _ => vec![(passed, share), (0, 1.0 - share)],
+                };
+                let tint = passage(&ways);
+                match kind {
+                    0 => trace.hit(id, 0.25, Some(&tint)),
+                    1 => trace.mirror(id, 0.25, &tint),
+                    2 => trace.patch(id, w, Some(&tint)),
+                    3 => trace.slope(id, w, Some(&tint)),
+                    4 => trace.emitted(id, w, Some(&tint)),
+                    _ => trace.lamp(lamp, w, Some(&tint)),
+                }
+                for (l, x) in expected.iter_mut().enumerate() {
+                    let left: f32 = ways.iter().map(|&(k, share)| share * FILTERS.of(&PASSED[k])[l]).sum();
+                    let emits = light.emitted.row(k)[l] * f32::from(u8::from(light.bright_emitted[k] > 0.0));
+                    let brings = match kind {
+                        0 => 0.25 * light.reflected.row(k)[l],
+                        1 => 0.25 * light.mirrors.row(k)[l],
+                        2 => w * (0.5 * light.reflected.row(k)[l] + emits),
+                        3 => w * 0.5 * light.reflected.row(k)[l],
+                        4 => w * emits,
+                        _ => w * all[lamp].1.get(l).copied().unwrap_or(0.0),
+                    };
+                    *x += f64::from(left * brings);
+                }
+            }
+            let packed = trace.pack();
+            let got = replay::<8>(&packed, &light, &all, &stains).unwrap();
+            for (got, want) in got.iter().zip(expected) {
+                prop_assert!((f64::from(*got) - want).abs() <= 0.02 + 1e-5 * want.abs(), "{got} {want}");
+            }
+            // Lamps count as if nothing were left out on the way.
+            let lamps: f32 = terms.iter().filter(|t| t.0 == 5).map(|t| t.2).sum();
+            let found: f32 = lamps_of(&packed, NODES, 3).unwrap().iter().map(|f| f.1).sum();
+            prop_assert!((found - lamps).abs() < 1e-4 * lamps.max(1.0));
+            // A part of it is refused, other bytes are no fault, and a room without panes knows nothing of them.
+            prop_assert!(replay::<8>(&packed[..packed.len() - 1], &light, &all, &stains).is_err());
+            let none = Filters::default();
+            prop_assert!(replay::<8>(&packed, &light, &all, &Stains::new(&none)).is_err());
+            let mut other = packed.to_vec();
+            let at = cut.index(other.len());
+            other[at] ^= flip;
+            let _ = replay::<8>(&other, &light, &all, &stains);
+            let _ = lamps_of(&other, NODES, 3);
         }
 
         #[test]
         fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..80)) {
             let (light, lamps) = light();
-            let _ = replay::<8>(&bytes, &light, &lamps);
+            let _ = replay::<8>(&bytes, &light, &lamps, &Stains::new(&FILTERS));
             let _ = lamps_of(&bytes, NODES, 3);
         }
     }

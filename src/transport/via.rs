@@ -1,6 +1,6 @@
 //! How a point looks into mirrors, and what rays meet by way of them.
 
-use crate::light::Filter;
+use crate::light::Passage;
 use glam::DVec3;
 
 /// By which mirrors a receiver looks.
@@ -18,7 +18,7 @@ pub(super) struct Arrived {
     pub(super) end: End,
     /// None where nothing has an image.
     pub(super) image: Option<u32>,
-    pub(super) filter: Box<Filter>,
+    pub(super) passage: Box<Passage>,
 }
 
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,7 @@
 //! Layers: the light of groups of lamps adds up to the whole, and is what the group alone would give.
 
 mod dimmed;
+mod kept;
 
 #[path = "../report/browser.rs"]
 mod browser;
@@ -573,10 +574,6 @@ fn what_does_not_go_together_is_refused() {
         (
             &["--layers", "--spectrum", "dense"][..],
             "--spectrum: does not hold",
-        ),
-        (
-            &["--layers", "--cache"][..],
-            "--cache: is for changing lamps",
         ),
         (&["--probes", "0"][..], "--probes"),
         (&["--probes", "-1"][..], "--probes"),

@@ -163,7 +163,7 @@ impl Browser {
     }
 
     /// Waits for what was asked for to be drawn.
-    fn drawn(&mut self) {
+    pub(crate) fn drawn(&mut self) {
         self.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))");
     }
 

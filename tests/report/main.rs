@@ -24,6 +24,11 @@ struct Reported {
 
 impl Reported {
     fn new(room: &str, error: &str) -> Self {
+        Self::with(room, error, &[])
+    }
+
+    /// With further options.
+    fn with(room: &str, error: &str, more: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         for end in ["glb", "spectra.json"] {
             let name = format!("{room}.{end}");
@@ -44,6 +49,7 @@ impl Reported {
                 "-q",
                 "--xyz",
             ])
+            .args(more)
             .current_dir(folder.path())
             .output()
             .unwrap();
@@ -263,6 +269,81 @@ fn vertices_stand_in_the_order_of_the_file() {
         (first, primitives),
         (count, light["glows"].as_array().unwrap().len())
     );
+}
+
+/// What layers bring adds up to the illuminance of the file; sliders dim them in the picture and at the measured point.
+#[test]
+fn lamps_are_dimmed_in_the_page() {
+    let reported = Reported::with("two-rooms", "3", &["--layers"]);
+    let (data, planes) = (reported.data(), reported.opened("planes"));
+    let light = &data["light"];
+    let names = light["layers"].as_array().unwrap();
+    assert!(names.len() > 1, "{names:?}");
+    let count = light["vertices"].as_u64().unwrap() as usize;
+    let shares = &planes[planes.len() - 2 * names.len() * count..];
+    let share = |k: usize, v: usize| {
+        let code = |half: usize| f64::from(shares[(2 * k + half) * count + v]);
+        (256.0 * code(0) + code(1)) / 65535.0
+    };
+    let mut lit = 0;
+    for v in 0..count {
+        let sum: f64 = (0..names.len()).map(|k| share(k, v)).sum();
+        // Where there is no light nothing has a share of it.
+        assert!(sum == 0.0 || (sum - 1.0).abs() < 1e-4, "{v}: {sum}");
+        lit += usize::from(sum > 0.0);
+    }
+    assert!(2 * lit > count, "{lit} of {count}");
+    // Without layers there is neither byte nor slider.
+    assert_eq!(
+        Reported::new("cornell", "5").data()["light"]["layers"],
+        serde_json::json!([])
+    );
+
+    let Some(mut browser) = Browser::start() else {
+        eprintln!("SKIPPED: no chromium here, the page was not opened (apt-get install chromium)");
+        return;
+    };
+    browser.open(&reported.page("two-rooms"));
+    browser.wait_for("document.documentElement?.dataset.ready === 'yes'");
+    let first = browser.pixels();
+    browser.run(&format!("{CANVAS}.focus()"));
+    browser.press("Enter", "Enter", 13);
+    let before = browser.text("point");
+    assert!(!before.contains("as the lamps are set"), "{before}");
+    let set = |browser: &mut Browser, value: &str| {
+        for k in 0..names.len() {
+            browser.run(&format!(
+                "(() => {{ const s = document.getElementById('layer-{k}'); s.value = {value}; s.dispatchEvent(new Event('input')); \
+                 return ''; }})()"
+            ));
+        }
+        browser.drawn();
+    };
+    set(&mut browser, "0");
+    let mean = |pixels: &[f64]| pixels.iter().sum::<f64>() / pixels.len() as f64;
+    let dark = browser.pixels();
+    assert!(
+        mean(&dark) < 0.7 * mean(&first),
+        "{} {}",
+        mean(&dark),
+        mean(&first)
+    );
+    let out = browser.text("point");
+    assert!(
+        out.contains("as the lamps are set") && out.contains("0 lx"),
+        "{out}"
+    );
+    set(&mut browser, "200");
+    assert!(mean(&browser.pixels()) > mean(&first));
+    browser.run("document.querySelector('#layers button').click()");
+    browser.drawn();
+    assert_eq!(
+        browser.pixels(),
+        first,
+        "the light of the file does not come back"
+    );
+    assert_eq!(browser.text("point"), before);
+    assert!(browser.faults().is_empty(), "{:#?}", browser.faults());
 }
 
 /// The committed bundle is that of the committed sources and lock file.

@@ -2,13 +2,14 @@
 //!
 //! Bytes in planes, so that they deflate well. For each step (rounds, then the file): high bytes and low bytes of the
 //! illuminance's logarithm, u', v' (CIE 1976). A step holds what has to be added, byte by byte, to the step after it. Then, if
-//! it is known, the error; then high and low bytes of each component of the spectrum.
+//! it is known, the error; then high and low bytes of each component of the spectrum, and of each layer's share.
 //!
 //! | what | coded as | resolution |
 //! |---|---|---|
 //! | illuminance | `1 + (log10 E - low) / (high - low) 65534`; 0: none | 1e-4 of itself |
 //! | u', v' | 255ths of the room's range | a 255th of it |
 //! | error | `255 sqrt(e / most)` | .4 % of the most |
+//! | illuminance of each layer | 65535ths of that of the file | a 65535th of it |
 //! | spectrum for each lux | mean and principal components, 65535ths of a component's range | stated in the page |
 
 use super::history::{Corner, History, corners};
@@ -46,6 +47,8 @@ pub(super) struct Index {
     /// What the error's mean over the room is.
     error_mean_de2000: Option<f64>,
     spectrum: Components,
+    /// Names of the layers.
+    layers: Vec<String>,
     /// Mean illuminance of the surfaces by area, and the values that 2 and 98 % of the area stay below, lx.
     mean_lx: f64,
     usual_lx: [f64; 2],
@@ -102,6 +105,7 @@ pub(super) fn pack(
         bytes.extend(error.iter().map(code));
     }
     let spectrum = spectra(bake, baked, order, &mut bytes);
+    let layers = layers(bake, baked, order, &mut bytes);
     let lux: Vec<f64> = steps
         .last()
         .map_or(&[][..], |(_, light)| light)
@@ -117,6 +121,7 @@ pub(super) fn pack(
         error_most_de2000: most,
         error_mean_de2000: error.map(|(_, mean)| mean),
         spectrum,
+        layers,
         mean_lx: mean(&lux, &area),
         usual_lx: [0.02, 0.98].map(|share| below(&lux, &area, share)),
     };
@@ -267,6 +272,23 @@ impl Coding {
         }
         out
     }
+}
+
+/// What each layer brings of the illuminance of the vertices, as a share, goes to `bytes`; names of the layers.
+fn layers(bake: &Bake, baked: &Baked, order: &[usize], bytes: &mut Vec<u8>) -> Vec<String> {
+    let rows = || order.iter().flat_map(|&k| &baked.irradiance[k]);
+    let lux = |row: &[f32; LEAVES]| bake.lanes().tristimulus(row)[1];
+    for lanes in bake.layer_lanes() {
+        let code = |row: &[f32; LEAVES]| {
+            let share = lux(&lanes.of(row)) / lux(row);
+            // In the dark none brings anything.
+            (65535.0 * share.clamp(0.0, 1.0)).round() as u16
+        };
+        let codes: Vec<u16> = rows().map(code).collect();
+        bytes.extend(codes.iter().map(|c| c.to_be_bytes()[0]));
+        bytes.extend(codes.iter().map(|c| c.to_be_bytes()[1]));
+    }
+    bake.layers().map_or(Vec::new(), |l| l.names.clone())
 }
 
 /// Principal components of the vertices' spectra; their coefficients go to `bytes`.

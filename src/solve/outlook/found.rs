@@ -3,8 +3,8 @@
 use crate::geometry::Hit;
 use crate::geometry::sampling::{hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
+use crate::light::passed::{self, Passed, Steps};
 use crate::link::Sight;
-use crate::solve::tinted::{self, Passed, passed};
 use crate::transport::hemisphere::{BEAM, Hemisphere};
 use glam::Vec3;
 
@@ -102,9 +102,11 @@ impl Found {
                 if mirrored.image.is_none() {
                     self.lamps.push(ray);
                 }
-                tinted::met(glazing.as_ref(), &mirrored.route)
+                passed::met(glazing.as_ref(), &mirrored.route, Steps::Coarse)
             }
-            (None, Some(glazing)) => passed(glazing, from, from + first.t * way),
+            (None, Some(glazing)) => {
+                passed::passed(glazing, from, from + first.t * way, Steps::Coarse)
+            }
             _ => return,
         };
         if !passed.is_empty() {

@@ -6,17 +6,28 @@
 use super::Outlook;
 use super::found::{ALONE, End};
 use crate::hierarchy::{NONE, Tree};
+use crate::light::Filters;
+use crate::light::passed::Passed;
+use crate::solve::tinted::{self, Tints};
 use crate::store::codec::{Plain, Read};
 use crate::store::{Broken, Decoder, Encoder};
 use crate::team::Team;
+use std::collections::BTreeSet;
 
 /// Nodes whose rays ranks send each other at a time: some ten MB.
 const TOGETHER: usize = 1 << 16;
+/// Flag, beside what a ray passes, of those that bring what their ends emit.
+const LAMP: u32 = 1 << 31;
 
 impl Outlook {
     /// Writes it down: where the rays end, or only the leaves that they met, which is half as much and enough as long as
-    /// no leaf is split.
-    pub(in crate::solve) fn encode(&self, whole: bool, out: &mut Encoder) -> std::io::Result<()> {
+    /// no leaf is split. In a room with panes or mirrors (then there are `filters`) also what the rays pass.
+    pub(in crate::solve) fn encode(
+        &self,
+        whole: bool,
+        filters: Option<&Filters>,
+        out: &mut Encoder,
+    ) -> std::io::Result<()> {
         out.put_all(&self.target)?;
         out.put_all(&self.bare)?;
         out.put_list(
@@ -26,10 +37,45 @@ impl Outlook {
         out.put_list(self.range.len(), self.range.iter().map(|r| r.1))?;
         if whole {
             self.encode_rays(out, |k| self.ends[k].entry)?;
-            self.encode_rays(out, |k| self.ends[k].at)
+            self.encode_rays(out, |k| self.ends[k].at)?;
         } else {
-            self.encode_rays(out, |k| self.met[k])
+            self.encode_rays(out, |k| self.met[k])?;
         }
+        match filters {
+            Some(filters) => self.encode_passed(filters, out),
+            None => Ok(()),
+        }
+    }
+
+    /// What the rays of all ranks pass, once, and the number of what each passes.
+    fn encode_passed(&self, filters: &Filters, out: &mut Encoder) -> std::io::Result<()> {
+        let own = vec![self.tints.numbers()];
+        let mut all: BTreeSet<Passed> = BTreeSet::new();
+        for of_rank in self.team.merge(0..self.team.ranks(), own) {
+            let passed = tinted::all_of(&of_rank, filters);
+            all.extend(passed.map_err(|Broken(what)| std::io::Error::other(what))?);
+        }
+        out.put_all(&tinted::listed(all.iter()))?;
+        let places = self.tints.places_in(&all);
+        self.encode_rays(out, |k| {
+            let number = self.tints.of(k).checked_sub(1);
+            let lamp = self.lamps.binary_search(&(k as u32)).is_ok();
+            number.map_or(0, |number| places[number as usize]) | if lamp { LAMP } else { 0 }
+        })
+    }
+
+    /// Reads it back.
+    fn decode_passed(&mut self, counts: &[u32], filters: &Filters, from: &mut Decoder) -> Read<()> {
+        let all = tinted::all_of(&from.get_all::<u64>()?, filters)?;
+        let mut of = self.own::<u32>(counts, from)?;
+        for (ray, number) in (0..).zip(&mut of) {
+            if *number & LAMP != 0 {
+                *number &= !LAMP;
+                self.lamps.push(ray);
+            }
+        }
+        self.tints = Tints::known(all, of)?;
+        Ok(())
     }
 
     /// A list of what `of` says of each ray.
@@ -59,6 +105,7 @@ impl Outlook {
         tree: &Tree,
         team: Team,
         whole: bool,
+        filters: Option<&Filters>,
         from: &mut Decoder,
     ) -> Read<Self> {
         let nodes = tree.nodes.len();
@@ -92,6 +139,9 @@ impl Outlook {
             if !outlook.met.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }
+        }
+        if let Some(filters) = filters {
+            outlook.decode_passed(&counts, filters, from)?;
         }
         let mut held = 0;
         outlook.range = (counts.iter().enumerate())

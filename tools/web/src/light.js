@@ -33,6 +33,25 @@ export class Light {
       const [a, b] = [plane(next + 2 * k), plane(next + 2 * k + 1)];
       return Float32Array.from(a, (x, i) => low + ((high - low) * (256 * x + b[i])) / 65535);
     });
+    next += 2 * this.coefficients.length;
+    // What each layer brings of the file's illuminance.
+    this.shares = index.layers.map((_, k) => {
+      const [a, b] = [plane(next + 2 * k), plane(next + 2 * k + 1)];
+      return Float32Array.from(a, (x, i) => (256 * x + b[i]) / 65535);
+    });
+    this.factors = null;
+  }
+
+  /** Dims the layers by a factor each; null: as in the file. */
+  dim(factors) {
+    this.factors = factors;
+    const { lux } = this.steps[this.last];
+    this.dimmed = factors && lux.map((x, i) => x * factors.reduce((sum, f, k) => sum + f * this.shares[k][i], 0));
+  }
+
+  /** Illuminance of a step at the vertices; of the file's own with its layers dimmed. */
+  lux(step) {
+    return (step === this.last && this.factors && this.dimmed) || this.steps[step].lux;
   }
 
   #step([high, low, u, v]) {

@@ -2,6 +2,7 @@
 
 import { around } from "./around.js";
 import { $, digits, linearTicks, niceAbove, whole } from "./dom.js";
+import { layers } from "./layers.js";
 import { Light, mixed } from "./light.js";
 import { live } from "./live.js";
 import { legend, luxScale, MAGMA, VIRIDIS } from "./maps.js";
@@ -57,6 +58,11 @@ window.haarlightReport = async (data, open) => {
   const round = rounds(data, light, (step) => {
     stage.show(step);
     point(spot, step);
+  });
+  layers(light.index.layers, (factors) => {
+    light.dim(factors);
+    stage.show(stage.step);
+    point(spot, stage.step);
   });
   const looked = (view) => {
     $("legends").replaceChildren(...shown[view]);
@@ -120,11 +126,13 @@ function reading(data, light) {
     if (!spot) return show(null);
     const { vertices, weights, material, point: place } = spot;
     const lux = (k) => mixed(light.steps[k].lux, vertices, weights);
+    const rows = step === light.last ? [] : [[`in round ${light.index.rounds[step]}`, `${digits(lux(step))} lx`]];
+    if (light.factors) rows.push(["as the lamps are set", `${digits(mixed(light.dimmed, vertices, weights))} lx`]);
     const xyz = [0, 1, 2].map((c) => vertices.reduce((sum, v, i) => sum + weights[i] * light.steps[light.last].xyz[3 * v + c], 0));
     const left = light.index.spectrum.left_out;
     return show({
       lux: lux(light.last), xyz, material, place,
-      rows: step === light.last ? [] : [[`in round ${light.index.rounds[step]}`, `${digits(lux(step))} lx`]],
+      rows,
       error: light.error && mixed(light.error, vertices, weights),
       values: light.spectrum(vertices, weights).map((x) => 1000 * x),
       note: `Light that falls on the surface, in the file${left > 5e-4 ? `; spectra are kept to ${digits(100 * left, 1)} %.` : "."}`,

@@ -25,7 +25,7 @@ export function pointCard(room) {
     const cct = xyz && temperature(room, xyz);
     const list = [
       h("dt", {}, "Illuminance"), h("dd", { class: "big" }, `${digits(lux)} lx`),
-      rows.map(([name, value]) => row(name, value)),
+      rows.flatMap(([name, value]) => row(name, value)),
       xyz && row("Error", error == null ? "not known" : [`ΔE00 ${digits(error, 2)} `, h("small", {}, errorIs)]),
       sum > 0 && row("x, y", `${(xyz[0] / sum).toFixed(4)}, ${(xyz[1] / sum).toFixed(4)}`),
       xyz && row("CCT", cct ? [`${Math.round(cct.kelvin)} K `, h("small", {}, `Duv ${cct.duv >= 0 ? "+" : "−"}${Math.abs(cct.duv).toFixed(4)}`)]

@@ -6,6 +6,7 @@ import {
 } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { Controls } from "./controls.js";
+import { displayed } from "./layers.js";
 import { table } from "./maps.js";
 
 const TICKS = 24;
@@ -95,6 +96,8 @@ export class Stage {
   #attach(gltf) {
     const { maps } = this;
     const first = new Map();
+    const layers = gltf.asset.extras?.haarlight?.layers;
+    this.scale = layers?.scale ?? 1;
     let next = 0;
     // Other scenes of the file were not baked.
     const shown = new Set();
@@ -121,6 +124,7 @@ export class Stage {
       const colour = geometry.attributes.color;
       this.parts.push({
         mesh, at, count, glows, name: material.name,
+        layers: (layers?.names ?? []).map(({ attribute }) => geometry.attributes[attribute.toLowerCase()]),
         file: colour && Float32Array.from({ length: 3 * count }, (_, k) => colour.getComponent(Math.floor(k / 3), k % 3)),
         looks: {
           light: material,
@@ -159,15 +163,29 @@ export class Stage {
     this.step = step;
     for (const part of this.parts) {
       const { color, lux } = part.mesh.geometry.attributes;
-      lux.array.set(this.light.steps[step].lux.subarray(part.at, part.at + part.count));
+      lux.array.set((this.light.lux?.(step) ?? this.light.steps[step].lux).subarray(part.at, part.at + part.count));
       lux.needsUpdate = true;
-      if (!color || part.glows) continue;
+      if (!color) continue;
+      if (step === this.light.last && this.#dim(part, color)) continue;
+      if (part.glows && !part.layers.length) continue;
       const ratio = step === this.light.last ? null : this.light.ratios(step, part.at, part.count);
       for (let i = 0; i < part.count; i += 1)
-        for (let c = 0; c < 3; c += 1) color.setComponent(i, c, part.file[3 * i + c] * (ratio ? ratio[3 * i + c] : 1));
+        for (let c = 0; c < 3; c += 1) color.setComponent(i, c, part.file[3 * i + c] * (ratio && !part.glows ? ratio[3 * i + c] : 1));
       color.needsUpdate = true;
     }
     this.draw();
+  }
+
+  /** Colours under dimmed layers; false where none are. */
+  #dim({ count, layers }, color) {
+    const { factors } = this.light;
+    if (!factors || !layers.every(Boolean) || layers.length !== factors.length) return false;
+    for (let i = 0; i < count; i += 1) {
+      const sum = [0, 1, 2].map((c) => this.scale * layers.reduce((all, set, k) => all + factors[k] * set.getComponent(i, c), 0));
+      displayed(sum).forEach((x, c) => color.setComponent(i, c, x));
+    }
+    color.needsUpdate = true;
+    return true;
   }
 
   setView(view) {
