@@ -13,8 +13,9 @@ const SAME_PLACE: f64 = 1e-7;
 const SAME_NORMAL: f64 = 1e-4;
 /// Darker than this share of the white, a place below a black back counts as inside of what that belongs to.
 const DIM: f64 = 0.05;
-/// Places gathered at a time, so that progress shows.
-const PART: usize = 16_384;
+/// Places gathered at a time, so that progress shows and an end is heard of: a look takes up to a millisecond in a dungeon of many lamps, and
+/// with eight times as many the gather went on for 12 to 20 s after Ctrl-C on two busy cores.
+const PART: usize = 2048;
 
 /// What a place gets.
 #[derive(Debug)]

@@ -37,9 +37,9 @@ const AT: f64 = 0.5;
 const SKETCH: f64 = 4.0;
 const SKETCH_MOST: f64 = 4.0;
 
-/// Where there is no time to look, the mesh grows for so long as the solved light tells: half a million vertices are written in twice
-/// that time.
-const UNSEEN: Duration = Duration::from_secs(1);
+/// Where there is no time to look, the mesh grows for so long as the solved light tells. To write the vertices of a large room takes
+/// two to four times as long.
+const UNSEEN: Duration = Duration::from_millis(500);
 
 /// What bounds the mesh of the output besides its error.
 pub struct Limits<'a> {
@@ -86,15 +86,19 @@ impl Bake {
             self.grow_unseen(&mut growth, progress);
         }
         let area = growth.seen_area();
-        let settled = self.settled(&growth);
-        let samples = growth.measured(self, &settled, 0, progress);
+        let mut settled = self.settled(&growth);
+        let mut samples = growth.measured(self, &settled, 0, progress);
         let before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
         let mut turns = Turns::new(allowed, area, growth.cells.all.len(), before);
         loop {
+            let cells = growth.cells.all.len();
             let end = growth.grow(turns.aim, progress);
-            let settled = self.settled(&growth);
-            let samples = growth.measured(self, &settled, turns.turn, progress);
+            // Where there was no time to grow, what was measured is still so.
+            if end != End::Late || growth.cells.all.len() != cells {
+                settled = self.settled(&growth);
+                samples = growth.measured(self, &settled, turns.turn, progress);
+            }
             let interpolation =
                 summed(&samples, allowed, (end == End::Most).then_some(growth.most));
             let ended = (end, limits.is_late());
