@@ -197,17 +197,8 @@ impl Bake {
         out.put_text(&rounds)
     }
 
-    /// Takes them up, except for what is behind `light.irradiance` (if `whole`) and `light.leaves`: what the leaves reflect,
-    /// and where the direct light of each leaf comes from, if that was kept. If lamps are gone since it is not known what leaves reflect.
-    pub(crate) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
-        let splits = from.get_list::<u32>()?;
-        self.refinement.tree.nodes.reserve(4 * splits.len());
-        self.refinement.tree.elements.reserve(4 * splits.len());
-        for id in splits {
-            split(&mut self.refinement.tree, id)?;
-        }
-        let nodes = self.refinement.tree.nodes.len();
-        self.refinement.graph = decode_graph(nodes, self.room.mesh.triangles.len(), from)?;
+    /// Takes up lanes and what they cause. Are lamps gone since, and how many lanes were written?
+    fn take_up_lanes(&mut self, whole: bool, from: &mut Decoder) -> Read<(bool, usize)> {
         let (lanes, written) = self.read_lanes(whole, from)?;
         let gone = lanes.len() < written;
         self.solution.lanes = match self.room.settings.representation {
@@ -225,6 +216,28 @@ impl Bake {
         self.solution.filters = Filters::new(&self.room.scene, &self.solution.lanes);
         let error: f64 = from.get()?;
         self.solution.spectrum_error = (!error.is_nan()).then_some(error);
+        Ok((
+            gone,
+            if gone {
+                written
+            } else {
+                self.solution.lanes.len()
+            },
+        ))
+    }
+
+    /// Takes them up, except for what is behind `light.irradiance` (if `whole`) and `light.leaves`: what the leaves reflect,
+    /// and where the direct light of each leaf comes from, if that was kept. If lamps are gone since it is not known what leaves reflect.
+    pub(crate) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
+        let splits = from.get_list::<u32>()?;
+        self.refinement.tree.nodes.reserve(4 * splits.len());
+        self.refinement.tree.elements.reserve(4 * splits.len());
+        for id in splits {
+            split(&mut self.refinement.tree, id)?;
+        }
+        let nodes = self.refinement.tree.nodes.len();
+        self.refinement.graph = decode_graph(nodes, self.room.mesh.triangles.len(), from)?;
+        let (gone, kept) = self.take_up_lanes(whole, from)?;
         let white = from.get()?;
         self.refinement.outlook = Outlook::decode(
             &self.refinement.tree,
@@ -249,11 +262,6 @@ impl Bake {
         };
         self.refinement.areas = self.refinement.outlook.areas(&self.refinement.tree);
         let leaves: Vec<u32> = self.refinement.leaves();
-        let kept = if gone {
-            written
-        } else {
-            self.solution.lanes.len()
-        };
         let (count, width) = (leaves.len(), padded(kept));
         let mut reflected = rows(from, count, width)?;
         if gone {

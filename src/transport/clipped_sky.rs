@@ -3,15 +3,15 @@
 //! The directions fall into eight triangles, far away, less the shadows of what stands before them; what is left is cut until the sky is
 //! even over each part, whose factor is exact. Panes are no shadows: what they leave is a mean over directions among these parts.
 
-use super::outside::{Look, Outside, Ways};
 use super::receiver::Receiver;
+use super::ways::Ways;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{
-    NO_PLANE, Patch, Segment, Shadow, Shaft, ShaftContents, lambert_edges_x8, quarters,
+    Clipper, NO_PLANE, Patch, Segment, Shadow, Shaft, ShaftContents, lambert_edges_x8, quarters,
 };
 use crate::light::{Passage, Tint};
 use crate::link::Sight;
-use crate::scene::sky::{PARTS, PLACES};
+use crate::scene::sky::{PARTS, PLACES, Sky};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -32,23 +32,38 @@ const NARROW: f64 = 0.9;
 /// How often a part is cut for the sky's sake: about the sun it changes within a degree.
 const DEPTH: u32 = 6;
 
-impl Outside {
-    /// By clipped polygons.
-    pub(super) fn exactly(
-        &self,
-        (sight, by): (&Sight, Option<&dyn Ways>),
-        to: &Receiver,
-        samples: usize,
-        look: &mut Look,
-    ) -> [f64; PLACES] {
-        let by = by.filter(|by| by.change_light());
-        let mut seen = [0.0; PLACES];
-        look.parts.of_each(by.is_some());
-        let far = FAR * sight.mesh.half_size;
+/// Memory of a look, and what it found.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    clipper: Clipper,
+    /// Irradiance by each part of the sky, where open level ground has 1, and by the ground.
+    pub(super) seen: [f64; PLACES],
+    /// What panes leave of them in the mean; none where nothing changes light.
+    pub(super) tints: [Option<Passage>; PLACES],
+    /// Rays cast.
+    pub(super) rays: u64,
+    parts: Vec<Part>,
+}
+
+/// A point that looks outside.
+pub(super) struct Looker<'a> {
+    pub(super) sky: &'a Sky,
+    pub(super) sight: &'a Sight<'a>,
+    /// What changes light on its way; none where nothing does.
+    pub(super) by: Option<&'a dyn Ways>,
+    pub(super) to: &'a Receiver,
+}
+
+impl Looker<'_> {
+    /// Looks; so many directions ask what panes leave.
+    pub(super) fn look(&self, samples: usize, found: &mut Found) {
+        (found.seen, found.tints, found.rays) = ([0.0; PLACES], Default::default(), 0);
+        found.parts.clear();
+        let far = FAR * self.sight.mesh.half_size;
         for octant in 0..8_u32 {
             let sign = |bit: u32| if octant >> bit & 1 == 1 { -far } else { far };
             let [x, y, z] = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
-            if [x, y, z].iter().all(|d| d.dot(to.normal) <= 0.0) {
+            if [x, y, z].iter().all(|d| d.dot(self.to.normal) <= 0.0) {
                 continue;
             }
             // Their fronts are inside.
@@ -57,30 +72,21 @@ impl Outside {
             } else {
                 [x, y, z]
             };
-            let corners = corners.map(|d| to.point + d);
             let cell = Cell {
-                corners,
+                corners: corners.map(|d| self.to.point + d),
                 up: y.y > 0.0,
                 cuts: CUTS,
             };
-            self.cell(sight, to, &cell, None, look, &mut seen);
+            self.cell(&cell, None, found);
         }
-        if let Some(by) = by {
-            look.tints = self.tinted(by, to, samples, &look.parts);
+        if let Some(by) = self.by {
+            found.tints = self.tinted(by, samples, &found.parts);
         }
-        seen
     }
 
     /// Adds what is seen of a far triangle; of its blockers nothing is known but that they are among the candidates.
-    fn cell(
-        &self,
-        sight: &Sight,
-        to: &Receiver,
-        cell: &Cell,
-        candidates: Option<&[u32]>,
-        look: &mut Look,
-        seen: &mut [f64; PLACES],
-    ) {
+    fn cell(&self, cell: &Cell, candidates: Option<&[u32]>, found: &mut Found) {
+        let (sight, to) = (self.sight, self.to);
         let point = Patch::Point {
             at: to.point,
             normal: to.normal,
@@ -96,31 +102,11 @@ impl Outside {
             ShaftContents::Few(list) => Some(list),
             ShaftContents::Many => None,
         };
-        if let Some(list) = &list {
-            let clipper = &mut look.clipper;
-            clipper.begin(to.point, &cell.corners);
-            let planes = [to.plane, NO_PLANE];
-            let blockers = sight.blockers(list, planes).into_iter().flatten();
-            let fits = blockers.into_iter().all(|blocker| {
-                let outline = sight.mesh.outline(blocker);
-                let shadow = Shadow::new(to.point, outline.as_ref());
-                clipper.cut(&shadow, PIECES)
-            });
-            if fits {
-                let whole = lambert_edges_x8(to.point, to.normal, &cell.corners);
-                if clipper.factor(to.normal, whole) > 0.0 {
-                    for piece in clipper.visible() {
-                        let sum = &mut Sum {
-                            up: cell.up,
-                            share: 1.0,
-                            seen,
-                            parts: &mut look.parts,
-                        };
-                        self.add(to.normal, piece, sum);
-                    }
-                }
-                return;
-            }
+        if list
+            .as_ref()
+            .is_some_and(|list| self.clip(cell, list, found))
+        {
+            return;
         }
         if cell.cuts > 0 {
             for corners in quarters(cell.corners) {
@@ -129,7 +115,7 @@ impl Outside {
                     cuts: cell.cuts - 1,
                     ..*cell
                 };
-                self.cell(sight, to, &part, list.as_deref().or(candidates), look, seen);
+                self.cell(&part, list.as_deref().or(candidates), found);
             }
             return;
         }
@@ -142,30 +128,46 @@ impl Outside {
                 .occluded(&Segment::new(to.point, end, [to.plane, NO_PLANE]))
         });
         let share = open.count() as f64 / f64::from(LAST_RAYS);
-        look.rays += u64::from(LAST_RAYS);
+        found.rays += u64::from(LAST_RAYS);
         if share > 0.0 {
             let corners = cell.corners.map(|c| c - to.point);
-            let sum = &mut Sum {
-                up: cell.up,
-                share,
-                seen,
-                parts: &mut look.parts,
-            };
-            self.add(to.normal, &corners, sum);
+            self.add((cell.up, share), &corners, found);
         }
     }
 
-    /// Adds a polygon of directions, any lengths.
-    fn add(&self, normal: DVec3, polygon: &[DVec3], sum: &mut Sum) {
-        if sum.parts.0.is_none() && (!sum.up || self.sky.is_even()) {
-            let factor = sum.share * lambert_edges_x8(DVec3::ZERO, normal, polygon);
-            return sum.add([factor; PARTS]);
+    /// Adds what is seen of a far triangle past these blockers; false, and nothing is added, if it falls into too many pieces.
+    fn clip(&self, cell: &Cell, blockers: &[u32], found: &mut Found) -> bool {
+        let (sight, to) = (self.sight, self.to);
+        let mut clipper = std::mem::take(&mut found.clipper);
+        clipper.begin(to.point, &cell.corners);
+        let blockers = sight.blockers(blockers, [to.plane, NO_PLANE]);
+        let fits = blockers.into_iter().flatten().all(|blocker| {
+            let outline = sight.mesh.outline(blocker);
+            clipper.cut(&Shadow::new(to.point, outline.as_ref()), PIECES)
+        });
+        if fits {
+            let whole = lambert_edges_x8(to.point, to.normal, &cell.corners);
+            if clipper.factor(to.normal, whole) > 0.0 {
+                for piece in clipper.visible() {
+                    self.add((cell.up, 1.0), piece, found);
+                }
+            }
+        }
+        found.clipper = clipper;
+        fits
+    }
+
+    /// Adds a polygon of directions, any lengths, above the horizon or below it, of which a share is free.
+    fn add(&self, (up, share): (bool, f64), polygon: &[DVec3], found: &mut Found) {
+        if self.by.is_none() && (!up || self.sky.is_even()) {
+            let factor = share * lambert_edges_x8(DVec3::ZERO, self.to.normal, polygon);
+            return found.add(up, [factor; PARTS]);
         }
         let first = polygon[0].normalize();
         for two in polygon[1..].windows(2) {
             let corners = [first, two[0].normalize(), two[1].normalize()];
-            let radiance = corners.map(|d| self.half(sum.up, d));
-            self.triangle(normal, corners, radiance, DEPTH, sum);
+            let radiance = corners.map(|d| self.half(up, d));
+            self.triangle((up, share), corners, radiance, DEPTH, found);
         }
     }
 
@@ -181,36 +183,36 @@ impl Outside {
     /// Adds the irradiance by a triangle, of which the radiance at the corners is known.
     fn triangle(
         &self,
-        normal: DVec3,
+        (up, share): (bool, f64),
         corners: [DVec3; 3],
         radiance: [[f64; PARTS]; 3],
         depth: u32,
-        sum: &mut Sum,
+        found: &mut Found,
     ) {
-        let [a, b, c] = corners;
+        let ([a, b, c], normal) = (corners, self.to.normal);
         if corners.iter().all(|d| d.dot(normal) <= 0.0) {
             return;
         }
         let middles = [a + b, b + c, c + a].map(|d| d.normalize());
-        let halfway = middles.map(|d| self.half(sum.up, d));
+        let halfway = middles.map(|d| self.half(up, d));
         let mean = |[x, y, z]: [[f64; PARTS]; 3]| -> [f64; PARTS] {
             std::array::from_fn(|k| (x[k] + y[k] + z[k]) / 3.0)
         };
         // Exact for quadratic variation, and what is exact for linear.
         let (fine, coarse) = (mean(halfway), mean(radiance));
         let apart = std::array::from_fn(|k| (fine[k] - coarse[k]).abs());
-        let is_even =
-            self.sky.brightness(sum.up, apart) <= EVEN * self.sky.brightness(sum.up, fine);
+        let bright = |radiance| self.sky.brightness(up, radiance);
+        let is_even = bright(apart) <= EVEN * bright(fine);
         let narrow = a.dot(b).min(b.dot(c)).min(c.dot(a)) > NARROW;
         if depth == 0 || (narrow && is_even) {
-            let factor = sum.share * lambert_edges_x8(DVec3::ZERO, normal, &corners);
+            let factor = share * lambert_edges_x8(DVec3::ZERO, normal, &corners);
             let brings = fine.map(|fine| PI * fine * factor);
-            sum.add(brings);
-            if let Some(parts) = &mut sum.parts.0 {
-                let brings = self.sky.brightness(sum.up, brings);
-                parts.push(Part {
+            found.add(up, brings);
+            if self.by.is_some() {
+                let brings = bright(brings);
+                found.parts.push(Part {
                     corners,
-                    up: sum.up,
+                    up,
                     brings,
                 });
             }
@@ -225,25 +227,19 @@ impl Outside {
             ([ab, bc, ca], halfway),
         ]
         .into_iter()
-        .for_each(|(part, radiance)| self.triangle(normal, part, radiance, depth - 1, sum));
+        .for_each(|(part, radiance)| self.triangle((up, share), part, radiance, depth - 1, found));
     }
 
     /// What panes leave of each part of the sky and of the ground, in the mean, by so many directions among what is free.
-    fn tinted(
-        &self,
-        by: &dyn Ways,
-        to: &Receiver,
-        samples: usize,
-        parts: &Parts,
-    ) -> [Option<Passage>; PLACES] {
+    fn tinted(&self, by: &dyn Ways, samples: usize, parts: &[Part]) -> [Option<Passage>; PLACES] {
         let (mut tints, mut all): ([Tint; PLACES], Tint) = Default::default();
-        let parts = parts.0.as_deref().unwrap_or_default();
+        let to = self.to;
         let step = parts.iter().map(|p| p.brings).sum::<f64>() / samples as f64;
         let (mut number, mut until) = (0, 0.0);
         let turn = hash(to.seed, 0x5c4);
         for part in parts.iter().filter(|p| p.brings > 0.0) {
             until += part.brings;
-            while number < samples && (f64::from(number as u32) + 0.5) * step < until {
+            while number < samples && (number as f64 + 0.5) * step < until {
                 let [u, v, w] = triangle_weights(sequence02(number as u32, turn));
                 let [a, b, c] = part.corners;
                 let at = a * u + b * v + c * w;
@@ -268,6 +264,16 @@ impl Outside {
     }
 }
 
+impl Found {
+    /// Adds irradiance by the parts of one half.
+    fn add(&mut self, up: bool, brings: [f64; PARTS]) {
+        let first = if up { 0 } else { PARTS };
+        for (seen, brings) in self.seen[first..].iter_mut().zip(brings) {
+            *seen += brings;
+        }
+    }
+}
+
 /// A far triangle.
 struct Cell {
     corners: [DVec3; 3],
@@ -285,36 +291,6 @@ struct Part {
     up: bool,
     /// How bright is what comes of it, about.
     brings: f64,
-}
-
-/// What a point sees of sky and ground, in even parts; none where nobody asks for them.
-#[derive(Debug, Default)]
-pub(super) struct Parts(Option<Vec<Part>>);
-
-impl Parts {
-    /// Another point; are parts asked for?
-    fn of_each(&mut self, asked: bool) {
-        let mut parts = self.0.take().unwrap_or_default();
-        parts.clear();
-        self.0 = asked.then_some(parts);
-    }
-}
-
-/// Irradiance being summed: of one half, of which so much is free.
-struct Sum<'a> {
-    up: bool,
-    share: f64,
-    seen: &'a mut [f64; PLACES],
-    parts: &'a mut Parts,
-}
-
-impl Sum<'_> {
-    fn add(&mut self, brings: [f64; PARTS]) {
-        let first = if self.up { 0 } else { PARTS };
-        for (seen, brings) in self.seen[first..].iter_mut().zip(brings) {
-            *seen += brings;
-        }
-    }
 }
 
 #[cfg(test)]
@@ -337,7 +313,7 @@ mod tests {
         let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
         bake.run();
         let [mut clipped, mut cast] = [[[0.0; 4]; 2]; 2];
-        bake.with_sight(|bake, sight| {
+        bake.room.with_sight(|sight| {
             let gatherer = bake.gatherer(sight);
             let (outside, tree) = (gatherer.sky.unwrap(), bake.tree());
             let mut look = Memory::default().look;
@@ -375,7 +351,10 @@ mod tests {
                 let share = area * seen[place];
                 sum[0] += share;
                 for (sum, lane) in sum[1..].iter_mut().zip([5, 30, 50]) {
-                    *sum += share * tints[place].map_or(1.0, |tint| f64::from(tint[lane]));
+                    *sum += share
+                        * tints[place]
+                            .as_ref()
+                            .map_or(1.0, |tint| f64::from(tint.filter[lane]));
                 }
             }
         }

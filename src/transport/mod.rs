@@ -10,7 +10,8 @@
 //! | `hemisphere`, `sweep` | beams of rays that find the patches they end on |
 //! | `via`, `mirrored` | the same lamps and patches by way of mirrors |
 //! | `nearby` | short paths where rays end close by |
-//! | `openings`, `outside`, `sky` | where rays leave the room, and what comes in there: sky, ground, the sun's disc |
+//! | `openings`, `outside`, `clipped_sky`, `sky` | where rays leave the room, and what comes in there: sky, ground, the sun's disc |
+//! | `ways` | what is on ways from there |
 //! | `trace` | what a point gets its light from, kept for relighting |
 
 mod clipped_sky;
@@ -32,6 +33,7 @@ mod slope;
 mod sweep;
 pub(crate) mod trace;
 mod via;
+mod ways;
 
 pub use gatherer::{Gatherer, Memory};
 pub(crate) use outside::{Look, Outside};

@@ -5,11 +5,12 @@
 //! heuristic the few rays of the hemisphere that find a small opening brought 2 % of noise to what those toward it know. A ray serves all
 //! parts of the sky.
 
-use super::clipped_sky::Parts;
+use super::clipped_sky::{Found, Looker};
 use super::openings::{Choice, Openings};
 use super::receiver::Receiver;
+use super::ways::Ways;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
-use crate::geometry::{Clipper, NO_PLANE, Segment};
+use crate::geometry::{NO_PLANE, Segment};
 use crate::light::{Passage, Tint};
 use crate::link::{Sight, View};
 use crate::scene::sky::{PARTS, PLACES, Sky};
@@ -35,8 +36,7 @@ pub(crate) struct Outside {
 /// What a look outside takes.
 #[derive(Debug, Default)]
 pub(crate) struct Look {
-    pub(super) clipper: Clipper,
-    pub(super) parts: Parts,
+    found: Found,
     choice: Choice,
     segments: Vec<Segment>,
     open: Vec<(Search, DVec3)>,
@@ -71,18 +71,6 @@ enum Search {
     Hemisphere,
     Openings,
     Spots,
-}
-
-/// What is on ways of light.
-pub(super) trait Ways {
-    /// For each segment: is it blocked?
-    fn block(&self, segments: &[Segment], out: &mut Vec<bool>);
-    /// May light change on its way?
-    fn change_light(&self) -> bool;
-    /// What is left of light on a free segment (none: all), and how bright that is, as a share.
-    fn leave(&self, segment: &Segment) -> (Option<Passage>, f64);
-    /// What is so far away lies outside the room.
-    fn reach(&self) -> f64;
 }
 
 /// How a point looks outside.
@@ -128,7 +116,16 @@ impl Outside {
         // Many points stand for a leaf that looks for itself: rays do there.
         let one_of_many = sight.panes.is_some() && way.kind() == 0;
         if Self::is_exact(&self.sky, sight) && !one_of_many {
-            self.exactly((sight, by), to, TINTED[way.kind()], look)
+            let looker = Looker {
+                sky: &self.sky,
+                sight,
+                by: by.filter(|by| by.change_light()),
+                to,
+            };
+            looker.look(TINTED[way.kind()], &mut look.found);
+            look.rays += look.found.rays;
+            look.tints = std::mem::take(&mut look.found.tints);
+            look.found.seen
         } else {
             self.by_rays((sight, by), to, way, look)
         }

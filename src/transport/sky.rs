@@ -1,8 +1,9 @@
 //! Sky, ground below the horizon and the sun's disc at a point.
 
 use super::gatherer::{Gatherer, Memory};
-use super::outside::{Way, Ways};
+use super::outside::Way;
 use super::receiver::{Gathered, Receiver};
+use super::ways::Ways;
 use crate::geometry::sampling::{around, cosine_direction, hash, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::light::{Passage, accumulate};
