@@ -255,7 +255,7 @@ fn evaluate_all(
     interrupt: &Interrupt,
     done: &mut Refined,
 ) -> Result<Vec<(Link, View)>, Interrupted> {
-    let parts: Result<Vec<(Vec<(Link, View)>, u64)>, _> = pairs
+    let parts: Result<Vec<_>, _> = pairs
         .par_chunks(CHUNK)
         .map(|chunk| {
             interrupt.check()?;
@@ -268,7 +268,7 @@ fn evaluate_all(
                 }
                 out.extend(evaluate(room, a, b, &views[v as usize], &mut scratch));
             }
-            Ok((out, scratch.rays))
+            Ok::<_, Interrupted>((out, scratch.rays))
         })
         .collect();
     done.evaluated += pairs.len() as u64;
