@@ -282,8 +282,9 @@ fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
             "{name}: measured {measured}, stated {stated} and {}",
             estimate(&fresh)
         );
+        // Estimates are to be at least .7 of what is measured.
         assert!(
-            measured < stated.hypot(estimate(&fresh)),
+            0.7 * measured < stated.hypot(estimate(&fresh)),
             "{name}: {measured} {stated}"
         );
         assert!(
