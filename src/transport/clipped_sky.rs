@@ -230,8 +230,8 @@ impl Looker<'_> {
     }
 
     /// What panes leave of each part of the sky and of the ground, in the mean: every even part of what is free is asked for by itself, in
-    /// the middles of triangles in proportion to what it brings. As many random directions miss a wall close below a roof of glass, where
-    /// all light comes in along it, by .9 %; these by less than .2 %.
+    /// the middles of triangles in proportion to what it brings. Of CIE 171 5.10, point A close below a roof of glass, along which all its
+    /// light comes in, is off by .8 % with 256 random directions, by .4 % with as many middles, and by half of that with twice as many.
     fn tinted(&self, by: &dyn Ways, samples: usize, parts: &[Part]) -> [Option<Passage>; PLACES] {
         let (mut tints, mut all): ([Tint; PLACES], Tint) = Default::default();
         let bright = |part: &Part| self.sky.brightness(part.up, part.brings);

@@ -24,7 +24,7 @@ const RAYS: [[usize; 3]; 4] = [[16, 16, 16], [64, 64, 64], [512, 1024, 1024], [0
 const FEW: usize = 16;
 
 /// Directions in which it is asked what panes leave where all else is exact, in the same order.
-const TINTED: [usize; 4] = [16, 64, 256, 256];
+const TINTED: [usize; 4] = [16, 64, 512, 512];
 
 /// What is outside a room.
 #[derive(Debug, Clone)]
