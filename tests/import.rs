@@ -5,7 +5,7 @@ mod common;
 use common::{Room, U8, U16, png, push};
 use glam::{DVec3, Vec3};
 use haarlight::scene::document::{AlphaMode, Document, RawLightKind};
-use haarlight::scene::{Projection, Surface, Wrap};
+use haarlight::scene::{Options, Projection, Scene, Surface, Wrap};
 use serde_json::json;
 
 /// Front of the first triangle, unit length.
@@ -233,6 +233,42 @@ fn materials_come_with_the_defaults_of_the_standard() {
     );
     assert_eq!(geometry.surfaces[0].material, 1);
     assert_eq!(geometry.warnings.len(), 2, "{:?}", geometry.warnings);
+}
+
+/// Of a metal that is smooth by its factors a texture's blue says where it is one; its green makes it smoother only.
+#[test]
+fn textures_say_where_smooth_metals_are_mirrors() {
+    let read = |roughness: f64, pixels: &[[u8; 4]]| {
+        let mut room = Room::triangle();
+        room.primitive()["material"] = json!(0);
+        let image = room.view(&png(pixels.len() as u32, 1, pixels));
+        room.json["images"] = json!([{"bufferView": image, "mimeType": "image/png"}]);
+        room.json["textures"] = json!([{"source": 0}]);
+        room.json["materials"] = json!([{"pbrMetallicRoughness":
+            {"roughnessFactor": roughness, "metallicRoughnessTexture": {"index": 0}}}]);
+        let (document, _) = room.load().unwrap();
+        let scene = Scene::from_document(document, &Options::default()).unwrap();
+        (
+            scene.materials[0].mirror.is_some(),
+            scene.warnings.join("\n"),
+        )
+    };
+    let (metal, other) = ([0, 255, 255, 255], [0, 255, 0, 255]);
+    let few = |strays: usize| [vec![metal; 200 - strays], vec![other; strays]].concat();
+    for (roughness, pixels, mirrors) in [
+        (0.05, vec![metal; 4], true),
+        // JPEG.
+        (0.05, vec![[0, 0, 250, 255]], true),
+        (0.05, vec![other; 4], false),
+        (0.05, few(1), true),
+        (0.05, few(20), false),
+        (0.5, vec![[0, 0, 255, 255]; 4], false),
+    ] {
+        let (is_mirror, said) = read(roughness, &pixels);
+        assert_eq!(is_mirror, mirrors, "{roughness} {:?}: {said}", pixels[0]);
+        let told = "whose metallicRoughnessTexture says no metal in places: matt";
+        assert_eq!(said.contains(told), !mirrors && roughness < 0.1, "{said}");
+    }
 }
 
 #[test]

@@ -195,3 +195,118 @@ fn the_log_measures_the_light_of_the_room() {
     let cct = box_under_d65["CCT_K"]["value"].as_f64().unwrap();
     assert!((4000.0..6504.0).contains(&cct), "{cct}");
 }
+
+/// A bake of the Cornell box: its verdict's metrics.
+fn metrics_of_bake(options: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let room = folder.path().join("cornell.glb");
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    for name in ["cornell.glb", "cornell.spectra.json"] {
+        std::fs::copy(scenes.join(name), folder.path().join(name)).unwrap();
+    }
+    let output = Command::new(env!("CARGO_BIN_EXE_haarlight"))
+        .args(["bake", "-q", "--json", "--error", "1"])
+        .arg(room)
+        .args(options)
+        .output()
+        .unwrap();
+    let verdict: Value = serde_json::from_slice(&output.stdout).unwrap();
+    verdict["metrics"].clone()
+}
+
+/// A probe of 12 x 12 points on its floor, and what else is asked for.
+fn floor_probed(options: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let points = folder.path().join("points.csv");
+    let at = |k: usize, size: f64| size * (k as f64 + 0.5) / 12.0;
+    let rows = (0..144).map(|k| format!("{},0,{},0,1,0\n", at(k % 12, 0.55), at(k / 12, 0.559)));
+    std::fs::write(
+        &points,
+        "x,y,z,nx,ny,nz\n".to_owned() + &rows.collect::<String>(),
+    )
+    .unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_haarlight"))
+        .args(["probe", "--metrics", "--json", "--error", "1", "-q"])
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb"))
+        .arg("--points")
+        .arg(&points)
+        .args(options)
+        .output()
+        .unwrap();
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn near(a: &Value, b: &Value, tolerance: f64) {
+    let [x, y] = [a, b].map(|value| value.as_f64().unwrap_or_else(|| panic!("{a} {b}")));
+    assert!((x / y - 1.0).abs() <= tolerance, "{x} {y}");
+}
+
+/// The mean over the floor, its uniformity and the glare that the cameras see are those that `probe` finds.
+#[test]
+fn the_log_measures_the_working_plane_and_glare() {
+    let metrics = metrics_of_bake(&[]);
+    let plane = &metrics["working_plane"];
+    // The box is half a metre high: its floor is the plane.
+    assert_eq!(plane["height_m"], 0.0);
+    assert!(plane["floor_m"].as_f64().unwrap().abs() < 1e-9, "{plane}");
+    // Its blocks stand on some.
+    let count = plane["points"].as_u64().unwrap();
+    assert!((80..150).contains(&count), "{plane}");
+    assert!(plane["DF_percent"].is_null(), "{plane}");
+    for name in ["mean_lux", "min_over_mean", "min_over_max"] {
+        let [low, value, high] = ["low", "value", "high"].map(|k| plane[name][k].as_f64().unwrap());
+        assert!(0.0 < low && low < value && value < high, "{name}: {plane}");
+    }
+    let view = &metrics["ugr"][0];
+    assert!(view["camera"].is_string(), "{view}");
+    let six = [&view["eye"], &view["direction"]].map(|v| {
+        let numbers = v.as_array().unwrap().iter().map(Value::to_string);
+        numbers.collect::<Vec<_>>().join(",")
+    });
+    let probed = floor_probed(&["--ugr", &six.join(",")]);
+    let uniformity = &probed["metrics"]["uniformity"];
+    near(&plane["mean_lux"]["value"], &uniformity["mean_lux"], 0.03);
+    near(
+        &plane["min_over_mean"]["value"],
+        &uniformity["min_over_mean"]["value"],
+        0.15,
+    );
+    near(
+        &view["background_cd_m2"],
+        &probed["ugr"][0]["background_cd_m2"],
+        0.02,
+    );
+    near(
+        &view["rating"]["value"],
+        &probed["ugr"][0]["rating"]["value"],
+        0.02,
+    );
+}
+
+/// Rows keep the light of the sky apart from the lamp's: their daylight factor is that of a bake under the sky alone.
+#[test]
+fn the_log_has_daylight_factors_where_there_is_a_sky() {
+    let sky = ["--sky", "uniform", "--sky-lux", "10000"];
+    let metrics = metrics_of_bake(&sky);
+    let factor = &metrics["working_plane"]["DF_percent"];
+    let probed = floor_probed(&sky);
+    let points = probed["metrics"]["points"].as_array().unwrap().iter();
+    let places = probed["places"].as_array().unwrap().iter();
+    let inside = points.zip(places).filter(|(_, place)| **place == "room");
+    let mut all: Vec<f64> = inside
+        .map(|(p, _)| p["DF_percent"]["value"].as_f64().unwrap())
+        .collect();
+    all.sort_by(f64::total_cmp);
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    near(&factor["mean"]["value"], &Value::from(mean), 0.05);
+    near(
+        &factor["median"]["value"],
+        &Value::from(all[all.len() / 2]),
+        0.1,
+    );
+    for name in ["mean", "median"] {
+        let [low, value, high] =
+            ["low", "value", "high"].map(|k| factor[name][k].as_f64().unwrap());
+        assert!(low < value && value < high, "{factor}");
+    }
+}

@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 /// As [`Scene::load`](crate::scene::Scene::load); outputs that would overwrite an input or each other; files that cannot be written.
 pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let team = common.team;
+    let told = args.json || args.log.is_some() || args.report.is_some();
     let args = &args.of_rank(team);
     let stop = Stop::new(args.solving.time).of_all(team);
     stop.listen()?;
@@ -52,6 +53,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         cache: cache.as_deref(),
         cameras: &cameras,
         grid: grid.as_ref(),
+        told,
     };
     let mut kept = Kept::new(order, load_s)?;
     let mut bake = order.begin(scene, &mut kept)?;

@@ -3,6 +3,7 @@
 use super::bake_args::BakeArgs;
 use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
 use super::maps;
+use super::metrics;
 use super::options::Common;
 use super::parting;
 use super::paths::text;
@@ -49,6 +50,8 @@ pub(super) struct Order<'a> {
     pub(super) cameras: &'a [Camera],
     /// Where probes stand.
     pub(super) grid: Option<&'a Grid>,
+    /// Is the verdict asked for, by this rank or another?
+    pub(super) told: bool,
 }
 
 /// What is kept of a bake while it goes on.
@@ -328,6 +331,11 @@ impl Order<'_> {
         let Self {
             args, stop, talk, ..
         } = self;
+        // All ranks look together.
+        let metrics = match self.told {
+            true => metrics::of_bake(bake, self.cameras),
+            false => metrics::of_room(bake),
+        };
         kept.seconds.total = stop.elapsed_s();
         let record = VerdictRecord::new(End {
             bake,
@@ -336,6 +344,7 @@ impl Order<'_> {
             glb: &written.glb,
             exposure: written.exposure,
             outputs: std::mem::take(&mut kept.outputs),
+            metrics,
             seconds: kept.seconds,
             warned: talk.warned(),
         });

@@ -70,7 +70,6 @@
 //!
 //! Last `{"record": "verdict", ...}` ([`VerdictRecord`]), which `--json` prints too.
 
-use super::metrics;
 use crate::PROGRAM;
 use crate::gather::{Baked, Interpolation};
 use crate::output::{BakedGlb, Exposure};
@@ -297,7 +296,8 @@ pub struct VerdictRecord {
     /// Tristimulus irradiance of the adaptation white, lm/m2.
     pub white: [f64; 3],
     /// Illuminance, colour temperature, rendering, fidelity and alpha-opic daylight of the mean light on all surfaces, each with the range
-    /// that the error of light at points allows; names as of `probe --metrics`.
+    /// that the error of light at points allows; names as of `probe --metrics`. In a log, a report and by `--json` also the illuminance, its
+    /// uniformity and daylight factors on the working plane, and glare as the cameras see it.
     pub metrics: serde_json::Value,
     /// Visibility rays of all rounds and of the gather.
     pub rays: u64,
@@ -321,6 +321,7 @@ pub(super) struct End<'a> {
     pub(super) glb: &'a BakedGlb,
     pub(super) exposure: Exposure,
     pub(super) outputs: Outputs,
+    pub(super) metrics: serde_json::Value,
     pub(super) seconds: Seconds,
     pub(super) warned: usize,
 }
@@ -368,7 +369,7 @@ impl VerdictRecord {
             ev100: end.exposure.ev(),
             exposure: end.exposure,
             white: end.bake.light().white,
-            metrics: metrics::of_room(end.bake),
+            metrics: end.metrics,
             rays,
             rays_per_s: rate(rays, end.seconds.solve + end.seconds.gather),
             links_per_s: rate(links, links_s),

@@ -15,19 +15,31 @@
 //! "high"}}], "uniformity": {...}}`, where what has no value has a `reason`, and Ra of a light further from its reference than
 //! the CIE vouches for has a `note`. Uniformity is that of the points in the room.
 //!
-//! The verdict of a bake's log has the same figures, `metrics`, of the mean light on all surfaces.
+//! The verdict of a bake's log has the same figures, `metrics`, of the mean light on all surfaces, and beside them
+//!
+//! | field | what |
+//! |---|---|
+//! | `working_plane` | a horizontal grid `height_m` above the floor at `floor_m` (see [`WorkingPlane`]), of its points those in the room: `points`, `spacing_m`, `mean_lux`, `min_lux`, `max_lux`, `min_over_mean`, `min_over_max`; with a sky `DF_percent`, its `mean` and `median`. Null without a floor |
+//! | `ugr` | what `probe --ugr` tells, from the place of each camera, of the file or chosen, along its view, with the `camera`'s name |
+//!
+//! Ranges are those of a point; means err less. The daylight factor is taken from the rows that hold the light of the sky by themselves, and
+//! its range is as if all of the light's error were the sky's; where rows do not keep it apart there is a `reason` instead, and
+//! `probe --metrics` finds it by a bake of its own.
 //!
 //! Light is held on 64 leaves. Against tables at 5 nm, over all 48 illuminants of the CIE, that shifts colour temperature by
 //! up to .5 %, Duv by .0003, Ra by 1.3, R9 by 5, Rf and Rg by .9 and alpha-opic daylight by .5 %, most of it in lamps of
 //! lines; the ranges do not hold this.
 
+use super::glare::{self, Viewpoint};
 use crate::color::{
     Bands, GREATEST_DISTANCE, MEASURES, Measured, Meter, NAMES, Range, Stated, Uniformity,
 };
-use crate::gather::Probed;
+use crate::gather::{Probed, WorkingPlane};
+use crate::scene::Camera;
 use crate::solve::{Bake, Round};
 use crate::spectrum::{Grid, Leaves};
-use crate::survey::Place;
+use crate::survey::{Place, places};
+use glam::DVec3;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
@@ -165,19 +177,9 @@ impl Metrics {
             });
         let points: Vec<Value> = points.collect();
         let uniformity = self.uniformity.map(|(all, count)| {
-            let ratio = |ratio: Option<f64>| {
-                let range = (ratio.zip(self.stated))
-                    .map(|(ratio, stated)| Uniformity::range(ratio, stated.relative));
-                figure(ratio.ok_or("no light"), range)
-            };
-            json!({
-                "points": count,
-                "min_lux": all.min,
-                "mean_lux": all.mean,
-                "max_lux": all.max,
-                "min_over_mean": ratio(all.min_over_mean()),
-                "min_over_max": ratio(all.min_over_max()),
-            })
+            let mut uniformity = uniform(&all, self.stated);
+            uniformity["points"] = json!(count);
+            uniformity
         });
         json!({
             "kind": "estimate",
@@ -187,6 +189,22 @@ impl Metrics {
             "uniformity": uniformity,
         })
     }
+}
+
+/// Uniformity as JSON.
+fn uniform(all: &Uniformity, stated: Option<Stated>) -> Value {
+    let ratio = |ratio: Option<f64>| {
+        let range =
+            (ratio.zip(stated)).map(|(ratio, stated)| Uniformity::range(ratio, stated.relative));
+        figure(ratio.ok_or("no light"), range)
+    };
+    json!({
+        "min_lux": all.min,
+        "mean_lux": all.mean,
+        "max_lux": all.max,
+        "min_over_mean": ratio(all.min_over_mean()),
+        "min_over_max": ratio(all.min_over_max()),
+    })
 }
 
 /// What a round says of the error at points.
@@ -204,6 +222,78 @@ pub(super) fn of_room(bake: &Bake) -> Value {
     let stated = stated(bake.rounds().last());
     let (measured, ranges) = measured(&meter, &bake.mean_spectrum(), stated);
     point(&measured, &ranges)
+}
+
+/// The same with those of the working plane, and glare as the cameras see it.
+pub(super) fn of_bake(bake: &Bake, cameras: &[Camera]) -> Value {
+    let stated = stated(bake.rounds().last());
+    let relative = stated.map(|stated| stated.relative);
+    let mut all = of_room(bake);
+    let plane = bake
+        .working_plane()
+        .and_then(|plane| on_plane(bake, &plane, stated));
+    all["working_plane"] = plane.unwrap_or(Value::Null);
+    let scale = bake.scene().changes.scale;
+    let views = cameras.iter().map(|camera| {
+        let (place, back) = (camera.to_world.w_axis, camera.to_world.z_axis);
+        let place = place.truncate();
+        let direction = -back.truncate().normalize_or(DVec3::Z);
+        let view = Viewpoint {
+            eye: place / scale,
+            direction,
+        };
+        let mut entry = glare::entry(&view, &bake.glare(place, direction), relative);
+        entry["camera"] = json!(camera.name);
+        entry
+    });
+    all["ugr"] = views.collect();
+    all
+}
+
+/// The figures of a working plane; none where no point of it is in the room.
+fn on_plane(bake: &Bake, plane: &WorkingPlane, stated: Option<Stated>) -> Option<Value> {
+    let scene = bake.scene();
+    let inside = |(k, place): (usize, Place)| (place == Place::Room).then_some(plane.points[k]);
+    let places = places(scene, &plane.points).into_iter().enumerate();
+    let points: Vec<(DVec3, DVec3)> = places.filter_map(inside).collect();
+    let (probed, by_sky) = bake.probe_with_sky(&points);
+    let lux: Vec<f64> = probed.iter().map(|light| light.xyz[1]).collect();
+    let all = Uniformity::of(&lux)?;
+    let mut out = uniform(&all, stated);
+    let mean = stated.map(|stated| Range::of(all.mean).scaled(stated.relative));
+    out["mean_lux"] = figure(Ok::<_, String>(all.mean), mean);
+    out["points"] = json!(points.len());
+    out["spacing_m"] = json!(plane.spacing);
+    out["floor_m"] = json!(plane.floor);
+    out["height_m"] = json!(plane.height);
+    if let Some(outside) = scene.sky_illuminance().filter(|&lux| lux > 0.0) {
+        let factors = by_sky.map(|lux| lux.iter().map(|lux| 100.0 * lux / outside).collect());
+        // As if all of the error were the sky's.
+        let may_err = stated.map(|stated| 100.0 * stated.relative * all.mean / outside);
+        out[DAYLIGHT] = daylight_of(factors, may_err);
+    }
+    Some(out)
+}
+
+/// Mean and median of daylight factors, per cent, that may be wrong by so much in the mean.
+fn daylight_of(factors: Option<Vec<f64>>, may_err: Option<f64>) -> Value {
+    let Some(mut factors) = factors else {
+        let reason =
+            "the light of the sky is not kept apart from other light here: see probe --metrics";
+        return json!({ "value": null, "reason": reason });
+    };
+    factors.sort_by(f64::total_cmp);
+    let count = factors.len();
+    let mean = factors.iter().sum::<f64>() / count as f64;
+    let median = 0.5 * (factors[(count - 1) / 2] + factors[count / 2]);
+    let told = |factor: f64| {
+        let range = may_err.map(|error| Range {
+            low: (factor - error).max(0.0),
+            high: factor + error,
+        });
+        figure(Ok::<_, String>(factor), range)
+    };
+    json!({ "mean": told(mean), "median": told(median) })
 }
 
 /// The figures of a light, and the ranges that the stated error allows.

@@ -12,8 +12,8 @@
 //! | `snapshots` | pictures of the rounds |
 //! | `parting` | layers of lamps and probes of a bake |
 //! | `maps` | light maps of a bake, and what may be asked of them |
-//! | `metrics` | figures of lighting practice for `probe` |
-//! | `glare` | glare at viewpoints for `probe` |
+//! | `metrics` | figures of lighting practice for `probe` and for the log |
+//! | `glare` | glare at viewpoints, the same |
 //! | `pictures` | plan and spectra of a room for `inspect` |
 //! | `points` | the CSV of points for `probe` |
 //! | `stop` | Ctrl-C and `--time` |

@@ -166,7 +166,10 @@ impl Bake {
             return Vec::new();
         }
         let mut found: BTreeMap<u32, Bright> = BTreeMap::new();
-        for leaf in tree.leaves() {
+        for leaf in tree
+            .leaves()
+            .filter(|&leaf| light.bright_emitted[leaf as usize] > 0.0)
+        {
             let luminance = self.lanes().tristimulus(light.emitted.row(leaf as usize))[1] / PI;
             let node: &Node = tree.node(leaf);
             if let Some(element) = tree.element(node).filter(|_| luminance > 0.0) {

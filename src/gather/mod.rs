@@ -8,6 +8,7 @@ mod probe;
 pub mod refined;
 mod shown;
 mod spectra;
+mod working_plane;
 
 pub use crate::transport::MOSTLY;
 pub use air::{Air, Around};
@@ -16,6 +17,7 @@ pub(crate) use bake::{KeptVertex, Look, Vertex, lend};
 pub use glare::Glare;
 pub(crate) use layers::LayerLanes;
 pub use probe::Probed;
+pub use working_plane::WorkingPlane;
 
 /// The refined mesh of one surface, with the light at its vertices. Output of the gather, input of every writer.
 #[derive(Debug, Clone, Default)]

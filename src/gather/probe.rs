@@ -1,7 +1,7 @@
 //! The light of any point: on a face, whose links then serve it, or in the air.
 
 use crate::solve::{Bake, weights_of};
-use crate::spectrum::Leaves;
+use crate::spectrum::{LEAVES, Leaves};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 
@@ -32,18 +32,50 @@ pub(super) struct Spot {
 impl Bake {
     /// Irradiance at points in world space with unit normals.
     pub fn probe(&self, points: &[(DVec3, DVec3)]) -> Vec<Probed> {
-        self.gather_at(points)
-            .into_iter()
-            .map(
-                |Gathered {
-                     irradiance, backs, ..
-                 }| Probed {
-                    backs,
-                    xyz: self.lanes().tristimulus(&irradiance),
-                    leaves: self.lanes().leaves(&irradiance),
-                },
-            )
-            .collect()
+        let gathered = self.gather_at(points);
+        gathered.iter().map(|point| self.probed(point)).collect()
+    }
+
+    fn probed(&self, point: &Gathered) -> Probed {
+        Probed {
+            backs: point.backs,
+            xyz: self.lanes().tristimulus(&point.irradiance),
+            leaves: self.lanes().leaves(&point.irradiance),
+        }
+    }
+
+    /// The same, and the illuminance by the sky without sun and lamps, lx; none where rows do not keep it apart from other light.
+    pub fn probe_with_sky(&self, points: &[(DVec3, DVec3)]) -> (Vec<Probed>, Option<Vec<f64>>) {
+        let gathered = self.gather_at(points);
+        let sky = self.lanes_of_sky().map(|own| {
+            let lux = |point: &Gathered| {
+                let mut row = point.irradiance;
+                for (x, _) in row.iter_mut().zip(own).filter(|(_, own)| !own) {
+                    *x = 0.0;
+                }
+                self.lanes().tristimulus(&row)[1]
+            };
+            gathered.iter().map(lux).collect()
+        });
+        let probed = gathered.iter().map(|point| self.probed(point)).collect();
+        (probed, sky)
+    }
+
+    /// Which lanes hold light of the sky; none where some hold other light too, and without a sky.
+    fn lanes_of_sky(&self) -> Option<[bool; LEAVES]> {
+        let scene = self.scene();
+        scene.sky.as_ref()?;
+        if !scene.shines_beside_sky() {
+            return Some([true; LEAVES]);
+        }
+        let own = scene
+            .spectra_of_sky_alone()
+            .filter(|_| self.lanes().is_ratio())?;
+        let lanes = self.lanes().lanes();
+        let light = |lane: usize| lanes.get(lane).and_then(|lane| lane.light);
+        Some(std::array::from_fn(|lane| {
+            light(lane).is_some_and(|light| own.contains(&light))
+        }))
     }
 
     /// Light at points in world space with unit normals, by lane.

@@ -61,12 +61,7 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
     ];
     reader.keys(entry, &KEYS, place);
     let mut spectra = MaterialSpectra::default();
-    let mut reflectance = |key: &str| {
-        let place = format!("{place}, {key}");
-        let object = reader.object(entry.get(key)?, &place)?;
-        reader.keys(object, &["name", "csv"], &place);
-        reader.sampled(object, Kind::Reflectance, &place)
-    };
+    let mut reflectance = |key: &str| reader.share(entry.get(key)?, &format!("{place}, {key}"));
     spectra.reflectance = reflectance("reflectance");
     spectra.back = reflectance("back_reflectance");
     if let Some(value) = entry.get("fluorescence") {

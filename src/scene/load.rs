@@ -124,7 +124,7 @@ impl Lit {
         let mut lamps = Lamps::new(grid, &upsampler);
         let tinted = tinted(raw.len(), &surfaces);
         let (mut materials, shining) = materials::materials(
-            raw, &tinted, &file, path, grid, &upsampler, &mut lamps, check,
+            raw, &tinted, images, &file, path, grid, &upsampler, &mut lamps, check,
         );
         for material in &mut materials {
             material.tint_mirror(images, &upsampler);

@@ -17,7 +17,7 @@ use super::raw::{AlphaMode, RawMaterial};
 use super::reader::Sampled;
 use super::sheets;
 use super::spectra_file::SpectraFile;
-use super::{Alpha, Emission, GREATEST_ALBEDO, Material, Sides};
+use super::{Alpha, Emission, GREATEST_ALBEDO, Image, Material, Sides};
 use crate::color::Upsampler;
 use crate::data::Grid;
 use std::path::Path;
@@ -45,6 +45,7 @@ struct Said {
 pub(crate) fn materials(
     raw: &[RawMaterial],
     tinted: &[bool],
+    images: &[Image],
     file: &SpectraFile,
     room: &Path,
     grid: &Grid,
@@ -86,7 +87,8 @@ pub(crate) fn materials(
             material.mirror = {
                 let passes = material.pane.is_some() || is_sheet;
                 let rho = &material.reflectance;
-                (said.mirrors).mirror((raw, &name), spectra.mirror, [passes, emits], rho)
+                let (wanted, not) = (spectra.mirror, [passes, emits]);
+                (said.mirrors).mirror((raw, &name), wanted, not, rho, images)
             };
             if let Some(wish) = &spectra.fluorescence {
                 let measured = spectra.reflectance.as_ref().map(|r| r.from.as_str());
@@ -356,6 +358,7 @@ mod tests {
         let (mut made, _) = materials(
             raw,
             &vec![false; raw.len()],
+            &[],
             &file,
             room,
             &grid,
@@ -452,6 +455,7 @@ mod tests {
         let (mut made, _) = materials(
             &raws,
             &[false; 5],
+            &[],
             &file,
             &room,
             &grid,

@@ -1,14 +1,19 @@
 //! Mirrors: materials that send light on in one direction.
 //!
-//! Two things make a mirror: `"mirror": true` of the side file, and a metal (metallic 1) with a roughness below `SMOOTH`.
+//! Two things make a mirror: `"mirror": true` of the side file, and a metal (metallic 1) with a roughness below `SMOOTH`. A
+//! metallicRoughnessTexture multiplies both factors (glTF 2.0, section 3.9.2): its green can make a smooth material smoother only, its blue
+//! can say that it is no metal. So a smooth metal is a mirror if the texture says metal everywhere: of all its texels no more than
+//! `STRAYS` may say otherwise. A texture that makes a rough factor smooth is not looked at.
+//!
 //! At normal incidence it reflects the material's reflectance, at an angle `F = F0 + (1 - F0) (1 - cos)^5` of it (Schlick, An
 //! inexpensive BRDF model for physically-based rendering, 1994, eq. 15), wavelength by wavelength. Roughness below the limit counts
 //! as none.
 
-use super::GREATEST_ALBEDO;
 use super::check::{Check, listed};
 use super::json::short;
 use super::raw::RawMaterial;
+use super::{GREATEST_ALBEDO, Image};
+use crate::color::encode;
 use crate::data::Leaves;
 
 /// Metals smoother than this are mirrors: GGX of alpha = roughness^2 = .01 has half its light within 1 degree of the mirrored
@@ -16,6 +21,27 @@ use crate::data::Leaves;
 const SMOOTH: f32 = 0.1;
 /// Metallic from here on is a metal: bytes round 1 to no less.
 const METAL: f32 = 0.995;
+
+/// And so a texel, which may have been through JPEG.
+const METAL_TEXEL: f64 = 0.95;
+/// Share of a texture's texels that may be no metal, as those at the edge of a picture.
+const STRAYS: f64 = 0.01;
+
+/// Do the factors of a material make it a mirror?
+pub(super) fn is_smooth_metal(raw: &RawMaterial) -> bool {
+    raw.metallic >= METAL && raw.roughness.unwrap_or(1.0) < SMOOTH
+}
+
+/// Does the material's texture, if it has one, say that it is a metal everywhere?
+fn is_metal_everywhere(raw: &RawMaterial, images: &[Image]) -> bool {
+    let image = (raw.metal_texture.as_ref()).and_then(|texture| images.get(texture.image));
+    image.is_none_or(|image| {
+        // Images are decoded as colours, and numbers are linear.
+        let is_metal = |blue: f32| encode(f64::from(blue)) >= METAL_TEXEL;
+        let strays = image.pixels.iter().filter(|p| !is_metal(p[2])).count();
+        strays as f64 <= STRAYS * image.pixels.len() as f64
+    })
+}
 
 /// How a material mirrors.
 #[derive(Debug, Clone)]
@@ -63,13 +89,15 @@ impl Said {
         wanted: Option<bool>,
         [passes, emits]: [bool; 2],
         reflectance: &Leaves,
+        images: &[Image],
     ) -> Option<Mirror> {
         let rough = raw.roughness.unwrap_or(1.0);
-        let smooth = raw.metallic >= METAL && rough < SMOOTH;
-        if wanted.is_none() && smooth && raw.metal_texture {
+        let mut mirrors = wanted.unwrap_or(is_smooth_metal(raw) && !raw.unlit);
+        if mirrors && wanted.is_none() && !is_metal_everywhere(raw, images) {
             self.textured.push(name.into());
+            mirrors = false;
         }
-        if !wanted.unwrap_or(smooth && !raw.metal_texture && !raw.unlit) {
+        if !mirrors {
             return None;
         }
         if passes {
@@ -104,8 +132,8 @@ impl Said {
             (&self.glowing, "a mirror that emits: a lamp, no mirror"),
             (
                 &self.textured,
-                "a smooth metal with a metallicRoughnessTexture: matt, as the texture is not looked at; \"mirror\": true in the \
-                 side file makes it a mirror",
+                "a smooth metal whose metallicRoughnessTexture says no metal in places: matt; \"mirror\": true in the side file makes \
+                 it a mirror",
             ),
         ];
         for (names, what) in warnings {

@@ -8,6 +8,7 @@ use crate::scene::Texture;
 use crate::scene::check::Check;
 use crate::scene::json::{self, Item, double};
 use crate::scene::luminaires::{IesNode, ies_node};
+use crate::scene::mirror;
 use crate::scene::nodes::Placed;
 use crate::scene::texture_info::Slots;
 use glam::DMat4;
@@ -62,8 +63,8 @@ pub struct RawMaterial {
     pub volume: Option<RawVolume>,
     /// Roughness, if it is said.
     pub roughness: Option<f32>,
-    /// Does a texture multiply metallic and roughness?
-    pub metal_texture: bool,
+    /// Texture that multiplies metallic and roughness, of what their factors make a mirror.
+    pub metal_texture: Option<Texture>,
     /// The material's extras.
     pub extras: Option<Value>,
     /// Names of all extensions on the material, sorted.
@@ -92,7 +93,7 @@ impl Default for RawMaterial {
             ior: None,
             volume: None,
             roughness: None,
-            metal_texture: false,
+            metal_texture: None,
             extras: None,
             extensions: Vec::new(),
         }
@@ -237,7 +238,9 @@ fn material(
         out.metallic = unit(values.metallic_factor.0, "metallicFactor", item, check);
         let rough = unit(values.roughness_factor.0, "roughnessFactor", item, check);
         out.roughness = pbr.has("roughnessFactor").then_some(rough);
-        out.metal_texture = pbr.has("metallicRoughnessTexture");
+        if mirror::is_smooth_metal(&out) {
+            out.metal_texture = slots.texture(json, &pbr, "metallicRoughnessTexture", check);
+        }
         out.base_color_texture = slots.texture(json, &pbr, "baseColorTexture", check);
     }
     const DIFFUSE: &str = "KHR_materials_pbrSpecularGlossiness";

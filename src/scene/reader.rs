@@ -5,7 +5,7 @@ use super::json::short;
 use super::said;
 use super::uri;
 use crate::color::Observer;
-use crate::data::{Grid, Kind, Leaves, Named, Outside, Table, named, nearest, nearest_of};
+use crate::data::{Grid, Kind, LEAVES, Leaves, Named, Outside, Table, named, nearest, nearest_of};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
@@ -121,6 +121,31 @@ impl Reader<'_> {
             leaves,
             is_csv,
         })
+    }
+
+    /// A share of light at each wavelength: an object that names a spectrum, or one number from 0 to 1 for all.
+    pub(super) fn share(&mut self, value: &Value, place: &str) -> Option<Sampled> {
+        let Some(plain) = value.as_f64() else {
+            let object = self.object(value, place)?;
+            self.keys(object, &["name", "csv"], place);
+            return self.sampled(object, Kind::Reflectance, place);
+        };
+        if !(0.0..=1.0).contains(&plain) {
+            self.goes_beyond(&plain.to_string(), place);
+            return None;
+        }
+        Some(Sampled {
+            from: plain.to_string(),
+            leaves: [plain; LEAVES],
+            is_csv: false,
+        })
+    }
+
+    /// Says that a share of light is none.
+    pub(super) fn goes_beyond(&mut self, from: &str, place: &str) {
+        let what = format!("'{from}' goes beyond 0 to 1");
+        let next = "write a share of light, from 0 to 1";
+        self.check.problem(place, what, next);
     }
 
     /// Says where a spectrum has no data in the ultraviolet that is asked for.

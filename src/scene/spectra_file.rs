@@ -17,7 +17,7 @@
 //! object of a material, `extras` of a light that of a light. The file wins, reflectance and emission each by itself.
 //!
 //! A CSV (`wavelength_nm,value`, linear between rows) lies in the folder of the file that names it; a text of several lines
-//! is the CSV itself. A reflectance is held beyond its rows, an emission is zero there. The emission of a *surface* given as a CSV without a luminance is
+//! is the CSV itself. One number from 0 to 1 is a reflectance, transmittance or transmission alike at all wavelengths. A reflectance is held beyond its rows, an emission is zero there. The emission of a *surface* given as a CSV without a luminance is
 //! spectral radiance in W/m2/sr/nm; with a luminance (cd/m2) only its shape counts. A named illuminant without a
 //! luminance keeps the brightness that glTF gives the material. The spectrum of a *light* is a shape always: glTF's
 //! candela or lux, times the luminance of its colour, say how bright it is. `"profile"`: see `luminaires`.
@@ -248,6 +248,35 @@ mod tests {
         );
         let spot = file.lights["Spot"].spectrum.as_ref();
         assert_eq!(spot.unwrap().from, "cie/A");
+    }
+
+    #[test]
+    fn one_number_is_a_share_at_all_wavelengths() {
+        for key in [
+            "reflectance",
+            "back_reflectance",
+            "transmission",
+            "transmittance",
+        ] {
+            let of = |number: f64| open(&json!({"materials": {"wall": {key: number}}}), &[]);
+            let (file, problems, _) = of(0.25);
+            assert_eq!(problems, Vec::<String>::new());
+            let wall = &file.materials["wall"];
+            let all = [
+                &wall.reflectance,
+                &wall.back,
+                &wall.transmission,
+                &wall.transmittance,
+            ];
+            let given: Vec<_> = all.into_iter().flatten().collect();
+            assert_eq!(given.len(), 1, "{key}");
+            assert_eq!(given[0].leaves, [0.25; 64]);
+            for number in [1.5, -0.1] {
+                let said = of(number).1.join("\n");
+                let text = format!("material 'wall', {key}: '{number}' goes beyond 0 to 1");
+                assert!(said.contains(&text), "{text}\n-- in --\n{said}");
+            }
+        }
     }
 
     #[test]

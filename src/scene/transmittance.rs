@@ -1,7 +1,6 @@
 //! What a side file says of light that passes: `"transmittance"` of a whole pane at normal incidence, and `"transmission"` of a sheet.
 
 use super::reader::{Reader, Sampled};
-use crate::data::{Kind, LEAVES};
 use serde_json::{Map, Value};
 
 /// Reads the transmittance of a material's `entry`: by name or table as a reflectance, or one number for all wavelengths. A pane lets light
@@ -27,25 +26,12 @@ pub(super) fn read(
     share(reader, value, "transmittance", place)
 }
 
-/// Reads a share of light under a key: by name or table as a reflectance, or one number for all wavelengths.
+/// Reads a share of light that passes under a key, as [`Reader::share`]; more than all cannot.
 pub(super) fn share(reader: &mut Reader, value: &Value, key: &str, place: &str) -> Option<Sampled> {
     let place = format!("{place}, {key}");
-    let sampled = match value.as_f64() {
-        Some(plain) => Sampled {
-            from: format!("{plain}"),
-            leaves: [plain; LEAVES],
-            is_csv: false,
-        },
-        None => {
-            let object = reader.object(value, &place)?;
-            reader.keys(object, &["name", "csv"], &place);
-            reader.sampled(object, Kind::Reflectance, &place)?
-        }
-    };
+    let sampled = reader.share(value, &place)?;
     if !sampled.leaves.iter().all(|t| (0.0..=1.0).contains(t)) {
-        let what = format!("'{}' goes beyond 0 to 1", sampled.from);
-        let next = "write the share of light that passes, from 0 to 1";
-        reader.check.problem(&place, what, next);
+        reader.goes_beyond(&sampled.from, &place);
         return None;
     }
     Some(sampled)
@@ -57,7 +43,7 @@ mod tests {
     use super::super::check::Check;
     use super::super::spectra_file::SpectraFile;
     use super::*;
-    use crate::data::Grid;
+    use crate::data::{Grid, LEAVES};
     use serde_json::json;
 
     /// What a side file with this entry comes to, and its problems.

@@ -2,6 +2,7 @@
 
 #[path = "../report/browser.rs"]
 mod browser;
+mod glass;
 mod page;
 mod points;
 mod program;

@@ -2,8 +2,8 @@
 
 use super::LIT_GROUND;
 use crate::color::{KM, Observer};
-use crate::data::LEAVES;
-use crate::scene::{LightKind, PunctualLight, Scene};
+use crate::data::{LEAVES, Leaves};
+use crate::scene::{LightKind, Material, PunctualLight, Scene};
 
 /// Is a light the sky, or the ground that the sky lights?
 fn is_of_sky(light: &PunctualLight) -> bool {
@@ -25,24 +25,47 @@ impl Scene {
         (!parts.is_empty()).then(|| parts.iter().sum())
     }
 
+    /// Light spectra that only the sky and the ground that it lights shine by; none where other lamps share one of them, and where
+    /// something fluoresces: what it gives out is not told apart by what excites it.
+    pub(crate) fn spectra_of_sky_alone(&self) -> Option<Vec<usize>> {
+        let of_sky = |own: bool| {
+            let lights = self.lights.iter().filter(move |l| is_of_sky(l) == own);
+            lights.map(|l| l.light)
+        };
+        let emitted = (self.materials.iter()).filter_map(|m| Some(m.emission.as_ref()?.light));
+        let others: Vec<usize> = of_sky(false).chain(emitted).collect();
+        let own: Vec<usize> = of_sky(true).collect();
+        let fluoresces = self.materials.iter().any(|m| m.fluorescence.is_some());
+        let apart = !fluoresces && !own.iter().any(|light| others.contains(light));
+        apart.then_some(own)
+    }
+
+    /// Does anything shine but the sky and the ground that it lights?
+    pub(crate) fn shines_beside_sky(&self) -> bool {
+        let bright = |shape: &Leaves| shape.iter().any(|&x| x > 0.0);
+        let emission = |m: &Material| m.emission.as_ref().is_some_and(|e| bright(&e.shape));
+        (self.lights.iter()).any(|l| !is_of_sky(l) && bright(&l.shape))
+            || self.materials.iter().any(emission)
+    }
+
     /// The room with all lamps dark but the sky and the ground that it lights; none where there are no others.
     #[must_use]
     pub fn under_sky_alone(&self) -> Option<Self> {
+        if !self.shines_beside_sky() {
+            return None;
+        }
         let mut scene = self.clone();
-        let mut others = false;
         for light in scene.lights.iter_mut().filter(|l| !is_of_sky(l)) {
-            others |= light.shape.iter().any(|&x| x > 0.0);
             light.shape = [0.0; LEAVES];
         }
-        for emission in scene
+        let emissions = scene
             .materials
             .iter_mut()
-            .filter_map(|m| m.emission.as_mut())
-        {
-            others |= emission.shape.iter().any(|&x| x > 0.0);
+            .filter_map(|m| m.emission.as_mut());
+        for emission in emissions {
             emission.shape = [0.0; LEAVES];
             emission.scale = 0.0;
         }
-        others.then_some(scene)
+        Some(scene)
     }
 }

@@ -1,0 +1,202 @@
+//! Points by which the light of a whole room is told: a horizontal grid over its floor.
+//!
+//! The floor is the lowest large level of what looks up and is lit: faces within [`LEVEL`] of each other are one level, and one is large if
+//! it has [`LARGE`] of the area that the largest has. So a table is no floor, and a cellar that no light reaches is none. The grid has the
+//! same distance both ways and lies [`HEIGHT`] above the floor, as the reference plane of daylight does (EN 17037:2018); in rooms
+//! lower than twice that on the floor itself. No border along the walls is left out.
+
+use crate::solve::Bake;
+use glam::{DVec3, dvec3};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Height of the plane above the floor, m.
+const HEIGHT: f64 = 0.85;
+/// Points, about.
+const POINTS: f64 = 150.0;
+/// Points one way at the most: thin floors that run across have few for their size.
+const MOST: f64 = 200.0;
+/// Heights of one level, m.
+const LEVEL: f64 = 0.05;
+/// What a level has of the area of the largest, to be a floor.
+const LARGE: f64 = 0.25;
+/// Cosine of the slope up to which a face looks up, 2.6 degrees.
+const UP: f64 = 0.999;
+
+/// A horizontal grid of points over the floor of a room.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct WorkingPlane {
+    /// Height of the floor in world space, m.
+    pub floor: f64,
+    /// Height of the points above it, m: .85, or 0 in low rooms.
+    pub height: f64,
+    /// Distance between neighbours, m.
+    pub spacing: f64,
+    /// Points in world space with their normals, which look up.
+    pub points: Vec<(DVec3, DVec3)>,
+}
+
+impl Bake {
+    /// The working plane of the room; none where nothing that looks up is lit.
+    pub fn working_plane(&self) -> Option<WorkingPlane> {
+        let mesh = self.mesh();
+        let areas = self.lit_and_up();
+        let height_of = |entry: usize| middle(corners(self, entry)).y;
+        let mut levels: BTreeMap<i64, f64> = BTreeMap::new();
+        for (&entry, area) in &areas {
+            *levels.entry(level(height_of(entry))).or_default() += area;
+        }
+        // Rounding may part what lies in one plane.
+        let with_next = |k: i64| {
+            let area = |k: i64| levels.get(&k).copied().unwrap_or(0.0);
+            area(k) + area(k + 1)
+        };
+        let most = levels.keys().map(|&k| with_next(k)).fold(0.0, f64::max);
+        let lowest = (levels.keys().copied()).find(|&k| with_next(k) >= LARGE * most)?;
+        let of_floor = |entry: usize| (lowest..=lowest + 1).contains(&level(height_of(entry)));
+        let faces: Vec<(usize, f64)> = (areas.into_iter())
+            .filter(|&(entry, _)| of_floor(entry))
+            .collect();
+        let area: f64 = faces.iter().map(|(_, area)| area).sum();
+        let moment: f64 = (faces.iter())
+            .map(|&(entry, area)| area * height_of(entry))
+            .sum();
+        let floor = moment / area;
+        let top = (mesh.positions.iter()).fold(f64::NEG_INFINITY, |top, p| top.max(p.y));
+        let height = if top - floor < 2.0 * HEIGHT {
+            0.0
+        } else {
+            HEIGHT
+        };
+        let triangles: Vec<[DVec3; 3]> = (faces.iter())
+            .map(|&(entry, _)| corners(self, entry))
+            .collect();
+        let (spacing, places) = grid(&triangles, area);
+        let at = |[x, z]: [f64; 2]| mesh.centre + dvec3(x, floor + height, z);
+        Some(WorkingPlane {
+            floor: mesh.centre.y + floor,
+            height,
+            spacing,
+            points: places.map(|place| (at(place), DVec3::Y)).collect(),
+        })
+    }
+
+    /// Faces that look up, by their entry in the hierarchy, with the area of them that is lit.
+    fn lit_and_up(&self) -> BTreeMap<usize, f64> {
+        let (tree, arrival) = (self.tree(), &self.light().arrival);
+        let mut areas = BTreeMap::new();
+        for leaf in tree.leaves() {
+            let node = tree.node(leaf);
+            let lit = arrival.get(leaf as usize).is_some_and(|a| a.all > 0.0);
+            let Some(element) = tree.element(node).filter(|_| lit) else {
+                continue;
+            };
+            let entry = element.face as usize;
+            if tree.face_normal[entry].y >= UP {
+                *areas.entry(entry).or_insert(0.0) += node.area;
+            }
+        }
+        areas
+    }
+}
+
+/// Corners of a face, recentred.
+fn corners(bake: &Bake, entry: usize) -> [DVec3; 3] {
+    bake.mesh().corners(bake.tree().faces[entry])
+}
+
+fn middle(corners: [DVec3; 3]) -> DVec3 {
+    corners.iter().sum::<DVec3>() / 3.0
+}
+
+/// Which level a height is of.
+fn level(height: f64) -> i64 {
+    (height / LEVEL).round() as i64
+}
+
+/// The distance of neighbours, m, and x and z of the places of a grid that lie below one of the triangles, whose whole area is given.
+fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = [f64; 2]>) {
+    let points = || triangles.iter().flatten();
+    let low = points().fold(DVec3::INFINITY, |low, p| low.min(*p));
+    let high = points().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
+    let size = high - low;
+    let spacing = (area / POINTS).sqrt().max(size.x.max(size.z) / MOST);
+    // The same margin on both sides.
+    let first = [[low.x, size.x], [low.z, size.z]].map(|[low, size]| {
+        let count = (size / spacing).round().max(1.0);
+        low + 0.5 * (size - (count - 1.0) * spacing)
+    });
+    let mut found = BTreeSet::new();
+    for [a, b, c] in triangles.iter().map(|t| t.map(|p| [p.x, p.z])) {
+        let steps = |axis: usize| {
+            let [a, b, c] = [a, b, c].map(|p| (p[axis] - first[axis]) / spacing);
+            a.min(b).min(c).ceil() as i64..=a.max(b).max(c).floor() as i64
+        };
+        for (i, j) in steps(0).flat_map(|i| steps(1).map(move |j| (i, j))) {
+            let p = [first[0] + i as f64 * spacing, first[1] + j as f64 * spacing];
+            let turn = |a: [f64; 2], b: [f64; 2]| {
+                (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+            };
+            let turns = [turn(a, b), turn(b, c), turn(c, a)];
+            if turns.iter().all(|t| *t >= 0.0) || turns.iter().all(|t| *t <= 0.0) {
+                found.insert((i, j));
+            }
+        }
+    }
+    let place = move |(i, j)| [first[0] + i as f64 * spacing, first[1] + j as f64 * spacing];
+    (spacing, found.into_iter().map(place))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Options, Scene};
+    use crate::solve::Settings;
+    use std::path::Path;
+
+    fn plane_of(name: &str) -> WorkingPlane {
+        let room = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("scenes")
+            .join(name);
+        let settings = Settings {
+            rounds: 1,
+            ..Settings::default()
+        };
+        let mut bake = Bake::new(Scene::load(room, &Options::default()).unwrap(), settings);
+        bake.run();
+        bake.working_plane().unwrap()
+    }
+
+    #[test]
+    fn a_low_box_is_told_by_its_floor_and_a_room_above_it() {
+        let cornell = plane_of("cornell.glb");
+        assert_eq!(cornell.height, 0.0);
+        let furnished = plane_of("furnished.glb");
+        assert_eq!(furnished.height, HEIGHT);
+        for plane in [&cornell, &furnished] {
+            let count = plane.points.len();
+            assert!((100..=200).contains(&count), "{count}");
+            assert!(plane.floor.abs() < 1e-9, "{}", plane.floor);
+            for (point, normal) in &plane.points {
+                assert!((point.y - plane.height).abs() < 1e-9);
+                assert_eq!(*normal, DVec3::Y);
+            }
+        }
+    }
+
+    #[test]
+    fn places_lie_over_their_triangles() {
+        // An L of area 3.
+        let quad = |x: f64, z: f64| {
+            let [a, b, c, d] = [[x, z], [x, z + 1.0], [x + 1.0, z + 1.0], [x + 1.0, z]]
+                .map(|[x, z]| dvec3(x, 0.0, z));
+            [[a, b, c], [a, c, d]]
+        };
+        let floor = [quad(0.0, 0.0), quad(1.0, 0.0), quad(0.0, 1.0)].concat();
+        let (spacing, places) = grid(&floor, 3.0);
+        let places: Vec<[f64; 2]> = places.collect();
+        assert!((spacing - (3.0_f64 / POINTS).sqrt()).abs() < 1e-12);
+        assert!(places.iter().all(|[x, z]| *x <= 1.0 || *z <= 1.0));
+        assert!(places.len().abs_diff(150) < 20, "{}", places.len());
+    }
+}
