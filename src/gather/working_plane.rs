@@ -7,7 +7,7 @@
 
 use crate::solve::Bake;
 use glam::{DVec3, dvec3};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Height of the plane above the floor, m.
 const HEIGHT: f64 = 0.85;
@@ -72,7 +72,11 @@ impl Bake {
             .map(|&(entry, _)| corners(self, entry))
             .collect();
         let (spacing, places) = grid(&triangles, area);
-        let at = |[x, z]: [f64; 2]| mesh.centre + dvec3(x, floor + height, z);
+        // On the floor itself, which may have a rug, or at one height.
+        let at = |place: DVec3| match height > 0.0 {
+            true => mesh.centre + dvec3(place.x, floor + height, place.z),
+            false => mesh.centre + place,
+        };
         Some(WorkingPlane {
             floor: mesh.centre.y + floor,
             height,
@@ -114,8 +118,9 @@ fn level(height: f64) -> i64 {
     (height / LEVEL).round() as i64
 }
 
-/// The distance of neighbours, m, and x and z of the places of a grid that lie below one of the triangles, whose whole area is given.
-fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = [f64; 2]>) {
+/// The distance of neighbours, m, and the places on triangles that a grid over them has, the highest where there are several; `area` is
+/// that of all of them.
+fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = DVec3>) {
     let points = || triangles.iter().flatten();
     let low = points().fold(DVec3::INFINITY, |low, p| low.min(*p));
     let high = points().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
@@ -126,25 +131,26 @@ fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = [f64;
         let count = (size / spacing).round().max(1.0);
         low + 0.5 * (size - (count - 1.0) * spacing)
     });
-    let mut found = BTreeSet::new();
-    for [a, b, c] in triangles.iter().map(|t| t.map(|p| [p.x, p.z])) {
-        let steps = |axis: usize| {
-            let [a, b, c] = [a, b, c].map(|p| (p[axis] - first[axis]) / spacing);
+    let mut found: BTreeMap<(i64, i64), DVec3> = BTreeMap::new();
+    for &[a, b, c] in triangles {
+        let steps = |axis: usize, of: fn(DVec3) -> f64| {
+            let [a, b, c] = [a, b, c].map(|p| (of(p) - first[axis]) / spacing);
             a.min(b).min(c).ceil() as i64..=a.max(b).max(c).floor() as i64
         };
-        for (i, j) in steps(0).flat_map(|i| steps(1).map(move |j| (i, j))) {
-            let p = [first[0] + i as f64 * spacing, first[1] + j as f64 * spacing];
-            let turn = |a: [f64; 2], b: [f64; 2]| {
-                (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
-            };
-            let turns = [turn(a, b), turn(b, c), turn(c, a)];
-            if turns.iter().all(|t| *t >= 0.0) || turns.iter().all(|t| *t <= 0.0) {
-                found.insert((i, j));
+        for (i, j) in steps(0, |p| p.x).flat_map(|i| steps(1, |p| p.z).map(move |j| (i, j))) {
+            let x = first[0] + i as f64 * spacing;
+            let z = first[1] + j as f64 * spacing;
+            let turn = |a: DVec3, b: DVec3| (b.x - a.x) * (z - a.z) - (b.z - a.z) * (x - a.x);
+            let turns = [turn(b, c), turn(c, a), turn(a, b)];
+            let all: f64 = turns.iter().sum();
+            if all != 0.0 && turns.iter().all(|turn| turn / all >= 0.0) {
+                let y = (turns[0] * a.y + turns[1] * b.y + turns[2] * c.y) / all;
+                let place = found.entry((i, j)).or_insert(dvec3(x, y, z));
+                place.y = place.y.max(y);
             }
         }
     }
-    let place = move |(i, j)| [first[0] + i as f64 * spacing, first[1] + j as f64 * spacing];
-    (spacing, found.into_iter().map(place))
+    (spacing, found.into_values())
 }
 
 #[cfg(test)]
@@ -176,9 +182,11 @@ mod tests {
         for plane in [&cornell, &furnished] {
             let count = plane.points.len();
             assert!((100..=200).contains(&count), "{count}");
-            assert!(plane.floor.abs() < 1e-9, "{}", plane.floor);
+            // With the rug.
+            assert!((0.0..0.01).contains(&plane.floor), "{}", plane.floor);
             for (point, normal) in &plane.points {
-                assert!((point.y - plane.height).abs() < 1e-9);
+                let height = if plane.height > 0.0 { plane.floor } else { 0.0 } + plane.height;
+                assert!((point.y - height).abs() < 1e-9, "{point}");
                 assert_eq!(*normal, DVec3::Y);
             }
         }
@@ -194,9 +202,9 @@ mod tests {
         };
         let floor = [quad(0.0, 0.0), quad(1.0, 0.0), quad(0.0, 1.0)].concat();
         let (spacing, places) = grid(&floor, 3.0);
-        let places: Vec<[f64; 2]> = places.collect();
+        let places: Vec<DVec3> = places.collect();
         assert!((spacing - (3.0_f64 / POINTS).sqrt()).abs() < 1e-12);
-        assert!(places.iter().all(|[x, z]| *x <= 1.0 || *z <= 1.0));
+        assert!(places.iter().all(|p| p.x <= 1.0 || p.z <= 1.0));
         assert!(places.len().abs_diff(150) < 20, "{}", places.len());
     }
 }

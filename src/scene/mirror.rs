@@ -1,6 +1,6 @@
 //! Mirrors: materials that send light on in one direction.
 //!
-//! Two things make a mirror: `"mirror": true` of the side file, and a metal (metallic 1) with a roughness below `SMOOTH`. A
+//! Two things make a mirror: `"mirror": true` of the side file, and a metal (metallic 1) with a roughness below .1. A
 //! metallicRoughnessTexture multiplies both factors (glTF 2.0, section 3.9.2): its green can make a smooth material smoother only, its blue
 //! can say that it is no metal. So a smooth metal is a mirror if the texture says metal everywhere: of all its texels no more than
 //! `STRAYS` may say otherwise. A texture that makes a rough factor smooth is not looked at.
@@ -16,21 +16,10 @@ use super::{GREATEST_ALBEDO, Image};
 use crate::color::encode;
 use crate::data::Leaves;
 
-/// Metals smoother than this are mirrors: GGX of alpha = roughness^2 = .01 has half its light within 1 degree of the mirrored
-/// direction.
-const SMOOTH: f32 = 0.1;
-/// Metallic from here on is a metal: bytes round 1 to no less.
-const METAL: f32 = 0.995;
-
-/// And so a texel, which may have been through JPEG.
+/// Metallic from here on a texel is a metal: it may have been through JPEG.
 const METAL_TEXEL: f64 = 0.95;
 /// Share of a texture's texels that may be no metal, as those at the edge of a picture.
 const STRAYS: f64 = 0.01;
-
-/// Do the factors of a material make it a mirror?
-pub(super) fn is_smooth_metal(raw: &RawMaterial) -> bool {
-    raw.metallic >= METAL && raw.roughness.unwrap_or(1.0) < SMOOTH
-}
 
 /// Does the material's texture, if it has one, say that it is a metal everywhere?
 fn is_metal_everywhere(raw: &RawMaterial, images: &[Image]) -> bool {
@@ -92,7 +81,7 @@ impl Said {
         images: &[Image],
     ) -> Option<Mirror> {
         let rough = raw.roughness.unwrap_or(1.0);
-        let mut mirrors = wanted.unwrap_or(is_smooth_metal(raw) && !raw.unlit);
+        let mut mirrors = wanted.unwrap_or(raw.is_smooth_metal() && !raw.unlit);
         if mirrors && wanted.is_none() && !is_metal_everywhere(raw, images) {
             self.textured.push(name.into());
             mirrors = false;

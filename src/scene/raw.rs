@@ -8,7 +8,6 @@ use crate::scene::Texture;
 use crate::scene::check::Check;
 use crate::scene::json::{self, Item, double};
 use crate::scene::luminaires::{IesNode, ies_node};
-use crate::scene::mirror;
 use crate::scene::nodes::Placed;
 use crate::scene::texture_info::Slots;
 use glam::DMat4;
@@ -97,6 +96,19 @@ impl Default for RawMaterial {
             extras: None,
             extensions: Vec::new(),
         }
+    }
+}
+
+/// Metals smoother than this are mirrors: GGX of alpha = roughness^2 = .01 has half its light within 1 degree of the mirrored
+/// direction.
+const SMOOTH: f32 = 0.1;
+/// Metallic from here on is a metal: bytes round 1 to no less.
+const METAL: f32 = 0.995;
+
+impl RawMaterial {
+    /// Do its factors make it a mirror?
+    pub(super) fn is_smooth_metal(&self) -> bool {
+        self.metallic >= METAL && self.roughness.unwrap_or(1.0) < SMOOTH
     }
 }
 
@@ -238,7 +250,7 @@ fn material(
         out.metallic = unit(values.metallic_factor.0, "metallicFactor", item, check);
         let rough = unit(values.roughness_factor.0, "roughnessFactor", item, check);
         out.roughness = pbr.has("roughnessFactor").then_some(rough);
-        if mirror::is_smooth_metal(&out) {
+        if out.is_smooth_metal() {
             out.metal_texture = slots.texture(json, &pbr, "metallicRoughnessTexture", check);
         }
         out.base_color_texture = slots.texture(json, &pbr, "baseColorTexture", check);

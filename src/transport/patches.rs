@@ -394,11 +394,24 @@ impl Gatherer<'_> {
             });
             return None;
         }
+        let share = self.visible_by_rays(to, (id, known), (element, planes), carries, memory);
+        Some((share, false))
+    }
+
+    /// Visible share of an element by rays; `known`: what its link found.
+    fn visible_by_rays(
+        &self,
+        to: &Receiver,
+        (id, known): (u32, f32),
+        (element, planes): (&Element, [u32; 2]),
+        carries: f64,
+        memory: &mut Memory,
+    ) -> f64 {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
         let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
         let count = wanted.clamp(RAYS[0], RAYS[1]);
         let shift = pattern(to.seed, id, 2);
-        let normal = node.normal;
+        let normal = self.tree.node(id).normal;
         memory.segments.clear();
         memory.weights.clear();
         for k in 0..count {
@@ -418,7 +431,7 @@ impl Gatherer<'_> {
         let seen = open_weight(&memory.weights, &memory.blocked);
         // Where no ray gets through, nothing does: what other parts of the element see must not leak in.
         if seen <= 0.0 {
-            return Some((0.0, false));
+            return 0.0;
         }
         // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
         // blurs is bounded by the size of the receiving element.
@@ -427,9 +440,7 @@ impl Gatherer<'_> {
         } else {
             PRIOR
         };
-        let all = count as f64 + prior;
-        let share = (seen / total * count as f64 + prior * f64::from(known)) / all;
-        Some((share, false))
+        (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
     }
 
     /// Factor of what is seen past the listed triangles, exactly; `whole` is that of the whole patch. None where that takes too
