@@ -237,7 +237,8 @@ impl<'a> Ends<'a> {
         }
         let near = self.gap < NEAR;
         if self.are_polygons() && (near || open <= 0.0) {
-            open = contours(tree, self.s, self.t);
+            let found = std::mem::replace(&mut open, contours(tree, self.s, self.t));
+            most = most.max(unseen(count, open - found, self.s.area));
         }
         if open <= 0.0 {
             return None;
@@ -294,6 +295,22 @@ impl<'a> Ends<'a> {
     }
 }
 
+/// What two patches may exchange that none of the points met which stand for a cluster: all that a part of the size of one point's share
+/// can. With less than that said of two sets of sheets that interleave, a link that found next to nothing between them was
+/// good enough, and the gap between a lamp and its ceiling had no light but the lamp's own.
+pub(super) fn unmet(a: &Node, b: &Node) -> f64 {
+    if simple(a) && simple(b) {
+        return 0.0;
+    }
+    // Neither sends more to the other than falls into the cone around it.
+    let distance = a.centre.distance(b.centre);
+    let most = |from: &Node, to: &Node| {
+        let sine = to.radius / (distance - from.radius).max(to.radius);
+        from.area * (sine * sine)
+    };
+    most(a, b).min(most(b, a)) / (2 * CLUSTER_POINTS) as f64
+}
+
 /// Works out the link between two patches and the way between; none if they exchange nothing. `parents` is what is known
 /// of a pair that holds this one.
 pub fn evaluate(
@@ -308,7 +325,7 @@ pub fn evaluate(
         if ends.are_polygons() {
             return None;
         }
-        // No two points of these clusters face each other; others may, and a lamp among them must not get lost.
+        // No two points of these clusters face each other; others may.
         let link = Link {
             a,
             b,
@@ -345,8 +362,9 @@ fn variation_over(
     shift: [f64; 2],
     scratch: &mut Scratch,
 ) -> f64 {
+    const COUNT: usize = 3;
     let samples = &mut scratch.b;
-    tree.samples(on, 3, shift, samples);
+    tree.samples(on, COUNT, shift, samples);
     let nearest = polygons(tree, tree.node(on))
         .map(|(corners, entry)| (nearest_point(&corners, to.centre), entry))
         .min_by(|(p, _), (q, _)| {
@@ -365,7 +383,15 @@ fn variation_over(
         least = least.min(f);
         most = most.max(f);
     }
+    let found = scratch.factors[..COUNT].iter().sum::<f64>() / COUNT as f64;
+    most = most.max(unseen(COUNT, mean - found, 1.0));
     (0.5 * (most - least) / mean).min(MOST_VARIATION)
+}
+
+/// How bright a part must be that none of `count` points of a patch met, if it holds what they found too little: they would have met more
+/// than their share of the area. Without it the gap between a lamp and a ceiling had no light but the lamp's own.
+fn unseen(count: usize, missing: f64, area: f64) -> f64 {
+    count as f64 * missing / area
 }
 
 /// Unoccluded exchange of two small sets of faces.

@@ -5,6 +5,7 @@
 //! factor alone). Links between the parts of a cluster are always opened. Every pass evaluates all new pairs in
 //! parallel and splits elements in order, so the result does not depend on the number of threads.
 
+use super::kernel::unmet;
 use super::visibility::View;
 use super::{Link, Room, Scratch, Sight, Way, evaluate, facing};
 use crate::hierarchy::{NONE, Node, Tree};
@@ -43,8 +44,11 @@ impl Demand<'_> {
         } else {
             (visibility * (1.0 - visibility)).sqrt().max(0.1)
         };
-        let misplaced =
-            f64::from(link.open_exchange) * (f64::from(link.variation) * visibility + doubt);
+        let met = f64::from(link.open_exchange) * (f64::from(link.variation) * visibility + doubt);
+        let misplaced = match self.hidden {
+            true => met.max(unmet(tree.node(link.a), tree.node(link.b))),
+            false => met,
+        };
         let at = |receiver: u32, source: u32| {
             let area = tree.node(receiver).area;
             // Patches made in this round are dark to it: it goes one level deeper. With the brightness of what is above them
