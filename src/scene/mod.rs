@@ -39,6 +39,7 @@ pub mod profile;
 mod raw;
 mod reader;
 mod room;
+mod running;
 mod said;
 pub mod sheet;
 mod sheets;
