@@ -7,6 +7,7 @@
 //! Where leaves look for themselves the points are random, weighted by how open they are (a leaf is what others see of
 //! it, see `outlook`): without bias whatever lies across the leaf, from two points upwards. What matters gets more of them.
 
+use super::landing::Landed;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::hierarchy::{NONE, Tree, stratified};
 use crate::light::weighed;
@@ -272,11 +273,17 @@ impl Direct {
                 found
             };
             let parts = team.map_unless(interrupt, &chunks, Memory::default, gather)?;
+            let landed = look.landed(tree);
             for (part, leaves) in parts.iter().zip(fresh.chunks(CHUNK)) {
                 self.rays += part.rays;
                 for (k, &(leaf, _)) in leaves.iter().enumerate() {
                     let row = &part.rows[k * self.width..(k + 1) * self.width];
-                    self.put(leaf, row, [part.spread[k], part.whole[k]]);
+                    let found = weighed(row, look.weights()) * f64::from(part.whole[k]);
+                    let spread = match landed.missing(leaf, tree.node(leaf).area, found) as f32 {
+                        0.0 => part.spread[k],
+                        missing => part.spread[k].abs().max(missing),
+                    };
+                    self.put(leaf, row, [spread, part.whole[k]]);
                     self.keep_trace(leaf, part.traces[k].as_deref());
                 }
             }
@@ -350,6 +357,8 @@ pub(crate) trait Look: Sync {
     ) -> Option<[f32; 64]>;
     /// Greatest brightness of direct light on a leaf were nothing in the way, share of white, about.
     fn unshadowed(&self, tree: &Tree, leaf: u32, tolerance: f64) -> f64;
+    /// What rays from lamps find to land on the leaves.
+    fn landed(&self, tree: &Tree) -> Landed;
     /// Do leaves count as what others see of them?
     fn by_chance(&self) -> bool;
     /// How open a point is, found from a few rays: the share of them that meet fronts.

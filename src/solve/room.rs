@@ -2,6 +2,7 @@
 
 use super::estimate::Probes;
 use super::flux::{self, Closed, Sent};
+use super::landing::Landing;
 use super::parting::Parting;
 use super::representation::Representation;
 use super::sources::Painter;
@@ -76,6 +77,8 @@ pub(crate) struct Room {
     pub(crate) outside: Option<Outside>,
     /// Where the light of lamps goes first.
     pub(crate) sent: Sent,
+    /// And where on which faces; nothing in a room that is only relit.
+    pub(super) landings: Vec<Landing>,
     pub(crate) weights: [Leaves; 3],
     /// Colours of textures as spectra: its table is made once.
     pub(crate) upsampler: Upsampler,
@@ -147,6 +150,7 @@ impl Room {
             sealed: Closed::No,
             outside: None,
             sent: Sent::default(),
+            landings: Vec::new(),
             panes: Panes::new(&scene, mesh.centre),
             mirrors,
             weights: Observer::cie1931().weights(&scene.grid),

@@ -24,6 +24,9 @@ impl Look for Fake {
     fn unshadowed(&self, _: &Tree, _: u32, _: f64) -> f64 {
         3.0
     }
+    fn landed(&self, _: &Tree) -> Landed {
+        Landed::default()
+    }
     fn by_chance(&self) -> bool {
         true
     }
