@@ -3,6 +3,7 @@
 //! Positions are recentred on the middle of the scene, f64, in the file's units. Welding joins vertices at equal
 //! positions, so that neighbours know each other across surfaces.
 
+use super::raised::{Moves, Raised};
 use crate::geometry::{RayIndex, plane_ids};
 use crate::scene::{Alpha, Scene, Sides};
 use glam::{DVec3, Vec3};
@@ -53,11 +54,26 @@ pub struct Mesh {
     pub(super) part: Vec<u32>,
     /// Corners of parts, as weights of the corners of the origin.
     pub(super) within: Vec<[[f64; 3]; 3]>,
+    /// Surfaces that lie in others; not kept where triangles are cut.
+    pub raised: Vec<Raised>,
 }
 
 impl Mesh {
-    /// Welds the surfaces of `scene`.
+    /// Welds the surfaces of `scene`; those that lie in others are raised.
     pub fn new(scene: &Scene) -> Self {
+        let mesh = Self::welded(scene, &Moves::new());
+        let input: Vec<&[[u32; 3]]> = scene.surfaces.iter().map(|s| &*s.triangles).collect();
+        let (raised, moves) = mesh.lying(&input);
+        if raised.is_empty() {
+            return mesh;
+        }
+        Self {
+            raised,
+            ..Self::welded(scene, &moves)
+        }
+    }
+
+    fn welded(scene: &Scene, moves: &Moves) -> Self {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in scene.surfaces.iter().flat_map(|s| &s.positions) {
             low = low.min(*p);
@@ -83,8 +99,10 @@ impl Mesh {
             let ids: Vec<u32> = surface
                 .positions
                 .iter()
-                .map(|p| {
-                    let q = *p - centre;
+                .zip(0_u32..)
+                .map(|(p, vertex)| {
+                    let moved = moves.get(&(s as u32, vertex));
+                    let q = *p - centre + moved.copied().unwrap_or_default();
                     // Adding zero turns -0 into +0, so that both weld.
                     let key = (q + DVec3::ZERO).to_array().map(f64::to_bits);
                     *welded.entry(key).or_insert_with(|| {
@@ -147,6 +165,7 @@ impl Mesh {
             first_triangle: vec![0],
             part: Vec::new(),
             within: Vec::new(),
+            raised: Vec::new(),
         }
     }
 
