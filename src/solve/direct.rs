@@ -231,6 +231,22 @@ impl Direct {
         }
     }
 
+    /// Does light vary too much over a leaf, by its points or by what landed there?
+    fn is_uneven(
+        &self,
+        (tree, leaf): (&Tree, u32),
+        demand: &Demand,
+        look: &impl Look,
+        landed: &Landed,
+    ) -> bool {
+        let stake = Stake::new(tree, leaf, demand);
+        let found = weighed(self.row(leaf), look.weights()) * f64::from(self.whole(leaf));
+        let missing = landed.missing(leaf, tree.node(leaf).area, found);
+        let spread = f64::from(self.spread[leaf as usize]).max(missing);
+        let too_much = !look.by_chance() && spread * stake.share > UNEVEN;
+        (too_much || spread * stake.split > 1.0) && stake.may_split
+    }
+
     /// Gathers at all new leaves, each rank of the team at its own, and splits them until direct light varies less than the demand allows.
     /// By a rule, no patch may misplace more than `coarsest` (share of white) of a leaf's light, however small the leaf: all
     /// small leaves would err alike.
@@ -253,8 +269,14 @@ impl Direct {
             self.place.resize(tree.nodes.len(), NONE);
             self.spread.resize(tree.nodes.len(), 0.0);
             self.whole.resize(tree.nodes.len(), 1.0);
+            let landed = look.landed(tree);
+            let stake = |leaf: u32| {
+                let stake = Stake::new(tree, leaf, demand);
+                let tiny = stake.tiny && !landed.matters(leaf);
+                Stake { tiny, ..stake }
+            };
             let fresh: Vec<(u32, Stake)> = (open.iter())
-                .map(|&leaf| (leaf, Stake::new(tree, leaf, demand)))
+                .map(|&leaf| (leaf, stake(leaf)))
                 .filter(|(leaf, stake)| {
                     let k = *leaf as usize;
                     self.place[k] == NONE || f64::from(-self.spread[k]) * stake.split > 1.0
@@ -276,27 +298,16 @@ impl Direct {
                 found
             };
             let parts = team.map_unless(interrupt, &chunks, Memory::default, gather)?;
-            let landed = look.landed(tree);
             for (part, leaves) in parts.iter().zip(fresh.chunks(CHUNK)) {
                 self.rays += part.rays;
                 for (k, &(leaf, _)) in leaves.iter().enumerate() {
                     let row = &part.rows[k * self.width..(k + 1) * self.width];
-                    let found = weighed(row, look.weights()) * f64::from(part.whole[k]);
-                    let spread = match landed.missing(leaf, tree.node(leaf).area, found) as f32 {
-                        0.0 => part.spread[k],
-                        missing => part.spread[k].abs().max(missing),
-                    };
-                    self.put(leaf, row, [spread, part.whole[k]]);
+                    self.put(leaf, row, [part.spread[k], part.whole[k]]);
                     self.keep_trace(leaf, part.traces[k].as_deref());
                 }
             }
             let split: Vec<u32> = (open.into_iter())
-                .filter(|&leaf| {
-                    let stake = Stake::new(tree, leaf, demand);
-                    let spread = f64::from(self.spread[leaf as usize]);
-                    let uneven = !look.by_chance() && spread * stake.share > UNEVEN;
-                    (uneven || spread * stake.split > 1.0) && stake.may_split
-                })
+                .filter(|&leaf| self.is_uneven((tree, leaf), demand, look, &landed))
                 .collect();
             open = Vec::new();
             for leaf in split {

@@ -24,6 +24,9 @@ const PARTS: usize = 16;
 /// So far must what landed stand out of its noise, standard deviations: ten rays where points found nothing.
 const SIGMAS: f64 = 3.0;
 
+/// From so many rays on a leaf is looked at, however small: four are .02 % of the light of all lamps.
+const MANY: f64 = 4.0;
+
 /// Where a ray from a lamp met a front.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Landing {
@@ -54,6 +57,12 @@ impl Landed {
             *square += bright * bright;
         }
         Self { sums }
+    }
+
+    /// Does so much land on a leaf that it is no chance?
+    pub(super) fn matters(&self, leaf: u32) -> bool {
+        let sums = self.sums.get(&leaf);
+        sums.is_some_and(|[sum, square]| sum * sum > MANY * square)
     }
 
     /// How much brighter a leaf is in the mean than what its points found; 0 where that may be chance.
@@ -148,7 +157,29 @@ impl Follower<'_> {
     }
 }
 
+/// How far the white must fall short of what landed to be that of a room whose light was not found.
+const DIM: f64 = 0.5;
+
 impl Room {
+    /// The white of a room in which most light of lamps was not found yet: that of what landed, which is at least something.
+    pub(super) fn landed_white(&self, white: [f64; 3]) -> [f64; 3] {
+        let total: f64 = (self.mesh.faces.iter())
+            .map(|face| self.mesh.area[face.triangle as usize])
+            .sum();
+        let flux = self
+            .landings
+            .iter()
+            .fold([0.0; 3], |sum: [f64; 3], landing| {
+                std::array::from_fn(|k| sum[k] + f64::from(landing.flux[k]))
+            });
+        let landed = flux.map(|x| 2.0 * x / total.max(f64::MIN_POSITIVE));
+        if white[1] < DIM * landed[1] {
+            landed
+        } else {
+            white
+        }
+    }
+
     /// Follows the light of lamps to where it lands.
     pub(super) fn landings(
         &self,

@@ -58,6 +58,9 @@ const SHEET_DIRECTIONS: f64 = 0.5;
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.002;
 
+/// Why light is blocked where nothing else would.
+pub(super) const RAISED: &str = "a surface lies in the plane of another";
+
 /// A room that is baked. No round changes it; only relighting puts another scene of the same shape in its place.
 pub(crate) struct Room {
     pub(crate) scene: Scene,
@@ -127,6 +130,9 @@ impl Room {
     pub(super) fn new(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
         let mut plan = Plan::of(&scene);
         let mesh = Mesh::new(&scene);
+        if !mesh.raised.is_empty() {
+            plan.on(Kind::Occlusion, RAISED);
+        }
         let (parting, closed) = match known {
             Some(known) => {
                 let parting = Parting::again(&scene, mesh, known.spaces, known.parted);
