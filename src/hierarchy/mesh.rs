@@ -3,7 +3,6 @@
 //! Positions are recentred on the middle of the scene, f64, in the file's units. Welding joins vertices at equal
 //! positions, so that neighbours know each other across surfaces.
 
-use super::raised::{Moves, Raised};
 use crate::geometry::{RayIndex, plane_ids};
 use crate::scene::{Alpha, Scene, Sides};
 use glam::{DVec3, Vec3};
@@ -20,6 +19,20 @@ pub struct Face {
     /// The back of a two-sided triangle?
     pub back: bool,
 }
+
+/// A surface that lies in another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raised {
+    /// The surface that is raised, and that in which it lies.
+    pub surfaces: [usize; 2],
+    /// What they have in common.
+    pub area: f64,
+    /// How far it is raised.
+    pub height: f64,
+}
+
+/// What vertices of surfaces are moved by.
+pub(super) type Moves = HashMap<(u32, u32), DVec3>;
 
 /// The welded triangles of a scene.
 #[derive(Debug)]

@@ -14,10 +14,9 @@ mod validate;
 
 pub use cut::{Cut, cuts};
 pub use halves::{Blocker, Outline};
-pub use mesh::{Face, Mesh};
+pub use mesh::{Face, Mesh, Raised};
 pub use mirrors::{BOUNCES, Image, Mirrors, Route};
 pub use panes::{Crossing, Glazing, Panes};
-pub use raised::Raised;
 pub use spaces::{Spaces, spaces};
 pub use tree::{Element, Grown, NONE, Node, Sample, Tree};
 pub(crate) use tree::{leaf_below, stratified};

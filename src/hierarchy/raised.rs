@@ -3,30 +3,16 @@
 //! Which of two such faces is seen is chance, and taken as they stand both would take the same light: a floor that is there twice
 //! reflects twice. So what covers less is raised by next to nothing, and hides what it lies in.
 
-use super::mesh::{Face, Mesh};
+use super::mesh::{Face, Mesh, Moves, Raised};
 use crate::geometry::sampling::tangents;
 use glam::{DVec2, DVec3};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How far, share of the room's diagonal: .5 mm in a room of 10 m. Well above the distance within which rays pass over what is met
 /// (`END_GAP`), below what anybody models.
 const RAISED: f64 = 5e-5;
 /// What two triangles have in common counts from this share of the smaller one: neighbours have their edges in common.
 const COMMON: f64 = 1e-3;
-
-/// A surface that lies in another.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Raised {
-    /// The surface that is raised, and that in which it lies.
-    pub surfaces: [usize; 2],
-    /// What they have in common.
-    pub area: f64,
-    /// How far it is raised.
-    pub height: f64,
-}
-
-/// What vertices of surfaces are moved by.
-pub(super) type Moves = HashMap<(u32, u32), DVec3>;
 
 /// A face in its plane.
 struct Flat {

@@ -53,6 +53,7 @@ mod transmittance;
 mod typed;
 pub(crate) mod uri;
 mod world;
+mod wrap;
 
 pub use camera::{Camera, Projection};
 pub(crate) use check::listed;

@@ -4,6 +4,7 @@
 //! (glTF 2.0, section 3.8.4). Values are linear light. Bilinear whatever the sampler's filter says: a mean over a
 //! surface does not depend on it.
 
+pub use super::wrap::Wrap;
 use crate::scene::Image;
 
 /// Triangles of fewer texels than this are sampled: bilinear values count there. Larger ones by running sums; of a large image with a
@@ -28,17 +29,6 @@ pub struct Texture {
     pub transform: [[f32; 3]; 2],
     /// Wrapping in u and v.
     pub wrap: [Wrap; 2],
-}
-
-/// Wrapping of texture coordinates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wrap {
-    /// Tile.
-    Repeat,
-    /// Tile, every second one turned.
-    Mirror,
-    /// Hold the edge.
-    Clamp,
 }
 
 impl Texture {
@@ -128,22 +118,6 @@ fn neighbours(at: f64, size: usize, wrap: Wrap) -> ([usize; 2], f32) {
     // In [-1, 2 size], whatever came in.
     let index = [first, first + 1.0].map(|i| wrap.texel(i, size));
     (index, fraction)
-}
-
-impl Wrap {
-    /// Which of `size` texels in a row stands at `place`, a whole number.
-    pub(super) fn texel(self, place: f64, size: usize) -> usize {
-        let (i, whole) = (place as i64, size as i64);
-        let i = match self {
-            Wrap::Repeat => i.rem_euclid(whole),
-            Wrap::Mirror => {
-                let i = i.rem_euclid(2 * whole);
-                if i < whole { i } else { 2 * whole - 1 - i }
-            }
-            Wrap::Clamp => i.clamp(0, whole - 1),
-        };
-        i as usize
-    }
 }
 
 #[cfg(test)]

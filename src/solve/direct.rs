@@ -7,7 +7,7 @@
 //! Where leaves look for themselves the points are random, weighted by how open they are (a leaf is what others see of
 //! it, see `outlook`): without bias whatever lies across the leaf, from two points upwards. What matters gets more of them.
 
-use super::landing::Landed;
+use super::landed::Landed;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::hierarchy::{NONE, Tree, stratified};
 use crate::light::weighed;
@@ -48,7 +48,7 @@ const RANDOM: [usize; 3] = [2, 8, 256];
 const FLUX_SHARE: f64 = 2e-4;
 /// By a rule, a leaf on which light ranges so far is split however bright it is there, half the range times the share of all area: eyes tell
 /// little in a pool of sun, but the room lives on it. A hall's sun patch was 17 % too bright as a whole.
-const UNEVEN: f64 = 0.01;
+const UNEVEN: f64 = 0.005;
 /// A point that sees no front weighs next to nothing, but so that a leaf which nobody sees is not without light.
 const UNSEEN: f32 = 1e-4;
 /// Leaves that a task looks at.

@@ -3,7 +3,7 @@
 use super::Bake;
 use super::direct::{Look, receiver};
 use super::flux::{self, Closed};
-use super::landing::Landed;
+use super::landed::Landed;
 use super::refinement::Refinement;
 use super::room::{Room, by_rays};
 use super::solution::Solution;

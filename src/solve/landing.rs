@@ -3,16 +3,16 @@
 //! Points of a large leaf pass by the pool of a narrow spot, or the sun that a small hole lets in, and find the leaf evenly dark: nothing
 //! would ever split it. Rays from the lamp cannot miss it. They decide only what is split; what leaves receive is found at points.
 
+use super::landed::Landing;
 use super::room::Room;
 use super::sent::TOGETHER;
 use crate::geometry::NO_PLANE;
 use crate::geometry::sampling::{sequence02, tangents};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::Lanes;
-use crate::light::{Filters, Glass, brightness};
+use crate::light::{Filters, Glass};
 use crate::link::Sight;
 use glam::{DVec3, Vec3};
-use std::collections::HashMap;
 
 /// Rays from lamps: a leaf that is to be split for it receives at least .06 % of all their light.
 const RAYS: u32 = 16_384;
@@ -21,63 +21,6 @@ const RAYS: u32 = 16_384;
 const CELLS: usize = 256;
 /// The most parts of a cell along each side.
 const PARTS: usize = 16;
-/// So far must what landed stand out of its noise, standard deviations: ten rays where points found nothing.
-const SIGMAS: f64 = 3.0;
-
-/// From so many rays on a leaf is looked at, however small: four are .02 % of the light of all lamps.
-const MANY: f64 = 4.0;
-
-/// Where a ray from a lamp met a front.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Landing {
-    /// Entry of the hierarchy's faces, and the weights of its second and third corner.
-    entry: u32,
-    weights: [f32; 2],
-    /// Tristimulus flux that it stands for, lm.
-    flux: [f32; 3],
-}
-
-/// What landed on leaves.
-#[derive(Debug, Default)]
-pub(super) struct Landed {
-    /// By leaf: brightness times area, and the square of its standard deviation.
-    sums: HashMap<u32, [f64; 2]>,
-}
-
-impl Landed {
-    /// On the leaves of a hierarchy, as shares of a white.
-    pub(super) fn new(tree: &Tree, landings: &[Landing], white: [f64; 3]) -> Self {
-        let mut sums: HashMap<u32, [f64; 2]> = HashMap::new();
-        for landing in landings {
-            let [u, v] = landing.weights.map(f64::from);
-            let leaf = tree.leaf_at(landing.entry, [1.0 - u - v, u, v]);
-            let bright = brightness(landing.flux.map(f64::from), white);
-            let [sum, square] = sums.entry(leaf).or_default();
-            *sum += bright;
-            *square += bright * bright;
-        }
-        Self { sums }
-    }
-
-    /// Does so much land on a leaf that it is no chance?
-    pub(super) fn matters(&self, leaf: u32) -> bool {
-        let sums = self.sums.get(&leaf);
-        sums.is_some_and(|[sum, square]| sum * sum > MANY * square)
-    }
-
-    /// How much brighter a leaf is in the mean than what its points found; 0 where that may be chance.
-    pub(super) fn missing(&self, leaf: u32, area: f64, found: f64) -> f64 {
-        let Some([sum, square]) = self.sums.get(&leaf) else {
-            return 0.0;
-        };
-        let missing = sum / area - found;
-        match missing * area > SIGMAS * square.sqrt() {
-            true => missing,
-            false => 0.0,
-        }
-    }
-}
-
 /// What follows rays to where they land.
 struct Follower<'a> {
     tree: &'a Tree,

@@ -17,6 +17,7 @@ pub(crate) mod flux;
 pub mod forecast;
 mod held;
 mod lamp_light;
+mod landed;
 mod landing;
 mod linear;
 mod lists;

@@ -2,7 +2,7 @@
 
 use super::estimate::Probes;
 use super::flux::{self, Closed, Sent};
-use super::landing::Landing;
+use super::landed::Landing;
 use super::parting::Parting;
 use super::representation::Representation;
 use super::sources::Painter;
