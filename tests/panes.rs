@@ -436,12 +436,8 @@ fn cards_let_light_through_by_texel() {
     level(&mut room, 1.0, card);
     let mut scene = room.scene();
     let alphas = [0.0, 0.25, 0.5, 1.0];
-    scene.images.push(Image {
-        name: "dirt".into(),
-        width: 4,
-        height: 1,
-        pixels: alphas.map(|alpha| [0.0, 0.0, 0.0, alpha]).to_vec(),
-    });
+    let dirt = alphas.map(|alpha| [0.0, 0.0, 0.0, alpha]).to_vec();
+    scene.images.push(Image::new("dirt", 4, dirt));
     let surface = &mut scene.panes[0];
     let uvs = surface.positions.iter().map(|p| [p.x as f32 / 4.0, 0.5]);
     surface.texcoords = vec![uvs.collect()];

@@ -374,7 +374,7 @@ impl<'a> Audit<'a> {
                 let spot = match light.kind {
                     LightKind::Spot { inner, outer } => {
                         let along = -light.direction.dot(d) / r2.sqrt();
-                        ((along - outer.cos()) / (inner.cos() - outer.cos()).max(1e-3))
+                        ((along - outer.cos()) / (inner.cos() - outer.cos()).max(1e-12))
                             .clamp(0.0, 1.0)
                             .powi(2)
                     }

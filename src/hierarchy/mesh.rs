@@ -20,6 +20,20 @@ pub struct Face {
     pub back: bool,
 }
 
+/// A surface that lies in another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raised {
+    /// The surface that is raised, and that in which it lies.
+    pub surfaces: [usize; 2],
+    /// What they have in common.
+    pub area: f64,
+    /// How far it is raised.
+    pub height: f64,
+}
+
+/// What vertices of surfaces are moved by.
+pub(super) type Moves = HashMap<(u32, u32), DVec3>;
+
 /// The welded triangles of a scene.
 #[derive(Debug)]
 pub struct Mesh {
@@ -53,11 +67,26 @@ pub struct Mesh {
     pub(super) part: Vec<u32>,
     /// Corners of parts, as weights of the corners of the origin.
     pub(super) within: Vec<[[f64; 3]; 3]>,
+    /// Surfaces that lie in others; not kept where triangles are cut.
+    pub raised: Vec<Raised>,
 }
 
 impl Mesh {
-    /// Welds the surfaces of `scene`.
+    /// Welds the surfaces of `scene`; those that lie in others are raised.
     pub fn new(scene: &Scene) -> Self {
+        let mesh = Self::welded(scene, &Moves::new());
+        let input: Vec<&[[u32; 3]]> = scene.surfaces.iter().map(|s| &*s.triangles).collect();
+        let (raised, moves) = mesh.lying(&input);
+        if raised.is_empty() {
+            return mesh;
+        }
+        Self {
+            raised,
+            ..Self::welded(scene, &moves)
+        }
+    }
+
+    fn welded(scene: &Scene, moves: &Moves) -> Self {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in scene.surfaces.iter().flat_map(|s| &s.positions) {
             low = low.min(*p);
@@ -83,8 +112,10 @@ impl Mesh {
             let ids: Vec<u32> = surface
                 .positions
                 .iter()
-                .map(|p| {
-                    let q = *p - centre;
+                .zip(0_u32..)
+                .map(|(p, vertex)| {
+                    let moved = moves.get(&(s as u32, vertex));
+                    let q = *p - centre + moved.copied().unwrap_or_default();
                     // Adding zero turns -0 into +0, so that both weld.
                     let key = (q + DVec3::ZERO).to_array().map(f64::to_bits);
                     *welded.entry(key).or_insert_with(|| {
@@ -147,6 +178,7 @@ impl Mesh {
             first_triangle: vec![0],
             part: Vec::new(),
             within: Vec::new(),
+            raised: Vec::new(),
         }
     }
 

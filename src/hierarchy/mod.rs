@@ -7,13 +7,14 @@ mod halves;
 mod mesh;
 mod mirrors;
 mod panes;
+mod raised;
 mod spaces;
 mod tree;
 mod validate;
 
 pub use cut::{Cut, cuts};
 pub use halves::{Blocker, Outline};
-pub use mesh::{Face, Mesh};
+pub use mesh::{Face, Mesh, Raised};
 pub use mirrors::{BOUNCES, Image, Mirrors, Route};
 pub use panes::{Crossing, Glazing, Panes};
 pub use spaces::{Spaces, spaces};

@@ -205,6 +205,14 @@ impl Plan {
         }
     }
 
+    /// Lets an effect run that does not.
+    pub(crate) fn on(&mut self, kind: Kind, reason: &str) {
+        let mut named = self.effects.iter_mut().filter(|e| e.name == kind.name());
+        if let Some(effect) = named.find(|effect| !effect.runs) {
+            (effect.runs, effect.reason) = (true, reason.into());
+        }
+    }
+
     /// Says more of an effect.
     pub(crate) fn say(&mut self, kind: Kind, more: &str) {
         let mut named = self.effects.iter_mut().filter(|e| e.name == kind.name());

@@ -7,8 +7,10 @@
 //! Large images are shrunk by whole factors with a box filter, in linear light: what the solver needs are means over
 //! elements. So the memory for images is bounded: [`MAX_TEXELS`] in all.
 
+use super::running::Running;
 use image::{DynamicImage, GenericImageView, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
+use std::sync::OnceLock;
 
 /// Texels of all images together (16 bytes each).
 const MAX_TEXELS: usize = 1 << 26;
@@ -37,9 +39,30 @@ pub struct Image {
     pub height: usize,
     /// Linear RGBA, row by row from the top.
     pub pixels: Vec<[f32; 4]>,
+    /// Made when they are first asked for.
+    running: OnceLock<Running>,
 }
 
 impl Image {
+    /// An image with rows of `width` pixels, linear RGBA from the top left; of what is too few for a row nothing is left.
+    pub fn new(name: &str, width: usize, mut pixels: Vec<[f32; 4]>) -> Self {
+        let height = pixels.len() / width.max(1);
+        pixels.truncate(width * height);
+        Self {
+            name: name.to_owned(),
+            width,
+            height,
+            pixels,
+            running: OnceLock::new(),
+        }
+    }
+
+    /// Running sums of the pixels, which must not change any more.
+    pub(super) fn running(&self) -> &Running {
+        let make = || Running::new(self.width, &self.pixels);
+        self.running.get_or_init(make)
+    }
+
     /// Mean of all texels; white of none.
     pub(crate) fn mean(&self) -> [f32; 4] {
         if self.pixels.is_empty() {
@@ -55,12 +78,7 @@ impl Image {
 
 /// What stands in for an image that cannot be read: a grey that neither brightens nor darkens much.
 pub(crate) fn neutral(name: &str) -> Image {
-    Image {
-        name: name.to_owned(),
-        width: 1,
-        height: 1,
-        pixels: vec![[0.5, 0.5, 0.5, 1.0]],
-    }
+    Image::new(name, 1, vec![[0.5, 0.5, 0.5, 1.0]])
 }
 
 /// Decodes one of `count` images, or says why not; `room` is how many pixels may still be decoded.
@@ -155,12 +173,7 @@ fn linear(name: &str, decoded: &DynamicImage, budget: usize) -> Image {
             [of(r), of(g), of(b), f32::from(a) / 255.0]
         })
     };
-    Image {
-        name: name.to_owned(),
-        width: width.div_ceil(shrink),
-        height: height.div_ceil(shrink),
-        pixels,
-    }
+    Image::new(name, width.div_ceil(shrink), pixels)
 }
 
 /// Means over blocks of `shrink` x `shrink` pixels; blocks at the right and lower edge may be smaller.

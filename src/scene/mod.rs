@@ -39,6 +39,7 @@ pub mod profile;
 mod raw;
 mod reader;
 mod room;
+mod running;
 mod said;
 pub mod sheet;
 mod sheets;
@@ -52,6 +53,7 @@ mod transmittance;
 mod typed;
 pub(crate) mod uri;
 mod world;
+mod wrap;
 
 pub use camera::{Camera, Projection};
 pub(crate) use check::listed;

@@ -102,7 +102,21 @@ pub(super) fn check_names(
     }
     known.sort_unstable();
     known.dedup();
+    let mut taken: BTreeMap<&str, &str> = BTreeMap::new();
     for (layer, lamps) in wishes {
+        for lamp in lamps {
+            let first = *taken.entry(lamp).or_insert(layer);
+            if first != layer {
+                let what = format!("'{}' is in layer '{}' already", short(lamp), short(first));
+                let place = format!("layer '{}'", short(layer));
+                check.stranger(
+                    unknown,
+                    &place,
+                    what,
+                    "name a lamp in one layer only".into(),
+                );
+            }
+        }
         for lamp in lamps.iter().filter(|lamp| !known.contains(&lamp.as_str())) {
             // The sky may be left out at any time.
             if lamp == SKY || lamp == SUN {

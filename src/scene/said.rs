@@ -61,7 +61,9 @@ pub(super) fn called(csv: &str) -> String {
 /// The JSON of a file; otherwise what is wrong and what to do.
 pub(super) fn json_of(path: &Path) -> Result<Value, (String, &'static str)> {
     let text = uri::read_file(path).map_err(|why| (why, "name a spectra file that can be read"))?;
-    serde_json::from_slice(&text)
+    // Editors on Windows put a byte order mark first.
+    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&text);
+    serde_json::from_slice(text)
         .map_err(|why| (format!("is not valid JSON ({why})"), "mend the file"))
 }
 

@@ -3,6 +3,7 @@
 use super::Bake;
 use super::direct::{Look, receiver};
 use super::flux::{self, Closed};
+use super::landed::Landed;
 use super::refinement::Refinement;
 use super::room::{Room, by_rays};
 use super::solution::Solution;
@@ -85,6 +86,10 @@ impl Look for Looker<'_> {
             Some(_) => MIRRORED * most,
             None => most,
         }
+    }
+
+    fn landed(&self, tree: &Tree) -> Landed {
+        Landed::new(tree, &self.room.landings, self.solution.light.white)
     }
 
     fn by_chance(&self) -> bool {

@@ -17,6 +17,8 @@ pub(crate) mod flux;
 pub mod forecast;
 mod held;
 mod lamp_light;
+mod landed;
+mod landing;
 mod linear;
 mod lists;
 mod looking;
@@ -283,6 +285,9 @@ impl Bake {
             let guess = self.room.guess(tree);
             self.solution.light.white = self.room.settings.white.unwrap_or(guess.white);
             return (guess.bright, vec![1.0; nodes]);
+        }
+        if self.room.settings.white.is_none() {
+            self.solution.light.white = self.room.landed_white(self.solution.light.white);
         }
         let bright = &self.solution.light.bright_reflected;
         (bright[..nodes].to_vec(), self.solution.keenness(tree))

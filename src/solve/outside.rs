@@ -1,7 +1,7 @@
 //! What lies outside a room: its sky, if any of it is seen.
 
 use super::flux::{self, Closed};
-use super::room::Room;
+use super::room::{RAISED, Room};
 use crate::hierarchy::Tree;
 use crate::light::Filters;
 use crate::scene::effects::{Kind, Plan};
@@ -22,6 +22,7 @@ impl Room {
         let filters = Filters::new(&self.scene, &lanes);
         // In a closed room this is known without a ray.
         self.sent = self.with_sight(|sight| self.sent(tree, &lanes, &filters, sight));
+        self.landings = self.with_sight(|sight| self.landings(tree, &lanes, &filters, sight));
     }
 
     /// Looks for the openings of a room with a sky; takes the sky out of a room that is closed, which then costs nothing and is
@@ -46,7 +47,11 @@ impl Room {
         // Where only black backs are met besides fronts no ray leaves it either.
         if self.sealed == Closed::Yes {
             self.scene.shut_out_sky();
+            let occlusion = self.plan.runs(Kind::Occlusion);
             self.plan = Plan::of(&self.scene);
+            if occlusion {
+                self.plan.on(Kind::Occlusion, RAISED);
+            }
             if let Some(mirrors) = &self.mirrors {
                 self.plan.say(Kind::Mirrors, &mirrors.said());
             }

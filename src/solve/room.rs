@@ -2,6 +2,7 @@
 
 use super::estimate::Probes;
 use super::flux::{self, Closed, Sent};
+use super::landed::Landing;
 use super::parting::Parting;
 use super::representation::Representation;
 use super::sources::Painter;
@@ -57,6 +58,9 @@ const SHEET_DIRECTIONS: f64 = 0.5;
 /// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.002;
 
+/// Why light is blocked where nothing else would.
+pub(super) const RAISED: &str = "a surface lies in the plane of another";
+
 /// A room that is baked. No round changes it; only relighting puts another scene of the same shape in its place.
 pub(crate) struct Room {
     pub(crate) scene: Scene,
@@ -76,6 +80,8 @@ pub(crate) struct Room {
     pub(crate) outside: Option<Outside>,
     /// Where the light of lamps goes first.
     pub(crate) sent: Sent,
+    /// And where on which faces; nothing in a room that is only relit.
+    pub(super) landings: Vec<Landing>,
     pub(crate) weights: [Leaves; 3],
     /// Colours of textures as spectra: its table is made once.
     pub(crate) upsampler: Upsampler,
@@ -124,6 +130,9 @@ impl Room {
     pub(super) fn new(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
         let mut plan = Plan::of(&scene);
         let mesh = Mesh::new(&scene);
+        if !mesh.raised.is_empty() {
+            plan.on(Kind::Occlusion, RAISED);
+        }
         let (parting, closed) = match known {
             Some(known) => {
                 let parting = Parting::again(&scene, mesh, known.spaces, known.parted);
@@ -147,6 +156,7 @@ impl Room {
             sealed: Closed::No,
             outside: None,
             sent: Sent::default(),
+            landings: Vec::new(),
             panes: Panes::new(&scene, mesh.centre),
             mirrors,
             weights: Observer::cie1931().weights(&scene.grid),

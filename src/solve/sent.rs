@@ -21,7 +21,7 @@ const RAYS: u32 = 32_768;
 /// Rays from a surface start so far before it, share of half the room.
 const OFF: f64 = 1e-5;
 /// Rays that go together.
-const TOGETHER: usize = 16;
+pub(super) const TOGETHER: usize = 16;
 
 impl Room {
     /// Follows the light of lamps.
@@ -33,7 +33,7 @@ impl Room {
         sight: &Sight,
     ) -> Sent {
         let lamps = self.sending(tree, lanes);
-        let all: f64 = lamps.iter().map(|lamp| lamp.0).sum();
+        let all: f64 = lamps.iter().map(|lamp| lamp.0[1]).sum();
         if all <= 0.0 {
             return Sent::default();
         }
@@ -50,7 +50,7 @@ impl Room {
         };
         let glass = (sight.panes).map(|glazing| Glass { glazing, filters });
         let mut first = 0;
-        for (flux, lamp) in lamps {
+        for ([_, flux, _], lamp) in lamps {
             // At least a packet, so that no lamp goes without.
             let count = (f64::from(RAYS) * flux / all).ceil() as usize;
             let count = count.next_multiple_of(TOGETHER);
@@ -82,23 +82,24 @@ impl Room {
         sent
     }
 
-    /// Lamps with their luminous flux.
-    fn sending(&self, tree: &Tree, lanes: &Lanes) -> Vec<(f64, Lamp<'_>)> {
-        let exitance: Vec<f64> = (self.scene.materials.iter())
-            .map(|m| lanes.exitance(m.even_emission())[1])
+    /// Lamps with their tristimulus flux, all but those that shine from far away.
+    pub(super) fn sending(&self, tree: &Tree, lanes: &Lanes) -> Vec<([f64; 3], Lamp<'_>)> {
+        let exitance: Vec<[f64; 3]> = (self.scene.materials.iter())
+            .map(|m| lanes.exitance(m.even_emission()))
             .collect();
         let faces = (0..tree.faces.len()).filter_map(|entry| {
             let triangle = tree.faces[entry].triangle as usize;
-            let flux = exitance[self.mesh.material[triangle] as usize] * self.mesh.area[triangle];
-            (flux > 0.0).then_some((flux, Lamp::Face(entry)))
+            let exitance = exitance[self.mesh.material[triangle] as usize];
+            let flux = exitance.map(|x| x * self.mesh.area[triangle]);
+            (flux[1] > 0.0).then_some((flux, Lamp::Face(entry)))
         });
         let mut lamps: Vec<_> = faces.collect();
         for light in &self.scene.lights {
             let Some(solid) = super::punctual::solid_angle(light.kind) else {
                 continue;
             };
-            let flux = solid * lanes.emission(light.light, &light.shape, 1.0)[1];
-            if flux > 0.0 {
+            let flux = lanes.emission(light.light, &light.shape, solid);
+            if flux[1] > 0.0 {
                 lamps.push((flux, Lamp::Punctual(light)));
             }
         }
@@ -108,7 +109,7 @@ impl Room {
 
 /// What sends light.
 #[derive(Clone, Copy)]
-enum Lamp<'a> {
+pub(super) enum Lamp<'a> {
     /// An entry of the hierarchy's faces.
     Face(usize),
     Punctual(&'a PunctualLight),
@@ -116,7 +117,7 @@ enum Lamp<'a> {
 
 impl Lamp<'_> {
     /// Start, direction and plane of its `k`-th ray, and what it counts for: 1 in the mean.
-    fn ray(self, room: &Room, tree: &Tree, k: u32) -> (DVec3, DVec3, u32, f64) {
+    pub(super) fn ray(self, room: &Room, tree: &Tree, k: u32) -> (DVec3, DVec3, u32, f64) {
         // Two shifts of one sequence depend on each other.
         let mut random = Pcg::new(hash(13, u64::from(k)));
         let (u, v) = (sequence02(k, 11), [random.f64(), random.f64()]);

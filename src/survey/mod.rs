@@ -8,6 +8,7 @@
 //! | `eyes` | what a ray meets: a front, a back, nothing |
 //! | `content` | no surface, no lamp |
 //! | `lamps` | lamps that shine away from the room, and which faces to turn |
+//! | `lying` | surfaces that lie in others |
 //! | `openings` | open to a sky that nobody describes |
 //! | `size` | rooms that are too large or too small to be rooms |
 //! | `points` | points inside solids and outside the room |
@@ -15,6 +16,7 @@
 mod content;
 mod eyes;
 mod lamps;
+mod lying;
 mod openings;
 mod points;
 mod size;
@@ -54,6 +56,7 @@ pub fn advise(scene: &mut Scene, wishes: Wishes) -> Vec<Problem> {
     }
     scene.warnings.extend(size::hint(scene));
     scene.warnings.extend(openings::hint(scene));
+    scene.warnings.extend(lying::hint(scene));
     let mut problem = content::no_lamp(scene);
     if problem.is_none() {
         let mut away = lamps::away(scene);

@@ -43,6 +43,9 @@ impl Gatherer<'_> {
         let Some((factor, end)) = punctual_factor(lamp, to, self.far()) else {
             return (0.0, None);
         };
+        if self.is_behind(to, end) {
+            return (0.0, None);
+        }
         let way = Segment::new(to.point, end, [to.plane, NO_PLANE]);
         let seen = match lamp.kind {
             LightKind::Sun => self.sun_seen(to, lamp, memory),
@@ -56,6 +59,19 @@ impl Gatherer<'_> {
             true => (factor * seen, self.through(&way)),
             false => (0.0, None),
         }
+    }
+
+    /// Does a shading normal look at a place that lies behind the face itself? No ray is told so by its own plane, and in a vault of few
+    /// faces nothing else is in the way of the sun.
+    fn is_behind(&self, to: &Receiver, place: DVec3) -> bool {
+        let Some(leaf) = to.leaf.filter(|_| self.via.is_none()) else {
+            return false;
+        };
+        let element = self.tree.element(self.tree.node(leaf));
+        element.is_some_and(|element| {
+            let flat = self.tree.face_normal[element.face as usize];
+            flat.dot(place - to.point) <= 0.0
+        })
     }
 }
 
@@ -84,9 +100,10 @@ pub fn punctual_factor(
     }
     let spot = match lamp.kind {
         LightKind::Spot { inner, outer } => {
-            // The fall-off that KHR_lights_punctual gives: smooth between the cosines of both angles.
+            // The fall-off that KHR_lights_punctual gives: smooth between the cosines of both angles. Its .001 as the least width, which
+            // is there so that nothing is divided by 0, would leave a cone of 1 degree .1 % of its candela.
             let along = -lamp.direction.dot(d) / r2.sqrt();
-            let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
+            let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-12);
             ((along - outer.cos()) * scale).clamp(0.0, 1.0).powi(2)
         }
         LightKind::Profile => {

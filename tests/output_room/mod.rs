@@ -118,15 +118,7 @@ fn checker() -> (Vec<u8>, Image) {
             f32::from(p[3]) / 255.0,
         ]
     });
-    (
-        png.into_inner(),
-        Image {
-            name: "checker".into(),
-            width: 8,
-            height: 8,
-            pixels: pixels.collect(),
-        },
-    )
+    (png.into_inner(), Image::new("checker", 8, pixels.collect()))
 }
 
 fn material(name: &str, index: usize) -> Material {

@@ -502,6 +502,21 @@ fn too_many_layers_are_refused() {
     );
 }
 
+#[test]
+fn a_lamp_goes_to_one_layer() {
+    let said = json!({ "layers": { "a": ["panel"], "b": ["panel"] } });
+    let options = Options {
+        said: Some(said),
+        ..Options::default()
+    };
+    let Err(Error::Input(problems)) = Scene::load(scenes().join("convex.glb"), &options) else {
+        panic!("it was put into both");
+    };
+    let text: Vec<String> = problems.iter().map(ToString::to_string).collect();
+    let said = |text: &String| text.contains("layer 'b'") && text.contains("in layer 'a' already");
+    assert!(text.iter().any(said), "{text:?}");
+}
+
 fn haarlight(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_haarlight"))
         .args(args)

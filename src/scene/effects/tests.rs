@@ -94,12 +94,9 @@ fn a_dent_or_an_object_is_no_convex_room() {
 #[test]
 fn grey_paint_with_grey_texture_and_vertices_stays_one_band() {
     let mut scene = room("furnace.glb");
-    scene.images.push(Image {
-        name: "t".into(),
-        width: 1,
-        height: 1,
-        pixels: vec![[0.3, 0.3, 0.3, 1.0]],
-    });
+    scene
+        .images
+        .push(Image::new("t", 1, vec![[0.3, 0.3, 0.3, 1.0]]));
     scene.materials[0].paint = Some(super::super::Texture {
         image: 0,
         texcoord: 0,

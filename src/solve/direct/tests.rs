@@ -24,6 +24,9 @@ impl Look for Fake {
     fn unshadowed(&self, _: &Tree, _: u32, _: f64) -> f64 {
         3.0
     }
+    fn landed(&self, _: &Tree) -> Landed {
+        Landed::default()
+    }
     fn by_chance(&self) -> bool {
         true
     }
@@ -46,6 +49,7 @@ fn random_points_find_the_light_that_others_see() {
     for flux in [0.0, 10.0] {
         let stake = Stake {
             split: 0.0,
+            share: 0.0,
             flux,
             tolerance: 0.1,
             may_split: true,

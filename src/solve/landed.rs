@@ -1,0 +1,62 @@
+//! What landed on leaves by rays from lamps, held against what their points found.
+
+use crate::hierarchy::Tree;
+use crate::light::brightness;
+use std::collections::HashMap;
+
+/// So far must what landed stand out of its noise, standard deviations: ten rays where points found nothing.
+const SIGMAS: f64 = 3.0;
+
+/// From so many rays on a leaf is looked at, however small: four are .02 % of the light of all lamps.
+const MANY: f64 = 4.0;
+
+/// Where a ray from a lamp met a front.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Landing {
+    /// Entry of the hierarchy's faces, and the weights of its second and third corner.
+    pub(super) entry: u32,
+    pub(super) weights: [f32; 2],
+    /// Tristimulus flux that it stands for, lm.
+    pub(super) flux: [f32; 3],
+}
+
+/// What landed on leaves.
+#[derive(Debug, Default)]
+pub(super) struct Landed {
+    /// By leaf: brightness times area, and the square of its standard deviation.
+    sums: HashMap<u32, [f64; 2]>,
+}
+
+impl Landed {
+    /// On the leaves of a hierarchy, as shares of a white.
+    pub(super) fn new(tree: &Tree, landings: &[Landing], white: [f64; 3]) -> Self {
+        let mut sums: HashMap<u32, [f64; 2]> = HashMap::new();
+        for landing in landings {
+            let [u, v] = landing.weights.map(f64::from);
+            let leaf = tree.leaf_at(landing.entry, [1.0 - u - v, u, v]);
+            let bright = brightness(landing.flux.map(f64::from), white);
+            let [sum, square] = sums.entry(leaf).or_default();
+            *sum += bright;
+            *square += bright * bright;
+        }
+        Self { sums }
+    }
+
+    /// Does so much land on a leaf that it is no chance?
+    pub(super) fn matters(&self, leaf: u32) -> bool {
+        let sums = self.sums.get(&leaf);
+        sums.is_some_and(|[sum, square]| sum * sum > MANY * square)
+    }
+
+    /// How much brighter a leaf is in the mean than what its points found; 0 where that may be chance.
+    pub(super) fn missing(&self, leaf: u32, area: f64, found: f64) -> f64 {
+        let Some([sum, square]) = self.sums.get(&leaf) else {
+            return 0.0;
+        };
+        let missing = sum / area - found;
+        match missing * area > SIGMAS * square.sqrt() {
+            true => missing,
+            false => 0.0,
+        }
+    }
+}
