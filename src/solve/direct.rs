@@ -46,9 +46,6 @@ const RANDOM: [usize; 3] = [2, 8, 256];
 /// What a leaf may misplace of all direct light by too few points, about. From the first round on a garage's leaves then
 /// receive what its lamp sends within a per cent.
 const FLUX_SHARE: f64 = 2e-4;
-/// By a rule, a leaf on which light ranges so far is split however bright it is there, half the range times the share of all area: eyes tell
-/// little in a pool of sun, but the room lives on it. A hall's sun patch was 17 % too bright as a whole.
-const UNEVEN: f64 = 0.005;
 /// A point that sees no front weighs next to nothing, but so that a leaf which nobody sees is not without light.
 const UNSEEN: f32 = 1e-4;
 /// Leaves that a task looks at.
@@ -243,8 +240,7 @@ impl Direct {
         let found = weighed(self.row(leaf), look.weights()) * f64::from(self.whole(leaf));
         let missing = landed.missing(leaf, tree.node(leaf).area, found);
         let spread = f64::from(self.spread[leaf as usize]).max(missing);
-        let too_much = !look.by_chance() && spread * stake.share > UNEVEN;
-        (too_much || spread * stake.split > 1.0) && stake.may_split
+        spread * stake.split > 1.0 && stake.may_split
     }
 
     /// Gathers at all new leaves, each rank of the team at its own, and splits them until direct light varies less than the demand allows.
@@ -332,8 +328,6 @@ impl Direct {
 struct Stake {
     /// How much of what splits a leaf a range of one white takes.
     split: f64,
-    /// Of all area.
-    share: f64,
     /// How much of what a leaf may misplace of all light one white takes.
     flux: f64,
     /// What a patch may misplace at a point, share of white: what would split the leaf is what it has to be told from.
@@ -352,7 +346,6 @@ impl Stake {
         let depth = tree.elements[node.element as usize].depth;
         Self {
             split: f64::from(keen) * share.sqrt() / demand.threshold,
-            share,
             // The white is twice the mean.
             flux: share / (0.5 * FLUX_SHARE),
             tolerance: NOISE * demand.threshold / share.sqrt(),

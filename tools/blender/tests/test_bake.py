@@ -83,7 +83,7 @@ def test_the_attribute_equals_probe():
         open_to_room = np.array([b == "room" for b in bright])
         probed = light.probe(y_up(points)[open_to_room], y_up([n for _, n, _ in places])[open_to_room])
         found = np.array([lux for _, _, lux in places])[open_to_room]
-        # Straight lines between vertices have an error of their own, as large as the light's (ARCHITECTURE, the mesh).
+        # Straight lines between vertices have an error of their own, as large as the light's (docs/decisions.md).
         error = np.sqrt(np.average((found - probed.lux) ** 2, weights=area[open_to_room]))
         stated = np.sqrt(np.average(probed.plus_minus**2, weights=area[open_to_room]))
         mean = np.average(found, weights=area[open_to_room]) / np.average(probed.lux, weights=area[open_to_room])
