@@ -8,7 +8,6 @@ use super::gatherer::{Gatherer, Lamp, Memory, Of};
 use super::luminaire;
 use super::punctual::punctual_factor;
 use super::receiver::{Gathered, Receiver};
-use super::slope::Seen;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
@@ -138,7 +137,7 @@ impl Gatherer<'_> {
             let each = lamps.iter().zip(&seen).enumerate();
             for (k, (lamp, &seen)) in each.filter(|(_, (_, seen))| **seen > 0.0) {
                 let tint = tints.get(k).or(tints.last());
-                self.see(to, lamp.id, lamp.factor, Seen::of(seen), tint, of, out);
+                self.see(to, lamp.id, lamp.factor, seen, tint, of, out);
             }
         }
         memory.lamps = lamps;

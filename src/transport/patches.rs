@@ -6,7 +6,6 @@
 
 use super::gatherer::{CLOSE, Gatherer, Lamp, Linked, Memory, Of};
 use super::receiver::{Gathered, Receiver};
-use super::slope::Seen;
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
 use crate::light::{Passage, Tint, accumulate};
@@ -164,21 +163,12 @@ impl Gatherer<'_> {
         let (reflected, emitted) = self.brightness(id, of);
         let carries = factor * (reflected + emitted);
         if clear {
-            self.see(to, id, factor, Seen::of(1.0), None, of, out);
-        } else if let Some((share, clipped)) =
+            self.see(to, id, factor, 1.0, None, of, out);
+        } else if let Some(visible) =
             self.visible(to, (id, way, v), factor, carries, emitted > 0.0, memory)
         {
             let tint = self.tint(memory);
-            let parts = Some(&memory.clipper).filter(|_| clipped && share < 1.0);
-            self.see(
-                to,
-                id,
-                factor,
-                Seen { share, parts },
-                tint.as_ref(),
-                of,
-                out,
-            );
+            self.see(to, id, factor, visible, tint.as_ref(), of, out);
         }
     }
 
@@ -209,15 +199,15 @@ impl Gatherer<'_> {
         to: &Receiver,
         id: u32,
         factor: f64,
-        seen: Seen,
+        visible: f64,
         tint: Option<&Passage>,
         of: Of,
         out: &mut Gathered,
     ) {
-        self.add(id, factor, seen.share, tint, of, out);
+        self.add(id, factor, visible, tint, of, out);
         // Behind panes leaves are even: where there are any, patches are only gathered so if they glare.
         if of != Of::Emitted && tint.is_none() {
-            self.slope(to, id, factor, seen, CLEAR_SHARE * self.tolerance, out);
+            self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
         }
     }
 
@@ -346,9 +336,8 @@ impl Gatherer<'_> {
         Some((factor, visible))
     }
 
-    /// Visible share of a polygon patch, and whether it was clipped, so that the clipper has its parts; none yet for a lamp that rays must
-    /// find, see `lamps_together`. `carries` is what it would bring unblocked, share of white. What is clipped exactly knows no filters:
-    /// behind panes rays decide.
+    /// Visible share of a polygon patch; none yet for a lamp that rays must find, see `lamps_together`. `carries` is what it
+    /// would bring unblocked, share of white. What is clipped exactly knows no filters: behind panes rays decide.
     fn visible(
         &self,
         to: &Receiver,
@@ -357,10 +346,10 @@ impl Gatherer<'_> {
         carries: f64,
         lamp: bool,
         memory: &mut Memory,
-    ) -> Option<(f64, bool)> {
+    ) -> Option<f64> {
         let node = self.tree.node(id);
         let Some(element) = self.tree.element(node) else {
-            return Some((1.0, false));
+            return Some(1.0);
         };
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
@@ -368,7 +357,7 @@ impl Gatherer<'_> {
         if clips && let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
-                return Some(((seen / factor).min(1.0), true));
+                return Some((seen / factor).min(1.0));
             }
         }
         if lamp {
@@ -378,10 +367,10 @@ impl Gatherer<'_> {
                     .sight
                     .view_from(to.point, to.normal, &element.corners, planes)
                 {
-                    View::Clear => return Some((1.0, false)),
+                    View::Clear => return Some(1.0),
                     View::Listed(list) => {
                         if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
-                            return Some(((seen / factor).min(1.0), true));
+                            return Some((seen / factor).min(1.0));
                         }
                     }
                     View::Crowded => {}
@@ -394,24 +383,11 @@ impl Gatherer<'_> {
             });
             return None;
         }
-        let share = self.visible_by_rays(to, (id, known), (element, planes), carries, memory);
-        Some((share, false))
-    }
-
-    /// Visible share of an element by rays; `known`: what its link found.
-    fn visible_by_rays(
-        &self,
-        to: &Receiver,
-        (id, known): (u32, f32),
-        (element, planes): (&Element, [u32; 2]),
-        carries: f64,
-        memory: &mut Memory,
-    ) -> f64 {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
         let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
         let count = wanted.clamp(RAYS[0], RAYS[1]);
         let shift = pattern(to.seed, id, 2);
-        let normal = self.tree.node(id).normal;
+        let normal = node.normal;
         memory.segments.clear();
         memory.weights.clear();
         for k in 0..count {
@@ -431,7 +407,7 @@ impl Gatherer<'_> {
         let seen = open_weight(&memory.weights, &memory.blocked);
         // Where no ray gets through, nothing does: what other parts of the element see must not leak in.
         if seen <= 0.0 {
-            return 0.0;
+            return Some(0.0);
         }
         // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
         // blurs is bounded by the size of the receiving element.
@@ -440,7 +416,7 @@ impl Gatherer<'_> {
         } else {
             PRIOR
         };
-        (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
+        Some((seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior))
     }
 
     /// Factor of what is seen past the listed triangles, exactly; `whole` is that of the whole patch. None where that takes too

@@ -149,9 +149,11 @@ fn the_command_relights_layers() {
     assert_eq!(done.status.code(), Some(0), "{done:?}");
     let read = |path: &str| std::fs::read(path).unwrap();
     let (a, b) = (read(&first), read(&again));
-    assert_eq!(a.len(), b.len());
+    // Errors that are said may have a digit more or less; vertices may not.
+    let text = |file: &[u8]| u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+    assert_eq!(a.len() - text(&a), b.len() - text(&b));
     let named = |file: &[u8]| {
-        let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+        let length = text(file);
         let json: serde_json::Value = serde_json::from_slice(&file[20..20 + length]).unwrap();
         json["asset"]["extras"]["haarlight"]["layers"]["names"].clone()
     };

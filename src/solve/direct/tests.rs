@@ -49,7 +49,6 @@ fn random_points_find_the_light_that_others_see() {
     for flux in [0.0, 10.0] {
         let stake = Stake {
             split: 0.0,
-            share: 0.0,
             flux,
             tolerance: 0.1,
             may_split: true,
