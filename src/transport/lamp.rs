@@ -8,6 +8,7 @@ use super::gatherer::{Gatherer, Lamp, Memory, Of};
 use super::luminaire;
 use super::punctual::punctual_factor;
 use super::receiver::{Gathered, Receiver};
+use super::slope::Seen;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
@@ -30,8 +31,6 @@ const LEAF_RAYS: usize = 16;
 /// All lamps together may misplace what so many patches may. With 1, 2 and 4 three furnished rooms end at the same errors
 /// (.37, .31, .26 mean CIEDE2000) within .01.
 const PATCHES: f64 = 4.0;
-/// Lamps that no ray went to are faint if they bring no more than so many rays stand for.
-const FAINT: f64 = 2.0;
 /// Elements that stand for a far cluster of lamps.
 const CHOSEN: usize = 4;
 
@@ -127,8 +126,8 @@ impl Gatherer<'_> {
                     seen[lamp] += weight / total * all / lamps[lamp].carries;
                 }
             }
-            if visible >= 1.0 {
-                self.look_at_others(to, &lamps, &owners, &mut seen, memory);
+            if self.light.apart && visible >= 1.0 {
+                self.look_at_each(to, &lamps, &owners, &mut seen, memory);
             }
             let tints = self.tints(&owners, lamps.len(), memory);
             let left = all * self.left_by(tints.last());
@@ -137,20 +136,17 @@ impl Gatherer<'_> {
             let each = lamps.iter().zip(&seen).enumerate();
             for (k, (lamp, &seen)) in each.filter(|(_, (_, seen))| **seen > 0.0) {
                 let tint = tints.get(k).or(tints.last());
-                self.see(to, lamp.id, lamp.factor, seen, tint, of, out);
+                self.see(to, lamp.id, lamp.factor, Seen::of(seen), tint, of, out);
             }
         }
         memory.lamps = lamps;
         memory.lamps.clear();
     }
 
-    /// Where every ray found its lamp, a lamp that none went to counts as seen, too: it is faint beside the others. So faint lamps shone
-    /// through walls: one of 1/50 in the room next door brought five times the light of it that is there. If those that no ray went to are
-    /// few and bring no more together than [`FAINT`] rays, each gets one.
-    ///
-    /// Where brightness has two meanings, what is seen and what is excited, each of their elements does: a lamp behind a wall
-    /// that is faint beside one of ultraviolet light doubled what is seen in its booth.
-    fn look_at_others(
+    /// Where every ray found its lamp, a lamp that none went to counts as seen, too: it is faint beside the others. Not so where brightness
+    /// has two meanings, what is seen and what is excited: a lamp behind a wall that is faint beside one of ultraviolet light doubled what is
+    /// seen in its booth. Such lamps get a ray each.
+    fn look_at_each(
         &self,
         to: &Receiver,
         lamps: &[Lamp],
@@ -158,20 +154,9 @@ impl Gatherer<'_> {
         seen: &mut [f64],
         memory: &mut Memory,
     ) {
-        let mut asked = vec![false; lamps.len()];
-        owners.iter().for_each(|&k| asked[k] = true);
-        if asked.iter().all(|&asked| asked) {
-            return;
-        }
-        let each = 0..lamps.len();
-        let looked = match self.light.apart {
-            true => each.filter(|&k| !asked[k]).map(|k| (k, vec![k])).collect(),
-            false => self.faint_lamps(to, lamps, &asked, owners.len()),
-        };
-        for (k, of) in looked {
-            let lamp = &lamps[k];
+        for (k, lamp) in lamps.iter().enumerate() {
             let node = self.tree.node(lamp.id);
-            let Some(element) = self.tree.element(node) else {
+            let Some(element) = self.tree.element(node).filter(|_| !owners.contains(&k)) else {
                 continue;
             };
             let parts = parts_of(to, element.corners, lamp.factor);
@@ -180,60 +165,9 @@ impl Gatherer<'_> {
                 let planes = [to.plane, self.tree.face_plane[element.face as usize]];
                 memory.rays += 1;
                 let hidden = (self.sight).blocks_one(&Segment::new(to.point, point, planes));
-                let share = if hidden { 0.0 } else { 1.0 };
-                of.into_iter().for_each(|k| seen[k] = share);
+                seen[k] = if hidden { 0.0 } else { 1.0 };
             }
         }
-    }
-
-    /// Surfaces of which no element was asked, if they are few and faint: of each an element chosen by what it would bring, and all.
-    fn faint_lamps(
-        &self,
-        to: &Receiver,
-        lamps: &[Lamp],
-        asked: &[bool],
-        rays: usize,
-    ) -> Vec<(usize, Vec<usize>)> {
-        let surface = |lamp: &Lamp| {
-            let element = self.tree.element(self.tree.node(lamp.id))?;
-            let face = self.tree.faces[element.face as usize];
-            Some(self.sight.mesh.origin[face.triangle as usize].0)
-        };
-        let mut known = Vec::new();
-        for (lamp, _) in lamps.iter().zip(asked).filter(|(_, asked)| **asked) {
-            let surface = surface(lamp);
-            if !known.contains(&surface) {
-                known.push(surface);
-            }
-        }
-        let all: f64 = lamps.iter().map(|lamp| lamp.carries).sum();
-        let mut left = FAINT / rays.max(1) as f64 * all;
-        let mut others: Vec<(Option<u32>, Vec<usize>)> = Vec::new();
-        for (k, lamp) in lamps.iter().enumerate().filter(|(k, _)| !asked[*k]) {
-            let surface = surface(lamp);
-            if known.contains(&surface) {
-                continue;
-            }
-            left -= lamp.carries;
-            if left < 0.0 {
-                return Vec::new();
-            }
-            match others.iter_mut().find(|(other, _)| *other == surface) {
-                Some((_, of)) => of.push(k),
-                None => others.push((surface, vec![k])),
-            }
-        }
-        let chosen = |of: Vec<usize>| {
-            let turn = sequence02(0, hash(to.seed ^ 3, u64::from(lamps[of[0]].id)))[0];
-            let bring: f64 = of.iter().map(|&k| lamps[k].carries).sum();
-            let mut left = turn * bring;
-            let found = of.iter().copied().find(|&k| {
-                left -= lamps[k].carries;
-                left < 0.0
-            });
-            (found.unwrap_or(of[0]), of)
-        };
-        others.into_iter().map(|(_, of)| chosen(of)).collect()
     }
 
     /// What panes leave of each lamp's light, by the rays that reached it, and last of all lamps' light together, which stands for

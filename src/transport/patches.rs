@@ -6,6 +6,7 @@
 
 use super::gatherer::{CLOSE, Gatherer, Lamp, Linked, Memory, Of};
 use super::receiver::{Gathered, Receiver};
+use super::slope::Seen;
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
 use crate::light::{Passage, Tint, accumulate};
@@ -163,12 +164,21 @@ impl Gatherer<'_> {
         let (reflected, emitted) = self.brightness(id, of);
         let carries = factor * (reflected + emitted);
         if clear {
-            self.see(to, id, factor, 1.0, None, of, out);
-        } else if let Some(visible) =
+            self.see(to, id, factor, Seen::of(1.0), None, of, out);
+        } else if let Some((share, clipped)) =
             self.visible(to, (id, way, v), factor, carries, emitted > 0.0, memory)
         {
             let tint = self.tint(memory);
-            self.see(to, id, factor, visible, tint.as_ref(), of, out);
+            let parts = Some(&memory.clipper).filter(|_| clipped && share < 1.0);
+            self.see(
+                to,
+                id,
+                factor,
+                Seen { share, parts },
+                tint.as_ref(),
+                of,
+                out,
+            );
         }
     }
 
@@ -199,15 +209,15 @@ impl Gatherer<'_> {
         to: &Receiver,
         id: u32,
         factor: f64,
-        visible: f64,
+        seen: Seen,
         tint: Option<&Passage>,
         of: Of,
         out: &mut Gathered,
     ) {
-        self.add(id, factor, visible, tint, of, out);
+        self.add(id, factor, seen.share, tint, of, out);
         // Behind panes leaves are even: where there are any, patches are only gathered so if they glare.
         if of != Of::Emitted && tint.is_none() {
-            self.slope(to, id, factor, visible, CLEAR_SHARE * self.tolerance, out);
+            self.slope(to, id, factor, seen, CLEAR_SHARE * self.tolerance, out);
         }
     }
 
@@ -336,8 +346,9 @@ impl Gatherer<'_> {
         Some((factor, visible))
     }
 
-    /// Visible share of a polygon patch; none yet for a lamp that rays must find, see `lamps_together`. `carries` is what it
-    /// would bring unblocked, share of white. What is clipped exactly knows no filters: behind panes rays decide.
+    /// Visible share of a polygon patch, and whether it was clipped, so that the clipper has its parts; none yet for a lamp that rays must
+    /// find, see `lamps_together`. `carries` is what it would bring unblocked, share of white. What is clipped exactly knows no filters:
+    /// behind panes rays decide.
     fn visible(
         &self,
         to: &Receiver,
@@ -346,10 +357,10 @@ impl Gatherer<'_> {
         carries: f64,
         lamp: bool,
         memory: &mut Memory,
-    ) -> Option<f64> {
+    ) -> Option<(f64, bool)> {
         let node = self.tree.node(id);
         let Some(element) = self.tree.element(node) else {
-            return Some(1.0);
+            return Some((1.0, false));
         };
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
@@ -357,7 +368,7 @@ impl Gatherer<'_> {
         if clips && let Way::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
-                return Some((seen / factor).min(1.0));
+                return Some(((seen / factor).min(1.0), true));
             }
         }
         if lamp {
@@ -367,10 +378,10 @@ impl Gatherer<'_> {
                     .sight
                     .view_from(to.point, to.normal, &element.corners, planes)
                 {
-                    View::Clear => return Some(1.0),
+                    View::Clear => return Some((1.0, false)),
                     View::Listed(list) => {
                         if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
-                            return Some((seen / factor).min(1.0));
+                            return Some(((seen / factor).min(1.0), true));
                         }
                     }
                     View::Crowded => {}
@@ -383,11 +394,24 @@ impl Gatherer<'_> {
             });
             return None;
         }
+        let share = self.visible_by_rays(to, (id, known), (element, planes), carries, memory);
+        Some((share, false))
+    }
+
+    /// Visible share of an element by rays; `known`: what its link found.
+    fn visible_by_rays(
+        &self,
+        to: &Receiver,
+        (id, known): (u32, f32),
+        (element, planes): (&Element, [u32; 2]),
+        carries: f64,
+        memory: &mut Memory,
+    ) -> f64 {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
         let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
         let count = wanted.clamp(RAYS[0], RAYS[1]);
         let shift = pattern(to.seed, id, 2);
-        let normal = node.normal;
+        let normal = self.tree.node(id).normal;
         memory.segments.clear();
         memory.weights.clear();
         for k in 0..count {
@@ -407,7 +431,7 @@ impl Gatherer<'_> {
         let seen = open_weight(&memory.weights, &memory.blocked);
         // Where no ray gets through, nothing does: what other parts of the element see must not leak in.
         if seen <= 0.0 {
-            return Some(0.0);
+            return 0.0;
         }
         // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
         // blurs is bounded by the size of the receiving element.
@@ -416,7 +440,7 @@ impl Gatherer<'_> {
         } else {
             PRIOR
         };
-        Some((seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior))
+        (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
     }
 
     /// Factor of what is seen past the listed triangles, exactly; `whole` is that of the whole patch. None where that takes too

@@ -140,8 +140,3 @@ fn dimmed_is_baked(room: &str, kind: &str, lamp: &str) {
 fn a_room_behind_panes_is_dimmed_as_it_is_baked() {
     dimmed_is_baked("glazed", "lights", "sun");
 }
-
-#[test]
-fn a_room_with_mirrors_is_dimmed_as_it_is_baked() {
-    dimmed_is_baked("mirrored", "materials", "bulb");
-}
