@@ -4,7 +4,7 @@
 mod built;
 mod common;
 
-use built::{Room, sphere};
+use built::{Room, close, sphere};
 use glam::{DVec3, dvec3};
 use haarlight::audit::{Audit, Reference as Traced, Report};
 use haarlight::color::{KM, Observer};
@@ -50,14 +50,6 @@ fn baked(scene: Scene, error: f64) -> Bake {
     let mut bake = Bake::new(scene, settings(error));
     bake.run();
     bake
-}
-
-fn close(a: f64, b: f64, tolerance: f64, what: &str) {
-    assert!(
-        (a - b).abs() <= tolerance * b.abs(),
-        "{what}: {a} for {b}, off by {:e}",
-        a / b - 1.0
-    );
 }
 
 /// Three tristimulus values.

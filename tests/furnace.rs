@@ -4,7 +4,7 @@
 #[path = "common/built.rs"]
 mod built;
 
-use built::{Room, luminous, sphere};
+use built::{Room, baked, luminous, sphere};
 use glam::{DVec3, dvec3};
 use haarlight::link::exchange;
 use haarlight::scene::Scene;
@@ -12,12 +12,6 @@ use haarlight::solve::{Bake, Closed, Settings};
 use haarlight::spectrum::{Grid, LEAVES};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-
-fn baked(scene: Scene) -> Bake {
-    let mut bake = Bake::new(scene, Settings::default());
-    bake.run();
-    bake
-}
 
 /// Lux on every leaf of the hierarchy, with its area.
 fn lux(bake: &Bake) -> Vec<(f64, f64)> {

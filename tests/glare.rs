@@ -3,23 +3,15 @@
 #[path = "common/built.rs"]
 mod built;
 
-use built::Room;
+use built::{Room, baked_to};
 use glam::{DVec3, dvec3};
 use haarlight::color::position_index;
+use haarlight::scene::LightKind;
 use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
-use haarlight::scene::{LightKind, Scene};
-use haarlight::solve::{Bake, Settings};
 use std::f64::consts::PI;
 
-fn baked(scene: Scene) -> Bake {
-    let settings = Settings {
-        error: 1.0,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(scene, settings);
-    bake.run();
-    bake
-}
+/// Errors of bakes.
+const ERROR: f64 = 1.0;
 
 /// A grey room of 6 m by 4 m by 3 m with a panel of 60 cm at its ceiling.
 fn room() -> Room {
@@ -55,7 +47,7 @@ fn the_rating_of_a_panel_is_the_formula() {
     let mut room = room();
     // A light without extent has no luminance: it is named, and adds to the background alone.
     room.punctual(LightKind::Point, dvec3(1.0, 2.0, 1.0), DVec3::NEG_Y, 50.0);
-    let bake = baked(room.scene());
+    let bake = baked_to(ERROR, room.scene());
     let seen = bake.glare(EYE, AHEAD);
     let [(_, bright)] = &seen.luminaires[..] else {
         panic!("{seen:?}");
@@ -109,7 +101,7 @@ fn what_hides_a_panel_takes_its_glare() {
             2.5 * DVec3::Z,
             paint,
         );
-        baked(room.scene()).glare(EYE, AHEAD)
+        baked_to(ERROR, room.scene()).glare(EYE, AHEAD)
     };
     let half = board(true);
     let share = half.luminaires[0].1.solid_angle / panel().0;
@@ -119,7 +111,7 @@ fn what_hides_a_panel_takes_its_glare() {
     assert_eq!(none.rating, Some(f64::NEG_INFINITY));
     // Nor does one see what is behind.
     assert!(
-        baked(room().scene())
+        baked_to(ERROR, room().scene())
             .glare(EYE, DVec3::Z)
             .luminaires
             .is_empty()
@@ -151,8 +143,8 @@ fn daylight_factors_are_those_of_the_sky_alone() {
     let alone = scene.under_sky_alone().unwrap();
     assert!(alone.under_sky_alone().is_none());
     let point = [(dvec3(0.0, 0.0, 0.02), DVec3::Y)];
-    let factor = baked(alone).probe(&point)[0].xyz[1] / outside;
+    let factor = baked_to(ERROR, alone).probe(&point)[0].xyz[1] / outside;
     assert!((factor - 0.5).abs() < 2e-3, "{factor}");
     // The lamp shines all the same.
-    assert!(baked(scene).probe(&point)[0].xyz[1] > 0.6 * outside);
+    assert!(baked_to(ERROR, scene).probe(&point)[0].xyz[1] > 0.6 * outside);
 }

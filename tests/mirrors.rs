@@ -3,7 +3,7 @@
 #[path = "common/built.rs"]
 mod built;
 
-use built::Room;
+use built::{Room, baked, close};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
@@ -27,22 +27,12 @@ fn copper() -> Leaves {
     std::array::from_fn(|k| 0.45 + 0.5 / (1.0 + (-(k as f64 - 32.0) / 3.0).exp()))
 }
 
-fn baked(room: Room) -> Bake {
-    let mut bake = Bake::new(room.scene(), Settings::default());
-    bake.run();
-    bake
-}
-
 fn leaves(bake: &Bake, points: &[(DVec3, DVec3)]) -> Vec<Leaves> {
     bake.probe(points).iter().map(|p| p.leaves).collect()
 }
 
 fn lux(bake: &Bake, points: &[(DVec3, DVec3)]) -> Vec<f64> {
     bake.probe(points).iter().map(|p| p.xyz[1]).collect()
-}
-
-fn close(a: f64, b: f64, tolerance: f64, what: &str) {
-    assert!((a - b).abs() <= tolerance * b.abs(), "{what}: {a} for {b}");
 }
 
 /// A black floor of 4 m x 4 m, and an upright mirror of 3 m height over its edge x = 0.
@@ -80,7 +70,7 @@ fn a_lamp_beside_a_mirror_shines_twice() {
         let mut room = beside([reflectance; LEAVES]);
         let lamp = dvec3(0.8, 1.5, 2.0);
         room.point(lamp, 4.0 * PI * 100.0);
-        let bake = baked(room);
+        let bake = baked(room.scene());
         assert!(bake.plan().runs(Kind::Mirrors));
         let image = dvec3(-0.8, 1.5, 2.0);
         for (got, place) in lux(&bake, &floor()).into_iter().zip(floor()) {
@@ -101,7 +91,7 @@ fn panels_and_the_sun_shine_twice() {
         [[low, 1.8], [high, 1.8], [high, 2.2], [low, 2.2]].map(|[x, z]| dvec3(x, 1.5, z))
     };
     room.polygon(&corners([0.6, 1.0]), panel);
-    let bake = baked(room);
+    let bake = baked(room.scene());
     for (got, (point, normal)) in lux(&bake, &floor()).into_iter().zip(floor()) {
         let seen = |x| lambert_polygon(point, normal, &corners(x)).abs();
         let want = 1000.0 * (seen([0.6, 1.0]) + BRIGHT * seen([-1.0, -0.6]));
@@ -110,7 +100,7 @@ fn panels_and_the_sun_shine_twice() {
     let mut room = beside([BRIGHT; LEAVES]);
     let toward = dvec3(0.5, 1.0, 0.2).normalize();
     room.punctual(LightKind::Directional, DVec3::ONE, -toward, 500.0);
-    for (k, got) in lux(&baked(room), &floor()).into_iter().enumerate() {
+    for (k, got) in lux(&baked(room.scene()), &floor()).into_iter().enumerate() {
         // The last lies where the light over the top of the mirror goes.
         let times = if k == 3 { 1.0 } else { 1.0 + BRIGHT };
         close(got, 500.0 * toward.y * times, 1e-4, "lux by the sun");
@@ -125,7 +115,7 @@ fn two_mirrors_at_a_right_angle_make_three_lamps() {
     room.quad(DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 3.0, other);
     let lamp = dvec3(0.8, 1.5, 1.2);
     room.point(lamp, 4.0 * PI * 100.0);
-    let bake = baked(room);
+    let bake = baked(room.scene());
     let places = [(0.3, 0.4), (1.0, 1.0), (2.0, 0.7)].map(|(x, z)| (dvec3(x, 0.0, z), DVec3::Y));
     for (got, place) in lux(&bake, &places).into_iter().zip(places) {
         let at = |x: f64, z: f64| lamp * dvec3(x, 1.0, z);
@@ -182,7 +172,7 @@ fn a_periscope_shows_a_lamp() {
     let panel = room.lamp(0.0, 1000.0);
     let corners = [[-0.1, -0.1], [-0.1, 0.1], [0.1, 0.1], [0.1, -0.1]];
     room.polygon(&corners.map(|[y, z]| dvec3(2.0, 2.0 + y, z)), panel);
-    let bake = baked(room);
+    let bake = baked(room.scene());
     for (y, z) in [(0.0, 0.0), (0.05, -0.1)] {
         let eye = dvec3(-1.0, y, z);
         let got = lux(&bake, &[(eye, DVec3::X)])[0];
@@ -352,11 +342,11 @@ fn the_path_tracer_agrees() {
     let places = upwards(&[(0.5, 2.0), (1.5, 1.0), (2.2, 3.2)]);
     let mut room = furnished([0.9; LEAVES], 0.6);
     room.point(dvec3(1.2, 2.2, 2.4), 1000.0);
-    agrees(&baked(room), &places, 1 << 15, 0.01);
+    agrees(&baked(room.scene()), &places, 1 << 15, 0.01);
     let mut room = furnished(copper(), 0.6);
     let panel = room.lamp(0.2, 2000.0);
     room.quad(dvec3(1.0, 2.99, 1.6), DVec3::X * 0.6, DVec3::Z * 0.6, panel);
-    agrees(&baked(room), &places, 1 << 16, 0.01);
+    agrees(&baked(room.scene()), &places, 1 << 16, 0.01);
 }
 
 /// A ball that mirrors: lamps are found in it by rays alone. One point is noisy, the mean of many is not.
@@ -370,7 +360,7 @@ fn a_ball_agrees_within_its_noise() {
     room.mesh(corners, triangles, mirror);
     let panel = room.lamp(0.2, 2000.0);
     room.quad(dvec3(0.6, 2.99, 0.6), DVec3::X * 1.6, DVec3::Z * 1.6, panel);
-    let bake = baked(room);
+    let bake = baked(room.scene());
     let at = |k: i32| (0.5 + 0.6 * f64::from(k % 6), 0.5 + 0.6 * f64::from(k / 6));
     let places: Vec<(f64, f64)> = (0..36).map(at).collect();
     let points = upwards(&places);
@@ -395,7 +385,7 @@ fn no_light_is_lost_or_made() {
         let walls = [mirror, paint, paint, paint, paint, paint];
         room.hollow(DVec3::ZERO, dvec3(4.0, 3.0, 4.0), walls);
         room.point(dvec3(1.7, 1.6, 2.2), 1000.0);
-        let flux = baked(room).rounds().last().unwrap().flux;
+        let flux = baked(room.scene()).rounds().last().unwrap().flux;
         println!("{rho}: {flux:?}");
         close(flux.received_lm, 1000.0, 0.01, "received");
         close(flux.absorbed_lm, 1000.0, 0.01, "absorbed");
@@ -413,7 +403,7 @@ fn a_box_of_mirrors_agrees() {
     let panel = room.lamp(0.0, 1000.0);
     room.block(dvec3(1.5, 1.4, 2.0), dvec3(1.9, 1.6, 2.4), panel);
     let up = upwards(&[(1.0, 1.0), (2.0, 2.0), (3.5, 0.4)]);
-    agrees(&baked(room), &up, 1 << 14, 0.02);
+    agrees(&baked(room.scene()), &up, 1 << 14, 0.02);
 }
 
 /// Nothing is a mirror: nothing is asked of them.

@@ -3,22 +3,14 @@
 #[path = "common/built.rs"]
 mod built;
 
-use built::Room;
+use built::{Room, baked_to};
 use glam::{DVec3, dvec3};
 use haarlight::hierarchy::Mesh;
-use haarlight::scene::{LightKind, Scene};
-use haarlight::solve::{Bake, Settings};
+use haarlight::scene::LightKind;
 use std::f64::consts::PI;
 
-fn baked(scene: Scene) -> Bake {
-    let settings = Settings {
-        error: 1.0,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(scene, settings);
-    bake.run();
-    bake
-}
+/// Errors of bakes.
+const ERROR: f64 = 1.0;
 
 /// The pool of a cone of 1 degree is 5 cm across, on a floor of 24 m2 in two triangles.
 #[test]
@@ -31,7 +23,7 @@ fn narrow_spots_light_what_their_lumens_say() {
         let spot = LightKind::Spot { inner, outer };
         room.punctual(spot, dvec3(3.0, 2.8, 2.0), dvec3(0.6, -1.0, 0.2), 10_000.0);
         let lumens = 10_000.0 * 2.0 * PI * (1.0 - outer.cos()) / 3.0;
-        let bake = baked(room.scene());
+        let bake = baked_to(ERROR, room.scene());
         for round in bake.rounds() {
             let share = round.flux.received_lm / lumens;
             assert!((share - 1.0).abs() < 0.01, "{degrees} degrees: {share}");
@@ -68,7 +60,7 @@ fn sun_through_a_small_hole_is_found_and_counted() {
     let direction = dvec3(0.3, -1.0, 0.4).normalize();
     room.punctual(LightKind::Directional, DVec3::ZERO, direction, 100_000.0);
     let lumens = 100_000.0 * hole * hole * -direction.y;
-    let bake = baked(room.scene());
+    let bake = baked_to(ERROR, room.scene());
     let share = bake.rounds().last().unwrap().flux.received_lm / lumens;
     // .979 is found; the rest is lost on leaves along the edge of the patch. Without rays from the sun it is 0.
     assert!((share - 1.0).abs() < 0.03, "{share}");
@@ -99,7 +91,7 @@ fn what_lies_in_a_floor_is_raised() {
     );
     assert!(Mesh::new(&with_carpet(0.01)).raised.is_empty());
     let lux = [flush, with_carpet(0.002)].map(|scene| {
-        let bake = baked(scene);
+        let bake = baked_to(ERROR, scene);
         let received = bake.rounds().last().unwrap().flux.received_lm;
         assert!((received / 1000.0 - 1.0).abs() < 0.02, "{received}");
         bake.probe(&[(dvec3(2.0, 2.49, 0.2), DVec3::NEG_Y)])[0].xyz[1]
@@ -131,7 +123,7 @@ fn no_sun_comes_through_a_face_with_leaning_normals() {
     let leaning = dvec3(-(2.0 * low).sin(), -(2.0 * low).cos(), 0.0);
     assert!(leaning.dot(direction) < 0.0);
     scene.surfaces[0].normals = Some(vec![leaning.as_vec3(); 4]);
-    let baked = baked(scene).baked(&|_, _| ());
+    let baked = baked_to(ERROR, scene).baked(&|_, _| ());
     for part in baked.surfaces.iter().filter(|part| part.surface == 0) {
         for vertex in &part.vertices {
             assert_eq!(vertex.irradiance, [0.0; 3]);

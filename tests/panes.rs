@@ -5,7 +5,7 @@ mod built;
 #[path = "common/daylit.rs"]
 mod daylit;
 
-use built::Room;
+use built::{Room, baked, close};
 use daylit::glass_of_the_report;
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
@@ -65,12 +65,6 @@ fn level(room: &mut Room, height: f64, pane: usize) {
     room.quad(dvec3(0.0, height, 0.0), z, x, pane);
 }
 
-fn baked(room: Room) -> Bake {
-    let mut bake = Bake::new(room.scene(), Settings::default());
-    bake.run();
-    bake
-}
-
 fn leaves(bake: &Bake, points: &[DVec3]) -> Vec<Leaves> {
     let up: Vec<_> = points.iter().map(|p| (*p, DVec3::Y)).collect();
     bake.probe(&up).iter().map(|p| p.leaves).collect()
@@ -82,20 +76,16 @@ fn places() -> Vec<DVec3> {
         .to_vec()
 }
 
-fn close(a: f64, b: f64, tolerance: f64, what: &str) {
-    assert!((a - b).abs() <= tolerance * b.abs(), "{what}: {a} for {b}");
-}
-
 /// Index 1 and nothing absorbed: the room is as it is where the pane stands outside, and as it is by exact polygons to what was asked
 /// for.
 #[test]
 fn a_loss_free_pane_changes_nothing() {
-    let exact = baked(lit(0.5));
+    let exact = baked(lit(0.5).scene());
     let [inside, outside] = [1.0, -1.0].map(|height| {
         let mut room = lit(0.5);
         let pane = room.pane(1.0, CLEAR);
         level(&mut room, height, pane);
-        leaves(&baked(room), &places())
+        leaves(&baked(room.scene()), &places())
     });
     for ((a, b), exact) in inside.iter().zip(&outside).zip(leaves(&exact, &places())) {
         close(a[30], b[30], 1e-6, "lux");
@@ -111,7 +101,7 @@ fn lamps_shine_through_slabs() {
         let power = room.power(0)[30];
         let pane = room.pane(1.5, [inside; LEAVES]);
         level(&mut room, 1.0, pane);
-        let bake = baked(room);
+        let bake = baked(room.scene());
         for (place, got) in places().iter().zip(leaves(&bake, &places())) {
             let d = dvec3(2.0, 2.0, 2.0) - *place;
             let cosine = d.y / d.length();
@@ -141,9 +131,9 @@ fn three_panes_in_a_row_multiply() {
         for (k, pane) in panes.into_iter().enumerate().take(count) {
             level(&mut room, 0.5 + 0.2 * k as f64, pane);
         }
-        leaves(&baked(room), &places()[..1])[0]
+        leaves(&baked(room.scene()), &places()[..1])[0]
     });
-    let plain = leaves(&baked(lit(0.0)), &places()[..1])[0];
+    let plain = leaves(&baked(lit(0.0).scene()), &places()[..1])[0];
     let (amber, blue) = (amber(), blue());
     let xyz = |leaves: &dyn Fn(usize) -> f64| {
         Observer::cie1931()
@@ -188,7 +178,7 @@ fn however_it_is_modelled_a_pane_is_one() {
                     room.mesh(corners.collect(), quads.collect(), pane);
                 }
             }
-            leaves(&baked(room), &places()[1..2])[0]
+            leaves(&baked(room.scene()), &places()[1..2])[0]
         })
         .collect();
     for other in &got[1..] {
@@ -225,7 +215,7 @@ fn the_path_tracer_agrees() {
     let pane = room.pane(1.5, amber());
     // An upright pane between two halves, the lamp in one of them.
     room.quad(dvec3(2.5, 0.0, 0.0), DVec3::Y * 3.0, DVec3::Z * 4.0, pane);
-    agrees(&baked(room), &[(1.0, 2.0), (3.2, 2.0), (3.6, 0.7)]);
+    agrees(&baked(room.scene()), &[(1.0, 2.0), (3.2, 2.0), (3.6, 0.7)]);
 }
 
 /// The sun through a pane, and a spot.
@@ -247,7 +237,7 @@ fn parallel_light_and_spots_pass() {
                 let pane = room.pane(1.5, [0.9; LEAVES]);
                 level(&mut room, 1.5, pane);
             }
-            leaves(&baked(room), &[dvec3(2.4, 0.0, 2.2)])[0][30]
+            leaves(&baked(room.scene()), &[dvec3(2.4, 0.0, 2.2)])[0][30]
         };
         let cosine = match kind {
             LightKind::Spot { .. } => 3.0 / dvec3(0.4, 3.0, 0.2).length(),
@@ -470,13 +460,13 @@ fn cards_let_light_through_by_texel() {
 /// A room without panes asks nothing of them; of one with panes the record says what they keep.
 #[test]
 fn panes_that_are_not_there_take_nothing() {
-    let bake = baked(lit(0.5));
+    let bake = baked(lit(0.5).scene());
     assert!(!bake.plan().runs(Kind::Panes));
     assert_eq!(bake.rounds()[0].flux.sent.in_panes, 0.0);
     let mut room = lit(0.5);
     let pane = room.pane(1.5, CLEAR);
     level(&mut room, 1.0, pane);
-    let bake = baked(room);
+    let bake = baked(room.scene());
     assert!(bake.plan().runs(Kind::Panes));
     let sent = bake.rounds()[0].flux.sent;
     assert!((0.02..0.2).contains(&sent.in_panes), "{sent:?}");

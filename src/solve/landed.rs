@@ -7,8 +7,8 @@ use std::collections::HashMap;
 /// So far must what landed stand out of its noise, standard deviations: ten rays where points found nothing.
 const SIGMAS: f64 = 3.0;
 
-/// From so many rays on a leaf is looked at, however small: four are .02 % of the light of all lamps.
-const MANY: f64 = 4.0;
+/// From so many rays on a leaf is looked at, however small: eight are .02 % of the light of all lamps.
+const MANY: f64 = 8.0;
 
 /// Where a ray from a lamp met a front.
 #[derive(Debug, Clone, Copy)]

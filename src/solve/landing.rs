@@ -1,38 +1,70 @@
-//! Where the light of lamps lands, by rays from the lamps themselves: what points of leaves may have missed.
+//! Where the light of lamps goes first, by rays from the lamps themselves: onto fronts, onto black backs, into panes, or out of the
+//! room. Nothing that receives light has a part in it, so that what leaves are found to receive can be held against it.
 //!
-//! Points of a large leaf pass by the pool of a narrow spot, or the sun that a small hole lets in, and find the leaf evenly dark: nothing
-//! would ever split it. Rays from the lamp cannot miss it. They decide only what is split; what leaves receive is found at points.
+//! Where it lands tells what points of leaves may have missed: those of a large leaf pass by the pool of a narrow spot, or the sun that
+//! a small hole lets in, and find the leaf evenly dark; nothing would ever split it. Rays from the lamp cannot miss it. They decide only
+//! what is split; what leaves receive is found at points.
 
+use super::flux::{Closed, Sent};
 use super::landed::Landing;
 use super::room::Room;
-use super::sent::TOGETHER;
-use crate::geometry::NO_PLANE;
 use crate::geometry::sampling::{sequence02, tangents};
+use crate::geometry::{Hit, NO_PLANE};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::Lanes;
 use crate::light::{Filters, Glass};
 use crate::link::Sight;
 use glam::{DVec3, Vec3};
 
-/// Rays from lamps: a leaf that is to be split for it receives at least .06 % of all their light.
-const RAYS: u32 = 16_384;
-/// Cells across the room, seen from where parallel light comes from, and as many rays again into those where it gets in: a
-/// hole of a hundredth of the room is seen.
+/// Rays from lamps: an error of about .1 % of the flux.
+const RAYS: u32 = 32_768;
+/// Rays that go together.
+const TOGETHER: usize = 16;
+/// Cells across the room, seen from where parallel light comes from, and half as many rays as those of lamps again into those where it
+/// gets in: a hole of a hundredth of the room is seen.
 const CELLS: usize = 256;
 /// The most parts of a cell along each side.
 const PARTS: usize = 16;
-/// What follows rays to where they land.
+
+/// A ray from a lamp: start, direction, and what flux it stands for.
+type Ray = (DVec3, DVec3, [f64; 3]);
+
+/// Where a ray from a lamp ended.
+struct End {
+    /// What it met; none if it left the room.
+    hit: Option<Hit>,
+    /// Entry of the hierarchy's faces that it met; [`NONE`] for a black back or nothing.
+    entry: u32,
+    /// Share of its light that panes let through.
+    through: f64,
+}
+
+impl End {
+    /// What a flux leaves where the ray landed, if that is a front.
+    fn landing(&self, flux: [f64; 3]) -> Option<Landing> {
+        let hit = self.hit.filter(|_| self.entry != NONE)?;
+        let [u, v] = hit.uv;
+        Some(Landing {
+            entry: self.entry,
+            weights: if hit.from_behind { [v, u] } else { [u, v] },
+            flux: flux.map(|x| (x * self.through) as f32),
+        })
+    }
+}
+
+/// What follows rays to where they end.
 struct Follower<'a> {
     tree: &'a Tree,
     sight: &'a Sight<'a>,
     glass: Option<Glass<'a>>,
+    /// Past all of the room.
     reach: f32,
-    found: Vec<Landing>,
 }
 
 impl Follower<'_> {
-    /// Rays of one lamp: start, direction, and what flux they stand for. Says which met a front.
-    fn follow(&mut self, rays: &[(DVec3, DVec3, [f64; 3])], plane: u32, met: &mut Vec<bool>) {
+    /// Where rays of one plane end.
+    fn follow(&self, rays: &[Ray], plane: u32) -> Vec<End> {
+        let mut ends = Vec::with_capacity(rays.len());
         for rays in rays.chunks(TOGETHER) {
             // The last packet is filled up with its first ray.
             let ray = |k: usize| rays.get(k).unwrap_or(&rays[0]);
@@ -40,32 +72,25 @@ impl Follower<'_> {
             let directions: [Vec3; TOGETHER] = std::array::from_fn(|k| ray(k).1.as_vec3());
             let mut hits = [None; TOGETHER];
             self.sight.meet(&from, &directions, plane, &mut hits);
-            for (k, &(_, _, flux)) in rays.iter().enumerate() {
-                let hit = hits[k].map(|hit| (hit, self.tree.met(&hit)));
-                let Some((hit, entry)) = hit.filter(|hit| hit.1 != NONE) else {
-                    met.push(false);
-                    continue;
-                };
-                met.push(true);
-                let end = from[k] + hit.t.min(self.reach) * directions[k];
-                let through = self
-                    .glass
-                    .map_or(1.0, |glass| glass.brightness(from[k], end));
-                let [u, v] = hit.uv;
-                self.found.push(Landing {
-                    entry,
-                    weights: if hit.from_behind { [v, u] } else { [u, v] },
-                    flux: flux.map(|x| (x * through) as f32),
-                });
-            }
+            ends.extend((0..rays.len()).map(|k| {
+                let hit = hits[k];
+                let reach = hit.map_or(self.reach, |hit| hit.t.min(self.reach));
+                let end = from[k] + reach * directions[k];
+                End {
+                    hit,
+                    entry: hit.map_or(NONE, |hit| self.tree.met(&hit)),
+                    through: (self.glass).map_or(1.0, |glass| glass.brightness(from[k], end)),
+                }
+            }));
         }
+        ends
     }
 
-    /// Parallel light of an irradiance across its rays: by a grid of cells, and once more by finer ones where it gets in.
-    fn parallel(&mut self, direction: DVec3, irradiance: [f64; 3], radius: f64) {
+    /// Where parallel light of an irradiance across its rays lands: by a grid of cells, and once more by finer ones where it gets in.
+    fn parallel(&self, direction: DVec3, irradiance: [f64; 3], radius: f64) -> Vec<Landing> {
         let [across, up] = tangents(direction);
         let side = 2.0 * radius / CELLS as f64;
-        let rays = |cells: &[usize], parts: usize| -> Vec<_> {
+        let rays = |cells: &[usize], parts: usize| -> Vec<Ray> {
             let part = side / parts as f64;
             let flux = irradiance.map(|e| e * part * part);
             let within = |&cell: &usize| {
@@ -79,88 +104,110 @@ impl Follower<'_> {
             };
             cells.iter().flat_map(within).collect()
         };
-        let (before, mut met) = (self.found.len(), Vec::new());
+        let landings = |rays: &[Ray], ends: &[End]| {
+            let landed = rays
+                .iter()
+                .zip(ends)
+                .filter_map(|(ray, end)| end.landing(ray.2));
+            landed.collect()
+        };
         let all: Vec<usize> = (0..CELLS * CELLS).collect();
-        self.follow(&rays(&all, 1), NO_PLANE, &mut met);
+        let coarse = rays(&all, 1);
+        let ends = self.follow(&coarse, NO_PLANE);
         // Where light gets in or a cell beside gets some.
         let near = |&cell: &usize| {
             let (x, y) = (cell % CELLS, cell / CELLS);
             let rows = y.saturating_sub(1)..(y + 2).min(CELLS);
             rows.into_iter().any(|y| {
                 let mut columns = x.saturating_sub(1)..(x + 2).min(CELLS);
-                columns.any(|x| met[y * CELLS + x])
+                columns.any(|x| ends[y * CELLS + x].entry != NONE)
             })
         };
         let cells: Vec<usize> = all.into_iter().filter(near).collect();
-        let parts = (RAYS as usize / cells.len().max(1)).isqrt().min(PARTS);
-        if parts > 1 {
-            self.found.truncate(before);
-            self.follow(&rays(&cells, parts), NO_PLANE, &mut Vec::new());
+        let parts = (RAYS as usize / 2 / cells.len().max(1)).isqrt().min(PARTS);
+        if parts <= 1 {
+            return landings(&coarse, &ends);
         }
+        let fine = rays(&cells, parts);
+        landings(&fine, &self.follow(&fine, NO_PLANE))
     }
 }
 
-/// How far the white must fall short of what landed to be that of a room whose light was not found.
-const DIM: f64 = 0.5;
-
 impl Room {
-    /// The white of a room in which most light of lamps was not found yet: that of what landed, which is at least something.
-    pub(super) fn landed_white(&self, white: [f64; 3]) -> [f64; 3] {
-        let total: f64 = (self.mesh.faces.iter())
-            .map(|face| self.mesh.area[face.triangle as usize])
-            .sum();
-        let flux = self
+    /// The white of a room, which is at least that of what landed: light that is reflected adds to it. Before light is found that no
+    /// point has met yet, it is less.
+    pub(super) fn landed_white(&self, tree: &Tree, white: [f64; 3]) -> [f64; 3] {
+        let landed = self
             .landings
             .iter()
             .fold([0.0; 3], |sum: [f64; 3], landing| {
                 std::array::from_fn(|k| sum[k] + f64::from(landing.flux[k]))
             });
-        let landed = flux.map(|x| 2.0 * x / total.max(f64::MIN_POSITIVE));
-        if white[1] < DIM * landed[1] {
-            landed
-        } else {
-            white
+        let landed = landed.map(|x| 2.0 * x / tree.nodes[0].area.max(f64::MIN_POSITIVE));
+        match white[1] < landed[1] {
+            true => landed,
+            false => white,
         }
     }
 
-    /// Follows the light of lamps to where it lands.
-    pub(super) fn landings(
+    /// Follows the light of lamps: where all of it goes, and where it lands.
+    pub(super) fn follow_lamps(
         &self,
         tree: &Tree,
         lanes: &Lanes,
         filters: &Filters,
         sight: &Sight,
-    ) -> Vec<Landing> {
-        let mut follower = Follower {
+    ) -> (Sent, Vec<Landing>) {
+        let follower = Follower {
             tree,
             sight,
             glass: (sight.panes).map(|glazing| Glass { glazing, filters }),
             reach: 4.0 * self.mesh.half_size as f32,
-            found: Vec::new(),
         };
         let lamps = self.sending(tree, lanes);
         let all: f64 = lamps.iter().map(|lamp| lamp.0[1]).sum();
+        let (mut sent, mut landings) = (Sent::default(), Vec::new());
+        sent.lamps_lm = all;
         let mut first = 0;
         for (flux, lamp) in lamps {
-            let count = (f64::from(RAYS) * flux[1] / all).ceil() as u32;
+            // At least a packet, so that no lamp goes without.
+            let count = (f64::from(RAYS) * flux[1] / all).ceil() as usize;
+            let count = count.next_multiple_of(TOGETHER);
             let rays: Vec<_> = (first..first + count)
-                .map(|k| lamp.ray(self, tree, k))
+                .map(|k| lamp.ray(self, tree, k as u32))
                 .collect();
             let plane = rays[0].2;
             let weights: f64 = rays.iter().map(|ray| ray.3).sum();
             let each = |weight: f64| flux.map(|x| x * weight / weights.max(f64::MIN_POSITIVE));
-            let rays: Vec<_> = (rays.into_iter())
+            let rays: Vec<Ray> = (rays.into_iter())
                 .map(|(from, direction, _, weight)| (from, direction, each(weight)))
                 .collect();
-            follower.follow(&rays, plane, &mut Vec::new());
+            for (ray, end) in rays.iter().zip(follower.follow(&rays, plane)) {
+                let share = ray.2[1] / all;
+                let to = match end.hit {
+                    None => &mut sent.outside,
+                    Some(_) if end.entry == NONE => &mut sent.to_backs,
+                    Some(_) => &mut sent.to_fronts,
+                };
+                *to += share * end.through;
+                sent.in_panes += share * (1.0 - end.through);
+                landings.extend(end.landing(ray.2));
+            }
             first += count;
+        }
+        if all > 0.0 && self.closed == Closed::Yes && sight.panes.is_none() {
+            (sent.to_fronts, sent.to_backs, sent.outside) = (1.0, 0.0, 0.0);
         }
         for light in &self.scene.lights {
             if light.kind.is_parallel() {
                 let irradiance = lanes.emission(light.light, &light.shape, 1.0);
-                follower.parallel(light.direction, irradiance, self.mesh.half_size);
+                landings.extend(follower.parallel(
+                    light.direction,
+                    irradiance,
+                    self.mesh.half_size,
+                ));
             }
         }
-        follower.found
+        (sent, landings)
     }
 }

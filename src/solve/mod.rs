@@ -17,6 +17,7 @@ pub(crate) mod flux;
 pub mod forecast;
 mod held;
 mod lamp_light;
+mod lamp_rays;
 mod landed;
 mod landing;
 mod linear;
@@ -36,7 +37,6 @@ mod refinement;
 mod reflection;
 mod representation;
 mod room;
-mod sent;
 mod shares;
 mod sheets;
 mod solution;
@@ -287,7 +287,7 @@ impl Bake {
             return (guess.bright, vec![1.0; nodes]);
         }
         if self.room.settings.white.is_none() {
-            self.solution.light.white = self.room.landed_white(self.solution.light.white);
+            self.solution.light.white = self.room.landed_white(tree, self.solution.light.white);
         }
         let bright = &self.solution.light.bright_reflected;
         (bright[..nodes].to_vec(), self.solution.keenness(tree))

@@ -20,9 +20,8 @@ impl Room {
         self.look_outside(tree, true);
         let lanes = self.dense_lanes();
         let filters = Filters::new(&self.scene, &lanes);
-        // In a closed room this is known without a ray.
-        self.sent = self.with_sight(|sight| self.sent(tree, &lanes, &filters, sight));
-        self.landings = self.with_sight(|sight| self.landings(tree, &lanes, &filters, sight));
+        (self.sent, self.landings) =
+            self.with_sight(|sight| self.follow_lamps(tree, &lanes, &filters, sight));
     }
 
     /// Looks for the openings of a room with a sky; takes the sky out of a room that is closed, which then costs nothing and is

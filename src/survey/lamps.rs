@@ -63,13 +63,12 @@ fn emits(scene: &Scene, surface: usize) -> bool {
 }
 
 /// None if some lamp lights the room, or there is nothing that it could light.
-pub(super) fn away(scene: &Scene) -> Option<Away> {
-    if (0..scene.surfaces.len()).all(|s| emits(scene, s)) {
+pub(super) fn away(eyes: &Eyes) -> Option<Away> {
+    if (0..eyes.scene.surfaces.len()).all(|s| emits(eyes.scene, s)) {
         return None;
     }
-    let eyes = Eyes::new(scene);
     let [few, many] = RAYS;
-    look(&eyes, few).and_then(|_| look(&eyes, many))
+    look(eyes, few).and_then(|_| look(eyes, many))
 }
 
 fn look(eyes: &Eyes, rays: u32) -> Option<Away> {

@@ -1,14 +1,14 @@
 //! Surfaces that lie in others.
 
-use crate::hierarchy::Mesh;
-use crate::scene::Scene;
+use super::eyes::Eyes;
 
 /// How many are named.
 const NAMED: usize = 3;
 
 /// What lies in something else, and what is made of it.
-pub(super) fn hint(scene: &Scene) -> Option<String> {
-    let mut raised = Mesh::new(scene).raised;
+pub(super) fn hint(eyes: &Eyes) -> Option<String> {
+    let scene = eyes.scene;
+    let mut raised: Vec<_> = eyes.mesh.raised.iter().collect();
     raised.sort_by(|a, b| b.area.total_cmp(&a.area));
     let first = raised.first()?;
     let named: Vec<String> = (raised.iter().take(NAMED))

@@ -23,6 +23,8 @@ mod size;
 
 pub use points::{Place, places};
 
+use eyes::Eyes;
+
 use crate::error::Problem;
 use crate::scene::Scene;
 
@@ -55,18 +57,23 @@ pub fn advise(scene: &mut Scene, wishes: Wishes) -> Vec<Problem> {
         return vec![problem];
     }
     scene.warnings.extend(size::hint(scene));
-    scene.warnings.extend(openings::hint(scene));
-    scene.warnings.extend(lying::hint(scene));
+    let eyes = Eyes::new(scene);
+    let warnings = openings::hint(&eyes).into_iter().chain(lying::hint(&eyes));
+    let warnings: Vec<String> = warnings.collect();
     let mut problem = content::no_lamp(scene);
+    let mut away = match problem {
+        None => lamps::away(&eyes),
+        Some(_) => None,
+    };
+    scene.warnings.extend(warnings);
     if problem.is_none() {
-        let mut away = lamps::away(scene);
         if wishes.flip {
             match &away {
                 Some(found) if !found.turned.is_empty() => {
                     let said = found.turning(scene);
                     scene.flip(found.turned.clone());
                     scene.warnings.push(said);
-                    away = lamps::away(scene);
+                    away = lamps::away(&Eyes::new(scene));
                 }
                 _ => scene
                     .warnings

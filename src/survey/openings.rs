@@ -3,7 +3,6 @@
 
 use super::eyes::{Eyes, Met};
 use crate::geometry::sampling::{Pcg, cosine_direction, triangle_weights};
-use crate::scene::Scene;
 
 /// Rays: a share of .1 % is found within a third of itself.
 const RAYS: usize = 8192;
@@ -11,11 +10,11 @@ const RAYS: usize = 8192;
 const LEAST: f64 = 1e-3;
 
 /// What to say of a room with openings and without a sky.
-pub(super) fn hint(scene: &Scene) -> Option<String> {
-    if scene.sky.is_some() {
+pub(super) fn hint(eyes: &Eyes) -> Option<String> {
+    if eyes.scene.sky.is_some() {
         return None;
     }
-    let share = share(&Eyes::new(scene));
+    let share = share(eyes);
     (share >= LEAST).then(|| {
         let per_cent = 100.0 * share;
         format!(
@@ -55,7 +54,7 @@ fn share(eyes: &Eyes) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Options;
+    use crate::scene::{Options, Scene};
 
     #[test]
     fn openings_are_told_with_their_share() {
@@ -63,9 +62,9 @@ mod tests {
             let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
             Scene::load(folder.join("scenes").join(name), &Options::default()).unwrap()
         };
-        let open = hint(&room("cornell.glb")).unwrap();
+        let open = hint(&Eyes::new(&room("cornell.glb"))).unwrap();
         assert!(open.contains("--sky overcast"), "{open}");
-        assert_eq!(hint(&room("cornell-closed.glb")), None);
-        assert_eq!(hint(&room("convex.glb")), None);
+        assert_eq!(hint(&Eyes::new(&room("cornell-closed.glb"))), None);
+        assert_eq!(hint(&Eyes::new(&room("convex.glb"))), None);
     }
 }

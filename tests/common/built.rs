@@ -16,8 +16,39 @@ use haarlight::scene::{
     Alpha, Emission, GREATEST_ALBEDO, LightKind, LightSpectrum, Material, PunctualLight, Scene,
     Sides, Source, Surface,
 };
+use haarlight::solve::{Bake, Settings};
 use haarlight::spectrum::{Grid, LEAVES, Leaves};
 use std::f64::consts::PI;
+
+/// A bake with default settings, to its end.
+pub(crate) fn baked(scene: Scene) -> Bake {
+    run(scene, Settings::default())
+}
+
+/// The same to an error of the user's.
+pub(crate) fn baked_to(error: f64, scene: Scene) -> Bake {
+    let settings = Settings {
+        error,
+        ..Settings::default()
+    };
+    run(scene, settings)
+}
+
+fn run(scene: Scene, settings: Settings) -> Bake {
+    let mut bake = Bake::new(scene, settings);
+    bake.run();
+    bake
+}
+
+/// `a` is `b`, but for a share of it.
+#[track_caller]
+pub(crate) fn close(a: f64, b: f64, tolerance: f64, what: &str) {
+    assert!(
+        (a - b).abs() <= tolerance * b.abs(),
+        "{what}: {a} for {b}, off by {:e}",
+        a / b - 1.0
+    );
+}
 
 /// A room in the making.
 pub(crate) struct Room {

@@ -164,7 +164,7 @@ impl Profile {
             } else {
                 0.0
             };
-            (1.0 - along) * self.candela[at] + along * next
+            between(self.candela[at], next, along)
         };
         if self.azimuth.len() == 1 {
             return column(0);
@@ -175,9 +175,7 @@ impl Profile {
         }
         match place(&self.azimuth, azimuth) {
             None => 0.0,
-            Some((plane, share)) if share > 0.0 => {
-                (1.0 - share) * column(plane) + share * column(plane + 1)
-            }
+            Some((plane, share)) if share > 0.0 => between(column(plane), column(plane + 1), share),
             Some((plane, _)) => column(plane),
         }
     }
@@ -278,6 +276,11 @@ fn place(list: &[f64], x: f64) -> Option<(usize, f64)> {
         None => Some((k, 0.0)),
         Some(next) => Some((k, ((x - list[k]) / (next - list[k])).clamp(0.0, 1.0))),
     }
+}
+
+/// Linear from `a` to `b`, and never outside of them by rounding.
+fn between(a: f64, b: f64, share: f64) -> f64 {
+    (a + share * (b - a)).clamp(a.min(b), a.max(b))
 }
 
 /// `int (I_p + (I_q - I_p) (t - p) / (q - p)) sin t dt` from p to q.

@@ -1,87 +1,19 @@
-//! Where the light of lamps goes first: onto fronts, onto black backs, or out of the room.
-//!
-//! By rays from the lamps themselves: nothing that receives light has a part in it, so that what leaves are found to receive
-//! can be held against it.
+//! Rays from lamps, chosen as their light is spread.
 
-use super::flux::{Closed, Sent};
 use super::room::Room;
 use crate::geometry::NO_PLANE;
 use crate::geometry::sampling::{
     Pcg, around, cosine_direction, hash, sequence02, sphere_direction, triangle_weights,
 };
-use crate::hierarchy::{NONE, Tree};
+use crate::hierarchy::Tree;
 use crate::light::lanes::Lanes;
-use crate::light::{Filters, Glass};
-use crate::link::Sight;
 use crate::scene::{LightKind, PunctualLight};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-/// Rays: an error of about 0.1 % of the flux.
-const RAYS: u32 = 32_768;
 /// Rays from a surface start so far before it, share of half the room.
 const OFF: f64 = 1e-5;
-/// Rays that go together.
-pub(super) const TOGETHER: usize = 16;
 
 impl Room {
-    /// Follows the light of lamps.
-    pub(super) fn sent(
-        &self,
-        tree: &Tree,
-        lanes: &Lanes,
-        filters: &Filters,
-        sight: &Sight,
-    ) -> Sent {
-        let lamps = self.sending(tree, lanes);
-        let all: f64 = lamps.iter().map(|lamp| lamp.0[1]).sum();
-        if all <= 0.0 {
-            return Sent::default();
-        }
-        if self.closed == Closed::Yes && sight.panes.is_none() {
-            return Sent {
-                lamps_lm: all,
-                to_fronts: 1.0,
-                ..Sent::default()
-            };
-        }
-        let mut sent = Sent {
-            lamps_lm: all,
-            ..Sent::default()
-        };
-        let glass = (sight.panes).map(|glazing| Glass { glazing, filters });
-        let mut first = 0;
-        for ([_, flux, _], lamp) in lamps {
-            // At least a packet, so that no lamp goes without.
-            let count = (f64::from(RAYS) * flux / all).ceil() as usize;
-            let count = count.next_multiple_of(TOGETHER);
-            let rays: Vec<_> = (first..first + count)
-                .map(|k| lamp.ray(self, tree, k as u32))
-                .collect();
-            let weights: f64 = rays.iter().map(|ray| ray.3).sum();
-            let each = flux / all / weights.max(f64::MIN_POSITIVE);
-            for rays in rays.chunks_exact(TOGETHER) {
-                let from: [Vec3; TOGETHER] = std::array::from_fn(|k| rays[k].0.as_vec3());
-                let directions: [Vec3; TOGETHER] = std::array::from_fn(|k| rays[k].1.as_vec3());
-                let mut hits = [None; TOGETHER];
-                sight.meet(&from, &directions, rays[0].2, &mut hits);
-                for (k, hit) in hits.into_iter().enumerate() {
-                    let reach = hit.map_or(4.0 * self.mesh.half_size as f32, |hit| hit.t);
-                    let end = from[k] + reach * directions[k];
-                    let through = glass.map_or(1.0, |glass| glass.brightness(from[k], end));
-                    let to = match hit {
-                        None => &mut sent.outside,
-                        Some(hit) if tree.met(&hit) == NONE => &mut sent.to_backs,
-                        Some(_) => &mut sent.to_fronts,
-                    };
-                    *to += each * rays[k].3 * through;
-                    sent.in_panes += each * rays[k].3 * (1.0 - through);
-                }
-            }
-            first += count;
-        }
-        sent
-    }
-
     /// Lamps with their tristimulus flux, all but those that shine from far away.
     pub(super) fn sending(&self, tree: &Tree, lanes: &Lanes) -> Vec<([f64; 3], Lamp<'_>)> {
         let exitance: Vec<[f64; 3]> = (self.scene.materials.iter())
