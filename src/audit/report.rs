@@ -52,7 +52,7 @@ pub struct Report {
     pub de2000: Spread,
     /// Relative error of illuminance, without sign.
     pub relative: Spread,
-    /// Mean relative error of illuminance, with sign: bake less truth.
+    /// Error of the mean illuminance, with sign: bake less truth, over truth. Points in the dark weigh as little as their light.
     pub bias: Measured,
     /// Mean standard error of the audit itself, CIEDE2000: what the figures cannot see below.
     pub noise_de2000: f64,
@@ -158,7 +158,7 @@ impl Report {
             .collect();
         let colour: Vec<[f64; 2]> = seen.iter().map(|s| s.de2000).collect();
         let relative: Vec<[f64; 2]> = seen.iter().map(|s| s.relative).collect();
-        let signed: Vec<f64> = relative.iter().map(|r| r[0]).collect();
+        let lux: Vec<[f64; 2]> = seen.iter().map(|s| [s.baked[1], s.traced[1]]).collect();
         let de2000 = Spread::of(&colour);
         Self {
             record: "audit",
@@ -167,7 +167,7 @@ impl Report {
             paths: reference.paths,
             seed: reference.seed,
             relative: Spread::of(&relative),
-            bias: Measured::mean(&signed),
+            bias: Measured::excess(&lux),
             noise_de2000: colour.iter().map(|c| c[1]).sum::<f64>() / colour.len().max(1) as f64,
             estimate_de2000: estimate,
             honesty: judge(estimate, &de2000.mean, NEGLIGIBLE * bake.settings().error),

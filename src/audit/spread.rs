@@ -52,6 +52,21 @@ impl Measured {
         }
     }
 
+    /// By what share the sum of the first is above that of the second; 0 of nothing. Its interval is that of a ratio: by the spread of
+    /// what is left of the differences when that share is taken off.
+    pub(super) fn excess(pairs: &[[f64; 2]]) -> Self {
+        let mean = |k: usize| pairs.iter().map(|p| p[k]).sum::<f64>() / pairs.len().max(1) as f64;
+        let (of, to) = (mean(0), mean(1));
+        if to <= 0.0 {
+            return Self::mean(&[]);
+        }
+        let value = of / to - 1.0;
+        let left: Vec<f64> = (pairs.iter())
+            .map(|[a, b]| value + (a - b - value * b) / to)
+            .collect();
+        Self::mean(&left)
+    }
+
     /// The same with its lower end lowered, to 0 at the most.
     fn lowered(self, by: f64) -> Self {
         Self {
@@ -134,6 +149,17 @@ mod tests {
         assert!((s.mean.value - 0.15).abs() < 1e-12 && s.mean.low < 0.15 && s.mean.high > 0.15);
         assert!((s.rms.value - 3.0 / 20f64.sqrt()).abs() < 1e-12);
         assert_eq!((s.p95.value, s.max.value), (0.0, 3.0));
+    }
+
+    #[test]
+    fn a_point_in_the_dark_makes_no_bias() {
+        // Ninety-nine points that are 1 % too bright, and one that is ten thousand times too bright in the dark.
+        let mut lux = vec![[101.0, 100.0]; 99];
+        lux.push([1.0, 1e-4]);
+        let bias = Measured::excess(&lux);
+        assert!((bias.value - 0.0101).abs() < 1e-6, "{bias:?}");
+        assert!(bias.low < 0.01 && bias.high > 0.0101 && bias.high < 0.02);
+        assert_eq!(Measured::excess(&[[0.0, 0.0]]).value, 0.0);
     }
 
     #[test]

@@ -63,7 +63,7 @@
 //! | `paths`, `seed` | | paths traced in all; seed of points and paths |
 //! | `de2000` | dE00 | colour difference of irradiance: `mean`, `rms`, `p95`, `max`, each with `value`, `low`, `high` (interval of 95 %), the audit's noise taken out |
 //! | `relative` | 1 | error of illuminance without sign, the same |
-//! | `bias` | 1 | mean error of illuminance with sign, bake less truth: `value`, `low`, `high` |
+//! | `bias` | 1 | error of the mean illuminance with sign, bake less truth over truth: `value`, `low`, `high` |
 //! | `noise_de2000` | dE00 | mean standard error of the audit itself |
 //! | `estimate_de2000` | dE00 | what is estimated of the file: light of the last round, and between vertices |
 //! | `honesty` | | `honest`: estimate within 0.7 and 3 times `de2000.mean`, as far as its interval tells; `too_low`, `too_high`, `no_estimate` |

@@ -143,7 +143,8 @@ impl Room {
             .fold([0.0; 3], |sum: [f64; 3], landing| {
                 std::array::from_fn(|k| sum[k] + f64::from(landing.flux[k]))
             });
-        let landed = landed.map(|x| 2.0 * x / tree.nodes[0].area.max(f64::MIN_POSITIVE));
+        let area = tree.nodes.first().map_or(0.0, |room| room.area);
+        let landed = landed.map(|x| 2.0 * x / area.max(f64::MIN_POSITIVE));
         match white[1] < landed[1] {
             true => landed,
             false => white,

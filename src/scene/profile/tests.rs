@@ -370,6 +370,16 @@ fn directions_are_chosen_as_the_light_is_spread() {
     assert!((along / count - integral / even).length() < 1e-3);
 }
 
+#[test]
+fn rounding_adds_nothing_to_even_light() {
+    let (vertical, horizontal) = (steps(0.0, 180.0, 15.0), steps(0.0, 360.0, 45.0));
+    let profile = read(&lm63("IESNA91", 1, &vertical, &horizontal, |_, _| 62.48));
+    for k in 0..1000 {
+        let d = at(0.17 * f64::from(k), 0.71 * f64::from(k));
+        assert_eq!(profile.toward(d), profile.peak());
+    }
+}
+
 proptest! {
     /// Whatever the bytes, there is a profile or a fault.
     #[test]
