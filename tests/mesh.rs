@@ -202,3 +202,29 @@ fn the_file_has_the_error_that_is_stated() {
     }
     assert!(compared > 60, "{compared}");
 }
+
+/// Lines between vertices on the light itself would lie below it, and the room that is drawn would take in 1.3 % less than its lamps send:
+/// in a closed room both are the same.
+#[test]
+fn what_is_drawn_takes_in_what_lamps_send() {
+    for name in ["convex.glb", "two-rooms.glb"] {
+        let (bake, baked) = baked(scene(name), 1.0);
+        let sent = bake.rounds().last().unwrap().flux.sent.lamps_lm;
+        // What leaves, with what area lamps emit, less what arrives.
+        let mut missing = 0.0;
+        for part in &baked.surfaces {
+            let surface = &bake.scene().surfaces[part.surface];
+            for t in &part.triangles {
+                let [a, b, c] = t.map(|v| position(surface, &part.vertices[v as usize]));
+                let net = |&v: &u32| {
+                    let vertex = &part.vertices[v as usize];
+                    f64::from(vertex.radiosity[1]) - f64::from(vertex.irradiance[1])
+                };
+                let area = 0.5 * (b - a).cross(c - a).length();
+                missing += area / 3.0 * t.iter().map(net).sum::<f64>();
+            }
+        }
+        let share = missing / sent;
+        assert!(share.abs() < 0.007, "{name}: {share}");
+    }
+}

@@ -73,6 +73,8 @@ impl Interpolation {
 pub(crate) struct KeptVertex {
     pub(crate) triangle: u32,
     pub(crate) weights: [f64; 3],
+    /// What its light is multiplied by, so that lines to its neighbours are right in the mean.
+    pub(crate) factor: f32,
     pub(crate) trace: Option<Box<[u8]>>,
 }
 

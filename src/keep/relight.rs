@@ -206,7 +206,7 @@ impl Bake {
         let rows = leaves.len() * (4 * self.solution.light.width() + 8);
         (of_leaves
             + of_vertices
-            + 32 * vertices
+            + 36 * vertices
             + 12 * baked
                 .surfaces
                 .iter()

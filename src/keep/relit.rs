@@ -18,6 +18,8 @@ pub(crate) struct Kept {
     back: bool,
     /// Triangle of the mesh of each vertex, and weights of its corners.
     vertices: Vec<(u32, [f64; 3])>,
+    /// What the light of each is multiplied by.
+    factors: Vec<f32>,
     triangles: Vec<[u32; 3]>,
     /// None for vertices that something covers.
     traces: Packs,
@@ -33,6 +35,7 @@ impl Kept {
         out.put([surface.surface as u64, u64::from(surface.back)])?;
         out.put_list(kept.len(), kept.iter().map(|v| v.triangle))?;
         out.put_list(kept.len(), kept.iter().map(|v| v.weights))?;
+        out.put_list(kept.len(), kept.iter().map(|v| v.factor))?;
         out.put_all(&surface.triangles)?;
         let traces: Vec<_> = kept.iter().map(|v| v.trace.as_deref()).collect();
         Packs::encode(&traces, out)
@@ -43,6 +46,7 @@ impl Kept {
         let [surface, back] = from.get::<[u64; 2]>()?;
         let origins: Vec<u32> = from.get_all()?;
         let weights: Vec<[f64; 3]> = from.get_exactly(origins.len())?;
+        let factors: Vec<f32> = from.get_exactly(origins.len())?;
         let triangles: Vec<[u32; 3]> = from.get_all()?;
         let traces = Packs::decode(from)?;
         let there = |&t: &u32| {
@@ -56,7 +60,8 @@ impl Kept {
                 .iter()
                 .flatten()
                 .all(|&v| (v as usize) < origins.len())
-            && traces.len() == origins.len();
+            && traces.len() == origins.len()
+            && factors.iter().all(|f| f.is_finite() && *f >= 0.0);
         if !fits {
             return Err(Broken::new("has a mesh that does not fit the room"));
         }
@@ -64,6 +69,7 @@ impl Kept {
             surface: surface as usize,
             back: back == 1,
             vertices: origins.into_iter().zip(weights).collect(),
+            factors,
             triangles,
             traces,
         })
@@ -110,6 +116,8 @@ impl Bake {
                 })?;
                 rows = placed.into_iter().map(|(_, row)| row).collect();
             }
+            let moved = rows.par_iter_mut().zip(&kept.factors);
+            moved.for_each(|(row, factor)| row.iter_mut().for_each(|x| *x *= factor));
             out.covered += lend_some(&mut rows, &kept.triangles);
             let look = &looks[self.scene().surfaces[kept.surface].material];
             let lit = kept.vertices.par_iter().zip(&rows);

@@ -4,6 +4,7 @@
 //! An edge that is split is split for every triangle that has it, so a vertex never lies on the edge of a triangle that
 //! does not use it. Which triangles share an edge, see [`Skins`](super::skins::Skins).
 
+use super::fit::missed_by_halves;
 use super::skins::Skins;
 use crate::gather::Vertex;
 use crate::hierarchy::{Mesh, NONE, Tree};
@@ -63,6 +64,9 @@ pub(super) struct Doubt {
     pub(super) inside: f32,
     /// How much of what the solved light told of the triangle around this one proved true.
     pub(super) trust: f32,
+    /// Illuminance that lines miss in the middle of each edge, lx: as seen, or as it follows for parts of a triangle that was looked at;
+    /// none where nothing is known.
+    pub(super) missed: [Option<f32>; 3],
 }
 
 /// A triangle of the output.
@@ -449,7 +453,13 @@ impl Cells {
         let sharp = self.along.get(&key(point, c.point));
         self.edges[mc as usize].sharp = sharp.copied().unwrap_or(0);
         let border = self.sheets[sheet as usize].part(hints, m, c, a);
-        let half = |corners, edges, share: f64, hints| Cell {
+        let own = [0, 1, 2].map(|k| doubt.missed[(edge + k) % 3]);
+        // Where the edge of a shadow is what lines miss, nothing follows.
+        let missed = match crossed {
+            None => missed_by_halves(own, of_a as f32),
+            Some(_) => [[None; 3]; 2],
+        };
+        let half = |corners, edges, share: f64, hints, missed| Cell {
             sheet,
             of,
             corners,
@@ -459,14 +469,26 @@ impl Cells {
             doubt: Doubt {
                 square: shrink * doubt.square,
                 trust: doubt.trust,
+                missed,
                 ..Doubt::default()
             },
         };
-        let first = half([a, m, c], [halves[0], mc, ca], of_a, (hints.0, border));
+        let first = half(
+            [a, m, c],
+            [halves[0], mc, ca],
+            of_a,
+            (hints.0, border),
+            missed[0],
+        );
         let rest = (border, hints.1);
         self.all[k] = first;
-        self.all
-            .push(half([m, b, c], [halves[1], bc, mc], 1.0 - of_a, rest));
+        self.all.push(half(
+            [m, b, c],
+            [halves[1], bc, mc],
+            1.0 - of_a,
+            rest,
+            missed[1],
+        ));
     }
 
     /// The triangles of each sheet.

@@ -481,6 +481,11 @@ impl<'a> Growth<'a> {
             off(middles[e], halves[e]).unwrap_or_else(|| COVERED * ends())
         });
         let inside = off(inside, weights);
+        let missed = [0, 1, 2].map(|e| {
+            let [a, b] = [e, (e + 1) % 3].map(|e| seen[e].then_some(light[e][1]));
+            let middle = self.looks.at(middles[e])?.xyz[1];
+            Some((middle - 0.5 * (a? + b?)) as f32)
+        });
         let edges: f64 = bent.iter().map(|d| d * d).sum();
         let before = f64::from(self.cells.all[k].doubt.trust);
         let (square, trust) = match (worst, inside) {
@@ -498,6 +503,7 @@ impl<'a> Growth<'a> {
             bent: bent.map(|d| d as f32),
             inside: inside as f32,
             trust: trust as f32,
+            missed,
         }
     }
 }

@@ -6,6 +6,7 @@ mod cells;
 mod drawn;
 mod edges;
 mod fences;
+mod fit;
 mod grow;
 pub(crate) mod hints;
 mod lines;

@@ -17,29 +17,36 @@ pub(super) struct Settled {
     pub(super) rows: Vec<Option<[f32; 64]>>,
     /// Look that it comes from.
     looks: Vec<u32>,
+    /// What the light of that is multiplied by, see [`fit`](super::fit).
+    factor: Vec<f32>,
     covered: usize,
 }
 
 impl Bake {
     /// The light of a mesh as it is written.
     pub(super) fn settled(&self, growth: &Growth) -> Vec<Settled> {
+        let fitted = growth.fitted();
         let sheets = growth.cells.sheets.iter().zip(growth.cells.triangles());
         let settle = |(number, (sheet, (triangles, of))): (usize, (&Sheet, Triangles))| {
             let mut looks = vec![UNSEEN; sheet.vertices.len()];
             for &v in triangles.iter().flatten() {
                 looks[v as usize] = growth.look(number, v).unwrap_or(UNSEEN);
             }
-            let row = |&look: &u32| match look {
+            let factor: Vec<f32> = (looks.iter())
+                .map(|&look| fitted.get(look as usize).copied().unwrap_or(1.0))
+                .collect();
+            let row = |(&look, factor): (&u32, &f32)| match look {
                 UNSEEN => None,
-                look => growth.looks.at(look).map(|seen| *seen.row),
+                look => (growth.looks.at(look)).map(|seen| seen.row.map(|x| x * factor)),
             };
-            let mut rows: Vec<Option<[f32; 64]>> = looks.iter().map(row).collect();
+            let mut rows: Vec<Option<[f32; 64]>> = looks.iter().zip(&factor).map(row).collect();
             let covered = lend(&mut rows, &triangles);
             Settled {
                 triangles,
                 of,
                 rows,
                 looks,
+                factor,
                 covered,
             }
         };
@@ -83,6 +90,7 @@ impl Bake {
                             kept.push(KeptVertex {
                                 triangle: vertex.triangle,
                                 weights: vertex.weights,
+                                factor: settled.factor[v],
                                 trace: seen.flatten().and_then(|seen| seen.trace.clone()),
                             });
                         }

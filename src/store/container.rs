@@ -49,7 +49,8 @@ impl Kind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint | Self::Cache => 6,
+            Self::Checkpoint => 6,
+            Self::Cache => 7,
         }
     }
 
