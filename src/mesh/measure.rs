@@ -12,6 +12,8 @@ use crate::color::seen_difference;
 use crate::gather::{Interpolation, LayerLanes, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
+use glam::DVec3;
+use std::collections::HashMap;
 
 /// Points at the least and at the most, and as a share of the looks so far: the mean is then known to some per cent.
 pub(crate) const POINTS: [usize; 2] = [512, 4096];
@@ -51,6 +53,34 @@ pub(crate) struct Sample {
     pub(crate) square: f64,
     /// Variance of a look.
     pub(crate) noise: f64,
+}
+
+/// Triangles of a sheet by the triangle of the mesh that they are part of.
+struct Parts(HashMap<u32, Vec<[u32; 3]>>);
+
+impl Parts {
+    fn new(settled: &Settled) -> Self {
+        let mut parts: HashMap<u32, Vec<[u32; 3]>> = HashMap::new();
+        for (triangle, of) in settled.triangles.iter().zip(&settled.of) {
+            parts.entry(*of).or_default().push(*triangle);
+        }
+        Self(parts)
+    }
+
+    /// The one around a point, and weights of its corners there.
+    fn find(&self, settled: &Settled, of: u32, point: DVec3) -> Option<([u32; 3], [f64; 3])> {
+        let place = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| settled.at[v as usize]);
+            let n = (b - a).cross(c - a);
+            let part =
+                |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(n) / n.length_squared();
+            (*t, [part(b, c), part(c, a), part(a, b)])
+        };
+        let depth = |(_, w): &([u32; 3], [f64; 3])| w[0].min(w[1]).min(w[2]);
+        let all = self.0.get(&of)?.iter().map(place);
+        let whole = all.filter(|part| depth(part).is_finite());
+        whole.max_by(|a, b| depth(a).total_cmp(&depth(b)))
+    }
 }
 
 impl Growth<'_> {
@@ -121,14 +151,17 @@ impl Growth<'_> {
             None => bake.lanes().tristimulus(row),
         };
         let difference = |a, b| seen_difference(a, b, white);
+        let parts: Vec<Parts> = settled.iter().map(Parts::new).collect();
         let sample = |&(cell, weights, looks): &PointLooks| {
             let of = &self.cells.all[cell];
+            let settled = &settled[of.sheet as usize];
+            let at = of.corners.map(|c| settled.at[c.vertex as usize]);
+            let point = (0..3).map(|k| weights[k] * at[k]).sum();
+            let (corners, weights) = parts[of.sheet as usize].find(settled, of.of.0, point)?;
             let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| shown(&seen.row)));
             let (one, two) = (one?, two?);
-            let light = of.corners.map(|c| {
-                let row = settled[of.sheet as usize].rows[c.vertex as usize];
-                row.map_or([0.0; 3], |row| shown(&row))
-            });
+            let light =
+                corners.map(|v| settled.rows[v as usize].map_or([0.0; 3], |row| shown(&row)));
             let drawn = mix(&light, weights);
             let noise = 0.5 * difference(one, two).powi(2);
             let seen = 0.5 * (difference(drawn, one).powi(2) + difference(drawn, two).powi(2));

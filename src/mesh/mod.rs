@@ -7,6 +7,7 @@ mod drawn;
 mod edges;
 mod fences;
 mod fit;
+mod flip;
 mod grow;
 pub(crate) mod hints;
 mod lines;

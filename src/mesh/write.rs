@@ -1,18 +1,23 @@
 //! The vertices that are written; covered ones are lent their neighbours' light.
 
-use super::cells::{Sheet, Triangles};
+use super::cells::Triangles;
+use super::flip::{Ground, grounds, turn};
 use super::grow::Growth;
+use crate::color::lab;
 use crate::gather::{Baked, BakedSurface, KeptVertex, lend};
 use crate::solve::Bake;
+use glam::DVec3;
 
 /// Nothing was seen.
 const UNSEEN: u32 = u32::MAX;
 
 /// Light of the vertices of a sheet, as it is written.
 pub(super) struct Settled {
-    triangles: Vec<[u32; 3]>,
+    pub(super) triangles: Vec<[u32; 3]>,
     /// Triangle of the mesh of each.
-    of: Vec<u32>,
+    pub(super) of: Vec<u32>,
+    /// Where vertices are.
+    pub(super) at: Vec<DVec3>,
     /// Irradiance of each vertex that a triangle uses.
     pub(super) rows: Vec<Option<[f32; 64]>>,
     /// Look that it comes from.
@@ -26,31 +31,48 @@ impl Bake {
     /// The light of a mesh as it is written.
     pub(super) fn settled(&self, growth: &Growth) -> Vec<Settled> {
         let fitted = growth.fitted();
-        let sheets = growth.cells.sheets.iter().zip(growth.cells.triangles());
-        let settle = |(number, (sheet, (triangles, of))): (usize, (&Sheet, Triangles))| {
-            let mut looks = vec![UNSEEN; sheet.vertices.len()];
-            for &v in triangles.iter().flatten() {
-                looks[v as usize] = growth.look(number, v).unwrap_or(UNSEEN);
-            }
-            let factor: Vec<f32> = (looks.iter())
-                .map(|&look| fitted.get(look as usize).copied().unwrap_or(1.0))
-                .collect();
-            let row = |(&look, factor): (&u32, &f32)| match look {
-                UNSEEN => None,
-                look => (growth.looks.at(look)).map(|seen| seen.row.map(|x| x * factor)),
-            };
-            let mut rows: Vec<Option<[f32; 64]>> = looks.iter().zip(&factor).map(row).collect();
-            let covered = lend(&mut rows, &triangles);
-            Settled {
-                triangles,
-                of,
-                rows,
-                looks,
-                factor,
-                covered,
-            }
+        let sheets = growth.cells.triangles().into_iter();
+        let sheets = sheets.zip(grounds(&growth.cells)).enumerate();
+        sheets
+            .map(|(number, (faces, ground))| self.settle(growth, &fitted, number, faces, ground))
+            .collect()
+    }
+
+    fn settle(
+        &self,
+        growth: &Growth,
+        fitted: &[f32],
+        sheet: usize,
+        mut faces: Triangles,
+        ground: Ground,
+    ) -> Settled {
+        let mut looks = vec![UNSEEN; ground.at.len()];
+        for &v in faces.0.iter().flatten() {
+            looks[v as usize] = growth.look(sheet, v).unwrap_or(UNSEEN);
+        }
+        let factor: Vec<f32> = (looks.iter())
+            .map(|&look| fitted.get(look as usize).copied().unwrap_or(1.0))
+            .collect();
+        let seen = |&look: &u32| (look != UNSEEN).then(|| growth.looks.at(look))?;
+        let lightness = |(look, &factor): (&u32, &f32)| {
+            let xyz = seen(look)?.xyz.map(|x| f64::from(factor) * x);
+            Some(lab(xyz, self.light().white)[0])
         };
-        sheets.enumerate().map(settle).collect()
+        let light: Vec<Option<f64>> = looks.iter().zip(&factor).map(lightness).collect();
+        turn(&ground, &mut faces, &light);
+        let row = |(look, factor): (&u32, &f32)| Some(seen(look)?.row.map(|x| x * factor));
+        let mut rows: Vec<Option<[f32; 64]>> = looks.iter().zip(&factor).map(row).collect();
+        let (triangles, of) = faces;
+        let covered = lend(&mut rows, &triangles);
+        Settled {
+            triangles,
+            of,
+            at: ground.at,
+            rows,
+            looks,
+            factor,
+            covered,
+        }
     }
 
     /// Vertices with their colours, as the writers want them.
