@@ -19,7 +19,7 @@
 //!
 //! | field | what |
 //! |---|---|
-//! | `working_plane` | a horizontal grid `height_m` above the floor at `floor_m` (see [`WorkingPlane`]), of its points those in the room: `points`, `spacing_m`, `mean_lux`, `min_lux`, `max_lux`, `min_over_mean`, `min_over_max`; with a sky `DF_percent`, its `mean` and `median`. Null without a floor |
+//! | `working_plane` | a horizontal grid `height_m` above the floor at `floor_m` (see [`WorkingPlane`]), of its points those in the room and not in hollows that no light reaches, `dark_points`: `points`, `spacing_m`, `mean_lux`, `min_lux`, `max_lux`, `min_over_mean`, `min_over_max`; with a sky `DF_percent`, its `mean` and `median`. Null without a floor |
 //! | `ugr` | what `probe --ugr` tells, from the place of each camera, of the file or chosen, along its view, with the `camera`'s name |
 //!
 //! Ranges are those of a point; means err less. The daylight factor is taken from the rows that hold the light of the sky by themselves, and
@@ -45,6 +45,9 @@ use serde_json::{Map, Value, json};
 
 /// Name of the daylight factor.
 const DAYLIGHT: &str = "DF_percent";
+/// Points of a working plane with less light than this share of the mean lie in hollows that light does not reach, and are left out: what is
+/// in the room has more, the black corner of a lit room some per cent.
+const HOLLOW: f64 = 1e-3;
 /// Place of Ra among the measures.
 const RA: usize = 3;
 
@@ -256,13 +259,22 @@ fn on_plane(bake: &Bake, plane: &WorkingPlane, stated: Option<Stated>) -> Option
     let inside = |(k, place): (usize, Place)| (place == Place::Room).then_some(plane.points[k]);
     let places = places(scene, &plane.points).into_iter().enumerate();
     let points: Vec<(DVec3, DVec3)> = places.filter_map(inside).collect();
-    let (probed, by_sky) = bake.probe_with_sky(&points);
-    let lux: Vec<f64> = probed.iter().map(|light| light.xyz[1]).collect();
+    let (probed, mut by_sky) = bake.probe_with_sky(&points);
+    let mut lux: Vec<f64> = probed.iter().map(|light| light.xyz[1]).collect();
+    let mean = lux.iter().sum::<f64>() / lux.len().max(1) as f64;
+    let lit: Vec<bool> = lux.iter().map(|&lux| lux >= HOLLOW * mean).collect();
+    let keep = |values: &mut Vec<f64>| {
+        let mut lit = lit.iter();
+        values.retain(|_| lit.next() == Some(&true));
+    };
+    keep(&mut lux);
+    by_sky.iter_mut().for_each(keep);
     let all = Uniformity::of(&lux)?;
     let mut out = uniform(&all, stated);
     let mean = stated.map(|stated| Range::of(all.mean).scaled(stated.relative));
     out["mean_lux"] = figure(Ok::<_, String>(all.mean), mean);
-    out["points"] = json!(points.len());
+    out["points"] = json!(lux.len());
+    out["dark_points"] = json!(points.len() - lux.len());
     out["spacing_m"] = json!(plane.spacing);
     out["floor_m"] = json!(plane.floor);
     out["height_m"] = json!(plane.height);
