@@ -10,9 +10,10 @@ use haarlight::data::{Kind, named, names};
 use std::process::ExitCode;
 
 const COMPARED: [&str; 5] = ["CCT_K", "Duv", "Ra", "Rf", "Rg"];
-/// What figures may differ by: the colour temperature as a share. The peer's is by Robertson's method where ours is Ohno's, and Ra
-/// takes its reference there.
-const ALLOWED: [f64; 5] = [2e-3, 2e-4, 0.3, 0.3, 0.3];
+/// What figures may differ by: the colour temperature as a share. Measured: 2e-5, 5e-6, 5e-4, .22 (F2) and .51 (LED-B3). The peer fits
+/// Sprague's curve through the 99 samples where ours are linear between 5 nm; Rg jumps where a sample goes over to the next bin of hue. At 5 nm,
+/// where nothing is interpolated, ours are those of a third program within .02 (`src/color/measures.rs`).
+const ALLOWED: [f64; 5] = [1e-4, 1e-5, 0.01, 0.3, 0.6];
 
 /// What the peer finds; none where it has no figures for such a light.
 fn peer(light: &[f64]) -> Option<[f64; 5]> {
