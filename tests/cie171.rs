@@ -383,7 +383,7 @@ struct TruthOfCase58 {
 impl TruthOfCase58 {
     fn new() -> Self {
         let scene = cube(|room| room.paint(0.5));
-        let references = [3, 4].map(|depth| Reference::new(&scene, depth, 1));
+        let references = [3, 4].map(|depth| Reference::new(&scene, depth, 1).unwrap());
         Self { scene, references }
     }
 
@@ -396,7 +396,7 @@ impl TruthOfCase58 {
                 reference.patches.iter().map(|p| rho * p.punctual[30]),
             );
             let mut radiosity = first.clone();
-            let apply = |x: &DVector<f64>| x - rho * (&reference.factors * x);
+            let apply = |x: &DVector<f64>| x - rho * (reference.factors(0) * x);
             let mut residual = &first - apply(&radiosity);
             let mut direction = residual.clone();
             while residual.norm() > 1e-9 * first.norm() {

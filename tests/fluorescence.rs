@@ -185,7 +185,7 @@ fn white_paper_agrees_with_the_whole_matrix() {
     for (light, what) in [(named(&grid, "cie/D65"), "D65"), (cut, "A, cut")] {
         let (room, [paper, emission, excitation]) = desk(light, grid);
         let scene = room.scene();
-        let reference = Reference::new(&scene, 2, 1);
+        let reference = Reference::new(&scene, 2, 1).unwrap();
         let solution = reference.solve();
         let points = desk_points();
         let truth = reference.gather(&scene, &solution, &points, 1);
@@ -259,7 +259,7 @@ fn paths_change_their_wavelength() {
     let grid = ultraviolet();
     let (room, _) = desk(named(&grid, "cie/D65"), grid);
     let scene = room.scene();
-    let reference = Reference::new(&scene, 2, 1);
+    let reference = Reference::new(&scene, 2, 1).unwrap();
     let solution = reference.solve();
     let points = desk_points();
     let truth = reference.gather(&scene, &solution, &points, 1);

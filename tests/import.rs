@@ -268,6 +268,8 @@ fn textures_say_where_smooth_metals_are_mirrors() {
         assert_eq!(is_mirror, mirrors, "{roughness} {:?}: {said}", pixels[0]);
         let told = "whose metallicRoughnessTexture says no metal in places: matt";
         assert_eq!(said.contains(told), !mirrors && roughness < 0.1, "{said}");
+        let unused = "said by a metallicRoughnessTexture, which is not used: matt everywhere";
+        assert_eq!(said.contains(unused), !mirrors, "{said}");
     }
 }
 

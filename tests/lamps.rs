@@ -454,7 +454,7 @@ fn audit_and_reference_agree() {
     ];
     let y = Observer::cie1931().weights(&haarlight::spectrum::Grid::default())[1];
     for scene in scenes {
-        let reference = Reference::new(&scene, 2, 1);
+        let reference = Reference::new(&scene, 2, 1).unwrap();
         let solution = reference.solve();
         let places = [[0.0, 0.0], [0.4, 0.1], [1.2, 0.3], [-1.5, 1.0]];
         let points: Vec<_> = places.map(|[x, z]| (dvec3(x, 0.0, z), DVec3::Y)).into();

@@ -340,6 +340,30 @@ fn curtain(base: [f64; 3], factor: Value, color: Value) -> Value {
     })
 }
 
+/// The same that is in part a metal.
+fn metallic(share: f64) -> Value {
+    let mut material = curtain([0.6; 3], json!(0.5), json!([0.5, 0.5, 0.5]));
+    material["pbrMetallicRoughness"]["metallicFactor"] = json!(share);
+    material
+}
+
+/// A metal reflects its base colour and lets nothing through: of a material that is a quarter metal three quarters pass, and what does
+/// not pass is reflected. What a side file measures is as it was measured.
+#[test]
+fn metals_let_nothing_through() {
+    let scene = read(&metallic(0.25), &json!({})).unwrap();
+    let (material, strength) = (&scene.materials[0], 0.5 * 0.75);
+    let sheet = material.sheet.as_ref().unwrap();
+    for (rho, tau) in material.reflectance.iter().zip(&sheet.transmittance) {
+        close(*rho, (1.0 - strength) * 0.6, 1e-6, "reflected");
+        close(*tau, strength * 0.5, 1e-6, "let through");
+    }
+    let measured = json!({"materials": {"curtain": {"transmission": 0.3}}});
+    let scene = read(&metallic(1.0), &measured).unwrap();
+    let sheet = scene.materials[0].sheet.as_ref().unwrap();
+    close(sheet.transmittance[0], 0.3, 1e-12, "measured");
+}
+
 /// `(1 - f) b` is reflected, `f c` passes, and the sheet has two sides whatever the file says.
 #[test]
 fn what_gltf_says_of_a_sheet() {
@@ -440,6 +464,15 @@ fn wrong_sheets_are_refused_by_name() {
             &curtain([0.6; 3], json!(0.3), json!([1, 1])),
             json!({}),
             vec!["diffuseTransmissionColorFactor"],
+        ),
+        (
+            &metallic(1.0),
+            json!({}),
+            vec![
+                "material 'curtain'",
+                "is a metal and lets light through",
+                "set its metallicFactor to 0",
+            ],
         ),
     ] {
         let text = read(material, &side).expect_err("is refused");

@@ -5,6 +5,7 @@ use crate::audit::{Honesty, Report};
 use crate::gather::Interpolation;
 use crate::report::{Align, Table};
 use crate::solve::{Round, Verdict};
+use serde_json::Value;
 
 /// Rounds as a table.
 pub(super) fn rounds(rounds: &[Round]) -> String {
@@ -106,6 +107,8 @@ pub(super) fn verdict(v: &VerdictRecord, audit: Option<&Report>) -> String {
     if let Some(audit) = audit {
         lines.push(measured(audit));
     }
+    lines.extend(working_plane(&v.metrics["working_plane"]));
+    lines.extend(glare(&v.metrics["ugr"][0]));
     lines.push(format!("written: {}", v.outputs.glb));
     lines.join("\n")
 }
@@ -124,6 +127,49 @@ fn between_vertices(i: &Interpolation) -> String {
         "of which between vertices, measured at {} points: mean {:.3}, 95 % below {:.2}{excess}",
         i.points, i.mean, i.p95
     )
+}
+
+/// A figure of the metrics with its range.
+fn figure(figure: &Value, digits: usize) -> Option<String> {
+    let value = figure["value"].as_f64()?;
+    let range = figure["low"]
+        .as_f64()
+        .map(|low| match figure["high"].as_f64() {
+            Some(high) => format!(" ({low:.digits$} to {high:.digits$})"),
+            None => format!(" ({low:.digits$} or more)"),
+        });
+    Some(format!("{value:.digits$}{}", range.unwrap_or_default()))
+}
+
+/// Light on the working plane, where it was looked for.
+fn working_plane(plane: &Value) -> Option<String> {
+    let mean = figure(&plane["mean_lux"], 0)?;
+    let mut line = format!(
+        "on a plane {:.2} m above the floor, at {} points: mean {mean} lx",
+        plane["height_m"].as_f64()?,
+        plane["points"]
+    );
+    if let Some(even) = figure(&plane["min_over_mean"], 2) {
+        line += &format!(", min/mean {even}");
+    }
+    let daylight = &plane["DF_percent"];
+    match (figure(&daylight["mean"], 2), daylight["reason"].as_str()) {
+        (Some(factor), _) => line += &format!(", daylight factor {factor} %"),
+        (None, Some(reason)) => line += &format!(", daylight factor: {reason}"),
+        (None, None) => {}
+    }
+    Some(line + "; ranges are estimates")
+}
+
+/// Glare at the first camera, where it was looked for.
+fn glare(view: &Value) -> Option<String> {
+    let camera = view["camera"].as_str()?;
+    let rating = figure(&view["rating"], 1);
+    let reason = view["rating"]["reason"].as_str().unwrap_or("not known");
+    Some(match rating {
+        Some(rating) => format!("UGR from camera '{camera}': {rating}"),
+        None => format!("UGR from camera '{camera}': none, {reason}"),
+    })
 }
 
 /// The error as the audit measured it, and what that makes of the estimate.

@@ -1,10 +1,12 @@
 //! Points by which the light of a whole room is told: a horizontal grid over its floor.
 //!
 //! The floor is the lowest large level of what looks up and is lit: faces within [`LEVEL`] of each other are one level, and one is large if
-//! it has [`LARGE`] of the area that the largest has. So a table is no floor, and a cellar that no light reaches is none. The grid has the
+//! it has [`LARGE`] of the area that the largest has. So a table is no floor, and a hollow that hardly any light reaches is none, see [`DARK`].
+//! Nor is the ground outside: where enough of what looks up has something above it, the rest does not count. The grid has the
 //! same distance both ways and lies [`HEIGHT`] above the floor, as the reference plane of daylight does (EN 17037:2018); in rooms
 //! lower than twice that on the floor itself. No border along the walls is left out.
 
+use crate::geometry::{NO_PLANE, Segment};
 use crate::solve::Bake;
 use glam::{DVec3, dvec3};
 use std::collections::BTreeMap;
@@ -17,8 +19,13 @@ const POINTS: f64 = 150.0;
 const MOST: f64 = 200.0;
 /// Heights of one level, m.
 const LEVEL: f64 = 0.05;
+/// Ways between points run so far above them, share of half the room: some millimetres.
+const LIFT: f64 = 1e-3;
 /// What a level has of the area of the largest, to be a floor.
 const LARGE: f64 = 0.25;
+/// A level with less light than this share of the brightest lies in a hollow: where walls meet badly light leaks into the ground below a
+/// house, 5e-6 of that on the lawn (sun-room of the shared rooms); behind a daylight factor of .01 % nobody works.
+const DARK: f64 = 1e-4;
 /// Cosine of the slope up to which a face looks up, 2.6 degrees.
 const UP: f64 = 0.999;
 
@@ -34,28 +41,47 @@ pub struct WorkingPlane {
     pub spacing: f64,
     /// Points in world space with their normals, which look up.
     pub points: Vec<(DVec3, DVec3)>,
+    /// For each point the part of the plane that it lies in: from neighbour to neighbour of a part nothing is in the way. Parts of few
+    /// points lie in cupboards and pillars.
+    pub parts: Vec<usize>,
 }
 
 impl Bake {
     /// The working plane of the room; none where nothing that looks up is lit.
     pub fn working_plane(&self) -> Option<WorkingPlane> {
         let mesh = self.mesh();
-        let areas = self.lit_and_up();
+        let lit = self.lit_and_up();
         let height_of = |entry: usize| middle(corners(self, entry)).y;
-        let mut levels: BTreeMap<i64, f64> = BTreeMap::new();
-        for (&entry, area) in &areas {
-            *levels.entry(level(height_of(entry))).or_default() += area;
+        let mut levels: BTreeMap<i64, [f64; 2]> = BTreeMap::new();
+        for (&entry, [area, light]) in &lit {
+            let of = levels.entry(level(height_of(entry))).or_default();
+            *of = [of[0] + area, of[1] + light];
         }
         // Rounding may part what lies in one plane.
         let with_next = |k: i64| {
-            let area = |k: i64| levels.get(&k).copied().unwrap_or(0.0);
-            area(k) + area(k + 1)
+            let of = |k: i64| levels.get(&k).copied().unwrap_or_default();
+            [0, 1].map(|x| of(k)[x] + of(k + 1)[x])
         };
-        let most = levels.keys().map(|&k| with_next(k)).fold(0.0, f64::max);
-        let lowest = (levels.keys().copied()).find(|&k| with_next(k) >= LARGE * most)?;
+        let large = |levels: Vec<i64>| -> Vec<i64> {
+            let area = |k: &i64| with_next(*k)[0];
+            let most = levels.iter().map(area).fold(0.0, f64::max);
+            let is_large = |k: &i64| area(k) >= LARGE * most;
+            levels.into_iter().filter(is_large).collect()
+        };
+        let brightness = |k: &i64| {
+            let [area, light] = with_next(*k);
+            light / area
+        };
+        let all = large(levels.keys().copied().collect());
+        let most = all.iter().map(brightness).fold(0.0, f64::max);
+        let is_lit = |k: &i64| brightness(k) >= DARK * most;
+        // Without the hollows, which may be larger than the floor.
+        let lit_levels = levels.keys().copied().filter(is_lit).collect();
+        let lowest = large(lit_levels).into_iter().min()?;
         let of_floor = |entry: usize| (lowest..=lowest + 1).contains(&level(height_of(entry)));
-        let faces: Vec<(usize, f64)> = (areas.into_iter())
+        let faces: Vec<(usize, f64)> = (lit.into_iter())
             .filter(|&(entry, _)| of_floor(entry))
+            .map(|(entry, [area, _])| (entry, area))
             .collect();
         let area: f64 = faces.iter().map(|(_, area)| area).sum();
         let moment: f64 = (faces.iter())
@@ -77,30 +103,76 @@ impl Bake {
             true => mesh.centre + dvec3(place.x, floor + height, place.z),
             false => mesh.centre + place,
         };
+        let (keys, points): (Vec<_>, Vec<_>) = places
+            .map(|(key, place)| (key, (at(place), DVec3::Y)))
+            .unzip();
+        let parts = self.parts(&keys, &points);
         Some(WorkingPlane {
             floor: mesh.centre.y + floor,
             height,
             spacing,
-            points: places.map(|place| (at(place), DVec3::Y)).collect(),
+            points,
+            parts,
         })
     }
 
-    /// Faces that look up, by their entry in the hierarchy, with the area of them that is lit.
-    fn lit_and_up(&self) -> BTreeMap<usize, f64> {
+    /// Which part each point of a grid lies in, by the number of the part's first point.
+    fn parts(&self, keys: &[(i64, i64)], points: &[(DVec3, DVec3)]) -> Vec<usize> {
+        let centre = self.mesh().centre;
+        // On the floor itself a way must not lie in it.
+        let lift = LIFT * self.mesh().half_size * DVec3::Y;
+        let place = |k: usize| points[k].0 - centre + lift;
+        let numbers: BTreeMap<_, usize> = keys.iter().copied().zip(0..).collect();
+        let mut parts: Vec<usize> = (0..points.len()).collect();
+        for (k, &(i, j)) in keys.iter().enumerate() {
+            for next in [(i + 1, j), (i, j + 1)] {
+                let Some(&other) = numbers.get(&next) else {
+                    continue;
+                };
+                let way = Segment::new(place(k), place(other), [NO_PLANE; 2]);
+                if parts[k] != parts[other] && !self.rays().occluded(&way) {
+                    let (to, from) = (parts[k].min(parts[other]), parts[k].max(parts[other]));
+                    parts
+                        .iter_mut()
+                        .filter(|p| **p == from)
+                        .for_each(|p| *p = to);
+                }
+            }
+        }
+        parts
+    }
+
+    /// Faces that look up, by their entry in the hierarchy, with the area of them that is lit and what meets it; only those with something
+    /// above them where they have [`LARGE`] of all the area.
+    fn lit_and_up(&self) -> BTreeMap<usize, [f64; 2]> {
         let (tree, arrival) = (self.tree(), &self.light().arrival);
-        let mut areas = BTreeMap::new();
+        let mut lit: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
         for leaf in tree.leaves() {
             let node = tree.node(leaf);
-            let lit = arrival.get(leaf as usize).is_some_and(|a| a.all > 0.0);
-            let Some(element) = tree.element(node).filter(|_| lit) else {
+            let light = arrival.get(leaf as usize).map_or(0.0, |a| f64::from(a.all));
+            let Some(element) = tree.element(node).filter(|_| light > 0.0) else {
                 continue;
             };
             let entry = element.face as usize;
             if tree.face_normal[entry].y >= UP {
-                *areas.entry(entry).or_insert(0.0) += node.area;
+                let of = lit.entry(entry).or_default();
+                *of = [of[0] + node.area, of[1] + node.area * light];
             }
         }
-        areas
+        let area = |of: &BTreeMap<usize, [f64; 2]>| of.values().map(|[a, _]| a).sum::<f64>();
+        let covered = |entry: &usize| {
+            let corners = corners(self, *entry);
+            let top = middle(corners) + 3.0 * self.mesh().half_size * DVec3::Y;
+            let plane = self.mesh().plane[tree.faces[*entry].triangle as usize];
+            let up = Segment::new(middle(corners), top, [plane, NO_PLANE]);
+            self.rays().occluded(&up)
+        };
+        let mut within = lit.clone();
+        within.retain(|entry, _| covered(entry));
+        match area(&within) >= LARGE * area(&lit) {
+            true => within,
+            false => lit,
+        }
     }
 }
 
@@ -118,9 +190,9 @@ fn level(height: f64) -> i64 {
     (height / LEVEL).round() as i64
 }
 
-/// The distance of neighbours, m, and the places on triangles that a grid over them has, the highest where there are several; `area` is
+/// The distance of neighbours, m, and the places on triangles that a grid over them has, by row and column, the highest where there are several; `area` is
 /// that of all of them.
-fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = DVec3>) {
+fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = ((i64, i64), DVec3)>) {
     let points = || triangles.iter().flatten();
     let low = points().fold(DVec3::INFINITY, |low, p| low.min(*p));
     let high = points().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
@@ -150,7 +222,7 @@ fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = DVec3
             }
         }
     }
-    (spacing, found.into_values())
+    (spacing, found.into_iter())
 }
 
 #[cfg(test)]
@@ -202,7 +274,7 @@ mod tests {
         };
         let floor = [quad(0.0, 0.0), quad(1.0, 0.0), quad(0.0, 1.0)].concat();
         let (spacing, places) = grid(&floor, 3.0);
-        let places: Vec<DVec3> = places.collect();
+        let places: Vec<DVec3> = places.map(|(_, place)| place).collect();
         assert!((spacing - (3.0_f64 / POINTS).sqrt()).abs() < 1e-12);
         assert!(places.iter().all(|p| p.x <= 1.0 || p.z <= 1.0));
         assert!(places.len().abs_diff(150) < 20, "{}", places.len());

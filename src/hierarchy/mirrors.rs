@@ -377,6 +377,16 @@ impl Mirrors {
         self.side(hit) != NONE
     }
 
+    /// Does a ray meet a mirror that nothing has an image in?
+    pub fn is_curved(&self, hit: &Hit) -> bool {
+        self.side(hit) == CURVED
+    }
+
+    /// Is there any?
+    pub fn has_curved(&self) -> bool {
+        self.curved
+    }
+
     /// Number of the plane that a ray met; none of what is curved or no mirror.
     fn side(&self, hit: &Hit) -> u32 {
         self.of[hit.triangle as usize][usize::from(hit.from_behind)]

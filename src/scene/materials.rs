@@ -30,6 +30,7 @@ const METALLIC: f32 = 0.5;
 #[derive(Default)]
 struct Said {
     metals: Vec<String>,
+    metals_by_texture: Vec<String>,
     unlit: Vec<String>,
     panes: pane::Said,
     sheets: sheets::Said,
@@ -74,7 +75,7 @@ pub(crate) fn materials(
             material.pane = panes.pane(raw, &name, through, emits, &place, upsampler, check);
             let rho = &mut material.reflectance;
             let textured = *tinted || raw.base_color_texture.is_some();
-            let raw_sheet = (raw, textured);
+            let raw_sheet = (raw, textured, mirror::metalness(raw, images));
             let sheet = sheets::sheet(raw_sheet, &spectra, rho, &place, grid, upsampler, check);
             if sheet.is_some() {
                 said.sheets.hear(raw, &name, material.pane.is_some(), emits);
@@ -298,7 +299,10 @@ impl Said {
         }
         // glTF's default material is a metal on paper only.
         if raw.metallic > METALLIC && raw.index.is_some() && !is_mirror {
-            self.metals.push(name.into());
+            match raw.has_metal_texture {
+                true => self.metals_by_texture.push(name.into()),
+                false => self.metals.push(name.into()),
+            }
         }
         if raw.unlit {
             self.unlit.push(name.into());
@@ -310,6 +314,11 @@ impl Said {
             (
                 &self.metals,
                 "metallic: matt, with the base colour as albedo",
+            ),
+            (
+                &self.metals_by_texture,
+                "where it is a metal and how rough is said by a metallicRoughnessTexture, which is not used: matt everywhere, with the base \
+                 colour as albedo",
             ),
             (
                 &self.unlit,

@@ -21,6 +21,16 @@ const METAL_TEXEL: f64 = 0.95;
 /// Share of a texture's texels that may be no metal, as those at the edge of a picture.
 const STRAYS: f64 = 0.01;
 
+/// Share of a material that is a metal, its texture taken by its mean.
+pub(super) fn metalness(raw: &RawMaterial, images: &[Image]) -> f64 {
+    let image = (raw.metal_texture.as_ref()).and_then(|texture| images.get(texture.image));
+    let mean = image.map_or(1.0, |image| {
+        let blue = image.pixels.iter().map(|p| encode(f64::from(p[2])));
+        blue.sum::<f64>() / image.pixels.len().max(1) as f64
+    });
+    f64::from(raw.metallic) * mean
+}
+
 /// Does the material's texture, if it has one, say that it is a metal everywhere?
 fn is_metal_everywhere(raw: &RawMaterial, images: &[Image]) -> bool {
     let image = (raw.metal_texture.as_ref()).and_then(|texture| images.get(texture.image));

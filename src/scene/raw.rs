@@ -62,8 +62,10 @@ pub struct RawMaterial {
     pub volume: Option<RawVolume>,
     /// Roughness, if it is said.
     pub roughness: Option<f32>,
-    /// Texture that multiplies metallic and roughness, of what their factors make a mirror.
+    /// Texture that multiplies metallic and roughness, of what their factors make a mirror, and of diffuse sheets.
     pub metal_texture: Option<Texture>,
+    /// Is there one, read or not?
+    pub has_metal_texture: bool,
     /// The material's extras.
     pub extras: Option<Value>,
     /// Names of all extensions on the material, sorted.
@@ -93,6 +95,7 @@ impl Default for RawMaterial {
             volume: None,
             roughness: None,
             metal_texture: None,
+            has_metal_texture: false,
             extras: None,
             extensions: Vec::new(),
         }
@@ -102,6 +105,8 @@ impl Default for RawMaterial {
 /// Metals smoother than this are mirrors: GGX of alpha = roughness^2 = .01 has half its light within 1 degree of the mirrored
 /// direction.
 const SMOOTH: f32 = 0.1;
+const SHEET: &str = "KHR_materials_diffuse_transmission";
+const METAL_TEXTURE: &str = "metallicRoughnessTexture";
 /// Metallic from here on is a metal: bytes round 1 to no less.
 const METAL: f32 = 0.995;
 
@@ -250,8 +255,10 @@ fn material(
         out.metallic = unit(values.metallic_factor.0, "metallicFactor", item, check);
         let rough = unit(values.roughness_factor.0, "roughnessFactor", item, check);
         out.roughness = pbr.has("roughnessFactor").then_some(rough);
-        if out.is_smooth_metal() {
-            out.metal_texture = slots.texture(json, &pbr, "metallicRoughnessTexture", check);
+        out.has_metal_texture = pbr.has(METAL_TEXTURE);
+        let is_sheet = out.extensions.iter().any(|name| name == SHEET);
+        if out.is_smooth_metal() || is_sheet && out.metallic > 0.0 {
+            out.metal_texture = slots.texture(json, &pbr, METAL_TEXTURE, check);
         }
         out.base_color_texture = slots.texture(json, &pbr, "baseColorTexture", check);
     }
@@ -349,7 +356,6 @@ fn transmission(
 
 /// KHR_materials_diffuse_transmission.
 fn sheet(json: &Value, item: &Item<'_>, slots: &mut Slots, check: &mut Check) -> Option<RawSheet> {
-    const SHEET: &str = "KHR_materials_diffuse_transmission";
     let sheet = item.extended(SHEET, check)?;
     let values = item.extension::<DiffuseTransmission>(SHEET, check)?;
     let factor = values.diffuse_transmission_factor;

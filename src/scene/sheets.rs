@@ -12,10 +12,14 @@ use super::sheet::{Sheet, bounded};
 use crate::color::Upsampler;
 use crate::data::{Grid, LEAVES, Leaves};
 
+/// Metallic from here on nothing passes: bytes round 1 to no less.
+const WHOLLY: f64 = 0.995;
+
 /// The sheet that a material is, if it is one; what both sides reflect goes into `reflectance`, which holds the whole base colour or
-/// what was measured. `textured`: is the base colour multiplied by a texture or by vertex colours?
+/// what was measured. `textured`: is the base colour multiplied by a texture or by vertex colours? `metallic`: the share of it that is a
+/// metal, which lets nothing through.
 pub(super) fn sheet(
-    (raw, textured): (&RawMaterial, bool),
+    (raw, textured, metallic): (&RawMaterial, bool, f64),
     spectra: &MaterialSpectra,
     reflectance: &mut Leaves,
     place: &str,
@@ -32,7 +36,13 @@ pub(super) fn sheet(
         }
         return None;
     }
-    let strength = given.map_or(0.0, |given| f64::from(given.strength));
+    if metallic >= WHOLLY && measured.is_none() {
+        let what = "is a metal and lets light through: KHR_materials_diffuse_transmission counts times 1 - metallic, which is 0";
+        let next = "set its metallicFactor to 0, take the extension out, or give a \"transmission\" in the side file";
+        check.problem(place, what, next);
+        return None;
+    }
+    let strength = given.map_or(0.0, |given| f64::from(given.strength) * (1.0 - metallic));
     let color = given.map_or([1.0; 3], |given| given.color);
     if spectra.reflectance.is_none() {
         *reflectance = reflectance.map(|r| (1.0 - strength) * r);

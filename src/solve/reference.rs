@@ -6,26 +6,32 @@
 //! not balanced, [`Reference::row_sums`] tells what they miss. Solved by LU for every distinct set of reflectances.
 //!
 //! What fluoresces adds the 64 x 64 Donaldson matrix of its material times its irradiance, found in rounds; each loses energy.
-//! It knows no panes and no mirrors: what they keep of a ray is no factor between patches. It shares triangles, Lambert's formula and the ray index with the solver: no hierarchy, no links, no lanes, no
-//! iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
+//! A sheet has a patch on each side, and what meets the one leaves the other by its transmittance. Panes filter each ray of a factor by
+//! incidence and leaf; where they have a colour every leaf has factors of its own, which takes 64 times the memory. It knows no mirrors:
+//! rooms with them are refused.
+//!
+//! It shares triangles, Lambert's formula, the ray index and what a ray crosses of panes with the solver: no hierarchy, no links, no
+//! lanes, no iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
 
-use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
-use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon, quarters};
-use crate::hierarchy::{Mesh, stratified};
-use crate::scene::effects::{Kind, Plan};
-use crate::scene::{LightKind, PunctualLight, Scene};
+mod lights;
+mod ways;
+
+use crate::color::Upsampler;
+use crate::error::{Error, Result};
+use crate::geometry::{NO_PLANE, quarters};
+use crate::hierarchy::Mesh;
+use crate::scene::sheet::Weave;
+use crate::scene::{Scene, short};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
+use lights::{punctual, punctual_at};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use ways::Ways;
 
-/// Points of a triangle of a lamp with a profile: where a shadow's edge crosses it they are off by about .3 %.
-const SHINING_POINTS: u32 = 1024;
 /// What is fluoresced has settled when no leaf changes by more than this share of the brightest.
 const SETTLED: f64 = 1e-12;
-/// Rays for the sky of a point: .1 % of open ground's.
-const DOME_RAYS: u32 = 1024;
 
 /// Radon's rule of degree 5 on a triangle (1948; Abramowitz and Stegun 1964, 25.4.63): weight, and weights of corners.
 fn radon() -> [(f64, [f64; 3]); 7] {
@@ -66,6 +72,10 @@ pub struct Patch {
     pub punctual: Leaves,
     /// Its material.
     pub material: usize,
+    /// What it lets through of light that meets its other side.
+    pub transmittance: Leaves,
+    /// The patch on its other side, if it lets light through.
+    pub behind: Option<usize>,
 }
 
 /// The patches of a room and who sees whom.
@@ -73,8 +83,8 @@ pub struct Patch {
 pub struct Reference {
     /// The patches: every side of every triangle of the scene, quartered alike.
     pub patches: Vec<Patch>,
-    /// `F_ij`: share of the light leaving i that reaches j.
-    pub factors: DMatrix<f64>,
+    /// `F_ij`: share of the light leaving i that reaches j, for all leaves alike or leaf by leaf.
+    factors: Vec<DMatrix<f64>>,
     /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a leaf by irradiance on another.
     pub donaldson: Vec<Option<Vec<Leaves>>>,
 }
@@ -88,58 +98,24 @@ pub struct Solution {
     pub irradiance: Vec<Leaves>,
 }
 
-/// What blocks the way in a room.
-struct Ways {
-    rays: RayIndex,
-    /// False: nothing can block.
-    blocks: bool,
-    /// Rays between a point and a polygon.
-    count: usize,
-}
-
-impl Ways {
-    /// Factor from a point to the visible part of a patch.
-    fn factor(&self, point: DVec3, normal: DVec3, plane: u32, to: &Patch) -> f64 {
-        if plane == to.plane || to.normal.dot(point - to.corners[0]) <= 0.0 {
-            return 0.0;
-        }
-        let open = lambert_polygon(point, normal, &to.corners);
-        if open <= 0.0 || !self.blocks {
-            return open;
-        }
-        let (mut seen, mut total) = (0.0, 0.0);
-        for k in 0..self.count {
-            let w = stratified(k, self.count, [0.5, 0.5]);
-            let q = to.corners[0] * w[0] + to.corners[1] * w[1] + to.corners[2] * w[2];
-            let d = q - point;
-            let (c1, c2, r2) = (normal.dot(d), -to.normal.dot(d), d.length_squared());
-            if c1 <= 0.0 || c2 <= 0.0 {
-                continue;
-            }
-            let weight = c1 * c2 / (r2 * r2);
-            total += weight;
-            if !self.blocked(point, q, [plane, to.plane]) {
-                seen += weight;
-            }
-        }
-        if total > 0.0 {
-            open * seen / total
-        } else {
-            open
-        }
-    }
-
-    fn blocked(&self, from: DVec3, to: DVec3, planes: [u32; 2]) -> bool {
-        self.blocks && self.rays.occluded(&Segment::new(from, to, planes))
-    }
-}
-
 impl Reference {
     /// Quarters every triangle of `scene` `depth` times and works out all factors, with `rays` rays from a point to a
     /// patch where something could block. Textures, vertex colours and holes are not looked at.
-    pub fn new(scene: &Scene, depth: u32, rays: usize) -> Self {
+    ///
+    /// # Errors
+    /// A room with mirrors.
+    pub fn new(scene: &Scene, depth: u32, rays: usize) -> Result<Self> {
+        let mirrors = scene.surfaces.iter().map(|s| &scene.materials[s.material]);
+        if let Some(mirror) = mirrors.into_iter().find(|m| m.mirror.is_some()) {
+            let what = format!(
+                "'{}' is a mirror, which is no patch that sees patches",
+                short(&mirror.name)
+            );
+            let next = "the path tracer follows mirrors: audit the room, or say \"mirror\": false";
+            return Err(Error::input(scene.source.place(), what, next));
+        }
         let mesh = Mesh::new(scene);
-        let ways = ways(scene, &mesh, rays);
+        let ways = Ways::new(scene, &mesh, rays);
         let mut patches = patches(scene, &mesh, depth);
         let lit: Vec<Leaves> = patches
             .par_iter()
@@ -148,45 +124,27 @@ impl Reference {
         for (patch, lit) in patches.iter_mut().zip(lit) {
             patch.punctual = lit;
         }
-        let n = patches.len();
-        let rule = radon();
-        let rows: Vec<Vec<f64>> = patches
-            .par_iter()
-            .enumerate()
-            .map(|(i, from)| {
-                let mut row = vec![0.0; n];
-                for (j, to) in patches.iter().enumerate() {
-                    if i != j && from.plane != to.plane {
-                        row[j] = rule
-                            .iter()
-                            .map(|&(w, at)| {
-                                w * ways.factor(point(from, at), from.normal, from.plane, to)
-                            })
-                            .sum();
-                    }
-                }
-                row
-            })
-            .collect();
-        let factors = DMatrix::from_fn(n, n, |i, j| {
-            let (a, b) = (patches[i].area, patches[j].area);
-            0.5 * (rows[i][j] + rows[j][i] * b / a)
-        });
+        let factors = factors(scene, &ways, &patches);
         let width = scene.grid.width();
         let donaldson = scene.materials.iter().map(|m| {
             let fluorescence = m.fluorescence.as_ref()?;
             Some(fluorescence.matrix(&scene.spectra, width))
         });
-        Self {
+        Ok(Self {
             donaldson: donaldson.collect(),
             patches,
             factors,
-        }
+        })
     }
 
-    /// Sum of every patch's factors: 1 in a closed room, but for the rule's error.
+    /// `F_ij` of a leaf: share of the light leaving i that reaches j.
+    pub fn factors(&self, leaf: usize) -> &DMatrix<f64> {
+        &self.factors[leaf.min(self.factors.len() - 1)]
+    }
+
+    /// Sum of every patch's factors on the first leaf: 1 in a closed room without panes, but for the rule's error.
     pub fn row_sums(&self) -> Vec<f64> {
-        self.factors.row_iter().map(|row| row.sum()).collect()
+        self.factors(0).row_iter().map(|row| row.sum()).collect()
     }
 
     /// Solves all leaves; where surfaces fluoresce as often as it takes until what they give out stays as it is.
@@ -227,20 +185,30 @@ impl Reference {
             if solved[leaf] {
                 continue;
             }
-            let rho: Vec<f64> = self.patches.iter().map(|p| p.reflectance[leaf]).collect();
-            let alike: Vec<usize> = (leaf..LEAVES)
-                .filter(|&l| {
-                    self.patches
-                        .iter()
-                        .zip(&rho)
-                        .all(|(p, r)| p.reflectance[l] == *r)
-                })
-                .collect();
+            let same = |l: usize| {
+                let alike = |p: &Patch| {
+                    p.reflectance[l] == p.reflectance[leaf]
+                        && p.transmittance[l] == p.transmittance[leaf]
+                };
+                (l == leaf || self.factors.len() == 1) && self.patches.iter().all(alike)
+            };
+            let alike: Vec<usize> = (leaf..LEAVES).filter(|&l| same(l)).collect();
+            // What leaves a patch of what meets it and its other side.
+            let scattered = |i: usize, x: &dyn Fn(usize) -> f64| {
+                let patch = &self.patches[i];
+                let through = |b: usize| patch.transmittance[leaf] * x(b);
+                patch.reflectance[leaf] * x(i) + patch.behind.map_or(0.0, through)
+            };
             let right = DMatrix::from_fn(n, alike.len(), |i, k| {
                 let (patch, leaf) = (&self.patches[i], alike[k]);
-                patch.exitance[leaf] + glow[i][leaf] + rho[i] * patch.punctual[leaf]
+                let lit = scattered(i, &|i| self.patches[i].punctual[leaf]);
+                patch.exitance[leaf] + glow[i][leaf] + lit
             });
-            let answer = solve(&self.factors, &rho, right);
+            let factors = self.factors(leaf);
+            let system = DMatrix::from_fn(n, n, |i, j| {
+                f64::from(u8::from(i == j)) - scattered(i, &|i| factors[(i, j)])
+            });
+            let answer = solved_system(system, &right);
             for (k, &l) in alike.iter().enumerate() {
                 solved[l] = true;
                 for (i, row) in radiosity.iter_mut().enumerate() {
@@ -248,11 +216,16 @@ impl Reference {
                 }
             }
         }
-        let sources = DMatrix::from_fn(n, LEAVES, |i, l| radiosity[i][l]);
-        let received = &self.factors * sources;
-        let irradiance = (0..n)
-            .map(|i| std::array::from_fn(|l| received[(i, l)] + self.patches[i].punctual[l]))
-            .collect();
+        let mut irradiance: Vec<Leaves> = self.patches.iter().map(|p| p.punctual).collect();
+        // All leaves at once, or one by one.
+        let at_once = LEAVES / self.factors.len();
+        for first in (0..LEAVES).step_by(at_once) {
+            let sources = DMatrix::from_fn(n, at_once, |i, k| radiosity[i][first + k]);
+            let received = self.factors(first) * sources;
+            for (i, row) in irradiance.iter_mut().enumerate() {
+                (0..at_once).for_each(|k| row[first + k] += received[(i, k)]);
+            }
+        }
         Solution {
             radiosity,
             irradiance,
@@ -269,7 +242,7 @@ impl Reference {
         rays: usize,
     ) -> Vec<Leaves> {
         let mesh = Mesh::new(scene);
-        let ways = ways(scene, &mesh, rays);
+        let ways = Ways::new(scene, &mesh, rays);
         points
             .par_iter()
             .map(|&(at, normal)| {
@@ -277,9 +250,12 @@ impl Reference {
                 let plane = plane_at(&mesh, &self.patches, at, normal);
                 let mut sum = [0.0; LEAVES];
                 for (patch, radiosity) in self.patches.iter().zip(&solution.radiosity) {
-                    let f = ways.factor(at, normal, plane, patch);
-                    if f > 0.0 {
-                        add(&mut sum, radiosity, f);
+                    match ways.factor(at, normal, plane, patch) {
+                        (f, None) => add(&mut sum, radiosity, f),
+                        (f, Some(passes)) => {
+                            let left = std::array::from_fn(|l| passes[l] * radiosity[l]);
+                            add(&mut sum, &left, f);
+                        }
                     }
                 }
                 add(
@@ -302,9 +278,13 @@ pub fn solve(factors: &DMatrix<f64>, rho: &[f64], right: DMatrix<f64>) -> DMatri
     let system = DMatrix::from_fn(n, n, |i, j| {
         f64::from(u8::from(i == j)) - rho[i] * factors[(i, j)]
     });
+    solved_system(system, &right)
+}
+
+fn solved_system(system: DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     system
         .lu()
-        .solve(&right)
+        .solve(right)
         .expect("albedos below 1 leave no row that is not dominated by its diagonal")
 }
 
@@ -314,14 +294,42 @@ pub fn solve_one(factors: &DMatrix<f64>, rho: &[f64], emission: &[f64]) -> DVect
     solve(factors, rho, right).column(0).into_owned()
 }
 
-fn ways(scene: &Scene, mesh: &Mesh, count: usize) -> Ways {
-    let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
-    let solid = vec![false; mesh.triangles.len()];
-    Ways {
-        rays: RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &solid),
-        blocks: Plan::of(scene).runs(Kind::Occlusion),
-        count,
-    }
+/// `F_ij`, made reciprocal by their means; for all leaves alike, or leaf by leaf where a pane has a colour.
+fn factors(scene: &Scene, ways: &Ways<'_>, patches: &[Patch]) -> Vec<DMatrix<f64>> {
+    let tinted = |s: &crate::scene::Surface| {
+        let pane = scene.materials[s.material].pane.as_ref();
+        pane.is_some_and(|pane| !pane.is_neutral())
+    };
+    let sets = if scene.panes.iter().any(tinted) {
+        LEAVES
+    } else {
+        1
+    };
+    let (n, rule) = (patches.len(), radon());
+    let row = |(i, from): (usize, &Patch)| {
+        let mut row = vec![0.0; sets * n];
+        for (j, to) in patches.iter().enumerate() {
+            if i == j || from.plane == to.plane {
+                continue;
+            }
+            let own = &mut row[sets * j..sets * (j + 1)];
+            for (w, at) in rule {
+                let (f, passes) = ways.factor(point(from, at), from.normal, from.plane, to);
+                for (k, x) in own.iter_mut().enumerate() {
+                    *x += w * f * passes.as_ref().map_or(1.0, |passes| passes[k]);
+                }
+            }
+        }
+        row
+    };
+    let rows: Vec<Vec<f64>> = patches.par_iter().enumerate().map(row).collect();
+    let mean = |k: usize, i: usize, j: usize| {
+        let (a, b) = (patches[i].area, patches[j].area);
+        0.5 * (rows[i][sets * j + k] + rows[j][sets * i + k] * b / a)
+    };
+    (0..sets)
+        .map(|k| DMatrix::from_fn(n, n, |i, j| mean(k, i, j)))
+        .collect()
 }
 
 fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
@@ -336,7 +344,8 @@ fn point(patch: &Patch, w: [f64; 3]) -> DVec3 {
 
 /// All sides of all triangles, quartered.
 fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
-    let mut out = Vec::new();
+    let mut out: Vec<Patch> = Vec::new();
+    let upsampler = Upsampler::new(&scene.grid);
     for &face in &mesh.faces {
         let triangle = face.triangle as usize;
         let material = &scene.materials[mesh.material[triangle] as usize];
@@ -344,6 +353,10 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
             let power = &scene.spectra[e.light].power;
             std::array::from_fn(|l| PI * power[l] * e.shape[l])
         });
+        let [reflectance, transmittance] = match &material.sheet {
+            Some(sheet) => material.scatters(sheet, None, Weave::PLAIN, face.back, &upsampler),
+            None => [material.reflectance, [0.0; LEAVES]],
+        };
         let mut corners = vec![mesh.corners(face)];
         for _ in 0..depth {
             corners = corners.into_iter().flat_map(quarters).collect();
@@ -354,13 +367,34 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
             normal: mesh.face_normal(face),
             plane: mesh.plane[triangle],
             area,
-            reflectance: material.reflectance,
+            reflectance,
             exitance,
             punctual: [0.0; LEAVES],
             material: mesh.material[triangle] as usize,
+            transmittance,
+            behind: None,
         }));
     }
+    pair_up(&mut out, scene);
     out
+}
+
+/// Tells the patches of sheets which lies on their other side: that whose middle is theirs.
+fn pair_up(patches: &mut [Patch], scene: &Scene) {
+    let middle = |p: &Patch| p.corners.iter().sum::<DVec3>() / 3.0;
+    let is_sheet = |p: &Patch| scene.materials[p.material].sheet.is_some();
+    let sheets: Vec<usize> = (0..patches.len())
+        .filter(|&k| is_sheet(&patches[k]))
+        .collect();
+    for &k in &sheets {
+        let own = &patches[k];
+        let near = 1e-6 * own.area.sqrt();
+        let is_behind = |&&other: &&usize| {
+            let other = &patches[other];
+            own.normal.dot(other.normal) < 0.0 && middle(own).distance(middle(other)) < near
+        };
+        patches[k].behind = sheets.iter().find(is_behind).copied();
+    }
 }
 
 /// Plane id of the patch that holds a point; [`NO_PLANE`] in the air.
@@ -373,145 +407,6 @@ fn plane_at(mesh: &Mesh, patches: &[Patch], at: DVec3, normal: DVec3) -> u32 {
             && w.iter().all(|&x| x >= -1e-9)
     };
     patches.iter().find(holds).map_or(NO_PLANE, |p| p.plane)
-}
-
-/// Mean irradiance of a patch from punctual lights.
-fn punctual(scene: &Scene, mesh: &Mesh, ways: &Ways, patch: &Patch) -> Leaves {
-    let mut sum = [0.0; LEAVES];
-    for (w, at) in radon() {
-        add(
-            &mut sum,
-            &punctual_at(
-                scene,
-                mesh,
-                ways,
-                point(patch, at),
-                patch.normal,
-                patch.plane,
-            ),
-            w,
-        );
-    }
-    sum
-}
-
-/// Irradiance at a point from punctual lights: `I cos / r^2`.
-fn punctual_at(
-    scene: &Scene,
-    mesh: &Mesh,
-    ways: &Ways,
-    at: DVec3,
-    normal: DVec3,
-    plane: u32,
-) -> Leaves {
-    let mut sum = [0.0; LEAVES];
-    for light in &scene.lights {
-        let (toward, end) = match light.kind {
-            LightKind::Sky(_) | LightKind::Ground(_) => {
-                let factor = dome_at(scene, mesh, ways, at, normal, plane, light.kind.place());
-                let power = &scene.spectra[light.light].power;
-                for l in 0..LEAVES {
-                    sum[l] += factor * power[l] * light.shape[l];
-                }
-                continue;
-            }
-            LightKind::Surface => {
-                let power = &scene.spectra[light.light].power;
-                let factor = shining_at(light, mesh, ways, at, normal, plane);
-                for l in 0..LEAVES {
-                    sum[l] += factor * power[l] * light.shape[l];
-                }
-                continue;
-            }
-            LightKind::Directional | LightKind::Sun => (
-                -light.direction,
-                at - light.direction * (4.0 * mesh.half_size),
-            ),
-            LightKind::Point | LightKind::Spot { .. } | LightKind::Profile => {
-                let end = light.position - mesh.centre;
-                ((end - at).normalize_or_zero(), end)
-            }
-        };
-        let spread = match light.kind {
-            LightKind::Directional | LightKind::Sun => 1.0,
-            LightKind::Point | LightKind::Sky(_) | LightKind::Ground(_) | LightKind::Surface => {
-                1.0 / end.distance_squared(at)
-            }
-            LightKind::Profile => {
-                let spread = light.luminaire.as_ref();
-                spread.map_or(0.0, |l| l.per_lumen(-toward)) / end.distance_squared(at)
-            }
-            LightKind::Spot { inner, outer } => {
-                let (cos, i, o) = (-light.direction.dot(toward), inner.cos(), outer.cos());
-                ((cos - o) / (i - o).max(1e-3)).clamp(0.0, 1.0).powi(2) / end.distance_squared(at)
-            }
-        };
-        let factor = normal.dot(toward) * spread;
-        if factor > 0.0 && factor.is_finite() && !ways.blocked(at, end, [plane, NO_PLANE]) {
-            let power = &scene.spectra[light.light].power;
-            for l in 0..LEAVES {
-                sum[l] += factor * power[l] * light.shape[l];
-            }
-        }
-    }
-    sum
-}
-
-/// What turns the flux of a lamp with an extent into irradiance: many points, a ray to each.
-fn shining_at(
-    light: &PunctualLight,
-    mesh: &Mesh,
-    ways: &Ways,
-    at: DVec3,
-    normal: DVec3,
-    plane: u32,
-) -> f64 {
-    let Some(luminaire) = &light.luminaire else {
-        return 0.0;
-    };
-    let mut sum = 0.0;
-    for (k, &[a, b, c]) in luminaire.triangles().iter().enumerate() {
-        let cross = (b - a).cross(c - a);
-        let own = cross.normalize_or_zero();
-        let shift = hash(k as u64, 0);
-        for n in 0..SHINING_POINTS {
-            let w = triangle_weights(sequence02(n, shift));
-            let from = a * w[0] + b * w[1] + c * w[2] + light.position - mesh.centre;
-            let (way, r2) = ((from - at).normalize_or_zero(), from.distance_squared(at));
-            let sent = luminaire.per_area(-way, own) * normal.dot(way).max(0.0) / r2;
-            let before = from + own * (1e-5 * mesh.half_size);
-            if sent > 0.0 && !ways.blocked(at, before, [plane, NO_PLANE]) {
-                sum += sent * 0.5 * cross.length() / f64::from(SHINING_POINTS);
-            }
-        }
-    }
-    sum
-}
-
-/// Irradiance of a point by a sky that gives open level ground 1, or by ground that sends out 1: the mean over many directions.
-fn dome_at(
-    scene: &Scene,
-    mesh: &Mesh,
-    ways: &Ways,
-    at: DVec3,
-    normal: DVec3,
-    plane: u32,
-    place: Option<usize>,
-) -> f64 {
-    let Some(sky) = &scene.sky else { return 0.0 };
-    let brings = |k: u32| {
-        let d = cosine_direction(normal, sequence02(k, 0));
-        let Some(radiance) = sky.part(place, d) else {
-            return 0.0;
-        };
-        let end = at + d * (4.0 * mesh.half_size);
-        if ways.blocked(at, end, [plane, NO_PLANE]) {
-            0.0
-        } else {
-            PI * radiance
-        }
-    };
-    (0..DOME_RAYS).map(brings).sum::<f64>() / f64::from(DOME_RAYS)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What a ray meets in a room: a front that takes light, a back that does not, or nothing.
 
-use crate::geometry::{NO_PLANE, RayIndex};
+use crate::geometry::{Hit, NO_PLANE, RayIndex};
 use crate::hierarchy::Mesh;
 use crate::hierarchy::alpha::is_hole;
 use crate::scene::{Scene, Sides};
@@ -35,16 +35,7 @@ impl<'a> Eyes<'a> {
 
     /// Looks from a point (world space) into a direction; what lies in `plane` is passed over.
     pub(super) fn look(&self, from: DVec3, direction: DVec3, plane: u32) -> Met {
-        let from = from - self.mesh.centre;
-        // Past all of the room, from wherever the point is.
-        let reach = (from.length() + 2.0 * self.mesh.half_size) as f32;
-        let solid =
-            |t: u32, u: f32, v: f32| !is_hole(self.scene, &self.mesh, t, [1.0 - u - v, u, v]);
-        let (from, direction) = (from.as_vec3(), direction.as_vec3());
-        let Some(hit) = self
-            .rays
-            .closest_with(from, direction, reach, plane, &solid)
-        else {
+        let Some(hit) = self.hit(from, direction, plane) else {
             return Met::Nothing;
         };
         let surface = self.mesh.origin[hit.triangle as usize].0 as usize;
@@ -54,6 +45,18 @@ impl<'a> Eyes<'a> {
             (true, Sides::Both) => Met::Behind(surface),
             (true, Sides::Front) => Met::Back(surface),
         }
+    }
+
+    /// The same, and which triangle that is.
+    pub(super) fn hit(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<Hit> {
+        let from = from - self.mesh.centre;
+        // Past all of the room, from wherever the point is.
+        let reach = (from.length() + 2.0 * self.mesh.half_size) as f32;
+        let solid =
+            |t: u32, u: f32, v: f32| !is_hole(self.scene, &self.mesh, t, [1.0 - u - v, u, v]);
+        let (from, direction) = (from.as_vec3(), direction.as_vec3());
+        self.rays
+            .closest_with(from, direction, reach, plane, &solid)
     }
 
     /// The same from a point in the air.

@@ -162,42 +162,49 @@ fn of_surface(eyes: &Eyes, surface: usize, way: Way, rays: u32) -> Seen {
 fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
     let mut seen = Seen::default();
     for k in 0..rays {
-        let [x, y] = sequence02(k, 0);
-        let (from, direction) = match light.kind {
-            LightKind::Point => (light.position, sphere_direction([x, y])),
-            LightKind::Spot { outer, .. } => {
-                // Evenly over the cone.
-                let cosine = 1.0 - y * (1.0 - outer.cos());
-                (light.position, around(light.direction, cosine, x))
-            }
-            LightKind::Profile | LightKind::Surface => {
-                // Two shifts of one sequence depend on each other.
-                let mut random = Pcg::new(hash(2, u64::from(k)));
-                let way = light.luminaire.as_ref();
-                let ray = way.and_then(|l| l.ray([x, y], [random.f64(), random.f64()]));
-                let (_, direction, _) = ray.unwrap_or((DVec3::ZERO, light.direction, 0.0));
-                (light.position, direction)
-            }
-            LightKind::Directional | LightKind::Sun | LightKind::Sky(_) | LightKind::Ground(_) => {
-                let from = if light.kind.is_dome() {
-                    // Two shifts of one sequence depend on each other.
-                    let mut random = Pcg::new(hash(1, u64::from(k)));
-                    cosine_direction(-light.direction, [random.f64(), random.f64()])
-                } else {
-                    -light.direction
-                };
-                let away = -from;
-                // From outside, on a disc that covers the room.
-                let (size, [u, v]) = (eyes.mesh.half_size, tangents(away));
-                let (radius, angle) = (size * y.sqrt(), TAU * x);
-                let across = radius * (angle.cos() * u + angle.sin() * v);
-                let from = eyes.mesh.centre - 1.1 * size * away + across;
-                (from, away)
-            }
-        };
+        let (from, direction, _) = ray_of(eyes, light, k);
         seen.add(eyes.scene, None, eyes.look_around(from, direction));
     }
     seen
+}
+
+/// A ray of a light that is no surface of a file: where it starts, its direction, and how much of the light goes along it, in any unit.
+pub(super) fn ray_of(eyes: &Eyes, light: &PunctualLight, k: u32) -> (DVec3, DVec3, f64) {
+    let [x, y] = sequence02(k, 0);
+    match light.kind {
+        LightKind::Point => (light.position, sphere_direction([x, y]), 1.0),
+        LightKind::Spot { inner, outer } => {
+            // Evenly over the cone.
+            let cosine = 1.0 - y * (1.0 - outer.cos());
+            let edge = (inner.cos() - outer.cos()).max(1e-3);
+            let share = ((cosine - outer.cos()) / edge).clamp(0.0, 1.0).powi(2);
+            (light.position, around(light.direction, cosine, x), share)
+        }
+        LightKind::Profile | LightKind::Surface => {
+            // Two shifts of one sequence depend on each other.
+            let mut random = Pcg::new(hash(2, u64::from(k)));
+            let way = light.luminaire.as_ref();
+            let ray = way.and_then(|l| l.ray([x, y], [random.f64(), random.f64()]));
+            let (from, direction, weight) = ray.unwrap_or((DVec3::ZERO, light.direction, 0.0));
+            (light.position + from, direction, weight)
+        }
+        LightKind::Directional | LightKind::Sun | LightKind::Sky(_) | LightKind::Ground(_) => {
+            let from = if light.kind.is_dome() {
+                // Two shifts of one sequence depend on each other.
+                let mut random = Pcg::new(hash(1, u64::from(k)));
+                cosine_direction(-light.direction, [random.f64(), random.f64()])
+            } else {
+                -light.direction
+            };
+            let away = -from;
+            // From outside, on a disc that covers the room.
+            let (size, [u, v]) = (eyes.mesh.half_size, tangents(away));
+            let (radius, angle) = (size * y.sqrt(), TAU * x);
+            let across = radius * (angle.cos() * u + angle.sin() * v);
+            let from = eyes.mesh.centre - 1.1 * size * away + across;
+            (from, away, 1.0)
+        }
+    }
 }
 
 impl Away {

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | `eyes` | what a ray meets: a front, a back, nothing |
 //! | `content` | no surface, no lamp |
+//! | `curved` | light that curved mirrors make caustics of |
 //! | `lamps` | lamps that shine away from the room, and which faces to turn |
 //! | `lying` | surfaces that lie in others |
 //! | `openings` | open to a sky that nobody describes |
@@ -14,6 +15,7 @@
 //! | `points` | points inside solids and outside the room |
 
 mod content;
+mod curved;
 mod eyes;
 mod lamps;
 mod lying;
@@ -58,14 +60,13 @@ pub fn advise(scene: &mut Scene, wishes: Wishes) -> Vec<Problem> {
     }
     scene.warnings.extend(size::hint(scene));
     let eyes = Eyes::new(scene);
-    let warnings = openings::hint(&eyes).into_iter().chain(lying::hint(&eyes));
-    let warnings: Vec<String> = warnings.collect();
+    let warnings = [openings::hint, lying::hint, curved::hint].map(|hint| hint(&eyes));
     let mut problem = content::no_lamp(scene);
     let mut away = match problem {
         None => lamps::away(&eyes),
         Some(_) => None,
     };
-    scene.warnings.extend(warnings);
+    scene.warnings.extend(warnings.into_iter().flatten());
     if problem.is_none() {
         if wishes.flip {
             match &away {

@@ -10,5 +10,6 @@ mod desk;
 mod faces;
 mod limits;
 mod names;
+mod plane;
 mod probes;
 mod warnings;

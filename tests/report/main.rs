@@ -439,6 +439,46 @@ fn inspect_draws_plan_and_spectra() {
     }
 }
 
+/// A lamp of a profile has its polar curve drawn, with the figures of its file; a room without one has none.
+#[test]
+fn inspect_draws_polar_curves() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = |room: &str| -> Vec<String> {
+        let room_file = root().join(format!("scenes/{room}.glb"));
+        let output = Command::new(env!("CARGO_BIN_EXE_haarlight"))
+            .args(["inspect", room_file.to_str().unwrap(), "--pictures", room])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        let files = std::fs::read_dir(folder.path().join(room)).unwrap();
+        let paths = files.map(|file| file.unwrap().path());
+        let curves = paths.filter(|p| {
+            p.file_name()
+                .unwrap()
+                .to_string_lossy()
+                .starts_with("profile")
+        });
+        curves
+            .map(|p| std::fs::read_to_string(p).unwrap())
+            .collect()
+    };
+    let curves = drawn("gallery");
+    assert_eq!(curves.len(), 3);
+    let spot = curves
+        .iter()
+        .find(|svg| svg.contains(">spot: Narrow spot with a ring<"));
+    for part in [
+        "type C: 393 lm, at most 2400 cd",
+        ">C90-C270<",
+        ">2000<",
+        ">30°<",
+    ] {
+        assert!(spot.unwrap().contains(part), "{part}");
+    }
+    assert!(drawn("two-rooms").is_empty());
+}
+
 #[test]
 fn the_page_lives_in_a_browser() {
     let Some(mut browser) = Browser::start() else {

@@ -35,6 +35,7 @@ export function header(data, light) {
     ["Lamps", `${digits(lumens, 4)} lm`, `${plan.facts.lights.length} in all`],
     ["Surfaces", `${digits(plan.facts.area_m2)} m²`, `${whole(plan.facts.triangles)} triangles`],
   ];
+  figures.push(...measured(verdict.metrics));
   $("figures").append(...figures.map(([name, value, note]) =>
     h("div", {}, h("dt", {}, name), h("dd", {}, value, h("small", {}, note)))));
   const warnings = [...plan.warnings, ...verdict.warnings];
@@ -44,6 +45,20 @@ export function header(data, light) {
     $("verdict").append(" ", h("span", { class: "badge warm" }, h("a", { href: "#warnings" }, count)));
   }
   $("warnings").querySelector("ul").append(...warnings.map((w) => h("li", {}, w)));
+}
+
+// What the verdict says of the working plane, of daylight and of glare, each with its range.
+function measured(metrics) {
+  const range = (f, unit) => f.low == null ? "" : `${digits(f.low)} – ${f.high == null ? "" : digits(f.high)}${unit}, estimate`;
+  const entry = (name, f, unit, note) => f?.value == null ? [] : [[name, `${digits(f.value)}${unit}`, [range(f, unit), note].filter(Boolean).join("; ")]];
+  const plane = metrics?.working_plane;
+  const view = metrics?.ugr?.[0];
+  return [
+    ...entry("Working plane", plane?.mean_lux, " lx", plane && `mean, ${digits(plane.height_m)} m above the floor`),
+    ...entry("Uniformity", plane?.min_over_mean, "", "least / mean on the plane"),
+    ...entry("Daylight factor", plane?.DF_percent?.mean, " %", "mean on the plane"),
+    ...entry("Glare (UGR)", view?.rating, "", view && `from ${view.camera}`),
+  ];
 }
 
 const card = (title, wide, ...content) => h("section", { class: wide ? "card wide" : "card" }, h("h2", {}, title), ...content);

@@ -1,0 +1,114 @@
+//! What blocks the way between two points of the reference, and what panes leave of light that takes it.
+
+use super::{Patch, add};
+use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon};
+use crate::hierarchy::{Glazing, Mesh, Panes, stratified};
+use crate::scene::Scene;
+use crate::scene::effects::{Kind, Plan};
+use crate::spectrum::{LEAVES, Leaves};
+use glam::DVec3;
+
+/// The ways of light in a room.
+pub(super) struct Ways<'a> {
+    scene: &'a Scene,
+    rays: RayIndex,
+    /// False: nothing can block.
+    blocks: bool,
+    panes: Option<Panes>,
+    /// Rays between a point and a polygon.
+    count: usize,
+}
+
+impl<'a> Ways<'a> {
+    pub(super) fn new(scene: &'a Scene, mesh: &Mesh, count: usize) -> Self {
+        let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+        let solid = vec![false; mesh.triangles.len()];
+        Self {
+            scene,
+            rays: RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &solid),
+            blocks: Plan::of(scene).runs(Kind::Occlusion),
+            panes: Panes::new(scene, mesh.centre),
+            count,
+        }
+    }
+
+    /// Factor from a point to the visible part of a patch, and what panes leave of its light; none: all.
+    pub(super) fn factor(
+        &self,
+        point: DVec3,
+        normal: DVec3,
+        plane: u32,
+        to: &Patch,
+    ) -> (f64, Option<Leaves>) {
+        if plane == to.plane || to.normal.dot(point - to.corners[0]) <= 0.0 {
+            return (0.0, None);
+        }
+        let open = lambert_polygon(point, normal, &to.corners);
+        if open <= 0.0 || !self.blocks {
+            return (open, None);
+        }
+        let (mut seen, mut total) = (0.0, 0.0);
+        let mut passed = self.panes.as_ref().map(|_| [0.0; LEAVES]);
+        for k in 0..self.count {
+            let w = stratified(k, self.count, [0.5, 0.5]);
+            let q = to.corners[0] * w[0] + to.corners[1] * w[1] + to.corners[2] * w[2];
+            let d = q - point;
+            let (c1, c2, r2) = (normal.dot(d), -to.normal.dot(d), d.length_squared());
+            if c1 <= 0.0 || c2 <= 0.0 {
+                continue;
+            }
+            let weight = c1 * c2 / (r2 * r2);
+            total += weight;
+            if !self.blocked(point, q, [plane, to.plane]) {
+                seen += weight;
+                if let Some(passed) = &mut passed {
+                    add(passed, &self.passes(point, q), weight);
+                }
+            }
+        }
+        if total <= 0.0 {
+            return (open, None);
+        }
+        let passed = passed.filter(|_| seen > 0.0);
+        (open * seen / total, passed.map(|row| row.map(|x| x / seen)))
+    }
+
+    /// Adds so much light that comes from `end` to a point, less what panes keep, if nothing blocks it. What lies in the point's plane does
+    /// not.
+    pub(super) fn bring(&self, sum: &mut Leaves, amount: f64, at: DVec3, end: DVec3, plane: u32) {
+        if !self.blocked(at, end, [plane, NO_PLANE]) {
+            match self.panes {
+                Some(_) => add(sum, &self.passes(at, end), amount),
+                None => sum.iter_mut().for_each(|s| *s += amount),
+            }
+        }
+    }
+
+    fn blocked(&self, from: DVec3, to: DVec3, planes: [u32; 2]) -> bool {
+        self.blocks && self.rays.occluded(&Segment::new(from, to, planes))
+    }
+
+    /// What the panes between two points let through.
+    fn passes(&self, from: DVec3, to: DVec3) -> Leaves {
+        let mut left = [1.0; LEAVES];
+        let Some(panes) = &self.panes else {
+            return left;
+        };
+        let glazing = Glazing {
+            panes,
+            scene: self.scene,
+        };
+        for crossing in glazing.crossings(from.as_vec3(), to.as_vec3()) {
+            let material = &self.scene.materials[crossing.material as usize];
+            if let Some(pane) = &material.pane {
+                let [cosine, thickness, texel] =
+                    [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
+                let passing = pane.passing(cosine, thickness, texel);
+                for (x, inside) in left.iter_mut().zip(pane.spectrum()) {
+                    *x *= passing(*inside);
+                }
+            }
+        }
+        left
+    }
+}
