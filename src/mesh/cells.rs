@@ -4,7 +4,7 @@
 //! An edge that is split is split for every triangle that has it, so a vertex never lies on the edge of a triangle that
 //! does not use it. Which triangles share an edge, see [`Skins`](super::skins::Skins).
 
-use super::fit::missed_by_halves;
+use super::missed::missed_by_halves;
 use super::skins::Skins;
 use crate::gather::Vertex;
 use crate::hierarchy::{Mesh, NONE, Tree};

@@ -13,6 +13,7 @@ pub(crate) mod hints;
 mod lines;
 pub(crate) mod looks;
 pub(crate) mod measure;
+mod missed;
 mod shades;
 mod shadow;
 mod skins;
