@@ -16,6 +16,7 @@ import grey
 import peer
 import places
 import room as rooms
+from drawn import Baked
 from gltf import Unreadable
 from metrics import Truth
 from spectra import Unknown
@@ -36,8 +37,12 @@ def arguments():
     parser.add_argument("--seconds", type=float, default=600, help="CPU seconds that the reference may take")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--program", default="target/release/haarlight")
+    parser.add_argument("--file", action="store_true", help="with --grey: the light of the baked file as a viewer draws it, and its size, in place of probe's")
     parser.add_argument("--bare", action="store_true", help="rows of the table without its head")
-    return parser.parse_args()
+    wanted = parser.parse_args()
+    if wanted.file and not wanted.grey:
+        parser.error("--file is for --grey rooms: their irradiance is twice their radiosity")
+    return wanted
 
 
 def say(text):
@@ -103,22 +108,39 @@ class Reference:
         return self.seconds * (whole / rel) ** 2 if rel > 0 else float("inf")
 
 
-def haarlight(program, path, reference, error):
-    """(CPU seconds of the whole process, tristimulus irradiance, stated dE00)."""
+def timed(command):
+    """(CPU seconds of the whole process, what it printed)."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    out = subprocess.run(command, check=False, stdout=subprocess.PIPE, text=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if not out.stdout.strip():
+        sys.exit(f"{' '.join(command)}: exit code {out.returncode}")
+    return after.ru_utime - before.ru_utime, out.stdout
+
+
+def probed(program, path, reference, error):
+    """(CPU seconds, tristimulus irradiance, stated dE00)."""
     with tempfile.TemporaryDirectory() as folder:
         points = os.path.join(folder, "points.csv")
         rows = np.concatenate([reference.points, reference.normals], axis=1)
         np.savetxt(points, rows, delimiter=",", header="x,y,z,nx,ny,nz", comments="", fmt="%.17g")
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        command = [program, "probe", path, "--points", points, "--error", str(error), "--json", "-q"]
-        out = subprocess.run(command, check=False, stdout=subprocess.PIPE, text=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        if not out.stdout.strip():
-            sys.exit(f"{' '.join(command)}: exit code {out.returncode}")
-    found = json.loads(out.stdout)
+        seconds, out = timed([program, "probe", path, "--points", points, "--error", str(error), "--json", "-q"])
+    found = json.loads(out)
     columns = [found["columns"].index(name) for name in ("E_X", "E_Y", "E_Z")]
     xyz = np.array(found["rows"], dtype=np.float64)[:, columns]
-    return after.ru_utime - before.ru_utime, xyz, found["error_de2000"]["value"]
+    return seconds, xyz, found["error_de2000"]["value"]
+
+
+def drawn(program, path, reference, error):
+    """The same of what a bake wrote, and says how large that is."""
+    with tempfile.TemporaryDirectory() as folder:
+        baked = os.path.join(folder, "baked.glb")
+        seconds, out = timed([program, "bake", path, "-o", baked, "--xyz", "--error", str(error), "--json", "-q"])
+        xyz = Baked(baked).irradiance(reference.points, reference.normals)
+        size = os.path.getsize(baked)
+    verdict = json.loads(out.strip().splitlines()[-1])
+    say(f"--error {error:g}: {verdict['vertices']} vertices, {size / 1e6:.2f} MB with `_XYZ`")
+    return seconds, xyz, verdict["error_de2000"]["value"]
 
 
 def row(name, error, reference, truth, run):
@@ -142,7 +164,8 @@ def main():
         say(f"{name}: {truth.lit.sum()} of {len(reference.points)} points; reference: {truth.runs} runs of {reference.paths} "
             f"paths a point, {reference.seconds:.0f} CPU s, standard error of a point {100 * truth.median_noise():.2f} % "
             f"(median), {100 * truth.rms_noise():.2f} % (RMS), dE00 {truth.colour_noise:.3f}")
-        runs = [(e, haarlight(wanted.program, path, reference, e)) for e in map(float, filter(None, wanted.errors.split(",")))]
+        light = drawn if wanted.file else probed
+        runs = [(e, light(wanted.program, path, reference, e)) for e in map(float, filter(None, wanted.errors.split(",")))]
     if runs and not wanted.bare:
         print(f"| {COLUMNS} |\n|{'---|' * (COLUMNS.count('|') + 1)}")
     for error, run in sorted(runs, key=lambda run: -truth.errors(run[1][1])["rel"]):

@@ -11,6 +11,7 @@ import grey
 import places
 import room as rooms
 import spectra
+from drawn import Baked
 from metrics import Truth, de2000
 
 QUAD = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], dtype="<f4")
@@ -190,3 +191,14 @@ def test_means_of_a_table():
     assert np.isclose(spectra.means(short, True).sum() * spectra.WIDTH, 800)
     with pytest.raises(spectra.Unknown):
         spectra.named("cie/nothing")
+
+
+def test_a_baked_file_is_drawn_between_its_vertices(written):
+    # Radiosity that rises along x: at a quarter of the floor, twice as wide as its quad, and seen from below on its mirror image.
+    changed = document()
+    changed["meshes"][0]["primitives"][0]["attributes"]["_XYZ"] = 0
+    light = Baked(written(changed))
+    points = np.array([[0.5, 1e-4, 0.7], [0.5, 2 - 1e-4, 1.6]])
+    found = light.irradiance(points, np.array([[0, 1, 0], [0, -1, 0]]))
+    assert np.allclose(found[:, 0], 2 * 0.25) and np.allclose(found[:, 1], 0)
+    assert np.allclose(found[:, 2], 2 * points[:, 2] / 2)
