@@ -14,6 +14,7 @@
 //! lanes, no iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
 
 mod lights;
+mod patch;
 mod ways;
 
 use crate::color::Upsampler;
@@ -26,57 +27,14 @@ use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
 use lights::{punctual, punctual_at};
 use nalgebra::{DMatrix, DVector};
+pub use patch::Patch;
+use patch::{add, point, radon};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use ways::Ways;
 
 /// What is fluoresced has settled when no leaf changes by more than this share of the brightest.
 const SETTLED: f64 = 1e-12;
-
-/// Radon's rule of degree 5 on a triangle (1948; Abramowitz and Stegun 1964, 25.4.63): weight, and weights of corners.
-fn radon() -> [(f64, [f64; 3]); 7] {
-    let root = 15.0_f64.sqrt();
-    let corner = |w: f64, a: f64| {
-        let b = 1.0 - 2.0 * a;
-        [(w, [b, a, a]), (w, [a, b, a]), (w, [a, a, b])]
-    };
-    let near = corner((155.0 - root) / 1200.0, (6.0 - root) / 21.0);
-    let far = corner((155.0 + root) / 1200.0, (6.0 + root) / 21.0);
-    [
-        (9.0 / 40.0, [1.0 / 3.0; 3]),
-        near[0],
-        near[1],
-        near[2],
-        far[0],
-        far[1],
-        far[2],
-    ]
-}
-
-/// A flat triangular patch, one side.
-#[derive(Debug, Clone)]
-pub struct Patch {
-    /// Corners, counter-clockwise from the front; recentred as in [`Mesh`].
-    pub corners: [DVec3; 3],
-    /// Unit normal of the front.
-    pub normal: DVec3,
-    /// Plane id of its triangle.
-    pub plane: u32,
-    /// Area.
-    pub area: f64,
-    /// Albedo.
-    pub reflectance: Leaves,
-    /// Exitance, W/m2/nm.
-    pub exitance: Leaves,
-    /// Irradiance from punctual lights, W/m2/nm.
-    pub punctual: Leaves,
-    /// Its material.
-    pub material: usize,
-    /// What it lets through of light that meets its other side.
-    pub transmittance: Leaves,
-    /// The patch on its other side, if it lets light through.
-    pub behind: Option<usize>,
-}
 
 /// The patches of a room and who sees whom.
 #[derive(Debug)]
@@ -330,16 +288,6 @@ fn factors(scene: &Scene, ways: &Ways<'_>, patches: &[Patch]) -> Vec<DMatrix<f64
     (0..sets)
         .map(|k| DMatrix::from_fn(n, n, |i, j| mean(k, i, j)))
         .collect()
-}
-
-fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
-    for (s, x) in sum.iter_mut().zip(x) {
-        *s += weight * x;
-    }
-}
-
-fn point(patch: &Patch, w: [f64; 3]) -> DVec3 {
-    patch.corners[0] * w[0] + patch.corners[1] * w[1] + patch.corners[2] * w[2]
 }
 
 /// All sides of all triangles, quartered.

@@ -10,6 +10,8 @@ use std::path::Path;
 
 /// Triangles that are compared.
 const COMPARED: usize = 300;
+/// Where they are read: beside a vertex, where what is drawn between vertices is of no weight.
+const BESIDE: [f64; 3] = [0.98, 0.01, 0.01];
 /// What a lamp is dimmed by.
 const FACTOR: f64 = 0.3;
 /// What rooms are baked to: colour difference.
@@ -18,7 +20,8 @@ const ERROR: f64 = 1.0;
 /// A triangle of the mesh that is shown.
 struct Shown {
     area: f64,
-    middle: DVec3,
+    /// Beside its first corner.
+    place: DVec3,
     normal: DVec3,
     /// Where it is read: the part and its vertices.
     part: usize,
@@ -26,7 +29,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// Tristimulus irradiance that the program reads at its middle.
+    /// Tristimulus irradiance that the program reads there.
     fn read(&self, program: &Program, mesh: u32) -> [f64; 3] {
         let Self {
             part,
@@ -34,7 +37,8 @@ impl Shown {
             ..
         } = self;
         let answer = program.get(&format!(
-            "/point?mesh={mesh}&part={part}&vertices={a},{b},{c}&weights=0.333333,0.333333,0.333334"
+            "/point?mesh={mesh}&part={part}&vertices={a},{b},{c}&weights={},{},{}",
+            BESIDE[0], BESIDE[1], BESIDE[2]
         ));
         assert_eq!(answer.status, 200, "{}", answer.text());
         let found: Value = serde_json::from_slice(&answer.body).unwrap();
@@ -78,7 +82,7 @@ fn triangles(glb: &[u8]) -> Vec<Shown> {
                 let across = (b - a).cross(c - a);
                 found.push(Shown {
                     area: across.length(),
-                    middle: (a + b + c) / 3.0,
+                    place: BESIDE[0] * a + BESIDE[1] * b + BESIDE[2] * c,
                     normal: across.normalize_or_zero(),
                     part,
                     corners: *corners,
@@ -127,8 +131,8 @@ impl Change {
     }
 }
 
-/// Changes a served room, and compares what is shown at the middles of triangles with what a bake of the changed room finds there. That the
-/// light between vertices is not that of the vertices is taken out by a bake of the room as it was. The colours differ by no more than
+/// Changes a served room, and compares what is shown beside vertices with what a bake of the changed room finds there. That vertices stand
+/// off their light is taken out by a bake of the room as it was. The colours differ by no more than
 /// both errors that are stated allow, estimates being at least .7 of what is measured. Returns how far illuminances are apart in the mean.
 fn changed_is_baked(room: &str, change: &Change) -> f64 {
     let program = Program::serve(room, &["--error", &ERROR.to_string()]);
@@ -146,7 +150,7 @@ fn changed_is_baked(room: &str, change: &Change) -> f64 {
     assert_eq!(numbers(&relit)[0], mesh, "solved anew: {relit}");
     let shown = read();
     let file = program.folder.path().join(format!("{room}.glb"));
-    let points: Vec<(DVec3, DVec3)> = places.iter().map(|p| (p.middle, p.normal)).collect();
+    let points: Vec<(DVec3, DVec3)> = places.iter().map(|p| (p.place, p.normal)).collect();
     let nothing = Change {
         side: json!({}),
         dimmed: None,
@@ -171,7 +175,7 @@ fn changed_is_baked(room: &str, change: &Change) -> f64 {
     ] = [0.0; 6];
     for (k, (&was, &shown)) in whole.iter().zip(&shown).enumerate() {
         let [full, now] = [&full.0, &fresh.0].map(|light| light[k].xyz);
-        // Where something covers the middle of a triangle its vertices have their neighbours' light.
+        // Where something covers a vertex it has its neighbours' light.
         if !(0.5..2.0).contains(&(was[1] / full[1])) {
             continue;
         }

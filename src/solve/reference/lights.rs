@@ -1,7 +1,7 @@
 //! What lamps and skies bring to points and patches of the reference, straight.
 
+use super::patch::{Patch, add, point, radon};
 use super::ways::Ways;
-use super::{Patch, add, point, radon};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
 use crate::hierarchy::Mesh;
 use crate::scene::{LightKind, PunctualLight, Scene};

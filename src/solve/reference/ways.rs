@@ -1,6 +1,6 @@
 //! What blocks the way between two points of the reference, and what panes leave of light that takes it.
 
-use super::{Patch, add};
+use super::patch::{Patch, add};
 use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon};
 use crate::hierarchy::{Glazing, Mesh, Panes, stratified};
 use crate::scene::Scene;
