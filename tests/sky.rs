@@ -7,14 +7,16 @@ mod daylit;
 
 use built::Room;
 use daylit::{LUX, bake, bake_at, beside, cie, places_beside, points, roof, room, through, wish};
-use glam::{DVec3, dvec3};
+use glam::{DMat4, DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::NO_PLANE;
-use haarlight::scene::Scene;
+use haarlight::output::Exposure;
+use haarlight::output::picture::{Format, Picture};
 use haarlight::scene::sky::{
     Brightness, Distribution, SkyType, SkyWish, SunPlace, SunWish, direction,
 };
+use haarlight::scene::{Camera, Projection, Scene};
 use haarlight::solve::{Bake, Settings};
 use std::f64::consts::PI;
 
@@ -253,4 +255,42 @@ fn reflected_skylight_agrees_with_paths() {
         println!("{cuts}: {got:.3} for {truth:.3}");
         assert!((got / truth - 1.0).abs() < 0.01, "{cuts}: {got} {truth}");
     }
+}
+
+/// A picture shows the sky where no surface is: at the middle of each pixel the luminance of the formula, and below it the ground.
+#[test]
+fn pictures_show_the_sky() {
+    let scene = room(0.0, 1.0, 1).scene().under(&wish(12)).unwrap();
+    let sky = Distribution::new(12, direction(60.0, 0.0));
+    let camera = Camera {
+        name: "out".to_owned(),
+        to_world: DMat4::IDENTITY,
+        projection: Projection::Perspective(1.2),
+        aspect: None,
+    };
+    let format = Format {
+        width: 16,
+        height: 12,
+        grid: 2,
+    };
+    let look = Exposure::auto(&scene, &[]);
+    let picture = Picture::draw(&scene, &[], &camera, &look, format).unwrap();
+    for (k, pixel) in picture.pixels.iter().enumerate() {
+        let across = |k: usize| (2.0 * k as f64 + 1.0 - 16.0) / 12.0 * 0.6_f64.tan();
+        let up = (12.0 - 2.0 * (k / 16) as f64 - 1.0) / 12.0 * 0.6_f64.tan();
+        let along = dvec3(across(k % 16), up, -1.0).normalize();
+        let got = f64::from(pixel.xyz[1]);
+        let want = match along.y > 0.0 {
+            true => LUX * sky.radiance(along),
+            false => LUX * 0.3 / PI,
+        };
+        assert!((got / want - 1.0).abs() < 1e-5, "{along}: {got} for {want}");
+        assert_eq!(pixel.coverage, 0.0);
+    }
+    let dark = Picture::draw(&room(0.0, 1.0, 1).scene(), &[], &camera, &look, format).unwrap();
+    assert!(
+        dark.pixels
+            .iter()
+            .all(|p| p.xyz == [0.0; 3] && p.shown[0] > 0.0)
+    );
 }

@@ -31,6 +31,7 @@ pub struct View {
     pixels: [f64; 2],
     /// Nearest drawn distance, the file's units.
     near: f64,
+    to_world: DMat4,
 }
 
 /// A projected point.
@@ -66,6 +67,7 @@ impl View {
         );
         Self {
             to_camera: rigid.inverse(),
+            to_world: rigid,
             perspective,
             half: [half_height * picture, half_height],
             pixels: [width as f64, height as f64],
@@ -75,6 +77,17 @@ impl View {
 
     pub(super) fn near(&self) -> f64 {
         self.near
+    }
+
+    /// Unit vector along which a place of the picture is looked at, in pixels from its upper left corner.
+    pub(super) fn direction(&self, [x, y]: [f64; 2]) -> DVec3 {
+        let across = self.half[0] * (2.0 * x / self.pixels[0] - 1.0);
+        let up = self.half[1] * (1.0 - 2.0 * y / self.pixels[1]);
+        let ahead = match self.perspective {
+            true => DVec3::new(across, up, -1.0),
+            false => DVec3::NEG_Z,
+        };
+        self.to_world.transform_vector3(ahead).normalize()
     }
 
     pub(super) fn project(&self, point: DVec3) -> Projected {

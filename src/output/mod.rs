@@ -9,6 +9,7 @@ pub mod gltf;
 mod lit_space;
 pub mod maps;
 pub mod npz;
+mod outside;
 pub mod picture;
 pub mod probes;
 mod raster;

@@ -7,16 +7,18 @@
 use super::camera::View;
 use super::curve;
 use super::exposure::Exposure;
+use super::outside::Outside;
 use super::raster::{self, Hit, Refined};
 use crate::color::{self, LinearSrgb};
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use crate::gather::refined;
 use crate::scene::{Camera, Scene};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Linear display value where the picture shows no surface.
-const BACKGROUND: f32 = 0.02;
+/// Linear display value where the picture shows no surface, and no sky is described.
+const BACKGROUND: f64 = 0.02;
 
 /// Size and smoothness of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,14 +46,27 @@ impl Default for Format {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Pixel {
-    /// Radiance in linear sRGB, cd/m2; 0 where there is no surface.
+    /// Radiance in linear sRGB, cd/m2; where there is no surface that of the sky, or 0.
     pub rgb: [f32; 3],
     /// Tristimulus radiance, Y in cd/m2.
     pub xyz: [f32; 3],
     /// Share of the pixel that shows a surface.
     pub coverage: f32,
-    /// Exposed and through the curve, linear, in [0, 1], over the background.
+    /// Exposed and through the curve, linear, in [0, 1], over sky or background.
     pub shown: [f32; 3],
+}
+
+impl Pixel {
+    /// What is seen beside the surfaces in it.
+    fn lay_over(&mut self, beyond: Shade) {
+        let share = 1.0 - self.coverage;
+        let all = [&mut self.rgb, &mut self.xyz, &mut self.shown];
+        for (of_surfaces, beyond) in all.into_iter().zip(beyond) {
+            for (c, more) in of_surfaces.iter_mut().zip(beyond) {
+                *c += share * more as f32;
+            }
+        }
+    }
 }
 
 /// A drawn picture, row by row from the top.
@@ -96,11 +111,26 @@ impl Picture {
         let srgb = LinearSrgb::standard();
         let shade = |hit: &Hit| shade(&meshes, &srgb, look, hit);
         let view = View::new(scene, camera, width, height);
-        let pixels = raster::draw(&meshes, &view, [width, height], grid, |samples| {
+        let mut pixels = raster::draw(&meshes, &view, [width, height], grid, |samples| {
             (0..width)
                 .map(|x| pixel(&meshes, samples, [x, width, grid], &shade))
                 .collect()
         });
+        let outside = Outside::new(scene);
+        let beyond = |(k, pixel): (usize, &mut Pixel)| {
+            let place = [k % width, k / width].map(|k| k as f64 + 0.5);
+            let seen = outside.as_ref().map(|o| o.radiance(view.direction(place)));
+            pixel.lay_over(seen.map_or([[0.0; 3], [0.0; 3], [BACKGROUND; 3]], |xyz| {
+                let rgb = srgb.from_xyz(xyz);
+                [
+                    rgb,
+                    xyz,
+                    curve::into_display(look.shown(rgb.map(|c| c * PI))),
+                ]
+            }));
+        };
+        let bare = pixels.par_iter_mut().enumerate();
+        bare.filter(|(_, p)| p.coverage < 1.0).for_each(beyond);
         Ok(Self {
             width,
             height,
@@ -247,6 +277,6 @@ fn pixel(
         rgb,
         xyz,
         coverage,
-        shown: shown.map(|c| c + (1.0 - coverage) * BACKGROUND),
+        shown,
     }
 }
