@@ -14,8 +14,6 @@ const COMPARED: usize = 300;
 const BESIDE: [f64; 3] = [0.98, 0.01, 0.01];
 /// What a lamp is dimmed by.
 const FACTOR: f64 = 0.3;
-/// What rooms are baked to: colour difference.
-const ERROR: f64 = 1.0;
 
 /// A triangle of the mesh that is shown.
 struct Shown {
@@ -100,6 +98,8 @@ fn triangles(glb: &[u8]) -> Vec<Shown> {
 struct Change {
     side: Value,
     dimmed: Option<(&'static str, &'static str)>,
+    /// What the room is baked to, before and after: colour difference.
+    error: f64,
 }
 
 impl Change {
@@ -135,7 +135,7 @@ impl Change {
 /// off their light is taken out by a bake of the room as it was. The colours differ by no more than
 /// both errors that are stated allow, estimates being at least .7 of what is measured. Returns how far illuminances are apart in the mean.
 fn changed_is_baked(room: &str, change: &Change) -> f64 {
-    let program = Program::serve(room, &["--error", &ERROR.to_string()]);
+    let program = Program::serve(room, &["--error", &change.error.to_string()]);
     let state = program.wait_done();
     let numbers = |state: &Value| [0, 2].map(|k| state["picture"][k].as_u64().unwrap() as u32);
     let [mesh, light] = numbers(&state);
@@ -154,10 +154,11 @@ fn changed_is_baked(room: &str, change: &Change) -> f64 {
     let nothing = Change {
         side: json!({}),
         dimmed: None,
+        error: change.error,
     };
     let [full, fresh] = [&nothing, change].map(|change| {
         let settings = Settings {
-            error: ERROR,
+            error: change.error,
             ..Settings::default()
         };
         let mut bake = Bake::new(change.of(&file), settings);
@@ -183,9 +184,10 @@ fn changed_is_baked(room: &str, change: &Change) -> f64 {
         let want = [0, 1, 2].map(|c| was[c] * now[c] / full[c]);
         apart += de2000(shown, want, fresh.1);
         moved += de2000(was, want, fresh.1);
-        lux += want[1];
-        off += (shown[1] - want[1]).abs();
-        bias += shown[1] - want[1];
+        let area = places[k].area;
+        lux += area * want[1];
+        off += area * (shown[1] - want[1]).abs();
+        bias += area * (shown[1] - want[1]);
     }
     let [apart, moved] = [apart / compared, moved / compared];
     let [off, bias] = [off / lux, bias / lux];
@@ -208,6 +210,8 @@ fn a_room_behind_panes_is_dimmed_as_it_is_baked() {
         &Change {
             side: json!({}),
             dimmed: Some(("lights", "sun")),
+            // At 1 illuminances are .5 % apart.
+            error: 0.7,
         },
     );
     assert!(off < 0.02, "{off}");
@@ -221,6 +225,7 @@ fn a_room_with_mirrors_is_changed_as_it_is_baked() {
         &Change {
             side: json!({"materials": {"walls": {"reflectance": {"name": "macbeth/blue"}}}}),
             dimmed: Some(("materials", "bulb")),
+            error: 1.0,
         },
     );
 }
