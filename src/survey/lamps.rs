@@ -173,12 +173,11 @@ pub(super) fn ray_of(eyes: &Eyes, light: &PunctualLight, k: u32) -> (DVec3, DVec
     let [x, y] = sequence02(k, 0);
     match light.kind {
         LightKind::Point => (light.position, sphere_direction([x, y]), 1.0),
-        LightKind::Spot { inner, outer } => {
+        LightKind::Spot { outer, .. } => {
             // Evenly over the cone.
             let cosine = 1.0 - y * (1.0 - outer.cos());
-            let edge = (inner.cos() - outer.cos()).max(1e-3);
-            let share = ((cosine - outer.cos()) / edge).clamp(0.0, 1.0).powi(2);
-            (light.position, around(light.direction, cosine, x), share)
+            let way = around(light.direction, cosine, x);
+            (light.position, way, light.kind.fall_off(cosine))
         }
         LightKind::Profile | LightKind::Surface => {
             // Two shifts of one sequence depend on each other.

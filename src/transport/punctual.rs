@@ -99,18 +99,11 @@ pub fn punctual_factor(
         return None;
     }
     let spot = match lamp.kind {
-        LightKind::Spot { inner, outer } => {
-            // The fall-off that KHR_lights_punctual gives: smooth between the cosines of both angles. Its .001 as the least width, which
-            // is there so that nothing is divided by 0, would leave a cone of 1 degree .1 % of its candela.
-            let along = -lamp.direction.dot(d) / r2.sqrt();
-            let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-12);
-            ((along - outer.cos()) * scale).clamp(0.0, 1.0).powi(2)
-        }
         LightKind::Profile => {
             let spread = lamp.luminaire.as_ref();
             spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
         }
-        _ => 1.0,
+        kind => kind.fall_off(-lamp.direction.dot(d) / r2.sqrt()),
     };
     (spot > 0.0).then(|| (spot * cosine / r2, lamp.position))
 }
