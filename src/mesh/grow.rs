@@ -39,8 +39,8 @@ type Asked = ([u32; 3], u32, [f64; 3]);
 /// Sum of the light of neighbours of covered vertices, and how many there are.
 type Lent = HashMap<u32, ([f64; 3], f64)>;
 
-/// Cell, weights of its corners, and two looks at a random point.
-pub(super) type PointLooks = (usize, [f64; 3], [u32; 2]);
+/// Of a random point the cell, the vertices between which it is drawn and their weights, and two looks.
+pub(super) type PointLooks = (usize, ([u32; 3], [f64; 3]), [u32; 2]);
 
 /// A mesh that grows.
 pub(super) struct Growth<'a> {

@@ -11,7 +11,7 @@ use super::write::Settled;
 use crate::color::seen_difference;
 use crate::gather::{Interpolation, LayerLanes, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
-use crate::solve::Bake;
+use crate::solve::{Bake, weights_of};
 use glam::DVec3;
 use std::collections::HashMap;
 
@@ -71,10 +71,7 @@ impl Parts {
     fn find(&self, settled: &Settled, of: u32, point: DVec3) -> Option<([u32; 3], [f64; 3])> {
         let place = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| settled.at[v as usize]);
-            let n = (b - a).cross(c - a);
-            let part =
-                |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(n) / n.length_squared();
-            (*t, [part(b, c), part(c, a), part(a, b)])
+            (*t, weights_of(point, a, b, c))
         };
         let depth = |(_, w): &([u32; 3], [f64; 3])| w[0].min(w[1]).min(w[2]);
         let all = self.0.get(&of)?.iter().map(place);
@@ -102,6 +99,7 @@ impl Growth<'_> {
         }
         let mut rng = Pcg::new(bake.settings().seed ^ SEED ^ turn << 32);
         let (mut cell, mut upto) = (0, self.cells.all[0].area);
+        let parts: Vec<Parts> = settled.iter().map(Parts::new).collect();
         let mut asked = Vec::with_capacity(count);
         for k in 0..count {
             let target = (k as f64 + rng.f64()) / count as f64 * whole;
@@ -122,7 +120,12 @@ impl Growth<'_> {
                 let seed = hash(bake.settings().seed ^ SEED, 2 * rng_seed + turn);
                 self.looks.again(&vertex, sheet.surface, sheet.back, seed)
             };
-            asked.push((cell, weights, [look(0), look(1)]));
+            let looks = [look(0), look(1)];
+            let drawn = &settled[of.sheet as usize];
+            let at = of.corners.map(|c| drawn.at[c.vertex as usize]);
+            let point = (0..3).map(|k| weights[k] * at[k]).sum();
+            let part = parts[of.sheet as usize].find(drawn, of.of.0, point);
+            asked.extend(part.map(|part| (cell, part, looks)));
         }
         // However late it is, what is said of the error is measured.
         self.looks.patient = true;
@@ -151,13 +154,8 @@ impl Growth<'_> {
             None => bake.lanes().tristimulus(row),
         };
         let difference = |a, b| seen_difference(a, b, white);
-        let parts: Vec<Parts> = settled.iter().map(Parts::new).collect();
-        let sample = |&(cell, weights, looks): &PointLooks| {
-            let of = &self.cells.all[cell];
-            let settled = &settled[of.sheet as usize];
-            let at = of.corners.map(|c| settled.at[c.vertex as usize]);
-            let point = (0..3).map(|k| weights[k] * at[k]).sum();
-            let (corners, weights) = parts[of.sheet as usize].find(settled, of.of.0, point)?;
+        let sample = |&(cell, (corners, weights), looks): &PointLooks| {
+            let settled = &settled[self.cells.all[cell].sheet as usize];
             let [one, two] = looks.map(|look| self.looks.at(look).map(|seen| shown(&seen.row)));
             let (one, two) = (one?, two?);
             let light =

@@ -1,6 +1,5 @@
 //! What pictures show where no surface is: the sky and the ground below it, where a sky is described. Panes before them are looked past.
 
-use crate::color::{KM, Observer};
 use crate::scene::Scene;
 use crate::scene::sky::{PLACES, Sky};
 use glam::DVec3;
@@ -16,19 +15,10 @@ impl<'a> Outside<'a> {
     /// None where no sky is described.
     pub(super) fn new(scene: &'a Scene) -> Option<Self> {
         let sky = scene.sky.as_ref()?;
-        let observer = Observer::cie1931().weights(&scene.grid);
         let mut parts = [[0.0; 3]; PLACES];
         for light in &scene.lights {
             if let Some(place) = light.kind.place() {
-                let power = scene.spectra[light.light].power.iter().zip(&light.shape);
-                let power: Vec<f64> = power.map(|(power, shape)| KM * power * shape).collect();
-                parts[place] = observer.map(|weights| {
-                    power
-                        .iter()
-                        .zip(weights)
-                        .map(|(p, weight)| p * weight)
-                        .sum()
-                });
+                parts[place] = scene.tristimulus(light);
             }
         }
         Some(Self { sky, parts })

@@ -21,10 +21,14 @@ const METAL_TEXEL: f64 = 0.95;
 /// Share of a texture's texels that may be no metal, as those at the edge of a picture.
 const STRAYS: f64 = 0.01;
 
+/// The picture that says where a material is a metal.
+fn metal_image<'a>(raw: &RawMaterial, images: &'a [Image]) -> Option<&'a Image> {
+    images.get(raw.metal_texture.as_ref()?.image)
+}
+
 /// Share of a material that is a metal, its texture taken by its mean.
 pub(super) fn metalness(raw: &RawMaterial, images: &[Image]) -> f64 {
-    let image = (raw.metal_texture.as_ref()).and_then(|texture| images.get(texture.image));
-    let mean = image.map_or(1.0, |image| {
+    let mean = metal_image(raw, images).map_or(1.0, |image| {
         let blue = image.pixels.iter().map(|p| encode(f64::from(p[2])));
         blue.sum::<f64>() / image.pixels.len().max(1) as f64
     });
@@ -33,8 +37,7 @@ pub(super) fn metalness(raw: &RawMaterial, images: &[Image]) -> f64 {
 
 /// Does the material's texture, if it has one, say that it is a metal everywhere?
 fn is_metal_everywhere(raw: &RawMaterial, images: &[Image]) -> bool {
-    let image = (raw.metal_texture.as_ref()).and_then(|texture| images.get(texture.image));
-    image.is_none_or(|image| {
+    metal_image(raw, images).is_none_or(|image| {
         // Images are decoded as colours, and numbers are linear.
         let is_metal = |blue: f32| encode(f64::from(blue)) >= METAL_TEXEL;
         let strays = image.pixels.iter().filter(|p| !is_metal(p[2])).count();

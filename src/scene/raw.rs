@@ -108,7 +108,7 @@ const SMOOTH: f32 = 0.1;
 const SHEET: &str = "KHR_materials_diffuse_transmission";
 const METAL_TEXTURE: &str = "metallicRoughnessTexture";
 /// Metallic from here on is a metal: bytes round 1 to no less.
-const METAL: f32 = 0.995;
+pub(super) const METAL: f32 = 0.995;
 
 impl RawMaterial {
     /// Do its factors make it a mirror?

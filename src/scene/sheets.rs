@@ -7,13 +7,10 @@ use super::GREATEST_ALBEDO;
 use super::check::{Check, listed};
 use super::json::short;
 use super::known::MaterialSpectra;
-use super::raw::RawMaterial;
+use super::raw::{METAL, RawMaterial};
 use super::sheet::{Sheet, bounded};
 use crate::color::Upsampler;
 use crate::data::{Grid, LEAVES, Leaves};
-
-/// Metallic from here on nothing passes: bytes round 1 to no less.
-const WHOLLY: f64 = 0.995;
 
 /// The sheet that a material is, if it is one; what both sides reflect goes into `reflectance`, which holds the whole base colour or
 /// what was measured. `textured`: is the base colour multiplied by a texture or by vertex colours? `metallic`: the share of it that is a
@@ -36,7 +33,7 @@ pub(super) fn sheet(
         }
         return None;
     }
-    if metallic >= WHOLLY && measured.is_none() {
+    if metallic >= f64::from(METAL) && measured.is_none() {
         let what = "is a metal and lets light through: KHR_materials_diffuse_transmission counts times 1 - metallic, which is 0";
         let next = "set its metallicFactor to 0, take the extension out, or give a \"transmission\" in the side file";
         check.problem(place, what, next);

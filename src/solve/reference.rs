@@ -25,10 +25,10 @@ use crate::scene::sheet::Weave;
 use crate::scene::{Scene, short};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
-use lights::{punctual, punctual_at};
+use lights::Lamps;
 use nalgebra::{DMatrix, DVector};
 pub use patch::Patch;
-use patch::{add, point, radon};
+use patch::{Place, add, radon};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use ways::Ways;
@@ -74,11 +74,13 @@ impl Reference {
         }
         let mesh = Mesh::new(scene);
         let ways = Ways::new(scene, &mesh, rays);
+        let lamps = Lamps {
+            scene,
+            mesh: &mesh,
+            ways: &ways,
+        };
         let mut patches = patches(scene, &mesh, depth);
-        let lit: Vec<Leaves> = patches
-            .par_iter()
-            .map(|p| punctual(scene, &mesh, &ways, p))
-            .collect();
+        let lit: Vec<Leaves> = patches.par_iter().map(|p| lamps.on(p)).collect();
         for (patch, lit) in patches.iter_mut().zip(lit) {
             patch.punctual = lit;
         }
@@ -201,14 +203,20 @@ impl Reference {
     ) -> Vec<Leaves> {
         let mesh = Mesh::new(scene);
         let ways = Ways::new(scene, &mesh, rays);
+        let lamps = Lamps {
+            scene,
+            mesh: &mesh,
+            ways: &ways,
+        };
         points
             .par_iter()
             .map(|&(at, normal)| {
                 let at = at - mesh.centre;
                 let plane = plane_at(&mesh, &self.patches, at, normal);
+                let place = Place { at, normal, plane };
                 let mut sum = [0.0; LEAVES];
                 for (patch, radiosity) in self.patches.iter().zip(&solution.radiosity) {
-                    match ways.factor(at, normal, plane, patch) {
+                    match ways.factor(place, patch) {
                         (f, None) => add(&mut sum, radiosity, f),
                         (f, Some(passes)) => {
                             let left = std::array::from_fn(|l| passes[l] * radiosity[l]);
@@ -216,11 +224,7 @@ impl Reference {
                         }
                     }
                 }
-                add(
-                    &mut sum,
-                    &punctual_at(scene, &mesh, &ways, at, normal, plane),
-                    1.0,
-                );
+                add(&mut sum, &lamps.at(place), 1.0);
                 sum
             })
             .collect()
@@ -272,7 +276,7 @@ fn factors(scene: &Scene, ways: &Ways<'_>, patches: &[Patch]) -> Vec<DMatrix<f64
             }
             let own = &mut row[sets * j..sets * (j + 1)];
             for (w, at) in rule {
-                let (f, passes) = ways.factor(point(from, at), from.normal, from.plane, to);
+                let (f, passes) = ways.factor(from.place(at), to);
                 for (k, x) in own.iter_mut().enumerate() {
                     *x += w * f * passes.as_ref().map_or(1.0, |passes| passes[k]);
                 }

@@ -14,15 +14,19 @@ impl Scene {
     /// Illuminance of open level ground by the sky without the sun, lx; none without a sky.
     pub fn sky_illuminance(&self) -> Option<f64> {
         self.sky.as_ref()?;
-        let y = Observer::cie1931().weights(&self.grid)[1];
-        let lux = |light: &PunctualLight| {
-            let power = &self.spectra[light.light].power;
-            let leaves = power.iter().zip(&light.shape).zip(&y);
-            leaves.map(|((p, s), y)| KM * p * s * y).sum::<f64>()
-        };
+        let lux = |light: &PunctualLight| self.tristimulus(light)[1];
         let is_sky = |light: &&PunctualLight| matches!(light.kind, LightKind::Sky(_));
         let parts: Vec<f64> = self.lights.iter().filter(is_sky).map(lux).collect();
         (!parts.is_empty()).then(|| parts.iter().sum())
+    }
+
+    /// Tristimulus value of what a light's [`shape`](PunctualLight::shape) says, Y in its photometric unit.
+    pub(crate) fn tristimulus(&self, light: &PunctualLight) -> [f64; 3] {
+        let power = &self.spectra[light.light].power;
+        Observer::cie1931().weights(&self.grid).map(|weights| {
+            let leaves = power.iter().zip(&light.shape).zip(weights);
+            leaves.map(|((p, s), weight)| KM * p * s * weight).sum()
+        })
     }
 
     /// Light spectra that only the sky and the ground that it lights shine by; none where other lamps share one of them, and where

@@ -54,6 +54,22 @@ pub(super) fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
     }
 }
 
-pub(super) fn point(patch: &Patch, w: [f64; 3]) -> DVec3 {
-    patch.corners[0] * w[0] + patch.corners[1] * w[1] + patch.corners[2] * w[2]
+/// Where light is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    pub(super) at: DVec3,
+    pub(super) normal: DVec3,
+    /// Plane that it lies in: what else lies in it blocks nothing.
+    pub(super) plane: u32,
+}
+
+impl Patch {
+    /// A place on it, by weights of its corners.
+    pub(super) fn place(&self, w: [f64; 3]) -> Place {
+        Place {
+            at: self.corners[0] * w[0] + self.corners[1] * w[1] + self.corners[2] * w[2],
+            normal: self.normal,
+            plane: self.plane,
+        }
+    }
 }

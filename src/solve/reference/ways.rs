@@ -1,6 +1,6 @@
 //! What blocks the way between two points of the reference, and what panes leave of light that takes it.
 
-use super::patch::{Patch, add};
+use super::patch::{Patch, Place, add};
 use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon};
 use crate::hierarchy::{Glazing, Mesh, Panes, stratified};
 use crate::scene::Scene;
@@ -33,13 +33,12 @@ impl<'a> Ways<'a> {
     }
 
     /// Factor from a point to the visible part of a patch, and what panes leave of its light; none: all.
-    pub(super) fn factor(
-        &self,
-        point: DVec3,
-        normal: DVec3,
-        plane: u32,
-        to: &Patch,
-    ) -> (f64, Option<Leaves>) {
+    pub(super) fn factor(&self, from: Place, to: &Patch) -> (f64, Option<Leaves>) {
+        let Place {
+            at: point,
+            normal,
+            plane,
+        } = from;
         if plane == to.plane || to.normal.dot(point - to.corners[0]) <= 0.0 {
             return (0.0, None);
         }
@@ -75,10 +74,10 @@ impl<'a> Ways<'a> {
 
     /// Adds so much light that comes from `end` to a point, less what panes keep, if nothing blocks it. What lies in the point's plane does
     /// not.
-    pub(super) fn bring(&self, sum: &mut Leaves, amount: f64, at: DVec3, end: DVec3, plane: u32) {
-        if !self.blocked(at, end, [plane, NO_PLANE]) {
+    pub(super) fn bring(&self, sum: &mut Leaves, amount: f64, to: Place, end: DVec3) {
+        if !self.blocked(to.at, end, [to.plane, NO_PLANE]) {
             match self.panes {
-                Some(_) => add(sum, &self.passes(at, end), amount),
+                Some(_) => add(sum, &self.passes(to.at, end), amount),
                 None => sum.iter_mut().for_each(|s| *s += amount),
             }
         }
