@@ -2,11 +2,11 @@
 
 use super::flux::{self, Closed};
 use super::room::{RAISED, Room};
+use crate::geometry::openings::Openings;
 use crate::hierarchy::Tree;
 use crate::light::Filters;
 use crate::scene::effects::{Kind, Plan};
-use crate::transport::Outside;
-use crate::transport::openings::Openings;
+use crate::transport::{Outside, find_openings};
 
 /// Why a closed room has neither.
 const CLOSED: &str = "the room is closed: no ray leaves it";
@@ -34,7 +34,7 @@ impl Room {
         }
         let seed = self.settings.seed;
         let find =
-            |room: &Self| room.with_sight(|sight| Openings::find(&room.mesh, tree, sight, seed));
+            |room: &Self| room.with_sight(|sight| find_openings(&room.mesh, tree, sight, seed));
         // The few rays that tell whether a room is closed may miss a slit. Those that are relit were looked at.
         let mut found = None;
         if rays && self.sealed == Closed::Yes {

@@ -10,7 +10,7 @@
 //! | `hemisphere`, `sweep` | beams of rays that find the patches they end on |
 //! | `via`, `mirrored` | the same lamps and patches by way of mirrors |
 //! | `nearby` | short paths where rays end close by |
-//! | `openings`, `outside`, `clipped_sky`, `sky` | where rays leave the room, and what comes in there: sky, ground, the sun's disc |
+//! | `outside`, `clipped_sky`, `sky` | what comes in where rays leave the room: sky, ground, the sun's disc |
 //! | `ways` | what is on ways from there |
 //! | `trace` | what a point gets its light from, kept for relighting |
 
@@ -21,7 +21,6 @@ mod lamp;
 mod luminaire;
 mod mirrored;
 mod nearby;
-pub(crate) mod openings;
 mod outside;
 mod patches;
 mod point;
@@ -36,6 +35,6 @@ mod via;
 mod ways;
 
 pub use gatherer::{Gatherer, Memory};
-pub(crate) use outside::{Look, Outside};
+pub(crate) use outside::{Look, Outside, find_openings};
 pub use punctual::punctual_factor;
 pub use receiver::{Gathered, MOSTLY, Receiver};

@@ -6,11 +6,12 @@
 //! parts of the sky.
 
 use super::clipped_sky::{Found, Looker};
-use super::openings::{Choice, Openings};
 use super::receiver::Receiver;
 use super::ways::Ways;
-use crate::geometry::sampling::{cosine_direction, hash, sequence02};
+use crate::geometry::openings::{BEAM, Choice, Openings, Start};
+use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment};
+use crate::hierarchy::{Mesh, Tree};
 use crate::light::{Passage, Tint};
 use crate::link::{Sight, View};
 use crate::scene::sky::{PARTS, PLACES, Sky};
@@ -97,6 +98,33 @@ impl Way<'_> {
             Way::Known(..) | Way::Shared(..) => 3,
         }
     }
+}
+
+/// Where rays from the surfaces of a room leave it.
+pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) -> Openings {
+    let area = tree.nodes.first().map_or(0.0, |root| root.area);
+    let start = |share: f64, square: [f64; 2]| {
+        tree.nodes.first()?;
+        let entry = tree.entry_at(share * area);
+        let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
+        Some(Start {
+            point: element.at(triangle_weights(square)),
+            normal: tree.face_normal[entry],
+            plane: tree.face_plane[entry],
+        })
+    };
+    let free = |start: &Start, ways: &[DVec3; BEAM]| {
+        let mut hits = [None; BEAM];
+        let ways = ways.map(|d| d.as_vec3());
+        sight.meet(
+            &[start.point.as_vec3(); BEAM],
+            &ways,
+            start.plane,
+            &mut hits,
+        );
+        hits.map(|hit| hit.is_none())
+    };
+    Openings::find(&mesh.positions, start, free, seed)
 }
 
 impl Outside {
