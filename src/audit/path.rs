@@ -7,6 +7,7 @@
 use super::fluorescence::{Tally, goes_on};
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
+use crate::geometry::openings::Openings;
 use crate::geometry::sampling::{Pcg, around, cosine_direction, hash, on_triangle, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Face, Mesh, Mirrors, Panes};
@@ -35,6 +36,8 @@ pub struct Audit<'a> {
     pub(super) masked: bool,
     pub(super) panes: Option<Panes>,
     pub(super) mirrors: Option<Mirrors>,
+    /// Where the sky is seen by few rays.
+    pub(super) openings: Option<Openings>,
     /// By material; none of what is no sheet.
     sheets: Vec<Option<SheetMeans>>,
 }
@@ -118,10 +121,11 @@ impl<'a> Audit<'a> {
             .any(|m| matches!(m.alpha, Alpha::Mask { .. }));
         let upsampler = Upsampler::new(&scene.grid);
         let sheets = scene.materials.iter();
-        Self {
+        let mut audit = Self {
             scene,
             mesh,
             rays,
+            openings: None,
             sheets: sheets
                 .map(|m| m.sheet_means(&scene.images, &upsampler))
                 .collect(),
@@ -131,7 +135,9 @@ impl<'a> Audit<'a> {
             masked,
             panes: Panes::new(scene, mesh.centre),
             mirrors: Mirrors::new(scene, mesh),
-        }
+        };
+        audit.openings = audit.small_openings();
+        audit
     }
 
     /// Irradiance at points (recentred) with unit normals; `planes` hold the plane id of the face a point lies on, or
@@ -196,11 +202,13 @@ impl<'a> Audit<'a> {
             self.lamp_sample(&at, toward_lamp, rng, &throughput, sum);
             self.punctual(&at, None, toward_lamp, rng, &throughput, sum);
             self.punctual_in_mirrors(&at, toward_lamp, rng, &throughput, sum);
-            self.spot(&at, toward_lamp, &throughput, sum);
+            let openings = self.openings_from(&at);
+            self.aimed_outside((&at, openings.as_ref()), toward_lamp, &throughput, sum);
             let mut direction = cosine_direction(at.normal, toward_any);
             let (hit, mirrors) = self.met(&at, &mut direction, &mut throughput, rng);
             let Some(hit) = hit else {
-                self.outside(&at, (direction, mirrors), &throughput, sum);
+                let from = (&at, openings.as_ref());
+                self.outside(from, (direction, mirrors), &throughput, sum);
                 return;
             };
             let triangle = hit.triangle as usize;

@@ -8,7 +8,7 @@
 use super::clipped_sky::{Found, Looker};
 use super::receiver::Receiver;
 use super::ways::Ways;
-use crate::geometry::openings::{BEAM, Choice, Openings, Start};
+use crate::geometry::openings::{BEAM, Choice, Openings, Start, Wall};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Mesh, Tree};
@@ -113,18 +113,18 @@ pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) 
             plane: tree.face_plane[entry],
         })
     };
-    let free = |start: &Start, ways: &[DVec3; BEAM]| {
+    let meet = |start: &Start, ways: &[DVec3; BEAM]| {
         let mut hits = [None; BEAM];
-        let ways = ways.map(|d| d.as_vec3());
-        sight.meet(
-            &[start.point.as_vec3(); BEAM],
-            &ways,
-            start.plane,
-            &mut hits,
-        );
-        hits.map(|hit| hit.is_none())
+        let (from, ways) = (start.point.as_vec3(), ways.map(|d| d.as_vec3()));
+        sight.meet(&[from; BEAM], &ways, start.plane, &mut hits);
+        hits.map(|hit| {
+            hit.map(|hit| Wall {
+                distance: f64::from(hit.t),
+                normal: mesh.normal[hit.triangle as usize],
+            })
+        })
     };
-    Openings::find(&mesh.positions, start, free, seed)
+    Openings::find(&mesh.positions, start, meet, seed)
 }
 
 impl Outside {
@@ -267,11 +267,14 @@ impl Outside {
             .weigh(to.point, to.normal, plain, &mut look.choice);
         look.segments.clear();
         let turn = hash(to.seed, 0x5c1);
+        let far = reach((sight, by));
         for k in 0..count as u32 {
             let at = self.openings.choose(&look.choice, sequence02(k, turn));
-            let ahead = at.filter(|at| to.normal.dot(at - to.point) > 0.0);
-            look.segments
-                .extend(ahead.map(|at| Segment::new(to.point, at, [to.plane, NO_PLANE])));
+            let way = at.map(|at| (at - to.point).normalize_or_zero());
+            let ahead = way.filter(|&d| to.normal.dot(d) > 0.0);
+            look.segments.extend(
+                ahead.map(|d| Segment::new(to.point, to.point + d * far, [to.plane, NO_PLANE])),
+            );
         }
         look.block((sight, by));
         let ways = look.segments.iter().zip(&look.blocked);
