@@ -1,10 +1,18 @@
 //! Only the effects that a scene calls for are paid for: shown by counters, never by time.
 
-use glam::DVec3;
+#[path = "common/built.rs"]
+mod built;
+
+use built::Room;
+use glam::{DVec3, dvec3};
 use haarlight::scene::effects::{Kind, Plan};
+use haarlight::scene::profile::Profile;
+use haarlight::scene::sky::{SkyType, SkyWish};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
+use haarlight::spectrum::LEAVES;
 use std::path::Path;
+use std::sync::Arc;
 
 fn room(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -186,4 +194,81 @@ fn one_light_spectrum_keeps_one_tree() {
     };
     assert_eq!(lights("cornell.glb"), (vec![Some(0)], false));
     assert_eq!(lights("two-rooms.glb"), (vec![Some(0), Some(1)], true));
+}
+
+/// A pane, a sheet, a mirror and a lamp with a profile on no surface, and a sky over a closed room: no ray, no byte, no element more, and the
+/// same light. (Fluorescence: `tests/fluorescence.rs`.)
+#[test]
+fn effects_that_are_not_there_cost_nothing() {
+    let counted = |more: &dyn Fn(&mut Room) -> Option<Kind>, change: &dyn Fn(Scene) -> Scene| {
+        let mut room = Room::new();
+        let paint = room.paint(0.5);
+        room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 3.0), [paint; 6]);
+        room.block(dvec3(1.0, 0.2, 1.0), dvec3(1.5, 1.0, 1.4), paint);
+        room.point(dvec3(0.6, 1.3, 1.4), 1000.0);
+        let kind = more(&mut room);
+        let bake = baked(change(room.scene()), Representation::Adaptive);
+        let plan = bake.plan();
+        assert!(!kind.is_some_and(|kind| plan.runs(kind)), "{plan}");
+        let counters: Vec<_> = (bake.rounds().iter())
+            .map(|r| {
+                (
+                    r.rays,
+                    r.nodes,
+                    r.links,
+                    r.intervals_working,
+                    r.memory_bytes,
+                )
+            })
+            .collect();
+        let written = bake.baked(&|_, _| {});
+        let vertices = written.surfaces.into_iter().map(|s| s.vertices);
+        (counters, written.rays, vertices.collect::<Vec<_>>())
+    };
+    let half = [0.5; LEAVES];
+    let as_it_is = |scene: Scene| scene;
+    let plain = counted(&|_| None, &as_it_is);
+    type Adds<'a> = &'a dyn Fn(&mut Room) -> Kind;
+    let unused: [(&str, Adds); 3] = [
+        ("pane", &|room| {
+            room.pane(1.5, half);
+            Kind::Panes
+        }),
+        ("sheet", &|room| {
+            room.sheet(half, half, [0.4; LEAVES]);
+            Kind::Sheets
+        }),
+        ("mirror", &|room| {
+            room.mirror(half);
+            Kind::Mirrors
+        }),
+    ];
+    for (name, more) in unused {
+        assert!(
+            counted(&|room| Some(more(room)), &as_it_is) == plain,
+            "{name}"
+        );
+    }
+    let profiled = |mut scene: Scene| {
+        let even = b"IESNA91\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 10\n0 180\n0\n9 9\n";
+        let lamp = scene.materials.last_mut().and_then(|m| m.emission.as_mut());
+        lamp.unwrap().profile = Some(Arc::new(Profile::parse(even).unwrap()));
+        scene
+    };
+    let lamp = |room: &mut Room| {
+        room.lamp(0.1, 100.0);
+        Some(Kind::MeasuredLamps)
+    };
+    assert!(counted(&lamp, &profiled) == plain, "profile");
+    let overcast = SkyWish {
+        kind: Some(SkyType(1)),
+        ..SkyWish::default()
+    };
+    let under = |scene: Scene| scene.under(&overcast).unwrap();
+    assert!(counted(&|_| Some(Kind::Sky), &under) == plain, "sky");
+    let plan = haarlight::solve::running(under(room("cornell-closed.glb"))).to_string();
+    assert!(
+        plan.contains("the room is closed: no ray leaves it"),
+        "{plan}"
+    );
 }

@@ -8,7 +8,7 @@ mod built;
 mod daylit;
 
 use built::Room;
-use daylit::{LUX, bake, beside, cie, glass_of_the_report, places_beside, through, wish};
+use daylit::{LUX, bake, beside, cie, glass_of_the_report, places_beside, summed, wish};
 use glam::DVec3;
 use haarlight::scene::pane::inside_of;
 use haarlight::scene::sky::{Distribution, direction};
@@ -54,10 +54,10 @@ fn cie_171_case_5_12() {
 
 /// Irradiance through a parallelogram by what is seen in each direction.
 fn whole(seen: impl Fn(DVec3) -> f64, window: [DVec3; 3], (point, normal): (DVec3, DVec3)) -> f64 {
-    let above = through(&seen, 0.0, window, (point, normal));
-    // `through` asks above the horizon only: turn the rest upwards.
+    let above = summed::<800>(&seen, 0.0, window, (point, normal));
+    // `summed` asks above the horizon only: turn the rest upwards.
     let flip = |d: DVec3| DVec3::new(d.x, -d.y, d.z);
-    let below = through(
+    let below = summed::<800>(
         |d| seen(flip(d)),
         0.0,
         window.map(flip),

@@ -514,6 +514,14 @@ fn wrong_dyes_are_refused_by_name() {
         ),
         (json!(7), "is not a JSON object"),
         (
+            dye("500,0.5\n600,0.5", "400,1\n500,1", 0.5),
+            "100 % of what is given out has shorter wavelengths than what excites it",
+        ),
+        (
+            json!({"csv": "per_nm,400,500,600\n400,0.5,1e-3,1e-3\n500,0,0.5,2e-3\n600,0,0,0.5"}),
+            "excited at 600 nm; rows are wavelengths of emission, columns of excitation: is the matrix transposed?",
+        ),
+        (
             json!([dye(good.0, good.1, 0.5), dye(good.0, good.1, -1.0)]),
             "fluorescence 2: its yield is -1",
         ),

@@ -569,6 +569,25 @@ fn what_is_wrong_with_a_profile_is_said_with_its_line() {
     assert!(said.unwrap_err().to_string().contains("parallel light"));
 }
 
+/// A lamp and a dye on no surface make no light spectrum.
+#[test]
+fn what_no_surface_shows_gives_no_light() {
+    let mut room = point_light();
+    common::push(&mut room.json["materials"], material("dye", 0.5));
+    let csv = |name: &str| json!({"csv": name});
+    let dye = json!({"excitation": csv("taken.csv"), "emission": csv("given.csv"), "yield": 0.9});
+    let lamp = json!({"name": "cie/F2", "luminance_cd_m2": 100});
+    let wish = json!({"materials": {"panel": {"emission": lamp}, "dye": {"fluorescence": dye}}});
+    let files = [
+        ("taken.csv", "400,0.5\n450,0.5\n"),
+        ("given.csv", "500,1\n600,1\n"),
+        ("room.spectra.json", &side(&wish)),
+    ];
+    let scene = loaded(&room, &files).unwrap();
+    assert_eq!(scene.spectra.len(), 1);
+    assert!(!Plan::of(&scene).runs(Kind::LightSpectra));
+}
+
 /// The rooms of this project load as they did: nothing measured, nothing of it in the plan.
 #[test]
 fn rooms_without_a_profile_have_none() {

@@ -6,7 +6,7 @@ mod built;
 mod daylit;
 
 use built::{Room, baked, close};
-use daylit::glass_of_the_report;
+use daylit::{LUX, beside, cie, glass_of_the_report, places_beside, wish};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, de2000};
@@ -414,6 +414,94 @@ fn a_face_and_its_back_have_the_thickness_of_their_material() {
         let open = 500.0 * bake.scene().spectra[0].power[30];
         let got = leaves(&bake, &[dvec3(1.5, 0.0, 2.0)])[0][30];
         close(got / open, 0.125, 1e-4, "through both faces");
+    }
+}
+
+/// A block of tinted glass between a floor and an even sky: Beer and Lambert along the chord of each direction, over the whole sky.
+#[test]
+fn a_block_under_a_sky_absorbs_along_its_chords() {
+    const INSIDE: f64 = 0.5;
+    const UNIT: f64 = 0.4;
+    let (low, high) = (dvec3(1.4, 0.5, 1.6), dvec3(2.6, 1.1, 2.4));
+    let mut room = Room::new();
+    let paint = room.paint(0.0);
+    room.quad(DVec3::ZERO, DVec3::Z * 4.0, DVec3::X * 4.0, paint);
+    let pane = room.pane(1.0, [INSIDE; LEAVES]);
+    let faces = built::faces(low, high).into_iter();
+    let corners = faces.flat_map(|mut face| {
+        face.reverse();
+        face
+    });
+    let quads = (0..6).flat_map(|k| [[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| 4 * k + i)));
+    room.mesh(corners.collect(), quads.collect(), pane);
+    let mut scene = room.scene();
+    if let Some(PaneKind::Glass { unit, .. }) =
+        scene.materials[pane].pane.as_mut().map(|p| &mut p.kind)
+    {
+        *unit = Some(UNIT);
+    }
+    let mut bake = Bake::new(scene.under(&wish(5)).unwrap(), Settings::default());
+    bake.run();
+    // Over the disc that the hemisphere is seen as, so that cosines are in its area.
+    let seen = |point: DVec3| {
+        let n = 600;
+        let mut sum = 0.0;
+        for (i, j) in (0..n).flat_map(|i| (0..2 * n).map(move |j| (i, j))) {
+            let r2 = (f64::from(i) + 0.5) / f64::from(n);
+            let (sin, cos) = (PI * (f64::from(j) + 0.5) / f64::from(n)).sin_cos();
+            let d = dvec3(r2.sqrt() * cos, (1.0 - r2).sqrt(), r2.sqrt() * sin);
+            let [a, b] = [(low - point) / d, (high - point) / d];
+            let chord = (a.max(b).min_element() - a.min(b).max_element()).max(0.0);
+            sum += INSIDE.powf(chord / UNIT);
+        }
+        LUX * sum / f64::from(2 * n * n)
+    };
+    let points = [(2.0, 2.0), (1.2, 2.3), (2.6, 1.1)].map(|(x, z)| dvec3(x, 0.0, z));
+    let up = points.map(|p| (p, DVec3::Y));
+    for (probed, point) in bake.probe(&up).iter().zip(points) {
+        let (got, want) = (probed.xyz[1], seen(point));
+        println!("{point}: {got:.3} for {want:.3}");
+        assert!(want < 0.95 * LUX);
+        close(got, want, 5e-3, "under the block");
+    }
+}
+
+/// A pane in the very plane of the wall that it sits in, its edges on those of the opening or over the frame, or a plate with a face there:
+/// the light of one that stands a millimetre before the wall, and none at all where nothing passes.
+#[test]
+fn panes_in_the_plane_of_their_frame_leak_nothing() {
+    let lux = |inside: f64, over: f64, before: f64, thick: f64| -> Vec<f64> {
+        let mut room = Room::new();
+        let [corner, u, v] = beside(&mut room);
+        let pane = room.pane(1.5, [inside; LEAVES]);
+        let (along, up, out) = (
+            over * u.normalize(),
+            over * v.normalize(),
+            cie(0.0, 1.0, 0.0),
+        );
+        let low = corner - along - up + before * out;
+        let (u, v) = (u + 2.0 * along, v + 2.0 * up);
+        match thick > 0.0 {
+            true => {
+                let far = low + u + v + thick * out;
+                room.block(low.min(far), low.max(far), pane);
+            }
+            false => room.quad(low, v, u, pane),
+        }
+        let bake = daylit::bake(room, &wish(12));
+        let probes = bake.probe(&places_beside());
+        probes.iter().map(|p| p.xyz[1]).collect()
+    };
+    let want = lux(0.6, 0.1, 1e-3, 0.0);
+    for (over, thick) in [(0.0, 0.0), (0.1, 0.0), (0.0, 0.006), (0.1, 0.006)] {
+        for (got, want) in lux(0.6, over, 0.0, thick).iter().zip(&want) {
+            close(*got, *want, 2e-3, "in the plane");
+        }
+        let dark = lux(0.0, over, 0.0, thick);
+        assert!(
+            dark.iter().all(|&lux| lux == 0.0),
+            "{over} {thick}: {dark:?}"
+        );
     }
 }
 

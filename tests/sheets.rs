@@ -630,30 +630,3 @@ fn a_flush_panel_leaves_the_ceiling_its_own_light() {
         .to_string();
     assert!(refused.contains("another shape"), "{refused}");
 }
-
-/// A sheet that nothing shows, and one that nothing passes, change no byte and cast no ray.
-#[test]
-fn sheets_that_are_not_there_cost_nothing() {
-    let room = |extra: &dyn Fn(&mut Room)| {
-        let mut room = Room::new();
-        let paint = room.paint(0.5);
-        room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 3.0), [paint; 6]);
-        room.block(dvec3(1.0, 0.0, 1.0), dvec3(1.5, 1.0, 1.4), paint);
-        room.point(dvec3(0.6, 1.3, 1.4), 1000.0);
-        extra(&mut room);
-        let bake = baked_to(ERROR, room.scene());
-        let rays: u64 = bake.rounds().iter().map(|r| r.rays).sum();
-        let written = bake.baked(&|_, _| {});
-        let vertices: Vec<_> = written
-            .surfaces
-            .iter()
-            .map(|s| s.vertices.clone())
-            .collect();
-        (rays, written.rays, vertices, bake.tree().nodes.len())
-    };
-    let plain = room(&|_| {});
-    let unused = room(&|room| {
-        room.sheet(even(0.3), even(0.3), even(0.4));
-    });
-    assert!(plain == unused);
-}

@@ -417,8 +417,12 @@ fn bad_maps_are_refused_in_words() {
     let other = folder.path().join("other.exr");
     for end in [0, 3, 4, 100, bytes.len() / 2, bytes.len() - 1] {
         std::fs::write(&other, &bytes[..end]).unwrap();
-        told(&other, if end < 4 { "neither" } else { "cannot be read" });
+        told(&other, if end < 4 { "neither" } else { "is cut short" });
     }
+    let whole = hdr(&folder, 64, |d| [1.0, 2.0 + d.x, 3.0]);
+    let bytes = std::fs::read(&whole).unwrap();
+    std::fs::write(&whole, &bytes[..bytes.len() / 2]).unwrap();
+    told(&whole, "is cut short");
     told(&folder.path().join("nowhere.hdr"), "cannot be read");
     told(folder.path(), "not a regular file");
     told(

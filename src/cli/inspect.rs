@@ -15,6 +15,7 @@ use crate::scene::document::Document;
 use crate::scene::effects::Plan;
 use crate::scene::facts::{Facts, LightFact, MaterialFact};
 use crate::scene::{Scene, short};
+use crate::solve::running;
 use crate::survey::advise;
 use serde_json::json;
 use std::io::Write;
@@ -57,18 +58,19 @@ pub fn run(args: &InspectArgs, out: &mut impl Write) -> Result<()> {
     if let Some(folder) = &args.pictures {
         pictures::write(folder, &scene, &facts)?;
     }
-    let plan = Plan::of(&scene);
+    let warnings = std::mem::take(&mut scene.warnings);
+    let plan = running(scene);
     let text = if args.json {
         let all = json!({
             "version": VERSION,
             "facts": facts,
             "plan": plan,
             "unsupported": unsupported,
-            "warnings": scene.warnings,
+            "warnings": warnings,
         });
         format!("{all:#}\n")
     } else {
-        page(&facts, &plan, &scene.warnings)
+        page(&facts, &plan, &warnings)
     };
     put(out, &text)
 }

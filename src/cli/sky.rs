@@ -1,6 +1,8 @@
 //! What is outside, as typed.
 
-use crate::scene::sky::{BRIGHT, Brightness, KELVIN, SkyName, SkyWish, SunPlace, SunWish, TURN};
+use crate::scene::sky::{
+    BRIGHT, Brightness, KELVIN, SUN_KELVIN, SkyName, SkyWish, SunPlace, SunWish, TURN,
+};
 
 /// Options of sky and sun. Each wins over what the file of spectra says.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -38,8 +40,8 @@ pub struct SkyArgs {
     /// Illuminance of a plane across the sun's rays, lx; 0: the sky alone [default: by type and height of the sun].
     #[arg(long, value_name = "LX", value_parser = not_negative)]
     pub sun_lux: Option<f64>,
-    /// Correlated colour temperature of the sun, K [default: 5500].
-    #[arg(long, value_name = "K", value_parser = kelvin)]
+    /// Correlated colour temperature of the sun, K; below 4000 that of a blackbody [default: 5500].
+    #[arg(long, value_name = "K", value_parser = sun_kelvin)]
     pub sun_cct: Option<f64>,
     /// Reflectance of open ground below the horizon [default: 0.2, under a map what it shows there].
     #[arg(long, value_name = "RHO", value_parser = share)]
@@ -93,6 +95,10 @@ fn turn(text: &str) -> Result<f64, String> {
 
 fn kelvin(text: &str) -> Result<f64, String> {
     within(text, KELVIN)
+}
+
+fn sun_kelvin(text: &str) -> Result<f64, String> {
+    within(text, SUN_KELVIN)
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -11,6 +11,9 @@
 //! wide as half the way to both neighbours: what is measured band by band. Between wavelengths both spectra of a product are linear,
 //! beyond the ends 0. Nothing is negative.
 //!
+//! Light that is given out has no shorter wavelengths than what excites it (Stokes 1852), but for a tail where both spectra overlap. More
+//! than [`UPHILL`] there, of what all columns give out for the same power each, is a problem: with rows for columns it is nearly all.
+//!
 //! The products are found by alternating least squares, column by column and never below 0 (hierarchical alternating least squares,
 //! Cichocki, Zdunek and Amari 2007), with the diagonal left out, where reflection hides what fluoresces. There are as few as describe the
 //! matrix to [`GOOD`], at most [`MOST`].
@@ -21,6 +24,9 @@ use crate::data::{Outside, Table};
 pub(super) const GOOD: f64 = 0.01;
 /// More than this is worth a warning.
 pub(super) const TOLERABLE: f64 = 0.05;
+/// Share of the power given out that may have shorter wavelengths than what excites it. Two bands alike, s wide (standard deviation) and d
+/// apart, have `Phi(-d / (s sqrt 2))`: .10 for fluorescein (494 and 521 nm, 15 nm wide), .14 for dyes of the red.
+pub(super) const UPHILL: f64 = 0.2;
 /// Products at the most: each is a light spectrum of its own.
 const MOST: usize = 4;
 /// Rounds of least squares at the most: a second for a matrix of 500 by 500.
@@ -123,6 +129,25 @@ impl Bispectral {
         self.cells.push(row);
         self.same.push(same);
         Ok(())
+    }
+
+    /// The share that is given out at shorter wavelengths than what excites it, and the excitation that most of it comes from, nm.
+    pub(super) fn uphill(&self) -> (f64, f64) {
+        let (heights, widths) = (widths(&self.emission), widths(&self.excitation));
+        let (mut all, mut short, mut worst) = (0.0, 0.0, (0.0, 0.0));
+        for (c, (&taken, width)) in self.excitation.iter().zip(widths).enumerate() {
+            let mut here = 0.0;
+            for (r, (&given, height)) in self.emission.iter().zip(&heights).enumerate() {
+                let power = self.cells[r][c] * height * width;
+                all += power;
+                here += if given < taken { power } else { 0.0 };
+            }
+            short += here;
+            if here > worst.0 {
+                worst = (here, taken);
+            }
+        }
+        (if all > 0.0 { short / all } else { 0.0 }, worst.1)
     }
 
     /// The reflectance, if the diagonal holds one.
@@ -344,6 +369,20 @@ mod tests {
             matrix.terms().all[0][1].at(370.0, Outside::Zero)
         });
         assert!((nm / band - 10.0).abs() < 1e-6, "{nm} {band}");
+    }
+
+    /// Rows for columns: all that goes to longer wavelengths goes to shorter ones.
+    #[test]
+    fn a_transposed_matrix_goes_uphill() {
+        let (a, b) = (bump(440.0, 30.0), bump(365.0, 25.0));
+        let of = |dye: [&dyn Fn(f64) -> f64; 2]| {
+            let matrix = Bispectral::parse(&of(&[dye], 0.4, "per_nm")).unwrap();
+            matrix.uphill()
+        };
+        let ((right, _), (wrong, at)) = (of([&a, &b]), of([&b, &a]));
+        assert!(right < 0.01 && wrong > 0.99, "{right} {wrong}");
+        assert!((430.0..=450.0).contains(&at), "{at}");
+        assert!((right + wrong - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -17,16 +17,22 @@
 //! Several dyes are a list. Beyond their rows both spectra are 0. The matrix: rows of emission, columns of excitation, the unit (`per_nm` or
 //! `per_band`) in the first cell, the reflectance where both wavelengths are equal; see `scene/bispectral.rs`.
 //!
+//! What is given out has no shorter wavelengths than what excites it, but for a tail: more than a fifth there is a problem, for dyes as
+//! for matrices.
+//!
 //! No more power leaves a surface than comes at any wavelength: `rho + g` above 1 is a problem where both are measured; a base colour,
 //! painted or not, reflects what the dye leaves of [`GREATEST_ALBEDO`](super::GREATEST_ALBEDO). Light does not wait: no phosphorescence.
 
 use super::LightSpectrum;
-use super::bispectral::Bispectral;
+use super::bispectral::{Bispectral, UPHILL};
 use super::check::Check;
 use super::json::short;
 use super::reader::Reader;
 use crate::data::{Grid, Kind, LEAVES, Leaves, Outside, Table};
 use serde_json::{Map, Value};
+
+/// Steps over an excitation, 1 nm of most of them: a share of a fifth is asked for.
+const STEPS: u32 = 400;
 
 /// What a material fluoresces.
 #[derive(Debug, Clone, PartialEq)]
@@ -176,6 +182,12 @@ fn dye(
         (reader.check).problem(&format!("{place}, emission"), what, next);
         return None;
     };
+    let (share, at) = uphill(&absorbed, &emission);
+    if share > UPHILL {
+        let next = "are excitation and emission each in the other's place?";
+        goes_uphill(reader.check, place, "", [share, at], next);
+        return None;
+    }
     let mean = mean_wavelength(&emission);
     let out = |nm: f64, share: f64| share * (quantum * nm / mean).min(1.0);
     // At the table's rows and the edges of the leaves: between them both factors are smooth.
@@ -214,6 +226,13 @@ fn matrix(reader: &mut Reader, object: &Map<String, Value>, place: &str) -> Opti
     let (text, from) = reader.text(object, place)?;
     match Bispectral::parse(&text) {
         Ok(matrix) => {
+            let (share, at) = matrix.uphill();
+            if share > UPHILL {
+                let file = format!("'{}', ", short(&from));
+                let next = "rows are wavelengths of emission, columns of excitation: is the matrix transposed?";
+                goes_uphill(reader.check, place, &file, [share, at], next);
+                return None;
+            }
             let terms = matrix.terms();
             let said = format!(
                 "{}: {} of emission, off by {:.2} % of the matrix",
@@ -245,6 +264,35 @@ fn matrix(reader: &mut Reader, object: &Map<String, Value>, place: &str) -> Opti
             None
         }
     }
+}
+
+/// Light of shorter wavelengths than what excites it, and most of it excited at `at`.
+fn goes_uphill(check: &mut Check, place: &str, file: &str, [share, at]: [f64; 2], next: &str) {
+    let what = format!(
+        "{file}{:.0} % of what is given out has shorter wavelengths than what excites it, most of that excited at {at} nm",
+        100.0 * share
+    );
+    check.problem(place, what, next);
+}
+
+/// The share of a dye's emission at shorter wavelengths than what excites it, all excitations with the same power, and the excitation
+/// that most of it comes from, nm.
+fn uphill(absorbed: &Table, emission: &Table) -> (f64, f64) {
+    let [first, last] = emission.range();
+    let whole = emission.integral(first, last, Outside::Zero);
+    let [low, high] = absorbed.range();
+    let (mut all, mut short, mut worst) = (0.0, 0.0, (0.0, low));
+    for k in 0..STEPS {
+        let nm = low + (high - low) * (f64::from(k) + 0.5) / f64::from(STEPS);
+        let taken = absorbed.at(nm, Outside::Zero);
+        let below = emission.integral(first, nm.clamp(first, last), Outside::Zero);
+        let here = taken * below / whole;
+        (all, short) = (all + taken, short + here);
+        if here > worst.0 {
+            worst = (here, nm.round());
+        }
+    }
+    (if all > 0.0 { short / all } else { 0.0 }, worst.1)
 }
 
 /// An emission on the grid, 1/nm, the integral of its whole table 1; none of a table of zeros.

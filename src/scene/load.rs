@@ -17,6 +17,7 @@ use super::{lacking, luminaires};
 use crate::color::Upsampler;
 use crate::data::Leaves;
 use crate::error::{Error, Result};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 impl Scene {
@@ -160,8 +161,14 @@ impl Lit {
         }
     }
 
-    /// Where no lamp is, nothing fluoresces.
+    /// What no surface shows gives out nothing and has no light spectrum; where no lamp is, nothing fluoresces.
     fn calm(&mut self) {
+        let shown: BTreeSet<usize> = self.surfaces.iter().map(|s| s.material).collect();
+        let unseen = (self.materials.iter_mut().enumerate()).filter(|(k, _)| !shown.contains(k));
+        for (_, material) in unseen {
+            (material.emission, material.fluorescence) = (None, None);
+        }
+        prune(&mut self.materials, &mut self.lights, &mut self.spectra);
         let shines = self.materials.iter().any(|m| m.emission.is_some());
         if self.lights.is_empty() && !shines {
             self.spectra.clear();

@@ -72,10 +72,12 @@ pub(crate) fn materials(
             let emits = material.emission.is_some();
             let through = spectra.transmittance.as_ref();
             let panes = &mut said.panes;
-            material.pane = panes.pane(raw, &name, through, emits, &place, upsampler, check);
+            let metallic = mirror::metalness(raw, images);
+            let of = (raw, metallic);
+            material.pane = panes.pane(of, &name, through, emits, &place, upsampler, check);
             let rho = &mut material.reflectance;
             let textured = *tinted || raw.base_color_texture.is_some();
-            let raw_sheet = (raw, textured, mirror::metalness(raw, images));
+            let raw_sheet = (raw, textured, metallic);
             let sheet = sheets::sheet(raw_sheet, &spectra, rho, &place, grid, upsampler, check);
             if sheet.is_some() {
                 said.sheets.hear(raw, &name, material.pane.is_some(), emits);

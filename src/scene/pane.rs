@@ -1,7 +1,8 @@
 //! Panes: materials that let light straight through, as filters on rays.
 //!
 //! Three things make a pane: a `transmittance` of the side file (of the whole pane at normal incidence),
-//! KHR_materials_transmission of at least .5, and alphaMode BLEND.
+//! KHR_materials_transmission of at least .5, and alphaMode BLEND. KHR_materials_transmission counts times 1 - metallic, as it says, a
+//! metallicRoughnessTexture by its mean: metals let nothing through.
 //!
 //! Glass is an absorbing slab with plane faces: both polarisations, all reflections between the faces summed (Born and Wolf,
 //! Principles of Optics, 7th edition, section 14.4 without interference; the angles of ISO 9050:2003, section 5.2), see [`slab`]. With
@@ -10,7 +11,7 @@
 //! is 0, nothing where it is 1.
 
 use super::check::{Check, listed};
-use super::raw::{AlphaMode, RawMaterial, RawVolume};
+use super::raw::{AlphaMode, METAL, RawMaterial, RawVolume};
 use super::reader::Sampled;
 use super::{Image, Surface, Texture};
 use crate::color::Upsampler;
@@ -215,20 +216,21 @@ pub(super) struct Said {
     blended: Vec<String>,
     rough: Vec<String>,
     weak: Vec<String>,
+    metals: Vec<String>,
     glowing: Vec<String>,
     two: Vec<String>,
     coloured: Vec<String>,
 }
 
 impl Said {
-    /// The pane that a material is, if it is one.
+    /// The pane that a material is, if it is one. `metallic`: the share of it that is a metal.
     #[expect(
         clippy::too_many_arguments,
         reason = "one call; each is a different thing"
     )]
     pub(super) fn pane(
         &mut self,
-        raw: &RawMaterial,
+        (raw, metallic): (&RawMaterial, f64),
         name: &str,
         measured: Option<&Sampled>,
         emits: bool,
@@ -237,9 +239,13 @@ impl Said {
         check: &mut Check,
     ) -> Option<Pane> {
         let blends = raw.alpha_mode == AlphaMode::Blend;
-        let glass = raw.transmission.is_some_and(|t| t >= LEAST);
-        if raw.transmission.is_some_and(|t| t > 0.0 && t < LEAST) && measured.is_none() {
-            self.weak.push(name.into());
+        let share = raw.transmission.unwrap_or(0.0) * (1.0 - metallic);
+        let glass = share >= LEAST && measured.is_none();
+        if raw.transmission.is_some_and(|t| t > 0.0) && !glass && measured.is_none() {
+            match metallic >= f64::from(METAL) {
+                true => self.metals.push(name.into()),
+                false => self.weak.push(name.into()),
+            }
         }
         if !(measured.is_some() || glass || blends) {
             return None;
@@ -248,7 +254,7 @@ impl Said {
             self.glowing.push(name.into());
             return None;
         }
-        if (measured.is_some() || glass) && raw.roughness.is_some_and(|r| r > ROUGH) {
+        if glass && raw.roughness.is_some_and(|r| r > ROUGH) {
             self.rough.push(name.into());
         }
         let ior = index(raw, place, check);
@@ -256,7 +262,15 @@ impl Said {
         let tint = upsampler.reflectance([r, g, b].map(|c| c.min(1.0)));
         if let Some(measured) = measured {
             let most = measured.leaves.iter().copied().fold(0.0, f64::max);
-            let ior = index_for(most, ior);
+            let usual = ior;
+            let ior = index_for(most, usual);
+            if ior < usual {
+                let clear = slab(usual, 1.0, 1.0, 1.0);
+                check.warn(format!(
+                    "{place}: its transmittance goes up to {most:.3}, and clear glass of index {usual:.2} lets through {clear:.3}: taken \
+                     as glass of index {ior:.2}, whose faces reflect as little as coated ones"
+                ));
+            }
             return Some(Pane {
                 kind: PaneKind::Glass {
                     ior,
@@ -280,7 +294,7 @@ impl Said {
             if volume.is_some_and(twice) {
                 self.coloured.push(name.into());
             }
-            return Some(glass_of(raw, ior, tint, upsampler));
+            return Some(glass_of(raw, share, ior, tint, upsampler));
         }
         self.blended.push(name.into());
         Some(Pane {
@@ -305,7 +319,12 @@ impl Said {
             ),
             (
                 &self.weak,
-                "KHR_materials_transmission below 0.5: opaque, what they let through is left out",
+                "KHR_materials_transmission times 1 - metallic below 0.5: opaque, what they let through is left out",
+            ),
+            (
+                &self.metals,
+                "KHR_materials_transmission on a metal: opaque, it counts times 1 - metallic; glass has a metallicFactor of 0 (it is 1 where \
+                 nothing is said)",
             ),
             (
                 &self.glowing,
@@ -346,8 +365,7 @@ fn index(raw: &RawMaterial, place: &str, check: &mut Check) -> f64 {
 }
 
 /// Glass by KHR_materials_transmission and KHR_materials_volume. The base colour tints once, the volume by the way.
-fn glass_of(raw: &RawMaterial, ior: f64, tint: Leaves, upsampler: &Upsampler) -> Pane {
-    let share = f64::from(raw.transmission.unwrap_or(1.0) as f32);
+fn glass_of(raw: &RawMaterial, share: f64, ior: f64, tint: Leaves, upsampler: &Upsampler) -> Pane {
     let (mut inside, mut unit, mut thickness) = (tint, None, 1.0);
     let mut from = format!("transmission {share:.3}, index {ior:.3}");
     if let Some(volume) = raw.volume.filter(|v| v.thickness > 0.0) {
@@ -454,9 +472,23 @@ mod tests {
     }
 
     fn made(change: impl FnOnce(&mut RawMaterial)) -> (Option<Pane>, String, String) {
+        measured(None, change)
+    }
+
+    /// The same with what a side file says of it.
+    fn measured(
+        transmittance: Option<f64>,
+        change: impl FnOnce(&mut RawMaterial),
+    ) -> (Option<Pane>, String, String) {
+        let of_file = transmittance.map(|share| Sampled {
+            from: share.to_string(),
+            leaves: [share; LEAVES],
+            is_csv: false,
+        });
         let mut raw = RawMaterial {
             index: Some(0),
             name: "glass".into(),
+            metallic: 0.0,
             transmission: Some(1.0),
             ..RawMaterial::default()
         };
@@ -464,7 +496,8 @@ mod tests {
         let upsampler = Upsampler::new(&crate::data::Grid::default());
         let (mut said, mut check) = (Said::default(), Check::new("room.glb"));
         let place = "material 'glass'";
-        let pane = said.pane(&raw, "glass", None, false, place, &upsampler, &mut check);
+        let (of, of_file) = ((&raw, f64::from(raw.metallic)), of_file.as_ref());
+        let pane = said.pane(of, "glass", of_file, false, place, &upsampler, &mut check);
         said.warn(&mut check);
         let (problems, warnings) = check.into_parts();
         let problems: Vec<String> = problems.iter().map(ToString::to_string).collect();
@@ -480,6 +513,40 @@ mod tests {
             pane.is_none() && warnings.contains("below 0.5: opaque"),
             "{warnings}"
         );
+        // Of what is in part a metal the rest lets light through; of a metal nothing.
+        let (pane, _, warnings) = made(|raw| raw.metallic = 0.25);
+        let share = pane.map(|pane| match pane.kind {
+            PaneKind::Glass { share, .. } => share,
+            PaneKind::Cover { .. } => 0.0,
+        });
+        assert!(
+            share == Some(0.75) && warnings.is_empty(),
+            "{share:?} {warnings}"
+        );
+        let (pane, _, warnings) = made(|raw| raw.metallic = 1.0);
+        assert!(
+            pane.is_none() && warnings.contains("on a metal: opaque"),
+            "{warnings}"
+        );
+        // What a side file measures is of the whole pane, and smooth.
+        let rough = |raw: &mut RawMaterial| (raw.metallic, raw.roughness) = (1.0, Some(0.9));
+        let (pane, _, warnings) = measured(Some(0.8), rough);
+        assert!(pane.is_some() && warnings.is_empty(), "{warnings}");
+        let (_, _, warnings) = made(|raw| raw.roughness = Some(0.9));
+        assert!(warnings.contains("rough panes"), "{warnings}");
+        // (1 - .04) / (1 + .04) is what clear glass lets through.
+        let (pane, _, warnings) = measured(Some(0.97), |_| ());
+        let normal = pane.unwrap().normal()[0];
+        assert!((normal - 0.97).abs() < 1e-12, "{normal}");
+        for said in [
+            "'glass'",
+            "up to 0.970",
+            "lets through 0.923",
+            "of index 1.28",
+        ] {
+            assert!(warnings.contains(said), "{said}: {warnings}");
+        }
+        assert_eq!(measured(Some(0.92), |_| ()).2, "");
         let (pane, _, warnings) = made(|raw| {
             (raw.transmission, raw.alpha_mode) = (None, AlphaMode::Blend);
         });

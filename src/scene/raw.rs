@@ -62,7 +62,7 @@ pub struct RawMaterial {
     pub volume: Option<RawVolume>,
     /// Roughness, if it is said.
     pub roughness: Option<f32>,
-    /// Texture that multiplies metallic and roughness, of what their factors make a mirror, and of diffuse sheets.
+    /// Texture that multiplies metallic and roughness, of what their factors make a mirror, of panes and of diffuse sheets.
     pub metal_texture: Option<Texture>,
     /// Is there one, read or not?
     pub has_metal_texture: bool,
@@ -106,6 +106,7 @@ impl Default for RawMaterial {
 /// direction.
 const SMOOTH: f32 = 0.1;
 const SHEET: &str = "KHR_materials_diffuse_transmission";
+const PANE: &str = "KHR_materials_transmission";
 const METAL_TEXTURE: &str = "metallicRoughnessTexture";
 /// Metallic from here on is a metal: bytes round 1 to no less.
 pub(super) const METAL: f32 = 0.995;
@@ -256,8 +257,9 @@ fn material(
         let rough = unit(values.roughness_factor.0, "roughnessFactor", item, check);
         out.roughness = pbr.has("roughnessFactor").then_some(rough);
         out.has_metal_texture = pbr.has(METAL_TEXTURE);
-        let is_sheet = out.extensions.iter().any(|name| name == SHEET);
-        if out.is_smooth_metal() || is_sheet && out.metallic > 0.0 {
+        let mut names = out.extensions.iter();
+        let passes = names.any(|name| name == SHEET || name == PANE);
+        if out.is_smooth_metal() || passes && out.metallic > 0.0 {
             out.metal_texture = slots.texture(json, &pbr, METAL_TEXTURE, check);
         }
         out.base_color_texture = slots.texture(json, &pbr, "baseColorTexture", check);
@@ -322,7 +324,6 @@ fn transmission(
     slots: &mut Slots,
     check: &mut Check,
 ) {
-    const PANE: &str = "KHR_materials_transmission";
     if let Some(pane) = item.extended(PANE, check) {
         let values = item.extension::<Transmission>(PANE, check);
         let factor = values.unwrap_or_default().transmission_factor.0;

@@ -63,6 +63,7 @@ use crate::team::{Asked, Interrupt, Interrupted, Team};
 pub use flux::Closed;
 pub use held::Held;
 pub use operator::Operator;
+pub use outside::running;
 use refinement::Refinement;
 pub use room::Settings;
 pub(crate) use room::{Known, Room};

@@ -125,20 +125,37 @@ fn directions(plan: &Plan, mesh: &Mesh) -> f64 {
     }
 }
 
+/// The plan as far as a scene and its welded mesh tell.
+pub(super) fn plan_of(scene: &Scene, mesh: &Mesh) -> Plan {
+    let mut plan = Plan::of(scene);
+    if !mesh.raised.is_empty() {
+        plan.on(Kind::Occlusion, RAISED);
+    }
+    plan
+}
+
 impl Room {
-    /// Welds a scene, finds its spaces, and the first hierarchy of its faces.
+    /// Welds a scene, finds its spaces, and the first hierarchy of its faces; and what is around it.
     pub(super) fn new(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
-        let mut plan = Plan::of(&scene);
-        let mesh = Mesh::new(&scene);
-        if !mesh.raised.is_empty() {
-            plan.on(Kind::Occlusion, RAISED);
-        }
-        let (parting, closed) = match known {
-            Some(known) => {
-                let parting = Parting::again(&scene, mesh, known.spaces, known.parted);
-                (parting, Some(known.closed))
+        let closed = known.as_ref().map(|known| known.closed);
+        let (mut room, tree) = Self::shaped(scene, settings, known);
+        match closed {
+            Some(closed) => {
+                [room.closed, room.sealed] = closed;
+                room.look_outside(&tree, false);
             }
-            None => (Parting::find(&scene, mesh, &plan, settings.seed), None),
+            None => room.look_around(&tree),
+        }
+        (room, tree)
+    }
+
+    /// The same without what is around it.
+    pub(super) fn shaped(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
+        let mesh = Mesh::new(&scene);
+        let mut plan = plan_of(&scene, &mesh);
+        let parting = match known {
+            Some(known) => Parting::again(&scene, mesh, known.spaces, known.parted),
+            None => Parting::find(&scene, mesh, &plan, settings.seed),
         };
         let Parting {
             mesh,
@@ -151,7 +168,7 @@ impl Room {
         if let Some(mirrors) = &mirrors {
             plan.say(Kind::Mirrors, &mirrors.said());
         }
-        let mut room = Self {
+        let room = Self {
             closed: Closed::No,
             sealed: Closed::No,
             outside: None,
@@ -174,13 +191,6 @@ impl Room {
             spaces,
             parted,
         };
-        match closed {
-            Some(closed) => {
-                [room.closed, room.sealed] = closed;
-                room.look_outside(&tree, false);
-            }
-            None => room.look_around(&tree),
-        }
         (room, tree)
     }
 

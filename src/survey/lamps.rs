@@ -4,8 +4,12 @@
 //! does, a lamp's surface is reversed if rays from its *backs* meet other things; if those are mostly backs, all faces
 //! of the room are reversed, and not the lamps alone. Rooms where everything glows (a furnace, a scan whose picture is
 //! its emission) light themselves.
+//!
+//! Sky, sun and parallel light come from outside: rays from fronts find the way to them, also through an opening that hardly any ray
+//! from outside would meet. Where no ray leaves the room it is closed to them, whichever way its faces look.
 
 use super::eyes::{Eyes, Met};
+use super::openings::Fronts;
 use crate::error::Problem;
 use crate::geometry::sampling::{
     Pcg, around, cosine_direction, hash, on_triangle, sequence02, sphere_direction, tangents,
@@ -17,6 +21,9 @@ use std::f64::consts::TAU;
 /// Rays of a lamp: a few for the first look, which most rooms pass with their first lamp, and many before a room is
 /// refused. A lamp deep in a housing shows through an opening that one ray in a thousand finds.
 const RAYS: [u32; 2] = [64, 8192];
+/// Rays from fronts for each of these: with as many as the bake looks for openings with (`transport/openings.rs`) it finds those that are
+/// found here.
+const FROM_FRONTS: u32 = 64;
 
 /// No lamp lights the room.
 #[derive(Debug)]
@@ -25,6 +32,8 @@ pub(super) struct Away {
     lamps: Vec<usize>,
     /// Lights without extent.
     lights: Vec<usize>,
+    /// Lights that the room is closed to.
+    shut_out: Vec<usize>,
     /// Is the whole room reversed?
     room: bool,
     /// Surfaces to turn.
@@ -76,13 +85,23 @@ fn look(eyes: &Eyes, rays: u32) -> Option<Away> {
     let mut found = Away {
         lamps: Vec::new(),
         lights: Vec::new(),
+        shut_out: Vec::new(),
         room: false,
         turned: Vec::new(),
     };
     let (mut fronts, mut backs) = (0, 0);
+    let outside = scene.lights.iter().filter(|l| is_outside(l));
+    let (is_open, is_lit) = reached(eyes, &outside.collect::<Vec<_>>(), rays);
+    if is_lit {
+        return None;
+    }
     for (k, light) in scene.lights.iter().enumerate() {
         // What shines from a surface is looked at with the surfaces.
         if light.kind == LightKind::Surface {
+            continue;
+        }
+        if is_outside(light) && !is_open {
+            found.shut_out.push(k);
             continue;
         }
         let seen = of_light(eyes, light, rays);
@@ -112,7 +131,7 @@ fn look(eyes: &Eyes, rays: u32) -> Option<Away> {
             found.lamps.push(surface);
         }
     }
-    if found.lamps.is_empty() && found.lights.is_empty() {
+    if found.lamps.is_empty() && found.lights.is_empty() && found.shut_out.is_empty() {
         return None;
     }
     found.room = backs > fronts;
@@ -122,6 +141,32 @@ fn look(eyes: &Eyes, rays: u32) -> Option<Away> {
         found.lamps.clone()
     };
     Some(found)
+}
+
+/// Does a light shine from outside, wherever the room ends?
+fn is_outside(light: &PunctualLight) -> bool {
+    light.kind.is_dome() || light.kind.is_parallel()
+}
+
+/// Does a ray from a front leave the room, and does one get to what shines outside?
+fn reached(eyes: &Eyes, outside: &[&PunctualLight], rays: u32) -> (bool, bool) {
+    if outside.is_empty() {
+        return (false, false);
+    }
+    let fronts = Fronts::new(eyes);
+    let mut is_open = false;
+    let is_lit = fronts.rays((rays * FROM_FRONTS) as usize).any(|ray| {
+        let away = fronts.leaves(&ray, ray.direction);
+        is_open |= away;
+        outside.iter().any(|light| match light.kind.is_dome() {
+            true => away && ray.direction.dot(light.direction) < 0.0,
+            false => {
+                let toward = -light.direction;
+                ray.normal.dot(toward) > 0.0 && fronts.leaves(&ray, toward)
+            }
+        })
+    });
+    (is_open, is_lit)
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -213,27 +258,34 @@ impl Away {
         if !self.lamps.is_empty() {
             what.push(format!("faces look reversed: {}", self.named(scene)));
         }
+        let named = |lights: &[usize]| {
+            let name = |&k: &usize| {
+                let light = &scene.lights[k];
+                format!("{} light '{}'", kind(light), short(&light.name))
+            };
+            listed(&lights.iter().map(name).collect::<Vec<_>>())
+        };
         if !self.lights.is_empty() {
-            let names: Vec<String> = self
-                .lights
-                .iter()
-                .map(|&k| {
-                    format!(
-                        "{} light '{}'",
-                        kind(&scene.lights[k]),
-                        short(&scene.lights[k].name)
-                    )
-                })
-                .collect();
+            let names = named(&self.lights);
+            what.push(format!("no front of a surface is met by {names}"));
+        }
+        if !self.shut_out.is_empty() {
             what.push(format!(
-                "no front of a surface is met by {}",
-                listed(&names)
+                "no front of a surface is reached by {}: the room is closed, no ray leaves it",
+                named(&self.shut_out)
             ));
         }
         if self.room {
             what.push("the room's surfaces are seen from behind, their faces look reversed".into());
         }
+        let all_outside = self.lights.iter().all(|&k| is_outside(&scene.lights[k]));
         let next = match (self.turned.is_empty(), self.room) {
+            (true, _) if !self.shut_out.is_empty() => {
+                "give it an opening, or a pane where there is glass, or a lamp inside"
+            }
+            (true, _) if scene.sky.is_some() && all_outside => {
+                "let the sun stand where it shines in, or give the sky light"
+            }
             (true, _) => {
                 "turn the lights' nodes (they shine along their -Z), or move them into the room"
             }
@@ -244,9 +296,13 @@ impl Away {
                 "recalculate the normals in the modelling program, or give --flip, which turns all faces"
             }
         };
+        let head = match self.lamps.is_empty() && self.lights.is_empty() {
+            true => "no lamp lights the room",
+            false => "all lamps shine away from the room",
+        };
         Problem::new(
             scene.source.place(),
-            format!("all lamps shine away from the room: {}", what.join("; ")),
+            format!("{head}: {}", what.join("; ")),
             format!("{next}; --allow-dark bakes it as it is"),
         )
     }

@@ -3,6 +3,7 @@
 
 use super::eyes::{Eyes, Met};
 use crate::geometry::sampling::{Pcg, cosine_direction, triangle_weights};
+use glam::DVec3;
 
 /// Rays: a share of .1 % is found within a third of itself.
 const RAYS: usize = 8192;
@@ -26,29 +27,66 @@ pub(super) fn hint(eyes: &Eyes) -> Option<String> {
 
 /// Share of the rays from fronts that leave the room.
 fn share(eyes: &Eyes) -> f64 {
-    let mesh = &eyes.mesh;
-    let mut sums = Vec::with_capacity(mesh.faces.len());
-    let mut area = 0.0;
-    for face in &mesh.faces {
-        area += mesh.area[face.triangle as usize];
-        sums.push(area);
-    }
-    let mut random = Pcg::new(0x0be7);
-    let mut away = 0;
-    for k in 0..RAYS {
-        let target = (k as f64 + random.f64()) / RAYS as f64 * area;
-        let entry = sums.partition_point(|&sum| sum <= target);
-        let Some(face) = mesh.faces.get(entry.min(sums.len().saturating_sub(1))) else {
-            return 0.0;
-        };
-        let [a, b, c] = mesh.corners(*face);
-        let w = triangle_weights([random.f64(), random.f64()]);
-        let from = a * w[0] + b * w[1] + c * w[2] + mesh.centre;
-        let direction = cosine_direction(mesh.face_normal(*face), [random.f64(), random.f64()]);
-        let plane = mesh.plane[face.triangle as usize];
-        away += usize::from(eyes.look(from, direction, plane) == Met::Nothing);
-    }
+    let fronts = Fronts::new(eyes);
+    let leaves = |ray: &Ray| fronts.leaves(ray, ray.direction);
+    let away = fronts.rays(RAYS).filter(leaves).count();
     away as f64 / RAYS as f64
+}
+
+/// A ray from a front: where it starts, its direction, and the plane that it starts from.
+pub(super) struct Ray {
+    from: DVec3,
+    pub(super) direction: DVec3,
+    pub(super) normal: DVec3,
+    plane: u32,
+}
+
+/// The sides of a room that take light.
+pub(super) struct Fronts<'a> {
+    eyes: &'a Eyes<'a>,
+    /// Area of the faces up to each.
+    sums: Vec<f64>,
+}
+
+impl<'a> Fronts<'a> {
+    pub(super) fn new(eyes: &'a Eyes) -> Self {
+        let mesh = &eyes.mesh;
+        let mut area = 0.0;
+        let sums = mesh.faces.iter().map(|face| {
+            area += mesh.area[face.triangle as usize];
+            area
+        });
+        let sums = sums.collect();
+        Self { eyes, sums }
+    }
+
+    /// Rays from points evenly over the fronts, in directions as they send light.
+    pub(super) fn rays(&self, count: usize) -> impl Iterator<Item = Ray> {
+        let mesh = &self.eyes.mesh;
+        let mut random = Pcg::new(0x0be7);
+        let area = self.sums.last().copied().unwrap_or(0.0);
+        (0..count).filter_map(move |k| {
+            let target = (k as f64 + random.f64()) / count as f64 * area;
+            let entry = self.sums.partition_point(|&sum| sum <= target);
+            let face = mesh
+                .faces
+                .get(entry.min(self.sums.len().saturating_sub(1)))?;
+            let [a, b, c] = mesh.corners(*face);
+            let w = triangle_weights([random.f64(), random.f64()]);
+            let normal = mesh.face_normal(*face);
+            Some(Ray {
+                from: a * w[0] + b * w[1] + c * w[2] + mesh.centre,
+                direction: cosine_direction(normal, [random.f64(), random.f64()]),
+                normal,
+                plane: mesh.plane[face.triangle as usize],
+            })
+        })
+    }
+
+    /// Does it leave the room if it goes in this direction?
+    pub(super) fn leaves(&self, ray: &Ray, direction: DVec3) -> bool {
+        self.eyes.look(ray.from, direction, ray.plane) == Met::Nothing
+    }
 }
 
 #[cfg(test)]

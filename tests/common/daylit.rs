@@ -115,13 +115,24 @@ pub(crate) fn points() -> Vec<(DVec3, DVec3)> {
 }
 
 /// Irradiance at a point through a parallelogram, lit by a sky of 1 (and ground of `ground`), by plain quadrature.
+///
+/// Of a smooth sky the midpoint rule is off by `(h / d)^2 / 12` at a distance of d: 1e-4 at the point nearest to the largest opening.
 pub(crate) fn through(
+    sky: impl Fn(DVec3) -> f64,
+    ground: f64,
+    opening: [DVec3; 3],
+    place: (DVec3, DVec3),
+) -> f64 {
+    summed::<400>(sky, ground, opening, place)
+}
+
+/// The same by so many points along each side.
+pub(crate) fn summed<const N: usize>(
     sky: impl Fn(DVec3) -> f64,
     ground: f64,
     [corner, u, v]: [DVec3; 3],
     (point, normal): (DVec3, DVec3),
 ) -> f64 {
-    const N: usize = 800;
     let (area, across) = (u.cross(v).length(), u.cross(v).normalize());
     let mut sum = 0.0;
     for j in 0..N {

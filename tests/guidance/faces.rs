@@ -1,6 +1,7 @@
 //! Lamps that shine away from the room, and no lamp at all.
 
 use crate::desk::{Desk, dark, light, lit, materials, object, panel, says, turned, vectors, walls};
+use glam::dvec3;
 use serde_json::json;
 
 #[test]
@@ -85,6 +86,67 @@ fn a_spot_that_points_out_of_the_room_is_named() {
     let said = desk.refused(&[]);
     says(&said, &["spot light 'Beam'", "-Z", "--allow-dark"]);
     assert!(!said.contains("give --flip"), "{said}");
+}
+
+/// A hand's breadth of sky is light. A room without any is closed, not reversed, and says of the sky that it is off.
+#[test]
+fn a_small_opening_lets_the_sky_in_and_a_closed_room_shuts_it_out() {
+    let overcast = ["--sky", "overcast"];
+    let sun = [
+        "--sky",
+        "overcast",
+        "--sky-lux",
+        "0",
+        "--ground",
+        "0",
+        "--sun",
+        "60,30",
+    ];
+    let sun = [&sun[..], &["--sun-lux", "50000"]].concat();
+    let desk = Desk::with(&dark());
+    for sky in [&overcast[..], &sun] {
+        let said = desk.refused(sky);
+        says(
+            &said,
+            &[
+                "no lamp lights the room",
+                "the room is closed, no ray leaves it",
+                "--allow-dark",
+            ],
+        );
+        assert!(
+            !said.contains("reversed") && !said.contains("--flip"),
+            "{said}"
+        );
+        let (_, page) = desk.run(&[&["inspect", "room.glb"], sky].concat(), 0);
+        says(&page, &["off      the room is closed: no ray leaves it"]);
+    }
+
+    // A ceiling of four parts about a hole of .1 m.
+    let mut faces = walls().to_vec();
+    faces.remove(3);
+    let xs = [0.0, 1.9, 2.0, 4.0];
+    let zs = [0.0, 2.4, 2.5, 5.0];
+    for (x, z) in [
+        ([0, 3], [0, 1]),
+        ([0, 3], [2, 3]),
+        ([0, 1], [1, 2]),
+        ([2, 3], [1, 2]),
+    ] {
+        let p = |i: usize, k: usize| dvec3(xs[x[i]], 3.0, zs[z[k]]);
+        faces.push([p(0, 0), p(1, 0), p(1, 1), p(0, 1)]);
+    }
+    let mut room = materials();
+    object(&mut room, "Room", &faces, 0);
+    let desk = Desk::with(&room);
+    for sky in [&overcast[..], &sun] {
+        let (_, page) = desk.run(&[&["inspect", "room.glb"], sky].concat(), 0);
+        assert!(!page.contains("no front"), "{page}");
+        let mut lines = page.lines().map(|line| line.split_whitespace().take(2));
+        assert!(lines.any(|words| words.eq(["sky", "runs"])), "{page}");
+    }
+    desk.bake(&overcast);
+    assert!(desk.light().into_iter().fold(0.0, f32::max) > 0.0);
 }
 
 #[test]

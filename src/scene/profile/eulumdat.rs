@@ -3,7 +3,7 @@
 //! | line | what |
 //! |---|---|
 //! | 1 | maker |
-//! | 2 to 7 | kind of lamp, symmetry, planes Mc and their step, angles Ng and their step |
+//! | 2 to 7 | type indicator, symmetry, planes Mc and their step, angles Ng and their step |
 //! | 8 to 12 | report, name, number, file, date |
 //! | 13 to 21 | length, width and height of the luminaire and of its luminous area, mm |
 //! | 22 to 25 | share downwards, light output ratio (%), factor of the intensities, tilt when measured |
@@ -18,6 +18,10 @@ use super::Fault;
 use super::numbers::Lines;
 use super::table::{Angles, BRIGHTEST, MOST_ANGLES, Measured, Profile, Symmetry};
 
+/// Greatest type indicator: 0 point source, 1 one that is alike all around, 2 linear, 3 any other; nothing follows from it here.
+const MOST_TYPE: usize = 3;
+/// Planes are where they should be within this, degrees.
+const SAME: f64 = 0.1;
 /// Metres in a millimetre.
 const MM: f64 = 1e-3;
 /// Sets of lamps at the most (the format says 20).
@@ -30,7 +34,8 @@ const OFF: f64 = 0.03;
 pub(super) fn parse(text: &str) -> Result<Profile, Fault> {
     let mut lines = Lines::new(text);
     lines.next_line("the maker's name")?;
-    lines.next_line("the kind of lamp")?;
+    let kind = lines.line_number("the type indicator")?;
+    lines.count(kind, MOST_TYPE, "the type indicator")?;
     let symmetry = lines.line_number("the symmetry")?;
     let symmetry = lines.count(symmetry, 4, "the symmetry")?;
     let planes = lines.line_number("the number of C planes")?;
@@ -68,6 +73,7 @@ pub(super) fn parse(text: &str) -> Result<Profile, Fault> {
         return Err(lines.fault(what, "give a flux and a factor above 0"));
     }
     let measured = table(&mut lines, symmetry, planes, rows, scale)?;
+    lines.end("give as many intensities as symmetry, planes and angles say")?;
     let mut profile = Profile::new(measured);
     profile.luminaire = luminaire;
     profile.format = "EULUMDAT".into();
@@ -146,6 +152,10 @@ fn table(
     for _ in 0..planes {
         let angle = lines.line_number("a C plane")?;
         rising(lines, &circle, angle, 360.0, "a C plane")?;
+        if circle.is_empty() && angle > SAME {
+            let what = format!("the first C plane is {angle}");
+            return Err(lines.fault(what, "count planes from 0 degrees"));
+        }
         circle.push(angle);
     }
     let mut polar = Vec::new();
@@ -206,7 +216,7 @@ fn reaches(lines: &Lines, kind: Symmetry, ends: [f64; 2]) -> Result<(), Fault> {
         Symmetry::Quadrant => (4, [0.0, 90.0]),
         Symmetry::None | Symmetry::Axial => return Ok(()),
     };
-    if (0..2).all(|k| (ends[k] - folds[k]).abs() <= 0.1) {
+    if (0..2).all(|k| (ends[k] - folds[k]).abs() <= SAME) {
         return Ok(());
     }
     let [from, to] = ends;

@@ -93,6 +93,9 @@ pub(super) fn parse(text: &str) -> Result<Profile, Fault> {
     }
     lines.number("the input watts")?;
     let measured = table(&mut lines, angles, rows, planes, factor)?;
+    lines.end(
+        "write decimals with a point (a comma makes two numbers of one), and as many intensities as the angles say",
+    )?;
     let mut profile = Profile::new(measured);
     profile.luminaire = head.luminaire;
     profile.format = head.edition.1.into();
@@ -219,6 +222,10 @@ fn table(
     };
     let vertical = ascending(lines, rows, low, "a vertical angle")?;
     let mut horizontal = ascending(lines, planes, high, "a horizontal angle")?;
+    if angles == Angles::C && planes == 1 && horizontal[0] > SAME {
+        let what = format!("its one horizontal angle is {}", horizontal[0]);
+        return Err(lines.fault(what, "give 0 for light that is alike all around"));
+    }
     let mut candela = Vec::new();
     for _ in 0..planes {
         let mut plane = lines.list(rows, "an intensity")?;

@@ -4,6 +4,8 @@ use super::Fault;
 
 /// Longest piece of a file that a message repeats.
 const SHOWN: usize = 24;
+/// Ctrl-Z, with which files of MS-DOS end.
+const END: char = '\u{1a}';
 
 /// UTF-8 as a rule; what is not is taken for Latin-1, in which older files are written.
 pub(super) fn decoded(bytes: &[u8]) -> String {
@@ -51,25 +53,45 @@ impl<'a> Lines<'a> {
 
     /// The next number, whatever line it stands on; blanks and commas are between numbers.
     pub(super) fn number(&mut self, what: &str) -> Result<f64, Fault> {
-        let between = |c: char| c.is_whitespace() || c == ',' || c == '\u{1a}';
+        match self.word() {
+            Some(word) => self.parsed(word, what),
+            None => Err(self.ended(what)),
+        }
+    }
+
+    /// What stands between two blanks or commas next, whatever line it stands on.
+    fn word(&mut self) -> Option<&'a str> {
+        let between = |c: char| c.is_whitespace() || c == ',' || c == END;
         loop {
             self.rest = self.rest.trim_start_matches(between);
             if !self.rest.is_empty() {
                 break;
             }
-            self.rest = self.lines.get(self.at).ok_or_else(|| self.ended(what))?;
+            self.rest = self.lines.get(self.at)?;
             self.at += 1;
         }
         let end = self.rest.find(between).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         self.rest = rest;
-        self.parsed(word, what)
+        Some(word)
+    }
+
+    /// The table is read: a number that still follows belongs to a table of another size. Words are a remark.
+    pub(super) fn end(&mut self, next: &str) -> Result<(), Fault> {
+        match self.word() {
+            Some(word) if word.parse::<f64>().is_ok() => {
+                let short: String = word.chars().take(SHOWN).collect();
+                Err(self.fault(format!("'{short}' follows on the last intensity"), next))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The next line as one number, with a point or a comma before its decimals; what follows a blank is a remark.
     pub(super) fn line_number(&mut self, what: &str) -> Result<f64, Fault> {
         let line = self.next_line(what)?;
-        let word = line.split_whitespace().next().unwrap_or("");
+        let ends = |c: char| c.is_whitespace() || c == END;
+        let word = line.split(ends).next().unwrap_or("");
         self.parsed(&word.replace(',', "."), what)
     }
 

@@ -312,6 +312,14 @@ fn faults_have_a_line_and_a_way_out() {
         ("1 3 2 1 2", "1 2.5 2 1 2", 3, "not a whole number"),
         ("1000 1 3", "1000 0 3", 4, "multiplied by 0"),
         ("NONE", "other.tlt", 2, "OTHER.TLT"),
+        ("4 5 6", "4,2 5 6", 8, "'6' follows on the last intensity"),
+        ("5 6", "5 6\n\n\n7", 11, "'7' follows on the last intensity"),
+        (
+            "3 2 1 2 0 0 0\n1 1 10\n0 45 90\n0 90\n1 2 3\n4 5 6",
+            "3 1 1 2 0 0 0\n1 1 10\n0 45 90\n10\n1 2 3",
+            6,
+            "its one horizontal angle is 10",
+        ),
     ] {
         let fault = Profile::parse(good.replace(old, new).as_bytes()).unwrap_err();
         assert!(fault.what.contains(what) && fault.line == line, "{fault:?}");
@@ -322,9 +330,32 @@ fn faults_have_a_line_and_a_way_out() {
         ("\r\n4\r\n24", "\r\n7\r\n24", 3, "the symmetry is 7"),
         ("\r\n24\r\n15", "\r\n26\r\n15", 6, "symmetry 4 cannot be"),
         ("2000", "0", 42, "intensities are for 0 lm"),
+        ("\r\n1\r\n4", "\r\n9\r\n4", 2, "the type indicator is 9"),
+        (
+            "\r\n0\r\n15\r\n",
+            "\r\n10\r\n15\r\n",
+            43,
+            "the first C plane is 10",
+        ),
     ] {
         let fault = Profile::parse(euro.replacen(old, new, 1).as_bytes()).unwrap_err();
         assert!(fault.what.contains(what) && fault.line == line, "{fault:?}");
+    }
+    let fault = Profile::parse(format!("{euro}\r\n\r\n100").as_bytes()).unwrap_err();
+    assert!(fault.what.contains("'100' follows"), "{fault:?}");
+    // Blank lines, the end of a file of MS-DOS, and remarks are no numbers.
+    for text in [good, &euro] {
+        for tail in [
+            "",
+            "\r\n \r\n\r\n",
+            "\u{1a}",
+            "\r\n\u{1a}\u{1a}",
+            " ,\n",
+            "\r\nEND 12",
+        ] {
+            let read = Profile::parse(format!("{}{tail}", text.trim_end()).as_bytes());
+            assert!(read.is_ok(), "{tail:?}: {read:?}");
+        }
     }
     assert_eq!(Profile::parse(b"").unwrap_err().line, 1);
 }

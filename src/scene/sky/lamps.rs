@@ -2,13 +2,13 @@
 
 use super::Distribution;
 use super::dome::Sky;
-use super::light::{Light, of_daylight, usual};
+use super::light::{Light, of_sun, usual};
 use super::parts::PLACES;
 use super::sun::{angles, direction, position};
 use super::wish::{SkyType, SkyWish, SunPlace};
 use crate::color::{KM, Observer};
 use crate::data::{Grid, LEAVES, Leaves, nearest_of};
-use crate::scene::check::Check;
+use crate::scene::check::{Check, listed};
 use crate::scene::json::short;
 use crate::scene::{LightKind, LightSpectrum, PunctualLight};
 use glam::{DQuat, DVec3};
@@ -46,6 +46,9 @@ pub(crate) fn join(
         spectra,
     };
     let (ground, own_sun) = (light.ground, light.sun);
+    if sun.is_none() && own_sun.is_none() {
+        sunless(wish, check);
+    }
     let (mut sky, spectrum) = makes.sky(light);
     let shining = match sun {
         Some(sun) => {
@@ -56,6 +59,9 @@ pub(crate) fn join(
         None => own_sun.and_then(|(toward, shape)| makes.of_map(wish, toward, spectrum, shape)),
     };
     if let Some(sun) = shining {
+        if sun.light.is_none() {
+            two_suns(makes.lights, check);
+        }
         let lux = makes.size(sun.spectrum, &sun.shape);
         let [elevation, azimuth] = angles(sun.toward);
         let azimuth = (azimuth - wish.north.unwrap_or(0.0)).rem_euclid(360.0);
@@ -68,6 +74,30 @@ pub(crate) fn join(
     }
     sky.bright = makes.bright();
     Some(sky)
+}
+
+/// Something is said of a sun that stands nowhere. That it has no light is nothing.
+fn sunless(wish: &SkyWish, check: &mut Check) {
+    let shines = wish.sun.illuminance.is_some_and(|lux| lux > 0.0);
+    if shines || wish.sun.kelvin.is_some() {
+        let what = "something is said of the sun's light, but not where it stands";
+        let next = "give --sun ELEVATION,AZIMUTH or \"sun\" in the file of spectra, or leave out its illuminance and colour temperature";
+        check.problem("sun", what, next);
+    }
+}
+
+/// Parallel light of the file beside a sun is a second one.
+fn two_suns(lights: &[PunctualLight], check: &mut Check) {
+    let parallel = lights.iter().filter(|l| l.kind == LightKind::Directional);
+    let names: Vec<String> = parallel.map(|l| format!("'{}'", short(&l.name))).collect();
+    if let Some(first) = names.first() {
+        let name = first.trim_matches('\'');
+        check.warn(format!(
+            "the sun shines beside parallel light of the file ({}): two suns, if that is meant as one; \"sun\": \"{name}\" in the \"sky\" \
+             of the file of spectra, without --sun, makes it the sun",
+            listed(&names)
+        ));
+    }
 }
 
 /// What kind of sky is asked for, if it is no map, and its sun; none where what is said does not go together, which is told.
@@ -238,7 +268,7 @@ impl Makes<'_> {
         Some(Shining {
             toward: sun.toward,
             light: sun.light,
-            spectrum: self.add_spectrum(of_daylight(kelvin, self.grid)),
+            spectrum: self.add_spectrum(of_sun(kelvin, self.grid)),
             shape: [lux; LEAVES],
             said: format!("{kelvin:.0} K"),
         })
@@ -259,7 +289,7 @@ impl Makes<'_> {
         }
         let (spectrum, shape, said) = match wish.sun.kelvin {
             Some(kelvin) => {
-                let spectrum = self.add_spectrum(of_daylight(kelvin, self.grid));
+                let spectrum = self.add_spectrum(of_sun(kelvin, self.grid));
                 (spectrum, [lux; LEAVES], format!("{kelvin:.0} K"))
             }
             None => (spectrum, shape.map(|x| x * lux / own), "of the map".into()),

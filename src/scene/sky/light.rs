@@ -6,9 +6,9 @@ use super::map::{Map, Wanted};
 use super::parts::PARTS;
 use super::picture::Picture;
 use super::sun::angles;
-use super::wish::{BRIGHT, Brightness, SkyType, SkyWish};
+use super::wish::{BRIGHT, Brightness, KELVIN, SkyType, SkyWish};
 use crate::color::{KM, Observer, Upsampler, primaries};
-use crate::data::{Grid, LEAVES, Leaves, Outside, Table, daylight, named};
+use crate::data::{Grid, LEAVES, Leaves, Outside, Table, blackbody, daylight, named};
 use crate::scene::LightSpectrum;
 use crate::scene::check::Check;
 use crate::scene::json::short;
@@ -205,6 +205,14 @@ fn usual_kelvin(kind: SkyType) -> f64 {
 /// The spectrum of daylight, luminous size 1.
 pub(super) fn of_daylight(kelvin: f64, grid: &Grid) -> LightSpectrum {
     sized(format!("daylight/{kelvin:.0}"), &daylight(kelvin), grid)
+}
+
+/// The spectrum of a sun: daylight, and where that ends a blackbody, luminous size 1.
+pub(super) fn of_sun(kelvin: f64, grid: &Grid) -> LightSpectrum {
+    match kelvin >= KELVIN[0] {
+        true => of_daylight(kelvin, grid),
+        false => sized(format!("blackbody/{kelvin:.0}"), &blackbody(kelvin), grid),
+    }
 }
 
 fn sum_of(parts: [Leaves; PARTS]) -> Leaves {

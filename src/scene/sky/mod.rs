@@ -40,5 +40,5 @@ pub(crate) use lamps::join;
 pub use map::Map;
 pub use parts::{PARTS, PLACES};
 pub use sun::{Hours, direction};
-pub use wish::{BRIGHT, KELVIN, TURN};
+pub use wish::{BRIGHT, KELVIN, SUN_KELVIN, TURN};
 pub use wish::{Brightness, SkyName, SkyType, SkyWish, SunPlace, SunWish};

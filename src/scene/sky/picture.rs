@@ -15,6 +15,8 @@ const MOST: u64 = 1 << 25;
 /// Texels that a byte of a file can stand for at the most: deflate (RFC 1951) makes no more than 1032 bytes of one, run lengths of
 /// RGBE 16 texels.
 const RATIO: u64 = 1032;
+/// What to do about a part of one.
+const WHOLE: &str = "copy or download the whole file again";
 /// First bytes of the formats. Some write the second in the place of the first, which the decoder wants.
 const RADIANCE: &[u8] = b"#?RADIANCE";
 const RGBE: &[u8] = b"#?RGBE";
@@ -43,7 +45,13 @@ impl Picture {
     pub(super) fn read(path: &Path) -> Result<Self, (String, &'static str)> {
         let next = "give an equirectangular map as .hdr or .exr";
         let bytes = uri::read_file(path).map_err(|why| (why, next))?;
-        let bad = |e: image::ImageError| (format!("cannot be read: {e}"), next);
+        let bad = |e: image::ImageError| match is_cut_short(&e) {
+            true => (
+                "is cut short: it ends before its last texel".to_owned(),
+                WHOLE,
+            ),
+            false => (format!("cannot be read: {e}"), next),
+        };
         let named = [RADIANCE, RGBE]
             .iter()
             .find_map(|name| bytes.strip_prefix(*name));
@@ -123,6 +131,14 @@ impl Picture {
     }
 }
 
+/// Did the file end before the decoder had all? That of OpenEXR says so in words alone.
+fn is_cut_short(error: &image::ImageError) -> bool {
+    match error {
+        image::ImageError::IoError(error) => error.kind() == std::io::ErrorKind::UnexpectedEof,
+        other => other.to_string().contains("missing bytes"),
+    }
+}
+
 /// Is the size that a file claims one of a map, and one that it can hold?
 fn checked(decoder: &impl ImageDecoder, bytes: usize) -> Result<(), (String, &'static str)> {
     let (width, height) = decoder.dimensions();
@@ -133,7 +149,7 @@ fn checked(decoder: &impl ImageDecoder, bytes: usize) -> Result<(), (String, &'s
     }
     if texels > (bytes as u64).saturating_mul(RATIO) {
         let what = format!("claims {width} x {height} texels in {bytes} bytes");
-        return Err((what, "give a whole file"));
+        return Err((what, WHOLE));
     }
     if height == 0 || u64::from(width) != 2 * u64::from(height) {
         let what = format!("has {width} x {height} texels");

@@ -14,9 +14,10 @@
 //! `ground_reflectance` puts open ground there. The sun
 //! stands at an elevation and azimuth, or where it is seen at `latitude_deg`, `longitude_deg` (east) and `time`
 //! (`2026-06-21T12:00:00+02:00`); or `"sun"` is the name of a directional light of the file. Its `illuminance_lx` is that of a plane
-//! across its rays.
+//! across its rays, its `cct_k` that of CIE daylight, below 4000 K, which that does not reach, of a blackbody.
 
 use super::sun::Hours;
+use crate::scene::json::short;
 use crate::scene::reader::Reader;
 use crate::scene::uri::{self, Place};
 use serde_json::{Map, Value};
@@ -125,30 +126,46 @@ impl FromStr for SunPlace {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || {
-            "the sun stands at ELEVATION,AZIMUTH in degrees, or at LATITUDE,LONGITUDE,TIME as in \
-             52.5,13.4,2026-06-21T12:00:00+02:00"
-                .to_owned()
-        };
-        let number = |text: &str, [least, most]: [f64; 2]| {
+        let number = |text: &str, what: &str, [least, most]: [f64; 2]| {
             let number = text.trim().parse::<f64>().ok();
             let within = number.filter(|n| (least..=most).contains(n));
-            within.ok_or_else(wrong)
+            within.ok_or_else(|| {
+                let text = short(text);
+                format!("its {what} is '{text}', not a number of degrees from {least} to {most}")
+            })
         };
         let parts: Vec<&str> = text.split(',').collect();
         match parts[..] {
             [elevation, azimuth] => Ok(Self::Angles {
-                elevation: number(elevation, HEIGHT)?,
-                azimuth: number(azimuth, TURN)?,
+                elevation: number(elevation, "elevation", HEIGHT)?,
+                azimuth: number(azimuth, "azimuth", TURN)?,
             }),
             [latitude, longitude, time] => Ok(Self::Clock {
-                latitude: number(latitude, HEIGHT)?,
-                longitude: number(longitude, HALF_TURN)?,
-                time: time.trim().parse().map_err(|_| wrong())?,
+                latitude: number(latitude, "latitude", HEIGHT)?,
+                longitude: number(longitude, "longitude", HALF_TURN)?,
+                time: moment(time.trim())?,
             }),
-            _ => Err(wrong()),
+            _ => Err(format!(
+                "the sun stands at ELEVATION,AZIMUTH in degrees, or at LATITUDE,LONGITUDE,TIME as in 52.5,13.4,{MOMENT}; decimals have a \
+                 point"
+            )),
         }
     }
+}
+
+/// How a time is written.
+const MOMENT: &str = "2026-06-21T12:00:00+02:00";
+
+/// A time, with its distance from universal time.
+fn moment(text: &str) -> Result<Hours, String> {
+    let zoneless = || format!("{text}Z").parse::<Hours>().is_ok();
+    text.parse().map_err(|_| match zoneless() {
+        true => format!(
+            "its time '{}' has no time zone: end it with the distance from universal time, as in {MOMENT}, or with Z for universal time itself",
+            short(text)
+        ),
+        false => format!("its time '{}' is none: write it as in {MOMENT}", short(text)),
+    })
 }
 
 /// What is said of the sun.
@@ -234,7 +251,7 @@ impl SkyWish {
         ];
         reader.keys(sky, &known, place);
         let mut wish = Self {
-            kind: parsed(sky, "type", place, reader),
+            kind: parsed(sky, "type", str::parse, place, reader),
             map: map(sky, place, reader),
             kelvin: number(sky, "cct_k", KELVIN, place, reader),
             horizon_kelvin: number(sky, "horizon_cct_k", KELVIN, place, reader),
@@ -270,6 +287,8 @@ impl SkyWish {
 
 /// Range of the correlated colour temperature of daylight, K.
 pub const KELVIN: [f64; 2] = [4000.0, 25_000.0];
+/// The same of the sun: a low one is redder than any daylight that the CIE has a spectrum for, about 2000 K on the horizon. Down to 600 mired.
+pub const SUN_KELVIN: [f64; 2] = [1667.0, 25_000.0];
 /// Range of an illuminance, lx, or a luminance, cd/m2.
 pub const BRIGHT: [f64; 2] = [0.0, 1e9];
 /// Range of an azimuth, degrees.
@@ -299,7 +318,7 @@ impl SunWish {
             (false, true, None) => {
                 let latitude = number(sun, clock[0], HEIGHT, place, reader);
                 let longitude = number(sun, clock[1], HALF_TURN, place, reader);
-                let time = parsed::<Hours>(sun, clock[2], place, reader);
+                let time = parsed(sun, clock[2], moment, place, reader);
                 let both = latitude.zip(longitude).zip(time);
                 both.map(|((latitude, longitude), time)| SunPlace::Clock {
                     latitude,
@@ -328,7 +347,7 @@ impl SunWish {
         Self {
             place: said,
             illuminance: number(sun, "illuminance_lx", BRIGHT, place, reader),
-            kelvin: number(sun, "cct_k", KELVIN, place, reader),
+            kelvin: number(sun, "cct_k", SUN_KELVIN, place, reader),
         }
     }
 }
@@ -369,20 +388,20 @@ fn number(
 }
 
 /// A text that reads as something.
-fn parsed<T: FromStr<Err: std::fmt::Display>>(
+fn parsed<T>(
     object: &Map<String, Value>,
     key: &str,
+    parse: impl Fn(&str) -> Result<T, String>,
     place: &str,
     reader: &mut Reader,
 ) -> Option<T> {
     let value = object.get(key)?;
-    let read = value.as_str().map(str::parse::<T>);
-    match read {
+    match value.as_str().map(parse) {
         Some(Ok(read)) => Some(read),
         Some(Err(why)) => {
             reader
                 .check
-                .problem(place, format!("{key} is {value}"), why.to_string());
+                .problem(place, format!("{key} is {value}"), why);
             None
         }
         None => {
@@ -423,8 +442,22 @@ mod tests {
         );
         let clock = "52.5,13.4,2026-06-21T12:00:00+02:00".parse();
         assert!(matches!(clock, Ok(SunPlace::Clock { latitude: 52.5, .. })));
-        for bad in ["40", "a,b", "NaN,3", "1,2,noon", "1,2,3,4"] {
-            assert!(bad.parse::<SunPlace>().is_err(), "{bad}");
+        for (bad, why) in [
+            ("40", "ELEVATION,AZIMUTH"),
+            ("1,2,3,4", "decimals have a point"),
+            (
+                "95,3",
+                "its elevation is '95', not a number of degrees from -90 to 90",
+            ),
+            ("NaN,3", "its elevation is 'NaN'"),
+            ("1,b", "its azimuth is 'b'"),
+            ("99,2,2026-06-21T12:00:00Z", "its latitude is '99'"),
+            ("1,200,2026-06-21T12:00:00Z", "its longitude is '200'"),
+            ("1,2,noon", "its time 'noon' is none: write it as in 2026-"),
+            ("1,2,2026-06-21T12:00:00", "has no time zone"),
+        ] {
+            let said = bad.parse::<SunPlace>().unwrap_err();
+            assert!(said.contains(why), "{bad}: {said}");
         }
     }
 }
