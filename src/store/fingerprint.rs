@@ -155,6 +155,9 @@ impl Fingerprint {
                     let spread = sky.luminance();
                     mix.add(spread.kind()).add(spread.sun().to_array());
                 }
+                (LightKind::Sky(_), Some(Dome::Spectral(sky))) => {
+                    mix.add(sky.model().air()).add(sky.model().sun().to_array());
+                }
                 (LightKind::Sky(_) | LightKind::Ground(_), Some(Dome::Map(map))) => {
                     mix.all(map.texels()).add(map.north());
                 }
