@@ -13,6 +13,8 @@ use haarlight::color::{KM, Observer};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::Scene;
 use haarlight::scene::sky::{Brightness, Dome, SkyWish, SunPlace, SunWish};
+use haarlight::solve::{Bake, Settings};
+use haarlight::spectrum::Leaves;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A sky with the sun over y = 4 of the room, without its direct light.
@@ -30,6 +32,17 @@ fn wish(turbidity: f64, elevation: f64) -> SkyWish {
         },
         ..SkyWish::default()
     }
+}
+
+/// One round: what points see of the sky itself does not depend on it.
+fn glanced(room: Room, wish: &SkyWish) -> Bake {
+    let settings = Settings {
+        rounds: 1,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(room.scene().under(wish).unwrap(), settings);
+    bake.run();
+    bake
 }
 
 /// Tristimulus radiance by the formula, linear between its wavelengths.
@@ -78,7 +91,7 @@ fn open_ground_has_the_light_of_the_model() {
     };
     let at = [(dvec3(2.0, 0.0, 1.3), DVec3::Y)];
     for (turbidity, elevation) in [(2.0, 60.0), (6.0, 20.0)] {
-        let bake = bake(floor(), &wish(turbidity, elevation));
+        let bake = glanced(floor(), &wish(turbidity, elevation));
         let want = ground(formula(bake.scene()));
         let got = DVec3::from_array(bake.probe(&at)[0].xyz);
         println!("{turbidity}, {elevation}: {got:.1} for {want:.1}");
@@ -93,7 +106,7 @@ fn open_ground_has_the_light_of_the_model() {
         brightness: Some(Brightness::Illuminance(LUX)),
         ..wish(6.0, 20.0)
     };
-    let lux = bake(floor(), &given).probe(&at)[0].xyz[1];
+    let lux = glanced(floor(), &given).probe(&at)[0].xyz[1];
     assert!((lux / LUX - 1.0).abs() < 2e-3, "{lux}");
 }
 
@@ -103,14 +116,14 @@ fn open_ground_has_the_light_of_the_model() {
 fn light_through_openings_has_the_colour_of_the_model() {
     let mut few = Room::new();
     let window = beside(&mut few);
-    let [a, _, b, _, c, _] = places_beside();
+    let [a, .., b, _] = places_beside();
     let seen = points();
     for (bake, opening, places, slack) in [
-        (bake(few, &wish(4.0, 25.0)), window, vec![a, b, c], 5e-3),
+        (glanced(few, &wish(4.0, 25.0)), window, vec![a, b], 5e-3),
         (
-            bake(room(0.0, 1.0, 6), &wish(6.0, 60.0)),
+            glanced(room(0.0, 1.0, 6), &wish(6.0, 60.0)),
             roof(1.0),
-            vec![seen[2], seen[9]],
+            vec![seen[2]],
             0.01,
         ),
     ] {
@@ -126,8 +139,8 @@ fn light_through_openings_has_the_colour_of_the_model() {
     }
 }
 
-/// Beside paths, which know the model itself and nothing of the three spectra that stand for it: summed over the points, the blue,
-/// the green and the red of it.
+/// Beside paths, which know the model itself and nothing of the three spectra that stand for it, summed over the points: colours, and the
+/// blue, the green and the red by themselves, of which the spectra of single openings are .7 % off in the mean.
 #[test]
 fn reflected_light_agrees_with_paths() {
     let bake = bake(room(0.5, 1.0, 1), &wish(3.0, 50.0));
@@ -137,17 +150,24 @@ fn reflected_light_agrees_with_paths() {
         .into_iter()
         .map(|(point, normal)| (point - mesh.centre + 1e-6 * normal, normal, NO_PLANE))
         .collect();
-    let paths = vec![32_768; places.len()];
+    let paths = vec![65_536; places.len()];
     let answers = Audit::new(scene, mesh, bake.rays()).irradiance(&places, &paths, 3);
+    let agree = |weights: &Leaves, slack: f64| {
+        let sum = |leaves: &Leaves| -> f64 { leaves.iter().zip(weights).map(|(x, w)| x * w).sum() };
+        let got: f64 = probed.iter().map(|p| sum(&p.leaves)).sum();
+        let truth: f64 = answers.iter().map(|answer| answer.linear(weights).0).sum();
+        println!("{got:.4} for {truth:.4}");
+        assert!((got / truth - 1.0).abs() < slack, "{got} should be {truth}");
+    };
+    for weights in Observer::cie1931().weights(&scene.grid) {
+        agree(&weights, 0.01);
+    }
     for (first, last) in [(420.0, 490.0), (500.0, 590.0), (600.0, 690.0)] {
         let within = |leaf: usize| (first..last).contains(&scene.grid.middle(leaf));
-        let weights = std::array::from_fn(|leaf| f64::from(u8::from(within(leaf))));
-        let sum =
-            |leaves: &[f64; 64]| -> f64 { leaves.iter().zip(weights).map(|(x, w)| x * w).sum() };
-        let got: f64 = probed.iter().map(|p| sum(&p.leaves)).sum();
-        let truth: f64 = answers.iter().map(|answer| answer.linear(&weights).0).sum();
-        println!("{first}: {got:.4} for {truth:.4}");
-        assert!((got / truth - 1.0).abs() < 0.01, "{first}: {got} {truth}");
+        agree(
+            &std::array::from_fn(|leaf| f64::from(u8::from(within(leaf)))),
+            0.015,
+        );
     }
 }
 
