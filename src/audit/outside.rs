@@ -125,6 +125,13 @@ impl Audit<'_> {
 
     /// Adds a weight times what comes from a direction outside.
     fn far(&self, sky: &Sky, direction: DVec3, weight: f64, throughput: &Leaves, sum: &mut Leaves) {
+        // Not by the parts that the bake knows: what these leave out is an error, too.
+        if let Some(radiance) = sky.exact(direction) {
+            for l in 0..LEAVES {
+                sum[l] += throughput[l] * weight * radiance[l];
+            }
+            return;
+        }
         for light in &self.scene.lights {
             let Some(radiance) = sky.part(light.kind.place(), direction) else {
                 continue;

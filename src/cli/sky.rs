@@ -9,7 +9,8 @@ use crate::scene::sky::{
 #[command(next_help_heading = "Sky and sun")]
 #[non_exhaustive]
 pub struct SkyArgs {
-    /// Light that enters where rays leave the room: overcast, intermediate, clear, uniform, or cie:1 to cie:16 (ISO 15469), or an
+    /// Light that enters where rays leave the room: overcast, intermediate, clear, uniform, or cie:1 to cie:16 (ISO 15469); hosek or
+    /// hosek:TURBIDITY, 1 to 10 (Hosek and Wilkie 2012: colours and brightness from the sun's height, turbidity [default: 3] and --ground); or an
     /// equirectangular map of all directions, .hdr or .exr, its middle toward +X.
     #[arg(long = "sky", value_name = "TYPE|MAP")]
     pub name: Option<SkyName>,
@@ -55,13 +56,15 @@ impl SkyArgs {
     /// What is meant.
     pub(super) fn wish(&self) -> SkyWish {
         let lux = self.sky_lux.map(Brightness::Illuminance);
-        let (kind, map) = match &self.name {
-            Some(SkyName::Type(kind)) => (Some(*kind), None),
-            Some(SkyName::Map(path)) => (None, Some(path.clone())),
-            None => (None, None),
+        let (kind, turbidity, map) = match &self.name {
+            Some(SkyName::Type(kind)) => (Some(*kind), None, None),
+            Some(SkyName::Hosek(turbidity)) => (None, Some(*turbidity), None),
+            Some(SkyName::Map(path)) => (None, None, Some(path.clone())),
+            None => (None, None, None),
         };
         SkyWish {
             kind,
+            turbidity,
             map,
             brightness: lux.or(self.sky_luminance.map(Brightness::Luminance)),
             kelvin: self.sky_cct,

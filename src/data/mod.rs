@@ -5,6 +5,7 @@ mod daylight;
 mod grid;
 mod nearest;
 mod registry;
+mod skylight;
 mod table;
 
 pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
@@ -15,3 +16,4 @@ pub use table::{CsvProblem, Outside, Table};
 
 pub(crate) use nearest::nearest_of;
 pub(crate) use registry::{alpha_opic, cmf_1931, cmf_1964, colour_evaluation, test_colours};
+pub(crate) use skylight::{SKYLIGHT_NM, TERMS, TURBIDITY, WAVES, skylight};

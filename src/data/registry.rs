@@ -259,6 +259,7 @@ mod tests {
             include_str!("alpha_opic.csv"),
             include_str!("test_colours.csv"),
             include_str!("colour_evaluation.csv"),
+            include_str!("hosek_wilkie.csv"),
         ]) {
             for key in [
                 "# source: ",

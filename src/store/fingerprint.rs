@@ -59,6 +59,24 @@ impl Mix {
 }
 
 impl Mix {
+    /// How light of a kind is spread by a sky.
+    fn dome(&mut self, kind: LightKind, dome: &Dome) {
+        match (kind, dome) {
+            (LightKind::Sky(_), Dome::Cie(sky)) => {
+                let spread = sky.luminance();
+                self.add(spread.kind()).add(spread.sun().to_array());
+            }
+            (LightKind::Sky(_), Dome::Spectral(sky)) => {
+                self.add(sky.model().air())
+                    .add(sky.model().sun().to_array());
+            }
+            (LightKind::Sky(_) | LightKind::Ground(_), Dome::Map(map)) => {
+                self.all(map.texels()).add(map.north());
+            }
+            _ => {}
+        }
+    }
+
     /// What of a pane is found where a ray passes it: thickness, value of the texture.
     fn pane_places(&mut self, pane: &Pane, surface: &Surface, images: &[u64]) {
         match &pane.kind {
@@ -150,15 +168,8 @@ impl Fingerprint {
             if !light.kind.is_parallel() {
                 mix.add(light.position.to_array());
             }
-            match (light.kind, scene.sky.as_ref().map(|sky| &sky.dome)) {
-                (LightKind::Sky(_), Some(Dome::Cie(sky))) => {
-                    let spread = sky.luminance();
-                    mix.add(spread.kind()).add(spread.sun().to_array());
-                }
-                (LightKind::Sky(_) | LightKind::Ground(_), Some(Dome::Map(map))) => {
-                    mix.all(map.texels()).add(map.north());
-                }
-                _ => {}
+            if let Some(sky) = &scene.sky {
+                mix.dome(light.kind, &sky.dome);
             }
             let mut what = "place";
             if let Some(luminaire) = &light.luminaire {
@@ -374,6 +385,7 @@ fn images(scene: &Scene) -> Vec<u64> {
 mod tests {
     use super::*;
     use crate::scene::Options;
+    use crate::scene::sky::{Brightness, SkyWish, SunWish};
     use proptest::prelude::*;
 
     fn room() -> Scene {
@@ -433,6 +445,26 @@ mod tests {
         let mut renamed = room();
         renamed.surfaces[0].name = "other".into();
         assert_eq!(seen(&renamed), (None, None));
+    }
+
+    /// How a sky spreads its light is shape, with the same light on open ground.
+    #[test]
+    fn another_turbidity_is_another_shape() {
+        let shape = |turbidity: f64| {
+            let wish = SkyWish {
+                turbidity: Some(turbidity),
+                brightness: Some(Brightness::Illuminance(100.0)),
+                sun: SunWish {
+                    place: Some("40,200".parse().unwrap()),
+                    ..SunWish::default()
+                },
+                ..SkyWish::default()
+            };
+            Fingerprint::shape(&room().under(&wish).unwrap())
+        };
+        assert_eq!(shape(3.0).change(&shape(3.0)), None);
+        let what = shape(3.0).change(&shape(4.0)).unwrap();
+        assert!(what.contains("light 'sky, bluest'"), "{what}");
     }
 
     /// Where panes and mirrors are is shape, what they do to light is paint.

@@ -56,7 +56,7 @@ def pack(wheels: list[Path], folder: Path) -> Path:
     version = re.search(r'^version = "(.*)"$', text, flags=re.M)[1]
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"haarlight-{version}.zip"
-    licences = [EXTENSION.parents[2] / name for name in ("LICENSE-MIT", "LICENSE-APACHE")]
+    licences = [EXTENSION.parents[2] / name for name in ("LICENSE-MIT", "LICENSE-APACHE", "LICENSE-HOSEK-WILKIE")]
     files = [("blender_manifest.toml", text.encode())]
     files += [(source.name, source.read_bytes()) for source in [*sorted(EXTENSION.glob("*.py")), *licences]]
     files += [(f"wheels/{wheel.name}", wheel.read_bytes()) for wheel in wheels]

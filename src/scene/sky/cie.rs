@@ -28,7 +28,7 @@ const TYPES: [[f64; 5]; 15] = [
 /// The traditional overcast sky.
 const TRADITIONAL: u8 = 16;
 /// Steps of the quadrature for the illuminance of open ground, by height and around: 1e-5 of it.
-const STEPS: [usize; 2] = [256, 512];
+pub(super) const STEPS: [usize; 2] = [256, 512];
 
 /// How the light of a sky is spread over the dome, brought to an illuminance of 1 on open level ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,14 +134,16 @@ impl Distribution {
     fn level(&self) -> f64 {
         match self.is_even() {
             true => PI,
-            false => level(|direction| [self.shape(direction)])[0],
+            false => level(STEPS, |direction| [self.shape(direction)])[0],
         }
     }
 }
 
-/// Irradiance of open level ground by radiances that depend on the direction, by the midpoint rule.
-pub(super) fn level<const N: usize>(radiance: impl Fn(DVec3) -> [f64; N]) -> [f64; N] {
-    let [up, around] = STEPS;
+/// Irradiance of open level ground by radiances that depend on the direction, by the midpoint rule in so many steps by height and around.
+pub(super) fn level<const N: usize>(
+    [up, around]: [usize; 2],
+    radiance: impl Fn(DVec3) -> [f64; N],
+) -> [f64; N] {
     let mut sum = [0.0; N];
     for k in 0..up {
         let (height, out) = (FRAC_PI_2 * (k as f64 + 0.5) / up as f64).sin_cos();

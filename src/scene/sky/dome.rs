@@ -1,13 +1,15 @@
 //! The sky of a room: what comes from each direction.
 //!
-//! Its light is a sum of up to three spectra, each spread over the dome in its own way: daylight of one or several colours, or red, green and
-//! blue of a map. Above the horizon a part is brought to an irradiance of 1 of open level ground, below it to the same of a plane that looks
+//! Its light is a sum of up to three spectra, each spread over the dome in its own way: daylight of one or several colours, those that
+//! stand for a spectral sky, or red, green and blue of a map. Above the horizon a part is brought to an irradiance of 1 of open level ground, below it to the same of a plane that looks
 //! down; how much of each there is, and of which spectrum, lamps of the kinds [`LightKind::Sky`](crate::scene::LightKind::Sky) and
 //! [`LightKind::Ground`](crate::scene::LightKind::Ground) say.
 
-use super::cie::{Distribution, level};
+use super::cie::{Distribution, STEPS, level};
 use super::map::Map;
+use super::mixture::Spectral;
 use super::parts::{PARTS, PLACES};
+use crate::data::Leaves;
 use glam::DVec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -21,6 +23,8 @@ pub const SUN_RADIUS: f64 = 0.5 * 0.53 * std::f64::consts::PI / 180.0;
 pub enum Dome {
     /// By ISO 15469.
     Cie(Tinted),
+    /// By Hosek and Wilkie.
+    Spectral(Arc<Spectral>),
     /// By a picture of all directions.
     Map(Arc<Map>),
 }
@@ -45,7 +49,9 @@ impl Tinted {
         };
         tinted.levels = match own {
             [false, false] => [1.0, 0.0, 0.0],
-            _ => level(|d| tinted.shares(d).map(|share| share * luminance.radiance(d))),
+            _ => level(STEPS, |d| {
+                tinted.shares(d).map(|share| share * luminance.radiance(d))
+            }),
         };
         tinted
     }
@@ -109,6 +115,7 @@ impl Sky {
         let first = if up { 0 } else { PARTS };
         let radiance = match &self.dome {
             Dome::Cie(sky) if up => sky.radiance(direction),
+            Dome::Spectral(sky) if up => sky.radiance(direction),
             Dome::Map(map) if up || self.below => map.radiance(direction),
             _ => [1.0 / PI, 0.0, 0.0],
         };
@@ -119,6 +126,14 @@ impl Sky {
     pub(crate) fn part(&self, place: Option<usize>, direction: DVec3) -> Option<f64> {
         let (first, radiance) = self.radiance(direction);
         radiance.get(place?.checked_sub(first)?).copied()
+    }
+
+    /// What comes from a direction by the formula itself, W/(m2 sr nm), where the parts only stand for it.
+    pub(crate) fn exact(&self, direction: DVec3) -> Option<Leaves> {
+        match &self.dome {
+            Dome::Spectral(sky) if direction.y > 0.0 => Some(sky.exact(direction)),
+            _ => None,
+        }
     }
 
     /// Is what lies below the horizon open ground, alike in all directions?
@@ -153,13 +168,14 @@ impl Sky {
     pub(crate) fn is_even(&self) -> bool {
         match &self.dome {
             Dome::Cie(sky) => sky.luminance.is_even() && sky.own == [false, false],
+            Dome::Spectral(_) => false,
             Dome::Map(map) => map.is_even(),
         }
     }
 
     /// Does it change so slowly, but for where the sun stands, that parts of it can be cut until each is even?
     pub(crate) fn is_smooth(&self) -> bool {
-        matches!(self.dome, Dome::Cie(_)) || self.is_even()
+        !matches!(self.dome, Dome::Map(_)) || self.is_even()
     }
 
     /// Has it spots that are best looked for?
@@ -171,7 +187,7 @@ impl Sky {
     pub(crate) fn spot(&self, sample: [f64; 2]) -> Option<DVec3> {
         match &self.dome {
             Dome::Map(map) => map.spot(sample),
-            Dome::Cie(_) => None,
+            Dome::Cie(_) | Dome::Spectral(_) => None,
         }
     }
 
@@ -179,7 +195,7 @@ impl Sky {
     pub(crate) fn spot_density(&self, direction: DVec3) -> f64 {
         match &self.dome {
             Dome::Map(map) => map.spot_density(direction),
-            Dome::Cie(_) => 0.0,
+            Dome::Cie(_) | Dome::Spectral(_) => 0.0,
         }
     }
 }

@@ -5,7 +5,7 @@ use super::dome::Sky;
 use super::light::{Light, of_sun, usual};
 use super::parts::PLACES;
 use super::sun::{angles, direction, position};
-use super::wish::{SkyType, SkyWish, SunPlace};
+use super::wish::{SkyType, SkyWish, SunPlace, TURBIDITY};
 use crate::color::{KM, Observer};
 use crate::data::{Grid, LEAVES, Leaves, nearest_of};
 use crate::scene::check::{Check, listed};
@@ -35,10 +35,12 @@ pub(crate) fn join(
         return None;
     }
     let (kind, sun) = asked(wish, nodes, lights, check)?;
-    let light = match (kind, &wish.map) {
-        (Some(kind), _) => Light::of_type(wish, kind, sun.as_ref().map(|s| s.toward), grid, check)?,
-        (None, Some(path)) => Light::of_map(wish, path, grid, check)?,
-        (None, None) => return None,
+    let toward = sun.as_ref().map(|sun| sun.toward);
+    let light = match (wish.turbidity.zip(toward), kind, &wish.map) {
+        (Some((turbidity, sun)), ..) => Light::of_air(wish, turbidity, sun, grid, check)?,
+        (None, Some(kind), _) => Light::of_type(wish, kind, toward, grid, check)?,
+        (None, None, Some(path)) => Light::of_map(wish, path, grid, check)?,
+        (None, None, None) => return None,
     };
     let mut makes = Makes {
         grid,
@@ -52,7 +54,7 @@ pub(crate) fn join(
     let (mut sky, spectrum) = makes.sky(light);
     let shining = match sun {
         Some(sun) => {
-            // Of a map nothing is known: the sun shines as it does in a clear sky.
+            // Of others nothing is known: the sun shines as it does in a clear sky.
             let usual = usual(kind.unwrap_or(CLEAR), Some(angles(sun.toward)[0]));
             makes.placed(wish, &sun, usual[1], check)
         }
@@ -107,17 +109,28 @@ fn asked(
     lights: &[PunctualLight],
     check: &mut Check,
 ) -> Option<(Option<SkyType>, Option<Sun>)> {
-    if wish.kind.is_none() && wish.map.is_none() {
+    if wish.kind.is_none() && wish.map.is_none() && wish.turbidity.is_none() {
         let what = "something is said of sky or sun, but not what the sky is like";
         let next = "give --sky clear, or \"type\" in the file of spectra";
         check.problem("sky", what, next);
         return None;
     }
     let sun = sun_of(wish, nodes, lights, check).ok()?;
-    if let (Some(kind), None) = (wish.kind, &sun)
-        && Distribution::follows_sun(kind.0)
+    if let Some(turbidity) = wish.turbidity
+        && !(TURBIDITY[0]..=TURBIDITY[1]).contains(&turbidity)
     {
-        let what = format!("a sky that is {} is brightest about the sun", kind.name());
+        let what = format!("the sky of Hosek and Wilkie has a turbidity of {turbidity}");
+        let next = "give one from 1 (clean air) to 10 (haze)";
+        check.problem("sky", what, next);
+        return None;
+    }
+    let brightest = match (wish.turbidity, wish.kind) {
+        (Some(_), _) => Some("of Hosek and Wilkie"),
+        (None, Some(kind)) if Distribution::follows_sun(kind.0) => Some(kind.name()),
+        _ => None,
+    };
+    if let (Some(name), None) = (brightest, &sun) {
+        let what = format!("a sky that is {name} is brightest about the sun");
         let next =
             "say where the sun stands: --sun ELEVATION,AZIMUTH or \"sun\" in the file of spectra";
         check.problem("sky", what, next);

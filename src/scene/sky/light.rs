@@ -2,7 +2,9 @@
 
 use super::Distribution;
 use super::dome::{Dome, Tinted};
+use super::hosek::Hosek;
 use super::map::{Map, Wanted};
+use super::mixture::Spectral;
 use super::parts::PARTS;
 use super::picture::Picture;
 use super::sun::angles;
@@ -20,8 +22,9 @@ use std::sync::Arc;
 const USUAL_LUX: f64 = 10_000.0;
 /// Reflectance of open ground, of which nothing more is said: grass, earth and asphalt mixed, as daylight calculations take it.
 const USUAL_GROUND: f64 = 0.2;
-/// What the parts of a sky are called besides: by colour of daylight, and of a map.
+/// What the parts of a sky are called besides: by colour of daylight, of a spectral sky, and of a map.
 const SHADES: [&str; PARTS] = ["", ", horizon", ", about the sun"];
+const MIXED: [&str; PARTS] = [", bluest", ", between", ", least blue"];
 const PRIMARIES: [&str; PARTS] = [", red", ", green", ", blue"];
 /// Illuminances beyond this are no light of day, lx.
 const MOST_LUX: f64 = BRIGHT[1];
@@ -90,6 +93,56 @@ impl Light {
             names: SHADES,
             spectrum: own,
             above,
+            below: [[0.0; LEAVES]; PARTS],
+            ground: Some(ground),
+            sun: None,
+        })
+    }
+
+    /// A sky of Hosek and Wilkie.
+    pub(super) fn of_air(
+        wish: &SkyWish,
+        turbidity: f64,
+        sun: DVec3,
+        grid: &Grid,
+        check: &mut Check,
+    ) -> Option<Self> {
+        let kelvins = [wish.kelvin, wish.horizon_kelvin, wish.sunward_kelvin];
+        if kelvins.iter().any(Option::is_some) {
+            let what = "the sky of Hosek and Wilkie has colours of its own";
+            let next = "leave out its colour temperature (\"cct_k\", --sky-cct and the like), or take another type";
+            check.problem("sky", what, next);
+            return None;
+        }
+        let ground = wish.ground.unwrap_or(USUAL_GROUND);
+        let sky = Spectral::new(Hosek::new(turbidity, ground, sun, grid), grid);
+        let luminous = Observer::cie1931().weights(grid)[1];
+        let size = |power: &Leaves| -> f64 {
+            let each = power.iter().zip(&luminous);
+            each.map(|(p, y)| KM * p * y).sum()
+        };
+        let own = size(&sum_of(*sky.levels()));
+        let factor = match wish.brightness {
+            Some(Brightness::Illuminance(lux)) => lux / own,
+            Some(Brightness::Luminance(zenith)) => zenith / size(&sky.exact(DVec3::Y)),
+            None => 1.0,
+        };
+        let power = sum_of(*sky.levels()).map(|x| x / own);
+        let sky = sky.scaled(factor);
+        let lux = factor * own;
+        Some(Self {
+            said: format!(
+                "Hosek and Wilkie, turbidity {turbidity}, {lux:.0} lx on open ground; ground {ground}"
+            ),
+            names: MIXED,
+            above: sky
+                .levels()
+                .map(|level| std::array::from_fn(|l| level[l] / power[l])),
+            spectrum: LightSpectrum {
+                name: format!("hosek/{turbidity}"),
+                power,
+            },
+            dome: Dome::Spectral(Arc::new(sky)),
             below: [[0.0; LEAVES]; PARTS],
             ground: Some(ground),
             sun: None,

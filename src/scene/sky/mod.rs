@@ -3,9 +3,10 @@
 //! | file | what |
 //! |---|---|
 //! | `cie` | how luminance lies over the dome: ISO 15469 |
+//! | `hosek`, `mixture` | radiance over the dome by wavelength: Hosek and Wilkie; the three spectra that stand for it |
 //! | `picture`, `map`, `disc` | a picture of all directions in its place, and the sun in it |
 //! | `parts` | of how many spectra |
-//! | `dome` | both: what comes from each direction |
+//! | `dome` | all of these: what comes from each direction |
 //! | `sun` | where the sun stands |
 //! | `wish` | what a side file or a command line says of sky and sun |
 //! | `light` | what the sky shines with |
@@ -24,9 +25,11 @@ mod alone;
 mod cie;
 mod disc;
 mod dome;
+mod hosek;
 mod lamps;
 mod light;
 mod map;
+mod mixture;
 mod parts;
 mod picture;
 mod sun;
@@ -35,9 +38,11 @@ mod wish;
 
 pub use cie::Distribution;
 pub use dome::{Dome, SUN_RADIUS, Sky, Tinted};
+pub use hosek::Hosek;
 pub(super) use lamps::LIT_GROUND;
 pub(crate) use lamps::join;
 pub use map::Map;
+pub use mixture::Spectral;
 pub use parts::{PARTS, PLACES};
 pub use sun::{Hours, direction};
 pub use wish::{BRIGHT, KELVIN, SUN_KELVIN, TURN};

@@ -5,7 +5,9 @@
 //!          "sun": { "elevation_deg": 40, "azimuth_deg": 200, "illuminance_lx": 80000, "cct_k": 5500 } }
 //! ```
 //!
-//! `type` is overcast (CIE 1), intermediate (10), clear (12), uniform (5), or cie:1 to cie:16 (16: traditional overcast).
+//! `type` is overcast (CIE 1), intermediate (10), clear (12), uniform (5), or cie:1 to cie:16 (16: traditional overcast); or hosek, the
+//! spectral sky of Hosek and Wilkie, which takes a `turbidity` (1 to 10, by default 3), has colours and an illuminance of its own and reckons
+//! with the reflectance of the ground.
 //! `illuminance_lx` is that of open level ground by the sky alone; `luminance_cd_m2` in its place is that of the zenith. `cct_k` is the
 //! colour of the whole sky, or where `horizon_cct_k` or `sunward_cct_k` say what it is at the horizon and about the sun, of the zenith.
 //!
@@ -59,10 +61,17 @@ impl FromStr for SkyType {
             .filter(|kind| (1..=16).contains(kind))
             .map(Self)
             .ok_or_else(|| {
-                "a sky is overcast, intermediate, clear, uniform, or cie:1 to cie:16".into()
+                "a sky is overcast, intermediate, clear, uniform, cie:1 to cie:16, or hosek".into()
             })
     }
 }
+
+/// Turbidities of the sky of Hosek and Wilkie.
+pub(super) const TURBIDITY: [f64; 2] = crate::data::TURBIDITY;
+/// That of clear air over land, where none is said.
+const USUAL_TURBIDITY: f64 = 3.0;
+/// What that sky is called.
+const HOSEK: &str = "hosek";
 
 /// What a command line names: a type of sky, or a picture of all directions.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +79,8 @@ impl FromStr for SkyType {
 pub enum SkyName {
     /// Of ISO 15469.
     Type(SkyType),
+    /// Of Hosek and Wilkie, by its turbidity.
+    Hosek(f64),
     /// A file.
     Map(PathBuf),
 }
@@ -78,12 +89,24 @@ impl FromStr for SkyName {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(rest) = text.strip_prefix(HOSEK) {
+            let said = rest.strip_prefix(':').map(|t| t.parse().ok());
+            let turbidity = match rest {
+                "" => Some(USUAL_TURBIDITY),
+                _ => said.flatten(),
+            };
+            if let Some(t) = turbidity.filter(|t| (TURBIDITY[0]..=TURBIDITY[1]).contains(t)) {
+                return Ok(Self::Hosek(t));
+            }
+        }
         let path = PathBuf::from(text);
         let ending = path.extension().map(|e| e.to_ascii_lowercase());
         match text.parse() {
             Ok(kind) => Ok(Self::Type(kind)),
             Err(_) if ending.is_some_and(|e| e == "hdr" || e == "exr") => Ok(Self::Map(path)),
-            Err(why) => Err(format!("{why}, or a map of all directions as .hdr or .exr")),
+            Err(why) => Err(format!(
+                "{why} (with its turbidity hosek:1 to hosek:10), or a map of all directions as .hdr or .exr"
+            )),
         }
     }
 }
@@ -186,6 +209,8 @@ pub struct SkyWish {
     pub kind: Option<SkyType>,
     /// How bright: of a map, its white.
     pub brightness: Option<Brightness>,
+    /// Turbidity of the sky of Hosek and Wilkie in the place of a kind.
+    pub turbidity: Option<f64>,
     /// A picture of all directions in the place of a kind.
     pub map: Option<PathBuf>,
     /// Correlated colour temperature, K: of the zenith where others are said.
@@ -211,12 +236,13 @@ impl SkyWish {
     /// These, and where they say nothing the others.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
-        let (kind, map) = match (self.kind, self.map) {
-            (None, None) => (other.kind, other.map),
+        let (kind, turbidity, map) = match (self.kind, self.turbidity, self.map) {
+            (None, None, None) => (other.kind, other.turbidity, other.map),
             said => said,
         };
         Self {
             kind,
+            turbidity,
             map,
             brightness: self.brightness.or(other.brightness),
             kelvin: self.kelvin.or(other.kelvin),
@@ -239,6 +265,7 @@ impl SkyWish {
         };
         let known = [
             "type",
+            "turbidity",
             "map",
             "illuminance_lx",
             "luminance_cd_m2",
@@ -250,8 +277,19 @@ impl SkyWish {
             "sun",
         ];
         reader.keys(sky, &known, place);
+        let is_hosek = sky.get("type").and_then(Value::as_str) == Some(HOSEK);
+        let turbidity = number(sky, "turbidity", TURBIDITY, place, reader);
+        if sky.contains_key("turbidity") && !is_hosek {
+            let what = "gives a turbidity to a sky that has none";
+            reader
+                .check
+                .problem(place, what, "give it \"type\": \"hosek\"");
+        }
         let mut wish = Self {
-            kind: parsed(sky, "type", str::parse, place, reader),
+            kind: (!is_hosek)
+                .then(|| parsed(sky, "type", str::parse, place, reader))
+                .flatten(),
+            turbidity: turbidity.or(is_hosek.then_some(USUAL_TURBIDITY)),
             map: map(sky, place, reader),
             kelvin: number(sky, "cct_k", KELVIN, place, reader),
             horizon_kelvin: number(sky, "horizon_cct_k", KELVIN, place, reader),
@@ -416,6 +454,8 @@ fn parsed<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Grid;
+    use crate::scene::check::{Check, Unknown};
 
     #[test]
     fn skies_and_suns_are_typed() {
@@ -433,6 +473,11 @@ mod tests {
         assert_eq!("a/b.HDR".parse(), Ok(SkyName::Map("a/b.HDR".into())));
         assert_eq!("cie:3".parse(), Ok(SkyName::Type(SkyType(3))));
         assert!("cloudy.png".parse::<SkyName>().is_err());
+        assert_eq!("hosek".parse(), Ok(SkyName::Hosek(3.0)));
+        assert_eq!("hosek:2.5".parse(), Ok(SkyName::Hosek(2.5)));
+        for bad in ["hosek:0.5", "hosek:11", "hosek:", "hosek3", "hosek:nan"] {
+            assert!(bad.parse::<SkyName>().is_err(), "{bad}");
+        }
         assert_eq!(
             "40,200".parse(),
             Ok(SunPlace::Angles {
@@ -459,5 +504,55 @@ mod tests {
             let said = bad.parse::<SunPlace>().unwrap_err();
             assert!(said.contains(why), "{bad}: {said}");
         }
+    }
+    #[test]
+    fn turbidity_belongs_to_one_sky() {
+        let read = |text: &str| {
+            let grid = Grid::paper();
+            let mut check = Check::new("room.spectra.json");
+            let mut reader = Reader {
+                folder: PathBuf::new(),
+                grid: &grid,
+                check: &mut check,
+                unknown: Unknown::Refuse,
+            };
+            let wish = SkyWish::read(&serde_json::from_str(text).unwrap(), "sky", &mut reader);
+            let problems = check.into_parts().0;
+            let told: Vec<String> = problems.iter().map(ToString::to_string).collect();
+            (wish.kind, wish.turbidity, told.join("\n"))
+        };
+        let (kind, turbidity, told) = read(r#"{"type": "hosek", "turbidity": 4.5}"#);
+        assert_eq!((kind, turbidity, told), (None, Some(4.5), String::new()));
+        assert_eq!(read(r#"{"type": "hosek"}"#).1, Some(3.0));
+        let told = read(r#"{"type": "hosek", "turbidity": 0.5}"#).2;
+        assert!(
+            told.contains("turbidity is 0.5, not a number from 1 to 10"),
+            "{told}"
+        );
+        let told = read(r#"{"type": "clear", "turbidity": 3}"#).2;
+        assert!(told.contains("turbidity to a sky that has none"), "{told}");
+        let told = read(r#"{"type": "hosec"}"#).2;
+        assert!(told.contains("or hosek"), "{told}");
+    }
+
+    /// A sky on the command line takes the place of that of the file, whatever kind either is.
+    #[test]
+    fn one_sky_gives_way_to_another() {
+        let hosek = SkyWish {
+            turbidity: Some(3.0),
+            ..SkyWish::default()
+        };
+        let clear = SkyWish {
+            kind: Some(SkyType(12)),
+            ground: Some(0.5),
+            ..SkyWish::default()
+        };
+        let over = hosek.clone().or(clear.clone());
+        assert_eq!(
+            (over.kind, over.turbidity, over.ground),
+            (None, Some(3.0), Some(0.5))
+        );
+        let under = clear.or(hosek);
+        assert_eq!((under.kind, under.turbidity), (Some(SkyType(12)), None));
     }
 }
