@@ -51,7 +51,7 @@ const OWN_RAYS: f64 = 0.75;
 /// A part is weighed in pieces that are no longer than this share of their distance, at most so many along its side and so many in all.
 const LENGTH: f64 = 0.5;
 const ALONG: f64 = 16.0;
-const PIECES: usize = 512;
+const PIECES: usize = 256;
 /// From so many rays on a part counts in full: one that a few rays touched is mostly wall.
 const FILLED: usize = 16;
 /// The box is larger than the room by this share of its half size: a few gaps of the ray index, so that it lies close upon openings in the
@@ -489,7 +489,9 @@ impl Openings {
             };
             for at in pieces.all() {
                 let toward = self.toward(part, &pieces, at, point, normal);
-                sum += toward.map_or(0.0, |(direction, factor)| factor * brightness(direction));
+                sum += toward.map_or(0.0, |(ways, factor)| {
+                    factor * ways.map(&brightness).iter().sum::<f64>()
+                });
                 choice.sums.push(sum);
             }
         }
@@ -548,7 +550,8 @@ impl Openings {
         }
     }
 
-    /// The direction of a piece's middle, and about its form factor; none if it is behind.
+    /// The directions of a piece's middle and of two corners, and about its form factor for each; none if it is behind. By the middle alone
+    /// a slit across the horizon, half of it above black ground, was never looked through.
     fn toward(
         &self,
         part: &Rectangle,
@@ -556,7 +559,7 @@ impl Openings {
         at: [u32; 2],
         point: DVec3,
         normal: DVec3,
-    ) -> Option<(DVec3, f64)> {
+    ) -> Option<([DVec3; 3], f64)> {
         let [low, size] = pieces.place(part, at);
         let corner = |u: f64, v: f64| {
             let at = [low[0] + u * size[0], low[1] + v * size[1]];
@@ -575,7 +578,9 @@ impl Openings {
             .max(LEAST_COSINE);
         let area = size[0] * size[1];
         let filled = (part.count as f64 / FILLED as f64).min(1.0);
-        Some((direction, filled * area * here * there / (PI * r2 + area)))
+        let factor = filled * area * here * there / (PI * r2 + area);
+        let ends = [corner(0.0, 0.0), corner(1.0, 1.0)].map(DVec3::normalize_or_zero);
+        Some(([direction, ends[0], ends[1]], factor / 3.0))
     }
 
     /// What all parts may bring if nothing stands in the way.
@@ -590,9 +595,10 @@ impl Openings {
             let pieces = self.pieces(k, point, LENGTH, 0);
             let part = &self.parts[k];
             for at in pieces.all() {
-                if let Some((direction, factor)) = self.toward(part, &pieces, at, point, normal) {
-                    let each = brightness(direction);
-                    sum = std::array::from_fn(|k| sum[k] + factor * each[k]);
+                if let Some((ways, factor)) = self.toward(part, &pieces, at, point, normal) {
+                    for each in ways.map(&brightness) {
+                        sum = std::array::from_fn(|k| sum[k] + factor * each[k]);
+                    }
                 }
             }
         }
