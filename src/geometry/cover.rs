@@ -25,9 +25,25 @@ const BINS: usize = 32;
 const LEAST: usize = 16;
 /// Splits that leave out less than this share of a rectangle are chance: between 32 points the widest gap is about a tenth.
 const GAIN: f64 = 0.15;
-/// The outermost of n points lie about an n-th of the width from the edge; further than k of them with probability e^-k. With 4 one
-/// part in fourteen lost a sliver, which single rays of the hemisphere then stood for: 1.6 % at a point of CIE 171 5.10.
-const BEYOND: f64 = 12.0;
+/// How far beyond the outermost of n points, as a share of the width, something may be found.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Edges {
+    /// Points lie evenly up to an edge: the outermost are about an n-th away, further than k of them with probability e^-k. With 4 one part
+    /// in fourteen lost a sliver, which single rays of the hemisphere then stood for: 1.6 % at a point of CIE 171 5.10.
+    Sharp,
+    /// They grow fewer toward it, as where each of many places sees another part: about the root of that.
+    Blurred,
+}
+
+impl Edges {
+    fn beyond(self, count: usize) -> f64 {
+        let n = count as f64;
+        match self {
+            Edges::Sharp => 12.0 / n,
+            Edges::Blurred => (3.0 / n.sqrt()).max(12.0 / n),
+        }
+    }
+}
 
 impl Rectangle {
     fn empty(plane: u8) -> Self {
@@ -113,11 +129,11 @@ impl Group {
     }
 
     /// The rectangle with what points may have missed at its edges; `least`: the width that points are known to.
-    fn rectangle(&self, least: [f64; 2]) -> Rectangle {
+    fn rectangle(&self, edges: Edges, least: [f64; 2]) -> Rectangle {
         let mut grown = self.tight;
         let size = grown.size();
         for k in 0..2 {
-            let more = size[k].max(least[k]) * BEYOND / grown.count as f64;
+            let more = size[k].max(least[k]) * edges.beyond(grown.count);
             grown.low[k] = (grown.low[k] - more).max(self.bounds.low[k]);
             grown.high[k] = (grown.high[k] + more).min(self.bounds.high[k]);
         }
@@ -166,6 +182,7 @@ fn best_split(spots: &[Spot], tight: &Rectangle) -> Option<Split> {
 pub(super) fn cover(
     spots: &mut [Spot],
     bounds: &[Rectangle],
+    edges: Edges,
     least: impl Fn(u8) -> [f64; 2],
     most: usize,
 ) -> Vec<Rectangle> {
@@ -189,7 +206,7 @@ pub(super) fn cover(
         groups[k] = low;
         groups.push(high);
     }
-    let whole = |group: &Group| group.rectangle(least(group.bounds.plane));
+    let whole = |group: &Group| group.rectangle(edges, least(group.bounds.plane));
     groups.iter().map(whole).collect()
 }
 
@@ -220,7 +237,7 @@ mod tests {
                 Spot { plane: 0, at }
             })
             .collect();
-        let parts = cover(&mut spots, &[square()], |_| [0.01; 2], 8);
+        let parts = cover(&mut spots, &[square()], Edges::Sharp, |_| [0.01; 2], 8);
         assert!(
             spots
                 .iter()
@@ -239,7 +256,10 @@ mod tests {
                 at: sequence02(k, 5),
             };
             let mut spots: Vec<Spot> = (0..count).map(spot).collect();
-            assert_eq!(cover(&mut spots, &[square()], |_| [0.01; 2], 8).len(), 1);
+            assert_eq!(
+                cover(&mut spots, &[square()], Edges::Sharp, |_| [0.01; 2], 8).len(),
+                1
+            );
         }
     }
 }

@@ -9,7 +9,7 @@
 //! A point that looks for the sky sends rays to these parts, in proportion to what they may bring, besides rays all over its
 //! hemisphere. Both together are without bias, whatever was overlooked here: parts only decide where it pays to look.
 
-use super::cover::{Rectangle, Spot, cover};
+use super::cover::{Edges, Rectangle, Spot, cover};
 use super::sampling::{Pcg, around, cosine_direction, hash, sequence02};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -376,7 +376,7 @@ impl Openings {
         free: impl Fn(usize, [DVec3; BEAM]) -> [bool; BEAM] + Sync,
     ) {
         let mut spots: Vec<Spot> = exits.iter().map(|e| e.spot).collect();
-        self.parts = self.cover(&mut spots, PARTS[0]);
+        self.parts = self.cover(&mut spots, Edges::Sharp, PARTS[0]);
         self.shared = self.parts.len();
         let kinds: [fn(&Exit) -> usize; 2] = [|e| e.place, |e| e.small];
         self.own = [0, 1].map(|k| {
@@ -398,10 +398,10 @@ impl Openings {
         });
     }
 
-    fn cover(&self, spots: &mut [Spot], most: usize) -> Vec<Rectangle> {
+    fn cover(&self, spots: &mut [Spot], edges: Edges, most: usize) -> Vec<Rectangle> {
         let sides: [Rectangle; 6] = std::array::from_fn(|side| self.side(side as u8));
         let cell = |side: u8| sides[usize::from(side)].size().map(|s| s / CELLS as f64);
-        cover(spots, &sides, cell, most)
+        cover(spots, &sides, edges, cell, most)
     }
 
     /// The parts of a place alone, if they are smaller than those of all places that are seen from there, and these mostly hidden.
@@ -424,7 +424,7 @@ impl Openings {
             all
         };
         let upto: Vec<f64> = seen.iter().map(upto).collect();
-        let parts = self.cover(&mut spots, PARTS[1]);
+        let parts = self.cover(&mut spots, Edges::Blurred, PARTS[1]);
         if parts.iter().map(Rectangle::area).sum::<f64>() >= SMALLER * all {
             return Vec::new();
         }
