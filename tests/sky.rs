@@ -75,6 +75,8 @@ fn cie_171_case_5_9() {
             check(kind, opening, 1, POINT);
         }
     }
+    // Its sun is the sharpest.
+    check(13, 1.0, 1, POINT);
 }
 
 /// The wall under the whole open roof, by the closed form of a rectangle seen from a perpendicular element.

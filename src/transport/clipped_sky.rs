@@ -29,6 +29,9 @@ const LAST_RAYS: u32 = 16;
 const EVEN: f64 = 0.005;
 /// And whose corners are less than this far apart, cosine: 25 degrees.
 const NARROW: f64 = 0.9;
+/// And which are no further apart than they are from the sun, where the sky comes to a point: by chance two means across it may be alike.
+/// Without that a point of CIE 171 5.9 under the sky of type 13 was .53 % dark.
+const BESIDE_SUN: f64 = 1.0;
 /// How often a part is cut for the sky's sake: about the sun it changes within a degree.
 const DEPTH: u32 = 6;
 
@@ -203,8 +206,13 @@ impl Looker<'_> {
         let apart = std::array::from_fn(|k| (fine[k] - coarse[k]).abs());
         let bright = |radiance| self.sky.brightness(up, radiance);
         let is_even = bright(apart) <= EVEN * bright(fine);
-        let narrow = a.dot(b).min(b.dot(c)).min(c.dot(a)) > NARROW;
-        if depth == 0 || (narrow && is_even) {
+        let cosine = a.dot(b).min(b.dot(c)).min(c.dot(a));
+        // 1 less the cosine goes with the square of a distance.
+        let is_beside = self.sky.peak().is_some_and(|sun| {
+            let nearest = corners.map(|d| d.dot(sun)).into_iter().fold(-1.0, f64::max);
+            1.0 - cosine > BESIDE_SUN * (1.0 - nearest)
+        });
+        if depth == 0 || (cosine > NARROW && is_even && !is_beside) {
             let factor = share * lambert_edges_x8(DVec3::ZERO, normal, &corners);
             let brings = fine.map(|fine| PI * fine * factor);
             found.add(up, brings);

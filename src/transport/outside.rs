@@ -267,14 +267,11 @@ impl Outside {
             .weigh(to.point, to.normal, plain, &mut look.choice);
         look.segments.clear();
         let turn = hash(to.seed, 0x5c1);
-        let far = reach((sight, by));
         for k in 0..count as u32 {
             let at = self.openings.choose(&look.choice, sequence02(k, turn));
-            let way = at.map(|at| (at - to.point).normalize_or_zero());
-            let ahead = way.filter(|&d| to.normal.dot(d) > 0.0);
-            look.segments.extend(
-                ahead.map(|d| Segment::new(to.point, to.point + d * far, [to.plane, NO_PLANE])),
-            );
+            let ahead = at.filter(|at| to.normal.dot(at - to.point) > 0.0);
+            look.segments
+                .extend(ahead.map(|at| Segment::new(to.point, at, [to.plane, NO_PLANE])));
         }
         look.block((sight, by));
         let ways = look.segments.iter().zip(&look.blocked);

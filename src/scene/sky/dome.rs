@@ -178,6 +178,18 @@ impl Sky {
         !matches!(self.dome, Dome::Map(_)) || self.is_even()
     }
 
+    /// Where it comes to a point: toward the sun; none where it does not follow that.
+    pub(crate) fn peak(&self) -> Option<DVec3> {
+        match &self.dome {
+            Dome::Cie(sky) => {
+                let sky = sky.luminance();
+                Distribution::follows_sun(sky.kind()).then(|| sky.sun())
+            }
+            Dome::Spectral(sky) => Some(sky.sun()),
+            Dome::Map(_) => None,
+        }
+    }
+
     /// Has it spots that are best looked for?
     pub(crate) fn has_spots(&self) -> bool {
         matches!(&self.dome, Dome::Map(map) if map.has_spots())

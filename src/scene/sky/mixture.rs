@@ -42,6 +42,11 @@ pub struct Spectral {
 }
 
 impl Spectral {
+    /// Toward the sun.
+    pub(super) fn sun(&self) -> DVec3 {
+        self.model.sun()
+    }
+
     /// The mixture for a model.
     pub(super) fn new(model: Hosek, grid: &Grid) -> Self {
         let colours = model.tristimulus(grid);

@@ -9,12 +9,16 @@
 //! A point that looks for the sky sends rays to these parts, in proportion to what they may bring, besides rays all over its
 //! hemisphere. Both together are without bias, whatever was overlooked here: parts only decide where it pays to look.
 
+mod aim;
+mod choice;
+
+pub(crate) use choice::Choice;
+
 use super::cover::{Edges, Rectangle, Spot, cover};
 use super::sampling::{Pcg, around, cosine_direction, hash, sequence02};
+use aim::Aim;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::f64::consts::PI;
-use std::ops::Range;
 
 /// Points that rays start from, [`BEAM`] each: an opening through which one ray in ten thousand leaves is met by 52.
 const POINTS: usize = 32_768;
@@ -35,8 +39,6 @@ const ENOUGH: usize = 128;
 const STEEP: f64 = 0.05;
 /// Cells along a side of the box, by which rays are aimed: each that was met as often as any other.
 const CELLS: usize = 32;
-/// Rays are aimed beside a gap by so many cells, as often by each power of two.
-const BESIDE: [f64; 2] = [0.125, 4.0];
 /// Places fall into so many cells along a side of the box; small ones are half as long.
 const PLACES: usize = 8;
 const KINDS: usize = 6 * PLACES.pow(3);
@@ -45,20 +47,11 @@ const PARTS: [usize; 2] = [64, 6];
 /// Rays that must have left a place, or a small one, for rectangles of its own.
 const OWN: [usize; 2] = [8, 64];
 /// A place has rectangles of its own where these have less than this share of the area that all places' have there, and no larger share of
-/// rays to those is free; they take most of its rays. The others go where rays from elsewhere left, too.
+/// rays to those is free.
 const SMALLER: f64 = 0.5;
-const OWN_RAYS: f64 = 0.75;
-/// A part is weighed in pieces that are no longer than this share of their distance, at most so many along its side and so many in all.
-const LENGTH: f64 = 0.5;
-const ALONG: f64 = 16.0;
-const PIECES: usize = 256;
-/// From so many rays on a part counts in full: one that a few rays touched is mostly wall.
-const FILLED: usize = 16;
 /// The box is larger than the room by this share of its half size: a few gaps of the ray index, so that it lies close upon openings in the
 /// outermost walls. With .001 what is seen through a roof at a low angle leaves the box beside its opening.
 const MARGIN: f64 = 2e-5;
-/// A piece that seems edge-on from its middle still counts as if it were turned by this cosine.
-const LEAST_COSINE: f64 = 0.1;
 
 /// A point of a surface that rays start from.
 #[derive(Debug, Clone, Copy)]
@@ -110,24 +103,6 @@ struct Gap {
 
 /// Rays that left: each with the number of the point that it started from and its own among the rays from there.
 type Left = Vec<([usize; 2], Exit)>;
-
-/// What the parts of the openings may bring to a point, summed up piece by piece.
-#[derive(Debug, Default)]
-pub(crate) struct Choice {
-    parts: Vec<Pieces>,
-    sums: Vec<f64>,
-    /// Where the lists of parts and pieces of all places end, and what share of the rays those of the place have.
-    shared: [usize; 2],
-    own: f64,
-}
-
-/// A part in pieces: as many along either axis, and the number of the first.
-#[derive(Debug, Clone, Copy)]
-struct Pieces {
-    part: u32,
-    along: [u32; 2],
-    first: u32,
-}
 
 /// Directions other than `axis`.
 fn across(axis: usize) -> [usize; 2] {
@@ -455,410 +430,11 @@ impl Openings {
             false => Vec::new(),
         }
     }
-
-    /// What each part may bring to a point that looks along a normal: about its form factor times `brightness` of its direction.
-    pub(crate) fn weigh(
-        &self,
-        point: DVec3,
-        normal: DVec3,
-        brightness: impl Fn(DVec3) -> f64,
-        choice: &mut Choice,
-    ) {
-        choice.parts.clear();
-        choice.sums.clear();
-        // Of the small place if it has any.
-        let own = [1, 0].into_iter().find_map(|k| {
-            let kind = self.kind(point, normal, PLACES << k);
-            let ends = self.own[k].get(kind..kind + 2)?;
-            (ends[0] < ends[1]).then_some(ends[0] as usize..ends[1] as usize)
-        });
-        let own = own.unwrap_or_default();
-        let length = self.piece_together(0..self.shared, point, LENGTH, choice);
-        choice.shared[0] = choice.parts.len();
-        self.piece_together(own, point, length, choice);
-        for k in 0..choice.parts.len() {
-            if k == choice.shared[0] {
-                choice.shared[1] = choice.sums.len();
-            }
-            let pieces = choice.parts[k];
-            let part = &self.parts[pieces.part as usize];
-            let starts = k == 0 || k == choice.shared[0];
-            let mut sum = match starts {
-                true => 0.0,
-                false => choice.sums.last().copied().unwrap_or(0.0),
-            };
-            for at in pieces.all() {
-                let toward = self.toward(part, &pieces, at, point, normal);
-                sum += toward.map_or(0.0, |(ways, factor)| {
-                    factor * ways.map(&brightness).iter().sum::<f64>()
-                });
-                choice.sums.push(sum);
-            }
-        }
-        if choice.shared[0] == choice.parts.len() {
-            choice.shared[1] = choice.sums.len();
-        }
-        let [all, own] = choice.totals();
-        choice.own = match (all > 0.0, own > 0.0) {
-            (true, true) => OWN_RAYS,
-            (_, own) => f64::from(u8::from(own)),
-        };
-    }
-
-    /// Adds parts in pieces, coarser ones where they were too many; how long they are for their distance.
-    fn piece_together(
-        &self,
-        list: Range<usize>,
-        point: DVec3,
-        mut length: f64,
-        choice: &mut Choice,
-    ) -> f64 {
-        let start = choice.parts.len();
-        loop {
-            choice.parts.truncate(start);
-            let before = match choice.parts.last() {
-                Some(last) => (last.first + last.count()) as usize,
-                None => 0,
-            };
-            let mut first = before;
-            for k in list.clone() {
-                let pieces = self.pieces(k, point, length, first);
-                first += pieces.count() as usize;
-                choice.parts.push(pieces);
-            }
-            if first - before <= PIECES.max(list.len()) {
-                return length;
-            }
-            length *= 1.5;
-        }
-    }
-
-    /// A part in pieces no longer than this for their distance.
-    fn pieces(&self, part: usize, point: DVec3, length: f64, first: usize) -> Pieces {
-        let of = &self.parts[part];
-        let [low, high] = [of.low, of.high].map(|at| self.point(of.plane, at));
-        let distance = (point.clamp(low, high) - point).length();
-        let along = of.size().map(|size| {
-            (size / (length * distance).max(1e-300))
-                .ceil()
-                .clamp(1.0, ALONG) as u32
-        });
-        Pieces {
-            part: part as u32,
-            along,
-            first: first as u32,
-        }
-    }
-
-    /// The directions of a piece's middle and of two corners, and about its form factor for each; none if it is behind. By the middle alone
-    /// a slit across the horizon, half of it above black ground, was never looked through.
-    fn toward(
-        &self,
-        part: &Rectangle,
-        pieces: &Pieces,
-        at: [u32; 2],
-        point: DVec3,
-        normal: DVec3,
-    ) -> Option<([DVec3; 3], f64)> {
-        let [low, size] = pieces.place(part, at);
-        let corner = |u: f64, v: f64| {
-            let at = [low[0] + u * size[0], low[1] + v * size[1]];
-            self.point(part.plane, at) - point
-        };
-        let ends = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]];
-        if ends.iter().all(|&[u, v]| normal.dot(corner(u, v)) <= 0.0) {
-            return None;
-        }
-        let way = corner(0.5, 0.5);
-        let r2 = way.length_squared();
-        let direction = way / r2.sqrt().max(1e-300);
-        let here = normal.dot(direction).max(LEAST_COSINE);
-        let there = direction[usize::from(part.plane) % 3]
-            .abs()
-            .max(LEAST_COSINE);
-        let area = size[0] * size[1];
-        let filled = (part.count as f64 / FILLED as f64).min(1.0);
-        let factor = filled * area * here * there / (PI * r2 + area);
-        let ends = [corner(0.0, 0.0), corner(1.0, 1.0)].map(DVec3::normalize_or_zero);
-        Some(([direction, ends[0], ends[1]], factor / 3.0))
-    }
-
-    /// What all parts may bring if nothing stands in the way.
-    pub(crate) fn most<const N: usize>(
-        &self,
-        point: DVec3,
-        normal: DVec3,
-        brightness: impl Fn(DVec3) -> [f64; N],
-    ) -> [f64; N] {
-        let mut sum = [0.0; N];
-        for k in 0..self.shared {
-            let pieces = self.pieces(k, point, LENGTH, 0);
-            let part = &self.parts[k];
-            for at in pieces.all() {
-                if let Some((ways, factor)) = self.toward(part, &pieces, at, point, normal) {
-                    for each in ways.map(&brightness) {
-                        sum = std::array::from_fn(|k| sum[k] + factor * each[k]);
-                    }
-                }
-            }
-        }
-        sum
-    }
-
-    /// A place on a part, chosen by what the parts may bring.
-    pub(crate) fn choose(&self, choice: &Choice, [u, v]: [f64; 2]) -> Option<DVec3> {
-        let totals = choice.totals();
-        let own = u < choice.own;
-        let (list, share) = match own {
-            true => (1, u / choice.own),
-            false => (0, (u - choice.own) / (1.0 - choice.own)),
-        };
-        if totals[list] <= 0.0 {
-            return None;
-        }
-        let (parts, sums) = choice.lists()[list].clone();
-        let target = share * totals[list];
-        let all = &choice.sums[sums.clone()];
-        let k = all.partition_point(|&sum| sum <= target).min(all.len() - 1);
-        let worth = choice.of(sums.start + k);
-        let rest = ((target - (all[k] - worth)) / worth).clamp(0.0, 1.0);
-        let piece = (sums.start + k) as u32;
-        let parts = &choice.parts[parts];
-        let pieces = &parts[parts.partition_point(|p| p.first <= piece) - 1];
-        let part = &self.parts[pieces.part as usize];
-        let number = piece - pieces.first;
-        let [low, size] = pieces.place(part, [number / pieces.along[1], number % pieces.along[1]]);
-        Some(self.point(part.plane, [low[0] + rest * size[0], low[1] + v * size[1]]))
-    }
-
-    /// Density, by solid angle, with which [`choose`](Self::choose) finds a direction of unit length.
-    pub(crate) fn density(&self, choice: &Choice, from: DVec3, direction: DVec3) -> f64 {
-        let (spot, t) = self.leaves(from, direction);
-        if !t.is_finite() {
-            return 0.0;
-        }
-        let by_area: f64 = [1.0 - choice.own, choice.own]
-            .into_iter()
-            .zip(choice.lists())
-            .zip(choice.totals())
-            .filter(|((share, _), total)| *share > 0.0 && *total > 0.0)
-            .map(|((share, (parts, _)), total)| {
-                let mut parts = choice.parts[parts].iter();
-                let holds = |p: &&Pieces| self.parts[p.part as usize].holds(spot.plane, spot.at);
-                parts.find(holds).map_or(0.0, |pieces| {
-                    let part = &self.parts[pieces.part as usize];
-                    let count = f64::from(pieces.count());
-                    let piece = choice.of(pieces.at(part, spot.at));
-                    share * piece / total * count / part.area().max(1e-300)
-                })
-            })
-            .sum();
-        by_area * t * t / direction[usize::from(spot.plane) % 3].abs().max(1e-12)
-    }
-}
-
-impl Pieces {
-    fn count(&self) -> u32 {
-        self.along[0] * self.along[1]
-    }
-
-    /// All of them.
-    fn all(self) -> impl Iterator<Item = [u32; 2]> {
-        let [n, m] = self.along;
-        (0..n).flat_map(move |i| (0..m).map(move |j| [i, j]))
-    }
-
-    /// Corner and size of one.
-    fn place(&self, part: &Rectangle, at: [u32; 2]) -> [[f64; 2]; 2] {
-        let whole = part.size();
-        let size = [0, 1].map(|k| whole[k] / f64::from(self.along[k]));
-        let low = [0, 1].map(|k| part.low[k] + f64::from(at[k]) * size[k]);
-        [low, size]
-    }
-
-    /// Number of the one that holds a point of the part.
-    fn at(&self, part: &Rectangle, at: [f64; 2]) -> usize {
-        let size = part.size();
-        let [i, j] = [0, 1].map(|k| {
-            let share = (at[k] - part.low[k]) / size[k].max(1e-300);
-            ((share * f64::from(self.along[k])) as u32).min(self.along[k] - 1)
-        });
-        (self.first + i * self.along[1] + j) as usize
-    }
-}
-
-impl Choice {
-    /// Parts and pieces of all places, and of the point's own.
-    fn lists(&self) -> [(Range<usize>, Range<usize>); 2] {
-        let [parts, pieces] = self.shared;
-        [
-            (0..parts, 0..pieces),
-            (parts..self.parts.len(), pieces..self.sums.len()),
-        ]
-    }
-
-    fn totals(&self) -> [f64; 2] {
-        self.lists()
-            .map(|(_, pieces)| self.sums[pieces].last().copied().unwrap_or(0.0))
-    }
-
-    /// Of the `k`-th piece.
-    fn of(&self, k: usize) -> f64 {
-        let first = k == 0 || k == self.shared[1];
-        self.sums[k] - if first { 0.0 } else { self.sums[k - 1] }
-    }
-}
-
-/// Where rays are aimed: beside gaps.
-struct Aim<'a> {
-    gaps: &'a [Gap],
-    /// Their numbers, by cells that hold them, and where each cell starts, one more at the end.
-    by_cell: Vec<u32>,
-    cells: Vec<u32>,
-    /// The same by kinds of places, where each of all starts.
-    by_place: Vec<u32>,
-    places: Vec<u32>,
-}
-
-impl<'a> Aim<'a> {
-    fn new(openings: &Openings, gaps: &'a [Gap]) -> Self {
-        let size = openings.cell();
-        let cell = |g: &Gap| ((g.at - openings.low) / size).as_u16vec3().to_array();
-        let numbers = || (0..gaps.len() as u32).collect::<Vec<u32>>();
-        let (mut by_cell, mut by_place) = (numbers(), numbers());
-        by_cell.sort_by_cached_key(|&k| cell(&gaps[k as usize]));
-        by_place.sort_by_key(|&k| gaps[k as usize].place);
-        let same = |a: &u32, b: &u32| cell(&gaps[*a as usize]) == cell(&gaps[*b as usize]);
-        let mut cells = vec![0];
-        for group in by_cell.chunk_by(same) {
-            cells.push(cells[cells.len() - 1] + group.len() as u32);
-        }
-        let place = |kind: usize| by_place.partition_point(|&k| gaps[k as usize].place < kind);
-        let places = (0..=KINDS).map(|kind| place(kind) as u32).collect();
-        Self {
-            gaps,
-            by_cell,
-            cells,
-            by_place,
-            places,
-        }
-    }
-
-    /// The gaps that a kind of place found.
-    fn of(&self, place: usize) -> &[u32] {
-        &self.by_place[self.places[place] as usize..self.places[place + 1] as usize]
-    }
-
-    /// A point beside a gap that was found from this place, from one beside it, or from anywhere, each cell as often, by turns.
-    fn at(&self, openings: &Openings, place: usize, turn: usize, random: &mut Pcg) -> Gap {
-        let mut among: &[u32] = match turn % 4 {
-            0 => &[],
-            1 => {
-                let near: Vec<usize> = beside(place).filter(|&k| !self.of(k).is_empty()).collect();
-                match near.len() {
-                    0 => &[],
-                    n => self.of(near[random.below(n as u32) as usize]),
-                }
-            }
-            _ => self.of(place),
-        };
-        if among.is_empty() {
-            let cell = random.below(self.cells.len() as u32 - 1) as usize;
-            among = &self.by_cell[self.cells[cell] as usize..self.cells[cell + 1] as usize];
-        }
-        let Gap { mut at, axis, .. } =
-            self.gaps[among[random.below(among.len() as u32) as usize] as usize];
-        let [least, most] = BESIDE.map(f64::log2);
-        for other in across(axis) {
-            let cells = (least + (most - least) * random.f64()).exp2();
-            at[other] += (2.0 * random.f64() - 1.0) * cells * openings.cell()[other];
-        }
-        let at = at.clamp(openings.low, openings.high);
-        Gap { place, at, axis }
-    }
-}
-
-/// Places beside one, whichever way they look, itself too.
-fn beside(place: usize) -> impl Iterator<Item = usize> {
-    let n = PLACES as i64;
-    let at = (place % PLACES.pow(3)) as i64;
-    let [x, y, z] = [at / (n * n), at / n % n, at % n];
-    let near = move |c: i64| (c - 1).max(0)..=(c + 1).min(n - 1);
-    (0..6).flat_map(move |side| {
-        near(x).flat_map(move |x| {
-            near(y).flat_map(move |y| {
-                near(z).map(move |z| (((side * n + x) * n + y) * n + z) as usize)
-            })
-        })
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A floor of 4 m x 4 m in a box of which the lid is open by one rectangle; some places have parts of their own.
-    fn openings() -> Openings {
-        let mut openings =
-            Openings::around(&[DVec3::new(-2.0, 0.0, -2.0), DVec3::new(2.0, 3.0, 2.0)]);
-        let here = openings.place(DVec3::new(0.7, 0.2, -0.4), DVec3::Y);
-        let exit = |place: usize, x: f64, z: f64| {
-            let plane = 4;
-            // Across y are z and x.
-            let spot = Spot { plane, at: [z, x] };
-            Exit {
-                place,
-                small: 0,
-                start: 0,
-                spot,
-            }
-        };
-        let mut exits: Vec<Exit> = (0..4000_u32)
-            .map(|k| {
-                let [x, z] = sequence02(k, 9);
-                exit(0, x - 0.5, 1.5 * z - 0.2)
-            })
-            .collect();
-        exits.extend((0..500_u32).map(|k| {
-            let [x, z] = sequence02(k, 10);
-            exit(here, 0.3 * x - 0.1, 0.4 * z)
-        }));
-        openings.divide(exits, |_, _| [false; BEAM]);
-        assert_eq!((openings.shared, openings.parts.len()), (1, 2));
-        openings
-    }
-
-    /// The chosen directions have the density that is said of them: the mean of f / density is the integral of f.
-    #[test]
-    fn directions_have_their_density() {
-        let openings = openings();
-        for point in [DVec3::new(0.7, 0.2, -0.4), DVec3::new(0.1, 2.6, 0.3)] {
-            let normal = DVec3::Y;
-            let mut choice = Choice::default();
-            openings.weigh(point, normal, |_| 1.0, &mut choice);
-            let n = 1 << 16;
-            let f = |d: DVec3| d.y / PI;
-            let chosen: f64 = (0..n)
-                .filter_map(|k| openings.choose(&choice, sequence02(k, 3)))
-                // Parts reach a little beyond the rectangle, where the lid is.
-                .filter(|at| (-0.5..=0.5).contains(&at.x) && (-0.2..=1.3).contains(&at.z))
-                .map(|at| (at - point).normalize())
-                .map(|d| f(d) / openings.density(&choice, point, d))
-                .sum();
-            // The rectangle from below, by plain quadrature.
-            let m = 400;
-            let mut plain = 0.0;
-            for j in 0..m {
-                for i in 0..m {
-                    let at = |k: i32| (f64::from(k) + 0.5) / f64::from(m);
-                    let d = DVec3::new(at(i) - 0.5, 3.0, 1.5 * at(j) - 0.2) - point;
-                    plain += d.y * d.y / (PI * d.length_squared().powi(2)) * 1.5 / f64::from(m * m);
-                }
-            }
-            let ratio = chosen / f64::from(n) / plain;
-            assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
-        }
-    }
 
     /// A slit of 2 cm in a wall is found to its edges from 4 m to 16 m away, though few rays all over the hemispheres leave; where the room
     /// ends there, and where it goes on outside: then places have parts of their own that are small.
@@ -901,10 +477,9 @@ mod tests {
                     open(point - d * (point.z / d.z))
                 };
                 let open = chosen.filter(open).count();
-                assert!(
-                    open as u32 > n / if outside > 0.0 { 8 } else { 2 },
-                    "{open}"
-                );
+                // Places are longer than the slit is wide; by the parts of all of them it is one ray in 200.
+                let least = if outside > 0.0 { n / 16 } else { n / 2 };
+                assert!(open as u32 > least, "{open}");
             }
         }
     }
