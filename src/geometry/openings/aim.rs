@@ -1,6 +1,6 @@
 //! Rays that are aimed where others left.
 
-use super::{Gap, KINDS, Openings, PLACES, across};
+use super::sides::{Gap, KINDS, Openings, PLACES, across};
 use crate::geometry::sampling::Pcg;
 
 /// Rays are aimed beside a gap by so many cells, as often by each power of two.

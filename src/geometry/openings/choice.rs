@@ -1,6 +1,6 @@
 //! Directions toward openings: chosen by what each piece of them may bring to a point, with their density.
 
-use super::{MARGIN, Openings, PLACES};
+use super::sides::{MARGIN, Openings, PLACES};
 use crate::geometry::cover::Rectangle;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -288,76 +288,5 @@ impl Choice {
     fn of(&self, k: usize) -> f64 {
         let first = k == 0 || k == self.shared[1];
         self.sums[k] - if first { 0.0 } else { self.sums[k - 1] }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::{BEAM, Exit};
-    use super::*;
-    use crate::geometry::cover::Spot;
-    use crate::geometry::sampling::sequence02;
-
-    /// A floor of 4 m x 4 m in a box of which the lid is open by one rectangle; some places have parts of their own.
-    fn openings() -> Openings {
-        let mut openings =
-            Openings::around(&[DVec3::new(-2.0, 0.0, -2.0), DVec3::new(2.0, 3.0, 2.0)]);
-        let here = openings.place(DVec3::new(0.7, 0.2, -0.4), DVec3::Y);
-        let exit = |place: usize, x: f64, z: f64| {
-            let plane = 4;
-            // Across y are z and x.
-            let spot = Spot { plane, at: [z, x] };
-            Exit {
-                place,
-                small: 0,
-                start: 0,
-                spot,
-            }
-        };
-        let mut exits: Vec<Exit> = (0..4000_u32)
-            .map(|k| {
-                let [x, z] = sequence02(k, 9);
-                exit(0, x - 0.5, 1.5 * z - 0.2)
-            })
-            .collect();
-        exits.extend((0..500_u32).map(|k| {
-            let [x, z] = sequence02(k, 10);
-            exit(here, 0.3 * x - 0.1, 0.4 * z)
-        }));
-        openings.divide(exits, |_, _| [false; BEAM]);
-        assert_eq!((openings.shared, openings.parts.len()), (1, 2));
-        openings
-    }
-
-    /// The chosen directions have the density that is said of them: the mean of f / density is the integral of f.
-    #[test]
-    fn directions_have_their_density() {
-        let openings = openings();
-        for point in [DVec3::new(0.7, 0.2, -0.4), DVec3::new(0.1, 2.6, 0.3)] {
-            let normal = DVec3::Y;
-            let mut choice = Choice::default();
-            openings.weigh(point, normal, |_| 1.0, &mut choice);
-            let n = 1 << 16;
-            let f = |d: DVec3| d.y / PI;
-            let chosen: f64 = (0..n)
-                .filter_map(|k| openings.choose(&choice, sequence02(k, 3)))
-                // Parts reach a little beyond the rectangle, where the lid is.
-                .filter(|at| (-0.5..=0.5).contains(&at.x) && (-0.2..=1.3).contains(&at.z))
-                .map(|at| (at - point).normalize())
-                .map(|d| f(d) / openings.density(&choice, point, d))
-                .sum();
-            // The rectangle from below, by plain quadrature.
-            let m = 400;
-            let mut plain = 0.0;
-            for j in 0..m {
-                for i in 0..m {
-                    let at = |k: i32| (f64::from(k) + 0.5) / f64::from(m);
-                    let d = DVec3::new(at(i) - 0.5, 3.0, 1.5 * at(j) - 0.2) - point;
-                    plain += d.y * d.y / (PI * d.length_squared().powi(2)) * 1.5 / f64::from(m * m);
-                }
-            }
-            let ratio = chosen / f64::from(n) / plain;
-            assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
-        }
     }
 }
