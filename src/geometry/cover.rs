@@ -149,10 +149,10 @@ fn best_split(spots: &[Spot], tight: &Rectangle) -> Option<Split> {
     let size = tight.size();
     let least = GAIN * tight.area();
     let mut best: Option<Split> = None;
-    for axis in 0..2 {
+    for (axis, width) in size.into_iter().enumerate() {
         let mut bins = [Rectangle::empty(tight.plane); BINS];
         for spot in spots {
-            let share = (spot.at[axis] - tight.low[axis]) / size[axis].max(1e-300);
+            let share = (spot.at[axis] - tight.low[axis]) / width.max(1e-300);
             bins[((share * BINS as f64) as usize).min(BINS - 1)].add(spot.at);
         }
         // What lies above each line.
