@@ -390,8 +390,7 @@ impl Relighter {
         let error = self.geometry.zip(distance).map(|(share, distance)| {
             let geometry = share * distance;
             let solve = convergence.bound * 100.0 * DE_PER_PERCENT;
-            (geometry.powi(2) + bake.solution.spectrum_error.unwrap_or(0.0).powi(2) + solve.powi(2))
-                .sqrt()
+            (geometry.powi(2) + bake.solution.lost().unwrap_or(0.0).powi(2) + solve.powi(2)).sqrt()
         });
         Ok(Relit {
             record: RelitRecord {
@@ -507,6 +506,7 @@ impl Relighter {
             tolerance,
             // A sweep more, which a first answer does without.
             counted: tolerance <= bake.room.tolerance(),
+            lister: None,
         };
         let (convergence, flux) = bake.solve_with::<L>(links, &leaves, given);
         bake.refinement.graph = graph;

@@ -16,7 +16,7 @@ use super::{Bake, NOBODY, Representation, direct};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::{self, Lanes};
-use crate::light::{Filters, Light, Neighbours, Rows, Through, padded};
+use crate::light::{Filters, Light, Lists, Neighbours, Rows, Through};
 use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
@@ -142,7 +142,8 @@ impl Bake {
                 [light, l.first as u32, l.count as u32]
             }),
         )?;
-        out.put(self.solution.spectrum_error.unwrap_or(f64::NAN))?;
+        let lanes = self.solution.spectrum_error.unwrap_or(f64::NAN);
+        out.put([lanes, self.solution.lost_by_lists])?;
         out.put(self.solution.light.white)?;
         self.refinement
             .outlook
@@ -153,31 +154,14 @@ impl Bake {
             self.refinement.balance.defect_after,
         ])?;
         out.put(self.refinement.balance.limited as u64)?;
-        let leaves = &self.solution.light.leaves;
-        let (reflected, irradiance) = (
-            &self.solution.light.reflected,
-            &self.solution.light.irradiance,
-        );
-        // What mirrors are read as stands apart.
-        let row = |&leaf: &u32| match self.is_mirror(leaf) {
-            true => self.solution.light.mirrors.row(leaf as usize),
-            false => reflected.row(leaf as usize),
-        };
-        out.put_list(
-            leaves.len() * reflected.width(),
-            leaves.iter().flat_map(row).copied(),
-        )?;
+        let (leaves, lanes) = (&self.solution.light.leaves, &self.solution.lanes);
+        let lists = |rows: &mut dyn Iterator<Item = &[f32]>| Lists::new(lanes, rows);
+        lists(&mut leaves.iter().map(|&leaf| self.sent(leaf))).encode(out)?;
         if whole {
-            out.put_list(
-                leaves.len() * irradiance.width(),
-                (0..leaves.len()).flat_map(|k| irradiance.row(k).iter().copied()),
-            )?;
-            out.put_list(
-                leaves.len() * self.solution.lanes.len(),
-                leaves
-                    .iter()
-                    .flat_map(|&k| self.refinement.direct.row(k).iter().copied()),
-            )?;
+            let irradiance = &self.solution.light.irradiance;
+            lists(&mut (0..leaves.len()).map(|k| irradiance.row(k))).encode(out)?;
+            let direct = &self.refinement.direct;
+            lists(&mut leaves.iter().map(|&leaf| direct.row(leaf))).encode(out)?;
             out.put_list(
                 leaves.len(),
                 leaves.iter().map(|&k| self.refinement.direct.figures(k)),
@@ -214,8 +198,9 @@ impl Bake {
             )),
         };
         self.solution.filters = Filters::new(&self.room.scene, &self.solution.lanes);
-        let error: f64 = from.get()?;
+        let [error, lost]: [f64; 2] = from.get()?;
         self.solution.spectrum_error = (!error.is_nan()).then_some(error);
+        self.solution.lost_by_lists = lost;
         Ok((
             gone,
             if gone {
@@ -262,18 +247,20 @@ impl Bake {
         };
         self.refinement.areas = self.refinement.outlook.areas(&self.refinement.tree);
         let leaves: Vec<u32> = self.refinement.leaves();
-        let (count, width) = (leaves.len(), padded(kept));
-        let mut reflected = rows(from, count, width)?;
+        let count = leaves.len();
+        let mut reflected = Lists::decode(count, kept, from)?.rows();
         if gone {
             reflected = Rows::default();
         }
         let mut irradiance = Rows::default();
         if whole {
-            irradiance = rows(from, count, width)?;
-            let lanes = self.solution.lanes.len();
-            let known: Vec<f32> = from.get_exactly(count * lanes)?;
+            irradiance = Lists::decode(count, kept, from)?.rows();
+            let known = Lists::decode(count, kept, from)?.rows();
+            let known: Vec<f32> = (0..count)
+                .flat_map(|k| known.row(k)[..kept].to_vec())
+                .collect();
             let figures: Vec<[f32; 2]> = from.get_exactly(count)?;
-            self.refinement.direct = direct::Direct::known(&leaves, nodes, lanes, &known, &figures);
+            self.refinement.direct = direct::Direct::known(&leaves, nodes, kept, &known, &figures);
         }
         self.refinement.direct.rays = from.get()?;
         let traces = Packs::decode(from)?;
@@ -457,18 +444,4 @@ fn lane_of([light, first, count]: [u32; 3]) -> Read<lanes::Lane> {
         first,
         count,
     })
-}
-
-fn rows(from: &mut Decoder, count: usize, width: usize) -> Read<Rows> {
-    let mut flat = from.get_list::<f32>()?;
-    if flat.len() != count * width {
-        return Err(Broken::new("has rows that do not fit"));
-    }
-    let mut rows = Rows::zero(count, width);
-    for k in 0..count {
-        for x in rows.row_mut(k) {
-            *x = flat.next().unwrap_or(0.0);
-        }
-    }
-    Ok(rows)
 }

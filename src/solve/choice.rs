@@ -3,8 +3,9 @@
 //! Perceptual and guaranteed control choose on a model of the room (`coarse`, `bounded`); the others follow from the
 //! lights and materials alone.
 
+use super::lists::LANES_SHARE;
 use super::sources::DenseSources;
-use super::{Bake, Representation, SPECTRUM_SHARE, coarse, direct, punctual};
+use super::{Bake, Representation, coarse, direct, punctual};
 use crate::color::normalization;
 use crate::light::lanes::Lanes;
 use crate::light::{self, Filters, Rows, guide};
@@ -47,11 +48,10 @@ impl Bake {
     }
 
     pub(super) fn chosen_lanes(&mut self) -> Result<Lanes, Interrupted> {
-        self.solution.spectrum_error = None;
+        (self.solution.spectrum_error, self.solution.lost_by_lists) = (None, 0.0);
         let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);
         let none = spectra.is_empty() || self.refinement.tree.nodes.is_empty();
-        let share = SPECTRUM_SHARE * self.room.settings.error;
-        let tolerance = self.room.settings.spectrum.unwrap_or(share);
+        let tolerance = self.spectrum_share();
         let guide = guide(&self.room.scene, weights);
         Ok(match self.room.settings.representation {
             // What excites lies where these ways are blind, or mixes their lanes.
@@ -85,7 +85,9 @@ impl Bake {
                 let basis = basis(&lights, &paints(&self.room.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
-            Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance)?,
+            Representation::Adaptive if !none => {
+                self.perceptual(guide.as_ref(), LANES_SHARE * tolerance)?
+            }
             Representation::Guaranteed if !none => {
                 let model = self.model(BOUNDED_PATCHES)?;
                 let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);

@@ -1,19 +1,38 @@
-//! The interval list that a patch needs for itself: the coarsening of its row that its error allows (paper 3.2, merge,
-//! under perceptual control).
+//! What patches carry after a round: lists (paper 3.1.1), chosen by the paper's control (3.2) under perceptual errors.
 //!
-//! Rows of all patches share the working partition, because that is what a gather streams through. A patch by itself
-//! is content with fewer intervals: siblings are merged while the colour of its irradiance under the adaptation white
-//! moves by no more than the limit (CIELUV). The union of the lists is what the room needs.
+//! Rows of all patches share the working partition, because that is what a gather streams through. A patch by itself is content
+//! with fewer intervals: its list starts on the cut of the patch before it, is refined while its error exceeds the patch's share
+//! of what spectra may cause, and merged while it is less than a quarter of that. What patches send is these lists, expanded: to
+//! watched points and vertices, and, from a checkpoint or a cache, to the next solve. What they lose is looked up by a sweep of the
+//! difference, and counted with the lanes' error.
 
-use super::{Bake, SPECTRUM_SHARE};
+use super::solving::Lit;
+use super::{Bake, Representation, SPECTRUM_SHARE};
 use crate::color::{KM, luv_jacobian};
 use crate::light::lanes::Lanes;
+use crate::light::{Joints, Rows, cuts_of};
+use crate::link::LinkRows;
 use crate::scene::LightSpectrum;
-use crate::spectrum::{CmfTree, Control, Leaves, Metric, Partition, SpectralList, coarsen};
+use crate::spectrum::{
+    CmfTree, Control, Leaves, Metric, Partition, Path, SpectralList, SpectralTree, control,
+};
 use rayon::prelude::*;
+use std::ops::Range;
+
+/// What a list may lose of the colour of its patch, share of what spectra may cause.
+const LIST_SHARE: f64 = 0.25;
+/// What is left to lanes: both errors are independent, and their squares add.
+pub(super) const LANES_SHARE: f64 = 0.968;
+/// Errors below this share of the limit are merged away, as in the paper's tests (4.2: "a ratio around 4").
+const MERGED_BELOW: f64 = 0.25;
+/// Patches that a task lists one after the other; fixed, so that results do not depend on the number of threads.
+const CHUNK: usize = 256;
+/// Leaves whose lists are counted after a round.
+const LISTED_LEAVES: usize = 4096;
 
 /// One list for each light.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PatchList {
     /// Mask and values: bit k set, an interval starts at leaf k; values are ratios to the light's power.
     pub lights: Vec<(Partition, Vec<f64>)>,
@@ -26,80 +45,167 @@ impl PatchList {
     }
 }
 
-/// Coarsens rows.
-pub(crate) struct Lister<'a> {
-    lanes: &'a Lanes,
-    trees: Vec<CmfTree>,
-    white: [f64; 3],
-    limit: f64,
+/// The lanes of one light.
+struct Part {
+    lanes: Range<usize>,
+    cut: Partition,
+    cmf: CmfTree,
 }
 
-impl<'a> Lister<'a> {
-    pub(crate) fn new(
-        lanes: &'a Lanes,
+/// Turns rows into lists that are within a limit of them.
+pub(crate) struct Lister {
+    parts: Vec<Part>,
+    xyz: Vec<[f64; 3]>,
+    white: [f64; 3],
+    rules: Control,
+}
+
+impl Lister {
+    /// Lists within a colour difference (CIELUV) of the rows; none where lanes are no ratios to lights.
+    fn new(
+        lanes: &Lanes,
         spectra: &[LightSpectrum],
         weights: &[Leaves; 3],
         white: [f64; 3],
         limit: f64,
-    ) -> Self {
+    ) -> Option<Self> {
         let cmf = CmfTree::new(*weights);
-        let trees = spectra.iter().map(|s| cmf.under(&s.power)).collect();
-        Self {
-            lanes,
-            trees,
+        let mut first = 0;
+        let cuts = lanes.cuts()?;
+        let part = |(cut, light): (&Partition, &LightSpectrum)| {
+            let start = first;
+            first += cut.count();
+            Part {
+                lanes: start..first,
+                cut: *cut,
+                cmf: cmf.under(&light.power),
+            }
+        };
+        let parts: Vec<Part> = cuts.iter().zip(spectra).map(part).collect();
+        // Lights share what is allowed.
+        let limit = limit / parts.len().max(1) as f64;
+        Some(Self {
+            parts,
+            xyz: lanes.xyz().iter().map(|x| x.map(|x| x / KM)).collect(),
             white: white.map(|x| x / KM),
-            limit,
+            rules: Control {
+                eps_min: MERGED_BELOW * limit,
+                ..Control::within(limit)
+            },
+        })
+    }
+
+    /// The cuts that lists start on where none is known.
+    fn finest(&self) -> Vec<Partition> {
+        self.parts.iter().map(|part| part.cut).collect()
+    }
+
+    /// Makes a row that of its list; `cuts` are those to start on, and then its own.
+    fn list(&self, row: &mut [f32], cuts: &mut [Partition]) {
+        let colour = self.xyz.iter().zip(&*row).fold([0.0; 3], |sum, (xyz, x)| {
+            std::array::from_fn(|c| sum[c] + xyz[c] * f64::from(*x))
+        });
+        // What is black is so on any cut.
+        if colour.iter().sum::<f64>() <= 0.0 {
+            return;
+        }
+        let metric = Metric::Luv(luv_jacobian(colour, self.white));
+        for (part, cut) in self.parts.iter().zip(cuts) {
+            let own = &mut row[part.lanes.clone()];
+            // Exactly flat stays exactly flat, and tells the next patch nothing.
+            if own.iter().all(|x| *x == own[0]) {
+                continue;
+            }
+            let mut values = [0.0; crate::spectrum::LEAVES];
+            for (value, x) in values.iter_mut().zip(&*own) {
+                *value = f64::from(*x);
+            }
+            let tree = SpectralTree::on(part.cut, &values[..own.len()], &part.cmf);
+            let mut list = SpectralList::new(&tree, *cut);
+            let path = Path {
+                source: &tree,
+                reflections: &[],
+            };
+            control(&mut list, &path, &part.cmf, &metric, &self.rules);
+            *cut = list.partition();
+            let leaves = list.leaves();
+            for (x, (first, _)) in own.iter_mut().zip(part.cut.iter()) {
+                *x = leaves[first] as f32;
+            }
         }
     }
 
-    /// The list of a row; the 64 leaves themselves are left as they are (they belong to no one light).
-    pub(super) fn list(&self, row: &[f32]) -> PatchList {
-        let xyz = self.lanes.tristimulus(row).map(|x| x / KM);
-        let metric = Metric::Luv(luv_jacobian(xyz, self.white));
-        // Lights share what is allowed.
-        let limit = self.limit / self.trees.len().max(1) as f64;
-        let mut lights = Vec::with_capacity(self.trees.len());
-        for (light, cmf) in self.trees.iter().enumerate() {
-            let own = || {
-                self.lanes
-                    .lanes()
-                    .iter()
-                    .zip(row)
-                    .filter(move |(lane, _)| lane.light == Some(light))
-            };
-            let bits = own().fold(0_u64, |bits, (lane, _)| bits | 1 << lane.first);
-            let Some(cut) = Partition::new(bits) else {
-                continue;
-            };
-            let values: Vec<f64> = own().map(|(_, &x)| f64::from(x)).collect();
-            let mut list = SpectralList::from_values(cut, &values);
-            coarsen(&mut list, cmf, &metric, &Control::within(limit));
-            let leaves = list.leaves();
-            let values = list
-                .partition()
-                .iter()
-                .map(|(first, _)| leaves[first])
-                .collect();
-            lights.push((list.partition(), values));
-        }
-        PatchList { lights }
+    /// Makes rows those of their lists.
+    pub(super) fn list_all(&self, rows: &mut Rows) {
+        let width = rows.width();
+        rows.parts_mut(CHUNK).for_each(|rows| {
+            let mut cuts = self.finest();
+            for row in rows.chunks_mut(width) {
+                self.list(row, &mut cuts);
+            }
+        });
     }
 }
 
-/// Leaves whose lists are looked at after a round.
-const LISTED_LEAVES: usize = 4096;
-
 impl Bake {
-    /// Mean number of intervals that a patch needs, over evenly chosen leaves.
+    /// What makes lists of rows; none where the way of carrying spectra is no adaptive one (others are there to be compared
+    /// with), or where light counts for more than is seen of it.
+    pub(super) fn lister(&self) -> Option<Lister> {
+        let (room, solution) = (&self.room, &self.solution);
+        let seen_only = solution.lanes.excites().is_none();
+        let adaptive = room.settings.representation == Representation::Adaptive;
+        let white = solution.light.white;
+        (adaptive && seen_only && white != [0.0; 3])
+            .then(|| {
+                Lister::new(
+                    &solution.lanes,
+                    &room.scene.spectra,
+                    &room.weights,
+                    white,
+                    LIST_SHARE * self.spectrum_share(),
+                )
+            })
+            .flatten()
+    }
+
+    /// Colour difference (CIELUV) that spectra may cause.
+    pub(super) fn spectrum_share(&self) -> f64 {
+        let share = SPECTRUM_SHARE * self.room.settings.error;
+        self.room.settings.spectrum.unwrap_or(share)
+    }
+
+    /// What leaves send as lists, and the mean colour difference (CIELUV) that this makes to the `irradiance` of leaves.
+    pub(super) fn listed<const L: usize>(
+        &self,
+        lister: &Lister,
+        (lit, rows): (&Lit, &LinkRows),
+        sent: &Rows,
+        irradiance: &Rows,
+    ) -> (Rows, f64) {
+        let mut lists = sent.clone();
+        lister.list_all(&mut lists);
+        let mut lost = lists.clone();
+        for (lost, sent) in lost.all_mut::<L>().iter_mut().zip(sent.all::<L>()) {
+            *lost = std::array::from_fn(|l| lost[l] - sent[l]);
+        }
+        let lost = self.received::<L>(lit, rows, &lost);
+        let lanes = &self.solution.lanes;
+        let white = self.solution.light.white.map(|x| x / KM);
+        let colour = |row: &[f32]| lanes.tristimulus(row).map(|x| x / KM);
+        let (mut sum, mut area) = (0.0, 0.0);
+        for (k, &leaf) in lit.leaves.iter().enumerate() {
+            let metric = Metric::Luv(luv_jacobian(colour(irradiance.row(k)), white));
+            let a = self.refinement.areas[leaf as usize];
+            sum += a * metric.size(colour(lost.row(k)), [0.0; 3]);
+            area += a;
+        }
+        (lists, if area > 0.0 { sum / area } else { 0.0 })
+    }
+
+    /// Mean number of intervals of the lists of patches, over evenly chosen leaves.
     pub(super) fn intervals_mean(&self) -> f64 {
-        let lists = self.lists(
-            self.solution
-                .light
-                .leaves
-                .len()
-                .div_ceil(LISTED_LEAVES)
-                .max(1),
-        );
+        let leaves = self.solution.light.leaves.len();
+        let lists = self.lists(leaves.div_ceil(LISTED_LEAVES).max(1));
         let sum: usize = lists.iter().map(PatchList::intervals).sum();
         if lists.is_empty() {
             0.0
@@ -108,25 +214,30 @@ impl Bake {
         }
     }
 
-    /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
+    /// The interval lists in which every `step`-th leaf of the hierarchy carries what it reflects, in order of
     /// [`Light::leaves`](crate::light::Light::leaves); empty where the rows hold the 64 leaves.
     pub fn lists(&self, step: usize) -> Vec<PatchList> {
-        if !self.solution.lanes.is_ratio() {
+        let lanes = &self.solution.lanes;
+        if !lanes.is_ratio() {
             return Vec::new();
         }
-        let limit = SPECTRUM_SHARE * self.room.settings.error;
-        let lister = Lister::new(
-            &self.solution.lanes,
-            &self.room.scene.spectra,
-            &self.room.weights,
-            self.solution.light.white,
-            limit,
-        );
-        let rows: Vec<usize> = (0..self.solution.light.leaves.len())
-            .step_by(step.max(1))
-            .collect();
-        rows.into_par_iter()
-            .map(|k| lister.list(self.solution.light.irradiance.row(k)))
-            .collect()
+        let joints = Joints::new(lanes);
+        let leaves = self.solution.light.leaves.iter().step_by(step.max(1));
+        let list = |&leaf: &u32| {
+            let row = self.sent(leaf);
+            PatchList {
+                lights: cuts_of(lanes.lanes(), joints.mask(row), row),
+            }
+        };
+        leaves.map(list).collect()
+    }
+
+    /// What a leaf reflects; what mirrors are read as stands apart.
+    pub(super) fn sent(&self, leaf: u32) -> &[f32] {
+        let light = &self.solution.light;
+        match self.is_mirror(leaf) {
+            true => light.mirrors.row(leaf as usize),
+            false => light.reflected.row(leaf as usize),
+        }
     }
 }

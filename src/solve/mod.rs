@@ -62,6 +62,7 @@ use crate::scene::{PunctualLight, Scene};
 use crate::team::{Asked, Interrupt, Interrupted, Team};
 pub use flux::Closed;
 pub use held::Held;
+pub(crate) use lists::Lister;
 pub use operator::Operator;
 pub use outside::running;
 use refinement::Refinement;
@@ -138,6 +139,8 @@ pub(crate) struct Given {
     pub(crate) tolerance: f64,
     /// Is it asked for where the light went?
     pub(crate) counted: bool,
+    /// What makes lists of it; none where it is not kept.
+    pub(crate) lister: Option<Lister>,
 }
 
 impl Bake {

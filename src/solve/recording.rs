@@ -86,7 +86,7 @@ impl Bake {
     /// What is known of the error, by source.
     fn errors(&self, m: &Measured) -> Errors {
         let estimate = Figure::estimate;
-        let spectrum = self.solution.spectrum_error.unwrap_or(0.0);
+        let spectrum = self.solution.lost().unwrap_or(0.0);
         let convergence_de = m.convergence.bound * 100.0 * DE_PER_PERCENT;
         // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
         let all = |geometry: f64| {
@@ -101,7 +101,7 @@ impl Bake {
             geometry_chromaticity: of(&|d| d.chromaticity),
             geometry_de_luv: of(&|d| d.de_luv),
             spectrum_de_luv: Figure {
-                value: self.solution.spectrum_error.filter(|e| e.is_finite()),
+                value: self.solution.lost().filter(|e| e.is_finite()),
                 kind: match self.room.settings.representation {
                     Representation::Guaranteed => Kind::Bound,
                     _ => Kind::Estimate,

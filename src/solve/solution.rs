@@ -22,6 +22,8 @@ pub(crate) struct Solution {
     pub(crate) lanes: Lanes,
     /// Colour difference (CIELUV) that the lanes cause, as far as it is known.
     pub(crate) spectrum_error: Option<f64>,
+    /// What the lists of patches cause beside it.
+    pub(crate) lost_by_lists: f64,
     /// The spectra of panes and mirrors on the present lanes.
     pub(crate) filters: Filters,
     /// Punctual lights, recentred, with their rows.
@@ -43,12 +45,19 @@ impl Solution {
             filters: Filters::new(&room.scene, &lanes),
             lanes,
             spectrum_error: None,
+            lost_by_lists: 0.0,
             lamps: Vec::new(),
             light: Light::default(),
             previous: Rows::default(),
             seen: Vec::new(),
             watched: Default::default(),
         }
+    }
+
+    /// Colour difference (CIELUV) that lanes and lists cause, as far as it is known.
+    pub(crate) fn lost(&self) -> Option<f64> {
+        self.spectrum_error
+            .map(|lanes| lanes.hypot(self.lost_by_lists))
     }
 
     /// Looks up the punctual lights on the present lanes.

@@ -17,8 +17,8 @@ use crate::spectrum::{LEAVES, Leaves};
 use std::borrow::Cow;
 
 /// The leaves under direct light, and how they reflect: what the bounces start from.
-struct Lit<'a> {
-    leaves: &'a [u32],
+pub(super) struct Lit<'a> {
+    pub(super) leaves: &'a [u32],
     /// Direct irradiance by leaf.
     first: &'a Rows,
     reflection: &'a Reflection,
@@ -95,6 +95,7 @@ impl Bake {
             emitted: None,
             tolerance: self.room.tolerance(),
             counted: true,
+            lister: self.lister(),
         };
         let solved = self.solve_with::<L>(rows, leaves, given);
         self.light_arrives();
@@ -115,6 +116,7 @@ impl Bake {
             emitted,
             tolerance,
             counted,
+            lister,
         } = given;
         let emission = sources.emission;
         let by_rays = self.room.by_rays();
@@ -148,8 +150,11 @@ impl Bake {
         if !runs {
             reflected = reflection.of::<L>(&irradiance);
         }
-        let sent = with::<L>(&reflected, given.as_ref());
-        let on_nodes = self.refinement.on_nodes::<L>(&sent, leaves);
+        let mut sent = with::<L>(&reflected, given.as_ref());
+        let lists = lister
+            .as_ref()
+            .map(|lister| self.listed::<L>(lister, (&lit, rows), &sent, &irradiance));
+        let mut on_nodes = self.refinement.on_nodes::<L>(&sent, leaves);
         let through = reflection.sheets.as_ref();
         let through = through.map(|s| s.shown.clone()).unwrap_or_default();
         let mut flux = flux::Balance::default();
@@ -165,11 +170,16 @@ impl Bake {
             flux = self.flux::<L>(leaves, &fluxes, &on_nodes, &sums);
         }
         (flux.sent, flux.scaled) = (self.room.sent, scaled);
+        if let Some((lists, lost)) = lists {
+            on_nodes = self.refinement.on_nodes::<L>(&lists, leaves);
+            (sent, self.solution.lost_by_lists) = (Cow::Owned(lists), lost);
+        }
         let emitted = emitted.unwrap_or_else(|| self.refinement.on_nodes::<L>(&emission, leaves));
         let on_nodes = self.without_mirrors::<L>(sent, on_nodes, leaves);
         if !through.is_empty() {
             irradiance = through.shown(irradiance);
         }
+        lister.iter().for_each(|l| l.list_all(&mut irradiance));
         self.solution.light.through = through;
         self.shine(leaves, emitted, on_nodes, irradiance);
         (bounced.convergence, flux)
@@ -286,7 +296,12 @@ impl Bake {
     }
 
     /// What radiosity of the leaves brings them.
-    fn received<const L: usize>(&self, lit: &Lit, rows: &LinkRows, radiosity: &Rows) -> Rows {
+    pub(super) fn received<const L: usize>(
+        &self,
+        lit: &Lit,
+        rows: &LinkRows,
+        radiosity: &Rows,
+    ) -> Rows {
         if self.room.by_rays() {
             return self.ray_system(lit).received::<L>(radiosity);
         }
