@@ -209,7 +209,7 @@ mod tests {
     use crate::color::Observer;
     use crate::scene::LightSpectrum;
     use crate::spectrum::Grid;
-    use crate::spectrum::partition::tests::any_cut;
+    use crate::spectrum::testing::any_cut;
     use proptest::prelude::*;
 
     proptest! {

@@ -1,5 +1,6 @@
 //! What the unit tests of this module share.
 
+pub(crate) use super::partition::tests::any_cut;
 use super::{CmfTree, Grid, Leaves};
 use crate::color::Observer;
 use proptest::prelude::*;

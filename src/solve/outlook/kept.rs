@@ -1,17 +1,24 @@
 //! How leaves look out, written down and read back.
 //!
+//! The rays of a leaf follow from its number, the seed and how many they are: a checkpoint holds no more of them, and they are cast
+//! again. A cache, which is read where there is no ray index, holds the leaves that they met.
+//!
 //! A file holds the rays of all leaves in the order of their numbers, whichever ranks have them: so a bake goes on with any number of
 //! ranks.
 
+use super::CHUNK;
 use super::Outlook;
-use super::found::{ALONE, End};
+use super::found::{ALONE, Found, look_from};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::Filters;
 use crate::light::passed::Passed;
+use crate::link::Sight;
 use crate::solve::tinted::{self, Tints};
 use crate::store::codec::{Plain, Read};
 use crate::store::{Broken, Decoder, Encoder};
 use crate::team::Team;
+use crate::transport::hemisphere::{BEAM, Hemisphere};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// Nodes whose rays ranks send each other at a time: some ten MB.
@@ -19,9 +26,12 @@ const TOGETHER: usize = 1 << 16;
 /// Flag, beside what a ray passes, of those that bring what their ends emit.
 const LAMP: u32 = 1 << 31;
 
+/// What rays are cast again with: what they meet, the most directions that a leaf looks in, and the seed.
+type Eyes<'a> = (&'a Sight<'a>, &'a Hemisphere, u64);
+
 impl Outlook {
-    /// Writes it down: where the rays end, or only the leaves that they met, which is half as much and enough as long as
-    /// no leaf is split. In a room with panes or mirrors (then there are `filters`) also what the rays pass.
+    /// Writes it down: how many rays there are (`whole`), or the leaves that they met, which is enough as long as no leaf is
+    /// split; then also, in a room with panes or mirrors (then there are `filters`), what the rays pass.
     pub(in crate::solve) fn encode(
         &self,
         whole: bool,
@@ -36,11 +46,9 @@ impl Outlook {
         )?;
         out.put_list(self.range.len(), self.range.iter().map(|r| r.1))?;
         if whole {
-            self.encode_rays(out, |k| self.ends[k].entry)?;
-            self.encode_rays(out, |k| self.ends[k].at)?;
-        } else {
-            self.encode_rays(out, |k| self.met[k])?;
+            return Ok(());
         }
+        self.encode_rays(out, |k| self.met[k])?;
         match filters {
             Some(filters) => self.encode_passed(filters, out),
             None => Ok(()),
@@ -100,11 +108,11 @@ impl Outlook {
         out.put_list(count, rays.flatten())
     }
 
-    /// Reads back what this rank needs, for the hierarchy that it was made for.
+    /// Reads back what this rank needs, for the hierarchy that it was made for; with `eyes`, what [`Outlook::encode`] wrote as a whole.
     pub(in crate::solve) fn decode(
         tree: &Tree,
         team: Team,
-        whole: bool,
+        eyes: Option<Eyes>,
         filters: Option<&Filters>,
         from: &mut Decoder,
     ) -> Read<Self> {
@@ -123,25 +131,17 @@ impl Outlook {
         if !(counts.is_empty() || counts.len() == nodes) {
             return Err(Broken::new("has rays in parts that do not fit"));
         }
-        if whole {
-            let entries = outlook.own::<u32>(&counts, from)?;
-            let places = outlook.own::<[u16; 2]>(&counts, from)?;
-            let ends = entries.into_iter().zip(places);
-            outlook.ends = ends.map(|(entry, at)| End { entry, at }).collect();
-            let faces = tree.faces.len();
-            let there = |e: &End| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
-            if !outlook.ends.iter().all(there) {
-                return Err(Broken::new("has rays that end nowhere"));
-            }
+        if let Some(eyes) = eyes {
+            outlook.look_again(tree, &counts, eyes)?;
         } else {
             outlook.met = outlook.own(&counts, from)?;
             let there = |&k: &u32| k == NONE || ((k & !ALONE) as usize) < nodes;
             if !outlook.met.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }
-        }
-        if let Some(filters) = filters {
-            outlook.decode_passed(&counts, filters, from)?;
+            if let Some(filters) = filters {
+                outlook.decode_passed(&counts, filters, from)?;
+            }
         }
         let mut held = 0;
         outlook.range = (counts.iter().enumerate())
@@ -154,10 +154,58 @@ impl Outlook {
                 (first, count)
             })
             .collect();
-        if whole {
+        if eyes.is_some() {
             outlook.find(tree);
         }
         Ok(outlook)
+    }
+
+    /// Casts the rays of this rank's leaves again, so many of each node.
+    fn look_again(
+        &mut self,
+        tree: &Tree,
+        counts: &[u32],
+        (sight, hemisphere, seed): Eyes,
+    ) -> Read<()> {
+        let patterns: Vec<Hemisphere> = (0..)
+            .map(|k| BEAM << k)
+            .take_while(|&n| n <= hemisphere.len())
+            .map(Hemisphere::new)
+            .collect();
+        let mut own = Vec::new();
+        let mut rays = 0_usize;
+        for (node, &count) in (0_u32..).zip(counts).filter(|(_, count)| **count > 0) {
+            let pattern = patterns.iter().find(|p| p.len() == count as usize);
+            match pattern.filter(|_| tree.node(node).element != NONE) {
+                Some(pattern) if self.team.owns(node as usize) => {
+                    rays += pattern.len();
+                    own.push((node, pattern));
+                }
+                Some(_) => {}
+                None => return Err(Broken::new("has rays in parts that do not fit")),
+            }
+        }
+        // The first ray of a leaf is a u32.
+        if u32::try_from(rays).is_err() {
+            return Err(Broken::new("has more rays than one rank can hold"));
+        }
+        let look =
+            |&(node, pattern): &(u32, &Hemisphere)| look_from(tree, node, sight, pattern, seed);
+        let found: Vec<Vec<Found>> = own
+            .par_chunks(CHUNK)
+            .map(|chunk| chunk.iter().map(look).collect())
+            .collect();
+        let tinted = sight.panes.is_some() || sight.mirrors.is_some();
+        self.ends.reserve(rays);
+        for found in found.into_iter().flatten() {
+            let first = self.ends.len() as u32;
+            if tinted {
+                self.tints.extend(found.ends.len(), found.passed);
+            }
+            self.lamps.extend(found.lamps.iter().map(|ray| first + ray));
+            self.ends.extend(found.ends);
+        }
+        Ok(())
     }
 
     /// A list of something for each ray: what is said of the rays of this rank's leaves.
