@@ -406,25 +406,6 @@ fn a_box_of_mirrors_agrees() {
     agrees(&baked(room.scene()), &up, 1 << 14, 0.02);
 }
 
-/// Nothing is a mirror: nothing is asked of them.
-#[test]
-fn mirrors_that_are_not_there_cost_nothing() {
-    let lit = |mirror: bool| {
-        let mut room = furnished([0.9; LEAVES], 0.6);
-        room.point(dvec3(1.2, 2.2, 2.4), 1000.0);
-        let mut scene = room.scene();
-        if !mirror {
-            scene.materials.iter_mut().for_each(|m| m.mirror = None);
-        }
-        let mut bake = Bake::new(scene, Settings::default());
-        bake.run();
-        bake
-    };
-    let [with, without] = [true, false].map(lit);
-    assert!(with.plan().runs(Kind::Mirrors) && !without.plan().runs(Kind::Mirrors));
-    assert!(without.light().mirrors.is_empty() && !with.light().mirrors.is_empty());
-}
-
 /// The same bytes at any number of threads.
 #[test]
 fn threads_change_nothing() {
