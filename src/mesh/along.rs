@@ -49,7 +49,7 @@ impl Growth<'_> {
         let sheet = &self.cells.sheets[cell.sheet as usize];
         let light = self.light(k);
         let mean = [0, 1, 2].map(|c| (light[0][c] + light[1][c] + light[2][c]) / 3.0);
-        let least = self.unknown.sqrt();
+        let least = self.allowed;
         let shows = |more: [f64; 3]| {
             let brighter = [0, 1, 2].map(|c| mean[c] + more[c]);
             self.difference(mean, brighter) > least

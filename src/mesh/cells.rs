@@ -110,6 +110,8 @@ pub(super) struct Sheet {
     /// them light its side.
     pub(super) sides: HashMap<(u32, u64, u64), u32>,
     pub(super) base: HashMap<u32, u32>,
+    /// Vertices on edges that something stands on: the one that they were before.
+    pub(super) parted: HashMap<u32, u32>,
     /// Where light is looked at for them.
     pub(super) beside: HashMap<u32, Vertex>,
 }

@@ -62,7 +62,7 @@ impl Cells {
         } in parted
         {
             for (k, sector) in sectors.iter().enumerate() {
-                self.give_vertex(sheet, (k == 0).then_some(vertex), sector);
+                self.give_vertex(sheet, (vertex, k), sector);
             }
         }
     }
@@ -176,21 +176,27 @@ impl Cells {
         sectors
     }
 
-    /// Gives the corners of a sector one vertex: `kept`, or a new one.
-    fn give_vertex(&mut self, sheet: u32, kept: Option<u32>, sector: &[Of]) {
-        let (k, c) = sector[0];
-        let Cell { of, corners, .. } = self.all[k];
+    /// Gives the corners of the `k`-th sector about a vertex one vertex: the first keeps it, others get a new one.
+    fn give_vertex(&mut self, sheet: u32, (parted, k): (u32, usize), sector: &[Of]) {
+        let (cell, c) = sector[0];
+        let Cell { of, corners, .. } = self.all[cell];
         let own = Vertex {
             triangle: of.0,
             weights: corners[c].weights,
             entry: of.1,
         };
-        let vertices = &mut self.sheets[sheet as usize].vertices;
-        let vertex = kept.unwrap_or(vertices.len() as u32);
-        match kept {
-            Some(vertex) => vertices[vertex as usize] = own,
-            None => vertices.push(own),
-        }
+        let sheet = &mut self.sheets[sheet as usize];
+        let vertex = match k {
+            0 => {
+                sheet.vertices[parted as usize] = own;
+                parted
+            }
+            _ => {
+                sheet.vertices.push(own);
+                sheet.vertices.len() as u32 - 1
+            }
+        };
+        sheet.parted.insert(vertex, parted);
         for &(k, c) in sector {
             self.all[k].corners[c].vertex = vertex;
         }

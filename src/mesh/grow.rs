@@ -59,8 +59,9 @@ pub(super) struct Growth<'a> {
     pub(super) most: usize,
     /// Is that a limit, or about right?
     pub(super) strict: bool,
-    /// Mean square of the input's triangles until something is known of them: what the output may have.
-    pub(super) unknown: f64,
+    /// What light between vertices may be off in the mean, and what triangles of the input are taken to be off until something is
+    /// known of them.
+    pub(super) allowed: f64,
     /// Variance of a look, by chance.
     pub(super) noise: f64,
     /// Points of the last measurement.
@@ -92,7 +93,7 @@ impl<'a> Growth<'a> {
             smallest: SMALLEST * half_size,
             most: usize::MAX,
             strict: false,
-            unknown: 0.0,
+            allowed: 0.0,
             noise: 0.0,
             asked: Vec::new(),
             looking: true,
@@ -268,7 +269,7 @@ impl<'a> Growth<'a> {
                     (RANGE * range.fold(0.0, f64::max)).powi(2)
                 };
                 if first {
-                    return told.max(range()).max(self.unknown);
+                    return told.max(range()).max(self.allowed * self.allowed);
                 }
                 let expected = square.max(told * f64::from(trust * trust));
                 // What was looked at before was not split there: beside a line light is known at corners only.

@@ -78,12 +78,15 @@ impl Bake {
     pub fn baked_within(&self, limits: &Limits, progress: &dyn Fn(usize, usize)) -> Baked {
         let mut growth = self.growth(Care::Vertex, limits.late);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
-        growth.unknown = allowed * allowed;
-        growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;
+        growth.allowed = allowed;
         if let Some(vertices) = limits.vertices {
             (growth.most, growth.strict) = (vertices, true);
         }
         growth.begin(progress);
+        if !growth.strict {
+            // Vertices on what stands on edges of the input are not the light's: in a restaurant they took all that it may have.
+            growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;
+        }
         if limits.is_late() {
             growth.until = Some(Instant::now() + UNSEEN);
             self.grow_unseen(&mut growth, progress);

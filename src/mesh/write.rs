@@ -7,6 +7,7 @@ use crate::color::lab;
 use crate::gather::{Baked, BakedSurface, KeptVertex, lend};
 use crate::solve::Bake;
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// Nothing was seen.
 const UNSEEN: u32 = u32::MAX;
@@ -25,6 +26,29 @@ pub(super) struct Settled {
     /// What the light of that is multiplied by, see [`fit`](super::fit).
     factor: Vec<f32>,
     covered: usize,
+}
+
+impl Growth<'_> {
+    /// Vertices that were parted are one again where light on both sides proved alike: no further apart than what the mean may be off.
+    fn join(
+        &self,
+        sheet: usize,
+        triangles: &mut [[u32; 3]],
+        light: impl Fn(u32) -> Option<[f64; 3]>,
+    ) {
+        let sheet = &self.cells.sheets[sheet];
+        let mut first = HashMap::new();
+        for v in triangles.iter_mut().flatten() {
+            let base = sheet.base.get(v).unwrap_or(v);
+            let own = *sheet.parted.get(base).unwrap_or(base);
+            let known = *first.entry(own).or_insert(*v);
+            if let (Some(a), Some(b)) = (light(known), light(*v))
+                && self.difference(a, b) <= self.allowed
+            {
+                *v = known;
+            }
+        }
+    }
 }
 
 impl Bake {
@@ -59,6 +83,7 @@ impl Bake {
             Some(lab(xyz, self.light().white)[0])
         };
         let light: Vec<Option<f64>> = looks.iter().zip(&factor).map(lightness).collect();
+        growth.join(sheet, &mut faces.0, |v| Some(seen(&looks[v as usize])?.xyz));
         turn(&ground, &mut faces, &light);
         let row = |(look, factor): (&u32, &f32)| Some(seen(look)?.row.map(|x| x * factor));
         let mut rows: Vec<Option<[f32; 64]>> = looks.iter().zip(&factor).map(row).collect();
