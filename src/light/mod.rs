@@ -2,6 +2,7 @@
 
 mod descent;
 mod filters;
+mod fixtures;
 mod fluorescent;
 pub mod lanes;
 pub(crate) mod passed;
@@ -12,6 +13,7 @@ mod through;
 pub use descent::Descent;
 pub use filters::{Filter, Filters, Glass};
 pub(crate) use filters::{Passage, Tint, accumulate};
+pub use fixtures::Fixtures;
 pub use fluorescent::Fluorescent;
 pub(crate) use fluorescent::{balance, guide};
 pub use rows::{Rows, padded};

@@ -1,10 +1,11 @@
 //! A solution: what every patch reflects and emits, in rows, with what the gather and the oracle ask of it.
 
 use super::descent::Descent;
+use super::fixtures::Fixtures;
 use super::lanes::Lanes;
 use super::rows::Rows;
 use super::through::Through;
-use crate::hierarchy::{NONE, Tree};
+use crate::hierarchy::{Mesh, NONE, Tree};
 use crate::link::{Graph, Way};
 use rayon::prelude::*;
 
@@ -51,6 +52,8 @@ pub struct Light {
     /// For each node the first below, or itself, that is an element that emits or has several children in which any does; none
     /// where none does.
     pub lit: Vec<u32>,
+    /// Lamps of many faces.
+    pub fixtures: Fixtures,
     /// Brightness of a punctual light's intensity (of its normal irradiance where it is directional).
     pub bright_lamps: Vec<f32>,
     /// Who is linked to whom.
@@ -88,11 +91,12 @@ impl Light {
             + size_of_val(self.arrival.as_slice())
             + self.descent.bytes()
             + self.through.bytes()
+            + self.fixtures.bytes()
             + 4 * (self.bright_lamps.len() + self.leaves.len() + self.lit.len())
     }
 
     /// Works out brightness and its spread from the rows, and what rays ask of the patches.
-    pub fn measure(&mut self, tree: &Tree, lanes: &Lanes) {
+    pub fn measure(&mut self, tree: &Tree, mesh: &Mesh, lanes: &Lanes) {
         let white = self.white;
         let scalar = |row: &[f32]| brightness(lanes.notice(row), white) as f32;
         let n = tree.nodes.len();
@@ -112,6 +116,7 @@ impl Light {
                 _ => k as u32,
             };
         }
+        self.fixtures = Fixtures::new(tree, mesh, &self.bright_emitted);
         self.brightest = self.bright_reflected.clone();
         for k in (0..n).rev() {
             let below = tree.nodes[k]

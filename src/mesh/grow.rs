@@ -272,11 +272,11 @@ impl<'a> Growth<'a> {
                     return told.max(range()).max(self.allowed * self.allowed);
                 }
                 let expected = square.max(told * f64::from(trust * trust));
-                // What was looked at before was not split there: beside a line light is known at corners only.
-                if self.is_beside_line(k) {
-                    return expected.max(range());
+                // Half of what crosses the edge of a shadow still does, and is as far off as the whole was.
+                match self.looking {
+                    true => expected.max(range()),
+                    false => expected,
                 }
-                expected
             })
             .collect();
         for (&k, square) in fresh.iter().zip(expected) {
@@ -286,14 +286,6 @@ impl<'a> Growth<'a> {
                 doubt.trust = 1.0;
             }
         }
-    }
-
-    /// Has a cell a corner on the edge of a shadow?
-    fn is_beside_line(&self, cell: usize) -> bool {
-        let cell = &self.cells.all[cell];
-        let beside = &self.cells.sheets[cell.sheet as usize].beside;
-        let mut corners = cell.corners.iter();
-        corners.any(|corner| beside.contains_key(&corner.vertex))
     }
 
     /// The first vertices.

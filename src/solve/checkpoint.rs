@@ -340,7 +340,7 @@ impl Bake {
         light.emitted = self.refinement.on_nodes::<L>(&emission, &light.leaves);
         light.half_size = self.room.mesh.half_size;
         light.apart = self.solution.lanes.excites().is_some();
-        light.measure(&self.refinement.tree, &self.solution.lanes);
+        light.measure(&self.refinement.tree, &self.room.mesh, &self.solution.lanes);
         self.solution.light = light;
         self.solution.light_lamps(&self.room);
     }

@@ -156,7 +156,7 @@ impl Bake {
         light.neighbours = Neighbours::new(nodes, &refinement.graph);
         light.half_size = room.mesh.half_size;
         solution.previous = std::mem::replace(&mut light.reflected, Rows::zero(nodes, L));
-        light.measure(&refinement.tree, &solution.lanes);
+        light.measure(&refinement.tree, &room.mesh, &solution.lanes);
         Ok(())
     }
 }

@@ -540,7 +540,7 @@ impl Bake {
             .unwrap_or_else(|| self.mean_irradiance().map(|x| 2.0 * x));
         self.solution
             .light
-            .measure(&self.refinement.tree, &self.solution.lanes);
+            .measure(&self.refinement.tree, &self.room.mesh, &self.solution.lanes);
     }
 
     /// Notes how bright what arrives on leaves is.

@@ -33,6 +33,9 @@ pub(super) enum Of {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lamp {
     pub(super) id: u32,
+    /// The cluster of elements that shine like this one and stand together, see [`Fixtures`](crate::light::Fixtures); [`NONE`] where
+    /// it is by itself.
+    pub(super) fixture: u32,
     pub(super) factor: f64,
     pub(super) carries: f64,
 }
@@ -61,6 +64,8 @@ pub struct Memory {
     pub(super) near: Vec<(u32, Hit)>,
     /// Lamps that are put off until all of them are known.
     pub(super) lamps: Vec<Lamp>,
+    /// Factors of the faces of a lamp of many.
+    pub(super) faces: Vec<f64>,
     /// Which path each segment to a lamp belongs to, and what it brings.
     pub(super) to_lamps: Vec<(usize, f64)>,
     /// What the rays of a point met by way of mirrors.

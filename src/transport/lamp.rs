@@ -230,17 +230,25 @@ impl Gatherer<'_> {
                 true => f64::INFINITY,
                 false => before + lamp.carries,
             };
-            let mut parts = Vec::new();
+            let (mut parts, mut face) = (Vec::new(), (0, 0.0));
+            if lamp.fixture != NONE && samples.peek().is_some_and(|s| s[0] * all < upto) {
+                self.faces_of(to, lamp.fixture, memory);
+            }
             while let Some([u, v]) = samples.next_if(|sample| sample[0] * all < upto) {
-                let node = self.tree.node(lamp.id);
+                // What is left of the number after the choice of a lamp serves for the point.
+                let mut u = ((u * all - before) / lamp.carries).clamp(0.0, 1.0);
+                let (mut id, mut chance) = (lamp.id, 1.0);
+                if lamp.fixture != NONE {
+                    (id, chance, u) = self.face_of(lamp, u, &mut face, memory);
+                    parts.clear();
+                }
+                let node = self.tree.node(id);
                 let Some(element) = self.tree.element(node) else {
                     continue;
                 };
                 if parts.is_empty() {
-                    parts = parts_of(to, element.corners, lamp.factor);
+                    parts = parts_of(to, element.corners, lamp.factor * chance);
                 }
-                // What is left of the number after the choice of a lamp serves for the point.
-                let u = ((u * all - before) / lamp.carries).clamp(0.0, 1.0);
                 let Some((point, weight)) = point_of(to, node.normal, &parts, [u, v]) else {
                     continue;
                 };

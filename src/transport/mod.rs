@@ -15,6 +15,7 @@
 //! | `trace` | what a point gets its light from, kept for relighting |
 
 mod clipped_sky;
+mod fixture;
 mod gatherer;
 pub mod hemisphere;
 mod lamp;

@@ -107,6 +107,10 @@ impl Gatherer<'_> {
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
+        if of == Of::Emitted && self.is_fixture(to, id) {
+            self.put_off(to, id, memory);
+            return;
+        }
         let node = self.tree.node(id);
         let (reflected, emitted) = self.brightness(id, of);
         let spread = f64::from(self.light.spread[id as usize]);
@@ -389,6 +393,7 @@ impl Gatherer<'_> {
             }
             memory.lamps.push(Lamp {
                 id,
+                fixture: NONE,
                 factor,
                 carries,
             });

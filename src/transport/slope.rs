@@ -246,7 +246,7 @@ mod tests {
                 row.fill(rise(element.at([1.0 / 3.0; 3])) as f32);
             }
         }
-        light.measure(tree, bake.lanes());
+        light.measure(tree, bake.mesh(), bake.lanes());
         let to = Receiver {
             point: DVec3::new(0.05, -0.2, 0.1) * size,
             normal: DVec3::new(0.3, 0.8, 0.2).normalize(),

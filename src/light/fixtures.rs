@@ -1,0 +1,152 @@
+//! Lamps of many faces, a glass bulb of hundreds of triangles, as points with a normal and an area.
+//!
+//! From some of their sizes away that is what such faces are, and to sum what they bring takes less time than to look through
+//! their hierarchy down to each.
+
+use crate::hierarchy::{Mesh, Tree};
+use glam::DVec3;
+use std::ops::Range;
+use wide::f64x8;
+
+/// Parts of a lamp whose exitance differs by no more than this share shine alike: means of equal numbers differ by rounding.
+const ALIKE: f32 = 1e-5;
+
+/// The faces that glow, in the order of the hierarchy.
+#[derive(Debug, Clone, Default)]
+pub struct Fixtures {
+    /// Their elements.
+    elements: Vec<u32>,
+    /// Middle, and normal times area over pi: coordinate by coordinate.
+    columns: [Vec<f64>; 6],
+    /// How many of them lie before each entry of [`Tree::faces`], and all.
+    before: Vec<u32>,
+    /// Of each node the radius of its largest face that glows, if all that do are of one surface and shine alike; else infinite.
+    grain: Vec<f32>,
+}
+
+impl Fixtures {
+    /// Of a hierarchy whose nodes emit with these brightnesses.
+    pub(crate) fn new(tree: &Tree, mesh: &Mesh, emitted: &[f32]) -> Self {
+        let mut out = Self {
+            grain: vec![0.0; tree.nodes.len()],
+            before: vec![0],
+            ..Self::default()
+        };
+        let mut radius = vec![0.0_f32; tree.faces.len()];
+        for (entry, &id) in tree.face_node.iter().enumerate() {
+            let element = tree.element(tree.node(id));
+            let glows = emitted.get(id as usize).is_some_and(|&bright| bright > 0.0);
+            if let Some(element) = element.filter(|_| glows) {
+                let [a, b, c] = element.corners;
+                let middle = (a + b + c) / 3.0;
+                let normal = (b - a).cross(c - a) / (2.0 * std::f64::consts::PI);
+                let both = middle.to_array().into_iter().chain(normal.to_array());
+                for (column, x) in out.columns.iter_mut().zip(both) {
+                    column.push(x);
+                }
+                out.elements.push(id);
+                let corners = element.corners.map(|p| p.distance(middle));
+                radius[entry] = corners.into_iter().fold(0.0, f64::max) as f32;
+            }
+            out.before.push(out.elements.len() as u32);
+        }
+        // What shines alike below each node: the surface it is of and how bright.
+        let mut shines: Vec<Option<(u32, f32)>> = vec![None; emitted.len()];
+        for k in (0..emitted.len()).rev().filter(|&k| emitted[k] > 0.0) {
+            let node = &tree.nodes[k];
+            let below = node.child_range().map(|c| c as usize);
+            out.grain[k] = below.clone().map(|c| out.grain[c]).fold(0.0, f32::max);
+            if let Some(element) = tree.element(node) {
+                let face = element.face as usize;
+                let even = below.clone().all(|c| alike(emitted[c], emitted[k]));
+                let surface = mesh.origin[tree.faces[face].triangle as usize].0;
+                shines[k] = Some((surface, emitted[k]));
+                out.grain[k] = if even {
+                    radius[face].max(out.grain[k])
+                } else {
+                    f32::INFINITY
+                };
+                continue;
+            }
+            let mut parts = below.filter_map(|c| shines[c]);
+            let first = parts.next();
+            let differs = |part: (u32, f32)| {
+                first.is_some_and(|one| part.0 != one.0 || !alike(part.1, one.1))
+            };
+            if parts.any(differs) {
+                out.grain[k] = f32::INFINITY;
+            }
+            shines[k] = first;
+        }
+        out
+    }
+
+    /// As if every lamp had few faces.
+    #[cfg(test)]
+    pub(crate) fn none(tree: &Tree) -> Self {
+        Self {
+            before: vec![0; tree.faces.len() + 1],
+            grain: vec![f32::INFINITY; tree.nodes.len()],
+            ..Self::default()
+        }
+    }
+
+    /// Radius of the largest face that glows below a node, if all of them shine alike; else infinite.
+    pub(crate) fn grain(&self, node: u32) -> f64 {
+        f64::from(self.grain[node as usize])
+    }
+
+    /// The faces below a node that glow.
+    pub(crate) fn below(&self, tree: &Tree, node: u32) -> Range<usize> {
+        let (first, count) = tree.node(node).faces;
+        let place = |entry: u32| self.before[entry as usize] as usize;
+        place(first)..place(first + count)
+    }
+
+    /// The element of a face.
+    pub(crate) fn element(&self, face: usize) -> u32 {
+        self.elements[face]
+    }
+
+    /// Form factors of faces far from a point, as those of their middles, which `out` then holds; their sum.
+    pub(crate) fn factors(
+        &self,
+        faces: Range<usize>,
+        point: DVec3,
+        normal: DVec3,
+        out: &mut Vec<f64>,
+    ) -> f64 {
+        out.clear();
+        let [point, normal] = [point, normal].map(|p| p.to_array().map(f64x8::splat));
+        for first in faces.clone().step_by(8) {
+            let count = (faces.end - first).min(8);
+            let lanes = |column: usize| {
+                let mut lanes = [0.0; 8];
+                lanes[..count].copy_from_slice(&self.columns[column][first..first + count]);
+                f64x8::new(lanes)
+            };
+            let way: [f64x8; 3] = std::array::from_fn(|c| lanes(c) - point[c]);
+            let dot = |a: [f64x8; 3]| a[0] * way[0] + a[1] * way[1] + a[2] * way[2];
+            let square = dot(way);
+            let here = dot(normal).fast_max(f64x8::ZERO);
+            let there = (-dot(std::array::from_fn(|c| lanes(3 + c)))).fast_max(f64x8::ZERO);
+            let factors = here * there / (square * square);
+            out.extend_from_slice(&factors.to_array()[..count]);
+        }
+        out.iter().sum()
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        4 * (self.elements.len() + self.before.len() + self.grain.len())
+            + self
+                .columns
+                .iter()
+                .map(|column| 8 * column.len())
+                .sum::<usize>()
+    }
+}
+
+fn alike(a: f32, b: f32) -> bool {
+    (a - b).abs() <= ALIKE * a.max(b)
+}

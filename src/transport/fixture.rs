@@ -1,0 +1,194 @@
+//! Lamps of many faces from afar: one lamp, whose faces are points with a normal and an area.
+
+use super::gatherer::{Gatherer, Lamp, Memory};
+use super::receiver::Receiver;
+
+/// From so many radii of the largest of its faces on, these count as points: a triangle then brings what its middle does within
+/// .4 %, and those of a bulb together within .1 %.
+const AFAR: f64 = 12.0;
+/// Faces from which on a lamp has many. Fewer are cut and clipped exactly.
+const MANY: usize = 16;
+
+impl Gatherer<'_> {
+    /// Is a cluster a lamp of many faces that stand for points here?
+    pub(super) fn is_fixture(&self, to: &Receiver, id: u32) -> bool {
+        let (fixtures, node) = (&self.light.fixtures, self.tree.node(id));
+        let gap = (node.centre - to.point).length() - node.radius;
+        gap > AFAR * fixtures.grain(id) && fixtures.below(self.tree, id).len() >= MANY
+    }
+
+    /// Puts such a lamp off until all lamps are known.
+    pub(super) fn put_off(&self, to: &Receiver, id: u32, memory: &mut Memory) {
+        let factor = self.faces_of(to, id, memory);
+        if factor > 0.0 {
+            let first = self.light.fixtures.below(self.tree, id).start;
+            let element = self.light.fixtures.element(first);
+            let emitted = f64::from(self.light.bright_emitted[element as usize]);
+            memory.lamps.push(Lamp {
+                id: element,
+                fixture: id,
+                factor,
+                carries: factor * emitted,
+            });
+        }
+    }
+
+    /// Puts the factors of a lamp's faces into the memory; their sum.
+    pub(super) fn faces_of(&self, to: &Receiver, id: u32, memory: &mut Memory) -> f64 {
+        let (fixtures, faces) = (
+            &self.light.fixtures,
+            self.light.fixtures.below(self.tree, id),
+        );
+        fixtures.factors(faces, to.point, to.normal, &mut memory.faces)
+    }
+
+    /// The face of such a lamp that a number in [0, 1) chooses by the factors in the memory: its element, its share of the whole, and
+    /// what is left of the number. `upto`: the face that was chosen last and the factors before it; numbers must ascend.
+    pub(super) fn face_of(
+        &self,
+        lamp: &Lamp,
+        u: f64,
+        upto: &mut (usize, f64),
+        memory: &Memory,
+    ) -> (u32, f64, f64) {
+        let (mut face, mut before) = *upto;
+        let factors = &memory.faces;
+        while face + 1 < factors.len() && before + factors[face] <= u * lamp.factor {
+            before += factors[face];
+            face += 1;
+        }
+        *upto = (face, before);
+        let first = self.light.fixtures.below(self.tree, lamp.fixture).start;
+        let rest = ((u * lamp.factor - before) / factors[face]).clamp(0.0, 1.0);
+        let share = factors[face] / lamp.factor;
+        (self.light.fixtures.element(first + face), share, rest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::lambert_triangles_x8;
+    use crate::light::Fixtures;
+    use crate::scene::{Options, Scene};
+    use crate::solve::{Bake, Settings};
+    use std::path::Path;
+
+    fn bake(room: &str) -> Bake {
+        let room = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("scenes")
+            .join(room);
+        let settings = Settings {
+            rounds: 1,
+            ..Settings::default()
+        };
+        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
+        bake.run();
+        bake
+    }
+
+    /// Middles of every so many leaves.
+    fn receivers(bake: &Bake, every: usize) -> Vec<Receiver> {
+        let tree = bake.tree();
+        let at = |leaf| {
+            let element = tree.element(tree.node(leaf)).unwrap();
+            Receiver {
+                point: element.at([1.0 / 3.0; 3]),
+                normal: tree.face_normal[element.face as usize],
+                plane: tree.face_plane[element.face as usize],
+                leaf: Some(leaf),
+                seed: u64::from(leaf),
+            }
+        };
+        tree.leaves().step_by(every).map(at).collect()
+    }
+
+    /// Clusters below the lit root that count as lamps of many faces from a point.
+    fn fixtures(gatherer: &Gatherer, to: &Receiver) -> Vec<u32> {
+        let (mut found, mut open) = (Vec::new(), vec![gatherer.light.lit[0]]);
+        while let Some(id) = open.pop() {
+            let node = gatherer.tree.node(id);
+            if gatherer.is_fixture(to, id) {
+                found.push(id);
+            } else if node.element == crate::hierarchy::NONE {
+                let parts = node.child_range().map(|c| gatherer.light.lit[c as usize]);
+                open.extend(parts.filter(|&c| c != crate::hierarchy::NONE));
+            }
+        }
+        found
+    }
+
+    /// Each face beside its exact form factor, and all of them together.
+    #[test]
+    fn faces_of_a_bulb_are_points_from_afar() {
+        let bake = bake("mirrored.glb");
+        let mut seen = 0;
+        bake.room.with_sight(|sight| {
+            let gatherer = bake.gatherer(sight);
+            let mut memory = Memory::default();
+            for to in receivers(&bake, 7) {
+                for id in fixtures(&gatherer, &to) {
+                    let sum = gatherer.faces_of(&to, id, &mut memory);
+                    let faces = gatherer.light.fixtures.below(gatherer.tree, id);
+                    let exact: Vec<f64> = faces
+                        .map(|face| {
+                            let node = gatherer.tree.node(gatherer.light.fixtures.element(face));
+                            let corners = gatherer.tree.element(node).unwrap().corners;
+                            lambert_triangles_x8(to.point, to.normal, [corners].into_iter())
+                                .to_array()[0]
+                        })
+                        .collect();
+                    let whole: f64 = exact.iter().sum();
+                    let largest = exact.iter().copied().fold(0.0, f64::max);
+                    for (fast, exact) in memory.faces.iter().zip(&exact) {
+                        assert!((fast - exact).abs() < 0.01 * largest, "{fast} {exact}");
+                    }
+                    // Where the horizon of the point cuts the bulb, faces that it cuts are in or out as a whole.
+                    let node = gatherer.tree.node(id);
+                    let above = (node.centre - to.point).dot(to.normal) > node.radius;
+                    if above {
+                        assert!((sum - whole).abs() < 1e-3 * whole, "{sum} {whole}");
+                        seen += 1;
+                    }
+                }
+            }
+        });
+        assert!(seen > 100, "{seen}");
+    }
+
+    /// The light of lamps with and without their hierarchy.
+    #[test]
+    fn a_lamp_of_many_faces_is_all_its_faces() {
+        for room in ["mirrored.glb", "curtained.glb"] {
+            let bake = bake(room);
+            let mut plain = bake.light().clone();
+            plain.fixtures = Fixtures::none(bake.tree());
+            let (mut off, mut all, mut rays) = (0.0, 0.0, [0, 0]);
+            bake.room.with_sight(|sight| {
+                // So many rays that their noise is small.
+                let fast = Gatherer {
+                    tolerance: 1e-6,
+                    ..bake.gatherer(sight)
+                };
+                let slow = Gatherer {
+                    light: &plain,
+                    tolerance: 1e-6,
+                    ..bake.gatherer(sight)
+                };
+                for to in receivers(&bake, 31) {
+                    let bright = |gatherer: &Gatherer, rays: &mut u64| {
+                        let mut memory = Memory::default();
+                        let row = gatherer.direct(&to, &mut memory);
+                        *rays += memory.rays;
+                        bake.lanes().tristimulus(&row)[1]
+                    };
+                    let [a, b] = [(&fast, 0), (&slow, 1)].map(|(g, k)| bright(g, &mut rays[k]));
+                    off += (a - b).abs();
+                    all += b;
+                }
+            });
+            assert!(all > 0.0 && off < 0.01 * all, "{room}: {off} of {all}");
+            assert_ne!(rays[0], 0);
+        }
+    }
+}
