@@ -7,9 +7,6 @@ const MEASURED: u64 = 10;
 /// Growing ends where so many times the cells leave more than this part of the error.
 const GROWN: f64 = 1.5;
 const STALLED: f64 = 0.93;
-/// Growing first aims at a root mean square of so many times the mean that is allowed: few places are far off. Measured, it is 2.8 times
-/// the mean in a living room, 3.0 in a theatre, 4.2 in a garage and 6 in a sunlit room.
-const FEW: f64 = 3.0;
 /// After a measurement that was not met, growing aims at this part of what the measured error asks for: with the mean square that is
 /// believed the mean falls by the power .95, in the garage and in the living room.
 const BELOW: f64 = 0.95;
@@ -23,9 +20,8 @@ pub(crate) const EXCESS: f64 = 1.2;
 pub(crate) const BENDS: f64 = 0.5;
 /// Looks differ by chance: squares of differences up to this many times the variance of a look count for nothing.
 pub(crate) const BY_CHANCE: f64 = 2.0;
-/// Of the difference of their corners, lines are taken to miss this share where nothing is known yet: .20 to .26 in a garage, as the root mean
-/// square over parts of triangles that were split and not looked at again. With .1 it took 5 to 12 % more vertices to the same mean there.
-pub(crate) const RANGE: f64 = 0.2;
+/// Corners this far apart let expect this much of it between them, where nothing is known yet.
+pub(crate) const RANGE: f64 = 0.1;
 
 /// How growing ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,10 +49,16 @@ pub(crate) struct Turns {
 }
 
 impl Turns {
-    /// Begins with the allowed error (mean CIEDE2000), the area that is seen, and what so many cells were measured to have.
-    pub(crate) fn new(allowed: f64, area: f64, cells: usize, before: Interpolation) -> Self {
+    /// Begins with the allowed error (mean CIEDE2000), the root mean square to aim at first, the area that is seen, and what so many
+    /// cells were measured to have.
+    pub(crate) fn new(
+        (allowed, first): (f64, f64),
+        area: f64,
+        cells: usize,
+        before: Interpolation,
+    ) -> Self {
         Self {
-            aim: (FEW * allowed).powi(2) * area,
+            aim: first * first * area,
             turn: 1,
             allowed,
             cells,
