@@ -18,7 +18,7 @@ use haarlight::output::picture::{Format, Picture};
 use haarlight::scene::sky::{
     Brightness, Distribution, SkyType, SkyWish, SunPlace, SunWish, direction,
 };
-use haarlight::scene::{Camera, LightKind, Projection};
+use haarlight::scene::{Camera, LightKind, Projection, Scene};
 use std::f64::consts::PI;
 
 /// Greatest error of a point.
@@ -302,6 +302,32 @@ fn a_low_sun_is_a_blackbody_and_no_second_one_unless_it_is_said() {
     );
     let named = under(SunPlace::Light("light 0".into()), None);
     assert!(!named.warnings.join("").contains("two suns"));
+}
+
+/// Under a sky of which no sun is said parallel light of the file shines on, and it is said how to put it out; asked for, it is out.
+#[test]
+fn parallel_light_shines_on_unless_there_is_to_be_no_sun() {
+    let under = |place: Option<SunPlace>| {
+        let mut room = room(0.5, 1.0, 1);
+        room.punctual(LightKind::Directional, DVec3::ZERO, DVec3::NEG_Y, 100.0);
+        let mut wish = wish(1);
+        wish.sun = SunWish {
+            place,
+            ..SunWish::default()
+        };
+        room.scene().under(&wish).unwrap()
+    };
+    let is_parallel = |scene: &Scene| scene.lights.iter().any(|l| l.kind.is_parallel());
+    let scene = under(None);
+    let said = scene.warnings.join("\n");
+    assert!(is_parallel(&scene), "{said}");
+    assert!(
+        said.contains("('light 0') shines on under this sky") && said.contains("--sun none"),
+        "{said}"
+    );
+    let scene = under(Some(SunPlace::Nowhere));
+    assert!(!is_parallel(&scene) && scene.warnings.is_empty());
+    assert!(scene.sky.is_some());
 }
 
 /// Skylight that surfaces pass on, beside paths: summed over the points, so that their noise is .3 %.

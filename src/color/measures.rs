@@ -469,6 +469,9 @@ mod tests {
                 let got = values(name, meter)[11];
                 assert!((got / mel - 1.0).abs() < 0.005, "{name}: {got}");
             }
+            // Of LED-B2 no figure is at hand that was printed: this is the sum over the 5 nm of both tables (CIE 015, CIE S 026).
+            let led = values("cie/LED-B2", meter)[11];
+            assert!((led / 45.781 - 1.0).abs() < 0.005, "{led}");
             let published = [35.929, 79.904, 100.440, 50.848, 40.420];
             for (got, want) in values("cie/FL12", meter)[DAYLIGHT..].iter().zip(published) {
                 assert!((got / want - 1.0).abs() < 0.005, "{got} {want}");

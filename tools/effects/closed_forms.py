@@ -16,8 +16,8 @@ ROWS = [
     ("sky", "sky", "an_even_sky_gives_open_ground_pi_l", "E = pi L on open ground"),
     ("sky", "sky", "cie_171_case_5_9_closed_form", "rectangle seen from a perpendicular element (4 x 4 roof, printed digits)"),
     ("sky", "reference", "the_solver_agrees_under_a_sky", "dense reference, one wavelength"),
-    ("sky, hosek", "spectral_sky", "open_ground_has_the_light_of_the_model", "quadrature of the model"),
-    ("sky, hosek", "spectral_sky", "light_through_openings_has_the_colour_of_the_model", "quadrature through openings, Y and Z"),
+    ("sky, hosek", "spectral_sky", "open_ground_has_the_light_of_the_model", "quadrature of the model, X, Y and Z"),
+    ("sky, hosek", "spectral_sky", "light_through_openings_has_the_colour_of_the_model", "quadrature through openings, X, Y and Z"),
     ("sky, map", "sky_maps", "a_map_of_a_sky_gives_the_light_of_that_sky", "the sky that the map shows"),
     ("sun", "sky", "the_sun_lights_a_patch_of_the_floor", "E sin(elevation)"),
     ("sun", "sky", "the_edge_of_a_sun_patch_is_as_wide_as_its_disc", "disc beyond a chord (of the open sun)"),
@@ -42,8 +42,10 @@ ROWS = [
     ("dye", "fluorescence", "a_furnace_has_the_gain_of_its_walls", "E = (L + e q) / (1 - rho)"),
     ("dye", "fluorescence", "white_paper_agrees_with_the_whole_matrix", "dense reference with the 64 x 64 matrix"),
 ]
-NUMBER = r"\[?(-?[0-9.]+(?:e-?[0-9]+)?)"
-COMPARED = re.compile(NUMBER + " for " + NUMBER)
+NUMBER = r"-?[0-9.]+(?:e-?[0-9]+)?"
+# A number, or some in brackets.
+VALUE = rf"({NUMBER}|\[[^\]]*\])"
+COMPARED = re.compile(VALUE + " for " + VALUE)
 
 
 def differences(text):
@@ -54,9 +56,10 @@ def differences(text):
             current = begins[1]
         if "CIE 171 |" in line:
             cases.append("|" + line.split("CIE 171 |")[1])
-        for got, want in COMPARED.findall(line):
-            if float(want) != 0:
-                found.setdefault(current, []).append(float(got) / float(want) - 1)
+        for pair in COMPARED.findall(line):
+            for got, want in zip(*([float(x) for x in re.findall(NUMBER, value)] for value in pair)):
+                if want != 0:
+                    found.setdefault(current, []).append(got / want - 1)
     return found, cases
 
 
