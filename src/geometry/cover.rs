@@ -33,8 +33,6 @@ pub(super) enum Edges {
     Sharp,
     /// They grow fewer toward it, as where each of many places sees another part: about the root of that.
     Blurred,
-    /// Even up to an edge, and more points are to come that will tell what these missed: beyond with a probability of e^-3.
-    Told,
 }
 
 impl Edges {
@@ -43,7 +41,6 @@ impl Edges {
         match self {
             Edges::Sharp => 12.0 / n,
             Edges::Blurred => (3.0 / n.sqrt()).max(12.0 / n),
-            Edges::Told => 3.0 / n,
         }
     }
 }

@@ -24,16 +24,6 @@ const RAYS: [[usize; 3]; 4] = [[16, 16, 16], [64, 64, 64], [512, 1024, 1024], [0
 /// So many times more to the openings in rooms of few triangles. With 4, a sky in a periscope is off by more than 1 %.
 const FEW: usize = 16;
 
-/// Points that see something else through an opening than their neighbours look that way first, through gaps and then as is chosen, so many
-/// times at the most by so many rays. These have no part in what comes in, which therefore has no bias: where they leave the others go.
-const FIRST_LOOKS: u64 = 6;
-const FIRST_RAYS: u32 = 64;
-/// Fewer rays than this to the openings are of a point that is one of many.
-const OWN_LOOK: usize = 256;
-/// Where this share of the first rays leaves, more is not gained by looking again; nor where none does so many times.
-const FREE: f64 = 0.5;
-const IN_VAIN: u64 = 3;
-
 /// Directions in which it is asked what panes leave where all else is exact, in the same order.
 const TINTED: [usize; 4] = [16, 64, 512, 512];
 
@@ -49,8 +39,6 @@ pub(crate) struct Outside {
 pub(crate) struct Look {
     found: Found,
     choice: Choice,
-    /// Directions of first rays that lead outside.
-    first: Vec<DVec3>,
     segments: Vec<Segment>,
     open: Vec<(Search, DVec3)>,
     blocked: Vec<bool>,
@@ -70,15 +58,6 @@ impl Look {
             None => sight.blocked(&self.segments, &View::Crowded, &mut self.blocked),
         }
         self.rays += self.segments.len() as u64;
-    }
-
-    /// Directions of those rays of its own that lead outside.
-    fn ways_out(&mut self, by: (&Sight, Option<&dyn Ways>), from: DVec3) -> Vec<DVec3> {
-        self.block(by);
-        let ways = self.segments.iter().zip(&self.blocked);
-        let free = ways.filter(|(_, blocked)| !**blocked);
-        free.map(|(s, _)| (s.to.as_dvec3() - from).normalize())
-            .collect()
     }
 }
 
@@ -284,58 +263,22 @@ impl Outside {
         look: &mut Look,
     ) {
         let plain = |d: DVec3| self.sky.plain(d);
-        let place = (to.point, to.normal);
         self.openings
             .weigh(to.point, to.normal, plain, &mut look.choice);
-        look.first.clear();
-        let looks = match count >= OWN_LOOK && !self.openings.gaps.is_empty() {
-            true => FIRST_LOOKS,
-            false => 0,
-        };
-        for turn in 0..looks {
-            match turn {
-                0 => self.aim_at_gaps(to, look),
-                _ => self.aim(to, (FIRST_RAYS, 0x5c4 + turn), look),
-            }
-            let free = look.ways_out((sight, by), to.point);
-            let enough = turn > 0 && free.len() as f64 > FREE * f64::from(FIRST_RAYS);
-            look.first.extend(free);
-            if enough || (look.first.is_empty() && turn + 1 == IN_VAIN) {
-                break;
-            }
-            self.openings
-                .aim(place, plain, &look.first, &mut look.choice);
-        }
-        self.aim(to, (count as u32, 0x5c1), look);
-        let free = look.ways_out((sight, by), to.point);
-        look.open
-            .extend(free.into_iter().map(|d| (Search::Openings, d)));
-    }
-
-    /// Rays through gaps.
-    fn aim_at_gaps(&self, to: &Receiver, look: &mut Look) {
         look.segments.clear();
-        // By turns, so that neighbours do not all see the same of them.
-        let first = hash(to.seed, 0x5c4) as usize % self.openings.gaps.len();
-        for k in first..first + FIRST_RAYS as usize {
-            let at = self.openings.beyond_gap(to.point, k);
-            if to.normal.dot(at - to.point) > 0.0 {
-                look.segments
-                    .push(Segment::new(to.point, at, [to.plane, NO_PLANE]));
-            }
-        }
-    }
-
-    /// So many rays as they are chosen, by a number of their own.
-    fn aim(&self, to: &Receiver, (count, own): (u32, u64), look: &mut Look) {
-        look.segments.clear();
-        let turn = hash(to.seed, own);
-        for k in 0..count {
+        let turn = hash(to.seed, 0x5c1);
+        for k in 0..count as u32 {
             let at = self.openings.choose(&look.choice, sequence02(k, turn));
             let ahead = at.filter(|at| to.normal.dot(at - to.point) > 0.0);
             look.segments
                 .extend(ahead.map(|at| Segment::new(to.point, at, [to.plane, NO_PLANE])));
         }
+        look.block((sight, by));
+        let ways = look.segments.iter().zip(&look.blocked);
+        let free = ways.filter(|(_, blocked)| !**blocked);
+        let toward = |s: &Segment| (s.to.as_dvec3() - to.point).normalize();
+        look.open
+            .extend(free.map(|(s, _)| (Search::Openings, toward(s))));
     }
 
     /// Irradiance by the open directions, by the power heuristic: of so many rays of each search.

@@ -2,7 +2,6 @@
 
 use super::sides::{Gap, KINDS, Openings, PLACES, across};
 use crate::geometry::sampling::Pcg;
-use glam::DVec3;
 
 /// Rays are aimed beside a gap by so many cells, as often by each power of two.
 const BESIDE: [f64; 2] = [0.125, 4.0];
@@ -47,21 +46,6 @@ impl<'a> Aim<'a> {
         &self.by_place[self.places[place] as usize..self.places[place + 1] as usize]
     }
 
-    /// The gaps of a cell, each as often.
-    fn cell(&self, random: &mut Pcg) -> &[u32] {
-        let cell = random.below(self.cells.len() as u32 - 1) as usize;
-        &self.by_cell[self.cells[cell] as usize..self.cells[cell + 1] as usize]
-    }
-
-    /// So many of them, from each cell as often.
-    pub(super) fn some(&self, count: usize, random: &mut Pcg) -> Vec<DVec3> {
-        let gap = |_| {
-            let cell = self.cell(random);
-            self.gaps[cell[random.below(cell.len() as u32) as usize] as usize].at
-        };
-        (0..count).map(gap).collect()
-    }
-
     /// A point beside a gap that was found from this place, from one beside it, or from anywhere, each cell as often, by turns.
     pub(super) fn at(
         &self,
@@ -82,7 +66,8 @@ impl<'a> Aim<'a> {
             _ => self.of(place),
         };
         if among.is_empty() {
-            among = self.cell(random);
+            let cell = random.below(self.cells.len() as u32 - 1) as usize;
+            among = &self.by_cell[self.cells[cell] as usize..self.cells[cell + 1] as usize];
         }
         let Gap { mut at, axis, .. } =
             self.gaps[among[random.below(among.len() as u32) as usize] as usize];

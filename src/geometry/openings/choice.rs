@@ -1,13 +1,12 @@
 //! Directions toward openings: chosen by what each piece of them may bring to a point, with their density.
 
 use super::sides::{MARGIN, Openings, PLACES};
-use crate::geometry::cover::{Edges, Rectangle, Spot};
+use crate::geometry::cover::Rectangle;
 use glam::DVec3;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Where a place has parts of its own they take most of its rays, and so do those of a point of what is left by its place. The others go
-/// where rays from elsewhere left, too.
+/// Where a place has parts of its own they take most of its rays. The others go where rays from elsewhere left, too.
 const OWN_RAYS: f64 = 0.75;
 /// A part is weighed in pieces that are no longer than this share of their distance, at most so many along its side and so many in all.
 const LENGTH: f64 = 0.5;
@@ -17,23 +16,15 @@ const PIECES: usize = 256;
 const FILLED: usize = 16;
 /// A piece that seems edge-on from its middle still counts as if it were turned by this cosine.
 const LEAST_COSINE: f64 = 0.1;
-/// Directions that lead out from a point tell of openings from this number on, and make so many parts.
-const TELLING: usize = 4;
-const POINT_PARTS: usize = 6;
-
-/// Parts of all places, of a place, and of a point.
-const LISTS: usize = 3;
 
 /// What the parts of the openings may bring to a point, summed up piece by piece.
 #[derive(Debug, Default)]
 pub(crate) struct Choice {
     parts: Vec<Pieces>,
     sums: Vec<f64>,
-    /// Where the lists of parts and pieces end, and what share of the rays each has.
-    ends: [[usize; 2]; LISTS],
-    shares: [f64; LISTS],
-    /// Parts of the point alone; their numbers go on where those of the openings end.
-    found: Vec<Rectangle>,
+    /// Where the lists of parts and pieces of all places end, and what share of the rays those of the place have.
+    shared: [usize; 2],
+    own: f64,
 }
 
 /// A part in pieces: as many along either axis, and the number of the first.
@@ -53,79 +44,45 @@ impl Openings {
         brightness: impl Fn(DVec3) -> f64,
         choice: &mut Choice,
     ) {
-        choice.clear();
+        choice.parts.clear();
+        choice.sums.clear();
         // Of the small place if it has any.
         let own = [1, 0].into_iter().find_map(|k| {
             let kind = self.kind(point, normal, PLACES << k);
             let ends = self.own[k].get(kind..kind + 2)?;
             (ends[0] < ends[1]).then_some(ends[0] as usize..ends[1] as usize)
         });
-        let lists = [0..self.shared, own.unwrap_or_default()];
-        let mut length = LENGTH;
-        for (list, parts) in lists.into_iter().enumerate() {
-            length = self.piece_together(parts, point, length, choice);
-            self.sum_up((point, normal), &brightness, list, choice);
-        }
-    }
-
-    /// Are there places with parts of their own? Then a point sees something else than its neighbours do.
-    pub(super) fn differ(&self) -> bool {
-        self.parts.len() > self.shared
-    }
-
-    /// Where a ray through a gap leaves the box; `k`: any number.
-    pub(crate) fn beyond_gap(&self, point: DVec3, k: usize) -> DVec3 {
-        let direction = (self.gaps[k % self.gaps.len()] - point).normalize_or_zero();
-        point + direction * self.leaves(point, direction).1.min(f64::MAX)
-    }
-
-    /// Adds parts of the point alone, about directions that are known to lead out from there.
-    pub(crate) fn aim(
-        &self,
-        (point, normal): (DVec3, DVec3),
-        brightness: impl Fn(DVec3) -> f64,
-        open: &[DVec3],
-        choice: &mut Choice,
-    ) {
-        if open.len() < TELLING {
-            return;
-        }
-        let mut spots: Vec<Spot> = open.iter().map(|&d| self.leaves(point, d).0).collect();
-        choice.forget_point();
-        choice.found = self.cover(&mut spots, Edges::Told, |_| [0.0; 2], POINT_PARTS);
-        let list = self.parts.len()..self.parts.len() + choice.found.len();
-        self.piece_together(list, point, LENGTH, choice);
-        self.sum_up((point, normal), brightness, LISTS - 1, choice);
-    }
-
-    /// Weighs the pieces that a list has got.
-    fn sum_up(
-        &self,
-        (point, normal): (DVec3, DVec3),
-        brightness: impl Fn(DVec3) -> f64,
-        list: usize,
-        choice: &mut Choice,
-    ) {
-        let mut sum = choice.sums.last().copied().unwrap_or(0.0);
-        for k in choice.list(list).start..choice.parts.len() {
+        let own = own.unwrap_or_default();
+        let length = self.piece_together(0..self.shared, point, LENGTH, choice);
+        choice.shared[0] = choice.parts.len();
+        self.piece_together(own, point, length, choice);
+        for k in 0..choice.parts.len() {
+            if k == choice.shared[0] {
+                choice.shared[1] = choice.sums.len();
+            }
             let pieces = choice.parts[k];
-            let part = self.part(choice, pieces.part as usize);
+            let part = &self.parts[pieces.part as usize];
+            let starts = k == 0 || k == choice.shared[0];
+            let mut sum = match starts {
+                true => 0.0,
+                false => choice.sums.last().copied().unwrap_or(0.0),
+            };
             for at in pieces.all() {
-                let toward = self.toward(&part, &pieces, at, point, normal);
+                let toward = self.toward(part, &pieces, at, point, normal);
                 sum += toward.map_or(0.0, |(ways, factor)| {
                     factor * ways.map(&brightness).iter().sum::<f64>()
                 });
                 choice.sums.push(sum);
             }
         }
-        choice.ends[list..].fill([choice.parts.len(), choice.sums.len()]);
-        choice.share_out();
-    }
-
-    /// A part by its number.
-    fn part(&self, choice: &Choice, k: usize) -> Rectangle {
-        let known = self.parts.get(k).copied();
-        known.unwrap_or_else(|| choice.found[k - self.parts.len()])
+        if choice.shared[0] == choice.parts.len() {
+            choice.shared[1] = choice.sums.len();
+        }
+        let [all, own] = choice.totals();
+        choice.own = match (all > 0.0, own > 0.0) {
+            (true, true) => OWN_RAYS,
+            (_, own) => f64::from(u8::from(own)),
+        };
     }
 
     /// Adds parts in pieces, coarser ones where they were too many; how long they are for their distance.
@@ -145,7 +102,7 @@ impl Openings {
             };
             let mut first = before;
             for k in list.clone() {
-                let pieces = self.pieces((k, &self.part(choice, k)), point, length, first);
+                let pieces = self.pieces(k, point, length, first);
                 first += pieces.count() as usize;
                 choice.parts.push(pieces);
             }
@@ -157,13 +114,8 @@ impl Openings {
     }
 
     /// A part in pieces no longer than this for their distance.
-    fn pieces(
-        &self,
-        (part, of): (usize, &Rectangle),
-        point: DVec3,
-        length: f64,
-        first: usize,
-    ) -> Pieces {
+    fn pieces(&self, part: usize, point: DVec3, length: f64, first: usize) -> Pieces {
+        let of = &self.parts[part];
         let [low, high] = [of.low, of.high].map(|at| self.point(of.plane, at));
         // Never none: a point on the box would have no end of pieces.
         let distance = (point.clamp(low, high) - point).length();
@@ -222,8 +174,8 @@ impl Openings {
     ) -> [f64; N] {
         let mut sum = [0.0; N];
         for k in 0..self.shared {
+            let pieces = self.pieces(k, point, LENGTH, 0);
             let part = &self.parts[k];
-            let pieces = self.pieces((k, part), point, LENGTH, 0);
             for at in pieces.all() {
                 if let Some((ways, factor)) = self.toward(part, &pieces, at, point, normal) {
                     for each in ways.map(&brightness) {
@@ -237,23 +189,27 @@ impl Openings {
 
     /// A place on a part, chosen by what the parts may bring.
     pub(crate) fn choose(&self, choice: &Choice, [u, v]: [f64; 2]) -> Option<DVec3> {
-        let mut rest = u;
-        let list = (0..LISTS).rev().find(|&list| {
-            let within = rest < choice.shares[list];
-            rest -= if within { 0.0 } else { choice.shares[list] };
-            within
-        })?;
-        let sums = choice.pieces(list);
-        let before = choice.before(sums.start);
-        let target = before + rest / choice.shares[list] * choice.total(list);
+        let totals = choice.totals();
+        let own = u < choice.own;
+        let (list, share) = match own {
+            true => (1, u / choice.own),
+            false => (0, (u - choice.own) / (1.0 - choice.own)),
+        };
+        if totals[list] <= 0.0 {
+            return None;
+        }
+        let (parts, sums) = choice.lists()[list].clone();
+        let target = share * totals[list];
         let all = &choice.sums[sums.clone()];
-        let k = all.partition_point(|&sum| sum <= target).min(all.len() - 1) + sums.start;
-        let rest = ((target - choice.before(k)) / choice.of(k)).clamp(0.0, 1.0);
-        let piece = k as u32;
-        let pieces = choice.parts[choice.parts.partition_point(|p| p.first <= piece) - 1];
-        let part = self.part(choice, pieces.part as usize);
+        let k = all.partition_point(|&sum| sum <= target).min(all.len() - 1);
+        let worth = choice.of(sums.start + k);
+        let rest = ((target - (all[k] - worth)) / worth).clamp(0.0, 1.0);
+        let piece = (sums.start + k) as u32;
+        let parts = &choice.parts[parts];
+        let pieces = &parts[parts.partition_point(|p| p.first <= piece) - 1];
+        let part = &self.parts[pieces.part as usize];
         let number = piece - pieces.first;
-        let [low, size] = pieces.place(&part, [number / pieces.along[1], number % pieces.along[1]]);
+        let [low, size] = pieces.place(part, [number / pieces.along[1], number % pieces.along[1]]);
         Some(self.point(part.plane, [low[0] + rest * size[0], low[1] + v * size[1]]))
     }
 
@@ -263,18 +219,19 @@ impl Openings {
         if !t.is_finite() {
             return 0.0;
         }
-        let by_area: f64 = (0..LISTS)
-            .filter(|&list| choice.shares[list] > 0.0)
-            .map(|list| {
-                let parts = choice.parts[choice.list(list)].iter();
-                let mut parts =
-                    parts.map(|&pieces| (pieces, self.part(choice, pieces.part as usize)));
-                let held = parts.find(|(_, part)| part.holds(spot.plane, spot.at));
-                held.map_or(0.0, |(pieces, part)| {
+        let by_area: f64 = [1.0 - choice.own, choice.own]
+            .into_iter()
+            .zip(choice.lists())
+            .zip(choice.totals())
+            .filter(|((share, _), total)| *share > 0.0 && *total > 0.0)
+            .map(|((share, (parts, _)), total)| {
+                let mut parts = choice.parts[parts].iter();
+                let holds = |p: &&Pieces| self.parts[p.part as usize].holds(spot.plane, spot.at);
+                parts.find(holds).map_or(0.0, |pieces| {
+                    let part = &self.parts[pieces.part as usize];
                     let count = f64::from(pieces.count());
-                    let piece = choice.of(pieces.at(&part, spot.at));
-                    choice.shares[list] * piece / choice.total(list) * count
-                        / part.area().max(1e-300)
+                    let piece = choice.of(pieces.at(part, spot.at));
+                    share * piece / total * count / part.area().max(1e-300)
                 })
             })
             .sum();
@@ -313,58 +270,23 @@ impl Pieces {
 }
 
 impl Choice {
-    fn clear(&mut self) {
-        self.parts.clear();
-        self.sums.clear();
-        self.found.clear();
-        self.ends = Default::default();
+    /// Parts and pieces of all places, and of the point's own.
+    fn lists(&self) -> [(Range<usize>, Range<usize>); 2] {
+        let [parts, pieces] = self.shared;
+        [
+            (0..parts, 0..pieces),
+            (parts..self.parts.len(), pieces..self.sums.len()),
+        ]
     }
 
-    /// Takes out the parts of the point alone.
-    fn forget_point(&mut self) {
-        let [parts, pieces] = self.ends[LISTS - 2];
-        self.parts.truncate(parts);
-        self.sums.truncate(pieces);
-    }
-
-    /// Most rays to the parts that are known best, of what is left most to the next.
-    fn share_out(&mut self) {
-        let mut left = 1.0;
-        self.shares = [0.0; LISTS];
-        for list in (0..LISTS).rev() {
-            if self.total(list) > 0.0 {
-                self.shares[list] = if list > 0 { OWN_RAYS * left } else { left };
-                left -= self.shares[list];
-            }
-        }
-        let all: f64 = self.shares.iter().sum();
-        self.shares.iter_mut().for_each(|s| *s /= all.max(1e-300));
-    }
-
-    /// The parts of a list.
-    fn list(&self, list: usize) -> Range<usize> {
-        let first = if list > 0 { self.ends[list - 1][0] } else { 0 };
-        first..self.ends[list][0]
-    }
-
-    /// Its pieces.
-    fn pieces(&self, list: usize) -> Range<usize> {
-        let first = if list > 0 { self.ends[list - 1][1] } else { 0 };
-        first..self.ends[list][1]
-    }
-
-    fn total(&self, list: usize) -> f64 {
-        let pieces = self.pieces(list);
-        self.before(pieces.end) - self.before(pieces.start)
-    }
-
-    /// Of all pieces before the `k`-th.
-    fn before(&self, k: usize) -> f64 {
-        if k > 0 { self.sums[k - 1] } else { 0.0 }
+    fn totals(&self) -> [f64; 2] {
+        self.lists()
+            .map(|(_, pieces)| self.sums[pieces].last().copied().unwrap_or(0.0))
     }
 
     /// Of the `k`-th piece.
     fn of(&self, k: usize) -> f64 {
-        self.sums[k] - self.before(k)
+        let first = k == 0 || k == self.shared[1];
+        self.sums[k] - if first { 0.0 } else { self.sums[k - 1] }
     }
 }

@@ -24,8 +24,6 @@ const ENOUGH: usize = 128;
 const STEEP: f64 = 0.05;
 /// Rectangles of all places together, and of one. An opening that is a rectangle takes one.
 const PARTS: [usize; 2] = [64, 6];
-/// Gaps that are kept for points to aim at.
-const KEPT: usize = 256;
 /// Rays that must have left a place, or a small one, for rectangles of its own.
 const OWN: [usize; 2] = [8, 64];
 /// A place has rectangles of its own where these have less than this share of the area that all places' have there, and no larger share of
@@ -91,10 +89,6 @@ impl Openings {
             let way = |at: DVec3| (at - starts[k].point).normalize_or_zero();
             meet(&starts[k], &targets.map(way)).map(|met| met.is_none())
         });
-        if openings.differ() {
-            let aim = Aim::new(&openings, &gaps);
-            openings.gaps = aim.some(KEPT, &mut Pcg::new(hash(seed, 0x9a5)));
-        }
         openings
     }
 
@@ -194,7 +188,7 @@ impl Openings {
         free: impl Fn(usize, [DVec3; BEAM]) -> [bool; BEAM] + Sync,
     ) {
         let mut spots: Vec<Spot> = exits.iter().map(|e| e.spot).collect();
-        self.parts = self.cover(&mut spots, Edges::Sharp, self.cells(), PARTS[0]);
+        self.parts = self.cover(&mut spots, Edges::Sharp, PARTS[0]);
         self.shared = self.parts.len();
         let kinds: [fn(&Exit) -> usize; 2] = [|e| e.place, |e| e.small];
         self.own = [0, 1].map(|k| {
@@ -216,22 +210,10 @@ impl Openings {
         });
     }
 
-    /// The least width that rays from many places tell.
-    fn cells(&self) -> impl Fn(u8) -> [f64; 2] {
+    fn cover(&self, spots: &mut [Spot], edges: Edges, most: usize) -> Vec<Rectangle> {
         let sides: [Rectangle; 6] = std::array::from_fn(|side| self.side(side as u8));
-        move |side| sides[usize::from(side)].size().map(|s| s / CELLS as f64)
-    }
-
-    /// Rectangles on the box about spots.
-    pub(super) fn cover(
-        &self,
-        spots: &mut [Spot],
-        edges: Edges,
-        least: impl Fn(u8) -> [f64; 2],
-        most: usize,
-    ) -> Vec<Rectangle> {
-        let sides: [Rectangle; 6] = std::array::from_fn(|side| self.side(side as u8));
-        cover(spots, &sides, edges, least, most)
+        let cell = |side: u8| sides[usize::from(side)].size().map(|s| s / CELLS as f64);
+        cover(spots, &sides, edges, cell, most)
     }
 
     /// The parts of a place alone, if they are smaller than those of all places that are seen from there, and these mostly hidden.
@@ -254,7 +236,7 @@ impl Openings {
             all
         };
         let upto: Vec<f64> = seen.iter().map(upto).collect();
-        let parts = self.cover(&mut spots, Edges::Blurred, self.cells(), PARTS[1]);
+        let parts = self.cover(&mut spots, Edges::Blurred, PARTS[1]);
         if parts.iter().map(Rectangle::area).sum::<f64>() >= SMALLER * all {
             return Vec::new();
         }

@@ -42,8 +42,6 @@ pub(crate) struct Openings {
     pub(super) share: f64,
     /// First of the parts of each kind of place, one more at the end; and of small ones.
     pub(super) own: [Vec<u32>; 2],
-    /// Some gaps, as many in each cell that holds any; none where no place has parts of its own.
-    pub(crate) gaps: Vec<DVec3>,
 }
 
 /// A ray that left: from which kind of place, and where.
