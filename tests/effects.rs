@@ -5,12 +5,14 @@ mod built;
 
 use built::Room;
 use glam::{DVec3, dvec3};
+use haarlight::audit::{Reference, Report};
 use haarlight::scene::effects::{Kind, Plan};
 use haarlight::scene::profile::Profile;
 use haarlight::scene::sky::{SkyType, SkyWish};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::LEAVES;
+use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -271,4 +273,47 @@ fn effects_that_are_not_there_cost_nothing() {
         plan.contains("the room is closed: no ray leaves it"),
         "{plan}"
     );
+}
+
+/// The audit's paths follow all effects by their own rules, and each where others are: panes before sky and sun, walls of paper, a
+/// tinted mirror, a ceiling with a dye, and a table that shines by a profile.
+#[test]
+fn paths_agree_with_all_effects_at_once() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/glazed.glb");
+    let csv = |rows: &str| json!({"csv": rows});
+    let options = Options {
+        said: Some(json!({"materials": {
+            "walls": {"transmission": 0.05},
+            "red wall": {"mirror": true},
+            "ceiling": {"reflectance": 0.4, "fluorescence": {
+                "excitation": csv("380,0.5\n480,0.5"), "emission": csv("500,1\n600,1"), "yield": 1.0,
+            }},
+            "table": {"emission": {"profile": "gallery-panel.ldt", "name": "cie/LED-B3"}},
+        }})),
+        ..Options::default()
+    };
+    let bake = baked(
+        Scene::load(path, &options).unwrap(),
+        Representation::Adaptive,
+    );
+    let plan = bake.plan();
+    for kind in [
+        Kind::MeasuredLamps,
+        Kind::Sky,
+        Kind::Sun,
+        Kind::Panes,
+        Kind::Sheets,
+        Kind::Mirrors,
+        Kind::Fluorescence,
+    ] {
+        assert!(plan.runs(kind), "{plan}");
+    }
+    let reference = Reference::new(&bake, 150, 1 << 14, 3);
+    let report = Report::against(&bake, &reference);
+    println!(
+        "dE00 {:?}, bias {:?}, noise {:.3}, estimate {:?}",
+        report.de2000.mean, report.bias, report.noise_de2000, report.estimate_de2000
+    );
+    assert!(report.de2000.mean.value < 1.5, "{:?}", report.de2000);
+    assert!(report.bias.value.abs() < 0.02, "{:?}", report.bias);
 }

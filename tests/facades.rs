@@ -8,7 +8,7 @@ mod built;
 mod daylit;
 
 use built::Room;
-use daylit::{LUX, bake, beside, cie, glass_of_the_report, places_beside, summed, wish};
+use daylit::{LUX, bake, beside, cie, glass_of_the_report, places_beside, row, summed, wish};
 use glam::DVec3;
 use haarlight::scene::pane::inside_of;
 use haarlight::scene::sky::{Distribution, direction};
@@ -41,6 +41,7 @@ fn cie_171_case_5_12() {
         let bake = bake(room, &wish(kind));
         let sky = Distribution::new(kind, direction(60.0, 0.0));
         let places = places_beside();
+        let mut off = Vec::new();
         for (probed, place) in bake.probe(&places).iter().zip(places) {
             let across = cie(0.0, 1.0, 0.0);
             let seen = |d: DVec3| outside(&sky, d) * glass_of_the_report(d.dot(across).abs());
@@ -48,8 +49,18 @@ fn cie_171_case_5_12() {
             let got = probed.xyz[1];
             println!("type {kind}, {place:?}: {got:.4} for {want:.4}");
             assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
+            off.push(got / want - 1.0);
         }
+        summary("5.12", kind, &off);
     }
+}
+
+/// The row of a case under a type of sky.
+fn summary(case: &str, kind: u8, off: &[f64]) {
+    let worst = off.iter().fold(0.0, |worst: f64, off| worst.max(off.abs()));
+    let squares: f64 = off.iter().map(|off| off * off).sum();
+    let rms = (squares / off.len() as f64).sqrt();
+    row(case, &format!("type {kind}"), worst, rms);
 }
 
 /// Irradiance through a parallelogram by what is seen in each direction.
@@ -151,7 +162,7 @@ fn meets_room(from: DVec3, d: DVec3) -> bool {
 }
 
 /// The window under a mask, by quadrature, and as it is baked.
-fn masked(corner: DVec3, sides: [DVec3; 2], kind: u8) {
+fn masked(case: &str, corner: DVec3, sides: [DVec3; 2], kind: u8) {
     let sky = Distribution::new(kind, direction(60.0, 0.0));
     let mask = Mask::new(corner, sides, &sky);
     let mut room = Room::new();
@@ -160,6 +171,7 @@ fn masked(corner: DVec3, sides: [DVec3; 2], kind: u8) {
     room.quad(corner, sides[0], sides[1], paint);
     let bake = bake(room, &wish(kind));
     let places = places_beside();
+    let mut off = Vec::new();
     for (probed, place) in bake.probe(&places).iter().zip(places) {
         let seen = |d: DVec3| mask.met(place.0, d).unwrap_or_else(|| outside(&sky, d));
         let passed_on = |d: DVec3| mask.met(place.0, d).unwrap_or(0.0);
@@ -167,7 +179,9 @@ fn masked(corner: DVec3, sides: [DVec3; 2], kind: u8) {
         let of_mask = LUX * whole(passed_on, window, place);
         println!("type {kind}, {place:?}: {got:.4} for {want:.4}, {of_mask:.4} of the mask");
         assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
+        off.push(got / want - 1.0);
     }
+    summary(case, kind, &off);
 }
 
 /// 5.13: a canopy above the window, 1 m deep, that goes on to both sides.
@@ -180,7 +194,7 @@ fn a_canopy_above_a_window() {
         cie(0.0, 1.0, 0.0),
     );
     for kind in [1, 5, 12] {
-        masked(corner, [x, y], kind);
+        masked("5.13", corner, [x, y], kind);
     }
 }
 
@@ -193,6 +207,6 @@ fn a_facade_opposite_a_window() {
         cie(0.0, 0.0, 9.0),
     );
     for kind in [1, 5, 12] {
-        masked(corner, [x, z], kind);
+        masked("5.14", corner, [x, z], kind);
     }
 }

@@ -204,6 +204,7 @@ fn a_profile_lights_the_floor_by_its_closed_form() {
             for c in [0.0, 30.0, 90.0, 180.0, 240.0, 315.0] {
                 let want = lopsided(gamma, c) * gamma.to_radians().cos().powi(3) / 2.5_f64.powi(2);
                 let found = lux(&bake, below(2.5, gamma, c));
+                println!("{gamma} {c}: {found} for {want}");
                 assert!(
                     (found / want - 1.0).abs() < 1e-4,
                     "{gamma} {c}: {found} {want}"
@@ -368,6 +369,7 @@ fn a_panel_shines_from_its_area() {
                 }
             }
             let found = lux(&bake, at);
+            println!("{height} {at}: {found} for {want}");
             assert!(
                 (found / want - 1.0).abs() < 2e-3,
                 "{height} {at}: {found} {want}"
@@ -418,6 +420,7 @@ fn a_panel_is_right_close_by() {
         ] {
             let want = PI * 500.0 / 0.72 * lambert_polygon(at, normal, &panel);
             let found = bake.probe(&[(at, normal)])[0].xyz[1];
+            println!("{below} {at} {normal}: {found} for {want}");
             assert!(
                 (found / want - 1.0).abs() < 0.01,
                 "{below} {at} {normal}: {found} {want}"

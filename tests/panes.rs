@@ -6,7 +6,7 @@ mod built;
 mod daylit;
 
 use built::{Room, baked, close};
-use daylit::{LUX, beside, cie, glass_of_the_report, places_beside, wish};
+use daylit::{LUX, beside, cie, glass_of_the_report, places_beside, row, wish};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, de2000};
@@ -606,6 +606,7 @@ fn case_5_10_glazed_openings() {
     ];
     for (opening, printed) in printed {
         let bake = glazed(opening);
+        let (mut worst, mut squares) = (0.0_f64, 0.0);
         let y = |v: f64| DVec3::NEG_Z * v;
         let wall = (0..6).map(|k| (dvec3(2.0, 2.75 - 0.5 * f64::from(k), 0.0), y(1.0)));
         let floor = (0..8).map(|k| {
@@ -633,6 +634,8 @@ fn case_5_10_glazed_openings() {
                 "{opening} {k}: {got:.3} for {want:.3} ({:+.2} %)",
                 100.0 * (got / want - 1.0)
             );
+            let off = got / want - 1.0;
+            (worst, squares) = (worst.max(off.abs()), squares + off * off);
             // And half a unit of the printed digits.
             assert!(
                 (got - want).abs() <= 0.005 * want + 0.005,
@@ -646,6 +649,8 @@ fn case_5_10_glazed_openings() {
                 );
             }
         }
+        let rms = (squares / points.len() as f64).sqrt();
+        row("5.10", &format!("type 5, {opening} m"), worst, rms);
     }
 }
 

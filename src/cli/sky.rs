@@ -15,10 +15,10 @@ pub struct SkyArgs {
     #[arg(long = "sky", value_name = "TYPE|MAP")]
     pub name: Option<SkyName>,
     /// Where the sun stands, degrees: its height and its azimuth from north (-Z) over east (+X); or the place and time that it
-    /// is seen from, as in 52.5,13.4,2026-06-21T12:00:00+02:00.
+    /// is seen from, as in 52.5,13.4,2026-06-21T12:00:00+02:00; none: no sun, nor parallel light of the file.
     #[arg(
         long,
-        value_name = "ELEVATION,AZIMUTH|LATITUDE,LONGITUDE,TIME",
+        value_name = "ELEVATION,AZIMUTH|LATITUDE,LONGITUDE,TIME|none",
         allow_hyphen_values = true
     )]
     pub sun: Option<SunPlace>,

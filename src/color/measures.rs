@@ -465,7 +465,9 @@ mod tests {
             assert!(values("cie/A", meter)[2].abs() < 1e-5);
             assert!((values("cie/D65", meter)[2] - 0.0032).abs() < 5e-5);
             // CIE S 026 by frudawski.de: melanopic daylight of 100 lx, and FL12 for all receptors.
-            for (name, mel) in [("cie/A", 49.58), ("cie/D55", 90.40), ("cie/FL12", 40.42)] {
+            // LED-B2: our sum over 5 nm of the tables of CIE 015 and CIE S 026, as no printed figure is at hand.
+            let published = [("cie/A", 49.58), ("cie/D55", 90.40), ("cie/FL12", 40.42)];
+            for (name, mel) in published.into_iter().chain([("cie/LED-B2", 45.78)]) {
                 let got = values(name, meter)[11];
                 assert!((got / mel - 1.0).abs() < 0.005, "{name}: {got}");
             }

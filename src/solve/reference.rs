@@ -7,8 +7,9 @@
 //!
 //! What fluoresces adds the 64 x 64 Donaldson matrix of its material times its irradiance, found in rounds; each loses energy.
 //! A sheet has a patch on each side, and what meets the one leaves the other by its transmittance. Panes filter each ray of a factor by
-//! incidence and leaf; where they have a colour every leaf has factors of its own, which takes 64 times the memory. It knows no mirrors:
-//! rooms with them are refused.
+//! incidence and leaf; where they have a colour every leaf has factors of its own, which takes 64 times the memory. Skies come by 16,384
+//! directions a point, of their parts and not of the formula; the sun is parallel, without its disc. It knows no mirrors: rooms with them are
+//! refused.
 //!
 //! It shares triangles, Lambert's formula, the ray index and what a ray crosses of panes with the solver: no hierarchy, no links, no
 //! lanes, no iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.

@@ -40,9 +40,10 @@ fn run(scene: Scene, settings: Settings) -> Bake {
     bake
 }
 
-/// `a` is `b`, but for a share of it.
+/// `a` is `b`, but for a share of it. Printed for `tools/effects/closed_forms.py`.
 #[track_caller]
 pub(crate) fn close(a: f64, b: f64, tolerance: f64, what: &str) {
+    println!("{what}: {a} for {b}");
     assert!(
         (a - b).abs() <= tolerance * b.abs(),
         "{what}: {a} for {b}, off by {:e}",

@@ -8,6 +8,15 @@ use haarlight::scene::sky::{Brightness, SkyType, SkyWish, SunPlace, SunWish};
 use haarlight::solve::{Bake, Settings};
 use std::f64::consts::PI;
 
+/// Prints a row of the table in `BENCHMARKS.md`: a case of CIE 171, what of it, the worst point and the root mean square, as shares.
+pub(crate) fn row(case: &str, what: &str, worst: f64, rms: f64) {
+    println!(
+        "CIE 171 | {case} | {what} | {:.3} | {:.3} |",
+        100.0 * worst,
+        100.0 * rms
+    );
+}
+
 /// Illuminance of open ground in these tests: per cent are lux.
 pub(crate) const LUX: f64 = 100.0;
 

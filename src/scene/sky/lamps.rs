@@ -35,6 +35,10 @@ pub(crate) fn join(
         return None;
     }
     let (kind, sun) = asked(wish, nodes, lights, check)?;
+    let sunless_by_wish = wish.sun.place == Some(SunPlace::Nowhere);
+    if sunless_by_wish {
+        lights.retain(|light| light.kind != LightKind::Directional);
+    }
     let toward = sun.as_ref().map(|sun| sun.toward);
     let light = match (wish.turbidity.zip(toward), kind, &wish.map) {
         (Some((turbidity, sun)), ..) => Light::of_air(wish, turbidity, sun, grid, check)?,
@@ -48,8 +52,9 @@ pub(crate) fn join(
         spectra,
     };
     let (ground, own_sun) = (light.ground, light.sun);
-    if sun.is_none() && own_sun.is_none() {
+    if sun.is_none() && own_sun.is_none() && !sunless_by_wish {
         sunless(wish, check);
+        sun_of_file(makes.lights, check);
     }
     let (mut sky, spectrum) = makes.sky(light);
     let shining = match sun {
@@ -58,6 +63,7 @@ pub(crate) fn join(
             let usual = usual(kind.unwrap_or(CLEAR), Some(angles(sun.toward)[0]));
             makes.placed(wish, &sun, usual[1], check)
         }
+        None if sunless_by_wish => None,
         None => own_sun.and_then(|(toward, shape)| makes.of_map(wish, toward, spectrum, shape)),
     };
     if let Some(sun) = shining {
@@ -88,16 +94,30 @@ fn sunless(wish: &SkyWish, check: &mut Check) {
     }
 }
 
+/// Names of the parallel lights of the file, and the first as it is.
+fn parallel(lights: &[PunctualLight]) -> Option<(String, String)> {
+    let parallel = lights.iter().filter(|l| l.kind == LightKind::Directional);
+    let names: Vec<String> = parallel.map(|l| short(&l.name)).collect();
+    let quoted: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
+    Some((listed(&quoted), names.into_iter().next()?))
+}
+
+/// Parallel light of the file goes on shining under a sky of which no sun is said.
+fn sun_of_file(lights: &[PunctualLight], check: &mut Check) {
+    if let Some((all, name)) = parallel(lights) {
+        check.warn(format!(
+            "parallel light of the file ({all}) shines on under this sky, as a sun would: --sun none, or \"sun\": false in the \"sky\" of the \
+             file of spectra, puts it out; \"sun\": \"{name}\" there makes it the sun of the sky"
+        ));
+    }
+}
+
 /// Parallel light of the file beside a sun is a second one.
 fn two_suns(lights: &[PunctualLight], check: &mut Check) {
-    let parallel = lights.iter().filter(|l| l.kind == LightKind::Directional);
-    let names: Vec<String> = parallel.map(|l| format!("'{}'", short(&l.name))).collect();
-    if let Some(first) = names.first() {
-        let name = first.trim_matches('\'');
+    if let Some((all, name)) = parallel(lights) {
         check.warn(format!(
-            "the sun shines beside parallel light of the file ({}): two suns, if that is meant as one; \"sun\": \"{name}\" in the \"sky\" \
-             of the file of spectra, without --sun, makes it the sun",
-            listed(&names)
+            "the sun shines beside parallel light of the file ({all}): two suns, if that is meant as one; \"sun\": \"{name}\" in the \"sky\" \
+             of the file of spectra, without --sun, makes it the sun"
         ));
     }
 }
@@ -168,6 +188,7 @@ fn sun_of(
                 return Err(());
             }
         },
+        SunPlace::Nowhere => return Ok(None),
         SunPlace::Light(name) => {
             let is = |light: &PunctualLight| {
                 let node = |(node, of): &(String, String)| node == name && *of == light.name;

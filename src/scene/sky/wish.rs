@@ -15,7 +15,8 @@
 //! `luminance_cd_m2` is then that of white, (1, 1, 1), by default 1. What it shows below the horizon counts, unless
 //! `ground_reflectance` puts open ground there. The sun
 //! stands at an elevation and azimuth, or where it is seen at `latitude_deg`, `longitude_deg` (east) and `time`
-//! (`2026-06-21T12:00:00+02:00`); or `"sun"` is the name of a directional light of the file. Its `illuminance_lx` is that of a plane
+//! (`2026-06-21T12:00:00+02:00`); or `"sun"` is the name of a directional light of the file, or `false`: none shines, nor does parallel light
+//! of the file. Its `illuminance_lx` is that of a plane
 //! across its rays, its `cct_k` that of CIE daylight, below 4000 K, which that does not reach, of a blackbody.
 
 use super::sun::Hours;
@@ -143,12 +144,20 @@ pub enum SunPlace {
     },
     /// A directional light of the file, by its name or its node's.
     Light(String),
+    /// None shines; directional lights of the file are put out.
+    Nowhere,
 }
+
+/// What a command line says for no sun.
+const NO_SUN: &str = "none";
 
 impl FromStr for SunPlace {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if text == NO_SUN {
+            return Ok(Self::Nowhere);
+        }
         let number = |text: &str, what: &str, [least, most]: [f64; 2]| {
             let number = text.trim().parse::<f64>().ok();
             let within = number.filter(|n| (least..=most).contains(n));
@@ -170,7 +179,7 @@ impl FromStr for SunPlace {
             }),
             _ => Err(format!(
                 "the sun stands at ELEVATION,AZIMUTH in degrees, or at LATITUDE,LONGITUDE,TIME as in 52.5,13.4,{MOMENT}; decimals have a \
-                 point"
+                 point; {NO_SUN} puts it out"
             )),
         }
     }
@@ -316,6 +325,7 @@ impl SkyWish {
         };
         match sky.get("sun") {
             None => {}
+            Some(Value::Bool(false)) => wish.sun.place = Some(SunPlace::Nowhere),
             Some(Value::String(name)) => wish.sun.place = Some(SunPlace::Light(name.clone())),
             Some(sun) => wish.sun = SunWish::read(sun, &format!("{place}, sun"), reader),
         }
@@ -485,6 +495,7 @@ mod tests {
                 azimuth: 200.0
             })
         );
+        assert_eq!("none".parse(), Ok(SunPlace::Nowhere));
         let clock = "52.5,13.4,2026-06-21T12:00:00+02:00".parse();
         assert!(matches!(clock, Ok(SunPlace::Clock { latitude: 52.5, .. })));
         for (bad, why) in [

@@ -10,8 +10,9 @@ use std::f64::consts::PI;
 
 /// Points of a triangle of a lamp with a profile: where a shadow's edge crosses it they are off by about .3 %.
 const SHINING_POINTS: u32 = 1024;
-/// Rays for the sky of a point: .1 % of open ground's.
-const DOME_RAYS: u32 = 1024;
+/// Rays for the sky of a point. In a box of 2 m with a gap of 1 m about an edge points are off by .14 % (root mean square, patches twice as
+/// fine) with 16,384, by 1 % with 1024.
+const DOME_RAYS: u32 = 16_384;
 
 /// The lamps of a room, and the ways of their light.
 pub(super) struct Lamps<'a> {

@@ -26,7 +26,8 @@ impl<'a> Ways<'a> {
         Self {
             scene,
             rays: RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &solid),
-            blocks: Plan::of(scene).runs(Kind::Occlusion),
+            // Between the walls of a convex room nothing blocks, but these block the sky.
+            blocks: Plan::of(scene).runs(Kind::Occlusion) || scene.sky.is_some(),
             panes: Panes::new(scene, mesh.centre),
             count,
         }
