@@ -105,7 +105,7 @@ impl Outlook {
         }
         let mean = mean_area(tree);
         let escape = |&k: &usize| {
-            let wanted = LEAF_RAYS[0] as f64 * (tree.nodes[k].area / mean);
+            let wanted = LEAF_RAYS[0] as f64 * (tree.nodes[k].counted / mean);
             let wanted = (wanted as usize).clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
             escape_from(tree, k, sight, wanted.next_multiple_of(BEAM), seed)
         };
@@ -163,7 +163,7 @@ impl Outlook {
             .map(|chunk| {
                 interrupt.check()?;
                 let each = |&leaf: &u32| {
-                    let wanted = usual * tree.node(leaf).area;
+                    let wanted = usual * tree.node(leaf).counted;
                     let pattern = patterns
                         .iter()
                         .find(|p| p.len() as f64 >= wanted)
@@ -451,9 +451,9 @@ impl Outlook {
     }
 }
 
-/// Mean area of the leaves.
+/// Mean area of the leaves, as far as it counts.
 fn mean_area(tree: &Tree) -> f64 {
-    tree.nodes.first().map_or(0.0, |n| n.area) / tree.leaves().count().max(1) as f64
+    tree.counted() / tree.leaves().count().max(1) as f64
 }
 
 /// Casts `count` rays out of a leaf. How many there were, how many missed all fronts, how many started where something

@@ -36,6 +36,12 @@ impl Refinement {
         self.tree.leaves().collect()
     }
 
+    /// As much of a leaf's area as takes part and counts.
+    pub(crate) fn counted(&self, leaf: u32) -> f64 {
+        let node = self.tree.node(leaf);
+        self.areas[leaf as usize] * (node.counted / node.area)
+    }
+
     /// The links of each node.
     pub(crate) fn link_rows(&self) -> LinkRows {
         LinkRows::new(self.tree.nodes.len(), &self.graph.links)
@@ -107,7 +113,7 @@ impl Refinement {
                         && self.tree.elements[node.element as usize].depth < MAX_DEPTH
                         && self.outlook.variation(k, &bright, seed)
                             * f64::from(keen[k as usize])
-                            * (node.area / demand.total_area).sqrt()
+                            * self.tree.share(k).sqrt()
                             > demand.threshold
                 })
                 .collect();
