@@ -7,7 +7,7 @@ mod built;
 use built::{Room, sphere};
 use glam::{DVec3, dvec3};
 use haarlight::scene::Scene;
-use haarlight::solve::{Bake, Settings};
+use haarlight::solve::{Averages, Bake, Settings};
 use std::time::Instant;
 
 /// What a room stands on.
@@ -37,6 +37,8 @@ struct Plan {
 const ROOM: DVec3 = dvec3(4.0, 2.6, 3.0);
 /// Thickness of its walls, m.
 const THICK: f64 = 0.2;
+/// Points stand so far above the floor, m: what lies in the plane of something else is raised by less.
+const ABOVE: f64 = 1e-3;
 /// Where on the plain it stands.
 const AWAY: [f64; 2] = [310.0, 170.0];
 
@@ -100,15 +102,15 @@ impl Plan {
         for i in 0..6 {
             for k in 0..4 {
                 let [u, v] = [(f64::from(i) + 0.5) / 6.0, (f64::from(k) + 0.5) / 4.0];
-                points.push((dvec3(u * ROOM.x, 0.0, v * ROOM.z), DVec3::Y));
+                points.push((dvec3(u * ROOM.x, ABOVE, v * ROOM.z), DVec3::Y));
                 points.push((dvec3(u * ROOM.x, ROOM.y, v * ROOM.z), DVec3::NEG_Y));
                 points.push((dvec3(u * ROOM.x, v * ROOM.y, 0.0), DVec3::Z));
                 points.push((dvec3(0.0, v * ROOM.y, u * ROOM.z), DVec3::X));
             }
         }
         let lies_under = |p: &DVec3| {
-            (p.y == 0.0 && p.x > 2.85 && p.z < 2.15)
-                || (p.y == 0.0 && p.distance(dvec3(2.3, 0.0, 2.3)) < 0.1)
+            (p.y == ABOVE && p.x > 2.85 && p.z < 2.15)
+                || (p.y == ABOVE && p.distance(dvec3(2.3, 0.0, 2.3)) < 0.1)
                 || (p.z == 0.0 && p.x > 2.85 && p.y < 0.46)
         };
         points.retain(|(p, _)| !lies_under(p));
@@ -130,23 +132,22 @@ impl Plan {
             .iter()
             .map(|p| p.xyz[1])
             .collect();
-        let solved = started.elapsed().as_secs_f64();
-        let baked = bake.baked(&|_, _| {});
-        let vertices = baked.surfaces.iter().map(|s| s.vertices.len()).sum();
         let last = bake.rounds().last().unwrap();
         let seen = Seen {
             lux,
-            vertices,
+            white: bake.light().white[1],
+            leaves: bake.light().leaves.len(),
+            averages: bake.averages(),
             error: last.error.total_de2000.value.unwrap_or(f64::NAN),
         };
-        let white = bake.light().white[1];
         println!(
-            "{self:?}: {verdict:?} in {} rounds, {} leaves, {} links, estimate {:.3}, white {white:.0}, {vertices} vertices, {solved:.2} s + {:.2} s",
+            "{self:?}: {verdict:?} in {} rounds, {} leaves, {} links, estimate {:.3}, white {:.0}, {:.2} s",
             bake.rounds().len(),
-            bake.light().leaves.len(),
+            seen.leaves,
             last.links,
             seen.error,
-            started.elapsed().as_secs_f64() - solved,
+            seen.white,
+            started.elapsed().as_secs_f64(),
         );
         seen
     }
@@ -155,7 +156,9 @@ impl Plan {
 /// What a bake found.
 struct Seen {
     lux: Vec<f64>,
-    vertices: usize,
+    white: f64,
+    leaves: usize,
+    averages: Averages,
     error: f64,
 }
 
@@ -173,34 +176,69 @@ impl Seen {
     }
 }
 
+/// All rooms on a floor of their own, as large as they are.
+fn plans() -> [Plan; 4] {
+    [(false, false), (false, true), (true, false), (true, true)].map(|(furnished, two_sided)| {
+        Plan {
+            ground: Ground::Floor,
+            two_sided,
+            furnished,
+            size: 1.0,
+        }
+    })
+}
+
+/// Light within what is stated, and as much work: on the plain floors are found to be the same room.
 #[test]
-#[ignore = "prints what is"]
-fn measure() {
-    for furnished in [false, true] {
-        for two_sided in [false, true] {
-            let plan = |ground, size| Plan {
-                ground,
-                two_sided,
-                furnished,
-                size,
-            };
-            let fine = plan(Ground::Floor, 1.0).bake(0.1);
-            let all = [
-                plan(Ground::Floor, 1.0),
-                plan(Ground::Plain, 1.0),
-                plan(Ground::Lying, 1.0),
-                plan(Ground::Floor, 100.0),
-                plan(Ground::Floor, 0.01),
-            ];
-            for plan in all {
-                let seen = plan.bake(0.5);
-                let [rms, most] = seen.off(&fine);
-                println!(
-                    "    off {:.2} % RMS, {:.1} % at most",
-                    100.0 * rms,
-                    100.0 * most
+fn a_plain_around_a_room_changes_nothing() {
+    for plan in plans() {
+        let fine = plan.bake(0.2);
+        let alone = plan.bake(0.5);
+        for ground in [Ground::Plain, Ground::Lying] {
+            let plain = Plan { ground, ..plan }.bake(0.5);
+            // .5 dE00 are about 1.4 % of a mid grey.
+            let [rms, most] = plain.off(&fine);
+            assert!(rms < 0.014 && most < 0.06, "{ground:?}: off {rms}, {most}");
+            let same = |a: f64, b: f64, factor: f64, what: &str| {
+                assert!(
+                    a < factor * b && b < factor * a,
+                    "{ground:?}: {what} {a} for {b}"
                 );
-            }
+            };
+            same(plain.white, alone.white, 1.1, "white");
+            same(plain.error, alone.error, 2.0, "estimate");
+            same(plain.leaves as f64, alone.leaves as f64, 3.0, "leaves");
+            same(
+                plain.averages.counted_m2,
+                alone.averages.counted_m2,
+                1.2,
+                "area that counts",
+            );
+            assert!(plain.averages.area_m2 > 1e6);
+        }
+    }
+}
+
+/// Positions are rounded as much at all powers of two, and no length or area is absolute: not a bit differs.
+#[test]
+fn sizes_by_powers_of_two_change_no_bit() {
+    for plan in plans() {
+        let one = plan.bake(0.5);
+        for size in [64.0, 1.0 / 64.0] {
+            let other = Plan { size, ..plan }.bake(0.5);
+            assert_eq!(one.lux, other.lux, "{size}");
+        }
+    }
+}
+
+/// What is rounded otherwise is split otherwise here and there.
+#[test]
+fn a_hundred_times_as_large_or_small_has_the_same_light() {
+    for plan in plans() {
+        let one = plan.bake(0.5);
+        for size in [100.0, 0.01] {
+            let [rms, most] = Plan { size, ..plan }.bake(0.5).off(&one);
+            assert!(rms < 0.012 && most < 0.04, "{size}: {rms}, {most}");
         }
     }
 }

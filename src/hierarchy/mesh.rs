@@ -90,6 +90,17 @@ impl Frame {
             half_size: 0.5 * (high - low).length(),
         }
     }
+
+    /// To be written down.
+    pub(crate) fn numbers(self) -> [f64; 4] {
+        self.centre.extend(self.half_size).to_array()
+    }
+
+    /// As it was before it was written down.
+    pub(crate) fn of_numbers([x, y, z, half_size]: [f64; 4]) -> Self {
+        let centre = DVec3::new(x, y, z);
+        Self { centre, half_size }
+    }
 }
 
 impl Mesh {

@@ -25,7 +25,6 @@ use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
 use crate::transport::trace::{self, Stains};
-use glam::DVec3;
 use std::path::Path;
 use std::time::Instant;
 
@@ -159,11 +158,7 @@ impl Bake {
             out.put_all(&self.room.parted)?;
             out.put_all(&self.room.counted.splits)?;
             out.put_all(&self.room.counted.shares)?;
-            let frame = self
-                .room
-                .frame
-                .map(|f| [f.centre.x, f.centre.y, f.centre.z, f.half_size]);
-            out.put_all(frame.as_slice())?;
+            out.put_all(self.room.frame.map(Frame::numbers).as_slice())?;
             out.put([self.room.closed, self.room.sealed].map(|c| u8::from(c == Closed::Yes)))?;
             out.put(guess)?;
             out.put(distance.unwrap_or(0.0))?;
@@ -286,10 +281,7 @@ impl Relighter {
             parted,
             closed,
             counted: Counted { splits, shares },
-            frame: frame.first().map(|&[x, y, z, half_size]| Frame {
-                centre: DVec3::new(x, y, z),
-                half_size,
-            }),
+            frame: frame.first().copied().map(Frame::of_numbers),
         };
         let mut bake = Bake::with(scene, settings, Some(known));
         bake.room.keep = true;

@@ -58,23 +58,47 @@ fn shell(glb: &mut Glb) {
     for [left, right] in [[0.0, WALL[0]], [WALL[1], FAR]] {
         let middle = dvec3(0.5 * (left + right), 0.5 * HEIGHT, 0.5 * DEPTH);
         flat(&mut below, [left, 0.0, 0.0], [right, 0.0, DEPTH], middle);
-        flat(&mut above, [left, HEIGHT, 0.0], [right, HEIGHT, DEPTH], middle);
+        flat(
+            &mut above,
+            [left, HEIGHT, 0.0],
+            [right, HEIGHT, DEPTH],
+            middle,
+        );
         for z in [0.0, DEPTH] {
             flat(&mut walls, [left, 0.0, z], [right, HEIGHT, z], middle);
         }
-        let [whole, door] = if left == 0.0 { [left, right] } else { [right, left] };
-        flat(&mut walls, [whole, 0.0, 0.0], [whole, HEIGHT, DEPTH], middle);
+        let [whole, door] = if left == 0.0 {
+            [left, right]
+        } else {
+            [right, left]
+        };
+        flat(
+            &mut walls,
+            [whole, 0.0, 0.0],
+            [whole, HEIGHT, DEPTH],
+            middle,
+        );
         flat(&mut walls, [door, 0.0, 0.0], [door, HEIGHT, from], middle);
         flat(&mut walls, [door, 0.0, to], [door, HEIGHT, DEPTH], middle);
         flat(&mut walls, [door, top, from], [door, HEIGHT, to], middle);
     }
     let middle = dvec3(0.5 * (WALL[0] + WALL[1]), 1.0, 0.5 * (from + to));
     flat(&mut below, [WALL[0], 0.0, from], [WALL[1], 0.0, to], middle);
-    flat(&mut around, [WALL[0], top, from], [WALL[1], top, to], middle);
+    flat(
+        &mut around,
+        [WALL[0], top, from],
+        [WALL[1], top, to],
+        middle,
+    );
     for z in [from, to] {
         flat(&mut around, [WALL[0], 0.0, z], [WALL[1], top, z], middle);
     }
-    let parts = [(&walls, plaster), (&above, ceiling), (&below, floor), (&around, frame)];
+    let parts = [
+        (&walls, plaster),
+        (&above, ceiling),
+        (&below, floor),
+        (&around, frame),
+    ];
     glb.draw("shell", &parts);
 }
 
@@ -83,7 +107,8 @@ fn lamp(glb: &mut Glb) {
     let glow = glb.lamp("tube", [0.7; 3], [1.0, 0.97, 0.9], 7200.0);
     let metal = glb.paint("housing", [0.8; 3]);
     let middle = dvec3(2.1, HEIGHT - 0.08, 1.8);
-    let lying = DMat4::from_translation(middle - dvec3(-0.6, 0.0, 0.0)) * DMat4::from_rotation_z(FRAC_PI_2);
+    let lying =
+        DMat4::from_translation(middle - dvec3(-0.6, 0.0, 0.0)) * DMat4::from_rotation_z(FRAC_PI_2);
     let tube = tube([0.0; 3], 0.019, 1.2, 8).moved(lying);
     let housing = block(
         [middle.x - 0.62, HEIGHT - 0.05, middle.z - 0.04],
@@ -118,6 +143,11 @@ fn furniture(glb: &mut Glb) {
     let board = block([7.32, 0.0, 0.05], [7.38, 1.0, 1.75]);
     glb.draw("headboard", &[(&board, oak)]);
     let mut rug = Mesh::default();
-    flat(&mut rug, [5.0, 0.01, 1.9], [6.8, 0.01, 3.1], dvec3(6.0, 2.0, 2.5));
+    flat(
+        &mut rug,
+        [5.0, 0.01, 1.9],
+        [6.8, 0.01, 3.1],
+        dvec3(6.0, 2.0, 2.5),
+    );
     glb.draw("rug", &[(&rug, wool)]);
 }
