@@ -359,19 +359,21 @@ mod tests {
         let mut tree = tree();
         let counted = tree.count(landings([20_000, 20_000]));
         tree.weigh(&counted);
-        assert!((tree.counted() - 2.0).abs() < 0.1, "{}", tree.counted());
+        // 1 m2 of each. Parts are told apart down to legs of .35 m (2^-12 of the face), and those that the border of 2 m passes through count.
+        let all = tree.counted();
+        assert!((2.0..2.5).contains(&all), "{all}");
         assert_eq!(tree.node(1).counted, 1.0);
         let [low, high] = tree.counted_box().unwrap();
-        assert!(low.length() < 1e-9 && high.max_element() < 1.5, "{high}");
+        assert!(low.length() < 1e-9 && high.max_element() < 1.8, "{high}");
         // Random points lie where it counts.
         let mut random = Pcg::new(9);
-        let mut on = [0.0; 2];
+        let mut on = [0.0_f64; 2];
         for k in 0..1000 {
             let (entry, weights) = tree.random(f64::from(k) / 1000.0, [random.f64(), random.f64()]);
             on[entry] += 1e-3;
             assert!(entry == 0 || weights[0] > 1.0 - 2e-3, "{weights:?}");
         }
-        assert!((on[0] - 0.5).abs() < 0.03, "{on:?}");
+        assert!((on[0] - 1.0 / all).abs() < 0.01, "{on:?}");
     }
 
     #[test]

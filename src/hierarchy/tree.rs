@@ -173,9 +173,9 @@ pub struct Tree {
     /// without sheets.
     pub behind: Vec<u32>,
     /// Running sum of the areas that count over `faces`, like `face_area`; empty where all of them do.
-    pub(crate) face_counted: Vec<f64>,
+    pub face_counted: Vec<f64>,
     /// Nodes that there were when it was found out what counts: parts of these count alike.
-    pub(crate) known: u32,
+    pub known: u32,
 }
 
 /// How far a hierarchy had grown: parts are only ever added behind what there was.
