@@ -49,7 +49,9 @@ impl Plan {
         let plain = room.paint(0.3);
         let lamp = room.lamp(0.0, 8000.0);
         if self.two_sided {
-            [wall, floor, plain].map(|paint| room.two_sided(paint));
+            for paint in [wall, floor, plain] {
+                room.two_sided(paint);
+            }
         }
         let at = |p: DVec3| p * self.size;
         let [low, high] = [
