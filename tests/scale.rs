@@ -13,6 +13,8 @@ use std::time::Instant;
 /// What a room stands on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Ground {
+    /// None: the room has insides only.
+    None,
     /// A floor of its own, as large as its walls need.
     Floor,
     /// A plain of a square kilometre, some way from its middle, that is the floor.
@@ -62,24 +64,31 @@ impl Plan {
             let (z, x) = (DVec3::Z * (high - low), DVec3::X * (high - low));
             room.quad(at(low), at(z), at(x), paint);
         };
-        if self.ground != Ground::Plain {
+        if matches!(self.ground, Ground::Floor | Ground::Lying) {
             flat(&mut room, low, high.with_y(0.0), floor);
         }
-        if self.ground != Ground::Floor {
+        if matches!(self.ground, Ground::Plain | Ground::Lying) {
             let low = dvec3(-AWAY[0], 0.0, -AWAY[1]);
             flat(&mut room, low, low + dvec3(1000.0, 0.0, 1000.0), plain);
         }
         let block = |room: &mut Room, low: DVec3, high: DVec3, paint| {
             room.block(at(low), at(high), paint);
         };
-        for [a, b] in [
+        let walls = [
             [low, dvec3(0.0, ROOM.y, high.z)],
             [dvec3(ROOM.x, 0.0, low.z), high],
             [dvec3(0.0, 0.0, low.z), dvec3(ROOM.x, ROOM.y, 0.0)],
             [dvec3(0.0, 0.0, ROOM.z), dvec3(ROOM.x, ROOM.y, high.z)],
             [low.with_y(ROOM.y), high.with_y(ROOM.y + THICK)],
-        ] {
-            block(&mut room, a, b, wall);
+        ];
+        match self.ground {
+            Ground::None => {
+                let six = [wall, wall, floor, wall, wall, wall];
+                room.hollow(DVec3::ZERO, at(ROOM), six);
+            }
+            _ => walls
+                .into_iter()
+                .for_each(|[a, b]| block(&mut room, a, b, wall)),
         }
         // Looks down.
         let corner = dvec3(1.6, ROOM.y - 0.05, 1.2);
@@ -188,6 +197,27 @@ fn plans() -> [Plan; 4] {
             size: 1.0,
         }
     })
+}
+
+/// Outsides of walls are as large as their insides: averaged over both, the white is half of what it is and the stated error a third.
+#[test]
+fn outsides_of_walls_change_nothing() {
+    let bake = |ground| {
+        Plan {
+            ground,
+            ..plans()[0]
+        }
+        .bake(0.5)
+    };
+    let [thick, thin] = [Ground::Floor, Ground::None].map(bake);
+    let [rms, most] = thick.off(&thin);
+    assert!(rms < 0.014 && most < 0.06, "off {rms}, {most}");
+    let ratio = thick.white / thin.white;
+    assert!((ratio - 1.0).abs() < 0.03, "white {ratio}");
+    let ratio = thick.error / thin.error;
+    assert!((0.6..1.6).contains(&ratio), "estimate {ratio}");
+    let ratio = thick.averages.counted_m2 / thin.averages.area_m2;
+    assert!((ratio - 1.0).abs() < 0.05, "area that counts {ratio}");
 }
 
 /// Light within what is stated, and as much work: on the plain floors are found to be the same room.
