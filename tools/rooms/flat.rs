@@ -21,8 +21,8 @@ pub(crate) fn room() -> Glb {
     furniture(&mut glb);
     glb.camera(
         "living room",
-        dvec3(0.3, 1.6, 0.3),
-        dvec3(4.0, 0.8, 2.8),
+        dvec3(0.3, 1.6, 3.3),
+        dvec3(2.7, 0.8, 0.4),
         1.1,
         4.0 / 3.0,
     );
