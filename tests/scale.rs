@@ -199,7 +199,8 @@ fn plans() -> [Plan; 4] {
     })
 }
 
-/// Outsides of walls are as large as their insides: averaged over both, the white is half of what it is and the stated error a third.
+/// Outsides of walls are as large as their insides: averaged over both, white and stated error were half of what they are. What is left is the
+/// floor below the walls, 4.5 % of the room and too narrow to be told from it, and the chance of 160 watched points.
 #[test]
 fn outsides_of_walls_change_nothing() {
     let bake = |ground| {
@@ -213,11 +214,11 @@ fn outsides_of_walls_change_nothing() {
     let [rms, most] = thick.off(&thin);
     assert!(rms < 0.014 && most < 0.06, "off {rms}, {most}");
     let ratio = thick.white / thin.white;
-    assert!((ratio - 1.0).abs() < 0.03, "white {ratio}");
+    assert!((ratio - 1.0).abs() < 0.06, "white {ratio}");
     let ratio = thick.error / thin.error;
-    assert!((0.6..1.6).contains(&ratio), "estimate {ratio}");
+    assert!((0.55..1.8).contains(&ratio), "estimate {ratio}");
     let ratio = thick.averages.counted_m2 / thin.averages.area_m2;
-    assert!((ratio - 1.0).abs() < 0.05, "area that counts {ratio}");
+    assert!((ratio - 1.0).abs() < 0.06, "area that counts {ratio}");
 }
 
 /// Light within what is stated, and as much work: on the plain floors are found to be the same room.
