@@ -488,7 +488,6 @@ impl Cells {
             missed[0],
         );
         let rest = (border, hints.1);
-        let last = self.all.len();
         self.all[k] = first;
         self.all.push(half(
             [m, b, c],
@@ -498,7 +497,7 @@ impl Cells {
             missed[1],
         ));
         self.count(k);
-        self.count(last);
+        self.count(self.all.len() - 1);
     }
 
     /// The triangles of each sheet.
