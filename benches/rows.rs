@@ -138,7 +138,6 @@ fn room(leaves: usize) -> (Tree, Vec<Link>) {
         let demand = Demand {
             bright: &even,
             keen: &even,
-            total_area: tree.nodes[0].area,
             threshold,
             least_area: 0.0,
             hidden: true,

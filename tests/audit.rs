@@ -418,6 +418,19 @@ fn calibrate(path: &Path, points: usize, most_paths: usize) -> Vec<String> {
     wrong
 }
 
+/// A sixth of this room's light comes from the underside of its lamp's housing, which one path in some hundred finds.
+const RARE: &str = "flat.glb";
+
+/// With 4096 paths a point the reference itself is off by 1.7 dE00, and does not know how rarely it finds most of it.
+#[test]
+fn calibration_where_paths_find_light_rarely() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenes")
+        .join(RARE);
+    let wrong = calibrate(&path, 100, 1 << 16);
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
 /// Rooms of our own, after every round.
 #[test]
 fn calibration_of_the_estimate() {
@@ -428,6 +441,7 @@ fn calibration_of_the_estimate() {
         .filter(|p| p.extension().is_some_and(|e| e == "glb"))
         // What a bake has left there is no room of ours.
         .filter(|p| !p.to_string_lossy().ends_with(".baked.glb"))
+        .filter(|p| !p.ends_with(RARE))
         .collect();
     paths.sort();
     let wrong: Vec<String> = paths

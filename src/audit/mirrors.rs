@@ -24,7 +24,7 @@ impl Audit<'_> {
         let (mut from, mut plane) = (at.point, at.plane);
         for count in 0.. {
             let hit = self.closest(from, *direction, plane);
-            let reach = hit.map_or(4.0 * self.mesh.half_size, |hit| f64::from(hit.t));
+            let reach = hit.map_or(4.0 * self.mesh.reach, |hit| f64::from(hit.t));
             *throughput = self.filtered(throughput, from, from + *direction * reach);
             let mirror = hit.filter(|hit| self.mirrors.as_ref().is_some_and(|m| m.is_mirror(hit)));
             let Some(on) = mirror else {

@@ -30,7 +30,7 @@ impl Audit<'_> {
     }
 
     pub(super) fn closest(&self, from: DVec3, direction: DVec3, plane: u32) -> Option<Hit> {
-        let reach = (4.0 * self.mesh.half_size) as f32;
+        let reach = (4.0 * self.mesh.reach) as f32;
         if self.masked {
             let opaque = |t: u32, u: f32, v: f32| {
                 !alpha::is_hole(self.scene, self.mesh, t, [1.0 - u - v, u, v])

@@ -1,12 +1,12 @@
 //! The path tracer's answer at random points of a room, to which any number of bakes of that room can be held.
 //!
-//! Points lie on all faces, one in each of N strata of equal area; those that something solid covers or lies right upon are
+//! Points lie on all faces, one in each of N strata of equal area, as far as it counts (see `hierarchy/counted.rs`); those that something solid covers or lies right upon are
 //! left out and counted. A pilot of few paths tells how many each point takes; it decides on numbers only, as using it in the answer
 //! would prefer lucky points. Figures are tristimulus irradiance, lm/m2; Y is lux.
 
 use super::path::{Answer, Audit, BATCHES};
 use crate::color::{KM, Observer, de2000};
-use crate::geometry::sampling::{Pcg, hash, triangle_weights};
+use crate::geometry::sampling::{Pcg, hash};
 use crate::hierarchy::Face;
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
@@ -55,7 +55,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Traces at `points` random points by area, at most `most_paths` paths a point (and a pilot): as many as bring the
+    /// Traces at `points` random points by the area that counts, at most `most_paths` paths a point (and a pilot): as many as bring the
     /// standard error to a quarter of the error that `bake` is asked for. Of the bake only the room, its triangles and
     /// its rays are used, whatever rounds it has done. The same numbers for the same seed at any number of threads.
     pub fn new(bake: &Bake, points: usize, most_paths: usize, seed: u64) -> Self {
@@ -187,16 +187,15 @@ fn shown(
     (on, shown)
 }
 
-/// Random points by area, one stratum each, those that are not covered; and how many are.
+/// Random points by the area that counts, one stratum each, those that are not covered; and how many are.
 fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
     let tree = bake.tree();
     let mut rng = Pcg::new(seed ^ 0x00a0_d177);
     let mut all = Vec::with_capacity(points);
-    if let Some(root) = tree.nodes.first() {
+    if !tree.nodes.is_empty() {
         for k in 0..points {
-            let target = (k as f64 + rng.f64()) / points as f64 * root.area;
-            let entry = tree.entry_at(target);
-            let weights = triangle_weights([rng.f64(), rng.f64()]);
+            let share = (k as f64 + rng.f64()) / points as f64;
+            let (entry, weights) = tree.random(share, [rng.f64(), rng.f64()]);
             let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
             all.push(Place {
                 face: tree.faces[entry],

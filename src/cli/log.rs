@@ -2,7 +2,7 @@
 //!
 //! Figures of error are objects `{"value": ..., "kind": ...}` with kind `bound` (cannot be exceeded), `estimate` or
 //! `measured` (compared with an independent answer). Numbers that are not known (or not finite) are `null`. Colour
-//! differences are means over random points of the room's surfaces, by area, of the irradiance they get, under the
+//! differences are means over random points of the room's surfaces, by the area that counts (`averages`), of the irradiance they get, under the
 //! adaptation white. Seconds are wall time.
 //!
 //! First `{"record": "plan", ...}` ([`PlanRecord`]):
@@ -15,6 +15,7 @@
 //! | `facts` | the room: see [`Facts`], units in the names |
 //! | `settings` | see [`SettingsRecord`] |
 //! | `warnings` | what the user should know of the room, sentences |
+//! | `averages` | what errors are averaged over: `over` in words, `counted_m2` of `area_m2` (see [`Averages`]). Area counts in full where light of the lamps, followed from surface to surface, lands at least a fiftieth as densely as usual, in proportion where less, and where none lands not at all |
 //!
 //! Then for each round `{"record": "round", ...}` ([`Round`](crate::solve::Round)):
 //!
@@ -76,7 +77,7 @@ use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
 use crate::solve::record::{Figure, Kind, LOG_VERSION};
-use crate::solve::{Bake, Representation, Verdict};
+use crate::solve::{Averages, Bake, Representation, Verdict};
 use serde::Serialize;
 
 /// What was asked for.
@@ -137,6 +138,8 @@ pub struct PlanRecord<'a> {
     pub settings: SettingsRecord,
     /// Warnings about the room.
     pub warnings: &'a [String],
+    /// What errors are averaged over.
+    pub averages: Averages,
 }
 
 impl<'a> PlanRecord<'a> {
@@ -150,6 +153,7 @@ impl<'a> PlanRecord<'a> {
             facts: Facts::of(bake.scene()),
             settings: SettingsRecord::of(bake, time_s),
             warnings: &bake.scene().warnings,
+            averages: bake.averages(),
         }
     }
 }

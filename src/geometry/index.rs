@@ -70,6 +70,12 @@ impl RayIndex {
         Self { tree, gap, places }
     }
 
+    /// The same where only a room of half this size counts of the scene: coordinates there are rounded less.
+    pub(crate) fn for_room(mut self, half_size: f32) -> Self {
+        self.gap = self.gap.min(END_GAP * half_size);
+        self
+    }
+
     /// Block and lane of a triangle.
     pub(crate) fn place(&self, triangle: u32) -> Option<(usize, usize)> {
         let place = *self.places.get(triangle as usize)?;

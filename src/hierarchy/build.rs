@@ -264,6 +264,7 @@ fn finish(mesh: &Mesh, tree: &mut Tree) {
                 normal,
                 cone: 1.0,
                 area,
+                counted: area,
                 flat: true,
                 ..tree.nodes[id].clone()
             };
@@ -306,6 +307,7 @@ fn finish(mesh: &Mesh, tree: &mut Tree) {
             normal,
             cone,
             area,
+            counted: area,
             flat,
             ..node.clone()
         };

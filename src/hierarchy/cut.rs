@@ -433,7 +433,7 @@ impl Mesh {
         }
         let old = std::mem::replace(&mut self, Self::empty());
         self.centre = old.centre;
-        self.half_size = old.half_size;
+        (self.half_size, self.reach) = (old.half_size, old.reach);
         self.sheets.clone_from(&old.sheets);
         self.positions.clone_from(&old.positions);
         self.first_triangle.clear();

@@ -39,8 +39,10 @@ pub(super) type Moves = HashMap<(u32, u32), DVec3>;
 pub struct Mesh {
     /// What was subtracted from world positions.
     pub centre: DVec3,
-    /// Half the diagonal of the bounding box.
+    /// Half the diagonal of the box about what counts of the room, see `Frame`: what lengths are shares of.
     pub half_size: f64,
+    /// No corner is farther from the centre.
+    pub reach: f64,
     /// Distinct positions, recentred.
     pub positions: Vec<DVec3>,
     /// Corners, counter-clockwise from the front.
@@ -71,10 +73,45 @@ pub struct Mesh {
     pub raised: Vec<Raised>,
 }
 
+/// What counts of a room: the lengths by which things are told apart follow from it, and not from what else is in the file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    /// Middle, world space.
+    pub(crate) centre: DVec3,
+    /// Half the diagonal.
+    pub(crate) half_size: f64,
+}
+
+impl Frame {
+    /// Of a box.
+    pub(crate) fn of(low: DVec3, high: DVec3) -> Self {
+        Self {
+            centre: 0.5 * (low + high),
+            half_size: 0.5 * (high - low).length(),
+        }
+    }
+
+    /// To be written down.
+    pub(crate) fn numbers(self) -> [f64; 4] {
+        self.centre.extend(self.half_size).to_array()
+    }
+
+    /// As it was before it was written down.
+    pub(crate) fn of_numbers([x, y, z, half_size]: [f64; 4]) -> Self {
+        let centre = DVec3::new(x, y, z);
+        Self { centre, half_size }
+    }
+}
+
 impl Mesh {
-    /// Welds the surfaces of `scene`; those that lie in others are raised.
+    /// Welds the surfaces of `scene`; those that lie in others are raised. All of it counts.
     pub fn new(scene: &Scene) -> Self {
-        let mesh = Self::welded(scene, &Moves::new());
+        Self::framed(scene, None)
+    }
+
+    /// The same where only what lies in a frame counts.
+    pub(crate) fn framed(scene: &Scene, frame: Option<Frame>) -> Self {
+        let mesh = Self::welded(scene, &Moves::new(), frame);
         let input: Vec<&[[u32; 3]]> = scene.surfaces.iter().map(|s| &*s.triangles).collect();
         let (raised, moves) = mesh.lying(&input);
         if raised.is_empty() {
@@ -82,11 +119,11 @@ impl Mesh {
         }
         Self {
             raised,
-            ..Self::welded(scene, &moves)
+            ..Self::welded(scene, &moves, frame)
         }
     }
 
-    fn welded(scene: &Scene, moves: &Moves) -> Self {
+    fn welded(scene: &Scene, moves: &Moves, frame: Option<Frame>) -> Self {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in scene.surfaces.iter().flat_map(|s| &s.positions) {
             low = low.min(*p);
@@ -95,10 +132,12 @@ impl Mesh {
         if low.x > high.x {
             (low, high) = (DVec3::ZERO, DVec3::ZERO);
         }
-        let centre = 0.5 * (low + high);
+        let whole = Frame::of(low, high);
+        let Frame { centre, half_size } = frame.unwrap_or(whole);
         let mut mesh = Self {
             centre,
-            half_size: 0.5 * (high - low).length(),
+            half_size,
+            reach: whole.centre.distance(centre) + whole.half_size,
             sheets: (0_u32..)
                 .zip(&scene.materials)
                 .filter_map(|(k, m)| m.sheet.as_ref().map(|_| k))
@@ -165,6 +204,7 @@ impl Mesh {
         Self {
             centre: DVec3::ZERO,
             half_size: 0.0,
+            reach: 0.0,
             positions: Vec::new(),
             triangles: Vec::new(),
             origin: Vec::new(),
@@ -188,6 +228,7 @@ impl Mesh {
         let masks = |m: &u32| matches!(scene.materials[*m as usize].alpha, Alpha::Mask { .. });
         let masked: Vec<bool> = self.material.iter().map(masks).collect();
         RayIndex::build(&positions, &self.triangles, &self.plane, &masked)
+            .for_room(self.half_size as f32)
     }
 
     /// A point of a triangle by its barycentric weights, recentred.

@@ -2,6 +2,7 @@
 
 pub mod alpha;
 mod build;
+mod counted;
 mod cut;
 mod halves;
 mod mesh;
@@ -12,8 +13,10 @@ mod spaces;
 mod tree;
 mod validate;
 
+pub(crate) use counted::{Counted, Landing};
 pub use cut::{Cut, cuts};
 pub use halves::{Blocker, Outline};
+pub(crate) use mesh::Frame;
 pub use mesh::{Face, Mesh, Raised};
 pub use mirrors::{BOUNCES, Image, Mirrors, Route};
 pub use panes::{Crossing, Glazing, Panes};

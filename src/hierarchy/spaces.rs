@@ -210,7 +210,7 @@ impl<'a> Rooms<'a> {
         };
         let normal = mesh.normal[triangle as usize] * if back { -1.0 } else { 1.0 };
         let direction = cosine_direction(normal, sequence02(k, !seed));
-        let reach = (4.0 * mesh.half_size) as f32;
+        let reach = (4.0 * mesh.reach) as f32;
         let plane = mesh.plane[triangle as usize];
         let (from32, direction32) = (from.as_vec3(), direction.as_vec3());
         let Some(hit) = self.rays.closest(from32, direction32, reach, plane) else {

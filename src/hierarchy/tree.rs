@@ -37,6 +37,8 @@ pub struct Node {
     pub radius: f64,
     /// Surface area.
     pub area: f64,
+    /// As much of it as counts, see `counted`: what errors are averaged over.
+    pub counted: f64,
     /// Area-weighted mean normal, unit length.
     pub normal: DVec3,
     /// Cosine of the half angle of a cone about `normal` that holds every normal below; -1: all directions.
@@ -58,6 +60,7 @@ impl Node {
             centre: DVec3::ZERO,
             radius: 0.0,
             area,
+            counted: area,
             normal: DVec3::ZERO,
             cone: -1.0,
         }
@@ -169,6 +172,10 @@ pub struct Tree {
     /// For each element of a diffuse sheet the one behind it, on the same triangle; [`NONE`] for other nodes. Empty in a room
     /// without sheets.
     pub behind: Vec<u32>,
+    /// Running sum of the areas that count over `faces`, like `face_area`; empty where all of them do.
+    pub face_counted: Vec<f64>,
+    /// Nodes that there were when it was found out what counts: parts of these count alike.
+    pub known: u32,
 }
 
 /// How far a hierarchy had grown: parts are only ever added behind what there was.
@@ -292,6 +299,7 @@ impl Tree {
                 children: 0,
                 element,
                 area: 0.25 * node.area,
+                counted: 0.25 * node.counted,
                 ..node.clone()
             };
             self.nodes.push(part.around(&corners));
@@ -381,7 +389,7 @@ pub(crate) fn leaf_below(face: u32, mut weights: [f64; 3], first: impl Fn(u32) -
 }
 
 /// Which child of an element holds a point, given by barycentric weights, which become those on the child.
-fn quarter(w: &mut [f64; 3]) -> u32 {
+pub(super) fn quarter(w: &mut [f64; 3]) -> u32 {
     // Children 0, 1, 2 hold the corners, child 3 the middle (turned around).
     match w.iter().position(|&x| x >= 0.5) {
         Some(k) => {

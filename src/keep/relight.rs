@@ -13,6 +13,7 @@ use super::relit::Kept;
 use crate::color::de2000;
 use crate::error::{Error, Result};
 use crate::gather::Baked;
+use crate::hierarchy::{Counted, Frame};
 use crate::light::lanes::Lanes;
 use crate::light::{Light, Rows, padded};
 use crate::link::LinkRows;
@@ -155,6 +156,9 @@ impl Bake {
             out.put_text(&settings)?;
             out.put_all(&self.room.spaces)?;
             out.put_all(&self.room.parted)?;
+            out.put_all(&self.room.counted.splits)?;
+            out.put_all(&self.room.counted.shares)?;
+            out.put_all(self.room.frame.map(Frame::numbers).as_slice())?;
             out.put([self.room.closed, self.room.sealed].map(|c| u8::from(c == Closed::Yes)))?;
             out.put(guess)?;
             out.put(distance.unwrap_or(0.0))?;
@@ -267,6 +271,8 @@ impl Relighter {
         let settings: Settings = serde_json::from_str(&from.get_text()?)
             .map_err(|problem| Broken::new(format!("has settings that do not read: {problem}")))?;
         let (spaces, parted) = (from.get_all()?, from.get_all()?);
+        let (splits, shares) = (from.get_all()?, from.get_all()?);
+        let frame: Vec<[f64; 4]> = from.get_all()?;
         let closed = from
             .get::<[u8; 2]>()?
             .map(|c| if c == 1 { Closed::Yes } else { Closed::No });
@@ -274,6 +280,8 @@ impl Relighter {
             spaces,
             parted,
             closed,
+            counted: Counted { splits, shares },
+            frame: frame.first().copied().map(Frame::of_numbers),
         };
         let mut bake = Bake::with(scene, settings, Some(known));
         bake.room.keep = true;

@@ -39,7 +39,7 @@ impl Sight<'_> {
             let plane = self.mesh.plane[triangle];
             let next = self.meet_one(at.as_vec3(), way.as_vec3(), plane);
             let ended = |hit: &Hit| !(route.goes_on() && mirrors.is_mirror(hit));
-            let reach = next.map_or(4.0 * self.mesh.half_size, |hit| f64::from(hit.t));
+            let reach = next.map_or(4.0 * self.mesh.reach, |hit| f64::from(hit.t));
             travelled += reach as f32;
             if next.as_ref().is_none_or(ended) {
                 route.end(at + way * reach);

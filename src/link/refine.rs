@@ -12,8 +12,9 @@ use crate::hierarchy::{NONE, Node, Tree};
 use crate::team::{Interrupt, Interrupted};
 use rayon::prelude::*;
 
-/// Deepest quartering of a face: side lengths shrink to 1/4096.
-pub const MAX_DEPTH: u8 = 12;
+/// Deepest quartering of a face: 6 cm of a kilometre, and below that in f64. How small elements of a room may be follows from its area
+/// ([`Demand::least_area`]).
+pub const MAX_DEPTH: u8 = 24;
 /// Pairs a task evaluates: enough to pay for a task, few enough to share out.
 const CHUNK: usize = 64;
 
@@ -24,9 +25,7 @@ pub struct Demand<'a> {
     pub bright: &'a [f32],
     /// How much lightness a change of irradiance makes at every node: `(H / white)^(-2/3)`, as in CIELAB; 1 at the white.
     pub keen: &'a [f32],
-    /// Area of all faces.
-    pub total_area: f64,
-    /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of the area.
+    /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of the area that counts.
     pub threshold: f64,
     /// Elements below this area are not split.
     pub least_area: f64,
@@ -55,7 +54,7 @@ impl Demand<'_> {
             // the Cornell box takes half as long again to the same error.
             let bright = f64::from(self.bright.get(source as usize).copied().unwrap_or(0.0));
             let keen = f64::from(self.keen.get(receiver as usize).copied().unwrap_or(1.0));
-            misplaced / area * bright * keen * (area / self.total_area).sqrt()
+            misplaced / area * bright * keen * tree.share(receiver).sqrt()
         };
         at(link.a, link.b).max(at(link.b, link.a))
     }

@@ -79,6 +79,8 @@ pub(super) struct Cell {
     /// Edge k leads from corner k to the next.
     pub(super) edges: [u32; 3],
     pub(super) area: f64,
+    /// Share of it that counts, see `hierarchy::counted`.
+    pub(super) counts: f64,
     /// Which of the sheet's hints lie in it.
     pub(super) hints: (u32, u32),
     pub(super) doubt: Doubt,
@@ -90,6 +92,8 @@ pub(super) struct Hint {
     /// Weights of the second and third corner of the triangle of the mesh.
     pub(super) at: [f64; 2],
     pub(super) area: f64,
+    /// Share of it that counts.
+    pub(super) counts: f64,
     /// What of it others see, see `solve::outlook`.
     pub(super) open: f64,
     /// Tristimulus irradiance.
@@ -252,6 +256,7 @@ impl Cells {
                 corners,
                 edges,
                 area: mesh.area[triangle as usize],
+                counts: 1.0,
                 hints: (0, 0),
                 doubt: Doubt::default(),
             });
@@ -423,6 +428,7 @@ impl Cells {
             corners,
             edges,
             area,
+            counts,
             hints,
             doubt,
         } = self.all[k];
@@ -467,6 +473,7 @@ impl Cells {
             corners,
             edges,
             area: share * area,
+            counts,
             hints,
             doubt: Doubt {
                 square: shrink * doubt.square,
@@ -491,6 +498,8 @@ impl Cells {
             rest,
             missed[1],
         ));
+        self.count(k);
+        self.count(self.all.len() - 1);
     }
 
     /// The triangles of each sheet.
@@ -568,6 +577,11 @@ impl Cell {
     pub(super) fn at(&self, weights: [f64; 3]) -> [f64; 3] {
         let corner = |k: usize, j: usize| self.corners[k].weights[j] * weights[k];
         std::array::from_fn(|j| corner(0, j) + corner(1, j) + corner(2, j))
+    }
+
+    /// Area that counts.
+    pub(super) fn counted(&self) -> f64 {
+        self.area * self.counts
     }
 
     /// Does it belong to a face of the hierarchy, with some area?

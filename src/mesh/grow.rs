@@ -230,10 +230,10 @@ impl<'a> Growth<'a> {
         cell.corners.iter().any(corner) || hints.iter().any(|hint| hint.open > 0.0)
     }
 
-    /// Area of all cells of which anybody can see anything: what the error is a mean over.
+    /// Area that counts of all cells of which anybody can see anything: what the error is a mean over.
     pub(super) fn seen_area(&self) -> f64 {
         let seen = (0..self.cells.all.len()).filter(|&k| self.is_seen(k));
-        seen.map(|k| self.cells.all[k].area).sum()
+        seen.map(|k| self.cells.all[k].counted()).sum()
     }
 
     /// Mean square of what the solved light differs by, as far as others see it, its worst place and how much it differs there.
@@ -506,7 +506,7 @@ impl<'a> Growth<'a> {
 
 /// What a cell adds to the mean square, times the area of all.
 fn share(cell: &Cell) -> f64 {
-    cell.area * cell.doubt.square
+    cell.counted() * cell.doubt.square
 }
 
 /// Light between three corners.

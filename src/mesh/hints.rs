@@ -6,6 +6,21 @@ use crate::hierarchy::Tree;
 use crate::solve::Bake;
 use glam::DVec3;
 
+impl Cells {
+    /// Finds how much of a cell counts, by the hints in it; one without any is like the whole that it is a part of.
+    pub(super) fn count(&mut self, k: usize) {
+        let cell = &mut self.all[k];
+        let (first, end) = cell.hints;
+        let hints = &self.sheets[cell.sheet as usize].hints[first as usize..end as usize];
+        let [area, counted] = hints.iter().fold([0.0; 2], |[area, counted], hint| {
+            [area + hint.area, counted + hint.area * hint.counts]
+        });
+        if area > 0.0 {
+            cell.counts = counted / area;
+        }
+    }
+}
+
 /// Gives every sheet the leaves of its faces as hints, and every cell its share of them. Cells are still the triangles of
 /// the mesh.
 pub(super) fn give(bake: &Bake, cells: &mut Cells) {
@@ -28,12 +43,16 @@ pub(super) fn give(bake: &Bake, cells: &mut Cells) {
                 sheet.hints.extend(light.map(|light| Hint {
                     at,
                     area,
+                    counts: tree.node(leaf).counted / tree.node(leaf).area,
                     open,
                     light,
                 }));
             });
         }
         cell.hints = (first, sheet.hints.len() as u32);
+    }
+    for k in 0..cells.all.len() {
+        cells.count(k);
     }
 }
 

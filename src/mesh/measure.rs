@@ -6,6 +6,7 @@
 //! least, i the error of interpolation: the rays of vertices may have more in common than chance. What is left when that is
 //! taken off scatters about i^2, below 0 as well as above: roots keep the sign, so that chance cancels in their mean.
 
+use super::cells::Cell;
 use super::grow::{Growth, PointLooks, mix};
 use super::write::Settled;
 use crate::color::seen_difference;
@@ -81,7 +82,7 @@ impl Parts {
 }
 
 impl Growth<'_> {
-    /// Looks at random points that were never looked at before, one in each stratum of equal area.
+    /// Looks at random points that were never looked at before, one in each stratum of equal area that counts.
     pub(super) fn measured(
         &mut self,
         bake: &Bake,
@@ -93,19 +94,19 @@ impl Growth<'_> {
             true => POINTS[0],
             false => (self.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]),
         };
-        let whole: f64 = self.cells.all.iter().map(|c| c.area).sum();
+        let whole: f64 = self.cells.all.iter().map(Cell::counted).sum();
         if whole <= 0.0 {
             return Vec::new();
         }
         let mut rng = Pcg::new(bake.settings().seed ^ SEED ^ turn << 32);
-        let (mut cell, mut upto) = (0, self.cells.all[0].area);
+        let (mut cell, mut upto) = (0, self.cells.all[0].counted());
         let parts: Vec<Parts> = settled.iter().map(Parts::new).collect();
         let mut asked = Vec::with_capacity(count);
         for k in 0..count {
             let target = (k as f64 + rng.f64()) / count as f64 * whole;
             while upto <= target && cell + 1 < self.cells.all.len() {
                 cell += 1;
-                upto += self.cells.all[cell].area;
+                upto += self.cells.all[cell].counted();
             }
             let weights = triangle_weights([rng.f64(), rng.f64()]);
             let of = &self.cells.all[cell];
@@ -189,7 +190,7 @@ impl Growth<'_> {
 
     /// Triangles that are as small as is allowed and still further off than `square`.
     pub(super) fn unfinished(&self, square: f64) -> usize {
-        let small = |c: &&super::cells::Cell| c.doubt.square > square && self.is_smallest(c);
+        let small = |c: &&Cell| c.doubt.square > square && self.is_smallest(c);
         self.cells.all.iter().filter(small).count()
     }
 }

@@ -154,7 +154,7 @@ impl Bake {
     fn grow_unseen(&self, growth: &mut Growth, progress: &dyn Fn(usize, usize)) {
         growth.believe(true);
         let allowed = (SKETCH * self.settings().error).min(SKETCH_MOST);
-        let area: f64 = growth.cells.all.iter().map(|c| c.area).sum();
+        let area: f64 = growth.cells.all.iter().map(|c| c.counted()).sum();
         growth.grow(allowed * allowed * area, progress);
     }
 

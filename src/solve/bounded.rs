@@ -137,11 +137,10 @@ impl Coarse {
             .zip(cuts)
             .map(|(lit, cut)| self.bounces(lit, *cut))
             .collect();
-        let total = self.areas[0];
         let mut mean = 0.0;
         let mut harm: Vec<Vec<f64>> = cuts.iter().map(|c| vec![0.0; c.count()]).collect();
         for k in 0..self.leaves.len() {
-            let area = self.areas[self.leaves[k] as usize] / total;
+            let area = self.tree.share(self.leaves[k]);
             let (mut xyz, mut error, mut radius) = ([0.0; 3], [0.0; 3], [0.0; 3]);
             for ((lit, cut), rows) in lights.iter().zip(cuts).zip(&rows) {
                 for (interval, (first, len)) in rows[k].iter().zip(cut.iter()) {

@@ -355,6 +355,8 @@ fn splits(tree: &Tree) -> Vec<u32> {
     };
     let mut split: Vec<u32> = (0..tree.nodes.len() as u32)
         .filter(|&k| tree.node(k).element != NONE && !tree.node(k).is_leaf() && leads(k))
+        // What is split because only a part of it counts is split anyway.
+        .filter(|&k| tree.node(k).child >= tree.known)
         .collect();
     split.sort_unstable_by_key(|&k| tree.node(k).child);
     split

@@ -75,7 +75,7 @@ impl Coarse {
             .map(|&g| g as usize + 1)
             .max()
             .unwrap_or(0);
-        let mut area = vec![0.0; count];
+        let (mut area, mut counted) = (vec![0.0; count], vec![0.0; count]);
         let mut reflectance = vec![[0.0; LEAVES]; count];
         let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
         let mut punctual = emission.clone();
@@ -84,6 +84,7 @@ impl Coarse {
         for &leaf in leaves {
             let (g, a) = (group[leaf as usize] as usize, areas[leaf as usize]);
             area[g] += a;
+            counted[g] += a * (tree.node(leaf).counted / tree.node(leaf).area);
             add(&mut reflectance[g], &dense.reflectance(leaf), a);
             if let Some(passes) = dense.through(leaf) {
                 let pair = [leaf, tree.behind(leaf)].map(|k| group[k as usize]);
@@ -123,7 +124,7 @@ impl Coarse {
         let matrix = exchanges(tree, links, factor, areas, &group, count);
         let pairs = pairs(&matrix, count);
         Self {
-            tree: flat_tree(&area),
+            tree: flat_tree(&area, &counted),
             links: LinkRows::new(count + 1, &pairs),
             leaves: (1..=count as u32).collect(),
             factor: vec![1.0; count + 1],
@@ -301,10 +302,10 @@ fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
     }
 }
 
-/// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node of the largest area is opened.
+/// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node of which most counts is opened.
 pub(super) fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut open = std::collections::BinaryHeap::new();
-    let key = |id: u32| (ordered(tree.node(id).area), std::cmp::Reverse(id));
+    let key = |id: u32| (ordered(tree.node(id).counted), std::cmp::Reverse(id));
     open.push((key(0), 0_u32));
     let mut count = 1;
     let mut is_cut = vec![false; tree.nodes.len()];
@@ -410,13 +411,17 @@ fn pairs(matrix: &[f64], count: usize) -> Vec<Link> {
 }
 
 /// A root with one child a patch.
-fn flat_tree(areas: &[f64]) -> Tree {
+fn flat_tree(areas: &[f64], counted: &[f64]) -> Tree {
     let mut nodes = vec![Node {
         child: 1,
         children: areas.len() as u8,
+        counted: counted.iter().sum(),
         ..Node::bare(NONE, areas.iter().sum())
     }];
-    nodes.extend(areas.iter().map(|&a| Node::bare(0, a)));
+    nodes.extend(areas.iter().zip(counted).map(|(&area, &counted)| Node {
+        counted,
+        ..Node::bare(0, area)
+    }));
     Tree {
         nodes,
         ..Tree::default()
@@ -434,7 +439,7 @@ mod tests {
     #[test]
     fn rows_of_the_model_are_those_of_the_leaves() {
         let mut rng = Pcg::new(3);
-        let mut tree = flat_tree(&[1.0; 4]);
+        let mut tree = flat_tree(&[1.0; 4], &[1.0; 4]);
         for parent in 1..=16 {
             let first = tree.nodes.len() as u32;
             let node = &mut tree.nodes[parent];

@@ -17,7 +17,7 @@ const UNSEEN: f64 = 1e-3;
 pub(crate) struct Choice {
     /// One cut a light.
     pub cuts: Vec<Partition>,
-    /// Area-weighted mean CIELUV difference of irradiance that they cause on the model.
+    /// Mean CIELUV difference of irradiance that they cause on the model.
     pub error: f64,
 }
 
@@ -55,7 +55,7 @@ impl Coarse {
             })
             .collect();
         let jacobians: Vec<[[f64; 3]; 3]> = truth.iter().map(|&t| luv_jacobian(t, white)).collect();
-        let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).area).sum();
+        let total: f64 = self.leaves.iter().map(|&l| self.tree.node(l).counted).sum();
         let tolerance = tolerance.max(UNSEEN);
         if let Some(cuts) = known.filter(|cuts| cuts.len() == spectra.len()) {
             let lanes = guided(Lanes::ratio(spectra, &cuts, weights));
@@ -112,7 +112,7 @@ impl Coarse {
         let mut harm = vec![0.0; lanes.len()];
         let mut mean = 0.0;
         for (k, jacobian) in jacobians.iter().enumerate() {
-            let area = self.tree.node(self.leaves[k]).area / total;
+            let area = self.tree.node(self.leaves[k]).counted / total;
             let (mut all, mut excited) = ([0.0; 3], [0.0; 3]);
             for (l, lane) in lanes.lanes().iter().enumerate() {
                 // Leaf lanes are exact.

@@ -35,8 +35,10 @@ const POINTS: [([f64; 3], f64); 6] = {
     ]
 };
 const MIDDLE: [([f64; 3], f64); 1] = [([1.0 / 3.0; 3], 1.0)];
-/// Leaves below this share of all area are looked at from one point, or as few as can be.
+/// Leaves below this share of the area that counts are looked at from one point, or as few as can be.
 const TINY: f64 = 1e-5;
+/// What does not count has this share, so that nothing is divided by zero.
+const LEAST_SHARE: f64 = 1e-30;
 /// Further points that are tried where some are covered.
 const MORE_POINTS: usize = 8;
 /// Error of a leaf's direct light, in what would split the leaf.
@@ -342,7 +344,7 @@ impl Stake {
     pub(crate) fn new(tree: &Tree, leaf: u32, demand: &Demand) -> Self {
         let node = tree.node(leaf);
         let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
-        let share = node.area / demand.total_area;
+        let share = tree.share(leaf).max(LEAST_SHARE);
         let depth = tree.elements[node.element as usize].depth;
         Self {
             split: f64::from(keen) * share.sqrt() / demand.threshold,

@@ -1,12 +1,12 @@
 //! How wrong the solution still is: an *estimate*, from two rounds at the same points.
 //!
-//! At fixed random points (by area) the light is gathered after every round with sampling patterns of its own. Errors
+//! At fixed random points (by the area that counts) the light is gathered after every round with sampling patterns of its own. Errors
 //! fall by a factor q of about 0.6 a round. Were those of two rounds independent, the distance d between the rounds
 //! would make the error of the later one `d / sqrt(1 + 1 / q^2) = 0.5 d`; were they alike, `d q / (1 - q) = 1.5 d`. The
 //! truth lies between; [`SHARE`] was measured against the audit.
 
 use crate::color::{de_luv, de2000, uv_1960};
-use crate::geometry::sampling::{Pcg, triangle_weights};
+use crate::geometry::sampling::Pcg;
 use crate::hierarchy::Tree;
 use crate::transport::Receiver;
 use glam::DVec3;
@@ -24,6 +24,7 @@ const SHARE_OF_FIRST: f64 = 0.75;
 const SHARE_OF_RAYS: f64 = 0.95;
 
 /// Watched points.
+#[derive(Default)]
 pub(crate) struct Probes {
     /// Face entry, weights on the face, point and normal.
     pub(super) points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
@@ -50,15 +51,14 @@ impl Distance {
 }
 
 impl Probes {
-    /// Random points, by area.
+    /// Random points, by the area that counts.
     pub(crate) fn new(tree: &Tree, seed: u64) -> Self {
         let mut rng = Pcg::new(seed ^ 0x009b_0be5);
         let mut points = Vec::new();
-        if let Some(root) = tree.nodes.first() {
+        if !tree.nodes.is_empty() {
             for k in 0..POINTS {
-                let target = (k as f64 + rng.f64()) / POINTS as f64 * root.area;
-                let entry = tree.entry_at(target);
-                let weights = triangle_weights([rng.f64(), rng.f64()]);
+                let share = (k as f64 + rng.f64()) / POINTS as f64;
+                let (entry, weights) = tree.random(share, [rng.f64(), rng.f64()]);
                 let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
                 points.push((
                     entry as u32,

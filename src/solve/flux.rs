@@ -94,7 +94,7 @@ pub(super) fn meets(
     direction: DVec3,
     plane: u32,
 ) -> Meets {
-    let reach = (4.0 * mesh.half_size) as f32;
+    let reach = (4.0 * mesh.reach) as f32;
     match rays.closest(from.as_vec3(), direction.as_vec3(), reach, plane) {
         None => Meets::Nothing,
         Some(hit) if hit.from_behind && tree.entry[hit.triangle as usize][1] == NONE => Meets::Back,
@@ -155,12 +155,13 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         .collect();
     let material = |k: usize| mesh.material[tree.faces[k].triangle as usize] as usize;
     let area = |k: usize| mesh.area[tree.faces[k].triangle as usize];
+    let counted = |k: usize| tree.node(tree.face_node[k]).counted;
     let (mut flux, mut total, mut mean) = ([0.0; 3], 0.0, 0.0);
     for k in 0..tree.faces.len() {
         let (m, a) = (material(k), area(k));
         flux = std::array::from_fn(|c| flux[c] + a * glow[m][c]);
-        total += a;
-        mean += a * albedo[m];
+        total += counted(k);
+        mean += counted(k) * albedo[m];
     }
     for light in &scene.lights {
         let solid = super::punctual::solid_angle(light.kind);
@@ -186,7 +187,7 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         let node = &tree.nodes[k];
         bright[k] = if node.is_leaf() {
             let m = material(node.faces.0 as usize);
-            (0.5 * albedo[m]) as f32
+            (0.5 * albedo[m] * (node.counted / node.area)) as f32
         } else {
             node.child_range()
                 .map(|c| f64::from(bright[c as usize]) * tree.node(c).area)

@@ -41,7 +41,6 @@ impl Bake {
         self.gather_direct(&Demand {
             bright: &[],
             keen: &[],
-            total_area: self.refinement.tree.nodes.first().map_or(0.0, |n| n.area),
             threshold,
             least_area: f64::INFINITY,
             hidden: true,
@@ -76,7 +75,7 @@ impl Bake {
                     .solution
                     .lanes
                     .tristimulus(self.solution.light.irradiance.row(k));
-                (xyz, self.refinement.areas[leaf as usize])
+                (xyz, self.refinement.counted(leaf))
             })
             .collect()
     }

@@ -143,7 +143,7 @@ impl Room {
             .fold([0.0; 3], |sum: [f64; 3], landing| {
                 std::array::from_fn(|k| sum[k] + f64::from(landing.flux[k]))
             });
-        let area = tree.nodes.first().map_or(0.0, |room| room.area);
+        let area = tree.counted();
         let landed = landed.map(|x| 2.0 * x / area.max(f64::MIN_POSITIVE));
         match white[1] < landed[1] {
             true => landed,
@@ -163,7 +163,7 @@ impl Room {
             tree,
             sight,
             glass: (sight.panes).map(|glazing| Glass { glazing, filters }),
-            reach: 4.0 * self.mesh.half_size as f32,
+            reach: 4.0 * self.mesh.reach as f32,
         };
         let lamps = self.sending(tree, lanes);
         let all: f64 = lamps.iter().map(|lamp| lamp.0[1]).sum();

@@ -22,6 +22,7 @@ mod landed;
 mod landing;
 mod linear;
 mod lists;
+mod lit;
 mod looking;
 mod mixed;
 mod operator;
@@ -47,6 +48,7 @@ mod tinted;
 pub(crate) mod two_grid;
 
 pub use lists::PatchList;
+pub use lit::Averages;
 pub use record::{Round, Verdict};
 pub use representation::Representation;
 pub(crate) use sources::weights_of;
@@ -89,7 +91,7 @@ const WORTH_STALLING: usize = 100_000;
 const MOST_LINKS: usize = 4_000_000;
 /// Rooms of this many faces choose their lanes once.
 const MANY_FACES: usize = 50_000;
-/// Elements are not split below this share of the area of all faces.
+/// Elements are not split below this share of the area that counts.
 const LEAST_AREA: f64 = 1e-7;
 /// The working partition may cause this share of the asked-for error. In the Cornell box under F2, .05 to .35 cost the
 /// same time within 2 %, and .35 left a third more error at 2 than .05.
@@ -213,13 +215,11 @@ impl Bake {
         let by_rays = self.room.by_rays();
         let faces = self.refinement.tree.faces.len();
         let shares = Shares::of(by_rays, is_small(&self.room.mesh), faces);
-        let total_area = self.refinement.tree.nodes.first().map_or(0.0, |n| n.area);
         let demand = Demand {
             bright: &bright,
             keen: &keen,
-            total_area,
             threshold: threshold * shares.link,
-            least_area: LEAST_AREA * total_area,
+            least_area: LEAST_AREA * self.refinement.tree.counted(),
             hidden: !by_rays,
         };
         let refined = self.refinement.refine_links(&self.room, &demand)?;

@@ -22,7 +22,7 @@ use crate::hierarchy::{NONE, Tree, leaf_below};
 use crate::light::rows::Rows;
 use crate::link::Sight;
 use crate::team::{Interrupt, Interrupted, Team};
-use crate::transport::hemisphere::{BEAM, Hemisphere};
+use crate::transport::hemisphere::{BEAM, Hemisphere, Pattern};
 use found::{ALONE, End, Found, Pairs, look_from, start};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -72,6 +72,14 @@ pub(super) struct Grown {
 }
 
 impl Outlook {
+    /// Nothing looked at yet, by the ranks of a team.
+    pub(super) fn of_team(team: Team) -> Self {
+        Self {
+            team,
+            ..Self::default()
+        }
+    }
+
     /// Looks out of new leaves. A leaf below one of which very many rays all met fronts is not looked at again. Returns
     /// the rays cast.
     pub(super) fn extend(
@@ -105,7 +113,7 @@ impl Outlook {
         }
         let mean = mean_area(tree);
         let escape = |&k: &usize| {
-            let wanted = LEAF_RAYS[0] as f64 * (tree.nodes[k].area / mean);
+            let wanted = LEAF_RAYS[0] as f64 * (tree.nodes[k].counted / mean);
             let wanted = (wanted as usize).clamp(LEAF_RAYS[1], LEAF_RAYS[2]);
             escape_from(tree, k, sight, wanted.next_multiple_of(BEAM), seed)
         };
@@ -149,10 +157,10 @@ impl Outlook {
             .filter(|&k| tree.node(k).is_leaf() && self.range[k as usize].1 == 0)
             .collect();
         let mean = mean_area(tree);
-        let patterns: Vec<Hemisphere> = (0..)
+        let patterns: Vec<Pattern> = (0..)
             .map(|k| LOOKING.1 << k)
             .take_while(|&n| n <= hemisphere.len())
-            .map(Hemisphere::new)
+            .map(Pattern::new)
             .collect();
         let usual = LOOKING.0 * hemisphere.len() as f64 / mean;
         let team = self.team;
@@ -163,11 +171,11 @@ impl Outlook {
             .map(|chunk| {
                 interrupt.check()?;
                 let each = |&leaf: &u32| {
-                    let wanted = usual * tree.node(leaf).area;
+                    let wanted = usual * tree.node(leaf).counted;
                     let pattern = patterns
                         .iter()
                         .find(|p| p.len() as f64 >= wanted)
-                        .unwrap_or(hemisphere);
+                        .unwrap_or(hemisphere.pattern());
                     look_from(tree, leaf, sight, pattern, seed)
                 };
                 Ok(chunk.iter().map(each).collect())
@@ -451,9 +459,9 @@ impl Outlook {
     }
 }
 
-/// Mean area of the leaves.
+/// Mean area of the leaves, as far as it counts.
 fn mean_area(tree: &Tree) -> f64 {
-    tree.nodes.first().map_or(0.0, |n| n.area) / tree.leaves().count().max(1) as f64
+    tree.counted() / tree.leaves().count().max(1) as f64
 }
 
 /// Casts `count` rays out of a leaf. How many there were, how many missed all fronts, how many started where something

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 /// Points of an element that a light is looked at from.
 const POINTS: usize = 4;
-/// Leaves below this share of all area do not count for the choice of lanes.
+/// Leaves below this share of the area that counts do not count for the choice of lanes.
 const SLIGHT: f64 = 1e-5;
 /// Elements that a task looks at.
 const CHUNK: usize = 64;
@@ -153,7 +153,6 @@ pub(super) fn factors(
             rays: 0,
         });
     }
-    let total = tree.nodes.first().map_or(0.0, |n| n.area);
     let chunks: Vec<&[u32]> = leaves.chunks(CHUNK).collect();
     let parts: Vec<(Vec<Factors>, u64)> = team.map_unless(
         interrupt,
@@ -164,7 +163,7 @@ pub(super) fn factors(
             let lists = chunk
                 .iter()
                 .map(|&leaf| {
-                    if tree.node(leaf).area < SLIGHT * total {
+                    if tree.share(leaf) < SLIGHT {
                         return Vec::new();
                     }
                     let half = mesh.half_size;

@@ -8,7 +8,7 @@ use super::representation::Representation;
 use super::sources::Painter;
 use crate::color::{Observer, Upsampler};
 use crate::geometry::RayIndex;
-use crate::hierarchy::{Glazing, Mesh, Mirrors, Panes, Tree};
+use crate::hierarchy::{Counted, Frame, Glazing, Mesh, Mirrors, Panes, Tree};
 use crate::light::lanes::Lanes;
 use crate::link::{Opaque, Sight, is_small};
 use crate::scene::Scene;
@@ -86,6 +86,10 @@ pub(crate) struct Room {
     /// Colours of textures as spectra: its table is made once.
     pub(crate) upsampler: Upsampler,
     pub(crate) hemisphere: Hemisphere,
+    /// What counts of it; errors are averaged over that.
+    pub(crate) counted: Counted,
+    /// The box about it, where most of the file lies outside.
+    pub(crate) frame: Option<Frame>,
     /// Points that are watched from round to round.
     pub(crate) probes: Probes,
     /// Space of each face, and which cuts were made for them, see [`spaces`](crate::hierarchy::spaces).
@@ -106,6 +110,9 @@ pub(crate) struct Known {
     pub(crate) parted: Vec<u32>,
     /// Of the room, and without what is covered.
     pub(crate) closed: [Closed; 2],
+    /// What counts of it, and the box about that.
+    pub(crate) counted: Counted,
+    pub(crate) frame: Option<Frame>,
 }
 
 /// Do leaves and points of this room look for themselves? In a room of few triangles exact clipping is better, but it knows no
@@ -151,7 +158,29 @@ impl Room {
 
     /// The same without what is around it.
     pub(super) fn shaped(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
-        let mesh = Mesh::new(&scene);
+        let counted = known.as_ref().map(|known| known.counted.clone());
+        let frame = known.as_ref().and_then(|known| known.frame);
+        let (mut room, mut tree) = Self::framed(scene, settings, known, frame);
+        let found = counted.is_none();
+        room.counted = counted.unwrap_or_else(|| room.count(&mut tree));
+        tree.weigh(&room.counted);
+        if let Some(frame) = room.frame_of(&tree).filter(|_| found) {
+            (room, tree) = Self::framed(room.scene, room.settings, None, Some(frame));
+            room.counted = room.count(&mut tree);
+            tree.weigh(&room.counted);
+        }
+        room.probes = Probes::new(&tree, room.settings.seed);
+        (room, tree)
+    }
+
+    /// The same where only what lies in a frame counts, and is not weighed yet.
+    fn framed(
+        scene: Scene,
+        settings: Settings,
+        known: Option<Known>,
+        frame: Option<Frame>,
+    ) -> (Self, Tree) {
+        let mesh = Mesh::framed(&scene, frame);
         let mut plan = plan_of(&scene, &mesh);
         let parting = match known {
             Some(known) => Parting::again(&scene, mesh, known.spaces, known.parted),
@@ -179,7 +208,9 @@ impl Room {
             weights: Observer::cie1931().weights(&scene.grid),
             upsampler: Upsampler::new(&scene.grid),
             hemisphere: Hemisphere::for_error(settings.error * directions(&plan, &mesh)),
-            probes: Probes::new(&tree, settings.seed),
+            counted: Counted::default(),
+            frame,
+            probes: Probes::default(),
             keep: false,
             team: Team::default(),
             interrupt: Interrupt::default(),

@@ -560,7 +560,7 @@ impl Bake {
         self.solution.light.bright_lamps = self.solution.bright_lamps();
     }
 
-    /// Area-weighted mean irradiance, tristimulus.
+    /// Mean irradiance by the area that counts, tristimulus.
     pub fn mean_irradiance(&self) -> [f64; 3] {
         self.mean_over_leaves(|row| self.solution.lanes.tristimulus(row))
     }
@@ -570,11 +570,11 @@ impl Bake {
         self.mean_over_leaves(|row| self.solution.lanes.leaves(row))
     }
 
-    /// The mean of what irradiance comes to, by area; 0 where there is none.
+    /// The mean of what irradiance comes to, by the area that counts; 0 where there is none.
     fn mean_over_leaves<const N: usize>(&self, of: impl Fn(&[f32]) -> [f64; N]) -> [f64; N] {
         let (mut sum, mut area) = ([0.0; N], 0.0);
         for (k, &leaf) in self.solution.light.leaves.iter().enumerate() {
-            let a = self.refinement.areas[leaf as usize];
+            let a = self.refinement.counted(leaf);
             let each = of(self.solution.light.irradiance.row(k));
             sum = std::array::from_fn(|c| sum[c] + a * each[c]);
             area += a;

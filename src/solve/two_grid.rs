@@ -244,13 +244,13 @@ fn block(row: &[f32], b: usize) -> f32x16 {
     f32x16::from(all)
 }
 
-/// Patch of each node at and below the cut; [`NONE`] above. Clusters of several planes are opened first, then what is
-/// largest.
+/// Patch of each node at and below the cut; [`NONE`] above. Clusters of several planes are opened first, then what
+/// counts most.
 fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
     let key = |id: u32| {
         let node = tree.node(id);
         // Areas are positive: their bits stand in their order.
-        (!node.flat, node.area.to_bits(), Reverse(id))
+        (!node.flat, node.counted.to_bits(), Reverse(id))
     };
     let mut open = BinaryHeap::from([(key(0), 0)]);
     let mut patch = vec![NONE; tree.nodes.len()];

@@ -9,6 +9,7 @@ mod cie171;
 mod cornell;
 mod curtained;
 mod daylit;
+mod flat;
 mod furnished;
 mod gallery;
 mod glazed;
@@ -69,6 +70,7 @@ const ROOMS: &[Room] = &[
         Some(simple::two_rooms_spectra),
     ),
     ("corridor", simple::corridor, None),
+    ("flat", flat::room, None),
     ("daylit", daylit::room, Some(daylit::spectra)),
     ("glazed", glazed::room, Some(glazed::spectra)),
     ("curtained", curtained::room, Some(curtained::spectra)),
