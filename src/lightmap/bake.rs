@@ -78,7 +78,7 @@ impl Bake {
         let samples = growth.compared(&points, &self.placed(&growth, &Vec::new(), None).0);
         let before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
-        let mut turns = Turns::new((allowed, allowed), area, growth.cells.len(), before);
+        let mut turns = Turns::new(allowed, area, growth.cells.len(), before);
         loop {
             let end = growth.grow(turns.aim, progress);
             let points = growth.points(self, turns.turn, progress);

@@ -8,7 +8,7 @@
 use super::cells::{Cell, Cells, Corner, Doubt, Hint, within};
 use super::looks::Looks;
 use super::shades::Shades;
-use super::turns::{BENDS, BY_CHANCE, EXCESS, End, largest};
+use super::turns::{BENDS, BY_CHANCE, EXCESS, End, RANGE, largest};
 use crate::color::seen_difference;
 use crate::gather::Vertex;
 use crate::geometry::sampling::{hash, triangle_weights};
@@ -23,9 +23,6 @@ const SMALLEST: f64 = 1e-3;
 /// What remains of the mean square after a bisection: two halve a smooth triangle's size, and its error falls with the
 /// square of that.
 pub(super) const SHRINK: f64 = 0.25;
-/// Of the difference of their corners, lines are taken to miss this share where nothing is known yet: .20 to .26 in a garage, as the root mean
-/// square over parts of triangles that were split and not looked at again.
-const RANGE: f64 = 0.2;
 /// Where something covers the middle of an edge, this much of the difference of its ends counts.
 const COVERED: f64 = 0.25;
 /// Vertices that splitting one triangle may take, its neighbours' included: as measured, 1 to 5, twice as many on an edge of a
@@ -275,11 +272,11 @@ impl<'a> Growth<'a> {
                     return told.max(range()).max(self.allowed * self.allowed);
                 }
                 let expected = square.max(told * f64::from(trust * trust));
-                // Half of what crosses the edge of a shadow still does, and is as far off as the whole was.
-                match self.looking {
-                    true => expected.max(range()),
-                    false => expected,
+                // What was looked at before was not split there: beside a line light is known at corners only.
+                if self.is_beside_line(k) {
+                    return expected.max(range());
                 }
+                expected
             })
             .collect();
         for (&k, square) in fresh.iter().zip(expected) {
@@ -289,6 +286,14 @@ impl<'a> Growth<'a> {
                 doubt.trust = 1.0;
             }
         }
+    }
+
+    /// Has a cell a corner on the edge of a shadow?
+    fn is_beside_line(&self, cell: usize) -> bool {
+        let cell = &self.cells.all[cell];
+        let beside = &self.cells.sheets[cell.sheet as usize].beside;
+        let mut corners = cell.corners.iter();
+        corners.any(|corner| beside.contains_key(&corner.vertex))
     }
 
     /// The first vertices.

@@ -40,10 +40,6 @@ const AT: f64 = 0.5;
 const SKETCH: f64 = 4.0;
 const SKETCH_MOST: f64 = 4.0;
 
-/// Growing first aims at a root mean square of so many times the mean that is allowed: few places are far off. Measured, it is 2.8 times
-/// the mean in a living room, 3.0 in a theatre, 4.2 in a garage and 6 in a sunlit room.
-const FEW: f64 = 2.0;
-
 /// Where there is no time to look, the mesh grows for so long as the solved light tells. To write the vertices of a large room takes
 /// two to four times as long.
 const UNSEEN: Duration = Duration::from_millis(500);
@@ -100,12 +96,7 @@ impl Bake {
         let mut samples = growth.measured(self, &settled, 0, progress);
         let before = summed(&samples, allowed, None);
         growth.noise = before.noise * before.noise;
-        let mut turns = Turns::new(
-            (allowed, FEW * allowed),
-            area,
-            growth.cells.all.len(),
-            before,
-        );
+        let mut turns = Turns::new(allowed, area, growth.cells.all.len(), before);
         loop {
             let cells = growth.cells.all.len();
             let end = growth.grow(turns.aim, progress);

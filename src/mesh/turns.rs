@@ -7,9 +7,8 @@ const MEASURED: u64 = 10;
 /// Growing ends where so many times the cells leave more than this part of the error.
 const GROWN: f64 = 1.5;
 const STALLED: f64 = 0.93;
-/// After a measurement that was not met, growing aims at this part of what the measured error asks for: with the mean square that is
-/// believed the mean falls by the power .95, in the garage and in the living room.
-const BELOW: f64 = 0.95;
+/// After a measurement that was not met, growing aims at this part of what the measured error asks for.
+const BELOW: f64 = 0.8;
 /// And at no less than this part of what it aimed at before.
 const STEP: f64 = 0.2;
 /// Shares down to this part of the largest are dealt with at a time.
@@ -49,16 +48,10 @@ pub(crate) struct Turns {
 }
 
 impl Turns {
-    /// Begins with the allowed error (mean CIEDE2000), the root mean square to aim at first, the area that is seen, and what so many
-    /// cells were measured to have.
-    pub(crate) fn new(
-        (allowed, first): (f64, f64),
-        area: f64,
-        cells: usize,
-        before: Interpolation,
-    ) -> Self {
+    /// Begins with the allowed error (mean CIEDE2000), the area that is seen, and what so many cells were measured to have.
+    pub(crate) fn new(allowed: f64, area: f64, cells: usize, before: Interpolation) -> Self {
         Self {
-            aim: first * first * area,
+            aim: allowed * allowed * area,
             turn: 1,
             allowed,
             cells,
@@ -83,7 +76,7 @@ impl Turns {
         if found.is_met() || end != End::Reached || self.turn == MEASURED || stalled || is_late {
             return true;
         }
-        let wrong = found.mean / self.allowed;
+        let wrong = (found.mean / self.allowed).powi(2);
         self.aim = sum.min(self.aim) * (BELOW / wrong).clamp(STEP, BELOW);
         self.turn += 1;
         false

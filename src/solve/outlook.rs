@@ -22,7 +22,7 @@ use crate::hierarchy::{NONE, Tree, leaf_below};
 use crate::light::rows::Rows;
 use crate::link::Sight;
 use crate::team::{Interrupt, Interrupted, Team};
-use crate::transport::hemisphere::{BEAM, Hemisphere, Pattern};
+use crate::transport::hemisphere::{BEAM, Hemisphere};
 use found::{ALONE, End, Found, Pairs, look_from, start};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -157,10 +157,10 @@ impl Outlook {
             .filter(|&k| tree.node(k).is_leaf() && self.range[k as usize].1 == 0)
             .collect();
         let mean = mean_area(tree);
-        let patterns: Vec<Pattern> = (0..)
+        let patterns: Vec<Hemisphere> = (0..)
             .map(|k| LOOKING.1 << k)
             .take_while(|&n| n <= hemisphere.len())
-            .map(Pattern::new)
+            .map(Hemisphere::new)
             .collect();
         let usual = LOOKING.0 * hemisphere.len() as f64 / mean;
         let team = self.team;
@@ -175,7 +175,7 @@ impl Outlook {
                     let pattern = patterns
                         .iter()
                         .find(|p| p.len() as f64 >= wanted)
-                        .unwrap_or(hemisphere.pattern());
+                        .unwrap_or(hemisphere);
                     look_from(tree, leaf, sight, pattern, seed)
                 };
                 Ok(chunk.iter().map(each).collect())

@@ -5,7 +5,7 @@ use crate::geometry::sampling::{hash, sequence02, tangents, triangle_weights};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::passed::{self, Passed, Steps};
 use crate::link::Sight;
-use crate::transport::hemisphere::{BEAM, Pattern};
+use crate::transport::hemisphere::{BEAM, Hemisphere};
 use glam::Vec3;
 
 /// Flag of a face or leaf that was met by a ray whose fellow from the same point met no front.
@@ -38,27 +38,29 @@ pub(super) struct Found {
     pub(super) lamps: Vec<u32>,
 }
 
-/// Casts the rays of a leaf: a shifted pattern of directions, two from each of points all over it.
+/// Casts the rays of a leaf: a turned pattern of directions, two from each of points all over it.
 pub(super) fn look_from(
     tree: &Tree,
     leaf: u32,
     sight: &Sight,
-    pattern: &Pattern,
+    pattern: &Hemisphere,
     seed: u64,
 ) -> Found {
     let node = tree.node(leaf);
     let element = &tree.elements[node.element as usize];
     let plane = tree.face_plane[element.face as usize];
     let pairs = Pairs::new(leaf, pattern.len(), seed);
-    let shift = hash(seed ^ 1, u64::from(leaf));
+    let turn = hash(seed ^ 1, u64::from(leaf));
+    let (sin, cos) = (std::f64::consts::TAU * sequence02(0, turn)[0]).sin_cos();
     let [x, y] = tangents(node.normal);
+    let [x, y] = [x * cos + y * sin, y * cos - x * sin];
     let mut found = Found {
         ends: Vec::with_capacity(pattern.len()),
         ..Found::default()
     };
     let mut hits = [None; BEAM];
     let (mut from, mut directions) = ([Vec3::ZERO; BEAM], [Vec3::ZERO; BEAM]);
-    for beam in pattern.beams(shift) {
+    for beam in pattern.beams() {
         for (k, d) in beam.iter().enumerate() {
             directions[k] = (x * d.x + y * d.y + node.normal * d.z).as_vec3();
             from[k] = element.at(pairs.start(found.ends.len() + k)).as_vec3();
