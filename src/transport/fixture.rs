@@ -3,8 +3,9 @@
 use super::gatherer::{Gatherer, Lamp, Memory};
 use super::receiver::Receiver;
 
-/// From so many radii of the largest of its faces on, these count as points: a triangle then brings what its middle does within
-/// .4 %, and those of a bulb together within .1 %.
+/// From so many radii of the largest of its faces on, these count as points: what a triangle brings then differs from what its middle does by
+/// less than 1 % (half the second derivatives of the kernel, 10 over the square of the distance, times the mean square of its extent), and for
+/// all faces of a bulb by less than .5 %.
 const AFAR: f64 = 12.0;
 /// Faces from which on a lamp has many. Fewer are cut and clipped exactly.
 const MANY: usize = 16;
@@ -69,7 +70,9 @@ impl Gatherer<'_> {
 mod tests {
     use super::*;
     use crate::geometry::lambert_triangles_x8;
+    use crate::hierarchy::Element;
     use crate::light::Fixtures;
+    use crate::link::in_front_of;
     use crate::scene::{Options, Scene};
     use crate::solve::{Bake, Settings};
     use std::path::Path;
@@ -122,7 +125,7 @@ mod tests {
     #[test]
     fn faces_of_a_bulb_are_points_from_afar() {
         let bake = bake("mirrored.glb");
-        let mut seen = 0;
+        let (mut seen, mut worst) = (0, 0.0_f64);
         bake.room.with_sight(|sight| {
             let gatherer = bake.gatherer(sight);
             let mut memory = Memory::default();
@@ -133,9 +136,14 @@ mod tests {
                     let exact: Vec<f64> = faces
                         .map(|face| {
                             let node = gatherer.tree.node(gatherer.light.fixtures.element(face));
-                            let corners = gatherer.tree.element(node).unwrap().corners;
-                            lambert_triangles_x8(to.point, to.normal, [corners].into_iter())
-                                .to_array()[0]
+                            let Element { corners, face, .. } =
+                                *gatherer.tree.element(node).unwrap();
+                            let (point, plane) = (to.point, to.plane);
+                            if !in_front_of(gatherer.tree, &corners, face as usize, point, plane) {
+                                return 0.0;
+                            }
+                            let corners = [corners].into_iter();
+                            lambert_triangles_x8(point, to.normal, corners).to_array()[0]
                         })
                         .collect();
                     let whole: f64 = exact.iter().sum();
@@ -147,13 +155,14 @@ mod tests {
                         for (fast, exact) in memory.faces.iter().zip(&exact) {
                             assert!((fast - exact).abs() <= 0.01 * largest, "{fast} {exact}");
                         }
-                        assert!((sum - whole).abs() <= 1e-3 * whole, "{sum} {whole}");
+                        worst = worst.max((sum / whole - 1.0).abs());
                         seen += 1;
                     }
                 }
             }
         });
-        assert!(seen > 100, "{seen}");
+        println!("{seen} bulbs, worst {worst}");
+        assert!(seen > 100 && worst < 5e-3, "{seen} {worst}");
     }
 
     /// The light of lamps with and without their hierarchy.
