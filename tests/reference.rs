@@ -3,12 +3,12 @@
 #[path = "common/built.rs"]
 mod built;
 
-use built::{Room, faces};
+use built::{Room, faces, sun};
 use glam::{DVec3, dvec3};
 use haarlight::color::{KM, Observer};
 use haarlight::link::exchange;
 use haarlight::scene::Scene;
-use haarlight::scene::sky::{SkyType, SkyWish, SunPlace, SunWish};
+use haarlight::scene::sky::{SkyType, SkyWish};
 use haarlight::solve::reference::{Reference, solve_one};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::{Grid, LEAVES, Leaves};
@@ -496,14 +496,7 @@ fn the_solver_agrees_under_a_sky() {
     room.quad(x, z, 0.5 * y, grey);
     let wish = SkyWish {
         kind: Some(SkyType(12)),
-        sun: SunWish {
-            place: Some(SunPlace::Angles {
-                elevation: 50.0,
-                azimuth: 20.0,
-            }),
-            illuminance: Some(0.0),
-            kelvin: None,
-        },
+        sun: sun([50.0, 20.0], 0.0),
         ..SkyWish::default()
     };
     let scene = room.scene().under(&wish).unwrap();

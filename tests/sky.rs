@@ -5,7 +5,7 @@ mod built;
 #[path = "common/daylit.rs"]
 mod daylit;
 
-use built::Room;
+use built::{Room, sun};
 use daylit::{
     LUX, bake, bake_at, beside, cie, places_beside, points, roof, room, row, through, wish,
 };
@@ -189,14 +189,7 @@ fn the_sun_lights_a_patch_of_the_floor() {
 #[test]
 fn the_edge_of_a_sun_patch_is_as_wide_as_its_disc() {
     let wish = SkyWish {
-        sun: SunWish {
-            place: Some(SunPlace::Angles {
-                elevation: 60.0,
-                azimuth: 90.0,
-            }),
-            illuminance: Some(80_000.0),
-            kelvin: None,
-        },
+        sun: sun([60.0, 90.0], 80_000.0),
         brightness: Some(Brightness::Illuminance(0.0)),
         ..wish(12)
     };

@@ -5,7 +5,7 @@ mod built;
 #[path = "common/daylit.rs"]
 mod daylit;
 
-use built::Room;
+use built::{Room, sun};
 use daylit::{LUX, bake, bake_at, cie, points, roof, room, through, wish};
 use exr::prelude::*;
 use glam::{DVec3, dvec3};
@@ -496,14 +496,7 @@ fn a_sun_can_be_added_to_a_map() {
     let folder = TempDir::new().unwrap();
     let map = hdr(&folder, 64, |_| [5.0; 3]);
     let wish = SkyWish {
-        sun: SunWish {
-            place: Some(SunPlace::Angles {
-                elevation: 30.0,
-                azimuth: 45.0,
-            }),
-            illuminance: Some(1000.0),
-            kelvin: None,
-        },
+        sun: sun([30.0, 45.0], 1000.0),
         ..of_map(&map)
     };
     let mut room = Room::new();

@@ -5,14 +5,14 @@ mod built;
 #[path = "common/daylit.rs"]
 mod daylit;
 
-use built::Room;
+use built::{Room, sun};
 use daylit::{LUX, bake, beside, places_beside, points, roof, room, through};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::Scene;
-use haarlight::scene::sky::{Brightness, Dome, SkyWish, SunPlace, SunWish};
+use haarlight::scene::sky::{Brightness, Dome, SkyWish};
 use haarlight::solve::{Bake, Settings};
 use haarlight::spectrum::Leaves;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -22,14 +22,7 @@ fn wish(turbidity: f64, elevation: f64) -> SkyWish {
     SkyWish {
         turbidity: Some(turbidity),
         ground: Some(0.3),
-        sun: SunWish {
-            place: Some(SunPlace::Angles {
-                elevation,
-                azimuth: 0.0,
-            }),
-            illuminance: Some(0.0),
-            kelvin: None,
-        },
+        sun: sun([elevation, 0.0], 0.0),
         ..SkyWish::default()
     }
 }

@@ -228,21 +228,10 @@ fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = ((i64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Options, Scene};
-    use crate::solve::Settings;
-    use std::path::Path;
+    use crate::transport::tests::baked;
 
     fn plane_of(name: &str) -> WorkingPlane {
-        let room = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("scenes")
-            .join(name);
-        let settings = Settings {
-            rounds: 1,
-            ..Settings::default()
-        };
-        let mut bake = Bake::new(Scene::load(room, &Options::default()).unwrap(), settings);
-        bake.run();
-        bake.working_plane().unwrap()
+        baked(name, 1).working_plane().unwrap()
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! From some of their sizes away that is what such faces are, and to sum what they bring takes less time than to look through
 //! their hierarchy down to each.
 
-use crate::hierarchy::{Mesh, Tree};
+use crate::hierarchy::{Element, Mesh, Tree};
 use glam::DVec3;
 use std::ops::Range;
 use wide::f64x8;
@@ -32,21 +32,17 @@ impl Fixtures {
             before: vec![0],
             ..Self::default()
         };
-        let mut radius = vec![0.0_f32; tree.faces.len()];
-        for (entry, &id) in tree.face_node.iter().enumerate() {
+        for &id in &tree.face_node {
             let element = tree.element(tree.node(id));
-            let glows = emitted.get(id as usize).is_some_and(|&bright| bright > 0.0);
-            if let Some(element) = element.filter(|_| glows) {
+            if let Some(element) = element.filter(|_| emitted[id as usize] > 0.0) {
                 let [a, b, c] = element.corners;
-                let middle = (a + b + c) / 3.0;
+                let middle = middle(element);
                 let normal = (b - a).cross(c - a) / (2.0 * std::f64::consts::PI);
                 let both = middle.to_array().into_iter().chain(normal.to_array());
                 for (column, x) in out.columns.iter_mut().zip(both) {
                     column.push(x);
                 }
                 out.elements.push(id);
-                let corners = element.corners.map(|p| p.distance(middle));
-                radius[entry] = corners.into_iter().fold(0.0, f64::max) as f32;
             }
             out.before.push(out.elements.len() as u32);
         }
@@ -57,15 +53,11 @@ impl Fixtures {
             let below = node.child_range().map(|c| c as usize);
             out.grain[k] = below.clone().map(|c| out.grain[c]).fold(0.0, f32::max);
             if let Some(element) = tree.element(node) {
-                let face = element.face as usize;
+                let triangle = tree.faces[element.face as usize].triangle;
+                shines[k] = Some((mesh.origin[triangle as usize].0, emitted[k]));
                 let even = below.clone().all(|c| alike(emitted[c], emitted[k]));
-                let surface = mesh.origin[tree.faces[face].triangle as usize].0;
-                shines[k] = Some((surface, emitted[k]));
-                out.grain[k] = if even {
-                    radius[face].max(out.grain[k])
-                } else {
-                    f32::INFINITY
-                };
+                let radius = if even { radius(element) } else { f32::INFINITY };
+                out.grain[k] = radius.max(out.grain[k]);
                 continue;
             }
             let mut parts = below.filter_map(|c| shines[c]);
@@ -108,7 +100,7 @@ impl Fixtures {
         self.elements[face]
     }
 
-    /// Form factors of faces far from a point, as those of their middles, which `out` then holds; their sum.
+    /// Adds form factors of faces far from a point, as those of their middles, to `out`; their sum.
     pub(crate) fn factors(
         &self,
         faces: Range<usize>,
@@ -116,7 +108,7 @@ impl Fixtures {
         normal: DVec3,
         out: &mut Vec<f64>,
     ) -> f64 {
-        out.clear();
+        let begin = out.len();
         let [point, normal] = [point, normal].map(|p| p.to_array().map(f64x8::splat));
         for first in faces.clone().step_by(8) {
             let count = (faces.end - first).min(8);
@@ -133,7 +125,7 @@ impl Fixtures {
             let factors = here * there / (square * square);
             out.extend_from_slice(&factors.to_array()[..count]);
         }
-        out.iter().sum()
+        out[begin..].iter().sum()
     }
 
     /// Bytes held.
@@ -145,6 +137,18 @@ impl Fixtures {
                 .map(|column| 8 * column.len())
                 .sum::<usize>()
     }
+}
+
+fn middle(element: &Element) -> DVec3 {
+    let [a, b, c] = element.corners;
+    (a + b + c) / 3.0
+}
+
+/// Distance of the furthest corner from the middle.
+fn radius(element: &Element) -> f32 {
+    let middle = middle(element);
+    let corners = element.corners.map(|p| p.distance(middle));
+    corners.into_iter().fold(0.0, f64::max) as f32
 }
 
 fn alike(a: f32, b: f32) -> bool {

@@ -29,7 +29,8 @@ pub(super) struct Settled {
 }
 
 impl Growth<'_> {
-    /// Vertices that were parted are one again where light on both sides proved alike: no further apart than what the mean may be off.
+    /// Vertices that were parted, by what stands on an edge or by that of a shadow, are one again where light on both sides proved alike: no
+    /// further apart than what the mean may be off.
     fn join(
         &self,
         sheet: usize,

@@ -323,9 +323,7 @@ mod tests {
     use super::super::gatherer::Memory;
     use super::super::outside::Way;
     use super::*;
-    use crate::scene::{Options, Scene};
-    use crate::solve::{Bake, Settings};
-    use std::path::Path;
+    use crate::transport::tests::{baked, middle};
 
     #[test]
     fn middles_are_those_of_equal_triangles() {
@@ -346,27 +344,14 @@ mod tests {
     /// The plain way is by rays: the same factors, and the same is left behind three kinds of panes.
     #[test]
     fn rays_find_the_same_sky_behind_panes() {
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/glazed.glb");
-        let settings = Settings {
-            rounds: 1,
-            ..Settings::default()
-        };
-        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
-        bake.run();
+        let bake = baked("glazed.glb", 1);
         let [mut clipped, mut cast] = [[[0.0; 4]; 2]; 2];
         bake.room.with_sight(|sight| {
             let gatherer = bake.gatherer(sight);
             let (outside, tree) = (gatherer.sky.unwrap(), bake.tree());
             let mut look = Memory::default().look;
             for leaf in tree.leaves() {
-                let element = tree.element(tree.node(leaf)).unwrap();
-                let to = Receiver {
-                    point: element.at([1.0 / 3.0; 3]),
-                    normal: tree.face_normal[element.face as usize],
-                    plane: tree.face_plane[element.face as usize],
-                    leaf: Some(leaf),
-                    seed: u64::from(leaf),
-                };
+                let to = middle(tree, leaf);
                 let ways = (sight, Some(&gatherer as &dyn Ways));
                 let area = tree.node(leaf).area;
                 let seen = outside.seen(ways, &to, Way::Rays(2), &mut look);

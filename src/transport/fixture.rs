@@ -20,26 +20,26 @@ impl Gatherer<'_> {
 
     /// Puts such a lamp off until all lamps are known.
     pub(super) fn put_off(&self, to: &Receiver, id: u32, memory: &mut Memory) {
+        let fixtures = &self.light.fixtures;
+        let faces = memory.faces.len();
         let factor = self.faces_of(to, id, memory);
         if factor > 0.0 {
-            let first = self.light.fixtures.below(self.tree, id).start;
-            let element = self.light.fixtures.element(first);
+            let element = fixtures.element(fixtures.below(self.tree, id).start);
             let emitted = f64::from(self.light.bright_emitted[element as usize]);
             memory.lamps.push(Lamp {
                 id: element,
                 fixture: id,
+                faces,
                 factor,
                 carries: factor * emitted,
             });
         }
     }
 
-    /// Puts the factors of a lamp's faces into the memory; their sum.
-    pub(super) fn faces_of(&self, to: &Receiver, id: u32, memory: &mut Memory) -> f64 {
-        let (fixtures, faces) = (
-            &self.light.fixtures,
-            self.light.fixtures.below(self.tree, id),
-        );
+    /// Adds the factors of a lamp's faces to the memory; their sum.
+    fn faces_of(&self, to: &Receiver, id: u32, memory: &mut Memory) -> f64 {
+        let fixtures = &self.light.fixtures;
+        let faces = fixtures.below(self.tree, id);
         fixtures.factors(faces, to.point, to.normal, &mut memory.faces)
     }
 
@@ -52,17 +52,17 @@ impl Gatherer<'_> {
         upto: &mut (usize, f64),
         memory: &Memory,
     ) -> (u32, f64, f64) {
-        let (mut face, mut before) = *upto;
-        let factors = &memory.faces;
-        while face + 1 < factors.len() && before + factors[face] <= u * lamp.factor {
-            before += factors[face];
-            face += 1;
+        let faces = self.light.fixtures.below(self.tree, lamp.fixture);
+        let factors = &memory.faces[lamp.faces..][..faces.len()];
+        let (face, before) = upto;
+        while *face + 1 < factors.len() && *before + factors[*face] <= u * lamp.factor {
+            *before += factors[*face];
+            *face += 1;
         }
-        *upto = (face, before);
-        let first = self.light.fixtures.below(self.tree, lamp.fixture).start;
-        let rest = ((u * lamp.factor - before) / factors[face]).clamp(0.0, 1.0);
-        let share = factors[face] / lamp.factor;
-        (self.light.fixtures.element(first + face), share, rest)
+        let rest = ((u * lamp.factor - *before) / factors[*face]).clamp(0.0, 1.0);
+        let share = factors[*face] / lamp.factor;
+        let element = self.light.fixtures.element(faces.start + *face);
+        (element, share, rest)
     }
 }
 
@@ -70,41 +70,10 @@ impl Gatherer<'_> {
 mod tests {
     use super::*;
     use crate::geometry::lambert_triangles_x8;
-    use crate::hierarchy::Element;
+    use crate::hierarchy::{Element, NONE};
     use crate::light::Fixtures;
     use crate::link::in_front_of;
-    use crate::scene::{Options, Scene};
-    use crate::solve::{Bake, Settings};
-    use std::path::Path;
-
-    fn bake(room: &str) -> Bake {
-        let room = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("scenes")
-            .join(room);
-        let settings = Settings {
-            rounds: 1,
-            ..Settings::default()
-        };
-        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
-        bake.run();
-        bake
-    }
-
-    /// Middles of every so many leaves.
-    fn receivers(bake: &Bake, every: usize) -> Vec<Receiver> {
-        let tree = bake.tree();
-        let at = |leaf| {
-            let element = tree.element(tree.node(leaf)).unwrap();
-            Receiver {
-                point: element.at([1.0 / 3.0; 3]),
-                normal: tree.face_normal[element.face as usize],
-                plane: tree.face_plane[element.face as usize],
-                leaf: Some(leaf),
-                seed: u64::from(leaf),
-            }
-        };
-        tree.leaves().step_by(every).map(at).collect()
-    }
+    use crate::transport::tests::{baked, middle};
 
     /// Clusters below the lit root that count as lamps of many faces from a point.
     fn fixtures(gatherer: &Gatherer, to: &Receiver) -> Vec<u32> {
@@ -113,9 +82,9 @@ mod tests {
             let node = gatherer.tree.node(id);
             if gatherer.is_fixture(to, id) {
                 found.push(id);
-            } else if node.element == crate::hierarchy::NONE {
+            } else if node.element == NONE {
                 let parts = node.child_range().map(|c| gatherer.light.lit[c as usize]);
-                open.extend(parts.filter(|&c| c != crate::hierarchy::NONE));
+                open.extend(parts.filter(|&c| c != NONE));
             }
         }
         found
@@ -124,13 +93,15 @@ mod tests {
     /// Each face beside its exact form factor, and all of them together.
     #[test]
     fn faces_of_a_bulb_are_points_from_afar() {
-        let bake = bake("mirrored.glb");
+        let bake = baked("mirrored.glb", 1);
         let (mut seen, mut worst) = (0, 0.0_f64);
         bake.room.with_sight(|sight| {
             let gatherer = bake.gatherer(sight);
             let mut memory = Memory::default();
-            for to in receivers(&bake, 7) {
+            for leaf in bake.tree().leaves().step_by(7) {
+                let to = middle(bake.tree(), leaf);
                 for id in fixtures(&gatherer, &to) {
+                    memory.faces.clear();
                     let sum = gatherer.faces_of(&to, id, &mut memory);
                     let faces = gatherer.light.fixtures.below(gatherer.tree, id);
                     let exact: Vec<f64> = faces
@@ -169,7 +140,7 @@ mod tests {
     #[test]
     fn a_lamp_of_many_faces_is_all_its_faces() {
         for room in ["mirrored.glb", "curtained.glb"] {
-            let bake = bake(room);
+            let bake = baked(room, 1);
             let mut plain = bake.light().clone();
             plain.fixtures = Fixtures::none(bake.tree());
             let (mut off, mut all, mut rays) = (0.0, 0.0, [0, 0]);
@@ -184,7 +155,8 @@ mod tests {
                     tolerance: 1e-6,
                     ..bake.gatherer(sight)
                 };
-                for to in receivers(&bake, 31) {
+                for leaf in bake.tree().leaves().step_by(31) {
+                    let to = middle(bake.tree(), leaf);
                     let bright = |gatherer: &Gatherer, rays: &mut u64| {
                         let mut memory = Memory::default();
                         let row = gatherer.direct(&to, &mut memory);

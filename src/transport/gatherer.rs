@@ -36,6 +36,8 @@ pub(super) struct Lamp {
     /// The cluster of elements that shine like this one and stand together, see [`Fixtures`](crate::light::Fixtures); [`NONE`] where
     /// it is by itself.
     pub(super) fixture: u32,
+    /// Where the factors of that cluster's faces begin in the memory.
+    pub(super) faces: usize,
     pub(super) factor: f64,
     pub(super) carries: f64,
 }
@@ -64,7 +66,7 @@ pub struct Memory {
     pub(super) near: Vec<(u32, Hit)>,
     /// Lamps that are put off until all of them are known.
     pub(super) lamps: Vec<Lamp>,
-    /// Factors of the faces of a lamp of many.
+    /// Factors of the faces of lamps of many, one lamp after the other.
     pub(super) faces: Vec<f64>,
     /// Which path each segment to a lamp belongs to, and what it brings.
     pub(super) to_lamps: Vec<(usize, f64)>,

@@ -141,6 +141,7 @@ impl Gatherer<'_> {
         }
         memory.lamps = lamps;
         memory.lamps.clear();
+        memory.faces.clear();
     }
 
     /// Where every ray found its lamp, a lamp that none went to counts as seen, too: it is faint beside the others. Not so where brightness
@@ -231,9 +232,6 @@ impl Gatherer<'_> {
                 false => before + lamp.carries,
             };
             let (mut parts, mut face) = (Vec::new(), (0, 0.0));
-            if lamp.fixture != NONE && samples.peek().is_some_and(|s| s[0] * all < upto) {
-                self.faces_of(to, lamp.fixture, memory);
-            }
             while let Some([u, v]) = samples.next_if(|sample| sample[0] * all < upto) {
                 // What is left of the number after the choice of a lamp serves for the point.
                 let mut u = ((u * all - before) / lamp.carries).clamp(0.0, 1.0);
@@ -402,9 +400,7 @@ mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
     use crate::light::brightness;
-    use crate::scene::{Options, Scene};
-    use crate::solve::{Bake, Settings};
-    use std::path::Path;
+    use crate::transport::tests::{baked, middle};
 
     fn to() -> Receiver {
         Receiver {
@@ -472,13 +468,7 @@ mod tests {
     #[test]
     fn one_lamp_by_chance_is_all_lamps_on_the_mean() {
         const SAMPLES: u32 = 1024;
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/furnished.glb");
-        let settings = Settings {
-            rounds: 1,
-            ..Settings::default()
-        };
-        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
-        bake.run();
+        let bake = baked("furnished.glb", 1);
         assert!(!bake.lamps().is_empty());
         let (mut off, mut all) = (0.0, 0.0);
         bake.room.with_sight(|sight| {
@@ -490,13 +480,9 @@ mod tests {
             let mut memory = Memory::default();
             let tree = bake.tree();
             for leaf in tree.leaves().step_by(97) {
-                let element = tree.element(tree.node(leaf)).unwrap();
                 let to = Receiver {
-                    point: element.at([1.0 / 3.0; 3]),
-                    normal: tree.face_normal[element.face as usize],
-                    plane: tree.face_plane[element.face as usize],
-                    leaf: Some(leaf),
                     seed: 0,
+                    ..middle(tree, leaf)
                 };
                 let row = gatherer.direct(&to, &mut memory);
                 let want = brightness(bake.lanes().tristimulus(&row), bake.light().white);

@@ -31,6 +31,8 @@ mod shadows;
 mod sky;
 mod slope;
 mod sweep;
+#[cfg(test)]
+pub(crate) mod tests;
 pub(crate) mod trace;
 mod via;
 mod ways;

@@ -394,6 +394,7 @@ impl Gatherer<'_> {
             memory.lamps.push(Lamp {
                 id,
                 fixture: NONE,
+                faces: 0,
                 factor,
                 carries,
             });

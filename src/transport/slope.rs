@@ -193,9 +193,7 @@ fn moment(
 mod tests {
     use super::*;
     use crate::geometry::{NO_PLANE, Shadow};
-    use crate::scene::{Options, Scene};
-    use crate::solve::{Bake, Settings};
-    use std::path::Path;
+    use crate::transport::tests::baked;
 
     /// Irradiance by the parts of an element that are not hidden, and without that they differ: by many small triangles.
     fn by_quadrature(
@@ -228,13 +226,7 @@ mod tests {
     /// On leaves and on patches that have children, whole and behind an edge.
     #[test]
     fn light_that_rises_evenly_comes_as_by_quadrature() {
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
-        let settings = Settings {
-            rounds: 2,
-            ..Settings::default()
-        };
-        let mut bake = Bake::new(Scene::load(&room, &Options::default()).unwrap(), settings);
-        bake.run();
+        let bake = baked("convex.glb", 2);
         let (tree, size) = (bake.tree(), bake.mesh().half_size);
         // As bright as white.
         let level = bake.light().white[1];

@@ -11,7 +11,7 @@ use haarlight::scene::fluorescence::{Fluorescence, Term};
 use haarlight::scene::mirror::Mirror;
 use haarlight::scene::pane::{Pane, PaneKind};
 use haarlight::scene::sheet::Sheet;
-use haarlight::scene::sky::Sky;
+use haarlight::scene::sky::{Sky, SunPlace, SunWish};
 use haarlight::scene::{
     Alpha, Emission, GREATEST_ALBEDO, LightKind, LightSpectrum, Material, PunctualLight, Scene,
     Sides, Source, Surface,
@@ -19,6 +19,15 @@ use haarlight::scene::{
 use haarlight::solve::{Bake, Settings};
 use haarlight::spectrum::{Grid, LEAVES, Leaves};
 use std::f64::consts::PI;
+
+/// A sun at an elevation and azimuth, degrees, and its illuminance across its rays, lx.
+pub(crate) fn sun([elevation, azimuth]: [f64; 2], illuminance: f64) -> SunWish {
+    SunWish {
+        place: Some(SunPlace::Angles { elevation, azimuth }),
+        illuminance: Some(illuminance),
+        kelvin: None,
+    }
+}
 
 /// A bake with default settings, to its end.
 pub(crate) fn baked(scene: Scene) -> Bake {

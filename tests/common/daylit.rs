@@ -2,9 +2,9 @@
 
 #![allow(dead_code, reason = "no test file uses all of it")]
 
-use crate::built::Room;
+use crate::built::{Room, sun};
 use glam::{DVec3, dvec3};
-use haarlight::scene::sky::{Brightness, SkyType, SkyWish, SunPlace, SunWish};
+use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
 use haarlight::solve::{Bake, Settings};
 use std::f64::consts::PI;
 
@@ -31,14 +31,7 @@ pub(crate) fn wish(kind: u8) -> SkyWish {
         kind: Some(SkyType(kind)),
         brightness: Some(Brightness::Illuminance(LUX)),
         ground: Some(0.3),
-        sun: SunWish {
-            place: Some(SunPlace::Angles {
-                elevation: 60.0,
-                azimuth: 0.0,
-            }),
-            illuminance: Some(0.0),
-            kelvin: None,
-        },
+        sun: sun([60.0, 0.0], 0.0),
         ..SkyWish::default()
     }
 }

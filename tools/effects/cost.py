@@ -49,8 +49,6 @@ def cost(command):
     return usage.ru_utime
 
 
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("room", type=Path)

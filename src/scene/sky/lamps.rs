@@ -35,8 +35,8 @@ pub(crate) fn join(
         return None;
     }
     let (kind, sun) = asked(wish, nodes, lights, check)?;
-    let sunless_by_wish = wish.sun.place == Some(SunPlace::Nowhere);
-    if sunless_by_wish {
+    let put_out = wish.sun.place == Some(SunPlace::Nowhere);
+    if put_out {
         lights.retain(|light| light.kind != LightKind::Directional);
     }
     let toward = sun.as_ref().map(|sun| sun.toward);
@@ -51,8 +51,8 @@ pub(crate) fn join(
         lights,
         spectra,
     };
-    let (ground, own_sun) = (light.ground, light.sun);
-    if sun.is_none() && own_sun.is_none() && !sunless_by_wish {
+    let (ground, own_sun) = (light.ground, light.sun.filter(|_| !put_out));
+    if sun.is_none() && own_sun.is_none() && !put_out {
         sunless(wish, check);
         sun_of_file(makes.lights, check);
     }
@@ -63,7 +63,6 @@ pub(crate) fn join(
             let usual = usual(kind.unwrap_or(CLEAR), Some(angles(sun.toward)[0]));
             makes.placed(wish, &sun, usual[1], check)
         }
-        None if sunless_by_wish => None,
         None => own_sun.and_then(|(toward, shape)| makes.of_map(wish, toward, spectrum, shape)),
     };
     if let Some(sun) = shining {
