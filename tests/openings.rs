@@ -106,19 +106,20 @@ fn small_openings_in_the_outermost_wall_are_as_right_as_large_ones() {
     for (width, height) in [(0.02, 2.0), (0.1, 0.1), (0.3, 0.3), (2.0, 1.0)] {
         let (room, opening) = long_room(width, height, false);
         let errors = errors(&bake(room, &sky()), opening);
-        assert!(errors.iter().all(|e| e.abs() < 0.015), "{width} x {height}");
+        assert!(errors.iter().all(|e| e.abs() < 0.01), "{width} x {height}");
     }
 }
 
-/// What opens within the room's box is seen elsewhere on that from each place, and the parts of a place are larger than what each of its
-/// points sees: root mean squares over the points are .024 and .029, where parts of all places together gave .7 and .1.
+/// Here the room goes on beyond the opening, on a terrace: from there much sky is seen by which nothing comes in. Points that see a strip
+/// of the sky above black ground are off most.
 #[test]
-fn small_openings_in_inner_walls_are_found_place_by_place() {
-    for (width, height) in [(0.3, 0.3), (2.0, 1.0)] {
+fn small_openings_in_inner_walls_are_as_right_as_in_outer_ones() {
+    for (width, height) in [(0.02, 2.0), (0.1, 0.1), (0.3, 0.3), (2.0, 1.0)] {
         let (room, opening) = long_room(width, height, true);
         let errors = errors(&bake(room, &sky()), opening);
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-        assert!(rms < 0.04, "{width} x {height}: {rms}");
+        assert!(rms < 0.015, "{width} x {height}: {rms}");
+        assert!(errors.iter().all(|e| e.abs() < 0.04), "{width} x {height}");
     }
 }
 

@@ -16,7 +16,7 @@
 //! | [`polygon`] | form factor from an element of surface to a polygon |
 //! | [`nearest`] | the point of a triangle that is nearest to some point |
 //! | [`lanes`] | the same for eight pairs at once |
-//! | `openings`, `cover` | where rays leave a room, in rectangles that rays can be sent to |
+//! | `openings` | where rays leave a room, in boxes that rays can be sent to |
 //! | [`sampling`] | repeatable points on triangles and directions in a hemisphere |
 //!
 //! Measured with `cargo bench --bench rays` (21 November 2026, one core of an AMD EPYC of family 26 with AVX-512, best of 200 runs), in millions a
@@ -41,7 +41,6 @@
 mod beam;
 pub mod blockers;
 pub mod clip;
-mod cover;
 pub mod index;
 pub mod lanes;
 pub mod nearest;

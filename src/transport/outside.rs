@@ -239,19 +239,12 @@ impl Outside {
         count: usize,
         look: &mut Look,
     ) {
-        look.segments.clear();
         let turn = hash(to.seed, 0x5c3);
-        let far = reach((sight, by));
         let ahead: Vec<DVec3> = (0..count as u32)
             .filter_map(|k| self.sky.spot(sequence02(k, turn)))
             .filter(|d| to.normal.dot(*d) > 0.0)
             .collect();
-        let way = |d: &DVec3| Segment::new(to.point, to.point + *d * far, [to.plane, NO_PLANE]);
-        look.segments.extend(ahead.iter().map(way));
-        look.block((sight, by));
-        let ways = ahead.into_iter().zip(&look.blocked);
-        let free = ways.filter(|(_, blocked)| !**blocked);
-        look.open.extend(free.map(|(d, _)| (Search::Spots, d)));
+        self.cast((sight, by), to, (Search::Spots, &ahead), look);
     }
 
     /// Rays to the openings: adds the directions that lead outside.
@@ -265,20 +258,34 @@ impl Outside {
         let plain = |d: DVec3| self.sky.plain(d);
         self.openings
             .weigh(to.point, to.normal, plain, &mut look.choice);
-        look.segments.clear();
         let turn = hash(to.seed, 0x5c1);
-        for k in 0..count as u32 {
-            let at = self.openings.choose(&look.choice, sequence02(k, turn));
-            let ahead = at.filter(|at| to.normal.dot(at - to.point) > 0.0);
-            look.segments
-                .extend(ahead.map(|at| Segment::new(to.point, at, [to.plane, NO_PLANE])));
-        }
+        let toward = |k| {
+            let at = self.openings.choose(&look.choice, sequence02(k, turn))?;
+            Some((at - to.point).normalize_or_zero())
+        };
+        let ahead: Vec<DVec3> = (0..count as u32)
+            .filter_map(toward)
+            .filter(|d| to.normal.dot(*d) > 0.0)
+            .collect();
+        self.cast((sight, by), to, (Search::Openings, &ahead), look);
+    }
+
+    /// Adds those of some directions that lead outside: beyond an opening, too, something may stand.
+    fn cast(
+        &self,
+        (sight, by): (&Sight, Option<&dyn Ways>),
+        to: &Receiver,
+        (search, ahead): (Search, &[DVec3]),
+        look: &mut Look,
+    ) {
+        let far = reach((sight, by));
+        let way = |d: &DVec3| Segment::new(to.point, to.point + *d * far, [to.plane, NO_PLANE]);
+        look.segments.clear();
+        look.segments.extend(ahead.iter().map(way));
         look.block((sight, by));
-        let ways = look.segments.iter().zip(&look.blocked);
+        let ways = ahead.iter().zip(&look.blocked);
         let free = ways.filter(|(_, blocked)| !**blocked);
-        let toward = |s: &Segment| (s.to.as_dvec3() - to.point).normalize();
-        look.open
-            .extend(free.map(|(s, _)| (Search::Openings, toward(s))));
+        look.open.extend(free.map(|(&d, _)| (search, d)));
     }
 
     /// Irradiance by the open directions, by the power heuristic: of so many rays of each search.

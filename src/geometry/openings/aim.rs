@@ -1,7 +1,9 @@
 //! Rays that are aimed where others left.
 
-use super::sides::{Gap, KINDS, Openings, PLACES, across};
+use super::gaps::{Gap, across};
+use super::{KINDS, Openings, PLACES};
 use crate::geometry::sampling::Pcg;
+use glam::DVec3;
 
 /// Rays are aimed beside a gap by so many cells, as often by each power of two.
 const BESIDE: [f64; 2] = [0.125, 4.0];
@@ -53,7 +55,7 @@ impl<'a> Aim<'a> {
         place: usize,
         turn: usize,
         random: &mut Pcg,
-    ) -> Gap {
+    ) -> DVec3 {
         let mut among: &[u32] = match turn % 4 {
             0 => &[],
             1 => {
@@ -76,8 +78,7 @@ impl<'a> Aim<'a> {
             let cells = (least + (most - least) * random.f64()).exp2();
             at[other] += (2.0 * random.f64() - 1.0) * cells * openings.cell()[other];
         }
-        let at = at.clamp(openings.low, openings.high);
-        Gap { place, at, axis }
+        at.clamp(openings.low, openings.high)
     }
 }
 

@@ -1,19 +1,22 @@
 //! Directions toward openings: chosen by what each piece of them may bring to a point, with their density.
 
-use super::sides::{MARGIN, Openings, PLACES};
-use crate::geometry::cover::Rectangle;
+use super::boxes::Part;
+use super::gaps::across;
+use super::{MARGIN, Openings};
 use glam::DVec3;
 use std::f64::consts::PI;
-use std::ops::Range;
 
-/// Where a place has parts of its own they take most of its rays. The others go where rays from elsewhere left, too.
-const OWN_RAYS: f64 = 0.75;
 /// A part is weighed in pieces that are no longer than this share of their distance, at most so many along its side and so many in all.
 const LENGTH: f64 = 0.5;
 const ALONG: f64 = 16.0;
 const PIECES: usize = 256;
-/// From so many rays on a part counts in full: one that a few rays touched is mostly wall.
-const FILLED: usize = 16;
+/// Pieces along a side at least, if there are few parts, where one corner is so many times as bright as another: of a window that is half
+/// below the horizon each is above it or not. With one, points that see a strip of sky above black ground were 4 % off; with so many
+/// everywhere, rays lie less evenly, and points are off by .3 % that are else by .1.
+const FEWEST: usize = 4;
+const UNEVEN: f64 = 2.0;
+/// Parts that may bring less than this share of all are left out.
+const NOTHING: f64 = 0.002;
 /// A piece that seems edge-on from its middle still counts as if it were turned by this cosine.
 const LEAST_COSINE: f64 = 0.1;
 
@@ -22,21 +25,22 @@ const LEAST_COSINE: f64 = 0.1;
 pub(crate) struct Choice {
     parts: Vec<Pieces>,
     sums: Vec<f64>,
-    /// Where the lists of parts and pieces of all places end, and what share of the rays those of the place have.
-    shared: [usize; 2],
-    own: f64,
 }
 
-/// A part in pieces: as many along either axis, and the number of the first.
-#[derive(Debug, Clone, Copy)]
+/// A part in pieces.
+#[derive(Debug, Clone, Copy, Default)]
 struct Pieces {
     part: u32,
+    /// Its brightness, if that is about the same all over.
+    even: Option<f64>,
+    /// Pieces along either axis across it, and the number of the first.
     along: [u32; 2],
     first: u32,
 }
 
 impl Openings {
-    /// What each part may bring to a point that looks along a normal: about its form factor times `brightness` of its direction.
+    /// What each part may bring to a point that looks along a normal: about its form factor, as far as it is seen from there, times
+    /// `brightness` of its direction. Those that bring next to nothing are left to rays over the hemisphere.
     pub(crate) fn weigh(
         &self,
         point: DVec3,
@@ -44,128 +48,86 @@ impl Openings {
         brightness: impl Fn(DVec3) -> f64,
         choice: &mut Choice,
     ) {
-        choice.parts.clear();
+        self.weigh_from(NOTHING, (point, normal), brightness, choice);
+    }
+
+    /// The same of the parts that take this share of all at least.
+    pub(super) fn weigh_from(
+        &self,
+        least: f64,
+        (point, normal): (DVec3, DVec3),
+        brightness: impl Fn(DVec3) -> f64,
+        choice: &mut Choice,
+    ) {
         choice.sums.clear();
-        // Of the small place if it has any.
-        let own = [1, 0].into_iter().find_map(|k| {
-            let kind = self.kind(point, normal, PLACES << k);
-            let ends = self.own[k].get(kind..kind + 2)?;
-            (ends[0] < ends[1]).then_some(ends[0] as usize..ends[1] as usize)
-        });
-        let own = own.unwrap_or_default();
-        let length = self.piece_together(0..self.shared, point, LENGTH, choice);
-        choice.shared[0] = choice.parts.len();
-        self.piece_together(own, point, length, choice);
-        for k in 0..choice.parts.len() {
-            if k == choice.shared[0] {
-                choice.shared[1] = choice.sums.len();
+        choice.parts.clear();
+        let shown = self.place(point, normal) * self.parts.len();
+        let shown = |part: usize| f64::from(self.shown[shown + part]);
+        let rough = |k: usize| shown(k) * self.parts[k].factor_at_most(point, normal);
+        let all: f64 = (0..self.parts.len()).map(rough).sum();
+        let kept = (0..self.parts.len()).filter(|&k| rough(k) > least * all);
+        choice.parts.extend(kept.map(|k| {
+            let corners = self.parts[k].corners();
+            let each = corners.map(|at| brightness((at - point).normalize_or_zero()));
+            let most = each.into_iter().fold(0.0, f64::max);
+            let is_even = each.into_iter().all(|b| UNEVEN * b >= most);
+            Pieces {
+                part: k as u32,
+                even: is_even.then(|| each.iter().sum::<f64>() / 4.0),
+                ..Pieces::default()
             }
-            let pieces = choice.parts[k];
+        }));
+        self.cut(point, choice);
+        let mut sum = 0.0;
+        for pieces in &choice.parts {
             let part = &self.parts[pieces.part as usize];
-            let starts = k == 0 || k == choice.shared[0];
-            let mut sum = match starts {
-                true => 0.0,
-                false => choice.sums.last().copied().unwrap_or(0.0),
-            };
+            let shown = shown(pieces.part as usize);
             for at in pieces.all() {
-                let toward = self.toward(part, &pieces, at, point, normal);
+                let toward = toward(part, pieces, at, point, normal);
                 sum += toward.map_or(0.0, |(ways, factor)| {
-                    factor * ways.map(&brightness).iter().sum::<f64>()
+                    let bright = pieces
+                        .even
+                        .unwrap_or_else(|| ways.map(&brightness).iter().sum::<f64>() / 3.0);
+                    shown * factor * bright
                 });
                 choice.sums.push(sum);
             }
         }
-        if choice.shared[0] == choice.parts.len() {
-            choice.shared[1] = choice.sums.len();
-        }
-        let [all, own] = choice.totals();
-        choice.own = match (all > 0.0, own > 0.0) {
-            (true, true) => OWN_RAYS,
-            (_, own) => f64::from(u8::from(own)),
-        };
     }
 
-    /// Adds parts in pieces, coarser ones where they were too many; how long they are for their distance.
-    fn piece_together(
-        &self,
-        list: Range<usize>,
-        point: DVec3,
-        mut length: f64,
-        choice: &mut Choice,
-    ) -> f64 {
-        let start = choice.parts.len();
+    /// Cuts parts into pieces, coarser ones where they were too many.
+    fn cut(&self, point: DVec3, choice: &mut Choice) {
+        let (mut length, parts) = (LENGTH, choice.parts.len().max(1));
+        let fewest = (PIECES / parts).isqrt().clamp(1, FEWEST);
         loop {
-            choice.parts.truncate(start);
-            let before = match choice.parts.last() {
-                Some(last) => (last.first + last.count()) as usize,
-                None => 0,
-            };
-            let mut first = before;
-            for k in list.clone() {
-                let pieces = self.pieces(k, point, length, first);
-                first += pieces.count() as usize;
-                choice.parts.push(pieces);
+            let mut first = 0;
+            for pieces in &mut choice.parts {
+                let fewest = pieces.even.map_or(fewest as f64, |_| 1.0);
+                pieces.along = self.along(pieces.part as usize, point, [length, fewest]);
+                pieces.first = first;
+                first += pieces.count();
             }
-            if first - before <= PIECES.max(list.len()) {
-                return length;
+            if first as usize <= PIECES.max(parts * fewest * fewest) {
+                return;
             }
             length *= 1.5;
         }
     }
 
-    /// A part in pieces no longer than this for their distance.
-    fn pieces(&self, part: usize, point: DVec3, length: f64, first: usize) -> Pieces {
+    /// How many pieces along either side of a part are no longer than this for their distance, so many at least.
+    fn along(&self, part: usize, point: DVec3, [length, fewest]: [f64; 2]) -> [u32; 2] {
         let of = &self.parts[part];
-        let [low, high] = [of.low, of.high].map(|at| self.point(of.plane, at));
         // Never none: a point on the box would have no end of pieces.
-        let distance = (point.clamp(low, high) - point).length();
+        let distance = of.distance(point);
         let distance = distance.max(MARGIN * (self.high - self.low).length());
-        let along = of.size().map(|size| {
-            (size / (length * distance).max(1e-300))
+        across(of.axis).map(|axis| {
+            (of.size()[axis] / (length * distance).max(1e-300))
                 .ceil()
-                .clamp(1.0, ALONG) as u32
-        });
-        Pieces {
-            part: part as u32,
-            along,
-            first: first as u32,
-        }
+                .clamp(fewest, ALONG) as u32
+        })
     }
 
-    /// The directions of a piece's middle and of two corners, and about its form factor for each; none if it is behind. By the middle alone
-    /// a slit across the horizon, half of it above black ground, was never looked through.
-    fn toward(
-        &self,
-        part: &Rectangle,
-        pieces: &Pieces,
-        at: [u32; 2],
-        point: DVec3,
-        normal: DVec3,
-    ) -> Option<([DVec3; 3], f64)> {
-        let [low, size] = pieces.place(part, at);
-        let corner = |u: f64, v: f64| {
-            let at = [low[0] + u * size[0], low[1] + v * size[1]];
-            self.point(part.plane, at) - point
-        };
-        let ends = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]];
-        if ends.iter().all(|&[u, v]| normal.dot(corner(u, v)) <= 0.0) {
-            return None;
-        }
-        let way = corner(0.5, 0.5);
-        let r2 = way.length_squared();
-        let direction = way / r2.sqrt().max(1e-300);
-        let here = normal.dot(direction).max(LEAST_COSINE);
-        let there = direction[usize::from(part.plane) % 3]
-            .abs()
-            .max(LEAST_COSINE);
-        let area = size[0] * size[1];
-        let filled = (part.count as f64 / FILLED as f64).min(1.0);
-        let factor = filled * area * here * there / (PI * r2 + area);
-        let ends = [corner(0.0, 0.0), corner(1.0, 1.0)].map(DVec3::normalize_or_zero);
-        Some(([direction, ends[0], ends[1]], factor / 3.0))
-    }
-
-    /// What all parts may bring if nothing stands in the way.
+    /// What all parts may bring if nothing stands in the way but what hides them from the whole place.
     pub(crate) fn most<const N: usize>(
         &self,
         point: DVec3,
@@ -173,13 +135,17 @@ impl Openings {
         brightness: impl Fn(DVec3) -> [f64; N],
     ) -> [f64; N] {
         let mut sum = [0.0; N];
-        for k in 0..self.shared {
-            let pieces = self.pieces(k, point, LENGTH, 0);
-            let part = &self.parts[k];
+        let shown = self.place(point, normal) * self.parts.len();
+        for (k, part) in self.parts.iter().enumerate() {
+            let pieces = Pieces {
+                along: self.along(k, point, [LENGTH, 1.0]),
+                ..Pieces::default()
+            };
+            let shown = f64::from(self.shown[shown + k]);
             for at in pieces.all() {
-                if let Some((ways, factor)) = self.toward(part, &pieces, at, point, normal) {
+                if let Some((ways, factor)) = toward(part, &pieces, at, point, normal) {
                     for each in ways.map(&brightness) {
-                        sum = std::array::from_fn(|k| sum[k] + factor * each[k]);
+                        sum = std::array::from_fn(|k| sum[k] + shown * factor * each[k] / 3.0);
                     }
                 }
             }
@@ -187,56 +153,115 @@ impl Openings {
         sum
     }
 
-    /// A place on a part, chosen by what the parts may bring.
+    /// A place in a part, chosen by what the parts may bring.
     pub(crate) fn choose(&self, choice: &Choice, [u, v]: [f64; 2]) -> Option<DVec3> {
-        let totals = choice.totals();
-        let own = u < choice.own;
-        let (list, share) = match own {
-            true => (1, u / choice.own),
-            false => (0, (u - choice.own) / (1.0 - choice.own)),
-        };
-        if totals[list] <= 0.0 {
+        let total = choice.total();
+        if total <= 0.0 {
             return None;
         }
-        let (parts, sums) = choice.lists()[list].clone();
-        let target = share * totals[list];
-        let all = &choice.sums[sums.clone()];
-        let k = all.partition_point(|&sum| sum <= target).min(all.len() - 1);
-        let worth = choice.of(sums.start + k);
-        let rest = ((target - (all[k] - worth)) / worth).clamp(0.0, 1.0);
-        let piece = (sums.start + k) as u32;
-        let parts = &choice.parts[parts];
-        let pieces = &parts[parts.partition_point(|p| p.first <= piece) - 1];
+        let target = u * total;
+        let sums = &choice.sums;
+        let k = sums
+            .partition_point(|&sum| sum <= target)
+            .min(sums.len() - 1);
+        let rest = ((target - (sums[k] - choice.of(k))) / choice.of(k)).clamp(0.0, 1.0);
+        let piece = k as u32;
+        let pieces = &choice.parts[choice.parts.partition_point(|p| p.first <= piece) - 1];
         let part = &self.parts[pieces.part as usize];
-        let number = piece - pieces.first;
-        let [low, size] = pieces.place(part, [number / pieces.along[1], number % pieces.along[1]]);
-        Some(self.point(part.plane, [low[0] + rest * size[0], low[1] + v * size[1]]))
+        let inner = piece - pieces.first;
+        let [low, size] = pieces.place(part, [inner / pieces.along[1], inner % pieces.along[1]]);
+        let mut at = low;
+        let [first, second] = across(part.axis);
+        at[first] += rest * size[first];
+        at[second] += v * size[second];
+        // What is flat needs no number of its own; elsewhere the lower digits of one do.
+        at[part.axis] += (4096.0 * v).fract() * size[part.axis];
+        Some(at)
     }
 
     /// Density, by solid angle, with which [`choose`](Self::choose) finds a direction of unit length.
     pub(crate) fn density(&self, choice: &Choice, from: DVec3, direction: DVec3) -> f64 {
-        let (spot, t) = self.leaves(from, direction);
-        if !t.is_finite() {
-            return 0.0;
+        let total = choice.total();
+        let mut sum = 0.0;
+        if total > 0.0 {
+            self.crossed(choice, from, direction, |_, density| sum += density);
+            sum /= total;
         }
-        let by_area: f64 = [1.0 - choice.own, choice.own]
-            .into_iter()
-            .zip(choice.lists())
-            .zip(choice.totals())
-            .filter(|((share, _), total)| *share > 0.0 && *total > 0.0)
-            .map(|((share, (parts, _)), total)| {
-                let mut parts = choice.parts[parts].iter();
-                let holds = |p: &&Pieces| self.parts[p.part as usize].holds(spot.plane, spot.at);
-                parts.find(holds).map_or(0.0, |pieces| {
-                    let part = &self.parts[pieces.part as usize];
-                    let count = f64::from(pieces.count());
-                    let piece = choice.of(pieces.at(part, spot.at));
-                    share * piece / total * count / part.area().max(1e-300)
-                })
-            })
-            .sum();
-        by_area * t * t / direction[usize::from(spot.plane) % 3].abs().max(1e-12)
+        sum
     }
+
+    /// The parts that a direction leads through, and for each its density times what the part may bring.
+    ///
+    /// Of points that lie evenly in a box of volume V those in a direction have density (b^3 - a^3) / 3V, if that enters it at a distance
+    /// a and leaves it at b.
+    pub(super) fn crossed(
+        &self,
+        choice: &Choice,
+        from: DVec3,
+        direction: DVec3,
+        mut each: impl FnMut(usize, f64),
+    ) {
+        let inverse = direction.recip();
+        for pieces in &choice.parts {
+            let part = &self.parts[pieces.part as usize];
+            let Some(range) = crossed(&part.ends(), from, inverse) else {
+                continue;
+            };
+            let ends = range.map(|t| pieces.holding(part, from + direction * t));
+            let [rows, columns] = [0, 1].map(|k| {
+                let (a, b) = (ends[0][k], ends[1][k]);
+                a.min(b)..=a.max(b)
+            });
+            let mut density = 0.0;
+            for at in rows.flat_map(|i| columns.clone().map(move |j| [i, j])) {
+                let worth = choice.of(pieces.number(at));
+                let [low, size] = pieces.place(part, at);
+                if let Some([a, b]) = crossed(&[low, low + size], from, inverse) {
+                    let volume = size.x * size.y * size.z;
+                    let cubes = (b - a) * (a * a + a * b + b * b);
+                    density += worth * cubes / (3.0 * volume);
+                }
+            }
+            if density > 0.0 {
+                each(pieces.part as usize, density);
+            }
+        }
+    }
+}
+
+/// Where a ray of a direction with these reciprocals enters and leaves a box before it.
+pub(super) fn crossed([low, high]: &[DVec3; 2], from: DVec3, inverse: DVec3) -> Option<[f64; 2]> {
+    let (a, b) = ((*low - from) * inverse, (*high - from) * inverse);
+    // Where it runs along a side that it lies on, 0 times infinity: it does not enter there.
+    let near = a.min(b).max_element().max(0.0);
+    let far = a.max(b).min_element();
+    (near < far).then_some([near, far])
+}
+
+/// The directions of a piece's middle and of two corners, and about its form factor; none if it is behind. By the middle alone a
+/// slit across the horizon, half of it above black ground, was never looked through.
+fn toward(
+    part: &Part,
+    pieces: &Pieces,
+    at: [u32; 2],
+    point: DVec3,
+    normal: DVec3,
+) -> Option<([DVec3; 3], f64)> {
+    let [low, size] = pieces.place(part, at);
+    // The farthest corner along the normal.
+    let farthest = DVec3::select(normal.cmpgt(DVec3::ZERO), low + size, low);
+    if normal.dot(farthest - point) <= 0.0 {
+        return None;
+    }
+    let way = low + 0.5 * size - point;
+    let r2 = way.length_squared();
+    let direction = way / r2.sqrt().max(1e-300);
+    let here = normal.dot(direction).max(LEAST_COSINE);
+    let there = direction.abs().max(DVec3::splat(LEAST_COSINE));
+    let area = DVec3::new(size.y * size.z, size.z * size.x, size.x * size.y);
+    let factor = there.dot(area) * here / (PI * r2 + area.element_sum());
+    let ends = [low, low + size].map(|at| (at - point).normalize_or_zero());
+    Some(([direction, ends[0], ends[1]], factor))
 }
 
 impl Pieces {
@@ -251,42 +276,47 @@ impl Pieces {
     }
 
     /// Corner and size of one.
-    fn place(&self, part: &Rectangle, at: [u32; 2]) -> [[f64; 2]; 2] {
-        let whole = part.size();
-        let size = [0, 1].map(|k| whole[k] / f64::from(self.along[k]));
-        let low = [0, 1].map(|k| part.low[k] + f64::from(at[k]) * size[k]);
+    fn place(&self, part: &Part, at: [u32; 2]) -> [DVec3; 2] {
+        let (mut low, mut size) = (part.low, part.size());
+        for (k, axis) in across(part.axis).into_iter().enumerate() {
+            size[axis] /= f64::from(self.along[k]);
+            low[axis] += f64::from(at[k]) * size[axis];
+        }
         [low, size]
     }
 
-    /// Number of the one that holds a point of the part.
-    fn at(&self, part: &Rectangle, at: [f64; 2]) -> usize {
-        let size = part.size();
-        let [i, j] = [0, 1].map(|k| {
-            let share = (at[k] - part.low[k]) / size[k].max(1e-300);
+    /// The one that holds a point of the part.
+    fn holding(&self, part: &Part, at: DVec3) -> [u32; 2] {
+        let axes = across(part.axis);
+        [0, 1].map(|k| {
+            let share = (at - part.low)[axes[k]] / part.size()[axes[k]].max(1e-300);
             ((share * f64::from(self.along[k])) as u32).min(self.along[k] - 1)
-        });
+        })
+    }
+
+    /// Its number among those of all parts.
+    fn number(&self, [i, j]: [u32; 2]) -> usize {
         (self.first + i * self.along[1] + j) as usize
     }
 }
 
 impl Choice {
-    /// Parts and pieces of all places, and of the point's own.
-    fn lists(&self) -> [(Range<usize>, Range<usize>); 2] {
-        let [parts, pieces] = self.shared;
-        [
-            (0..parts, 0..pieces),
-            (parts..self.parts.len(), pieces..self.sums.len()),
-        ]
+    /// The parts, and what each may bring.
+    pub(super) fn worths(&self) -> impl Iterator<Item = (usize, f64)> {
+        let sum = |piece: u32| match piece {
+            0 => 0.0,
+            k => self.sums[k as usize - 1],
+        };
+        let worth = move |p: &Pieces| (p.part as usize, sum(p.first + p.count()) - sum(p.first));
+        self.parts.iter().map(worth)
     }
 
-    fn totals(&self) -> [f64; 2] {
-        self.lists()
-            .map(|(_, pieces)| self.sums[pieces].last().copied().unwrap_or(0.0))
+    pub(super) fn total(&self) -> f64 {
+        self.sums.last().copied().unwrap_or(0.0)
     }
 
     /// Of the `k`-th piece.
     fn of(&self, k: usize) -> f64 {
-        let first = k == 0 || k == self.shared[1];
-        self.sums[k] - if first { 0.0 } else { self.sums[k - 1] }
+        self.sums[k] - if k == 0 { 0.0 } else { self.sums[k - 1] }
     }
 }
