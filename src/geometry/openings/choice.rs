@@ -16,7 +16,7 @@ const PIECES: usize = 256;
 const FEWEST: usize = 4;
 const UNEVEN: f64 = 2.0;
 /// Parts that may bring less than this share of all are left out.
-const NOTHING: f64 = 0.002;
+const NOTHING: f64 = 1e-4;
 /// A piece that seems edge-on from its middle still counts as if it were turned by this cosine.
 const LEAST_COSINE: f64 = 0.1;
 
