@@ -138,12 +138,13 @@ pub(crate) fn points() -> Vec<(DVec3, DVec3)> {
     wall.chain(floor).collect()
 }
 
-/// Points A to N, those above G to N at the ceiling, and some of the side walls: all see an opening of the facade.
+/// Points A to N, those above G to N at the ceiling, some of the side walls, and those places: all see an opening of the facade.
 pub(crate) fn points_beside() -> Vec<(DVec3, DVec3)> {
     let ceiling = (0..8).map(|k| (cie(2.0, 0.25 + 0.5 * f64::from(k), 3.0), DVec3::NEG_Y));
     let sides = [(1.0, 1.0), (2.0, 1.0), (3.0, 0.5), (3.0, 2.5)]
         .map(|(y, z)| (cie(0.0, y, z), cie(1.0, 0.0, 0.0)));
-    points().into_iter().chain(ceiling).chain(sides).collect()
+    let all = points().into_iter().chain(ceiling).chain(sides);
+    all.chain(places_beside()).collect()
 }
 
 /// Irradiance at a point through a parallelogram, lit by a sky of 1 (and ground of `ground`), by plain quadrature.
