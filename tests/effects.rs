@@ -3,7 +3,7 @@
 #[path = "common/built.rs"]
 mod built;
 
-use built::Room;
+use built::{Room, sun};
 use glam::{DVec3, dvec3};
 use haarlight::audit::{Reference, Report};
 use haarlight::scene::effects::{Kind, Plan};
@@ -198,8 +198,8 @@ fn one_light_spectrum_keeps_one_tree() {
     assert_eq!(lights("two-rooms.glb"), (vec![Some(0), Some(1)], true));
 }
 
-/// A pane, a sheet, a mirror and a lamp with a profile on no surface, and a sky over a closed room: no ray, no byte, no element more, and the
-/// same light. (Fluorescence: `tests/fluorescence.rs`.)
+/// A pane, a sheet, a mirror and a lamp with a profile on no surface, and sky and sun over a closed room: no ray of the light, no byte, no element
+/// more, and the same light. (Fluorescence: `tests/fluorescence.rs`.) That it is closed takes as many rays in any room.
 #[test]
 fn effects_that_are_not_there_cost_nothing() {
     let counted = |more: &dyn Fn(&mut Room) -> Option<Kind>, change: &dyn Fn(Scene) -> Scene| {
@@ -225,11 +225,16 @@ fn effects_that_are_not_there_cost_nothing() {
             .collect();
         let written = bake.baked(&|_, _| {});
         let vertices = written.surfaces.into_iter().map(|s| s.vertices);
-        (counters, written.rays, vertices.collect::<Vec<_>>())
+        let looked = bake.rounds().iter().map(|r| r.opening_rays).sum::<u64>();
+        (
+            (counters, written.rays, vertices.collect::<Vec<_>>()),
+            looked,
+        )
     };
     let half = [0.5; LEAVES];
     let as_it_is = |scene: Scene| scene;
-    let plain = counted(&|_| None, &as_it_is);
+    let (plain, looked) = counted(&|_| None, &as_it_is);
+    assert_eq!(looked, 0, "nobody looks for a sky that is not there");
     type Adds<'a> = &'a dyn Fn(&mut Room) -> Kind;
     let unused: [(&str, Adds); 3] = [
         ("pane", &|room| {
@@ -246,10 +251,8 @@ fn effects_that_are_not_there_cost_nothing() {
         }),
     ];
     for (name, more) in unused {
-        assert!(
-            counted(&|room| Some(more(room)), &as_it_is) == plain,
-            "{name}"
-        );
+        let with = counted(&|room| Some(more(room)), &as_it_is);
+        assert!(with == (plain.clone(), 0), "{name}");
     }
     let profiled = |mut scene: Scene| {
         let even = b"IESNA91\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 10\n0 180\n0\n9 9\n";
@@ -261,13 +264,32 @@ fn effects_that_are_not_there_cost_nothing() {
         room.lamp(0.1, 100.0);
         Some(Kind::MeasuredLamps)
     };
-    assert!(counted(&lamp, &profiled) == plain, "profile");
+    assert!(counted(&lamp, &profiled) == (plain.clone(), 0), "profile");
     let overcast = SkyWish {
         kind: Some(SkyType(1)),
         ..SkyWish::default()
     };
+    let sunny = SkyWish {
+        kind: Some(SkyType(12)),
+        sun: sun([40.0, 120.0], 80_000.0),
+        ..SkyWish::default()
+    };
+    for (wish, kind) in [
+        (&overcast, Kind::Sky),
+        (&sunny, Kind::Sky),
+        (&sunny, Kind::Sun),
+    ] {
+        let under = |scene: Scene| scene.under(wish).unwrap();
+        let (with, looked) = counted(&|_| Some(kind), &under);
+        println!("{kind:?}: {looked} rays told that the room is closed");
+        assert!(with == plain, "{kind:?}");
+        // As many in any closed room, and no more than a blink takes.
+        assert!(looked > 0 && looked <= 1 << 20, "{looked}");
+        let bake = baked(under(room("cornell-closed.glb")), Representation::Adaptive);
+        let of = |round: usize| bake.rounds()[round].opening_rays;
+        assert_eq!((of(0), of(1)), (looked, 0));
+    }
     let under = |scene: Scene| scene.under(&overcast).unwrap();
-    assert!(counted(&|_| Some(Kind::Sky), &under) == plain, "sky");
     let plan = haarlight::solve::running(under(room("cornell-closed.glb"))).to_string();
     assert!(
         plan.contains("the room is closed: no ray leaves it"),
@@ -308,12 +330,23 @@ fn paths_agree_with_all_effects_at_once() {
     ] {
         assert!(plan.runs(kind), "{plan}");
     }
-    let reference = Reference::new(&bake, 150, 1 << 14, 3);
-    let report = Report::against(&bake, &reference);
-    println!(
-        "dE00 {:?}, bias {:?}, noise {:.3}, estimate {:?}",
-        report.de2000.mean, report.bias, report.noise_de2000, report.estimate_de2000
-    );
-    assert!(report.de2000.mean.value < 1.5, "{:?}", report.de2000);
-    assert!(report.bias.value.abs() < 0.02, "{:?}", report.bias);
+    // A few bright paths make some references uncertain: each counts by how narrow its interval is.
+    let (mut bias, mut weights) = (0.0, 0.0);
+    for seed in 3..7 {
+        let reference = Reference::new(&bake, 150, 1 << 14, seed);
+        let report = Report::against(&bake, &reference);
+        println!(
+            "dE00 {:?}, bias {:?}, noise {:.3}, estimate {:?}",
+            report.de2000.mean, report.bias, report.noise_de2000, report.estimate_de2000
+        );
+        assert!(report.de2000.mean.value < 0.5, "{:?}", report.de2000);
+        let [low, high] = [report.bias.low, report.bias.high];
+        assert!(low < 5e-3 && high > -5e-3, "{:?}", report.bias);
+        let weight = (high - low).powi(-2);
+        bias += weight * report.bias.value;
+        weights += weight;
+    }
+    bias /= weights;
+    println!("bias of all: {bias}");
+    assert!(bias.abs() < 2e-3, "{bias}");
 }

@@ -8,9 +8,12 @@ mod built;
 mod daylit;
 
 use built::Room;
-use daylit::{LUX, bake, beside, cie, glass_of_the_report, places_beside, row, summed, wish};
+use daylit::{
+    LUX, bake, beside, cie, facade, gathered, glass_of_the_report, past_the_horizon, places_beside,
+    points_beside, row, wish,
+};
 use glam::DVec3;
-use haarlight::scene::pane::inside_of;
+use haarlight::scene::pane::{inside_of, slab};
 use haarlight::scene::sky::{Distribution, direction};
 use haarlight::spectrum::LEAVES;
 use std::f64::consts::{PI, TAU};
@@ -28,53 +31,57 @@ fn outside(sky: &Distribution, d: DVec3) -> f64 {
     }
 }
 
-/// 5.12: the window of 5.11 with the glass of 5.10.
+/// 5.12: the windows of 5.11 with the glass of 5.10.
 #[test]
 fn cie_171_case_5_12() {
-    for kind in [1, 5, 12] {
+    for (kind, all) in (1..=16).flat_map(|kind| [(kind, false), (kind, true)]) {
+        let size = if all { "4 x 3 m" } else { "2 x 1 m" };
         let mut room = Room::new();
-        let window = beside(&mut room);
+        let window = facade(&mut room, all);
         let inside = inside_of(glass_of_the_report(1.0), 1.55);
         let glass = room.pane(1.55, [inside; LEAVES]);
         let [corner, u, v] = window;
         room.quad(corner, v, u, glass);
         let bake = bake(room, &wish(kind));
         let sky = Distribution::new(kind, direction(60.0, 0.0));
-        let places = places_beside();
-        let mut off = Vec::new();
+        let places = points_beside();
+        let (mut off, mut unlike) = (Vec::new(), 0);
         for (probed, place) in bake.probe(&places).iter().zip(places) {
-            let across = cie(0.0, 1.0, 0.0);
-            let seen = |d: DVec3| outside(&sky, d) * glass_of_the_report(d.dot(across).abs());
-            let want = LUX * whole(seen, window, place);
             let got = probed.xyz[1];
-            println!("type {kind}, {place:?}: {got:.4} for {want:.4}");
-            assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
+            let through = |passes: &dyn Fn(f64) -> f64| {
+                let seen = |d: DVec3| outside(&sky, d) * passes(d.z.abs());
+                LUX * past_the_horizon(seen, window, place)
+            };
+            let want = through(&glass_of_the_report);
+            let slab = through(&|cosine| slab(1.55, inside, 1.0, cosine));
+            println!("type {kind}, {size}, {place:?}: {got:.4} for {want:.4}");
             off.push(got / want - 1.0);
+            let own = got / slab - 1.0;
+            assert!(own.abs() <= POINT, "{kind} {size} {place:?}: {own}");
+            // 25 cm from the window, at floor and ceiling, light comes in along the glass: there the slab itself is .5 % off the report's
+            // polynomial.
+            if (slab / want - 1.0).abs() > 4e-3 {
+                unlike += 1;
+                continue;
+            }
+            assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
         }
-        summary("5.12", kind, &off);
+        assert!(unlike <= 2, "{kind} {size}: {unlike}");
+        summary("5.12", &format!("type {kind}, {size}"), &off);
     }
 }
 
 /// The row of a case under a type of sky.
-fn summary(case: &str, kind: u8, off: &[f64]) {
+fn summary(case: &str, what: &str, off: &[f64]) {
     let worst = off.iter().fold(0.0, |worst: f64, off| worst.max(off.abs()));
     let squares: f64 = off.iter().map(|off| off * off).sum();
     let rms = (squares / off.len() as f64).sqrt();
-    row(case, &format!("type {kind}"), worst, rms);
+    row(case, what, worst, rms);
 }
 
-/// Irradiance through a parallelogram by what is seen in each direction.
-fn whole(seen: impl Fn(DVec3) -> f64, window: [DVec3; 3], (point, normal): (DVec3, DVec3)) -> f64 {
-    let above = summed::<800>(&seen, 0.0, window, (point, normal));
-    // `summed` asks above the horizon only: turn the rest upwards.
-    let flip = |d: DVec3| DVec3::new(d.x, -d.y, d.z);
-    let below = summed::<800>(
-        |d| seen(flip(d)),
-        0.0,
-        window.map(flip),
-        (flip(point), flip(normal)),
-    );
-    above + below
+/// Irradiance through the window by what is seen in each direction; finely, for the edges of a mask.
+fn whole(seen: impl Fn(DVec3) -> f64, window: [DVec3; 3], place: (DVec3, DVec3)) -> f64 {
+    gathered::<800>(seen, window, place)
 }
 
 /// A rectangle that hides sky and ground, and what it gives out at each of its points by the light that falls on it past the room.
@@ -181,7 +188,7 @@ fn masked(case: &str, corner: DVec3, sides: [DVec3; 2], kind: u8) {
         assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
         off.push(got / want - 1.0);
     }
-    summary(case, kind, &off);
+    summary(case, &format!("type {kind}"), &off);
 }
 
 /// 5.13: a canopy above the window, 1 m deep, that goes on to both sides.

@@ -62,6 +62,24 @@ fn ies(step: f64, candela: impl Fn(f64, f64) -> f64) -> String {
     text
 }
 
+/// A EULUMDAT file of a lamp of 2000 lm of which 80 % leave the luminaire, cd/klm by the cosine below it: 1600 lm.
+fn eulumdat() -> String {
+    let steps: Vec<f64> = (0..=18).map(|k| 5.0 * f64::from(k)).collect();
+    let planes: Vec<f64> = (0..24).map(|k| 15.0 * f64::from(k)).collect();
+    let mut lines: Vec<String> = [
+        "none", "1", "1", "24", "15", "19", "5", "-", "Disc", "-", "-", "-", "100", "0", "50",
+        "90", "0", "0", "0", "0", "0", "100", "80", "1", "0", "1", "2", "LED", "2000", "4000",
+        "80", "20",
+    ]
+    .map(String::from)
+    .into();
+    lines.extend(vec!["0".to_owned(); 10]);
+    lines.extend(planes.iter().chain(&steps).map(f64::to_string));
+    let candela = |gamma: f64| 800.0 / PI * gamma.to_radians().cos();
+    lines.extend(steps.iter().map(|gamma| format!("{:.4}", candela(*gamma))));
+    lines.join("\n")
+}
+
 /// A corner, both edges from there, and the material.
 type Quad = ([f32; 3], [f32; 3], [f32; 3], usize);
 
@@ -240,7 +258,8 @@ fn a_lamp_is_named_with_its_profile_and_lumens() {
 /// A black room around the lamp receives the lumens of the file, wherever it hangs and from whatever it shines.
 #[test]
 fn flux_closes_with_the_lumens_of_the_file() {
-    for panel in [false, true] {
+    let files = [("lamp.ies", 800.0 * PI), ("lamp.ldt", 1600.0)];
+    for (panel, (file, lumens)) in files.into_iter().flat_map(|f| [(false, f), (true, f)]) {
         let mut room = Room::empty();
         room.json["materials"] = json!([material("walls", 0.0), material("panel", 0.0)]);
         let mut all: Vec<_> = [
@@ -261,7 +280,7 @@ fn flux_closes_with_the_lumens_of_the_file() {
         room.json["scenes"][0]["nodes"] = json!(nodes);
         let wish = match panel {
             true => {
-                json!({"materials": {"panel": {"emission": {"profile": "lamp.ies", "name": "cie/A"}}}})
+                json!({"materials": {"panel": {"emission": {"profile": file, "name": "cie/A"}}}})
             }
             false => {
                 room.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
@@ -272,11 +291,12 @@ fn flux_closes_with_the_lumens_of_the_file() {
                     &mut room,
                     json!({"translation": [1, 2, 1.2], "rotation": DOWN, "extensions": carried}),
                 );
-                json!({"lights": {"lamp": {"profile": "lamp.ies", "name": "cie/A"}}})
+                json!({"lights": {"lamp": {"profile": file, "name": "cie/A"}}})
             }
         };
         let files = [
             ("lamp.ies", &*ies(5.0, lopsided)),
+            ("lamp.ldt", &*eulumdat()),
             ("room.spectra.json", &*side(&wish)),
         ];
         let scene = loaded(&room, &files).unwrap();
@@ -290,6 +310,9 @@ fn flux_closes_with_the_lumens_of_the_file() {
             (flux.received_lm / want - 1.0).abs() < POINT,
             "{panel} {flux:?}"
         );
+        let off = flux.received_lm / lumens - 1.0;
+        println!("{file}, {panel}: {} for {lumens}", flux.received_lm);
+        assert!(off.abs() < POINT, "{file} {panel}: {off}");
         let sent = flux.sent;
         assert!((sent.to_fronts + sent.to_backs + sent.outside - 1.0).abs() < 1e-9);
     }

@@ -599,10 +599,10 @@ fn glazed(opening: f64) -> Bake {
 /// Points A to F of the wall and G to N of the floor against quadrature over the opening, and the printed ones.
 #[test]
 fn case_5_10_glazed_openings() {
-    // A, C, G, J and N; of the large opening A is wrong in print, as in case 5.9, and C .4 % above the report's own polynomial.
+    // A, C, G, J and N; of the large opening A is wrong in print, as in case 5.9.
     let printed = [
         (1.0, [0.35, 2.12, 1.71, 2.96, 1.71]),
-        (4.0, [f64::NAN, f64::NAN, 23.43, 31.25, 23.43]),
+        (4.0, [f64::NAN, 22.92, 23.43, 31.25, 23.43]),
     ];
     for (opening, printed) in printed {
         let bake = glazed(opening);
@@ -636,13 +636,13 @@ fn case_5_10_glazed_openings() {
             );
             let off = got / want - 1.0;
             (worst, squares) = (worst.max(off.abs()), squares + off * off);
-            // And half a unit of the printed digits.
             assert!(
-                (got - want).abs() <= 0.005 * want + 0.005,
+                (got - want).abs() <= 0.005 * want,
                 "{opening} {k}: {got} {want}"
             );
             let place = [0, 2, 6, 9, 13].iter().position(|&p| p == k);
             if let Some(printed) = place.map(|p| printed[p]).filter(|p| p.is_finite()) {
+                // And half a unit of the printed digits.
                 assert!(
                     (got - printed).abs() <= 0.005 * printed + 0.005,
                     "{k}: {got} {printed}"

@@ -7,7 +7,8 @@ mod daylit;
 
 use built::{Room, sun};
 use daylit::{
-    LUX, bake, bake_at, beside, cie, places_beside, points, roof, room, row, through, wish,
+    LUX, bake, bake_at, bake_by, cie, facade, past_the_horizon, points, points_beside, roof, room,
+    row, through, wish,
 };
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::audit::Audit;
@@ -37,25 +38,31 @@ const TABLES: [(u8, f64, [f64; 5]); 8] = [
     (16, 4.0, [39.28, 26.79, 31.36, 42.76, 31.36]),
 ];
 
-/// `slack`: for the root mean square over the points; for each of them as well where nothing is left to chance, else three times
-/// as much.
-fn check(kind: u8, opening: f64, cuts: usize, slack: f64) {
-    let bake = bake(room(0.0, opening, cuts), &wish(kind));
+/// The points of a room, every panel of which is cut into `cuts` x `cuts` squares, against quadrature and the report.
+fn check(kind: u8, opening: f64, cuts: usize, seed: u64) {
+    let bake = bake_by(room(0.0, opening, cuts), &wish(kind), 0.5, seed);
     let sky = Distribution::new(kind, direction(60.0, 0.0));
     let lux: Vec<f64> = bake.probe(&points()).iter().map(|p| p.xyz[1]).collect();
-    let each = if cuts == 1 { slack } else { 3.0 * slack };
     let (mut worst, mut squares) = (0.0_f64, 0.0);
     for (k, (got, at)) in lux.iter().zip(points()).enumerate() {
         let want = LUX * through(|d| sky.radiance(d), 0.0, roof(opening), at);
         let off = got / want - 1.0;
         (worst, squares) = (worst.max(off.abs()), squares + off * off);
         println!("type {kind}, {opening} m, point {k}: {got:.4} for {want:.4}");
-        assert!(off.abs() <= each, "{k}: {got} should be {want}");
     }
     let rms = (squares / lux.len() as f64).sqrt();
     let way = if cuts == 1 { "" } else { ", by rays" };
     row("5.9", &format!("type {kind}, {opening} m{way}"), worst, rms);
-    assert!(rms <= slack, "{rms}");
+    // Exactly, or by rays, that of a large opening with some noise.
+    let each = match (cuts, opening > 1.0) {
+        (1, _) => 1e-3,
+        (_, false) => POINT,
+        (_, true) => 1.5 * POINT,
+    };
+    assert!(
+        worst <= each && rms <= 0.5 * each,
+        "type {kind}, {opening} m, seed {seed}: {worst}, {rms}"
+    );
     if let Some((_, _, table)) = TABLES.iter().find(|t| (t.0, t.1) == (kind, opening)) {
         for (place, want) in [0, 2, 6, 9, 13].into_iter().zip(table) {
             // A of the report's 4 x 4 wall is wrong near the opening (see the closed form of type 5).
@@ -75,7 +82,7 @@ fn check(kind: u8, opening: f64, cuts: usize, slack: f64) {
 fn cie_171_case_5_9() {
     for kind in 1..=16 {
         for opening in [1.0, 4.0] {
-            check(kind, opening, 1, POINT);
+            check(kind, opening, 1, 0);
         }
     }
 }
@@ -99,36 +106,35 @@ fn cie_171_case_5_9_closed_form() {
 /// one.
 #[test]
 fn rays_through_an_opening_agree_with_polygons() {
-    for (kind, opening, slack) in [
-        (1, 1.0, 0.005),
-        (12, 1.0, 0.005),
-        (12, 4.0, 0.005),
-        (5, 0.2, 0.01),
-    ] {
-        check(kind, opening, 6, slack);
+    for (kind, opening) in [(1, 1.0), (12, 1.0), (12, 4.0), (5, 0.2)] {
+        for seed in 0..3 {
+            check(kind, opening, 6, seed);
+        }
     }
 }
 
-/// 5.11: a window in a wall shows sky above the horizon and ground below it.
+/// 5.11: a window in a wall, and a wall that is a window, show sky above the horizon and ground below it.
 #[test]
 fn ground_below_the_horizon_lights_a_ceiling() {
-    for kind in 1..=16 {
+    for (kind, whole) in (1..=16).flat_map(|kind| [(kind, false), (kind, true)]) {
         let (mut worst, mut squares) = (0.0_f64, 0.0);
         let mut room = Room::new();
-        let window = beside(&mut room);
+        let window = facade(&mut room, whole);
         let bake = bake(room, &wish(kind));
         let sky = Distribution::new(kind, direction(60.0, 0.0));
-        let places = places_beside();
+        let seen = |d: DVec3| if d.y > 0.0 { sky.radiance(d) } else { 0.3 / PI };
+        let places = points_beside();
         for (probed, place) in bake.probe(&places).iter().zip(&places) {
             let got = probed.xyz[1];
-            let want = LUX * through(|d| sky.radiance(d), 0.3, window, *place);
+            let want = LUX * past_the_horizon(seen, window, *place);
             println!("type {kind}, {place:?}: {got:.4} for {want:.4}");
             let off = got / want - 1.0;
             (worst, squares) = (worst.max(off.abs()), squares + off * off);
-            assert!(off.abs() <= POINT, "{kind}: {got} should be {want}");
         }
         let rms = (squares / places.len() as f64).sqrt();
-        row("5.11", &format!("type {kind}"), worst, rms);
+        let size = if whole { "4 x 3 m" } else { "2 x 1 m" };
+        row("5.11", &format!("type {kind}, {size}"), worst, rms);
+        assert!(worst <= 2e-3, "type {kind}, {size}: {worst}");
     }
 }
 
@@ -379,4 +385,87 @@ fn pictures_show_the_sky() {
             .iter()
             .all(|p| p.xyz == [0.0; 3] && p.shown[0] > 0.0)
     );
+}
+
+/// Table 1 of ISO 15469 by its groups (Darula and Kittler 2002, CIE general sky standard defining luminance distributions): a and b of the
+/// six gradations, c, d and e of the six indicatrices, and which of them make the fifteen types.
+const GRADATIONS: [[f64; 2]; 6] = [
+    [4.0, -0.70],
+    [1.1, -0.80],
+    [0.0, -1.00],
+    [-1.0, -0.55],
+    [-1.0, -0.32],
+    [-1.0, -0.15],
+];
+const INDICATRICES: [[f64; 3]; 6] = [
+    [0.0, -1.0, 0.00],
+    [2.0, -1.5, 0.15],
+    [5.0, -2.5, 0.30],
+    [10.0, -3.0, 0.45],
+    [16.0, -3.0, 0.30],
+    [24.0, -2.8, 0.15],
+];
+const MADE_OF: [[usize; 2]; 15] = [
+    [1, 1],
+    [1, 2],
+    [2, 1],
+    [2, 2],
+    [3, 1],
+    [3, 2],
+    [3, 3],
+    [3, 4],
+    [4, 2],
+    [4, 3],
+    [4, 4],
+    [5, 4],
+    [5, 5],
+    [6, 5],
+    [6, 6],
+];
+
+/// Every type by the standard's formula, worked out here: by angles from the zenith and around it, the sun over +X.
+#[test]
+fn skies_are_those_of_the_standard() {
+    const N: usize = 500;
+    for (k, [gradation, indicatrix]) in MADE_OF.into_iter().enumerate() {
+        let [a, b] = GRADATIONS[gradation - 1];
+        let [c, d, e] = INDICATRICES[indicatrix - 1];
+        for height in [10.0, 35.0, 60.0_f64] {
+            let sun = (90.0 - height).to_radians();
+            let luminance = |z: f64, around: f64| {
+                let cosine = sun.cos() * z.cos() + sun.sin() * z.sin() * around.cos();
+                let chi = cosine.clamp(-1.0, 1.0).acos();
+                let scattered = 1.0 + c * ((d * chi).exp() - (0.5 * d * PI).exp());
+                (1.0 + a * (b / z.cos()).exp()) * (scattered + e * chi.cos().powi(2))
+            };
+            // Illuminance of open ground: midpoints in both angles, half around.
+            let mut level = 0.0;
+            for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
+                let z = 0.5 * PI * (i as f64 + 0.5) / N as f64;
+                let around = PI * (j as f64 + 0.5) / N as f64;
+                level += z.sin() * z.cos() * luminance(z, around);
+            }
+            level *= PI * PI / (N * N) as f64;
+            let sky = Distribution::new(k as u8 + 1, direction(height, 90.0));
+            for (up, around) in [
+                (90.0, 0.0),
+                (60.0, 0.0),
+                (45.0, 180.0),
+                (20.0, 77.0),
+                (5.0, 140.0),
+            ] {
+                let want = luminance((90.0_f64 - up).to_radians(), f64::to_radians(around)) / level;
+                let got = sky.radiance(direction(up, 90.0 + around));
+                assert!(
+                    (got / want - 1.0).abs() < 1e-4,
+                    "type {}, sun at {height}, {up} {around}: {got} {want}",
+                    k + 1
+                );
+            }
+        }
+    }
+    // The zenith of the overcast sky beside its horizon: 1 + 4 exp(-.7).
+    let overcast = Distribution::new(1, DVec3::Y);
+    let steep = overcast.zenith() / overcast.radiance(direction(0.01, 0.0));
+    assert!((steep - 2.986_341).abs() < 1e-5, "{steep}");
 }

@@ -28,6 +28,7 @@
 //! | `remaining_rounds` | | expected rounds to the asked-for error, `null` likewise |
 //! | `threshold` | share of white | greatest error that a link keeps, weighted by the root of the receiver's share of area |
 //! | `rays` | | visibility rays cast in this round for links, direct light and openness |
+//! | `opening_rays` | | rays by which the openings of a room under a sky were looked for before the first round, of a closed room always as many; 0 without a sky and in later rounds |
 //! | `links_evaluated`, `links_capped` | | links looked at; those that wanted refinement but had the least size |
 //! | `elements`, `nodes`, `links`, `links_clear` | | leaves of the hierarchy, all patches, links, links proved free of blockers |
 //! | `intervals_working`, `intervals_mean` | | wavelength intervals of the working partition (all lights), and mean over patches |

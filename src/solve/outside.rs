@@ -54,13 +54,10 @@ impl Room {
         if self.scene.sky.is_none() {
             return;
         }
-        let seed = self.settings.seed;
-        let find =
-            |room: &Self| room.with_sight(|sight| find_openings(&room.mesh, tree, sight, seed));
         // The few rays that tell whether a room is closed may miss a slit. Those that are relit were looked at.
         let mut found = None;
         if rays && self.sealed == Closed::Yes {
-            found = Some(find(self)).filter(|openings| !openings.is_empty());
+            found = Some(self.find_openings(tree)).filter(|openings| !openings.is_empty());
             if found.is_some() {
                 (self.closed, self.sealed) = (Closed::No, Closed::No);
             }
@@ -93,8 +90,17 @@ impl Room {
             self.panes.is_none() && self.with_sight(|sight| Outside::is_exact(&sky, sight));
         let openings = match is_exact {
             true => Openings::default(),
-            false => found.unwrap_or_else(|| find(self)),
+            false => found.unwrap_or_else(|| self.find_openings(tree)),
         };
         self.outside = Some(Outside { sky, openings });
+    }
+
+    /// Where rays leave the room; counts them.
+    fn find_openings(&mut self, tree: &Tree) -> Openings {
+        let seed = self.settings.seed;
+        let (openings, cast) =
+            self.with_sight(|sight| find_openings(&self.mesh, tree, sight, seed));
+        self.opening_rays += cast;
+        openings
     }
 }

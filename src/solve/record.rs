@@ -146,6 +146,9 @@ pub struct Round {
     pub threshold: f64,
     /// Visibility rays cast for links and punctual lights in this round.
     pub rays: u64,
+    /// Rays by which the openings of a room under a sky were looked for before the first round; 0 in others.
+    #[serde(default)]
+    pub opening_rays: u64,
     /// Links evaluated in this round.
     pub links_evaluated: u64,
     /// Links that wanted refinement when their ends were as small as allowed.

@@ -38,6 +38,10 @@ impl Bake {
                 .collect(),
             threshold: m.threshold,
             rays: m.rays,
+            opening_rays: match bake.rounds.is_empty() {
+                true => bake.room.opening_rays,
+                false => 0,
+            },
             links_evaluated: m.refined.evaluated,
             links_capped: m.refined.capped,
             elements: light.leaves.len(),

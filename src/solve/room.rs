@@ -78,6 +78,8 @@ pub(crate) struct Room {
     pub(crate) sealed: Closed,
     /// What is outside; none where no light comes from there.
     pub(crate) outside: Option<Outside>,
+    /// Rays by which openings to a sky were looked for.
+    pub(super) opening_rays: u64,
     /// Where the light of lamps goes first.
     pub(crate) sent: Sent,
     /// And where on which faces; nothing in a room that is only relit.
@@ -201,6 +203,7 @@ impl Room {
             closed: Closed::No,
             sealed: Closed::No,
             outside: None,
+            opening_rays: 0,
             sent: Sent::default(),
             landings: Vec::new(),
             panes: Panes::new(&scene, mesh.centre),

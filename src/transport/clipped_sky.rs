@@ -214,7 +214,15 @@ impl Looker<'_> {
         });
         if depth == 0 || (cosine > NARROW && is_even && !is_beside) {
             let factor = share * lambert_edges_x8(DVec3::ZERO, normal, &corners);
-            let brings = fine.map(|fine| PI * fine * factor);
+            // A sky that is brighter where it falls in more steeply brings more than its mean does: points of a floor far from a window were
+            // 1.2 % dark under a sky of type 1. Products of what is linear are exact.
+            let steep = middles.map(|d| d.dot(normal).max(0.0));
+            let all: f64 = steep.iter().sum();
+            let mean = |k: usize| match all > 0.0 {
+                true => (0..3).map(|i| steep[i] * halfway[i][k]).sum::<f64>() / all,
+                false => fine[k],
+            };
+            let brings = std::array::from_fn(|k| PI * mean(k) * factor);
             found.add(up, brings);
             if self.by.is_some() {
                 found.parts.push(Part {

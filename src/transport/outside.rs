@@ -17,6 +17,7 @@ use crate::link::{Sight, View};
 use crate::scene::sky::{PARTS, PLACES, Sky};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Rays over the hemisphere, to the openings, and toward spots where there are some: of a random point of a leaf, of a point by a rule, of
 /// one for its own sake, and of one whose rays over the hemisphere are known.
@@ -100,8 +101,9 @@ impl Way<'_> {
     }
 }
 
-/// Where rays from the surfaces of a room leave it.
-pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) -> Openings {
+/// Where rays from the surfaces of a room leave it, and how many were cast to find out.
+pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) -> (Openings, u64) {
+    let cast = AtomicU64::new(0);
     let area = tree.nodes.first().map_or(0.0, |root| root.area);
     let start = |share: f64, square: [f64; 2]| {
         tree.nodes.first()?;
@@ -117,6 +119,7 @@ pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) 
         let mut hits = [None; BEAM];
         let (from, ways) = (start.point.as_vec3(), ways.map(|d| d.as_vec3()));
         sight.meet(&[from; BEAM], &ways, start.plane, &mut hits);
+        cast.fetch_add(BEAM as u64, Ordering::Relaxed);
         hits.map(|hit| {
             hit.map(|hit| Wall {
                 distance: f64::from(hit.t),
@@ -124,7 +127,8 @@ pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) 
             })
         })
     };
-    Openings::find(&mesh.positions, start, meet, seed)
+    let openings = Openings::find(&mesh.positions, start, meet, seed);
+    (openings, cast.into_inner())
 }
 
 impl Outside {

@@ -41,8 +41,14 @@ pub(crate) fn bake(room: Room, wish: &SkyWish) -> Bake {
 }
 
 pub(crate) fn bake_at(room: Room, wish: &SkyWish, error: f64) -> Bake {
+    bake_by(room, wish, error, 0)
+}
+
+/// The same by patterns of another seed.
+pub(crate) fn bake_by(room: Room, wish: &SkyWish, error: f64, seed: u64) -> Bake {
     let settings = Settings {
         error,
+        seed,
         ..Settings::default()
     };
     let mut bake = Bake::new(room.scene().under(wish).unwrap(), settings);
@@ -82,6 +88,27 @@ pub(crate) fn room(rho: f64, opening: f64, cuts: usize) -> Room {
 
 /// The same room with a window of 2 m x 1 m in the wall y = 4, its sill at 1 m; returns the window.
 pub(crate) fn beside(room: &mut Room) -> [DVec3; 3] {
+    let wall = cie(0.0, 4.0, 0.0);
+    let (x, z) = (cie(1.0, 0.0, 0.0), cie(0.0, 0.0, 1.0));
+    let paint = beside_whole(room);
+    room.quad(wall, 4.0 * x, 1.0 * z, paint);
+    room.quad(wall + 2.0 * z, 4.0 * x, 1.0 * z, paint);
+    room.quad(wall + 1.0 * z, 1.0 * x, 1.0 * z, paint);
+    room.quad(wall + 1.0 * z + 3.0 * x, 1.0 * x, 1.0 * z, paint);
+    [wall + 1.0 * z + 1.0 * x, 2.0 * x, 1.0 * z]
+}
+
+/// The facade openings of 5.11 and 5.12: that window, and all of the wall, 4 m x 3 m.
+pub(crate) fn facade(room: &mut Room, whole: bool) -> [DVec3; 3] {
+    if !whole {
+        return beside(room);
+    }
+    beside_whole(room);
+    [cie(0.0, 4.0, 0.0), cie(4.0, 0.0, 0.0), cie(0.0, 0.0, 3.0)]
+}
+
+/// The room without the wall y = 4; returns its paint.
+fn beside_whole(room: &mut Room) -> usize {
     let paint = room.paint(0.0);
     let (x, y, z) = (cie(1.0, 0.0, 0.0), cie(0.0, 1.0, 0.0), cie(0.0, 0.0, 1.0));
     room.quad(DVec3::ZERO, 4.0 * x, 4.0 * y, paint);
@@ -89,12 +116,7 @@ pub(crate) fn beside(room: &mut Room) -> [DVec3; 3] {
     room.quad(DVec3::ZERO, 3.0 * z, 4.0 * x, paint);
     room.quad(DVec3::ZERO, 4.0 * y, 3.0 * z, paint);
     room.quad(4.0 * x, 3.0 * z, 4.0 * y, paint);
-    let wall = 4.0 * y;
-    room.quad(wall, 4.0 * x, 1.0 * z, paint);
-    room.quad(wall + 2.0 * z, 4.0 * x, 1.0 * z, paint);
-    room.quad(wall + 1.0 * z, 1.0 * x, 1.0 * z, paint);
-    room.quad(wall + 1.0 * z + 3.0 * x, 1.0 * x, 1.0 * z, paint);
-    [wall + 1.0 * z + 1.0 * x, 2.0 * x, 1.0 * z]
+    paint
 }
 
 /// Places in that room that see the window.
@@ -116,6 +138,15 @@ pub(crate) fn points() -> Vec<(DVec3, DVec3)> {
     wall.chain(floor).collect()
 }
 
+/// Points A to N, those above G to N at the ceiling, some of the side walls, and those places: all see an opening of the facade.
+pub(crate) fn points_beside() -> Vec<(DVec3, DVec3)> {
+    let ceiling = (0..8).map(|k| (cie(2.0, 0.25 + 0.5 * f64::from(k), 3.0), DVec3::NEG_Y));
+    let sides = [(1.0, 1.0), (2.0, 1.0), (3.0, 0.5), (3.0, 2.5)]
+        .map(|(y, z)| (cie(0.0, y, z), cie(1.0, 0.0, 0.0)));
+    let all = points().into_iter().chain(ceiling).chain(sides);
+    all.chain(places_beside()).collect()
+}
+
 /// Irradiance at a point through a parallelogram, lit by a sky of 1 (and ground of `ground`), by plain quadrature.
 ///
 /// Of a smooth sky the midpoint rule is off by `(h / d)^2 / 12` at a distance of d: 1e-4 at the point nearest to the largest opening.
@@ -132,6 +163,16 @@ pub(crate) fn through(
 pub(crate) fn summed<const N: usize>(
     sky: impl Fn(DVec3) -> f64,
     ground: f64,
+    opening: [DVec3; 3],
+    place: (DVec3, DVec3),
+) -> f64 {
+    let seen = |d: DVec3| if d.y > 0.0 { sky(d) } else { ground / PI };
+    gathered::<N>(seen, opening, place)
+}
+
+/// The same of whatever is seen in each direction.
+pub(crate) fn gathered<const N: usize>(
+    seen: impl Fn(DVec3) -> f64,
     [corner, u, v]: [DVec3; 3],
     (point, normal): (DVec3, DVec3),
 ) -> f64 {
@@ -143,11 +184,22 @@ pub(crate) fn summed<const N: usize>(
             let way = corner + u * at(i) + v * at(j) - point;
             let r2 = way.length_squared();
             let d = way / r2.sqrt();
-            let radiance = if d.y > 0.0 { sky(d) } else { ground / PI };
-            sum += radiance * normal.dot(d).max(0.0) * across.dot(d).abs() / r2;
+            sum += seen(d) * normal.dot(d).max(0.0) * across.dot(d).abs() / r2;
         }
     }
     sum * area / (N * N) as f64
+}
+
+/// The same through an upright window, cut at the horizon, where what is seen jumps.
+pub(crate) fn past_the_horizon(
+    seen: impl Fn(DVec3) -> f64,
+    [corner, u, v]: [DVec3; 3],
+    place: (DVec3, DVec3),
+) -> f64 {
+    let below = v * ((place.0.y - corner.y) / v.y).clamp(0.0, 1.0);
+    let parts = [[corner, u, below], [corner + below, u, v - below]];
+    let there = parts.into_iter().filter(|part| part[2].y > 0.0);
+    there.map(|part| gathered::<400>(&seen, part, place)).sum()
 }
 
 /// The opening in the roof: a corner and two sides.
