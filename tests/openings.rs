@@ -119,7 +119,7 @@ fn small_openings_in_inner_walls_are_as_right_as_in_outer_ones() {
         let errors = errors(&bake(room, &sky()), opening);
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
         assert!(rms < 0.015, "{width} x {height}: {rms}");
-        assert!(errors.iter().all(|e| e.abs() < 0.04), "{width} x {height}");
+        assert!(errors.iter().all(|e| e.abs() < 0.05), "{width} x {height}");
     }
 }
 

@@ -15,6 +15,9 @@ use std::f64::consts::PI;
 /// each at every point that a path comes by.
 const SMALL: f64 = 0.02;
 
+/// Paths that look through openings from about the same place.
+const PATHS: f64 = 1e3;
+
 impl Audit<'_> {
     /// The openings of a room with a sky, where they are small.
     pub(super) fn small_openings(&self) -> Option<Openings> {
@@ -52,7 +55,7 @@ impl Audit<'_> {
     pub(super) fn openings_from(&self, at: &Vertex) -> Option<Choice> {
         let (sky, openings) = (self.scene.sky.as_ref()?, self.openings.as_ref()?);
         let mut choice = Choice::default();
-        openings.weigh(at.point, at.normal, |d| sky.plain(d), &mut choice);
+        openings.weigh(PATHS, (at.point, at.normal), |d| sky.plain(d), &mut choice);
         Some(choice)
     }
 

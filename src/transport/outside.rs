@@ -260,8 +260,9 @@ impl Outside {
         look: &mut Look,
     ) {
         let plain = |d: DVec3| self.sky.plain(d);
+        let from = (to.point, to.normal);
         self.openings
-            .weigh(to.point, to.normal, plain, &mut look.choice);
+            .weigh(count as f64, from, plain, &mut look.choice);
         let turn = hash(to.seed, 0x5c1);
         let toward = |k| {
             let at = self.openings.choose(&look.choice, sequence02(k, turn))?;

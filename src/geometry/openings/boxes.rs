@@ -16,7 +16,7 @@ const LEAST_WORTH: f64 = 0.002;
 /// How far beyond the outermost of n gaps an opening may go on, as a share of its width: they are about an n-th from its edge, further than
 /// k of them with probability e^-k. With 4 one box in fourteen lost a sliver, which single rays of the hemisphere then stood for: 1.6 % at
 /// a point of CIE 171 5.10.
-const BEYOND: f64 = 12.0;
+const BEYOND: f64 = 8.0;
 
 /// A box that an opening lies in: flat along an axis unless that is at several depths.
 #[derive(Debug, Clone, Copy)]

@@ -15,8 +15,12 @@ const PIECES: usize = 256;
 /// everywhere, rays lie less evenly, and points are off by .3 % that are else by .1.
 const FEWEST: usize = 4;
 const UNEVEN: f64 = 2.0;
-/// Parts that may bring less than this share of all are left out.
-const NOTHING: f64 = 1e-4;
+/// So many rays go to the parts as if all were open, for each that goes by what a place sees of them: a place is larger than its points. None
+/// takes more than a tenfold part of a sum then that way; without, single leaves of a garden were off by ten times their light.
+const BLINDLY: f64 = 0.1;
+/// Parts that would take less than this of a ray are left out, and a ray chooses among so many pieces.
+const NOTHING: f64 = 0.05;
+const EACH: f64 = 4.0;
 /// A piece that seems edge-on from its middle still counts as if it were turned by this cosine.
 const LEAST_COSINE: f64 = 0.1;
 
@@ -40,32 +44,24 @@ struct Pieces {
 
 impl Openings {
     /// What each part may bring to a point that looks along a normal: about its form factor, as far as it is seen from there, times
-    /// `brightness` of its direction. Those that bring next to nothing are left to rays over the hemisphere.
+    /// `brightness` of its direction. Of so many rays, parts that would take next to none are left to rays over the hemisphere.
     pub(crate) fn weigh(
         &self,
-        point: DVec3,
-        normal: DVec3,
-        brightness: impl Fn(DVec3) -> f64,
-        choice: &mut Choice,
-    ) {
-        self.weigh_from(NOTHING, (point, normal), brightness, choice);
-    }
-
-    /// The same of the parts that take this share of all at least.
-    pub(super) fn weigh_from(
-        &self,
-        least: f64,
+        rays: f64,
         (point, normal): (DVec3, DVec3),
         brightness: impl Fn(DVec3) -> f64,
         choice: &mut Choice,
     ) {
+        let least = NOTHING / rays;
         choice.sums.clear();
         choice.parts.clear();
         let shown = self.place(point, normal) * self.parts.len();
         let shown = |part: usize| f64::from(self.shown[shown + part]);
-        let rough = |k: usize| shown(k) * self.parts[k].factor_at_most(point, normal);
-        let all: f64 = (0..self.parts.len()).map(rough).sum();
-        let kept = (0..self.parts.len()).filter(|&k| rough(k) > least * all);
+        let rough = |k: usize| self.parts[k].factor_at_most(point, normal);
+        let parts = || 0..self.parts.len();
+        let all: f64 = parts().map(|k| shown(k) * rough(k)).sum();
+        let blindly = BLINDLY * all / parts().map(rough).sum::<f64>().max(1e-300);
+        let kept = parts().filter(|&k| (shown(k) + blindly) * rough(k) > least * all);
         choice.parts.extend(kept.map(|k| {
             let corners = self.parts[k].corners();
             let each = corners.map(|at| brightness((at - point).normalize_or_zero()));
@@ -77,28 +73,37 @@ impl Openings {
                 ..Pieces::default()
             }
         }));
-        self.cut(point, choice);
-        let mut sum = 0.0;
+        let most = (EACH * rays).min(PIECES as f64) as usize;
+        self.cut(point, most, choice);
+        let [mut open, mut blind] = [0.0; 2];
         for pieces in &choice.parts {
             let part = &self.parts[pieces.part as usize];
-            let shown = shown(pieces.part as usize);
             for at in pieces.all() {
                 let toward = toward(part, pieces, at, point, normal);
-                sum += toward.map_or(0.0, |(ways, factor)| {
-                    let bright = pieces
-                        .even
-                        .unwrap_or_else(|| ways.map(&brightness).iter().sum::<f64>() / 3.0);
-                    shown * factor * bright
+                let brings = toward.map_or(0.0, |(ways, factor)| {
+                    let mean = || ways.map(&brightness).iter().sum::<f64>() / 3.0;
+                    factor * pieces.even.unwrap_or_else(mean)
                 });
-                choice.sums.push(sum);
+                open += shown(pieces.part as usize) * brings;
+                blind += brings;
+                choice.sums.push(brings);
+            }
+        }
+        let blindly = BLINDLY * open / f64::max(blind, 1e-300);
+        let mut sum = 0.0;
+        for pieces in &choice.parts {
+            let share = shown(pieces.part as usize) + blindly;
+            for piece in &mut choice.sums[pieces.first as usize..][..pieces.count() as usize] {
+                sum += share * *piece;
+                *piece = sum;
             }
         }
     }
 
-    /// Cuts parts into pieces, coarser ones where they were too many.
-    fn cut(&self, point: DVec3, choice: &mut Choice) {
+    /// Cuts parts into pieces, coarser ones where they were more than this.
+    fn cut(&self, point: DVec3, most: usize, choice: &mut Choice) {
         let (mut length, parts) = (LENGTH, choice.parts.len().max(1));
-        let fewest = (PIECES / parts).isqrt().clamp(1, FEWEST);
+        let fewest = (most / parts).isqrt().clamp(1, FEWEST);
         loop {
             let mut first = 0;
             for pieces in &mut choice.parts {
@@ -107,7 +112,7 @@ impl Openings {
                 pieces.first = first;
                 first += pieces.count();
             }
-            if first as usize <= PIECES.max(parts * fewest * fewest) {
+            if first as usize <= most.max(parts * fewest * fewest) {
                 return;
             }
             length *= 1.5;
@@ -120,8 +125,15 @@ impl Openings {
         // Never none: a point on the box would have no end of pieces.
         let distance = of.distance(point);
         let distance = distance.max(MARGIN * (self.high - self.low).length());
-        across(of.axis).map(|axis| {
-            (of.size()[axis] / (length * distance).max(1e-300))
+        let axes = across(of.axis);
+        let longest = axes
+            .map(|axis| of.size()[axis])
+            .into_iter()
+            .fold(0.0, f64::max);
+        axes.map(|axis| {
+            let size = of.size()[axis];
+            let fewest = (fewest * size / longest).ceil().max(1.0);
+            (size / (length * distance).max(1e-300))
                 .ceil()
                 .clamp(fewest, ALONG) as u32
         })

@@ -148,7 +148,7 @@ mod tests {
         for point in [DVec3::new(0.7, 0.2, -0.4), DVec3::new(0.1, 2.6, 0.3)] {
             let normal = DVec3::Y;
             let mut choice = Choice::default();
-            openings.weigh(point, normal, |_| 1.0, &mut choice);
+            openings.weigh(1e3, (point, normal), |_| 1.0, &mut choice);
             let n = 1 << 16;
             let f = |d: DVec3| d.y / PI;
             // Where a direction crosses the lid: parts reach beyond its rectangle, where it is shut.
@@ -201,7 +201,7 @@ mod tests {
             let openings = Openings::find(&corners, start, meet, 1);
             let mut choice = Choice::default();
             for point in [[-1.7, 0.0, 15.0], [0.3, 0.0, 8.0], [1.2, 0.0, 4.5]].map(DVec3::from) {
-                openings.weigh(point, DVec3::Y, |_| 1.0, &mut choice);
+                openings.weigh(1e3, (point, DVec3::Y), |_| 1.0, &mut choice);
                 let n = 1000;
                 // All of it is found.
                 let through = |k| {

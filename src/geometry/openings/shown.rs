@@ -11,12 +11,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// What a place knows of a part counts for this many rays by what all places know.
+/// What all places know of a part as small as a cell counts for this many rays of one, of a larger one for fewer by as much: rays all over
+/// the hemisphere meet that, too. As many for all took four fifths of the rays to a slit in an inner wall, and points were 9 % off.
 const PRIOR: f64 = 0.25;
-/// A part as small as a cell is looked at by no less than this share of what all places see of it, since a place is larger than the points
-/// that asked for it. Large ones are met by rays all over the hemisphere, too: .02 for all took four fifths of the rays to a window of .3 m
-/// in an inner wall, and points were 2 % off.
-const LEAST: f64 = 0.02;
+/// Of a part that is open for a smaller share than this little is seen.
+const MUCH: f64 = 0.1;
 /// So many times rays are shared out. Twice leaves a tenth of a window's rays to what lies behind it.
 const TIMES: usize = 6;
 
@@ -35,7 +34,14 @@ struct Asked {
     rays: f64,
 }
 
-/// What the points of a task asked: of each part from each place, and the rays that left.
+/// What is known of a part: the share that is open, and how many rays that counts for.
+#[derive(Debug, Clone, Copy, Default)]
+struct Known {
+    open: f64,
+    counts: f64,
+}
+
+/// What a point asked: of each part from each place, and the rays that left.
 type Answers = (Vec<(usize, usize, Asked)>, Vec<Ray>);
 
 impl Openings {
@@ -53,32 +59,56 @@ impl Openings {
         self.shown = vec![1.0; KINDS * parts];
         let look = |k: usize| self.ask(&starts[k], places[k], meet, hash(seed, k as u64));
         let answers: Vec<Answers> = (0..starts.len()).into_par_iter().map(look).collect();
-        let mut asked = vec![Asked::default(); (KINDS + 1) * parts];
+        let mut asked = vec![Asked::default(); KINDS * parts];
         let mut rays = Vec::new();
         for (some, left) in answers {
             for (place, part, by) in some {
-                for place in [place, KINDS] {
-                    let all = &mut asked[place * parts + part];
-                    all.worth += by.worth;
-                    all.rays += by.rays;
-                }
+                let all = &mut asked[place * parts + part];
+                all.worth += by.worth;
+                all.rays += by.rays;
             }
             rays.extend(left);
         }
-        let everywhere = share_out(&rays, &asked[KINDS * parts..], |_| (1.0, 0.0));
+        rays.sort_by_key(|ray| ray.place);
+        let places: Vec<(&[Ray], &[Asked])> = (0..KINDS)
+            .map(|place| {
+                let [first, end] =
+                    [place, place + 1].map(|p| rays.partition_point(|r| r.place < p));
+                (&rays[first..end], &asked[place * parts..][..parts])
+            })
+            .collect();
+        // What is known of a part: how open it is to the places that see much of it.
+        let alone: Vec<Shares> = places
+            .par_iter()
+            .map(|(rays, asked)| share_out(rays, asked, |_| Known::default()))
+            .collect();
+        let open = |part: usize| {
+            let seeing = places.iter().zip(&alone).filter(|(_, s)| s[part][0] > MUCH);
+            let [brings, worth] = seeing.fold([0.0, 1e-300], |[brings, worth], ((_, asked), s)| {
+                [brings + s[part][1], worth + asked[part].worth]
+            });
+            (brings / worth).min(1.0)
+        };
         let cell = self.cell();
         let cell = (cell.x * cell.y).max(cell.y * cell.z).max(cell.z * cell.x);
-        let known = |part: usize| {
-            let least = LEAST * (cell / self.parts[part].area()).min(1.0);
-            (everywhere[part], least * everywhere[part])
-        };
-        rays.sort_by_key(|ray| ray.place);
-        let of = |place: usize| {
-            let [first, end] = [place, place + 1].map(|p| rays.partition_point(|r| r.place < p));
-            share_out(&rays[first..end], &asked[place * parts..][..parts], known)
-        };
-        let shown: Vec<Vec<f64>> = (0..KINDS).into_par_iter().map(of).collect();
-        self.shown = shown.concat().into_iter().map(|s| s as f32).collect();
+        let known: Vec<Known> = (0..parts)
+            .map(|part| {
+                let small = (cell / self.parts[part].area()).min(1.0);
+                let open = open(part);
+                Known {
+                    open,
+                    counts: PRIOR * small,
+                }
+            })
+            .collect();
+        let shown: Vec<Vec<f32>> = places
+            .par_iter()
+            .map(|(rays, asked)| {
+                let shares = share_out(rays, asked, |part| known[part]);
+                shares.into_iter().map(|[share, _]| share as f32).collect()
+            })
+            .collect();
+        self.shown = shown.concat();
     }
 
     /// Rays from a point to the parts as if all were open.
@@ -91,7 +121,7 @@ impl Openings {
     ) -> Answers {
         let (point, normal) = (start.point, start.normal);
         let mut choice = Choice::default();
-        self.weigh_from(0.0, (point, normal), |_| 1.0, &mut choice);
+        self.weigh(f64::INFINITY, (point, normal), |_| 1.0, &mut choice);
         let total = choice.total();
         let asked = choice.worths().map(|(part, worth)| {
             let rays = BEAM as f64 * worth / total.max(1e-300);
@@ -121,26 +151,31 @@ impl Openings {
     }
 }
 
-/// What each part brings, as a share of what it would if it were open. `known`: what is known of it before, and the least that is taken.
-fn share_out(rays: &[Ray], asked: &[Asked], known: impl Fn(usize) -> (f64, f64)) -> Vec<f64> {
-    let mut shares = vec![1.0; asked.len()];
+/// Of each part what it brings, as a share of what it would if it were open, and as it is.
+type Shares = Vec<[f64; 2]>;
+
+/// Shares out rays by what is known of the parts before.
+fn share_out(rays: &[Ray], asked: &[Asked], known: impl Fn(usize) -> Known) -> Shares {
+    let mut shares = vec![[1.0, 0.0]; asked.len()];
     for _ in 0..TIMES {
         let mut brings = vec![0.0; asked.len()];
         for ray in rays {
-            let by = |&(part, density): &(usize, f64)| shares[part] * density;
+            let by = |&(part, density): &(usize, f64)| shares[part][0] * density;
             let all: f64 = ray.crossed.iter().map(by).sum();
             for each in &ray.crossed {
                 brings[each.0] += ray.brings * by(each) / all.max(1e-300);
             }
         }
         for (part, share) in shares.iter_mut().enumerate() {
-            let (Asked { worth, rays }, (before, least)) = (asked[part], known(part));
-            let open = if worth > 0.0 {
+            let Asked { worth, rays } = asked[part];
+            let Known { open, counts } = known(part);
+            let found = if worth > 0.0 {
                 brings[part] / worth
             } else {
                 0.0
             };
-            *share = ((open * rays + PRIOR * before) / (rays + PRIOR)).max(least);
+            let found = (found * rays + counts * open) / (rays + counts).max(1e-300);
+            *share = [found.min(1.0), brings[part]];
         }
     }
     shares
