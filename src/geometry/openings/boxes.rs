@@ -11,7 +11,8 @@ const BINS: usize = 32;
 const LEAST: usize = 32;
 /// Splits that leave out less than this share of a box are chance: between 32 points the widest gap is about a tenth.
 const GAIN: f64 = 0.15;
-/// Nor is a box of which a split would free less than this share of all gaps from as much room again.
+/// Nor is a box of which a split would free less than this share of all gaps from as much room again: a house in a garden takes 30 boxes
+/// then, else 50, and is no noisier.
 const LEAST_WORTH: f64 = 0.002;
 /// How far beyond the outermost of n gaps an opening may go on, as a share of its width: they are about an n-th from its edge, further than
 /// k of them with probability e^-k. With 4 one box in fourteen lost a sliver, which single rays of the hemisphere then stood for: 1.6 % at

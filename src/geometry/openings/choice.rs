@@ -16,7 +16,7 @@ const PIECES: usize = 256;
 const FEWEST: usize = 4;
 const UNEVEN: f64 = 2.0;
 /// So many rays go to the parts as if all were open, for each that goes by what a place sees of them: a place is larger than its points. None
-/// takes more than a tenfold part of a sum then that way; without, single leaves of a garden were off by ten times their light.
+/// stands for more than ten then; without, the file of a house in a garden was off by 3.2 dE00 in root mean square, with it by .8 to 1.3.
 const BLINDLY: f64 = 0.1;
 /// Parts that would take less than this of a ray are left out, and a ray chooses among so many pieces.
 const NOTHING: f64 = 0.05;

@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// What all places know of a part as small as a cell counts for this many rays of one, of a larger one for fewer by as much: rays all over
-/// the hemisphere meet that, too. As many for all took four fifths of the rays to a slit in an inner wall, and points were 9 % off.
+/// the hemisphere meet that, too. With as many for all, points that see a slit in an inner wall were 9 % off.
 const PRIOR: f64 = 0.25;
 /// Of a part that is open for a smaller share than this little is seen.
 const MUCH: f64 = 0.1;
-/// So many times rays are shared out. Twice leaves a tenth of a window's rays to what lies behind it.
+/// So many times rays are shared out: each time divides what lies behind a window by the ratio of their sizes.
 const TIMES: usize = 6;
 
 /// A ray that left: what it stands for, and the parts that it crossed with their density.
