@@ -1,7 +1,7 @@
 //! Rays that are aimed where others left.
 
 use super::gaps::{Gap, across};
-use super::{KINDS, Openings, PLACES};
+use super::sides::{KINDS, Openings, PLACES};
 use crate::geometry::sampling::Pcg;
 use glam::DVec3;
 

@@ -2,7 +2,7 @@
 
 use super::boxes::Part;
 use super::gaps::across;
-use super::{MARGIN, Openings};
+use super::sides::{MARGIN, Openings};
 use glam::DVec3;
 use std::f64::consts::PI;
 

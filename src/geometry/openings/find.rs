@@ -3,7 +3,7 @@
 use super::aim::Aim;
 use super::boxes::enclose;
 use super::gaps::{Exit, Gap};
-use super::{BEAM, KINDS, MARGIN, Openings, Start, Wall};
+use super::sides::{BEAM, KINDS, MARGIN, Openings, Start, Wall};
 use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02};
 use glam::DVec3;
 use rayon::prelude::*;

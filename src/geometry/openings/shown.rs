@@ -5,7 +5,7 @@
 //! maximisation, Dempster, Laird and Rubin 1977): inside of the house the window takes all, and outside the sides of the yard.
 
 use super::choice::Choice;
-use super::{BEAM, KINDS, Openings, Start, Wall};
+use super::sides::{BEAM, KINDS, Openings, Start, Wall};
 use crate::geometry::sampling::{Pcg, hash};
 use glam::DVec3;
 use rayon::prelude::*;
