@@ -35,7 +35,8 @@ pub(crate) struct Choice {
 #[derive(Debug, Clone, Copy, Default)]
 struct Pieces {
     part: u32,
-    /// Its brightness, if that is about the same all over.
+    /// Do its corners differ in brightness? Its brightness, if they do not and it is small.
+    is_uneven: bool,
     even: Option<f64>,
     /// Pieces along either axis across it, and the number of the first.
     along: [u32; 2],
@@ -63,15 +64,19 @@ impl Openings {
         let blindly = BLINDLY * all / parts().map(rough).sum::<f64>().max(1e-300);
         let kept = parts().filter(|&k| (shown(k) + blindly) * rough(k) > least * all);
         choice.parts.extend(kept.map(|k| {
+            let mut pieces = Pieces {
+                part: k as u32,
+                ..Pieces::default()
+            };
             let corners = self.parts[k].corners();
             let each = corners.map(|at| brightness((at - point).normalize_or_zero()));
             let most = each.into_iter().fold(0.0, f64::max);
-            let is_even = each.into_iter().all(|b| UNEVEN * b >= most);
-            Pieces {
-                part: k as u32,
-                even: is_even.then(|| each.iter().sum::<f64>() / 4.0),
-                ..Pieces::default()
+            pieces.is_uneven = each.into_iter().any(|b| UNEVEN * b < most);
+            // Inside of a large one anything may be.
+            if !pieces.is_uneven && self.along(k, point, [LENGTH, 1.0]) == [1, 1] {
+                pieces.even = Some(each.iter().sum::<f64>() / 4.0);
             }
+            pieces
         }));
         let most = (EACH * rays).min(PIECES as f64) as usize;
         self.cut(point, most, choice);
@@ -107,7 +112,7 @@ impl Openings {
         loop {
             let mut first = 0;
             for pieces in &mut choice.parts {
-                let fewest = pieces.even.map_or(fewest as f64, |_| 1.0);
+                let fewest = if pieces.is_uneven { fewest as f64 } else { 1.0 };
                 pieces.along = self.along(pieces.part as usize, point, [length, fewest]);
                 pieces.first = first;
                 first += pieces.count();
