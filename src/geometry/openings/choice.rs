@@ -3,6 +3,7 @@
 use super::boxes::Part;
 use super::gaps::across;
 use super::sides::{MARGIN, Openings};
+use crate::geometry::sampling::hash;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -191,8 +192,9 @@ impl Openings {
         let [first, second] = across(part.axis);
         at[first] += rest * size[first];
         at[second] += v * size[second];
-        // What is flat needs no number of its own; elsewhere the lower digits of one do.
-        at[part.axis] += (4096.0 * v).fract() * size[part.axis];
+        // A number of its own for what is not flat: digits of the others repeat in sequences of few points.
+        let depth = hash(u.to_bits(), v.to_bits()) as f64 / u64::MAX as f64;
+        at[part.axis] += depth * size[part.axis];
         Some(at)
     }
 

@@ -59,7 +59,9 @@ mod tests {
             let normal = DVec3::Y;
             let mut choice = Choice::default();
             openings.weigh(1e3, (point, normal), |_| 1.0, &mut choice);
-            let n = 1 << 16;
+            // Many sequences of few points, as points take them.
+            let n = 1 << 20;
+            let square = |k: u32| sequence02(k % 256, u64::from(k / 256));
             let f = |d: DVec3| d.y / PI;
             // Where a direction crosses the lid: parts reach beyond its rectangle, where it is shut.
             let open = |d: &DVec3| {
@@ -67,7 +69,7 @@ mod tests {
                 d.y > 0.0 && (-0.5..=0.5).contains(&at.x) && (-0.2..=1.3).contains(&at.z)
             };
             let chosen: f64 = (0..n)
-                .filter_map(|k| openings.choose(&choice, sequence02(k, 3)))
+                .filter_map(|k| openings.choose(&choice, square(k)))
                 .map(|at| (at - point).normalize())
                 .filter(open)
                 .map(|d| f(d) / openings.density(&choice, point, d))
