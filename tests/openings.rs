@@ -118,7 +118,7 @@ fn small_openings_in_inner_walls_are_as_right_as_in_outer_ones() {
         let (room, opening) = long_room(width, height, true);
         let errors = errors(&bake(room, &sky()), opening);
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-        assert!(rms < 0.015, "{width} x {height}: {rms}");
+        assert!(rms < 0.02, "{width} x {height}: {rms}");
         assert!(errors.iter().all(|e| e.abs() < 0.05), "{width} x {height}");
     }
 }
