@@ -3,9 +3,11 @@
 
 #[path = "common/built.rs"]
 mod built;
+#[path = "common/desk.rs"]
+mod desk;
 
 use built::{Room, close};
-use glam::{DVec3, dvec3};
+use glam::DVec3;
 use haarlight::color::{KM, Observer};
 use haarlight::scene::{Material, Options, Scene};
 use haarlight::solve::reference::Reference;
@@ -140,26 +142,8 @@ fn desk(light: Leaves) -> (Scene, usize) {
     }
     let (plain, glow, wall) = (room.paint(0.5), room.paint(0.6), room.paint(0.4));
     room.glow(glow, lamp, 5000.0);
-    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
-    room.quad(DVec3::ZERO, 2.0 * z, x, sheet);
-    room.quad(x, 2.0 * z, x, plain);
-    room.quad(2.0 * y, 2.0 * x, 2.0 * z, glow);
-    room.quad(DVec3::ZERO, 2.0 * y, 2.0 * z, wall);
-    room.quad(2.0 * x, 2.0 * z, 2.0 * y, wall);
-    room.quad(DVec3::ZERO, 2.0 * x, 2.0 * y, wall);
-    room.quad(2.0 * z, 2.0 * y, 2.0 * x, wall);
+    desk::furnish(&mut room, [sheet, plain, glow], [wall; 4]);
     (room.scene(), sheet)
-}
-
-fn points() -> Vec<(DVec3, DVec3)> {
-    let mut points = Vec::new();
-    for (a, b) in [(0.31, 0.42), (0.7, 1.4), (1.3, 0.9), (1.7, 1.6)] {
-        points.push((dvec3(a, 0.0, b), DVec3::Y));
-        points.push((dvec3(a, 2.0, b), DVec3::NEG_Y));
-        points.push((dvec3(0.0, a, b), DVec3::X));
-        points.push((dvec3(a, b, 0.0), DVec3::Z));
-    }
-    points
 }
 
 /// Under ultraviolet light the paper glows blue, under violet light green: irradiance at points and what the paper shows, against the reference
@@ -177,7 +161,7 @@ fn a_matrix_of_many_products_agrees_with_itself() {
         let mut reference = Reference::new(&scene, 2, 1).unwrap();
         reference.donaldson[sheet] = Some(raw.clone());
         let solution = reference.solve();
-        let points = points();
+        let points = desk::points();
         let truth = reference.gather(&scene, &solution, &points, 1);
         for representation in [Representation::Adaptive, Representation::Dense] {
             let settings = Settings {

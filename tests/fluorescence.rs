@@ -3,6 +3,8 @@
 #[path = "common/built.rs"]
 mod built;
 mod common;
+#[path = "common/desk.rs"]
+mod desk;
 
 use built::{Room, close, sphere};
 use glam::{DVec3, dvec3};
@@ -149,27 +151,8 @@ fn desk(light: Leaves, grid: Grid) -> (Room, [Leaves; 3]) {
         room.spectral_paint(rise(0.6, 0.1, 500.0)),
     );
     let white = room.spectral_paint(rise(0.06, 0.8, 400.0));
-    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
-    let corner = dvec3(0.0, 0.0, 0.0);
-    room.quad(corner, 2.0 * z, x, sheet);
-    room.quad(x, 2.0 * z, x, plain);
-    room.quad(2.0 * y, 2.0 * x, 2.0 * z, glow);
-    room.quad(corner, 2.0 * y, 2.0 * z, red);
-    room.quad(2.0 * x, 2.0 * z, 2.0 * y, blue);
-    room.quad(corner, 2.0 * x, 2.0 * y, white);
-    room.quad(2.0 * z, 2.0 * y, 2.0 * x, white);
+    desk::furnish(&mut room, [sheet, plain, glow], [red, blue, white, white]);
     (room, [paper, emission, excitation])
-}
-
-fn desk_points() -> Vec<(DVec3, DVec3)> {
-    let mut points = Vec::new();
-    for (a, b) in [(0.31, 0.42), (0.7, 1.4), (1.3, 0.9), (1.7, 1.6)] {
-        points.push((dvec3(a, 0.0, b), DVec3::Y));
-        points.push((dvec3(a, 2.0, b), DVec3::NEG_Y));
-        points.push((dvec3(0.0, a, b), DVec3::X));
-        points.push((dvec3(a, b, 0.0), DVec3::Z));
-    }
-    points
 }
 
 /// White paper with and without a brightener under D65, and under A without ultraviolet, against the dense reference with the whole
@@ -187,7 +170,7 @@ fn white_paper_agrees_with_the_whole_matrix() {
         let scene = room.scene();
         let reference = Reference::new(&scene, 2, 1).unwrap();
         let solution = reference.solve();
-        let points = desk_points();
+        let points = desk::points();
         let truth = reference.gather(&scene, &solution, &points, 1);
         for representation in [Representation::Adaptive, Representation::Dense] {
             let mut bake = Bake::new(
@@ -261,7 +244,7 @@ fn paths_change_their_wavelength() {
     let scene = room.scene();
     let reference = Reference::new(&scene, 2, 1).unwrap();
     let solution = reference.solve();
-    let points = desk_points();
+    let points = desk::points();
     let truth = reference.gather(&scene, &solution, &points, 1);
     let bake = Bake::new(scene, Settings::default());
     let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());

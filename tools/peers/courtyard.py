@@ -14,7 +14,7 @@ import tempfile
 
 import numpy as np
 
-from gltf import write_glb
+from gltf import write_quads
 
 WIDTH = 1024  # of the sky's picture
 SUN = (50.0, 60.0)  # height and azimuth from north (-Z) over east (+X), degrees
@@ -84,24 +84,9 @@ def level(picture):
 
 
 def glb(path):
-    document = {"asset": {"version": "2.0"}, "scene": 0, "accessors": [], "bufferViews": [], "meshes": [], "nodes": [],
-                "materials": [{"name": name, "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": 3 * [rho] + [1]}}
-                              for name, rho in PAINTS.items()]}
-    buffers = []
-    for k, (o, u, v, paint) in enumerate(quads()):
-        corners = np.array([o, o + u, o + u + v, o + v], dtype="<f4")
-        for data, kind, component in ((corners, "VEC3", 5126), (np.array([0, 1, 2, 0, 2, 3], dtype="<u2"), "SCALAR", 5123)):
-            document["bufferViews"].append({"buffer": len(buffers), "byteLength": data.nbytes})
-            accessor = {"bufferView": len(buffers), "componentType": component, "type": kind, "count": len(data)}
-            if kind == "VEC3":
-                accessor |= {"min": corners.min(0).tolist(), "max": corners.max(0).tolist()}
-            document["accessors"].append(accessor)
-            buffers.append(data.tobytes())
-        primitive = {"attributes": {"POSITION": 2 * k}, "indices": 2 * k + 1, "material": list(PAINTS).index(paint)}
-        document["meshes"].append({"primitives": [primitive]})
-        document["nodes"].append({"mesh": k})
-    document["scenes"] = [{"nodes": list(range(len(document["nodes"])))}]
-    write_glb(path, document, buffers)
+    materials = [{"name": name, "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": 3 * [rho] + [1]}}
+                 for name, rho in PAINTS.items()]
+    write_quads(path, quads(), materials)
 
 
 def ours(program, folder, sky):

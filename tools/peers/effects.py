@@ -15,7 +15,7 @@ import tempfile
 import numpy as np
 
 from courtyard import TO_XYZ
-from gltf import write_glb
+from gltf import write_quads
 
 EFFECTS = ("pane", "sheet", "mirror")
 LUMINANCE = 1000.0  # of the lamp, cd/m2
@@ -79,25 +79,8 @@ SIDE = {"materials": {"sheet": {"reflectance": RHO, "transmission": TAU}, "mirro
 
 def write(folder, effect):
     """Room, side file and points."""
-    names = [m["name"] for m in materials()]
-    document = {"asset": {"version": "2.0"}, "scene": 0, "accessors": [], "bufferViews": [], "meshes": [], "nodes": [],
-                "materials": materials(), "extensionsUsed": ["KHR_materials_emissive_strength"]}
-    buffers, used = [], set()
-    for k, (o, u, v, paint) in enumerate(quads(effect)):
-        used.add(paint)
-        corners = np.array([o, o + u, o + u + v, o + v], dtype="<f4")
-        for data, kind, component in ((corners, "VEC3", 5126), (np.array([0, 1, 2, 0, 2, 3], dtype="<u2"), "SCALAR", 5123)):
-            document["bufferViews"].append({"buffer": len(buffers), "byteLength": data.nbytes})
-            accessor = {"bufferView": len(buffers), "componentType": component, "type": kind, "count": len(data)}
-            if kind == "VEC3":
-                accessor |= {"min": corners.min(0).tolist(), "max": corners.max(0).tolist()}
-            document["accessors"].append(accessor)
-            buffers.append(data.tobytes())
-        primitive = {"attributes": {"POSITION": 2 * k}, "indices": 2 * k + 1, "material": names.index(paint)}
-        document["meshes"].append({"primitives": [primitive]})
-        document["nodes"].append({"mesh": k})
-    document["scenes"] = [{"nodes": list(range(len(document["nodes"])))}]
-    write_glb(os.path.join(folder, "room.glb"), document, buffers)
+    write_quads(os.path.join(folder, "room.glb"), quads(effect), materials(), extensionsUsed=["KHR_materials_emissive_strength"])
+    used = {paint for *_, paint in quads(effect)}
     side = {"materials": {name: said for name, said in SIDE["materials"].items() if name in used}}
     with open(os.path.join(folder, "room.spectra.json"), "w") as out:
         json.dump(side, out)

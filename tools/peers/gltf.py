@@ -113,6 +113,28 @@ def linear(values):
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
+def write_quads(path, quads, materials, **more):
+    """A .glb of quads: corner, two sides, name of the material; fronts where the first side times the second points."""
+    names = [material["name"] for material in materials]
+    document = {"asset": {"version": "2.0"}, "scene": 0, "accessors": [], "bufferViews": [], "meshes": [], "nodes": [],
+                "materials": materials} | more
+    buffers = []
+    for k, (o, u, v, paint) in enumerate(quads):
+        corners = np.array([o, o + u, o + u + v, o + v], dtype="<f4")
+        for data, kind, component in ((corners, "VEC3", 5126), (np.array([0, 1, 2, 0, 2, 3], dtype="<u2"), "SCALAR", 5123)):
+            document["bufferViews"].append({"buffer": len(buffers), "byteLength": data.nbytes})
+            accessor = {"bufferView": len(buffers), "componentType": component, "type": kind, "count": len(data)}
+            if kind == "VEC3":
+                accessor |= {"min": corners.min(0).tolist(), "max": corners.max(0).tolist()}
+            document["accessors"].append(accessor)
+            buffers.append(data.tobytes())
+        primitive = {"attributes": {"POSITION": 2 * k}, "indices": 2 * k + 1, "material": names.index(paint)}
+        document["meshes"].append({"primitives": [primitive]})
+        document["nodes"].append({"mesh": k})
+    document["scenes"] = [{"nodes": list(range(len(document["nodes"])))}]
+    write_glb(path, document, buffers)
+
+
 def write_glb(path, document, buffers):
     """One GLB with all buffers in its binary chunk."""
     binary, starts = b"", []
