@@ -160,12 +160,11 @@ impl Group {
         let size = self.tight.size();
         let mut more = size.max(least) * (BEYOND / self.tight.count as f64);
         more[axis] = 0.0;
-        let (mut low, mut high) = (self.tight.low - more, self.tight.high + more);
-        (low, high) = (low.max(self.low), high.min(self.high));
-        for k in 0..3 {
-            (low[k], high[k]) = (low[k] - flat[k], high[k] + flat[k]);
+        Part {
+            low: (self.tight.low - more).max(self.low) - flat,
+            high: (self.tight.high + more).min(self.high) + flat,
+            axis,
         }
-        Part { low, high, axis }
     }
 }
 

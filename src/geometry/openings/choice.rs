@@ -249,7 +249,7 @@ impl Openings {
 }
 
 /// Where a ray of a direction with these reciprocals enters and leaves a box before it.
-pub(super) fn crossed([low, high]: &[DVec3; 2], from: DVec3, inverse: DVec3) -> Option<[f64; 2]> {
+fn crossed([low, high]: &[DVec3; 2], from: DVec3, inverse: DVec3) -> Option<[f64; 2]> {
     let (a, b) = ((*low - from) * inverse, (*high - from) * inverse);
     // Where it runs along a side that it lies on, 0 times infinity: it does not enter there.
     let near = a.min(b).max_element().max(0.0);

@@ -44,13 +44,13 @@ impl Openings {
             std::array::from_fn(|j| cosine_direction(normal, sequence02(j as u32, shift)))
         };
         let all: Vec<usize> = (0..starts.len()).collect();
-        let exits = openings.exits((&starts, &all), &meet, wide);
-        openings.share = exits.len() as f64 / (BEAM * starts.len().max(1)) as f64;
-        let mut gaps = openings.gaps(&starts, &exits, &meet, hash(seed, 0));
         let places: Vec<usize> = starts
             .iter()
             .map(|start| openings.place(start.point, start.normal))
             .collect();
+        let exits = self::exits((&starts, &places, &all), &meet, wide);
+        openings.share = exits.len() as f64 / (BEAM * starts.len().max(1)) as f64;
+        let mut gaps = openings.gaps(&starts, &exits, &meet, hash(seed, 0));
         for round in 1..=ROUNDS {
             if gaps.is_empty() {
                 break;
@@ -70,7 +70,7 @@ impl Openings {
                     (target - starts[k].point).normalize_or_zero()
                 })
             };
-            let more = openings.exits((&starts, &short), &meet, aimed);
+            let more = self::exits((&starts, &places, &short), &meet, aimed);
             let more = openings.gaps(&starts, &more, &meet, hash(seed, round));
             gaps.extend(more);
         }
@@ -79,31 +79,6 @@ impl Openings {
         openings.parts = enclose(&mut gaps, [openings.low, openings.high], widths, PARTS);
         openings.look_at_parts((&starts, &places), &meet, hash(seed, ROUNDS + 1));
         openings
-    }
-
-    /// The rays that leave from some of the points.
-    fn exits(
-        &self,
-        (starts, some): (&[Start], &[usize]),
-        meet: &(impl Fn(&Start, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
-        ways: impl Fn(usize) -> [DVec3; BEAM] + Sync,
-    ) -> Vec<Exit> {
-        let from_chunk = |chunk: &[usize]| {
-            let mut found = Vec::new();
-            for &k in chunk {
-                let (start, ways) = (&starts[k], ways(k));
-                let place = self.place(start.point, start.normal);
-                let met = meet(start, &ways);
-                for (way, _) in ways.into_iter().zip(met).filter(|(_, met)| met.is_none()) {
-                    if start.normal.dot(way) > 0.0 {
-                        let start = k;
-                        found.push(Exit { start, place, way });
-                    }
-                }
-            }
-            found
-        };
-        some.par_chunks(CHUNK).flat_map_iter(from_chunk).collect()
     }
 
     /// Gaps on the ways of some of the rays that left each place, spread over these.
@@ -127,4 +102,28 @@ impl Openings {
         };
         asked.par_iter().enumerate().map(gap).collect()
     }
+}
+
+/// The rays that leave from some of the points.
+fn exits(
+    (starts, places, some): (&[Start], &[usize], &[usize]),
+    meet: &(impl Fn(&Start, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
+    ways: impl Fn(usize) -> [DVec3; BEAM] + Sync,
+) -> Vec<Exit> {
+    let from_chunk = |chunk: &[usize]| {
+        let mut found = Vec::new();
+        for &k in chunk {
+            let (start, ways) = (&starts[k], ways(k));
+            let place = places[k];
+            let met = meet(start, &ways);
+            for (way, _) in ways.into_iter().zip(met).filter(|(_, met)| met.is_none()) {
+                if start.normal.dot(way) > 0.0 {
+                    let start = k;
+                    found.push(Exit { start, place, way });
+                }
+            }
+        }
+        found
+    };
+    some.par_chunks(CHUNK).flat_map_iter(from_chunk).collect()
 }

@@ -88,6 +88,7 @@ mod tests {
             assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
         }
     }
+
     /// A slit of 2 cm in a wall is found to its edges from 4 m to 16 m away, though few rays all over the hemispheres leave; where the room
     /// ends there, and where it goes on outside.
     #[test]
