@@ -1,5 +1,8 @@
 //! A bake that is stopped between rounds and resumed ends with the same bytes; what does not belong is refused.
 
+#[path = "common/every_effect.rs"]
+mod every_effect;
+
 use haarlight::output::{Exposure, Writing, baked_glb, npz};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
@@ -114,6 +117,23 @@ fn a_resumed_bake_ends_with_the_same_bytes() {
             }
         }
     }
+}
+
+/// All effects in one room.
+#[test]
+fn a_bake_with_every_effect_is_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c");
+    let begun = || Bake::new(every_effect::room(), settings(1.0, 2));
+    let mut whole = begun();
+    whole.step();
+    whole.save(&path).unwrap();
+    whole.step();
+    let mut resumed = begun();
+    resumed.resume(&path).unwrap();
+    resumed.step();
+    assert!(state(&whole) == state(&resumed));
+    assert!(files(&whole) == files(&resumed));
 }
 
 /// However spectra are carried.

@@ -2,6 +2,8 @@
 
 #[path = "common/built.rs"]
 mod built;
+#[path = "common/every_effect.rs"]
+mod every_effect;
 
 use built::{Room, sun};
 use glam::{DVec3, dvec3};
@@ -12,7 +14,6 @@ use haarlight::scene::sky::{SkyType, SkyWish};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::LEAVES;
-use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -297,27 +298,10 @@ fn effects_that_are_not_there_cost_nothing() {
     );
 }
 
-/// The audit's paths follow all effects by their own rules, and each where others are: panes before sky and sun, walls of paper, a
-/// tinted mirror, a ceiling with a dye, and a table that shines by a profile.
+/// The audit's paths follow all effects by their own rules, and each where others are.
 #[test]
 fn paths_agree_with_all_effects_at_once() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/glazed.glb");
-    let csv = |rows: &str| json!({"csv": rows});
-    let options = Options {
-        said: Some(json!({"materials": {
-            "walls": {"transmission": 0.05},
-            "red wall": {"mirror": true},
-            "ceiling": {"reflectance": 0.4, "fluorescence": {
-                "excitation": csv("380,0.5\n480,0.5"), "emission": csv("500,1\n600,1"), "yield": 1.0,
-            }},
-            "table": {"emission": {"profile": "gallery-panel.ldt", "name": "cie/LED-B3"}},
-        }})),
-        ..Options::default()
-    };
-    let bake = baked(
-        Scene::load(path, &options).unwrap(),
-        Representation::Adaptive,
-    );
+    let bake = baked(every_effect::room(), Representation::Adaptive);
     let plan = bake.plan();
     for kind in [
         Kind::MeasuredLamps,

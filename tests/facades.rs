@@ -9,7 +9,7 @@ mod daylit;
 
 use built::Room;
 use daylit::{
-    LUX, bake, beside, cie, facade, gathered, glass_of_the_report, past_the_horizon, places_beside,
+    INDEX, LUX, bake, beside, cie, facade, gathered, glass_of_the_report, past_the_horizon, places_beside,
     points_beside, row, wish,
 };
 use glam::DVec3;
@@ -38,8 +38,8 @@ fn cie_171_case_5_12() {
         let size = if all { "4 x 3 m" } else { "2 x 1 m" };
         let mut room = Room::new();
         let window = facade(&mut room, all);
-        let inside = inside_of(glass_of_the_report(1.0), 1.55);
-        let glass = room.pane(1.55, [inside; LEAVES]);
+        let inside = inside_of(glass_of_the_report(1.0), INDEX);
+        let glass = room.pane(INDEX, [inside; LEAVES]);
         let [corner, u, v] = window;
         room.quad(corner, v, u, glass);
         let bake = bake(room, &wish(kind));
@@ -53,7 +53,7 @@ fn cie_171_case_5_12() {
                 LUX * past_the_horizon(seen, window, place)
             };
             let want = through(&glass_of_the_report);
-            let slab = through(&|cosine| slab(1.55, inside, 1.0, cosine));
+            let slab = through(&|cosine| slab(INDEX, inside, 1.0, cosine));
             println!("type {kind}, {size}, {place:?}: {got:.4} for {want:.4}");
             off.push(got / want - 1.0);
             let own = got / slab - 1.0;

@@ -6,7 +6,7 @@ mod built;
 mod daylit;
 
 use built::{Room, baked, close};
-use daylit::{LUX, beside, cie, glass_of_the_report, places_beside, row, wish};
+use daylit::{INDEX, LUX, beside, cie, glass_of_the_report, places_beside, row, wish};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, de2000};
@@ -580,9 +580,8 @@ fn glazed(opening: f64) -> Bake {
         room.quad(at(0.0, rim), opening * y, rim * x, paint);
         room.quad(at(4.0 - rim, rim), opening * y, rim * x, paint);
     }
-    // The slab that comes nearest to the report's polynomial: within .7 % from 6 degrees above grazing upwards.
-    let inside = inside_of(glass_of_the_report(1.0), 1.55);
-    let glass = room.pane(1.55, [inside; LEAVES]);
+    let inside = inside_of(glass_of_the_report(1.0), INDEX);
+    let glass = room.pane(INDEX, [inside; LEAVES]);
     room.quad(at(rim, rim), opening * y, opening * x, glass);
     let wish = SkyWish {
         kind: Some(SkyType(5)),

@@ -212,6 +212,9 @@ pub(crate) fn roof(opening: f64) -> [DVec3; 3] {
     ]
 }
 
+/// Index of the slab that comes nearest to that glass: within .6 % from 9 degrees above grazing upwards.
+pub(crate) const INDEX: f64 = 1.54;
+
 /// Clear glass of 6 mm as the report gives it, by the cosine of incidence.
 pub(crate) fn glass_of_the_report(cosine: f64) -> f64 {
     [
