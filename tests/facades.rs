@@ -9,8 +9,8 @@ mod daylit;
 
 use built::Room;
 use daylit::{
-    INDEX, LUX, bake, beside, cie, facade, gathered, glass_of_the_report, past_the_horizon, places_beside,
-    points_beside, row, wish,
+    INDEX, LUX, bake, beside, cie, facade, gathered, glass_of_the_report, past_the_horizon,
+    places_beside, points_beside, row, wish,
 };
 use glam::DVec3;
 use haarlight::scene::pane::{inside_of, slab};
@@ -45,7 +45,7 @@ fn cie_171_case_5_12() {
         let bake = bake(room, &wish(kind));
         let sky = Distribution::new(kind, direction(60.0, 0.0));
         let places = points_beside();
-        let (mut off, mut unlike) = (Vec::new(), 0);
+        let mut off = Vec::new();
         for (probed, place) in bake.probe(&places).iter().zip(places) {
             let got = probed.xyz[1];
             let through = |passes: &dyn Fn(f64) -> f64| {
@@ -58,15 +58,8 @@ fn cie_171_case_5_12() {
             off.push(got / want - 1.0);
             let own = got / slab - 1.0;
             assert!(own.abs() <= POINT, "{kind} {size} {place:?}: {own}");
-            // 25 cm from the window, at floor and ceiling, light comes in along the glass: there the slab itself is .5 % off the report's
-            // polynomial.
-            if (slab / want - 1.0).abs() > 4e-3 {
-                unlike += 1;
-                continue;
-            }
             assert!((got / want - 1.0).abs() <= POINT, "{got} should be {want}");
         }
-        assert!(unlike <= 2, "{kind} {size}: {unlike}");
         summary("5.12", &format!("type {kind}, {size}"), &off);
     }
 }

@@ -105,26 +105,39 @@ fn errors(bake: &Bake, opening: [DVec3; 3]) -> Vec<f64> {
     errors
 }
 
-#[test]
-fn small_openings_in_the_outermost_wall_are_as_right_as_large_ones() {
-    for (width, height) in [(0.02, 2.0), (0.1, 0.1), (0.3, 0.3), (2.0, 1.0), (4.0, 3.0)] {
-        let (room, opening) = long_room(width, height, false);
+/// Small openings and, as the last, all of the wall.
+const OPENINGS: [(f64, f64); 5] = [(0.02, 2.0), (0.1, 0.1), (0.3, 0.3), (2.0, 1.0), (4.0, 3.0)];
+
+/// Holds every point within `most` of the truth, and the root mean square of each opening within `rms` and within a quarter more than that
+/// of a wall of glass.
+fn holds(terrace: bool, most: f64, rms: f64) {
+    let found = OPENINGS.map(|(width, height)| {
+        let (room, opening) = long_room(width, height, terrace);
         let errors = errors(&bake(room, &sky()), opening);
-        assert!(errors.iter().all(|e| e.abs() < 0.01), "{width} x {height}");
+        let worst = errors.iter().fold(0.0, |worst: f64, e| worst.max(e.abs()));
+        let squares: f64 = errors.iter().map(|e| e * e).sum();
+        let rms = (squares / errors.len() as f64).sqrt();
+        println!("{width} x {height}: {rms:.4}, worst {worst:.4}");
+        (rms, worst)
+    });
+    let wall = found[OPENINGS.len() - 1].0;
+    for ((width, height), (got, worst)) in OPENINGS.into_iter().zip(found) {
+        assert!(worst < most, "{width} x {height}: {worst}");
+        assert!(got < rms, "{width} x {height}: {got}");
+        assert!(got < 1.25 * wall, "{width} x {height}: {got}, wall {wall}");
     }
+}
+
+#[test]
+fn small_openings_in_the_outermost_wall_are_as_right_as_a_wall_of_glass() {
+    holds(false, 0.01, 0.004);
 }
 
 /// Here the room goes on beyond the opening, on a terrace: from there much sky is seen by which nothing comes in. Points that see a strip
 /// of the sky above black ground are off most.
 #[test]
-fn small_openings_in_inner_walls_are_as_right_as_in_outer_ones() {
-    for (width, height) in [(0.02, 2.0), (0.1, 0.1), (0.3, 0.3), (2.0, 1.0), (4.0, 3.0)] {
-        let (room, opening) = long_room(width, height, true);
-        let errors = errors(&bake(room, &sky()), opening);
-        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-        assert!(rms < 0.02, "{width} x {height}: {rms}");
-        assert!(errors.iter().all(|e| e.abs() < 0.05), "{width} x {height}");
-    }
+fn small_openings_in_inner_walls_are_as_right_as_a_wall_of_glass_there() {
+    holds(true, 0.05, 0.02);
 }
 
 /// The audit's paths look through them, too.
