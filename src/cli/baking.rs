@@ -238,7 +238,8 @@ impl Order<'_> {
         let clock = Instant::now();
         let limits = Limits {
             vertices: most_vertices(args, bake.scene())?,
-            late: &|| stop.is_late(kept.drawing),
+            // Where there is no solution nothing is looked at: there is no time, and light beside what is believed would show as patches.
+            late: &|| bake.rounds().is_empty() || stop.is_late(kept.drawing),
         };
         let maps = (args.mapping.is_wanted()).then(|| args.mapping.maps(bake, stop, talk));
         let of_vertices = match &maps {
