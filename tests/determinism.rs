@@ -140,6 +140,9 @@ fn by_the_program(room: &str, options: &[&str]) -> Vec<Vec<u8>> {
         "out.glb",
         "--error",
         "2",
+        // Pictures may take a tenth of that, however busy the machine is.
+        "--time",
+        "10000",
         "--npz",
         "out.npz",
         "--log",

@@ -8,12 +8,14 @@ use glam::{DVec3, dvec3};
 use haarlight::audit::{Reference, Report};
 use haarlight::gather::Baked;
 use haarlight::gather::refined::position;
+use haarlight::mesh::Limits;
 use haarlight::output::{Exposure, Writing, baked_glb};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn baked(scene: Scene, error: f64) -> (Bake, Baked) {
     let mut bake = Bake::new(
@@ -43,6 +45,47 @@ fn vertices(baked: &Baked) -> usize {
 #[test]
 fn no_vertex_lies_on_an_edge_that_does_not_use_it() {
     let (bake, baked) = baked(scene("cornell.glb"), 1.0);
+    has_no_cracks(&bake, &baked);
+}
+
+/// Wherever time runs out, the mesh is whole, and the error that is stated is that of the mesh that there is.
+#[test]
+fn a_mesh_that_is_cut_short_is_whole_and_measured() {
+    let (bake, whole) = baked(scene("cornell.glb"), 1.0);
+    let cut = |after: usize| {
+        let asked = AtomicUsize::new(0);
+        let late = || asked.fetch_add(1, Ordering::Relaxed) >= after;
+        let limits = Limits {
+            late: &late,
+            ..Limits::default()
+        };
+        let baked = bake.baked_within(&limits, &|_, _| {});
+        (baked, asked.into_inner())
+    };
+    let (uncut, times) = cut(usize::MAX);
+    assert_eq!(
+        vertices(&uncut),
+        vertices(&whole),
+        "asking changes the mesh"
+    );
+    assert!(times > 10, "{times}");
+    for after in [0, times / 6, times / 3] {
+        let (baked, _) = cut(after);
+        has_no_cracks(&bake, &baked);
+        let found = baked.interpolation.unwrap();
+        assert!(found.points > 300, "{after}: {found:?}");
+        assert!(after > 0 || !found.is_met(), "{found:?}");
+        let stated = bake.error_of(&baked).unwrap();
+        let measured = Report::of_file(&bake, &baked, &Reference::new(&bake, 300, 4096, 7));
+        let mean = measured.de2000.mean.value;
+        assert!(
+            (0.6..1.7).contains(&(stated / mean)),
+            "{after}: {stated} for {mean}"
+        );
+    }
+}
+
+fn has_no_cracks(bake: &Bake, baked: &Baked) {
     for part in &baked.surfaces {
         let surface = &bake.scene().surfaces[part.surface];
         let at: Vec<DVec3> = part.vertices.iter().map(|v| position(surface, v)).collect();

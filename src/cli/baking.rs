@@ -1,7 +1,9 @@
 //! The steps of `haarlight bake`, in order: begin, rounds, gather, write, audit, end.
 
 use super::bake_args::BakeArgs;
-use super::log::{End, Outputs, PlanRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code};
+use super::log::{
+    End, Outputs, PlanRecord, RoundRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code,
+};
 use super::maps;
 use super::metrics;
 use super::options::Common;
@@ -30,9 +32,13 @@ use std::fs::File;
 use std::path::Path;
 use std::time::Instant;
 
-/// Pictures of rounds take this share of the time so far at the most, once they have taken [`PICTURES_FREE_S`].
+/// Pictures take this share of the time given at the most, or of the time so far. Where none is given they may take [`PICTURES_FREE_S`] in any
+/// case: in a Cornell box a round's took 1 s a camera on two busy cores, and small rooms would have none.
 const PICTURES_SHARE: f64 = 0.1;
-const PICTURES_FREE_S: f64 = 10.0;
+const PICTURES_FREE_S: f64 = 2.0;
+/// What a triangle that is expected of the written mesh takes, in looks, with all that is done besides: 3.0 in a Cornell box, 4.0 in a sunlit
+/// room, 5.1 in a home theater, of whose mesh but two fifths were foreseen, 7.6 in a garage.
+const LOOKS: f64 = 4.5;
 /// Distinguishes the audit's random numbers from the solver's.
 const AUDIT_SEED: u64 = 0x5eed_a0d1;
 /// Paths a point of the audit at the most.
@@ -63,6 +69,8 @@ pub(super) struct Kept {
     seconds: Seconds,
     /// Seconds that pictures of the result will take: as long as those of the last round.
     drawing: f64,
+    /// Seconds that those of the last round took, with their gather.
+    last_pictures: f64,
 }
 
 /// The light that is written.
@@ -108,6 +116,7 @@ impl Kept {
                 ..Seconds::default()
             },
             drawing: 0.0,
+            last_pictures: 0.0,
         })
     }
 
@@ -116,8 +125,8 @@ impl Kept {
     }
 
     /// Takes note of a round.
-    fn note(&mut self, bake: &Bake, round: &Round) -> Result<()> {
-        self.log(round)?;
+    fn note(&mut self, bake: &Bake, round: &Round, to_end_s: Option<f64>) -> Result<()> {
+        self.log(&RoundRecord { round, to_end_s })?;
         if let Some(report) = &mut self.report {
             report.note(bake);
         }
@@ -144,7 +153,8 @@ impl Order<'_> {
         if let Some(path) = resumed.filter(|path| common.team.first_says(path.exists())) {
             bake.resume(path)?;
             for round in bake.rounds() {
-                kept.log(round)?;
+                let to_end_s = None;
+                kept.log(&RoundRecord { round, to_end_s })?;
             }
             if let Some(report) = &mut kept.report {
                 report.note(&bake);
@@ -158,33 +168,54 @@ impl Order<'_> {
 
     /// Rounds until it is enough.
     pub(super) fn rounds(self, bake: &mut Bake, kept: &mut Kept) -> Result<Verdict> {
-        let verdict = self.stop.run(bake, self.talk, |bake, round| {
-            kept.seconds.solve += round.round_s;
-            kept.note(bake, round)?;
-            if let Some(path) = &self.args.checkpoint {
-                bake.save(path)?;
-            }
-            self.pictures(bake, round, kept)
-        })?;
+        let vertices = most_vertices(self.args, bake.scene())?;
+        let ahead = |bake: &Bake, round: &Round| {
+            let rounds = round.remaining_s?;
+            Some(rounds + self.file_ahead(bake, round, vertices)?)
+        };
+        let verdict = self
+            .stop
+            .run(bake, self.talk, ahead, |bake, round, to_end_s| {
+                kept.seconds.solve += round.round_s;
+                kept.note(bake, round, to_end_s)?;
+                if let Some(path) = &self.args.checkpoint {
+                    bake.save(path)?;
+                }
+                self.pictures(bake, round, kept)
+            })?;
         kept.seconds.solve += bake.taken_back_s().unwrap_or(0.0);
         Ok(verdict)
     }
 
+    /// Seconds that the mesh of the file is expected to take; light maps are not foreseen.
+    fn file_ahead(self, bake: &Bake, round: &Round, vertices: Option<usize>) -> Option<f64> {
+        let looks = LOOKS * bake.triangles_ahead(vertices) as f64;
+        (!self.args.mapping.is_wanted()).then_some(looks * round.look_s)
+    }
+
     /// Pictures of a round, as long as they take little of the time.
     fn pictures(self, bake: &Bake, round: &Round, kept: &mut Kept) -> Result<()> {
-        let (talk, stop) = (self.talk, self.stop);
-        let affordable = PICTURES_SHARE * stop.elapsed_s().max(PICTURES_FREE_S / PICTURES_SHARE);
-        let is_affordable = kept.seconds.snapshots <= affordable;
+        let (talk, stop, team) = (self.talk, self.stop, self.common.team);
+        let free = (self.args.solving.time).map_or(PICTURES_FREE_S, |time| PICTURES_SHARE * time);
+        // Those of the result are drawn in any case.
+        let left =
+            free.max(PICTURES_SHARE * stop.elapsed_s()) - kept.seconds.snapshots - kept.drawing;
+        // These take as long as the last.
+        let is_affordable = kept.last_pictures <= left;
         let Some(snapshots) = kept
             .snapshots
             .as_ref()
-            .filter(|_| self.common.team.first_says(is_affordable))
+            .filter(|_| team.first_says(is_affordable))
         else {
             return Ok(());
         };
         let clock = Instant::now();
         let seen = snapshots.seen(bake.scene());
-        let light = bake.sketch(&seen, &|done, of| talk.progress("gathering", done, of));
+        let time = left - kept.drawing;
+        let late = || team.first_says(clock.elapsed().as_secs_f64() > time);
+        let light = bake.sketch_within(&seen, &late, &|done, of| {
+            talk.progress("gathering", done, of);
+        });
         talk.phase("drawing");
         let drawn = Instant::now();
         let (scene, surfaces) = (bake.scene(), &light.surfaces);
@@ -194,7 +225,8 @@ impl Order<'_> {
         kept.log(&SnapshotsRecord::new(round.round, &files, exposure))?;
         kept.outputs.pictures.extend(files);
         kept.drawing = drawn.elapsed().as_secs_f64();
-        kept.seconds.snapshots += clock.elapsed().as_secs_f64();
+        kept.last_pictures = clock.elapsed().as_secs_f64();
+        kept.seconds.snapshots += kept.last_pictures;
         Ok(())
     }
 
@@ -206,7 +238,8 @@ impl Order<'_> {
         let clock = Instant::now();
         let limits = Limits {
             vertices: most_vertices(args, bake.scene())?,
-            late: &|| stop.is_late(kept.drawing),
+            // Where there is no solution nothing is looked at: there is no time, and light beside what is believed would show as patches.
+            late: &|| bake.rounds().is_empty() || stop.is_late(kept.drawing),
         };
         let maps = (args.mapping.is_wanted()).then(|| args.mapping.maps(bake, stop, talk));
         let of_vertices = match &maps {
@@ -218,14 +251,18 @@ impl Order<'_> {
             of_vertices,
             verdict,
         };
-        let cut_short = stop.is_late(kept.drawing);
+        // A mesh that is as fine as it has to be was not cut short.
+        let coarse = (lit.baked().interpolation).is_some_and(|between| !between.is_met());
+        let cut_short = coarse && stop.is_late(kept.drawing);
         kept.seconds.gather = clock.elapsed().as_secs_f64();
         // An error is reached when the file's is.
         let error = bake.error_of(lit.baked());
         let met = error.is_none_or(|e| e <= bake.settings().error);
         lit.verdict = match verdict {
-            Verdict::Reached if !met && cut_short => stop.reason().unwrap_or(Verdict::Exhausted),
-            Verdict::Reached if !met => Verdict::Exhausted,
+            Verdict::Reached if met => Verdict::Reached,
+            // Whatever the rounds ended for, the file would be better had there been time.
+            verdict if cut_short => stop.reason().unwrap_or(verdict),
+            Verdict::Reached => Verdict::Exhausted,
             verdict => verdict,
         };
         Ok(lit)

@@ -24,8 +24,10 @@
 //! | `round` | | number, from 1 |
 //! | `elapsed_s` | s | since the room was read |
 //! | `round_s`, `phases_s` | s | of this round, and by phase: `links`, `spectrum`, `direct`, `balance`, `solve`, `estimate` |
-//! | `next_round_s`, `remaining_s` | s | expected for the next round, and for all rounds to the asked-for error (see [`forecast`](crate::solve::forecast)); the latter `null` if the error is not known or no longer falls |
-//! | `remaining_rounds` | | expected rounds to the asked-for error, `null` likewise |
+//! | `next_round_s`, `remaining_s` | s | expected for the next round, and for all rounds until the bake ends (see [`forecast`](crate::solve::forecast)); the latter `null` if the error is not known or no end is in sight |
+//! | `remaining_rounds` | | expected rounds, `null` likewise |
+//! | `to_end_s` | s | expected until the file is there: these rounds and its mesh, no more than what is left of `--time`; `null` if that is not known, as of light maps, and of rounds before a checkpoint |
+//! | `look_s` | s | of a look at a point, with all threads at work |
 //! | `threshold` | share of white | greatest error that a link keeps, weighted by the root of the receiver's share of area |
 //! | `rays` | | visibility rays cast in this round for links, direct light and openness |
 //! | `opening_rays` | | rays by which the openings of a room under a sky were looked for before the first round, of a closed room always as many; 0 without a sky and in later rounds |
@@ -52,7 +54,7 @@
 //! | `flux.scaled` | 1 | what light on leaves was multiplied by so that none goes missing, `direct` and `reflected`; 1: nothing was |
 //! | `row_sum_defect`, `row_sum_defect_after` | 1 | distance of row sums from what each leaf looks out on: mean by area and greatest, before and after balancing |
 //!
-//! After a round with `--snapshots` (left out while pictures take more than a tenth of the time), `{"record": "snapshots", ...}` ([`SnapshotsRecord`]): `round`, `files`,
+//! After a round with `--snapshots` (left out where pictures would take more than a tenth of the time), `{"record": "snapshots", ...}` ([`SnapshotsRecord`]): `round`, `files`,
 //! `exposure`, metered in this round: `scale` (display value for each lm/m2), `balance` (white balance, a matrix on linear
 //! sRGB), `compressed` (share of what the cameras see, lamps left out, that the curve towards white makes darker).
 //!
@@ -78,7 +80,7 @@ use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
 use crate::solve::record::{Figure, Kind, LOG_VERSION};
-use crate::solve::{Averages, Bake, Representation, Verdict};
+use crate::solve::{Averages, Bake, Representation, Round, Verdict};
 use serde::Serialize;
 
 /// What was asked for.
@@ -157,6 +159,16 @@ impl<'a> PlanRecord<'a> {
             averages: bake.averages(),
         }
     }
+}
+
+/// A round.
+#[derive(Debug, Clone, Serialize)]
+pub struct RoundRecord<'a> {
+    /// What was measured.
+    #[serde(flatten)]
+    pub round: &'a Round,
+    /// Seconds expected from here to the end of the bake.
+    pub to_end_s: Option<f64>,
 }
 
 /// Pictures of a round.

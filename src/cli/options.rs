@@ -91,8 +91,8 @@ pub struct Solving {
     /// Mean colour difference (CIEDE2000) at which to stop.
     #[arg(long, value_name = "DE", default_value_t = 0.5, value_parser = positive)]
     pub error: f64,
-    /// Take about this many seconds in all, with gather, pictures and writing [default: no limit]. The first round is always
-    /// done.
+    /// Take about this many seconds in all, with gather, pictures and writing [default: no limit]. Where not even the first
+    /// round fits, a bake shows where rays from the lamps landed.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub time: Option<f64>,
 }

@@ -22,7 +22,7 @@ use super::stop::Stop;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::gather::{Glare, Probed};
-use crate::solve::{Bake, Representation, Verdict};
+use crate::solve::{Bake, Representation, Round, Verdict};
 use crate::spectrum::{Grid, LEAVES};
 use crate::store::file;
 use crate::survey::{Place, places};
@@ -95,7 +95,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
         Representation::Adaptive
     };
     let mut bake = prepare(scene, &args.solving, common, representation, &talk);
-    let verdict = stop.run(&mut bake, &talk, |_, _| Ok(()))?;
+    let verdict = stop.run(&mut bake, &talk, rounds_ahead, |_, _, _| Ok(()))?;
     talk.phase("probing");
     let scale = bake.scene().changes.scale;
     let points: Vec<Point> = (read.points.iter())
@@ -228,12 +228,17 @@ fn measured(
             talk.phase("daylight");
             let adaptive = Representation::Adaptive;
             let mut under_sky = prepare(alone, &args.solving, common, adaptive, talk);
-            let verdict = stop.run(&mut under_sky, talk, |_, _| Ok(()))?;
+            let verdict = stop.run(&mut under_sky, talk, rounds_ahead, |_, _, _| Ok(()))?;
             let probed = under_sky.probe(points);
             let metrics = metrics.with_daylight(factors(&probed), relative(&under_sky));
             (metrics, Some(verdict))
         }
     })
+}
+
+/// Seconds that further rounds are expected to take.
+fn rounds_ahead(_: &Bake, round: &Round) -> Option<f64> {
+    round.remaining_s
 }
 
 /// The points; a file that cannot be read is a problem like those in it.

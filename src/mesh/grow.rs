@@ -510,7 +510,7 @@ impl<'a> Growth<'a> {
 }
 
 /// What a cell adds to the mean square, times the area of all.
-fn share(cell: &Cell) -> f64 {
+pub(super) fn share(cell: &Cell) -> f64 {
     cell.counted() * cell.doubt.square
 }
 

@@ -1,6 +1,7 @@
 //! The mesh that is written: grown from the input's triangles, as fine as straight lines between vertices need it for the
 //! asked-for error, and measured.
 
+mod ahead;
 mod along;
 mod cells;
 mod drawn;
@@ -85,7 +86,7 @@ impl Bake {
         growth.begin(progress);
         if !growth.strict {
             // Vertices on what stands on edges of the input are not the light's: in a restaurant they took all that it may have.
-            growth.most = growth.used() + (MOST_VERTICES * AT / self.settings().error) as usize;
+            growth.most = growth.used() + self.more_vertices();
         }
         if limits.is_late() {
             growth.until = Some(Instant::now() + UNSEEN);
@@ -127,7 +128,20 @@ impl Bake {
     /// # Panics
     /// If `seen` lacks a triangle of the room.
     pub fn sketch(&self, seen: &[Vec<bool>], progress: &dyn Fn(usize, usize)) -> Baked {
-        let mut growth = self.growth(Care::Sketch, &|| false);
+        self.sketch_within(seen, &|| false, progress)
+    }
+
+    /// The same until it is late: then all other vertices get the light of their leaves, too.
+    ///
+    /// # Panics
+    /// As [`Bake::sketch`].
+    pub fn sketch_within(
+        &self,
+        seen: &[Vec<bool>],
+        late: &(dyn Fn() -> bool + Sync),
+        progress: &dyn Fn(usize, usize),
+    ) -> Baked {
+        let mut growth = self.growth(Care::Sketch, late);
         growth.believe(true);
         growth.begin(progress);
         self.grow_unseen(&mut growth, progress);
@@ -154,6 +168,11 @@ impl Bake {
     pub fn error_of(&self, baked: &Baked) -> Option<f64> {
         let light = self.rounds().last()?.error.total_de2000.value?;
         Some(light.hypot(baked.interpolation.map_or(0.0, |i| i.mean)))
+    }
+
+    /// Vertices that the mesh may have besides those of the input.
+    fn more_vertices(&self) -> usize {
+        (MOST_VERTICES * AT / self.settings().error) as usize
     }
 
     fn growth<'a>(&'a self, care: Care, late: &'a (dyn Fn() -> bool + Sync)) -> Growth<'a> {

@@ -11,6 +11,7 @@ mod coarse;
 pub(crate) mod conjugate;
 mod cuts;
 mod direct;
+mod early;
 mod estimate;
 mod fluorescing;
 pub(crate) mod flux;
@@ -63,6 +64,7 @@ use crate::scene::effects::Plan;
 use crate::scene::{PunctualLight, Scene};
 use crate::team::{Asked, Interrupt, Interrupted, Team};
 pub use flux::Closed;
+use forecast::{BY_LINKS, BY_RAYS, Goal, Past};
 pub use held::Held;
 pub use operator::Operator;
 pub use outside::running;
@@ -78,17 +80,6 @@ use std::time::Instant;
 const FIRST_THRESHOLD: f64 = 0.02;
 /// What a round divides the threshold by: about twice the links, half the error.
 const THRESHOLD_STEP: f64 = 3.0;
-/// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
-const LEAST_ROUNDS: usize = 3;
-/// Fewer rounds do where a mere preview is asked for, an error of so much, and the estimate is so many times smaller.
-const PREVIEW: f64 = 2.0;
-const EARLY: f64 = 4.0;
-/// A round that leaves this share of the error of the one before has stalled, if there are many links already. One that finds it
-/// much greater has not: it found light that the rounds before it overlooked, as in the gap above a lamp.
-const STALLED: f64 = 0.9;
-const WORTH_STALLING: usize = 100_000;
-/// No round that would make more links than this, at four times those of the last: about 200 MB.
-const MOST_LINKS: usize = 4_000_000;
 /// Rooms of this many faces choose their lanes once.
 const MANY_FACES: usize = 50_000;
 /// Elements are not split below this share of the area that counts.
@@ -175,14 +166,16 @@ impl Bake {
     }
 
     /// The same, unless it is `asked` for an end before the round is done: then the bake is what it was before, and there is no
-    /// round. The first round is always done, so that there is light; and so is every round of a bake by several ranks, each of
-    /// which would have to be asked at the very same place.
+    /// round. Where it was the first, there is the light that rays from the lamps tell, see `early`. Every round of a bake by several
+    /// ranks is done, each of which would have to be asked at the very same place; and the first of one that keeps where light comes from.
     pub fn step_unless(&mut self, asked: Asked) -> Option<&Round> {
-        if self.rounds.is_empty() || !self.room.team.is_alone() {
+        let is_first = self.rounds.is_empty();
+        if !self.room.team.is_alone() || (is_first && self.room.keep) {
             return Some(self.step());
         }
         let begun = Instant::now();
-        let before = self.before();
+        let grown = self.refinement.tree.grown();
+        let before = (!is_first).then(|| self.before());
         self.room.interrupt = Interrupt::by(asked);
         let record = self.round();
         self.room.interrupt = Interrupt::default();
@@ -193,7 +186,13 @@ impl Bake {
                 self.rounds.last()
             }
             Err(Interrupted) => {
-                self.take_back(before);
+                match before {
+                    Some(before) => self.take_back(before),
+                    None => {
+                        self.begin_again(&grown);
+                        self.light_by_landings();
+                    }
+                }
                 self.taken_back_s = Some(begun.elapsed().as_secs_f64());
                 None
             }
@@ -209,6 +208,10 @@ impl Bake {
     fn round(&mut self) -> Result<Round, Interrupted> {
         let mut clock = record::Clock::start(self.watch.clone());
         let round = self.rounds.len();
+        if round == 0 && self.taken_back_s.is_some() {
+            // Light of a first round that was given up is none to go on from.
+            self.begin_again(&self.refinement.tree.grown());
+        }
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
         let (bright, keen) = self.stakes();
@@ -298,31 +301,27 @@ impl Bake {
 impl Bake {
     /// Has the bake come to an end, and how? None: another round may help.
     pub fn verdict(&self) -> Option<Verdict> {
-        let last = self.rounds.last()?;
-        let estimate = |r: &Round| r.error.total_de2000.value;
-        let asked = LIGHT_SHARE * self.room.settings.error;
-        let settled =
-            |e: f64| self.rounds.len() >= LEAST_ROUNDS || (asked >= PREVIEW && EARLY * e <= asked);
-        if estimate(last).is_some_and(|e| e <= asked && settled(e)) {
-            return Some(Verdict::Reached);
+        if self.rounds.is_empty() {
+            return None;
         }
         if self.refinement.tree.nodes.is_empty() || self.room.scene.spectra.is_empty() {
             return Some(Verdict::Reached);
         }
-        if self.rounds.len() >= self.room.settings.rounds {
-            return Some(Verdict::OutOfRounds);
+        let past: Vec<Past> = self.rounds.iter().map(Round::past).collect();
+        self.goal().verdict(&past)
+    }
+
+    /// What is asked of the light on the patches.
+    fn goal(&self) -> Goal {
+        Goal {
+            error: LIGHT_SHARE * self.room.settings.error,
+            rounds: self.room.settings.rounds,
+            fall: if self.room.by_rays() {
+                BY_RAYS
+            } else {
+                BY_LINKS
+            },
         }
-        // Four times the links for next to nothing: what is left is the noise of visibility in the gather.
-        let before = self
-            .rounds
-            .len()
-            .checked_sub(2)
-            .and_then(|k| estimate(&self.rounds[k]));
-        let stalled = before
-            .zip(estimate(last))
-            .is_some_and(|(before, now)| (STALLED..1.0 / STALLED).contains(&(now / before)));
-        (4 * last.links > MOST_LINKS || (stalled && last.links > WORTH_STALLING))
-            .then_some(Verdict::Exhausted)
     }
 
     /// Spreads the work over a team: all ranks are to be told the same from here on, and come to the same.

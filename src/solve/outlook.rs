@@ -72,6 +72,12 @@ pub(super) struct Grown {
 }
 
 impl Outlook {
+    /// Takes all leaves for bare, and all their light to meet fronts: nothing was looked at.
+    pub(super) fn open(&mut self, tree: &Tree) {
+        self.bare = vec![1.0; tree.nodes.len()];
+        self.target = vec![1.0; tree.nodes.len()];
+    }
+
     /// Nothing looked at yet, by the ranks of a team.
     pub(super) fn of_team(team: Team) -> Self {
         Self {

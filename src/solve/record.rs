@@ -49,6 +49,11 @@ impl Clock {
         &self.laps
     }
 
+    /// Seconds of the last phase.
+    pub(super) fn last(&self) -> f64 {
+        self.laps.last().map_or(0.0, |lap| lap.1)
+    }
+
     pub(super) fn total(&self) -> f64 {
         self.start.elapsed().as_secs_f64()
     }
@@ -133,13 +138,15 @@ pub struct Round {
     /// Expected seconds of the next round, from the growth so far.
     #[serde(default)]
     pub next_round_s: f64,
-    /// Expected rounds to the asked-for error, an estimate from the errors so far; none if it is not known or the error
-    /// no longer falls.
+    /// Expected rounds until the bake ends, an estimate from the rounds so far; none if the error is not known or no end is in sight.
     #[serde(default)]
     pub remaining_rounds: Option<usize>,
     /// Expected seconds of these rounds (the gather for the output comes on top).
     #[serde(default)]
     pub remaining_s: Option<f64>,
+    /// Seconds of a look at a watched point, with all threads at work.
+    #[serde(default)]
+    pub look_s: f64,
     /// Seconds by phase.
     pub phases_s: serde_json::Map<String, serde_json::Value>,
     /// Greatest error a link keeps: share of white, weighted by the root of the receiver's share of area.

@@ -1,9 +1,9 @@
 //! The record of a round, from what it measured and what it left.
 
 use super::estimate::Distance;
-use super::forecast::{forecast, next_round};
+use super::forecast::{Past, next_round};
 use super::record::{Errors, Figure, Kind, Measured, Round};
-use super::{Bake, DE_PER_PERCENT, LIGHT_SHARE, Representation};
+use super::{Bake, DE_PER_PERCENT, Representation};
 use crate::link::Way;
 
 impl Bake {
@@ -13,13 +13,14 @@ impl Bake {
         let light = &bake.solution.light;
         let errors = bake.errors(&m);
         let seconds = m.clock.total();
-        let before = bake.rounds.iter();
-        let curve: Vec<(f64, Option<f64>)> = before
-            .map(|r| (r.round_s, r.error.total_de2000.value))
-            .chain([(seconds, errors.total_de2000.value)])
-            .collect();
-        let times: Vec<f64> = curve.iter().map(|c| c.0).collect();
-        let ahead = forecast(&curve, LIGHT_SHARE * bake.room.settings.error);
+        let own = Past {
+            seconds,
+            error: errors.total_de2000.value,
+            links: bake.refinement.graph.links.len(),
+        };
+        let before = bake.rounds.iter().map(Round::past);
+        let past: Vec<Past> = before.chain([own]).collect();
+        let ahead = bake.goal().forecast(&past);
         let per = |bytes: usize, count: usize| bytes as f64 / count.max(1) as f64;
         let (of_links, of_elements) = (bake.bytes_of_links(&m), bake.bytes_of_elements());
         Round {
@@ -27,9 +28,10 @@ impl Bake {
             round: bake.rounds.len() + 1,
             elapsed_s: bake.started.elapsed().as_secs_f64(),
             round_s: seconds,
-            next_round_s: next_round(&times),
+            next_round_s: next_round(&past),
             remaining_rounds: ahead.map(|a| a.rounds),
             remaining_s: ahead.map(|a| a.seconds),
+            look_s: m.clock.last() / bake.room.probes.points.len().max(1) as f64,
             phases_s: m
                 .clock
                 .laps()
@@ -117,6 +119,17 @@ impl Bake {
             },
             convergence_de_luv: estimate(Some(convergence_de)),
             total_xyz: of(&|d| d.relative * white / 6.0),
+        }
+    }
+}
+
+impl Round {
+    /// As far as the end of a bake depends on it.
+    pub(super) fn past(&self) -> Past {
+        Past {
+            seconds: self.round_s,
+            error: self.error.total_de2000.value,
+            links: self.links,
         }
     }
 }

@@ -519,7 +519,13 @@ impl Bake {
     }
 
     /// Takes over a solution: light by node, irradiance by leaf, and the white that eyes adapt to.
-    fn shine(&mut self, leaves: &[u32], emitted: Rows, reflected: Rows, irradiance: Rows) {
+    pub(super) fn shine(
+        &mut self,
+        leaves: &[u32],
+        emitted: Rows,
+        reflected: Rows,
+        irradiance: Rows,
+    ) {
         self.solution.light = Light {
             reflected,
             emitted,

@@ -1,0 +1,49 @@
+//! How large the mesh of the output will be, from the solved light alone.
+//!
+//! Split into n parts, a triangle whose mean square is s^2 has s^2 / n^2 (see [`SHRINK`](super::grow::SHRINK)). With areas A the fewest parts
+//! for a sum are `n = c (A s^2)^(1/3)`, at least one, with the c at which `sum of A s^2 / n^2` is what is allowed. An *estimate*.
+
+use super::grow::share;
+use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
+
+/// Triangles that a vertex adds to a mesh.
+const A_VERTEX: usize = 2;
+/// Steps in which c is found, each a doubling.
+const DOUBLINGS: usize = 40;
+
+impl Bake {
+    /// Triangles that the mesh of the output is expected to have, within a limit of vertices if there is one.
+    pub fn triangles_ahead(&self, vertices: Option<usize>) -> usize {
+        let mut growth = self.growth(Care::Sketch, &|| false);
+        growth.believe(true);
+        growth.begin(&|_, _| {});
+        let (cells, used) = (growth.cells.all.len(), growth.used());
+        let shares: Vec<f64> = growth.cells.all.iter().map(share).collect();
+        let allowed = (INTERPOLATION_SHARE * self.settings().error).powi(2) * growth.seen_area();
+        let most = vertices.map_or(self.more_vertices(), |most| most.saturating_sub(used));
+        parts(&shares, allowed).min(cells + A_VERTEX * most)
+    }
+}
+
+/// Parts of all, where the sum of what is left of their shares is allowed.
+fn parts(shares: &[f64], allowed: f64) -> usize {
+    let roots: Vec<f64> = shares.iter().map(|share| share.cbrt()).collect();
+    let of = |c: f64| roots.iter().map(move |root| (c * root).max(1.0));
+    let left = |c: f64| -> f64 {
+        shares
+            .iter()
+            .zip(of(c))
+            .map(|(share, n)| share / (n * n))
+            .sum()
+    };
+    let most = roots.iter().copied().fold(0.0, f64::max);
+    let mut c = 1.0 / most.max(f64::MIN_POSITIVE);
+    for _ in 0..DOUBLINGS {
+        if left(c) <= allowed {
+            break;
+        }
+        c *= 2.0;
+    }
+    // No more than memory holds: it is bounded where it is used.
+    of(c).sum::<f64>() as usize
+}
