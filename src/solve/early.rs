@@ -54,11 +54,7 @@ impl Bake {
             .map(|l| f64::from(l.flux[1]))
             .sum();
         let albedo = self.albedo(&leaves, &sources.reflectance, &spectrum);
-        let even = match landed > 0.0 {
-            true => landed / area * albedo / (1.0 - albedo),
-            // Under a sky alone the guess of the white, which is twice the mean irradiance.
-            false => 0.5 * guess.white[1],
-        };
+        let even = landed / area * albedo / (1.0 - albedo);
         let (mut first, mut irradiance) = (Rows::default(), Rows::zero(leaves.len(), LEAVES));
         let mut reflected = irradiance.clone();
         first.clone_from(&irradiance);

@@ -167,10 +167,12 @@ impl Bake {
 
     /// The same, unless it is `asked` for an end before the round is done: then the bake is what it was before, and there is no
     /// round. Where it was the first, there is the light that rays from the lamps tell, see `early`. Every round of a bake by several
-    /// ranks is done, each of which would have to be asked at the very same place; and the first of one that keeps where light comes from.
+    /// ranks is done, each of which would have to be asked at the very same place; and the first of one that keeps where light comes from,
+    /// or whose sky sends light that no lamp does.
     pub fn step_unless(&mut self, asked: Asked) -> Option<&Round> {
         let is_first = self.rounds.is_empty();
-        if !self.room.team.is_alone() || (is_first && self.room.keep) {
+        let is_needed = self.room.keep || self.room.scene.sky.is_some();
+        if !self.room.team.is_alone() || (is_first && is_needed) {
             return Some(self.step());
         }
         let begun = Instant::now();
