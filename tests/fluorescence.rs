@@ -168,7 +168,7 @@ fn white_paper_agrees_with_the_whole_matrix() {
     for (light, what) in [(named(&grid, "cie/D65"), "D65"), (cut, "A, cut")] {
         let (room, [paper, emission, excitation]) = desk(light, grid);
         let scene = room.scene();
-        let reference = Reference::new(&scene, 2, 1).unwrap();
+        let reference = Reference::new(&scene, 3, 1).unwrap();
         let solution = reference.solve();
         let points = desk::points();
         let truth = reference.gather(&scene, &solution, &points, 1);
@@ -205,7 +205,7 @@ fn white_paper_agrees_with_the_whole_matrix() {
                     let place: DVec3 = (0..3)
                         .map(|k| paint.positions[corners[k] as usize] * vertex.weights[k])
                         .sum();
-                    // In corners the reference's patches, of 25 cm, are too coarse.
+                    // In corners the reference's patches, of an eighth of a metre, are too coarse.
                     let inside = |x: f64| x > 0.3 && x < 1.7;
                     let own = (place.x - 1.0).abs() > 0.05;
                     if !(inside(place.x) && inside(place.z) && own) {

@@ -25,7 +25,11 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
     let team = common.team;
     let told = args.json || args.log.is_some() || args.report.is_some();
     let args = &args.of_rank(team);
-    let stop = Stop::new(args.solving.time).of_all(team).at_any_time();
+    let mut stop = Stop::new(args.solving.time).of_all(team);
+    // A checkpoint is there to go on from: without a round it would have nothing.
+    if args.checkpoint.is_none() {
+        stop = stop.at_any_time();
+    }
     stop.listen()?;
     let talk = Talk::new(common.quiet || !team.is_first());
     let output = args

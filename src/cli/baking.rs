@@ -125,12 +125,19 @@ impl Kept {
     }
 
     /// Takes note of a round.
-    fn note(&mut self, bake: &Bake, round: &Round, to_end_s: Option<f64>) -> Result<()> {
-        self.log(&RoundRecord { round, to_end_s })?;
-        if let Some(report) = &mut self.report {
-            report.note(bake);
+    fn note(&mut self, record: &RoundRecord) -> Result<()> {
+        self.log(record)?;
+        match &mut self.report {
+            Some(report) => report.note(record),
+            None => Ok(()),
         }
-        Ok(())
+    }
+
+    /// Takes note of the light after a round.
+    fn see(&mut self, bake: &Bake) {
+        if let Some(report) = &mut self.report {
+            report.see(bake);
+        }
     }
 }
 
@@ -154,11 +161,9 @@ impl Order<'_> {
             bake.resume(path)?;
             for round in bake.rounds() {
                 let to_end_s = None;
-                kept.log(&RoundRecord { round, to_end_s })?;
+                kept.note(&RoundRecord { round, to_end_s })?;
             }
-            if let Some(report) = &mut kept.report {
-                report.note(&bake);
-            }
+            kept.see(&bake);
             let rounds = bake.rounds().len();
             talk.say(&format!("going on after round {rounds} of {}", text(path)));
         }
@@ -177,7 +182,8 @@ impl Order<'_> {
             .stop
             .run(bake, self.talk, ahead, |bake, round, to_end_s| {
                 kept.seconds.solve += round.round_s;
-                kept.note(bake, round, to_end_s)?;
+                kept.note(&RoundRecord { round, to_end_s })?;
+                kept.see(bake);
                 if let Some(path) = &self.args.checkpoint {
                     bake.save(path)?;
                 }

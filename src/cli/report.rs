@@ -1,6 +1,6 @@
 //! The page of a bake (`--report`): what the log says, gathered while it is written.
 
-use super::log::{PlanRecord, VerdictRecord};
+use super::log::{PlanRecord, RoundRecord, VerdictRecord};
 use crate::audit;
 use crate::error::{Error, Result};
 use crate::gather::Baked;
@@ -17,6 +17,7 @@ use std::path::PathBuf;
 pub(super) struct Report {
     pub(super) path: PathBuf,
     plan: Value,
+    rounds: Vec<Value>,
     history: History,
 }
 
@@ -25,12 +26,19 @@ impl Report {
         Ok(Self {
             path,
             plan: value(plan)?,
+            rounds: Vec::new(),
             history: History::default(),
         })
     }
 
     /// A round is done.
-    pub(super) fn note(&mut self, bake: &Bake) {
+    pub(super) fn note(&mut self, record: &RoundRecord) -> Result<()> {
+        self.rounds.push(value(record)?);
+        Ok(())
+    }
+
+    /// This is the light after the last.
+    pub(super) fn see(&mut self, bake: &Bake) {
         self.history.note(bake);
     }
 
@@ -46,7 +54,7 @@ impl Report {
     ) -> Result<()> {
         let log = json!({
             "plan": self.plan,
-            "rounds": value(bake.rounds())?,
+            "rounds": self.rounds,
             "audit": value(&audit)?,
             "verdict": value(verdict)?,
         });
