@@ -195,8 +195,8 @@ impl Order<'_> {
 
     /// Seconds that the mesh of the file is expected to take; light maps are not foreseen.
     fn file_ahead(self, bake: &Bake, round: &Round, vertices: Option<usize>) -> Option<f64> {
-        let looks = LOOKS * bake.triangles_ahead(vertices) as f64;
-        (!self.args.mapping.is_wanted()).then_some(looks * round.look_s)
+        (!self.args.mapping.is_wanted())
+            .then(|| LOOKS * bake.triangles_ahead(vertices) as f64 * round.look_s)
     }
 
     /// Pictures of a round, as long as they take little of the time.

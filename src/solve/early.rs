@@ -55,22 +55,18 @@ impl Bake {
             .sum();
         let albedo = self.albedo(&leaves, &sources.reflectance, &spectrum);
         let even = landed / area * albedo / (1.0 - albedo);
-        let (mut first, mut irradiance) = (Rows::default(), Rows::zero(leaves.len(), LEAVES));
+        let mut rows = Vec::with_capacity(leaves.len() * LEAVES);
+        let mut irradiance = Rows::zero(leaves.len(), LEAVES);
         let mut reflected = irradiance.clone();
-        first.clone_from(&irradiance);
         for (k, direct) in direct.into_iter().enumerate() {
             for (lane, per_lux) in spectrum.iter().enumerate() {
-                first.row_mut(k)[lane] = (direct * per_lux) as f32;
+                rows.push((direct * per_lux) as f32);
                 let all = ((direct + even) * per_lux) as f32;
                 irradiance.row_mut(k)[lane] = all;
                 reflected.row_mut(k)[lane] = all * sources.reflectance.row(k)[lane];
             }
         }
         let nodes = self.refinement.tree.nodes.len();
-        let rows: Vec<f32> = (0..leaves.len())
-            .flat_map(|k| first.row(k))
-            .copied()
-            .collect();
         let even = vec![[0.0, 1.0]; leaves.len()];
         self.refinement.direct = Direct::known(&leaves, nodes, LEAVES, &rows, &even);
         let emitted = self
