@@ -17,7 +17,7 @@
 //! | `warnings` | what the user should know of the room, sentences |
 //! | `averages` | what errors are averaged over: `over` in words, `counted_m2` of `area_m2` (see [`Averages`]). Area counts in full where light of the lamps, followed from surface to surface, lands at least a fiftieth as densely as usual, in proportion where less, and where none lands not at all |
 //!
-//! Then for each round `{"record": "round", ...}` ([`Round`](crate::solve::Round)):
+//! Then for each round `{"record": "round", ...}` ([`Round`]):
 //!
 //! | field | unit | what |
 //! |---|---|---|
