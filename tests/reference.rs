@@ -263,7 +263,7 @@ fn the_solver_agrees_behind_a_screen() {
     room.hollow(low, high, [wall, wall, wall, wall, glow, wall]);
     room.quad(dvec3(0.8, 0.4, 1.7), 1.4 * DVec3::X, 1.2 * DVec3::Y, screen);
     let scene = room.scene();
-    let reference = Reference::new(&scene, 2, 16).unwrap();
+    let reference = Reference::new(&scene, 3, 16).unwrap();
     let sums = reference.row_sums();
     assert!(sums.iter().all(|s| (s - 1.0).abs() < 0.05), "{sums:?}");
     let solution = reference.solve();
@@ -283,7 +283,7 @@ fn the_solver_agrees_behind_a_screen() {
         .collect();
     let rms = (offs.iter().map(|x| x * x).sum::<f64>() / offs.len() as f64).sqrt();
     println!("rms {rms:e} of {offs:?}");
-    assert!(rms < 1e-2, "{rms:e}");
+    assert!(rms < 4e-3, "{rms:e}");
 }
 
 /// The order of the solver: round by round against the reference (its own error taken out after Richardson 1911). Elements
@@ -410,8 +410,9 @@ fn adaptive_dense_and_reference_agree() {
 }
 
 /// A bake against the reference at points, channel by channel of light: root mean square of what each leaf is off, and what is claimed.
+/// With patches of 50 cm in place of 25 the reference is off by more than the bake: by .6 % behind a sheet.
 fn off_the_reference(scene: &Scene, rays: usize, points: &[(DVec3, DVec3)]) -> (f64, f64) {
-    let reference = Reference::new(scene, 2, rays).unwrap();
+    let reference = Reference::new(scene, 3, rays).unwrap();
     let truth = reference.gather(scene, &reference.solve(), points, 64);
     let settings = Settings {
         error: 0.5,
@@ -465,7 +466,7 @@ fn the_solver_agrees_behind_a_pane() {
     let scene = parted(|room| room.pane(1.5, amber));
     let (rms, claim) = off_the_reference(&scene, 9, &below());
     println!("pane: rms {rms:e}, claimed {claim:e}");
-    assert!(rms < 0.01 && rms < claim / 0.7, "{rms:e} of {claim:e}");
+    assert!(rms < 0.003 && rms < claim / 0.7, "{rms:e} of {claim:e}");
 }
 
 /// A sheet whose sides differ: what passes from the lamp's side, and what is reflected and let back from the other.
@@ -475,7 +476,7 @@ fn the_solver_agrees_behind_a_sheet() {
     let scene = parted(|room| room.sheet([0.2; LEAVES], [0.5; LEAVES], green));
     let (rms, claim) = off_the_reference(&scene, 4, &below());
     println!("sheet: rms {rms:e}, claimed {claim:e}");
-    assert!(rms < 0.01 && rms < claim / 0.7, "{rms:e} of {claim:e}");
+    assert!(rms < 0.003 && rms < claim / 0.7, "{rms:e} of {claim:e}");
 }
 
 /// A clear sky and its ground by a gap in a roof and a wall, and what walls pass on of it.

@@ -12,8 +12,10 @@ use glam::DVec3;
 pub(crate) const BEAM: usize = 16;
 /// Directions at the least, and at the most.
 const COUNT: [usize; 2] = [64, 4096];
-/// Directions at an asked-for colour difference of [`AT`]; their error falls with the power 3/4 of their number.
-const USUAL: f64 = 512.0;
+/// Directions at an asked-for colour difference of [`AT`]; their error falls with the power 3/4 of their number. With 512 points of the grey garage
+/// are off by 6.7, 5.0 and 2.7 % at `--error` 2, 1 and .5 (root mean square), with 1,024 by 4.7, 3.9 and 2.6, for 6, 14 and 33 % more time, but
+/// its file takes a quarter less: of 71,000 vertices a seventh stood on noise.
+const USUAL: f64 = 1024.0;
 const AT: f64 = 0.5;
 
 /// A set of directions about +z, beam by beam.

@@ -37,6 +37,13 @@ const CHOSEN: usize = 4;
 /// A triangle and its factor for a point.
 type Part = ([DVec3; 3], f64);
 
+/// How far a lamp is done with rays to it: what its face was cut into, and where among its faces the last ray went.
+#[derive(Default)]
+struct Aim {
+    parts: Vec<Part>,
+    face: (usize, f64),
+}
+
 /// A lamp that was chosen, the way to it, and what turns what it emits into irradiance by all that it stands for.
 struct Chosen {
     element: u32,
@@ -119,15 +126,14 @@ impl Gatherer<'_> {
             let open = open_weight(&memory.weights, &memory.blocked);
             let visible = if total > 0.0 { open / total } else { 0.0 };
             let mut seen = vec![visible; lamps.len()];
-            if visible > 0.0 && visible < 1.0 {
+            if self.light.apart {
+                self.look_at_each(to, &lamps, &owners, &mut seen, memory);
+            } else if visible > 0.0 && visible < 1.0 {
                 seen.fill(0.0);
                 let rays = owners.iter().zip(&memory.weights).zip(&memory.blocked);
                 for ((&lamp, weight), _) in rays.filter(|(_, blocked)| !**blocked) {
                     seen[lamp] += weight / total * all / lamps[lamp].carries;
                 }
-            }
-            if self.light.apart && visible >= 1.0 {
-                self.look_at_each(to, &lamps, &owners, &mut seen, memory);
             }
             let tints = self.tints(&owners, lamps.len(), memory);
             let left = all * self.left_by(tints.last());
@@ -144,9 +150,10 @@ impl Gatherer<'_> {
         memory.faces.clear();
     }
 
-    /// Where every ray found its lamp, a lamp that none went to counts as seen, too: it is faint beside the others. Not so where brightness
-    /// has two meanings, what is seen and what is excited: a lamp behind a wall that is faint beside one of ultraviolet light doubled what is
-    /// seen in its booth. Such lamps get a ray each.
+    /// What is seen of each lamp, by its own rays. Where brightness has one meaning, a lamp that no ray went to is faint beside the others, and
+    /// those stand for it. Not so where it has two, what is seen and what is excited: a lamp behind a wall that is faint beside one of
+    /// ultraviolet light doubled what is seen in its booth. Such lamps get a ray each, whatever became of the others: given only where
+    /// all others were open, they can but darken, and a furnace was dark by .4 %.
     fn look_at_each(
         &self,
         to: &Receiver,
@@ -155,17 +162,21 @@ impl Gatherer<'_> {
         seen: &mut [f64],
         memory: &mut Memory,
     ) {
-        for (k, lamp) in lamps.iter().enumerate() {
-            let node = self.tree.node(lamp.id);
-            let Some(element) = self.tree.element(node).filter(|_| !owners.contains(&k)) else {
+        let mut own = vec![[0.0; 2]; lamps.len()];
+        let rays = owners.iter().zip(&memory.weights).zip(&memory.blocked);
+        for ((&lamp, weight), &blocked) in rays {
+            own[lamp][0] += f64::from(u8::from(!blocked)) * weight;
+            own[lamp][1] += weight;
+        }
+        for ((k, lamp), [open, all]) in lamps.iter().enumerate().zip(own) {
+            if all > 0.0 {
+                seen[k] = open / all;
                 continue;
-            };
-            let parts = parts_of(to, element.corners, lamp.factor);
+            }
             let sample = sequence02(k as u32, hash(to.seed ^ 2, u64::from(lamp.id)));
-            if let Some((point, _)) = point_of(to, node.normal, &parts, sample) {
-                let planes = [to.plane, self.tree.face_plane[element.face as usize]];
+            if let Some((segment, _)) = self.ray_to(to, lamp, sample, &mut Aim::default(), memory) {
                 memory.rays += 1;
-                let hidden = (self.sight).blocks_one(&Segment::new(to.point, point, planes));
+                let hidden = self.sight.blocks_one(&segment);
                 seen[k] = if hidden { 0.0 } else { 1.0 };
             }
         }
@@ -231,35 +242,43 @@ impl Gatherer<'_> {
                 true => f64::INFINITY,
                 false => before + lamp.carries,
             };
-            let (mut parts, mut face) = (Vec::new(), (0, 0.0));
+            let mut aim = Aim::default();
             while let Some([u, v]) = samples.next_if(|sample| sample[0] * all < upto) {
                 // What is left of the number after the choice of a lamp serves for the point.
-                let mut u = ((u * all - before) / lamp.carries).clamp(0.0, 1.0);
-                let (mut id, mut chance) = (lamp.id, 1.0);
-                if lamp.fixture != NONE {
-                    (id, chance, u) = self.face_of(lamp, u, &mut face, memory);
-                    parts.clear();
-                }
-                let node = self.tree.node(id);
-                let Some(element) = self.tree.element(node) else {
-                    continue;
-                };
-                if parts.is_empty() {
-                    parts = parts_of(to, element.corners, lamp.factor * chance);
-                }
-                let Some((point, weight)) = point_of(to, node.normal, &parts, [u, v]) else {
-                    continue;
-                };
-                if weight > 0.0 {
-                    let planes = [to.plane, self.tree.face_plane[element.face as usize]];
+                let u = ((u * all - before) / lamp.carries).clamp(0.0, 1.0);
+                if let Some((segment, weight)) = self.ray_to(to, lamp, [u, v], &mut aim, memory) {
                     memory.weights.push(weight);
-                    memory.segments.push(Segment::new(to.point, point, planes));
+                    memory.segments.push(segment);
                     owners.push(k);
                 }
             }
             before += lamp.carries;
         }
         owners
+    }
+
+    /// A ray to a point of a lamp, and its weight; none where what was chosen sends nothing. Numbers of one aim ascend.
+    fn ray_to(
+        &self,
+        to: &Receiver,
+        lamp: &Lamp,
+        [mut u, v]: [f64; 2],
+        aim: &mut Aim,
+        memory: &Memory,
+    ) -> Option<(Segment, f64)> {
+        let (mut id, mut chance) = (lamp.id, 1.0);
+        if lamp.fixture != NONE {
+            (id, chance, u) = self.face_of(lamp, u, &mut aim.face, memory);
+            aim.parts.clear();
+        }
+        let node = self.tree.node(id);
+        let element = self.tree.element(node)?;
+        if aim.parts.is_empty() {
+            aim.parts = parts_of(to, element.corners, lamp.factor * chance);
+        }
+        let (point, weight) = point_of(to, node.normal, &aim.parts, [u, v])?;
+        let planes = [to.plane, self.tree.face_plane[element.face as usize]];
+        (weight > 0.0).then(|| (Segment::new(to.point, point, planes), weight))
     }
 
     /// Adds what the emitting elements of a far cluster send, by some of them chosen by chance. `carries`: how much that is

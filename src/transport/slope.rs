@@ -5,7 +5,8 @@
 //! round: minus that), which keeps the child's mean B. Over a patch with children of its own it is `s_j = 2 (b_j - m)` of these.
 //! A point receives `sum over j of s_j (W_j - W / 3)` more than by the mean alone, with `W_j` the integral of w_j over the form factor's
 //! kernel and W their sum, over what is seen of the patch, found by quartering that while it matters. Where a window or a corner
-//! cuts a patch what is seen is darker or brighter than its mean.
+//! cuts a patch what is seen is darker or brighter than its mean. And a point far from a wall is nearest to the wall's bright middle, where
+//! one beside it, which goes by the wall's parts, is near its dark edge: by means alone rooms were dark by .3 to .8 % at `--error 1`.
 
 use super::gatherer::Gatherer;
 use super::receiver::{Gathered, Receiver};
@@ -64,7 +65,7 @@ impl Gatherer<'_> {
         let Some(element) = self.tree.element(self.tree.node(id)) else {
             return;
         };
-        let Some(slope) = self.slope_of(id, seen).filter(|_| seen.share > 0.0) else {
+        let Some(slope) = self.slope_of(id).filter(|_| seen.share > 0.0) else {
             return;
         };
         // Weights differ from 1/3 by about as much over the kernel.
@@ -112,12 +113,11 @@ impl Gatherer<'_> {
         }
     }
 
-    /// How the light of a patch goes on; none where nothing is known of it. Those with children are even if it is not known which parts of
-    /// them are seen: they were entered until that matters.
-    fn slope_of(&self, id: u32, seen: Seen) -> Option<Slope> {
+    /// How the light of a patch goes on; none where nothing is known of it.
+    fn slope_of(&self, id: u32) -> Option<Slope> {
         let node = self.tree.node(id);
         let (first, times) = match (node.is_leaf(), node.parent) {
-            (false, _) if seen.parts.is_some() && self.has_parts(node) => (node.child, 2.0),
+            (false, _) if self.has_parts(node) => (node.child, 2.0),
             (false, _) | (true, NONE) => return None,
             (true, parent) => {
                 self.tree.element(node).filter(|e| e.depth > 0)?;
@@ -163,7 +163,8 @@ fn fan<'a>(
     })
 }
 
-/// Adds the integrals of the barycentric weights over a triangle; `w` are those of its corners, `factor` its own.
+/// Adds the integrals of the barycentric weights over a triangle; `w` are those of its corners, `factor` its own. Where it is not quartered
+/// the kernel is taken to be as linear as they are.
 fn moment(
     to: &Receiver,
     corners: [DVec3; 3],
@@ -175,8 +176,17 @@ fn moment(
 ) {
     let size = 0.5_f64.powi(depth as i32);
     if depth >= DEEPEST || 0.25 * factor * size <= limit {
+        let kernels = kernels(to, corners);
+        let mean = kernels.iter().sum::<f64>() / 3.0;
+        // On a corner it has no bound.
+        let share = |k: usize| match mean > 0.0 && mean.is_finite() {
+            true => kernels[k] / mean,
+            false => 1.0,
+        };
+        // The integral of f g over a triangle, both linear: of each corner's f_i g_i, and of the product of both sums, a twelfth.
+        let all = w[0] * (3.0 + share(0)) + w[1] * (3.0 + share(1)) + w[2] * (3.0 + share(2));
         for (k, out) in out.iter_mut().enumerate() {
-            *out += factor * (w[0][k] + w[1][k] + w[2][k]) / 3.0;
+            *out += factor * all[k] / 12.0;
         }
         return;
     }
@@ -187,6 +197,17 @@ fn moment(
             moment(to, corners, w, part, limit, depth + 1, out);
         }
     }
+}
+
+/// The form factor's kernel at the corners of a triangle, in any unit; 0 behind the horizon.
+fn kernels(to: &Receiver, corners: [DVec3; 3]) -> [f64; 3] {
+    let [a, b, c] = corners;
+    let back = (c - a).cross(b - a);
+    corners.map(|corner| {
+        let way = corner - to.point;
+        let r2 = way.length_squared();
+        to.normal.dot(way).max(0.0) * back.dot(way).max(0.0) / (r2 * r2)
+    })
 }
 
 #[cfg(test)]
@@ -281,11 +302,9 @@ mod tests {
                 let want = sum / all;
                 let mut clipper = Clipper::default();
                 clipper.begin(to.point, &corners);
-                let all = match node.is_leaf() {
-                    true => Seen::of(1.0),
-                    false => clipped(&clipper),
-                };
-                whole[0] = whole[0].max((got(all) / want - 1.0).abs());
+                for all in [Seen::of(1.0), clipped(&clipper)] {
+                    whole[0] = whole[0].max((got(all) / want - 1.0).abs());
+                }
                 whole[1] = whole[1].max((mean / want - 1.0).abs());
                 assert!(clipper.cut(&shadow, 48));
                 let share = clipper.factor(to.normal, factor) / factor;
