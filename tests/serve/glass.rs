@@ -199,7 +199,10 @@ fn changed_is_baked(room: &str, change: &Change) -> f64 {
     assert!(4.0 * compared > 3.0 * COMPARED as f64, "{compared}");
     assert!(moved > 5.0 * apart, "{moved} moved, {apart} apart");
     assert!(0.7 * apart < stated.hypot(fresh.2), "{apart} of {stated}");
-    assert!(bias.abs() < 0.005, "{room}: bias {bias}");
+    // Half a per cent at the default error of .5, as of a bake, and in proportion. All vertices look in the same directions, which err for the
+    // light of lamps otherwise than for that of walls: with walls that turn from .7 to .1 the mirrored room is .6 % dark at 1, .5 % at .5, and
+    // by points with directions of their own neither bake is off by more than .2 %.
+    assert!(bias.abs() < 0.01 * change.error, "{room}: bias {bias}");
     off
 }
 
@@ -214,13 +217,13 @@ fn a_room_behind_panes_is_dimmed_as_it_is_baked() {
             error: 0.7,
         },
     );
-    assert!(off < 0.02, "{off}");
+    assert!(off < 0.012, "{off}");
 }
 
 /// The bulb stands before a mirror, and the walls are seen in all three.
 #[test]
 fn a_room_with_mirrors_is_changed_as_it_is_baked() {
-    changed_is_baked(
+    let off = changed_is_baked(
         "mirrored",
         &Change {
             side: json!({"materials": {"walls": {"reflectance": {"name": "macbeth/blue"}}}}),
@@ -228,4 +231,5 @@ fn a_room_with_mirrors_is_changed_as_it_is_baked() {
             error: 1.0,
         },
     );
+    assert!(off < 0.025, "{off}");
 }
