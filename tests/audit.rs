@@ -351,6 +351,47 @@ fn a_reference_serves_several_bakes() {
     assert!(error(&fine) < error(&coarse));
 }
 
+/// A box without a bottom hangs a little above the floor. Below it the floor looks at black backs, and hardly any light gets there: what a file
+/// shows there nobody sees, and files take it from around.
+#[test]
+fn a_file_is_not_held_to_what_lies_inside_of_something() {
+    let mut room = Room::new();
+    let (wall, lamp) = (room.paint(0.5), room.lamp(0.0, 2000.0));
+    room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 3.0), [wall; 6]);
+    room.quad(dvec3(1.0, 2.45, 1.0), DVec3::X, DVec3::Z, lamp);
+    let (low, up) = (dvec3(1.0, 0.2, 1.0), 0.8 * DVec3::Y);
+    room.quad(low + up, DVec3::Z, DVec3::X, wall);
+    room.quad(low, DVec3::Z, up, wall);
+    room.quad(low + DVec3::X, up, DVec3::Z, wall);
+    room.quad(low, up, DVec3::X, wall);
+    room.quad(low + DVec3::Z, DVec3::X, up, wall);
+    let mut bake = Bake::new(room.scene(), Settings::default());
+    bake.run();
+    let reference = Reference::new(&bake, 600, 1 << 12, 3);
+    let points = Report::against(&bake, &reference);
+    let file = Report::of_file(&bake, &bake.baked(&|_, _| {}), &reference);
+    let below = |report: &Report| {
+        let within = |x: f64| x > 1.2 && x < 1.8;
+        let below = |p: DVec3| p.y < 0.01 && within(p.x) && within(p.z);
+        report.seen.iter().filter(|s| below(s.point)).count()
+    };
+    println!(
+        "{} points, {} below; {}",
+        points.points,
+        below(&points),
+        below(&file)
+    );
+    assert!(below(&points) > 0, "nothing is tested");
+    assert_eq!(below(&file), 0);
+    assert_eq!(
+        file.points + file.covered,
+        points.points + points.covered,
+        "left out, and not counted"
+    );
+    assert!(file.points > points.points * 4 / 5, "{}", file.points);
+    assert!(file.de2000.mean.value < 1.0, "{:?}", file.de2000);
+}
+
 /// In a furnace the bake is right to the last digits: the audit must not take its own noise for an error.
 #[test]
 fn the_report_finds_nothing_where_nothing_is_wrong() {

@@ -6,18 +6,22 @@
 
 use super::path::{Answer, Audit, BATCHES};
 use crate::color::{KM, Observer, de2000};
-use crate::geometry::sampling::{Pcg, hash};
+use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02};
 use crate::hierarchy::Face;
+use crate::mesh::looks::DIM;
 use crate::solve::Bake;
 use crate::spectrum::Leaves;
-use crate::transport::Receiver;
+use crate::transport::{MOSTLY, Receiver};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Paths of a point that tell how many more it takes.
 const PILOT: usize = 512;
 /// The standard error at a point is brought to this share of the colour difference that the bake is asked for.
 const NOISE_SHARE: f64 = 0.25;
+/// Directions that tell whether a point lies inside of something.
+const LOOKS: u32 = 64;
 
 /// A point of a face.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +47,9 @@ pub struct Reference {
     pub truth: Vec<[f64; 3]>,
     /// The same by independent batches, of which `truth` is the mean.
     pub batches: Vec<[[f64; 3]; BATCHES]>,
+    /// Which points lie inside of something, so that nobody sees what is drawn there: black backs are most of what they look at, or they
+    /// are dark and such a back is right above them. Files take their vertices there for covered by the same rules.
+    pub(super) inside: Vec<bool>,
     /// What points of diffuse sheets show, with the light behind them, see [`Through`](crate::light::Through): number of the point and
     /// what its batches come to. Empty without sheets.
     pub(super) shown: Vec<(usize, [[f64; 3]; BATCHES])>,
@@ -97,9 +104,11 @@ impl Reference {
         let batches = tristimulus(&answers);
         let (on_sheets, shown) = shown(&audit, &places, &starts, &wanted, (answers, seed));
         let shown = on_sheets.into_iter().zip(tristimulus(&shown)).collect();
+        let truth: Vec<[f64; 3]> = batches.iter().map(mean).collect();
         Self {
             shown,
-            truth: batches.iter().map(mean).collect(),
+            inside: inside(bake, &places, &truth, DIM * white[1]),
+            truth,
             points: places,
             batches,
             covered,
@@ -212,6 +221,18 @@ fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
     all.retain(|_| [covered.next(), pressed.next()] == [Some(false); 2]);
     let count = before - all.len();
     (all, count)
+}
+
+/// Which points lie inside of something: see [`Reference::inside`]. Darker than `dim`, lx, is dark.
+fn inside(bake: &Bake, places: &[Place], truth: &[[f64; 3]], dim: f64) -> Vec<bool> {
+    let one = |(place, truth): (&Place, &[f64; 3])| {
+        let to = receiver(bake, place, 0);
+        let way = |k: u32| cosine_direction(to.normal, sequence02(k, 0));
+        let backs = (0..LOOKS).filter(|&k| bake.meets_back(&to, way(k)));
+        backs.count() as f64 > MOSTLY * f64::from(LOOKS)
+            || (truth[1] < dim && bake.meets_back(&to, to.normal))
+    };
+    places.par_iter().zip(truth).map(one).collect()
 }
 
 fn receiver(bake: &Bake, place: &Place, seed: u64) -> Receiver {

@@ -104,7 +104,7 @@ impl Report {
     pub fn against(bake: &Bake, reference: &Reference) -> Self {
         let gathered = bake.gather(&reference.receivers(bake));
         let light = gathered.iter();
-        let light = light.map(|g| bake.lanes().tristimulus(&g.irradiance));
+        let light = light.map(|g| Some(bake.lanes().tristimulus(&g.irradiance)));
         let last = bake.rounds().last();
         let estimate = last.and_then(|r| r.error.total_de2000.value);
         Self::of(bake, reference, light.collect(), estimate)
@@ -115,9 +115,8 @@ impl Report {
         let reference = &*reference.as_shown();
         let points = reference.points.iter();
         let places: Vec<_> = points.map(|p| (p.face, p.point)).collect();
-        let light = bake.drawn(baked, &places).into_iter();
-        let light = light.map(Option::unwrap_or_default);
-        Self::of(bake, reference, light.collect(), bake.error_of(baked))
+        let light = bake.drawn(baked, &places);
+        Self::drawn(bake, reference, light, bake.error_of(baked))
     }
 
     /// Compares light maps with a reference of the same room: light as a bilinear look-up has it.
@@ -127,20 +126,38 @@ impl Report {
         let places: Vec<_> = points
             .map(|p| (p.face, p.point - bake.mesh().centre))
             .collect();
-        let light = maps.drawn(bake.mesh(), &places).into_iter();
-        let light = light.map(Option::unwrap_or_default);
-        Self::of(bake, reference, light.collect(), bake.error_of(&maps.baked))
+        let light = maps.drawn(bake.mesh(), &places);
+        Self::drawn(bake, reference, light, bake.error_of(&maps.baked))
     }
 
-    fn of(bake: &Bake, reference: &Reference, light: Vec<[f64; 3]>, estimate: Option<f64>) -> Self {
+    /// Compares what is drawn at the points, save those inside of something, which count as covered.
+    fn drawn(
+        bake: &Bake,
+        reference: &Reference,
+        light: Vec<Option<[f64; 3]>>,
+        estimate: Option<f64>,
+    ) -> Self {
+        let light = light.into_iter().zip(&reference.inside);
+        let light = light.map(|(light, inside)| (!inside).then(|| light.unwrap_or_default()));
+        Self::of(bake, reference, light.collect(), estimate)
+    }
+
+    /// Compares light at the points; those without are left out.
+    fn of(
+        bake: &Bake,
+        reference: &Reference,
+        light: Vec<Option<[f64; 3]>>,
+        estimate: Option<f64>,
+    ) -> Self {
         let white = bake.light().white;
         let seen: Vec<Seen> = light
-            .into_iter()
+            .iter()
             .enumerate()
-            .map(|(k, baked)| {
+            .filter_map(|(k, baked)| {
+                let baked = (*baked)?;
                 let (place, traced) = (&reference.points[k], reference.truth[k]);
                 let scale = traced[1].max(DARK * white[1]).max(f64::MIN_POSITIVE);
-                Seen {
+                Some(Seen {
                     point: place.point,
                     normal: place.normal,
                     baked,
@@ -153,7 +170,7 @@ impl Report {
                         (baked[1] - traced[1]) / scale,
                         reference.standard_error(k) / scale,
                     ],
-                }
+                })
             })
             .collect();
         let colour: Vec<[f64; 2]> = seen.iter().map(|s| s.de2000).collect();
@@ -163,7 +180,7 @@ impl Report {
         Self {
             record: "audit",
             points: seen.len(),
-            covered: reference.covered,
+            covered: reference.covered + light.len() - seen.len(),
             paths: reference.paths,
             seed: reference.seed,
             relative: Spread::of(&relative),

@@ -4,6 +4,7 @@
 //! for a sum are `n = c (A s^2)^(1/3)`, at least one, with the c at which `sum of A s^2 / n^2` is what is allowed. An *estimate*.
 
 use super::grow::share;
+use super::turns::SQUARE;
 use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
 
 /// Triangles that a vertex adds to a mesh.
@@ -19,7 +20,8 @@ impl Bake {
         growth.begin(&|_, _| {});
         let (cells, used) = (growth.cells.all.len(), growth.used());
         let shares: Vec<f64> = growth.cells.all.iter().map(share).collect();
-        let allowed = (INTERPOLATION_SHARE * self.settings().error).powi(2) * growth.seen_area();
+        let allowed = INTERPOLATION_SHARE * self.settings().error;
+        let allowed = SQUARE * allowed * allowed * growth.seen_area();
         let most = vertices.map_or(self.more_vertices(), |most| most.saturating_sub(used));
         parts(&shares, allowed).min(cells + A_VERTEX * most)
     }

@@ -264,19 +264,13 @@ impl<'a> Growth<'a> {
                 if !self.is_seen(k) {
                     return 0.0;
                 }
-                let range = || {
-                    let range = (0..3).map(|k| self.difference(light[k], light[(k + 1) % 3]));
-                    (RANGE * range.fold(0.0, f64::max)).powi(2)
-                };
-                if first {
-                    return told.max(range()).max(self.allowed * self.allowed);
+                let range = (0..3).map(|k| self.difference(light[k], light[(k + 1) % 3]));
+                let range = (RANGE * range.fold(0.0, f64::max)).powi(2);
+                match first {
+                    true => told.max(range).max(self.allowed * self.allowed),
+                    // Half of a triangle that was flat where it was looked at may still hold what nobody saw.
+                    false => square.max(told * f64::from(trust * trust)).max(range),
                 }
-                let expected = square.max(told * f64::from(trust * trust));
-                // What was looked at before was not split there: beside a line light is known at corners only.
-                if self.is_beside_line(k) {
-                    return expected.max(range());
-                }
-                expected
             })
             .collect();
         for (&k, square) in fresh.iter().zip(expected) {
@@ -286,14 +280,6 @@ impl<'a> Growth<'a> {
                 doubt.trust = 1.0;
             }
         }
-    }
-
-    /// Has a cell a corner on the edge of a shadow?
-    fn is_beside_line(&self, cell: usize) -> bool {
-        let cell = &self.cells.all[cell];
-        let beside = &self.cells.sheets[cell.sheet as usize].beside;
-        let mut corners = cell.corners.iter();
-        corners.any(|corner| beside.contains_key(&corner.vertex))
     }
 
     /// The first vertices.

@@ -1,7 +1,6 @@
 //! Looks at light: each place with its normal is gathered at once, whichever triangles ask for it.
 
 use crate::gather::{MOSTLY, Vertex};
-use crate::hierarchy::NONE;
 use crate::solve::{Bake, Care};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
@@ -12,7 +11,7 @@ const SAME_PLACE: f64 = 1e-7;
 /// Normals that differ by less than this in each component are one.
 const SAME_NORMAL: f64 = 1e-4;
 /// Darker than this share of the white, a place below a black back counts as inside of what that belongs to.
-const DIM: f64 = 0.05;
+pub(crate) const DIM: f64 = 0.05;
 /// Places gathered at a time, so that progress shows and an end is heard of: a look takes up to a millisecond in a dungeon of many lamps, and
 /// with eight times as many the gather went on for 12 to 20 s after Ctrl-C on two busy cores.
 const PART: usize = 2048;
@@ -223,13 +222,7 @@ impl<'a> Looks<'a> {
 
     /// Does a place lie inside something that is black from there? Then it is dark, and a black back is above it.
     fn is_inside(&self, to: &Receiver, seen: &Seen) -> bool {
-        let (rays, white) = (self.bake.rays(), self.bake.light().white);
-        if seen.xyz[1] >= DIM * white[1] {
-            return false;
-        }
-        let (from, up) = (to.point.as_vec3(), to.normal.as_vec3());
-        let hit = rays.closest(from, up, f32::MAX, to.plane);
-        hit.is_some_and(|hit| self.bake.tree().met(&hit) == NONE)
+        seen.xyz[1] < DIM * self.bake.light().white[1] && self.bake.meets_back(to, to.normal)
     }
 
     /// The light of a leaf.

@@ -7,6 +7,9 @@ const MEASURED: u64 = 10;
 /// Growing ends where so many times the cells leave more than this part of the error.
 const GROWN: f64 = 1.5;
 const STALLED: f64 = 0.93;
+/// What is allowed is a mean; the mean square of what was measured is at least so many times its square: 1.9 in the Cornell box, 2.4 in two rooms,
+/// 4 in a flat, 14 in a living room, 20 in a sunlit one.
+pub(super) const SQUARE: f64 = 2.0;
 /// After a measurement that was not met, growing aims at this part of what the measured error asks for.
 const BELOW: f64 = 0.8;
 /// And at no less than this part of what it aimed at before.
@@ -19,7 +22,9 @@ pub(crate) const EXCESS: f64 = 1.2;
 pub(crate) const BENDS: f64 = 0.5;
 /// Looks differ by chance: squares of differences up to this many times the variance of a look count for nothing.
 pub(crate) const BY_CHANCE: f64 = 2.0;
-/// Corners this far apart let expect this much of it between them, where nothing is known yet.
+/// Corners this far apart let expect at least this much of it between them, until that was looked at. Where only the triangles of the input expected it, light
+/// stayed unseen inside of their halves: with it for all, and [`SQUARE`], the error of `--error 1` between vertices is .14, .36 and .48 in a sunlit room, a flat and
+/// a living room (root mean square .6, .7, 1.8) with 10,700, 3,100 and 71,000 vertices, without .18, .27 and .43 (2.0, .7, 1.7) with 12,100, 3,800 and 79,000.
 pub(crate) const RANGE: f64 = 0.1;
 
 /// How growing ended.
@@ -51,7 +56,7 @@ impl Turns {
     /// Begins with the allowed error (mean CIEDE2000), the area that is seen, and what so many cells were measured to have.
     pub(crate) fn new(allowed: f64, area: f64, cells: usize, before: Interpolation) -> Self {
         Self {
-            aim: allowed * allowed * area,
+            aim: SQUARE * allowed * allowed * area,
             turn: 1,
             allowed,
             cells,

@@ -3,9 +3,11 @@
 use super::estimate::{self, Distance};
 use super::{Bake, Care, Closed, flux};
 use crate::geometry::{NO_PLANE, Segment};
+use crate::hierarchy::NONE;
 use crate::link::Sight;
 use crate::transport::hemisphere::Hemisphere;
 use crate::transport::{Gathered, Gatherer, MOSTLY, Memory, Receiver};
+use glam::DVec3;
 
 /// A face that has less of its area bare lies below something.
 const MOSTLY_COVERED: f64 = 0.01;
@@ -114,6 +116,13 @@ impl Bake {
                 )
         };
         self.is_pressed(sight, to) || covered()
+    }
+
+    /// Is what a ray from a point meets first a black back?
+    pub(crate) fn meets_back(&self, to: &Receiver, way: DVec3) -> bool {
+        let (from, way) = (to.point.as_vec3(), way.as_vec3());
+        let hit = self.room.rays.closest(from, way, f32::MAX, to.plane);
+        hit.is_some_and(|hit| self.refinement.tree.met(&hit) == NONE)
     }
 
     /// What of a leaf others see.
