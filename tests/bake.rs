@@ -110,7 +110,7 @@ fn threads_and_onlookers_change_nothing() {
 /// The spectra of the npz are the light of the glb: their tristimulus values are what `_XYZ` holds.
 #[test]
 fn spectra_integrate_to_the_tristimulus_radiosity() {
-    let mut bake = Bake::new(room("cornell.glb"), settings(2.0));
+    let mut bake = Bake::new(room("cornell.glb"), settings(1.0));
     bake.run();
     let baked = bake.baked(&|_, _| {});
     let weights = Observer::cie1931().weights(&bake.scene().grid);
