@@ -18,8 +18,7 @@ use crate::light::lanes::Lanes;
 use crate::light::{Light, Rows, padded};
 use crate::link::LinkRows;
 use crate::scene::Scene;
-use crate::solve::conjugate::Convergence;
-use crate::solve::two_grid::TwoGrid;
+use crate::solve::solver::Convergence;
 use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, NOBODY, Settings, flux, punctual};
 use crate::spectrum::LEAVES;
 use crate::store::codec::Read;
@@ -491,11 +490,6 @@ impl Relighter {
 
         let clock = Instant::now();
         let looks = bake.refinement.outlook.looks();
-        if looks && bake.refinement.two_grid.is_none() {
-            let (tree, outlook) = (&bake.refinement.tree, &bake.refinement.outlook);
-            bake.refinement.two_grid =
-                Some(TwoGrid::new(tree, outlook, &leaves, &bake.refinement.areas));
-        }
         // Where leaves look for themselves a solve asks for no links.
         let links = self.links.get_or_insert_with(|| {
             let links = if looks {

@@ -4,10 +4,9 @@
 //! of the hierarchy: the real links, summed between the patches of the cut (Galerkin), with mean reflectances. There the
 //! 64-leaf solution is affordable, and what a partition loses is *measured* on the model, an *estimate* for the room.
 
-use super::conjugate::System;
 use super::operator::Operator;
 use super::reflection::{Reflection, Sheets};
-use super::sheets;
+use super::solver::System;
 use crate::hierarchy::{NONE, Node, Tree};
 use crate::light::Through;
 use crate::light::lanes::Lanes;
@@ -229,19 +228,16 @@ impl Coarse {
                 *x += p;
             }
         }
-        let mut more = if self.through.is_empty() {
-            let mut reflected = Rows::zero(count, L);
-            let system = System {
-                operator,
-                reflectance: &rho,
-                greatest: &greatest,
-                interrupt: &NEVER,
-            };
-            system.solve::<L>(&first, &mut reflected, TOLERANCE);
-            system.operator.received::<L>(&reflected)
-        } else {
-            self.through_sheets::<L>(lanes, &operator, (rho, greatest), &first)
+        let system = System {
+            reflection: &self.reflection::<L>(lanes, rho, greatest),
+            areas: (self.leaves.iter())
+                .map(|&k| self.areas[k as usize])
+                .collect(),
+            receive: &|radiosity| operator.received::<L>(radiosity),
+            interrupt: &NEVER,
         };
+        let mut reflected = Rows::zero(count, L);
+        let (_, mut more) = system.solve::<L>(&first, &mut reflected, TOLERANCE);
         for k in 0..count {
             for (x, f) in more.row_mut(k).iter_mut().zip(first.row(k)) {
                 *x += f;
@@ -250,14 +246,21 @@ impl Coarse {
         more
     }
 
-    /// Irradiance by reflected light where light passes sheets.
-    fn through_sheets<const L: usize>(
+    /// How the patches reflect, and what passes sheets.
+    fn reflection<const L: usize>(
         &self,
         lanes: &Lanes,
-        operator: &Operator,
-        (rows, mut greatest): (Rows, Vec<f32>),
-        first: &Rows,
-    ) -> Rows {
+        rows: Rows,
+        mut greatest: Vec<f32>,
+    ) -> Reflection {
+        if self.through.is_empty() {
+            return Reflection {
+                rows,
+                greatest,
+                mixed: None,
+                sheets: None,
+            };
+        }
         let mut through = Rows::zero(self.through.len(), L);
         let mut passing = vec![[0.0_f32; L]; self.leaves.len()];
         for (k, ([patch, _], passes)) in self.through.iter().enumerate() {
@@ -271,7 +274,7 @@ impl Coarse {
                 *g = g.max(r + t);
             }
         }
-        let reflection = Reflection {
+        Reflection {
             rows,
             greatest,
             mixed: None,
@@ -280,19 +283,7 @@ impl Coarse {
                 through,
                 shown: Through::default(),
             }),
-        };
-        let system = sheets::System {
-            reflection: &reflection,
-            areas: self
-                .leaves
-                .iter()
-                .map(|&k| self.areas[k as usize])
-                .collect(),
-            receive: &|radiosity| operator.received::<L>(radiosity),
-            interrupt: &NEVER,
-        };
-        let mut reflected = Rows::zero(self.leaves.len(), L);
-        system.solve::<L>(first, &mut reflected, TOLERANCE).1
+        }
     }
 }
 

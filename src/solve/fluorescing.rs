@@ -6,7 +6,7 @@
 //! `g / (1 - rho)` at wavelengths of emissions, since every meeting with a surface that fluoresces reflects rho and gives out g. As
 //! emissions mostly excite nothing, the second round mostly finds what the first found.
 
-use super::conjugate::{Convergence, step};
+use super::solver::{Convergence, step};
 use super::sums::{CHUNK, added, chunks};
 use crate::hierarchy::{Mesh, Tree};
 use crate::light::lanes::Lanes;

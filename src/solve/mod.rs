@@ -2,13 +2,11 @@
 //!
 //! [`Bake::step`] is the loop on one screen; everything it calls stands in a file of its own.
 
-mod aggregates;
 mod before;
 mod bounded;
 mod checkpoint;
 mod choice;
 mod coarse;
-pub(crate) mod conjugate;
 mod cuts;
 mod direct;
 mod early;
@@ -31,7 +29,6 @@ mod outlook;
 mod outside;
 mod parting;
 pub(crate) mod punctual;
-mod rays;
 pub mod record;
 mod recording;
 pub mod reference;
@@ -40,13 +37,12 @@ mod reflection;
 mod representation;
 mod room;
 mod shares;
-mod sheets;
 mod solution;
+pub(crate) mod solver;
 mod solving;
 mod sources;
 mod sums;
 mod tinted;
-pub(crate) mod two_grid;
 
 pub use lists::PatchList;
 pub use lit::Averages;

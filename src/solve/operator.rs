@@ -1,7 +1,5 @@
 //! The transport operator on rows: pull, gather over the links, push.
 //!
-//! With `R = rho H` the reflected radiosity, `d` the balance factors and `y = sqrt(A / rho) R`, the radiosity equation
-//! `R = rho F (E + R)` becomes `(1 - K) y = b` with the symmetric `K = root F root / A`, `root = d sqrt(rho A)`.
 //! One pass costs one multiply-add a link, direction and lane.
 //!
 //! A gather waits for rows that lie anywhere, so that what counts is how many are on their way at once: four sums go on
@@ -31,8 +29,6 @@ pub struct Operator<'a> {
     pub(super) links: &'a LinkRows,
     /// Leaves of the hierarchy, ascending.
     pub(super) leaves: &'a [u32],
-    /// Area of each node that takes part.
-    pub(super) areas: &'a [f64],
     /// Balance factors by node.
     pub(super) factor: &'a [f32],
     shape: Shape,
@@ -98,7 +94,6 @@ impl<'a> Operator<'a> {
             tree,
             links,
             leaves,
-            areas,
             factor,
             shape: Shape::new(tree, leaves, areas),
         }

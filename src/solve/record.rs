@@ -1,8 +1,8 @@
 //! What is written down after every round: the lines of the log.
 
-use super::conjugate::Convergence;
 use super::estimate::Distance;
 use super::flux::Balance;
+use super::solver::Convergence;
 use crate::link::Refined;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;

@@ -1,10 +1,10 @@
 //! What rounds refine: the hierarchy, its links, and what its leaves see.
 
 use super::direct::Direct;
+use super::operator;
 use super::outlook::Outlook;
 use super::punctual::Shadowed;
 use super::room::{Room, by_rays};
-use super::{operator, two_grid};
 use crate::geometry::sampling::hash;
 use crate::hierarchy::Tree;
 use crate::light::{Light, Rows};
@@ -29,8 +29,6 @@ pub(crate) struct Refinement {
     pub(crate) direct: Direct,
     /// What the choice of lanes may take for granted when lamps and paints change: shadows of punctual lights, balance.
     pub(crate) frozen: Option<(Shadowed, Vec<f32>)>,
-    /// Few patches that stand for the room in a solve by rays.
-    pub(crate) two_grid: Option<two_grid::TwoGrid>,
 }
 
 impl Refinement {

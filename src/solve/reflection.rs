@@ -1,7 +1,7 @@
 //! How the leaves reflect: lane by lane, or by a matrix a paint where lanes reflect into each other; and what passes sheets.
 
+use super::linear;
 use super::mixed::Mixed;
-use super::{conjugate, linear};
 use crate::light::lanes::Lanes;
 use crate::light::{Rows, Through};
 
@@ -29,11 +29,19 @@ pub(crate) struct Sheets {
 }
 
 impl Reflection {
+    /// The greatest share of irradiance that leaves a leaf, by lane.
+    pub(super) fn greatest<const L: usize>(&self) -> [f64; L] {
+        match &self.mixed {
+            Some(mixed) => [mixed.greatest; L],
+            None => std::array::from_fn(|l| self.greatest.get(l).map_or(0.0, |&s| f64::from(s))),
+        }
+    }
+
     /// What is reflected of an irradiance.
     pub(super) fn of<const L: usize>(&self, irradiance: &Rows) -> Rows {
         let mut sent = match &self.mixed {
             Some(mixed) => mixed.reflect::<L>(irradiance),
-            None => conjugate::product::<L>(irradiance, &self.rows),
+            None => product::<L>(irradiance, &self.rows),
         };
         if let Some(sheets) = &self.sheets {
             let met = irradiance.all::<L>();
@@ -87,4 +95,13 @@ impl Reflection {
         }
         self.rows
     }
+}
+
+/// `x y`, element by element.
+fn product<const L: usize>(x: &Rows, y: &Rows) -> Rows {
+    let mut out = x.clone();
+    for (x, y) in out.all_mut::<L>().iter_mut().zip(y.all::<L>()) {
+        *x = std::array::from_fn(|l| x[l] * y[l]);
+    }
+    out
 }

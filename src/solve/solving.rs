@@ -1,14 +1,13 @@
 //! The solve of a round: from direct light on the leaves to the light on every patch, with the flux that went where.
 
-use super::conjugate::{Convergence, System, step};
 use super::fluorescing::{Glow, Rounds};
 use super::flux::{self, Closed};
 use super::linear;
 use super::mixed::Mixed;
 use super::operator::Operator;
-use super::rays::RaySystem;
+use super::refinement::Refinement;
 use super::reflection::Reflection;
-use super::sheets;
+use super::solver::{Convergence, System, step};
 use super::{Bake, Given};
 use crate::light::{Arrival, Light, Neighbours, Rows, padded, weighed};
 use crate::link::LinkRows;
@@ -22,6 +21,8 @@ struct Lit<'a> {
     /// Direct irradiance by leaf.
     first: &'a Rows,
     reflection: &'a Reflection,
+    /// From radiosity by leaf to irradiance by leaf.
+    receive: &'a dyn Fn(&Rows) -> Rows,
     /// Relative error at which the solve ends.
     tolerance: f64,
 }
@@ -131,16 +132,18 @@ impl Bake {
             sheets: sources.sheets,
         };
         let sums = self.sums_of(rows);
-        let lit = Lit {
-            leaves,
-            first: &first,
-            reflection: &reflection,
-            tolerance,
-        };
         let runs = self.room.plan.runs(Kind::Interreflection);
-        let bounced = match runs {
-            true => self.all_bounces::<L>(&lit, rows, &sums, sources.glow.as_ref(), &mut reflected),
-            false => Bounced::none::<L>(leaves.len()),
+        let bounced = if runs {
+            let lit = Lit {
+                leaves,
+                first: &first,
+                reflection: &reflection,
+                receive: &*self.receive::<L>(rows, leaves),
+                tolerance,
+            };
+            self.all_bounces::<L>(&lit, rows, &sums, sources.glow.as_ref(), &mut reflected)
+        } else {
+            Bounced::none::<L>(leaves.len())
         };
         scaled.reflected = bounced.ratio;
         let (mut irradiance, given) = (bounced.irradiance, bounced.given);
@@ -213,11 +216,11 @@ impl Bake {
         let mut given = None;
         let (convergence, mut irradiance) = match glow {
             Some(glow) => {
-                let (done, out, seen) = self.fluoresce::<L>(lit, rows, glow, reflected);
+                let (done, out, seen) = self.fluoresce::<L>(lit, glow, reflected);
                 given = Some(out);
                 (done, seen)
             }
-            None => self.bounce::<L>(lit, rows, reflected),
+            None => self.bounce::<L>(lit, reflected),
         };
         let mut ratio = 1.0;
         if !self.room.by_rays() {
@@ -232,34 +235,30 @@ impl Bake {
         }
     }
 
-    /// All bounces, before links are looked at once more: how the solve went, and irradiance by reflected light where it is at hand.
-    fn bounce<const L: usize>(
-        &self,
-        lit: &Lit,
-        rows: &LinkRows,
-        reflected: &mut Rows,
-    ) -> (Convergence, Rows) {
-        match self.room.by_rays() {
-            true => self.bounce_by_rays::<L>(lit, reflected),
-            false => {
-                let convergence = self.bounce_along_links::<L>(lit, rows, reflected);
-                (convergence, Rows::default())
-            }
-        }
+    /// All bounces, before links are looked at once more: how the solve went, and irradiance by reflected light.
+    fn bounce<const L: usize>(&self, lit: &Lit, reflected: &mut Rows) -> (Convergence, Rows) {
+        let system = System {
+            reflection: lit.reflection,
+            areas: self.areas_of(lit.leaves),
+            receive: lit.receive,
+            interrupt: &self.room.interrupt,
+        };
+        system.solve::<L>(lit.first, reflected, lit.tolerance)
+    }
+
+    /// As much of the area of leaves as takes part.
+    fn areas_of(&self, leaves: &[u32]) -> Vec<f64> {
+        let areas = &self.refinement.areas;
+        leaves.iter().map(|&leaf| areas[leaf as usize]).collect()
     }
 
     /// The same where surfaces fluoresce: with what they give out, and irradiance by both.
     fn fluoresce<const L: usize>(
         &self,
         lit: &Lit,
-        rows: &LinkRows,
         glow: &Glow,
         reflected: &mut Rows,
     ) -> (Convergence, Rows, Rows) {
-        let areas = lit
-            .leaves
-            .iter()
-            .map(|&leaf| self.refinement.areas[leaf as usize]);
         let one = [1.0; LEAVES];
         let power = self
             .solution
@@ -267,56 +266,39 @@ impl Bake {
             .taken(&one, self.room.scene.grid.width());
         let rounds = Rounds {
             glow,
-            areas: areas.collect(),
+            areas: self.areas_of(lit.leaves),
             power: power.into_iter().map(f64::from).collect(),
             tolerance: lit.tolerance,
             interrupt: &self.room.interrupt,
         };
-        let receive = |radiosity: &Rows| self.received::<L>(lit, rows, radiosity);
-        let by_rays = self.room.by_rays();
-        rounds.solve::<L>(lit.first, reflected, receive, |first, reflected| {
-            let lit = Lit { first, ..*lit };
-            let (convergence, seen) = self.bounce::<L>(&lit, rows, reflected);
-            let seen = match by_rays {
-                true => seen,
-                false => receive(reflected),
-            };
-            (convergence, seen)
+        rounds.solve::<L>(lit.first, reflected, lit.receive, |first, reflected| {
+            self.bounce::<L>(&Lit { first, ..*lit }, reflected)
         })
     }
 
-    /// What radiosity of the leaves brings them.
-    fn received<const L: usize>(&self, lit: &Lit, rows: &LinkRows, radiosity: &Rows) -> Rows {
+    /// What turns radiosity of the leaves into what they receive: their rays, or links.
+    fn receive<'a, const L: usize>(
+        &'a self,
+        rows: &'a LinkRows,
+        leaves: &'a [u32],
+    ) -> Box<dyn Fn(&Rows) -> Rows + 'a> {
+        let Refinement {
+            tree,
+            outlook,
+            areas,
+            balance,
+            ..
+        } = &self.refinement;
         if self.room.by_rays() {
-            return self.ray_system(lit).received::<L>(radiosity);
+            return Box::new(move |radiosity| {
+                let mut seen = Rows::zero(leaves.len(), L);
+                let nodes = self.refinement.on_nodes::<L>(radiosity, leaves);
+                outlook.irradiance::<L>(leaves, &nodes, &mut seen);
+                seen
+            });
         }
-        let factor = &self.refinement.balance.factor;
-        Operator::new(
-            &self.refinement.tree,
-            rows,
-            lit.leaves,
-            &self.refinement.areas,
-            factor,
-        )
-        .received::<L>(radiosity)
-    }
-
-    /// The leaves as they look for themselves.
-    fn ray_system<'a>(&'a self, lit: &'a Lit) -> RaySystem<'a> {
-        // Two grids end by what is seen; what excites is not, and each lane has to tell for itself.
-        let seen_only = self.solution.lanes.excites().is_none();
-        RaySystem {
-            tree: &self.refinement.tree,
-            outlook: &self.refinement.outlook,
-            leaves: lit.leaves,
-            areas: &self.refinement.areas,
-            reflectance: &lit.reflection.rows,
-            greatest: &lit.reflection.greatest,
-            two_grid: (self.refinement.two_grid.as_ref())
-                .filter(|_| seen_only)
-                .map(|grid| (grid, self.solution.lanes.xyz())),
-            interrupt: &self.room.interrupt,
-        }
+        let operator = Operator::new(tree, rows, leaves, areas, &balance.factor);
+        Box::new(move |radiosity| operator.received::<L>(radiosity))
     }
 
     /// What rows of links sum to; nothing where leaves look for themselves.
@@ -347,73 +329,6 @@ impl Bake {
             leaves,
         );
         flux::ratio(lumens(first), before)
-    }
-
-    /// All bounces where leaves look for themselves: how the solve went, and irradiance by reflected light.
-    fn bounce_by_rays<const L: usize>(
-        &self,
-        lit: &Lit,
-        reflected: &mut Rows,
-    ) -> (Convergence, Rows) {
-        let system = self.ray_system(lit);
-        if lit.reflection.sheets.is_some() {
-            let receive = |radiosity: &Rows| system.received::<L>(radiosity);
-            let sheets = self.through_sheets(lit, &receive);
-            return sheets.solve::<L>(lit.first, reflected, lit.tolerance);
-        }
-        match &lit.reflection.mixed {
-            Some(mixed) => mixed.solve_by_rays::<L>(&system, lit.first, reflected, lit.tolerance),
-            None => system.solve::<L>(lit.first, reflected, lit.tolerance),
-        }
-    }
-
-    /// All bounces along links.
-    fn bounce_along_links<const L: usize>(
-        &self,
-        lit: &Lit,
-        rows: &LinkRows,
-        reflected: &mut Rows,
-    ) -> Convergence {
-        let factor = &self.refinement.balance.factor;
-        let system = System {
-            operator: Operator::new(
-                &self.refinement.tree,
-                rows,
-                lit.leaves,
-                &self.refinement.areas,
-                factor,
-            ),
-            reflectance: &lit.reflection.rows,
-            greatest: &lit.reflection.greatest,
-            interrupt: &self.room.interrupt,
-        };
-        if lit.reflection.sheets.is_some() {
-            let receive = |radiosity: &Rows| system.operator.received::<L>(radiosity);
-            let sheets = self.through_sheets(lit, &receive);
-            return sheets.solve::<L>(lit.first, reflected, lit.tolerance).0;
-        }
-        match &lit.reflection.mixed {
-            Some(mixed) => mixed.solve::<L>(&system.operator, lit.first, reflected, lit.tolerance),
-            None => system.solve::<L>(lit.first, reflected, lit.tolerance),
-        }
-    }
-
-    /// The same room where light passes sheets.
-    fn through_sheets<'a>(
-        &'a self,
-        lit: &'a Lit,
-        receive: &'a dyn Fn(&Rows) -> Rows,
-    ) -> sheets::System<'a> {
-        let areas = lit
-            .leaves
-            .iter()
-            .map(|&leaf| self.refinement.areas[leaf as usize]);
-        sheets::System {
-            reflection: lit.reflection,
-            areas: areas.collect(),
-            receive,
-            interrupt: &self.room.interrupt,
-        }
     }
 
     /// Last passes over the links, see [`linear`]: irradiance by reflected light, and what its flux was multiplied by. What fluoresces is

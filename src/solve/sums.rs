@@ -19,28 +19,13 @@ pub(super) fn added<const L: usize, const N: usize>(
     sums
 }
 
-/// Inner products.
-pub(super) fn dot<const L: usize>(x: &Rows, y: &Rows) -> [f64; L] {
-    let parts = chunks::<L>(x).zip(chunks::<L>(y)).map(|(x, y)| {
-        let mut sum = [0.0; L];
-        for (x, y) in x.iter().zip(y) {
-            add_products(&mut sum, x, y);
-        }
-        [sum]
-    });
-    let [sums] = added(parts);
-    sums
-}
-
 /// Inner products, rows times areas.
 pub(super) fn dot_by_area<const L: usize>(areas: &[f64], x: &Rows, y: &Rows) -> [f64; L] {
     let rows = chunks::<L>(x).zip(chunks::<L>(y));
     let parts = rows.zip(areas.par_chunks(CHUNK)).map(|((x, y), areas)| {
         let mut sum = [0.0; L];
         for ((x, y), area) in x.iter().zip(y).zip(areas) {
-            for l in 0..L {
-                sum[l] += area * f64::from(x[l]) * f64::from(y[l]);
-            }
+            add_products(&mut sum, *area, x, y);
         }
         [sum]
     });
@@ -55,10 +40,10 @@ pub(super) fn chunks<const L: usize>(
     rows.all::<L>().par_chunks(CHUNK)
 }
 
-/// `sum += x y`. Slices of a length that the compiler does not know: of arrays it makes single numbers.
+/// `sum += area x y`. Slices of a length that the compiler does not know: of arrays it makes single numbers.
 #[inline(never)]
-pub(super) fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
+fn add_products(sum: &mut [f64], area: f64, x: &[f32], y: &[f32]) {
     for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
-        *s += f64::from(*x) * f64::from(*y);
+        *s += area * f64::from(*x) * f64::from(*y);
     }
 }
