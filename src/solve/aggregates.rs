@@ -1,22 +1,22 @@
-//! The coarse step of the solve: some tens of large aggregates of patches that take part as wholes.
+//! The coarse step of the solve: some tens of large aggregates of patches, each treated as a whole.
 //!
-//! Conjugate gradients on `(1 - K) y = b` are slow where light finds its level slowly: in long rooms and behind doors,
-//! with bright walls. There the error is nearly constant on large patches. So with `z_a = root` on the leaves of an
+//! Conjugate gradients on `(1 - K) y = b` are slow where light spreads slowly: in long rooms and behind doors, with
+//! bright walls. There the error is nearly constant on large patches. So with `z_a = root` on the leaves of an
 //! aggregate (constant irradiance on it) and the Galerkin matrix `E_ab = z_a . (1 - K) z_b` of each lane,
 //!
 //! ```text
 //! M^-1 = 1 + Z (E^-1 - W^-1) Z^T,    W = Z^T Z (diagonal)
 //! ```
 //!
-//! solves that part at once and leaves alone what is at right angles to it: symmetric, positive definite, no application
+//! solves that part at once and leaves what is orthogonal to it unchanged: symmetric, positive definite, no application
 //! of the operator (two-level additive Schwarz; Dryja and Widlund 1987, Nicolaides 1987 for the coarse space). The
-//! matrix takes one pass over the links: a link between nodes inside aggregates carries what their leaves reflect in the
-//! mean, one of a node that lies above is shared out among those below.
+//! matrix takes one pass over the links: a link between nodes inside aggregates carries what their leaves reflect on
+//! average; a link of a node that lies above is shared out among the aggregates below.
 //!
 //! In a corridor of 40 x 3 x 2 m and albedo .99, 24 iterations become 8, in a room of 4 x 3 x 5 m 12 become 7. A matrix
 //! costs as much as 3 to 10 iterations, the more the fewer lanes there are.
 //!
-//! Aggregates hold only leaves that exchange light, over whatever detours: what is dark stays exactly dark.
+//! Aggregates hold only leaves that exchange light, however indirectly: what is dark stays exactly dark.
 
 use super::operator::{Operator, pull};
 use super::sums::add_products;
@@ -31,12 +31,12 @@ use std::collections::BTreeMap;
 
 /// Aggregates at the most.
 const MOST: usize = 64;
-/// Nodes of the cut an aggregate, at the most.
+/// Nodes of the cut for each aggregate, at the most.
 const PIECES: usize = 8;
 
 /// Aggregates and their solved matrices.
 pub(crate) struct Aggregates {
-    /// Places of the leaves of each aggregate.
+    /// Positions of the leaves of each aggregate.
     members: Vec<Vec<u32>>,
     /// By lane; none where nothing is reflected.
     lanes: Vec<Option<Lane>>,
@@ -46,7 +46,7 @@ pub(crate) struct Aggregates {
 struct Lane {
     /// Aggregates that reflect.
     some: Vec<usize>,
-    /// `1 / sqrt(W)`, of those.
+    /// `1 / sqrt(W)` of those aggregates.
     scale: Vec<f64>,
     solved: Cholesky<f64, Dyn>,
 }
@@ -149,23 +149,23 @@ impl Aggregates {
     }
 }
 
-/// The hierarchy shared out among aggregates: each holds some nodes of a cut, close together.
+/// The hierarchy divided among aggregates: each holds some nodes of a cut, close together.
 pub(crate) struct Parts {
     /// How many aggregates.
     pub count: usize,
     /// Nodes above the cut, ascending.
     pub above: Vec<u32>,
-    /// For each node its aggregate; [`NONE`] above the cut, and for what is in no aggregate.
+    /// For each node its aggregate; [`NONE`] above the cut, and for nodes in no aggregate.
     pub of: Vec<u32>,
 }
 
 impl Parts {
-    /// Cuts the hierarchy, then bisects what the cut holds along its longest extent. Aggregates need not be nodes: a
-    /// long triangle has long parts, but those beside each other make up a short piece of a corridor.
+    /// Cuts the hierarchy, then bisects the nodes of the cut along their longest extent. Aggregates need not be nodes:
+    /// a long triangle has long children, but children beside each other make up a short piece of a corridor.
     pub(crate) fn new(tree: &Tree, links: &LinkRows, most: usize) -> Self {
         let groups = groups(tree, links);
         let mut open = std::collections::BinaryHeap::new();
-        // Positive numbers are in the order of their bits. What is apart comes first.
+        // Positive numbers sort by their bits. Nodes whose leaves do not all exchange light are opened first.
         let key = |id: u32| {
             let apart = groups[id as usize] == NONE;
             (apart, tree.node(id).radius.to_bits(), Reverse(id))
@@ -216,11 +216,11 @@ impl Parts {
     }
 }
 
-/// Nodes side by side.
+/// Nodes close together.
 struct Part {
     pieces: Vec<u32>,
     area: f64,
-    /// Longest extent of the middles of its nodes, and along which axis.
+    /// Longest extent of the centres of these nodes, and its axis.
     length: f64,
     axis: usize,
 }
@@ -255,8 +255,8 @@ impl Part {
     }
 }
 
-/// For each node a number that is the same for all nodes that exchange light, over whatever detours; [`NONE`] if some of
-/// its leaves exchange none with others.
+/// For each node the lowest node with which its leaves exchange light, however indirectly; [`NONE`] if its leaves do not
+/// all exchange light.
 fn groups(tree: &Tree, links: &LinkRows) -> Vec<u32> {
     let nodes = &tree.nodes;
     let mut parent: Vec<u32> = (0..nodes.len() as u32).collect();
@@ -279,7 +279,7 @@ fn groups(tree: &Tree, links: &LinkRows) -> Vec<u32> {
         let others = row.iter().map(|e| e.0).filter(|&other| other as usize > k);
         for other in children.chain(others) {
             let (a, b) = (find(&mut parent, k as u32), find(&mut parent, other));
-            // The lesser one stands for both.
+            // The lesser node stands for both.
             parent[a.max(b) as usize] = a.min(b);
         }
     }
@@ -306,7 +306,7 @@ impl Operator<'_> {
         scratch: &mut Rows,
     ) -> Vec<f64> {
         let (tree, areas) = (self.tree, self.areas);
-        // What a leaf reflects of irradiance 1, balanced.
+        // What a leaf reflects at irradiance 1, balanced.
         let mean = scratch.all_mut::<L>();
         for (rho, &leaf) in reflectance.all::<L>().iter().zip(self.leaves) {
             let factor = self.factor[leaf as usize];
@@ -331,7 +331,7 @@ impl Operator<'_> {
                     self.add_row::<L>(id, parts, mean, &shares, &mean[id], sums);
                 }
             });
-        // What the nodes above gather goes to all below in proportion.
+        // What the nodes above gather goes to all aggregates below in proportion.
         let mut gathered = vec![0.0; size];
         for (place, &id) in parts.above.iter().enumerate() {
             if self.links.row(id as usize).is_empty() {
@@ -349,7 +349,7 @@ impl Operator<'_> {
         matrix
     }
 
-    /// What a node that reflects so much exchanges with each aggregate.
+    /// Adds what a node of radiosity `reflected` exchanges with each aggregate.
     fn add_row<const L: usize>(
         &self,
         id: usize,
@@ -374,16 +374,16 @@ impl Operator<'_> {
     }
 }
 
-/// What each aggregate below a node above the cut contributes to its mean: rows of lanes.
+/// Contribution of each aggregate below a node above the cut to that node's mean: rows of lanes.
 struct Shares {
     lanes: usize,
-    /// For each node of [`Parts::above`], parts and where their rows are.
+    /// For each node of [`Parts::above`], its aggregates and where their rows are.
     lists: Vec<Vec<(usize, usize)>>,
     rows: Vec<f64>,
 }
 
 impl Shares {
-    /// From the means that nodes have as their parents see them.
+    /// From the means of nodes as their parents see them.
     pub(crate) fn new<const L: usize>(
         tree: &Tree,
         areas: &[f64],
@@ -436,7 +436,7 @@ fn add_exchange(sum: &mut [f64], g: f32, x: &[f32], y: &[f32]) {
     }
 }
 
-/// The same.
+/// `sum += g x y`, y in f64.
 #[inline(never)]
 fn add_shared(sum: &mut [f64], g: f32, x: &[f32], y: &[f64]) {
     for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {

@@ -1,8 +1,8 @@
-//! Conjugate gradients on all bands at once: one matrix, one right-hand side a lane, one alpha and beta a lane.
+//! Conjugate gradients on all bands at once: one matrix; a right-hand side, an alpha and a beta for each lane.
 //!
 //! (Hestenes and Stiefel 1952.) The operator is symmetric with eigenvalues in [1 - rho_max, 1 + rho_max], so that
-//! `|error| <= |residual| / (1 - rho_max)` in the norm `sum A R^2 / rho`: a *bound*, given exact row sums. Where that
-//! takes long, [`Aggregates`] precondition it.
+//! `|error| <= |residual| / (1 - rho_max)` in the norm `sum A R^2 / rho`: a *bound*, given exact row sums. Where this
+//! takes long, [`Aggregates`] precondition the system.
 
 use super::aggregates::Aggregates;
 use super::operator::Operator;
@@ -12,11 +12,11 @@ use crate::team::Interrupt;
 
 /// Iterations at the most. Corridors of albedo .99 take about 20.
 pub(super) const MAX_ITERATIONS: usize = 400;
-/// The coarse step is taken at once from this albedo on,
+/// Greatest albedo from which on the coarse step is taken at once.
 const BRIGHT: f64 = 0.98;
-/// and later if so many iterations
+/// Iterations after which a darker room is judged.
 const LOOK: usize = 6;
-/// let fear more than so many others.
+/// Such a room takes the coarse step if more iterations than this are still expected.
 const MANY: f64 = 12.0;
 
 /// Is the coarse step worth building, given the greatest albedo and the bounds of the error so far?
@@ -37,7 +37,7 @@ pub(crate) struct Convergence {
     pub residual: f64,
     /// Bound of the relative error in the norm above: residual / (1 - rho_max), worst lane.
     pub bound: f64,
-    /// How often all bounces were found for what fluoresces; 0 where nothing does.
+    /// How often all bounces were found until fluorescence settled; 0 where nothing fluoresces.
     pub fluorescence: usize,
 }
 
@@ -50,7 +50,7 @@ pub(crate) struct System<'a> {
     pub reflectance: &'a Rows,
     /// Greatest reflectance of each lane.
     pub greatest: &'a [f32],
-    /// Ends the iterations wherever they are.
+    /// Ends the iterations at any time.
     pub interrupt: &'a Interrupt,
 }
 
@@ -68,7 +68,8 @@ impl System<'_> {
         })
     }
 
-    /// The same with the coarse step as soon as `pays` finds it worth it, from the bounds before each iteration.
+    /// [`System::solve`] with the coarse step as soon as `pays` finds it worth while, from the bounds before each
+    /// iteration.
     pub(crate) fn solve_with<const L: usize>(
         &self,
         first: &Rows,
@@ -96,7 +97,7 @@ impl System<'_> {
         let mut bounds = Vec::new();
         loop {
             (done.residual, done.bound) = self.left(&rr, &norm);
-            // Rounding ends progress: what is left is f32, not the method.
+            // Rounding ends progress: the rest is the precision of f32, not the method.
             let rounding = rr.iter().zip(&norm).all(|(r, b)| *r <= 1e-14 * b);
             let ended = done.iterations >= MAX_ITERATIONS || self.interrupt.is_raised();
             if done.bound <= tolerance || rounding || ended {
@@ -161,7 +162,7 @@ impl System<'_> {
         }
     }
 
-    /// Relative residual of the worst lane, and how large its error may still be, from squares of residual and right-hand side.
+    /// Relative residual of the worst lane, and bound of its error, from squares of residual and right-hand side.
     fn left(&self, rr: &[f64], norm: &[f64]) -> (f64, f64) {
         let (mut residual, mut bound) = (0.0_f64, 0.0_f64);
         for ((rr, norm), rho) in rr.iter().zip(norm).zip(self.greatest) {
@@ -226,7 +227,7 @@ pub(super) fn product<const L: usize>(x: &Rows, y: &Rows) -> Rows {
     out
 }
 
-/// The next direction: `p = z + beta p`, lane by lane.
+/// The next search direction: `p = z + beta p`, lane by lane.
 pub(super) fn turn<const L: usize>(p: &mut Rows, z: &Rows, beta: [f32; L]) {
     for (p, z) in p.all_mut::<L>().iter_mut().zip(z.all::<L>()) {
         *p = std::array::from_fn(|l| z[l] + beta[l] * p[l]);
@@ -249,11 +250,10 @@ mod tests {
     use crate::link::{Link, LinkRows, Way};
 
     const LEVELS: u32 = 8;
-    /// Leaves that a leaf sees on either side.
+    /// Leaves that a leaf sees on each side.
     const REACH: u32 = 4;
 
-    /// A binary tree over two rows of equal leaves of area 1, all side by side in a chain; the two halves see nothing of
-    /// each other.
+    /// A binary tree over two rows of equal leaves of area 1, each row a chain; neither sees the other.
     fn chains() -> (Tree, Vec<f64>, Vec<u32>, Vec<Link>) {
         let first_leaf = (1_u32 << LEVELS) - 1;
         let count = 2 * first_leaf + 1;
@@ -285,7 +285,7 @@ mod tests {
         };
         let mut links = Vec::new();
         for (from, to) in [(first_leaf, half), (half, count)] {
-            // A leaf sees the next ones on either side, and mirrors at the ends: every row sums to 1.
+            // A leaf sees the next ones on either side, mirrored at the ends: every row sums to 1.
             let exchange = 0.5 / f64::from(REACH) as f32;
             for k in from..to {
                 for step in 1..=REACH {

@@ -14,18 +14,18 @@ use crate::spectrum::Leaves;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
-/// Rows a task multiplies; fixed.
+/// Rows a task multiplies; fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 256;
 
-/// How the leaves reflect: different paints, and which paint each leaf has.
+/// How the leaves reflect: the paints, and which paint each leaf has.
 #[derive(Debug, Default)]
 pub(crate) struct Mixed {
     /// Rows of M, padded to the width of lanes, paint by paint.
     whole: Vec<Rows>,
-    /// Rows of its root.
+    /// Rows of the root of M.
     root: Vec<Rows>,
     of: Vec<u32>,
-    /// Greatest eigenvalue of all.
+    /// Greatest eigenvalue of all matrices.
     greatest: f64,
 }
 
@@ -152,8 +152,8 @@ impl Mixed {
         done
     }
 
-    /// The same where leaves look for themselves: plain sweeps, since no lane has a flux of its own to keep. Reflected
-    /// radiosity, and irradiance by it.
+    /// [`Self::solve`] where leaves look for themselves: plain sweeps, since no lane has a flux of its own to conserve.
+    /// Reflected radiosity, and irradiance by it.
     pub(super) fn solve_by_rays<const L: usize>(
         &self,
         system: &RaySystem,

@@ -1,8 +1,8 @@
 //! The solution where leaves look for themselves: `R = rho (H0 + K R)`, `K` the mean over what the rays of a leaf meet.
 //!
-//! Plain sweeps (Jacobi) shrink every error by the albedo. A factor a lane and sweep helps: it scales the whole solution so
-//! that no light is missing, because the slowest mode of a bright room is all of it together. It goes to 1 as the sweeps
-//! converge: rows are taken as they are.
+//! Plain sweeps (Jacobi) shrink every error by the albedo. One factor per lane and sweep helps: it scales the whole
+//! solution so that no light is missing, because the slowest mode of a bright room is the room as a whole. The factor goes
+//! to 1 as the sweeps converge: rows are taken as they are.
 
 use super::conjugate::Convergence;
 use super::operator::pull;
@@ -18,10 +18,10 @@ use rayon::prelude::*;
 const SWEEPS: usize = 400;
 /// The scale of one sweep stays within this factor.
 const GREATEST_SCALE: f64 = 2.0;
-/// Changes that shrink more slowly from sweep to sweep count as shrinking so.
+/// The slowest shrinkage of changes from sweep to sweep that is believed.
 const SLOWEST: f64 = 0.95;
-/// After a correction that left more than this share of the change, a sweep goes without: what few patches cannot tell
-/// apart must not build up.
+/// After a correction that left more than this share of the change, a sweep goes without: errors that the few patches
+/// cannot resolve must not build up.
 const WORTH_CORRECTING: f64 = 0.5;
 
 /// What a solve by rays works on.
@@ -29,7 +29,7 @@ pub(crate) struct RaySystem<'a> {
     pub(super) tree: &'a Tree,
     pub(super) outlook: &'a Outlook,
     pub(super) leaves: &'a [u32],
-    /// Area by node that takes part.
+    /// Area of each node that takes part.
     pub(super) areas: &'a [f64],
     /// By leaf.
     pub(super) reflectance: &'a Rows,
@@ -37,17 +37,17 @@ pub(crate) struct RaySystem<'a> {
     pub(super) greatest: &'a [f32],
     /// Few patches that stand for the room, and tristimulus values of each lane.
     pub(super) two_grid: Option<(&'a TwoGrid, &'a [[f64; 3]])>,
-    /// Ends the sweeps wherever they are.
+    /// Ends the sweeps at any time.
     pub(super) interrupt: &'a Interrupt,
 }
 
-/// What a sweep changes, times areas.
+/// The changes of a sweep, times areas.
 struct Change<const L: usize> {
-    /// By lane, whatever its sign.
+    /// By lane, absolute.
     change: [f64; L],
-    /// Reflected after it, by lane.
+    /// Reflected radiosity after the sweep, by lane.
     total: [f64; L],
-    /// By patch of the two grids, with its sign.
+    /// By patch of the two grids, signed.
     moved: Option<Vec<[f64; L]>>,
 }
 
@@ -88,7 +88,7 @@ impl RaySystem<'_> {
             };
             let mut settled = done.bound <= tolerance;
             if let (Some((grid, xyz)), Some(moved)) = (self.two_grid, &moved) {
-                // The mean error is small first; light that is trapped somewhere settles last.
+                // The mean error is small first; light trapped somewhere settles last.
                 let earlier = std::mem::replace(&mut steps, grid.seen::<L>(moved, xyz));
                 settled = settled && {
                     let all = grid.seen::<L>(&self.sums::<L>(grid, reflected), xyz);
@@ -111,8 +111,8 @@ impl RaySystem<'_> {
         }
     }
 
-    /// What a sweep is to be scaled by, lane by lane, so that no light is missing: what direct light reflects, over what is
-    /// reflected now less what of it comes again.
+    /// By what a sweep must be scaled, lane by lane, so that no light is missing: the first reflection of direct light,
+    /// over the light reflected now less its next reflection.
     fn missing<const L: usize>(&self, reflected: &Rows, seen: &Rows, first: &Rows) -> [f64; L] {
         let bounces = chunks::<L>(reflected).zip(chunks::<L>(seen));
         let direct = chunks::<L>(first).zip(chunks::<L>(self.reflectance));
@@ -137,7 +137,7 @@ impl RaySystem<'_> {
         })
     }
 
-    /// Reflects what the leaves receive; `factor` is what it was scaled by.
+    /// Reflects what the leaves receive; `factor` is what `seen` was scaled by.
     fn reflect<const L: usize>(
         &self,
         seen: &Rows,
@@ -152,7 +152,7 @@ impl RaySystem<'_> {
         };
         let moved = self.two_grid.map(|(grid, _)| {
             let now = reflected.all::<L>();
-            // From the scaled solution, which misses no light as a whole.
+            // Changes against the scaled solution, which as a whole misses no light.
             let change = |k: usize| {
                 let next = next(k);
                 std::array::from_fn(|l| next[l] - factor[l] * now[k][l])
@@ -187,7 +187,7 @@ impl RaySystem<'_> {
         grid.sums::<L>(|k| self.areas[self.leaves[k] as usize], |k| rows[k])
     }
 
-    /// Relative change of the worst lane, and how large its error may still be.
+    /// Relative change of the worst lane, and bound of its error.
     fn worst(&self, change: &[f64], total: &[f64]) -> (f64, f64) {
         let (mut residual, mut bound) = (0.0_f64, 0.0_f64);
         for ((change, total), rho) in change.iter().zip(total).zip(self.greatest) {
@@ -199,7 +199,7 @@ impl RaySystem<'_> {
         (residual, bound)
     }
 
-    /// The same of the worst of X, Y and Z.
+    /// [`Self::worst`] for X, Y and Z in place of lanes.
     fn seen(&self, change: &[f64], total: &[f64], xyz: &[[f64; 3]]) -> (f64, f64) {
         let (mut residual, mut bound) = (0.0_f64, 0.0_f64);
         for c in 0..3 {
@@ -226,7 +226,7 @@ impl RaySystem<'_> {
         seen
     }
 
-    /// The same with room for it, `nodes` for a row a node.
+    /// [`Self::received`] into `seen`; `nodes` is scratch, a row for each node.
     fn receive<const L: usize>(&self, reflected: &Rows, nodes: &mut Rows, seen: &mut Rows) {
         let all = nodes.all_mut::<L>();
         for (row, &leaf) in reflected.all::<L>().iter().zip(self.leaves) {

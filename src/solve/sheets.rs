@@ -1,11 +1,11 @@
 //! The solve in rooms with diffuse sheets: what leaves one side depends on the light of both,
-//! `R = rho (f + F R) + tau (f' + F' R)`, where ' is the side behind.
+//! `R = rho (f + F R) + tau (f' + F' R)`, where ' marks the side behind.
 //!
-//! With M for both terms that is `(1 - M F) R = M f`. M is symmetric, but where more light passes a sheet than it sends back it has
-//! negative eigenvalues, and conjugate gradients on its root are out. So light is found by BiCGSTAB (van der Vorst 1992), all lanes
-//! side by side, which asks for no symmetry; then plain sweeps, `R = M (f + F R)`, tell how far it got and go on where it did not get
-//! far enough. In the norm `sum A R^2` M shrinks by the greatest `rho + tau`, s, and F does not grow: what a sweep changes by d leaves
-//! an error of `d s / (1 - s)` at the most.
+//! With M for both terms that is `(1 - M F) R = M f`. M is symmetric, but where a sheet lets more light through than it reflects it
+//! has negative eigenvalues, which rules out conjugate gradients on its root. So light is found by BiCGSTAB (van der Vorst 1992), all
+//! lanes side by side, which needs no symmetry; then plain sweeps, `R = M (f + F R)`, tell how large the error is and go on if it is
+//! too large. In the norm `sum A R^2` M shrinks by the greatest `rho + tau`, s, and F does not grow: a sweep that changes R by d
+//! leaves an error of `d s / (1 - s)` at the most.
 
 use super::conjugate::{Convergence, step, turn};
 use super::reflection::Reflection;
@@ -13,21 +13,21 @@ use super::sums::dot_by_area;
 use crate::light::rows::Rows;
 use crate::team::Interrupt;
 
-/// Applications of the operator to find the light, at the most: bright rooms take some 20.
+/// Applications of the operator by BiCGSTAB, at the most: bright rooms take some 20.
 const MOST: usize = 100;
-/// What is sought this way is this share of the tolerance: the norm says little of what is closed in.
+/// BiCGSTAB goes on to this share of the tolerance: the norm says little of closed-in places.
 const SHARE: f64 = 0.1;
 /// Sweeps at the most.
 const SWEEPS: usize = 400;
 
-/// A room whose leaves reflect so, with what turns radiosity into irradiance.
+/// How the leaves of a room reflect, and what turns radiosity into irradiance.
 pub(super) struct System<'a> {
     pub(super) reflection: &'a Reflection,
     /// Area of each leaf.
     pub(super) areas: Vec<f64>,
     /// From radiosity by leaf to irradiance by leaf.
     pub(super) receive: &'a dyn Fn(&Rows) -> Rows,
-    /// Ends the solve wherever it is.
+    /// Ends the solve at any time.
     pub(super) interrupt: &'a Interrupt,
 }
 
@@ -72,7 +72,7 @@ impl System<'_> {
         }
     }
 
-    /// BiCGSTAB. What it leaves is no worse than the guess.
+    /// BiCGSTAB. Its result is no worse than the guess.
     fn approach<const L: usize>(
         &self,
         first: &Rows,
@@ -146,7 +146,7 @@ impl System<'_> {
     }
 }
 
-/// Lane by lane; 0 where that is no number.
+/// Quotients lane by lane; 0 where not finite.
 fn ratios<const L: usize>(a: &[f64; L], b: &[f64; L]) -> [f32; L] {
     std::array::from_fn(|l| {
         let ratio = (a[l] / b[l]) as f32;

@@ -55,7 +55,7 @@ pub(super) fn chunks<const L: usize>(
     rows.all::<L>().par_chunks(CHUNK)
 }
 
-/// `sum += x y`. Slices of a length that the compiler does not know: of arrays it makes single numbers.
+/// `sum += x y`, on slices: for arrays, whose length it knows, the compiler writes scalar code.
 #[inline(never)]
 pub(super) fn add_products(sum: &mut [f64], x: &[f32], y: &[f32]) {
     for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {

@@ -1,10 +1,10 @@
-//! What sweeps over all leaves would find slowly, found on few patches: the two-grid method for equations of the second
+//! Finds on few patches what sweeps over all leaves would find slowly: the two-grid method for equations of the second
 //! kind (Atkinson 1976; Hackbusch, Multi-Grid Methods and Applications, 1985, chapter 16).
 //!
 //! A sweep turns R into `G(R) = rho (f + K R)` and leaves the error e, `e = d + A e` with the change `d = G(R) - R` and
-//! `A = rho K`. So the solution is `G(R) + A e`, and of `A e = rho (K e)` the part in brackets is smooth: it is worked out
-//! on a cut of the hierarchy, `u = K_c e_c`, `e_c = d_c + rho_c u` (means over patches, K_c from the same rays), and every
-//! leaf reflects its patch's u. What the cut gets wrong the next sweep finds; the sweeps alone say when it is enough.
+//! `A = rho K`. So the solution is `G(R) + A e`, and of `A e = rho (K e)` the part in brackets is smooth: that is worked
+//! out on a cut of the hierarchy, `u = K_c e_c`, `e_c = d_c + rho_c u` (means over patches, K_c from the same rays), and
+//! every leaf reflects its patch's u. The next sweep finds the errors of the cut; the sweeps alone tell when to stop.
 
 use super::outlook::Outlook;
 use crate::hierarchy::{NONE, Tree};
@@ -16,29 +16,29 @@ use wide::f32x16;
 
 /// Patches of the cut at the most.
 const PATCHES: usize = 2560;
-/// Sweeps over the cut at the most, and the relative change after which no more are worth while: the cut errs by more.
+/// Sweeps over the cut at the most, and the relative change after which more are not worth while: the cut errs by more.
 const SWEEPS: usize = 100;
 const ENOUGH: f32 = 0.02;
 /// Lanes that are solved together.
 const BLOCK: usize = 16;
 
-/// A patch that reflects less than this share of the mean counts as one that reflects so much.
+/// The least reflected light, as a share of the mean, that the error of a patch is related to.
 const DARK: f64 = 0.05;
 
 /// The cut, and who sees whom on it.
 pub(crate) struct TwoGrid {
     /// Patch of each leaf, by leaf.
     patch: Vec<u32>,
-    /// The leaves of each patch, as their places in the list of leaves.
+    /// The leaves of each patch, as positions in the list of leaves.
     members: Vec<Vec<u32>>,
-    /// Bare area of each patch.
+    /// Area of each patch that takes part.
     areas: Vec<f64>,
     /// For each patch, which patches its rays met and their shares.
     seen: Vec<Vec<(u32, f32)>>,
 }
 
 impl TwoGrid {
-    /// Sums what the rays of the leaves met.
+    /// Sums over the patches that the rays of the leaves met.
     pub(crate) fn new(tree: &Tree, outlook: &Outlook, leaves: &[u32], areas: &[f64]) -> Self {
         let of_node = cut(tree, PATCHES);
         let patch: Vec<u32> = leaves.iter().map(|&k| of_node[k as usize]).collect();
@@ -74,12 +74,12 @@ impl TwoGrid {
         }
     }
 
-    /// How many patches.
+    /// Number of patches.
     pub(super) fn len(&self) -> usize {
         self.areas.len()
     }
 
-    /// Rows of leaves times their areas, summed over each patch; both by place in the list of leaves.
+    /// Rows of leaves times their areas, summed over each patch; `area` and `row` by position in the list of leaves.
     pub(super) fn sums<const L: usize>(
         &self,
         area: impl Fn(usize) -> f64 + Sync,
@@ -122,8 +122,8 @@ impl TwoGrid {
         sums.par_iter().map(seen).collect()
     }
 
-    /// Greatest relative error that is left in any patch, if its changes go on to shrink by `ratio` a sweep. `before` and
-    /// `change` are those of the last two sweeps (one may pass through zero), `all` is what patches reflect.
+    /// Greatest relative error that remains in any patch, if changes go on to shrink by `ratio` per sweep. `before` and
+    /// `change` are the changes of the last two sweeps (one may pass through zero), `all` is what patches reflect.
     pub(super) fn left(
         &self,
         before: &[[f64; 3]],
@@ -148,10 +148,10 @@ impl TwoGrid {
         greatest * ratio / (1.0 - ratio)
     }
 
-    /// Adds to what leaves reflect what the error after a sweep sends them. `change` is the mean change by the sweep,
-    /// `mean_reflectance` that of each patch. What leaves have `received`, by leaf and as means over the patches, tells how far
-    /// each is open to what its patch is sent: in a closed pocket a correction meant for the room would put out what light
-    /// there is, and sweeps bring it back only slowly.
+    /// Adds to what leaves reflect the light that the error of a sweep sends them. `change` is the mean change by the sweep,
+    /// `mean_reflectance` that of each patch. What leaves have `received`, by leaf and as means over the patches, tells how
+    /// open each is to the light sent to its patch: in a closed pocket a correction meant for the room would put out the light,
+    /// and sweeps bring it back only slowly.
     pub(super) fn correct<const L: usize>(
         &self,
         change: &Rows,
@@ -190,7 +190,7 @@ impl TwoGrid {
                 let (sent, mean) = (&sent[p as usize], &received[1].all::<L>()[p as usize]);
                 for l in 0..L {
                     let open = if h[l] < mean[l] { h[l] / mean[l] } else { 1.0 };
-                    // Too much of a correction must not make light negative.
+                    // Too great a correction must not make light negative.
                     r[l] = (r[l] + open * rho[l] * sent[l]).max(0.0);
                 }
             });
@@ -198,14 +198,14 @@ impl TwoGrid {
 }
 
 impl TwoGrid {
-    /// What patches send each other of the error, some lanes of it: sweeps in place.
+    /// The error that patches send each other, a block of lanes at a time: sweeps in place.
     fn sent(&self, change: &[f32x16], reflectance: &[f32x16]) -> Vec<f32x16> {
         let mut error = change.to_vec();
         let mut sent = vec![f32x16::ZERO; error.len()];
         for _ in 0..SWEEPS {
             let (mut moved, mut total) = (f32x16::ZERO, f32x16::ZERO);
             for (k, row) in self.seen.iter().enumerate() {
-                // Several sums: none waits for another.
+                // Several sums, so that none waits for another.
                 let mut sums = [f32x16::ZERO; 4];
                 let of =
                     |&(source, share): &(u32, f32)| f32x16::splat(share) * error[source as usize];
@@ -244,12 +244,12 @@ fn block(row: &[f32], b: usize) -> f32x16 {
     f32x16::from(all)
 }
 
-/// Patch of each node at and below the cut; [`NONE`] above. Clusters of several planes are opened first, then what
-/// counts most.
+/// Patch of each node at and below the cut; [`NONE`] above. Clusters of several planes are opened first, then nodes of
+/// the greatest counted area.
 fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
     let key = |id: u32| {
         let node = tree.node(id);
-        // Areas are positive: their bits stand in their order.
+        // Areas are positive: their bits sort as they do.
         (!node.flat, node.counted.to_bits(), Reverse(id))
     };
     let mut open = BinaryHeap::from([(key(0), 0)]);
