@@ -507,7 +507,7 @@ fn by_rule(
         }
     }
     mean.spread = mean.half_range();
-    // Light that covered points receive counts as even over the leaf.
+    // By the rule, the whole leaf is as bright as its uncovered points.
     mean.bright[1] = mean.bright[0] / f64::from(mean.total.max(f32::MIN_POSITIVE));
     mean.points = 1;
     mean

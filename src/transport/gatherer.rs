@@ -114,7 +114,7 @@ pub struct Gatherer<'a> {
     pub(crate) glass: Option<Glass<'a>>,
     /// What mirrors leave of light.
     pub(crate) filters: &'a Filters,
-    /// The mirror image from which the receiver is lit, which then stands at its own image; none: straight.
+    /// The mirrors by which light comes: the receiver is then the image of the true one. None: light comes straight.
     pub(crate) via: Option<Via>,
     /// What one patch may misplace, share of the white's irradiance.
     pub tolerance: f64,
