@@ -28,7 +28,7 @@ pub struct Balance {
     pub defect_before: [f64; 2],
     /// The same distances after balancing.
     pub defect_after: [f64; 2],
-    /// Leaves whose factor reached [`GREATEST`].
+    /// Leaves whose factor reached the limit.
     pub limited: usize,
 }
 

@@ -57,7 +57,7 @@ pub(crate) trait Dense {
 }
 
 impl Coarse {
-    /// Sums links and sources over a cut of `tree` into at most so many patches.
+    /// Sums links and sources over a cut of `tree`, into a limited number of patches.
     #[expect(clippy::too_many_arguments, reason = "one caller")]
     pub(crate) fn new(
         tree: &Tree,

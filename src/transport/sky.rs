@@ -55,7 +55,7 @@ impl Gatherer<'_> {
         self.come_in(to, way, own, memory, out);
     }
 
-    /// [`Self::outside`] in one of `images` images; `open`, of so many directions over the hemisphere, lead out of the
+    /// [`Self::outside`] in one of `images` images; `open`, of `of` directions over the hemisphere, lead out of the
     /// room.
     pub(super) fn outside_in_mirrors(
         &self,
