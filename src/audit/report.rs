@@ -42,7 +42,7 @@ pub struct Report {
     pub record: &'static str,
     /// Points that were compared.
     pub points: usize,
-    /// Random points that something solid covers: left out.
+    /// Random points that something solid covers or, of what a file shows, that lie inside of something: left out.
     pub covered: usize,
     /// Paths traced.
     pub paths: u64,

@@ -63,7 +63,7 @@
 //!
 //! | field | unit | what |
 //! |---|---|---|
-//! | `points`, `covered` | | random points compared; those left out, as something solid covers them |
+//! | `points`, `covered` | | random points compared; those left out, as something solid covers them or, of what a file shows, they lie inside of something |
 //! | `paths`, `seed` | | paths traced in all; seed of points and paths |
 //! | `de2000` | dE00 | colour difference of irradiance: `mean`, `rms`, `p95`, `max`, each with `value`, `low`, `high` (interval of 95 %), the audit's noise taken out |
 //! | `relative` | 1 | error of illuminance without sign, the same |

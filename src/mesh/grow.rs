@@ -506,3 +506,32 @@ pub(super) fn share(cell: &Cell) -> f64 {
 pub(super) fn mix(light: &[[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|c| (0..3).map(|k| light[k][c] * weights[k]).sum())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::Care;
+    use crate::transport::tests::baked;
+
+    /// However flat the triangle was of which they are halves.
+    #[test]
+    fn halves_expect_something_of_the_difference_of_their_corners() {
+        let bake = baked("cornell.glb", 1);
+        let mut growth = bake.growth(Care::Vertex, &|| false);
+        growth.begin(&|_, _| {});
+        let all: Vec<usize> = (0..growth.cells.all.len()).collect();
+        for &k in &all {
+            growth.cells.all[k].doubt = Doubt::default();
+        }
+        growth.expect(&all, false, &|_, _| {});
+        let mut apart = 0;
+        for &k in &all {
+            let [a, b, c] = growth.light(k);
+            let pairs = [[a, b], [b, c], [c, a]].map(|[a, b]| growth.difference(a, b));
+            let range = pairs.into_iter().fold(0.0, f64::max);
+            apart += usize::from(range > 1.0);
+            assert_eq!(growth.cells.all[k].doubt.square, (0.1 * range).powi(2));
+        }
+        assert!(apart > 10, "{apart}");
+    }
+}

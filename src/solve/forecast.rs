@@ -22,8 +22,12 @@ const AHEAD: usize = 12;
 /// smaller.
 const PREVIEW: f64 = 2.0;
 const EARLY: f64 = 4.0;
-/// One round less suffices where the estimate is this many times smaller than the error asked for: by rays it was off by less after
-/// three rounds (Cornell boxes with dust: .22 for .28 and .30). A sunlit room at `--error 1` takes two thirds of the time.
+/// Least rounds before an estimate is believed: one distance between rounds may be small by chance, or because the second found
+/// nothing to refine yet.
+const LEAST_ROUNDS: usize = 3;
+/// After [`LEAST_ROUNDS`] an estimate is off by less than this factor (by rays it was .22 for .28 and .30, in Cornell boxes with
+/// dust), so these rounds suffice if it is this many times smaller than the error asked for. A sunlit room at `--error 1` then takes
+/// four fifths of the time.
 const DOUBTFUL: f64 = 2.0;
 /// A round that leaves this share of the error of the one before has stalled, if there are many links already. If the error rose
 /// much, the round has not: it found light that earlier rounds overlooked, as in the gap above a lamp.
@@ -46,9 +50,8 @@ pub struct Past {
 /// How errors fall.
 #[derive(Debug, Clone, Copy)]
 pub struct Fall {
-    /// Rounds before an estimate is believed, at the least. One distance between rounds may be small by chance, or because the second
-    /// round found nothing to refine yet. By rays two distances may be: a Cornell box with 200 triangles of dust ended with 1,500 leaves
-    /// after three rounds, or with 5,400 after four, by the seed, at .30 or .22 dE00.
+    /// Rounds after which an estimate is believed as it is. By rays two distances between rounds may be small by chance: a Cornell box
+    /// with 200 triangles of dust ended with 1,500 leaves after three rounds, or with 5,400 after four, by the seed, at .30 or .22 dE00.
     least: usize,
     /// Share of the second round's error that the third leaves.
     first: f64,
@@ -65,7 +68,7 @@ pub const BY_RAYS: Fall = Fall {
 };
 /// Where light goes along links. `first`: .1 to .4 in Cornell boxes.
 pub const BY_LINKS: Fall = Fall {
-    least: 3,
+    least: LEAST_ROUNDS,
     first: 0.3,
     slower: 1.0,
 };
@@ -96,10 +99,10 @@ impl Goal {
     /// Is the error or the number of rounds reached?
     fn done(&self, past: &[Past]) -> Option<Verdict> {
         let asked = self.error;
-        let settled = |e: f64| match self.fall.least.saturating_sub(past.len()) {
-            0 => true,
-            1 if past.len() > 2 && DOUBTFUL * e <= asked => true,
-            _ => asked >= PREVIEW && EARLY * e <= asked,
+        let settled = |e: f64| {
+            past.len() >= self.fall.least
+                || (past.len() >= LEAST_ROUNDS && DOUBTFUL * e <= asked)
+                || (asked >= PREVIEW && EARLY * e <= asked)
         };
         if past.last()?.error.is_some_and(|e| e <= asked && settled(e)) {
             return Some(Verdict::Reached);
@@ -204,6 +207,19 @@ mod tests {
         assert_eq!(next_round(&past(&[(1.0, 1.0, 0), (3.0, 1.0, 0)])), 9.0);
         let faster = next_round(&past(&[(3.0, 1.0, 0), (1.0, 1.0, 0)]));
         assert!((faster - 3_f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn by_rays_three_rounds_do_where_the_estimate_is_half_of_what_is_asked() {
+        let three = |last: f64| past(&[(1.0, f64::NAN, 1), (1.0, 0.5, 1), (1.0, last, 1)]);
+        assert_eq!(GOAL.verdict(&three(0.19)), Some(Verdict::Reached));
+        assert_eq!(GOAL.verdict(&three(0.21)), None);
+        assert_eq!(GOAL.verdict(&three(0.19)[..2]), None);
+        let by_links = Goal {
+            fall: BY_LINKS,
+            ..GOAL
+        };
+        assert_eq!(by_links.verdict(&three(0.39)), Some(Verdict::Reached));
     }
 
     /// A home theater and a living room as baked: the forecast, and the time then taken.
