@@ -1,13 +1,13 @@
 //! Light in the air: irradiance from all sides at points, as spherical harmonics and as an ambient cube.
 //!
-//! At a point the irradiance `E(n)` of a small surface that looks to n is gathered for 26 directions n, as `probe` does it:
+//! At a point the irradiance `E(n)` of a small surface with normal n is gathered for 26 directions n, as `probe` does it:
 //! the six axes, twelve edges and eight corners of a cube, which with weights 1/21, 4/105 and 9/280 are Lebedev's
 //! quadrature of degree 7 (Lebedev 1976). With real spherical harmonics Y_lm,
 //!
 //! `E(n) = sum A_l L_lm Y_lm(n)`, A_0 = pi, A_1 = 2 pi / 3, A_2 = pi / 4, A_3 = 0, A_4 = -pi / 24 ...
-//! (Ramamoorthi and Hanrahan, 2001), so that `L_lm = 4 pi / A_l sum w E(n) Y_lm(n)` for l up to 2 are the coefficients of
-//! *radiance*; orders 3 to 5 of E do not disturb them; those beyond put order 2 off by up to 19 % for a lamp without extent. What E has beyond order 2 is the truncation, up to some per cent of
-//! E where light comes from one side; it is measured in the 26 directions.
+//! (Ramamoorthi and Hanrahan, 2001), so that `L_lm = 4 pi / A_l sum w E(n) Y_lm(n)` for l up to 2 are the coefficients of *radiance*. Orders 3 to 5
+//! of E do not disturb them; higher orders put order 2 off by up to 19 % for a lamp without extent. The truncation is the part of E beyond order 2,
+//! up to some per cent of E where light comes from one side; it is measured in the 26 directions.
 //!
 //! The ambient cube (Mitchell, McTaggart and Green 2006) is E to +X, -X, +Y, -Y, +Z and -Z.
 
@@ -22,7 +22,7 @@ use std::f64::consts::PI;
 /// Tristimulus values.
 type Xyz = [f64; 3];
 
-/// Directions of a point.
+/// Directions at a point.
 const DIRECTIONS: usize = 26;
 /// Points gathered at a time: 26 rows each.
 const PART: usize = 1024;
@@ -39,17 +39,17 @@ pub struct Around {
 /// A point in the air.
 #[derive(Debug, Clone)]
 pub struct Air {
-    /// Is it in the room? If not, no light was looked for.
+    /// Is the point in the room? If not, no light is gathered.
     pub place: Place,
     /// All light.
     pub light: Around,
-    /// That of each layer, if there are any; they add up.
+    /// The light of each layer, if there are any; layers add up to `light`.
     pub layers: Vec<Around>,
-    /// What irradiance has beyond the coefficients: root mean square of illuminance over all directions, share of its mean.
+    /// Irradiance beyond the coefficients: root mean square of illuminance over all directions, share of its mean.
     pub truncation: f64,
 }
 
-/// The directions and their weights, which add to 1.
+/// The directions and their weights, which sum to 1.
 pub fn directions() -> [(DVec3, f64); DIRECTIONS] {
     let mut all = [(DVec3::ZERO, 0.0); DIRECTIONS];
     let axes = [DVec3::X, DVec3::Y, DVec3::Z];
@@ -60,7 +60,7 @@ pub fn directions() -> [(DVec3, f64); DIRECTIONS] {
     };
     for axis in axes {
         add(axis, 1.0 / 21.0);
-        // Without zeros below zero: directions of rays about a normal depend on their sign.
+        // Avoid negative zeros: directions of rays about a normal depend on their sign.
         add(DVec3::ZERO - axis, 1.0 / 21.0);
     }
     for [a, b] in [[0, 1], [1, 2], [2, 0]] {
@@ -75,7 +75,7 @@ pub fn directions() -> [(DVec3, f64); DIRECTIONS] {
     all
 }
 
-/// Real spherical harmonics up to order 2, as three.js and others order and sign them.
+/// Real spherical harmonics up to order 2, in the order and with the signs of three.js and others.
 pub fn harmonics(n: DVec3) -> [f64; 9] {
     let DVec3 { x, y, z } = n;
     let root = |a: f64| (a / PI).sqrt();
@@ -93,7 +93,7 @@ pub fn harmonics(n: DVec3) -> [f64; 9] {
     ]
 }
 
-/// What turns a coefficient of radiance into one of irradiance.
+/// Factor from a coefficient of radiance to one of irradiance.
 fn cosine(k: usize) -> f64 {
     match k {
         0 => PI,
@@ -103,7 +103,7 @@ fn cosine(k: usize) -> f64 {
 }
 
 impl Around {
-    /// From irradiance to the 26 [`directions`].
+    /// From irradiance in the 26 [`directions`].
     pub fn new(irradiance: &[Xyz; DIRECTIONS]) -> Self {
         let mut sh = [[0.0; 3]; 9];
         for ((way, weight), e) in directions().into_iter().zip(irradiance) {
@@ -118,7 +118,7 @@ impl Around {
         }
     }
 
-    /// Irradiance of a surface that looks to `n`, as the coefficients tell it.
+    /// Irradiance of a surface with normal `n`, from the coefficients.
     pub fn irradiance(&self, n: DVec3) -> Xyz {
         let basis = harmonics(n);
         [0, 1, 2].map(|c| (0..9).map(|k| cosine(k) * basis[k] * self.sh[k][c]).sum())
@@ -138,7 +138,7 @@ impl Around {
 }
 
 impl Bake {
-    /// Light at points in the air (world space). Points in something solid or outside of the room are told apart and dark.
+    /// Light at points in the air (world space). Points inside something solid or outside the room are marked, and dark.
     ///
     /// ```
     /// use glam::DVec3;
@@ -161,13 +161,13 @@ impl Bake {
     }
 
     fn air_of(&self, points: &[DVec3], layers: &[LayerLanes]) -> Vec<Air> {
-        // Looked at from the points themselves.
+        // Seen from the points themselves.
         let aimless: Vec<(DVec3, DVec3)> = points.iter().map(|&p| (p, DVec3::ZERO)).collect();
         let places = places(self.scene(), &aimless);
         let directions = directions();
         let looking = |(point, _): (&DVec3, &Place)| {
             let spot = self.spot(*point, |_| true);
-            // One pattern for all: neighbours err alike, and that does not show.
+            // One pattern for all: neighbours err alike, which does not show.
             directions.map(|(normal, _)| self.receiver_at(&spot, normal, 0))
         };
         let receivers: Vec<Receiver> = (points.par_iter().zip(&places))
@@ -266,9 +266,9 @@ mod tests {
         assert!((around.irradiance(toward)[1] - PI).abs() < 1e-12);
     }
 
-    /// Of a lamp without extent, E = max(0, cos), coefficients are Y in its direction. Orders 6 and more of E, which the quadrature
-    /// takes for lower ones, put order 2 off the most where the lamp lies on an axis: there the rule has
-    /// 1/21 + 4 (4/105) / sqrt(2) / 4 = .07456 for the mean of c (3 c^2 - 1) / 2 over the lit half, which is 1/16: 19.3 %.
+    /// For a lamp without extent, E = max(0, cos), the coefficients are Y in its direction. Orders 6 and more of E, which the
+    /// quadrature takes for lower ones, put order 2 off the most where the lamp lies on an axis: there the rule has 1/21 + 4
+    /// (4/105) / sqrt(2) / 4 = .07456 for the mean of c (3 c^2 - 1) / 2 over the lit half, which is 1/16: 19.3 %.
     #[test]
     fn a_lamp_is_its_direction() {
         for toward in [

@@ -12,36 +12,37 @@ use crate::transport::Receiver;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Vertices are drawn this far into the triangle they belong to: a point on an edge lies on the neighbouring wall too.
+/// Vertices are moved this far into the triangle they belong to: a point on an edge also lies on the neighbouring wall.
 const INSET: f64 = 2e-3;
 /// Texels nearer to an edge than this share of the room's half diagonal (1 mm in a room of 20 m), or than vertices would be, are
-/// drawn that far into the triangle.
+/// moved that far into the triangle.
 const TEXEL_INSET: f64 = 1e-4;
-/// The baked mesh and what it took.
+/// The baked mesh, and what it took.
 #[derive(Debug, Default)]
 pub struct Baked {
-    /// One entry a side of a surface.
+    /// One entry for each side of a surface.
     pub surfaces: Vec<BakedSurface>,
     /// Irradiance rows of all vertices, surface by surface, in order.
     pub irradiance: Vec<Vec<[f32; 64]>>,
-    /// The vertices in the same order with where their light comes from, if that is kept.
+    /// The vertices in the same order, with where their light comes from, if kept.
     pub(crate) kept: Vec<Vec<KeptVertex>>,
-    /// Vertices that something solid covers: they got their neighbours' light.
+    /// Vertices that something solid covers: they have their neighbours' light.
     pub covered: usize,
-    /// Triangles that wanted to be finer when the limits were met.
+    /// Triangles that were to be divided further when the limits were reached.
     pub capped: usize,
     /// Triangle of [`Mesh`](crate::hierarchy::Mesh) that each triangle is part of; empty after relighting.
     pub of: Vec<Vec<u32>>,
-    /// How far light between vertices is from what looking there shows; none in a sketch and after relighting.
+    /// How far light between vertices is from what gathering there finds; none in a sketch and after relighting.
     pub interpolation: Option<Interpolation>,
-    /// The same for each layer by itself, under the adaptation white of the whole; none without layers, and of maps.
+    /// `interpolation` for each layer by itself, under the adaptation white of the whole; empty without layers, and for
+    /// maps.
     pub layers: Vec<Interpolation>,
     /// Visibility rays cast.
     pub rays: u64,
 }
 
-/// How far light between the vertices of a file is from what looking there shows: colour differences (CIEDE2000 of a white
-/// surface's light under the adaptation white) at random points by area, those left out that something covers.
+/// How far light between the vertices of a file is from what gathering there finds: colour differences (CIEDE2000 of a
+/// white surface's light under the adaptation white) at random points by area, covered points left out.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct Interpolation {
@@ -51,29 +52,29 @@ pub struct Interpolation {
     pub mean: f64,
     /// Value that 95 % of the points do not exceed.
     pub p95: f64,
-    /// Root of the mean variance of a look, which is not counted.
+    /// Root of the mean variance of gathered light, which is not counted.
     pub noise: f64,
     /// Points.
     pub points: usize,
-    /// What the mean may be: its share of the error asked for, which is a mean too.
+    /// What the mean may be: its share of the error asked for, which is also a mean.
     pub allowed: f64,
-    /// Vertices that are allowed, if it got as many.
+    /// The number of vertices allowed, if the mesh has reached it.
     pub capped: Option<usize>,
 }
 
 impl Interpolation {
-    /// Is it as small as it has to be?
+    /// Is the mean within what is allowed?
     pub fn is_met(&self) -> bool {
         self.mean <= self.allowed
     }
 }
 
-/// A vertex of the output on the mesh, with where its light comes from; none if something covers it.
+/// A vertex of the output on the mesh, with where its light comes from; none if something covers the vertex.
 #[derive(Debug)]
 pub(crate) struct KeptVertex {
     pub(crate) triangle: u32,
     pub(crate) weights: [f64; 3],
-    /// What its light is multiplied by, so that lines to its neighbours are right in the mean.
+    /// Factor of the vertex's light, so that lines to its neighbours are right on average.
     pub(crate) factor: f32,
     pub(crate) trace: Option<Box<[u8]>>,
 }
@@ -81,7 +82,7 @@ pub(crate) struct KeptVertex {
 /// A vertex on the mesh.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Vertex {
-    /// Triangle of the mesh that it is described on, and weights of its corners.
+    /// Triangle of the mesh that the vertex is described on, and weights of its corners.
     pub(crate) triangle: u32,
     pub(crate) weights: [f64; 3],
     /// Entry of the face in the hierarchy.
@@ -94,7 +95,7 @@ impl Bake {
         self.mesh().at(vertex.triangle as usize, vertex.weights)
     }
 
-    /// The place of a vertex, drawn into its triangle, with its shading normal.
+    /// The place of a vertex, moved into its triangle, with its shading normal.
     pub(crate) fn receiver(&self, vertex: &Vertex, surface: usize, back: bool) -> Receiver {
         let inner = vertex.weights.map(|w| w * (1.0 - INSET) + INSET / 3.0);
         self.facing(vertex, inner, surface, back)
@@ -107,7 +108,7 @@ impl Bake {
             mesh.triangles[vertex.triangle as usize].map(|p| mesh.positions[p as usize]);
         let twice = 2.0 * mesh.area[vertex.triangle as usize];
         let distance = TEXEL_INSET * mesh.half_size;
-        // Weight of a corner at that distance from the edge opposite to it.
+        // Weight of a corner at that distance from the opposite edge.
         let least = [c - b, a - c, b - a].map(|edge| {
             let share = distance * edge.length() / twice;
             if share < INSET / 3.0 {
@@ -139,7 +140,7 @@ impl Bake {
                     .sum();
                 let sum = if back { -sum } else { sum };
                 let shading = sum.normalize_or(flat);
-                // A shading normal that looks behind its own triangle is an error of the file.
+                // A shading normal that points behind its own triangle is an error of the file.
                 if shading.dot(flat) > 0.0 {
                     shading
                 } else {
@@ -162,18 +163,18 @@ impl Bake {
             normal,
             plane: mesh.plane[triangle],
             leaf,
-            // One pattern of rays for all: neighbours err alike, and that does not show.
+            // One pattern of rays for all: neighbours err alike, which does not show.
             seed: 0,
         }
     }
 
-    /// How each material of the scene turns irradiance into what is seen.
+    /// How each material of the scene turns irradiance into visible light.
     pub(crate) fn looks<'a>(&self, upsampler: &'a Upsampler) -> Vec<Look<'a>> {
         let materials = self.scene().materials.iter();
         materials.map(|m| Look::new(self, m, upsampler)).collect()
     }
 
-    /// What a vertex gives out by itself; none of surfaces that do not shine.
+    /// Emission at a vertex; none on surfaces that do not emit.
     pub(super) fn glow(&self, vertex: &Vertex, back: bool, look: &Look) -> Option<&[f32]> {
         if !look.emits || vertex.entry == crate::hierarchy::NONE {
             return None;
@@ -187,7 +188,7 @@ impl Bake {
         Some(self.light().emitted.row(leaf as usize))
     }
 
-    /// What a vertex shows.
+    /// The visible light of a vertex.
     pub(crate) fn vertex(
         &self,
         vertex: &Vertex,
@@ -221,27 +222,27 @@ impl Bake {
     }
 }
 
-/// How a material turns irradiance into what is seen.
+/// How a material turns irradiance into visible light.
 pub(crate) struct Look<'a> {
-    /// Reflectance on the leaves, vertex colours apart; of diffuse sheets with the transmittance.
+    /// Reflectance on the spectral leaves, without vertex colours; for diffuse sheets including the transmittance.
     reflectance: Leaves,
-    /// Transmittance, and what share of the base colour is reflected beside it.
+    /// Transmittance, and the share of the base colour that is reflected besides.
     through: Option<(Leaves, f64)>,
     /// Base colour with the texture's mean, where vertex colours multiply it.
     base: Option<[f32; 3]>,
     upsampler: &'a Upsampler,
-    /// Tristimulus radiosity for a unit of each lane's irradiance, with what fluoresces.
+    /// Tristimulus radiosity per unit of each lane's irradiance, fluorescence included.
     reflected: Vec<[f64; 3]>,
-    /// What fluoresces, and its tristimulus radiosity for a unit of each lane's irradiance.
+    /// The fluorescence, and its tristimulus radiosity per unit of each lane's irradiance.
     fluorescent: Option<(Fluorescent, Vec<[f64; 3]>)>,
-    /// Greatest reflectance beside it.
+    /// Greatest reflectance that fluorescence leaves room for.
     room: Option<Leaves>,
     /// Mean colour of the texture, which the display multiplies again.
     pub(super) unpainted: Option<[f64; 3]>,
     emits: bool,
-    /// Light spectrum that it emits.
+    /// Light spectrum of the emission.
     pub(super) light: Option<usize>,
-    /// Exitance that a lamp with a profile is shown with.
+    /// Exitance with which a lamp with a profile is shown.
     pub(super) shown: Option<[f64; 3]>,
 }
 
@@ -289,7 +290,7 @@ impl<'a> Look<'a> {
         look
     }
 
-    /// A reflectance, no greater than what fluoresces leaves.
+    /// A reflectance, limited to what fluorescence leaves room for.
     fn beside(&self, reflectance: Leaves) -> Leaves {
         match &self.room {
             Some(room) => std::array::from_fn(|k| reflectance[k].min(room[k])),
@@ -297,7 +298,7 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// Tristimulus radiosity for a unit of each lane's irradiance, of a reflectance and of what fluoresces.
+    /// Tristimulus radiosity per unit of each lane's irradiance, for a reflectance and fluorescence.
     fn sent(&self, lanes: &Lanes, reflectance: &Leaves) -> Vec<[f64; 3]> {
         let mut all = lanes.reflected(reflectance);
         for (all, more) in all
@@ -309,30 +310,30 @@ impl<'a> Look<'a> {
         all
     }
 
-    /// Spectral exitance of what fluoresces under a row of irradiance, W/m2/nm; none where nothing does.
+    /// Spectral exitance of fluorescence under a row of irradiance, W/m2/nm; none where nothing fluoresces.
     pub(super) fn fluoresced(&self, lanes: &Lanes, row: &[f32; 64]) -> Option<Leaves> {
         let (fluorescent, _) = self.fluorescent.as_ref()?;
         Some(fluorescent.leaves(lanes, row))
     }
 
-    /// Tristimulus radiosity that is reflected of a row of irradiance, vertex colours apart.
+    /// Tristimulus radiosity of a row of irradiance, without vertex colours.
     pub(super) fn reflect(&self, row: &[f32; 64]) -> [f64; 3] {
         weighed(row, &self.reflected)
     }
 
-    /// Reflectance on the leaves, of a texture its mean; vertex colours apart.
+    /// Reflectance on the spectral leaves, for a texture its mean; without vertex colours.
     pub(crate) fn reflectance(&self) -> &Leaves {
         &self.reflectance
     }
 
-    /// Reflectance at a vertex that vertex colours paint; none elsewhere.
+    /// Reflectance at a vertex where vertex colours apply; none elsewhere.
     fn painted(&self, surface: &Surface, vertex: &BakedVertex) -> Option<Leaves> {
         let base = self.base.filter(|_| surface.colors.is_some())?;
         let color = refined_mesh::vertex_color(surface, vertex);
         let color = std::array::from_fn(|c| base[c] * color[c]);
         let painted = self.upsampler.reflectance_fast(color);
         Some(match &self.through {
-            // Vertex colours paint what is reflected.
+            // Vertex colours change only what is reflected.
             Some((through, left)) => std::array::from_fn(|k| through[k] + left * painted[k]),
             None => self.beside(painted),
         })
@@ -344,8 +345,8 @@ impl<'a> Look<'a> {
     }
 }
 
-/// Gives covered vertices the mean of their neighbours, ring by ring; returns how many there were. What no light surrounds
-/// stays dark.
+/// Gives covered vertices the mean of their neighbours, ring by ring; returns how many there were. A vertex with no light
+/// around it stays dark.
 pub(crate) fn lend(rows: &mut [Option<[f32; 64]>], triangles: &[[u32; 3]]) -> usize {
     let mut count = None;
     loop {

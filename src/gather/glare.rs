@@ -1,7 +1,8 @@
-//! What glares at a viewpoint: luminaires as an eye sees them, before the background that the light of the room makes.
+//! Glare at a viewpoint: luminaires as an eye sees them, before the background that the light of the room makes.
 //!
-//! Lamps are cut until their parts look small and a ray tells of each whether it is seen; luminances are those of the lamps
-//! themselves and known. The background is the light that reaches the eye by way of other things, and the sky, over pi.
+//! Lamps are divided until their parts look small, and a ray tells of each part whether it is visible; luminances are those
+//! of the lamps themselves, which are known. The background is the light that reaches the eye from other surfaces, and from
+//! the sky, over pi.
 
 use crate::color::{Bright, position_index, unified_glare_rating};
 use crate::geometry::{NO_PLANE, Segment, quarters};
@@ -14,32 +15,32 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Parts are cut until they look this large, radians: position indices of neighbours then differ by 2 % at the most.
+/// Size of parts as seen by the eye, radians: position indices of neighbours then differ by 2 % at the most.
 const PART: f64 = 0.02;
-/// But no more often than this: a lamp before one's nose ends in 4^6 parts.
+/// Divisions at the most: a lamp right before the eye ends in 4^6 parts.
 const CUTS: u32 = 6;
-/// Rays end so far before a lamp, share of half the room: f32 positions are off by 1e-7 of it.
+/// Distance before a lamp at which rays end, share of the room's half size: f32 positions are off by 1e-7 of that.
 const BEFORE: f64 = 1e-5;
 
-/// What glares at a viewpoint.
+/// Glare at a viewpoint.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Glare {
     /// Luminance of the background, cd/m2.
     pub background: f64,
-    /// Luminaires that are seen, by the names of their nodes or lights.
+    /// Visible luminaires, by the names of their nodes or lights.
     pub luminaires: Vec<(String, Bright)>,
     /// The unified glare rating; none where the background is black, negative infinity where no luminaire is seen.
     pub rating: Option<f64>,
-    /// What has no part in it: lights without extent, which have no luminance; the sun; the sky where its light is not kept apart;
-    /// what panes take; what mirrors show.
+    /// What the rating leaves out: lights without extent, which have no luminance; the sun; the sky where its light is not kept
+    /// apart; what panes absorb; what mirrors show.
     pub left_out: Vec<String>,
 }
 
 /// An eye.
 struct Eye<'a> {
     sight: &'a Sight<'a>,
-    /// Recentred.
+    /// Position, recentred.
     at: DVec3,
     forward: DVec3,
     up: DVec3,
@@ -55,7 +56,7 @@ impl Eye<'_> {
                 .blocks_one(&Segment::new(self.at, place, [NO_PLANE; 2]))
     }
 
-    /// Adds what is seen of a triangle whose luminance towards the eye, in a unit direction, is known.
+    /// Adds the visible part of a triangle whose luminance is known for any unit direction towards the eye.
     fn add(&self, triangle: [DVec3; 3], luminance: &impl Fn(DVec3) -> f64, out: &mut Bright) {
         let [a, b, c] = triangle;
         let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -89,8 +90,8 @@ fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
 }
 
 impl Bake {
-    /// What glares at an eye in world space that looks in a direction; both as `probe` takes points and normals. Heads are upright
-    /// (+Y), and of one who looks straight up or down towards -Z.
+    /// Glare for an eye in world space that looks in a direction; both as points and normals for `probe`. Heads are upright (+Y);
+    /// the top of one that looks straight up or down points to -Z.
     pub fn glare(&self, eye: DVec3, direction: DVec3) -> Glare {
         let forward = direction.normalize_or_zero();
         let across = |up: DVec3| (up - forward * forward.dot(up)).try_normalize();
@@ -124,7 +125,7 @@ impl Bake {
         let gathered = self.gather_at(&[(eye, forward)]).swap_remove(0);
         let lights = &self.scene().lights;
         let sky = lights.iter().find(|l| matches!(l.kind, LightKind::Sky(_)));
-        // Rows keep apart light of several spectra, not lamps: a lamp of the sky's spectrum cannot be told from it.
+        // Rows separate spectra, not lamps: a lamp with the sky's spectrum cannot be told from the sky.
         let own = |sky: &&PunctualLight| {
             let mut others = lights
                 .iter()
@@ -159,7 +160,7 @@ impl Bake {
         self.lanes().tristimulus(&row)[1] / PI
     }
 
-    /// Surfaces that shine alike in all directions.
+    /// Surfaces that emit evenly in all directions.
     fn surfaces_seen(&self, eye: &Eye) -> Vec<(String, Bright)> {
         let (tree, mesh, light) = (self.tree(), self.mesh(), self.light());
         if light.emitted.is_empty() {

@@ -1,5 +1,5 @@
-//! The light of each layer of lamps (see `scene::layers`): rows hold every light spectrum by itself, a layer is some of
-//! their lanes. So the layers of a vertex are parts of one sum, and add up to it but for rounding.
+//! The light of each layer of lamps (see `scene::layers`): rows hold every light spectrum separately, and a layer is
+//! some of their lanes. So the layers of a vertex are parts of one sum, and add up to it but for rounding.
 
 use super::bake::{Look, Vertex};
 use crate::color::LinearSrgb;
@@ -7,7 +7,7 @@ use crate::light::lanes::Lane;
 use crate::scene::layers::Layers;
 use crate::solve::Bake;
 
-/// Which lanes of a row are a layer's.
+/// The lanes of a row that belong to a layer.
 #[derive(Debug, Clone)]
 pub(crate) struct LayerLanes([bool; 64]);
 
@@ -23,7 +23,7 @@ impl LayerLanes {
 }
 
 impl Bake {
-    /// The layers of the room, if its lamps were parted and rows hold them by themselves.
+    /// The layers of the room, if its lamps were divided into layers and rows hold these separately.
     pub fn layers(&self) -> Option<&Layers> {
         let layers = self.scene().changes.layers.as_ref()?;
         self.lanes().is_ratio().then_some(layers)
@@ -44,8 +44,8 @@ impl Bake {
             .collect()
     }
 
-    /// Adds what each layer shows at a vertex, as [`BakedVertex::light`](super::BakedVertex::light), to those of a surface,
-    /// layer by layer.
+    /// Appends the light of each layer at a vertex, as in [`BakedVertex::light`](super::BakedVertex::light), to
+    /// `shown`, layer by layer.
     pub(crate) fn add_layers(
         &self,
         layers: &[LayerLanes],
@@ -70,7 +70,7 @@ impl Bake {
         let glow = match (self.glow(vertex, back, look), look.shown) {
             (None, _) => [0.0; 3],
             (Some(own), None) => self.lanes().tristimulus(&lanes.of(own)),
-            // Shown by a profile: all of it is of one lamp.
+            // Shown by a profile: all its light comes from one lamp.
             (Some(_), Some(shown)) => {
                 let layer = look.light.zip(self.layers());
                 let own = layer.is_some_and(|(light, layers)| layers.of_light[light] == k);

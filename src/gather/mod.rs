@@ -1,4 +1,4 @@
-//! What the light looks like at points and at the vertices of the refined mesh.
+//! The light at points and at the vertices of the refined mesh.
 
 pub mod air;
 mod bake;
@@ -24,16 +24,16 @@ pub use working_plane::WorkingPlane;
 pub struct BakedSurface {
     /// Index in `Scene::surfaces`.
     pub surface: usize,
-    /// Is this the back of a two-sided surface? Its triangles are turned, its normals point the other way.
+    /// Is this the back of a two-sided surface? Then its triangles are reversed, and its normals point the other way.
     pub back: bool,
     /// Vertices as points of input triangles: attributes are interpolated with these weights.
     pub vertices: Vec<BakedVertex>,
     /// Triangles, counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// For each layer (see [`Layers`](crate::scene::layers::Layers)) what [`BakedVertex::light`] has of it, vertex by vertex; none
+    /// For each layer (see [`Layers`](crate::scene::layers::Layers)) its part of [`BakedVertex::light`], vertex by vertex; empty
     /// without layers.
     pub layers: Vec<Vec<[f32; 3]>>,
-    /// Where its light stands in light maps; none: at its vertices.
+    /// Where the light of this mesh is in light maps; none: it is at the vertices.
     pub map: Option<MapPlace>,
 }
 
@@ -53,12 +53,12 @@ pub struct BakedVertex {
     pub triangle: u32,
     /// Barycentric weights of the triangle's three corners, each in [0, 1], sum 1.
     pub weights: [f64; 3],
-    /// Tristimulus irradiance on the front (Km = 683 lm/W: Y is lux); of diffuse sheets with the light behind them, as it is shown
+    /// Tristimulus irradiance on the front (Km = 683 lm/W: Y is lux); on diffuse sheets including the light behind, as shown
     /// ([`Through`](crate::light::Through)).
     pub irradiance: [f32; 3],
     /// Tristimulus radiosity that leaves the front, own emission included, in lm/m2 (Y); radiance is this over pi.
     pub radiosity: [f32; 3],
-    /// The same radiosity divided by the paint's texture and vertex colour where there is one: linear sRGB, lm/m2.
-    /// Times the texture (and vertex colour) this shows the radiosity. Equal to the radiosity's colour where there is none.
+    /// This radiosity divided by the paint's texture and vertex colour where there are any: linear sRGB, lm/m2. Times the
+    /// texture (and vertex colour) it shows the radiosity. Where there are none it is the radiosity's colour.
     pub light: [f32; 3],
 }

@@ -1,12 +1,12 @@
-//! The light of any point: on a face, whose links then serve it, or in the air.
+//! The light at any point: on a face, whose links are then used, or in the air.
 
 use crate::solve::{Bake, weights_of};
 use crate::spectrum::{LEAVES, Leaves};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 
-/// Probes nearer to an edge than this share of a triangle's height are drawn that far into it: a point on an edge lies on the
-/// neighbouring wall too.
+/// Probes nearer to an edge than this share of a triangle's height are moved that far into it: a point on an edge also lies
+/// on the neighbouring wall.
 const PROBE_INSET: f64 = 1e-5;
 
 /// Light at any point, for probes.
@@ -15,7 +15,7 @@ const PROBE_INSET: f64 = 1e-5;
 pub struct Probed {
     /// Tristimulus irradiance; Y is lux.
     pub xyz: [f64; 3],
-    /// Irradiance on the 64 leaves, W/m2/nm.
+    /// Irradiance on the 64 spectral leaves, W/m2/nm.
     pub leaves: Leaves,
     /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`](super::MOSTLY) a vertex there counts as covered.
     pub backs: f64,
@@ -23,7 +23,7 @@ pub struct Probed {
 
 /// A point and the faces that it lies on.
 pub(super) struct Spot {
-    /// Recentred.
+    /// Position, recentred.
     point: DVec3,
     /// Entries of the faces, and weights of their corners.
     faces: Vec<(u32, [f64; 3])>,
@@ -44,7 +44,8 @@ impl Bake {
         }
     }
 
-    /// The same, and the illuminance by the sky without sun and lamps, lx; none where rows do not keep it apart from other light.
+    /// [`Self::probe`], and the illuminance by the sky without sun and lamps, lx; none where rows do not separate it from other
+    /// light.
     pub fn probe_with_sky(&self, points: &[(DVec3, DVec3)]) -> (Vec<Probed>, Option<Vec<f64>>) {
         let gathered = self.gather_at(points);
         let sky = self.lanes_of_sky().map(|own| {
@@ -61,7 +62,7 @@ impl Bake {
         (probed, sky)
     }
 
-    /// Which lanes hold light of the sky; none where some hold other light too, and without a sky.
+    /// The lanes that hold light of the sky; none where some also hold other light, and without a sky.
     fn lanes_of_sky(&self) -> Option<[bool; LEAVES]> {
         let scene = self.scene();
         scene.sky.as_ref()?;
@@ -91,7 +92,7 @@ impl Bake {
         self.gather(&receivers)
     }
 
-    /// Finds the faces that a point in world space lies on, of those whose normals are `wanted`.
+    /// Finds the faces that a point in world space lies on, among those whose normals are `wanted`.
     pub(super) fn spot(&self, point: DVec3, wanted: impl Fn(DVec3) -> bool) -> Spot {
         let (mesh, tree) = (self.mesh(), self.tree());
         let point = point - mesh.centre;
@@ -112,7 +113,8 @@ impl Bake {
         Spot { point, faces }
     }
 
-    /// Looks from a spot along a normal: from its face, if that looks the same way; a point in the air looks at the whole room.
+    /// A receiver at a spot with a normal: on its face, if that has the same normal; a point in the air receives from the whole
+    /// room.
     pub(super) fn receiver_at(&self, spot: &Spot, normal: DVec3, seed: u64) -> Receiver {
         let (mesh, tree) = (self.mesh(), self.tree());
         let agrees =
@@ -127,7 +129,7 @@ impl Bake {
             };
         };
         let w = w.map(|x| x.max(0.0));
-        // On an edge the point would lie in the neighbouring wall too, and see past it.
+        // On an edge the point would also lie in the neighbouring wall, and see past it.
         let edge = w.iter().any(|&x| x < PROBE_INSET);
         let (w, point) = if edge {
             let [a, b, c] = mesh.corners(tree.faces[entry as usize]);
@@ -146,7 +148,7 @@ impl Bake {
     }
 }
 
-/// Does a face look the way of a normal?
+/// Is a face's normal along `normal`?
 fn looks_along(face: DVec3, normal: DVec3) -> bool {
     face.dot(normal) >= 1.0 - 1e-6
 }

@@ -9,7 +9,7 @@ use crate::scene::{Scene, Surface};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
-/// Checks that every index of a refined mesh points at something and that every number is one.
+/// Checks that every index of a refined mesh is in range and that every number is finite.
 ///
 /// # Errors
 /// An internal fault: the mesh comes from this program. All writers call this first and may index freely afterwards.
@@ -76,8 +76,8 @@ pub fn position(surface: &Surface, vertex: &BakedVertex) -> DVec3 {
     u * a + v * b + w * c
 }
 
-/// Shading normal in world space, unit length, out of the side that the sheet shows: the interpolated one, else the
-/// input triangle's.
+/// Shading normal in world space, unit length, on the side that the surface shows: the interpolated one, else that of
+/// the input triangle.
 pub fn normal(surface: &Surface, baked: &BakedSurface, vertex: &BakedVertex) -> DVec3 {
     let corners = corners(surface, vertex);
     let [a, b, c] = corners.map(|c| surface.positions[c]);
@@ -95,8 +95,8 @@ pub fn normal(surface: &Surface, baked: &BakedSurface, vertex: &BakedVertex) -> 
     if baked.back { -front } else { front }
 }
 
-/// Unit normals of the sheet itself at its vertices, out of the side that it shows: means over the triangles that meet at a
-/// place, by area, so that equal places have equal ones. Zero where they cancel.
+/// Unit normals of the refined mesh itself at its vertices, on the side that it shows: means by area over the triangles
+/// that meet at a place, so that equal places have equal ones. Zero where they cancel.
 pub fn outward(surface: &Surface, baked: &BakedSurface) -> Vec<DVec3> {
     // Adding zero turns -0 into +0.
     let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
@@ -115,7 +115,7 @@ pub fn outward(surface: &Surface, baked: &BakedSurface) -> Vec<DVec3> {
     places.iter().map(|p| sum(p).normalize_or_zero()).collect()
 }
 
-/// Interpolates four-component vertex data; vertices beyond its end count as `missing`.
+/// Interpolates four-component vertex data; vertices beyond the end of `data` count as `missing`.
 pub(crate) fn vec4(
     surface: &Surface,
     vertex: &BakedVertex,

@@ -1,4 +1,4 @@
-//! The light of points of surfaces as it is shown: on diffuse sheets, with what passes from behind.
+//! The light at points of surfaces as shown: on diffuse sheets, including the light that passes from behind.
 
 use crate::hierarchy::NONE;
 use crate::light::mixed;
@@ -6,7 +6,7 @@ use crate::solve::{Bake, Care};
 use crate::transport::{Gathered, Receiver, trace};
 
 impl Bake {
-    /// Gathers at points of surfaces, in order; where these are diffuse sheets also behind them, see [`Through`](crate::light::Through).
+    /// Gathers at points of surfaces, in order; for points of diffuse sheets also behind these, see [`Through`](crate::light::Through).
     pub(crate) fn gather_shown(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
         let mut gathered = self.gather_with(receivers, care);
         let behind: Vec<(usize, u32, Receiver)> = (receivers.iter().enumerate())
@@ -22,7 +22,8 @@ impl Bake {
             };
             let shown = &mut gathered[*k];
             mixed(shares, &mut shown.irradiance, &other.irradiance);
-            // What passes a sheet has arrived by way of it: who keeps the lamps lights a side from its own side alone.
+            // Direct light stays that of the side itself: an engine that keeps its lamps lights a side only from that
+            // side.
             mixed(shares, &mut shown.direct, &[0.0; 64]);
             shown.rays += other.rays;
             if let (Some(own), Some(other)) = (&shown.packed, &other.packed) {
@@ -32,7 +33,7 @@ impl Bake {
         gathered
     }
 
-    /// The place of the leaf of a point of a sheet among the leaves of the solution, and the point behind it.
+    /// For a point on a sheet: the position of its leaf among the leaves of the solution, and the point behind.
     fn behind(&self, to: &Receiver) -> Option<(u32, Receiver)> {
         let leaf = to.leaf?;
         let place = self.place_on_sheet(leaf)?;
@@ -44,7 +45,7 @@ impl Bake {
         Some((place, other))
     }
 
-    /// The place of a leaf among the leaves of the solution, if it is one of a sheet.
+    /// The position of a leaf among the leaves of the solution, if the leaf belongs to a sheet.
     pub(crate) fn place_on_sheet(&self, leaf: u32) -> Option<u32> {
         let light = self.light();
         if light.through.is_empty() || self.tree().behind(leaf) == NONE {

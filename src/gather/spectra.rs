@@ -1,4 +1,4 @@
-//! Spectra at the vertices of the refined mesh: `B(leaf) = rho(leaf) H(leaf) + pi L(leaf)`, W/m2/nm, and what fluoresces.
+//! Spectra at the vertices of the refined mesh: `B(leaf) = rho(leaf) H(leaf) + pi L(leaf)`, W/m2/nm, plus fluorescence.
 //!
 //! The reflectance is the one behind [`BakedVertex::radiosity`](super::BakedVertex::radiosity): a paint texture enters
 //! with its mean colour. An emissive texture is looked up at the vertex.
@@ -15,12 +15,13 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 impl Bake {
-    /// Radiosity on the 64 leaves at every vertex, W/m2/nm, surface by surface, own emission included.
+    /// Radiosity on the 64 spectral leaves at every vertex, W/m2/nm, surface by surface, own emission included.
     pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
         self.spectra_of(baked, None)
     }
 
-    /// Of which by layer `k` of [`Bake::layers`]: those of all layers add up to the whole. Nothing where there is no such layer.
+    /// The part of this radiosity that is due to layer `k` of [`Bake::layers`]: all layers add up to the whole. Empty where
+    /// there is no such layer.
     pub fn layer_spectra(&self, baked: &Baked, k: usize) -> Vec<Vec<[f32; LEAVES]>> {
         match self.layer_lanes().get(k) {
             Some(lanes) => self.spectra_of(baked, Some((k, lanes))),

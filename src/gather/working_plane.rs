@@ -1,10 +1,10 @@
-//! Points by which the light of a whole room is told: a horizontal grid over its floor.
+//! Points that represent the light of a whole room: a horizontal grid over its floor.
 //!
-//! The floor is the lowest large level of what looks up and is lit: faces within [`LEVEL`] of each other are one level, and one is large if
-//! it has [`LARGE`] of the area that the largest has. So a table is no floor, and a hollow that hardly any light reaches is none, see [`DARK`].
-//! Nor is the ground outside: where enough of what looks up has something above it, the rest does not count. The grid has the
-//! same distance both ways and lies [`HEIGHT`] above the floor, as the reference plane of daylight does (EN 17037:2018); in rooms
-//! lower than twice that on the floor itself. No border along the walls is left out.
+//! The floor is the lowest large level of lit faces that look up: faces within [`LEVEL`] of each other are one level, and a level is large if
+//! it has [`LARGE`] of the area of the largest. So a table is not a floor, nor is a hollow that hardly any light reaches, see [`DARK`]. Nor is
+//! the ground outside: where enough of these faces have something above them, the rest do not count. The grid has the same spacing both ways
+//! and lies [`HEIGHT`] above the floor, like the reference plane of daylight (EN 17037:2018); in rooms lower than twice that, on the floor
+//! itself. No border along the walls is left out.
 
 use crate::geometry::{NO_PLANE, Segment};
 use crate::solve::Bake;
@@ -13,20 +13,20 @@ use std::collections::BTreeMap;
 
 /// Height of the plane above the floor, m.
 const HEIGHT: f64 = 0.85;
-/// Points, about.
+/// Rough number of points.
 const POINTS: f64 = 150.0;
-/// Points one way at the most: thin floors that run across have few for their size.
+/// Points in one direction at the most: thin floors that run diagonally have few for their size.
 const MOST: f64 = 200.0;
-/// Heights of one level, m.
+/// Height of one level, m.
 const LEVEL: f64 = 0.05;
-/// Ways between points run so far above them, share of half the room: some millimetres.
+/// Distance above points at which the ways between them run, share of the room's half size: some millimetres.
 const LIFT: f64 = 1e-3;
-/// What a level has of the area of the largest, to be a floor.
+/// Share of the largest level's area that makes a level a floor.
 const LARGE: f64 = 0.25;
 /// A level with less light than this share of the brightest lies in a hollow: where walls meet badly light leaks into the ground below a
-/// house, 5e-6 of that on the lawn (sun-room of the shared rooms); behind a daylight factor of .01 % nobody works.
+/// house, 5e-6 of the light on the lawn (sun-room of the shared rooms); nobody works at a daylight factor of .01 %.
 const DARK: f64 = 1e-4;
-/// Cosine of the slope up to which a face looks up, 2.6 degrees.
+/// Cosine of the greatest slope of a face that looks up, 2.6 degrees.
 const UP: f64 = 0.999;
 
 /// A horizontal grid of points over the floor of a room.
@@ -35,19 +35,19 @@ const UP: f64 = 0.999;
 pub struct WorkingPlane {
     /// Height of the floor in world space, m.
     pub floor: f64,
-    /// Height of the points above it, m: .85, or 0 in low rooms.
+    /// Height of the points above the floor, m: .85, or 0 in low rooms.
     pub height: f64,
     /// Distance between neighbours, m.
     pub spacing: f64,
-    /// Points in world space with their normals, which look up.
+    /// Points in world space with their normals, straight up.
     pub points: Vec<(DVec3, DVec3)>,
-    /// For each point the part of the plane that it lies in: from neighbour to neighbour of a part nothing is in the way. Parts of few
-    /// points lie in cupboards and pillars.
+    /// For each point the part of the plane that it lies in: nothing is between neighbours of a part. Parts of few points lie in
+    /// cupboards and pillars.
     pub parts: Vec<usize>,
 }
 
 impl Bake {
-    /// The working plane of the room; none where nothing that looks up is lit.
+    /// The working plane of the room; none where no face that looks up is lit.
     pub fn working_plane(&self) -> Option<WorkingPlane> {
         let mesh = self.mesh();
         let lit = self.lit_and_up();
@@ -57,7 +57,7 @@ impl Bake {
             let of = levels.entry(level(height_of(entry))).or_default();
             *of = [of[0] + area, of[1] + light];
         }
-        // Rounding may part what lies in one plane.
+        // Rounding may divide a single plane into two levels.
         let with_next = |k: i64| {
             let of = |k: i64| levels.get(&k).copied().unwrap_or_default();
             [0, 1].map(|x| of(k)[x] + of(k + 1)[x])
@@ -75,7 +75,7 @@ impl Bake {
         let all = large(levels.keys().copied().collect());
         let most = all.iter().map(brightness).fold(0.0, f64::max);
         let is_lit = |k: &i64| brightness(k) >= DARK * most;
-        // Without the hollows, which may be larger than the floor.
+        // Leave out hollows, which may be larger than the floor.
         let lit_levels = levels.keys().copied().filter(is_lit).collect();
         let lowest = large(lit_levels).into_iter().min()?;
         let of_floor = |entry: usize| (lowest..=lowest + 1).contains(&level(height_of(entry)));
@@ -116,10 +116,10 @@ impl Bake {
         })
     }
 
-    /// Which part each point of a grid lies in, by the number of the part's first point.
+    /// The part that each point of a grid lies in, as the index of the part's first point.
     fn parts(&self, keys: &[(i64, i64)], points: &[(DVec3, DVec3)]) -> Vec<usize> {
         let centre = self.mesh().centre;
-        // On the floor itself a way must not lie in it.
+        // On the floor itself, ways between points must not lie in it.
         let lift = LIFT * self.mesh().half_size * DVec3::Y;
         let place = |k: usize| points[k].0 - centre + lift;
         let numbers: BTreeMap<_, usize> = keys.iter().copied().zip(0..).collect();
@@ -142,8 +142,8 @@ impl Bake {
         parts
     }
 
-    /// Faces that look up, by their entry in the hierarchy, with the area of them that is lit and what meets it; only those with something
-    /// above them where they have [`LARGE`] of all the area.
+    /// Faces that look up, by their entry in the hierarchy, each with its lit area and the light on that; only those with something above
+    /// them where these have [`LARGE`] of all the area.
     fn lit_and_up(&self) -> BTreeMap<usize, [f64; 2]> {
         let (tree, arrival) = (self.tree(), &self.light().arrival);
         let mut lit: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
@@ -185,13 +185,13 @@ fn middle(corners: [DVec3; 3]) -> DVec3 {
     corners.iter().sum::<DVec3>() / 3.0
 }
 
-/// Which level a height is of.
+/// The level of a height.
 fn level(height: f64) -> i64 {
     (height / LEVEL).round() as i64
 }
 
-/// The distance of neighbours, m, and the places on triangles that a grid over them has, by row and column, the highest where there are several; `area` is
-/// that of all of them.
+/// The distance of neighbours, m, and the points of a grid over triangles by row and column, the highest where several triangles lie above each other;
+/// `area` is that of all triangles.
 fn grid(triangles: &[[DVec3; 3]], area: f64) -> (f64, impl Iterator<Item = ((i64, i64), DVec3)>) {
     let points = || triangles.iter().flatten();
     let low = points().fold(DVec3::INFINITY, |low, p| low.min(*p));
@@ -243,7 +243,7 @@ mod tests {
         for plane in [&cornell, &furnished] {
             let count = plane.points.len();
             assert!((100..=200).contains(&count), "{count}");
-            // With the rug.
+            // The floor with the rug.
             assert!((0.0..0.01).contains(&plane.floor), "{}", plane.floor);
             for (point, normal) in &plane.points {
                 let height = if plane.height > 0.0 { plane.floor } else { 0.0 } + plane.height;
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn places_lie_over_their_triangles() {
-        // An L of area 3.
+        // An L-shaped floor of area 3.
         let quad = |x: f64, z: f64| {
             let [a, b, c, d] = [[x, z], [x, z + 1.0], [x + 1.0, z + 1.0], [x + 1.0, z]]
                 .map(|[x, z]| dvec3(x, 0.0, z));

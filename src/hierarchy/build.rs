@@ -1,7 +1,7 @@
 //! Clusters of faces: a binary tree, split top down where surface area times normal spread falls most.
 //!
-//! The cost is the orientation-aware heuristic of Conty Estevez and Kulla (2018) on bins: a cluster is worth having
-//! when it is small *and* faces one way, because a link treats it as one diffuse patch with one mean normal.
+//! The cost is the orientation-aware heuristic of Conty Estevez and Kulla (2018) on bins: a cluster is good if it is
+//! small *and* faces one way, because a link treats it as one diffuse patch with one mean normal.
 
 use super::mesh::Mesh;
 use super::tree::{Element, NONE, Node, Tree};
@@ -74,8 +74,8 @@ impl Bounds {
 }
 
 impl Tree {
-    /// Builds the clusters over all faces of `mesh`; only the topmost hold faces of more than one of the `spaces`, which
-    /// name the space of each face.
+    /// Builds the clusters over all faces of `mesh`; only the topmost hold faces of more than one space. `spaces` has
+    /// the space of each face.
     pub fn new(mesh: &Mesh, spaces: &[u32]) -> Self {
         let mut items: Vec<Item> = mesh
             .faces
@@ -116,7 +116,7 @@ impl Tree {
             return tree;
         }
         tree.nodes.push(placeholder(NONE, 0, items.len()));
-        // A stack instead of recursion: depth is bounded by the number of faces only.
+        // A stack instead of recursion: depth is bounded only by the number of faces.
         let mut open = vec![0_u32];
         while let Some(id) = open.pop() {
             let (first, count) = (
@@ -158,14 +158,14 @@ fn placeholder(parent: u32, first: usize, count: usize) -> Node {
     }
 }
 
-/// Where to part items, in order of their spaces, of more than one space: between two of them, near the middle.
+/// Where to split items of several spaces, ordered by space: between two spaces, near the middle.
 fn between_spaces(items: &[Item]) -> Option<usize> {
     let (first, last) = (items.first()?.space, items.last()?.space);
     if first == last {
         return None;
     }
     let middle = items[items.len() / 2].space;
-    // Before the middle's space, or after it where that is the first of all.
+    // Before the middle item's space, or after this where it is the first of all.
     let before = items.partition_point(|item| item.space < middle);
     let after = items.partition_point(|item| item.space <= middle);
     Some(if before > 0 { before } else { after })
@@ -231,7 +231,7 @@ fn split(items: &mut [Item]) -> usize {
             return first;
         }
     }
-    // Everything in one place and facing one way: halve by order.
+    // All centres and normals are equal: halve by order.
     items.len() / 2
 }
 
@@ -253,7 +253,7 @@ fn finish(mesh: &Mesh, tree: &mut Tree) {
             tree.face_node[first] = id as u32;
             let normal = tree.face_normal[first];
             let area = tree.face_area[first + 1] - tree.face_area[first];
-            // The prefix sum loses digits for small faces; the mesh has the area itself.
+            // The prefix sum loses digits for small faces; the mesh has the exact area.
             let area = if area > 0.0 {
                 mesh.area[tree.faces[first].triangle as usize]
             } else {

@@ -1,22 +1,21 @@
-//! How much of each face counts as room, by where light lands.
+//! How much of each face counts as room, found by where light lands.
 //!
-//! Errors are averaged, points are watched and patches are refined by the area that counts: a plain around a house has a thousand times its
-//! area and none of its light. Light that goes from surface to surface lands everywhere in a room about evenly; where it lands
-//! less than [`DARK`] times as densely as usual, area counts in proportion, elsewhere all of it. So a dark corner of a room counts
-//! like the rest, and what no light reaches counts for nothing, the outsides of walls as well as the plain. Faces that lie in the room in
-//! part are split.
+//! Errors are averaged, points are watched and patches are refined by counted area: a plain around a house has a thousand times the area of
+//! the house and none of its light. Light that goes from surface to surface lands about evenly everywhere in a room; where it lands less
+//! than [`DARK`] times as densely as usual, area counts in proportion, elsewhere in full. So a dark corner of a room counts like the rest,
+//! and what no light reaches counts for nothing, the outsides of walls as well as the plain. Faces that lie partly in the room are split.
 
 use super::tree::{NONE, Tree, quarter};
 use crate::geometry::quarters;
 use crate::geometry::sampling::triangle_weights;
 use glam::DVec3;
 
-/// Where light lands at this share of the usual density, or more densely, all of the area counts.
+/// Share of the usual density of landings from which on area counts in full.
 const DARK: f64 = 0.02;
-/// Landings that what counts in full has at the least: parts that would have fewer are not told apart. Of light at four times the
+/// Least number of landings on a piece that just counts in full: smaller pieces are not distinguished. Of light at four times the
 /// least density less than one part in 10^11 is taken for darker than the least by chance (Poisson, 64 expected).
 const EVIDENCE: f64 = 16.0;
-/// Landings in a piece whose density is looked at.
+/// Landings in a piece whose density is determined.
 const PIECE: usize = 16;
 /// An element is split for its dark part only if that is more than this share of the room.
 const WORTH: f64 = 0.01;
@@ -24,28 +23,28 @@ const WORTH: f64 = 0.01;
 /// Where light landed: the entry of a face, and weights of its corners.
 pub(crate) type Landing = (u32, [f64; 3]);
 
-/// What of a hierarchy counts; empty where all does.
+/// How much of a hierarchy counts; empty where everything does.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Counted {
-    /// Elements that were split for it, in order.
+    /// Elements that were split for this, in order.
     pub(crate) splits: Vec<u32>,
-    /// Share of each node that then is a leaf, ascending; in [0, 1].
+    /// Share of each node that is a leaf after these splits, ascending; in [0, 1].
     pub(crate) shares: Vec<f32>,
 }
 
-/// What is being found out.
+/// The state of finding what counts.
 struct Finder {
-    /// Landings on the area that just counts in full, 1/m2.
+    /// Least density of landings that counts in full, 1/m2.
     full: f64,
     /// Dark parts below this area are not worth a split.
     worth: f64,
     splits: Vec<u32>,
-    /// Shares found so far by node; NaN where none is.
+    /// Shares found so far by node; NaN where none is known.
     shares: Vec<f32>,
 }
 
 impl Tree {
-    /// Finds what counts, and splits what lies in the room in part.
+    /// Finds what counts, and splits elements that lie partly in the room.
     pub(crate) fn count(&mut self, mut landings: Vec<Landing>) -> Counted {
         landings.sort_by_key(|landing| landing.0);
         let mut pieces = Vec::new();
@@ -77,10 +76,10 @@ impl Tree {
         }
     }
 
-    /// Lets only that count; the hierarchy is the one that it was found for, before or after it was split.
+    /// Lets only `counted` count; the hierarchy is the one it was found for, before or after its splits.
     pub(crate) fn weigh(&mut self, counted: &Counted) {
         for &id in &counted.splits {
-            // What is read from a file may name anything.
+            // A file may name any number.
             if (id as usize) < self.nodes.len() {
                 self.subdivide(id);
             }
@@ -117,7 +116,7 @@ impl Tree {
         self.node(id).counted / self.counted()
     }
 
-    /// The box about what counts for the larger part of it, recentred; none where nothing does.
+    /// The box around all leaves of which more than half counts, recentred; none where there are none.
     pub(crate) fn counted_box(&self) -> Option<[DVec3; 2]> {
         let nodes = self.leaves().map(|k| self.node(k));
         let some = nodes.filter(|node| node.counted > 0.5 * node.area);
@@ -125,8 +124,8 @@ impl Tree {
             .reduce(|[low, high], [a, b]| [low.min(a), high.max(b)])
     }
 
-    /// A random point by the area that counts, from a `share` of all that in [0, 1) and a point of the unit square: entry of a
-    /// face, and weights of its corners.
+    /// A random point by counted area, from a `share` of this area in [0, 1) and a point of the unit square: entry of a face,
+    /// and weights of its corners.
     pub(crate) fn random(&self, share: f64, square: [f64; 2]) -> (usize, [f64; 3]) {
         let sums = match self.face_counted.is_empty() {
             true => &self.face_area,
@@ -152,7 +151,7 @@ impl Tree {
         (entry, point.to_array())
     }
 
-    /// Landings of the children of a node that has some, each with its child.
+    /// Children of a node that have landings, each with these.
     fn by_child<'a>(&self, id: u32, landings: &'a mut [Landing]) -> Vec<(u32, &'a mut [Landing])> {
         let node = self.node(id);
         if node.element != NONE {
@@ -172,7 +171,7 @@ impl Tree {
         found
     }
 
-    /// Area and landings of pieces, each as large as it takes to hold some.
+    /// Area and landings of pieces, each as large as needed to hold some.
     fn pieces(&self, id: u32, landings: &mut [Landing], pieces: &mut Vec<(f64, usize)>) {
         let node = self.node(id);
         if node.element != NONE {
@@ -215,7 +214,7 @@ fn by_quarter(landings: &mut [Landing]) -> [&mut [Landing]; 4] {
     })
 }
 
-/// The density that half of all landings exceed; none where there are none.
+/// The density that half of all landings exceed; none without landings.
 fn usual(pieces: Vec<(f64, usize)>) -> Option<f64> {
     let mut pieces: Vec<(f64, usize)> = (pieces.into_iter())
         .filter(|&(area, count)| count > 0 && area > 0.0)
@@ -232,7 +231,7 @@ fn usual(pieces: Vec<(f64, usize)>) -> Option<f64> {
 }
 
 impl Finder {
-    /// Is an area so large that landings tell whether it counts?
+    /// Is an area large enough for landings to tell whether it counts?
     fn tells(&self, area: f64) -> bool {
         area * self.full >= EVIDENCE
     }
@@ -268,7 +267,7 @@ impl Finder {
                 .child_range()
                 .any(|child| self.tells(tree.node(child).area));
             if !told {
-                // Too small to tell, together as well, what lies in it counts.
+                // Children too small to tell, and too small together: they count.
                 let share = match self.tells(node.area) {
                     true => self.share(node.area, landings.len()),
                     false => 1.0,
@@ -340,7 +339,7 @@ mod tests {
         tree
     }
 
-    /// Landings all over the first face, and on as large a corner of the second.
+    /// Landings all over the first face, and on a corner of the second that is as large as the first.
     fn landings(on: [usize; 2]) -> Vec<Landing> {
         let mut random = Pcg::new(7);
         let mut all = Vec::new();
@@ -359,13 +358,14 @@ mod tests {
         let mut tree = tree();
         let counted = tree.count(landings([20_000, 20_000]));
         tree.weigh(&counted);
-        // 1 m2 of each. Parts are told apart down to legs of .35 m (2^-12 of the face), and those that the border of 2 m passes through count.
+        // 1 m2 of each. Parts are distinguished down to legs of .35 m (2^-12 of the face), and parts that the border of 2 m passes through
+        // count.
         let all = tree.counted();
         assert!((2.0..2.5).contains(&all), "{all}");
         assert_eq!(tree.node(1).counted, 1.0);
         let [low, high] = tree.counted_box().unwrap();
         assert!(low.length() < 1e-9 && high.max_element() < 1.8, "{high}");
-        // Random points lie where it counts.
+        // Random points lie where area counts.
         let mut random = Pcg::new(9);
         let mut on = [0.0_f64; 2];
         for k in 0..1000 {

@@ -1,12 +1,13 @@
 //! Triangles cut where others meet them: a floor that runs on below a wall is two floors.
 //!
-//! A patch holds one light. One that lies on both sides of a wall takes light from the one to the other, so every
-//! triangle is cut along the segments in which others cross it or stand on it. The parts are convex; a cut runs on to the
-//! border of the part that it crosses. [`super::spaces`] finds out which triangles are worth it (those that belong to
-//! several spaces), and [`Mesh::cut`] makes the triangles, with the points on common edges that their neighbours have.
+//! A patch has one light. If it lies on both sides of a wall it takes light from one side to the other, so every triangle
+//! is cut along the segments in which others cross it or stand on it. The parts are convex; a cut runs on to the border
+//! of the part that it crosses. [`super::spaces`] finds out which triangles are worth cutting (those that belong to
+//! several spaces), and [`Mesh::cut`] makes the new triangles, with the points that their neighbours have on common
+//! edges.
 //!
-//! What hovers right before a surface (a lamp below a ceiling, a rug, a picture) is as good as on it: below it is a gap with a
-//! light of its own, and a patch that lies in the gap and beside it would show the gap's light to the room.
+//! A thing that hovers right before a surface (a lamp below a ceiling, a rug, a picture) is as good as on it: between them is
+//! a gap with a light of its own, and a patch that lies partly in the gap would show the gap's light to the room.
 //! Lengths are in scene units; points within [`TOUCH`] of each other are one.
 
 use super::mesh::{Face, Mesh, WHOLE};
@@ -15,13 +16,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
-/// Surfaces nearer than this share of the scene's half size touch: what f32 positions in a file mean.
+/// Surfaces nearer than this share of the scene's half size touch: the accuracy of f32 positions in a file.
 const TOUCH: f64 = 1e-6;
-/// What hovers before a surface nearer than this share of the scene's half size cuts it. A room
-/// with a lamp 1 to 20 mm below its ceiling was 2 to 8 % too bright and is within 1.5 %; beyond 6 cm (2 %) nothing changes. Only in
-/// rooms all of whose cuts are made: in a restaurant, where rays do what links do here, four times the leaves gave nothing.
+/// Things that hover before a surface nearer than this share of the scene's half size cut the surface. A room with a lamp 1 to 20
+/// mm below its ceiling was 2 to 8 % too bright and is within 1.5 %; beyond 6 cm (2 %) nothing changes. Only in rooms all of whose
+/// cuts are made: in a restaurant, where rays do what links do here, four times the leaves gained nothing.
 const HOVER: f64 = 0.01;
-/// Parts that what hovers may add to a triangle: a panel adds up to 8, and 40 cards one above the other thousands.
+/// Parts that hovering things may add to a triangle: a panel adds up to 8, and 40 cards one above the other thousands.
 const OUTLINED: usize = 64;
 /// A triangle that more than this many others meet stays whole: it is foliage, not a wall.
 const MOST: usize = 256;
@@ -56,7 +57,7 @@ impl Cut {
             .collect()
     }
 
-    /// Adds a point, or finds the one that is there already.
+    /// Adds a point, or finds the one already there.
     fn add(&mut self, plane: &Plane, weights: [f64; 3]) -> u32 {
         let point = plane.at(weights);
         let near = |w: &[f64; 3]| plane.at(*w).distance(point) <= plane.snap();
@@ -128,7 +129,7 @@ impl Cut {
         }
     }
 
-    /// Takes the points that edges of the triangle have: its own move onto them, those of neighbours are added.
+    /// Adopts the points on the triangle's edges: own points move onto them, those of neighbours are added.
     fn share(&mut self, vertices: [u32; 3], edges: &BTreeMap<Edge, Vec<f64>>) {
         for w in &mut self.points {
             if let Some((edge, x)) = on_edge(vertices, *w)
@@ -152,7 +153,7 @@ impl Cut {
         }
     }
 
-    /// Cuts along the outlines of what hovers, unless that is too much: then none of them counts.
+    /// Cuts along the outlines of hovering things, unless that makes too many parts: then along none.
     fn outlined(self, plane: &Plane, outlines: Vec<[DVec3; 2]>) -> Self {
         let most = self.parts.len() + OUTLINED;
         let mut cut = self.clone();
@@ -168,7 +169,7 @@ impl Cut {
         }
     }
 
-    /// Gives every part the points that lie on its edges, so that neighbours have the same.
+    /// Gives every part the points that lie on its edges, so that neighbours have the same points.
     fn fit(&mut self, plane: &Plane) {
         let at: Vec<DVec3> = self.points.iter().map(|&w| plane.at(w)).collect();
         for part in &mut self.parts {
@@ -195,7 +196,8 @@ impl Cut {
         }
     }
 
-    /// Triangles of all parts: always the ear of the greatest altitude that leaves no point on its long side.
+    /// Triangles of all parts: cuts off ears, always that of the greatest altitude that leaves no point on its long
+    /// side.
     fn triangles(&self, plane: &Plane) -> Vec<[u32; 3]> {
         let at = |k: u32| plane.at(self.points[k as usize]);
         let mut out = Vec::new();
@@ -227,7 +229,7 @@ impl Cut {
     }
 }
 
-/// The plane of a triangle, and lengths that count as nothing.
+/// The plane of a triangle, and the lengths below which points coincide or touch.
 struct Plane {
     corners: [DVec3; 3],
     normal: DVec3,
@@ -257,7 +259,7 @@ impl Plane {
     }
 
     fn at(&self, w: [f64; 3]) -> DVec3 {
-        // From the middle corner on, so that a corner is itself to the last bit.
+        // Start from the corner itself, so that it is exact to the last bit.
         match w.iter().position(|&x| x == 1.0) {
             Some(k) => self.corners[k],
             None => self.corners[0] * w[0] + self.corners[1] * w[1] + self.corners[2] * w[2],
@@ -268,7 +270,7 @@ impl Plane {
         2.0 * self.area / self.corners[(k + 1) % 3].distance(self.corners[(k + 2) % 3])
     }
 
-    /// How far points lie before the plane; nothing where that is less than `reach`.
+    /// Distances of points before the plane; 0 where less than `reach`.
     fn before(&self, points: [DVec3; 3], reach: f64) -> [f64; 3] {
         points.map(|p| {
             let d = self.normal.dot(p - self.corners[0]);
@@ -276,7 +278,7 @@ impl Plane {
         })
     }
 
-    /// Edges of another triangle that hover before this one, inside the triangle: one of them, or all, unless it touches.
+    /// Edges of another triangle that hover before this one without touching it, clipped to this triangle.
     fn hovering(&self, other: [DVec3; 3]) -> Vec<(usize, [DVec3; 2])> {
         let exact = self.before(other, self.touch);
         let near = self.before(other, self.hover);
@@ -290,7 +292,7 @@ impl Plane {
         (0..3).filter_map(edge).collect()
     }
 
-    /// Where another triangle crosses this plane or stands on it, inside the triangle.
+    /// The segment, inside the triangle, where another triangle crosses its plane or stands on it.
     fn met(&self, other: [DVec3; 3]) -> Option<[DVec3; 2]> {
         let d = self.before(other, self.touch);
         let mut ends = Vec::with_capacity(3);
@@ -305,20 +307,20 @@ impl Plane {
         }
         match ends[..] {
             [p, q] => clipped([p, q], &self.corners, self),
-            // It touches in a point, or lies in the plane.
+            // The other triangle touches in a point, or lies in the plane.
             _ => None,
         }
     }
 }
 
-/// What of a segment lies inside a convex polygon, if that has a length.
+/// The part of a segment inside a convex polygon, if it has a length.
 fn clipped([p, q]: [DVec3; 2], polygon: &[DVec3], plane: &Plane) -> Option<[DVec3; 2]> {
     let (mut low, mut high) = (0.0_f64, 1.0_f64);
     for k in 0..polygon.len() {
         let (a, b) = (polygon[k], polygon[(k + 1) % polygon.len()]);
         let inward = plane.normal.cross((b - a).normalize_or_zero());
         let (dp, dq) = (inward.dot(p - a), inward.dot(q - a));
-        // What runs along an edge cuts nothing off.
+        // A segment along an edge cuts nothing off.
         if dp <= plane.snap() && dq <= plane.snap() {
             return None;
         }
@@ -334,7 +336,7 @@ fn clipped([p, q]: [DVec3; 2], polygon: &[DVec3], plane: &Plane) -> Option<[DVec
         .then(|| [p + along * low, p + along * high])
 }
 
-/// All triangles that others meet, or, where that is asked for, that something hovers before, in parts.
+/// All triangles that others meet, in parts; if `hovering`, also those before which something hovers.
 pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
     let mut taking: Vec<u32> = mesh.faces.iter().map(|f| f.triangle).collect();
     taking.dedup();
@@ -373,7 +375,7 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
             for segment in segments {
                 cut.split(&plane, segment);
             }
-            // An edge of two triangles of one plane is no outline.
+            // An edge of two triangles in one plane is not an outline.
             let is_once = |edge: &_| outlines.iter().filter(|(other, _)| other == edge).count() < 2;
             let outlines = outlines.iter().filter(|(edge, _)| is_once(edge));
             let cut = cut.outlined(&plane, outlines.map(|(_, segment)| *segment).collect());
@@ -383,14 +385,14 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
         .collect()
 }
 
-/// Its lower and its higher vertex.
+/// The lower and the higher vertex of an edge.
 type Edge = (u32, u32);
 
 fn key(a: u32, b: u32) -> Edge {
     (a.min(b), a.max(b))
 }
 
-/// An edge with the share of the way from its lower to its higher vertex, for a point on it.
+/// For a point on an edge, the edge with the share of the way from its lower to its higher vertex.
 fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<(Edge, f64)> {
     let k = w.iter().position(|&x| x == 0.0)?;
     let (i, j) = ((k + 1) % 3, (k + 2) % 3);
@@ -401,7 +403,7 @@ fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<(Edge, f64)> {
     Some((key(a, b), if a < b { w[j] } else { w[i] }))
 }
 
-/// Shares of the way along each edge at which cuts have points, ascending; merged where both sides mean the same.
+/// Shares of the way along each edge at which cuts have points, ascending; merged where both sides have the same point.
 fn points_on_edges(mesh: &Mesh, cuts: &[Cut]) -> BTreeMap<Edge, Vec<f64>> {
     let mut edges: BTreeMap<Edge, Vec<f64>> = BTreeMap::new();
     for cut in cuts {
@@ -470,7 +472,7 @@ impl Mesh {
         self
     }
 
-    /// Vertices at the points of a cut: points on an edge are those of its neighbour.
+    /// Vertices at the points of a cut: on an edge they are shared with its neighbour.
     fn weld(
         &mut self,
         cut: &Cut,
@@ -494,7 +496,7 @@ impl Mesh {
         cut.points.iter().map(id).collect()
     }
 
-    /// Takes over triangle `t` of another mesh, or a part of it.
+    /// Copies triangle `t` of another mesh, or a part of it.
     fn copy(&mut self, old: &Self, t: usize, corners: [u32; 3], cut: u32, sides: [bool; 2]) {
         let triangle = self.triangles.len() as u32;
         let [a, b, c] = corners.map(|v| self.positions[v as usize]);
@@ -517,7 +519,7 @@ impl Mesh {
     }
 }
 
-/// Weights of a point on an edge, the same bits from both sides.
+/// Weights of a point on an edge, with the same bits from both sides.
 fn edge_weights(vertices: [u32; 3], (low, high): Edge, t: f64) -> [f64; 3] {
     vertices.map(|v| {
         if v == low {

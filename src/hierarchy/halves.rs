@@ -5,10 +5,10 @@ use super::tree::NONE;
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Sines of corners below this are none: the quadrilateral is a triangle.
+/// Sines of corners below this count as 0: the quadrilateral is a triangle.
 const STRAIGHT: f64 = 1e-6;
 
-/// What hides as one: a triangle, or a convex quadrilateral in one plane.
+/// The outline of a blocker: a triangle, or a convex quadrilateral in one plane.
 #[derive(Debug, Clone, Copy)]
 pub struct Outline {
     corners: [DVec3; 4],
@@ -20,7 +20,7 @@ pub struct Outline {
 pub struct Blocker {
     /// The triangle.
     pub triangle: u32,
-    /// Does it stand for both halves?
+    /// Does the blocker include the other half?
     pub together: bool,
 }
 
@@ -31,7 +31,7 @@ impl AsRef<[DVec3]> for Outline {
 }
 
 impl Mesh {
-    /// For each triangle the one with which it makes a convex quadrilateral; [`NONE`] for those left over.
+    /// For each triangle the other half of its convex quadrilateral; [`NONE`] where there is none.
     pub(super) fn paired(&self) -> Vec<u32> {
         let mut half = vec![NONE; self.triangles.len()];
         let mut waiting: HashMap<(u32, u32), u32> = HashMap::new();
@@ -60,12 +60,12 @@ impl Mesh {
         half
     }
 
-    /// What hides as one: each listed triangle, or both halves of a quadrilateral where both are listed.
+    /// The blockers of a list: each triangle, or both halves of a quadrilateral as one where both are listed.
     pub fn blockers(&self, list: &[u32]) -> impl Iterator<Item = Blocker> {
         list.iter().filter_map(|&triangle| {
             let half = self.half[triangle as usize];
             let together = half != NONE && list.contains(&half);
-            // The first half stands for both.
+            // The first half represents both.
             (!together || triangle < half).then_some(Blocker { triangle, together })
         })
     }
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn halves_of_squares_find_each_other() {
-        // Two squares side by side: the diagonals pair, not the edge between them.
+        // Two squares side by side: triangles pair over the diagonals, not over the edge between the squares.
         let positions = [
             [0., 0., 0.],
             [1., 0., 0.],

@@ -11,27 +11,27 @@ use std::collections::{HashMap, HashSet};
 /// In [`Mesh::part`]: the triangle is a whole one.
 pub(super) const WHOLE: u32 = u32::MAX;
 
-/// One side of a triangle: what emits, reflects and receives.
+/// One side of a triangle: it emits, reflects and receives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Face {
     /// Index of the triangle.
     pub triangle: u32,
-    /// The back of a two-sided triangle?
+    /// Is this the back of a two-sided triangle?
     pub back: bool,
 }
 
-/// A surface that lies in another.
+/// A surface that lies in the plane of another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raised {
-    /// The surface that is raised, and that in which it lies.
+    /// The surface that is raised, and the one in which it lies.
     pub surfaces: [usize; 2],
-    /// What they have in common.
+    /// The area that they have in common.
     pub area: f64,
-    /// How far it is raised.
+    /// How far the first is raised.
     pub height: f64,
 }
 
-/// What vertices of surfaces are moved by.
+/// Displacements of vertices of surfaces.
 pub(super) type Moves = HashMap<(u32, u32), DVec3>;
 
 /// The welded triangles of a scene.
@@ -39,7 +39,8 @@ pub(super) type Moves = HashMap<(u32, u32), DVec3>;
 pub struct Mesh {
     /// What was subtracted from world positions.
     pub centre: DVec3,
-    /// Half the diagonal of the box about what counts of the room, see `Frame`: what lengths are shares of.
+    /// Half the diagonal of the box around the part of the room that counts, see `Frame`: lengths are given as shares
+    /// of this.
     pub half_size: f64,
     /// No corner is farther from the centre.
     pub reach: f64,
@@ -53,7 +54,8 @@ pub struct Mesh {
     pub material: Vec<u32>,
     /// Plane of each triangle: equal for triangles in one plane, whichever way they face.
     pub plane: Vec<u32>,
-    /// The other half of the convex quadrilateral that each triangle is part of; [`NONE`](super::NONE) without.
+    /// The other half of the convex quadrilateral that each triangle is part of; [`NONE`](super::NONE) where there is
+    /// none.
     pub(super) half: Vec<u32>,
     /// Unit normal of the front of each triangle.
     pub normal: Vec<DVec3>,
@@ -61,19 +63,21 @@ pub struct Mesh {
     pub area: Vec<f64>,
     /// All sides that take part.
     pub faces: Vec<Face>,
-    /// Materials that are diffuse sheets: light passes between the two faces of their triangles. Empty where none is.
+    /// Materials that are diffuse sheets: light passes between the two faces of their triangles. Empty without sheets.
     pub(super) sheets: Vec<u32>,
-    /// First triangle of each surface, then the end: triangles of a surface stand together, in its own order.
+    /// First triangle of each surface, and the end of the last: triangles of a surface are contiguous, in its own
+    /// order.
     pub first_triangle: Vec<u32>,
     /// For each triangle that is a part of its origin, its entry in `within`.
     pub(super) part: Vec<u32>,
     /// Corners of parts, as weights of the corners of the origin.
     pub(super) within: Vec<[[f64; 3]; 3]>,
-    /// Surfaces that lie in others; not kept where triangles are cut.
+    /// Surfaces that lie in others; not kept by meshes that were cut.
     pub raised: Vec<Raised>,
 }
 
-/// What counts of a room: the lengths by which things are told apart follow from it, and not from what else is in the file.
+/// The extent of what counts of a room: lengths below which things coincide follow from this, and not from the rest of the
+/// file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Frame {
     /// Middle, world space.
@@ -83,7 +87,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// Of a box.
+    /// The frame of a box.
     pub(crate) fn of(low: DVec3, high: DVec3) -> Self {
         Self {
             centre: 0.5 * (low + high),
@@ -91,12 +95,12 @@ impl Frame {
         }
     }
 
-    /// To be written down.
+    /// The frame as numbers for a file.
     pub(crate) fn numbers(self) -> [f64; 4] {
         self.centre.extend(self.half_size).to_array()
     }
 
-    /// As it was before it was written down.
+    /// The frame of such numbers.
     pub(crate) fn of_numbers([x, y, z, half_size]: [f64; 4]) -> Self {
         let centre = DVec3::new(x, y, z);
         Self { centre, half_size }
@@ -104,12 +108,12 @@ impl Frame {
 }
 
 impl Mesh {
-    /// Welds the surfaces of `scene`; those that lie in others are raised. All of it counts.
+    /// Welds the surfaces of `scene`; those that lie in others are raised. Everything counts.
     pub fn new(scene: &Scene) -> Self {
         Self::framed(scene, None)
     }
 
-    /// The same where only what lies in a frame counts.
+    /// [`Mesh::new`] where only what lies in a frame counts.
     pub(crate) fn framed(scene: &Scene, frame: Option<Frame>) -> Self {
         let mesh = Self::welded(scene, &Moves::new(), frame);
         let input: Vec<&[[u32; 3]]> = scene.surfaces.iter().map(|s| &*s.triangles).collect();
@@ -145,7 +149,7 @@ impl Mesh {
             ..Self::empty()
         };
         let mut welded: HashMap<[u64; 3], u32> = HashMap::new();
-        // Sides that are there: corners in their order, the least first.
+        // Sides found so far: corners in their order, starting with the least.
         let mut known: HashSet<[u32; 3]> = HashSet::new();
         for (s, surface) in scene.surfaces.iter().enumerate() {
             let ids: Vec<u32> = surface
@@ -174,8 +178,8 @@ impl Mesh {
                 mesh.material.push(surface.material as u32);
                 mesh.normal.push(cross.normalize_or_zero());
                 mesh.area.push(0.5 * cross.length());
-                // A triangle without area blocks nothing and receives nothing; it stays in the output only. So does one that
-                // is there already: light would meet the place twice.
+                // A triangle without area blocks nothing and receives nothing; it stays only in the output. So does a
+                // repeated triangle: light would meet the place twice.
                 if cross.length_squared() > 0.0 {
                     if known.insert(turned_to_least(corners)) {
                         mesh.faces.push(Face {
@@ -248,7 +252,7 @@ impl Mesh {
         }
     }
 
-    /// The corner of the input triangle that corner `k` of a triangle of the mesh is.
+    /// The corner of the input triangle that is corner `k` of a triangle of the mesh.
     pub fn input_corner(&self, triangle: usize, k: usize) -> Option<usize> {
         match self.within.get(self.part[triangle] as usize) {
             None => Some(k),
@@ -256,7 +260,7 @@ impl Mesh {
         }
     }
 
-    /// The same in single precision, for textures.
+    /// [`Self::on_origin`] in single precision, for textures.
     pub fn on_origin_f32(&self, triangle: usize, weights: [f32; 3]) -> [f32; 3] {
         match self.part[triangle] {
             WHOLE => weights,
@@ -272,14 +276,14 @@ impl Mesh {
         if face.back { [a, c, b] } else { [a, b, c] }
     }
 
-    /// Unit normal of a face, out of that side.
+    /// Unit normal of a face, on its own side.
     pub fn face_normal(&self, face: Face) -> DVec3 {
         let n = self.normal[face.triangle as usize];
         if face.back { -n } else { n }
     }
 }
 
-/// The same corners in the same sense, the least first: equal for equal sides.
+/// The same corners in the same sense, starting with the least: equal for equal sides.
 fn turned_to_least(mut corners: [u32; 3]) -> [u32; 3] {
     while corners[0] > corners[1] || corners[0] > corners[2] {
         corners.rotate_left(1);

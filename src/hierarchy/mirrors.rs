@@ -1,11 +1,11 @@
-//! Where mirrors are, and in which of them, one after the other, things have images.
+//! Where mirrors are, and in which sequences of them things have images.
 //!
-//! All triangles of a material in one plane that look the same way are one plane mirror. What a point sees by way of plane
-//! mirrors `m1, m2, ..` it would see straight from where `.. R2 R1` takes it, `Ri` being the reflection in `mi`, through the mirrors as
-//! windows. So lamps are looked for from there, with the factors that they have for any other point. Which mirrors may follow one another
-//! is found once; an [`Image`] is such a sequence.
+//! All triangles of a material that lie in one plane and face the same way are one plane mirror. What a point sees by way of plane
+//! mirrors `m1, m2, ..` it would see straight from its mirror image `.. R2 R1 p`, `Ri` being the reflection in `mi`, with the mirrors as
+//! windows. So lamps are gathered from the image, with the factors that they have for any other point. Which mirrors may follow one
+//! another is found once; an [`Image`] is such a sequence.
 //!
-//! Surfaces of many small planes are curved mirrors: rays find what is seen in them, and nothing has images there.
+//! Surfaces of many small planes are curved mirrors: rays find the light in them, and things have no images there.
 
 use super::{Mesh, NONE};
 use crate::geometry::Hit;
@@ -13,29 +13,30 @@ use crate::scene::{Scene, Sides};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
-/// Mirrors that light meets one after the other; the next is read as a matt surface.
+/// Mirrors that light meets in sequence; the next is taken for a matt surface.
 pub const BOUNCES: usize = 4;
-/// A plane counts for itself that has this share of the mirroring area of a surface: beyond 16 sides a prism is a tube.
+/// Least share of the mirroring area of a surface that makes a plane a mirror of its own: beyond 16 sides a prism
+/// counts as a tube.
 const PLANE_SHARE: f64 = 1.0 / 16.0;
 /// Plane mirrors at the most, the largest.
 const PLANES: usize = 32;
 /// Images at the most, those of few mirrors first: a box of six mirrors has 156 of up to three.
 const IMAGES: usize = 256;
-/// In [`Mirrors::of`]: a mirror that nothing has an image in.
+/// In [`Mirrors::of`]: a mirror in which things have no image.
 const CURVED: u32 = NONE - 1;
-/// Nearer than this to a plane, share of half the room, a point lies in it: ten roundings of f32.
+/// A point nearer than this to a plane, share of the room's half size, lies in the plane: ten roundings of f32.
 const IN_PLANE: f64 = 1e-6;
 
-/// Mirrors one after the other, the first that a ray from a point meets first; the rest [`NONE`].
+/// Mirrors in the order in which a ray from a point meets them; the rest [`NONE`].
 type Sequence = [u32; BOUNCES];
 
-/// A plane mirror, or where it appears to be, behind others.
+/// A plane mirror, or its own image in other mirrors.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     normal: DVec3,
-    /// `normal . x = offset` in it.
+    /// `normal . x = offset` on the plane.
     offset: f64,
-    /// All of it lies in this ball.
+    /// Centre and radius of a sphere that contains the mirror.
     centre: DVec3,
     radius: f64,
     material: u32,
@@ -50,7 +51,7 @@ impl Plane {
         p - 2.0 * self.height(p) * self.normal
     }
 
-    /// Where this plane appears to be in a mirror.
+    /// The image of this plane in a mirror.
     fn seen_in(&self, mirror: &Self) -> Self {
         let normal = self.normal - 2.0 * self.normal.dot(mirror.normal) * mirror.normal;
         let on = mirror.reflected(self.offset * self.normal);
@@ -67,15 +68,15 @@ impl Plane {
 #[derive(Debug, Clone)]
 pub struct Image {
     planes: Sequence,
-    /// Takes a point that looks to where it would look from without the mirrors.
+    /// Takes a receiving point to its mirror image.
     turn: DMat3,
     shift: DVec3,
-    /// The mirrors as windows, as the point that looks sees them.
+    /// The mirrors as windows, as seen from the point's mirror image.
     windows: Vec<Plane>,
 }
 
 impl Image {
-    /// Of no mirrors: to go on from.
+    /// The image in no mirrors, to be continued.
     fn straight() -> Self {
         Self {
             planes: [NONE; BOUNCES],
@@ -85,28 +86,28 @@ impl Image {
         }
     }
 
-    /// Where a point looks from as if there were no mirrors.
+    /// The mirror image from which a point receives as if there were no mirrors.
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.turn * p + self.shift
     }
 
-    /// The same for a direction.
+    /// [`Self::point`] for a direction.
     pub fn direction(&self, d: DVec3) -> DVec3 {
         self.turn * d
     }
 
-    /// How many mirrors.
+    /// Number of mirrors.
     pub fn depth(&self) -> usize {
         self.windows.len()
     }
 
-    /// Where a place appears to be to who looks into the mirrors.
+    /// Where a place appears to be for one who looks into the mirrors.
     fn appears(&self, p: DVec3) -> DVec3 {
         self.turn.transpose() * (p - self.shift)
     }
 
-    /// Could a point with a normal see anything this way? It lies before all windows, they are above its horizon, and two by two
-    /// in one line of sight.
+    /// Could a point with a normal see anything this way? It must lie before all windows, these must be above its horizon, and
+    /// any two of them in one line of sight.
     fn is_open_to(&self, point: DVec3, normal: DVec3, least: f64) -> bool {
         let mut cones = [Cone::default(); BOUNCES];
         for (k, window) in self.windows.iter().enumerate() {
@@ -123,7 +124,7 @@ impl Image {
     }
 }
 
-/// The directions from a point to a ball.
+/// The directions from a point to a sphere.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cone {
     axis: DVec3,
@@ -140,14 +141,14 @@ impl Cone {
         }
     }
 
-    /// Have two no direction in common?
+    /// Have two cones no direction in common?
     fn is_apart(&self, other: &Self) -> bool {
         let both = self.half + other.half;
         both < std::f64::consts::PI && self.axis.dot(other.axis) < both.cos()
     }
 }
 
-/// The way of light by mirrors.
+/// The path of light by mirrors.
 #[derive(Debug, Clone, Copy)]
 pub struct Route {
     points: [DVec3; BOUNCES + 2],
@@ -165,7 +166,7 @@ impl Route {
         }
     }
 
-    /// Goes on by a mirror of a material, met at a place under a cosine.
+    /// Adds a mirror of a material, met at a place under a cosine.
     pub(crate) fn bounce(&mut self, at: DVec3, material: u32, cosine: f64) {
         self.bounces[self.count] = (material, cosine as f32);
         self.count += 1;
@@ -177,17 +178,17 @@ impl Route {
         self.points[self.count + 1] = at;
     }
 
-    /// Can it meet another mirror?
+    /// Can the path meet another mirror?
     pub(crate) fn goes_on(&self) -> bool {
         self.count < BOUNCES
     }
 
-    /// Material of each mirror that it meets, and the cosine of incidence.
+    /// Material of each mirror on the path, and the cosine of incidence.
     pub fn bounces(&self) -> &[(u32, f32)] {
         &self.bounces[..self.count]
     }
 
-    /// Where it starts, meets mirrors, and ends.
+    /// Start of the path, its points on mirrors, and its end.
     pub fn points(&self) -> &[DVec3] {
         &self.points[..self.count + 2]
     }
@@ -196,7 +197,7 @@ impl Route {
 /// All mirrors of a room.
 #[derive(Debug, Clone)]
 pub struct Mirrors {
-    /// By triangle, its front and its back: number of its plane, [`CURVED`], or [`NONE`] of what is no mirror.
+    /// By triangle, for its front and its back: number of the plane, [`CURVED`], or [`NONE`] where it is no mirror.
     of: Vec<[u32; 2]>,
     planes: Vec<Plane>,
     images: Vec<Image>,
@@ -206,17 +207,17 @@ pub struct Mirrors {
     least: f64,
 }
 
-/// A plane mirror being put together.
+/// A plane mirror being assembled.
 #[derive(Default)]
 struct Part {
     area: f64,
-    /// Greatest share that it has in the mirroring area of a surface.
+    /// Its greatest share in the mirroring area of a surface.
     share: f64,
     sides: Vec<(usize, usize)>,
 }
 
 impl Mirrors {
-    /// The mirrors of a scene, where its mesh is; none where it has none.
+    /// The mirrors of a scene; none where there are none.
     pub fn new(scene: &Scene, mesh: &Mesh) -> Option<Self> {
         let is_mirror = |m: &u32| scene.materials[*m as usize].mirror.is_some();
         if !mesh.material.iter().any(is_mirror) {
@@ -261,7 +262,7 @@ impl Mirrors {
         Some(mirrors)
     }
 
-    /// Takes the largest planes.
+    /// Keeps the largest planes.
     fn find_planes(&mut self, mesh: &Mesh, mut parts: Vec<Part>) {
         let all = parts.len();
         parts.retain(|part| part.share >= PLANE_SHARE && part.area > 0.0);
@@ -352,7 +353,7 @@ impl Mirrors {
         let depth = image.depth();
         let earlier = image.planes[..depth].iter().rev();
         let window = earlier.fold(*mirror, |seen, &k| seen.seen_in(&self.planes[k as usize]));
-        // Behind all windows before it.
+        // The new mirror must lie behind all windows before it.
         let behind = |w: &Plane| w.height(window.centre) - window.radius < -self.least;
         if !image.windows.iter().all(behind) {
             return None;
@@ -377,17 +378,17 @@ impl Mirrors {
         self.side(hit) != NONE
     }
 
-    /// Does a ray meet a mirror that nothing has an image in?
+    /// Does a ray meet a mirror in which things have no image?
     pub fn is_curved(&self, hit: &Hit) -> bool {
         self.side(hit) == CURVED
     }
 
-    /// Is there any?
+    /// Are there any such mirrors?
     pub fn has_curved(&self) -> bool {
         self.curved
     }
 
-    /// Number of the plane that a ray met; none of what is curved or no mirror.
+    /// Number of the plane that a ray met; [`CURVED`] or [`NONE`] for others.
     fn side(&self, hit: &Hit) -> u32 {
         self.of[hit.triangle as usize][usize::from(hit.from_behind)]
     }
@@ -397,12 +398,12 @@ impl Mirrors {
         self.of[triangle as usize][usize::from(back)] != NONE
     }
 
-    /// All images of what may be seen.
+    /// All images in which something may be seen.
     pub fn images(&self) -> &[Image] {
         &self.images
     }
 
-    /// Number of the image in the mirrors that were met, in order; none if nothing has one there.
+    /// Number of the image in the mirrors that were met, in order; none if things have no image there.
     pub fn image_of(&self, met: &[Hit]) -> Option<u32> {
         let mut planes = [NONE; BOUNCES];
         for (plane, hit) in planes.iter_mut().zip(met) {
@@ -411,14 +412,14 @@ impl Mirrors {
         self.numbers.get(&planes).copied()
     }
 
-    /// Numbers of the images that a point with a normal may see something in.
+    /// Numbers of the images in which a point with a normal may see something.
     pub fn seen_from(&self, point: DVec3, normal: DVec3) -> impl Iterator<Item = u32> {
         let open = move |image: &Image| image.is_open_to(point, normal, self.least);
         let images = (0..).zip(&self.images);
         images.filter(move |(_, image)| open(image)).map(|(k, _)| k)
     }
 
-    /// Could a ball, or any of it, be seen from a point by an image's mirrors?
+    /// Could any part of a sphere be seen from a point by an image's mirrors?
     pub fn may_show(&self, image: u32, from: DVec3, (centre, radius): (DVec3, f64)) -> bool {
         let image = &self.images[image as usize];
         let ball = Cone::new(from, image.appears(centre), radius);
@@ -427,11 +428,11 @@ impl Mirrors {
         windows.all(|window| !window.is_apart(&ball))
     }
 
-    /// The way from a point by an image's mirrors to a place, as if nothing else stood about; none where it misses one.
+    /// The path from a point by an image's mirrors to a place, ignoring blockers; none where it misses a mirror.
     pub fn route(&self, image: u32, from: DVec3, to: DVec3) -> Option<Route> {
         let image = &self.images[image as usize];
         let plane = |k: usize| &self.planes[image.planes[k] as usize];
-        // Where the place appears to be, from behind the last mirror on.
+        // Where the place appears to be, mirror by mirror from the last.
         let mut aims = [to; BOUNCES + 1];
         for k in (0..image.depth()).rev() {
             aims[k] = plane(k).reflected(aims[k + 1]);
@@ -460,7 +461,7 @@ impl Mirrors {
         self.images[image as usize].planes[k] == self.side(hit)
     }
 
-    /// What is looked for in them, in words.
+    /// The numbers of planes and images, in words.
     pub fn said(&self) -> String {
         let (planes, images) = (self.planes.len(), self.images.len());
         let mut said = format!("{planes} plane mirrors, {images} images");
@@ -522,7 +523,7 @@ mod tests {
             "looks away"
         );
         mirrors.images = vec![twice];
-        // As long as the way unfolded.
+        // As long as the unfolded path.
         let route = mirrors.route(0, eye, place).unwrap();
         assert_eq!(route.bounces().len(), 2);
         let legs = route

@@ -1,6 +1,6 @@
-//! Where panes are: which of them a ray passes, at what angle, through how much glass.
+//! Where panes are: which of them a ray passes, at what angle, and through how much glass.
 //!
-//! Panes stand in a ray index of their own and block nothing. A ray asks for all their faces that it crosses; faces that bound one
+//! Panes have a ray index of their own and block nothing. A ray asks for all their faces that it crosses; faces that bound one
 //! sheet of glass count as one pane, however it was modelled:
 //! - a face that stands alone is a pane;
 //! - faces that lie upon each other (a quad and its back) are one;
@@ -16,14 +16,14 @@ use glam::{DVec3, Vec3};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 
-/// Faces of one pane are at most this far apart, m: laminated glass of banks and aquaria is 30 to 50 mm thick, and the panes of double
-/// glazing stand as far from each other, but there each has both its faces.
+/// Faces of one pane are at most this far apart, m: laminated glass of banks and aquaria is 30 to 50 mm thick; the panes of double
+/// glazing are as far apart, but each of these has both its faces.
 const NEAR: f64 = 0.05;
-/// Hits nearer to each other than this share of half the size of the panes are in one place: a few roundings of f32.
+/// Hits nearer to each other than this share of the panes' half size are in one place: a few roundings of f32.
 const TOGETHER: f64 = 2e-6;
-/// Cosine of two normals from which on faces are parallel: 2.6 degrees.
+/// Least cosine between normals of parallel faces: 2.6 degrees.
 const PARALLEL: f64 = 0.999;
-/// A closed part thinner than this share of its size holds nothing: f32 positions are off by 1e-7 of it.
+/// A closed part thinner than this share of its size contains nothing: f32 positions are off by 1e-7 of that.
 const HOLLOW: f64 = 1e-6;
 /// Pairs of solids and parts that may be their cavities, at the most.
 const MOST_PAIRS: usize = 1 << 22;
@@ -37,7 +37,7 @@ pub struct Crossing {
     pub cosine: f32,
     /// Thickness of a slab that absorbs as much, in units of the material.
     pub thickness: f32,
-    /// Value of the pane's texture there.
+    /// Value of the pane's texture at the crossing.
     pub texel: f32,
 }
 
@@ -48,7 +48,7 @@ struct Face {
     surface: u32,
     triangle: u32,
     material: u32,
-    /// Which connected part.
+    /// The connected part that the triangle belongs to.
     part: u32,
     normal: DVec3,
 }
@@ -57,11 +57,11 @@ struct Face {
 #[derive(Debug, Clone, Copy, Default)]
 struct Part {
     closed: bool,
-    /// Of a closed part, volume over half its surface: the thickness of a sheet.
+    /// For a closed part, volume over half its surface: the thickness of a flat one.
     thickness: f64,
-    /// Do its faces look inwards? So do those of a reversed solid, and of a cavity in one.
+    /// Do its faces look inwards? They do in a reversed solid, and in a cavity of a solid.
     inward: bool,
-    /// Its ends.
+    /// Lower and upper corner of its bounding box.
     bounds: [DVec3; 2],
 }
 
@@ -78,18 +78,18 @@ pub struct Panes {
     rays: RayIndex,
     faces: Vec<Face>,
     parts: Vec<Part>,
-    /// Of each part: is it a solid whose faces look inwards?
+    /// For each part: is it a solid whose faces look inwards?
     reversed: Vec<bool>,
     /// Distance within which hits are in one place.
     together: f64,
 }
 
-/// The panes of a room with what they are made of.
+/// The panes of a room with their materials.
 #[derive(Debug, Clone, Copy)]
 pub struct Glazing<'a> {
-    /// Where they are.
+    /// Positions of the panes.
     pub panes: &'a Panes,
-    /// Their materials.
+    /// Materials of the panes.
     pub scene: &'a Scene,
 }
 
@@ -112,7 +112,7 @@ struct Hit {
 }
 
 impl Panes {
-    /// The panes of a scene, recentred as its mesh is; none where it has none.
+    /// The panes of a scene, recentred like its mesh; none where there are none.
     pub fn new(scene: &Scene, centre: DVec3) -> Option<Self> {
         if scene.panes.is_empty() {
             return None;
@@ -135,13 +135,13 @@ impl Panes {
                 });
             }
         }
-        // All are masked: then the index asks about every face that a ray crosses.
+        // All triangles are masked: so the index asks about every face that a ray crosses.
         let rays = RayIndex::build(&positions, &triangles, &[], &vec![true; triangles.len()]);
         let [low, high] = rays.bounds();
         let far = low.abs().max(high.abs()).max_element();
         let solids: Vec<&Part> = parts.iter().filter(|p| p.closed && !p.inward).collect();
         let inward = parts.iter().filter(|p| p.closed && p.inward).count();
-        // Of more than that nobody asks which are cavities.
+        // With more pairs than that, cavities are not looked for.
         let few = inward * solids.len() <= MOST_PAIRS;
         let reversed = parts
             .iter()
@@ -210,10 +210,10 @@ impl Panes {
         }
     }
 
-    /// Puts faces together that bound one pane.
+    /// Combines faces that bound one pane.
     fn panes_of(&self, scene: &Scene, hits: &[Hit], length: f64) -> Vec<Crossing> {
         let mut out = Vec::new();
-        // Faces that were entered and not left yet; and the last that was done with.
+        // Faces entered and not yet left; and the last face that was finished.
         let mut open: Vec<Hit> = Vec::new();
         let mut last: Option<Hit> = None;
         for hit in hits {
@@ -222,7 +222,7 @@ impl Panes {
                     && other.face.normal.dot(hit.face.normal).abs() > PARALLEL
                     && (hit.at - other.at).abs() <= self.together
             };
-            // An edge that two triangles share; a back that stands right upon its front.
+            // An edge shared by two triangles, or a back that lies right on its front.
             let here = |o: &&Hit| hit.at - o.at <= self.together;
             let mut near = open.iter().rev().take_while(here);
             let again = near.any(|o| o.enters == hit.enters && same(o));
@@ -248,12 +248,12 @@ impl Panes {
     fn bound(&self, entry: &Hit, exit: &Hit) -> bool {
         let [a, b] = [entry.face, exit.face];
         let near = (exit.at - entry.at) * entry.cosine <= NEAR && is_parallel(entry, exit);
-        // A cavity is a part of its own.
+        // A cavity counts as a part of its own.
         let one = [a, b].iter().all(|f| self.parts[f.part as usize].closed);
         a.material == b.material && (near || one)
     }
 
-    /// What lies between two faces.
+    /// The panes between two faces.
     fn between(&self, scene: &Scene, entry: &Hit, exit: &Hit, out: &mut Vec<Crossing>) {
         let Some(pane) = pane_of(scene, entry) else {
             return;
@@ -285,7 +285,7 @@ impl Panes {
         }
     }
 
-    /// A face by itself; a ray that starts or ends within a solid goes so far through it.
+    /// A single face; a ray that starts or ends within a solid passes `chord` of it.
     fn alone(&self, scene: &Scene, hit: &Hit, chord: f64) -> Crossing {
         let solid = self.parts[hit.face.part as usize].closed;
         match pane_of(scene, hit).map(|p| &p.kind) {
@@ -326,7 +326,7 @@ fn pane_of<'a>(scene: &'a Scene, hit: &Hit) -> Option<&'a Pane> {
     scene.materials[hit.face.material as usize].pane.as_ref()
 }
 
-/// Value of a pane's texture, and for paint of vertex alpha.
+/// Value of a pane's texture; for paint, that of the vertex alpha.
 fn texel_at(scene: &Scene, surface: &Surface, triangle: u32, weights: [f32; 3]) -> f64 {
     let Some(pane) = &scene.materials[surface.material].pane else {
         return 1.0;
@@ -346,7 +346,7 @@ fn texel_at(scene: &Scene, surface: &Surface, triangle: u32, weights: [f32; 3]) 
     value
 }
 
-/// Adds the connected parts of a surface; which of them each triangle belongs to.
+/// Adds the connected parts of a surface; returns the part of each triangle.
 fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
     // Vertices at equal positions are one: exporters split them where normals or texture coordinates differ.
     let mut welded: HashMap<[u64; 3], usize> = HashMap::new();
@@ -368,7 +368,7 @@ fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
         }
     }
     let mut number: BTreeMap<usize, u32> = BTreeMap::new();
-    // Of each part, how often each edge is run through one way more than the other; volume and area.
+    // For each part: how much more often each edge is run along in one direction than in the other; volume and area.
     let mut edges: BTreeMap<(u32, usize, usize), i64> = BTreeMap::new();
     let first = parts.len() as u32;
     let mut sums: Vec<[f64; 2]> = Vec::new();
@@ -402,7 +402,7 @@ fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
     let each = sums.iter().zip(closed).zip(bounds);
     parts.extend(each.map(|((&[volume, area], balanced), bounds)| {
         let thickness = 2.0 * volume.abs() / area;
-        // A face and its back balance as well, and hold nothing.
+        // A face and its back also balance, but contain nothing.
         let closed = balanced && thickness > HOLLOW * area.sqrt();
         Part {
             closed,

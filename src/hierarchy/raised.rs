@@ -1,24 +1,24 @@
 //! Faces that lie in others: a carpet in the plane of its floor, a panel in that of its wall, a lamp in that of its ceiling.
 //!
-//! Which of two such faces is seen is chance, and taken as they stand both would take the same light: a floor that is there twice
-//! reflects twice. So what covers less is raised by next to nothing, and hides what it lies in.
+//! Which of two such faces is visible would be chance, and unchanged both would receive the same light: a floor that is there
+//! twice reflects twice. So the one that covers less is raised by next to nothing, and hides the part that it covers.
 
 use super::mesh::{Face, Mesh, Moves, Raised};
 use crate::geometry::sampling::tangents;
 use glam::{DVec2, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How far, share of the room's diagonal: .5 mm in a room of 10 m. Well above the distance within which rays pass over what is met
-/// (`END_GAP`), below what anybody models.
+/// Height, share of the room's diagonal: .5 mm in a room of 10 m. Well above the distance within which rays ignore surfaces
+/// (`END_GAP`), and below what anybody models.
 const RAISED: f64 = 5e-5;
-/// What two triangles have in common counts from this share of the smaller one: neighbours have their edges in common.
+/// A common area counts from this share of the smaller triangle on: neighbours have their edges in common.
 const COMMON: f64 = 1e-3;
 
 /// A face in its plane.
 struct Flat {
     surface: u32,
     triangle: u32,
-    /// Does it look along the normal of the plane?
+    /// Does the face look along the normal of the plane?
     along: bool,
     corners: [DVec2; 3],
     low: DVec2,
@@ -26,11 +26,11 @@ struct Flat {
     area: f64,
 }
 
-/// What surfaces have in common, by their numbers and by whether that looks along the normal.
+/// Common areas of surfaces, by their numbers and by whether they look along the normal.
 type Common = BTreeMap<(u32, u32, bool), f64>;
 
 impl Mesh {
-    /// The surfaces that lie in others, and what their vertices are to be moved by.
+    /// The surfaces that lie in others, and the displacements of their vertices.
     pub(super) fn lying(&self, input: &[&[[u32; 3]]]) -> (Vec<Raised>, Moves) {
         let mut order: Vec<Face> = self.faces.clone();
         order.sort_by_key(|face| (self.plane[face.triangle as usize], face.triangle, face.back));
@@ -74,7 +74,7 @@ impl Mesh {
         }
     }
 
-    /// Piles up the surfaces of a plane, those that cover most of it first.
+    /// Stacks the surfaces of a plane, those that cover most of it first.
     fn raise(
         &self,
         flat: &[Flat],
@@ -124,7 +124,7 @@ impl Mesh {
     }
 }
 
-/// What faces of different surfaces that look the same way have in common; faces come from the left.
+/// Common areas of faces of different surfaces that look the same way; faces are sorted from the left.
 fn common(faces: &[Flat]) -> Common {
     let mut found = Common::new();
     let mut open: Vec<&Flat> = Vec::new();
@@ -190,7 +190,7 @@ mod tests {
         let far = t([5.0, 5.0], [6.0, 5.0], [5.0, 6.0]);
         assert_eq!(overlap(half, far), 0.0);
         let wide = t([-1.0, 0.5], [2.0, 0.5], [2.0, 2.0]);
-        // Of the half above y = .5, below y = .5 + (x + 1) / 2: all.
+        // The half above y = .5 lies wholly below y = .5 + (x + 1) / 2.
         assert!((overlap(half, wide) - 0.125).abs() < 1e-15);
     }
 }

@@ -1,11 +1,11 @@
 //! Which faces share a space: light can pass between them, straight or over other faces.
 //!
-//! Random rays join the face that they leave with the face that they meet. A closed room and what lies around it come out
-//! as two spaces; a cluster that held faces of both would take light from the one into the other. Rays join nothing that
-//! light cannot pass between. They may leave a space in parts, which only makes the cluster tree a little worse.
+//! Random rays join the face that they leave with the face that they meet. A closed room and its surroundings turn out to
+//! be two spaces; a cluster with faces of both would take light from one into the other. Rays join nothing between which
+//! light cannot pass. They may fail to join all parts of a space, which only makes the cluster tree a little worse.
 //!
-//! A triangle that others meet takes part in its parts ([`super::cut`]): those that belong to different spaces must not
-//! share a patch. Parts whose rays meet black backs for the most part lie under or in something solid, and belong nowhere.
+//! A triangle that others meet is tested part by part ([`super::cut`]): parts in different spaces must not share a patch.
+//! Parts whose rays mostly meet black backs lie under or in something solid, and belong to no space.
 
 use super::cut::Cut;
 use super::mesh::Mesh;
@@ -14,31 +14,31 @@ use crate::geometry::sampling::{cosine_direction, hash, on_triangle, sequence02}
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Rays of a face in a pass.
+/// Rays of a face in one pass.
 const RAYS: u32 = 8;
-/// Rays of the first pass, all faces together: a fraction of a second.
+/// Rays of the first pass, for all faces together: a fraction of a second.
 const FIRST_PASS: usize = 1_000_000;
-/// Passes over the faces that are not in the largest space yet.
+/// Passes over the faces that are not yet in the largest space.
 const PASSES: u64 = 4;
 /// No face.
 const NONE: u32 = u32::MAX;
-/// Rays leave a part this share of the way from its border to its middle, and those that meet one nearer to its border
-/// than this share of the scene's half size tell nothing: single precision might take them through a wall.
+/// Rays leave a part this share of the way from its border to its middle, and those that meet a part nearer to its
+/// border than this share of the scene's half size tell nothing: single precision might take them through a wall.
 const CLEAR_OF_BORDER: [f64; 2] = [0.02, 1e-5];
 /// Parts narrower than this share of the scene's half size send no rays, for the same reason.
 const NARROW: f64 = 1e-4;
 
-/// Spaces, and what must be cut for their sake.
+/// Spaces, and the cuts that separate them.
 #[derive(Debug, Clone)]
 pub struct Spaces {
-    /// Space of each face of the mesh: numbers count up in order of the first face. Faces that no ray joins to anything
-    /// are put to the largest space: they see nothing that could be taken elsewhere.
+    /// Space of each face of the mesh, numbered in order of the first face. Faces that no ray joins to anything are
+    /// added to the largest space: they see nothing whose light could be taken elsewhere.
     pub of_face: Vec<u32>,
-    /// Positions of the cuts whose parts belong to different spaces.
+    /// Indices of the cuts whose parts belong to different spaces.
     pub parted: Vec<usize>,
 }
 
-/// Finds the spaces of `mesh`, some triangles of which are there in parts.
+/// Finds the spaces of `mesh`, given some triangles in parts.
 pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
     let rooms = Rooms::new(mesh, rays, cuts);
     let (faces, count) = (mesh.faces.len(), rooms.count());
@@ -50,7 +50,7 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
             Some(part) => !rooms.narrow(part),
         }
     };
-    // How many rays of parts met fronts, less those that met backs.
+    // For each part the number of rays that met fronts, less those that met backs.
     let mut fronts = vec![0_i32; count - faces];
     let mut open: Vec<u32> = (0..count as u32).filter(|&k| takes_part(k)).collect();
     for pass in 0..PASSES {
@@ -84,7 +84,7 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
             break;
         }
     }
-    // A face in parts belongs where the first of them does that belongs anywhere.
+    // A face in parts belongs to the space of the first part that belongs to any.
     let roots: Vec<u32> = (0..count as u32).map(|k| find(&mut above, k)).collect();
     let mut parted = Vec::new();
     for (c, part) in rooms.parts.iter().enumerate() {
@@ -104,7 +104,7 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
             parted.push(c);
         }
     }
-    // The least of a set stands for it: parts come after all faces.
+    // The least member of a set represents it: parts come after all faces.
     above.truncate(faces);
     Spaces {
         of_face: numbered(above),
@@ -122,14 +122,14 @@ enum Meets {
     Nothing,
 }
 
-/// A cut triangle: its parts in space, and the id of the first of them on each side.
+/// A cut triangle: its parts in space, and the id of the first part on each side.
 struct Parts {
     triangle: u32,
     polygons: Vec<Vec<DVec3>>,
     first: [u32; 2],
 }
 
-/// Faces, then parts of faces, with the rays between them.
+/// Faces, then parts of faces: the nodes that rays join.
 struct Rooms<'a> {
     mesh: &'a Mesh,
     rays: &'a RayIndex,
@@ -137,7 +137,7 @@ struct Rooms<'a> {
     /// Face of each side of each triangle, and the cut of each triangle.
     sides: Vec<[u32; 2]>,
     cut_of: Vec<u32>,
-    /// Cut, polygon and side of the ids that come after the faces.
+    /// Cut, polygon and side of each id after the faces.
     which: Vec<(u32, u32, bool)>,
 }
 
@@ -232,7 +232,7 @@ impl<'a> Rooms<'a> {
         }
     }
 
-    /// Does a point of a triangle's plane lie inside a polygon on it, clear of its border?
+    /// Does a point of a triangle's plane lie inside a polygon on the triangle, clear of the border?
     fn holds(&self, polygon: &[DVec3], triangle: u32, at: DVec3) -> bool {
         let normal = self.mesh.normal[triangle as usize];
         let clear = CLEAR_OF_BORDER[1] * self.mesh.half_size;
@@ -263,7 +263,7 @@ fn on_polygon(polygon: &[DVec3], k: u32, seed: u64) -> DVec3 {
     point.lerp(middle, CLEAR_OF_BORDER[0])
 }
 
-/// The representative of a face's set; the way there is halved (Tarjan and van Leeuwen 1984).
+/// The representative of a face's set; the path to it is halved (Tarjan and van Leeuwen 1984).
 fn find(above: &mut [u32], mut k: u32) -> u32 {
     while above[k as usize] != k {
         let next = above[above[k as usize] as usize];
@@ -273,7 +273,7 @@ fn find(above: &mut [u32], mut k: u32) -> u32 {
     k
 }
 
-/// Joins two sets; the lower number represents both, so that the outcome does not depend on the order.
+/// Joins two sets; the lower number represents both, so that the result does not depend on the order.
 fn join(above: &mut [u32], a: u32, b: u32) {
     let (a, b) = (find(above, a), find(above, b));
     above[a.max(b) as usize] = a.min(b);
@@ -290,7 +290,7 @@ fn largest(above: &mut [u32]) -> u32 {
         .unwrap_or(0) as u32
 }
 
-/// Sets as numbers in order of their first faces; sets of one face go to the largest.
+/// Sets numbered in order of their first faces; sets of one face are added to the largest.
 fn numbered(mut above: Vec<u32>) -> Vec<u32> {
     let count = above.len();
     let main = largest(&mut above);
@@ -329,7 +329,7 @@ mod tests {
             join(&mut above, a, b);
         }
         assert_eq!(largest(&mut above), 2);
-        // 0 and 3 stand alone and go with 2, 5, 6.
+        // 0 and 3 are single and go with 2, 5, 6.
         assert_eq!(numbered(above), [0, 1, 0, 0, 1, 0, 0]);
         assert_eq!(numbered(Vec::new()), Vec::<u32>::new());
     }

@@ -1,7 +1,7 @@
 //! The tree of patches: clusters of faces above, faces in the middle, elements (quarters of quarters) below.
 //!
-//! Nodes stand in an arena in which children come after their parent and side by side, so that *pull* (leaves to root)
-//! is one backward and *push* one forward sweep. Elements split one to four at their edge midpoints
+//! Nodes lie in an arena in which children come after their parent and side by side, so that *pull* (leaves to root) is
+//! one backward and *push* one forward sweep. Elements split one to four at their edge midpoints
 //! (Hanrahan, Salzman and Aupperle 1991); clusters split as built.
 
 use super::mesh::{Face, Mesh};
@@ -23,7 +23,7 @@ pub struct Node {
     pub children: u8,
     /// Is every face below in one plane and facing one way?
     pub flat: bool,
-    /// Which element this is; [`NONE`] for a cluster.
+    /// Index of the node's element; [`NONE`] for a cluster.
     pub element: u32,
     /// First of the node's faces in [`Tree::faces`], and how many (1 for elements).
     pub faces: (u32, u32),
@@ -37,7 +37,7 @@ pub struct Node {
     pub radius: f64,
     /// Surface area.
     pub area: f64,
-    /// As much of it as counts, see `counted`: what errors are averaged over.
+    /// The part of the area that counts, see `counted`: errors are averaged over this.
     pub counted: f64,
     /// Area-weighted mean normal, unit length.
     pub normal: DVec3,
@@ -46,7 +46,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// A leaf of some area that is nowhere in particular and no element.
+    /// A leaf of some area, without position or element.
     pub fn bare(parent: u32, area: f64) -> Self {
         Self {
             parent,
@@ -71,7 +71,7 @@ impl Node {
         self.children == 0
     }
 
-    /// The same node with its box and sphere set around some points.
+    /// The node with its box and sphere set around some points.
     pub(super) fn around(self, points: &[DVec3]) -> Self {
         let (low, high) = points
             .iter()
@@ -104,7 +104,7 @@ impl Node {
             (1.0 - self.cone * self.cone).max(0.0).sqrt(),
         ];
         let along = [(1.0 - bundle * bundle).sqrt(), self.cone];
-        // Together a right angle or more, or more than is missing from one.
+        // Together a right angle or more, or at least what is missing to one.
         along[0] * along[1] <= bundle * cone
             || self.normal.dot(way) > -distance * (bundle * along[1] + along[0] * cone)
     }
@@ -124,7 +124,7 @@ impl Node {
 pub struct Element {
     /// Corners, counter-clockwise from the side it faces.
     pub corners: [DVec3; 3],
-    /// Position in [`Tree::faces`] of the face it is part of.
+    /// Position in [`Tree::faces`] of the element's face.
     pub face: u32,
     /// Number of splits between the face and this element.
     pub depth: u8,
@@ -137,7 +137,7 @@ impl Element {
     }
 }
 
-/// A point of a node that stands for a share of its area.
+/// A point of a node that represents a share of its area.
 #[derive(Debug, Clone, Copy)]
 pub struct Sample {
     /// The point.
@@ -146,7 +146,7 @@ pub struct Sample {
     pub normal: DVec3,
     /// Plane id of the face.
     pub plane: u32,
-    /// Area that the sample stands for.
+    /// Area that the sample represents.
     pub area: f64,
 }
 
@@ -169,16 +169,16 @@ pub struct Tree {
     pub face_area: Vec<f64>,
     /// For each triangle of the mesh, the entries of `faces` that are its front and its back.
     pub entry: Vec<[u32; 2]>,
-    /// For each element of a diffuse sheet the one behind it, on the same triangle; [`NONE`] for other nodes. Empty in a room
-    /// without sheets.
+    /// For each element of a diffuse sheet the one on the other side of the same triangle; [`NONE`] for other nodes. Empty in
+    /// a room without sheets.
     pub behind: Vec<u32>,
-    /// Running sum of the areas that count over `faces`, like `face_area`; empty where all of them do.
+    /// Running sum of counted areas over `faces`, like `face_area`; empty where all area counts.
     pub face_counted: Vec<f64>,
-    /// Nodes that there were when it was found out what counts: parts of these count alike.
+    /// Number of nodes when counted areas were found: parts of these nodes count in the same proportion.
     pub known: u32,
 }
 
-/// How far a hierarchy had grown: parts are only ever added behind what there was.
+/// Size of a hierarchy: nodes are only ever appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grown {
     nodes: usize,
@@ -210,18 +210,18 @@ impl Tree {
         (self.face_area.partition_point(|&a| a <= area).max(1) - 1).min(self.faces.len() - 1)
     }
 
-    /// The element of a node that is one.
+    /// The element of a node; none for a cluster.
     pub fn element(&self, node: &Node) -> Option<&Element> {
         self.elements.get(node.element as usize)
     }
 
-    /// The element of a diffuse sheet that lies behind a node, with the same corners, facing the other way; [`NONE`] where light does
-    /// not pass. Both are leaves, or none of them is.
+    /// The element on the other side of a diffuse sheet, with the same corners, facing the other way; [`NONE`] where light does not
+    /// pass. Both are leaves, or neither is.
     pub fn behind(&self, id: u32) -> u32 {
         self.behind.get(id as usize).copied().unwrap_or(NONE)
     }
 
-    /// Pairs the faces of triangles that light passes between.
+    /// Pairs the two faces of triangles that light passes through.
     pub(super) fn pair_sheets(&mut self, mesh: &Mesh) {
         if mesh.sheets.is_empty() {
             return;
@@ -236,7 +236,8 @@ impl Tree {
         }
     }
 
-    /// Splits a leaf element into four, and with it the one behind it in a diffuse sheet; does nothing for a node with children. Every child is similar to its parent.
+    /// Splits a leaf element into four, together with the one on the other side of a diffuse sheet; does nothing for a node with children. Every
+    /// child is similar to its parent.
     pub fn subdivide(&mut self, id: u32) {
         let behind = self.behind(id);
         let first = self.quarter(id);
@@ -245,7 +246,8 @@ impl Tree {
         }
         let other = self.quarter(behind);
         self.behind.resize(self.nodes.len(), NONE);
-        // Seen from behind the corners go round the other way: the parts at the second and the third change places.
+        // Seen from the other side, corners run the other way round: the children at the second and third corner are
+        // exchanged.
         for (k, part) in [0, 2, 1, 3].into_iter().enumerate() {
             let [one, two] = [first + k as u32, other + part];
             self.behind[one as usize] = two;
@@ -253,7 +255,7 @@ impl Tree {
         }
     }
 
-    /// How far the hierarchy has grown, for [`Tree::shrink`].
+    /// The size of the hierarchy, for [`Tree::shrink`].
     pub fn grown(&self) -> Grown {
         Grown {
             nodes: self.nodes.len(),
@@ -262,7 +264,7 @@ impl Tree {
         }
     }
 
-    /// Takes back every split since.
+    /// Takes back every split since `to`.
     pub fn shrink(&mut self, to: &Grown) {
         self.nodes.truncate(to.nodes);
         self.elements.truncate(to.elements);
@@ -274,7 +276,7 @@ impl Tree {
         }
     }
 
-    /// The first of the four parts that a leaf element is split into; [`NONE`] for what cannot be split.
+    /// Splits a leaf element; returns the first of its four children, or [`NONE`] if it cannot be split.
     fn quarter(&mut self, id: u32) -> u32 {
         let node = self.node(id).clone();
         if !node.is_leaf() || node.element == NONE {
@@ -310,7 +312,7 @@ impl Tree {
         first
     }
 
-    /// Gives every node without a number ([`NONE`]) that of the nearest node above that has one.
+    /// Gives every node without a number ([`NONE`]) the number of its nearest ancestor that has one.
     pub fn inherit(&self, number: &mut [u32]) {
         for id in 1..number.len() {
             if number[id] == NONE {
@@ -337,7 +339,7 @@ impl Tree {
         })
     }
 
-    /// `count` points of a node, each standing for an equal share of its area, stratified over the faces of a cluster.
+    /// `count` points of a node, each representing an equal share of its area, stratified over the faces of a cluster.
     /// `u` shifts the pattern: a pair of numbers in [0, 1).
     pub fn samples(&self, id: u32, count: usize, u: [f64; 2], out: &mut Vec<Sample>) {
         let node = self.node(id);
@@ -377,7 +379,7 @@ impl Tree {
     }
 }
 
-/// The leaf that holds a point of a face, `first` being the first of the children of a node, [`NONE`] for a leaf.
+/// The leaf that contains a point of a face; `first` gives the first child of a node, [`NONE`] for a leaf.
 pub(crate) fn leaf_below(face: u32, mut weights: [f64; 3], first: impl Fn(u32) -> u32) -> u32 {
     let mut id = face;
     loop {
@@ -388,9 +390,9 @@ pub(crate) fn leaf_below(face: u32, mut weights: [f64; 3], first: impl Fn(u32) -
     }
 }
 
-/// Which child of an element holds a point, given by barycentric weights, which become those on the child.
+/// The child of an element that contains a point, given by barycentric weights, which become weights on the child.
 pub(super) fn quarter(w: &mut [f64; 3]) -> u32 {
-    // Children 0, 1, 2 hold the corners, child 3 the middle (turned around).
+    // Children 0, 1, 2 have the corners, child 3 is the middle (rotated).
     match w.iter().position(|&x| x >= 0.5) {
         Some(k) => {
             *w = std::array::from_fn(|i| if i == k { 2.0 * w[i] - 1.0 } else { 2.0 * w[i] });
@@ -425,7 +427,7 @@ mod tests {
     use crate::geometry::sampling::{Pcg, sphere_direction};
     use std::f64::consts::FRAC_PI_2;
 
-    /// By the angles themselves.
+    /// Against the angles themselves.
     #[test]
     fn cones_that_may_face() {
         let mut random = Pcg::new(4);

@@ -1,15 +1,15 @@
-//! The hierarchy as rays look at it: from the face that a ray met down to a leaf, and up again to what was gathered whole.
+//! The hierarchy as rays need it: from the face that a ray met down to a leaf, and up again to patches that were gathered as
+//! a whole.
 //!
-//! Every ray goes this way, and the patches themselves lie far apart in memory: what rays ask of them stands here, 12 bytes a
-//! patch.
+//! Every ray goes this way, and nodes lie far apart in memory: what rays need of them is kept here, 12 bytes a node.
 
 use crate::hierarchy::{NONE, Tree, leaf_below};
 use crate::link::POLYGONS;
 
-/// What is nearer than this many times the square root of a leaf's area is close by.
+/// Hits nearer to a leaf than this many times the square root of its area are close by.
 const NEAR: f64 = 1.5;
 
-/// What rays ask of the patches that a solution knows.
+/// What rays need of the nodes that a solution knows.
 #[derive(Debug, Clone, Default)]
 pub struct Descent {
     steps: Vec<Step>,
@@ -19,20 +19,20 @@ pub struct Descent {
 struct Step {
     /// First of the children; [`NONE`] for a leaf.
     child: u32,
-    /// Parent, if that may be gathered whole: as polygons; else [`NONE`].
+    /// Parent, if it may be gathered as a whole, as polygons; else [`NONE`].
     above: u32,
     /// Hits nearer than this are close by.
     near: f32,
 }
 
 impl Descent {
-    /// Of a whole hierarchy.
+    /// For a whole hierarchy.
     pub(crate) fn new(tree: &Tree) -> Self {
         let whole = |&id: &u32| id != NONE && tree.node(id).faces.1 <= POLYGONS;
         let steps = (0_u32..).zip(&tree.nodes).map(|(k, node)| Step {
             child: node.child,
             above: Some(node.parent).filter(whole).unwrap_or(NONE),
-            // What passes a sheet does not come from what its point can see.
+            // Light that passes a sheet does not come from what the point on this side can see.
             near: match tree.behind(k) {
                 NONE => (NEAR * node.area.sqrt()) as f32,
                 _ => 0.0,
@@ -43,19 +43,19 @@ impl Descent {
         }
     }
 
-    /// The leaf that holds a point of a face, as [`Tree::leaf_at`] when the solution was made.
+    /// The leaf that contains a point of a face, as found by [`Tree::leaf_at`] when the solution was made.
     pub(crate) fn leaf_at(&self, tree: &Tree, entry: u32, weights: [f64; 3]) -> u32 {
         let face = tree.face_node[entry as usize];
         leaf_below(face, weights, |k| self.steps[k as usize].child)
     }
 
-    /// A patch and those above it that may be gathered whole.
+    /// A patch and its ancestors that may be gathered as a whole.
     pub(crate) fn upwards(&self, leaf: u32) -> impl Iterator<Item = u32> {
         let above = |&id: &u32| Some(self.steps[id as usize].above).filter(|&id| id != NONE);
         std::iter::successors(Some(leaf), above)
     }
 
-    /// What is nearer than this to a leaf is close by; 0: nothing ever is.
+    /// Hits nearer than this to a leaf are close by; 0: none is.
     pub(crate) fn near(&self, leaf: u32) -> f32 {
         self.steps[leaf as usize].near
     }
@@ -100,7 +100,7 @@ mod tests {
         split(&mut tree, 100);
         for (&(entry, w), &leaf) in places.iter().zip(&known) {
             assert_eq!(descent.leaf_at(&tree, entry, w), leaf);
-            // All patches above that have few faces, and no other.
+            // All ancestors of few faces, and no other nodes.
             let parent = |&id: &u32| Some(tree.node(id).parent).filter(|&p| p != NONE);
             let plain = std::iter::successors(Some(leaf), parent)
                 .filter(|&id| tree.node(id).faces.1 <= POLYGONS);

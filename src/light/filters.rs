@@ -1,8 +1,8 @@
 //! What panes and mirrors leave of light, lane by lane.
 //!
-//! A lane of a filter is the pane's transmittance for the mean (eq. 3 under the lane's light) of what its inside lets through, so that
-//! filters multiply rows as reflectances do. Neutral panes are exact on any lanes. The same of mirrors, with what they reflect at
-//! normal incidence.
+//! A lane of a pane's filter is the pane's transmittance at the mean (eq. 3 under the lane's light) of what its inside lets through,
+//! so that filters multiply rows as reflectances do. Neutral panes are exact on any lanes. The same holds for mirrors, with their
+//! reflectance at normal incidence.
 
 use super::lanes::Lanes;
 use super::passed::{self, Passed, Steps};
@@ -13,17 +13,18 @@ use crate::scene::pane::Pane;
 use crate::spectrum::LEAVES;
 use glam::Vec3;
 
-/// What passes, by lane.
+/// Transmittance or reflectance by lane.
 pub type Filter = [f32; LEAVES];
 
 /// The spectra of panes and mirrors on some lanes.
 #[derive(Debug, Clone, Default)]
 pub struct Filters {
-    /// By material: what the inside of its pane lets through or its mirror reflects, lane by lane; empty for what is neither.
+    /// By material: transmittance of the inside of its pane or reflectance of its mirror, lane by lane; empty for other
+    /// materials.
     inside: Vec<Vec<f32>>,
     /// By material: its pane.
     panes: Vec<Option<Pane>>,
-    /// How much each lane counts in brightness.
+    /// Weight of each lane in brightness.
     weights: Vec<f64>,
 }
 
@@ -73,7 +74,7 @@ impl Filters {
         self.weights.is_empty()
     }
 
-    /// Multiplies a filter by what one pane lets through.
+    /// Multiplies a filter by the transmittance of one pane.
     pub fn pass(&self, crossing: &Crossing, filter: &mut Filter) {
         let material = crossing.material as usize;
         let Some(pane) = &self.panes[material] else {
@@ -84,13 +85,13 @@ impl Filters {
         self.multiply(material, pane.passing(cosine, thickness, texel), filter);
     }
 
-    /// Multiplies a filter by what one mirror reflects.
+    /// Multiplies a filter by the reflectance of one mirror.
     pub fn mirror(&self, material: u32, cosine: f32, filter: &mut Filter) {
         let reflects = |normal| Mirror::reflects(normal, f64::from(cosine));
         self.multiply(material as usize, reflects, filter);
     }
 
-    /// What is left of light that passes this.
+    /// The filter of what light passes.
     pub(crate) fn of(&self, passed: &[[i32; 4]]) -> Filter {
         let mut filter = [1.0; LEAVES];
         for &one in passed {
@@ -103,7 +104,7 @@ impl Filters {
         filter
     }
 
-    /// Is it something that light of a room with these panes and mirrors can pass?
+    /// Can light of a room with these panes and mirrors pass this?
     pub(crate) fn knows(&self, passed: &[[i32; 4]]) -> bool {
         let known = |material: u32| self.inside.get(material as usize);
         passed::is_possible(passed, |material| {
@@ -121,7 +122,7 @@ impl Filters {
         }
     }
 
-    /// What is left of light by way of mirrors, and of panes between them; as `kept` asks.
+    /// What mirrors on a route and panes between them leave of light; recorded if `kept`.
     pub(crate) fn along(
         &self,
         glazing: Option<Glazing>,
@@ -145,7 +146,7 @@ impl Filters {
         Passage::plain(filter)
     }
 
-    /// What is left of light that passes this, and what it passes.
+    /// What is left of light that passes this, and what was passed.
     fn past(&self, passed: Passed) -> Passage {
         Passage {
             filter: self.of(&passed),
@@ -153,7 +154,7 @@ impl Filters {
         }
     }
 
-    /// About how bright light is that has passed, as a share: the mean over lanes by luminance.
+    /// Rough share of brightness that a filter leaves: the mean over lanes by luminance.
     pub fn brightness(&self, filter: &Filter) -> f64 {
         let lanes = filter.iter().zip(&self.weights);
         lanes.map(|(x, w)| f64::from(*x) * w).sum()
@@ -165,18 +166,18 @@ impl Filters {
 pub(crate) struct Passage {
     /// By lane.
     pub(crate) filter: Filter,
-    /// Where it is kept where light comes from: what it passes, by shares, so that the filter is the mean of theirs. Else nothing.
+    /// If the origin of light is recorded: what the light passes, by shares, so that the filter is the mean of theirs. Else empty.
     pub(crate) by: Vec<(Passed, f32)>,
 }
 
 impl Passage {
-    /// Of which nothing else is kept.
+    /// A passage of which only the filter is recorded.
     fn plain(filter: Filter) -> Self {
         let by = Vec::new();
         Self { filter, by }
     }
 
-    /// Past nothing.
+    /// A passage past nothing.
     pub(crate) fn free() -> Self {
         Self::plain([1.0; LEAVES])
     }
@@ -188,7 +189,7 @@ pub(crate) struct Tint {
     sum: [f64; LEAVES],
     all: f64,
     by: Vec<(Passed, f64)>,
-    /// Weight of ways on which all is left.
+    /// Weight of ways on which nothing is lost.
     free: f64,
 }
 
@@ -204,7 +205,7 @@ impl Default for Tint {
 }
 
 impl Tint {
-    /// Adds a way; none: all is left.
+    /// Adds a way; none: nothing is lost on it.
     pub(crate) fn add(&mut self, passage: Option<&Passage>, weight: f64) {
         self.all += weight;
         let Some(Passage { filter, by }) = passage else {
@@ -219,7 +220,7 @@ impl Tint {
         self.by.extend(by.iter().map(times));
     }
 
-    /// The mean; none of nothing.
+    /// The mean; none without ways.
     pub(crate) fn mean(self) -> Option<Passage> {
         if self.all <= 0.0 {
             return None;
@@ -238,7 +239,7 @@ impl Tint {
 }
 
 impl Glass<'_> {
-    /// What panes leave of light on a segment, as `kept` asks; none if it passes none.
+    /// What panes leave of light on a segment, recorded if `kept`; none if it passes no pane.
     pub(crate) fn through(&self, from: Vec3, to: Vec3, kept: Option<Steps>) -> Option<Passage> {
         if let Some(steps) = kept {
             let passed = passed::passed(&self.glazing, from, to, steps);
@@ -255,14 +256,14 @@ impl Glass<'_> {
         Some(Passage::plain(filter))
     }
 
-    /// How bright light is that has passed the segment, as a share.
+    /// Share of brightness that panes leave on the segment.
     pub(crate) fn brightness(&self, from: Vec3, to: Vec3) -> f64 {
         let passage = self.through(from, to, None);
         passage.map_or(1.0, |passage| self.filters.brightness(&passage.filter))
     }
 }
 
-/// Adds a row times a weight, of each lane what a filter leaves.
+/// Adds a row times a weight, lane by lane times a filter.
 pub(crate) fn accumulate(sum: &mut [f32], weight: f32, row: &[f32], tint: Option<&Filter>) {
     match tint {
         None => {

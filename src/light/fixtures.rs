@@ -1,31 +1,32 @@
-//! Lamps of many faces, a glass bulb of hundreds of triangles, as points with a normal and an area.
+//! Lamps of many faces, such as a glass bulb of hundreds of triangles, as points with a normal and an area.
 //!
-//! From some of their sizes away that is what such faces are, and to sum what they bring takes less time than to look through
-//! their hierarchy down to each.
+//! From several of their sizes away such faces are no more than that, and summing their light takes less time than descending
+//! the hierarchy to each.
 
 use crate::hierarchy::{Element, Mesh, Tree};
 use glam::DVec3;
 use std::ops::Range;
 use wide::f64x8;
 
-/// Parts of a lamp whose exitance differs by no more than this share shine alike: means of equal numbers differ by rounding.
+/// Parts of a lamp whose exitance differs by no more than this share emit alike: means of equal numbers differ by rounding.
 const ALIKE: f32 = 1e-5;
 
-/// The faces that glow, in the order of the hierarchy.
+/// The emitting faces, in the order of the hierarchy.
 #[derive(Debug, Clone, Default)]
 pub struct Fixtures {
-    /// Their elements.
+    /// The elements of these faces.
     elements: Vec<u32>,
     /// Middle, and normal times area over pi: coordinate by coordinate.
     columns: [Vec<f64>; 6],
-    /// How many of them lie before each entry of [`Tree::faces`], and all.
+    /// For each entry of [`Tree::faces`] the number of emitting faces before it, and at the end that of all.
     before: Vec<u32>,
-    /// Of each node the radius of its largest face that glows, if all that do are of one surface and shine alike; else infinite.
+    /// For each node the radius of its largest emitting face, if all that emit belong to one surface and emit alike; else
+    /// infinite.
     grain: Vec<f32>,
 }
 
 impl Fixtures {
-    /// Of a hierarchy whose nodes emit with these brightnesses.
+    /// The emitting faces of a hierarchy whose nodes have these brightnesses.
     pub(crate) fn new(tree: &Tree, mesh: &Mesh, emitted: &[f32]) -> Self {
         let mut out = Self {
             grain: vec![0.0; tree.nodes.len()],
@@ -46,7 +47,7 @@ impl Fixtures {
             }
             out.before.push(out.elements.len() as u32);
         }
-        // What shines alike below each node: the surface it is of and how bright.
+        // For each node below which everything emits alike: the surface and its brightness.
         let mut shines: Vec<Option<(u32, f32)>> = vec![None; emitted.len()];
         for k in (0..emitted.len()).rev().filter(|&k| emitted[k] > 0.0) {
             let node = &tree.nodes[k];
@@ -83,12 +84,12 @@ impl Fixtures {
         }
     }
 
-    /// Radius of the largest face that glows below a node, if all of them shine alike; else infinite.
+    /// Radius of the largest emitting face below a node, if all of them emit alike; else infinite.
     pub(crate) fn grain(&self, node: u32) -> f64 {
         f64::from(self.grain[node as usize])
     }
 
-    /// The faces below a node that glow.
+    /// The emitting faces below a node.
     pub(crate) fn below(&self, tree: &Tree, node: u32) -> Range<usize> {
         let (first, count) = tree.node(node).faces;
         let place = |entry: u32| self.before[entry as usize] as usize;
@@ -100,7 +101,7 @@ impl Fixtures {
         self.elements[face]
     }
 
-    /// Adds form factors of faces far from a point, as those of their middles, to `out`; their sum.
+    /// Adds form factors of faces far from a point, as those of their middles, to `out`; returns their sum.
     pub(crate) fn factors(
         &self,
         faces: Range<usize>,

@@ -1,4 +1,4 @@
-//! What a material fluoresces, on lanes: each lane of its irradiance excites its terms by so much, each term fills the lanes of its own
+//! Fluorescence of a material on lanes: each lane of irradiance excites the material's terms, and each term fills the lanes of its own
 //! light spectrum.
 
 use super::lanes::Lanes;
@@ -9,12 +9,12 @@ use crate::spectrum::{LEAVES, Leaves};
 /// A material's terms.
 #[derive(Debug, Clone)]
 pub struct Fluorescent {
-    /// What a lane of irradiance at 1 excites, and the row that excitation 1 gives out; padded with 0.
+    /// For each term: what each lane of irradiance at 1 excites, and the row that excitation 1 emits; padded with 0.
     terms: Vec<([f32; LEAVES], [f32; LEAVES])>,
 }
 
 impl Fluorescent {
-    /// On some lanes.
+    /// The terms of a material on some lanes.
     pub fn new(fluorescence: &Fluorescence, lanes: &Lanes, scene: &Scene) -> Self {
         let layers = scene.changes.layers.as_ref();
         let terms = fluorescence.terms.iter().map(|term| {
@@ -25,7 +25,7 @@ impl Fluorescent {
                     .light
                     .zip(layers)
                     .map(|(light, all)| all.of_light[light]);
-                // Lanes of all lights together excite the first copy, as a whole.
+                // Lanes of all lights together excite only the first copy.
                 let own = match (term.layer, layer) {
                     (Some(own), Some(layer)) => own == layer,
                     (Some(own), None) => own == 0,
@@ -41,7 +41,7 @@ impl Fluorescent {
         }
     }
 
-    /// What is given out under an irradiance.
+    /// Fluorescent exitance by an irradiance.
     pub fn of<const L: usize>(&self, irradiance: &[f32; L]) -> [f32; L] {
         let mut out = [0.0; L];
         for (taken, given) in &self.terms {
@@ -74,7 +74,7 @@ impl Fluorescent {
     }
 }
 
-/// What light counts for by what it excites, as weights beside the observer's: for each leaf the tristimulus values that a surface
+/// Weights of light by what it excites, besides the observer's: for each spectral leaf the tristimulus values that a surface
 /// fluoresces under it, the greatest of all materials; none where nothing fluoresces.
 pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]> {
     let width = scene.grid.width();
@@ -102,8 +102,8 @@ pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]>
     any.then_some(more)
 }
 
-/// The share of what is excited that counts in brightness beside what is seen: so much that the lamp that excites most counts no more
-/// than the one that is seen most, or errors of either would be nothing beside the other.
+/// Share of excitation that counts in brightness beside visible light: such that the most exciting lamp counts no more than the most
+/// visible one, or errors of one would vanish beside the other.
 pub(crate) fn balance(scene: &Scene, weights: &[Leaves; 3], guide: &[Leaves; 3]) -> f64 {
     let surfaces = scene.materials.iter().filter_map(|m| m.emission.as_ref());
     let surfaces = surfaces.map(|e| (e.light, &e.shape));

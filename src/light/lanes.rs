@@ -2,13 +2,13 @@
 //!
 //! Each light spectrum S(lambda) of the room is kept exactly; a lane holds the *ratio* radiosity / S on one interval of
 //! that light's dyadic cut. Reflectances are averaged by the paper's eq. 3 with `S abar` in place of `abar`, so that a
-//! grey room needs one lane a light, whatever its lines, and a first reflection keeps its tristimulus values.
-//! Where all lights together would need more than 64 lanes, the rows hold the 64 leaves themselves.
+//! grey room needs one lane a light, whatever its lines, and a first reflection keeps its tristimulus values. Where all
+//! lights together would need more than 64 lanes, the rows hold the 64 spectral leaves (leaves, here).
 //!
-//! Other ways to hold spectra are here to be compared with: radiosity itself on intervals (the paper's way), linear
-//! sRGB, and coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
+//! Other ways to hold spectra serve for comparison: radiosity itself on intervals (the paper's way), linear sRGB, and
+//! coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
 //!
-//! Where surfaces fluoresce light counts also for what it excites, by weights as the observer's: see [`Lanes::guided`].
+//! Where surfaces fluoresce, light also counts by what it excites: see [`Lanes::guided`].
 //!
 //! Units: ratio lanes are numbers that multiply S (W/m2/nm of radiosity per unit of `LightSpectrum::power`);
 //! absolute lanes are W/m2/nm; lanes of linear sRGB are W/m2 weighted by the observer, (1, 1, 1) has Y = 1 / KM lm/m2.
@@ -21,7 +21,7 @@ use nalgebra::Matrix3;
 /// One lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Lane {
-    /// Which light's ratio; none: absolute.
+    /// The light whose ratio the lane holds; none: absolute.
     pub light: Option<usize>,
     /// First leaf of the interval.
     pub first: usize,
@@ -34,7 +34,7 @@ pub struct Lane {
 enum Base {
     /// Values on intervals.
     Intervals(Vec<Lane>),
-    /// Linear sRGB: what each leaf of a reflectance adds to it under D65, and each leaf of a radiosity.
+    /// Linear sRGB: the contribution of each leaf of a reflectance under D65, and of each leaf of a radiosity.
     Rgb {
         paint: Box<[Leaves; 3]>,
         light: Box<[Leaves; 3]>,
@@ -51,24 +51,24 @@ pub struct Lanes {
     xyz: Vec<[f64; 3]>,
     power: Vec<Leaves>,
     weights: [Leaves; 3],
-    /// What light counts for beside what is seen of it.
+    /// How light counts besides being visible.
     guide: Option<Box<Guide>>,
 }
 
-/// What light counts for beside what is seen of it.
+/// How light counts by what it excites.
 #[derive(Debug, Clone)]
 struct Guide {
-    /// Weights as the observer's.
+    /// Weights like the observer's.
     weights: [Leaves; 3],
-    /// Tristimulus value of a lane at 1 by them.
+    /// Tristimulus value of each lane at 1 by these weights.
     xyz: Vec<[f64; 3]>,
-    /// A share of it, with what is seen.
+    /// A share of that, plus the visible tristimulus value.
     both: Vec<[f64; 3]>,
 }
 
 impl Lanes {
-    /// One cut a light; falls back to [`Lanes::dense`] beyond 64 lanes. `weights` are the integrals of the colour
-    /// matching functions over the leaves, nm.
+    /// One cut for each light; falls back to [`Lanes::dense`] beyond 64 lanes. `weights` are the integrals of the
+    /// colour matching functions over the leaves, nm.
     pub fn ratio(spectra: &[LightSpectrum], cuts: &[Partition], weights: &[Leaves; 3]) -> Self {
         assert_eq!(spectra.len(), cuts.len(), "a cut for each light");
         if cuts.iter().map(|c| c.count()).sum::<usize>() > LEAVES {
@@ -127,7 +127,7 @@ impl Lanes {
         Self::with(lanes.collect(), spectra, weights)
     }
 
-    /// Linear sRGB: reflectances by their colour under D65, lamps by theirs. Three numbers, and no way back.
+    /// Linear sRGB: reflectances by their colour under D65, lamps by their own. Three numbers, and no way back.
     pub fn rgb(spectra: &[LightSpectrum], upsampler: &Upsampler, weights: &[Leaves; 3]) -> Self {
         let one = |leaf: usize| -> Leaves { std::array::from_fn(|k| f64::from(k == leaf)) };
         let display = LinearSrgb::standard();
@@ -156,7 +156,7 @@ impl Lanes {
         }
     }
 
-    /// Coordinates in an orthonormal basis. Lanes do not reflect one by one then: see [`Lanes::matrix`].
+    /// Coordinates in an orthonormal basis. Lanes then do not reflect one by one: see [`Lanes::matrix`].
     pub fn vectors(spectra: &[LightSpectrum], basis: Vec<Leaves>, weights: &[Leaves; 3]) -> Self {
         let xyz = basis
             .iter()
@@ -171,7 +171,7 @@ impl Lanes {
         }
     }
 
-    /// These lanes.
+    /// The given lanes.
     pub(crate) fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
         let power: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
         let xyz = lanes
@@ -195,8 +195,8 @@ impl Lanes {
         }
     }
 
-    /// The same lanes, whose averages follow further weights beside the observer's, what a surface sends out for a unit of each leaf at
-    /// other wavelengths, and whose brightness a `share` of it.
+    /// These lanes, whose averages also follow `weights` besides the observer's: what a surface emits at other wavelengths per unit of
+    /// each leaf. A `share` of that is added to brightness.
     #[must_use]
     pub fn guided(mut self, weights: &[Leaves; 3], share: f64) -> Self {
         let of = |lane: &Lane, w: &Leaves| {
@@ -222,12 +222,12 @@ impl Lanes {
         self.xyz.len()
     }
 
-    /// No lane at all (a room without light)?
+    /// Is there no lane (in a room without light)?
     pub fn is_empty(&self) -> bool {
         self.xyz.is_empty()
     }
 
-    /// The intervals that lanes stand for; none where lanes are no intervals (sRGB, a basis).
+    /// The intervals that lanes stand for; empty where lanes are not intervals (sRGB, a basis).
     pub fn lanes(&self) -> &[Lane] {
         match &self.base {
             Base::Intervals(lanes) => lanes,
@@ -283,28 +283,28 @@ impl Lanes {
         &self.xyz
     }
 
-    /// What each lane at 1 counts for in brightness: its tristimulus value, with a share of what it excites.
+    /// Weight of each lane at 1 in brightness: its tristimulus value, plus a share of what it excites.
     pub fn noticed(&self) -> &[[f64; 3]] {
         self.guide.as_ref().map_or(&self.xyz, |guide| &guide.both)
     }
 
-    /// Tristimulus value of what each lane at 1 excites; none where nothing fluoresces.
+    /// Tristimulus value excited by each lane at 1; none where nothing fluoresces.
     pub fn excites(&self) -> Option<&[[f64; 3]]> {
         self.guide.as_ref().map(|guide| &*guide.xyz)
     }
 
-    /// Tristimulus values of a row as it counts in brightness.
+    /// Tristimulus values of a row, weighted for brightness.
     pub fn notice(&self, row: &[f32]) -> [f64; 3] {
         summed(row, self.noticed())
     }
 
-    /// Tristimulus values of what a row excites; 0 where nothing fluoresces.
+    /// Tristimulus values that a row excites; 0 where nothing fluoresces.
     pub fn excited(&self, row: &[f32]) -> [f64; 3] {
         summed(row, self.excites().unwrap_or_default())
     }
 
-    /// What each lane at 1 brings a surface that takes so much of each leaf, the `width` of a leaf in nm: W/m2. Nothing where lanes are no
-    /// intervals.
+    /// Power that a surface takes from each lane at 1, given the share it takes of each leaf and the `width` of a leaf in nm: W/m2. Empty
+    /// where lanes are not intervals.
     pub fn taken(&self, share: &Leaves, width: f64) -> Vec<f32> {
         let lanes = self.lanes().iter().map(|lane| {
             let leaves = lane.first..lane.first + lane.count;
@@ -314,8 +314,8 @@ impl Lanes {
         lanes.collect()
     }
 
-    /// What each lane holds of a smooth factor (a reflectance, a lamp's shape): eq. 3 under the lane's light. Where
-    /// lanes mix this says nothing; [`Lanes::matrix`] does.
+    /// Average of a smooth factor (a reflectance, a lamp's shape) on each lane: eq. 3 under the lane's light. Where
+    /// lanes mix, only [`Lanes::matrix`] is meaningful.
     pub fn averages(&self, f: &Leaves, out: &mut [f32]) {
         match &self.base {
             Base::Intervals(lanes) => {
@@ -373,14 +373,14 @@ impl Lanes {
         }
     }
 
-    /// Tristimulus values of what a light gives out, `shape` of it times `scale`.
+    /// Tristimulus values of an emission: `scale` times `shape` of a light.
     pub(crate) fn emission(&self, light: usize, shape: &Leaves, scale: f64) -> [f64; 3] {
         let mut row = [0.0_f32; LEAVES];
         self.add_emission(light, shape, scale, &mut row);
         self.tristimulus(&row)
     }
 
-    /// Tristimulus exitance of a surface: pi times its radiance; 0 where it does not shine.
+    /// Tristimulus exitance of a surface: pi times its radiance; 0 where it does not emit.
     pub(crate) fn exitance(&self, emission: Option<&Emission>) -> [f64; 3] {
         emission.map_or([0.0; 3], |e| {
             self.emission(e.light, &e.shape, std::f64::consts::PI)
@@ -427,8 +427,8 @@ impl Lanes {
         summed(row, &self.xyz)
     }
 
-    /// Tristimulus values of a row after one more reflection, with the reflectance at full resolution as far as lanes
-    /// know of it.
+    /// Tristimulus values of each lane at 1 after one more reflection, with the reflectance at full resolution as far
+    /// as lanes can resolve it.
     pub fn reflected(&self, reflectance: &Leaves) -> Vec<[f64; 3]> {
         let through = |spectrum: &dyn Fn(usize) -> f64| {
             self.weights.each_ref().map(|w| {
@@ -455,7 +455,7 @@ impl Lanes {
         }
     }
 
-    /// What an interval lane at 1 stands for on a leaf.
+    /// Value of an interval lane at 1 on a leaf.
     fn shape(&self, lane: &Lane, leaf: usize) -> f64 {
         if (lane.first..lane.first + lane.count).contains(&leaf) {
             lane.light.map_or(1.0, |l| self.power[l][leaf])
@@ -464,7 +464,7 @@ impl Lanes {
         }
     }
 
-    /// The 64 leaf values of a row, W/m2/nm. Of linear sRGB the shortest spectrum of that colour: one of many.
+    /// The 64 leaf values of a row, W/m2/nm. For linear sRGB the shortest of the many spectra of that colour.
     pub fn leaves(&self, row: &[f32]) -> Leaves {
         let mut out = [0.0; LEAVES];
         match &self.base {
@@ -526,7 +526,7 @@ mod tests {
         }
     }
 
-    /// Every way to hold spectra gives back the colour of the lamp, whatever its lines, but the paper's on a coarse cut.
+    /// Every way to hold spectra keeps the colour of the lamp, whatever its lines, except the paper's on a coarse cut.
     #[test]
     fn lamps_keep_their_colour() {
         let weights = Observer::cie1931().weights(&Grid::default());
@@ -580,7 +580,7 @@ mod tests {
         assert!((r - 0.45).abs() < 1e-4 && (g - 0.12).abs() < 1e-4 && (b - 0.08).abs() < 1e-4);
     }
 
-    /// Reflection in a basis is exact for what the basis holds.
+    /// Reflection in a basis is exact for spectra that the basis holds.
     #[test]
     fn a_whole_basis_reflects_exactly() {
         let weights = Observer::cie1931().weights(&Grid::default());

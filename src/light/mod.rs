@@ -1,4 +1,4 @@
-//! What both sides of the transport share: lanes, rows of them, and the solution on the patches.
+//! Shared by solver and transport: lanes, rows of lanes, and the solution on the patches.
 
 mod descent;
 mod filters;

@@ -1,27 +1,28 @@
-//! What light passes on its way, by name: the panes that it crosses and the mirrors that it meets, with angles and thicknesses rounded.
+//! What light passes on its way: the panes that it crosses and the mirrors that it meets, with angles and thicknesses rounded.
 //!
-//! Lanes change and spectra of panes may be changed; what a ray passes does not. So it is this that leaves keep from round to round and
-//! that caches hold, and what it leaves of each lane is worked out anew ([`Filters::of`](super::Filters::of)).
+//! Lanes change, and spectra of panes may be changed; what a ray passes does not. So this is what leaves keep from round to round and
+//! caches hold, and its filter on the present lanes is worked out anew ([`Filters::of`](super::Filters::of)).
 
 use crate::hierarchy::{Crossing, Glazing, Route};
 use crate::store::Broken;
 use crate::store::codec::Read;
 use glam::Vec3;
 
-/// Cosines of incidence and values of textures are counted in so many parts of 1.
+/// Cosines of incidence and values of textures are stored as multiples of one over this.
 const FINE: i32 = 2048;
-/// Steps of thickness to a doubling: 2 % of what is absorbed.
+/// Steps of thickness per doubling: 2 % of what is absorbed.
 const OCTAVE: f32 = 32.0;
-/// Doublings of thickness, either way, beyond which a file is damaged.
+/// Doublings of thickness, in either direction, beyond which a file is damaged.
 const MOST_DOUBLINGS: i32 = 256;
 
-/// How finely cosines and values of textures are told apart: each is taken at the middle of its step.
+/// How finely cosines and values of textures are distinguished: each is put in the middle of its step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Steps {
-    /// 128 steps, for means over many rays: transmittance bends by less than 1e-3 over a step but for the last 2 degrees before grazing.
+    /// 128 steps, for means over many rays: transmittance bends by less than 1e-3 over a step, except in the last 2 degrees before
+    /// grazing.
     Coarse,
-    /// 1024 steps, for points: a lamp may shine on all of a floor at one angle. Transmittance is then off by 5e-4 at the most where it
-    /// falls by as much as the cosine does.
+    /// 1024 steps, for points: a lamp may light a whole floor at one angle. Transmittance is then off by 5e-4 at the most where its
+    /// slope against the cosine is 1.
     Fine,
 }
 
@@ -40,8 +41,8 @@ impl Steps {
     }
 }
 
-/// What light passes: material, thickness, value of the texture and cosine of incidence of each pane; of a mirror the first and the last.
-/// Sorted, so that the order on the way does not count.
+/// What light passes: material, thickness, value of the texture and cosine of incidence of each pane; for a mirror only the first and the
+/// last. Sorted, so that the order on the way does not matter.
 pub(crate) type Passed = Vec<[i32; 4]>;
 
 /// What light on a segment passes.
@@ -52,7 +53,7 @@ pub(crate) fn passed(glazing: &Glazing, from: Vec3, to: Vec3, steps: Steps) -> P
     passed
 }
 
-/// What light meets and passes that mirrors send on.
+/// What light passes and meets on a route by mirrors.
 pub(crate) fn met(glazing: Option<&Glazing>, route: &Route, steps: Steps) -> Passed {
     let mirror = |&(material, cosine): &(u32, f32)| {
         let crossing = Crossing {
@@ -79,7 +80,7 @@ fn rounded(crossing: &Crossing, steps: Steps) -> [i32; 4] {
         true => (OCTAVE * crossing.thickness.log2()).round() as i32,
         false => i32::MIN,
     };
-    // A plain pane has the value 1, whole.
+    // A plain pane has the value 1, exactly.
     let texel = match crossing.texel >= 1.0 {
         true => FINE,
         false => steps.middle(crossing.texel),
@@ -101,7 +102,7 @@ pub(super) fn crossing([material, thickness, texel, cosine]: [i32; 4]) -> Crossi
     }
 }
 
-/// Could it be something that light passes, if these materials are those of panes and mirrors?
+/// Can light pass this, if `changes_light` tells which materials are panes or mirrors?
 pub(super) fn is_possible(passed: &[[i32; 4]], changes_light: impl Fn(u32) -> bool) -> bool {
     let most = OCTAVE as i32 * MOST_DOUBLINGS;
     passed.iter().all(|&[material, thickness, texel, cosine]| {
@@ -111,7 +112,7 @@ pub(super) fn is_possible(passed: &[[i32; 4]], changes_light: impl Fn(u32) -> bo
     })
 }
 
-/// What is passed as numbers from 0 up, that tell it apart and come back by [`from_numbers`].
+/// What is passed, encoded as distinct lists of numbers from 0 up, which [`from_numbers`] decodes.
 pub(crate) fn numbers(passed: &[[i32; 4]]) -> impl Iterator<Item = u64> {
     passed.iter().flatten().map(|&k| match k {
         // No thickness.
@@ -120,10 +121,10 @@ pub(crate) fn numbers(passed: &[[i32; 4]]) -> impl Iterator<Item = u64> {
     })
 }
 
-/// What these numbers stand for.
+/// Decodes [`numbers`].
 ///
 /// # Errors
-/// [`Broken`]: they stand for nothing.
+/// [`Broken`]: the numbers mean nothing.
 pub(crate) fn from_numbers(numbers: &[u64]) -> Read<Passed> {
     let (all, rest) = numbers.as_chunks::<4>();
     let number = |n: u64| match n.checked_sub(1) {
@@ -152,7 +153,8 @@ mod tests {
             prop_assert_eq!(from_numbers(&numbers), Ok(all));
         }
 
-        /// Steps keep what they say: cosine and texture within half a step, thickness within a 64th of a doubling.
+        /// Rounding keeps within its steps: cosine and texture within half a step, thickness within a 64th of a
+        /// doubling.
         #[test]
         fn rounding_is_as_fine_as_it_says(
             cosine in 0.0_f32..1.0,

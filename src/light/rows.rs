@@ -1,4 +1,4 @@
-//! Rows of bands: one contiguous, 64-byte aligned row of f32 a patch, all patches on one working partition.
+//! Rows of bands: one contiguous, 64-byte aligned row of f32 for each patch, all on one working partition.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -26,7 +26,7 @@ impl Rows {
     pub fn zero(rows: usize, width: usize) -> Self {
         debug_assert!(matches!(width, 4 | 8 | 16 | 32 | 64));
         Self {
-            // Zero by the system, which touches no memory before it is used.
+            // Zeroed by the system, which touches memory only when it is used.
             lines: bytemuck::zeroed_vec((rows * width).div_ceil(16)),
             rows,
             width,
@@ -38,7 +38,7 @@ impl Rows {
         self.rows
     }
 
-    /// No rows?
+    /// Are there no rows?
     pub fn is_empty(&self) -> bool {
         self.rows == 0
     }
@@ -85,7 +85,7 @@ impl Rows {
             .par_chunks_mut(rows * self.width)
     }
 
-    /// All rows as vectors V, N a row. V and N make up the width; rows start on multiples of V's size.
+    /// All rows as vectors V, N to a row. V and N must make up the width; rows start on multiples of V's size.
     pub(crate) fn vectors<V: Pod, const N: usize>(&self) -> &[[V; N]] {
         debug_assert_eq!(size_of::<[V; N]>(), self.width * size_of::<f32>());
         &bytemuck::cast_slice::<Line, V>(&self.lines)
@@ -93,7 +93,7 @@ impl Rows {
             .0[..self.rows]
     }
 
-    /// All rows as vectors V, N a row.
+    /// All rows as vectors V, N to a row.
     pub(crate) fn vectors_mut<V: Pod, const N: usize>(&mut self) -> &mut [[V; N]] {
         debug_assert_eq!(size_of::<[V; N]>(), self.width * size_of::<f32>());
         &mut bytemuck::cast_slice_mut::<Line, V>(&mut self.lines)

@@ -1,4 +1,4 @@
-//! A solution: what every patch reflects and emits, in rows, with what the gather and the oracle ask of it.
+//! A solution: the reflected and emitted light of every patch, in rows, with what the gather and refinement need of it.
 
 use super::descent::Descent;
 use super::fixtures::Fixtures;
@@ -13,9 +13,9 @@ use rayon::prelude::*;
 #[derive(Debug, Clone, Copy, Default)]
 #[non_exhaustive]
 pub struct Arrival {
-    /// All of it.
+    /// All light.
     pub all: f32,
-    /// Of which straight from lamps.
+    /// Its part straight from lamps.
     pub direct: f32,
     /// Half the range of direct light over the leaf.
     pub spread: f32,
@@ -28,41 +28,42 @@ pub struct Light {
     pub reflected: Rows,
     /// Exitance of every node (area mean), by lane.
     pub emitted: Rows,
-    /// Radiosity of every leaf that is a mirror, for rays that met too many, by node: for all others mirrors are dark. Empty in a room
-    /// without.
+    /// Radiosity of every leaf that is a mirror, by node, for rays that met too many mirrors; for all other light mirrors are dark.
+    /// Empty in a room without mirrors.
     pub mirrors: Rows,
-    /// Irradiance of every leaf of the hierarchy, in order of `leaves`; of diffuse sheets as it is shown, see [`Through`].
+    /// Irradiance of every leaf of the hierarchy, in order of `leaves`; for diffuse sheets as shown, see [`Through`].
     pub irradiance: Rows,
     /// What the sides of diffuse sheets show of each other's light.
     pub through: Through,
     /// Leaves of the hierarchy, ascending.
     pub leaves: Vec<u32>,
-    /// Brightness of what each node reflects, share of the white's.
+    /// Brightness of each node's reflected radiosity, share of the white's.
     pub bright_reflected: Vec<f32>,
-    /// Brightness of what each node emits.
+    /// Brightness of each node's exitance.
     pub bright_emitted: Vec<f32>,
-    /// Greatest brightness of what any leaf below each node reflects.
+    /// Greatest brightness of reflected radiosity on any leaf below each node.
     pub brightest: Vec<f32>,
     /// Standard deviation of brightness over the leaves of a node.
     pub spread: Vec<f32>,
-    /// What arrives on every node that is a leaf; nothing elsewhere.
+    /// Light that arrives on every node that is a leaf; 0 elsewhere.
     pub arrival: Vec<Arrival>,
-    /// The hierarchy as rays look at it.
+    /// The hierarchy as rays need it.
     pub descent: Descent,
-    /// For each node the first below, or itself, that is an element that emits or has several children in which any does; none
-    /// where none does.
+    /// For each node the first node, itself or below, that is an emitting element or has several children with emission below;
+    /// [`NONE`] where nothing emits.
     pub lit: Vec<u32>,
     /// Lamps of many faces.
     pub fixtures: Fixtures,
     /// Brightness of a punctual light's intensity (of its normal irradiance where it is directional).
     pub bright_lamps: Vec<f32>,
-    /// Who is linked to whom.
+    /// The links of each node.
     pub neighbours: Neighbours,
     /// Irradiance of the adaptation white, tristimulus.
     pub white: [f64; 3],
     /// Half the diagonal of the room.
     pub half_size: f64,
-    /// Does light count for what it excites beside what is seen of it? Then what is faint by both together may be bright by one.
+    /// Does light count by what it excites as well as by being visible? Then light that is faint by both together may be bright
+    /// by one.
     pub apart: bool,
 }
 
@@ -72,7 +73,7 @@ impl Light {
         self.reflected.width()
     }
 
-    /// Bytes held, links' other ends aside.
+    /// Bytes held, except for the other ends of links.
     pub fn bytes(&self) -> usize {
         let scalars = [
             &self.bright_reflected,
@@ -95,7 +96,7 @@ impl Light {
             + 4 * (self.bright_lamps.len() + self.leaves.len() + self.lit.len())
     }
 
-    /// Works out brightness and its spread from the rows, and what rays ask of the patches.
+    /// Works out brightness and its spread from the rows, and what rays need of the nodes.
     pub fn measure(&mut self, tree: &Tree, mesh: &Mesh, lanes: &Lanes) {
         let white = self.white;
         let scalar = |row: &[f32]| brightness(lanes.notice(row), white) as f32;
@@ -149,15 +150,15 @@ impl Light {
     }
 }
 
-/// Darker than this share of white counts as this dark: nobody sees lightness below it.
+/// Anything darker than this share of white counts as this dark: nobody sees differences below.
 const DARKEST: f64 = 0.02;
 
-/// How much lightness a change of light makes where it is so bright, as a multiple of what it makes at white.
+/// How much a change of light changes lightness at a brightness, as a multiple of that at white.
 pub(crate) fn keenness(bright: f64) -> f64 {
     bright.max(DARKEST).powf(-2.0 / 3.0)
 }
 
-/// One number for how bright a colour is beside the white: the mean of its three ratios, so that no colour counts nothing.
+/// Brightness of a colour relative to white: the mean of the three ratios, so that no colour counts for nothing.
 pub(crate) fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
     (0..3)
         .map(|k| {
@@ -171,14 +172,14 @@ pub(crate) fn brightness(xyz: [f64; 3], white: [f64; 3]) -> f64 {
         / 3.0
 }
 
-/// A row as one number, by what each lane counts.
+/// A row as one number, by the weight of each lane.
 pub(crate) fn weighed(row: &[f32], weights: &[f64]) -> f64 {
     let lanes = row.iter().zip(weights);
     lanes.map(|(x, w)| f64::from(*x) * w).sum()
 }
 
-/// For each node, the other ends of its links and what may stand between. Links found blocked are here too:
-/// a point may see what sixteen rays did not.
+/// For each node, the other ends of its links and what may stand between. Links found blocked are included: a point may
+/// see what the few rays of a link did not.
 #[derive(Debug, Clone, Default)]
 pub struct Neighbours {
     start: Vec<u32>,
@@ -217,7 +218,7 @@ impl Neighbours {
     /// Other ends of a node's links.
     pub fn row(&self, node: u32) -> &[(u32, Way, f32)] {
         let k = node as usize;
-        // Elements split after the links were made have none of their own.
+        // Elements split after the links were made have no links of their own.
         if k + 1 >= self.start.len() {
             return &[];
         }

@@ -1,15 +1,15 @@
 //! What the two sides of diffuse sheets show of each other's light.
 //!
-//! One number a lane says how bright light is on an opaque surface: its irradiance. A side of a sheet sends out
-//! `rho E + tau E'`, E' behind it. So that it looks like any other surface downstream, its light is given as the irradiance that the
-//! sheet's whole reflectance and transmittance, s, would turn into that: `(rho / s) E + (tau / s) E'`, lane by lane.
+//! One number per lane tells how bright light is on an opaque surface: its irradiance. A side of a sheet has radiosity
+//! `rho E + tau E'`, E' behind. So that it looks like any other surface to later steps, its light is given as the irradiance that
+//! the sheet's whole reflectance and transmittance, s, would turn into that radiosity: `(rho / s) E + (tau / s) E'`, lane by lane.
 
 use super::rows::Rows;
 
 /// The shares of both irradiances in the light of a side, for the leaves of sheets.
 #[derive(Debug, Clone, Default)]
 pub struct Through {
-    /// Places among the leaves of a side and of the one behind it, ascending.
+    /// Positions among the leaves of a side and of the side behind it, ascending.
     pairs: Vec<[u32; 2]>,
     /// `rho / s` of each pair; 1 where s is 0.
     own: Rows,
@@ -18,7 +18,8 @@ pub struct Through {
 }
 
 impl Through {
-    /// Of pairs of leaves, with what their sides reflect, let through, and are shown by.
+    /// For pairs of leaves: reflectance and transmittance of their sides, and the reflectance by which their light is
+    /// shown.
     pub(crate) fn new(pairs: Vec<[u32; 2]>, [rho, tau, shown]: [&Rows; 3]) -> Self {
         let (mut own, mut across) = (rho.clone(), tau.clone());
         for k in 0..pairs.len() {
@@ -38,14 +39,14 @@ impl Through {
         self.pairs.is_empty()
     }
 
-    /// The shares of its own irradiance and of that behind it in the light of a leaf, by its place among the leaves; none of what is
-    /// no sheet.
+    /// The shares of a leaf's own irradiance and of that behind it in its light as shown, by its position among the leaves; none
+    /// where it is no sheet.
     pub fn shares(&self, place: u32) -> Option<[&[f32]; 2]> {
         let k = self.pairs.binary_search_by_key(&place, |pair| pair[0]);
         k.ok().map(|k| [self.own.row(k), self.across.row(k)])
     }
 
-    /// Irradiance by leaf, of sheets as it is shown.
+    /// Irradiance by leaf, for sheets as shown.
     pub(crate) fn shown(&self, mut irradiance: Rows) -> Rows {
         let met = irradiance.clone();
         for (k, [place, behind]) in self.pairs.iter().map(|p| p.map(|x| x as usize)).enumerate() {
@@ -61,7 +62,7 @@ impl Through {
     }
 }
 
-/// Turns the irradiance of a side into what it is shown by, with that behind it.
+/// Turns the irradiance of a side into that by which it is shown, given the irradiance behind.
 pub(crate) fn mixed([own, across]: [&[f32]; 2], light: &mut [f32], behind: &[f32]) {
     let shares = own.iter().zip(across);
     for ((light, behind), (own, across)) in light.iter_mut().zip(behind).zip(shares) {
@@ -73,7 +74,7 @@ pub(crate) fn mixed([own, across]: [&[f32]; 2], light: &mut [f32], behind: &[f32
 mod tests {
     use super::*;
 
-    /// Times s, what is shown is what the side sends out; a side that sends out nothing keeps its own light.
+    /// Times s, the light as shown is the side's radiosity; a side without radiosity keeps its own light.
     #[test]
     fn what_is_shown_times_the_whole_is_what_leaves() {
         let rows = |values: [[f32; 4]; 2]| {

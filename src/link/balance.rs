@@ -1,12 +1,12 @@
-//! Makes every row of form factors sum to what it must, symmetrically.
+//! Scales the rows of form factors symmetrically so that each sums to its target.
 //!
 //! Finds factors `d_i` on the leaves such that `d_i * sum_j G_ij d_j = target_i A_i` (Sinkhorn and Knopp 1967, in the
-//! symmetric form of Knight 2008): reciprocity stays exact, and with target 1 light is neither made nor lost. In a
-//! closed room of albedo .95, rows that miss 1 % make it 16 % too dark. The target of a leaf is the share of its light
+//! symmetric form of Knight 2008): reciprocity stays exact, and with target 1 no light is made or lost. In a closed
+//! room of albedo .95, rows that are 1 % short make it 16 % too dark. The target of a leaf is the share of its light
 //! that meets a front: 1 in a closed room, less where light leaves or meets a black back.
 //!
-//! Rows of leaves differ from their targets mostly because a link of an ancestor lights all its parts alike; the sums
-//! over larger patches are right. Bringing only those above 1 down would therefore lose light.
+//! Rows of leaves differ from their targets mostly because a link of an ancestor lights all its children alike; the
+//! sums over larger patches are right. Scaling down only rows above 1 would therefore lose light.
 
 use super::LinkRows;
 use crate::hierarchy::Tree;
@@ -19,16 +19,16 @@ const STEPS: usize = 200;
 /// has no limit: rows above 1 would make light, and the solve diverge.
 const GREATEST: f64 = 4.0;
 
-/// Row factors and what the rows summed to before.
+/// Row factors, and how far row sums are from their targets.
 #[derive(Debug, Clone, Default)]
 pub struct Balance {
     /// Factor of each node that is a leaf (1 elsewhere).
     pub factor: Vec<f32>,
     /// Area-weighted mean and greatest distance of row sums from their targets before balancing.
     pub defect_before: [f64; 2],
-    /// The same after.
+    /// The same distances after balancing.
     pub defect_after: [f64; 2],
-    /// Leaves whose factor met the limit.
+    /// Leaves whose factor reached the limit.
     pub limited: usize,
 }
 
@@ -55,7 +55,7 @@ pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> B
             factor[k] = next;
         }
         sums = row_sums(tree, rows, areas, &factor);
-        // Slivers in odd corners may take for ever; what counts is that they carry nothing.
+        // Slivers in odd corners may never converge, but carry next to nothing.
         if worst < TOLERANCE || mean < 0.01 * TOLERANCE * areas.first().copied().unwrap_or(0.0) {
             break;
         }

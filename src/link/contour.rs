@@ -2,8 +2,8 @@
 //!
 //! Stokes' theorem turns `A_1 F_12` into `1/(2 pi) contour integral over both of ln r dx_1 . dx_2` (Sparrow 1963). For a pair
 //! of straight edges the inner integral is elementary; so is the outer one for parallel edges and for edges with a common
-//! corner, where its integrand is singular. For the others Gauss and Legendre's rule does it. The integrand
-//! is a logarithm where the area form has `1/r^2`: two triangles that share an edge are no hard case.
+//! corner, where its integrand is singular. For other edges Gauss-Legendre quadrature suffices. The integrand is a
+//! logarithm where the area form has `1/r^2`: two triangles that share an edge are not a hard case.
 
 use crate::geometry::lanes::{angle_over_sine, dot, sub};
 use crate::geometry::polygon::edges;
@@ -21,14 +21,14 @@ const GAUSS: [(f64, f64); 6] = [
     (0.966_234_757_101_576, 0.085_662_246_189_585_17),
 ];
 
-/// A logarithm of less is that of this; what it is multiplied by is nothing then.
+/// Least argument of a logarithm; the logarithm's factor is 0 there.
 const LEAST: f64 = f64::MIN_POSITIVE;
 
-/// Edges whose directions differ by less count as parallel: what that misplaces is of the same order.
+/// Edges whose directions differ by less count as parallel: the error is of the same order.
 const PARALLEL: f64 = 1e-10;
 
 /// `A_1 F_12` of two triangles that face each other, each clipped to the front of the other; corners counter-clockwise
-/// from the front, same unit of length. Relative error about 1e-5 for triangles with a common edge, less apart; it grows
+/// from the front, same unit of length. Relative error about 1e-5 for triangles with a common edge, less for others; it grows
 /// where edges that share no corner pass close by each other.
 pub fn exchange(one: &[DVec3; 3], two: &[DVec3; 3]) -> f64 {
     let (a, b) = (front(one, two), front(two, one));
@@ -44,17 +44,17 @@ pub fn exchange(one: &[DVec3; 3], two: &[DVec3; 3]) -> f64 {
             }
         }
     }
-    // Edges of facing triangles run against each other; rounding may leave a trace below zero.
+    // Edges of facing triangles run in opposite directions; rounding may leave a trace below zero.
     (sum.total() / TAU).max(0.0)
 }
 
-/// A weighted sum of means of `ln |x - y|`, eight of them worked out at once.
+/// A weighted sum of means of `ln |x - y|`, worked out eight at a time.
 #[derive(Default)]
 struct Logs {
     sum: f64,
-    /// Over y on an edge: how often each counts, x, and both ends.
+    /// Means over y on an edge: their weights, x, and both ends.
     edges: Eight<10>,
-    /// Over both of two parallel edges: second primitives with their weights, u and h.
+    /// Means over two parallel edges: second primitives with their weights, u and h.
     parallel: Eight<3>,
 }
 
@@ -81,7 +81,7 @@ impl Logs {
             self.sum -= 0.5 * weight;
             return;
         }
-        // Gauss points on the shorter edge: over it the integral changes less.
+        // Gauss points go on the shorter edge, over which the inner integral changes less.
         let ((p, q), (r, s)) = if p.distance_squared(q) <= r.distance_squared(s) {
             ((p, q), (r, s))
         } else {
@@ -92,7 +92,7 @@ impl Logs {
         }
     }
 
-    /// The same for parallel edges, whose double integral is elementary; false for others.
+    /// [`Self::pair`] for parallel edges, whose double integral is elementary; false for others.
     fn parallel_pair(&mut self, weight: f64, [p, q]: [DVec3; 2], [r, s]: [DVec3; 2]) -> bool {
         let (a, b) = (q - p, s - r);
         let (square_a, square_b) = (a.length_squared(), b.length_squared());
@@ -106,7 +106,7 @@ impl Logs {
         let u = from.dot(along);
         let height = (from - along * u).length();
         let step = length_a.copysign(a.dot(along));
-        // Positions of q and p against s and r: the second primitive is taken four times.
+        // Positions of q and p relative to s and r: the second primitive at four values of u.
         let weight = weight / (step * length_b);
         for (u, sign) in [
             (u, -1.0),
@@ -134,13 +134,13 @@ impl Logs {
         }
     }
 
-    /// The sum, with what is left in the batches.
+    /// The sum, including what is left in the batches.
     fn total(mut self) -> f64 {
         self.sum + means(self.edges.take()) + second_primitives(self.parallel.take())
     }
 }
 
-/// Up to eight rows of numbers, by column. Rows that are not set weigh nothing.
+/// Up to eight rows of numbers, by column. Unset rows have weight 0.
 struct Eight<const N: usize> {
     columns: [[f64; 8]; N],
     count: usize,
@@ -156,7 +156,7 @@ impl<const N: usize> Default for Eight<N> {
 }
 
 impl<const N: usize> Eight<N> {
-    /// Adds a row; true when that makes eight.
+    /// Adds a row; true when there are eight.
     fn push(&mut self, row: [f64; N]) -> bool {
         for (column, x) in self.columns.iter_mut().zip(row) {
             column[self.count] = x;
@@ -165,19 +165,19 @@ impl<const N: usize> Eight<N> {
         self.count == 8
     }
 
-    /// The columns; the next rows begin anew.
+    /// The columns; the next rows start afresh.
     fn take(&mut self) -> [f64x8; N] {
-        // Weights stand first.
+        // The first column holds the weights.
         self.columns[0][self.count..].fill(0.0);
         self.count = 0;
         self.columns.map(f64x8::new)
     }
 }
 
-/// Sum of weighted means of `ln |x - y|` over y on rs; an edge without length has none.
+/// Sum of weighted means of `ln |x - y|` over y on rs; an edge of length 0 adds nothing.
 ///
 /// With x at height h over the line and its foot at u from r, the mean over the length L is
-/// `((L - u) ln |s - x| + u ln |r - x| + h angle) / L - 1`, the angle being that under which x sees the edge.
+/// `((L - u) ln |s - x| + u ln |r - x| + h angle) / L - 1`, where x sees the edge under the angle.
 fn means([weight, x, y, z, rx, ry, rz, sx, sy, sz]: [f64x8; 10]) -> f64 {
     let (point, from, to) = ([x, y, z], [rx, ry, rz], [sx, sy, sz]);
     let (edge, before, behind) = (sub(to, from), sub(point, from), sub(point, to));
@@ -188,7 +188,7 @@ fn means([weight, x, y, z, rx, ry, rz, sx, sy, sz]: [f64x8; 10]) -> f64 {
     let (near, far) = (dot(before, before), dot(behind, behind));
     let rest = f64x8::ONE - u;
     let logs = rest * ln(far) + u * ln(near);
-    // In lengths of the edge, of which the sine is h.
+    // In units of the edge's length; the angle's sine is proportional to h.
     let hh = dot(foot, foot) * over;
     let size = (near * far).sqrt() * over;
     let over_sine = angle_over_sine(hh - u * rest, size, || hh.sqrt());
@@ -306,14 +306,14 @@ mod tests {
         close(squares(floor, wall), 0.200_043_776_075_403, 1e-5);
     }
 
-    /// Mean of `ln |x - y|` over both edges, as the sums above have it.
+    /// Mean of `ln |x - y|` over both edges, as the code above has it.
     fn mean_log(p: DVec3, q: DVec3, r: DVec3, s: DVec3) -> f64 {
         let mut sum = Logs::default();
         sum.pair(1.0, [p, q], [r, s]);
         sum.total()
     }
 
-    /// Eight at once against one at a time, in every place of a batch.
+    /// Eight at once against one at a time, at every place of a batch.
     #[test]
     fn batches_agree_with_plain_primitives() {
         let primitive = |u: f64, h: f64| {
@@ -366,7 +366,7 @@ mod tests {
         assert_eq!(sum.total(), 0.0);
     }
 
-    /// Closed forms against plain double quadrature; the edges keep apart, where that is exact too.
+    /// Closed forms against plain double quadrature; the edges are apart, where quadrature is exact too.
     #[test]
     fn mean_logarithms() {
         let plain = |p: DVec3, q: DVec3, r: DVec3, s: DVec3| -> f64 {
@@ -394,7 +394,7 @@ mod tests {
             (o, v(1., 0., 0.), v(1.8, 0.4, 0.2), v(0.3, 0.4, 0.2), 1e-12),
             (o, v(1., 2., 0.), v(3., 6., 0.), v(2., 4., 0.), 1e-12),
             (o, v(1., 0., 0.), v(0., 0.5, 1.), v(0.2, 1.5, 0.), 1e-6),
-            // Common corners: the quadrature is the one that errs.
+            // Common corners: here the quadrature errs.
             (o, v(1., 0., 0.), o, v(0.2, 1.5, 0.), 1e-4),
             (v(1., 0., 0.), o, v(-0.5, 0., 0.), o, 1e-4),
             (o, v(1., 0., 0.), v(0.7, 0., 0.), v(-0.1, 0., 0.), 2e-2),
@@ -434,7 +434,7 @@ mod tests {
         assert!((f - 1.0 / 3.0).abs() < 1e-5, "{f}");
     }
 
-    /// Half of a square is below the other's plane: the front half alone counts.
+    /// Half of a square is below the other's plane: only the front half counts.
     #[test]
     fn clipped_at_the_horizon() {
         let floor = [v(0., 0., 0.), v(1., 0., 0.), v(1., 1., 0.), v(0., 1., 0.)];

@@ -1,8 +1,8 @@
 //! The exchange of light between two patches: `A_a F_ab = integral over a and b of V cos_a cos_b / (pi r^2)`.
 //!
 //! One end is sampled by points; towards the other end the point-to-polygon factor is exact (Lambert 1760) where that
-//! end is a face or a few of them. Two large clusters meet as points on both sides. Nothing is clamped: Lambert's
-//! formula lies in [0, 1] however near the polygon is.
+//! end is a face or a few of them. Two large clusters are points on both sides. Nothing is clamped: Lambert's formula
+//! lies in [0, 1] however near the polygon is.
 
 use super::contour::exchange;
 use super::visibility::{PIECES, View, segment};
@@ -17,21 +17,21 @@ use std::f64::consts::PI;
 pub(crate) const POLYGONS: u32 = 4;
 /// Points that stand for a larger cluster.
 const CLUSTER_POINTS: usize = 8;
-/// Beyond this gap one point does: 1/r^2 changes by less than 2 % over the smaller end, and evenly.
+/// Beyond this gap one point is enough: 1/r^2 changes by less than 2 % over the smaller end, and evenly.
 const FAR: f64 = 8.0;
 /// Below this gap points would err by more than 1 %: contour integrals are used.
 const NEAR: f64 = 2.5;
 /// Points that look past a short list of blockers.
 const POINTS: usize = 6;
-/// More than this a link's variation is not said to be.
+/// The greatest variation that a link is given.
 const MOST_VARIATION: f64 = 4.0;
 /// A visible share below this is rounding.
 const SLIVER: f64 = 1e-9;
-/// Rays of a pair. Their number does not depend on what they find: stopping when the first agree would make hidden
-/// pairs too dark and open ones too bright.
+/// Rays of a pair. Their number does not depend on their results: stopping when the first agree would make hidden pairs
+/// too dark and open ones too bright.
 const RAYS: usize = 8;
 
-/// Reused memory of one thread, and what it did.
+/// Reused memory of one thread, and a count of its rays.
 #[derive(Debug, Default)]
 pub struct Scratch {
     pub(crate) a: Vec<Sample>,
@@ -57,7 +57,7 @@ fn in_front(tree: &Tree, a: &Node, b: &Node) -> bool {
     if a.flat {
         let origin = tree.elements[tree.node(tree.face_node[a.faces.0 as usize]).element as usize]
             .corners[0];
-        // Points nearer than rounding count as on the plane; light to them is nil.
+        // Points nearer than rounding count as on the plane: light to them is nil.
         let least = 1e-12 * (origin.length() + b.centre.length());
         let above = |p: DVec3| a.normal.dot(p - origin) > least;
         if b.faces.1 <= POLYGONS {
@@ -96,8 +96,8 @@ pub(crate) fn in_front_of(
     tree.face_plane[entry] != plane && tree.face_normal[entry].dot(point - corners[0]) > 0.0
 }
 
-/// Factors from points to a patch with nothing in the way, each in [0, 1]: the share of the light leaving a small surface
-/// there that would reach the patch. `others` holds sample points of the patch if it is a large cluster.
+/// Unoccluded factors from points to a patch, each in [0, 1]: the share of the light leaving a small surface at the point
+/// that would reach the patch. `others` holds sample points of the patch if it is a large cluster.
 pub fn point_factors(
     tree: &Tree,
     points: &[Sample],
@@ -121,7 +121,7 @@ pub fn point_factors(
     }
 }
 
-/// Adds the factors of up to eight points to a face, where they are in front of it and not in its plane.
+/// Adds the factors of up to eight points to a face, except where they are behind it or in its plane.
 fn add_factors(
     tree: &Tree,
     points: &[Sample],
@@ -145,7 +145,8 @@ fn add_factors(
     }
 }
 
-/// `cos cos / max(pi r^2, area)` towards a random sample that stands for `area`: without bias where it is far, at most 1/area near.
+/// `cos cos / max(pi r^2, area)` towards a random sample that stands for `area`: without bias at a distance, at most 1/area near
+/// by.
 fn point_to_point(s: &Sample, t: &Sample) -> f64 {
     let d = t.point - s.point;
     let r2 = d.length_squared();
@@ -165,12 +166,12 @@ fn gap(a: &Node, b: &Node) -> f64 {
     a.centre.distance(b.centre) / (a.radius + b.radius)
 }
 
-/// A set of polygons, or a cluster that points stand for?
+/// Is a node a set of polygons, and not a cluster represented by points?
 fn simple(node: &Node) -> bool {
     node.faces.1 <= POLYGONS
 }
 
-/// Two patches as the kernel takes them: one is sampled, towards the other the factor is exact if it is simple.
+/// Two patches as the kernel sees them: one is sampled, and towards the other the factor is exact if it is simple.
 #[derive(Debug, Clone, Copy)]
 struct Ends<'a> {
     sampled: u32,
@@ -183,7 +184,7 @@ struct Ends<'a> {
 }
 
 impl<'a> Ends<'a> {
-    /// The smaller end is sampled, the larger is the polygon: the factor varies less over a small patch.
+    /// Samples the smaller end and takes the larger as the polygon: the factor varies less over a small patch.
     fn of(room: &'a Room, a: u32, b: u32) -> Self {
         let (na, nb) = (room.tree.node(a), room.tree.node(b));
         let a_sampled = match (simple(na), simple(nb)) {
@@ -213,12 +214,12 @@ impl<'a> Ends<'a> {
         }
     }
 
-    /// Do contour integrals take the place of points?
+    /// Are contour integrals used in place of points?
     fn are_polygons(&self) -> bool {
         simple(self.s) && simple(self.t)
     }
 
-    /// Exchange with nothing in the way, and its relative variation; none where no points face each other.
+    /// Unoccluded exchange, and its relative variation; none where no points face each other.
     #[inline]
     fn unoccluded(&self, tree: &Tree, scratch: &mut Scratch) -> Option<(f64, f64)> {
         let count = self.points();
@@ -243,14 +244,15 @@ impl<'a> Ends<'a> {
         if open <= 0.0 {
             return None;
         }
-        // One point says nothing about variation: 1/r^2 over the patch's own size does.
+        // One point tells nothing about variation; the variation of 1/r^2 over the patch's own size does.
         let variation = if count == 1 {
             let distance = self.s.centre.distance(self.t.centre);
             2.0 * (self.s.radius / distance.max(self.s.radius + f64::MIN_POSITIVE))
         } else {
             (0.5 * (most - least) / (open / self.s.area)).min(MOST_VARIATION)
         };
-        // The smaller end says nothing about a larger one that it shines on here and there: a lamp close below a ceiling.
+        // Points of the smaller end tell nothing about a larger one that is lit only here and there: a lamp close below a
+        // ceiling.
         if self.are_polygons() && near {
             let mean = open / self.t.area;
             let over = variation_over(tree, self.other, self.s, mean, self.shift, scratch);
@@ -259,14 +261,14 @@ impl<'a> Ends<'a> {
         Some((open, variation))
     }
 
-    /// The share that is visible, and the way between.
+    /// The visible share, and the view between the ends.
     #[inline]
     fn visible(&self, room: &Room, parents: &View, scratch: &mut Scratch) -> (f64, View) {
         let (sight, tree, shift) = (room.sight, room.tree, self.shift);
         let (s, t) = (self.sampled, self.other);
         let view = || sight.view(tree, self.s, self.t, parents);
-        // A look into the shaft costs as much as many rays where much stands about. It is worth that where it starts from
-        // a list, or where rays say that it may come out clear.
+        // In cluttered rooms a look into the shaft costs as much as many rays. It is worth while where it starts from a
+        // list, or where rays suggest that it may come out clear.
         let (view, rays) = if *parents == View::Crowded && !sight.small() && sight.occlusion {
             let rays = sampled_visibility(room, s, t, shift, &View::Crowded, scratch);
             let view = if rays == 1.0 { view() } else { View::Crowded };
@@ -276,7 +278,8 @@ impl<'a> Ends<'a> {
         };
         let share = match (&view, rays) {
             (View::Clear, _) => 1.0,
-            // Where a plane cuts one end, no point of it may lie in front of the other end; then the other end looks.
+            // Where a plane cuts one end, perhaps none of its points lies in front of the other end; then the other end
+            // is sampled.
             (View::Listed(list), _) if simple(self.t) => {
                 clipped_visibility(room, s, t, shift, list, scratch)
                     .or_else(|| {
@@ -295,9 +298,9 @@ impl<'a> Ends<'a> {
     }
 }
 
-/// What two patches may exchange that none of the points met which stand for a cluster: all that a part of the size of one point's share
-/// can. With less than that said of two sets of sheets that interleave, a link that found next to nothing between them was
-/// good enough, and the gap between a lamp and its ceiling had no light but the lamp's own.
+/// What two patches may exchange without any of the points that represent a cluster noticing: all that a part can exchange whose size is
+/// one point's share. With a lower figure for two interleaved sets of sheets, a link that found next to nothing between them was good
+/// enough, and the gap between a lamp and its ceiling had no light but the lamp's own.
 pub(super) fn unmet(a: &Node, b: &Node) -> f64 {
     if simple(a) && simple(b) {
         return 0.0;
@@ -311,8 +314,8 @@ pub(super) fn unmet(a: &Node, b: &Node) -> f64 {
     most(a, b).min(most(b, a)) / (2 * CLUSTER_POINTS) as f64
 }
 
-/// Works out the link between two patches and the way between; none if they exchange nothing. `parents` is what is known
-/// of a pair that holds this one.
+/// Works out the link between two patches and the view between them; none if they exchange nothing. `parents` is the
+/// view of a pair that contains this one.
 pub fn evaluate(
     room: &Room,
     a: u32,
@@ -325,7 +328,7 @@ pub fn evaluate(
         if ends.are_polygons() {
             return None;
         }
-        // No two points of these clusters face each other; others may.
+        // No two sample points of these clusters face each other; other points may.
         let link = Link {
             a,
             b,
@@ -352,8 +355,8 @@ pub fn evaluate(
     Some((link, view))
 }
 
-/// Relative variation over node `on` of the factor towards node `to`, of known mean, both of a few faces: at the point nearest
-/// to the other end and at points that know nothing of it.
+/// Relative variation over node `on` of the factor towards node `to`, of known mean, both of a few faces: from the point
+/// nearest to the other end and from points chosen independently of it.
 fn variation_over(
     tree: &Tree,
     on: u32,
@@ -388,8 +391,8 @@ fn variation_over(
     (0.5 * (most - least) / mean).min(MOST_VARIATION)
 }
 
-/// How bright a part must be that none of `count` points of a patch met, if it holds what they found too little: they would have met more
-/// than their share of the area. Without it the gap between a lamp and a ceiling had no light but the lamp's own.
+/// How bright a part must be that all `count` points of a patch missed, if it holds the light that they are short of: a larger part would
+/// have been met by more of them. Without this the gap between a lamp and a ceiling had no light but the lamp's own.
 fn unseen(count: usize, missing: f64, area: f64) -> f64 {
     count as f64 * missing / area
 }
@@ -407,8 +410,8 @@ fn contours(tree: &Tree, a: &Node, b: &Node) -> f64 {
     sum
 }
 
-/// Visible share by points on one end that see exactly what is left of the polygons of the other. None if that takes too
-/// many pieces, or if no point is in front of the other end.
+/// Visible share by points on one end, each of which sees exactly the unblocked part of the polygons of the other. None
+/// if that takes too many pieces, or if no point is in front of the other end.
 fn clipped_visibility(
     room: &Room,
     s: u32,
@@ -447,7 +450,7 @@ fn clipped_visibility(
             seen += scratch.clipper.factor(p.normal, open);
         }
     }
-    // Rounding leaves slivers of polygons that are seen edge-on: what is hidden must be exactly dark.
+    // Rounding leaves slivers of polygons seen edge-on: hidden patches must be exactly dark.
     let share = if seen < SLIVER * total {
         0.0
     } else {
@@ -456,7 +459,7 @@ fn clipped_visibility(
     (total > 0.0).then(|| share.min(1.0))
 }
 
-/// Visible share by rays between points of both ends, each weighted by what it would carry.
+/// Visible share by rays between points of both ends, each weighted by the light it would carry.
 fn sampled_visibility(
     room: &Room,
     s: u32,
@@ -487,12 +490,12 @@ fn sampled_visibility(
     scratch.rays += scratch.segments.len() as u64;
     let total: f64 = scratch.weights.iter().sum();
     let seen = open_weight(&scratch.weights, &scratch.blocked);
-    // No ray runs from front to front: the pair meets at the horizon and carries next to nothing. Taking it as open would
-    // let light through walls.
+    // No ray runs from front to front: the pair meets at the horizon and exchanges next to nothing. Taking it as open
+    // would let light through walls.
     if total > 0.0 { seen / total } else { 0.0 }
 }
 
-/// Sum of the weights of what is not blocked.
+/// Sum of the weights of unblocked rays.
 pub(crate) fn open_weight(weights: &[f64], blocked: &[bool]) -> f64 {
     let pairs = weights.iter().zip(blocked);
     pairs

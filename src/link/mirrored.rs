@@ -5,21 +5,21 @@ use crate::geometry::{Hit, Segment};
 use crate::hierarchy::{BOUNCES, Route};
 use glam::{DVec3, Vec3};
 
-/// Where a ray got that mirrors sent on.
+/// The path of a ray that mirrors sent on.
 #[derive(Debug, Clone, Copy)]
 pub struct Mirrored {
-    /// The mirrors on its way, its start and its end.
+    /// The mirrors on the path, its start and its end.
     pub route: Route,
-    /// What it met at last, at its distance by way of the mirrors; a mirror only if there were too many. None: it left the room.
+    /// What the ray met at last, at its distance along the path; a mirror only if there were too many. None: it left the room.
     pub hit: Option<Hit>,
-    /// Unit direction at last.
+    /// Unit direction after the last mirror.
     pub direction: DVec3,
-    /// The image that it went by; none where things have none.
+    /// The mirror image that the ray went by; none where things have none.
     pub image: Option<u32>,
 }
 
 impl Sight<'_> {
-    /// Follows a ray that met a mirror; none if what it met is none.
+    /// Follows a ray that met something; none if that is not a mirror.
     pub fn mirrored(&self, from: Vec3, direction: Vec3, hit: &Hit) -> Option<Mirrored> {
         let mirrors = self.mirrors.filter(|mirrors| mirrors.is_mirror(hit))?;
         let mut route = Route::new(from.as_dvec3());
@@ -57,8 +57,8 @@ impl Sight<'_> {
         }
     }
 
-    /// Is the way free from a point on a plane, by an image's mirrors, to the end of a segment, whose start is where the point would
-    /// look from?
+    /// Is the path by an image's mirrors free, from a point on a plane to the end of a segment? The segment itself starts at the
+    /// point's mirror image.
     pub fn is_open(&self, image: u32, (point, mut plane): (DVec3, u32), segment: &Segment) -> bool {
         let Some(mirrors) = self.mirrors else {
             return false;

@@ -1,4 +1,4 @@
-//! Links: who exchanges light with whom, how much, and how well that is known.
+//! Links: which patches exchange light, how much, and how well that is known.
 
 mod balance;
 mod contour;
@@ -30,11 +30,11 @@ pub struct Link {
     pub b: u32,
     /// `A_a F_ab` with visibility, in the file's units squared.
     pub exchange: f32,
-    /// The same with nothing in the way.
+    /// `exchange` with nothing in the way.
     pub open_exchange: f32,
-    /// Relative variation of the point-to-patch factor, half of (greatest - least) over the mean.
+    /// Relative variation of the point-to-patch factor: half of (greatest - least), over the mean.
     pub variation: f32,
-    /// What may block.
+    /// What may block this exchange.
     pub way: Way,
 }
 
@@ -56,16 +56,16 @@ pub enum Way {
     Clear,
     /// Only a few triangles: `Graph::blockers[start..start + count]`.
     Listed {
-        /// First.
+        /// Index of the first.
         start: u32,
-        /// How many.
+        /// Number of them.
         count: u8,
     },
     /// Anything.
     Crowded,
 }
 
-/// What links are made of: the patches and what may stand between them.
+/// What links are worked out from: the patches and what may stand between them.
 #[derive(Clone, Copy)]
 pub struct Room<'a> {
     /// The patches.

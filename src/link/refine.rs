@@ -1,8 +1,8 @@
 //! Hierarchical refinement: which links are good enough, and what the others become.
 //!
-//! A link is refined while the light it may misplace, weighted by how much of the room receives it, exceeds the
+//! A link is refined while the light it may misplace, weighted by the share of the room that receives it, exceeds the
 //! threshold of the round (Hanrahan, Salzman and Aupperle 1991, section 4, with an error per link in place of the form
-//! factor alone). Links between the parts of a cluster are always opened. Every pass evaluates all new pairs in
+//! factor alone). Links between the children of a cluster are always opened. Every pass evaluates all new pairs in
 //! parallel and splits elements in order, so the result does not depend on the number of threads.
 
 use super::kernel::unmet;
@@ -12,24 +12,25 @@ use crate::hierarchy::{NONE, Node, Tree};
 use crate::team::{Interrupt, Interrupted};
 use rayon::prelude::*;
 
-/// Deepest quartering of a face: 6 cm of a kilometre, and below that in f64. How small elements of a room may be follows from its area
+/// Deepest quartering of a face: edges of a kilometre become .06 mm. How small elements of a room may be follows from its area
 /// ([`Demand::least_area`]).
 pub const MAX_DEPTH: u8 = 24;
-/// Pairs a task evaluates: enough to pay for a task, few enough to share out.
+/// Pairs a task evaluates: enough to be worth a task, few enough to share out.
 const CHUNK: usize = 64;
 
-/// What a link's error is worth, and how much is allowed.
+/// What a link's error is worth, and how much of it is allowed.
 #[derive(Debug, Clone, Copy)]
 pub struct Demand<'a> {
     /// Radiosity of every node, reflected and emitted, as a share of the adaptation white's.
     pub bright: &'a [f32],
-    /// How much lightness a change of irradiance makes at every node: `(H / white)^(-2/3)`, as in CIELAB; 1 at the white.
+    /// How much a change of irradiance changes the lightness of every node: `(H / white)^(-2/3)`, as in CIELAB; 1 at the
+    /// white.
     pub keen: &'a [f32],
-    /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of the area that counts.
+    /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of counted area.
     pub threshold: f64,
     /// Elements below this area are not split.
     pub least_area: f64,
-    /// Does light go where the links say? Where leaves look for themselves, links need not know what hides their ends.
+    /// Does light travel by the links? Where leaves look for themselves, links need not know what hides their ends.
     pub hidden: bool,
 }
 
@@ -37,7 +38,8 @@ impl Demand<'_> {
     /// Error that a link causes at its ends, as a share of white, weighted by receiving area; the worse end counts.
     pub fn error(&self, tree: &Tree, link: &Link) -> f64 {
         let visibility = f64::from(link.visibility());
-        // An unproved "hidden" is right to about one in the rays cast; "partly" misplaces light like a coin.
+        // An unproved visibility of 0 or 1 is right to about one in the number of rays cast; one in between misplaces
+        // light like a coin toss.
         let doubt = if link.way == Way::Clear || !self.hidden {
             0.0
         } else {
@@ -50,8 +52,8 @@ impl Demand<'_> {
         };
         let at = |receiver: u32, source: u32| {
             let area = tree.node(receiver).area;
-            // Patches made in this round are dark to it: it goes one level deeper. With the brightness of what is above them
-            // the Cornell box takes half as long again to the same error.
+            // Patches made in this round have no brightness yet: refinement goes one level deeper. If they took that of
+            // their ancestors, the Cornell box would take half as long again to reach the same error.
             let bright = f64::from(self.bright.get(source as usize).copied().unwrap_or(0.0));
             let keen = f64::from(self.keen.get(receiver as usize).copied().unwrap_or(1.0));
             misplaced / area * bright * keen * tree.share(receiver).sqrt()
@@ -94,7 +96,7 @@ impl Graph {
     /// Refines until no link exceeds the demand; the first call also makes the first links.
     ///
     /// # Errors
-    /// It was given up: the links are of no use any more.
+    /// Refinement was interrupted: the links are of no use any more.
     pub fn refine(
         &mut self,
         tree: &mut Tree,
@@ -143,7 +145,7 @@ impl Graph {
                 done.capped += u64::from(wants);
             }
         }
-        // Lists of links that are opened go; the others move up.
+        // The lists of opened links are dropped; the others move up.
         let blockers = std::mem::take(&mut self.blockers);
         for link in &mut kept {
             if let Way::Listed { count, .. } = link.way {
@@ -164,7 +166,7 @@ impl Graph {
             .collect()
     }
 
-    /// Good links are kept, the others opened.
+    /// Keeps good links and puts the others in `open`.
     fn sort_out(
         &mut self,
         tree: &Tree,
@@ -201,7 +203,7 @@ impl Graph {
     }
 }
 
-/// The triangles that a way lists.
+/// The triangles listed for a way.
 pub fn blockers_of(blockers: &[u32], way: Way) -> &[u32] {
     match way {
         Way::Listed { start, count } => {
@@ -229,7 +231,7 @@ fn splittable(tree: &Tree, link: &Link, demand: &Demand) -> Option<(u32, u32)> {
     larger_first.into_iter().find(|&(end, _)| can(end))
 }
 
-/// Splits one end of each link: the pairs (part, other end, index of the view), and the links' views.
+/// Splits one end of each link. Returns the pairs (child, other end, index of the view), and the links' views.
 fn split(
     tree: &mut Tree,
     demand: &Demand,
@@ -250,7 +252,7 @@ fn split(
     (pairs, views)
 }
 
-/// Evaluates pairs (a, b, index of what is known of their parents' view), in order.
+/// Evaluates pairs (a, b, index of their parents' view), in order.
 fn evaluate_all(
     room: &Room,
     pairs: &[(u32, u32, u32)],

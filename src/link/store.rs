@@ -1,18 +1,18 @@
-//! Links as compressed rows, one row per patch: what the operator streams through. 8 bytes a direction.
+//! Links as compressed rows, one row per patch: what the operator streams through. 8 bytes per link and direction.
 
 use super::Link;
 
 /// For each node, its links' other ends and exchanges.
 #[derive(Debug, Default)]
 pub struct LinkRows {
-    /// Where each node's row starts; one longer than there are nodes.
+    /// Where each node's row starts; one more entry than nodes.
     start: Vec<u32>,
     /// Source node and `A F` of each entry.
     entries: Vec<(u32, f32)>,
 }
 
 impl LinkRows {
-    /// Sorts links into rows; links that carry nothing are left out. Entries of a row stand in order of their source.
+    /// Sorts links into rows; links that carry nothing are left out. Entries of a row are sorted by source.
     pub fn new(nodes: usize, links: &[Link]) -> Self {
         let carrying = || links.iter().filter(|l| l.exchange > 0.0);
         let mut start = vec![0_u32; nodes + 1];
@@ -44,7 +44,7 @@ impl LinkRows {
         &self.entries[self.range(node)]
     }
 
-    /// Where the row of a node stands among all entries.
+    /// Where the row of a node lies among all entries.
     pub fn range(&self, node: usize) -> std::ops::Range<usize> {
         self.start[node] as usize..self.start[node + 1] as usize
     }

@@ -1,4 +1,4 @@
-//! Is the way between two patches clear? Exactly where the shaft between them is empty, by rays elsewhere.
+//! Is the way between two patches clear? Exact where the shaft between them is empty, by rays elsewhere.
 
 use crate::geometry::{Hit, Patch, RayIndex, Segment, Shaft, ShaftContents};
 use crate::hierarchy::{Blocker, Glazing, Mesh, Mirrors, Node, Sample, Tree};
@@ -6,9 +6,9 @@ use glam::{DVec3, Vec3};
 
 /// More blockers than this in a shaft are not listed: rays then ask the whole index.
 const LISTED: usize = 24;
-/// A room of this many triangles is small: a shaft costs no more than a handful of rays.
+/// A room of at most this many triangles is small: a shaft costs no more than a handful of rays.
 const SMALL: usize = 256;
-/// A polygon seen past its blockers may fall into this many pieces before rays take over.
+/// Pieces into which blockers may cut a polygon before rays take over.
 pub(crate) const PIECES: usize = 48;
 
 /// Tells whether a point of a masked triangle is solid: triangle, then barycentrics of its second and third corner.
@@ -22,9 +22,9 @@ pub struct Sight<'a> {
     pub opaque: Option<&'a Opaque<'a>>,
     /// Where the triangles are.
     pub mesh: &'a Mesh,
-    /// What light passes through on its way; none where the room has no panes.
+    /// The panes, through which light passes; none where the room has none.
     pub panes: Option<Glazing<'a>>,
-    /// What sends light on in one direction; none where the room has no mirrors. They block as other things do.
+    /// The mirrors, which send light on in one direction; none where the room has none. They also block.
     pub mirrors: Option<&'a Mirrors>,
     /// False where nothing can block (a convex room): then no ray is cast and no shaft is built.
     pub occlusion: bool,
@@ -47,12 +47,12 @@ pub(crate) fn is_small(mesh: &Mesh) -> bool {
 }
 
 impl Sight<'_> {
-    /// So few triangles that a look into any shaft is cheap?
+    /// Are there so few triangles that a look into any shaft is cheap?
     pub fn small(&self) -> bool {
         is_small(self.mesh)
     }
 
-    /// Looks into the shaft between two patches. `parents` is what is known of a pair that holds this one.
+    /// Looks into the shaft between two patches. `parents` is the view of a pair that contains this one.
     pub fn view(&self, tree: &Tree, a: &Node, b: &Node, parents: &View) -> View {
         let candidates = match parents {
             View::Clear => return View::Clear,
@@ -70,8 +70,8 @@ impl Sight<'_> {
         }
     }
 
-    /// What of the listed triangles blocks between faces of two planes, which do not block themselves; none where some have
-    /// holes.
+    /// Those of the listed triangles that can block between faces of two planes: triangles in these planes cannot. None
+    /// where some triangles have holes.
     pub fn blockers(
         &self,
         list: &[u32],
@@ -109,7 +109,7 @@ impl Sight<'_> {
         }
     }
 
-    /// What up to sixteen rays meet first; triangles of `plane` are looked through.
+    /// What up to sixteen rays meet first; triangles of `plane` are ignored.
     pub fn meet(&self, from: &[Vec3], directions: &[Vec3], plane: u32, out: &mut [Option<Hit>]) {
         match self.opaque {
             Some(opaque) => self
@@ -121,7 +121,7 @@ impl Sight<'_> {
         }
     }
 
-    /// What one ray meets first; triangles of `plane` are looked through.
+    /// What one ray meets first; triangles of `plane` are ignored.
     pub fn meet_one(&self, from: Vec3, direction: Vec3, plane: u32) -> Option<Hit> {
         match self.opaque {
             Some(opaque) => self

@@ -1,7 +1,7 @@
 //! How large the mesh of the output will be, from the solved light alone.
 //!
-//! Split into n parts, a triangle whose mean square is s^2 has s^2 / n^2 (see [`SHRINK`](super::grow::SHRINK)). With areas A the fewest parts
-//! for a sum are `n = c (A s^2)^(1/3)`, at least one, with the c at which `sum of A s^2 / n^2` is what is allowed. An *estimate*.
+//! A triangle of mean square s^2 has s^2 / n^2 once it is split into n parts (see [`SHRINK`](super::grow::SHRINK)). With areas A the fewest
+//! parts for a given sum are `n = c (A s^2)^(1/3)`, at least one, with the c at which `sum of A s^2 / n^2` is the allowed sum. An *estimate*.
 
 use super::grow::share;
 use super::turns::SQUARE;
@@ -13,7 +13,7 @@ const A_VERTEX: usize = 2;
 const DOUBLINGS: usize = 40;
 
 impl Bake {
-    /// Triangles that the mesh of the output is expected to have, within a limit of vertices if there is one.
+    /// Expected number of triangles of the output's mesh, within a limit of vertices if there is one.
     pub fn triangles_ahead(&self, vertices: Option<usize>) -> usize {
         let mut growth = self.growth(Care::Sketch, &|| false);
         growth.believe(true);
@@ -27,7 +27,7 @@ impl Bake {
     }
 }
 
-/// Parts of all, where the sum of what is left of their shares is allowed.
+/// Total number of parts at which the sum of their shares is the allowed one.
 fn parts(shares: &[f64], allowed: f64) -> usize {
     let roots: Vec<f64> = shares.iter().map(|share| share.cbrt()).collect();
     let of = |c: f64| roots.iter().map(move |root| (c * root).max(1.0));
@@ -46,6 +46,6 @@ fn parts(shares: &[f64], allowed: f64) -> usize {
         }
         c *= 2.0;
     }
-    // No more than memory holds: it is bounded where it is used.
+    // The cast is safe: the number is limited where it is used.
     of(c).sum::<f64>() as usize
 }

@@ -1,22 +1,23 @@
-//! Splits what growing picks: along edges of shadows where there are any, else at edges that bend.
+//! Splits the triangles that growing picks: along edges of shadows where there are any, else at edges over which light
+//! bends.
 
 use super::grow::{Growth, SHRINK};
 use super::shades::COVER;
 
-/// What edges of shadows may take when the error is met: share of the triangles, and triangles of a small room.
+/// What edges of shadows may take once the error is met: share of the triangles, and triangles of a small room.
 const FOR_LINES: f64 = 0.02;
 const LINES: usize = 400;
-/// How often in one go lines are carried on into the triangles that they lead to.
+/// How often in one call lines are carried on into the next triangles.
 const TURNS: usize = 6;
 
 impl Growth<'_> {
-    /// Splits cells that were looked at; returns those that are new.
+    /// Splits cells that were looked at; returns the new cells.
     pub(super) fn split(&mut self, tested: &[usize]) -> Vec<usize> {
         let wanted = match self.looking {
             true => tested.iter().map(|&k| (k, self.lamps_of(k))).collect(),
             false => Vec::new(),
         };
-        // Within a limit of vertices a line is carried on when growing picks it again.
+        // Within a limit of vertices a line is carried on only when growing picks its next triangle.
         let turns = if self.strict { 1 } else { TURNS };
         let late = || self.looks.is_late();
         let mut fresh = (self.cells).split_along(&self.shades, wanted, SHRINK, (turns, &late));
@@ -32,8 +33,8 @@ impl Growth<'_> {
         fresh
     }
 
-    /// Carries edges of shadows on to their ends, whatever the error is: half a line is seen. Takes at most [`FOR_LINES`] as many
-    /// triangles as there are, however often it is called.
+    /// Carries edges of shadows on to their ends, whatever the error is: half a line is visible. Adds at most [`FOR_LINES`] as
+    /// many triangles as there are, however often it is called.
     pub(super) fn finish_lines(&mut self, progress: &dyn Fn(usize, usize)) {
         let all = (FOR_LINES * self.cells.all.len() as f64) as usize + LINES;
         let (most, before) = (all.saturating_sub(self.for_lines), self.cells.all.len());
@@ -43,7 +44,7 @@ impl Growth<'_> {
         self.expect(&fresh, false, progress);
     }
 
-    /// Lamps whose shadow would matter in a cell, and what covers it if anything does.
+    /// Lamps whose shadow would matter in a cell, and [`COVER`] if anything covers part of the cell.
     fn lamps_of(&self, k: usize) -> u64 {
         let cell = &self.cells.all[k];
         let sheet = &self.cells.sheets[cell.sheet as usize];

@@ -1,8 +1,8 @@
-//! The triangles of the output: input triangles, bisected at edges that they share: in their middles, or where the edge of a
-//! shadow crosses them.
+//! The triangles of the output: input triangles, bisected at edges that they share, in the middle or where the edge of a
+//! shadow crosses.
 //!
-//! An edge that is split is split for every triangle that has it, so a vertex never lies on the edge of a triangle that
-//! does not use it. Which triangles share an edge, see [`Skins`](super::skins::Skins).
+//! An edge is split for all triangles that have it, so a vertex never lies on the edge of a triangle that does not use
+//! it. For which triangles share an edge, see [`Skins`](super::skins::Skins).
 
 use super::missed::missed_by_halves;
 use super::skins::Skins;
@@ -13,10 +13,11 @@ use glam::DVec3;
 use std::collections::HashMap;
 
 /// Edges shorter than this share of a triangle's longest are split only together with the longest: strips may stay strips,
-/// needles may not turn up.
+/// needles must not arise.
 const SLENDER: f64 = 0.25;
 
-/// What stands on an edge of the input is dealt with like a lamp that no place is lit by; light on either side is its own.
+/// An edge of the input on which something stands is treated like the edge of the shadow of a lamp that lights no place;
+/// each side has its own light.
 pub(super) const FENCE: u64 = 1 << 62;
 
 /// A corner of a cell.
@@ -35,11 +36,11 @@ pub(super) struct Edge {
     pub(super) ends: [u32; 2],
     pub(super) length: f64,
     pub(super) marked: bool,
-    /// Where it is to be split, from the first end on, if the edge of a shadow crosses it.
+    /// Where the edge is to be split, from the first end on, if the edge of a shadow crosses it.
     pub(super) crossed: Option<f64>,
-    /// Lamps whose light ends along it, a bit each.
+    /// Lamps whose light ends along the edge, one bit each.
     pub(super) sharp: u64,
-    /// Once it is split: the point there, and both halves.
+    /// Once the edge is split: the point there, and both halves.
     pub(super) split: Option<(u32, [u32; 2])>,
 }
 
@@ -47,25 +48,25 @@ pub(super) struct Edge {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     Point(u32),
-    /// Where an edge is to be split.
+    /// Where this edge is to be split.
     Crossing(u32),
 }
 
-/// How far light in a triangle is from what its corners say.
+/// How far the light in a triangle is from that between its corners.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Doubt {
-    /// Mean square of the colour difference, as far as it is known.
+    /// Mean square of the colour difference, as far as known.
     pub(super) square: f64,
-    /// Was it looked at, or is it only expected?
+    /// Was light looked at here, or is the difference only expected?
     pub(super) tested: bool,
     /// Colour difference in the middle of each edge, if tested.
     pub(super) bent: [f32; 3],
-    /// And inside.
+    /// Colour difference at a point inside, if tested.
     pub(super) inside: f32,
-    /// How much of what the solved light told of the triangle around this one proved true.
+    /// Share of the differences told by the solved light that proved true in the triangle around this one.
     pub(super) trust: f32,
-    /// Illuminance that lines miss in the middle of each edge, lx: as seen, or as it follows for parts of a triangle that was looked at;
-    /// none where nothing is known.
+    /// Illuminance that lines miss in the middle of each edge, lx: as seen, or as derived for parts of a triangle that was looked at;
+    /// none where unknown.
     pub(super) missed: [Option<f32>; 3],
 }
 
@@ -79,22 +80,22 @@ pub(super) struct Cell {
     /// Edge k leads from corner k to the next.
     pub(super) edges: [u32; 3],
     pub(super) area: f64,
-    /// Share of it that counts, see `hierarchy::counted`.
+    /// Share of the area that counts, see `hierarchy::counted`.
     pub(super) counts: f64,
-    /// Which of the sheet's hints lie in it.
+    /// The range of the sheet's hints that lie in the triangle.
     pub(super) hints: (u32, u32),
     pub(super) doubt: Doubt,
 }
 
-/// What the solved light says at a place.
+/// The solved light at a place.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hint {
     /// Weights of the second and third corner of the triangle of the mesh.
     pub(super) at: [f64; 2],
     pub(super) area: f64,
-    /// Share of it that counts.
+    /// Share of the area that counts.
     pub(super) counts: f64,
-    /// What of it others see, see `solve::outlook`.
+    /// Share of the area that others see, see `solve::outlook`.
     pub(super) open: f64,
     /// Tristimulus irradiance.
     pub(super) light: [f64; 3],
@@ -107,16 +108,16 @@ pub(super) struct Sheet {
     pub(super) back: bool,
     pub(super) vertices: Vec<Vertex>,
     pub(super) hints: Vec<Hint>,
-    /// Vertex between two: in their middle (0), or at that share from the first to the second.
-    /// On an edge that something stands on, by which way the triangle runs along it.
+    /// Vertex between two: in their middle (0), or at this share from the first to the second. Along an edge on which
+    /// something stands, also by the direction in which the triangle runs along it.
     between: HashMap<(u32, u32, u64, u8), u32>,
-    /// Vertices on the edge of a shadow: the one before light there was known to be two, lamps that end there, and which of
-    /// them light its side.
+    /// Vertices on the edge of a shadow: the vertex before its light was divided, the lamps whose light ends there, and
+    /// those of them that light its side.
     pub(super) sides: HashMap<(u32, u64, u64), u32>,
     pub(super) base: HashMap<u32, u32>,
-    /// Vertices on edges that something stands on: the one that they were before.
+    /// Vertices on edges on which something stands: the vertex from which each was divided.
     pub(super) parted: HashMap<u32, u32>,
-    /// Where light is looked at for them.
+    /// Places where the light of such vertices is looked at.
     pub(super) beside: HashMap<u32, Vertex>,
 }
 
@@ -129,12 +130,12 @@ pub(super) struct Cells {
     pub(super) points: Vec<DVec3>,
     /// Points on edges of shadows, and lamps whose light ends there.
     pub(super) sharp: HashMap<u32, u64>,
-    /// Of which those that were not before.
+    /// Of these points, those that are new.
     pub(super) sharpened: Vec<u32>,
-    /// Edges of shadows that are to be edges of triangles when next is split.
+    /// Edges of shadows that are to become edges of triangles at the next split.
     pub(super) lines: Vec<([End; 2], u64)>,
     pub(super) along: HashMap<(u32, u32), u64>,
-    /// Triangles that came to be by points inside others.
+    /// Triangles made by points put inside others.
     pub(super) starred: Vec<usize>,
 }
 
@@ -163,13 +164,13 @@ pub(super) fn key(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// Both triangles of an edge get the same bits, whichever weights are zero.
+/// Both triangles of an edge must get the same bits, whichever weights are zero.
 fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
     std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
 }
 
 impl Cells {
-    /// Starts with the triangles of the mesh. `spaces` holds the space of each entry and whether something covers it.
+    /// Starts from the triangles of the mesh. `spaces` holds the space of each entry and whether something covers it.
     pub(super) fn new(scene: &Scene, mesh: &Mesh, tree: &Tree, spaces: &[(u32, bool)]) -> Self {
         let mut start = Start {
             mesh,
@@ -198,8 +199,9 @@ impl Cells {
         cells
     }
 
-    /// Adds a side of a surface. Vertices are those of the input, not shared across planes where a surface has no normals of
-    /// its own, nor by faces of different spaces; where a covered face meets a bare one it is the bare one's.
+    /// Adds a side of a surface. Vertices are those of the input; they are not shared across planes where a surface has no
+    /// normals of its own, nor by faces of different spaces; where a covered face meets a bare one the vertex belongs to the
+    /// bare one.
     fn add(&mut self, start: &mut Start, number: usize, surface: &Surface, back: bool) {
         let (mesh, number_of_sheet) = (start.mesh, self.sheets.len() as u32);
         let mut sheet = Sheet {
@@ -224,7 +226,8 @@ impl Cells {
                 weights[k] = 1.0;
                 let name = match mesh.input_corner(triangle as usize, k) {
                     Some(corner) => u64::from(surface.triangles[local][corner]),
-                    // A point where triangles were cut belongs to its input triangle alone: attributes may jump.
+                    // A point where triangles were cut belongs to its input triangle alone: attributes may differ
+                    // across it.
                     None => u64::from(local as u32 + 1) << 32 | u64::from(point),
                 };
                 let vertex = *known.entry((name, group, space)).or_insert_with(|| {
@@ -295,7 +298,7 @@ impl Cells {
         self.length(cell, self.longest(cell))
     }
 
-    /// Vertex in the middle of an edge of a cell, made if need be: a place to look at light; nothing is split for it.
+    /// Vertex in the middle of an edge of a cell, made if need be: a place to look at light; nothing is split.
     pub(super) fn middle(&mut self, cell: usize, k: usize) -> u32 {
         let Cell {
             sheet, of, corners, ..
@@ -311,7 +314,7 @@ impl Cells {
         middle
     }
 
-    /// Vertex in the middle of an edge of a cell, if there is one.
+    /// Vertex in the middle of an edge of a cell, if it exists.
     pub(super) fn known_middle(&self, cell: &Cell, k: usize) -> Option<u32> {
         let [a, b] = [k, (k + 1) % 3].map(|k| cell.corners[k].vertex);
         let known = &self.sheets[cell.sheet as usize].between;
@@ -320,7 +323,8 @@ impl Cells {
             .copied()
     }
 
-    /// Which way a cell runs along an edge that something stands on; 0 along all others, where both sides are one.
+    /// Direction in which a cell runs along an edge on which something stands; 0 along all other edges, whose sides
+    /// share vertices.
     fn way_along(&self, cell: &Cell, k: usize) -> u8 {
         let edge = &self.edges[cell.edges[k] as usize];
         match edge.sharp & FENCE {
@@ -336,8 +340,8 @@ impl Cells {
         self.edges[edge as usize].marked = true;
     }
 
-    /// Splits the marked edges, and the triangles that have them; returns the triangles that are new. `shrink` is what
-    /// remains of an expected mean square after a bisection.
+    /// Splits the marked edges, and the triangles that have them; returns the new triangles. `shrink` is the share of
+    /// an expected mean square that remains after a bisection.
     pub(super) fn split(&mut self, shrink: f64) -> Vec<usize> {
         self.close();
         for k in 0..self.edges.len() {
@@ -367,7 +371,7 @@ impl Cells {
         self.draw_lines();
         let mut fresh = std::mem::take(&mut self.starred);
         let mut k = 0;
-        // Halves that still have a split edge come up again, at the end or here.
+        // Halves that still have a split edge come up again: new ones at the end, others right here.
         while k < self.all.len() {
             if let Some(edge) = self.to_bisect(&self.all[k]) {
                 self.bisect(k, edge, shrink);
@@ -393,7 +397,7 @@ impl Cells {
                 let longest = self.longest(cell);
                 let limit = SLENDER * self.length(cell, longest);
                 let edge = |k: usize| &self.edges[cell.edges[k] as usize];
-                // Where the edge of a shadow crosses it, it must be split there, and may be alone.
+                // Where the edge of a shadow crosses an edge, that must be split there, even alone.
                 let slender = |k: usize| {
                     let edge = edge(k);
                     edge.marked && edge.crossed.is_none() && edge.length < limit
@@ -409,7 +413,8 @@ impl Cells {
         }
     }
 
-    /// The longest of the split edges of a cell; those that the edge of a shadow crosses come first, so that it becomes one.
+    /// The longest split edge of a cell; edges crossed by the edge of a shadow come first, so that this becomes an edge of
+    /// triangles.
     fn to_bisect(&self, cell: &Cell) -> Option<usize> {
         let edge = |k: usize| &self.edges[cell.edges[k] as usize];
         let rank = |k: usize| (edge(k).crossed.is_some(), edge(k).length);
@@ -420,7 +425,7 @@ impl Cells {
         })
     }
 
-    /// Bisects a cell at a split edge: one half takes its place, the other is the last.
+    /// Bisects a cell at a split edge: one half takes its place, the other is appended.
     fn bisect(&mut self, k: usize, edge: usize, shrink: f64) {
         let Cell {
             sheet,
@@ -462,7 +467,7 @@ impl Cells {
         self.edges[mc as usize].sharp = sharp.copied().unwrap_or(0);
         let border = self.sheets[sheet as usize].part(hints, m, c, a);
         let own = [0, 1, 2].map(|k| doubt.missed[(edge + k) % 3]);
-        // Where the edge of a shadow is what lines miss, nothing follows.
+        // Where lines miss the edge of a shadow, nothing follows for the halves.
         let missed = match crossed {
             None => missed_by_halves(own, of_a as f32),
             Some(_) => [[None; 3]; 2],
@@ -518,7 +523,7 @@ impl Cells {
 pub(super) type Triangles = (Vec<[u32; 3]>, Vec<u32>);
 
 impl Sheet {
-    /// Vertex on the way from `a` to `b`; `way`: see [`Cells::way_along`].
+    /// Vertex at share `at` from `a` to `b`; for `way` see [`Cells::way_along`].
     fn between(
         &mut self,
         (triangle, entry): (u32, u32),
@@ -573,7 +578,7 @@ pub(super) fn within(corners: &[Corner; 3], at: [f64; 2]) -> [f64; 3] {
 }
 
 impl Cell {
-    /// Weights of the corners of the triangle of the mesh, from those of the cell's own.
+    /// Weights of the corners of the triangle of the mesh, from weights of the cell's own corners.
     pub(super) fn at(&self, weights: [f64; 3]) -> [f64; 3] {
         let corner = |k: usize, j: usize| self.corners[k].weights[j] * weights[k];
         std::array::from_fn(|j| corner(0, j) + corner(1, j) + corner(2, j))
@@ -584,7 +589,7 @@ impl Cell {
         self.area * self.counts
     }
 
-    /// Does it belong to a face of the hierarchy, with some area?
+    /// Does the cell belong to a face of the hierarchy, and has it any area?
     pub(super) fn is_face(&self) -> bool {
         self.of.1 != NONE && self.area > 0.0
     }

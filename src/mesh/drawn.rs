@@ -17,7 +17,7 @@ impl Bake {
                 .or_default()
                 .push(k);
         }
-        // How far outside a triangle each place is, and what it gets there.
+        // The least weight of each place in the triangle that it lies in best, and the light there.
         let mut best = vec![(f64::NEG_INFINITY, None); places.len()];
         for (part, of) in baked.surfaces.iter().zip(&baked.of) {
             let surface = &self.scene().surfaces[part.surface];

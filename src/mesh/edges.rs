@@ -1,8 +1,9 @@
 //! Finds edges of shadows in a triangle that is to be split.
 //!
-//! Where light of a lamp begins or ends on the triangle's edges is found by halving, with rays alone. Between two such
-//! crossings the shadow's edge is a line if light differs to its left and right all along; if it is not, its corner is
-//! looked for where it would be if both ends ran on straight. What is neither is bisected, and looked at again.
+//! Where light of a lamp begins or ends on the triangle's edges is found by halving, with rays alone. Two such
+//! crossings are joined by a line if light differs to its left and right all along; if it does not, a corner of the
+//! shadow is looked for where its edges would meet if both ran on straight. All other triangles are bisected, and
+//! looked at again.
 
 use super::cells::{Cell, Cells, End, FENCE, within};
 use super::lines::Sharp;
@@ -12,47 +13,49 @@ use crate::link::Sight;
 use crate::transport::Receiver;
 use glam::{DVec2, DVec3, dvec2};
 
-/// Parts of an edge that the beginning or end of light is looked for in; what begins and ends within one is found when
-/// triangles are smaller.
+/// Parts of an edge in which the beginning or end of light is looked for; light that both begins and ends within one
+/// part is found when triangles are smaller.
 const PARTS: usize = 8;
-/// The same along a line beside the edge, near a crossing.
+/// Parts along a line beside the edge, near a crossing.
 const FINE_PARTS: usize = 32;
-/// All lengths below are shares of the room's half diagonal, 5 m in a room of 6 m by 6 m by 3 m.
-/// Crossings are known to this: some micrometres, for what they tell is carried on to eight times as far.
+/// All lengths below are shares of the room's half diagonal, 5 m in a room of 6 m by 6 m by 3 m. Accuracy of crossings:
+/// some micrometres, as lines through them are extended to eight times as far.
 const FOUND: f64 = 1e-6;
-/// A line may be this far from the edge of the shadow: half of what triangles may be as small as.
+/// A line may be this far from the edge of the shadow: half the size of the smallest triangles.
 const STRAIGHT: f64 = 5e-4;
-/// Crossings this near to the end of an edge are that end. Nothing shorter becomes an edge by them.
+/// Crossings this near to the end of an edge count as that end. No edge shorter than this arises from crossings.
 const NEAR: f64 = 4e-4;
-/// Light of a side is looked at so far from its edge, or up to that far where that is half shadow yet: wider ones are no
-/// edges.
+/// Distance from an edge of a shadow at which the light of a side is looked at, and the greatest such distance where the
+/// first still lies in half shadow: wider half shadows have no edge.
 const BESIDE: f64 = 1e-3;
 const SHARP: f64 = 4e-3;
-/// But no further than this share of the way to the middle of a triangle.
+/// But no further than this share of the way to the middle of the triangle.
 const INTO: f64 = 0.75;
-/// Where along a line its sides are looked at.
+/// Positions along a line at which its sides are looked at.
 const ALONG: [f64; 5] = [0.06, 0.27, 0.5, 0.73, 0.94];
-/// Depths at which an edge of a shadow is found once more, to see where it runs; share of the triangle.
+/// Depths at which an edge of a shadow is found a second time, to see its direction; share of the triangle.
 const DEPTHS: [f64; 3] = [0.125, 0.03125, 0.0078125];
 /// A triangle with more crossings is bisected first.
 const CROSSINGS: usize = 8;
-/// Edges of shadows are found once more only where they run away from a triangle's edge by more than one part in so many.
+/// Edges of shadows are found a second time only if they leave a triangle's edge at a slope of more than one in this
+/// many.
 const REACH: f64 = 4.0;
-/// What is left out at the ends of a line beside an edge, and at the least between a bend and the edges; shares.
+/// Left out at the ends of a line beside an edge, and the least distance of a bend from the edges; shares.
 const END: f64 = 1e-4;
 const INSIDE: f64 = 1e-3;
-/// The same when lines are finished; and triangles are bisected for it down to this size: 2 cm.
+/// Steps in which lines are carried on to be finished; and the size down to which triangles are bisected for them: 2
+/// cm.
 const FINISHING: usize = 24;
 const BISECTED: f64 = 4e-3;
 
-/// A cell, looked into.
+/// A cell that is searched for edges of shadows.
 struct Look<'a> {
     shades: &'a Shades<'a>,
     sight: &'a Sight<'a>,
     cells: &'a Cells,
     cell: &'a Cell,
     lamp: u64,
-    /// All that are of interest.
+    /// All lamps of interest.
     lamps: u64,
     half_size: f64,
 }
@@ -138,7 +141,7 @@ impl Look<'_> {
         found
     }
 
-    /// Does light differ to the left and to the right all along a line?
+    /// Does light differ between left and right all along a line?
     fn is_edge(&self, a: [f64; 3], b: [f64; 3]) -> bool {
         let [p, q] = [self.point(a), self.point(b)];
         let length = p.distance(q);
@@ -174,7 +177,7 @@ impl Look<'_> {
         compared > 1 && left.is_some_and(|left| is_hard || (sharp(1.0, left) && sharp(-1.0, !left)))
     }
 
-    /// Where the edge of the shadow that begins at a mark runs on: a second place on it.
+    /// A second place on the edge of the shadow that begins at a mark.
     fn heading(&self, from: &Mark, depth: f64) -> Option<[f64; 3]> {
         let corners = self.cell.corners.map(|c| c.weights);
         let (a, b, middle) = match from {
@@ -208,7 +211,7 @@ impl Look<'_> {
         }
     }
 
-    /// Where two edges that begin at marks meet, if they do inside.
+    /// Where two edges of shadows that begin at marks meet, if they meet inside.
     fn bend(&self, p: &Mark, q: &Mark, depth: f64) -> Option<[f64; 3]> {
         let (from, to) = (self.weights(p), self.weights(q));
         let (a, c) = (flat(from), flat(to));
@@ -234,7 +237,7 @@ impl Look<'_> {
 
     fn look(&self) -> Found {
         let crossings = self.crossings();
-        // Neighbours may have put both ends of an edge with a bend on corners.
+        // Neighbours may have put both ends of a bent edge on corners.
         let ends = (0..3).filter(|&k| self.cells.lamps_at(self.cell, k) & self.lamp != 0);
         if crossings.is_empty() && ends.count() < 2 {
             return Found::Even;
@@ -291,7 +294,8 @@ impl Cells {
         self.sharp.get(&point).copied().unwrap_or(0)
     }
 
-    /// Finds edges of cells that are edges of shadows without having been made for it: an end is known to lie on one.
+    /// Finds edges of cells that are edges of shadows without having been made for them: an end of each is known to lie
+    /// on one.
     fn find_edges(&mut self, shades: &Shades, wanted: &[(usize, u64)]) {
         let half_size = shades.bake().mesh().half_size;
         let cells = &*self;
@@ -360,9 +364,9 @@ impl Cells {
         })
     }
 
-    /// Asks for what a plan says, unless something else was asked for before.
+    /// Requests what a plan needs, unless something else was requested before.
     fn ask(&mut self, k: usize, plan: &Plan, near: f64) {
-        // Edges are known by their numbers before the cell becomes three.
+        // Edges are referred to by number before the cell becomes three.
         let mut ends = Vec::new();
         for mark in plan.lines.iter().flat_map(|(marks, _)| marks) {
             ends.push(match mark {
@@ -382,8 +386,8 @@ impl Cells {
         }
     }
 
-    /// Splits cells along edges of shadows of lamps, and those that the edges lead to, so many times or until it is late; returns
-    /// the cells that are new. `shrink` is what remains of an expected mean square.
+    /// Splits cells along edges of shadows of lamps, and the cells into which these edges lead, a number of times or until it is
+    /// late; returns the new cells. `shrink` is the share of an expected mean square that remains.
     pub(super) fn split_along(
         &mut self,
         shades: &Shades,
@@ -410,9 +414,8 @@ impl Cells {
         fresh
     }
 
-    /// Carries edges of shadows on to where they end: through all triangles that have a corner on one, which are bisected where
-    /// there is no line and they are large enough for that to show. No more than `most` triangles come to be. Returns those that
-    /// are new.
+    /// Carries edges of shadows on to their ends: through all triangles that have a corner on one. Those without a line are
+    /// bisected if they are large enough for that to show. Adds at most `most` triangles. Returns the new ones.
     pub(super) fn finish_lines(
         &mut self,
         shades: &Shades,
@@ -428,13 +431,13 @@ impl Cells {
             let lamps = |k: usize| {
                 let corners = self.all[k].corners.iter();
                 let of = |point| self.sharp.get(&point).copied().unwrap_or(0);
-                // What ends at a cover is carried on by what grows alone: there may be many, and little to be seen.
+                // Lines that end at a cover are carried on only by growing: there may be many, with little to be seen.
                 corners.fold(0, |all, corner| all | of(corner.point)) & !(COVER | FENCE)
             };
             let all = some.iter().map(|&k| (k, lamps(k)));
             let wanted: Vec<(usize, u64)> = all.filter(|(_, lamps)| *lamps != 0).collect();
             let found = self.look_into(shades, &wanted);
-            // What is finished takes nothing of what there may be.
+            // Finished cells take nothing of what is allowed.
             let is_open = |(wanted, found): &(&(usize, u64), &Found)| match found {
                 Found::Edge(_) => true,
                 Found::Other => self.size(&self.all[wanted.0]) > least,
@@ -455,7 +458,7 @@ impl Cells {
         fresh
     }
 
-    /// Splits cells along the lines found, and bisects those where light ends otherwise that are larger than `least`.
+    /// Splits cells along the lines found, and bisects those larger than `least` in which light ends otherwise.
     fn split_found(
         &mut self,
         shades: &Shades,
@@ -480,8 +483,8 @@ impl Cells {
         self.take_sides(shades, split)
     }
 
-    /// Gives corners on edges of shadows the vertices of their sides, in new cells and wherever points were none before; returns
-    /// all of these cells.
+    /// Gives corners on edges of shadows the vertices of their sides, in new cells and at points that were not on such edges
+    /// before; returns all of these cells.
     pub(super) fn take_sides(&mut self, shades: &Shades, mut fresh: Vec<usize>) -> Vec<usize> {
         let corners = self.sharp_corners(&fresh);
         let half_size = shades.bake().mesh().half_size;
@@ -499,7 +502,7 @@ impl Cells {
         fresh
     }
 
-    /// Which lamps light a corner of a cell inside of it, and a place there that is out of half shadow, if there is one near.
+    /// The lamps that light the inside of a cell at a corner, and a place there outside half shadow, if there is one nearby.
     fn side(
         &self,
         shades: &Shades,
@@ -512,7 +515,7 @@ impl Cells {
         let from = cell.corners[corner].weights;
         let own = |k: usize, at: usize| cell.corners[at].weights[k] / 3.0;
         let middle: [f64; 3] = std::array::from_fn(|k| own(k, 0) + own(k, 1) + own(k, 2));
-        // How far the middle is from the edges that meet here.
+        // Distance of the middle from the edges that meet here.
         let near = [corner, (corner + 2) % 3].map(|e| {
             let edge = &self.edges[cell.edges[e] as usize];
             2.0 / 3.0 * cell.area / edge.length

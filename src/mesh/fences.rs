@@ -1,7 +1,8 @@
-//! Edges of the input that something stands on: a ceiling that ends at a wall which runs on above it.
+//! Edges of the input on which something stands: a ceiling that ends at a wall which runs on above the ceiling.
 //!
-//! Light on both sides of such an edge has nothing to do with each other, though they are one plane and maybe one space. So
-//! each side gets vertices of its own, whose light is looked at beside the edge, as on edges of shadows.
+//! The light on one side of such an edge has nothing to do with that on the other, though both sides lie in one plane and
+//! maybe in one space. So each side gets vertices of its own, whose light is looked at beside the edge, as on edges of
+//! shadows.
 
 use super::cells::{Cell, Cells, FENCE};
 use super::shades::Shades;
@@ -12,25 +13,25 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What stands on an edge is looked for this far from it, a share of the room's half diagonal: 2.5 mm in a room of 6 m by
-/// 6 m by 3 m, where lines are as far from what they stand for.
+/// Distance from an edge at which things standing on it are looked for, a share of the room's half diagonal: 2.5 mm in a
+/// room of 6 m by 6 m by 3 m, where lines are as far from the edges of shadows.
 const ASIDE: f64 = 5e-4;
 /// But no further than this share of the height of a triangle on the edge.
 const INTO: f64 = 0.2;
-/// And so many times higher than aside, so that the way passes above edges that are bent outwards.
+/// Height of the way between both sides, as a multiple of that distance, so that it passes above edges bent outwards.
 const ABOVE: f64 = 3.0;
-/// Of so many cells about an edge every two are looked at.
+/// Of this many cells around an edge at the most all pairs are tested.
 const MOST: usize = 8;
-/// Where along an edge.
+/// Positions along an edge.
 const ALONG: [f64; 3] = [0.2, 0.5, 0.8];
 
-/// Normals whose cosine is above this are one direction to who looks: places there share what is seen.
+/// Normals whose cosine is above this are one direction for looks: such places share their light.
 const ALIKE: f64 = 0.999;
 
-/// A corner of a cell, or the edge that begins there.
+/// A corner of a cell, or the edge that begins at this corner.
 type Of = (usize, usize);
 
-/// What becomes of a vertex: its sheet, and the corners about it in sectors, of which the first keeps it.
+/// How a vertex is divided: its sheet, and the corners around it in sectors, the first of which keeps it.
 struct Parted {
     sheet: u32,
     vertex: u32,
@@ -38,9 +39,9 @@ struct Parted {
 }
 
 impl Cells {
-    /// Parts the vertices on edges that something stands on, unless that takes more than `most` new ones. Not where it is what lies
-    /// upon one side: that side is lent the light of the other. `spaces` holds the space of each entry and whether something
-    /// covers it. To be called before any edge is split.
+    /// Divides the vertices on edges on which something stands, unless that takes more than `most` new ones. Edges of things that
+    /// lie on one side are left out: that side is lent the light of the other. `spaces` holds the space of each entry and whether
+    /// something covers it. Must be called before any edge is split.
     pub(super) fn fence(&mut self, shades: &Shades, spaces: &[(u32, bool)], most: usize) {
         let fenced = self.fenced(shades, spaces);
         let ends = fenced.iter().map(|&edge| self.edges[edge as usize].ends);
@@ -67,7 +68,7 @@ impl Cells {
         }
     }
 
-    /// Edges that something stands on.
+    /// Edges on which something stands.
     fn fenced(&self, shades: &Shades, spaces: &[(u32, bool)]) -> BTreeSet<u32> {
         let mut around: Vec<(u32, Of)> = Vec::with_capacity(3 * self.all.len());
         let is_bare = |cell: &Cell| !spaces.get(cell.of.1 as usize).is_some_and(|space| space.1);
@@ -94,7 +95,8 @@ impl Cells {
         })
     }
 
-    /// Does something stand on the edge that two cells share? They must be of a sheet, or look the same way.
+    /// Does something stand on the edge that two cells share? Both must belong to one sheet, or face the same
+    /// direction.
     fn stands_between(&self, shades: &Shades, sight: &Sight, (a, e): Of, (b, f): Of) -> bool {
         let mesh = shades.bake().mesh();
         let [a, b] = [(a, e), (b, f)].map(|(k, e)| (&self.all[k], e));
@@ -115,8 +117,8 @@ impl Cells {
         })
     }
 
-    /// From the edge `e` of a cell to a place a little into it and above, and the cell's normal; none where it is too thin or
-    /// smaller than what is looked for.
+    /// The way from the edge `e` of a cell to a place a little inside and above it, and the cell's normal; none where the
+    /// cell is too thin or too small for the search.
     fn beside(&self, shades: &Shades, (cell, e): (&Cell, usize)) -> Option<(DVec3, DVec3)> {
         let aside = ASIDE * shades.bake().mesh().half_size;
         let [p, q, r] = [0, 1, 2].map(|k| self.points[cell.corners[(e + k) % 3].point as usize]);
@@ -128,7 +130,7 @@ impl Cells {
         wide.then(|| (step * (into + ABOVE * normal), normal))
     }
 
-    /// What becomes of the vertices at points where fenced edges end.
+    /// How the vertices at ends of fenced edges are divided.
     fn parted(&self, fenced: &BTreeSet<u32>, points: &BTreeSet<u32>) -> Vec<Parted> {
         let mut corners: BTreeMap<(u32, u32), Vec<Of>> = BTreeMap::new();
         for (k, cell) in self.all.iter().enumerate() {
@@ -147,7 +149,7 @@ impl Cells {
         parted.collect()
     }
 
-    /// Corners about a vertex in sets that reach each other over edges which nothing stands on.
+    /// Corners around a vertex in sets that are connected by edges on which nothing stands.
     fn sectors(&self, about: &[Of], fenced: &BTreeSet<u32>) -> Vec<Vec<Of>> {
         let open = |(k, c): Of| {
             let edges = [c, (c + 2) % 3].map(|e| self.all[k].edges[e]);
@@ -164,7 +166,7 @@ impl Cells {
             while let Some(place) = next.pop() {
                 if !std::mem::replace(&mut taken[place], true) {
                     sector.push(about[place]);
-                    // Asked for once: who shares an edge is then taken, or about to be.
+                    // Each edge is followed once: its corners are then taken, or about to be.
                     let beyond = open(about[place]).filter_map(|edge| along.remove(&edge));
                     next.extend(beyond.flatten());
                 }
@@ -176,7 +178,8 @@ impl Cells {
         sectors
     }
 
-    /// Gives the corners of the `k`-th sector about a vertex one vertex: the first keeps it, others get a new one.
+    /// Gives the corners of the `k`-th sector around a vertex one vertex: the first sector keeps the old one, others
+    /// get a new one.
     fn give_vertex(&mut self, sheet: u32, (parted, k): (u32, usize), sector: &[Of]) {
         let (cell, c) = sector[0];
         let Cell { of, corners, .. } = self.all[cell];

@@ -1,20 +1,20 @@
-//! Vertices moved off their own light, so that what is drawn between them is right in the mean.
+//! Moves vertices off their own light, so that the light drawn between them is right on average.
 //!
-//! Lines between points of light that bends lie on one side of it: with vertices on the light itself rooms were drawn .5 to 1.5 %
-//! too dark at `--error 1`, as light is highest where it bends most. Where it bends evenly over a triangle, what lines miss is in the mean
-//! a third of what they miss in the middles of its three edges together (the rule of edge middles, exact to the second degree), and
-//! those were looked at. Every vertex takes the mean of that over the triangles around it, by area.
+//! Straight lines between points of a curve lie on one side of the curve: with vertices on the light itself rooms were drawn .5 to 1.5 %
+//! too dark at `--error 1`, as light is highest where it bends most. Where it bends evenly over a triangle, lines miss on average a third
+//! of what they miss in the middles of its three edges together (the rule of edge middles, exact to the second degree), and these were
+//! looked at. Every vertex is moved by the mean of that over the triangles around it, by area.
 
 use super::grow::Growth;
 
-/// Where lines miss more than this share of the light at the darkest corner of a triangle, it is no curve but the edge of a shadow, and moves no
-/// vertex: beside sun patches dark corners got to twice their light, and streaks ran from them. With .1, .25 and .5 the error between
+/// Where lines miss more than this share of the light at the darkest corner of a triangle, they miss the edge of a shadow and not a curve, and no
+/// vertex is moved: beside sun patches dark corners got up to twice their light, and streaks ran from them. With .1, .25 and .5 the error between
 /// vertices is .250, .226 and .227 in two rooms, .292, .292 and .291 in cornell, .229, .233 and .233 in daylit, and the same in convex and gallery.
 const MOST: f64 = 0.25;
 
 impl Growth<'_> {
-    /// What the light of each look is to be multiplied by where it is a vertex. Alike for all vertices of a look, so that there is no
-    /// seam; a factor alone, so that light of each lamp keeps its part and can be changed afterwards.
+    /// Factor of the light of each look where it belongs to a vertex. The same for all vertices of a look, so that there is no seam;
+    /// only a factor, so that the light of each lamp keeps its share and can be changed afterwards.
     pub(super) fn fitted(&self) -> Vec<f32> {
         let mut missed = vec![[0.0; 2]; self.looks.len()];
         for cell in &self.cells.all {

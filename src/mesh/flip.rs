@@ -1,31 +1,31 @@
-//! Diagonals turned where light asks for it.
+//! Turns diagonals where light asks for it.
 //!
-//! Bisection knows two diagonals to a square and no contours: where light falls off towards a wall, triangles with one corner there
-//! stand beside triangles with two, and draw teeth. Two triangles that share an edge inside one triangle of the input may share the other
-//! diagonal as well. That one is drawn which makes fewer creases: the sum, over the edges around, of their length times the jump of the
-//! gradient of lightness there, what an eye takes for a line (data-dependent triangulation, Dyn, Levin & Rippa 1990).
+//! Bisection knows two diagonals of a square and no contours: where light falls off towards a wall, triangles with one corner at the wall
+//! stand beside triangles with two, and look like teeth. Two triangles that share an edge inside one triangle of the input may as well
+//! share the other diagonal. The diagonal with fewer creases is drawn: creases are the sum, over the edges around, of length times the
+//! jump of the gradient of lightness, which an eye takes for a line (data-dependent triangulation, Dyn, Levin & Rippa 1990).
 
 use super::cells::{Cells, Sheet, Triangles, key};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
-/// No triangle is made that has less than this share of the area of both: needles show what they should hide.
+/// No triangle is made with less than this share of the area of both: needles would show what they should hide.
 const SLIVER: f64 = 0.05;
-/// A turn must take away this share of the creases around. Interpolation at `--error 1` (mean dE00; as bisected, and with turns that take
-/// away anything, .15 and .3): cornell .296, .316, .304, .292; gallery .322, .332, .328, .307; two rooms .233, .226, .224, .226; convex .282,
-/// .272, .268, .263; Bevy's box .206, .210, .193, .196; sun-room .135, .141, .138, .135. With .5 rather more again.
+/// A turn must remove this share of the creases around. Interpolation at `--error 1` (mean dE00; as bisected, with turns that remove
+/// anything, with .15 and with .3): cornell .296, .316, .304, .292; gallery .322, .332, .328, .307; two rooms .233, .226, .224, .226; convex
+/// .282, .272, .268, .263; Bevy's box .206, .210, .193, .196; sun-room .135, .141, .138, .135. With .5 rather more again.
 const LESS: f64 = 0.3;
-/// Triangles that meet at less than this cosine are no plane.
+/// Triangles whose normals meet at less than this cosine do not lie in one plane.
 const FLAT: f64 = 0.9999;
 
-/// What does not change of a sheet: where its vertices are, and which edges are lines where light ends.
+/// The unchanging part of a sheet: where its vertices are, and which edges are lines where light ends.
 #[derive(Debug, Default)]
 pub(super) struct Ground {
     pub(super) at: Vec<DVec3>,
     lines: HashSet<(u32, u32)>,
 }
 
-/// Of all sheets.
+/// The unchanging parts of all sheets.
 pub(super) fn grounds(cells: &Cells) -> Vec<Ground> {
     let ground = |sheet: &Sheet| Ground {
         at: vec![DVec3::ZERO; sheet.vertices.len()],
@@ -46,7 +46,7 @@ pub(super) fn grounds(cells: &Cells) -> Vec<Ground> {
     grounds
 }
 
-/// Triangles of a sheet as they are drawn.
+/// Triangles of a sheet as drawn.
 struct Faces<'a> {
     triangles: &'a mut [[u32; 3]],
     /// Triangle of the mesh of each.
@@ -58,7 +58,7 @@ struct Faces<'a> {
     beside: HashMap<(u32, u32), [Option<u32>; 2]>,
 }
 
-/// Turns the diagonals of a sheet whose vertices have these lightnesses.
+/// Turns the diagonals of a sheet with the given lightness at vertices.
 pub(super) fn turn(ground: &Ground, (triangles, of): &mut Triangles, light: &[Option<f64>]) {
     let mut faces = Faces {
         triangles,
@@ -70,7 +70,7 @@ pub(super) fn turn(ground: &Ground, (triangles, of): &mut Triangles, light: &[Op
     for t in 0..faces.triangles.len() as u32 {
         faces.tie(t);
     }
-    // Every turn takes creases away, so there is an end.
+    // Every turn removes creases, so this ends.
     let mut open: BTreeSet<(u32, u32)> = faces.beside.keys().copied().collect();
     while let Some(edge) = open.pop_first() {
         if !ground.lines.contains(&edge) {
@@ -109,7 +109,7 @@ impl Faces<'_> {
         (b - a).cross(c - a)
     }
 
-    /// Normal of twice the area, and how lightness rises.
+    /// Normal of twice the area, and the gradient of lightness.
     fn slope(&self, triangle: [u32; 3]) -> Option<(DVec3, DVec3)> {
         let [a, b, c] = triangle.map(|v| self.at[v as usize]);
         let [la, lb, lc] = triangle.map(|v| self.light[v as usize]);
@@ -118,7 +118,7 @@ impl Faces<'_> {
         (n != DVec3::ZERO).then(|| (n, n.cross(rises) / n.length_squared()))
     }
 
-    /// Length times jump of the gradient between a triangle and what is beyond one of its edges.
+    /// Length times jump of the gradient between a triangle and the one beyond its edge `k`.
     fn crease(&self, triangle: [u32; 3], k: usize, beyond: Option<[u32; 3]>) -> f64 {
         let jump = || {
             let ((n, one), (m, other)) = (self.slope(triangle)?, self.slope(beyond?)?);
@@ -129,7 +129,8 @@ impl Faces<'_> {
         jump().unwrap_or(0.0)
     }
 
-    /// Creases around two triangles that share their first edge and are drawn, or might be, where now `both` are.
+    /// Creases around two triangles that share their first edge, drawn or considered, in place of the present triangles
+    /// `both`.
     fn creases(&self, pair: [[u32; 3]; 2], both: [u32; 2]) -> f64 {
         let beyond = |p: u32, q: u32| {
             let near = self.beside.get(&key(p, q))?;
@@ -142,7 +143,7 @@ impl Faces<'_> {
         self.crease(pair[0], 0, Some(pair[1])) + outer(pair[0]) + outer(pair[1])
     }
 
-    /// Turns an edge if that makes fewer creases; then the edges around, whose creases are others now.
+    /// Turns an edge if that makes fewer creases; returns the edges around, whose creases have changed.
     fn turned(&mut self, edge: (u32, u32)) -> Option<[(u32, u32); 4]> {
         let &[Some(t), Some(s)] = self.beside.get(&edge)? else {
             return None;
@@ -197,7 +198,7 @@ mod tests {
         (ground, (squares.collect(), vec![0; 8]))
     }
 
-    /// Light that falls off across diagonals that are not drawn: all are turned.
+    /// Lightness that falls off across diagonals that are not drawn: all are turned.
     fn folded(at: &[DVec3]) -> Vec<Option<f64>> {
         at.iter().map(|p| Some((p.x + p.y - 2.5).abs())).collect()
     }
@@ -206,7 +207,7 @@ mod tests {
     fn diagonals_follow_what_light_does() {
         let (ground, mut faces) = strip();
         turn(&ground, &mut faces, &folded(&ground.at));
-        // The fold lies in the third square from (2.5, 0) to (1.5, 1): what is drawn along x + y = 2 and 3 is straight.
+        // The fold lies in the third square from (2.5, 0) to (1.5, 1): light along x + y = 2 and 3 is drawn straight.
         for (a, b) in [(2, 5), (4, 7)] {
             let has = |t: &&[u32; 3]| t.contains(&a) || t.contains(&b);
             let along = faces.0.iter().filter(|t| t.contains(&a) && t.contains(&b));

@@ -1,9 +1,10 @@
-//! The mesh grows where straight lines between its vertices are not what looking there shows.
+//! The mesh grows where straight lines between its vertices differ from the light that a look there finds.
 //!
-//! Every triangle has a mean square of the colour difference between both, times its area its share of the error: first as
-//! the solved light lets it expect, then as seen in the middles of its edges and at one point inside. The largest shares are
-//! looked at or, where that is done, split at the edges that bend; so shares become alike, which takes the fewest
-//! vertices for a sum. Squares, although it is the mean that ends it: teeth along shadows are few, and seen.
+//! Every triangle has a mean square of the colour difference between both, and times its area this is its share of the
+//! error: first as expected from the solved light, then as seen in the middles of its edges and at one point inside. The
+//! triangles with the largest shares are looked at or, if that is done, split at the edges over which light bends; so shares
+//! become alike, which takes the fewest vertices for a sum. Squares are used although growing ends by the mean: teeth along
+//! shadows are few, and visible.
 
 use super::cells::{Cell, Cells, Corner, Doubt, Hint, within};
 use super::looks::Looks;
@@ -16,61 +17,60 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::time::Instant;
 
-/// Not asked for yet.
+/// A look that is not asked for yet.
 const UNKNOWN: u32 = u32::MAX;
 /// Triangles are split until their longest edge is this share of the room's half diagonal.
 const SMALLEST: f64 = 1e-3;
-/// What remains of the mean square after a bisection: two halve a smooth triangle's size, and its error falls with the
-/// square of that.
+/// Share of the mean square that remains after a bisection: two bisections halve a smooth triangle's size, and its
+/// error falls with the square of that.
 pub(super) const SHRINK: f64 = 0.25;
-/// Where something covers the middle of an edge, this much of the difference of its ends counts.
+/// Where something covers the middle of an edge, this share of the difference between its ends counts.
 const COVERED: f64 = 0.25;
-/// Vertices that splitting one triangle may take, its neighbours' included: as measured, 1 to 5, twice as many on an edge of a
-/// shadow.
+/// Vertices that splitting one triangle may take, including those of its neighbours: 1 to 5 were measured, twice as many on an
+/// edge of a shadow.
 const SPLIT: usize = 16;
-/// A limit of vertices counts as met where less than this part of it is left.
+/// A limit of vertices counts as reached when fewer than this are left.
 const FULL: usize = 64;
 
-/// Light at the corners of a cell, mean square of what the solved light differs by, and its worst place.
+/// Light at the corners of a cell, mean square of its difference from the solved light, and the worst place.
 type Told = ([[f64; 3]; 3], f64, Option<(Hint, f64)>);
-/// Looks in the middles of edges and inside, and weights of the corners there.
+/// Looks in the middles of edges and inside, and weights of the corners at the last.
 type Asked = ([u32; 3], u32, [f64; 3]);
 
-/// Sum of the light of neighbours of covered vertices, and how many there are.
+/// Sum of the light of neighbours of covered vertices, and their number.
 type Lent = HashMap<u32, ([f64; 3], f64)>;
 
-/// Of a random point the cell, the vertices between which it is drawn and their weights, and two looks.
+/// For a random point the cell, the vertices between which it is drawn and their weights, and two looks.
 pub(super) type PointLooks = (usize, ([u32; 3], [f64; 3]), [u32; 2]);
 
 /// A mesh that grows.
 pub(super) struct Growth<'a> {
     pub(super) cells: Cells,
     pub(super) looks: Looks<'a>,
-    /// What throws shadows.
+    /// The lamps that throw shadows.
     pub(super) shades: Shades<'a>,
     /// Look of each vertex of each sheet.
     looked: Vec<Vec<u32>>,
-    /// What covered vertices of each sheet are lent.
+    /// Light lent to covered vertices of each sheet.
     lent: Vec<Lent>,
     white: [f64; 3],
     /// Edges no longer than this are not split.
     smallest: f64,
     /// Vertices at the most.
     pub(super) most: usize,
-    /// Is that a limit, or about right?
+    /// Is `most` a limit, or a rough number?
     pub(super) strict: bool,
-    /// What light between vertices may be off in the mean, and what triangles of the input are taken to be off until something is
-    /// known of them.
+    /// Allowed mean error of light between vertices; triangles of the input are expected to have it until more is known of them.
     pub(super) allowed: f64,
-    /// Variance of a look, by chance.
+    /// Variance of a look by chance.
     pub(super) noise: f64,
     /// Points of the last measurement.
     pub(super) asked: Vec<PointLooks>,
     /// Is light looked at, or is the solved light believed?
     pub(super) looking: bool,
-    /// When growing ends where nothing is looked at any more.
+    /// When growing ends if nothing is looked at any more.
     pub(super) until: Option<Instant>,
-    /// Triangles that edges of shadows took to be finished.
+    /// Triangles added to finish edges of shadows.
     pub(super) for_lines: usize,
 }
 
@@ -106,7 +106,7 @@ impl<'a> Growth<'a> {
         seen_difference(a, b, self.white)
     }
 
-    /// Asks for the vertices of some cells.
+    /// Asks for looks at the vertices of some cells.
     fn want_corners(&mut self, cells: &[usize]) {
         for &k in cells {
             let cell = &self.cells.all[k];
@@ -132,14 +132,14 @@ impl<'a> Growth<'a> {
         *look
     }
 
-    /// Believes the solved light from now on, or looks.
+    /// From now on believes the solved light, or looks.
     pub(super) fn believe(&mut self, believing: bool) {
         self.looking = !believing;
         self.looks.believing = believing;
     }
 
-    /// Looks again at the vertices of triangles that lie on some of the mesh's, and at their neighbours, which may lend them
-    /// light.
+    /// Looks again at the vertices of triangles that lie on `wanted` triangles of the mesh, and at their neighbours, which
+    /// may lend them light.
     pub(super) fn look_again(
         &mut self,
         wanted: impl Fn(u32) -> bool,
@@ -174,7 +174,7 @@ impl<'a> Growth<'a> {
         self.cells.size(cell) <= self.smallest
     }
 
-    /// Look of a vertex, if it was asked for.
+    /// Look of a vertex, if asked for.
     pub(super) fn look(&self, sheet: usize, vertex: u32) -> Option<u32> {
         let look = self.looked[sheet].get(vertex as usize);
         look.copied().filter(|&look| look != UNKNOWN)
@@ -200,7 +200,7 @@ impl<'a> Growth<'a> {
         self.looks.at(look).map(|seen| seen.xyz)
     }
 
-    /// Lends covered vertices the light of their neighbours, as is done in the output.
+    /// Lends covered vertices the light of their neighbours, as in the output.
     fn lend(&mut self) {
         let mut lent = vec![Lent::new(); self.cells.sheets.len()];
         for cell in &self.cells.all {
@@ -218,7 +218,7 @@ impl<'a> Growth<'a> {
         self.lent = lent;
     }
 
-    /// Can anybody see anything of a cell? Corners, and what the rays of leaves tell.
+    /// Can anybody see any part of a cell? Told by its corners and by the rays of leaves.
     fn is_seen(&self, cell: usize) -> bool {
         let cell = &self.cells.all[cell];
         let sheet = &self.cells.sheets[cell.sheet as usize];
@@ -227,13 +227,14 @@ impl<'a> Growth<'a> {
         cell.corners.iter().any(corner) || hints.iter().any(|hint| hint.open > 0.0)
     }
 
-    /// Area that counts of all cells of which anybody can see anything: what the error is a mean over.
+    /// Counted area of all cells of which anything can be seen: the error is a mean over this.
     pub(super) fn seen_area(&self) -> f64 {
         let seen = (0..self.cells.all.len()).filter(|&k| self.is_seen(k));
         seen.map(|k| self.cells.all[k].counted()).sum()
     }
 
-    /// Mean square of what the solved light differs by, as far as others see it, its worst place and how much it differs there.
+    /// Mean square of the solved light's difference from a cell, as far as others see it, the worst place and the difference
+    /// there.
     fn told(&self, cell: usize, light: &[[f64; 3]; 3]) -> (f64, Option<(Hint, f64)>) {
         let cell = &self.cells.all[cell];
         let sheet = &self.cells.sheets[cell.sheet as usize];
@@ -250,7 +251,7 @@ impl<'a> Growth<'a> {
         (if area > 0.0 { sum / area } else { 0.0 }, worst)
     }
 
-    /// Looks at the corners of new cells, and what the solved light lets expect there.
+    /// Looks at the corners of new cells, and sets the error that the solved light lets expect there.
     pub(super) fn expect(&mut self, fresh: &[usize], first: bool, progress: &dyn Fn(usize, usize)) {
         self.want_corners(fresh);
         self.looks.complete(progress);
@@ -268,7 +269,7 @@ impl<'a> Growth<'a> {
                 let range = (RANGE * range.fold(0.0, f64::max)).powi(2);
                 match first {
                     true => told.max(range).max(self.allowed * self.allowed),
-                    // Half of a triangle that was flat where it was looked at may still hold what nobody saw.
+                    // Half of a triangle that was flat where it was looked at may still hide something.
                     false => square.max(told * f64::from(trust * trust)).max(range),
                 }
             })
@@ -282,7 +283,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// The first vertices.
+    /// Makes the first vertices.
     pub(super) fn begin(&mut self, progress: &dyn Fn(usize, usize)) {
         if self.looking && !self.looks.is_late() {
             let most = match self.strict {
@@ -342,7 +343,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// How many vertices would be written.
+    /// Number of vertices that would be written.
     pub(super) fn used(&self) -> usize {
         let sheets = self.cells.sheets.iter();
         let mut used: Vec<Vec<bool>> = sheets.map(|s| vec![false; s.vertices.len()]).collect();
@@ -374,7 +375,7 @@ impl<'a> Growth<'a> {
         picked
     }
 
-    /// Marks the edges of a tested cell that bend; all of them if it is inside that light differs.
+    /// Marks the edges of a tested cell over which light bends; all of them if light differs inside.
     pub(super) fn mark(&mut self, k: usize) {
         let doubt = self.cells.all[k].doubt;
         let worst = doubt.bent.into_iter().fold(doubt.inside, f32::max);
@@ -392,7 +393,8 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Looks at light in the middles of edges and at a point inside: where the solved light is worst, or anywhere.
+    /// Looks at light in the middles of edges and at a point inside: where the solved light differs most, or a random
+    /// one.
     fn test(&mut self, cells: &[usize], progress: &dyn Fn(usize, usize)) {
         let told: Vec<_> = cells
             .par_iter()
@@ -400,7 +402,7 @@ impl<'a> Growth<'a> {
                 let light = self.light(k);
                 let (square, worst) = self.told(k, &light);
                 let cell = &self.cells.all[k];
-                // A single leaf says nothing of what differs inside.
+                // A single leaf tells nothing of differences inside.
                 let worst = worst.filter(|(_, d)| cell.hints.1 > cell.hints.0 + 1 && *d > 0.0);
                 (light, square, worst)
             })
@@ -434,8 +436,8 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// What is known of a cell now: its light, what the solved light tells of it and where that is worst; looks in the middles
-    /// of edges, one inside, and where that is.
+    /// The doubt of a cell, from its light, the solved light's difference and worst place, looks in the middles of edges and
+    /// one inside, and the place of the last.
     fn judged(
         &self,
         k: usize,
@@ -445,7 +447,7 @@ impl<'a> Growth<'a> {
         let off = |look: u32, weights: [f64; 3]| {
             let seen = self.looks.at(look)?.xyz;
             let off = self.difference(mix(&light, weights), seen);
-            // What chance alone may do is no bend.
+            // A difference that chance alone may cause is not a bend.
             Some((off * off - BY_CHANCE * self.noise).max(0.0).sqrt())
         };
         let halves = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
@@ -453,14 +455,14 @@ impl<'a> Growth<'a> {
         let seen = corners.map(|c| self.seen(*sheet as usize, c.vertex).is_some());
         let mut looks = middles.into_iter().chain([inside]);
         if !seen.contains(&true) && looks.all(|look| self.looks.at(look).is_none()) {
-            // It lies below something.
+            // The cell lies below something.
             return Doubt {
                 tested: true,
                 ..Doubt::default()
             };
         }
         let bent = [0, 1, 2].map(|e| {
-            // The edge of something that stands here runs through, unless all of this lies below it.
+            // The edge of something that stands here runs through the cell, unless the whole cell lies below it.
             let ends = || match seen[e] || seen[(e + 1) % 3] {
                 true => self.difference(light[e], light[(e + 1) % 3]),
                 false => 0.0,
@@ -495,7 +497,7 @@ impl<'a> Growth<'a> {
     }
 }
 
-/// What a cell adds to the mean square, times the area of all.
+/// Contribution of a cell to the mean square, times the total area.
 pub(super) fn share(cell: &Cell) -> f64 {
     cell.counted() * cell.doubt.square
 }
@@ -511,7 +513,7 @@ mod tests {
     use crate::solve::Care;
     use crate::transport::tests::baked;
 
-    /// However flat the triangle was that they are halves of.
+    /// However flat the triangle was of which they are halves.
     #[test]
     fn halves_expect_something_of_the_difference_of_their_corners() {
         let bake = baked("cornell.glb", 1);

@@ -1,4 +1,4 @@
-//! What the solved light tells of a triangle before anybody looks: every leaf of the hierarchy in it has a value.
+//! What the solved light tells of a triangle before any look: every leaf of the hierarchy in it has a value.
 
 use super::cells::{Cells, Hint};
 use crate::geometry::quarters;
@@ -7,7 +7,8 @@ use crate::solve::Bake;
 use glam::DVec3;
 
 impl Cells {
-    /// Finds how much of a cell counts, by the hints in it; one without any is like the whole that it is a part of.
+    /// Finds how much of a cell counts, by the hints in it; a cell without hints counts like the triangle that it is
+    /// part of.
     pub(super) fn count(&mut self, k: usize) {
         let cell = &mut self.all[k];
         let (first, end) = cell.hints;
@@ -21,8 +22,8 @@ impl Cells {
     }
 }
 
-/// Gives every sheet the leaves of its faces as hints, and every cell its share of them. Cells are still the triangles of
-/// the mesh.
+/// Gives every sheet the leaves of its faces as hints, and every cell its range of them. Cells must still be the
+/// triangles of the mesh.
 pub(super) fn give(bake: &Bake, cells: &mut Cells) {
     let (tree, light) = (bake.tree(), bake.light());
     let of_leaf: Vec<[f64; 3]> = (0..light.irradiance.len().min(light.leaves.len()))
@@ -56,7 +57,8 @@ pub(super) fn give(bake: &Bake, cells: &mut Cells) {
     }
 }
 
-/// Leaves of a face: number, weights of the second and third corner of the triangle of the mesh at the middle, area.
+/// Leaves of a face: node, weights of the second and third corner of the triangle of the mesh at the leaf's middle,
+/// area.
 pub(crate) fn leaves(
     tree: &Tree,
     face: u32,
@@ -64,7 +66,7 @@ pub(crate) fn leaves(
     area: f64,
     mut each: impl FnMut(u32, [f64; 2], f64),
 ) {
-    // Weights of the corners, halved as the corners are.
+    // Weights of the corners, halved together with the corners.
     let mut open = vec![(face, DVec3::AXES, area)];
     while let Some((id, corners, area)) = open.pop() {
         let node = tree.node(id);

@@ -1,7 +1,9 @@
-//! Edges of shadows as edges of triangles: where the input's triangles are split for them, and what vertices are on both sides.
+//! Edges of shadows as edges of triangles: where the input's triangles are split for them, and which vertices lie on both
+//! sides.
 //!
-//! On such an edge every point has a vertex for each side: what tells sides apart is which of the lamps that it is an edge
-//! for light a place right beside the point. So light on either side is its own, and the mesh is as connected as before.
+//! On such an edge every point has a vertex for each side: a side is identified by those lamps, of all that the edge
+//! belongs to, that light a place right beside the point. So each side has its own light, and the mesh is as connected as
+//! before.
 
 use super::cells::{Cell, Cells, Corner, Doubt, End, Sheet, key, within};
 use crate::gather::Vertex;
@@ -10,8 +12,8 @@ use crate::gather::Vertex;
 pub(super) type Sharp = (usize, usize, u64);
 
 impl Cells {
-    /// Asks for an edge of a cell to be split at a share of the way from corner `k` to the next. None where something else
-    /// was asked for before, further than `near` from there.
+    /// Requests the split of an edge of a cell at a share of the way from corner `k` to the next. None where another split
+    /// was requested before, further than `near` from there.
     pub(super) fn cross(&mut self, cell: usize, k: usize, at: f64, near: f64) -> Option<End> {
         let Cell { corners, edges, .. } = &self.all[cell];
         let (id, first) = (edges[k], corners[k].point);
@@ -25,12 +27,12 @@ impl Cells {
         ((known - at).abs() * edge.length <= near).then_some(End::Crossing(id))
     }
 
-    /// Asks for a line between two points to be an edge, if it becomes one when next is split.
+    /// Requests that a line between two points become an edge at the next split, if possible.
     pub(super) fn line(&mut self, ends: [End; 2], lamps: u64) {
         self.lines.push((ends, lamps));
     }
 
-    /// Finds the ends of lines among the points that edges were just split at.
+    /// Finds the ends of lines among the points at which edges were just split.
     pub(super) fn draw_lines(&mut self) {
         for (ends, lamps) in std::mem::take(&mut self.lines) {
             let point = |end| match end {
@@ -47,7 +49,7 @@ impl Cells {
         }
     }
 
-    /// Light of lamps ends at a point.
+    /// Records that light of lamps ends at a point.
     pub(super) fn sharpen(&mut self, point: u32, lamps: u64) {
         let known = self.sharp.entry(point).or_default();
         if *known & lamps != lamps {
@@ -106,7 +108,7 @@ impl Cells {
         End::Point(point)
     }
 
-    /// Brings those hints to the front that lie in a triangle; where they end.
+    /// Moves those hints to the front that lie in a triangle; returns their range.
     fn sector(&mut self, sheet: u32, hints: (u32, u32), corners: &[Corner; 3]) -> (u32, u32) {
         let some = &mut self.sheets[sheet as usize].hints[hints.0 as usize..hints.1 as usize];
         some.sort_by_key(|hint| within(corners, hint.at).iter().any(|w| *w < 0.0));
@@ -120,7 +122,7 @@ impl Cells {
         self.edges[cell.edges[k] as usize].sharp
     }
 
-    /// Corners on edges of shadows, of new cells and of those about points that were none before.
+    /// Corners on edges of shadows, of new cells and of cells around points that were not on such edges before.
     pub(super) fn sharp_corners(&mut self, fresh: &[usize]) -> Vec<Sharp> {
         let mut is_fresh = vec![false; self.all.len()];
         for &k in fresh {
@@ -144,7 +146,8 @@ impl Cells {
         found
     }
 
-    /// Gives a corner the vertex of its side: `lit` tells which lamps light it, and light is looked at `beside` it.
+    /// Gives a corner the vertex of its side: `lit` has the lamps that light the side, whose light is looked at
+    /// `beside` the corner.
     pub(super) fn take_side(&mut self, (cell, k, lamps): Sharp, lit: u64, beside: [f64; 3]) {
         let Cell {
             sheet, of, corners, ..
@@ -168,11 +171,13 @@ impl Cells {
     }
 }
 
-/// What is looked at beside the middle of a line where its ends are not: share of the way to the opposite corner.
+/// Where the light beside the middle of a line is looked at if its ends give no place: share of the way to the opposite
+/// corner.
 const INTO: f64 = 0.05;
 
 impl Sheet {
-    /// Light of a vertex in the middle of a line from `a` to `b` is looked at where that of both is, on the side of `c`.
+    /// Light of a vertex in the middle of a line from `a` to `b` is looked at between the places of both ends, on the
+    /// side of `c`.
     pub(super) fn beside_line(
         &mut self,
         vertex: u32,

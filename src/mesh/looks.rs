@@ -1,4 +1,4 @@
-//! Looks at light: each place with its normal is gathered at once, whichever triangles ask for it.
+//! Looks at light: each place with its normal is gathered once, whichever triangles ask for it.
 
 use crate::gather::{MOSTLY, Vertex};
 use crate::solve::{Bake, Care};
@@ -6,29 +6,30 @@ use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Places closer than this share of the room's half diagonal are one.
+/// Places closer than this share of the room's half diagonal are the same.
 const SAME_PLACE: f64 = 1e-7;
-/// Normals that differ by less than this in each component are one.
+/// Normals that differ by less than this in each component are the same.
 const SAME_NORMAL: f64 = 1e-4;
-/// Darker than this share of the white, a place below a black back counts as inside of what that belongs to.
+/// A place below a black back that is darker than this share of the white counts as inside the thing that the back
+/// belongs to.
 pub(crate) const DIM: f64 = 0.05;
-/// Places gathered at a time, so that progress shows and an end is heard of: a look takes up to a millisecond in a dungeon of many lamps, and
-/// with eight times as many the gather went on for 12 to 20 s after Ctrl-C on two busy cores.
+/// Places gathered at a time, so that progress shows and an interrupt is noticed: a look takes up to a millisecond in a dungeon of many
+/// lamps, and with eight times as many the gather went on for 12 to 20 s after Ctrl-C on two busy cores.
 const PART: usize = 2048;
 
-/// What a place gets.
+/// The light at a place.
 #[derive(Debug)]
 pub(crate) struct Seen {
     /// Irradiance by lane.
     pub(crate) row: Box<[f32; 64]>,
     /// Tristimulus irradiance.
     pub(crate) xyz: [f64; 3],
-    /// Where it comes from, if that is kept.
+    /// Where the light comes from, if kept.
     pub(crate) trace: Option<Box<[u8]>>,
 }
 
 /// Place and normal, rounded; space; is the light of its leaf taken as it is? And the material of a diffuse sheet, whose light is
-/// shown with what passes it, or of what fluoresces, on which light counts for more.
+/// shown with what passes it, or of a fluorescent surface, on which exciting light also counts.
 type Key = ([i64; 6], (u32, bool), bool, Option<u32>);
 
 /// All looks so far.
@@ -37,16 +38,16 @@ pub(crate) struct Looks<'a> {
     care: Care,
     /// Is it time to end?
     late: &'a (dyn Fn() -> bool + Sync),
-    /// Is everything looked at all the same?
+    /// Is everything looked at nevertheless?
     pub(crate) patient: bool,
-    /// Is the light of the leaves taken as it is?
+    /// Is the light of the leaves used as it is?
     pub(crate) believing: bool,
-    /// Is light that comes straight from lamps left out?
+    /// Is direct light of lamps left out?
     pub(crate) indirect: bool,
     spaces: Vec<(u32, bool)>,
     known: HashMap<Key, u32>,
     places: Vec<(Receiver, bool)>,
-    /// None: something solid covers it, or lies right upon it.
+    /// None: something solid covers the place, or lies right upon it.
     seen: Vec<Option<Seen>>,
     pub(crate) rays: u64,
 }
@@ -73,13 +74,13 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// Asks for a vertex; its number. It is looked at when [`Looks::complete`] is called.
+    /// Asks for a look at a vertex and returns its number. The look is done by [`Looks::complete`].
     pub(crate) fn want(&mut self, vertex: &Vertex, surface: usize, back: bool) -> u32 {
         let to = self.bake.receiver(vertex, surface, back);
         self.ask(vertex, to)
     }
 
-    /// The same for a texel of a light map, which lies where it is, save at edges.
+    /// [`Looks::want`] for a texel of a light map, which is moved only at edges.
     pub(crate) fn want_texel(&mut self, vertex: &Vertex, surface: usize, back: bool) -> u32 {
         let to = self.bake.texel(vertex, surface, back);
         self.ask(vertex, to)
@@ -121,7 +122,7 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// Does a place lie on what fluoresces?
+    /// Does a place lie on a fluorescent surface?
     fn fluoresces(&self, to: &Receiver) -> bool {
         let (tree, mesh) = (self.bake.tree(), self.bake.mesh());
         to.leaf.is_some_and(|leaf| {
@@ -131,13 +132,13 @@ impl<'a> Looks<'a> {
         })
     }
 
-    /// Asks for a vertex once more, with a pattern of rays of its own, to be looked at in any case; the number of the look.
+    /// Asks for another look at a vertex, with its own pattern of rays, in any case; returns the number of the look.
     pub(crate) fn again(&mut self, vertex: &Vertex, surface: usize, back: bool, seed: u64) -> u32 {
         let to = self.bake.receiver(vertex, surface, back);
         self.once(Receiver { seed, ..to })
     }
 
-    /// The same for a place of a light map.
+    /// [`Looks::again`] for a place of a light map.
     pub(crate) fn texel_again(
         &mut self,
         vertex: &Vertex,
@@ -163,17 +164,17 @@ impl<'a> Looks<'a> {
         (self.late)()
     }
 
-    /// What was seen.
+    /// The light that a look found.
     pub(crate) fn at(&self, look: u32) -> Option<&Seen> {
         self.seen[look as usize].as_ref()
     }
 
-    /// How many there are.
+    /// Number of looks.
     pub(crate) fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// Looks at all places asked for. `progress` is told (done, of) in places of this time.
+    /// Does all looks asked for. `progress` is told (done, of) in places of this call.
     pub(crate) fn complete(&mut self, progress: &dyn Fn(usize, usize)) {
         let first = self.seen.len();
         let wanted = self.places.len() - first;
@@ -220,7 +221,7 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// Does a place lie inside something that is black from there? Then it is dark, and a black back is above it.
+    /// Does a place lie inside something whose back is black from there? Then it is dark, and a black back is above it.
     fn is_inside(&self, to: &Receiver, seen: &Seen) -> bool {
         seen.xyz[1] < DIM * self.bake.light().white[1] && self.bake.meets_back(to, to.normal)
     }
@@ -237,7 +238,7 @@ impl<'a> Looks<'a> {
     }
 }
 
-/// Irradiance without what comes straight from lamps. Not below 0: both are sums of the same numbers, rounded apart.
+/// Irradiance without the direct light of lamps. Not below 0: both are sums of the same numbers, rounded differently.
 fn less(mut all: [f32; 64], direct: &[f32; 64]) -> [f32; 64] {
     for (all, direct) in all.iter_mut().zip(direct) {
         *all = (*all - direct).max(0.0);

@@ -1,10 +1,11 @@
-//! The interpolation error of the output, measured: light between vertices beside light at fresh random points.
+//! The interpolation error of the output, measured: light between vertices against light at new random points.
 //!
-//! Where points look by rays, a look errs by chance, which is no matter of interpolation: every point is looked at twice,
-//! with rays of its own each time. With s^2 the variance of a look, half the mean square of their difference, and weights w
-//! of the vertices, a look at a point differs from what is drawn there by `i^2 + s^2 (1 + sum of w^2)` in the mean square, at
-//! least, i the error of interpolation: the rays of vertices may have more in common than chance. What is left when that is
-//! taken off scatters about i^2, below 0 as well as above: roots keep the sign, so that chance cancels in their mean.
+//! Where points look by rays, a look has an error by chance, which is not an error of interpolation: every point is looked at
+//! twice, each time with rays of its own. With s^2 the variance of a look, half the mean square of their difference, and
+//! weights w of the vertices, a look at a point differs from the light drawn there by `i^2 + s^2 (1 + sum of w^2)` in the
+//! mean square, at least, i the error of interpolation: the rays of vertices may have more in common than chance. What
+//! remains when that is subtracted scatters about i^2, below 0 as well as above: roots keep the sign, so that chance cancels
+//! in their mean.
 
 use super::cells::Cell;
 use super::grow::{Growth, PointLooks, mix};
@@ -16,17 +17,17 @@ use crate::solve::{Bake, weights_of};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Points at the least and at the most, and as a share of the looks so far: the mean is then known to some per cent.
+/// Points: the least, the most, and as a share of the looks so far: the mean is then known to some per cent.
 pub(crate) const POINTS: [usize; 2] = [512, 4096];
 pub(crate) const SHARE: usize = 16;
-/// What was seen is learnt where its square is this many times what was expected.
+/// A measured square is learnt if it is this many times what was expected.
 pub(crate) const SURPRISE: f64 = 4.0;
 /// A single point must differ by this many times the variance of a look to count.
 pub(crate) const CHANCE: f64 = 4.0;
 /// Distinguishes these random numbers from others.
 const SEED: u64 = 0x0067_0f11;
 
-/// What samples tell of a file.
+/// The interpolation error of a file, from its samples.
 pub(crate) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Interpolation {
     let root = |s: &Sample| s.square.abs().sqrt().copysign(s.square);
     let mut off: Vec<f64> = samples.iter().map(root).collect();
@@ -50,7 +51,7 @@ pub(crate) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) ->
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
     pub(crate) cell: usize,
-    /// Square of the colour difference that is of interpolation; below 0 by chance.
+    /// Square of the colour difference due to interpolation; below 0 by chance.
     pub(crate) square: f64,
     /// Variance of a look.
     pub(crate) noise: f64,
@@ -68,7 +69,7 @@ impl Parts {
         Self(parts)
     }
 
-    /// The one around a point, and weights of its corners there.
+    /// The triangle around a point, and weights of its corners there.
     fn find(&self, settled: &Settled, of: u32, point: DVec3) -> Option<([u32; 3], [f64; 3])> {
         let place = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| settled.at[v as usize]);
@@ -82,7 +83,7 @@ impl Parts {
 }
 
 impl Growth<'_> {
-    /// Looks at random points that were never looked at before, one in each stratum of equal area that counts.
+    /// Looks at new random points, one in each stratum of equal counted area.
     pub(super) fn measured(
         &mut self,
         bake: &Bake,
@@ -128,7 +129,7 @@ impl Growth<'_> {
             let part = parts[of.sheet as usize].find(drawn, of.of.0, point);
             asked.extend(part.map(|part| (cell, part, looks)));
         }
-        // However late it is, what is said of the error is measured.
+        // However late it is, the error that is stated is measured.
         self.looks.patient = true;
         self.looks.complete(progress);
         self.looks.patient = false;
@@ -136,7 +137,7 @@ impl Growth<'_> {
         self.compared(bake, settled, None)
     }
 
-    /// What the last measurement tells of each layer by itself, under the white of the whole.
+    /// The last measurement for each layer by itself, under the white of the whole.
     pub(super) fn of_layers(
         &self,
         bake: &Bake,
@@ -147,7 +148,7 @@ impl Growth<'_> {
         bake.layer_lanes().iter().map(one).collect()
     }
 
-    /// What is drawn at the points of the last measurement beside what was seen there: of all light, or of a layer's.
+    /// Light drawn at the points of the last measurement against light seen there: all light, or that of a layer.
     fn compared(&self, bake: &Bake, settled: &[Settled], part: Option<&LayerLanes>) -> Vec<Sample> {
         let white = bake.light().white;
         let shown = |row: &[f32; 64]| match part {
@@ -175,7 +176,7 @@ impl Growth<'_> {
         self.asked.iter().filter_map(sample).collect()
     }
 
-    /// Takes what was seen at random points for what is to be expected of their triangles, where it is a surprise.
+    /// Sets the expected error of triangles to that seen at random points, where it is a surprise.
     pub(super) fn learn(&mut self, samples: &[Sample]) {
         for sample in samples {
             let doubt = &mut self.cells.all[sample.cell].doubt;
@@ -188,7 +189,7 @@ impl Growth<'_> {
         }
     }
 
-    /// Triangles that are as small as is allowed and still further off than `square`.
+    /// Number of triangles as small as allowed and still further off than `square`.
     pub(super) fn unfinished(&self, square: f64) -> usize {
         let small = |c: &&Cell| c.doubt.square > square && self.is_smallest(c);
         self.cells.all.iter().filter(small).count()

@@ -1,7 +1,7 @@
-//! What lines miss in the middles of edges, where it follows from what they miss in those of a larger triangle.
+//! What lines miss in the middles of edges, derived from what they miss in those of a larger triangle.
 
 /// What lines miss in the middles of the edges of both halves (a, m, c) and (m, b, c) of a triangle (a, b, c), where m is at a share `t`
-/// from a to b, by what they miss in its own: as lengths squared, where light bends evenly.
+/// from a to b, from what they miss in those of the triangle: in proportion to lengths squared, if light bends evenly.
 pub(super) fn missed_by_halves([ab, bc, ca]: [Option<f32>; 3], t: f32) -> [[Option<f32>; 3]; 2] {
     let mc = || Some((1.0 - t) * ca? + t * bc? - t * (1.0 - t) * ab?);
     let part = |share: f32| ab.map(|ab| share * share * ab);
@@ -35,7 +35,7 @@ mod tests {
                 }
             }
         }
-        // Of an edge that nobody looked at nothing follows.
+        // From an edge that was not looked at nothing follows.
         assert_eq!(
             missed_by_halves([None, Some(1.0), None], 0.5),
             [[None; 3], [None, Some(1.0), None]]

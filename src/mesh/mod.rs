@@ -1,4 +1,4 @@
-//! The mesh that is written: grown from the input's triangles, as fine as straight lines between vertices need it for the
+//! The mesh that is written: grown from the input's triangles, as fine as straight lines between vertices must be for the
 //! asked-for error, and measured.
 
 mod ahead;
@@ -36,20 +36,20 @@ use turns::{End, Turns};
 /// garage of 11,000 at .78 with 93,000 (1.2).
 const MOST_VERTICES: f64 = 131_072.0;
 const AT: f64 = 0.5;
-/// Pictures on the way may be off by this many times the error asked for, but by no more than so much: a black floor below
-/// a bright wall is off by 16 in the mean.
+/// Pictures on the way may be off by this many times the error asked for, but at most by the second number: a black floor
+/// below a bright wall is off by 16 on average.
 const SKETCH: f64 = 4.0;
 const SKETCH_MOST: f64 = 4.0;
 
-/// Where there is no time to look, the mesh grows for so long as the solved light tells. To write the vertices of a large room takes
-/// two to four times as long.
+/// Where there is no time to look, the mesh grows for this long by the solved light alone. Writing the vertices of a large room
+/// takes two to four times as long.
 const UNSEEN: Duration = Duration::from_millis(500);
 
 /// What bounds the mesh of the output besides its error.
 pub struct Limits<'a> {
     /// Vertices at the most; the input's own are kept in any case. None: as many as the error may need.
     pub vertices: Option<usize>,
-    /// Is it time to end? What is not looked at then shows the solved light as it is.
+    /// Is it time to end? Vertices without a look then show the solved light as it is.
     pub late: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -75,7 +75,7 @@ impl Bake {
         self.baked_within(&Limits::default(), progress)
     }
 
-    /// The same within limits: where they end it, with the error that was come to.
+    /// [`Bake::baked`] within limits: where these end growing, with the error reached.
     pub fn baked_within(&self, limits: &Limits, progress: &dyn Fn(usize, usize)) -> Baked {
         let mut growth = self.growth(Care::Vertex, limits.late);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
@@ -85,7 +85,8 @@ impl Bake {
         }
         growth.begin(progress);
         if !growth.strict {
-            // Vertices on what stands on edges of the input are not the light's: in a restaurant they took all that it may have.
+            // Vertices of edges on which things stand do not count among those for light: in a restaurant they took all that
+            // light may have.
             growth.most = growth.used() + self.more_vertices();
         }
         if limits.is_late() {
@@ -101,7 +102,7 @@ impl Bake {
         loop {
             let cells = growth.cells.all.len();
             let end = growth.grow(turns.aim, progress);
-            // Where there was no time to grow, what was measured is still so.
+            // Where there was no time to grow, the last measurement still holds.
             if end != End::Late || growth.cells.all.len() != cells {
                 settled = self.settled(&growth);
                 samples = growth.measured(self, &settled, turns.turn, progress);
@@ -122,8 +123,8 @@ impl Bake {
         }
     }
 
-    /// The same for pictures on the way: as fine as the solved light tells, with few rays. Vertices of triangles of the input
-    /// that no picture shows (`seen[surface][triangle]`) get the light of their leaves as it is.
+    /// [`Bake::baked`] for pictures on the way: as fine as the solved light tells, with few rays. Vertices of triangles of
+    /// the input that no picture shows (`seen[surface][triangle]`) get the light of their leaves as it is.
     ///
     /// # Panics
     /// If `seen` lacks a triangle of the room.
@@ -131,7 +132,7 @@ impl Bake {
         self.sketch_within(seen, &|| false, progress)
     }
 
-    /// The same until it is late: then all other vertices get the light of their leaves, too.
+    /// [`Bake::sketch`] until it is late: then all other vertices get the light of their leaves, too.
     ///
     /// # Panics
     /// As [`Bake::sketch`].
@@ -155,7 +156,7 @@ impl Bake {
         self.write_down(growth, settled)
     }
 
-    /// Grows as the solved light tells, without looking.
+    /// Grows by the solved light, without looking.
     fn grow_unseen(&self, growth: &mut Growth, progress: &dyn Fn(usize, usize)) {
         growth.believe(true);
         let allowed = (SKETCH * self.settings().error).min(SKETCH_MOST);
@@ -163,7 +164,7 @@ impl Bake {
         growth.grow(allowed * allowed * area, progress);
     }
 
-    /// Estimated error of a baked mesh, mean CIEDE2000: of light at points as the last round estimates it, and between them as
+    /// Estimated error of a baked mesh, mean CIEDE2000: for light at points by the last round's estimate, between them as
     /// measured; squares add.
     pub fn error_of(&self, baked: &Baked) -> Option<f64> {
         let light = self.rounds().last()?.error.total_de2000.value?;

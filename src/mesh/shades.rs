@@ -1,4 +1,5 @@
-//! Whether light comes straight from a lamp at a place: rays to the middles of lamps, and to the rims of those with an extent.
+//! Does light come straight from a lamp to a place? Told by rays to the middles of lamps, and to the rims of those with an
+//! extent.
 
 use super::cells::{Cell, FENCE, Sheet};
 use crate::gather::Vertex;
@@ -11,9 +12,9 @@ use crate::solve::Bake;
 use crate::transport::{Receiver, punctual_factor};
 use glam::DVec3;
 
-/// What covers a place is dealt with like a lamp: where it ends, light does.
+/// A cover is treated like a lamp: light ends where the cover begins.
 pub(super) const COVER: u64 = 1 << 63;
-/// Lamps that edges of shadows are looked for of, at the most: those that give most.
+/// Lamps for whose shadows edges are looked for, at the most: those that give most light.
 const LAMPS: usize = 62;
 /// Places on the rim of a lamp.
 const RIM: u32 = 4;
@@ -26,13 +27,13 @@ enum Aim {
     At(DVec3),
 }
 
-/// A lamp as its shadows see it.
+/// A lamp as a source of shadows.
 #[derive(Debug)]
 struct Lamp {
-    /// Among the punctual lights.
+    /// Index among the punctual lights.
     number: usize,
     middle: Aim,
-    /// Empty where it has no extent.
+    /// Empty for a lamp without extent.
     rim: Vec<Aim>,
     /// Tristimulus intensity.
     light: [f64; 3],
@@ -91,7 +92,7 @@ impl<'a> Shades<'a> {
         self.bake.texel(&vertex, sheet.surface, sheet.back)
     }
 
-    /// Lamps whose shadow at one of some places would be one to those who see it: `shows` is told the light that a lamp gives.
+    /// Lamps whose shadow at one of some places would be visible: `shows` is given the light of a lamp there.
     pub(super) fn that_matter(&self, places: &[Receiver], shows: impl Fn([f64; 3]) -> bool) -> u64 {
         let half_size = self.bake.light().half_size;
         let mut found = 0;
@@ -106,7 +107,7 @@ impl<'a> Shades<'a> {
         found
     }
 
-    /// Does the middle of a lamp light a place? Of [`COVER`]: is the place open?
+    /// Does the middle of a lamp light a place? For [`COVER`]: is the place uncovered?
     pub(super) fn lit(&self, sight: &Sight, lamp: u64, to: &Receiver) -> bool {
         match lamp {
             COVER => !self.bake.is_under(sight, to),
@@ -115,7 +116,7 @@ impl<'a> Shades<'a> {
         }
     }
 
-    /// The same; none in half shadow.
+    /// [`Self::lit`]; none in half shadow.
     pub(super) fn wholly(&self, sight: &Sight, lamp: u64, to: &Receiver) -> Option<bool> {
         let lit = self.lit(sight, lamp, to);
         let rim = match lamp {
@@ -126,7 +127,7 @@ impl<'a> Shades<'a> {
         alike.then_some(lit)
     }
 
-    /// Is its shadow without half shadow?
+    /// Does the lamp throw no half shadow?
     pub(super) fn is_hard(&self, lamp: u64) -> bool {
         matches!(lamp, COVER | FENCE) || self.of(lamp).rim.is_empty()
     }

@@ -1,10 +1,11 @@
-//! The edge of a shadow in a triangle, as it was found: what is split for it.
+//! The edge of a shadow in a triangle, as found: where the triangle is split for it.
 
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder};
 use crate::team::Packed;
 
-/// A place that light ends at on the edge of a cell: edge, share of it, weights of the corners of the triangle of the mesh.
+/// A place on the edge of a cell where light ends: edge, share of the edge, weights of the corners of the triangle of the
+/// mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     pub(super) edge: usize,
@@ -12,7 +13,7 @@ pub(super) struct Crossing {
     pub(super) weights: [f64; 3],
 }
 
-/// What an edge of a shadow runs between.
+/// An end of the edge of a shadow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Mark {
     Crossing(Crossing),
@@ -24,14 +25,14 @@ pub(super) enum Mark {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Plan {
     pub(super) inside: Option<[f64; 3]>,
-    /// With the lamps whose light ends there.
+    /// Lines with the lamps whose light ends along them.
     pub(super) lines: Vec<([Mark; 2], u64)>,
 }
 
-/// What looking into a cell comes to.
+/// The result of searching a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Found {
-    /// Nothing ends there, or too gently.
+    /// No light ends in the cell, or only gently.
     Even,
     Edge(Plan),
     /// Light ends there, but not along a line.

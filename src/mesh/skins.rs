@@ -1,8 +1,8 @@
-//! Which sides of triangles look like one surface: where they meet, they must have the same vertices, or the background
-//! would shine through.
+//! Which sides of triangles form one visible surface: where they meet, they must have the same vertices, or the
+//! background would shine through.
 //!
 //! Sides meet over an edge if they run along it in opposite senses. The two sides of one sheet do not: each may be as
-//! fine as its own light asks for.
+//! fine as its own light needs.
 
 use crate::hierarchy::Mesh;
 use crate::scene::{Scene, Sides};
@@ -19,7 +19,8 @@ impl Skins {
         let mut skins = Self {
             parent: (0..count).collect(),
         };
-        // Sides by the edge that they run along, in its sense; sorted, as a list for each of a million edges is slow to make.
+        // Sides by the edge that they run along, in its sense; sorted, as one list for each of a million edges would be slow
+        // to make.
         let mut along: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * mesh.triangles.len());
         for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
             let both = scene.materials[mesh.material[t] as usize].sides == Sides::Both;
@@ -37,7 +38,7 @@ impl Skins {
             let same = along[first..].iter();
             same.take_while(move |(other, _)| *other == edge)
         };
-        // In any order: the least side of a set stands for it.
+        // The order does not matter: the least side of a set stands for it.
         for &([p, q], side) in along.iter().filter(|([p, q], _)| p <= q) {
             for &(_, other) in of([q, p]) {
                 // The two sides of one triangle are never seen together.

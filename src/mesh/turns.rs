@@ -2,29 +2,30 @@
 
 use crate::gather::Interpolation;
 
-/// The error is measured this often at the most.
+/// Measurements of the error at the most.
 const MEASURED: u64 = 10;
-/// Growing ends where so many times the cells leave more than this part of the error.
+/// Growing ends where this many times the cells leave more than this share of the error.
 const GROWN: f64 = 1.5;
 const STALLED: f64 = 0.93;
-/// What is allowed is a mean; the mean square of what was measured is at least so many times its square: 1.9 in the Cornell box, 2.4 in two rooms,
-/// 4 in a flat, 14 in a living room, 20 in a sunlit one.
+/// The allowed error is a mean; the mean square of the measured error is at least this many times its square: 1.9 in the Cornell box, 2.4 in two
+/// rooms, 4 in a flat, 14 in a living room, 20 in a sunlit one.
 pub(super) const SQUARE: f64 = 2.0;
-/// After a measurement that was not met, growing aims at this part of what the measured error asks for.
+/// After a measurement that exceeds what is allowed, growing aims at this part of what the measured error asks for.
 const BELOW: f64 = 0.8;
-/// And at no less than this part of what it aimed at before.
+/// And at no less than this part of its last aim.
 const STEP: f64 = 0.2;
-/// Shares down to this part of the largest are dealt with at a time.
+/// Shares down to this part of the largest are dealt with together.
 const ALIKE: f64 = 1.0 / 16.0;
-/// Of what is too much, so many times are dealt with at a time: not all that is split becomes as good as expected.
+/// This many times the excess is dealt with at a time: not everything that is split becomes as good as expected.
 pub(crate) const EXCESS: f64 = 1.2;
-/// What bends by this share of what the worst does is split with it.
+/// Edges that bend by this share of the worst are split with it.
 pub(crate) const BENDS: f64 = 0.5;
-/// Looks differ by chance: squares of differences up to this many times the variance of a look count for nothing.
+/// Looks differ by chance: squares of differences up to this many times the variance of a look are ignored.
 pub(crate) const BY_CHANCE: f64 = 2.0;
-/// Corners this far apart let expect at least this much of it between them, until that was looked at. Where only the triangles of the input expected it, light
-/// stayed unseen inside of their halves: with it for all, and [`SQUARE`], the error of `--error 1` between vertices is .14, .36 and .48 in a sunlit room, a flat and
-/// a living room (root mean square .6, .7, 1.8) with 10,700, 3,100 and 71,000 vertices, without .18, .27 and .43 (2.0, .7, 1.7) with 12,100, 3,800 and 79,000.
+/// Until it is looked at, a triangle is expected to err by at least this share of the difference between its corners. When only triangles of the
+/// input expected that, light stayed unseen inside their halves: with it for all, and [`SQUARE`], the error of `--error 1` between vertices is .14,
+/// .36 and .48 in a sunlit room, a flat and a living room (root mean square .6, .7, 1.8) with 10,700, 3,100 and 71,000 vertices, without .18, .27 and
+/// .43 (2.0, .7, 1.7) with 12,100, 3,800 and 79,000.
 pub(crate) const RANGE: f64 = 0.1;
 
 /// How growing ended.
@@ -32,28 +33,28 @@ pub(crate) const RANGE: f64 = 0.1;
 pub(crate) enum End {
     /// The expected error is within the goal.
     Reached,
-    /// What is left cannot be split.
+    /// No remaining cell can be split.
     Smallest,
-    /// What may be spent is spent.
+    /// The limit of vertices is reached.
     Most,
     /// There is no time left.
     Late,
 }
 
-/// What was come to so far.
+/// The state of growing and measuring.
 pub(crate) struct Turns {
-    /// What the sum of all cells' shares of the mean square, times their area, is to come down to.
+    /// What the sum of all cells' shares (mean square times area) is to come down to.
     pub(crate) aim: f64,
     /// The number of this turn, from 1.
     pub(crate) turn: u64,
     allowed: f64,
-    /// Cells, and what was measured, when there were last [`GROWN`] times as many as before.
+    /// Number of cells and the measurement when there were last [`GROWN`] times as many as before.
     cells: usize,
     before: Interpolation,
 }
 
 impl Turns {
-    /// Begins with the allowed error (mean CIEDE2000), the area that is seen, and what so many cells were measured to have.
+    /// Starts with the allowed error (mean CIEDE2000), the area that is seen, and the measurement at a number of cells.
     pub(crate) fn new(allowed: f64, area: f64, cells: usize, before: Interpolation) -> Self {
         Self {
             aim: SQUARE * allowed * allowed * area,
@@ -64,8 +65,8 @@ impl Turns {
         }
     }
 
-    /// Is it over, with what was found after growing to so many cells? If not, the next turn has a new aim, below the `sum`
-    /// of shares that growing believes in.
+    /// Is growing over, given the measurement after growing to a number of cells? If not, the next turn has a new aim,
+    /// below the `sum` of shares that growing believes in.
     pub(crate) fn is_over(
         &mut self,
         found: Interpolation,
@@ -88,7 +89,7 @@ impl Turns {
     }
 }
 
-/// Cells whose shares are alike, the largest first; of those that are the same, the first.
+/// Cells with the largest shares, of similar size, in descending order; equal ones in their own order.
 pub(crate) fn largest(mut shares: Vec<(f64, usize)>) -> Vec<(f64, usize)> {
     let largest = shares.iter().map(|s| s.0).fold(0.0, f64::max);
     shares.retain(|s| s.0 >= ALIKE * largest);

@@ -1,4 +1,4 @@
-//! The vertices that are written; covered ones are lent their neighbours' light.
+//! The vertices as written; covered ones are lent their neighbours' light.
 
 use super::cells::Triangles;
 use super::flip::{Ground, grounds, turn};
@@ -9,28 +9,28 @@ use crate::solve::Bake;
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Nothing was seen.
+/// A vertex that no look belongs to.
 const UNSEEN: u32 = u32::MAX;
 
-/// Light of the vertices of a sheet, as it is written.
+/// Light of the vertices of a sheet, as written.
 pub(super) struct Settled {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Triangle of the mesh of each.
     pub(super) of: Vec<u32>,
-    /// Where vertices are.
+    /// Positions of the vertices.
     pub(super) at: Vec<DVec3>,
     /// Irradiance of each vertex that a triangle uses.
     pub(super) rows: Vec<Option<[f32; 64]>>,
-    /// Look that it comes from.
+    /// The look that each vertex takes its light from.
     looks: Vec<u32>,
-    /// What the light of that is multiplied by, see [`fit`](super::fit).
+    /// Factor of that light, see [`fit`](super::fit).
     factor: Vec<f32>,
     covered: usize,
 }
 
 impl Growth<'_> {
-    /// Vertices that were parted, by what stands on an edge or by that of a shadow, are one again where light on both sides proved alike: no
-    /// further apart than what the mean may be off.
+    /// Joins again those vertices divided by a thing on an edge or by the edge of a shadow whose light proved alike on both sides: no
+    /// further apart than the allowed mean error.
     fn join(
         &self,
         sheet: usize,
@@ -53,7 +53,7 @@ impl Growth<'_> {
 }
 
 impl Bake {
-    /// The light of a mesh as it is written.
+    /// The light of a mesh, as written.
     pub(super) fn settled(&self, growth: &Growth) -> Vec<Settled> {
         let fitted = growth.fitted();
         let sheets = growth.cells.triangles().into_iter();
@@ -101,7 +101,7 @@ impl Bake {
         }
     }
 
-    /// Vertices with their colours, as the writers want them.
+    /// The vertices with their colours, as the writers need them.
     pub(super) fn write_down(&self, growth: Growth, settled: Vec<Settled>) -> Baked {
         let looks = self.looks(self.upsampler());
         let layers = self.layer_lanes();

@@ -1,8 +1,8 @@
 //! What a bake was before a round, so that the round can be taken back.
 //!
-//! Hierarchy and rays of leaves only grow: of them no more is kept than how far they had come. Of light what the leaves reflect and receive is
-//! kept; the rest is found again from that, as a checkpoint does. That takes 38 of 670 MB
-//! in the fourth round of a restaurant of 153,000 elements; a copy of all of it took 340 MB beside 750 in the fifth.
+//! Hierarchy and rays of leaves only grow: of these only their sizes are kept. Of the light, what the leaves reflect and receive is kept; the
+//! rest is found again from that, as from a checkpoint. This takes 38 of 670 MB in the fourth round of a restaurant of 153,000 elements; a
+//! copy of everything took 340 MB beside 750 in the fifth.
 
 use super::Bake;
 use super::direct::Direct;
@@ -19,9 +19,9 @@ pub(super) struct Before {
     graph: Graph,
     balance: Balance,
     direct: Direct,
-    /// Of whose light there is only irradiance, the white, and what is no rows of leaves.
+    /// Of its light only irradiance, the white, the leaves and mirrors are kept.
     solution: Solution,
-    /// What the leaves reflect.
+    /// Reflected radiosity of the leaves.
     reflected: Rows,
 }
 
@@ -62,7 +62,7 @@ impl Bake {
         }
     }
 
-    /// Takes back what was done since.
+    /// Takes back what was done since `before`.
     pub(super) fn take_back(&mut self, before: Before) {
         let refinement = &mut self.refinement;
         refinement.outlook.shrink(&refinement.tree, &before.outlook);

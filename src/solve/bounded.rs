@@ -3,9 +3,9 @@
 //!
 //! Every patch of the model carries the record of `spectrum::Bounded` for each light and interval: value, errors, and how
 //! far these may be off. `H = P + sum F (E + rho H)` is summed bounce by bounce, with the products and sums of that
-//! record, and the tail of the series is bounded by `last bounce * r / (1 - r)`, r the greatest albedo times the
-//! greatest row sum. It is a bound of what the *lanes* do to the colours of the model (to first order in CIELUV), not of
-//! anything else; beside the truth it is some 3 to 6 times too careful, as in the paper's own tests.
+//! record, and the tail of the series is bounded by `last bounce * r / (1 - r)`, r the greatest albedo times the greatest
+//! row sum. The bound covers what the *lanes* do to the colours of the model (to first order in CIELUV), nothing else; it
+//! is some 3 to 6 times the true error, as in the paper's own tests.
 
 use super::coarse::Coarse;
 use super::cuts::{Choice, split_worst};
@@ -22,7 +22,7 @@ const TAIL: f64 = 1e-6;
 struct Lit {
     cmf: CmfTree,
     reflectance: Vec<Tree<Bounded>>,
-    /// What passes sheets: a patch and one behind it.
+    /// What passes sheets: a patch, the patch behind it, and the transmittance between them.
     through: Vec<([u32; 2], Tree<Bounded>)>,
     emission: Vec<Option<Tree<Bounded>>>,
     punctual: Vec<Option<Tree<Bounded>>>,

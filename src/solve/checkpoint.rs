@@ -1,14 +1,12 @@
-//! A bake between two rounds, written down and taken up again.
+//! Writing a bake between two rounds to a file, and resuming it.
 //!
-//! Kept is what cannot be had back from the room without rays: which elements were split (in order, so that the
-//! hierarchy grows again node by node), the links with their blockers, the lanes, how leaves look out and where their rays
-//! end, balance, light and direct light of the leaves, what the watched points saw, and the records. A bake that is resumed ends with the same
-//! bytes as one that was never stopped; so a checkpoint is refused unless the room, the settings and the program are the
-//! same, with what changed.
+//! A checkpoint holds what the room does not give without rays: which elements were split (in order, so that the hierarchy grows again node by
+//! node), the links with their blockers, the lanes, how leaves look out and where their rays end, balance, light and direct light of the
+//! leaves, the light at the watched points, and the records. A bake that is resumed ends with the same bytes as one that was never stopped; so
+//! a checkpoint is refused unless room, settings and program are the same, and the message names what changed.
 //!
-//! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (16 and 8 a ray where leaves look for
-//! themselves, 12 in rooms with panes or mirrors), `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 (8) a ray and `4 padded lanes` a leaf:
-//! the rest follows from where light comes from.
+//! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (16 and 8 a ray where leaves look for themselves, 12 in rooms with panes or mirrors),
+//! `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 (8) a ray and `4 padded lanes` a leaf: the rest follows from where light comes from.
 
 use super::outlook::Outlook;
 use super::sources::Sources;
@@ -32,7 +30,7 @@ const CROWDED: u16 = 1;
 const LISTED: u16 = 2;
 
 impl Bake {
-    /// Writes a checkpoint, the first rank alone; its size in bytes, 0 on other ranks.
+    /// Writes a checkpoint (the first rank alone does). Returns its size in bytes, 0 on other ranks.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -50,17 +48,17 @@ impl Bake {
         }
     }
 
-    /// Takes up a checkpoint: this bake, which has done no round, goes on where that one stood.
+    /// Resumes from a checkpoint: this bake, which has done no round, goes on where the saved one stood.
     ///
     /// # Errors
-    /// The file cannot be read, is none of ours, is damaged, or belongs to another room or other settings.
+    /// The file cannot be read, is not one of ours, is damaged, or belongs to another room or other settings.
     pub fn resume(&mut self, path: &Path) -> Result<()> {
         let now = self.fingerprint();
         let mut changed = None;
         container::read(path, Kind::Checkpoint, |from| {
             changed = Fingerprint::decode(from)?.change(&now);
             if changed.is_some() {
-                // What follows belongs to something else.
+                // The rest belongs to something else.
                 from.skip();
                 return Ok(());
             }
@@ -95,13 +93,13 @@ impl Bake {
         }
     }
 
-    /// What panes and mirrors leave of light; none in a room without.
+    /// What panes and mirrors leave of light; none in a room without them.
     fn filtered(&self) -> Option<&Filters> {
         let any = self.room.panes.is_some() || self.room.mirrors.is_some();
         any.then_some(&self.solution.filters)
     }
 
-    /// Everything that the outcome depends on.
+    /// Everything that the result depends on.
     fn fingerprint(&self) -> Fingerprint {
         let mut print = Fingerprint::default();
         print.set_text("program", crate::PROGRAM);
@@ -133,7 +131,7 @@ impl Bake {
     ) -> io::Result<()> {
         out.put_all(&splits(&self.refinement.tree))?;
         encode_graph(&self.refinement.graph, out)?;
-        // Lanes that are no intervals follow from the room.
+        // Lanes that are not intervals follow from the room.
         let intervals = self.solution.lanes.lanes();
         out.put_list(
             intervals.len(),
@@ -158,7 +156,7 @@ impl Bake {
             &self.solution.light.reflected,
             &self.solution.light.irradiance,
         );
-        // What mirrors are read as stands apart.
+        // The light by which rays take mirrors for matt surfaces is kept apart.
         let row = |&leaf: &u32| match self.is_mirror(leaf) {
             true => self.solution.light.mirrors.row(leaf as usize),
             false => reflected.row(leaf as usize),
@@ -197,7 +195,7 @@ impl Bake {
         out.put_text(&rounds)
     }
 
-    /// Takes up lanes and what they cause. Are lamps gone since, and how many lanes were written?
+    /// Reads lanes and their error. Returns whether lamps are gone since, and how many lanes were written.
     fn take_up_lanes(&mut self, whole: bool, from: &mut Decoder) -> Read<(bool, usize)> {
         let (lanes, written) = self.read_lanes(whole, from)?;
         let gone = lanes.len() < written;
@@ -226,8 +224,9 @@ impl Bake {
         ))
     }
 
-    /// Takes them up, except for what is behind `light.irradiance` (if `whole`) and `light.leaves`: what the leaves reflect,
-    /// and where the direct light of each leaf comes from, if that was kept. If lamps are gone since it is not known what leaves reflect.
+    /// Reads what [`Self::encode_state`] wrote, except for the light beyond `light.irradiance` (if `whole`) and `light.leaves`. Returns
+    /// what the leaves reflect, and where the direct light of each leaf comes from, if kept. If lamps are gone since, what leaves reflect
+    /// is unknown.
     pub(crate) fn decode_state(&mut self, whole: bool, from: &mut Decoder) -> Read<(Rows, Packs)> {
         let splits = from.get_list::<u32>()?;
         self.refinement.tree.nodes.reserve(4 * splits.len());
@@ -294,7 +293,7 @@ impl Bake {
         Ok((reflected, traces))
     }
 
-    /// Intervals of the lanes whose lamps are still there, and how many lanes there were.
+    /// Reads the lanes. Returns those whose lamps are still there, and how many were written.
     fn read_lanes(&self, whole: bool, from: &mut Decoder) -> Read<(Vec<lanes::Lane>, usize)> {
         let mut lanes = from
             .get_all::<[u32; 3]>()?
@@ -310,12 +309,12 @@ impl Bake {
         if whole && !lanes.iter().all(there) {
             return Err(Broken::new("has lanes of light that is not there"));
         }
-        // Lamps may have gone since.
+        // Lamps may have gone since the file was written.
         lanes.retain(there);
         Ok((lanes, written))
     }
 
-    /// The last solution from what the leaves reflect.
+    /// Finds the last solution again from what the leaves reflect.
     pub(crate) fn light_up(&mut self, reflected: &Rows) {
         match reflected.width() {
             4 => self.light_up_lanes::<4>(reflected),
@@ -346,16 +345,16 @@ impl Bake {
     }
 }
 
-/// Elements that were split, in the order in which it happened.
+/// Elements that were split, in the order of splitting.
 fn splits(tree: &Tree) -> Vec<u32> {
-    // What lies behind an element of a sheet is split with it.
+    // An element on the other side of a sheet is split together with its counterpart.
     let leads = |k: u32| match tree.behind(k) {
         NONE => true,
         behind => tree.node(k).child < tree.node(behind).child,
     };
     let mut split: Vec<u32> = (0..tree.nodes.len() as u32)
         .filter(|&k| tree.node(k).element != NONE && !tree.node(k).is_leaf() && leads(k))
-        // What is split because only a part of it counts is split anyway.
+        // Elements split because only a part of them counts are split anyway.
         .filter(|&k| tree.node(k).child >= tree.known)
         .collect();
     split.sort_unstable_by_key(|&k| tree.node(k).child);

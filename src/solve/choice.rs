@@ -1,4 +1,4 @@
-//! What the lanes of a bake stand for: the choice behind each [`Representation`].
+//! The choice of lanes behind each [`Representation`].
 //!
 //! Perceptual and guaranteed control choose on a model of the room (`coarse`, `bounded`); the others follow from the
 //! lights and materials alone.
@@ -17,13 +17,14 @@ use crate::spectrum::{
 };
 use crate::team::Interrupted;
 
-/// The paper's error limits leave its light sources (Table 1) this colour difference, CIELUV: mean of .26, .33 and .27.
+/// The paper's error limits leave this colour difference, CIELUV, to its light sources (Table 1): mean of .26, .33 and
+/// .27.
 const PAPER_DE_LUV: f64 = 0.29;
-/// Materials whose first and second reflections the paper's control looks at, and that train a basis.
+/// Materials whose first and second reflections the paper's control includes, and that train a basis.
 const MATERIALS: usize = 32;
-/// Tinted panes and mirrors that the choice of lanes looks at.
+/// Tinted panes and mirrors that the choice of lanes includes.
 const TINTS: usize = 8;
-/// Patches of the model on which bounds are worked out: they take a dozen numbers a lane and a hundred bounces.
+/// Patches of the model for bounds: these take a dozen numbers a lane and a hundred bounces.
 const BOUNDED_PATCHES: usize = 48;
 
 impl Bake {
@@ -31,7 +32,7 @@ impl Bake {
     pub(crate) fn choose_lanes(&mut self) -> Result<(), Interrupted> {
         let lanes = self.chosen_lanes()?;
         if !lanes.same_meaning(&self.solution.lanes) {
-            // The lanes of an earlier round mean something else: the next solve starts afresh.
+            // Light on lanes of another meaning is no start: the next solve starts afresh.
             self.solution.light.reflected = Rows::default();
             match lanes.places_in(&self.solution.lanes) {
                 Some(places) if lamps_are_flat(&self.room.scene) => {
@@ -54,7 +55,7 @@ impl Bake {
         let tolerance = self.room.settings.spectrum.unwrap_or(share);
         let guide = guide(&self.room.scene, weights);
         Ok(match self.room.settings.representation {
-            // What excites lies where these ways are blind, or mixes their lanes.
+            // Light that excites lies where these representations are blind, or in lanes that they mix.
             Representation::Rgb
             | Representation::Paper
             | Representation::Characteristic(_)
@@ -72,7 +73,7 @@ impl Bake {
                 let cut = paper_cut(&self.room.scene, weights, tolerance);
                 Lanes::absolute(spectra, cut, weights)
             }
-            // A filter would have to be a matrix there, and so would what passes a sheet.
+            // A filter would have to be a matrix here, and so would the transmittance of a sheet.
             Representation::Characteristic(_)
                 if self.room.panes.is_some()
                     || self.room.mirrors.is_some()
@@ -91,7 +92,7 @@ impl Bake {
                 let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);
                 let choice =
                     model.choose_bounded(spectra, weights, self.solution.light.white, tolerance);
-                // Without light there is no white to see an error by.
+                // Without light there is no white to judge an error by.
                 self.solution.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
                 Lanes::ratio(&self.room.scene.spectra, &choice.cuts, &self.room.weights)
             }
@@ -102,7 +103,7 @@ impl Bake {
         })
     }
 
-    /// The ratio to each light on as few intervals as the model of the room asks for.
+    /// Ratios to each light on as few intervals as the model of the room allows.
     fn perceptual(
         &mut self,
         guide: Option<&[Leaves; 3]>,
@@ -123,7 +124,7 @@ impl Bake {
             model.choose(spectra, seen, white, tolerance, known.clone(), copies)
         };
         let mut choice = choose(&model);
-        // What lies behind a pane has light of its own spectra: lanes serve all of them.
+        // Behind a pane light has other spectra: the lanes must serve all of them.
         let plain = (model.emission.clone(), model.punctual.clone());
         for filter in tints(&self.room.scene) {
             self.room.interrupt.check()?;
@@ -136,14 +137,14 @@ impl Bake {
                 choice.cuts = both;
             }
         }
-        // Without light there is no white to see an error by.
+        // Without light there is no white to judge an error by.
         self.solution.spectrum_error = Some(choice.error).filter(|e| e.is_finite());
         let cuts: Vec<Partition> = kin.of.iter().map(|&k| choice.cuts[k]).collect();
         let lanes = Lanes::ratio(&self.room.scene.spectra, &cuts, &self.room.weights);
         Ok(self.guided(lanes))
     }
 
-    /// Lanes that light counts in for what it excites, too, where surfaces fluoresce.
+    /// Lanes that also weigh light by what it excites, where surfaces fluoresce.
     pub(super) fn guided(&self, lanes: Lanes) -> Lanes {
         match guide(&self.room.scene, &self.room.weights) {
             Some(guide) => lanes.guided(
@@ -193,12 +194,12 @@ impl Bake {
     }
 }
 
-/// Light spectra of which a room with layers has copies: what is good for one is good for all of them, each of which may be
-/// shown alone.
+/// Distinct light spectra. A room with layers has copies of a spectrum: a cut that is good for one is good for all of them,
+/// each of which may be shown alone.
 struct Kin {
-    /// The different ones.
+    /// The distinct spectra.
     spectra: Vec<LightSpectrum>,
-    /// Number of each of the scene's spectra among these.
+    /// Index of each of the scene's spectra among these.
     of: Vec<usize>,
     /// How many copies there are of each; none without layers.
     copies: Option<Vec<usize>>,
@@ -229,7 +230,7 @@ impl Kin {
         }
     }
 
-    /// The cuts of the different spectra, given those of all.
+    /// The cuts of the distinct spectra, given those of all.
     fn one_of_each(&self, cuts: &[Partition]) -> Vec<Partition> {
         let of = |kind| self.of.iter().position(|k| *k == kind);
         let kinds = (0..self.spectra.len()).filter_map(of);
@@ -248,8 +249,7 @@ impl Kin {
     }
 }
 
-/// What the tinted panes of a scene let through and its tinted mirrors reflect, without those that come twice, and what all of them do
-/// together.
+/// Transmittances of the tinted panes of a scene and reflectances of its tinted mirrors, each once, and the product of all of them.
 fn tints(scene: &Scene) -> Vec<Leaves> {
     let mut tints: Vec<Leaves> = Vec::new();
     let panes = scene.panes.iter();
@@ -271,7 +271,8 @@ fn tints(scene: &Scene) -> Vec<Leaves> {
     tints
 }
 
-/// Does every lamp shine with just its light's spectrum? Its direct light is then one number a light, on any cut.
+/// Does every lamp shine with the very spectrum of its light? Then its direct light is one number for each light, on
+/// any cut.
 fn lamps_are_flat(scene: &Scene) -> bool {
     let flat = |shape: &Leaves| shape.iter().all(|&x| x == shape[0]);
     let mut emissions = scene.materials.iter().filter_map(|m| m.emission.as_ref());
@@ -279,7 +280,7 @@ fn lamps_are_flat(scene: &Scene) -> bool {
         && scene.lights.iter().all(|l| flat(&l.shape))
 }
 
-/// Different reflectances of a scene in order of its materials.
+/// Distinct reflectances of a scene, in order of its materials.
 fn paints(scene: &Scene) -> Vec<Leaves> {
     let mut paints: Vec<Leaves> = Vec::new();
     for material in &scene.materials {

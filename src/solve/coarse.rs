@@ -1,8 +1,9 @@
 //! A model of the room in a few hundred patches, to decide on wavelengths.
 //!
 //! The spectral error varies far less from place to place than light does, so the working partition is chosen on a cut
-//! of the hierarchy: the real links, summed between the patches of the cut (Galerkin), with mean reflectances. There the
-//! 64-leaf solution is affordable, and what a partition loses is *measured* on the model, an *estimate* for the room.
+//! of the hierarchy: the real links, summed between the patches of the cut (Galerkin), with mean reflectances. There a
+//! solution on all 64 spectral leaves is affordable; what a partition loses is *measured* on the model and is an
+//! *estimate* for the room.
 
 use super::operator::Operator;
 use super::reflection::{Reflection, Sheets};
@@ -19,7 +20,7 @@ use std::collections::BTreeMap;
 
 /// Patches of the model at the most (fits the child count of its root).
 pub(super) const PATCHES: usize = 192;
-/// The model is solved to this relative error: far below what is asked of wavelengths.
+/// Relative error to which the model is solved: far below what is asked of wavelengths.
 const TOLERANCE: f64 = 1e-4;
 
 /// The model.
@@ -31,31 +32,31 @@ pub(crate) struct Coarse {
     pub(super) areas: Vec<f64>,
     /// Reflectance of each patch.
     pub(super) reflectance: Vec<Leaves>,
-    /// Exitance or first irradiance of each patch by light, as shape on the leaves.
+    /// Exitance and direct punctual irradiance of each patch, light by light, as shapes on the spectral leaves.
     pub(super) emission: Vec<Vec<Leaves>>,
     pub(super) punctual: Vec<Vec<Leaves>>,
-    /// What passes sheets: a patch, one behind it, and how much of the light there leaves the patch.
+    /// What passes sheets: a patch, the patch behind it, and the transmittance from that to the patch.
     pub(super) through: Vec<([u32; 2], Leaves)>,
-    /// What excites each patch to give out a light; none of lights that are lamps'.
+    /// Excitation of each patch by fluorescent light; none for the lights of lamps.
     excitation: Vec<Option<Vec<Leaves>>>,
 }
 
-/// Dense rows of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
+/// Spectra of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
 pub(crate) trait Dense {
     /// Reflectance of a leaf node.
     fn reflectance(&self, leaf: u32) -> Leaves;
     /// Exitance shape of a leaf node under a light; none if it emits nothing of that light.
     fn emission(&self, leaf: u32, light: usize) -> Option<Leaves>;
-    /// Irradiance from punctual lights of one spectrum.
+    /// Irradiance shape of a leaf node by the punctual lights of one spectrum; none if there are none.
     fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves>;
-    /// What a leaf node lets through from the one behind it; none of what is no sheet.
+    /// Transmittance to a leaf node from the one behind it; none where it is no sheet.
     fn through(&self, leaf: u32) -> Option<Leaves>;
-    /// What excites a leaf node to give out a light; none if nothing does.
+    /// Excitation of a light by fluorescence at a leaf node; none if nothing excites it there.
     fn excitation(&self, leaf: u32, light: usize) -> Option<Leaves>;
 }
 
 impl Coarse {
-    /// Sums links and sources over a cut of `tree` into so many patches at the most.
+    /// Sums links and sources over a cut of `tree`, into a limited number of patches.
     #[expect(clippy::too_many_arguments, reason = "one caller")]
     pub(crate) fn new(
         tree: &Tree,
@@ -138,7 +139,8 @@ impl Coarse {
         }
     }
 
-    /// Lights what fluoresces by the light of lamps: enough to choose wavelengths by, as it excites little itself. `width` of a leaf, nm.
+    /// Adds the fluorescence that the light of lamps excites: enough to choose wavelengths by, as fluorescence itself excites little.
+    /// `width` of a spectral leaf, nm.
     pub(super) fn kindle(&mut self, spectra: &[LightSpectrum], weights: &[Leaves; 3], width: f64) {
         let mut brought = vec![[0.0; LEAVES]; self.leaves.len()];
         for light in (0..spectra.len()).filter(|&k| self.excitation[k].is_none()) {
@@ -164,7 +166,7 @@ impl Coarse {
         }
     }
 
-    /// Puts the light of lights together: `of` has for each its number among `count`.
+    /// Merges lights: `of` has for each its number among the `count` merged ones.
     pub(super) fn join(&mut self, of: &[usize], count: usize) {
         for lights in [&mut self.emission, &mut self.punctual] {
             let patches = lights.first().map_or(0, Vec::len);
@@ -176,7 +178,7 @@ impl Coarse {
             }
             *lights = joined;
         }
-        // Copies of what fluoresces are excited alike, each by its own layer.
+        // Layers have copies of a fluorescent light, one each and all excited alike: one of them stands for all.
         let mut joined = vec![None; count];
         for (excitation, &to) in self.excitation.iter().zip(of) {
             joined[to] = joined[to].take().or_else(|| excitation.clone());
@@ -293,7 +295,8 @@ fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
     }
 }
 
-/// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node of which most counts is opened.
+/// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node whose counted area is greatest
+/// is opened first.
 pub(super) fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut open = std::collections::BinaryHeap::new();
     let key = |id: u32| (ordered(tree.node(id).counted), std::cmp::Reverse(id));
@@ -329,8 +332,8 @@ fn ordered(area: f64) -> u64 {
     area.to_bits()
 }
 
-/// Exchange between the patches of the model, as the rows of the real leaves have it: what a link brings its end is shared out
-/// among what lies below by area, and balance factors enter by their mean over a part's leaves.
+/// Exchange between the patches of the model, as in the rows of the real leaves: the exchange of a link with a node above the
+/// cut is shared among the patches below it by area, and balance factors enter by their mean over a part's leaves.
 fn exchanges(
     tree: &Tree,
     links: &[Link],
@@ -385,7 +388,7 @@ fn pairs(matrix: &[f64], count: usize) -> Vec<Link> {
         for b in a..count {
             let g = matrix[a * count + b];
             if g > 0.0 {
-                // A patch of the model may light itself; the row holds it twice, so half is stored.
+                // A patch of the model may light itself: its row would hold such a link twice, so half is stored.
                 let g = if a == b { 0.5 * g } else { g };
                 pairs.push(Link {
                     a: a as u32 + 1,
@@ -401,7 +404,7 @@ fn pairs(matrix: &[f64], count: usize) -> Vec<Link> {
     pairs
 }
 
-/// A root with one child a patch.
+/// A root with one child per patch.
 fn flat_tree(areas: &[f64], counted: &[f64]) -> Tree {
     let mut nodes = vec![Node {
         child: 1,
@@ -425,8 +428,8 @@ mod tests {
     use crate::geometry::sampling::Pcg;
     use crate::link::row_sums;
 
-    /// What a patch of the model gets of light 1 everywhere is the mean of what its leaves get, however they are balanced
-    /// and whatever covers them. Rows that came out greater let the model's solve diverge.
+    /// A patch of the model receives, where all have radiosity 1, the mean of what its leaves receive, however they are
+    /// balanced and whatever covers them. Greater row sums let the model's solve diverge.
     #[test]
     fn rows_of_the_model_are_those_of_the_leaves() {
         let mut rng = Pcg::new(3);

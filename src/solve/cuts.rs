@@ -1,4 +1,5 @@
-//! The choice of a cut for each light spectrum on the model of the room (`coarse`), by what lanes lose of the 64 leaves' light.
+//! The choice of a cut for each light spectrum on the model of the room (`coarse`), by the loss of lanes against all 64
+//! spectral leaves.
 
 use super::coarse::Coarse;
 use crate::color::luv_jacobian;
@@ -9,13 +10,13 @@ use crate::spectrum::{LEAVES, Leaves, Partition};
 
 /// One lane in this many is split at a time.
 const BATCH: usize = 3;
-/// What the model's solve leaves undone and rounding may look like a colour difference of this size, CIELUV: no lane is split for less.
+/// Rounding and the residual of the model's solve may look like a colour difference of this size, CIELUV: no lane is split for less.
 const UNSEEN: f64 = 1e-3;
 
 /// What a choice of cuts does.
 #[derive(Debug, Clone)]
 pub(crate) struct Choice {
-    /// One cut a light.
+    /// One cut per light.
     pub cuts: Vec<Partition>,
     /// Mean CIELUV difference of irradiance that they cause on the model.
     pub error: f64,
@@ -23,9 +24,9 @@ pub(crate) struct Choice {
 
 impl Coarse {
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
-    /// padding would waste. `known` cuts are kept if they are good enough, and one for each light: where a lamp was given
-    /// another spectrum there may be more lights now, or fewer. `copies`: rows hold so many lights of each spectrum by
-    /// themselves, and must not become wider than they can be; none: one of each, and beyond 64 lanes the leaves.
+    /// padding would waste. `known` cuts are kept if they are good enough, and one for each light: a lamp with a new
+    /// spectrum may have changed the number of lights. `copies`: how many lights of each spectrum rows hold, which must
+    /// not become wider than rows can be; none: one of each, and spectral leaves in place of more than 64 lanes.
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
@@ -79,7 +80,7 @@ impl Coarse {
             {
                 return Choice { cuts, error };
             }
-            // Several at once: a split costs a solve, and 4, 8, 16 lanes are what rows hold. When padding is being
+            // Split several at once: each split costs a solve, and rows hold 4, 8 or 16 lanes. When padding is being
             // filled, no more than fit.
             let (most, room) = match (good, copies) {
                 (true, _) => (padded(size), padded(size) - size),
@@ -100,7 +101,8 @@ impl Coarse {
         }
     }
 
-    /// Mean difference that the lanes cause, and the lanes (of more than one leaf) by what they cause, the worst first.
+    /// Mean difference that the lanes cause, and the lanes (of more than one spectral leaf) by their share of it, the
+    /// worst first.
     fn loss(
         &self,
         lanes: &Lanes,
@@ -115,7 +117,7 @@ impl Coarse {
             let area = self.tree.node(self.leaves[k]).counted / total;
             let (mut all, mut excited) = ([0.0; 3], [0.0; 3]);
             for (l, lane) in lanes.lanes().iter().enumerate() {
-                // Leaf lanes are exact.
+                // Lanes of a single spectral leaf are exact.
                 let Some(light) = lane.light else { continue };
                 let (fine, reference) = &references[light];
                 let lost = |xyz: &[[f64; 3]]| {
@@ -128,7 +130,7 @@ impl Coarse {
                 let seen = lost(fine.xyz());
                 harm[l] += area * length(jacobian, seen);
                 all = plus(all, seen);
-                // What is lost of what excites shows on other surfaces than what is lost to the eye: one does not make up for the other.
+                // Lost excitation shows on other surfaces than light lost to the eye: one does not make up for the other.
                 if let Some(excites) = fine.excites() {
                     let lost = lost(excites);
                     harm[l] += area * length(jacobian, lost);
@@ -145,7 +147,8 @@ impl Coarse {
     }
 }
 
-/// Splits a share of the intervals (light, first leaf) that stand first, several at once: each step costs a solve.
+/// Splits a share of the intervals (light, first spectral leaf), those first in the list, several at once: each step
+/// costs a solve.
 pub(super) fn split_worst(cuts: &mut [Partition], worst: Vec<(usize, usize)>, count: usize) {
     let most = count.div_ceil(BATCH).max(1);
     for (light, first) in worst.into_iter().take(most) {

@@ -1,11 +1,12 @@
 //! Light straight from lamps, of any kind, on the hierarchy: gathered exactly at points of every leaf, never linked.
 //!
 //! Leaves over which direct light varies are split, which is where shadow boundaries and hot spots are; links then only
-//! carry reflected light, which is smooth. What a leaf got stays known for the rounds after.
+//! carry reflected light, which is smooth. The direct light of a leaf stays known in later rounds.
 //!
-//! In rooms of few triangles a quadrature rule finds the mean over a leaf, and points that something covers are left out.
-//! Where leaves look for themselves the points are random, weighted by how open they are (a leaf is what others see of
-//! it, see `outlook`): without bias whatever lies across the leaf, from two points upwards. What matters gets more of them.
+//! In rooms of few triangles a quadrature rule finds the mean over a leaf, and covered points are left out. Where leaves
+//! look for themselves the points are random, weighted by their openness (a leaf counts as far as others see it, see
+//! `outlook`): without bias whatever lies across the leaf, from two points upwards. Leaves that matter more get more
+//! points.
 
 use super::landed::Landed;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
@@ -35,32 +36,32 @@ const POINTS: [([f64; 3], f64); 6] = {
     ]
 };
 const MIDDLE: [([f64; 3], f64); 1] = [([1.0 / 3.0; 3], 1.0)];
-/// Leaves below this share of the area that counts are looked at from one point, or as few as can be.
+/// Leaves below this share of the counted area are gathered at one point, or as few as possible.
 const TINY: f64 = 1e-5;
-/// What does not count has this share, so that nothing is divided by zero.
+/// Area that does not count has this share, so that nothing is divided by zero.
 const LEAST_SHARE: f64 = 1e-30;
 /// Further points that are tried where some are covered.
 const MORE_POINTS: usize = 8;
-/// Error of a leaf's direct light, in what would split the leaf.
+/// Error allowed to a leaf's direct light, as a share of the variation that would split the leaf.
 const NOISE: f64 = 0.1;
-/// Random points of a leaf that nothing can split yet, of one that may have to be (as many decide about it), and at the most.
+/// Random points of a leaf that nothing can split yet, of one that may be split (as many more decide that), and at the most.
 const RANDOM: [usize; 3] = [2, 8, 256];
-/// What a leaf may misplace of all direct light by too few points, about. From the first round on a garage's leaves then
-/// receive what its lamp sends within a per cent.
+/// Rough share of all direct light that a leaf may misplace by too few points. With this a garage's leaves receive from
+/// the first round on what its lamp sends, within a per cent.
 const FLUX_SHARE: f64 = 2e-4;
-/// A point that sees no front weighs next to nothing, but so that a leaf which nobody sees is not without light.
+/// A point that sees no front has this small weight, so that a leaf which nobody sees is not without light.
 const UNSEEN: f32 = 1e-4;
 /// Leaves that a task looks at.
 const CHUNK: usize = 32;
 
-/// What was found at some leaves, in order.
+/// Direct light at some leaves, in order.
 #[derive(Debug, Default)]
 struct Found {
     /// Mean rows.
     rows: Vec<f32>,
-    /// Half the range of brightness over a leaf's points; if that was not measured, less than zero by how much it may be.
+    /// Half the range of brightness over a leaf's points; if not measured, minus a bound of it.
     spread: Vec<f32>,
-    /// Mean brightness of the whole leaf over that of what others see of it.
+    /// Mean brightness of the whole leaf over that of the part others see.
     whole: Vec<f32>,
     /// Where the light comes from, if that is kept.
     traces: Vec<Option<Box<[u8]>>>,
@@ -96,14 +97,14 @@ pub(crate) struct Direct {
     place: Vec<u32>,
     /// Rows by place.
     rows: Vec<f32>,
-    /// Places whose rows are not asked for any more.
+    /// Places whose rows are no longer needed.
     free: Vec<u32>,
-    /// Half the range of brightness over a leaf's points; if that was not measured, less than zero by how much it may be.
+    /// Half the range of brightness over a leaf's points; if not measured, minus a bound of it.
     spread: Vec<f32>,
-    /// Mean brightness of the whole leaf over that of what others see of it.
+    /// Mean brightness of the whole leaf over that of the part others see.
     whole: Vec<f32>,
-    /// Where each leaf's light comes from: a stretch of `bytes`; empty unless it is kept. What belonged to leaves that were
-    /// split stays among the bytes: each level below is four times as many.
+    /// Where each leaf's light comes from: a range of `bytes`; empty unless kept. The traces of leaves that were split stay
+    /// among the bytes: each level below takes four times as many.
     traces: Vec<Range<usize>>,
     bytes: Vec<u8>,
     /// Rays cast so far.
@@ -111,7 +112,7 @@ pub(crate) struct Direct {
 }
 
 impl Direct {
-    /// What is known of `leaves`, as it was before it was written down: a row of `width` lanes and two figures each, see
+    /// What is known of `leaves`, as read from a file: a row of `width` lanes and two figures each, see
     /// [`figures`](Self::figures).
     pub(super) fn known(
         leaves: &[u32],
@@ -135,12 +136,12 @@ impl Direct {
         known
     }
 
-    /// What is known of a leaf beside its row.
+    /// What is known of a leaf besides its row.
     pub(super) fn figures(&self, leaf: u32) -> [f32; 2] {
         [self.spread[leaf as usize], self.whole[leaf as usize]]
     }
 
-    /// Where the light of leaves comes from, as it was before it was written down.
+    /// Where the light of leaves comes from, as read from a file.
     pub(super) fn keep(&mut self, leaves: &[u32], traces: Vec<Option<Box<[u8]>>>) {
         for (trace, &leaf) in traces.into_iter().zip(leaves) {
             self.keep_trace(leaf, trace.as_deref());
@@ -155,7 +156,7 @@ impl Direct {
         self.traces[leaf as usize] = start..self.bytes.len();
     }
 
-    /// Where a leaf's light comes from (see `gather::trace`), if that is kept.
+    /// Where a leaf's light comes from (see `gather::trace`), if kept.
     pub(crate) fn trace(&self, leaf: u32) -> Option<&[u8]> {
         let stretch = self.traces.get(leaf as usize)?.clone();
         (!stretch.is_empty()).then(|| &self.bytes[stretch])
@@ -172,14 +173,14 @@ impl Direct {
             + self.bytes.len()
     }
 
-    /// Half the range of brightness over a leaf's points, or how much it may be.
+    /// Half the range of brightness over a leaf's points, or a bound of it.
     pub(super) fn spread(&self, leaf: u32) -> f32 {
         self.spread[leaf as usize].abs()
     }
 
-    /// Mean brightness of the whole leaf over that of what others see of it.
+    /// Mean brightness of the whole leaf over that of the part others see.
     pub(super) fn whole(&self, leaf: u32) -> f32 {
-        // Not known where light was replayed: leaves count as even then.
+        // Unknown where light was replayed: then leaves count as even.
         self.whole.get(leaf as usize).copied().unwrap_or(1.0)
     }
 
@@ -210,7 +211,7 @@ impl Direct {
         [self.spread[leaf as usize], self.whole[leaf as usize]] = figures;
     }
 
-    /// What was a leaf and is none any more asks for no memory.
+    /// Frees the row of a node that is a leaf no longer.
     fn forget(&mut self, node: usize) {
         let place = std::mem::replace(&mut self.place[node], NONE);
         self.free.extend(Some(place).filter(|&place| place != NONE));
@@ -219,7 +220,7 @@ impl Direct {
         }
     }
 
-    /// Rows on other lanes: each new lane takes what the lane at its place held.
+    /// Puts rows on other lanes: each new lane takes the value of the old lane at its place.
     pub(super) fn relabel(&mut self, places: &[usize]) {
         if self.width > 0 {
             let rows = self.rows.chunks(self.width);
@@ -230,7 +231,7 @@ impl Direct {
         }
     }
 
-    /// Does light vary too much over a leaf, by its points or by what landed there?
+    /// Does direct light vary too much over a leaf, by its points or by the rays that landed on it?
     fn is_uneven(
         &self,
         (tree, leaf): (&Tree, u32),
@@ -246,7 +247,7 @@ impl Direct {
     }
 
     /// Gathers at all new leaves, each rank of the team at its own, and splits them until direct light varies less than the demand allows.
-    /// By a rule, no patch may misplace more than `coarsest` (share of white) of a leaf's light, however small the leaf: all
+    /// By a quadrature rule, no patch may misplace more than `coarsest` (share of white) of a leaf's light, however small the leaf: all
     /// small leaves would err alike.
     pub(super) fn refine(
         &mut self,
@@ -309,7 +310,7 @@ impl Direct {
                 .collect();
             open = Vec::new();
             for leaf in split {
-                // What lies behind a leaf of a sheet is split with it.
+                // The leaf on the other side of a sheet is split together with this one.
                 if !tree.node(leaf).is_leaf() {
                     continue;
                 }
@@ -328,15 +329,15 @@ impl Direct {
 
 /// What a leaf's direct light matters for.
 struct Stake {
-    /// How much of what splits a leaf a range of one white takes.
+    /// A range of one white, as a multiple of the range that splits the leaf.
     split: f64,
-    /// How much of what a leaf may misplace of all light one white takes.
+    /// One white on the leaf, as a multiple of what it may misplace of all light.
     flux: f64,
-    /// What a patch may misplace at a point, share of white: what would split the leaf is what it has to be told from.
+    /// What a patch may misplace at a point, share of white: enough to tell whether the leaf should be split.
     tolerance: f64,
-    /// Is it large enough to be split?
+    /// Is the leaf large enough to be split?
     may_split: bool,
-    /// Is it next to nothing of the room?
+    /// Is the leaf next to nothing of the room?
     tiny: bool,
 }
 
@@ -357,7 +358,7 @@ impl Stake {
     }
 }
 
-/// How points of leaves are looked at.
+/// How direct light is gathered at points of leaves.
 pub(crate) trait Look: Sync {
     /// What turns a row into brightness, share of white.
     fn weights(&self) -> &[f64];
@@ -369,17 +370,17 @@ pub(crate) trait Look: Sync {
         tolerance: f64,
         memory: &mut Memory,
     ) -> Option<[f32; 64]>;
-    /// Greatest brightness of direct light on a leaf were nothing in the way, share of white, about.
+    /// Rough greatest brightness of direct light on a leaf if nothing were in its way, share of white.
     fn unshadowed(&self, tree: &Tree, leaf: u32, tolerance: f64) -> f64;
-    /// What rays from lamps find to land on the leaves.
+    /// Where rays from lamps land on the leaves.
     fn landed(&self, tree: &Tree) -> Landed;
-    /// Do leaves count as what others see of them?
+    /// Are leaves gathered at random points and weighted by openness?
     fn by_chance(&self) -> bool;
     /// How open a point is, found from a few rays: the share of them that meet fronts.
     fn openness(&self, tree: &Tree, to: &Receiver, memory: &mut Memory) -> f32;
 }
 
-/// What points of a leaf get, being summed.
+/// Direct light at points of a leaf, summed up.
 struct Mean {
     row: [f32; 64],
     total: f32,
@@ -387,7 +388,7 @@ struct Mean {
     range: [f64; 2],
     bright: [f64; 2],
     points: usize,
-    /// Of open points: how many, sums of brightness, its square and the variance that rays to lamps explain.
+    /// Over open points: their number, and sums of brightness, its square and the variance due to rays to lamps.
     open: [f64; 4],
     trace: Option<Trace>,
     /// Half the range of brightness, see [`Direct`].
@@ -445,7 +446,7 @@ impl Mean {
         ((squares - sum * sum / n) / (n - 1.0) - noise / n).max(0.0)
     }
 
-    /// Writes down the means.
+    /// Appends the means to `found`.
     fn end(self, found: &mut Found, width: usize) {
         let share = if self.total > 0.0 {
             1.0 / self.total
@@ -479,7 +480,7 @@ pub(super) fn receiver(tree: &Tree, leaf: u32, at: [f64; 3], seed: u64) -> Recei
 }
 
 /// Mean over the points of a quadrature rule; where one is covered, others until enough are found or the leaf counts as
-/// covered. A face that is next to nothing of the room (`tiny`) is looked at once: it is never split, and its pattern is not
+/// covered. A face that is next to nothing of the room (`tiny`) has one point: it is never split, and its pattern is not
 /// seen.
 fn by_rule(
     tree: &Tree,
@@ -506,7 +507,7 @@ fn by_rule(
         }
     }
     mean.spread = mean.half_range();
-    // Inside something nothing is brighter than elsewhere.
+    // By the rule, the whole leaf is as bright as its uncovered points.
     mean.bright[1] = mean.bright[0] / f64::from(mean.total.max(f32::MIN_POSITIVE));
     mean.points = 1;
     mean
@@ -514,12 +515,12 @@ fn by_rule(
 
 /// Mean over random points, each weighted by how `open` it is.
 ///
-/// How many there are follows from the light without shadows: were more taken where the first are bright, what is bright here
-/// and there would be found too dark. For the same reason the points that decide whether the leaf is split have no part in
-/// the mean: leaves that stay would be those on which few points found light to be even.
+/// Their number follows from the light without shadows: were more taken where the first are bright, places that are bright
+/// here and there would come out too dark. For the same reason the points that decide whether the leaf is split are left out
+/// of the mean: leaves that stay would be those on which few points found light to be even.
 fn by_chance(tree: &Tree, leaf: u32, look: &impl Look, stake: &Stake, memory: &mut Memory) -> Mean {
     let shift = hash(u64::from(leaf), 3);
-    // What would be a share of all light that matters, too.
+    // The tolerance, also for what would be a share of all light that matters.
     let tolerance = stake.tolerance.min(1.0 / stake.flux);
     let mut gather = |points: Range<usize>| {
         let mut mean = Mean::new();
@@ -547,9 +548,9 @@ fn by_chance(tree: &Tree, leaf: u32, look: &impl Look, stake: &Stake, memory: &m
             ..gather(0..count)
         };
     }
-    // Points beyond those that the mean may take.
+    // Points beyond those that the mean may use.
     let decide = gather(RANDOM[2]..RANDOM[2] + RANDOM[1]);
-    // An even distribution has this half range.
+    // Half the range of a uniform distribution of this variance.
     let spread = (3.0 * decide.variance()).sqrt();
     if stake.may_split && spread * stake.split > 1.0 {
         return Mean { spread, ..decide };

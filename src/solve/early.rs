@@ -1,8 +1,8 @@
-//! Light of a bake that has to end before its first round is done: where rays from the lamps landed, see [`landing`](super::landing).
+//! The light of a bake that must end before its first round is done: where rays from the lamps landed, see [`landing`](super::landing).
 //!
-//! A leaf gets what landed on the least node around it that enough rays met, as irradiance `E = flux / area`, and evenly what is
-//! reflected: `E rho / (1 - rho)` of the means over the room. All of it has the mean spectrum of the lamps. It is no solution, and nothing is known of
-//! its error.
+//! A leaf has, as irradiance `E = flux / area`, the light landed on the smallest node around it that enough rays met, and the same reflected light
+//! everywhere: `E rho / (1 - rho)` of the means over the room. All of this light has the mean spectrum of the lamps. It is not a solution, and its
+//! error is unknown.
 
 use super::direct::Direct;
 use super::outlook::Outlook;
@@ -13,14 +13,14 @@ use crate::light::Rows;
 use crate::spectrum::LEAVES;
 use std::borrow::Cow;
 
-/// Rays that tell the light of a node: its standard deviation is then a quarter.
+/// Rays that suffice for the light of a node: its standard deviation is then a quarter.
 const RAYS: u32 = 16;
 
 /// Mean albedo that is believed at the most, as in the guess of the white.
 const ALBEDO: f64 = 0.9;
 
 impl Bake {
-    /// Takes a first round back that was given up: to the room as it was prepared.
+    /// Takes back a first round that was interrupted: to the room as prepared.
     pub(super) fn begin_again(&mut self, grown: &Grown) {
         let mut tree = std::mem::take(&mut self.refinement.tree);
         tree.shrink(grown);
@@ -78,7 +78,7 @@ impl Bake {
         self.light_arrives();
     }
 
-    /// Illuminance of leaves by what landed on them, or around them.
+    /// Illuminance of leaves by the rays that landed on or around them.
     fn landed_on(&self, leaves: &[u32]) -> Vec<f64> {
         let tree = &self.refinement.tree;
         let mut sums = vec![(0_u32, 0.0_f64); tree.nodes.len()];
@@ -102,7 +102,8 @@ impl Bake {
         leaves.iter().map(around).collect()
     }
 
-    /// Share of this light that surfaces reflect in the mean, by the area that counts; no more than leaves the sum of all bounces finite.
+    /// Share of the lamps' light that surfaces reflect on average over the area that counts; at most [`ALBEDO`], so that the sum of all
+    /// bounces is finite.
     fn albedo(&self, leaves: &[u32], reflectance: &Rows, spectrum: &[f64]) -> f64 {
         let (lanes, tree) = (&self.solution.lanes, &self.refinement.tree);
         let sum = leaves.iter().enumerate().map(|(k, &leaf)| {
@@ -113,7 +114,7 @@ impl Bake {
         (sum.sum::<f64>() / tree.counted().max(f64::MIN_POSITIVE)).min(ALBEDO)
     }
 
-    /// Irradiance on each lane for a lux of the light of all lamps together; 0 where none shines.
+    /// Irradiance on each lane for one lux of the light of all lamps together; 0 where none shines.
     fn spectrum_of_lamps(&self, leaves: &[u32], emission: &Rows) -> Vec<f64> {
         let mut sum = [0.0_f32; LEAVES];
         for (k, &leaf) in leaves.iter().enumerate() {
@@ -124,7 +125,7 @@ impl Bake {
         }
         for (light, row) in &self.solution.lamps {
             let solid = super::punctual::solid_angle(light.kind);
-            // Parallel light counts as what meets a quarter of all surfaces, as in the guess of the white.
+            // Parallel light counts as if it met a quarter of all surfaces, as in the guess of the white.
             let solid = solid.unwrap_or(0.25 * self.refinement.tree.counted()) as f32;
             for (sum, x) in sum.iter_mut().zip(row) {
                 *sum += solid * x;

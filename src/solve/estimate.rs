@@ -1,8 +1,8 @@
-//! How wrong the solution still is: an *estimate*, from two rounds at the same points.
+//! How wrong the solution still is: an *estimate*, from the light at the same points in two rounds.
 //!
-//! At fixed random points (by the area that counts) the light is gathered after every round with sampling patterns of its own. Errors
-//! fall by a factor q of about 0.6 a round. Were those of two rounds independent, the distance d between the rounds
-//! would make the error of the later one `d / sqrt(1 + 1 / q^2) = 0.5 d`; were they alike, `d q / (1 - q) = 1.5 d`. The
+//! At fixed random points (distributed by counted area) the light is gathered after every round, each round with its own sampling
+//! patterns. Errors fall by a factor q of about 0.6 a round. If the errors of two rounds were independent, the distance d between the
+//! rounds would make the error of the later one `d / sqrt(1 + 1 / q^2) = 0.5 d`; if they were alike, `d q / (1 - q) = 1.5 d`. The
 //! truth lies between; [`SHARE`] was measured against the audit.
 
 use crate::color::{de_luv, de2000, uv_1960};
@@ -11,16 +11,16 @@ use crate::hierarchy::Tree;
 use crate::transport::Receiver;
 use glam::DVec3;
 
-/// Points that are watched.
+/// Points watched.
 const POINTS: usize = 160;
 /// Error of a round as a share of its distance to the round before. Measured against the audit at default error:
 /// Cornell box 1.5, two rooms 1.4, convex room 2.3.
 const SHARE: f64 = 1.5;
-/// The same after the second round. The first is so coarse that its error is most of the distance: the second was left with
-/// .5 of it in Cornell boxes, .25 to .85 elsewhere.
+/// As [`SHARE`], after the second round. The first is so coarse that its error is most of the distance: the second was left
+/// with .5 of the distance in Cornell boxes, .25 to .85 elsewhere.
 const SHARE_OF_FIRST: f64 = 0.75;
-/// The same where points look for themselves. Their rays are new every round: errors of two rounds have little in common.
-/// Measured with 600 points in two furnished rooms: 0.94 and 1.01.
+/// As [`SHARE`], where points look for themselves. Their rays are new every round: errors of two rounds have little in
+/// common. Measured with 600 points in two furnished rooms: 0.94 and 1.01.
 const SHARE_OF_RAYS: f64 = 0.95;
 
 /// Watched points.
@@ -30,7 +30,7 @@ pub(crate) struct Probes {
     pub(super) points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
 }
 
-/// Distance between two rounds, turned into error.
+/// Distance between two rounds, converted to error.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Distance {
     pub de2000: f64,
@@ -42,7 +42,7 @@ pub(crate) struct Distance {
 }
 
 impl Distance {
-    /// Is it a number? Light under a white that is none gives no colour.
+    /// Is the distance finite? Light under a white that is not gives no colour.
     fn is_known(&self) -> bool {
         [self.de2000, self.de_luv, self.relative, self.chromaticity]
             .iter()
@@ -51,7 +51,7 @@ impl Distance {
 }
 
 impl Probes {
-    /// Random points, by the area that counts.
+    /// Random points, distributed by counted area.
     pub(crate) fn new(tree: &Tree, seed: u64) -> Self {
         let mut rng = Pcg::new(seed ^ 0x009b_0be5);
         let mut points = Vec::new();
@@ -87,8 +87,8 @@ impl Probes {
     }
 }
 
-/// The estimated error of round `round` (from 0), by what was seen `before` and what is seen `now`; none after the first round
-/// and none where light is no number. `by_rays`: do points look for themselves?
+/// The estimated error of round `round` (from 0), by the light `before` and `now`; none after the first round and none where
+/// light is not finite. `by_rays`: do points look for themselves?
 pub(super) fn compare(
     before: &[[f64; 3]],
     now: &[[f64; 3]],
@@ -97,24 +97,24 @@ pub(super) fn compare(
     by_rays: bool,
 ) -> Option<Distance> {
     let share = match (by_rays, round) {
-        // The first two rounds are coarse alike: what they share is not noise of rays.
+        // The first two rounds are both coarse: the error they share is not noise of rays.
         (true, 0 | 1) => SHARE,
         (true, _) => SHARE_OF_RAYS,
         (false, 0 | 1) => SHARE_OF_FIRST,
         (false, _) => SHARE,
     };
-    // A difference of colours that are no numbers would read as none.
+    // Colours that are not finite would otherwise pass for equal ones.
     let sound = now.iter().chain(before).flatten().all(|x| x.is_finite());
     let result = (sound && !before.is_empty()).then(|| {
         let n = now.len() as f64;
-        // What is the same has no difference, also in a room without light, where there is no white to see it by.
+        // Equal light has no difference, also in a room without light, where there is no white.
         let pairs = || before.iter().zip(now).filter(|(a, b)| a != b);
         let mean = |differ: &dyn Fn([f64; 3], [f64; 3]) -> f64| {
             // An empty sum would be -0.
             pairs().fold(0.0, |sum, (a, b)| sum + differ(*a, *b)) / n
         };
         let floor = 1e-4 * white[1];
-        // The colour of what is as good as black is not looked at.
+        // The colour of what is almost black is ignored.
         let shift = |a: &[f64; 3], b: &[f64; 3]| match (uv_1960(*a), uv_1960(*b)) {
             (Some(p), Some(q)) if a[1].min(b[1]) > floor => {
                 (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)
@@ -154,7 +154,7 @@ mod tests {
         assert!(error(f64::NAN, 2).is_none());
         assert!(error(0.5, 3).is_none());
         assert_eq!(error(0.5, 4), Some(0.0));
-        // Dark rooms: no white, no difference; and no estimate where light comes and there is no white for it.
+        // Dark rooms: no white, no difference. Light without a white for it: no estimate.
         let dark = |light: f64| {
             let distance = compare(&[[0.0; 3]], &[[light; 3]], [0.0; 3], 4, false);
             distance.map(|d| (d.de2000, d.de_luv, d.relative))

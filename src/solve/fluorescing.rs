@@ -1,10 +1,10 @@
-//! The solve where surfaces fluoresce: `R = rho (f + F R) + Q (f + F R)`, Q from the lanes that excite to those of what is given out.
+//! The solve where surfaces fluoresce: `R = rho (f + F R) + Q (f + F R)`, Q from the lanes that excite to the lanes that are emitted.
 //!
-//! Lanes reflect by themselves, so what is given out is found in rounds: with Q's part as it is, `G`, all bounces of it and of all other
-//! light as ever, `R' = rho (f + F G + F R')`; from the light that this brings, G anew. A round that changes the power of G by d leaves
-//! an error of `d / (1 - k)` at the most: of what is given out at a wavelength no more than k comes back as G, k the greatest
-//! `g / (1 - rho)` at wavelengths of emissions, since every meeting with a surface that fluoresces reflects rho and gives out g. As
-//! emissions mostly excite nothing, the second round mostly finds what the first found.
+//! Each lane reflects by itself, so fluorescence is found in rounds: with its present part `G`, all bounces of `G` and of all other
+//! light as ever, `R' = rho (f + F G + F R')`; from the light that this brings, a new G. A round that changes the power of G by d leaves
+//! an error of `d / (1 - k)` at the most: of fluorescence at a wavelength no more than k comes back as G, k the greatest `g / (1 - rho)`
+//! at wavelengths of emissions, since every meeting with a fluorescent surface reflects rho and emits g. As emissions mostly excite
+//! nothing, the second round mostly finds what the first found.
 
 use super::solver::{Convergence, step};
 use super::sums::{CHUNK, added, chunks};
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 /// Rounds at the most; a dye whose emission excites it with a yield of .9 took 9 in a white room.
 const ROUNDS: usize = 60;
-/// Rounds end at this change whatever the bound: what is left is f32.
+/// Rounds end at this change whatever the bound: the rest is rounding of f32.
 const ROUNDING: f64 = 1e-6;
 
 /// What fluoresces, and how.
@@ -26,14 +26,14 @@ const ROUNDING: f64 = 1e-6;
 pub(crate) struct Glow {
     /// Materials that fluoresce.
     kinds: Vec<Fluorescent>,
-    /// For each leaf its number among these; none of what does not.
+    /// For each leaf the index of its material among these; none where it does not fluoresce.
     of: Vec<Option<u8>>,
-    /// Greatest share of the power that is given out that comes back as such.
+    /// Greatest share of fluorescent power that comes back as fluorescent power.
     back: f64,
 }
 
 impl Glow {
-    /// Of the leaves of a hierarchy; none where nothing fluoresces.
+    /// The fluorescence of the leaves of a hierarchy; none where nothing fluoresces.
     pub(super) fn new(
         (scene, mesh): (&Scene, &Mesh),
         tree: &Tree,
@@ -44,7 +44,8 @@ impl Glow {
         let of_material: Vec<Option<u8>> = (scene.materials.iter())
             .map(|m| {
                 let kind = Fluorescent::new(m.fluorescence.as_ref()?, lanes, scene);
-                // More kinds than a byte counts would take more light spectra than rows hold: those count as dark.
+                // More kinds than a byte counts would need more light spectra than rows hold: the rest do not
+                // fluoresce.
                 let number = u8::try_from(kinds.len()).ok()?;
                 kinds.push(kind);
                 Some(number)
@@ -64,7 +65,7 @@ impl Glow {
         })
     }
 
-    /// What the leaves give out under an irradiance, both by leaf.
+    /// Fluorescent exitance of the leaves by their irradiance.
     pub(super) fn of<const L: usize>(&self, irradiance: &Rows) -> Rows {
         let mut out = Rows::zero(irradiance.len(), L);
         let rows = out.all_mut::<L>().par_iter_mut();
@@ -79,7 +80,7 @@ impl Glow {
     }
 }
 
-/// The greatest `g / (1 - rho)` of a material at a wavelength that something gives out.
+/// The greatest `g / (1 - rho)` of a material at a wavelength of any fluorescent emission.
 fn back(scene: &Scene) -> f64 {
     let fluorescent = || {
         let used = scene.materials.iter();
@@ -103,7 +104,7 @@ fn back(scene: &Scene) -> f64 {
                 most.max(out[k] / (1.0 - rho))
             })
     };
-    // What is read is bounded; what is made in code may not be.
+    // Materials from files are bounded; those made in code may not be.
     fluorescent()
         .map(of)
         .fold(0.0, f64::max)
@@ -117,15 +118,15 @@ pub(super) struct Rounds<'a> {
     pub(super) areas: Vec<f64>,
     /// Power (W/m2) of each lane at 1.
     pub(super) power: Vec<f64>,
-    /// Relative error at which they end.
+    /// Relative error at which the rounds end.
     pub(super) tolerance: f64,
-    /// Ends them wherever they are.
+    /// Ends the rounds at any time.
     pub(super) interrupt: &'a Interrupt,
 }
 
 impl Rounds<'_> {
-    /// Reflected radiosity, what is given out, and irradiance by both, by leaf. `receive` turns radiosity into irradiance, `bounce` finds
-    /// from direct irradiance what is reflected of it and the irradiance by that.
+    /// Reflected radiosity, fluorescent exitance, and irradiance by both, by leaf. `receive` turns radiosity into irradiance; `bounce`
+    /// finds, from direct irradiance, its reflected radiosity and the irradiance by that.
     pub(super) fn solve<const L: usize>(
         &self,
         first: &Rows,
@@ -157,7 +158,7 @@ impl Rounds<'_> {
         }
     }
 
-    /// Power that the second gives out more or less than the first, and that it gives out.
+    /// Power by which `now` differs from `before`, and power of `now`.
     fn change<const L: usize>(&self, before: &Rows, now: &Rows) -> [f64; 2] {
         let rows = chunks::<L>(before).zip(chunks::<L>(now));
         let parts = (rows.zip(self.areas.par_chunks(CHUNK))).map(|((before, now), areas)| {

@@ -43,7 +43,7 @@ pub struct Sent {
     pub in_panes: f64,
 }
 
-/// Casts rays from the fronts of all faces: the room is closed if every one meets the front of something. The second
+/// Casts rays from the fronts of all faces: the room is closed if every ray meets the front of something. The second
 /// answer leaves out points that something solid covers, such as the floor below a box.
 pub(super) fn closedness(
     mesh: &Mesh,
@@ -56,7 +56,7 @@ pub(super) fn closedness(
         return [Closed::No; 2];
     };
     if sight.opaque.is_some() {
-        // Holes lead somewhere else.
+        // Light leaves through holes.
         return [Closed::No; 2];
     }
     let mut all = Closed::Yes;
@@ -102,7 +102,7 @@ pub(super) fn meets(
     }
 }
 
-/// Is a point of a surface covered by something solid that stands on it or ends there? Then it sees backs only.
+/// Is a point of a surface covered by something solid that stands on it or ends there? Then it sees only backs.
 pub(super) fn covered(
     mesh: &Mesh,
     tree: &Tree,
@@ -132,7 +132,7 @@ pub(crate) struct Guess {
     pub bright: Vec<f32>,
 }
 
-/// Share of a room's faces that sees the sky, about, before anything is known of its openings.
+/// Rough share of a room's faces that sees the sky, before anything is known of its openings.
 const DOME: f64 = 0.05;
 
 /// Light spread evenly over all faces: `H = flux / (A (1 - mean albedo))`.
@@ -169,7 +169,7 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         let xyz = lanes.emission(light.light, &light.shape, 1.0);
         flux = std::array::from_fn(|c| flux[c] + solid * xyz[c]);
     }
-    // Open rooms lose light: half counts as lost before more is known, so that the guess stays finite.
+    // Open rooms lose light: the mean albedo is capped before more is known, so that the guess stays finite.
     let mean = if total > 0.0 {
         (mean / total).min(0.9)
     } else {
@@ -203,7 +203,7 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
 const GREATEST_LOSS: f64 = 0.1;
 
 /// Scales direct light on the leaves of a closed room, lane by lane, so that the fronts receive exactly what the lamps
-/// give out: what rows of links are balanced for, for lamps.
+/// emit: for lamps, what balancing is for rows of links.
 pub(super) fn conserve(
     first: &mut Rows,
     emission: &Rows,
@@ -215,7 +215,7 @@ pub(super) fn conserve(
     let (mut given, mut received) = (vec![0.0; width], vec![0.0; width]);
     for (light, row) in lamps {
         let Some(solid) = super::punctual::solid_angle(light.kind) else {
-            // How much parallel light enters is not known.
+            // How much parallel light enters is unknown.
             return;
         };
         for (given, intensity) in given.iter_mut().zip(row) {
@@ -251,20 +251,20 @@ pub(super) fn conserve(
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Balance {
-    /// Luminous flux given out evenly by surfaces, lm (lamps with a profile are among `sent`). Light of a sky, of the sun and
-    /// parallel light counts from where it is received: what does not enter the room is in no sum.
+    /// Luminous flux emitted evenly by surfaces, lm (lamps with a profile are among `sent`). Light of a sky, of the sun and
+    /// of parallel lights counts from where it is received: what does not enter the room is in no sum.
     pub emitted_lm: f64,
     /// Luminous flux that fronts receive straight from lamps of any kind, lm.
     pub received_lm: f64,
-    /// Luminous flux that fronts give out at other wavelengths than excite it, lm; lit by it, they absorb it as any other light.
+    /// Luminous flux that fronts emit by fluorescence, lm; they absorb the light that excites it like any other.
     #[serde(default)]
     pub fluoresced_lm: f64,
     /// Luminous flux absorbed by fronts, lm.
     pub absorbed_lm: f64,
-    /// Luminous flux that left the room or met a black back, lm: by row sums below 1.
+    /// Luminous flux that left the room or met a black back, lm: from row sums below 1.
     pub escaped_lm: f64,
-    /// Worst relative difference of received (with what is fluoresced) and absorbed + escaped over all bands that carry light: what the solve
-    /// itself lost. Emitted and received differ by what direct light misses the room.
+    /// Worst relative difference of received (with fluorescence) and absorbed + escaped over all bands that carry light: what the solve
+    /// itself lost. Emitted and received differ by direct light that leaves the room.
     pub worst_band: f64,
     /// Where the light of lamps goes first, by rays from the lamps.
     #[serde(default)]
@@ -274,7 +274,7 @@ pub struct Balance {
     pub scaled: Scaled,
 }
 
-/// Adds fluxes that are given out, received, absorbed, escape and are fluoresced, each as a density on an area.
+/// Adds fluxes (emitted, received, absorbed, escaped, fluoresced), each as a density on an area.
 fn add(sums: &mut [f64; 5], area: f64, densities: [f64; 5]) {
     for (sum, density) in sums.iter_mut().zip(densities) {
         *sum += area * density;
@@ -282,7 +282,7 @@ fn add(sums: &mut [f64; 5], area: f64, densities: [f64; 5]) {
 }
 
 impl Balance {
-    /// Of fluxes by lane that are given out, received, absorbed, escape and are fluoresced.
+    /// The balance of fluxes by lane (emitted, received, absorbed, escaped, fluoresced).
     fn of(fluxes: &[[f64; 5]], lanes: &Lanes) -> Self {
         let lit = fluxes.iter().filter(|sums| sums[1] + sums[4] > 0.0);
         let lumens = |k: usize| {
@@ -305,7 +305,7 @@ impl Balance {
     }
 }
 
-/// What the light of leaves was multiplied by, so that none goes missing: luminous flux after over before. 1 is nothing.
+/// By what the light of leaves was multiplied so that none is lost: luminous flux after over before. 1 changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Scaled {
     /// Direct light in sealed rooms of few triangles.
@@ -330,7 +330,7 @@ pub(super) fn lumens(areas: &[f64], lanes: &Lanes, leaves: &[u32], rows: &Rows) 
         .sum()
 }
 
-/// `after / before`; 1 where there was nothing.
+/// `after / before`; 1 where nothing was before.
 pub(super) fn ratio(after: f64, before: f64) -> f64 {
     if before > 0.0 { after / before } else { 1.0 }
 }
@@ -363,21 +363,21 @@ pub(super) fn flux(
     Balance::of(&fluxes, lanes)
 }
 
-/// What the leaves receive as wholes, whatever others see of them.
+/// What the leaves receive as wholes, however much of them others see.
 pub(crate) struct Whole<'a> {
     /// Irradiance by reflected light, by leaf.
     pub(super) indirect: &'a Rows,
-    /// Direct light of a leaf as a share of that of what others see of it.
+    /// Direct light of a whole leaf, as a multiple of that on the part that others see.
     pub(super) direct: &'a dyn Fn(u32) -> f64,
-    /// Area of a leaf, all of it.
+    /// Area of a whole leaf.
     pub(super) area: &'a dyn Fn(u32) -> f64,
-    /// Is a leaf a mirror? Of light that falls on it counts only what it keeps, by its mean over angles: the rest is received where it
-    /// is sent.
+    /// Is a leaf a mirror? Of light that falls on a mirror only the part that it absorbs counts, by its mean over angles: the rest is
+    /// received where it is reflected to.
     pub(super) mirror: &'a dyn Fn(u32) -> bool,
 }
 
-/// The flux where leaves look for themselves: nothing is scaled, and what the rays of leaves find more or less than leaves
-/// send is the defect. `areas` are those of what others see: all that they send meets fronts.
+/// The flux where leaves look for themselves: nothing is scaled, and the defect is the difference of what the rays of
+/// leaves find and what leaves send. `areas` are those that others see: all that they send meets fronts.
 pub(super) fn flux_by_rays(
     areas: &[f64],
     lanes: &Lanes,
@@ -411,7 +411,7 @@ pub(super) fn flux_by_rays(
     Balance::of(&fluxes, lanes)
 }
 
-/// Rows by leaf that the flux is summed from.
+/// Rows by leaf from which the flux is summed.
 pub(crate) struct FluxRows<'a> {
     pub(super) emission: &'a Rows,
     pub(super) reflected: &'a Rows,

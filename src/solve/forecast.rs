@@ -1,45 +1,47 @@
-//! When a bake ends and how long it still takes: the rounds so far, continued.
+//! When a bake ends and how long it still takes: an extrapolation of the rounds so far.
 //!
-//! From round to round the time is multiplied by g, the links by l and the error by q. Early rounds add little to what the triangles
-//! of the room are; later ones approach the law that the thresholds follow: `g' = sqrt(g 3)`, `l' = sqrt(l 4)`. The error falls
-//! ever less, `1 - q' = (1 - q) / 2`
-//! where chance has a part in it. So rounds are added until one of them would end the bake. An *estimate*: the error is one itself, and
-//! its fall wavers by tens of per cent from round to round.
+//! From round to round the time is multiplied by g, the links by l and the error by q. Early rounds add little to the triangles of the
+//! room; later ones approach the law that the thresholds follow: `g' = sqrt(g 3)`, `l' = sqrt(l 4)`. Where rays bring noise the error
+//! falls less and less, `1 - q' = (1 - q) / 2`. So rounds are added until one of them would end the bake. An *estimate*: the error is
+//! itself one, and its fall varies by tens of per cent from round to round.
 
 use super::record::Verdict;
 
-/// What the growth of the time of rounds, and of links, comes to. In a living room of 22,000 triangles rounds 3 to 6 took 1.4, 2.2, 2.6 and 3.0 times as
-/// long as those before, and made 1.6, 2.8, 3.3 and 3.5 times the links; in a home theater of 15,000, 1.3 and 2.1 times as long, 1.4 and 2.1 times the links.
+/// What the growth of the time of rounds, and of links, tends to. In a living room of 22,000 triangles rounds 3 to 6 took 1.4, 2.2, 2.6 and 3.0 times as long
+/// as those before, and made 1.6, 2.8, 3.3 and 3.5 times the links; in a home theater of 15,000, 1.3 and 2.1 times as long, 1.4 and 2.1 times the links.
 const GROWTH: f64 = 3.0;
 const LINKS: f64 = 4.0;
-/// Growth that is believed at the most; less than none is not believed.
+/// The greatest growth that is believed; the least is 1.
 const GREATEST_GROWTH: f64 = 5.0;
-/// The fastest fall that is believed: beyond, the last two rounds were luck.
+/// The fastest fall that is believed: a faster one was luck.
 const FASTEST: f64 = 0.3;
-/// Rounds that are looked ahead at the most.
+/// Rounds to look ahead, at the most.
 const AHEAD: usize = 12;
 
-/// Fewer rounds do where a mere preview is asked for, an error of so much, and the estimate is so many times smaller.
+/// Fewer rounds suffice for a preview: if an error of at least `PREVIEW` is asked for and the estimate is `EARLY` times
+/// smaller.
 const PREVIEW: f64 = 2.0;
 const EARLY: f64 = 4.0;
-/// One distance between rounds may be small by chance, or because the second found nothing to refine yet.
+/// Least rounds before an estimate is believed: one distance between rounds may be small by chance, or because the second found
+/// nothing to refine yet.
 const LEAST_ROUNDS: usize = 3;
-/// After so many rounds an estimate is off by less than this: by rays it was .22 for .28 and .30, in Cornell boxes with dust. Where it is so many
-/// times smaller than what is asked for, they do. A sunlit room at `--error 1` takes four fifths of the time for it.
+/// After [`LEAST_ROUNDS`] an estimate is off by less than this factor (by rays it was .22 for .28 and .30, in Cornell boxes with
+/// dust), so these rounds suffice if it is this many times smaller than the error asked for. A sunlit room at `--error 1` then takes
+/// four fifths of the time.
 const DOUBTFUL: f64 = 2.0;
-/// A round that leaves this share of the error of the one before has stalled, if there are many links already. One that finds it
-/// much greater has not: it found light that the rounds before it overlooked, as in the gap above a lamp.
+/// A round that leaves this share of the error of the one before has stalled, if there are many links already. If the error rose
+/// much, the round has not: it found light that earlier rounds overlooked, as in the gap above a lamp.
 const STALLED: f64 = 0.9;
 const WORTH_STALLING: usize = 100_000;
-/// No round that would make more links than this, at four times those of the last: about 200 MB.
+/// The most links that a next round may make, at four times those of the last: about 200 MB.
 const MOST_LINKS: usize = 4_000_000;
 
 /// A round as far as the end of a bake depends on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Past {
-    /// What it took.
+    /// Seconds that the round took.
     pub seconds: f64,
-    /// Estimated error, CIEDE2000, if it is known.
+    /// Estimated error, CIEDE2000, if known.
     pub error: Option<f64>,
     /// Links.
     pub links: usize,
@@ -48,23 +50,23 @@ pub struct Past {
 /// How errors fall.
 #[derive(Debug, Clone, Copy)]
 pub struct Fall {
-    /// Rounds after which an estimate is believed as it is. By rays two distances between rounds may be small by chance: a Cornell box with 200
-    /// triangles of dust ended with 1,500 leaves after three rounds, or with 5,400 after four, by the seed, at .30 or .22 dE00.
+    /// Rounds after which an estimate is believed as it is. By rays two distances between rounds may be small by chance: a Cornell box
+    /// with 200 triangles of dust ended with 1,500 leaves after three rounds, or with 5,400 after four, by the seed, at .30 or .22 dE00.
     least: usize,
-    /// What the third round leaves of the error of the second.
+    /// Share of the second round's error that the third leaves.
     first: f64,
-    /// What is left of `1 - q` a round later.
+    /// What remains of `1 - q` a round later.
     slower: f64,
 }
 
-/// Where leaves look by rays, whose errors by chance remain. The first: .36 in a sunlit room, .54, .65 and .68 in the living room, a garage and the
-/// home theater. What was left of `1 - q`: .44, .55 and .22 in the living room, .52 in the home theater.
+/// Where leaves look by rays, whose noise remains. `first`: .36 in a sunlit room, .54, .65 and .68 in the living room, a garage and the home
+/// theater. `slower`: .44, .55 and .22 in the living room, .52 in the home theater.
 pub const BY_RAYS: Fall = Fall {
     least: 4,
     first: 0.5,
     slower: 0.5,
 };
-/// Where light goes along links. The first: .1 to .4 in Cornell boxes.
+/// Where light goes along links. `first`: .1 to .4 in Cornell boxes.
 pub const BY_LINKS: Fall = Fall {
     least: LEAST_ROUNDS,
     first: 0.3,
@@ -78,15 +80,15 @@ pub struct Goal {
     pub error: f64,
     /// Rounds at the most.
     pub rounds: usize,
-    /// How its error falls.
+    /// How the error of the bake falls.
     pub fall: Fall,
 }
 
 impl Goal {
-    /// How a bake ends with these rounds; none: another may help.
+    /// How a bake ends with these rounds; none: another round may help.
     pub fn verdict(&self, past: &[Past]) -> Option<Verdict> {
         let (last, before) = (past.last()?, past.iter().rev().nth(1));
-        // Four times the links for next to nothing: what is left is the noise of visibility in the gather.
+        // Four times the links for next to nothing: the rest is the noise of visibility in the gather.
         let fall = before.and_then(|before| Some(last.error? / before.error?));
         let stalled = fall.is_some_and(|fall| (STALLED..1.0 / STALLED).contains(&fall))
             && last.links > WORTH_STALLING;
@@ -94,7 +96,7 @@ impl Goal {
         self.done(past).or(exhausted)
     }
 
-    /// Is the error reached, or the number of rounds?
+    /// Is the error or the number of rounds reached?
     fn done(&self, past: &[Past]) -> Option<Verdict> {
         let asked = self.error;
         let settled = |e: f64| {
@@ -108,8 +110,8 @@ impl Goal {
         (past.len() >= self.rounds).then_some(Verdict::OutOfRounds)
     }
 
-    /// Looks ahead from the rounds so far; none if the error is not known, or no end is in sight. Whether rounds stall before links
-    /// become too many cannot be foreseen (a living room did, a garage did not): between both times lies their geometric mean.
+    /// Extrapolates the rounds so far; none if the error is unknown, or no end is in sight. Whether rounds stall before links
+    /// become too many cannot be foreseen (a living room did, a garage did not): the geometric mean of both times is taken.
     pub fn forecast(&self, past: &[Past]) -> Option<Forecast> {
         past.last()?.error?;
         let mut all = past.to_vec();
@@ -143,12 +145,12 @@ fn has_many(past: &[Past]) -> bool {
     past.last().is_some_and(|last| 4 * last.links > MOST_LINKS)
 }
 
-/// A look ahead.
+/// An extrapolation of the rounds so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forecast {
     /// Rounds until the bake ends.
     pub rounds: usize,
-    /// Seconds for them.
+    /// Seconds of these rounds.
     pub seconds: f64,
 }
 
@@ -157,23 +159,24 @@ pub fn next_round(past: &[Past]) -> f64 {
     next(past, BY_LINKS).map_or(0.0, |round| round.seconds)
 }
 
-/// The round that is expected next.
+/// The next round, as expected.
 fn next(past: &[Past], law: Fall) -> Option<Past> {
     let (last, before) = (past.last()?, past.iter().rev().nth(1));
-    // The second round takes .4 to .8 times as long as the first in rooms of furniture, which looks at all leaves, twice as long in small ones.
+    // The second round takes .4 to .8 times as long as the first, which looks at all leaves, in rooms of furniture; twice as long in small
+    // ones.
     let grown = |limit: f64, of: &dyn Fn(&Past) -> f64| {
         let growth = before.map(|before| of(last) / of(before).max(1e-9));
         of(last) * growth.map_or(1.0, |g| (g.clamp(1.0, GREATEST_GROWTH) * limit).sqrt())
     };
     let known = before.and_then(|before| Some(last.error? / before.error?));
-    // An error that rises was underrated before: nothing is known of how it falls.
+    // An error that rises was underestimated before: how it falls is unknown.
     let fall = known.filter(|fall| *fall < 1.0).map_or(law.first, |fall| {
         1.0 - law.slower * (1.0 - fall.max(FASTEST))
     });
     Some(Past {
         seconds: grown(GROWTH, &|round| round.seconds),
         error: last.error.map(|error| fall * error),
-        // Fewer than memory holds.
+        // The cast is exact enough: there are fewer links than memory holds.
         links: grown(LINKS, &|round| round.links as f64) as usize,
     })
 }
@@ -219,7 +222,7 @@ mod tests {
         assert_eq!(by_links.verdict(&three(0.39)), Some(Verdict::Reached));
     }
 
-    /// A home theater and a living room as they were baked: what was told, and what it then took.
+    /// A home theater and a living room as baked: the forecast, and the time then taken.
     #[test]
     fn rooms_take_about_what_was_told() {
         let theater = [
@@ -251,7 +254,7 @@ mod tests {
     fn what_is_not_known_is_not_told() {
         assert_eq!(GOAL.forecast(&[]), None);
         assert_eq!(GOAL.forecast(&past(&[(1.0, f64::NAN, 9)])), None);
-        // Too far off; an error that rises falls as is usual.
+        // Too far off; after an error that rose, the usual fall is expected.
         let few = past(&[(1.0, 2.0, 0), (2.0, 1.9, 0)]);
         let far = Goal {
             error: 1e-6,

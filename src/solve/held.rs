@@ -1,14 +1,14 @@
-//! The same links, other lanes: a solution in which nothing differs from the last round but how spectra are carried.
+//! Held links: a solution that differs from the last round in nothing but how spectra are carried.
 //!
-//! What lanes do to colours is seen by itself here: beside a solution on all 64 leaves of the same links, with direct
-//! light gathered at the same points of the same leaves.
+//! This shows by itself what lanes do to colours: the solution is compared with one on all 64 spectral leaves of the
+//! same links, with direct light gathered at the same points of the same elements.
 
 use super::direct::Direct;
 use super::{Bake, NOBODY, Representation};
 use crate::link::Demand;
 use std::time::Instant;
 
-/// Held solutions are brought to the error that a bake would be brought to if it were asked for this little.
+/// Held solutions are converged as far as a bake that asks for this error.
 const CONVERGED: f64 = 0.01;
 
 /// A solution on held links.
@@ -16,7 +16,7 @@ const CONVERGED: f64 = 0.01;
 pub struct Held {
     /// Lanes in use.
     pub lanes: usize,
-    /// What the choice of lanes believes to cost, mean CIELUV; none where nothing is known.
+    /// Error expected by the choice of lanes, mean CIELUV; none where nothing is known.
     pub spectrum_de_luv: Option<f64>,
     /// Operator applications.
     pub iterations: usize,
@@ -25,15 +25,15 @@ pub struct Held {
 }
 
 impl Bake {
-    /// Solves again on the links and leaves of the last round. `error` is what the choice of lanes is made for; the solve
-    /// itself goes far beyond it. [`Bake::light`] and [`Bake::lanes`] are of this solution afterwards; none before the
+    /// Solves again on the links and leaves of the last round. `error` is what the lanes are chosen for; the solve itself
+    /// goes far beyond it. Afterwards [`Bake::light`] and [`Bake::lanes`] are those of this solution. None before the
     /// first round.
     pub fn hold(&mut self, representation: Representation, error: f64) -> Option<Held> {
         let threshold = self.rounds.last()?.threshold;
         let white = self.solution.light.white;
         let started = Instant::now();
         (self.room.settings.representation, self.room.settings.error) = (representation, error);
-        // Nothing is kept of the lanes before: what was good enough for another error would be taken again.
+        // Forget the former lanes: those good enough for another error would be taken again.
         self.solution.lanes = self.room.dense_lanes();
         self.choose_lanes().expect(NOBODY);
         let chosen = started.elapsed();

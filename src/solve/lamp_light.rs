@@ -1,4 +1,4 @@
-//! Direct light on the leaves of a bake: what [`Direct`](super::direct::Direct) asks of points.
+//! Direct light on the leaves of a bake: what [`Direct`](super::direct::Direct) needs of points.
 
 use super::Bake;
 use super::direct::{Look, receiver};
@@ -15,7 +15,7 @@ use crate::team::Interrupted;
 use crate::transport::{Gatherer, Memory, Receiver};
 use glam::Vec3;
 
-/// What one patch may misplace of the direct light of a leaf, share of white for each unit of asked-for error. With five
+/// What one patch may misplace of the direct light of a leaf, share of white per unit of asked-for error. With five
 /// times as much a white room of 10 000 faces is 1 % too dark, without a limit 14 %.
 const DIRECT_SHARE: f64 = 0.02;
 /// Rays that tell how open a point is.
@@ -28,15 +28,15 @@ const PLACES: [[f64; 3]; 4] = [
     [0.05, 0.05, 0.9],
 ];
 
-/// As if every lamp were seen in so many mirrors besides.
+/// Mirrors multiply the light of lamps by this at the most, by assumption.
 const MIRRORED: f64 = 2.0;
 
-/// Looks at points of leaves while the hierarchy is being refined.
+/// Gathers at points of leaves while the hierarchy is being refined.
 struct Looker<'a> {
     room: &'a Room,
     solution: &'a Solution,
     sight: &'a Sight<'a>,
-    /// The same without anything in the way.
+    /// `sight` with nothing in the way.
     clear: Sight<'a>,
     weights: Vec<f64>,
 }
@@ -111,7 +111,7 @@ impl Look for Looker<'_> {
 }
 
 impl Bake {
-    /// Gathers direct light on all leaves, splitting those that it varies over.
+    /// Gathers direct light on all leaves, splitting those over which it varies.
     pub(super) fn gather_direct(&mut self, demand: &Demand) -> Result<(), Interrupted> {
         match padded(self.solution.lanes.len()) {
             4 => self.place_emission::<4>(),

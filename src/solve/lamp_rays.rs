@@ -1,4 +1,4 @@
-//! Rays from lamps, chosen as their light is spread.
+//! Rays from lamps, distributed as the lamps send light.
 
 use super::room::Room;
 use crate::geometry::NO_PLANE;
@@ -10,11 +10,11 @@ use crate::light::lanes::Lanes;
 use crate::scene::{LightKind, PunctualLight};
 use glam::DVec3;
 
-/// Rays from a surface start so far before it, share of half the room.
+/// Distance before a surface at which rays start, share of the room's half size.
 const OFF: f64 = 1e-5;
 
 impl Room {
-    /// Lamps with their tristimulus flux, all but those that shine from far away.
+    /// Lamps with their tristimulus flux, except those that shine from far away.
     pub(super) fn sending(&self, tree: &Tree, lanes: &Lanes) -> Vec<([f64; 3], Lamp<'_>)> {
         let exitance: Vec<[f64; 3]> = (self.scene.materials.iter())
             .map(|m| lanes.exitance(m.even_emission()))
@@ -39,7 +39,7 @@ impl Room {
     }
 }
 
-/// What sends light.
+/// A source of light.
 #[derive(Clone, Copy)]
 pub(super) enum Lamp<'a> {
     /// An entry of the hierarchy's faces.
@@ -48,9 +48,9 @@ pub(super) enum Lamp<'a> {
 }
 
 impl Lamp<'_> {
-    /// Start, direction and plane of its `k`-th ray, and what it counts for: 1 in the mean.
+    /// Start, direction and plane of the `k`-th ray, and its weight: 1 in the mean.
     pub(super) fn ray(self, room: &Room, tree: &Tree, k: u32) -> (DVec3, DVec3, u32, f64) {
-        // Two shifts of one sequence depend on each other.
+        // Two shifts of one sequence are correlated.
         let mut random = Pcg::new(hash(13, u64::from(k)));
         let (u, v) = (sequence02(k, 11), [random.f64(), random.f64()]);
         match self {
@@ -69,7 +69,7 @@ impl Lamp<'_> {
                 if let Some(luminaire) = &light.luminaire {
                     let ray = luminaire.ray(u, v);
                     let (start, direction, weight) = ray.unwrap_or((DVec3::ZERO, DVec3::Y, 0.0));
-                    // Off the surface, so that it is not met.
+                    // Start off the surface, so that the ray does not meet it.
                     let start = start + direction * (OFF * room.mesh.half_size);
                     return (place + start, direction, NO_PLANE, weight);
                 }
@@ -85,8 +85,8 @@ impl Lamp<'_> {
     }
 }
 
-/// Cosine of an angle of a spot's light: of the share 1 - `u` of its flux that lies nearer to its axis. The intensity is 1 up
-/// to the inner angle and falls with `((c - c_o) / (c_i - c_o))^2` to the outer one (KHR_lights_punctual).
+/// Cosine of the angle within which a spot sends the share 1 - `u` of its flux. The intensity is 1 up to the inner angle and
+/// falls with `((c - c_o) / (c_i - c_o))^2` to the outer one (KHR_lights_punctual).
 fn cosine_of_spot(inner: f64, outer: f64, u: f64) -> f64 {
     let (inner, outer) = (inner.cos(), outer.cos());
     let core = 1.0 - inner;

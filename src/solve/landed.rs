@@ -1,13 +1,13 @@
-//! What landed on leaves by rays from lamps, held against what their points found.
+//! Where rays from lamps landed on leaves, compared with the light found at the leaves' points.
 
 use crate::hierarchy::Tree;
 use crate::light::brightness;
 use std::collections::HashMap;
 
-/// So far must what landed stand out of its noise, standard deviations: ten rays where points found nothing.
+/// Landed light must exceed its noise by this many standard deviations: ten rays where points found nothing.
 const SIGMAS: f64 = 3.0;
 
-/// From so many rays on a leaf is looked at, however small: eight are .02 % of the light of all lamps.
+/// A leaf on which this many rays landed is gathered at, however small: eight are .02 % of the light of all lamps.
 const MANY: f64 = 8.0;
 
 /// Where a ray from a lamp met a front.
@@ -16,11 +16,11 @@ pub(super) struct Landing {
     /// Entry of the hierarchy's faces, and the weights of its second and third corner.
     pub(super) entry: u32,
     pub(super) weights: [f32; 2],
-    /// Tristimulus flux that it stands for, lm.
+    /// Tristimulus flux of the ray, lm.
     pub(super) flux: [f32; 3],
 }
 
-/// What landed on leaves.
+/// Light that landed on leaves.
 #[derive(Debug, Default)]
 pub(super) struct Landed {
     /// By leaf: brightness times area, and the square of its standard deviation.
@@ -28,7 +28,7 @@ pub(super) struct Landed {
 }
 
 impl Landed {
-    /// On the leaves of a hierarchy, as shares of a white.
+    /// Landings on the leaves of a hierarchy, as shares of a white.
     pub(super) fn new(tree: &Tree, landings: &[Landing], white: [f64; 3]) -> Self {
         let mut sums: HashMap<u32, [f64; 2]> = HashMap::new();
         for landing in landings {
@@ -42,13 +42,13 @@ impl Landed {
         Self { sums }
     }
 
-    /// Does so much land on a leaf that it is no chance?
+    /// Did more rays land on a leaf than [`MANY`]?
     pub(super) fn matters(&self, leaf: u32) -> bool {
         let sums = self.sums.get(&leaf);
         sums.is_some_and(|[sum, square]| sum * sum > MANY * square)
     }
 
-    /// How much brighter a leaf is in the mean than what its points found; 0 where that may be chance.
+    /// How much brighter a leaf is on average than its points found; 0 where that may be chance.
     pub(super) fn missing(&self, leaf: u32, area: f64, found: f64) -> f64 {
         let Some([sum, square]) = self.sums.get(&leaf) else {
             return 0.0;

@@ -1,9 +1,9 @@
 //! Where the light of lamps goes first, by rays from the lamps themselves: onto fronts, onto black backs, into panes, or out of the
-//! room. Nothing that receives light has a part in it, so that what leaves are found to receive can be held against it.
+//! room. No receiver takes part, so that the light found at leaves can be compared with this.
 //!
-//! Where it lands tells what points of leaves may have missed: those of a large leaf pass by the pool of a narrow spot, or the sun that
-//! a small hole lets in, and find the leaf evenly dark; nothing would ever split it. Rays from the lamp cannot miss it. They decide only
-//! what is split; what leaves receive is found at points.
+//! Where it lands tells what points of leaves may have missed: the points of a large leaf may all lie beside the pool of a narrow spot,
+//! or of the sun through a small hole, and find the leaf evenly dark; nothing would ever split it. Rays from the lamp cannot miss that
+//! pool. They decide only what is split; light on leaves is found at points.
 
 use super::flux::{Closed, Sent};
 use super::landed::Landing;
@@ -18,29 +18,29 @@ use glam::{DVec3, Vec3};
 
 /// Rays from lamps: an error of about .1 % of the flux.
 const RAYS: u32 = 32_768;
-/// Rays that go together.
+/// Rays cast together.
 const TOGETHER: usize = 16;
-/// Cells across the room, seen from where parallel light comes from, and half as many rays as those of lamps again into those where it
-/// gets in: a hole of a hundredth of the room is seen.
+/// Cells across the room, as seen from the direction of parallel light. Half as many rays as those of lamps go again into the cells
+/// where light gets in: a hole of a hundredth of the room is seen.
 const CELLS: usize = 256;
-/// The most parts of a cell along each side.
+/// Parts of a cell along each side, at the most.
 const PARTS: usize = 16;
 
-/// A ray from a lamp: start, direction, and what flux it stands for.
+/// A ray from a lamp: start, direction, and the flux it carries.
 type Ray = (DVec3, DVec3, [f64; 3]);
 
 /// Where a ray from a lamp ended.
 struct End {
-    /// What it met; none if it left the room.
+    /// What the ray met; none if it left the room.
     hit: Option<Hit>,
-    /// Entry of the hierarchy's faces that it met; [`NONE`] for a black back or nothing.
+    /// Entry of the hierarchy's faces that the ray met; [`NONE`] for a black back or nothing.
     entry: u32,
-    /// Share of its light that panes let through.
+    /// Share of the ray's light that panes let through.
     through: f64,
 }
 
 impl End {
-    /// What a flux leaves where the ray landed, if that is a front.
+    /// The landing of a ray of `flux`, if it met a front.
     fn landing(&self, flux: [f64; 3]) -> Option<Landing> {
         let hit = self.hit.filter(|_| self.entry != NONE)?;
         let [u, v] = hit.uv;
@@ -52,17 +52,17 @@ impl End {
     }
 }
 
-/// What follows rays to where they end.
+/// Follows rays to where they end.
 struct Follower<'a> {
     tree: &'a Tree,
     sight: &'a Sight<'a>,
     glass: Option<Glass<'a>>,
-    /// Past all of the room.
+    /// Longer than the room.
     reach: f32,
 }
 
 impl Follower<'_> {
-    /// Where rays of one plane end.
+    /// Where rays that start in one plane end.
     fn follow(&self, rays: &[Ray], plane: u32) -> Vec<End> {
         let mut ends = Vec::with_capacity(rays.len());
         for rays in rays.chunks(TOGETHER) {
@@ -86,7 +86,7 @@ impl Follower<'_> {
         ends
     }
 
-    /// Where parallel light of an irradiance across its rays lands: by a grid of cells, and once more by finer ones where it gets in.
+    /// Where parallel light lands, given its irradiance across its direction: by a grid of cells, refined where light gets in.
     fn parallel(&self, direction: DVec3, irradiance: [f64; 3], radius: f64) -> Vec<Landing> {
         let [across, up] = tangents(direction);
         let side = 2.0 * radius / CELLS as f64;
@@ -114,7 +114,7 @@ impl Follower<'_> {
         let all: Vec<usize> = (0..CELLS * CELLS).collect();
         let coarse = rays(&all, 1);
         let ends = self.follow(&coarse, NO_PLANE);
-        // Where light gets in or a cell beside gets some.
+        // Cells where light gets in, and their neighbours.
         let near = |&cell: &usize| {
             let (x, y) = (cell % CELLS, cell / CELLS);
             let rows = y.saturating_sub(1)..(y + 2).min(CELLS);
@@ -134,8 +134,8 @@ impl Follower<'_> {
 }
 
 impl Room {
-    /// The white of a room, which is at least that of what landed: light that is reflected adds to it. Before light is found that no
-    /// point has met yet, it is less.
+    /// The white of a room, at least that of the landed light: reflected light adds to that. Before any point has found such light,
+    /// the white is less.
     pub(super) fn landed_white(&self, tree: &Tree, white: [f64; 3]) -> [f64; 3] {
         let landed = self
             .landings
@@ -151,7 +151,7 @@ impl Room {
         }
     }
 
-    /// Follows the light of lamps: where all of it goes, and where it lands.
+    /// Follows the light of lamps: where all of it goes, and where it lands on fronts.
     pub(super) fn follow_lamps(
         &self,
         tree: &Tree,
@@ -171,7 +171,7 @@ impl Room {
         sent.lamps_lm = all;
         let mut first = 0;
         for (flux, lamp) in lamps {
-            // At least a packet, so that no lamp goes without.
+            // At least a packet, so that every lamp has rays.
             let count = (f64::from(RAYS) * flux[1] / all).ceil() as usize;
             let count = count.next_multiple_of(TOGETHER);
             let rays: Vec<_> = (first..first + count)

@@ -1,18 +1,18 @@
-//! Light on the leaves to second order: what a link brings is not even over its receiver, nor is its source evenly bright;
-//! where these are elements with parts, both are linear functions.
+//! Light on the leaves to second order: a link lights its receiver unevenly, and its source is not evenly bright; where
+//! these are elements with children, both are linear functions.
 //!
 //! Links carry means. That keeps the operator symmetric, but errs to first order in the size of the elements, and always
-//! the same way: the middle of a wall comes out too dark, its corners too bright. So after the solve two more passes
-//! over the links find the light on the leaves anew.
+//! in the same direction: the middle of a wall comes out too dark, its corners too bright. So after the solve, two more
+//! passes over the links find the light on the leaves anew.
 //!
-//! The factor of the other end at three points that halve the ways from an element's middle to its corners gives shares
-//! 1 + s_k, the s_k summing to 0; the linear function through them is 1 + 2 sum over k of s_k w_k at barycentric weights
-//! w. A child at corner k has the mean 1 + s_k and half the slope, the middle child the mean 1 and minus half the slope.
-//! A source whose corner children have radiosities C_k sends B + sum of t_k C_k / 3 where it shows shares 1 + t_k.
+//! The form factor of the other end at three points half-way from an element's middle to its corners gives shares 1 +
+//! s_k, the s_k summing to 0; the linear function through them is 1 + 2 sum over k of s_k w_k at barycentric weights w.
+//! A child at corner k has the mean 1 + s_k and half the slope, the middle child the mean 1 and minus half the slope. A
+//! source with shares 1 + t_k whose corner children have radiosities C_k sends B + sum of t_k C_k / 3.
 //! (Linear elements: Zatz 1993, Galerkin radiosity, without its second order in the exchange of slopes for slopes.)
 //!
-//! With slopes the rows of leaves sum to what they must within a few per cent, without them within 20 near edges; what is
-//! left is taken out of each row. At last each lane is scaled so that what arrives is what is given out.
+//! With slopes the rows of leaves sum to their targets within a few per cent, without them within 20 near edges; each row
+//! is scaled to make up the rest. At last each lane is scaled so that all light that is sent arrives.
 
 use super::operator::{Vector, add, pull, scaled};
 use crate::hierarchy::{NONE, Node, Sample, Tree};
@@ -21,33 +21,33 @@ use crate::link::{LinkRows, Scratch, point_factors};
 use rayon::prelude::*;
 use wide::{f32x4, f32x8, f32x16};
 
-/// Passes: the second takes in the light that the first found. More change points of a white cube by less than .02 %.
+/// Passes: the second includes the light that the first found. More change points of a white cube by less than .02 %.
 pub(super) const PASSES: usize = 2;
 /// Nodes that a task looks at.
 const CHUNK: usize = 64;
 /// Points that stand for a large cluster.
 const POINTS: usize = 8;
-/// Shares are kept as multiples of one over this.
+/// Shares are stored as multiples of one over this.
 const FINE: f64 = 8192.0;
 /// A row is scaled up by this much at the most: a patch that sees next to nothing must not be blown up.
 const GREATEST: f32 = 2.0;
 
 /// Shares of a link's ends, less 1, in units of 1 / [`FINE`]: at two corners of the receiver and two of the source. The
-/// third makes the sum 0; all are 0 where an end has no parts.
+/// third makes the sum 0; all are 0 where an end has no children.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Shares {
     receiver: [i16; 2],
     source: [i16; 2],
 }
 
-/// The links with the slopes of what they bring.
+/// The links, with the slopes of the light they bring.
 #[derive(Debug)]
 pub(crate) struct Slopes<'a> {
     tree: &'a Tree,
     links: &'a LinkRows,
     areas: &'a [f64],
     leaves: &'a [u32],
-    /// Elements with parts, ascending.
+    /// Elements with children, ascending.
     inner: Vec<u32>,
     /// For each node its place among leaves or `inner`.
     place: Vec<u32>,
@@ -55,7 +55,7 @@ pub(crate) struct Slopes<'a> {
     shares: Vec<Shares>,
     /// For each leaf what its row must sum to.
     target: Vec<f32>,
-    /// For each leaf what its row is scaled by to do so.
+    /// For each leaf what its row is scaled by to sum to that.
     scale: Vec<f32>,
 }
 
@@ -105,7 +105,7 @@ impl<'a> Slopes<'a> {
                 .collect(),
             scale: vec![1.0; leaves.len()],
         };
-        // What comes of a radiosity of 1: form factors.
+        // Irradiance by a radiosity of 1: form factors.
         let mut one = Rows::zero(leaves.len(), 4);
         one.all_mut::<4>().fill([1.0; 4]);
         let sums = slopes.unscaled::<4>(&one);
@@ -130,9 +130,10 @@ impl<'a> Slopes<'a> {
         seen
     }
 
-    /// What irradiance `seen` by reflected light is to be scaled by, lane by lane, so that all that does not leave the
-    /// room arrives. With the first bounce `first` of direct light and `second` of what is seen (all by leaf) that is
-    /// the k of `k sum A seen = sum A target (first + k second)`. Here: both sums over k, and that without k.
+    /// By what `seen`, the irradiance by reflected light, must be scaled, lane by lane, so that all light that does not
+    /// leave the room arrives. With the first bounce `first` of direct light and the next bounce `second` of `seen`
+    /// (all by leaf) that is the k of `k sum A seen = sum A target (first + k second)`. Returned: the sum of all terms
+    /// with k, and of those without.
     pub(super) fn balance<const L: usize>(
         &self,
         seen: &Rows,
@@ -214,7 +215,7 @@ impl<'a> Slopes<'a> {
         }
     }
 
-    /// What the links of a node bring in the mean.
+    /// Mean irradiance that the links of a node bring.
     fn even<V: Vector, const N: usize>(&self, node: usize, means: &[[V; N]]) -> [V; N] {
         let mut sum = [V::zeroed(); N];
         for (&(source, exchange), shares) in self.row(node) {
@@ -229,7 +230,7 @@ impl<'a> Slopes<'a> {
         scaled(&sum, (1.0 / self.areas[node]) as f32)
     }
 
-    /// What they bring to the corners beyond that.
+    /// By how much the irradiance at its corners differs from that mean.
     fn slope<V: Vector, const N: usize>(&self, node: usize, means: &[[V; N]]) -> [[V; N]; 3] {
         let mut sums = [[V::zeroed(); N]; 3];
         for (&(source, exchange), shares) in self.row(node) {
@@ -276,7 +277,7 @@ fn points(tree: &Tree, node: &Node) -> Option<[Sample; 3]> {
     }))
 }
 
-/// Shares of `other` at the corners of `node`; 0 where that has no parts.
+/// Shares of `other` at the corners of `node`; 0 where `node` has no children.
 fn shares(tree: &Tree, node: u32, other: u32, scratch: &mut Scratch) -> [i16; 2] {
     let (node, from) = (tree.node(node), tree.node(other));
     let Some(points) = points(tree, node).filter(|_| !node.is_leaf()) else {
@@ -290,7 +291,7 @@ fn shares(tree: &Tree, node: u32, other: u32, scratch: &mut Scratch) -> [i16; 2]
         return [0; 2];
     }
     let shares = factors.map(|f| f / mean - 1.0);
-    // Nowhere below zero.
+    // At least one half at these points, so that the linear function is nowhere negative.
     let least = shares.iter().copied().fold(0.0, f64::min);
     let scale = (0.5 / -least).min(1.0);
     [0, 1].map(|k| (FINE * scale * shares[k]).round() as i16)
@@ -305,7 +306,7 @@ mod tests {
     use crate::scene::{Options, Scene};
     use std::path::Path;
 
-    /// A convex room, its first face quartered twice and linked to another face only.
+    /// A convex room, its first face quartered twice and linked to one other face only.
     fn one_link() -> (Tree, LinkRows, u32, u32) {
         let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
         let scene = Scene::load(room, &Options::default()).unwrap();
@@ -334,7 +335,7 @@ mod tests {
         let (tree, links, to, from) = one_link();
         let leaves: Vec<u32> = tree.leaves().collect();
         let areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
-        // Rows that sum to nothing in particular: no row is corrected.
+        // The row sums are arbitrary here: no row is corrected.
         let mut slopes = Slopes::new(&tree, &links, &areas, &leaves, &vec![1.0; areas.len()]);
         slopes.scale.fill(1.0);
         let mut light = Rows::zero(leaves.len(), 8);

@@ -2,8 +2,8 @@
 //! under perceptual control).
 //!
 //! Rows of all patches share the working partition, because that is what a gather streams through. A patch by itself
-//! is content with fewer intervals: siblings are merged while the colour of its irradiance under the adaptation white
-//! moves by no more than the limit (CIELUV). The union of the lists is what the room needs.
+//! needs fewer intervals: siblings are merged while the colour of its irradiance under the adaptation white moves by no
+//! more than the limit (CIELUV). The union of the lists is what the room needs.
 
 use super::{Bake, SPECTRUM_SHARE};
 use crate::color::{KM, luv_jacobian};
@@ -15,7 +15,8 @@ use rayon::prelude::*;
 /// One list for each light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PatchList {
-    /// Mask and values: bit k set, an interval starts at leaf k; values are ratios to the light's power.
+    /// Partition and values: where bit k is set, an interval starts at spectral leaf k; values are ratios to the
+    /// light's power.
     pub lights: Vec<(Partition, Vec<f64>)>,
 }
 
@@ -52,11 +53,11 @@ impl<'a> Lister<'a> {
         }
     }
 
-    /// The list of a row; the 64 leaves themselves are left as they are (they belong to no one light).
+    /// The list of a row. A row of the 64 spectral leaves stays as it is: they belong to no one light.
     pub(super) fn list(&self, row: &[f32]) -> PatchList {
         let xyz = self.lanes.tristimulus(row).map(|x| x / KM);
         let metric = Metric::Luv(luv_jacobian(xyz, self.white));
-        // Lights share what is allowed.
+        // Lights share the limit.
         let limit = self.limit / self.trees.len().max(1) as f64;
         let mut lights = Vec::with_capacity(self.trees.len());
         for (light, cmf) in self.trees.iter().enumerate() {
@@ -109,7 +110,7 @@ impl Bake {
     }
 
     /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
-    /// [`Light::leaves`](crate::light::Light::leaves); empty where the rows hold the 64 leaves.
+    /// [`Light::leaves`](crate::light::Light::leaves); empty where the rows hold the 64 spectral leaves.
     pub fn lists(&self, step: usize) -> Vec<PatchList> {
         if !self.solution.lanes.is_ratio() {
             return Vec::new();

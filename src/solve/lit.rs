@@ -1,7 +1,7 @@
-//! What of a room counts: paths of light from its lamps tell.
+//! What counts of a room, found by paths of light from its lamps.
 //!
-//! Every path goes on from surface to surface whatever they reflect, so that black walls count and bright ones do not count twice.
-//! Light from outside lands on all that is outside, and next to nothing of it in the room: where there is a sky, a sun or other parallel
+//! Every path goes on from surface to surface whatever their reflectance, so that black walls count and bright ones do not count twice.
+//! Light from outside lands on everything outside, and next to nothing of it in the room: where there is a sky, a sun or other parallel
 //! light, all surfaces count.
 
 use super::Bake;
@@ -11,15 +11,15 @@ use crate::hierarchy::{Counted, Frame, Landing, NONE, Tree};
 use crate::link::Sight;
 use rayon::prelude::*;
 
-/// Paths that tell whether anything is dark at all, a few milliseconds, and those that tell what.
+/// Paths that tell whether anything is dark at all (a few milliseconds), and those that tell what is dark.
 const PATHS: [u32; 2] = [1024, 16_384];
 /// Surfaces that a path meets: in closed rooms nearly all light has been everywhere by then.
 const BOUNCES: usize = 5;
-/// What counts makes a frame of its own if it is so much smaller than the file, but no smaller than this: single precision places what
-/// reaches 10^5 half sizes of a room to within 1 % of one, and where it crosses the room is chance.
+/// The part that counts gets a frame of its own if its half size is between these shares of the file's: single precision places things
+/// that reach 10^5 half sizes of a room only to within 1 % of one, and where they cross the room is chance.
 const SMALLER: [f64; 2] = [1e-5, 0.5];
 
-/// What errors of a bake are averaged over.
+/// The surfaces that errors of a bake are averaged over.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Averages {
     /// In words.
@@ -51,7 +51,7 @@ impl Room {
         lights.any(|light| light.kind.is_parallel() || light.kind.is_dome())
     }
 
-    /// What counts of a hierarchy.
+    /// Which part of a hierarchy counts.
     pub(super) fn count(&self, tree: &mut Tree) -> Counted {
         if tree.nodes.is_empty() || self.is_lit_from_outside() {
             return Counted::default();
@@ -70,7 +70,7 @@ impl Room {
         counted
     }
 
-    /// The frame of what counts, if most of the file lies outside it.
+    /// The frame of the part that counts, if most of the file lies outside it.
     pub(super) fn frame_of(&self, tree: &Tree) -> Option<Frame> {
         let [low, high] = tree.counted_box()?;
         let frame = Frame::of(low + self.mesh.centre, high + self.mesh.centre);
@@ -78,7 +78,7 @@ impl Room {
         (SMALLER[0] < size && size < SMALLER[1]).then_some(frame)
     }
 
-    /// Where light of the lamps lands, each by its flux.
+    /// Where light of the lamps lands: paths are shared among lamps by flux.
     fn landings(&self, tree: &Tree, sight: &Sight, paths: u32) -> Vec<Landing> {
         let lamps = self.sending(tree, &self.dense_lanes());
         let sums: Vec<f64> = (lamps.iter())
@@ -107,7 +107,7 @@ impl Room {
                 let [v, w] = if hit.from_behind { [w, v] } else { [v, w] };
                 landed.push((entry, [1.0 - v - w, v, w]));
                 let mut normal = tree.face_normal[entry as usize];
-                // A sheet sends half of it on.
+                // A sheet passes half of the paths to its other side.
                 if tree.behind(tree.face_node[entry as usize]) != NONE && random.f64() < 0.5 {
                     normal = -normal;
                 }

@@ -1,4 +1,4 @@
-//! What a solution is asked: light at receivers, and which of them something covers.
+//! What a solution can be asked: light at receivers, and which receivers are covered.
 
 use super::estimate::{self, Distance};
 use super::{Bake, Care, Closed, flux};
@@ -9,14 +9,14 @@ use crate::transport::hemisphere::Hemisphere;
 use crate::transport::{Gathered, Gatherer, MOSTLY, Memory, Receiver};
 use glam::DVec3;
 
-/// A face that has less of its area bare lies below something.
+/// A face of whose area less than this share is uncovered lies below something.
 const MOSTLY_COVERED: f64 = 0.01;
 /// A place with something right above it, within this share of the room's half diagonal, is not seen: a centimetre in a
 /// large room.
 const PRESSED: f64 = 2e-3;
 
 impl Bake {
-    /// Looks at the watched points: how far they are from where they were a round ago, see [`super::estimate`].
+    /// Gathers at the watched points: how far their light is from that of a round ago, see [`super::estimate`].
     pub(super) fn distance(&mut self) -> Option<Distance> {
         let round = self.rounds.len();
         let mut gathered = self.gather(&self.room.probes.receivers(&self.refinement.tree, round));
@@ -44,10 +44,10 @@ impl Bake {
         self.gather_with(receivers, Care::Full)
     }
 
-    /// Gathers with care, or just for a picture.
+    /// Gathers with care, or just for a picture, see [`Care`].
     pub(crate) fn gather_with(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
         if self.solution.light.width() == 0 || self.solution.light.white == [0.0; 3] {
-            // A room without light: nothing to look for.
+            // A room without light: nothing to gather.
             return vec![Gathered::dark(); receivers.len()];
         }
         self.room.with_sight(|sight| {
@@ -118,19 +118,19 @@ impl Bake {
         self.is_pressed(sight, to) || covered()
     }
 
-    /// Is what a ray from a point meets first a black back?
+    /// Does a ray from a point first meet a black back?
     pub(crate) fn meets_back(&self, to: &Receiver, way: DVec3) -> bool {
         let (from, way) = (to.point.as_vec3(), way.as_vec3());
         let hit = self.room.rays.closest(from, way, f32::MAX, to.plane);
         hit.is_some_and(|hit| self.refinement.tree.met(&hit) == NONE)
     }
 
-    /// What of a leaf others see.
+    /// Share of a leaf that others see.
     pub(crate) fn openness(&self, leaf: u32) -> f64 {
         f64::from(self.refinement.outlook.bare[leaf as usize])
     }
 
-    /// Of each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.
+    /// For each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.
     pub(crate) fn spaces(&self) -> Vec<(u32, bool)> {
         let mut spaces = vec![(0, false); self.refinement.tree.faces.len()];
         for (face, space) in self.room.mesh.faces.iter().zip(&self.room.spaces) {

@@ -8,10 +8,10 @@ use crate::spectrum::Leaves;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Rows a task multiplies; fixed.
+/// Rows a task multiplies; fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 256;
 
-/// How the leaves reflect: different paints, and which paint each leaf has.
+/// How the leaves reflect: the paints, and which paint each leaf has.
 #[derive(Debug, Default)]
 pub(crate) struct Mixed {
     /// Rows of M, padded to the width of lanes, paint by paint.

@@ -76,19 +76,19 @@ use std::time::Instant;
 const FIRST_THRESHOLD: f64 = 0.02;
 /// What a round divides the threshold by: about twice the links, half the error.
 const THRESHOLD_STEP: f64 = 3.0;
-/// Rooms of this many faces choose their lanes once.
+/// Rooms of at least this many faces choose their lanes only once.
 const MANY_FACES: usize = 50_000;
 /// Elements are not split below this share of the area that counts.
 const LEAST_AREA: f64 = 1e-7;
 /// The working partition may cause this share of the asked-for error. In the Cornell box under F2, .05 to .35 cost the
-/// same time within 2 %, and .35 left a third more error at 2 than .05.
+/// same time within 2 %, and at an error of 2, .35 left a third more error than .05.
 const SPECTRUM_SHARE: f64 = 0.2;
-/// Shares of the error asked for that light at points and straight lines between the vertices of the output may take:
-/// squares add to 1. Half and half would ask a room whose rounds halve the error for a further round in one of six cases
-/// more.
+/// Shares of the asked-for error that may be caused by light at points, and by straight lines between the vertices of
+/// the output: their squares add to 1. Equal shares would ask a room whose rounds halve the error for one more round in
+/// one case of six.
 pub(crate) const LIGHT_SHARE: f64 = 0.8;
 pub(crate) const INTERPOLATION_SHARE: f64 = 0.6;
-/// Why a step that nobody is asked about is always done.
+/// Why a step without an interrupt always ends in a result.
 pub(crate) const NOBODY: &str = "nobody interrupts it";
 
 /// What a gather is for.
@@ -96,9 +96,9 @@ pub(crate) const NOBODY: &str = "nobody interrupts it";
 pub(crate) enum Care {
     /// Points anywhere.
     Full,
-    /// Vertices: those within something are seen by nobody.
+    /// Vertices: nobody sees those that lie inside something.
     Vertex,
-    /// A picture on the way.
+    /// A picture of an unfinished bake.
     Sketch,
 }
 
@@ -119,13 +119,13 @@ pub(crate) struct Given {
     pub(crate) sources: Sources,
     /// Direct irradiance.
     pub(crate) first: Rows,
-    /// A guess of what is reflected.
+    /// A first guess of the reflected light.
     pub(crate) reflected: Rows,
-    /// What every node emits, if that is known.
+    /// What every node emits, if known.
     pub(crate) emitted: Option<Rows>,
     /// Relative error at which the solve ends.
     pub(crate) tolerance: f64,
-    /// Is it asked for where the light went?
+    /// Is a record asked for of where the light went?
     pub(crate) counted: bool,
 }
 
@@ -135,7 +135,7 @@ impl Bake {
         Self::with(scene, settings, None)
     }
 
-    /// The same where rays have told already which faces share a space, and what is closed.
+    /// Prepares a room of which rays have already told which faces share a space and what is closed.
     pub(crate) fn with(scene: Scene, settings: Settings, known: Option<Known>) -> Self {
         let started = Instant::now();
         let (room, tree) = Room::new(scene, settings, known);
@@ -161,10 +161,10 @@ impl Bake {
         &self.rounds[self.rounds.len() - 1]
     }
 
-    /// The same, unless it is `asked` for an end before the round is done: then the bake is what it was before, and there is no
-    /// round. Where it was the first, there is the light that rays from the lamps tell, see `early`. Every round of a bake by several
-    /// ranks is done, each of which would have to be asked at the very same place; and the first of one that keeps where light comes from,
-    /// or whose sky sends light that no lamp does.
+    /// [`Bake::step`], unless `asked` ends it before the round is done: then there is no round, and the bake is what it was before; if the
+    /// round was the first, it has the light that rays from the lamps give, see `early`. Some rounds are always done: those of a bake by
+    /// several ranks, which would all have to be interrupted at the very same place, and the first round of a bake that keeps where light
+    /// comes from, or that has a sky, whose light no rays from lamps give.
     pub fn step_unless(&mut self, asked: Asked) -> Option<&Round> {
         let is_first = self.rounds.is_empty();
         let is_needed = self.room.keep || self.room.scene.sky.is_some();
@@ -202,12 +202,12 @@ impl Bake {
         self.taken_back_s
     }
 
-    /// A round, and its record. Where it was given up, what it worked on is of no use any more.
+    /// A round, and its record. If it is interrupted, what it worked on is of no use any more.
     fn round(&mut self) -> Result<Round, Interrupted> {
         let mut clock = record::Clock::start(self.watch.clone());
         let round = self.rounds.len();
         if round == 0 && self.taken_back_s.is_some() {
-            // Light of a first round that was given up is none to go on from.
+            // The light of a first round that was interrupted is nothing to go on from.
             self.begin_again(&self.refinement.tree.grown());
         }
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
@@ -226,8 +226,8 @@ impl Bake {
         let refined = self.refinement.refine_links(&self.room, &demand)?;
         clock.lap("links");
 
-        // The first links are coarse: look again once there are more. A room of many faces is not coarse even then, and
-        // new lanes would ask for all direct light anew.
+        // The first links are coarse: choose again once there are more. In a room of many faces even the first are fine
+        // enough, and new lanes would mean gathering all direct light anew.
         if round == 0 || (round == 1 && faces < MANY_FACES) {
             self.choose_lanes()?;
         }
@@ -278,7 +278,7 @@ impl Bake {
         }))
     }
 
-    /// How bright every node is beside the white, and how much lightness a change of irradiance makes there: from the last
+    /// How bright every node is relative to white, and how much a change of its irradiance changes its lightness: from the last
     /// solution, or a guess before the first.
     fn stakes(&mut self) -> (Vec<f32>, Vec<f32>) {
         let tree = &self.refinement.tree;
@@ -322,7 +322,7 @@ impl Bake {
         }
     }
 
-    /// Spreads the work over a team: all ranks are to be told the same from here on, and come to the same.
+    /// Spreads the work over a team: from here on all ranks must get the same calls, and reach the same results.
     pub fn spread_over(&mut self, team: Team) {
         self.room.team = team;
         self.refinement.outlook.team = team;
@@ -382,7 +382,7 @@ impl Bake {
         &self.solution.light
     }
 
-    /// What runs and why.
+    /// Which effects are simulated, and why.
     pub fn plan(&self) -> &Plan {
         &self.room.plan
     }
@@ -392,7 +392,7 @@ impl Bake {
         &self.rounds
     }
 
-    /// Does light always meet a front?
+    /// Does every ray inside the room meet the front of a surface?
     pub fn closed(&self) -> Closed {
         self.room.closed
     }

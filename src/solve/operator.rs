@@ -1,11 +1,11 @@
 //! The transport operator on rows: pull, gather over the links, push.
 //!
-//! One pass costs one multiply-add a link, direction and lane.
+//! One pass costs one multiply-add for each link, direction and lane.
 //!
-//! A gather waits for rows that lie anywhere, so that what counts is how many are on their way at once: four sums go on
-//! side by side, none waiting for another, and all else a pass touches is compact (`Shape`), not the patches
-//! themselves. The links of a row stand in order of their source. Vectors are explicit: of loops over arrays of 16 and
-//! 32 lanes the compiler made single numbers, eight times as slow.
+//! A gather waits for rows that lie anywhere in memory, so what counts is how many loads are under way at once: four
+//! sums go on side by side, none waiting for another, and everything else a pass touches is compact (`Shape` in place
+//! of the nodes). The links of a row are sorted by source. Vectors are explicit: from loops over arrays of 16 and 32
+//! lanes the compiler made scalar code, eight times as slow.
 
 use crate::hierarchy::{NONE, Tree};
 use crate::light::rows::Rows;
@@ -34,7 +34,7 @@ pub struct Operator<'a> {
     shape: Shape,
 }
 
-/// The hierarchy as far as pull and push look at it.
+/// The part of the hierarchy that pull and push need.
 #[derive(Debug)]
 struct Shape {
     /// Nodes with children, ascending: node, first child, end of children.
@@ -108,7 +108,8 @@ impl<'a> Operator<'a> {
         seen
     }
 
-    /// The same with room for it: `nodes` and `gathered` are scratch with a row a node; `nodes` holds every patch's mean radiosity afterwards.
+    /// [`Self::received`] into `out`: `nodes` and `gathered` are scratch with a row a node; `nodes` then holds the mean radiosity of every
+    /// node.
     pub fn irradiance<const L: usize>(
         &self,
         radiosity: &Rows,
@@ -116,7 +117,8 @@ impl<'a> Operator<'a> {
         gathered: &mut Rows,
         out: &mut Rows,
     ) {
-        // Lanes of a vector, vectors of a row. Every width sums in the same order: a lane is the same number in all.
+        // Lanes of a vector, vectors of a row. Every width sums in the same order, so that a lane has the same value in
+        // all.
         match L {
             4 => self.pass::<f32x4, 1>(radiosity, nodes, gathered, out),
             8 => self.pass::<f32x8, 1>(radiosity, nodes, gathered, out),
@@ -168,7 +170,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Adds what each patch got to everything below it; the leaves' sums are balanced and written by leaf.
+    /// Adds what each node gathered to everything below it; the leaves' sums are balanced and written by leaf.
     fn push<V: Vector, const N: usize>(&self, rows: &mut [[V; N]], out: &mut [[V; N]]) {
         let shape = &self.shape;
         if shape.inner.is_empty()
@@ -277,7 +279,7 @@ mod tests {
         (tree, areas, leaves)
     }
 
-    /// Every link spelled out between leaves, in f64.
+    /// The operator in f64, every link written out between leaves.
     fn plainly(
         tree: &Tree,
         links: &[Link],
@@ -323,7 +325,7 @@ mod tests {
         let (tree, areas, leaves) = tree(&parents);
         let mut rng = Pcg::new(3);
         let mut links = Vec::new();
-        // More links at some nodes than sums go on side by side, and numbers of them that leave a rest.
+        // Some nodes have more links than sums go on side by side, and numbers of links that leave a rest.
         for a in 1..parents.len() as u32 {
             for b in a + 1..parents.len() as u32 {
                 if rng.f64() < 0.7 {

@@ -1,16 +1,17 @@
-//! How leaves look out: what their rows must sum to, how much of their area looks out at all, and, in rooms where much
-//! stands about, what they see.
+//! How leaves look out: what their rows must sum to, how much of their area looks out at all, and, in cluttered rooms,
+//! what they see.
 //!
-//! There most links are partly hidden, and what a link finds out with a few rays it spreads over all the leaves below its
-//! ends: dark corners get light that belongs elsewhere. So the leaves look for themselves, by rays with density cos / pi
-//! from points of a leaf. Rays of a leaf stay what they are from round to round; what they meet is looked up anew.
+//! In such rooms most links are partly hidden, and a link spreads what it finds out with a few rays over all the leaves
+//! below its ends: dark corners get light that belongs elsewhere. So the leaves look for themselves, by rays with density
+//! cos / pi from points of a leaf. The rays of a leaf stay the same from round to round; the leaves that they meet are
+//! looked up anew.
 //!
-//! A leaf is what others see of it. Of a floor that a cupboard stands on only the part beside the cupboard sends light to
-//! anyone, and of a part that looks half into the open every other ray does. With the openness o(x), the share of the rays
-//! from x that meet fronts, the light of a leaf is the mean weighted by it, `H = int o(x) H(x) dx / int o(x) dx`, and
-//! `A = int o(x) dx` its area. Both follow from the rays themselves: two start from each point, in directions chosen
-//! independently, and each counts if the other met a front. What leaves of these areas send to fronts, all of it, is what
-//! all leaves receive: nothing need be scaled.
+//! A leaf counts as far as others see it. Of a floor that a cupboard stands on, only the part beside the cupboard sends
+//! light to anyone, and of a part that looks half into the open, every other ray does. With the openness o(x), the share
+//! of the rays from x that meet fronts, the light of a leaf is the mean weighted by it, `H = int o(x) H(x) dx / int o(x)
+//! dx`, and `A = int o(x) dx` its area. Both follow from the rays themselves: two start from each point, in directions
+//! chosen independently, and each counts if the other met a front. All light that leaves of these areas send to fronts is
+//! received by leaves: nothing need be scaled.
 
 mod found;
 mod kept;
@@ -27,13 +28,13 @@ use found::{ALONE, End, Found, Pairs, look_from, start};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, at least, and at the most.
+/// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, the least, and the most.
 const LEAF_RAYS: [usize; 3] = [64, 32, 1024];
-/// A patch of which so many rays all met fronts is taken to be closed in.
+/// A patch of which this many rays all met fronts is taken to be closed in.
 const CERTAIN: usize = 1024;
 /// Rays of a leaf that looks for itself: share of a point's for a leaf of mean area, and the least.
 const LOOKING: (f64, usize) = (0.25, BEAM);
-/// Least share of a leaf's area that counts as bare.
+/// Least share of a leaf's area that counts as not covered.
 const LEAST_BARE: f64 = 1e-3;
 /// Leaves that a task looks at; fixed, so that results do not depend on the number of threads.
 const CHUNK: usize = 64;
@@ -44,8 +45,8 @@ const COVER_RAYS: usize = 4;
 pub(crate) struct Outlook {
     /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
     pub target: Vec<f32>,
-    /// For each node that is a leaf: share of its area that takes part. NaN elsewhere. Where leaves look for themselves it is
-    /// the mean openness, else what is not covered by something solid.
+    /// For each node that is a leaf: share of its area that takes part. NaN elsewhere. Where leaves look for themselves this
+    /// is the mean openness, else the share that nothing solid covers.
     pub bare: Vec<f32>,
     /// For each node: is it as good as certain that all its light meets fronts?
     certain: Vec<bool>,
@@ -53,17 +54,17 @@ pub(crate) struct Outlook {
     pub(super) team: Team,
     /// Where the rays of this rank's leaves ended, leaf after leaf.
     ends: Vec<End>,
-    /// What panes they pass and mirrors they meet.
+    /// Which panes those rays pass, and which mirrors they meet.
     pub(super) tints: Tints,
-    /// Rays that went by mirrors in which lamps have no image, ascending: they bring what their ends emit, too.
+    /// Rays by mirrors in which lamps have no image, ascending: these also bring the emission of their ends.
     lamps: Vec<u32>,
     /// First end of each node's rays ([`NONE`] if they are another rank's), and how many there are.
     range: Vec<(u32, u32)>,
-    /// The leaf of the present hierarchy at each end, maybe with the flag [`ALONE`]; [`NONE`] where there is none.
+    /// The leaf of the present hierarchy at each end, maybe with the flag [`ALONE`]; [`NONE`] where no front was met.
     met: Vec<u32>,
 }
 
-/// How much was known of how leaves look out: nodes, rays, and of these what goes by mirrors and how many filters they pass.
+/// How much was known when it was taken down: nodes, rays, rays by mirrors, and the filters that rays pass.
 pub(super) struct Grown {
     nodes: usize,
     ends: usize,
@@ -72,13 +73,13 @@ pub(super) struct Grown {
 }
 
 impl Outlook {
-    /// Takes all leaves for bare, and all their light to meet fronts: nothing was looked at.
+    /// Takes all leaves for uncovered, and all their light to meet fronts, without looking.
     pub(super) fn open(&mut self, tree: &Tree) {
         self.bare = vec![1.0; tree.nodes.len()];
         self.target = vec![1.0; tree.nodes.len()];
     }
 
-    /// Nothing looked at yet, by the ranks of a team.
+    /// An outlook of which nothing is known yet, of the ranks of a team.
     pub(super) fn of_team(team: Team) -> Self {
         Self {
             team,
@@ -86,8 +87,8 @@ impl Outlook {
         }
     }
 
-    /// Looks out of new leaves. A leaf below one of which very many rays all met fronts is not looked at again. Returns
-    /// the rays cast.
+    /// Casts rays out of new leaves. A leaf below one of which very many rays all met fronts casts none. Returns the
+    /// rays cast.
     pub(super) fn extend(
         &mut self,
         tree: &Tree,
@@ -142,8 +143,8 @@ impl Outlook {
         Ok(cast)
     }
 
-    /// Lets new leaves look for themselves, each rank its own, and looks up where the rays of all of them end in the present
-    /// hierarchy. Returns the rays cast by all ranks.
+    /// Lets new leaves look for themselves, each rank its own, and looks up where all rays end in the present hierarchy.
+    /// Returns the rays cast by all ranks.
     pub(super) fn look(
         &mut self,
         tree: &Tree,
@@ -153,7 +154,7 @@ impl Outlook {
         interrupt: &Interrupt,
     ) -> Result<u64, Interrupted> {
         if self.range.len() == tree.nodes.len() {
-            // A hierarchy only grows: this one has been looked out of.
+            // A hierarchy only grows: with as many nodes it is the same one.
             return Ok(0);
         }
         self.target.resize(tree.nodes.len(), f32::NAN);
@@ -215,9 +216,9 @@ impl Outlook {
         Ok(cast)
     }
 
-    /// Looks up which leaf stands at each end; what was found before stays where the leaf was not split.
+    /// Looks up which leaf lies at each end; a leaf found before is kept unless it was split.
     fn find(&mut self, tree: &Tree) {
-        // Patches lie far apart in memory, and rays ask of them only for their children.
+        // Nodes lie far apart in memory, and the look-up needs only their children.
         let children: Vec<u32> = tree.nodes.iter().map(|node| node.child).collect();
         let stands = |met: u32| children[(met & !ALONE) as usize] == NONE;
         let leaf_at = |end: &End| {
@@ -236,7 +237,7 @@ impl Outlook {
         });
     }
 
-    /// How much there is, for [`Outlook::shrink`].
+    /// How much is known, for [`Outlook::shrink`].
     pub(super) fn grown(&self) -> Grown {
         Grown {
             nodes: self.target.len(),
@@ -246,7 +247,7 @@ impl Outlook {
         }
     }
 
-    /// Forgets what was looked at since; `tree` is the hierarchy as it was refined since, too.
+    /// Forgets all that was looked up since `to`; `tree` is the hierarchy as refined since.
     pub(super) fn shrink(&mut self, tree: &Tree, to: &Grown) {
         self.target.truncate(to.nodes);
         self.bare.truncate(to.nodes);
@@ -273,14 +274,14 @@ impl Outlook {
 
     /// Irradiance of each leaf by what its rays met, `nodes` being the radiosity of every patch: by leaf.
     pub(super) fn irradiance<const L: usize>(&self, leaves: &[u32], nodes: &Rows, out: &mut Rows) {
-        // The flag is the highest bit, and part of what stands for no leaf.
+        // The flag is the highest bit, and set in [`NONE`] as well.
         let counted = |_, k: u32| Some(k).filter(|k| k & ALONE == 0);
         let share = |leaf| 1.0 / self.met(leaf).1;
         self.means::<L>(leaves, nodes, out, share, counted);
     }
 
-    /// Irradiance of each leaf by lamps that only rays find, in mirrors, `emitted` being what every patch emits: by leaf; none where
-    /// there are no such rays.
+    /// Irradiance of each leaf, by leaf, from lamps in mirrors that only rays find; `emitted` is the exitance of every patch. None
+    /// where there are no such rays.
     pub(super) fn lamps_in_mirrors<const L: usize>(
         &self,
         leaves: &[u32],
@@ -299,7 +300,7 @@ impl Outlook {
         Some(out)
     }
 
-    /// Irradiance of each leaf as a whole, whatever others see of it: by leaf, for the record of fluxes.
+    /// Irradiance of each leaf as a whole, however much of it others see: by leaf, for the record of fluxes.
     pub(super) fn irradiance_of_whole<const L: usize>(
         &self,
         leaves: &[u32],
@@ -311,7 +312,7 @@ impl Outlook {
         self.means::<L>(leaves, nodes, out, share, counted);
     }
 
-    /// Sums over what the rays of each leaf met, as far as it is counted, times a share of the leaf.
+    /// Sums, for each leaf, over the patches its rays met, as far as `counted` keeps them, times `share`.
     fn means<const L: usize>(
         &self,
         leaves: &[u32],
@@ -342,8 +343,8 @@ impl Outlook {
         self.team.merge_rows(leaves, &rows, out);
     }
 
-    /// The sum over what the rays of one of this rank's leaves met, as far as it is counted; in rooms without panes and mirrors rays
-    /// have no number.
+    /// The sum over the patches that the rays of one of this rank's leaves met, as far as `counted` keeps them; in rooms without
+    /// panes and mirrors rays have no number.
     fn sum<const L: usize>(
         &self,
         leaf: u32,
@@ -373,7 +374,7 @@ impl Outlook {
         sum
     }
 
-    /// An outlook of leaves (ascending nodes) that met these.
+    /// An outlook of `leaves` (ascending nodes) whose rays met the patches `seen`.
     #[cfg(test)]
     pub(super) fn of(nodes: usize, leaves: &[u32], seen: &[Vec<u32>]) -> Self {
         let mut outlook = Self {
@@ -391,11 +392,12 @@ impl Outlook {
         outlook
     }
 
-    /// What the rays of a leaf met that count, and what the sum over them is divided by for the leaf's irradiance.
+    /// The patches met by those rays of a leaf that count, and the divisor of the sum over them for the leaf's
+    /// irradiance.
     pub(super) fn met(&self, leaf: u32) -> (impl Iterator<Item = u32>, f32) {
         let met = self.ends_of(leaf);
         let fronts = (self.bare[leaf as usize] * met.len() as f32).round();
-        // The flag is the highest bit, and part of what stands for no leaf.
+        // The flag is the highest bit, and set in [`NONE`] as well.
         let counted = met.iter().copied().filter(|&k| k & ALONE == 0);
         (counted, fronts.max(1.0))
     }
@@ -405,14 +407,14 @@ impl Outlook {
         &self.met[start as usize..(start + count) as usize]
     }
 
-    /// How much reflected light varies over a leaf: the standard deviation between its four quarters that the noise of
-    /// their rays does not explain, `bright` being that of every patch.
+    /// How much reflected light varies over a leaf: the standard deviation between its four quarters beyond the noise
+    /// of their rays; `bright` is the brightness of every patch.
     pub(super) fn variation(&self, leaf: u32, bright: &[f32], seed: u64) -> f64 {
         let (first, count) = self.range[leaf as usize];
         let pairs = Pairs::new(leaf, count as usize, seed);
         let mut sums = [[0.0_f64; 3]; 4];
         for k in 0..count as usize {
-            // Points that see no fronts say nothing.
+            // Points that see no fronts tell nothing.
             if self.met[first as usize + pairs.fellow(k)] == NONE {
                 continue;
             }
@@ -450,7 +452,7 @@ impl Outlook {
         self.row_bytes() + 8 * (self.range.len() + self.target.len())
     }
 
-    /// Area of every node that takes part; never quite zero, so that nothing is divided by zero.
+    /// The area of every node that takes part; never quite zero, as it is divided by.
     pub(super) fn areas(&self, tree: &Tree) -> Vec<f64> {
         let mut areas: Vec<f64> = tree.nodes.iter().map(|n| n.area).collect();
         for k in (0..areas.len()).rev() {
@@ -465,13 +467,13 @@ impl Outlook {
     }
 }
 
-/// Mean area of the leaves, as far as it counts.
+/// Mean counted area of the leaves.
 fn mean_area(tree: &Tree) -> f64 {
     tree.counted() / tree.leaves().count().max(1) as f64
 }
 
-/// Casts `count` rays out of a leaf. How many there were, how many missed all fronts, how many started where something
-/// covers the leaf.
+/// Casts `count` rays out of a leaf. Returns how many were cast, how many missed all fronts, and how many started where
+/// something covers the leaf.
 fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64) -> [usize; 3] {
     let node = &tree.nodes[leaf];
     let element = &tree.elements[node.element as usize];
@@ -498,7 +500,7 @@ fn escape_from(tree: &Tree, leaf: usize, sight: &Sight, count: usize, seed: u64)
     [count, misses, covered]
 }
 
-/// Does everything that a point sees turn its black back on it? Then something solid stands on the point, or holds it.
+/// Does a point see nothing but black backs? Then something solid stands on the point, or holds it.
 fn is_covered(tree: &Tree, sight: &Sight, from: Vec3, normal: DVec3, plane: u32) -> bool {
     let mut hits = [None; COVER_RAYS];
     let directions: [Vec3; COVER_RAYS] =
@@ -526,7 +528,7 @@ mod tests {
         }
     }
 
-    /// Three points of a leaf, one of which is covered and one half open: light weighted by how open they are.
+    /// Three points of a leaf, one covered and one half open: their light is weighted by openness.
     #[test]
     fn a_leaf_is_what_others_see_of_it() {
         let mut nodes = Rows::zero(3, 4);

@@ -9,11 +9,11 @@ use crate::scene::Scene;
 use crate::scene::effects::{Kind, Plan};
 use crate::transport::{Outside, find_openings};
 
-/// Why a closed room has neither.
+/// Why a closed room has neither sky nor sun.
 const CLOSED: &str = "the room is closed: no ray leaves it";
 
-/// The plan of what a bake of a scene runs, of which nothing is solved. Under a sky it takes the rays by which a bake looks whether the
-/// room is open to it, seconds for 260 000 triangles.
+/// The plan of what a bake of a scene runs, without solving anything. Under a sky it casts the rays by which a bake finds out whether
+/// the room is open to the sky, which takes seconds for 260 000 triangles.
 pub fn running(scene: Scene) -> Plan {
     if scene.sky.is_none() || scene.surfaces.iter().all(|s| s.triangles.is_empty()) {
         let mesh = Mesh::new(&scene);
@@ -54,7 +54,8 @@ impl Room {
         if self.scene.sky.is_none() {
             return;
         }
-        // The few rays that tell whether a room is closed may miss a slit. Those that are relit were looked at.
+        // The few rays that tell whether a room is closed may miss a slit. A room that is relit was looked at when it
+        // was solved.
         let mut found = None;
         if rays && self.sealed == Closed::Yes {
             found = Some(self.find_openings(tree)).filter(|openings| !openings.is_empty());
@@ -62,7 +63,7 @@ impl Room {
                 (self.closed, self.sealed) = (Closed::No, Closed::No);
             }
         }
-        // Where only black backs are met besides fronts no ray leaves it either.
+        // Where rays meet only fronts and black backs, none leaves the room either.
         if self.sealed == Closed::Yes {
             let has_sun = self.plan.runs(Kind::Sun);
             self.scene.shut_out_sky();
@@ -95,7 +96,7 @@ impl Room {
         self.outside = Some(Outside { sky, openings });
     }
 
-    /// Where rays leave the room; counts them.
+    /// Finds where rays leave the room, and counts the rays cast.
     fn find_openings(&mut self, tree: &Tree) -> Openings {
         let seed = self.settings.seed;
         let (openings, cast) =

@@ -9,7 +9,7 @@ use crate::scene::effects::{Kind, Plan};
 /// A mesh whose triangles end where spaces end.
 pub(super) struct Parting {
     pub(super) mesh: Mesh,
-    /// Empty where nothing asks for rays.
+    /// Empty where known cuts are repeated.
     pub(super) rays: RayIndex,
     /// Space of each face.
     pub(super) spaces: Vec<u32>,
@@ -32,8 +32,8 @@ impl Parting {
         let cuts = cuts(&mesh, &rays, is_small(&mesh));
         let found = spaces(&mesh, &rays, &cuts, seed);
         let parted = if is_small(&mesh) {
-            // Here all are cut, and not only those that part spaces: a patch that something stands on shows what is left
-            // of it as one, dark wedges along the contact; one that a lamp hangs before shows the gap's light to the room.
+            // Cut them all, not only those that part spaces: a patch that something stands on shows its uncovered part as
+            // one, dark wedges along the contact; one close behind a lamp shows the light of the gap to the room.
             (0..cuts.len()).collect()
         } else {
             found.parted
@@ -57,7 +57,7 @@ impl Parting {
         }
     }
 
-    /// Cuts a mesh as it was cut before: no ray is cast, and no index is kept.
+    /// Repeats the cuts made to a mesh before: no ray is cast, and no index is kept.
     pub(super) fn again(scene: &Scene, mesh: Mesh, spaces: Vec<u32>, parted: Vec<u32>) -> Self {
         let mesh = if parted.is_empty() {
             mesh

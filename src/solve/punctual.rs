@@ -1,4 +1,4 @@
-//! Punctual lights on the hierarchy: never linked, but gathered at points of every element, with shadows.
+//! Punctual lights on the hierarchy: gathered at points of every element, with shadows; never linked.
 
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Mesh, Sample, Tree};
@@ -11,9 +11,9 @@ use crate::transport::{Look, Outside};
 use crate::transport::{Receiver, punctual_factor};
 use std::f64::consts::PI;
 
-/// Points of an element that a light is looked at from.
+/// Points of an element at which a light is gathered.
 const POINTS: usize = 4;
-/// Leaves below this share of the area that counts do not count for the choice of lanes.
+/// Leaves below this share of the counted area are left out of the choice of lanes.
 const SLIGHT: f64 = 1e-5;
 /// Elements that a task looks at.
 const CHUNK: usize = 64;
@@ -90,7 +90,7 @@ fn at_samples(
         });
     }
     let mut blocked = Vec::new();
-    // The sky changes slowly: the middle stands for all.
+    // Sky light changes slowly: its value at the middle stands for the leaf.
     let middle = Receiver {
         point: samples[0].point,
         normal: samples[0].normal,
@@ -186,8 +186,8 @@ pub(super) fn factors(
     Ok(out)
 }
 
-/// Integral of a light's angular distribution, so that flux is intensity times this (1 where the flux itself is what is known); none
-/// for directional light.
+/// Integral of a light's angular distribution: flux is intensity times this (1 where the flux itself is given); none for directional
+/// light.
 pub(super) fn solid_angle(kind: LightKind) -> Option<f64> {
     match kind {
         LightKind::Point => Some(4.0 * PI),

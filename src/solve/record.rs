@@ -10,7 +10,7 @@ use std::time::Instant;
 /// Version of the log's format. Raised when a field changes its meaning or goes.
 pub const LOG_VERSION: u32 = 1;
 
-/// Is told of every phase that ends.
+/// Called at the end of every phase, with its name.
 pub type Watch = std::sync::Arc<dyn Fn(&'static str) + Send + Sync>;
 
 /// Wall time of the phases of a round, seconds.
@@ -23,7 +23,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Starts.
+    /// Starts the first phase.
     pub fn start(watch: Option<Watch>) -> Self {
         let now = Instant::now();
         Self {
@@ -69,7 +69,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// An estimate; one that is no number is not known.
+    /// An estimate; a value that is not finite means not known.
     pub fn estimate(value: Option<f64>) -> Self {
         Self {
             value: value.filter(|v| v.is_finite()),
@@ -86,7 +86,7 @@ pub enum Kind {
     Bound,
     /// Our best guess.
     Estimate,
-    /// Compared with the truth.
+    /// Compared with a reference.
     Measured,
 }
 
@@ -109,7 +109,7 @@ pub struct Errors {
     pub spectrum_de_luv: Figure,
     /// Unfinished solve: relative, in the norm of the solver.
     pub convergence: Figure,
-    /// The same as CIELUV.
+    /// Unfinished solve, CIELUV.
     pub convergence_de_luv: Figure,
     /// Root mean square error of tristimulus irradiance X, Y, Z by all sources, lm/m2.
     pub total_xyz: Figure,
@@ -144,16 +144,16 @@ pub struct Round {
     /// Expected seconds of these rounds (the gather for the output comes on top).
     #[serde(default)]
     pub remaining_s: Option<f64>,
-    /// Seconds of a look at a watched point, with all threads at work.
+    /// Seconds of a gather at a watched point, with all threads at work.
     #[serde(default)]
     pub look_s: f64,
     /// Seconds by phase.
     pub phases_s: serde_json::Map<String, serde_json::Value>,
-    /// Greatest error a link keeps: share of white, weighted by the root of the receiver's share of area.
+    /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of area.
     pub threshold: f64,
     /// Visibility rays cast for links and punctual lights in this round.
     pub rays: u64,
-    /// Rays by which the openings of a room under a sky were looked for before the first round; 0 in others.
+    /// Rays that looked for the openings of a room under a sky before the first round; 0 in other rounds.
     #[serde(default)]
     pub opening_rays: u64,
     /// Links evaluated in this round.
@@ -177,15 +177,15 @@ pub struct Round {
     /// Bytes of these for the rows of leaves that look for themselves: of several ranks, those of the first.
     #[serde(default)]
     pub row_bytes: usize,
-    /// Of which for each link: the link with its blockers, two entries of its rows, two for the gather.
+    /// Bytes for each link: the link with its blockers, two entries of its rows, two for the gather.
     #[serde(default)]
     pub bytes_per_link: f64,
-    /// Of which for each element: its patches, their rows and direct light.
+    /// Bytes for each element: its patches, their rows and direct light.
     #[serde(default)]
     pub bytes_per_element: f64,
     /// Operator applications of the solve.
     pub iterations: usize,
-    /// How often all bounces were found, until what fluoresces changed no more; 0 where nothing does.
+    /// How often all bounces were found until fluorescence settled; 0 where nothing fluoresces.
     #[serde(default)]
     pub fluorescence_rounds: usize,
     /// Errors by source.
@@ -194,7 +194,7 @@ pub struct Round {
     pub flux: Balance,
     /// Distance of row sums from 1 before balancing: area-weighted mean and greatest.
     pub row_sum_defect: [f64; 2],
-    /// The same after.
+    /// The same distances after balancing.
     pub row_sum_defect_after: [f64; 2],
 }
 
@@ -206,7 +206,7 @@ pub enum Verdict {
     Reached,
     /// Time ran out.
     OutOfTime,
-    /// The user stopped it.
+    /// The user stopped the bake.
     Interrupted,
     /// No more rounds allowed.
     OutOfRounds,

@@ -7,7 +7,7 @@ use super::{Bake, DE_PER_PERCENT, Representation};
 use crate::link::Way;
 
 impl Bake {
-    /// What is written down of a round.
+    /// The record of a round.
     pub(super) fn recorded(&self, m: Measured) -> Round {
         let bake = self;
         let light = &bake.solution.light;
@@ -94,7 +94,7 @@ impl Bake {
         let estimate = Figure::estimate;
         let spectrum = self.solution.spectrum_error.unwrap_or(0.0);
         let convergence_de = m.convergence.bound * 100.0 * DE_PER_PERCENT;
-        // Sources are independent of each other: their squares add. The distance between rounds shows geometry only.
+        // Sources are independent: their squares add. The distance between rounds shows only geometry.
         let all = |geometry: f64| {
             (geometry * geometry + spectrum * spectrum + convergence_de * convergence_de).sqrt()
         };
@@ -124,7 +124,7 @@ impl Bake {
 }
 
 impl Round {
-    /// As far as the end of a bake depends on it.
+    /// What the end of a bake depends on.
     pub(super) fn past(&self) -> Past {
         Past {
             seconds: self.round_s,

@@ -1,18 +1,20 @@
-//! A plain reference: every patch sees every patch, all leaves, one direct solve a leaf. Slow and right.
+//! A plain reference: every patch sees every patch, on all 64 spectral leaves (leaves, here), each solved directly.
+//! Slow and right.
 //!
 //! `B_i = E_i + rho_i (P_i + sum_j F_ij B_j)` (Goral, Torrance, Greenberg and Battaile 1984), P the irradiance from
 //! punctual lights, W/m2/nm. `F_ij` is the mean over points of patch i of the exact point-to-polygon factor (Lambert
 //! 1760) times the share of rays to j that nothing blocks. `A_i F_ij` and `A_j F_ji` are made equal by their mean; rows are
 //! not balanced, [`Reference::row_sums`] tells what they miss. Solved by LU for every distinct set of reflectances.
 //!
-//! What fluoresces adds the 64 x 64 Donaldson matrix of its material times its irradiance, found in rounds; each loses energy.
-//! A sheet has a patch on each side, and what meets the one leaves the other by its transmittance. Panes filter each ray of a factor by
-//! incidence and leaf; where they have a colour every leaf has factors of its own, which takes 64 times the memory. Skies come by 16,384
-//! directions a point, of their parts and not of the formula; the sun is parallel, without its disc. It knows no mirrors: rooms with them are
+//! What fluoresces adds the 64 x 64 Donaldson matrix of its material times its irradiance, found in rounds, each of which
+//! loses energy.
+//! A sheet has a patch on each side, and what meets one side leaves the other by the transmittance. Panes filter each ray of a factor by
+//! incidence and leaf; where they are coloured every leaf has factors of its own, which takes 64 times the memory. Sky light comes from
+//! 16,384 directions a point, from the sky's parts and not from its formula; the sun is parallel, without its disc. Rooms with mirrors are
 //! refused.
 //!
-//! It shares triangles, Lambert's formula, the ray index and what a ray crosses of panes with the solver: no hierarchy, no links, no
-//! lanes, no iteration. Memory grows with the square of the patches, time with the cube: a few thousand at the most.
+//! With the solver it shares triangles, Lambert's formula, the ray index and what a ray crosses of panes: no hierarchy, no links, no
+//! lanes, no iteration. Memory grows with the square of the number of patches, time with the cube: a few thousand at the most.
 
 mod lights;
 mod patch;
@@ -34,21 +36,21 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use ways::Ways;
 
-/// What is fluoresced has settled when no leaf changes by more than this share of the brightest.
+/// Fluorescence has settled when it changes on no leaf by more than this share of the brightest.
 const SETTLED: f64 = 1e-12;
 
 /// The patches of a room and who sees whom.
 #[derive(Debug)]
 pub struct Reference {
-    /// The patches: every side of every triangle of the scene, quartered alike.
+    /// The patches: every side of every triangle of the scene, quartered equally often.
     pub patches: Vec<Patch>,
-    /// `F_ij`: share of the light leaving i that reaches j, for all leaves alike or leaf by leaf.
+    /// `F_ij`: share of the light leaving i that reaches j, one matrix for all leaves or one for each.
     factors: Vec<DMatrix<f64>>,
     /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a leaf by irradiance on another.
     pub donaldson: Vec<Option<Vec<Leaves>>>,
 }
 
-/// What leaves and meets the patches, W/m2/nm, in order of the patches.
+/// What leaves and meets the patches, W/m2/nm, in their order.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// Radiosity: emitted and reflected.
@@ -59,7 +61,7 @@ pub struct Solution {
 
 impl Reference {
     /// Quarters every triangle of `scene` `depth` times and works out all factors, with `rays` rays from a point to a
-    /// patch where something could block. Textures, vertex colours and holes are not looked at.
+    /// patch where something could block. Textures, vertex colours and holes are ignored.
     ///
     /// # Errors
     /// A room with mirrors.
@@ -98,7 +100,7 @@ impl Reference {
         })
     }
 
-    /// `F_ij` of a leaf: share of the light leaving i that reaches j.
+    /// `F_ij` on a leaf: share of the light leaving i that reaches j.
     pub fn factors(&self, leaf: usize) -> &DMatrix<f64> {
         &self.factors[leaf.min(self.factors.len() - 1)]
     }
@@ -108,7 +110,7 @@ impl Reference {
         self.factors(0).row_iter().map(|row| row.sum()).collect()
     }
 
-    /// Solves all leaves; where surfaces fluoresce as often as it takes until what they give out stays as it is.
+    /// Solves all leaves; where surfaces fluoresce, again until their fluorescence settles.
     pub fn solve(&self) -> Solution {
         let mut glow = vec![[0.0; LEAVES]; self.patches.len()];
         loop {
@@ -124,7 +126,7 @@ impl Reference {
         }
     }
 
-    /// What the patches fluoresce under an irradiance.
+    /// Fluorescent exitance of the patches by their irradiance.
     fn fluoresced(&self, irradiance: &[Leaves]) -> Vec<Leaves> {
         let all = self.patches.iter().zip(irradiance);
         let each = all.map(|(patch, light)| match &self.donaldson[patch.material] {
@@ -137,7 +139,7 @@ impl Reference {
         each.collect()
     }
 
-    /// Solves all leaves, given what the patches fluoresce.
+    /// Solves all leaves, given the fluorescent exitance of the patches.
     fn solve_with(&self, glow: &[Leaves]) -> Solution {
         let n = self.patches.len();
         let mut radiosity = vec![[0.0; LEAVES]; n];
@@ -154,7 +156,7 @@ impl Reference {
                 (l == leaf || self.factors.len() == 1) && self.patches.iter().all(alike)
             };
             let alike: Vec<usize> = (leaf..LEAVES).filter(|&l| same(l)).collect();
-            // What leaves a patch of what meets it and its other side.
+            // What leaves a patch, of the light that meets it and its other side.
             let scattered = |i: usize, x: &dyn Fn(usize) -> f64| {
                 let patch = &self.patches[i];
                 let through = |b: usize| patch.transmittance[leaf] * x(b);
@@ -178,7 +180,7 @@ impl Reference {
             }
         }
         let mut irradiance: Vec<Leaves> = self.patches.iter().map(|p| p.punctual).collect();
-        // All leaves at once, or one by one.
+        // All leaves at once, or one by one where each has its own factors.
         let at_once = LEAVES / self.factors.len();
         for first in (0..LEAVES).step_by(at_once) {
             let sources = DMatrix::from_fn(n, at_once, |i, k| radiosity[i][first + k]);
@@ -194,7 +196,7 @@ impl Reference {
     }
 
     /// Irradiance at points of surfaces (world space, unit normals) from a solution, each patch as an exact polygon with
-    /// `rays` rays to it: an order better than the patch means.
+    /// `rays` rays to it: an order better than the mean over a patch.
     pub fn gather(
         &self,
         scene: &Scene,
@@ -232,7 +234,7 @@ impl Reference {
     }
 }
 
-/// Radiosities of `B = right + diag(rho) F B`, a column a right-hand side; by LU with partial pivots.
+/// Radiosities of `B = right + diag(rho) F B`, a column for each right-hand side; by LU with partial pivoting.
 ///
 /// # Panics
 /// If the matrix is singular: a closed room of albedo 1.
@@ -251,13 +253,13 @@ fn solved_system(system: DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
         .expect("albedos below 1 leave no row that is not dominated by its diagonal")
 }
 
-/// The same for one right-hand side.
+/// [`solve`] for one right-hand side.
 pub fn solve_one(factors: &DMatrix<f64>, rho: &[f64], emission: &[f64]) -> DVector<f64> {
     let right = DMatrix::from_column_slice(emission.len(), 1, emission);
     solve(factors, rho, right).column(0).into_owned()
 }
 
-/// `F_ij`, made reciprocal by their means; for all leaves alike, or leaf by leaf where a pane has a colour.
+/// `F_ij`, made reciprocal by their means; one matrix for all leaves, or one for each where a pane is coloured.
 fn factors(scene: &Scene, ways: &Ways<'_>, patches: &[Patch]) -> Vec<DMatrix<f64>> {
     let tinted = |s: &crate::scene::Surface| {
         let pane = scene.materials[s.material].pane.as_ref();
@@ -332,7 +334,7 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
     out
 }
 
-/// Tells the patches of sheets which lies on their other side: that whose middle is theirs.
+/// Links each patch of a sheet with the patch on its other side, whose middle coincides with its own.
 fn pair_up(patches: &mut [Patch], scene: &Scene) {
     let middle = |p: &Patch| p.corners.iter().sum::<DVec3>() / 3.0;
     let is_sheet = |p: &Patch| scene.materials[p.material].sheet.is_some();

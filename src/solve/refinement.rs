@@ -1,4 +1,4 @@
-//! What rounds refine: the hierarchy, its links, and what its leaves see.
+//! What rounds refine: the hierarchy, its links, and the outlook of its leaves.
 
 use super::direct::Direct;
 use super::operator;
@@ -12,9 +12,9 @@ use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Refined, balance}
 use crate::team::Interrupted;
 use rayon::prelude::*;
 
-/// Levels that a round splits leaves by where reflected light varies.
+/// Levels of leaves that a round splits where reflected light varies.
 const LEVELS: usize = 4;
-/// Distinguishes rays that decide from those that bring light.
+/// Distinguishes the rays that decide on splits from those that bring light.
 const DECIDING: u64 = 0xdec1de;
 
 /// A room divided as finely as the rounds so far asked for.
@@ -27,7 +27,7 @@ pub(crate) struct Refinement {
     pub(crate) areas: Vec<f64>,
     pub(crate) balance: Balance,
     pub(crate) direct: Direct,
-    /// What the choice of lanes may take for granted when lamps and paints change: shadows of punctual lights, balance.
+    /// What the choice of lanes may take as given when lamps and paints change: shadows of punctual lights, balance.
     pub(crate) frozen: Option<(Shadowed, Vec<f32>)>,
 }
 
@@ -37,7 +37,7 @@ impl Refinement {
         self.tree.leaves().collect()
     }
 
-    /// As much of a leaf's area as takes part and counts.
+    /// Area of a leaf that takes part and counts.
     pub(crate) fn counted(&self, leaf: u32) -> f64 {
         let node = self.tree.node(leaf);
         self.areas[leaf as usize] * (node.counted / node.area)
@@ -48,7 +48,7 @@ impl Refinement {
         LinkRows::new(self.tree.nodes.len(), &self.graph.links)
     }
 
-    /// What makes rows of links sum to what they must.
+    /// The factors by which rows of links sum to their targets.
     pub(crate) fn balanced(&self, rows: &LinkRows) -> Balance {
         balance(&self.tree, rows, &self.areas, &self.outlook.target)
     }
@@ -63,7 +63,7 @@ impl Refinement {
         room.with_sight(|sight| graph.refine(tree, sight, seed, demand, &room.interrupt))
     }
 
-    /// Learns how new leaves look out; returns the rays cast.
+    /// Finds out how new leaves look out; returns the rays cast.
     pub(super) fn look_out(&mut self, room: &Room) -> Result<u64, Interrupted> {
         let (tree, outlook, seed) = (&self.tree, &mut self.outlook, room.settings.seed);
         let interrupt = &room.interrupt;
@@ -78,10 +78,10 @@ impl Refinement {
         Ok(rays)
     }
 
-    /// Splits leaves that see reflected light vary in the last solution, where leaves look for themselves; the rays cast.
+    /// Where leaves look for themselves, splits those over which reflected light varied in the last solution; returns the rays cast.
     ///
-    /// The rays that decide have no part in the light of leaves. With the same rays for both those leaves stayed whose few rays missed what is
-    /// bright, and 5 % of a flat's light went missing.
+    /// The rays that decide bring no light. With the same rays for both, those leaves stayed unsplit whose few rays missed a bright place, and
+    /// 5 % of a flat's light was lost.
     pub(super) fn split_where_light_varies(
         &mut self,
         room: &Room,
@@ -100,7 +100,7 @@ impl Refinement {
             })?;
             let known = light.bright_reflected.len();
             let nodes = self.tree.nodes.len() as u32;
-            // Parts of a patch that was a leaf in the last solution are as bright as it.
+            // Children of a patch that was a leaf in the last solution are as bright as it was.
             let mut bright = light.bright_reflected.clone();
             for k in known..nodes as usize {
                 bright.push(bright[self.tree.nodes[k].parent as usize]);

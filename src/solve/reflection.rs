@@ -1,4 +1,5 @@
-//! How the leaves reflect: lane by lane, or by a matrix a paint where lanes reflect into each other; and what passes sheets.
+//! How the leaves reflect: lane by lane, or by a matrix per paint where lanes reflect into each other; and what passes
+//! sheets.
 
 use super::linear;
 use super::mixed::Mixed;
@@ -11,20 +12,20 @@ pub(super) struct Reflection {
     pub(super) rows: Rows,
     /// Greatest reflectance of each lane.
     pub(super) greatest: Vec<f32>,
-    /// Matrices of the paints, where lanes are no bands.
+    /// Matrices of the paints, where lanes are not bands.
     pub(super) mixed: Option<Mixed>,
-    /// What passes sheets; never where lanes are no bands.
+    /// What passes sheets; none where lanes are not bands.
     pub(super) sheets: Option<Sheets>,
 }
 
-/// What the leaves of diffuse sheets let through.
+/// Transmittance of the leaves of diffuse sheets.
 #[derive(Debug, Clone)]
 pub(crate) struct Sheets {
-    /// Places among the leaves of a side and of the one behind it, ascending.
+    /// Positions among the leaves of a side and of the side behind it, ascending.
     pub pairs: Vec<[u32; 2]>,
     /// Transmittance of each pair.
     pub through: Rows,
-    /// How their light is shown.
+    /// How the light of these sheets is shown.
     pub shown: Through,
 }
 
@@ -55,7 +56,7 @@ impl Reflection {
         sent
     }
 
-    /// Scales what arrives so that no energy goes missing: by the [`linear::amplitude`] of both sums, lane by lane.
+    /// Scales irradiance so that no energy is lost: by the [`linear::amplitude`] of both sums, lane by lane.
     pub(super) fn scale<const L: usize>(
         &self,
         lanes: &Lanes,
@@ -63,7 +64,7 @@ impl Reflection {
         [over, without]: [[f64; L]; 2],
     ) {
         if self.mixed.is_some() {
-            // Lanes are no bands: it is each of the 64 leaves that keeps its energy.
+            // Where lanes are not bands, energy is kept on each of the 64 spectral leaves.
             let leaves_of = |sum: [f64; L]| lanes.leaves(&sum.map(|x| x as f32));
             let (over, without) = (leaves_of(over), leaves_of(without));
             let scale = std::array::from_fn(|k| linear::amplitude(over[k], without[k]));
@@ -78,8 +79,8 @@ impl Reflection {
         }
     }
 
-    /// The albedo of every leaf and lane under the light of the solution: of what meets a sheet, the share that leaves it on either
-    /// side. Where lanes reflect into each other that is what came back of what came in.
+    /// The albedo of every leaf and lane under the light of the solution: of the light that meets a sheet, the share that leaves it
+    /// on either side. Where lanes reflect into each other it is reflected over received light.
     pub(super) fn albedo<const L: usize>(mut self, reflected: &Rows, irradiance: &Rows) -> Rows {
         if self.mixed.is_some() {
             let rows = self.rows.all_mut::<L>().iter_mut();

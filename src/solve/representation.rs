@@ -1,9 +1,9 @@
-//! The ways in which rows may carry spectra: what the program does by itself, and what it is measured against.
+//! The ways in which rows may carry spectra: the program's own, and those that it is measured against.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Bands and vectors at the most: the leaves.
+/// Bands and vectors at the most: the spectral leaves.
 const MOST: u8 = 64;
 
 /// How spectra are carried by the rows.
@@ -13,16 +13,17 @@ pub enum Representation {
     /// the asked-for error. Written `adaptive` or `perceptual`.
     #[default]
     Adaptive,
-    /// The same, but what is held within the share is a *bound*: the paper's neglected term is taken at its greatest.
+    /// Like `Adaptive`, but the error within the share is a *bound*: the paper's neglected term is taken at its
+    /// greatest.
     Guaranteed,
     /// Radiosity itself on the union of the cuts that the paper's own control (3.1.3, 3.4, errors in XYZ) gives the
     /// lights and their first and second reflections.
     Paper,
-    /// Ratios to each light on so many intervals of equal width, in 1..=64.
+    /// Ratios to each light on this many intervals of equal width, in 1..=64.
     Uniform(u8),
-    /// Coordinates in a basis of so many vectors made for the room (paper 2.2.2), in 1..=64.
+    /// Coordinates in a basis of this many vectors made for the room (paper 2.2.2), in 1..=64.
     Characteristic(u8),
-    /// All 64 leaves.
+    /// All 64 spectral leaves.
     Dense,
     /// Linear sRGB: reflectances and lamps are reduced to three numbers before anything is solved.
     Rgb,

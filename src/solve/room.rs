@@ -1,4 +1,4 @@
-//! What is baked: all that stays as it is from the first round to the last.
+//! The room that is baked: all that stays the same from the first round to the last.
 
 use super::estimate::Probes;
 use super::flux::{self, Closed, Sent};
@@ -48,17 +48,17 @@ impl Default for Settings {
     }
 }
 
-/// Rooms of few triangles with panes or mirrors take directions for this share of the error: what is clipped exactly in others is found by rays
-/// there, and a ray costs next to nothing.
+/// Rooms of few triangles with panes or mirrors use directions for this share of the error: rays find there what is clipped exactly in others,
+/// and a ray costs next to nothing.
 const GLAZED_DIRECTIONS: f64 = 0.25;
-/// A shade around a bulb is as bright as a lamp, but found by rays like all that passes light on: rooms with sheets take directions for
-/// this share of the error. In a curtained room twice as fine directions and tolerances of points brought the estimate of the fifth round
-/// from .56 to .38 dE00, with half the elements.
+/// A shade around a bulb is as bright as a lamp, but found by rays like everything that passes light on: rooms with sheets use directions
+/// for this share of the error. In a curtained room directions and tolerances of points twice as fine brought the estimate of the fifth
+/// round from .56 to .38 dE00, with half the elements.
 const SHEET_DIRECTIONS: f64 = 0.5;
-/// The solve ends at this relative error for each unit of asked-for colour difference: far below geometry and spectrum.
+/// The solve ends at this relative error per unit of asked-for colour difference: far below geometry and spectrum.
 const SOLVE_SHARE: f64 = 0.002;
 
-/// Why light is blocked where nothing else would.
+/// Why occlusion is tested where nothing else would block light.
 pub(super) const RAISED: &str = "a surface lies in the plane of another";
 
 /// A room that is baked. No round changes it; only relighting puts another scene of the same shape in its place.
@@ -68,63 +68,63 @@ pub(crate) struct Room {
     pub(crate) plan: Plan,
     pub(crate) mesh: Mesh,
     pub(crate) rays: RayIndex,
-    /// What light passes through; none where the room has no panes.
+    /// The panes, through which light passes; none where the room has none.
     pub(crate) panes: Option<Panes>,
-    /// What sends light on in one direction; none where the room has no mirrors.
+    /// The mirrors, which send light on in one direction; none where the room has none.
     pub(crate) mirrors: Option<Mirrors>,
-    /// Does light always meet a front?
+    /// Does every ray meet a front?
     pub(crate) closed: Closed,
-    /// The same for what is not covered by something solid.
+    /// As `closed`, leaving out points that something solid covers.
     pub(crate) sealed: Closed,
-    /// What is outside; none where no light comes from there.
+    /// What is outside; none where no light comes from outside.
     pub(crate) outside: Option<Outside>,
-    /// Rays by which openings to a sky were looked for.
+    /// Rays that looked for openings to a sky.
     pub(super) opening_rays: u64,
     /// Where the light of lamps goes first.
     pub(crate) sent: Sent,
-    /// And where on which faces; nothing in a room that is only relit.
+    /// The places where that light lands on faces; empty in a room that is only relit.
     pub(super) landings: Vec<Landing>,
     pub(crate) weights: [Leaves; 3],
-    /// Colours of textures as spectra: its table is made once.
+    /// Turns colours of textures into spectra: its table is made once.
     pub(crate) upsampler: Upsampler,
     pub(crate) hemisphere: Hemisphere,
-    /// What counts of it; errors are averaged over that.
+    /// The part of the hierarchy that counts; errors are averaged over this.
     pub(crate) counted: Counted,
-    /// The box about it, where most of the file lies outside.
+    /// The box around that part, if most of the file lies outside it.
     pub(crate) frame: Option<Frame>,
     /// Points that are watched from round to round.
     pub(crate) probes: Probes,
-    /// Space of each face, and which cuts were made for them, see [`spaces`](crate::hierarchy::spaces).
+    /// Space of each face, and which cuts were made for spaces, see [`spaces`](crate::hierarchy::spaces).
     pub(crate) spaces: Vec<u32>,
     pub(crate) parted: Vec<u32>,
-    /// Is it kept where light comes from, for relighting?
+    /// Is the origin of light recorded, for relighting?
     pub(crate) keep: bool,
     /// The ranks that bake this room together.
     pub(crate) team: Team,
-    /// What ends a round before it is done.
+    /// Ends a round before it is done.
     pub(crate) interrupt: Interrupt,
 }
 
 /// What rays have told of a room before the first round.
 pub(crate) struct Known {
     pub(crate) spaces: Vec<u32>,
-    /// Which cuts of triangles were made for their sake.
+    /// Which cuts of triangles were made for spaces.
     pub(crate) parted: Vec<u32>,
-    /// Of the room, and without what is covered.
+    /// Of all points, and of those that nothing covers.
     pub(crate) closed: [Closed; 2],
-    /// What counts of it, and the box about that.
+    /// The part that counts, and the box around it.
     pub(crate) counted: Counted,
     pub(crate) frame: Option<Frame>,
 }
 
-/// Do leaves and points of this room look for themselves? In a room of few triangles exact clipping is better, but it knows no
-/// filters: where there are panes or mirrors rays do all.
+/// Do leaves and points of a room look for themselves? In a room of few triangles exact clipping is better, but it cannot
+/// apply filters: where there are panes or mirrors, rays are used.
 pub(super) fn by_rays(sight: &Sight) -> bool {
     let plain = sight.panes.is_none() && sight.mirrors.is_none();
     sight.occlusion && !(sight.small() && plain)
 }
 
-/// For what share of the error a room takes directions.
+/// The share of the error for which a room chooses its directions.
 fn directions(plan: &Plan, mesh: &Mesh) -> f64 {
     let filtered = plan.runs(Kind::Panes) || plan.runs(Kind::Mirrors);
     match (filtered && is_small(mesh), plan.runs(Kind::Sheets)) {
@@ -134,7 +134,7 @@ fn directions(plan: &Plan, mesh: &Mesh) -> f64 {
     }
 }
 
-/// The plan as far as a scene and its welded mesh tell.
+/// The plan as far as it follows from a scene and its welded mesh.
 pub(super) fn plan_of(scene: &Scene, mesh: &Mesh) -> Plan {
     let mut plan = Plan::of(scene);
     if !mesh.raised.is_empty() {
@@ -144,7 +144,7 @@ pub(super) fn plan_of(scene: &Scene, mesh: &Mesh) -> Plan {
 }
 
 impl Room {
-    /// Welds a scene, finds its spaces, and the first hierarchy of its faces; and what is around it.
+    /// Welds a scene, finds its spaces and the first hierarchy of its faces, and looks around outside.
     pub(super) fn new(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
         let closed = known.as_ref().map(|known| known.closed);
         let (mut room, tree) = Self::shaped(scene, settings, known);
@@ -158,7 +158,7 @@ impl Room {
         (room, tree)
     }
 
-    /// The same without what is around it.
+    /// [`Self::new`] without looking around outside.
     pub(super) fn shaped(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
         let counted = known.as_ref().map(|known| known.counted.clone());
         let frame = known.as_ref().and_then(|known| known.frame);
@@ -175,7 +175,7 @@ impl Room {
         (room, tree)
     }
 
-    /// The same where only what lies in a frame counts, and is not weighed yet.
+    /// Builds the room so that only what lies in a frame counts, which is not weighed yet.
     fn framed(
         scene: Scene,
         settings: Settings,
@@ -265,7 +265,7 @@ impl Room {
         Painter::new(&self.scene, &self.mesh, &self.upsampler)
     }
 
-    /// Radiosity itself on the 64 leaves: lanes that serve every light.
+    /// Radiosity itself on the 64 spectral leaves: lanes that serve every light.
     pub(crate) fn dense_lanes(&self) -> Lanes {
         Lanes::dense(&self.scene.spectra, &self.weights)
     }
@@ -275,7 +275,7 @@ impl Room {
         SOLVE_SHARE * self.settings.error
     }
 
-    /// How bright the room is about, before anything is solved.
+    /// A rough guess of the room's brightness, before anything is solved.
     pub(crate) fn guess(&self, tree: &Tree) -> flux::Guess {
         flux::guess(&self.scene, &self.mesh, tree, &self.weights)
     }

@@ -2,7 +2,7 @@
 
 /// How finely a room of one kind is divided, as multiples of the round's threshold.
 pub(super) struct Shares {
-    /// What a link may misplace.
+    /// How much light a link may misplace.
     pub(super) link: f64,
     /// By how much direct light may vary over a leaf.
     pub(super) direct: f64,
@@ -10,7 +10,7 @@ pub(super) struct Shares {
     pub(super) reflected: f64,
 }
 
-/// Rooms of few faces: there are many links to a leaf. Up to 16, the share for direct light changes the Cornell box's
+/// Rooms of few faces: there are many links to a leaf. A share for direct light of up to 16 changes the Cornell box's
 /// error at points by less than a tenth: what a leaf reflects is seen as a whole.
 const EMPTY: Shares = Shares {
     link: 0.125,
@@ -24,21 +24,21 @@ const TESSELLATED: Shares = Shares {
     reflected: 0.0,
 };
 const MANY_LEAVES: usize = 4096;
-/// Where leaves look for themselves links only say where the hierarchy is too coarse and what is near and clear, and points see
-/// reflected light through rays that end on many leaves.
+/// Where leaves look for themselves, links only tell where the hierarchy is too coarse and what is near and clear, and points
+/// see reflected light through rays that end on many leaves.
 const FURNISHED: Shares = Shares {
     link: 0.4,
     direct: 5.0,
     reflected: 1.4,
 };
-/// Rooms of few triangles that go by rays for their panes: direct light as in others of their size.
+/// Rooms of few triangles that are solved by rays because of their panes: direct light as in others of their size.
 const GLAZED: Shares = Shares {
     direct: EMPTY.direct,
     ..FURNISHED
 };
 
 impl Shares {
-    /// For a room of so many faces; does it go by rays, and is it one of few triangles?
+    /// The shares for a room of `faces` faces; is it solved by rays, and has it few triangles?
     pub(super) fn of(by_rays: bool, small: bool, faces: usize) -> Self {
         match (by_rays, small) {
             (true, true) => GLAZED,

@@ -1,4 +1,4 @@
-//! What a round solves for: the light on the hierarchy, on the lanes that were chosen for it.
+//! What a round solves for: the light on the hierarchy, on the lanes chosen for it.
 
 use super::punctual;
 use super::room::{Room, by_rays};
@@ -14,7 +14,7 @@ const GATHER_SHARE: f64 = 0.1;
 /// A relative error of 1 % of a mid grey is about this colour difference, see `estimate`.
 pub(crate) const DE_PER_PERCENT: f64 = 0.35;
 
-/// Where light of the watched points came from in a round, if that is kept.
+/// Where the light of the watched points came from in a round, if kept.
 pub(crate) type Traces = Vec<Option<Box<[u8]>>>;
 
 /// The light of the last round.
@@ -27,16 +27,16 @@ pub(crate) struct Solution {
     /// Punctual lights, recentred, with their rows.
     pub(crate) lamps: Vec<(PunctualLight, Vec<f32>)>,
     pub(crate) light: Light,
-    /// Reflected radiosity of the round before, by node: where a solve starts.
+    /// Reflected radiosity of the round before, by node: the start of a solve.
     pub(crate) previous: Rows,
-    /// What was seen at the watched points, X, Y, Z; empty before the first round.
+    /// Irradiance at the watched points, X, Y, Z; empty before the first round.
     pub(crate) seen: Vec<[f64; 3]>,
-    /// Where it came from in the last two rounds, if that is kept.
+    /// Where that irradiance came from in the last two rounds, if kept.
     pub(crate) watched: [Traces; 2],
 }
 
 impl Solution {
-    /// No light yet, on the 64 leaves.
+    /// No light yet, on the 64 spectral leaves.
     pub(super) fn new(room: &Room) -> Self {
         let lanes = room.dense_lanes();
         Self {
@@ -51,7 +51,7 @@ impl Solution {
         }
     }
 
-    /// Looks up the punctual lights on the present lanes.
+    /// Puts the punctual lights on the present lanes.
     pub(crate) fn light_lamps(&mut self, room: &Room) {
         self.lamps = punctual::lamps(&room.scene, &room.mesh, &self.lanes);
     }
@@ -63,7 +63,7 @@ impl Solution {
         xyz.map(|&xyz| brightness(xyz, white)).collect()
     }
 
-    /// How bright each lamp is for a factor of 1, share of the white's.
+    /// How bright each lamp is at a factor of 1, share of the white's.
     pub(super) fn bright_lamps(&self) -> Vec<f32> {
         let weights = self.bright_weights();
         let lamps = self.lamps.iter();
@@ -72,7 +72,7 @@ impl Solution {
             .collect()
     }
 
-    /// How much lightness a change of irradiance makes at every node.
+    /// How much a change of its irradiance changes the lightness of every node.
     pub(super) fn keenness(&self, tree: &Tree) -> Vec<f32> {
         let mut keen = vec![0.0_f32; tree.nodes.len()];
         for (k, &leaf) in self.light.leaves.iter().enumerate() {
@@ -95,7 +95,7 @@ impl Solution {
         keen
     }
 
-    /// Reflected radiosity of the last round on the leaves of this one: a new element starts from its nearest ancestor.
+    /// Reflected radiosity of the last round on the leaves of the present one: a new element starts from its nearest ancestor.
     pub(super) fn guess<const L: usize>(&self, tree: &Tree, leaves: &[u32]) -> Rows {
         let mut rows = Rows::zero(leaves.len(), L);
         if self.previous.width() == L {

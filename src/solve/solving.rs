@@ -1,4 +1,4 @@
-//! The solve of a round: from direct light on the leaves to the light on every patch, with the flux that went where.
+//! The solve of a round: from direct light on the leaves to the light on every patch, with the balance of fluxes.
 
 use super::fluorescing::{Glow, Rounds};
 use super::flux::{self, Closed};
@@ -27,19 +27,19 @@ struct Lit<'a> {
     tolerance: f64,
 }
 
-/// What the bounces come to.
+/// The result of all bounces.
 struct Bounced {
     convergence: Convergence,
-    /// Irradiance by reflected light, and by what fluoresces.
+    /// Irradiance by reflected light and by fluorescence.
     irradiance: Rows,
-    /// What fluoresces, by leaf; none where nothing does.
+    /// Fluorescent exitance, by leaf; none where nothing fluoresces.
     given: Option<Rows>,
-    /// What the flux of reflected light was multiplied by.
+    /// By what the flux of reflected light was multiplied.
     ratio: f64,
 }
 
 impl Bounced {
-    /// Of leaves that reflect nothing.
+    /// The result on leaves that reflect nothing.
     fn none<const L: usize>(leaves: usize) -> Self {
         Self {
             convergence: Convergence::default(),
@@ -50,7 +50,7 @@ impl Bounced {
     }
 }
 
-/// Rows with what fluoresces, if anything does.
+/// Rows plus fluorescent exitance, if any.
 fn with<'a, const L: usize>(rows: &'a Rows, given: Option<&Rows>) -> Cow<'a, Rows> {
     let mut rows = Cow::Borrowed(rows);
     if let Some(given) = given {
@@ -75,7 +75,7 @@ impl Bake {
         }
     }
 
-    /// The same on rows of so many lanes.
+    /// [`Self::solve`] on rows of `L` lanes.
     fn solve_on<const L: usize>(
         &mut self,
         rows: &LinkRows,
@@ -102,7 +102,7 @@ impl Bake {
         solved
     }
 
-    /// The solve itself, with what it starts from.
+    /// The solve itself; returns also what it starts from.
     pub(crate) fn solve_with<const L: usize>(
         &mut self,
         rows: &LinkRows,
@@ -178,7 +178,7 @@ impl Bake {
         (bounced.convergence, flux)
     }
 
-    /// Matrices of the paints, where lanes are no bands.
+    /// Matrices of the paints, where lanes are not bands.
     fn mixed(&self, leaves: &[u32]) -> Option<Mixed> {
         let (tree, lanes) = (&self.refinement.tree, &self.solution.lanes);
         (lanes.is_mixed()).then(|| self.room.painter().mixed(tree, leaves, lanes))
@@ -204,7 +204,7 @@ impl Bake {
         }
     }
 
-    /// All bounces, and what fluoresces.
+    /// All bounces, and fluorescence.
     fn all_bounces<const L: usize>(
         &self,
         lit: &Lit,
@@ -252,7 +252,7 @@ impl Bake {
         leaves.iter().map(|&leaf| areas[leaf as usize]).collect()
     }
 
-    /// The same where surfaces fluoresce: with what they give out, and irradiance by both.
+    /// [`Self::bounce`] where surfaces fluoresce: also the fluorescent exitance, and irradiance by both.
     fn fluoresce<const L: usize>(
         &self,
         lit: &Lit,
@@ -301,7 +301,7 @@ impl Bake {
         Box::new(move |radiosity| operator.received::<L>(radiosity))
     }
 
-    /// What rows of links sum to; nothing where leaves look for themselves.
+    /// What rows of links sum to; empty where leaves look for themselves.
     fn sums_of(&self, rows: &LinkRows) -> Vec<f64> {
         if self.room.by_rays() {
             return Vec::new();
@@ -316,7 +316,7 @@ impl Bake {
         crate::link::row_sums(&self.refinement.tree, rows, &self.refinement.areas, &factor)
     }
 
-    /// Scales direct light so that all that lamps give out arrives; its flux after over before.
+    /// Scales direct light so that all that lamps emit arrives; returns its flux after over before.
     fn conserve(&self, first: &mut Rows, emission: &Rows, leaves: &[u32]) -> f64 {
         let lumens =
             |rows: &Rows| flux::lumens(&self.refinement.areas, &self.solution.lanes, leaves, rows);
@@ -354,7 +354,7 @@ impl Bake {
         let bounced = reflection.of::<L>(lit.first);
         let (mut irradiance, mut ratio) = (Rows::default(), 1.0);
         for _ in 0..linear::PASSES {
-            // What is given out at other wavelengths comes of no irradiance of its lane: it counts with direct light.
+            // Fluorescence does not depend on the irradiance of its own lane: it counts with direct light.
             let given = glow.as_ref().map(|(_, given)| &**given);
             irradiance = slopes.irradiance::<L>(&with::<L>(reflected, given));
             let before = lumens(&irradiance);
@@ -409,7 +409,8 @@ impl Bake {
         })
     }
 
-    /// Takes what mirrors are read as out of what leaves send, and keeps it for rays that met too many; what all nodes send.
+    /// Takes the radiosity of mirrors as matt surfaces out of what leaves send, and keeps it for rays that met too many
+    /// mirrors; returns what all nodes send.
     pub(super) fn without_mirrors<const L: usize>(
         &mut self,
         sent: Cow<Rows>,
@@ -433,7 +434,7 @@ impl Bake {
         self.refinement.on_nodes::<L>(&sent, leaves)
     }
 
-    /// Takes over a solution: light by node, irradiance by leaf, and the white that eyes adapt to.
+    /// Takes over a solution: light by node, irradiance by leaf, and the adaptation white.
     pub(super) fn shine(
         &mut self,
         leaves: &[u32],
@@ -464,7 +465,7 @@ impl Bake {
             .measure(&self.refinement.tree, &self.room.mesh, &self.solution.lanes);
     }
 
-    /// Notes how bright what arrives on leaves is.
+    /// Stores how bright the light arriving on each leaf is.
     pub(super) fn light_arrives(&mut self) {
         let light = &self.solution.light;
         let weights = self.solution.bright_weights();
@@ -481,17 +482,17 @@ impl Bake {
         self.solution.light.bright_lamps = self.solution.bright_lamps();
     }
 
-    /// Mean irradiance by the area that counts, tristimulus.
+    /// Mean irradiance over the area that counts, tristimulus.
     pub fn mean_irradiance(&self) -> [f64; 3] {
         self.mean_over_leaves(|row| self.solution.lanes.tristimulus(row))
     }
 
-    /// The spectrum of the mean irradiance, W/m2/nm on the 64 leaves.
+    /// The spectrum of the mean irradiance, W/m2/nm on the 64 spectral leaves.
     pub fn mean_spectrum(&self) -> Leaves {
         self.mean_over_leaves(|row| self.solution.lanes.leaves(row))
     }
 
-    /// The mean of what irradiance comes to, by the area that counts; 0 where there is none.
+    /// The mean of `of` irradiance over the area that counts; 0 where there is none.
     fn mean_over_leaves<const N: usize>(&self, of: impl Fn(&[f32]) -> [f64; N]) -> [f64; N] {
         let (mut sum, mut area) = ([0.0; N], 0.0);
         for (k, &leaf) in self.solution.light.leaves.iter().enumerate() {

@@ -26,7 +26,7 @@ pub(crate) struct Sources {
     pub reflectance: Rows,
     /// Exitance by leaf: pi times radiance.
     pub emission: Rows,
-    /// Greatest reflectance of each lane, with what passes sheets.
+    /// Greatest reflectance of each lane; at a sheet, with its transmittance.
     pub greatest: Vec<f32>,
     /// What passes sheets; none in a room without.
     pub sheets: Option<Sheets>,
@@ -39,7 +39,7 @@ pub(crate) struct Painter<'a> {
     scene: &'a Scene,
     mesh: &'a Mesh,
     upsampler: &'a Upsampler,
-    /// By material; none of what is no sheet.
+    /// By material; none where it is no sheet.
     sheets: Vec<Option<SheetMeans>>,
 }
 
@@ -60,14 +60,14 @@ impl<'a> Painter<'a> {
     /// Rows for the given leaves of `tree`.
     pub(crate) fn paint(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Sources {
         let width = padded(lanes.len());
-        // One row a material; painted materials are worked out patch by patch.
+        // One row per material; textured materials are worked out patch by patch.
         let plain: Vec<(Vec<f32>, Vec<f32>)> = self
             .scene
             .materials
             .iter()
             .map(|m| {
                 let (mut rho, mut emission) = (vec![0.0; width], vec![0.0; width]);
-                // A mirror is read as a matt surface by rays that met too many.
+                // Rays that have met too many mirrors take a mirror for a matt surface.
                 let mirror = m.mirror.as_ref().map(Mirror::overall);
                 lanes.averages(mirror.as_ref().unwrap_or(&m.reflectance), &mut rho);
                 if let Some(e) = m.even_emission() {
@@ -124,7 +124,7 @@ impl<'a> Painter<'a> {
         sources
     }
 
-    /// Adds what sheets let through, and what is left for their sides to reflect.
+    /// Adds the transmittance of sheets, and reduces their reflectance to what that leaves.
     fn weave(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes, sources: &mut Sources) {
         let pairs: Vec<[u32; 2]> = (0_u32..)
             .zip(leaves)
@@ -146,7 +146,7 @@ impl<'a> Painter<'a> {
             for (rows, spectrum) in rows.iter_mut().zip(&woven) {
                 lanes.averages(spectrum, rows.row_mut(k));
             }
-            // As colours both may come to more than their spectra do.
+            // As colours, the two may sum to more than their spectra do.
             let [rho, through, ..] = &mut rows;
             for (rho, through) in rho.row_mut(k).iter_mut().zip(through.row(k)) {
                 *rho = rho.min(GREATEST_ALBEDO as f32 - through).max(0.0);
@@ -169,8 +169,8 @@ impl<'a> Painter<'a> {
         });
     }
 
-    /// What an element of a sheet reflects and lets through; what it reflects without the pattern of its paint, which viewers add, and
-    /// what its light is shown by. None of what is no sheet.
+    /// Reflectance and transmittance of an element of a sheet; its reflectance without the pattern of its paint, which viewers add;
+    /// and the reflectance that its light is shown by. None where it is no sheet.
     pub(super) fn woven(&self, tree: &Tree, element: &Element) -> Option<[Leaves; 4]> {
         let face = tree.faces[element.face as usize];
         let triangle = face.triangle as usize;
@@ -187,7 +187,7 @@ impl<'a> Painter<'a> {
         Some([rho, through, plain, means.shown])
     }
 
-    /// The matrices of the given leaves, where lanes reflect into each other.
+    /// The matrices of the given leaves, for lanes that reflect into each other.
     pub(super) fn mixed(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Mixed {
         let mut paints: Vec<Leaves> = self.scene.materials.iter().map(|m| m.reflectance).collect();
         let mut of = Vec::with_capacity(leaves.len());
@@ -240,7 +240,7 @@ impl<'a> Painter<'a> {
         Some(color)
     }
 
-    /// Emission and its shape over an element, if a texture shapes it.
+    /// Emission over an element and its spectral shape, if a texture varies it.
     fn glow_of<'m>(
         &self,
         m: &'m Material,
@@ -294,7 +294,7 @@ pub(crate) fn weights_of(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     [1.0 - wb - wc, wb, wc]
 }
 
-/// What single leaves reflect, emit and get from punctual lights, at full resolution.
+/// What single leaves reflect, emit and get from punctual lights, on all 64 spectral leaves.
 pub(crate) struct DenseSources<'a> {
     painter: &'a Painter<'a>,
     tree: &'a Tree,

@@ -1,6 +1,7 @@
-//! Panes and mirrors between leaves that look for themselves: which of their rays pass what, and what that leaves of each lane.
+//! Panes and mirrors between leaves that look for themselves: which of them rays pass, and what remains of each lane.
 //!
-//! Rays are kept from round to round and lanes are not, so what is kept of a ray is what it passes. Angles and thicknesses are rounded:
+//! Rays are kept from round to round and lanes are not, so a ray keeps the panes and mirrors it passes. Angles and thicknesses are
+//! rounded:
 //! a room has few panes and mirrors, and thousands of rays then share one filter.
 
 use crate::light::passed::{self, Passed};
@@ -9,24 +10,24 @@ use crate::store::Broken;
 use crate::store::codec::Read;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the rays of leaves pass.
+/// The panes and mirrors that the rays of leaves pass.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tints {
     /// For each ray the filter that it passes, counted from 1; 0: none. Empty in a room without panes and mirrors.
     of: Vec<u32>,
     /// The filters that rays pass.
     known: BTreeMap<Passed, u32>,
-    /// What they leave, by lane.
+    /// Transmittance of each filter, by lane.
     rows: Rows,
 }
 
 impl Tints {
-    /// No ray passes anything?
+    /// Does no ray pass anything?
     pub(super) fn is_empty(&self) -> bool {
         self.of.is_empty()
     }
 
-    /// Notes what the rays of one more leaf pass, of which there are `count`: those that pass anything, in order.
+    /// Adds `count` rays of one more leaf: `passed` lists those that pass anything, in order.
     pub(super) fn extend(&mut self, count: usize, passed: Vec<(u32, Passed)>) {
         let first = self.of.len();
         self.of.resize(first + count, 0);
@@ -36,28 +37,28 @@ impl Tints {
         }
     }
 
-    /// How many filters rays pass.
+    /// Number of filters that rays pass.
     pub(super) fn filters(&self) -> usize {
         self.known.len()
     }
 
-    /// Forgets all rays but the first, and all but the first filters.
+    /// Forgets all but the first `rays` rays and `filters` filters.
     pub(super) fn shrink(&mut self, rays: usize, filters: usize) {
         self.of.truncate(rays);
         self.known.retain(|_, number| *number as usize <= filters);
     }
 
-    /// The number of what a ray passes, counted from 1; 0: nothing.
+    /// The number of the filter of a ray, counted from 1; 0: none.
     pub(super) fn of(&self, ray: usize) -> u32 {
         self.of[ray]
     }
 
-    /// All that rays pass, as numbers for [`all_of`].
+    /// All filters that rays pass, encoded for [`all_of`].
     pub(super) fn numbers(&self) -> Vec<u64> {
         listed(self.known.keys())
     }
 
-    /// The numbers that what rays pass here has in a list of all, counted from 1, by its own less 1.
+    /// For each filter here, in order of its number, its number in a list of all, counted from 1.
     pub(super) fn places_in(&self, all: &BTreeSet<Passed>) -> Vec<u32> {
         let place: BTreeMap<&Passed, u32> = all.iter().zip(1..).collect();
         let mut places = vec![0; self.known.len()];
@@ -67,7 +68,7 @@ impl Tints {
         places
     }
 
-    /// Rays that pass these of a list of all, by number.
+    /// Rays that pass filters of a list of all, by number.
     ///
     /// # Errors
     /// [`Broken`]: the list has no such number.
@@ -82,7 +83,7 @@ impl Tints {
         })
     }
 
-    /// Works the filters out for these lanes.
+    /// Works out the filters on the present lanes.
     pub(super) fn on(&mut self, filters: &Filters) {
         if self.is_empty() {
             return;
@@ -95,7 +96,7 @@ impl Tints {
         }
     }
 
-    /// What a ray's filter leaves of each lane; none if it passes none.
+    /// Transmittance of a ray's filter on each lane; none if the ray passes none.
     pub(super) fn row<const L: usize>(&self, ray: usize) -> Option<&[f32; L]> {
         let number = self.of.get(ray)?.checked_sub(1)?;
         self.rows.all::<L>().get(number as usize)
@@ -107,7 +108,7 @@ impl Tints {
     }
 }
 
-/// What rays pass, as numbers: how many panes and mirrors, and each of them.
+/// Filters encoded as numbers: how many panes and mirrors, and each of them.
 pub(super) fn listed<'a>(all: impl Iterator<Item = &'a Passed>) -> Vec<u64> {
     let one = |passed: &'a Passed| {
         let count = passed.len() as u64;
@@ -116,10 +117,10 @@ pub(super) fn listed<'a>(all: impl Iterator<Item = &'a Passed>) -> Vec<u64> {
     all.flat_map(one).collect()
 }
 
-/// What such numbers stand for, if light of this room can pass it.
+/// Decodes [`listed`] filters, if light of this room can pass them.
 ///
 /// # Errors
-/// [`Broken`]: it cannot, or they stand for nothing.
+/// [`Broken`]: light cannot pass them, or the numbers mean nothing.
 pub(super) fn all_of(mut numbers: &[u64], filters: &Filters) -> Read<BTreeSet<Passed>> {
     let broken = || Broken::new("has rays that pass what is not there");
     let mut all = BTreeSet::new();

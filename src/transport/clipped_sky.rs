@@ -1,7 +1,7 @@
 //! Sky and ground at a point of a room of few triangles, exactly.
 //!
-//! The directions fall into eight triangles, far away, less the shadows of what stands before them; what is left is cut until the sky is
-//! even over each part, whose factor is exact. Panes are no shadows: what they leave is a mean over directions among these parts.
+//! All directions are covered by eight triangles, far away, less the shadows of blockers; the rest is divided until the sky is even over
+//! each part, whose factor is exact. Panes cast no shadows: their transmittance is a mean over directions among these parts.
 
 use super::receiver::Receiver;
 use super::ways::Ways;
@@ -15,33 +15,33 @@ use crate::scene::sky::{PARTS, PLACES, Sky};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// The far triangles stand this many half sizes of the room away: all of it lies before their planes.
+/// Distance of the far triangles in half sizes of the room: all of it lies before their planes.
 const FAR: f64 = 8.0;
-/// Blockers of a far triangle at the most, and pieces it may fall into, before it is cut.
+/// Blockers of a far triangle at the most, and pieces it may fall into, before it is divided.
 const LISTED: usize = 64;
 const PIECES: usize = 64;
-/// How often a far triangle is cut before rays decide: to 3 degrees.
+/// How often a far triangle is divided before rays decide: to 3 degrees.
 const CUTS: u32 = 5;
-/// Rays into what is left then.
+/// Rays into a far triangle that is divided no further.
 const LAST_RAYS: u32 = 16;
-/// A part is even where two means of the sky over it differ by less than this share. With .005 points of CIE 171 5.9 are off by
-/// .1 %.
+/// A part is even if two means of the sky over it differ by less than this share. With .005 points of CIE 171 5.9 are off by .1
+/// %.
 const EVEN: f64 = 0.005;
-/// And whose corners are less than this far apart, cosine: 25 degrees.
+/// Its corners must also be less than this far apart, cosine: 25 degrees.
 const NARROW: f64 = 0.9;
-/// And which are no further apart than they are from the sun, where the sky comes to a point: by chance two means across it may be alike.
-/// Without that a point of CIE 171 5.9 under the sky of type 13 was .53 % dark.
+/// And they must be no further apart than they are from the sun, where the sky has a peak: by chance two means across the peak may be
+/// alike. Without this a point of CIE 171 5.9 under the sky of type 13 was .53 % dark.
 const BESIDE_SUN: f64 = 1.0;
-/// How often a part is cut for the sky's sake: about the sun it changes within a degree.
+/// How often a part is divided for the sake of the sky, which changes within a degree about the sun.
 const DEPTH: u32 = 6;
 
-/// Memory of a look, and what it found.
+/// Memory of a look outside, and what it found.
 #[derive(Debug, Default)]
 pub(super) struct Found {
     clipper: Clipper,
     /// Irradiance by each part of the sky, where open level ground has 1, and by the ground.
     pub(super) seen: [f64; PLACES],
-    /// What panes leave of them in the mean; none where nothing changes light.
+    /// Mean transmittance of panes for each part; none where nothing changes light.
     pub(super) tints: [Option<Passage>; PLACES],
     /// Rays cast.
     pub(super) rays: u64,
@@ -58,7 +58,7 @@ pub(super) struct Looker<'a> {
 }
 
 impl Looker<'_> {
-    /// Looks; so many directions ask what panes leave.
+    /// Looks outside; `samples` directions find the transmittance of panes.
     pub(super) fn look(&self, samples: usize, found: &mut Found) {
         (found.seen, found.tints, found.rays) = ([0.0; PLACES], Default::default(), 0);
         found.parts.clear();
@@ -69,7 +69,7 @@ impl Looker<'_> {
             if [x, y, z].iter().all(|d| d.dot(self.to.normal) <= 0.0) {
                 continue;
             }
-            // Their fronts are inside.
+            // The fronts of the far triangles face inwards.
             let corners = if octant.count_ones() % 2 == 0 {
                 [x, z, y]
             } else {
@@ -87,7 +87,7 @@ impl Looker<'_> {
         }
     }
 
-    /// Adds what is seen of a far triangle; of its blockers nothing is known but that they are among the candidates.
+    /// Adds the visible part of a far triangle; its blockers are only known to be among the candidates.
     fn cell(&self, cell: &Cell, candidates: Option<&[u32]>, found: &mut Found) {
         let (sight, to) = (self.sight, self.to);
         let point = Patch::Point {
@@ -138,7 +138,8 @@ impl Looker<'_> {
         }
     }
 
-    /// Adds what is seen of a far triangle past these blockers; false, and nothing is added, if it falls into too many pieces.
+    /// Adds the part of a far triangle that is visible past these blockers; false, and nothing is added, if it falls into too
+    /// many pieces.
     fn clip(&self, cell: &Cell, blockers: &[u32], found: &mut Found) -> bool {
         let (sight, to) = (self.sight, self.to);
         let mut clipper = std::mem::take(&mut found.clipper);
@@ -160,7 +161,7 @@ impl Looker<'_> {
         fits
     }
 
-    /// Adds a polygon of directions, any lengths, above the horizon or below it, of which a share is free.
+    /// Adds a polygon of directions (of any length) above or below the horizon, of which a share is free.
     fn add(&self, (up, share): (bool, f64), polygon: &[DVec3], found: &mut Found) {
         if self.by.is_none() && (!up || self.sky.is_even()) {
             let factor = share * lambert_edges_x8(DVec3::ZERO, self.to.normal, polygon);
@@ -174,7 +175,8 @@ impl Looker<'_> {
         }
     }
 
-    /// Radiance of the parts of the sky from a direction that looks up, or of those of the ground from one that looks down; level is either.
+    /// Radiance of the parts of the sky from an upward direction, or of the parts of the ground from a downward one; level directions may be
+    /// either.
     fn half(&self, up: bool, direction: DVec3) -> [f64; PARTS] {
         let y = match up {
             true => direction.y.max(f64::MIN_POSITIVE),
@@ -183,7 +185,7 @@ impl Looker<'_> {
         self.sky.radiance(DVec3 { y, ..direction }).1
     }
 
-    /// Adds the irradiance by a triangle, of which the radiance at the corners is known.
+    /// Adds the irradiance by a triangle with known radiance at its corners.
     fn triangle(
         &self,
         (up, share): (bool, f64),
@@ -201,21 +203,21 @@ impl Looker<'_> {
         let mean = |[x, y, z]: [[f64; PARTS]; 3]| -> [f64; PARTS] {
             std::array::from_fn(|k| (x[k] + y[k] + z[k]) / 3.0)
         };
-        // Exact for quadratic variation, and what is exact for linear.
+        // One rule exact for quadratic variation, and one exact for linear.
         let (fine, coarse) = (mean(halfway), mean(radiance));
         let apart = std::array::from_fn(|k| (fine[k] - coarse[k]).abs());
         let bright = |radiance| self.sky.brightness(up, radiance);
         let is_even = bright(apart) <= EVEN * bright(fine);
         let cosine = a.dot(b).min(b.dot(c)).min(c.dot(a));
-        // 1 less the cosine goes with the square of a distance.
+        // 1 less the cosine is proportional to the square of the distance.
         let is_beside = self.sky.peak().is_some_and(|sun| {
             let nearest = corners.map(|d| d.dot(sun)).into_iter().fold(-1.0, f64::max);
             1.0 - cosine > BESIDE_SUN * (1.0 - nearest)
         });
         if depth == 0 || (cosine > NARROW && is_even && !is_beside) {
             let factor = share * lambert_edges_x8(DVec3::ZERO, normal, &corners);
-            // A sky that is brighter where it falls in more steeply brings more than its mean does: points of a floor far from a window were
-            // 1.2 % dark under a sky of type 1. Products of what is linear are exact.
+            // A sky that is brighter where its light is steeper brings more than its mean does: points of a floor far from a window were 1.2
+            // % dark under a sky of type 1. Products of two linear functions are exact.
             let steep = middles.map(|d| d.dot(normal).max(0.0));
             let all: f64 = steep.iter().sum();
             let mean = |k: usize| match all > 0.0 {
@@ -245,9 +247,9 @@ impl Looker<'_> {
         .for_each(|(part, radiance)| self.triangle((up, share), part, radiance, depth - 1, found));
     }
 
-    /// What panes leave of each part of the sky and of the ground, in the mean: every even part of what is free is asked for by itself, in
-    /// the middles of triangles in proportion to what it brings. Of CIE 171 5.10, point A close below a roof of glass, along which all its
-    /// light comes in, is off by .8 % with 256 random directions, by .4 % with as many middles, and by half of that with twice as many.
+    /// Mean transmittance of panes for each part of the sky and of the ground: each even free part is sampled separately, at the centroids
+    /// of triangles in proportion to its irradiance. Point A of CIE 171 5.10, close below a roof of glass along which all its light comes
+    /// in, is off by .8 % with 256 random directions, by .4 % with as many centroids, and by half of that with twice as many.
     fn tinted(&self, by: &dyn Ways, samples: usize, parts: &[Part]) -> [Option<Passage>; PLACES] {
         let (mut tints, mut all): ([Tint; PLACES], Tint) = Default::default();
         let bright = |part: &Part| self.sky.brightness(part.up, part.brings);
@@ -266,19 +268,19 @@ impl Looker<'_> {
                 }
             }
         }
-        // What is so narrow that no direction fell into it is taken to pass as the rest does.
+        // A part so narrow that no direction fell into it is taken to pass as the rest does.
         let all = all.mean();
         tints.map(|tint| tint.mean().or_else(|| all.clone()))
     }
 
-    /// What panes leave in one direction of a part, and how much that counts there.
+    /// Transmittance of panes in one direction of a part, and the weight of that direction.
     fn asked(&self, by: &dyn Ways, part: &Part, [u, v]: [f64; 2]) -> (Option<Passage>, f64) {
         let [a, b, c] = part.corners;
         let at = a * u + b * v + c * (1.0 - u - v);
         let direction = at.normalize();
         let end = self.to.point + direction * by.reach();
         let (passage, _) = by.leave(&Segment::new(self.to.point, end, [NO_PLANE; 2]));
-        // The triangle is cut by its area: a solid angle falls with the third power of its distance.
+        // The triangle is divided by area: a solid angle falls with the third power of its distance.
         (
             passage,
             self.to.normal.dot(direction).max(0.0) / at.length().powi(3),
@@ -286,7 +288,7 @@ impl Looker<'_> {
     }
 }
 
-/// Middles of the triangles of equal size that a triangle falls into, so many along a side, as its first two barycentric coordinates.
+/// Centroids of the equal triangles into which a triangle falls, `rows` along a side, as its first two barycentric coordinates.
 fn middles(rows: usize) -> impl Iterator<Item = [f64; 2]> {
     let place = move |i: usize, j: usize, third: f64| {
         [i, j].map(|k| (k as f64 + third / 3.0) / rows as f64)
@@ -310,9 +312,9 @@ impl Found {
 /// A far triangle.
 struct Cell {
     corners: [DVec3; 3],
-    /// Is it above the horizon?
+    /// Is the triangle above the horizon?
     up: bool,
-    /// How often it may still be cut.
+    /// How often the triangle may still be divided.
     cuts: u32,
 }
 
@@ -320,7 +322,7 @@ struct Cell {
 #[derive(Debug)]
 struct Part {
     corners: [DVec3; 3],
-    /// Is it above the horizon?
+    /// Is the triangle above the horizon?
     up: bool,
     /// Irradiance by each part of the sky, or of the ground.
     brings: [f64; PARTS],
@@ -349,7 +351,7 @@ mod tests {
         }
     }
 
-    /// The plain way is by rays: the same factors, and the same is left behind three kinds of panes.
+    /// The plain way is by rays: it finds the same factors, and the same transmittances of three kinds of panes.
     #[test]
     fn rays_find_the_same_sky_behind_panes() {
         let bake = baked("glazed.glb", 1);
@@ -373,7 +375,7 @@ mod tests {
         }
     }
 
-    /// Adds what is seen above and below the horizon, and what is left of it in three lanes.
+    /// Adds what is seen above and below the horizon, and what panes leave of that in three lanes.
     fn add(
         sums: &mut [[f64; 4]; 2],
         area: f64,

@@ -1,24 +1,24 @@
-//! Lamps of many faces from afar: one lamp, whose faces are points with a normal and an area.
+//! Lamps of many faces from afar: each is one lamp, whose faces are points with a normal and an area.
 
 use super::gatherer::{Gatherer, Lamp, Memory};
 use super::receiver::Receiver;
 
-/// From so many radii of the largest of its faces on, these count as points: what a triangle brings then differs from what its middle does by
-/// less than 1 % (half the second derivatives of the kernel, 10 over the square of the distance, times the mean square of its extent), and for
-/// all faces of a bulb by less than .5 %.
+/// Beyond this many radii of its largest face a lamp's faces count as points: the irradiance by a triangle then differs from that by its
+/// middle by less than 1 % (half the second derivatives of the kernel, 10 over the square of the distance, times the mean square of its
+/// extent), and for all faces of a bulb by less than .5 %.
 const AFAR: f64 = 12.0;
-/// Faces from which on a lamp has many. Fewer are cut and clipped exactly.
+/// A lamp of at least this many faces has many. Fewer are divided and clipped exactly.
 const MANY: usize = 16;
 
 impl Gatherer<'_> {
-    /// Is a cluster a lamp of many faces that stand for points here?
+    /// Is a cluster a lamp of many faces that count as points from here?
     pub(super) fn is_fixture(&self, to: &Receiver, id: u32) -> bool {
         let (fixtures, node) = (&self.light.fixtures, self.tree.node(id));
         let gap = (node.centre - to.point).length() - node.radius;
         gap > AFAR * fixtures.grain(id) && fixtures.below(self.tree, id).len() >= MANY
     }
 
-    /// Puts such a lamp off until all lamps are known.
+    /// Puts such a lamp in the list of lamps that rays decide together.
     pub(super) fn put_off(&self, to: &Receiver, id: u32, memory: &mut Memory) {
         let fixtures = &self.light.fixtures;
         let faces = memory.faces.len();
@@ -36,15 +36,15 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Adds the factors of a lamp's faces to the memory; their sum.
+    /// Adds the factors of a lamp's faces to the memory; returns their sum.
     fn faces_of(&self, to: &Receiver, id: u32, memory: &mut Memory) -> f64 {
         let fixtures = &self.light.fixtures;
         let faces = fixtures.below(self.tree, id);
         fixtures.factors(faces, to.point, to.normal, &mut memory.faces)
     }
 
-    /// The face of such a lamp that a number in [0, 1) chooses by the factors in the memory: its element, its share of the whole, and
-    /// what is left of the number. `upto`: the face that was chosen last and the factors before it; numbers must ascend.
+    /// The face of such a lamp that a number in [0, 1) selects by the factors in the memory: its element, its share of the whole, and
+    /// the rest of the number. `upto`: the face selected last and the sum of factors before it; numbers must ascend.
     pub(super) fn face_of(
         &self,
         lamp: &Lamp,
@@ -90,7 +90,7 @@ mod tests {
         found
     }
 
-    /// Each face beside its exact form factor, and all of them together.
+    /// Each face against its exact form factor, and all of them together.
     #[test]
     fn faces_of_a_bulb_are_points_from_afar() {
         let bake = baked("mirrored.glb", 1);
@@ -118,7 +118,7 @@ mod tests {
                         })
                         .collect();
                     let whole: f64 = exact.iter().sum();
-                    // Where the horizon of the point cuts the bulb, faces that it cuts are in or out as a whole.
+                    // Where the horizon of the point cuts the bulb, faces on the horizon are in or out as a whole.
                     let node = gatherer.tree.node(id);
                     let above = (node.centre - to.point).dot(to.normal) > node.radius;
                     if above {

@@ -1,4 +1,4 @@
-//! What gathering looks at, and the memory of one thread that does.
+//! What a gather works with, and the memory of one thread.
 
 use super::hemisphere::Hemisphere;
 use super::outside::{Look, Outside};
@@ -14,13 +14,13 @@ use crate::link::{Sight, Way};
 use crate::scene::PunctualLight;
 use glam::DVec3;
 
-/// Nearer than this many of its radii a cluster is entered, and a patch is not even.
+/// A cluster nearer than this many of its radii is entered, and a patch as near is not even.
 pub(super) const CLOSE: f64 = 1.5;
 
-/// A patch that a point is linked to: its node, what may stand between, what the link found visible.
+/// A patch that a point is linked to: its node, what may stand between, and the visible share that the link found.
 pub(super) type Linked = (u32, Way, f32);
 
-/// What light of patches is gathered.
+/// Which light of patches is gathered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Of {
     All,
@@ -28,15 +28,15 @@ pub(super) enum Of {
     Emitted,
 }
 
-/// An element of a lamp whose visible share rays must find: its exact factor, and what it would bring unblocked, share of
-/// white.
+/// An element of a lamp whose visible share is found by rays: its exact factor, and the irradiance it would bring
+/// unblocked, share of white.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lamp {
     pub(super) id: u32,
-    /// The cluster of elements that shine like this one and stand together, see [`Fixtures`](crate::light::Fixtures); [`NONE`] where
-    /// it is by itself.
+    /// The cluster of elements that emit alike and lie together, see [`Fixtures`](crate::light::Fixtures); [`NONE`] for a single
+    /// element.
     pub(super) fixture: u32,
-    /// Where the factors of that cluster's faces begin in the memory.
+    /// Where the factors of that cluster's faces start in the memory.
     pub(super) faces: usize,
     pub(super) factor: f64,
     pub(super) carries: f64,
@@ -50,7 +50,7 @@ pub struct Memory {
     /// Epoch in which each node was last gathered as a patch: rays that end on it bring nothing more.
     pub(super) taken: Vec<u32>,
     pub(super) epoch: u32,
-    /// Was any in this epoch?
+    /// Was any node so gathered in this epoch?
     pub(super) any_taken: bool,
     pub(super) samples: Vec<Sample>,
     pub(super) segments: Vec<Segment>,
@@ -60,19 +60,19 @@ pub struct Memory {
     pub(super) shadows: Shadows,
     /// What the rays of a point met.
     pub(super) met: Vec<(u32, Hit)>,
-    /// What panes leave of what these bring, in order; empty in a room without.
+    /// What panes leave of the light of these hits, in order; empty in a room without panes.
     pub(super) tints: Vec<Option<Box<Passage>>>,
-    /// Of which close by.
+    /// The hits close by.
     pub(super) near: Vec<(u32, Hit)>,
-    /// Lamps that are put off until all of them are known.
+    /// Lamps held back until all of them are known.
     pub(super) lamps: Vec<Lamp>,
-    /// Factors of the faces of lamps of many, one lamp after the other.
+    /// Factors of the faces of lamps with many faces, lamp after lamp.
     pub(super) faces: Vec<f64>,
-    /// Which path each segment to a lamp belongs to, and what it brings.
+    /// The path that each segment to a lamp belongs to, and what the lamp brings.
     pub(super) to_lamps: Vec<(usize, f64)>,
     /// What the rays of a point met by way of mirrors.
     pub(super) mirrored: Vec<Arrived>,
-    /// What a look outside takes.
+    /// Memory of a look outside.
     pub(super) look: Look,
     /// Directions in which the rays of a point leave the room.
     pub(super) escaped: Vec<DVec3>,
@@ -80,12 +80,12 @@ pub struct Memory {
     pub rays: u64,
     /// Variance of brightness by the rays to the lamps of the last point.
     pub(crate) noise: f64,
-    /// Where the direct light of the last point comes from, where that is kept.
+    /// Where the direct light of the last point comes from, if kept.
     pub(crate) trace: Option<Trace>,
 }
 
 impl Memory {
-    /// Another point: nothing is taken yet.
+    /// Starts on another point: no node is gathered yet.
     pub(super) fn begin(&mut self, nodes: usize) {
         self.open.clear();
         self.stack.clear();
@@ -98,40 +98,40 @@ impl Memory {
     }
 }
 
-/// Everything a gather looks at.
+/// Everything that a gather works with.
 pub struct Gatherer<'a> {
-    /// Patches.
+    /// The patches.
     pub tree: &'a Tree,
     /// The solution.
     pub light: &'a Light,
-    /// What blocks.
+    /// What blocks rays.
     pub sight: &'a Sight<'a>,
     /// Punctual lights with their rows of radiant intensity (or normal irradiance), recentred.
     pub lamps: &'a [(PunctualLight, Vec<f32>)],
-    /// What is outside; none where no light comes from there.
+    /// What is outside; none where no light comes from outside.
     pub(crate) sky: Option<&'a Outside>,
-    /// What light passes through on its way; none where the room has no panes.
+    /// The panes, through which light passes; none where the room has none.
     pub(crate) glass: Option<Glass<'a>>,
     /// What mirrors leave of light.
     pub(crate) filters: &'a Filters,
-    /// By which mirrors it is looked from a receiver that is where the true one would look from; none: straight.
+    /// The mirrors by which light comes: the receiver is then the image of the true one. None: light comes straight.
     pub(crate) via: Option<Via>,
     /// What one patch may misplace, share of the white's irradiance.
     pub tolerance: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
     pub closed: bool,
-    /// Directions for indirect light where rays find patches sooner than links do; none: by links.
+    /// The directions of rays for indirect light, where rays find patches sooner than links do; none: by links.
     pub hemisphere: Option<&'a Hemisphere>,
-    /// Are shafts to lamps that matter looked into? Where many points stand for a leaf, rays do.
+    /// Are shafts to lamps that matter looked into? Where many points represent a leaf, rays are used.
     pub(crate) shafts: bool,
-    /// Is it kept where light comes from?
+    /// Is the origin of light recorded?
     pub(crate) keep: bool,
-    /// Points of whose rays more than this share meet black backs lie within something and are not gathered.
+    /// Points of whose rays more than this share meet black backs lie inside something and are not gathered.
     pub(crate) most_backs: f64,
 }
 
 impl Gatherer<'_> {
-    /// Nothing yet; its trace where that is kept.
+    /// No light yet; with a trace if that is kept.
     pub(super) fn start(&self) -> Gathered {
         Gathered {
             trace: self.keep.then(Trace::new),
@@ -139,12 +139,12 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Does nothing change light on its way but what blocks it? Then it is clipped exactly.
+    /// Do only blockers affect light on its way? Then it is clipped exactly.
     pub(super) fn is_plain(&self) -> bool {
         self.glass.is_none() && self.via.is_none()
     }
 
-    /// What panes and mirrors leave of light on a free segment; none where all passes.
+    /// What panes and mirrors leave of light on a free segment; none: all.
     pub(super) fn through(&self, segment: &Segment) -> Option<Passage> {
         match self.via {
             Some(via) => self.by_way_of(via, segment),
@@ -152,7 +152,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// How what light passes is kept, if it is: of many points that stand for a leaf less finely.
+    /// How finely the panes that light passes are recorded, if they are: coarser where many points represent a leaf.
     pub(super) fn steps(&self) -> Option<Steps> {
         match (self.keep, self.shafts) {
             (false, _) => None,
@@ -161,7 +161,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// How bright light is that has passed a segment, as a share.
+    /// Share of brightness that is left of light on a segment.
     pub(super) fn dimmed(&self, segment: &Segment) -> f64 {
         self.left_by(self.through(segment).as_ref())
     }

@@ -1,9 +1,9 @@
 //! Indirect light by rays over the hemisphere: `H(p) = 1/n sum of B(where ray k ends)`, directions with density cos / pi.
 //!
-//! Where much stands about, nearly every link of a point is partly hidden, and rays to each patch in turn cost more than
-//! rays that find the patches themselves: one ray stands for form factor and visibility at once. All points share one
-//! pattern of directions (a (0,2)-sequence, Kollig and Keller 2002, on the concentric map of Shirley and Chiu 1997), in
-//! beams of sixteen. Neighbouring vertices then err alike: no blotches.
+//! In cluttered rooms nearly every link of a point is partly hidden, and rays to each patch in turn cost more than rays
+//! that find the patches themselves: one ray then gives form factor and visibility at once. All points share one pattern
+//! of directions (a (0,2)-sequence, Kollig and Keller 2002, on the concentric map of Shirley and Chiu 1997), in beams of
+//! sixteen. Neighbouring vertices then err alike: no blotches.
 
 use crate::geometry::sampling::sequence02;
 use glam::DVec3;
@@ -13,8 +13,8 @@ pub(crate) const BEAM: usize = 16;
 /// Directions at the least, and at the most.
 const COUNT: [usize; 2] = [64, 4096];
 /// Directions at an asked-for colour difference of [`AT`]; their error falls with the power 3/4 of their number. With 512 points of the grey garage
-/// are off by 6.7, 5.0 and 2.7 % at `--error` 2, 1 and .5 (root mean square), with 1,024 by 4.7, 3.9 and 2.6, for 6, 14 and 33 % more time, but
-/// its file takes a quarter less: of 71,000 vertices a seventh stood on noise.
+/// are off by 6.7, 5.0 and 2.7 % at `--error` 2, 1 and .5 (root mean square), with 1,024 by 4.7, 3.9 and 2.6, for 6, 14 and 33 % more time, but its
+/// file is a quarter smaller: of 71,000 vertices a seventh was due to noise.
 const USUAL: f64 = 1024.0;
 const AT: f64 = 0.5;
 
@@ -25,22 +25,22 @@ pub struct Hemisphere {
 }
 
 impl Hemisphere {
-    /// As many directions as an asked-for error (CIEDE2000) takes.
+    /// As many directions as an asked-for error (CIEDE2000) needs.
     pub fn for_error(error: f64) -> Self {
         let wanted = USUAL * (AT / error).powf(4.0 / 3.0);
         let count = (wanted.min(COUNT[1] as f64) as usize).next_power_of_two();
         Self::new(count.clamp(COUNT[0], COUNT[1]))
     }
 
-    /// The fewest.
+    /// The least number of directions.
     pub(crate) fn sketch() -> Self {
         Self::new(COUNT[0])
     }
 
-    /// `count` directions, a power of two from 16.
+    /// `count` directions, a power of two, at least 16.
     pub(crate) fn new(count: usize) -> Self {
         let beams = count / BEAM;
-        // Cells of the unit square, as square as can be; each holds one beam.
+        // Cells of the unit square, as square as possible; each holds one beam.
         let columns = 1 << (beams.ilog2().div_ceil(2));
         let rows = beams / columns;
         let mut points: Vec<(usize, [f64; 2])> = (0..count as u32)

@@ -1,8 +1,8 @@
-//! Emitting elements and punctual lights at a point: how much of a lamp is seen, and lamps chosen by chance.
+//! Emitting elements and punctual lights at a point: how much of a lamp is seen, and lamps chosen at random.
 //!
-//! A lamp near a point is cut into parts none of which is near; each has its exact factor (contour integral), and rays go to
-//! parts in proportion to it. How many rays is settled beforehand: to stop where the first few agree is to overlook thin
-//! things, and took 4 to 8 % of the light of lamps behind louvres.
+//! A lamp near a point is divided into parts none of which is near; each has its exact factor (contour integral), and rays
+//! go to parts in proportion to this. The number of rays is fixed beforehand: stopping where the first few agree overlooks
+//! thin things, and lost 4 to 8 % of the light of lamps behind louvres.
 
 use super::gatherer::{Gatherer, Lamp, Memory, Of};
 use super::luminaire;
@@ -18,40 +18,40 @@ use crate::scene::LightKind;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// A part is near a point that is closer to its middle than this many of its radii: beyond, what a differential area sends
-/// differs by less than a factor of 4 over the part, and weights make up for that.
+/// A part is near a point that is closer to its middle than this many of its radii: beyond, the kernel differs by less
+/// than a factor of 4 over the part, and weights compensate.
 const NEAR: f64 = 2.0;
 /// Parts of a lamp at the most.
 const PARTS: usize = 64;
-/// Rays to all lamps together: at least, and at the most.
+/// Rays to all lamps together: the least, and the most.
 const RAYS: [usize; 2] = [8, 256];
-/// And from each of the many points that stand for a leaf. With 4 a furnished room's leaves stay so noisy that a further
-/// round is asked for; with 8 that happens in one room of three, and no time is saved.
+/// Rays from each of the many points that represent a leaf. With 4 a furnished room's leaves stay so noisy that a
+/// further round is needed; with 8 that happens in one room of three, and no time is saved.
 const LEAF_RAYS: usize = 16;
-/// All lamps together may misplace what so many patches may. With 1, 2 and 4 three furnished rooms end at the same errors
-/// (.37, .31, .26 mean CIEDE2000) within .01.
+/// All lamps together may misplace as much as this many patches. With 1, 2 and 4 three furnished rooms end at the same
+/// errors (.37, .31, .26 mean CIEDE2000) within .01.
 const PATCHES: f64 = 4.0;
-/// Elements that stand for a far cluster of lamps.
+/// Elements that represent a far cluster of lamps.
 const CHOSEN: usize = 4;
 
 /// A triangle and its factor for a point.
 type Part = ([DVec3; 3], f64);
 
-/// How far a lamp is done with rays to it: what its face was cut into, and where among its faces the last ray went.
+/// State of the rays to a lamp: the parts of its face, and which of its faces the last ray went to.
 #[derive(Default)]
 struct Aim {
     parts: Vec<Part>,
     face: (usize, f64),
 }
 
-/// A lamp that was chosen, the way to it, and what turns what it emits into irradiance by all that it stands for.
+/// A chosen lamp, the segment to it, and the factor from its exitance to irradiance by all lamps that it represents.
 struct Chosen {
     element: u32,
     factor: f64,
     segment: Segment,
 }
 
-/// What a differential area at the end of `way` sends, per area; 0 if it is turned away.
+/// The kernel of a differential area at the end of `way`, per area; 0 if the area is turned away.
 fn kernel(to: &Receiver, normal: DVec3, way: DVec3) -> f64 {
     let (here, there) = (to.normal.dot(way), -normal.dot(way));
     if here > 0.0 && there > 0.0 {
@@ -61,7 +61,8 @@ fn kernel(to: &Receiver, normal: DVec3, way: DVec3) -> f64 {
     }
 }
 
-/// Cuts a lamp's triangle of exact factor `whole` until no part is near or there are [`PARTS`]; their factors sum to `whole`.
+/// Divides a lamp's triangle of exact factor `whole` until no part is near or there are [`PARTS`]; their factors sum to
+/// `whole`.
 fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
     let mut parts = vec![(corners, whole)];
     let mut next = 0;
@@ -74,7 +75,7 @@ fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
             next += 1;
             continue;
         }
-        // What is cut goes to the end, so that the largest are cut first.
+        // Divided parts go to the end, so that the largest are divided first.
         let cut = quarters(corners);
         let factors = lambert_triangles_x8(to.point, to.normal, cut.into_iter()).to_array();
         parts.remove(next);
@@ -83,8 +84,8 @@ fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
     parts
 }
 
-/// A point of one of the parts, chosen by their factors, with the weight that makes the kernel there stand for them all: 1 in
-/// the mean. What is left of `u` after the choice of a part serves for the point.
+/// A point of one of the parts, chosen by their factors, with the weight that lets the kernel there represent all parts: 1 in
+/// the mean. The rest of `u` after the choice of a part chooses the point.
 fn point_of(
     to: &Receiver,
     normal: DVec3,
@@ -107,8 +108,9 @@ fn point_of(
 }
 
 impl Gatherer<'_> {
-    /// Adds the lamps that were put off: what they would bring unblocked, times what of it a number of rays finds open. Each
-    /// ray goes to a lamp chosen by what it would bring, so that many lamps, or a lamp of many faces, take no more than one.
+    /// Adds the lamps that were held back: their unblocked light, times the share that a number of rays finds open. Each ray
+    /// goes to a lamp chosen by its unblocked light, so that many lamps, or a lamp of many faces, need no more rays than
+    /// one.
     pub(super) fn lamps_together(
         &self,
         to: &Receiver,
@@ -150,10 +152,10 @@ impl Gatherer<'_> {
         memory.faces.clear();
     }
 
-    /// What is seen of each lamp, by its own rays. Where brightness has one meaning, a lamp that no ray went to is faint beside the others, and
-    /// those stand for it. Not so where it has two, what is seen and what is excited: a lamp behind a wall that is faint beside one of
-    /// ultraviolet light doubled what is seen in its booth. Such lamps get a ray each, whatever became of the others: given only where
-    /// all others were open, they can but darken, and a furnace was dark by .4 %.
+    /// The visible share of each lamp, by its own rays. If brightness has one meaning, a lamp without a ray is faint beside the others, and
+    /// those represent it. Not so if it has two, visible light and excitation: a lamp behind a wall, faint beside one of ultraviolet light,
+    /// doubled the visible light in a booth. Such lamps get a ray each, whatever the others found: with rays only where all other lamps were
+    /// open, these could only darken, and a furnace was dark by .4 %.
     fn look_at_each(
         &self,
         to: &Receiver,
@@ -182,8 +184,8 @@ impl Gatherer<'_> {
         }
     }
 
-    /// What panes leave of each lamp's light, by the rays that reached it, and last of all lamps' light together, which stands for
-    /// those that no ray went to. Empty in a room without panes.
+    /// What panes leave of each lamp's light, by the rays that reached the lamp, and last of all lamps' light together, which
+    /// represents lamps without such rays. Empty in a room without panes.
     pub(super) fn tints(&self, owners: &[usize], lamps: usize, memory: &Memory) -> Vec<Passage> {
         if self.is_plain() {
             return Vec::new();
@@ -206,15 +208,15 @@ impl Gatherer<'_> {
         each.chain([whole.clone()]).collect()
     }
 
-    /// How bright light is of which so much is left, as a share.
+    /// Share of brightness that a passage leaves.
     pub(super) fn left_by(&self, passage: Option<&Passage>) -> f64 {
         passage.map_or(1.0, |passage| self.filters.brightness(&passage.filter))
     }
 
-    /// How many rays lamps are worth that would bring `all`, share of white.
+    /// How many rays are worth while to lamps that would bring `all`, share of white.
     pub(super) fn rays_to_lamps(&self, to: &Receiver, all: f64) -> usize {
-        // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses; what is dark is seen more keenly. Where many
-        // points stand for a leaf it is the points that make up for it.
+        // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses; errors in the dark are more visible. Where
+        // many points represent a leaf, their number compensates.
         let here = to
             .leaf
             .and_then(|leaf| self.light.arrival.get(leaf as usize));
@@ -226,8 +228,8 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Puts rays to lamps, in number as `all` that they would bring asks for, into the memory with their weights; which lamp
-    /// each goes to.
+    /// Aims rays at lamps, as many as `all` their light needs, and stores them with their weights in the memory; returns the
+    /// lamp of each.
     fn aim(&self, to: &Receiver, lamps: &[Lamp], all: f64, memory: &mut Memory) -> Vec<usize> {
         let count = self.rays_to_lamps(to, all);
         let turn = hash(to.seed, u64::from(lamps[0].id));
@@ -244,7 +246,7 @@ impl Gatherer<'_> {
             };
             let mut aim = Aim::default();
             while let Some([u, v]) = samples.next_if(|sample| sample[0] * all < upto) {
-                // What is left of the number after the choice of a lamp serves for the point.
+                // The rest of the number after the choice of a lamp chooses the point.
                 let u = ((u * all - before) / lamp.carries).clamp(0.0, 1.0);
                 if let Some((segment, weight)) = self.ray_to(to, lamp, [u, v], &mut aim, memory) {
                     memory.weights.push(weight);
@@ -257,7 +259,8 @@ impl Gatherer<'_> {
         owners
     }
 
-    /// A ray to a point of a lamp, and its weight; none where what was chosen sends nothing. Numbers of one aim ascend.
+    /// A ray to a point of a lamp, and its weight; none where the chosen point sends nothing. The numbers of one aim
+    /// ascend.
     fn ray_to(
         &self,
         to: &Receiver,
@@ -281,8 +284,8 @@ impl Gatherer<'_> {
         (weight > 0.0).then(|| (Segment::new(to.point, point, planes), weight))
     }
 
-    /// Adds what the emitting elements of a far cluster send, by some of them chosen by chance. `carries`: how much that is
-    /// about, share of white.
+    /// Adds the light of the emitting elements of a far cluster, by some of them chosen at random. `carries`: its rough
+    /// amount, share of white.
     pub(super) fn lamps_by_chance(
         &self,
         to: &Receiver,
@@ -309,7 +312,7 @@ impl Gatherer<'_> {
     }
 
     /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
-    /// the probability that it brings the light, if nothing lies on the segments: without bias.
+    /// its share of the light as probability, provided nothing blocks the segments: without bias.
     pub(super) fn one_lamp(&self, to: &Receiver, [u, v]: [f64; 2]) -> [Option<(f64, Segment)>; 2] {
         let punctual = self.one_punctual(to, [u, v]).map(|(bright, end)| {
             let segment = Segment::new(to.point, end, [to.plane, NO_PLANE]);
@@ -324,7 +327,7 @@ impl Gatherer<'_> {
         [punctual, emitter]
     }
 
-    /// Chooses a punctual light: brightness of them all, and where the ray to it ends.
+    /// Chooses a punctual light: the brightness of all of them, and the end of the ray.
     fn one_punctual(&self, to: &Receiver, [u, v]: [f64; 2]) -> Option<(f64, DVec3)> {
         let far = self.one_direction(to, [u, v]);
         let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
@@ -335,7 +338,7 @@ impl Gatherer<'_> {
                         (factors[place], to.point + d * self.distance())
                     }
                     (LightKind::Surface, _) => {
-                        // Which lamp is chosen must not tell which of its points.
+                        // The choice of a lamp must be independent of the choice of its point.
                         let turn = hash(u.to_bits() ^ v.to_bits().rotate_left(32), 0x73);
                         let at = sequence02(1, turn);
                         luminaire::whole(lamp, to, self.light.half_size, at)?
@@ -354,7 +357,7 @@ impl Gatherer<'_> {
         Some((all, end))
     }
 
-    /// Chooses a point of an emitting element below a node, [`NONE`] for no node.
+    /// Chooses a point of an emitting element below a node; [`NONE`] stands for no node.
     fn one_emitter(&self, to: &Receiver, below: u32, [mut u, v]: [f64; 2]) -> Option<Chosen> {
         let (id, chance) = self.emitting_element(to, below, &mut u)?;
         let node = self.tree.node(id);
@@ -374,8 +377,8 @@ impl Gatherer<'_> {
         })
     }
 
-    /// Chooses an emitting element below a node and tells with what probability; `u` serves again afterwards. The choice
-    /// descends the hierarchy (Conty Estevez and Kulla 2018).
+    /// Chooses an emitting element below a node, and returns its probability; `u` can be used again. The choice descends
+    /// the hierarchy (Conty Estevez and Kulla 2018).
     fn emitting_element(&self, to: &Receiver, below: u32, u: &mut f64) -> Option<(u32, f64)> {
         let worth = |id: u32| {
             let node = self.tree.node(id);
@@ -392,7 +395,7 @@ impl Gatherer<'_> {
         if id == NONE || worth(id) <= 0.0 {
             return None;
         }
-        // An element emits all over alike, whatever its parts.
+        // An element emits evenly, whatever its children.
         while self.tree.node(id).element == NONE {
             let children = self.tree.node(id).child_range();
             let children = children.map(fork).filter(|&child| child != NONE);
@@ -464,7 +467,7 @@ mod tests {
         }
     }
 
-    /// Weights of 1 in the mean, and nowhere far from it unless the parts ran out.
+    /// Weights are 1 in the mean, and nowhere far from 1 unless the parts ran out.
     #[test]
     fn points_of_a_lamp_stand_for_its_factor() {
         const SAMPLES: u32 = 4096;
@@ -483,7 +486,7 @@ mod tests {
         }
     }
 
-    /// Against all lamps in turn, exactly.
+    /// Against the exact sum over all lamps.
     #[test]
     fn one_lamp_by_chance_is_all_lamps_on_the_mean() {
         const SAMPLES: u32 = 1024;
@@ -491,7 +494,7 @@ mod tests {
         assert!(!bake.lamps().is_empty());
         let (mut off, mut all) = (0.0, 0.0);
         bake.room.with_sight(|sight| {
-            // So many rays that their noise is none.
+            // So many rays that they have no noise.
             let gatherer = Gatherer {
                 tolerance: 1e-6,
                 ..bake.gatherer(sight)

@@ -1,9 +1,9 @@
-//! Lamps that shine from a surface as a profile says: what they bring to a point, near and far.
+//! Lamps that emit from a surface by a profile: their irradiance at a point, near and far.
 //!
 //! `E(p) = Phi int i(p - x, n(x)) cos / r^2 V dA`, with `i` the intensity over flux and area of an element
-//! ([`Luminaire::per_area`](crate::scene::luminaires::Luminaire::per_area)). The surface is cut until no part is near the point; each part is
-//! a rule of seven points, or three where it is far. Where little stands between, what is seen is the surface less its shadows,
-//! exactly; else rays to parts chosen by what they bring find the visible share.
+//! ([`Luminaire::per_area`](crate::scene::luminaires::Luminaire::per_area)). The surface is divided until no part is near the point; each
+//! part has a rule of seven points, or three where it is far. Where little stands between, the visible part is the surface less its shadows,
+//! exactly; else rays to parts chosen by their irradiance find the visible share.
 
 use super::gatherer::{Gatherer, Memory};
 use super::receiver::Receiver;
@@ -15,16 +15,16 @@ use crate::scene::PunctualLight;
 use crate::scene::luminaires::Luminaire;
 use glam::DVec3;
 
-/// A part nearer than this many of its radii is cut: what the rule of seven points then misses of a square panel is below
-/// .01 %.
+/// A part nearer than this many of its radii is divided: the rule of seven points then errs by less than .01 % for a
+/// square panel.
 const NEAR: f64 = 2.0;
-/// Beyond this many of its radii three points (a rule of degree 2) do as well.
+/// Beyond this many of its radii three points (a rule of degree 2) are as good.
 const FAR: f64 = 8.0;
 /// Parts of a triangle at the most.
 const PARTS: usize = 64;
-/// Lamps of more triangles are found by rays alone.
+/// Lamps of more triangles are seen by rays alone.
 const FEW: usize = 16;
-/// Rays end so far before the surface, share of half the room: f32 positions are off by 1e-7 of it.
+/// Distance before the surface at which rays end, share of the room's half size: f32 positions are off by 1e-7 of that.
 const BEFORE: f64 = 1e-5;
 
 /// Points of a triangle and their weights, exact to degree 5 (Radon 1948; Cowper 1973).
@@ -43,7 +43,7 @@ const SEVEN: [([f64; 3], f64); 7] = {
         ([B, B, 1.0 - 2.0 * B], W[2]),
     ]
 };
-/// The same to degree 2 (Cowper 1973).
+/// Three points and their weights, exact to degree 2 (Cowper 1973).
 const THREE: [([f64; 3], f64); 3] = {
     const A: f64 = 1.0 / 6.0;
     const B: f64 = 2.0 / 3.0;
@@ -54,7 +54,7 @@ const THREE: [([f64; 3], f64); 3] = {
     ]
 };
 
-/// A part of a lamp, none near the point, and what turns the lamp's flux into what the part brings there.
+/// A part of a lamp, not near the point, and the factor from the lamp's flux to the irradiance by the part.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     corners: [DVec3; 3],
@@ -63,7 +63,7 @@ struct Part {
 }
 
 impl Part {
-    /// A point of it by chance, and its weight: 1 in the mean.
+    /// A random point of the part, and its weight: 1 in the mean.
     fn point(&self, luminaire: &Luminaire, to: &Receiver, uv: [f64; 2]) -> (DVec3, f64) {
         let [a, b, c] = self.corners;
         let at = mix(&self.corners, triangle_weights(uv));
@@ -79,7 +79,7 @@ fn mix(&[a, b, c]: &[DVec3; 3], w: [f64; 3]) -> DVec3 {
     a * w[0] + b * w[1] + c * w[2]
 }
 
-/// What a place of a lamp brings to a point, per area; 0 if it is turned away.
+/// Irradiance by a place of a lamp, per area; 0 if it is turned away.
 fn density(luminaire: &Luminaire, at: DVec3, normal: DVec3, to: &Receiver) -> f64 {
     let way = to.point - at;
     let square = way.length_squared();
@@ -90,7 +90,7 @@ fn density(luminaire: &Luminaire, at: DVec3, normal: DVec3, to: &Receiver) -> f6
     luminaire.per_area(way / square.sqrt(), normal) * cosine / square
 }
 
-/// The same of a place that is as bright from everywhere: cosines over the square of the distance.
+/// [`density`] of a place that is equally bright from all directions: cosines over the square of the distance.
 fn even(at: DVec3, normal: DVec3, to: &Receiver) -> f64 {
     let way = to.point - at;
     let square = way.length_squared();
@@ -98,7 +98,7 @@ fn even(at: DVec3, normal: DVec3, to: &Receiver) -> f64 {
     cosines[0] * cosines[1] / square.powi(2).max(f64::MIN_POSITIVE)
 }
 
-/// Triangles of a lamp that face a point and lie above it, lifted off their surface, with their normals.
+/// Triangles of a lamp that face a point and lie above its horizon, lifted off their surface, with their normals.
 fn facing(
     lamp: &PunctualLight,
     luminaire: &Luminaire,
@@ -116,15 +116,15 @@ fn facing(
     lifted.collect()
 }
 
-/// Cuts a triangle, the nearest part first, until none is near or there are [`PARTS`], and adds the parts that bring something. Of
-/// near ones the exact form factor counts, so that only how the profile varies over a part is left to the rule.
+/// Divides a triangle, the nearest part first, until no part is near or there are [`PARTS`], and adds the parts that bring
+/// something. Near ones use the exact form factor, so that only the variation of the profile over a part is left to the rule.
 fn cut(
     luminaire: &Luminaire,
     (triangle, normal): ([DVec3; 3], DVec3),
     to: &Receiver,
     out: &mut Vec<Part>,
 ) {
-    // How many of its radii a part is away.
+    // Distance of a part in its radii.
     let away = |corners: &[DVec3; 3]| {
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         let radius = corners.map(|p| p.distance(middle));
@@ -152,7 +152,7 @@ fn cut(
             let even = |w: &[f64; 3]| even(mix(&corners, *w), normal, to);
             let by_rule = area * rule.iter().map(|(w, weight)| weight * even(w)).sum::<f64>();
             let exact = std::f64::consts::PI * lambert_polygon(to.point, to.normal, &corners);
-            // A part that no point of the rule sees brings as good as nothing.
+            // A part that no point of the rule sees brings next to nothing.
             brings *= if by_rule > 0.0 { exact / by_rule } else { 0.0 };
         }
         if brings > 0.0 && brings.is_finite() {
@@ -165,7 +165,7 @@ fn cut(
     }
 }
 
-/// The part that a number in [0, 1) chooses by what parts bring, and what is left of the number.
+/// The part that a number in [0, 1) selects by the irradiance of parts, and the rest of the number.
 fn choose(parts: &[Part], all: f64, u: f64) -> Option<(&Part, f64)> {
     let mut left = u * all;
     let mut chosen = None;
@@ -179,8 +179,8 @@ fn choose(parts: &[Part], all: f64, u: f64) -> Option<(&Part, f64)> {
     chosen
 }
 
-/// What turns the flux of a lamp with an extent into irradiance where nothing is in between, and a point of it that two numbers
-/// in [0, 1) choose, by what it brings.
+/// Unblocked factor from the flux of a lamp with an extent to irradiance, and a point of the lamp that two numbers in [0, 1)
+/// select by irradiance.
 pub(super) fn whole(
     lamp: &PunctualLight,
     to: &Receiver,
@@ -198,8 +198,8 @@ pub(super) fn whole(
 }
 
 impl Gatherer<'_> {
-    /// What turns the flux of a lamp with an extent into irradiance, past what is in between, and what panes leave of it. `bright`:
-    /// what the lamp's flux is, share of white.
+    /// Factor from the flux of a lamp with an extent to irradiance, past blockers, and what panes leave of its light. `bright`: the
+    /// lamp's flux, share of white.
     pub(super) fn of_surface(
         &self,
         to: &Receiver,
@@ -211,7 +211,7 @@ impl Gatherer<'_> {
             return (0.0, None);
         };
         let (mut seen, mut parts) = (0.0, Vec::new());
-        // Panes are found by rays.
+        // Panes need rays.
         let by_rays = self.sight.occlusion || self.glass.is_some();
         let exact = self.shafts && self.is_plain() && luminaire.triangles().len() <= FEW;
         for triangle in facing(lamp, luminaire, to, self.light.half_size) {
@@ -238,7 +238,7 @@ impl Gatherer<'_> {
         (seen + more, passage)
     }
 
-    /// What a triangle of a lamp brings, less the shadows of what stands between; none where that is too much.
+    /// Irradiance by a triangle of a lamp, less the shadows of blockers; none where there are too many.
     fn past_blockers(
         &self,
         luminaire: &Luminaire,
@@ -260,7 +260,7 @@ impl Gatherer<'_> {
                         return None;
                     }
                 }
-                // What is left below this is rounding: what is hidden is exactly dark.
+                // Less than this is rounding: hidden lamps are exactly dark.
                 if memory.clipper.factor(to.normal, 1.0) <= 0.0 {
                     return Some(0.0);
                 }
@@ -275,7 +275,7 @@ impl Gatherer<'_> {
         Some(parts.iter().map(|part| part.brings).sum())
     }
 
-    /// What rays to the parts of a lamp find of what they bring, and the variance of its brightness.
+    /// The part of their irradiance that rays to the parts of a lamp find, and the variance of its brightness.
     fn by_lamp_rays(
         &self,
         luminaire: &Luminaire,

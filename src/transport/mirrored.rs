@@ -1,8 +1,8 @@
 //! Light by way of mirrors.
 //!
-//! Rays over the hemisphere that meet mirrors go on, and bring what they meet at last, tinted. Lamps, sun and openings are looked for in
-//! each image besides, from where the point would look from ([`Image::point`](crate::hierarchy::Image::point)): with the factors that
-//! they have for any point, but for what is in the way. So what lamps emit counts for rays only where nothing has an image.
+//! Rays over the hemisphere that meet mirrors go on, and bring the light of what they meet at last, tinted. Besides, lamps, sun and
+//! openings are gathered in each image, from the point's mirror image ([`Image::point`](crate::hierarchy::Image::point)): with the
+//! factors that they have for any point, except for what blocks them. So rays bring emission only where things have no image.
 
 use super::gatherer::{Gatherer, Memory};
 use super::receiver::{Gathered, Receiver};
@@ -15,11 +15,11 @@ use crate::link::View;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// Rays of one of many points that look for the sky in mirrors.
+/// Rays that look for the sky in mirrors, from one of many points.
 const RAYS: usize = 16;
 
 impl Gatherer<'_> {
-    /// For each segment: is it blocked, by whatever way it is looked?
+    /// For each segment: is it blocked, straight or by way of mirrors?
     pub(super) fn blocked(&self, segments: &[Segment], out: &mut Vec<bool>) {
         let Some(via) = self.via else {
             return self.sight.blocked(segments, &View::Crowded, out);
@@ -41,7 +41,7 @@ impl Gatherer<'_> {
         self.sight.is_open(via.image, from, segment)
     }
 
-    /// Could any of a ball be seen, by whatever way it is looked?
+    /// Could any part of a sphere be seen, straight or by way of mirrors?
     pub(super) fn may_show(&self, centre: DVec3, radius: f64) -> bool {
         let (Some(via), Some(mirrors)) = (self.via, self.sight.mirrors) else {
             return true;
@@ -49,25 +49,25 @@ impl Gatherer<'_> {
         mirrors.may_show(via.image, via.point, (centre, radius))
     }
 
-    /// What is left of light on a segment that is looked along by way of mirrors.
+    /// What is left of light on a segment by way of mirrors.
     pub(super) fn by_way_of(&self, via: Via, segment: &Segment) -> Option<Passage> {
         let mirrors = self.sight.mirrors?;
         let route = mirrors.route(via.image, via.point, segment.to.as_dvec3())?;
         Some(self.along(&route))
     }
 
-    /// What is left of light by a way by mirrors, and past panes between them.
+    /// What mirrors on a route and panes between them leave of light.
     pub(super) fn along(&self, route: &Route) -> Passage {
         let glazing = self.glass.map(|glass| glass.glazing);
         self.filters.along(glazing, route, self.steps())
     }
 
-    /// What is so far away lies outside the room, by whatever way it is looked.
+    /// Distance beyond which everything lies outside the room, straight or by way of mirrors.
     pub(super) fn distance(&self) -> f64 {
         4.0 * self.far()
     }
 
-    /// Half the size of the room; with all images by way of which it is looked.
+    /// Half the size of the room, including the images by way of which it is seen.
     pub(super) fn far(&self) -> f64 {
         let depth = match (self.via, self.sight.mirrors) {
             (Some(via), Some(mirrors)) => mirrors.images()[via.image as usize].depth(),
@@ -76,7 +76,7 @@ impl Gatherer<'_> {
         self.light.half_size * (1 + depth) as f64
     }
 
-    /// Looks in each mirror, and mirrors in mirrors, that a receiver may see something in.
+    /// Gathers in each mirror, and in mirrors in mirrors, in which a receiver may see something.
     fn in_each(&self, to: &Receiver, mut look: impl FnMut(&Gatherer, &Receiver, u32)) {
         let Some(mirrors) = self.sight.mirrors else {
             return;
@@ -99,7 +99,7 @@ impl Gatherer<'_> {
         let from = Receiver {
             point: known.point(to.point),
             normal: known.direction(to.normal),
-            // What lies in its plane may well be seen.
+            // Surfaces in the image's plane may well be visible.
             plane: crate::geometry::NO_PLANE,
             leaf: to.leaf,
             seed: hash(to.seed, u64::from(image)),
@@ -115,7 +115,7 @@ impl Gatherer<'_> {
         look(&gatherer, &from, image);
     }
 
-    /// The direct light of a point by one lamp in one image, each by chance: brightness.
+    /// Brightness of the direct light at a point by one lamp in one image, both chosen at random.
     pub(super) fn one_in_mirrors(&self, to: &Receiver, [u, v]: [f64; 2]) -> f64 {
         let Some(mirrors) = self.sight.mirrors else {
             return 0.0;
@@ -142,8 +142,8 @@ impl Gatherer<'_> {
         self.in_each(to, |gatherer, from, _| gatherer.lamps_of(from, memory, out));
     }
 
-    /// Lights without extent and those with a profile in mirrors, sky and ground. `of`: of how many rays over the hemisphere the
-    /// memory holds what they met by way of mirrors.
+    /// Lights without extent and those with a profile, sky and ground in mirrors. `of`: number of rays over the hemisphere from
+    /// which the memory holds those that met mirrors.
     pub(super) fn lights_in_mirrors(
         &self,
         to: &Receiver,
@@ -175,7 +175,7 @@ impl Gatherer<'_> {
         memory.mirrored = mirrored;
     }
 
-    /// Adds what comes from outside in one direction.
+    /// Adds light from outside in one direction.
     fn escapes(&self, direction: DVec3, share: f64, passage: &Passage, out: &mut Gathered) {
         let Some(outside) = self.sky else { return };
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
@@ -191,7 +191,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Follows a ray that met a mirror; false if it met none.
+    /// Follows a ray that met a mirror; false if it did not meet one.
     pub(super) fn follow(
         &self,
         from: Vec3,
@@ -223,7 +223,7 @@ impl Gatherer<'_> {
         self.sight.mirrors.is_some_and(|m| m.is_mirror(hit))
     }
 
-    /// Looks for the sky in mirrors by a few rays; how many.
+    /// Looks for the sky in mirrors by a few rays; returns their number.
     pub(super) fn glance(&self, to: &Receiver, memory: &mut Memory) -> usize {
         memory.mirrored.clear();
         if self.sight.mirrors.is_none() || self.sky.is_none() {
@@ -250,7 +250,8 @@ impl Gatherer<'_> {
         RAYS
     }
 
-    /// Adds what rays of a `share` each met by way of mirrors; what it emits where lamps have no image.
+    /// Adds the light of what rays of a `share` each met by way of mirrors, including emission where lamps have no
+    /// image.
     pub(super) fn patches_in_mirrors(&self, share: f32, memory: &Memory, out: &mut Gathered) {
         let width = self.light.width();
         for arrived in &memory.mirrored {

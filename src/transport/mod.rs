@@ -2,17 +2,17 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `receiver`, `gatherer` | a point, what it gets, and what gathering looks at |
-//! | `point` | everything that a point gets |
+//! | `receiver`, `gatherer` | a point, its light, and what a gather works with |
+//! | `point` | all light at a point |
 //! | `patches`, `slope`, `shadows` | patches of few faces with their exact factors, past what blocks them |
-//! | `lamp` | parts of lamps near a point, and lamps chosen by chance |
-//! | `punctual`, `luminaire` | lights without extent, and lamps that shine from a surface by a profile |
+//! | `lamp`, `fixture` | parts of lamps near a point, lamps chosen at random, lamps of many faces from afar |
+//! | `punctual`, `luminaire` | lights without extent, and lamps that emit from a surface by a profile |
 //! | `hemisphere`, `sweep` | beams of rays that find the patches they end on |
 //! | `via`, `mirrored` | the same lamps and patches by way of mirrors |
-//! | `nearby` | short paths where rays end close by |
+//! | `nearby` | short paths where rays end near the point |
 //! | `outside`, `clipped_sky`, `sky` | what comes in where rays leave the room: sky, ground, the sun's disc |
-//! | `ways` | what is on ways from there |
-//! | `trace` | what a point gets its light from, kept for relighting |
+//! | `ways` | what light from outside meets on its way |
+//! | `trace` | where a point's light comes from, kept for relighting |
 
 mod clipped_sky;
 mod fixture;

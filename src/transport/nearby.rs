@@ -1,12 +1,12 @@
-//! What rays meet close by: the light of a leaf as a whole says little about a point of it that lies in the gap behind a
-//! cupboard, or within something that another thing stands into, when the rest of the leaf lies in the open.
+//! What rays meet close by: the mean light of a leaf tells little about a point of it that lies in the gap behind a
+//! cupboard, or inside something that another thing stands in, when the rest of the leaf lies in the open.
 //!
-//! There the point that a ray met gathers for itself: its reflected light is the leaf's, times how much more or less light
-//! reaches the point than the leaf as a whole,
+//! There the point that a ray met gathers for itself: its reflected light is that of the leaf, times how much more or less
+//! light reaches the point than the whole leaf,
 //!
 //! `B(p) = B (D(p) + B(q)) / H`
 //!
-//! with H the leaf's irradiance, B what it reflects, D(p) the direct light of one lamp chosen by chance and q where one
+//! with H the leaf's irradiance, B its reflected radiosity, D(p) the direct light of one lamp chosen at random and q the point where one
 //! further ray ends, which may be close by again (a path, as in Kajiya 1986). Only brightness follows the path: colours stay those of the leaf.
 
 use super::gatherer::{Gatherer, Memory};
@@ -15,37 +15,37 @@ use crate::geometry::Hit;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::link::View;
 
-/// A point of whose rays more than this share meet black backs lies within something: then all is close by.
+/// A point of whose rays more than this share meet black backs lies inside something: then everything is close by.
 const WITHIN: f64 = 1.0 / 16.0;
 /// Steps of a path at the most.
 const STEPS: u64 = 8;
-/// Of the rays that meet something close by so many are followed at the most.
+/// Rays that meet something close by and are followed, at the most.
 const FOLLOWED: usize = 64;
 /// Where direct light varies by less than this share over a leaf, any point of it has the mean.
 const EVEN: f32 = 0.05;
 
-/// The light that a point close by reflects, by one path.
+/// The light reflected at a point close by, by one path.
 struct Path {
-    /// Which of the samples.
+    /// Index of the path's sample.
     sample: u32,
-    /// Where it has got to, on which leaf, while it goes on.
+    /// The leaf and the point that the path has reached, while it goes on.
     end: Option<(u32, Receiver)>,
-    /// What of the light there gets back.
+    /// Share of the light there that gets back to the start.
     through: f64,
-    /// What got back.
+    /// Light that got back to the start.
     sum: f64,
-    /// What the leaf reflects that it began on.
+    /// Reflected brightness of the leaf at the start.
     leaf: f64,
 }
 
 impl Gatherer<'_> {
-    /// Is a hit so near that its leaf says little about it? `backs`: share of the rays that met black backs.
+    /// Is a hit so near that its leaf tells little about it? `backs`: share of the rays that met black backs.
     pub(super) fn is_near(&self, leaf: u32, hit: &Hit, backs: f64) -> bool {
         let near = self.light.descent.near(leaf);
         hit.t < near || backs > WITHIN && near > 0.0
     }
 
-    /// What the points that rays met close by reflect, together, as a share of what their leaves do.
+    /// Reflected light of all points that rays met close by, as a share of that of their leaves.
     pub(super) fn nearby(
         &self,
         hits: &[(u32, Hit)],
@@ -66,7 +66,7 @@ impl Gatherer<'_> {
                 }
             })
             .collect();
-        // All paths a step at a time: rays from places close by go together.
+        // All paths advance one step at a time: rays from neighbouring places go together.
         for step in 0..STEPS {
             let samples = |dimension: u64| hash(seed, 2 * step + dimension);
             self.light_ends(&mut paths, backs, samples(1), memory);
@@ -116,8 +116,8 @@ impl Gatherer<'_> {
         memory.to_lamps = to_lamps;
     }
 
-    /// Takes paths to where their next rays end. Those that meet nothing end; so do those for which that was the `last`, on a
-    /// leaf that says what it reflects.
+    /// Takes paths to where their next rays end. Paths that meet nothing end; so do those for which that was the `last` step,
+    /// on a leaf whose reflected light is taken.
     fn go_on(
         &self,
         paths: &mut [Path],
@@ -130,7 +130,7 @@ impl Gatherer<'_> {
                 continue;
             };
             let way = cosine_direction(to.normal, sequence02(path.sample, samples));
-            // One by one: in packets such rays share too little of their way.
+            // One by one: such rays have too little in common for packets.
             let (start, ahead) = (to.point.as_vec3(), way.as_vec3());
             let mut next = self.sight.meet_one(start, ahead, to.plane);
             memory.rays += 1;
@@ -167,7 +167,8 @@ impl Gatherer<'_> {
     }
 }
 
-/// Sum of the first of all pairs as a share of the second, as far as it stands out of its noise (Stein's positive part).
+/// Sum of the first numbers of all pairs as a share of the second, as far as it exceeds its noise (Stein's positive
+/// part).
 fn believed(pairs: &[[f64; 2]]) -> f64 {
     let leaves: f64 = pairs.iter().map(|p| p[1]).sum();
     if leaves <= 0.0 {

@@ -1,9 +1,9 @@
-//! What comes in from outside: sky, and ground below the horizon.
+//! Light from outside: sky, and ground below the horizon.
 //!
-//! In rooms of few triangles exactly (`clipped_sky`). Elsewhere, and under a map, by rays over the hemisphere,
-//! toward the [`Openings`] and toward bright spots of a map, all together by the power heuristic (Veach and Guibas 1995): by the balance
-//! heuristic the few rays of the hemisphere that find a small opening brought 2 % of noise to what those toward it know. A ray serves all
-//! parts of the sky.
+//! In rooms of few triangles it is exact (`clipped_sky`). Elsewhere, and under a map, it is found by rays over the hemisphere, towards
+//! the [`Openings`] and towards bright spots of a map, combined by the power heuristic (Veach and Guibas 1995): with the balance
+//! heuristic the few rays of the hemisphere that find a small opening added 2 % of noise to the light known from rays towards it. A ray
+//! serves all parts of the sky.
 
 use super::clipped_sky::{Found, Looker};
 use super::receiver::Receiver;
@@ -19,13 +19,13 @@ use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Rays over the hemisphere, to the openings, and toward spots where there are some: of a random point of a leaf, of a point by a rule, of
-/// one for its own sake, and of one whose rays over the hemisphere are known.
+/// Rays over the hemisphere, to the openings, and towards spots if any: from a random point of a leaf, from a point of a quadrature rule,
+/// from a point for its own sake, and from one whose rays over the hemisphere are known.
 const RAYS: [[usize; 3]; 4] = [[16, 16, 16], [64, 64, 64], [512, 1024, 1024], [0, 256, 256]];
-/// So many times more to the openings in rooms of few triangles. With 4, a sky in a periscope is off by more than 1 %.
+/// Factor of the rays to the openings in rooms of few triangles. With 4, a sky in a periscope is off by more than 1 %.
 const FEW: usize = 16;
 
-/// Directions in which it is asked what panes leave where all else is exact, in the same order.
+/// Directions that find the transmittance of panes where all else is exact, in the same order.
 const TINTED: [usize; 4] = [16, 64, 512, 512];
 
 /// What is outside a room.
@@ -35,7 +35,7 @@ pub(crate) struct Outside {
     pub(crate) openings: Openings,
 }
 
-/// What a look outside takes.
+/// Memory and results of a look outside.
 #[derive(Debug, Default)]
 pub(crate) struct Look {
     found: Found,
@@ -47,7 +47,7 @@ pub(crate) struct Look {
     pub(crate) rays: u64,
     /// Variance of the factors.
     pub(super) noise: [f64; PLACES],
-    /// Mean filters of the parts of sky and ground where light comes through panes; none where none does.
+    /// Mean filters of the parts of sky and ground where light comes through panes; none where it does not.
     pub(super) tints: [Option<Passage>; PLACES],
 }
 
@@ -62,7 +62,7 @@ impl Look {
     }
 }
 
-/// What is so far away lies outside the room.
+/// Distance beyond which everything lies outside the room.
 fn reach((sight, by): (&Sight, Option<&dyn Ways>)) -> f64 {
     by.map_or(4.0 * sight.mesh.half_size, |by| by.reach())
 }
@@ -78,20 +78,20 @@ enum Search {
 /// How a point looks outside.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Way<'a> {
-    /// By these of [`RAYS`].
+    /// By the rays of this row of [`RAYS`].
     Rays(usize),
-    /// These directions, of so many over the hemisphere, lead out of the room.
+    /// These directions, of this many over the hemisphere, lead out of the room.
     Known(&'a [DVec3], usize),
-    /// The same for one of so many images, which share the rays to the openings.
+    /// `Known` for one of this many images, which share the rays to the openings.
     Shared(&'a [DVec3], usize, usize),
-    /// The same of one of many points, for which few rays to the openings do.
+    /// `Known` for one of many points, for which few rays to the openings are enough.
     Glanced(&'a [DVec3], usize),
     /// As if nothing stood in the way.
     Unshadowed,
 }
 
 impl Way<'_> {
-    /// Which of [`RAYS`].
+    /// The row of [`RAYS`].
     fn kind(self) -> usize {
         match self {
             Way::Rays(kind) => kind,
@@ -101,7 +101,7 @@ impl Way<'_> {
     }
 }
 
-/// Where rays from the surfaces of a room leave it, and how many were cast to find out.
+/// The places where rays from the surfaces of a room leave it, and the number of rays cast.
 pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) -> (Openings, u64) {
     let cast = AtomicU64::new(0);
     let area = tree.nodes.first().map_or(0.0, |root| root.area);
@@ -132,8 +132,8 @@ pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) 
 }
 
 impl Outside {
-    /// Irradiance of a point by each part of the sky, where open level ground has 1, and of what is below the horizon, where a plane
-    /// that looks down has 1.
+    /// Irradiance of a point by each part of the sky, where open level ground has 1, and by the ground, where a plane that faces
+    /// down has 1.
     pub(super) fn seen(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
@@ -145,7 +145,7 @@ impl Outside {
         if let Way::Unshadowed = way {
             return self.unshadowed(to);
         }
-        // Many points stand for a leaf that looks for itself: rays do there.
+        // Many points represent a leaf that looks for itself: for them rays are enough.
         let one_of_many = sight.panes.is_some() && way.kind() == 0;
         if Self::is_exact(&self.sky, sight) && !one_of_many {
             let looker = Looker {
@@ -163,7 +163,8 @@ impl Outside {
         }
     }
 
-    /// The same as if nothing stood in the way, about: by the middles of the openings, and by some directions toward spots.
+    /// A rough [`Self::seen`] with nothing in the way: by the middles of the openings, and by some directions towards
+    /// spots.
     fn unshadowed(&self, to: &Receiver) -> [f64; PLACES] {
         let mut seen = self.openings.most(to.point, to.normal, |d| {
             let mut each = [0.0; PLACES];
@@ -195,7 +196,7 @@ impl Outside {
         sky.is_smooth() && sight.small() && sight.opaque.is_none() && sight.mirrors.is_none()
     }
 
-    /// The same as one of many points sees it.
+    /// [`Self::seen`] from one of many points.
     pub(crate) fn lightly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; PLACES] {
         self.seen((sight, None), to, Way::Rays(0), look)
     }
@@ -210,7 +211,7 @@ impl Outside {
     ) -> [f64; PLACES] {
         let [wide, mut narrow, spots] = RAYS[way.kind()];
         if let (Way::Known(..) | Way::Shared(..), true) = (way, sight.small()) {
-            // Rooms of few triangles come here for mirrors and maps; a ray costs next to nothing there.
+            // Rooms of few triangles come here because of mirrors and maps; a ray costs next to nothing in them.
             narrow *= FEW;
         }
         if let Way::Shared(.., images) = way {
@@ -235,7 +236,7 @@ impl Outside {
         self.combine((sight, by), to, counts, look)
     }
 
-    /// Rays to bright spots of a map: adds the directions that lead outside.
+    /// Casts rays to bright spots of a map: adds the directions that lead outside.
     fn look_at_spots(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
@@ -251,7 +252,7 @@ impl Outside {
         self.cast((sight, by), to, (Search::Spots, &ahead), look);
     }
 
-    /// Rays to the openings: adds the directions that lead outside.
+    /// Casts rays to the openings: adds the directions that lead outside.
     fn look_through_openings(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
@@ -275,7 +276,7 @@ impl Outside {
         self.cast((sight, by), to, (Search::Openings, &ahead), look);
     }
 
-    /// Adds those of some directions that lead outside: beyond an opening, too, something may stand.
+    /// Adds those of some directions that lead outside: something may stand beyond an opening, too.
     fn cast(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
@@ -293,7 +294,7 @@ impl Outside {
         look.open.extend(free.map(|(&d, _)| (search, d)));
     }
 
-    /// Irradiance by the open directions, by the power heuristic: of so many rays of each search.
+    /// Irradiance by the open directions, by the power heuristic, given the number of rays of each search.
     fn combine(
         &self,
         (sight, by): (&Sight, Option<&dyn Ways>),
@@ -342,7 +343,7 @@ impl Outside {
         seen
     }
 
-    /// Rays over the hemisphere: leaves the directions that lead outside.
+    /// Casts rays over the hemisphere: keeps the directions that lead outside.
     fn look_around(&self, sight: &Sight, to: &Receiver, count: usize, look: &mut Look) {
         const TOGETHER: usize = 16;
         look.open.clear();

@@ -1,8 +1,8 @@
-//! What patches bring to a point: each with its exact polygon factor, or as its parts, and what is seen of it.
+//! The light of patches at a point: each with its exact polygon factor, or by its children, and its visible share.
 //!
 //! A patch whose light varies is entered (its children take its place) while that could misplace more than the tolerance;
-//! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in number with what they
-//! carry.
+//! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in proportion to their
+//! light.
 
 use super::gatherer::{CLOSE, Gatherer, Lamp, Linked, Memory, Of};
 use super::receiver::{Gathered, Receiver};
@@ -15,31 +15,31 @@ use crate::link::{
 };
 use glam::DVec3;
 
-/// Rays to a patch at least, and at the most.
+/// Rays to a patch: the least, and the most.
 const RAYS: [usize; 2] = [4, 32];
-/// Points that stand for a far cluster: one that carries little, and one that carries much.
+/// Points that represent a far cluster: one that carries little, and one that carries much.
 const CLUSTER_POINTS: [usize; 2] = [4, 8];
-/// A clear patch may misplace this share of the tolerance before its slope tells, and that is looked for where it brings as much: what many of
-/// them misplace goes the same way (the middle of a wall is brighter than its edges, and nearer), and to enter one costs no ray. At
-/// `--error 1` the light of the convex room is off by .29 % (root mean square); with .25 by .33, with 1 by .84, with .01 by .34.
+/// Share of the tolerance that a clear patch may misplace before its children are entered or its slope is added: the errors of many patches
+/// have the same sign (the middle of a wall is brighter than its edges, and nearer), and entering a patch costs no ray. At `--error 1` the
+/// light of the convex room is off by .29 % (root mean square); with .25 by .33, with 1 by .84, with .01 by .34.
 const CLEAR_SHARE: f64 = 0.05;
-/// The same of a patch of which a share is seen, nobody knows which: to enter it costs rays. With 1, .5, .2, .1 and .05 light at `--error 1`
-/// is off by 1.7, 1.6, 1.3, 1.2, 1.2 % in the Cornell box, by 5.0, 4.2, 3.2, 2.3, 1.8 in Bevy's, and by 7.8, 6.9, 6.0, 5.6, 5.4 in the corridor,
-/// in 1, .97, 1.01, 1.05, 1.12 times the time.
+/// The share for a patch that is partly hidden, nobody knows where: entering it costs rays. With 1, .5, .2, .1 and .05 light at `--error 1` is
+/// off by 1.7, 1.6, 1.3, 1.2, 1.2 % in the Cornell box, by 5.0, 4.2, 3.2, 2.3, 1.8 in Bevy's, and by 7.8, 6.9, 6.0, 5.6, 5.4 in the corridor, in
+/// 1, .97, 1.01, 1.05, 1.12 times the time.
 const PARTLY_SHARE: f64 = 0.2;
-/// How many rays a link's visibility counts for.
+/// Number of rays that a link's visibility counts as.
 const PRIOR: f64 = 4.0;
 /// A shaft to a lamp is looked into if the lamp carries this many tolerances.
 const SHAFT_WORTH: f64 = 4.0;
 
 impl Gatherer<'_> {
-    /// Greatest factor that a patch could have, by its projected area.
+    /// Bound of a patch's factor, from its projected area.
     pub(super) fn bound(&self, to: &Receiver, node: &Node) -> f64 {
         let gap = ((node.centre - to.point).length() - node.radius).max(0.0);
         node.area / (std::f64::consts::PI * gap * gap + node.area)
     }
 
-    /// Adds the patches on the stack, or puts their children in their place. Factors are worked out for eight faces at once.
+    /// Adds the patches on the stack, or replaces them by their children. Factors are worked out for eight faces at once.
     pub(super) fn patches(&self, to: &Receiver, of: Of, memory: &mut Memory, out: &mut Gathered) {
         loop {
             let mut open = [((NONE, Way::Clear, 0.0), 0.0); 8];
@@ -92,7 +92,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// What a node reflects and emits, of what is gathered, as shares of white.
+    /// Reflected and emitted brightness of a node, as far as gathered, as shares of white.
     fn brightness(&self, id: u32, of: Of) -> (f64, f64) {
         let reflected = f64::from(self.light.bright_reflected[id as usize]);
         let emitted = f64::from(self.light.bright_emitted[id as usize]);
@@ -103,7 +103,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Adds a cluster of many faces if it is far, else puts its children in its place.
+    /// Adds a cluster of many faces if it is far, else replaces it by its children.
     fn cluster(
         &self,
         to: &Receiver,
@@ -121,7 +121,8 @@ impl Gatherer<'_> {
         let spread = f64::from(self.light.spread[id as usize]);
         let factor = self.bound(to, node);
         let near = (node.centre - to.point).length() < CLOSE * node.radius;
-        // Points find a cluster's light to about a third of its spread, and where lamps are in it, of its light.
+        // Points find a cluster's light to about a third of its spread; with lamps in the cluster, only to the whole of
+        // their light.
         if near || factor * (0.3 * spread + emitted) > self.tolerance {
             let part = |c: u32| match of {
                 Of::Emitted => self.light.lit[c as usize],
@@ -143,7 +144,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Adds a patch of a few faces, or puts its children in its place.
+    /// Adds a patch of a few faces, or replaces it by its children.
     fn patch(
         &self,
         to: &Receiver,
@@ -191,12 +192,12 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Is nothing on the way? A way that links proved clear may lead through a pane.
+    /// Is a way free? One that links proved clear may lead through a pane.
     fn is_clear(&self, way: Way) -> bool {
         self.is_plain() && (way == Way::Clear || !self.sight.occlusion)
     }
 
-    /// What panes leave of what the last rays bring, where they are not blocked; none where no pane is passed.
+    /// What panes leave of the light of the last rays, where these are not blocked; none where no pane is passed.
     pub(super) fn tint(&self, memory: &Memory) -> Option<Passage> {
         if self.is_plain() {
             return None;
@@ -211,7 +212,7 @@ impl Gatherer<'_> {
         tint.mean().filter(|_| any)
     }
 
-    /// Adds a patch of a few faces of which a share is visible, and of its light what a filter leaves.
+    /// Adds a patch of a few faces with its visible share, and what a filter leaves of its light.
     #[expect(clippy::too_many_arguments, reason = "each is a different thing")]
     pub(super) fn see(
         &self,
@@ -224,13 +225,13 @@ impl Gatherer<'_> {
         out: &mut Gathered,
     ) {
         self.add(id, factor, seen.share, tint, of, out);
-        // Behind panes leaves are even: where there are any, patches are only gathered so if they glare.
+        // Behind panes leaves count as even: in rooms with panes, patches are gathered this way only if they glare.
         if of != Of::Emitted && tint.is_none() {
             self.slope(to, id, factor, seen, CLEAR_SHARE * self.tolerance, out);
         }
     }
 
-    /// By how much what the children of a node emit differs: nothing, unless a texture glows.
+    /// Difference in emission between the children of a node: 0 unless a texture varies the emission.
     fn uneven(&self, node: &Node) -> f64 {
         if !self.has_parts(node) {
             return 0.0;
@@ -295,7 +296,7 @@ impl Gatherer<'_> {
         self.add(id, factor, 1.0, tint, Of::Emitted, out);
     }
 
-    /// Could any of the patch be in front of the receiver, and the receiver in front of any of the patch?
+    /// Could any part of the patch be in front of the receiver, and the receiver in front of any part of the patch?
     pub(super) fn can_see(&self, to: &Receiver, node: &Node) -> bool {
         let from = node.centre - to.point;
         let reach = (0.5 * (node.high - node.low))
@@ -331,7 +332,7 @@ impl Gatherer<'_> {
             let r2 = d.length_squared();
             let (c1, c2) = (to.normal.dot(d), -s.normal.dot(d));
             if c1 > 0.0 && c2 > 0.0 && s.plane != to.plane {
-                // Random points of a cluster that is far: without bias, and never near enough to blow up.
+                // Random points of a far cluster: without bias, and never so near that their weights blow up.
                 memory
                     .weights
                     .push(c1 * c2 / (std::f64::consts::PI * r2 * r2) * s.area);
@@ -355,9 +356,9 @@ impl Gatherer<'_> {
         Some((factor, visible))
     }
 
-    /// Visible share of a polygon patch, and whether it was clipped, so that the clipper has its parts; none yet for a lamp that rays must
-    /// find, see `lamps_together`. `carries` is what it would bring unblocked, share of white. What is clipped exactly knows no filters:
-    /// behind panes rays decide.
+    /// Visible share of a polygon patch, and whether it was clipped, so that the clipper has its parts; none yet for a lamp that is left
+    /// to rays, see `lamps_together`. `carries` is the unblocked irradiance, share of white. Exact clipping cannot apply filters: behind
+    /// panes rays decide.
     fn visible(
         &self,
         to: &Receiver,
@@ -440,12 +441,12 @@ impl Gatherer<'_> {
         memory.rays += memory.segments.len() as u64;
         let total: f64 = memory.weights.iter().sum();
         let seen = open_weight(&memory.weights, &memory.blocked);
-        // Where no ray gets through, nothing does: what other parts of the element see must not leak in.
+        // Where no ray gets through, nothing does: light of other parts of the element must not leak in.
         if seen <= 0.0 {
             return 0.0;
         }
-        // What the link's own rays found over the whole patch counts as some more rays: it halves the noise, and what it
-        // blurs is bounded by the size of the receiving element.
+        // The link's own rays over the whole patch count as some more rays: this halves the noise, and the blur is
+        // bounded by the size of the receiving element.
         let prior = if to.leaf.is_none() || self.hemisphere.is_some() {
             0.0
         } else {
@@ -454,8 +455,8 @@ impl Gatherer<'_> {
         (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
     }
 
-    /// Factor of what is seen past the listed triangles, exactly; `whole` is that of the whole patch. None where that takes too
-    /// many pieces or a blocker has holes.
+    /// Exact factor of the part visible past the listed triangles; `whole` is the factor of the whole patch. None where there
+    /// are too many pieces or a blocker has holes.
     fn past(
         &self,
         list: &[u32],

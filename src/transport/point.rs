@@ -1,6 +1,7 @@
-//! Irradiance at a point: every link of the element that holds it (or the whole room), evaluated anew for that point.
+//! Irradiance at a point: every link of the element that contains it (or the whole room), evaluated anew for that
+//! point.
 //!
-//! `H(p) = sum over patches F(p -> b) V(p, b) B_b` and what punctual lights bring.
+//! `H(p) = sum over patches F(p -> b) V(p, b) B_b` plus the irradiance by punctual lights.
 
 use super::gatherer::{Gatherer, Linked, Memory, Of};
 use super::receiver::{Gathered, Receiver};
@@ -8,7 +9,7 @@ use crate::hierarchy::NONE;
 use crate::link::Way;
 
 impl Gatherer<'_> {
-    /// Gathers what comes straight from lamps.
+    /// Gathers the direct light of lamps.
     pub fn direct(&self, to: &Receiver, memory: &mut Memory) -> [f32; 64] {
         let mut out = self.start();
         memory.noise = 0.0;
@@ -24,7 +25,7 @@ impl Gatherer<'_> {
         out.direct
     }
 
-    /// Links of the receiver's leaf and of what holds it; without a leaf, the whole room.
+    /// Links of the receiver's leaf and of its ancestors; without a leaf, the whole room.
     pub(super) fn links(&self, to: &Receiver) -> impl Iterator<Item = Linked> {
         let parent = |&id: &u32| Some(self.tree.node(id).parent).filter(|&p| p != NONE);
         let room = to.leaf.is_none() && !self.tree.nodes.is_empty();
@@ -33,8 +34,8 @@ impl Gatherer<'_> {
             .chain(room.then_some((0, Way::Crowded, 0.5)))
     }
 
-    /// Gathers what patches emit. Where links say little about what stands between, lamps are looked for from the root: a lamp
-    /// is one element then, however many patches of it the receiver is linked to.
+    /// Gathers emission of patches. Where links tell little about blockers, lamps are searched from the root: a lamp is then
+    /// one element, however many of its patches the receiver is linked to.
     pub(super) fn lamps_of(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         memory.stack.clear();
         if self.hemisphere.is_some() {

@@ -1,4 +1,4 @@
-//! Lights without extent, the sun, and lamps with a profile, one after the other.
+//! Lights without extent, the sun, and lamps with a profile, in turn.
 
 use super::gatherer::{Gatherer, Memory};
 use super::luminaire;
@@ -10,7 +10,7 @@ use crate::scene::{LightKind, PunctualLight};
 use glam::DVec3;
 
 impl Gatherer<'_> {
-    /// Light of punctual lights, one ray each.
+    /// Adds the light of punctual lights, one ray each.
     pub(super) fn punctual(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {
             let (factor, passage) = match lamp.kind {
@@ -32,8 +32,8 @@ impl Gatherer<'_> {
         }
     }
 
-    /// What turns the intensity of a light without extent, or of the sun, into irradiance, past what is in between, and what
-    /// panes leave of it.
+    /// Factor from the intensity of a light without extent, or of the sun, to irradiance, past blockers, and what panes
+    /// leave of the light.
     fn of_light(
         &self,
         to: &Receiver,
@@ -61,8 +61,8 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Does a shading normal look at a place that lies behind the face itself? No ray is told so by its own plane, and in a vault of few
-    /// faces nothing else is in the way of the sun.
+    /// Does a shading normal face a place that lies behind the face itself? Rays ignore the face's own plane, and in a vault of few
+    /// faces nothing else blocks the sun.
     fn is_behind(&self, to: &Receiver, place: DVec3) -> bool {
         let Some(leaf) = to.leaf.filter(|_| self.via.is_none()) else {
             return false;
@@ -75,8 +75,8 @@ impl Gatherer<'_> {
     }
 }
 
-/// What turns a punctual light's intensity (of measured lamps, flux) into irradiance at a receiver where nothing is in between, and
-/// where the ray to it ends: of a lamp with an extent, at one of its points. None for sky and ground, which shine from everywhere.
+/// Unblocked factor from a punctual light's intensity (for measured lamps, flux) to irradiance at a receiver, and the end of the
+/// ray to the light: for a lamp with an extent, one of its points. None for sky and ground, whose light comes from everywhere.
 pub fn punctual_factor(
     lamp: &PunctualLight,
     to: &Receiver,

@@ -1,4 +1,4 @@
-//! A point that light comes to, and what it gets.
+//! A point that receives light, and the light it receives.
 
 use super::trace::Trace;
 use crate::store::Decoder;
@@ -6,7 +6,7 @@ use crate::store::codec::Read;
 use crate::team::Packed;
 use glam::DVec3;
 
-/// A vertex that sees more black backs than this, share of its rays, lies inside something.
+/// A vertex of whose rays more than this share meet black backs lies inside something.
 pub const MOSTLY: f64 = 0.75;
 
 /// Where light is received.
@@ -29,7 +29,7 @@ pub struct Receiver {
 pub struct Gathered {
     /// Irradiance by lane.
     pub irradiance: [f32; 64],
-    /// Of which straight from lamps.
+    /// Its part straight from lamps.
     pub direct: [f32; 64],
     /// Sum of visible factors: 1 in a closed room.
     pub seen: f64,
@@ -37,7 +37,7 @@ pub struct Gathered {
     pub backs: f64,
     /// Visibility rays cast for this point.
     pub rays: u64,
-    /// Where it comes from, where that is kept; at last packed.
+    /// Where the light comes from, if kept; packed in the end.
     pub(crate) trace: Option<Trace>,
     pub(crate) packed: Option<Box<[u8]>>,
 }
@@ -63,7 +63,7 @@ impl Gathered {
     }
 }
 
-/// What is packed already; a trace that is not stays where it is.
+/// Only a trace that is packed already is packed.
 impl Packed for Gathered {
     fn pack(&self, to: &mut Vec<u8>) {
         self.irradiance.pack(to);

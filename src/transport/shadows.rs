@@ -1,13 +1,14 @@
-//! The shadows that blockers cast from a point, kept while the point stays: patch after patch lies past the same few.
+//! The shadows that blockers cast from a point, kept as long as the point stays: many patches lie past the same few
+//! blockers.
 
 use crate::geometry::Shadow;
 use crate::hierarchy::Blocker;
 use glam::DVec3;
 
-/// As a power of two, how many shadows are kept: 90 kB.
+/// Binary logarithm of the number of shadows kept: 90 kB.
 const BITS: u32 = 9;
 
-/// Shadows by blocker, the last of those that share a place.
+/// Shadows by blocker; of blockers that share a place, the last.
 #[derive(Debug, Default)]
 pub(super) struct Shadows {
     point: DVec3,
@@ -32,7 +33,7 @@ impl Shadows {
             self.point = point;
             self.epoch += 1;
         }
-        // Knuth's multiplicative hash: neighbours in the room keep apart.
+        // Knuth's multiplicative hash: neighbours in the room get different places.
         let key = blocker.triangle << 1 | u32::from(blocker.together);
         let place = &mut self.places[(key.wrapping_mul(0x9e37_79b1) >> (32 - BITS)) as usize];
         let known = matches!(place, Some((epoch, b, _)) if (*epoch, *b) == (self.epoch, blocker));
@@ -49,7 +50,7 @@ mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
 
-    /// Through changes of point and shared places.
+    /// Also when the point changes and when blockers share a place.
     #[test]
     fn a_kept_shadow_is_that_of_its_blocker_and_point() {
         let mut random = Pcg::new(1);

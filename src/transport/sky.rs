@@ -12,7 +12,7 @@ use crate::scene::sky::{PLACES, SUN_RADIUS};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Rays to the sun's disc: of a random point of a leaf, and of others.
+/// Rays to the sun's disc: from a random point of a leaf, and from other points.
 const SUN_RAYS: [u32; 2] = [4, 16];
 
 impl Ways for Gatherer<'_> {
@@ -36,8 +36,8 @@ impl Ways for Gatherer<'_> {
 }
 
 impl Gatherer<'_> {
-    /// Adds what comes from outside. `known`: which directions, of how many over the hemisphere, lead there, if rays told already.
-    /// `own`: is it a point for its own sake?
+    /// Adds light from outside. `known`: the directions, and of how many over the hemisphere, that lead outside, if rays have
+    /// told. `own`: is this a point for its own sake?
     pub(super) fn outside(
         &self,
         to: &Receiver,
@@ -55,7 +55,8 @@ impl Gatherer<'_> {
         self.come_in(to, way, own, memory, out);
     }
 
-    /// The same by one of so many images, of which these directions, of so many over the hemisphere, lead out of the room.
+    /// [`Self::outside`] in one of `images` images; `open`, of `of` directions over the hemisphere, lead out of the
+    /// room.
     pub(super) fn outside_in_mirrors(
         &self,
         to: &Receiver,
@@ -71,10 +72,10 @@ impl Gatherer<'_> {
         self.come_in(to, way, true, memory, out);
     }
 
-    /// Adds what is found outside one way or another.
+    /// Adds the light from outside that `way` finds.
     fn come_in(&self, to: &Receiver, way: Way, own: bool, memory: &mut Memory, out: &mut Gathered) {
         let Some(outside) = self.sky else { return };
-        // Points for their own sake share one pattern where links serve them: what is left of its error is smooth.
+        // Points for their own sake share one pattern where links serve them: the remaining error is smooth.
         let seed = if self.hemisphere.is_some() || !own {
             to.seed
         } else {
@@ -100,11 +101,11 @@ impl Gatherer<'_> {
             accumulate(&mut out.irradiance, factor as f32, row, filter);
             accumulate(&mut out.direct, factor as f32, row, filter);
         }
-        // Parts are seen by the same rays, so that what is too much of one is too much of all.
+        // Parts are seen by the same rays, so that their errors add up.
         memory.noise += noise * noise;
     }
 
-    /// How much of the sun's disc a point sees.
+    /// Share of the sun's disc that a point sees.
     pub(super) fn sun_seen(&self, to: &Receiver, sun: &PunctualLight, memory: &mut Memory) -> f64 {
         if !self.sight.occlusion {
             return 1.0;
@@ -126,7 +127,7 @@ impl Gatherer<'_> {
         open.count() as f64 / f64::from(count)
     }
 
-    /// One direction of sky or ground by chance, and what it stands for, as factors of the parts.
+    /// One random direction of sky or ground, and the factors of the parts that it represents.
     pub(super) fn one_direction(
         &self,
         to: &Receiver,
@@ -135,7 +136,7 @@ impl Gatherer<'_> {
         let outside = self.sky?;
         let seed = hash(sample[0].to_bits(), sample[1].to_bits());
         let sky = &outside.sky;
-        // Of a map every second one toward its spots.
+        // Under a map every second direction goes towards its spots.
         let spots = sky.has_spots();
         let square = sequence02(0, seed);
         let by_cosine = || cosine_direction(to.normal, square);

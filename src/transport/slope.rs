@@ -1,12 +1,12 @@
-//! The light of a patch seen from nearby is not even: it goes on as it does over the patch and its siblings.
+//! The light of a patch seen from nearby is not even: it varies linearly, as over the patch and its siblings.
 //!
-//! The parent's three corner children, of radiosity b_0, b_1, b_2 with mean m, give a linear function on each child: at
-//! barycentric weights w of the child it is `B + sum over j of s_j w_j`, `s_j = b_j - m` (the middle child is turned
-//! round: minus that), which keeps the child's mean B. Over a patch with children of its own it is `s_j = 2 (b_j - m)` of these.
-//! A point receives `sum over j of s_j (W_j - W / 3)` more than by the mean alone, with `W_j` the integral of w_j over the form factor's
-//! kernel and W their sum, over what is seen of the patch, found by quartering that while it matters. Where a window or a corner
-//! cuts a patch what is seen is darker or brighter than its mean. And a point far from a wall is nearest to the wall's bright middle, where
-//! one beside it, which goes by the wall's parts, is near its dark edge: by means alone rooms were dark by .3 to .8 % at `--error 1`.
+//! The parent's three corner children, of radiosity b_0, b_1, b_2 with mean m, give a linear function on each child: at barycentric weights
+//! w of the child it is `B + sum over j of s_j w_j`, `s_j = b_j - m` (minus that on the middle child, which is rotated), which keeps the
+//! child's mean B. Over a patch with children of its own it is `s_j = 2 (b_j - m)` of these. A point receives
+//! `sum over j of s_j (W_j - W / 3)` more than by the mean alone, with `W_j` the integral of w_j over the form factor's kernel and W their
+//! sum, over the visible part of the patch, found by quartering this part while that matters. Where a window or a corner cuts a patch, its
+//! visible part is darker or brighter than its mean. And a point far from a wall is nearest to the wall's bright middle, while one beside
+//! the wall, which receives from its children, is near its dark edge: by means alone rooms were dark by .3 to .8 % at `--error 1`.
 
 use super::gatherer::Gatherer;
 use super::receiver::{Gathered, Receiver};
@@ -16,42 +16,42 @@ use glam::DVec3;
 
 /// A patch is quartered this often at the most.
 const DEEPEST: u32 = 3;
-/// Less than this share of white is never looked for, however small an error is asked for.
+/// Light below this share of white is ignored, however small an error is asked for.
 const LEAST: f64 = 1e-6;
-/// Patches that differ by less than this share of their light count as even where they are cut. What a window frame cuts off of one it cuts
-/// off of all beside it, and they all err the same way: a floor that saw a canopy only was .8 % too bright by patches each of which misplaced
-/// less than a twentieth of the tolerance, and is .2 to .4 % so.
+/// Patches that differ by less than this share of their light count as even where they are cut. A window frame cuts all patches beside each
+/// other in the same way, and their errors have the same sign: a floor that saw only a canopy was .8 % too bright by patches each of which
+/// misplaced less than a twentieth of the tolerance, and is .2 to .4 % with this.
 const EVEN: f64 = 2e-3;
 
-/// What a point sees of a patch.
+/// The part of a patch that a point sees.
 #[derive(Clone, Copy)]
 pub(super) struct Seen<'a> {
-    /// The share of its factor.
+    /// The visible share of the patch's factor.
     pub(super) share: f64,
-    /// Which parts, where they were clipped.
+    /// The visible parts, if clipped.
     pub(super) parts: Option<&'a Clipper>,
 }
 
 impl Seen<'_> {
-    /// A share of all parts alike.
+    /// The same share of all parts.
     pub(super) fn of(share: f64) -> Self {
         Self { share, parts: None }
     }
 }
 
-/// How the light of a patch goes on.
+/// How the light of a patch varies.
 struct Slope {
-    /// First of the three nodes that it is known by.
+    /// First of the three nodes whose radiosities define the slope.
     first: u32,
-    /// What their differences are multiplied by.
+    /// Factor of their differences from the mean.
     times: f64,
-    /// The greatest difference from the mean anywhere.
+    /// The greatest difference from the mean.
     steepest: f64,
 }
 
 impl Gatherer<'_> {
-    /// Adds what the slope of the radiosity of patch `id` brings, if that may exceed `limit` (share of white). `factor` is the
-    /// unblocked one.
+    /// Adds the irradiance by the slope of the radiosity of patch `id`, if that may exceed `limit` (share of white). `factor`
+    /// is the unblocked form factor.
     pub(super) fn slope(
         &self,
         to: &Receiver,
@@ -68,7 +68,7 @@ impl Gatherer<'_> {
         let Some(slope) = self.slope_of(id).filter(|_| seen.share > 0.0) else {
             return;
         };
-        // Weights differ from 1/3 by about as much over the kernel.
+        // Over the kernel, weights differ from 1/3 by about this much.
         let may_bring = factor * seen.share * slope.steepest * 0.5;
         let least = match seen.parts {
             Some(_)
@@ -113,7 +113,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// How the light of a patch goes on; none where nothing is known of it.
+    /// How the light of a patch varies; none where that is unknown.
     fn slope_of(&self, id: u32) -> Option<Slope> {
         let node = self.tree.node(id);
         let (first, times) = match (node.is_leaf(), node.parent) {
@@ -129,7 +129,7 @@ impl Gatherer<'_> {
         let corners = [bright(first), bright(first + 1), bright(first + 2)];
         let mean = corners.iter().sum::<f64>() / 3.0;
         let differences = corners.map(|b| times * (b - mean));
-        // Nowhere below zero.
+        // Light must be nowhere negative.
         let lowest = differences.into_iter().fold(0.0, f64::min);
         let scale = (bright(id) / -lowest).min(1.0);
         let steepest = differences.into_iter().map(f64::abs).fold(0.0, f64::max);
@@ -141,7 +141,8 @@ impl Gatherer<'_> {
     }
 }
 
-/// Triangles of a convex part of a patch, given from the point that looks, with the patch's weights at their corners.
+/// Triangles of a convex part of a patch, given relative to the receiving point, with the patch's weights at their
+/// corners.
 fn fan<'a>(
     to: &'a Receiver,
     [a, b, c]: [DVec3; 3],
@@ -163,8 +164,8 @@ fn fan<'a>(
     })
 }
 
-/// Adds the integrals of the barycentric weights over a triangle; `w` are those of its corners, `factor` its own. Where it is not quartered
-/// the kernel is taken to be as linear as they are.
+/// Adds the integrals of the barycentric weights over a triangle; `w` are the weights at its corners, `factor` is its form factor. A
+/// triangle that is not quartered counts as if the kernel, too, were linear over it.
 fn moment(
     to: &Receiver,
     corners: [DVec3; 3],
@@ -178,12 +179,13 @@ fn moment(
     if depth >= DEEPEST || 0.25 * factor * size <= limit {
         let kernels = kernels(to, corners);
         let mean = kernels.iter().sum::<f64>() / 3.0;
-        // On a corner it has no bound.
+        // On a corner the kernel is unbounded.
         let share = |k: usize| match mean > 0.0 && mean.is_finite() {
             true => kernels[k] / mean,
             false => 1.0,
         };
-        // The integral of f g over a triangle, both linear: of each corner's f_i g_i, and of the product of both sums, a twelfth.
+        // The integral of f g over a triangle, both linear: a twelfth of the sum of each corner's f_i g_i and of the product of
+        // both sums.
         let all = w[0] * (3.0 + share(0)) + w[1] * (3.0 + share(1)) + w[2] * (3.0 + share(2));
         for (k, out) in out.iter_mut().enumerate() {
             *out += factor * all[k] / 12.0;
@@ -216,7 +218,7 @@ mod tests {
     use crate::geometry::{NO_PLANE, Shadow};
     use crate::transport::tests::baked;
 
-    /// Irradiance by the parts of an element that are not hidden, and without that they differ: by many small triangles.
+    /// Irradiance by the unhidden part of an element, and the form factor of that part: by many small triangles.
     fn by_quadrature(
         to: &Receiver,
         [a, b, c]: [DVec3; 3],
@@ -267,7 +269,7 @@ mod tests {
             leaf: None,
             seed: 0,
         };
-        // Everything on one side of a plane beyond it.
+        // A shadow over everything on one side of a plane.
         let edge = [[-9.0, 0.3, -9.0], [9.0, 0.2, -9.0], [0.1, 0.25, 99.0]];
         let shadow = Shadow::new(
             to.point,
@@ -319,12 +321,12 @@ mod tests {
                 cut[1] = cut[1].max((mean / want - 1.0).abs());
             }
         });
-        // Of the worst patch, which is near: quartering ends.
+        // The worst patch is near: quartering ends.
         assert!(whole[0] < 1e-2 && whole[1] > 8.0 * whole[0], "{whole:?}");
         assert!(cut[0] < 1e-2 && cut[1] > 8.0 * cut[0], "{cut:?}");
     }
 
-    /// Does a convex polygon hold a point of its plane?
+    /// Does a convex polygon contain a point of its plane?
     fn holds(polygon: &[DVec3], p: DVec3) -> bool {
         let normal = (polygon[1] - polygon[0]).cross(polygon[2] - polygon[0]);
         let next = polygon.iter().cycle().skip(1);

@@ -1,4 +1,4 @@
-//! Light at a point in rooms where much stands about: lamps from the root, what is bright by links, all else by rays.
+//! Light at a point in cluttered rooms: lamps from the root, bright patches by links, all else by rays.
 
 use super::gatherer::{Gatherer, Memory, Of};
 use super::hemisphere::{BEAM, Hemisphere};
@@ -43,7 +43,7 @@ impl Gatherer<'_> {
         }
         self.lamps_of(to, memory, out);
         self.lamps_in_mirrors(to, memory, out);
-        // A ray must not carry more than this.
+        // No ray may carry more than this.
         self.bright(
             to,
             GLARE * self.tolerance * hemisphere.len() as f64,
@@ -64,13 +64,13 @@ impl Gatherer<'_> {
         memory.escaped = escaped;
     }
 
-    /// What patches reflect that are brighter than `most`, by links.
+    /// Adds the reflected light of patches brighter than `most`, by links.
     fn bright(&self, to: &Receiver, most: f64, memory: &mut Memory, out: &mut Gathered) {
         memory.open.extend(self.links(to));
         while let Some((id, way, v)) = memory.open.pop() {
             let k = id as usize;
             let brightest = f64::from(self.light.brightest[k]);
-            // Most are not, and their patches need not be looked at.
+            // Most links are not that bright, and their patches need not be loaded.
             if brightest <= most {
                 continue;
             }
@@ -90,7 +90,7 @@ impl Gatherer<'_> {
         self.patches(to, Of::Reflected, memory, out);
     }
 
-    /// What all other patches reflect, by the rays that were cast over the hemisphere, each of which has a `share`.
+    /// Adds the reflected light of all other patches, by the rays cast over the hemisphere, each of a `share`.
     fn look(&self, to: &Receiver, share: f32, memory: &mut Memory, out: &mut Gathered) {
         let met = std::mem::take(&mut memory.met);
         let width = self.light.width();
@@ -104,7 +104,7 @@ impl Gatherer<'_> {
         let (mut near, mut near_rays) = (std::mem::take(&mut memory.near), Vec::new());
         near.clear();
         for (ray, &(leaf, hit)) in met.iter().enumerate() {
-            // Rays that end on what was gathered as a patch bring nothing more.
+            // Rays that end on a patch gathered by its link bring nothing more.
             let taken = |id: u32| memory.taken[id as usize] == memory.epoch;
             if memory.any_taken && self.light.descent.upwards(leaf).any(taken) {
                 continue;
@@ -130,7 +130,8 @@ impl Gatherer<'_> {
         (memory.met, memory.near, memory.tints) = (met, near, tints);
     }
 
-    /// Casts the rays of a point. Which leaves they met, straight or by way of mirrors, in which directions they left the room, and how many met black backs.
+    /// Casts the rays of a point. Finds which leaves they meet, straight or by way of mirrors, in which directions they leave the room, and how many
+    /// meet black backs.
     fn cast(
         &self,
         to: &Receiver,
@@ -142,7 +143,7 @@ impl Gatherer<'_> {
         escaped.clear();
         tints.clear();
         mirrored.clear();
-        // Another seed turns the pattern.
+        // Another seed rotates the pattern.
         let (sin, cos) = (pattern(to.seed, 0, 0)[0] * std::f64::consts::TAU).sin_cos();
         let [x, y] = tangents(to.normal);
         let [x, y] = [x * cos + y * sin, y * cos - x * sin];
@@ -181,7 +182,7 @@ impl Gatherer<'_> {
         backs
     }
 
-    /// The smallest patch of the solution at a hit; none on a back that has no face.
+    /// The smallest patch of the solution at a hit; none on a back without a face.
     pub(super) fn met(&self, hit: &Hit) -> Option<u32> {
         let entry = self.tree.met(hit);
         if entry == NONE {

@@ -1,4 +1,4 @@
-//! What tests of several files of the transport begin with.
+//! Set-up shared by tests of several files of the transport.
 
 use super::receiver::Receiver;
 use crate::hierarchy::Tree;
@@ -6,7 +6,7 @@ use crate::scene::{Options, Scene};
 use crate::solve::{Bake, Settings};
 use std::path::Path;
 
-/// One of the rooms of `scenes/` after so many rounds.
+/// One of the rooms of `scenes/` after this many rounds.
 pub(crate) fn baked(room: &str, rounds: usize) -> Bake {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let scene = Scene::load(scenes.join(room), &Options::default()).unwrap();

@@ -1,12 +1,13 @@
-//! What a point gets its light from, kept so that lamps and paints can be changed without casting a ray.
+//! Where a point's light comes from, kept so that lamps and paints can be changed without casting a ray.
 //!
 //! Light is linear: with the patches k that a point gathered and their visible factors w_k frozen,
 //! `H(p) = scale sum (w_k + s_k) R_k + sum w_k E_k + sum f_l I_l + share sum n_j R_j` over patches (reflected R, emitted E,
 //! slopes s over their siblings), lamps (factor f, intensity I) and the leaves j that n_j of its rays over the hemisphere met.
 //!
-//! What came through panes or by way of mirrors has each term times what these leave; see [`tinted`].
+//! Each term of light that came through panes or by way of mirrors is multiplied by what these leave; see [`tinted`].
 //!
-//! Packed, ids stand sorted as differences in base 128: a patch takes about 6 bytes, a leaf that rays met about 2.
+//! In the packed form ids are sorted and stored as differences in base 128: a patch takes about 6 bytes, a leaf that
+//! rays met about 2.
 
 mod bytes;
 mod tinted;
@@ -26,11 +27,11 @@ pub(crate) struct Trace {
     /// Patches of which only reflected light counts.
     slopes: Vec<(u32, f32)>,
     hits: Vec<u32>,
-    /// What one ray carries.
+    /// Weight of one ray.
     share: f32,
-    /// What reflected light of patches is multiplied by at last.
+    /// Final factor of the patches' reflected light.
     scale: f32,
-    /// What came through panes or by way of mirrors.
+    /// Light that came through panes or by way of mirrors.
     tinted: Tinted,
 }
 
@@ -43,33 +44,34 @@ impl Trace {
         }
     }
 
-    /// A patch with its visible factor. `tint`: what is left of the light on its way, here and below; none: all.
+    /// Adds a patch with its visible factor. `tint`: what is left of the light on its way, for this and the following;
+    /// none: all.
     pub(super) fn patch(&mut self, id: u32, seen: f32, tint: Option<&Passage>) {
         self.add(Kind::Patch, id, seen, tint);
     }
 
-    /// The same of what the patch emits.
+    /// Adds the emission of a patch with its visible factor.
     pub(super) fn emitted(&mut self, id: u32, seen: f32, tint: Option<&Passage>) {
         self.add(Kind::Emitted, id, seen, tint);
     }
 
-    /// A punctual light with what turns its intensity into irradiance.
+    /// Adds a punctual light with the factor from its intensity to irradiance.
     pub(super) fn lamp(&mut self, lamp: usize, factor: f32, tint: Option<&Passage>) {
         self.add(Kind::Lamp, lamp as u32, factor, tint);
     }
 
-    /// More (or less) of what a patch reflects.
+    /// Adds to (or takes from) the reflected light of a patch.
     pub(super) fn slope(&mut self, id: u32, more: f32, tint: Option<&Passage>) {
         self.add(Kind::Slope, id, more, tint);
     }
 
-    /// A ray that carries `share` met a leaf.
+    /// Adds a ray of weight `share` that met a leaf.
     pub(super) fn hit(&mut self, leaf: u32, share: f32, tint: Option<&Passage>) {
         self.share = share;
         self.add(Kind::Hit, leaf, 1.0, tint);
     }
 
-    /// A ray that carries `share` met a leaf of a mirror, one mirror too many.
+    /// Adds a ray of weight `share` that met a leaf of a mirror, one mirror too many.
     pub(super) fn mirror(&mut self, leaf: u32, share: f32, tint: &Passage) {
         self.share = share;
         self.add(Kind::Mirror, leaf, 1.0, Some(tint));
@@ -100,7 +102,7 @@ impl Trace {
             Kind::Lamp => self.lamps.push((id, weight)),
             Kind::Slope => self.slopes.push((id, weight)),
             Kind::Hit => self.hits.push(id),
-            // Who meets a mirror at last has met others before.
+            // A ray that ends on a mirror has met others before, so it is never plain.
             Kind::Mirror => {}
         }
     }
@@ -118,7 +120,7 @@ impl Trace {
         self.tinted.absorb(&other.tinted, weight);
     }
 
-    /// All weights of patches and lamps times `factor`.
+    /// Multiplies all weights of patches and lamps by `factor`.
     pub(crate) fn times(mut self, factor: f32) -> Self {
         for (_, w) in self.patches.iter_mut().chain(&mut self.lamps) {
             *w *= factor;
@@ -167,7 +169,7 @@ impl Trace {
     }
 }
 
-/// Two packed traces as one: of a point of a diffuse sheet and of the point behind it.
+/// Two packed traces in one: of a point of a diffuse sheet and of the point behind.
 pub(crate) fn joined(own: &[u8], behind: &[u8]) -> Box<[u8]> {
     let mut out = Vec::with_capacity(own.len() + behind.len() + 4);
     number(own.len() as u64, &mut out);
@@ -176,10 +178,10 @@ pub(crate) fn joined(own: &[u8], behind: &[u8]) -> Box<[u8]> {
     out.into_boxed_slice()
 }
 
-/// The two of [`joined`].
+/// The two traces that [`joined`] packed.
 ///
 /// # Errors
-/// [`Broken`]: the bytes are no two traces.
+/// [`Broken`]: the bytes are not two traces.
 pub(crate) fn parted(both: &[u8]) -> Read<[&[u8]; 2]> {
     let mut from = Packed { rest: both };
     let own = usize::try_from(from.number()?).unwrap_or(usize::MAX);
@@ -187,10 +189,11 @@ pub(crate) fn parted(both: &[u8]) -> Read<[&[u8]; 2]> {
     Ok([own, behind])
 }
 
-/// Irradiance of a packed trace under a light, `L` lanes wide; `stains` tell what panes and mirrors leave of it. Where nothing is reflected yet `light.reflected` may be empty.
+/// Irradiance of a packed trace under a light, `L` lanes wide; `stains` hold the filters of panes and mirrors. Where nothing is reflected yet
+/// `light.reflected` may be empty.
 ///
 /// # Errors
-/// [`Broken`]: the bytes are no trace of this room.
+/// [`Broken`]: the bytes are not a trace of this room.
 pub(crate) fn replay<const L: usize>(
     packed: &[u8],
     light: &Light,
@@ -254,7 +257,7 @@ fn add<const L: usize>(sum: &mut [f32; L], row: &[f32; L], w: f32) {
     }
 }
 
-/// Weights of the lamps of a packed trace: (lamp, factor), in order, as if nothing were left out on the way.
+/// Weights of the lamps of a packed trace: (lamp, factor), in order, as if panes and mirrors left all light.
 ///
 /// # Errors
 /// As [`replay`].
@@ -301,7 +304,7 @@ mod tests {
     use proptest::prelude::*;
     use std::sync::LazyLock;
 
-    /// What the panes of a room leave of light.
+    /// The filters of the panes of a room.
     static FILTERS: LazyLock<Filters> = LazyLock::new(|| {
         let room = Scene::load("scenes/glazed.glb", &Options::default()).unwrap();
         let filters = Bake::new(room, Settings::default())
@@ -364,7 +367,7 @@ mod tests {
     }
 
     proptest! {
-        /// A packed trace gives the sum that it was made of, in any order.
+        /// A packed trace gives the sum that it was made from, in any order.
         #[test]
         fn a_trace_gives_its_sum(
             patches in prop::collection::vec((0..NODES as u32, 0.0_f32..1.0), 0..60),
@@ -411,7 +414,7 @@ mod tests {
             for (got, want) in got.iter().zip(expected) {
                 prop_assert!((f64::from(*got) - want).abs() <= 0.02 + 1e-5 * want.abs(), "{got} {want}");
             }
-            // Nothing reflected: what comes from lamps alone.
+            // Nothing reflected: only the light of lamps.
             let unlit = Light { reflected: Rows::zero(NODES, 8), ..light.clone() };
             let unknown = Light { reflected: Rows::zero(0, 8), ..light.clone() };
             prop_assert_eq!(replay::<8>(&packed, &unlit, &all, &stains), replay::<8>(&packed, &unknown, &all, &stains));
@@ -430,7 +433,7 @@ mod tests {
             prop_assert!(replay::<8>(&packed[..packed.len() - 1], &light, &all, &stains).is_err());
         }
 
-        /// What came past panes is what is left of it, term by term.
+        /// Light that came past panes is filtered, term by term.
         #[test]
         fn a_trace_knows_what_was_passed(
             terms in prop::collection::vec((0_usize..6, 0..NODES as u32, 0.1_f32..1.0, 1_usize..4, 0.0_f32..1.0), 1..40),
@@ -444,7 +447,7 @@ mod tests {
             let mut expected = [0.0_f64; 8];
             for &(kind, id, w, passed, share) in &terms {
                 let (k, lamp) = (id as usize, id as usize % 3);
-                // A ray takes one way, all else the mean of some.
+                // A ray takes one way, all other terms are means of several ways.
                 let ways = match kind {
                     0 | 1 => vec![(passed, 1.0)],
                     _ => vec![(passed, share), (0, 1.0 - share)],
@@ -477,11 +480,11 @@ mod tests {
             for (got, want) in got.iter().zip(expected) {
                 prop_assert!((f64::from(*got) - want).abs() <= 0.02 + 1e-5 * want.abs(), "{got} {want}");
             }
-            // Lamps count as if nothing were left out on the way.
+            // Lamps count as if panes left all light.
             let lamps: f32 = terms.iter().filter(|t| t.0 == 5).map(|t| t.2).sum();
             let found: f32 = lamps_of(&packed, NODES, 3).unwrap().iter().map(|f| f.1).sum();
             prop_assert!((found - lamps).abs() < 1e-4 * lamps.max(1.0));
-            // A part of it is refused, other bytes are no fault, and a room without panes knows nothing of them.
+            // A part of the bytes is refused, other bytes do no harm, and a room without panes does not know these.
             prop_assert!(replay::<8>(&packed[..packed.len() - 1], &light, &all, &stains).is_err());
             let none = Filters::default();
             prop_assert!(replay::<8>(&packed, &light, &all, &Stains::new(&none)).is_err());

@@ -1,13 +1,13 @@
-//! How a point looks into mirrors, and what rays meet by way of them.
+//! How a point sees by way of mirrors, and what its rays meet by way of them.
 
 use crate::light::Passage;
 use glam::DVec3;
 
-/// By which mirrors a receiver looks.
+/// The mirror image by which a receiver sees.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Via {
     pub(super) image: u32,
-    /// Where the true receiver is, and on which plane.
+    /// Position of the true receiver, and its plane.
     pub(super) point: DVec3,
     pub(super) plane: u32,
 }
@@ -16,7 +16,7 @@ pub(crate) struct Via {
 #[derive(Debug, Clone)]
 pub(super) struct Arrived {
     pub(super) end: End,
-    /// None where nothing has an image.
+    /// The image that the ray went by; none where things have none.
     pub(super) image: Option<u32>,
     pub(super) passage: Box<Passage>,
 }
@@ -24,14 +24,14 @@ pub(super) struct Arrived {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum End {
     Leaf(u32),
-    /// One mirror too many: it is read as a matt surface.
+    /// One mirror too many: it is taken for a matt surface.
     Mirror(u32),
-    /// It left the room in this direction.
+    /// The ray left the room in this direction.
     Outside(DVec3),
 }
 
 impl Arrived {
-    /// In which direction it left the room, if it did.
+    /// The direction in which the ray left the room, if it did.
     pub(super) fn outside(&self) -> Option<DVec3> {
         match self.end {
             End::Outside(direction) => Some(direction),

@@ -3,7 +3,7 @@ use crate::hierarchy::Mesh;
 use crate::scene::{Options, Scene};
 use std::path::Path;
 
-/// Light and openness that depend on where a point is.
+/// Light and openness that depend on the place.
 struct Fake;
 
 fn light(to: &Receiver) -> f32 {

@@ -8,7 +8,7 @@ use crate::link::Sight;
 use crate::transport::hemisphere::{BEAM, Hemisphere};
 use glam::Vec3;
 
-/// Flag of a face or leaf that was met by a ray whose fellow from the same point met no front.
+/// Flag of a face or leaf met by a ray whose fellow (the other ray from its point) met no front.
 pub(super) const ALONE: u32 = 1 << 31;
 
 /// Where a ray ended.
@@ -30,15 +30,15 @@ impl End {
 /// What the rays of a leaf found.
 #[derive(Default)]
 pub(super) struct Found {
-    /// Where they ended.
+    /// Where the rays ended.
     pub(super) ends: Vec<End>,
-    /// What those pass that pass panes or meet mirrors.
+    /// The rays that pass panes or meet mirrors, with those panes and mirrors.
     pub(super) passed: Vec<(u32, Passed)>,
-    /// Those that went by mirrors in which lamps have no image.
+    /// The rays that went by mirrors in which lamps have no image.
     pub(super) lamps: Vec<u32>,
 }
 
-/// Casts the rays of a leaf: a turned pattern of directions, two from each of points all over it.
+/// Casts the rays of a leaf: a rotated pattern of directions, two of them from each of points all over the leaf.
 pub(super) fn look_from(
     tree: &Tree,
     leaf: u32,
@@ -116,14 +116,14 @@ impl Found {
 }
 
 /// Which two rays of a leaf start from the same point: k and `k ^ mask`. The mask differs from leaf to leaf, so that the
-/// directions of the two have nothing in common.
+/// two directions are unrelated.
 pub(super) struct Pairs {
     mask: usize,
     shift: u64,
 }
 
 impl Pairs {
-    /// Of `count` rays, a power of two.
+    /// The pairs of `count` rays, a power of two.
     pub(super) fn new(leaf: u32, count: usize, seed: u64) -> Self {
         let shift = hash(seed, u64::from(leaf));
         let others = (count as u64).saturating_sub(1).max(1);
@@ -137,11 +137,11 @@ impl Pairs {
         k ^ self.mask
     }
 
-    /// Which of the points: 0 to half the number of rays.
+    /// The index of the point that ray `k` starts from: 0 to half the number of rays.
     pub(super) fn pair(&self, k: usize) -> usize {
         let top = 1 << self.mask.ilog2();
         let first = if k & top == 0 { k } else { self.fellow(k) };
-        // Without the bit that is 0 in the first of every pair.
+        // Drops the bit that is 0 in the first of every pair.
         first & (top - 1) | first >> 1 & !(top - 1)
     }
 

@@ -1,7 +1,7 @@
-//! How leaves look out, written down and read back.
+//! How leaves look out, written to a file and read back.
 //!
-//! A file holds the rays of all leaves in the order of their numbers, whichever ranks have them: so a bake goes on with any number of
-//! ranks.
+//! A file holds the rays of all leaves in the order of their numbers, whichever ranks have them: so a bake can go on with any number
+//! of ranks.
 
 use super::Outlook;
 use super::found::{ALONE, End};
@@ -14,14 +14,14 @@ use crate::store::{Broken, Decoder, Encoder};
 use crate::team::Team;
 use std::collections::BTreeSet;
 
-/// Nodes whose rays ranks send each other at a time: some ten MB.
+/// Nodes whose rays ranks exchange at a time: some ten MB.
 const TOGETHER: usize = 1 << 16;
-/// Flag, beside what a ray passes, of those that bring what their ends emit.
+/// Flag, beside what a ray passes, of rays that bring the emission of their ends.
 const LAMP: u32 = 1 << 31;
 
 impl Outlook {
-    /// Writes it down: where the rays end, or only the leaves that they met, which is half as much and enough as long as
-    /// no leaf is split. In a room with panes or mirrors (then there are `filters`) also what the rays pass.
+    /// Writes the outlook: where the rays end, or only the leaves that they met, which is half as much and enough as
+    /// long as no leaf is split. In a room with panes or mirrors (then there are `filters`) also what the rays pass.
     pub(in crate::solve) fn encode(
         &self,
         whole: bool,
@@ -47,7 +47,8 @@ impl Outlook {
         }
     }
 
-    /// What the rays of all ranks pass, once, and the number of what each passes.
+    /// Writes each distinct sequence of panes and mirrors that rays of any rank pass, once, and for each ray its
+    /// number.
     fn encode_passed(&self, filters: &Filters, out: &mut Encoder) -> std::io::Result<()> {
         let own = vec![self.tints.numbers()];
         let mut all: BTreeSet<Passed> = BTreeSet::new();
@@ -64,7 +65,7 @@ impl Outlook {
         })
     }
 
-    /// Reads it back.
+    /// Reads back what [`Outlook::encode_passed`] wrote.
     fn decode_passed(&mut self, counts: &[u32], filters: &Filters, from: &mut Decoder) -> Read<()> {
         let all = tinted::all_of(&from.get_all::<u64>()?, filters)?;
         let mut of = self.own::<u32>(counts, from)?;
@@ -78,7 +79,7 @@ impl Outlook {
         Ok(())
     }
 
-    /// A list of what `of` says of each ray.
+    /// Writes a list of `of` each ray.
     fn encode_rays<T: Plain>(
         &self,
         out: &mut Encoder,
@@ -100,7 +101,7 @@ impl Outlook {
         out.put_list(count, rays.flatten())
     }
 
-    /// Reads back what this rank needs, for the hierarchy that it was made for.
+    /// Reads back what this rank needs, for the hierarchy of which it was written.
     pub(in crate::solve) fn decode(
         tree: &Tree,
         team: Team,
@@ -160,7 +161,7 @@ impl Outlook {
         Ok(outlook)
     }
 
-    /// A list of something for each ray: what is said of the rays of this rank's leaves.
+    /// Reads a list with an item for each ray; keeps the items of the rays of this rank's leaves.
     fn own<T: Plain>(&self, counts: &[u32], from: &mut Decoder) -> Read<Vec<T>> {
         let mut all = from.get_list::<T>()?;
         let told: u64 = counts.iter().map(|&count| u64::from(count)).sum();
@@ -176,7 +177,7 @@ impl Outlook {
                 rays.for_each(drop);
             }
         }
-        // The first ray of a leaf is a u32.
+        // The index of a leaf's first ray is a u32.
         match u32::try_from(own.len()) {
             Ok(_) => Ok(own),
             Err(_) => Err(Broken::new("has more rays than one rank can hold")),

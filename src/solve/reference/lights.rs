@@ -1,4 +1,4 @@
-//! What lamps and skies bring to points and patches of the reference, straight.
+//! Direct light of lamps and skies at points and patches of the reference.
 
 use super::patch::{Patch, Place, add, radon};
 use super::ways::Ways;
@@ -8,7 +8,8 @@ use crate::scene::{LightKind, PunctualLight, Scene};
 use crate::spectrum::{LEAVES, Leaves};
 use std::f64::consts::PI;
 
-/// Points of a triangle of a lamp with a profile: where a shadow's edge crosses it they are off by about .3 %.
+/// Points on a triangle of a lamp with a profile: where a shadow's edge crosses the lamp, irradiance is off by about .3
+/// %.
 const SHINING_POINTS: u32 = 1024;
 /// Rays for the sky of a point. In a box of 2 m with a gap of 1 m about an edge points are off by .14 % (root mean square, patches twice as
 /// fine) with 16,384, by 1 % with 1024.
@@ -49,7 +50,7 @@ impl Lamps<'_> {
         sum
     }
 
-    /// What a light without extent brings for a unit of what it gives out: `I cos / r^2`.
+    /// Irradiance by a light without extent, per unit of intensity: `I cos / r^2`.
     fn point(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
         let parallel = light.kind.is_parallel();
         let end = match parallel {
@@ -74,7 +75,7 @@ impl Lamps<'_> {
         }
     }
 
-    /// What turns the flux of a lamp with an extent into irradiance: many points, a ray to each.
+    /// Irradiance by a lamp with an extent, per unit of flux: many points, a ray to each.
     fn surface(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
         let Some(luminaire) = &light.luminaire else {
             return;
@@ -98,7 +99,8 @@ impl Lamps<'_> {
         }
     }
 
-    /// What a sky brings that gives open level ground 1, or ground that sends out 1: the mean over many directions.
+    /// Irradiance by a part of the sky that gives open level ground 1, or by ground of exitance 1: the mean over many
+    /// directions.
     fn dome(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
         let Some(sky) = &self.scene.sky else { return };
         for k in 0..DOME_RAYS {

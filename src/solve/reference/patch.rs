@@ -10,7 +10,7 @@ pub struct Patch {
     pub corners: [DVec3; 3],
     /// Unit normal of the front.
     pub normal: DVec3,
-    /// Plane id of its triangle.
+    /// Plane id of the patch's triangle.
     pub plane: u32,
     /// Area.
     pub area: f64,
@@ -20,11 +20,11 @@ pub struct Patch {
     pub exitance: Leaves,
     /// Irradiance from punctual lights, W/m2/nm.
     pub punctual: Leaves,
-    /// Its material.
+    /// Index of the material.
     pub material: usize,
-    /// What it lets through of light that meets its other side.
+    /// Share of the light on the patch's other side that leaves this one.
     pub transmittance: Leaves,
-    /// The patch on its other side, if it lets light through.
+    /// The patch on the other side, if the material lets light through.
     pub behind: Option<usize>,
 }
 
@@ -59,12 +59,12 @@ pub(super) fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
 pub(super) struct Place {
     pub(super) at: DVec3,
     pub(super) normal: DVec3,
-    /// Plane that it lies in: what else lies in it blocks nothing.
+    /// Plane that the place lies in: nothing in this plane blocks.
     pub(super) plane: u32,
 }
 
 impl Patch {
-    /// A place on it, by weights of its corners.
+    /// A place on the patch, by weights of its corners.
     pub(super) fn place(&self, w: [f64; 3]) -> Place {
         Place {
             at: self.corners[0] * w[0] + self.corners[1] * w[1] + self.corners[2] * w[2],

@@ -1,4 +1,4 @@
-//! What blocks the way between two points of the reference, and what panes leave of light that takes it.
+//! What blocks light between two points of the reference, and what panes on its way let through.
 
 use super::patch::{Patch, Place, add};
 use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon};
@@ -26,14 +26,14 @@ impl<'a> Ways<'a> {
         Self {
             scene,
             rays: RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &solid),
-            // Between the walls of a convex room nothing blocks, but these block the sky.
+            // The walls of a convex room do not block each other, but they block the sky.
             blocks: Plan::of(scene).runs(Kind::Occlusion) || scene.sky.is_some(),
             panes: Panes::new(scene, mesh.centre),
             count,
         }
     }
 
-    /// Factor from a point to the visible part of a patch, and what panes leave of its light; none: all.
+    /// Form factor from a point to the visible part of a patch, and the transmittance of panes on the way; none: 1.
     pub(super) fn factor(&self, from: Place, to: &Patch) -> (f64, Option<Leaves>) {
         let Place {
             at: point,
@@ -73,8 +73,7 @@ impl<'a> Ways<'a> {
         (open * seen / total, passed.map(|row| row.map(|x| x / seen)))
     }
 
-    /// Adds so much light that comes from `end` to a point, less what panes keep, if nothing blocks it. What lies in the point's plane does
-    /// not.
+    /// Adds `amount` of light from `end` to a point, less what panes absorb, unless something blocks it. Nothing in the point's plane does.
     pub(super) fn bring(&self, sum: &mut Leaves, amount: f64, to: Place, end: DVec3) {
         if !self.blocked(to.at, end, [to.plane, NO_PLANE]) {
             match self.panes {
@@ -88,7 +87,7 @@ impl<'a> Ways<'a> {
         self.blocks && self.rays.occluded(&Segment::new(from, to, planes))
     }
 
-    /// What the panes between two points let through.
+    /// Transmittance of the panes between two points.
     fn passes(&self, from: DVec3, to: DVec3) -> Leaves {
         let mut left = [1.0; LEAVES];
         let Some(panes) = &self.panes else {

@@ -1,7 +1,9 @@
-//! What of a trace came through panes or by way of mirrors: grouped by what it passed, so that a filter is worked out once a group.
+//! The part of a trace that came through panes or by way of mirrors, grouped by what light passed, so that each filter is worked
+//! out once.
 //!
-//! Each group: how many numbers of what is passed are those of the group before, how many follow, and they (see
-//! [`passed::numbers`]); then its entries, `8 id + kind` and but for rays the weight. A ray takes about 8 bytes.
+//! A group holds: how many of the numbers for what is passed are as in the group before, how many follow, and these
+//! (see [`passed::numbers`]); then its entries, each `8 id + kind` and, except for rays, the weight. A ray takes about
+//! 8 bytes.
 
 use super::bytes::{Packed, broken, number};
 use crate::light::passed::{self, Passed};
@@ -11,21 +13,21 @@ use crate::store::codec::Read;
 use std::collections::HashMap;
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// Panes and mirrors on one way; more are in no room that was not made to have them.
+/// Panes and mirrors on one way at the most; only a room made to do so has more.
 const MOST_PASSED: u64 = 4096;
 
-/// Of what an entry tells.
+/// The kind of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     /// A ray that met a leaf.
     Hit,
     /// A ray that met a leaf of a mirror, one mirror too many.
     Mirror,
-    /// A patch: what it reflects and emits.
+    /// A patch: its reflected and emitted light.
     Patch,
-    /// What a patch reflects.
+    /// The reflected light of a patch.
     Slope,
-    /// What a patch emits.
+    /// The emission of a patch.
     Emitted,
     /// A punctual light.
     Lamp,
@@ -41,13 +43,13 @@ impl Kind {
         Self::Lamp,
     ];
 
-    /// Rays all carry alike.
+    /// Do all entries of this kind have the same weight?
     fn is_ray(self) -> bool {
         matches!(self, Self::Hit | Self::Mirror)
     }
 }
 
-/// One thing that brings light.
+/// One source of light.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
     pub(super) kind: Kind,
@@ -55,14 +57,14 @@ pub(super) struct Entry {
     pub(super) weight: f32,
 }
 
-/// What came past something, with what.
+/// Entries of light that passed something, with what it passed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tinted {
     entries: Vec<(Passed, Entry)>,
 }
 
 impl Tinted {
-    /// Something that came past panes or mirrors.
+    /// Adds an entry whose light passed panes or mirrors.
     pub(super) fn add(&mut self, passed: &Passed, entry: Entry) {
         self.entries.push((passed.clone(), entry));
     }
@@ -76,12 +78,12 @@ impl Tinted {
         self.entries.extend(other.entries.iter().map(times));
     }
 
-    /// All weights times `factor`.
+    /// Multiplies all weights by `factor`.
     pub(super) fn times(&mut self, factor: f32) {
         self.entries.iter_mut().for_each(|e| e.1.weight *= factor);
     }
 
-    /// As bytes; none where nothing was passed.
+    /// Packs the entries; appends nothing where nothing was passed.
     pub(super) fn pack(mut self, out: &mut Vec<u8>) {
         if self.entries.is_empty() {
             return;
@@ -117,14 +119,14 @@ impl Tinted {
     }
 }
 
-/// What panes and mirrors leave of light, by the numbers of what is passed: each is worked out when it is first asked for.
+/// Filters of panes and mirrors, by the numbers of what is passed: each is worked out when first needed.
 pub(crate) struct Stains<'a> {
     filters: &'a Filters,
     known: RwLock<HashMap<Box<[u64]>, Arc<Filter>>>,
 }
 
 impl<'a> Stains<'a> {
-    /// On the lanes of `filters`.
+    /// Filters on the lanes of `filters`.
     pub(crate) fn new(filters: &'a Filters) -> Self {
         let known = RwLock::default();
         Self { filters, known }
@@ -147,7 +149,7 @@ impl<'a> Stains<'a> {
     }
 }
 
-/// Something of the bytes after the untinted part of a trace.
+/// State of reading the groups after the untinted part of a trace.
 struct Groups {
     left: u64,
     numbers: Vec<u64>,
@@ -163,7 +165,7 @@ impl Groups {
         Ok(Self { left, numbers })
     }
 
-    /// How many entries the next group has, whose numbers then are known; none after the last.
+    /// Reads the numbers of the next group and returns how many entries it has; none after the last.
     fn next(&mut self, from: &mut Packed) -> Read<Option<u64>> {
         if self.left == 0 {
             return Ok(None);
@@ -192,7 +194,7 @@ fn entry(from: &mut Packed) -> Read<Entry> {
     Ok(Entry { kind, id, weight })
 }
 
-/// Calls `each` with all that came past something.
+/// Calls `each` with all entries.
 pub(super) fn entries(from: &mut Packed, mut each: impl FnMut(Entry) -> Read<()>) -> Read<()> {
     let mut groups = Groups::begin(from)?;
     while let Some(count) = groups.next(from)? {
@@ -203,17 +205,17 @@ pub(super) fn entries(from: &mut Packed, mut each: impl FnMut(Entry) -> Read<()>
     Ok(())
 }
 
-/// Light of a trace that is being summed.
+/// The light of a trace, being summed.
 pub(super) struct Sums<const L: usize> {
-    /// What patches reflect, before it is scaled.
+    /// Reflected light of patches, before it is scaled.
     pub(super) bounced: [f32; L],
-    /// What comes from lamps.
+    /// Light straight from lamps.
     pub(super) straight: [f32; L],
-    /// What the leaves reflect that rays met, by number of rays.
+    /// Reflected light of the leaves that rays met, by number of rays.
     pub(super) met: [f32; L],
 }
 
-/// Adds what came past something.
+/// Adds the light of all entries.
 pub(super) fn replay<const L: usize>(
     from: &mut Packed,
     light: &Light,
