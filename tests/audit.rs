@@ -1,7 +1,6 @@
 //! The path tracer against closed forms, by a chi-squared criterion; the report that is made of it.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::{Room, sphere};
 use glam::{DVec3, dvec3};

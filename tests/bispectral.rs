@@ -1,10 +1,8 @@
 //! Measured paper that no one dye explains: what it gives out moves to longer wavelengths with what excites it. The dense reference gets the
 //! matrix itself, the solver the products that stand for it.
 
-#[path = "common/built.rs"]
-mod built;
-#[path = "common/desk.rs"]
-mod desk;
+use crate::common::built;
+use crate::common::desk;
 
 use built::{Room, close};
 use glam::DVec3;

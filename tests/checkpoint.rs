@@ -1,7 +1,6 @@
 //! A bake that is stopped between rounds and resumed ends with the same bytes; what does not belong is refused.
 
-#[path = "common/every_effect.rs"]
-mod every_effect;
+use crate::common::every_effect;
 
 use haarlight::output::{Exposure, Writing, baked_glb, npz};
 use haarlight::scene::{Options, Scene};

@@ -4,8 +4,7 @@
 //! Figures of 5.2 to 5.7 are recomputed from the closed forms; 5.7 is the corrected Table 19 (the printed one is known to be
 //! wrong). A point (x, y, z) of the report, z up, stands at (x, z, -y) in the rooms.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};

@@ -1,8 +1,7 @@
 //! Light where things touch: vertices on the edges by which the blocks of the Cornell box stand on the floor, beside path
 //! tracing a little above them.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};

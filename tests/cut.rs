@@ -1,7 +1,6 @@
 //! Triangles cut where others meet them: nothing is lost, no crack opens, and input attributes stay where they were.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};

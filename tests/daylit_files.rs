@@ -1,6 +1,6 @@
 //! Daylight as files and command lines say it: the sun by the name of a light, by place and time, and through cards that are blended.
 
-mod common;
+use crate::common;
 
 use common::Room;
 use glam::{DQuat, DVec3, dvec3};

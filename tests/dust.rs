@@ -1,8 +1,7 @@
 //! Dust changes nothing: the same room with any number of tiny triangles in it has the same light, found as well, on both sides of every
 //! number at which a program might switch to other means.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::baked;
 use glam::{DMat4, DVec3};

@@ -1,7 +1,6 @@
 //! Edges of shadows are lines of the mesh that is written: light on either side of them is its own.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};

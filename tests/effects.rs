@@ -1,9 +1,7 @@
 //! Only the effects that a scene calls for are paid for: shown by counters, never by time.
 
-#[path = "common/built.rs"]
-mod built;
-#[path = "common/every_effect.rs"]
-mod every_effect;
+use crate::common::built;
+use crate::common::every_effect;
 
 use built::{Room, sun};
 use glam::{DVec3, dvec3};

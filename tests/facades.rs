@@ -2,10 +2,8 @@
 //! facade opposite. The report's own figures of these cases are not at hand: quadrature over the window takes their place, and over
 //! what a mask sees in turn.
 
-#[path = "common/built.rs"]
-mod built;
-#[path = "common/daylit.rs"]
-mod daylit;
+use crate::common::built;
+use crate::common::daylit;
 
 use built::Room;
 use daylit::{

@@ -1,10 +1,8 @@
 //! Fluorescence: light that comes at some wavelengths leaves at others, and no more of it.
 
-#[path = "common/built.rs"]
-mod built;
-mod common;
-#[path = "common/desk.rs"]
-mod desk;
+use crate::common;
+use crate::common::built;
+use crate::common::desk;
 
 use built::{Room, close, sphere};
 use glam::{DVec3, dvec3};

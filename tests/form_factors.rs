@@ -1,8 +1,7 @@
 //! Form factors against closed forms: points by Lambert's formula, patches by contour integrals, links as the solver
 //! makes them, and the solver itself. Figures without another source are recomputed from the closed form that is named.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::{Room, faces};
 use glam::{DVec3, dvec3};

@@ -1,8 +1,7 @@
 //! Exact identities of light: furnace, parallel plates, flux balance, sphere, leak test, reciprocity, closure.
 //! The solver runs with its default settings.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::{Room, baked, luminous, sphere};
 use glam::{DVec3, dvec3};

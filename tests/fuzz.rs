@@ -1,8 +1,7 @@
 //! The readers of side files, spectra and points, and whole bakes, under broken and hostile input: an input problem that
 //! says what is wrong, or sound numbers. Never a panic.
 
-#[path = "common/mod.rs"]
-mod common;
+use crate::common;
 
 use common::Room;
 use haarlight::Error;

@@ -1,7 +1,6 @@
 //! Glare at viewpoints and daylight factors, against closed forms.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::{Room, baked_to};
 use glam::{DVec3, dvec3};

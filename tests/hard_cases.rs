@@ -1,8 +1,7 @@
 //! Rooms that break radiosity solvers. In all of them: the solver ends, no figure is NaN or negative, light that is given
 //! out is accounted for.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};

@@ -1,6 +1,6 @@
 //! Reading glTF: small documents built here, one matter each.
 
-mod common;
+use crate::common;
 
 use common::{Room, U8, U16, png, push};
 use glam::{DVec3, Vec3};

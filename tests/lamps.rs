@@ -1,6 +1,6 @@
 //! Lamps as they are sold: what a profile on a light, on a node or on a surface brings, against closed forms and quadrature.
 
-mod common;
+use crate::common;
 
 use common::Room;
 use glam::{DVec3, dvec3};

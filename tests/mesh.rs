@@ -1,7 +1,6 @@
 //! The mesh that is written: no T-junctions, as fine as light needs it, and with the error that is stated.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};

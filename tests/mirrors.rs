@@ -1,7 +1,6 @@
 //! Mirrors: what is seen in them, as from where it would be looked without them.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::{Room, baked, close};
 use glam::{DVec3, dvec3};

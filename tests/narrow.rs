@@ -1,7 +1,6 @@
 //! Light that is easily missed or counted twice: narrow spots, sun through a small hole, faces that lie in others.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::{Room, baked_to};
 use glam::{DVec3, dvec3};

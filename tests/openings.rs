@@ -1,9 +1,7 @@
 //! Small openings far away: as right as a wall of glass. By rays, in rooms of many triangles, beside plain quadrature.
 
-#[path = "common/built.rs"]
-mod built;
-#[path = "common/daylit.rs"]
-mod daylit;
+use crate::common::built;
+use crate::common::daylit;
 
 use built::Room;
 use daylit::{LUX, bake, through, wish};

@@ -1,6 +1,6 @@
 //! The baked GLB, read back with another reader.
 
-mod output_room;
+use crate::output_room;
 
 use glam::{DMat4, DVec3, Mat4};
 use haarlight::gather::BakedSurface;

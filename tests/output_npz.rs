@@ -1,6 +1,6 @@
 //! The NumPy archive, read back through its own directory as a ZIP reader would.
 
-mod output_room;
+use crate::output_room;
 
 use haarlight::gather::refined;
 use haarlight::output::npz;

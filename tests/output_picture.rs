@@ -1,6 +1,6 @@
 //! Pictures: what a pixel holds against closed forms, and a room to look at (left in `target/tmp`).
 
-mod output_room;
+use crate::output_room;
 
 use ::exr::prelude::{ReadChannels, ReadLayers};
 use glam::{DMat4, DVec3};

@@ -1,6 +1,6 @@
 //! Smaller files: what is left out, quantised numbers, packed streams, budgets.
 
-mod output_room;
+use crate::output_room;
 
 use glam::DVec3;
 use haarlight::output::{BakedGlb, Exposure, Packing, Writing, baked_glb, vertices_within};

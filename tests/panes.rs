@@ -1,9 +1,7 @@
 //! Panes: filters on every ray, neither blockers nor receivers.
 
-#[path = "common/built.rs"]
-mod built;
-#[path = "common/daylit.rs"]
-mod daylit;
+use crate::common::built;
+use crate::common::daylit;
 
 use built::{Room, baked, close};
 use daylit::{INDEX, LUX, beside, cie, glass_of_the_report, places_beside, row, wish};

@@ -1,7 +1,6 @@
 //! Light in the air: the same as `probe` finds, and what spherical harmonics of known light are.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};

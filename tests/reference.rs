@@ -1,7 +1,6 @@
 //! The plain reference against closed forms, and the solver against the plain reference.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::{Room, faces, sun};
 use glam::{DVec3, dvec3};

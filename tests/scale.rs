@@ -1,8 +1,7 @@
 //! The scale of a file does not matter: a room on a plain of a square kilometre is the room alone, and a room a hundred times as large or as
 //! small has the same light.
 
-#[path = "common/built.rs"]
-mod built;
+use crate::common::built;
 
 use built::{Room, sphere};
 use glam::{DVec3, dvec3};

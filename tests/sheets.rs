@@ -1,8 +1,7 @@
 //! Diffuse sheets: what meets one side leaves both.
 
-#[path = "common/built.rs"]
-mod built;
-mod common;
+use crate::common;
+use crate::common::built;
 
 use built::{Room, baked_to, close, sphere};
 use glam::{DVec3, dvec3};

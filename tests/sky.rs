@@ -1,9 +1,7 @@
 //! Light of sky and sun: CIE 171:2006, cases 5.9, 5.11 and 5.12, and closed forms.
 
-#[path = "common/built.rs"]
-mod built;
-#[path = "common/daylit.rs"]
-mod daylit;
+use crate::common::built;
+use crate::common::daylit;
 
 use built::{Room, sun};
 use daylit::{

@@ -1,9 +1,7 @@
 //! Pictures of all directions as skies, and skies of several colours: closed forms, quadrature, and the audit.
 
-#[path = "common/built.rs"]
-mod built;
-#[path = "common/daylit.rs"]
-mod daylit;
+use crate::common::built;
+use crate::common::daylit;
 
 use built::{Room, sun};
 use daylit::{LUX, bake, bake_at, cie, points, roof, room, through, wish};

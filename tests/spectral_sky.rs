@@ -1,9 +1,7 @@
 //! Light of the spectral sky of Hosek and Wilkie. Its radiance itself is tested where it is worked out (`scene/sky/hosek.rs`).
 
-#[path = "common/built.rs"]
-mod built;
-#[path = "common/daylit.rs"]
-mod daylit;
+use crate::common::built;
+use crate::common::daylit;
 
 use built::{Room, sun};
 use daylit::{LUX, bake, beside, places_beside, points, roof, room, through};

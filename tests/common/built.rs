@@ -3,8 +3,6 @@
 //! All lamps share one light spectrum of equal energy (luminous size 1), so that a figure in lm/m2 is a figure for every
 //! leaf up to one constant.
 
-#![allow(dead_code, reason = "no test file uses all of it")]
-
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
 use haarlight::scene::fluorescence::{Fluorescence, Term};

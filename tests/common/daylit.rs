@@ -1,8 +1,6 @@
 //! The rooms of CIE 171:2006, 5.9 and what follows, and light through their openings by quadrature.
 
-#![allow(dead_code, reason = "no test file uses all of it")]
-
-use crate::built::{Room, sun};
+use crate::common::built::{Room, sun};
 use glam::{DVec3, dvec3};
 use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
 use haarlight::solve::{Bake, Settings};

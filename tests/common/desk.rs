@@ -1,6 +1,6 @@
 //! A desk of 2 m x 2 m in a closed room of its size, below a lamp that is all of the ceiling.
 
-use crate::built::Room;
+use crate::common::built::Room;
 use glam::{DVec3, dvec3};
 
 /// The paper takes half of the desk, what is plain the other half.

@@ -1,6 +1,10 @@
 //! Builds small glTF files in memory.
 
-#![allow(dead_code, reason = "no test file uses all of it")]
+pub(crate) mod built;
+pub(crate) mod daylit;
+pub(crate) mod desk;
+pub(crate) mod every_effect;
+pub(crate) mod three;
 
 use haarlight::scene::document::Document;
 use haarlight::scene::geometry::Geometry;

@@ -2,7 +2,7 @@
 //!
 //! Needs Chromium and the npm module three (`npm install three`, in HAARLIGHT_NODE_MODULES or tools/web); skipped without.
 
-use crate::browser::Browser;
+use crate::report::browser::Browser;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

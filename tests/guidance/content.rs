@@ -1,7 +1,7 @@
 //! Files with nothing in them, rooms of a strange size, a picture that is smaller than it looks.
 
+use super::desk::{Desk, dark, light, lit, materials, object, panel, says, vectors, walls};
 use crate::common::{Room, push};
-use crate::desk::{Desk, dark, light, lit, materials, object, panel, says, vectors, walls};
 use haarlight::scene::{Options, Scene};
 use serde_json::json;
 

@@ -1,6 +1,6 @@
 //! A folder with small rooms, and the real program in it.
 
-use crate::built::faces;
+use crate::common::built::faces;
 use crate::common::{F32, Room, U8, push};
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};

@@ -1,6 +1,6 @@
 //! Lamps that shine away from the room, and no lamp at all.
 
-use crate::desk::{Desk, dark, light, lit, materials, object, panel, says, turned, vectors, walls};
+use super::desk::{Desk, dark, light, lit, materials, object, panel, says, turned, vectors, walls};
 use glam::dvec3;
 use serde_json::json;
 

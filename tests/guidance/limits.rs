@@ -1,6 +1,6 @@
 //! Figures: estimates that are none, lamps that nothing can carry.
 
-use crate::desk::{Desk, dark, light, lit, says};
+use super::desk::{Desk, dark, light, lit, says};
 use serde_json::{Value, json};
 
 #[test]

@@ -1,6 +1,6 @@
 //! Names: keys of side files, spectra, the cache.
 
-use crate::desk::{Desk, lit, says};
+use super::desk::{Desk, lit, says};
 use serde_json::json;
 
 #[test]

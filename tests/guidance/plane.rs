@@ -1,7 +1,7 @@
 //! What a bake says of its working plane.
 
-use crate::built::faces;
-use crate::desk::{Desk, light, lit, object, says};
+use super::desk::{Desk, light, lit, object, says};
+use crate::common::built::faces;
 use glam::dvec3;
 use serde_json::json;
 

@@ -1,7 +1,7 @@
 //! Sensors: where they are, and what they read.
 
-use crate::built::faces;
-use crate::desk::{Desk, lit, object, says, turned};
+use super::desk::{Desk, lit, object, says, turned};
+use crate::common::built::faces;
 use glam::dvec3;
 use serde_json::Value;
 

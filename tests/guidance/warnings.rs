@@ -1,6 +1,6 @@
 //! Warnings are not lost when nobody listens, and nobody listening is no fault.
 
-use crate::desk::{Desk, lit, says};
+use super::desk::{Desk, lit, says};
 use serde_json::{Value, json};
 use std::io::Read;
 use std::process::Stdio;

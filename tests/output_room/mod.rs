@@ -3,8 +3,6 @@
 //! Mesh 0 has two primitives, a textured floor and a wall with vertex colours, and hangs on two nodes, one mirrored.
 //! Mesh 1 is instanced twice; mesh 2 holds points, which carry no light. A camera, an animation and extras ride along.
 
-#![allow(dead_code, unreachable_pub, reason = "each test binary uses a part")]
-
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use haarlight::gather::{BakedSurface, BakedVertex};
 use haarlight::scene::*;
@@ -12,7 +10,7 @@ use haarlight::spectrum::{Grid, LEAVES};
 use serde_json::{Value, json};
 
 /// Side of the quads.
-pub const SIDE: f32 = 2.0;
+pub(crate) const SIDE: f32 = 2.0;
 
 const CORNERS: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
@@ -141,7 +139,7 @@ fn material(name: &str, index: usize) -> Material {
 }
 
 /// The room.
-pub fn room() -> Scene {
+pub(crate) fn room() -> Scene {
     let mut document = Document::default();
     let indices = |d: &mut Document| {
         let bytes: Vec<u8> = TRIANGLES.iter().flatten().map(|&i| i as u8).collect();
@@ -335,7 +333,7 @@ fn surface(
 }
 
 /// Each quad cut into `n` by `n` cells, lit by a smooth function of the place.
-pub fn refined(scene: &Scene, n: u32) -> Vec<BakedSurface> {
+pub(crate) fn refined(scene: &Scene, n: u32) -> Vec<BakedSurface> {
     let light = |p: DVec3| [100.0 + 20.0 * p.x, 120.0, 80.0 + 30.0 * p.y].map(|c| c as f32);
     scene
         .surfaces
@@ -394,7 +392,7 @@ pub fn refined(scene: &Scene, n: u32) -> Vec<BakedSurface> {
 }
 
 /// The back of a sheet, with its own even light.
-pub fn back(front: &BakedSurface, light: f64) -> BakedSurface {
+pub(crate) fn back(front: &BakedSurface, light: f64) -> BakedSurface {
     let mut back = front.clone();
     back.back = true;
     for triangle in &mut back.triangles {

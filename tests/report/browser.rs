@@ -1,7 +1,5 @@
 //! A headless Chromium on two pipes: the DevTools protocol, messages of JSON that end in a zero byte.
 
-#![allow(dead_code, reason = "two tests share it, and neither uses all of it")]
-
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

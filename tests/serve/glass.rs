@@ -1,6 +1,6 @@
 //! Rooms with panes and mirrors: what is shown after a change is what a bake of the changed room finds.
 
-use crate::program::Program;
+use super::program::Program;
 use glam::{DMat4, DVec3};
 use haarlight::color::de2000;
 use haarlight::scene::{Options, Scene};

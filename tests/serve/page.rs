@@ -1,7 +1,7 @@
 //! The live page in a browser.
 
-use crate::browser::{Browser, CANVAS};
-use crate::program::Program;
+use super::program::Program;
+use crate::report::browser::{Browser, CANVAS};
 
 fn differ(a: &[f64], b: &[f64]) -> usize {
     let pairs = a.iter().zip(b);

@@ -1,6 +1,6 @@
 //! Points of the room, read through the program.
 
-use crate::program::Program;
+use super::program::Program;
 use serde_json::{Value, json};
 
 /// A point is read with its spectrum, of which the illuminance is the sum, as the picture has it; and with its error.

@@ -1,7 +1,5 @@
 //! `haarlight serve` over plain TCP: who is answered, what is refused, and what becomes of the light.
 
-#[path = "../report/browser.rs"]
-mod browser;
 mod glass;
 mod page;
 mod points;

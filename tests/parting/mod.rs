@@ -3,14 +3,7 @@
 mod dimmed;
 mod kept;
 
-#[path = "../report/browser.rs"]
-mod browser;
-
-#[path = "../common/built.rs"]
-mod built;
-
-#[path = "../common/three.rs"]
-mod three;
+use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};

@@ -1,6 +1,6 @@
 //! The page of a bake: whole, small, true to the log, and alive in a browser.
 
-mod browser;
+pub(crate) mod browser;
 
 use browser::{Browser, CANVAS};
 use flate2::read::GzDecoder;

@@ -4,14 +4,7 @@ mod file;
 mod room;
 mod shown;
 
-#[path = "../report/browser.rs"]
-mod browser;
-
-#[path = "../common/built.rs"]
-mod built;
-
-#[path = "../common/three.rs"]
-mod three;
+use crate::common::built;
 
 use file::{Mapped, Texels};
 use glam::{DVec2, DVec3, dvec3};

@@ -1,10 +1,5 @@
 //! What a person hears who exported a room in the wrong way: faults named, with a way out, and no silence.
 
-#[path = "../common/built.rs"]
-mod built;
-#[path = "../common/mod.rs"]
-mod common;
-
 mod content;
 mod desk;
 mod faces;
