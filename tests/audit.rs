@@ -5,11 +5,11 @@ mod built;
 
 use built::{Room, sphere};
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Audit, BATCHES, Honesty, Reference, Report};
+use haarlight::audit::{Audit, BATCHES, Honesty, PathReference, Report};
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::lambert_polygon;
 use haarlight::geometry::sampling::{Pcg, on_triangle};
-use haarlight::scene::effects::{Kind, Plan};
+use haarlight::scene::effects::{EffectKind, Plan};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings, Verdict};
 use haarlight::spectrum::{Grid, LEAVES, Leaves};
@@ -336,7 +336,7 @@ fn a_reference_serves_several_bakes() {
         bake
     };
     // Made before any round, by a bake that is asked for the same error.
-    let reference = Reference::new(&bake(0.5, 0), 30, 2048, 5);
+    let reference = PathReference::new(&bake(0.5, 0), 30, 2048, 5);
     assert_eq!(reference.points.len() + reference.covered, 30);
     let all = 0..reference.points.len();
     let interval: f64 = all.map(|k| reference.interval(k)).sum();
@@ -367,7 +367,7 @@ fn a_file_is_not_held_to_what_lies_inside_of_something() {
     room.quad(low + DVec3::Z, DVec3::X, up, wall);
     let mut bake = Bake::new(room.scene(), Settings::default());
     bake.run();
-    let reference = Reference::new(&bake, 600, 1 << 12, 3);
+    let reference = PathReference::new(&bake, 600, 1 << 12, 3);
     let points = Report::against(&bake, &reference);
     let file = Report::of_file(&bake, &bake.baked(&|_, _| {}), &reference);
     let below = |report: &Report| {
@@ -418,7 +418,12 @@ fn calibrate(path: &Path, points: usize, most_paths: usize) -> Vec<String> {
     let scene = Scene::load(path, &Options::default()).unwrap();
     let plan = Plan::of(&scene);
     // Where rays carry all light the default takes minutes.
-    let by_rays = [Kind::Panes, Kind::Sheets, Kind::Mirrors, Kind::Fluorescence];
+    let by_rays = [
+        EffectKind::Panes,
+        EffectKind::Sheets,
+        EffectKind::Mirrors,
+        EffectKind::Fluorescence,
+    ];
     let error = if by_rays.into_iter().any(|kind| plan.runs(kind)) {
         1.0
     } else {
@@ -429,7 +434,7 @@ fn calibrate(path: &Path, points: usize, most_paths: usize) -> Vec<String> {
         ..Settings::default()
     };
     let mut bake = Bake::new(scene, settings);
-    let reference = Reference::new(&bake, points, most_paths, 1);
+    let reference = PathReference::new(&bake, points, most_paths, 1);
     let name = path.file_stem().unwrap().to_string_lossy().into_owned();
     let mut wrong = Vec::new();
     while bake.verdict().is_none() {
@@ -536,7 +541,7 @@ fn has_no_plateau(room: &str, asked: f64, paths: usize) {
         };
         Bake::new(scene, settings)
     };
-    let reference = Reference::new(&bake(0.5), 200, paths, 3);
+    let reference = PathReference::new(&bake(0.5), 200, paths, 3);
     for (error, least, colour) in [(0.5, 0.01, 0.5), (asked, 0.003, 0.2)] {
         let mut bake = bake(error);
         bake.run();
@@ -563,7 +568,7 @@ fn has_no_plateau(room: &str, asked: f64, paths: usize) {
             .filter(|s| !near_edge(s.point))
             .collect();
         assert!(away.len() > 120, "{}", away.len());
-        let mean = |f: &dyn Fn(&haarlight::audit::Seen) -> f64| {
+        let mean = |f: &dyn Fn(&haarlight::audit::AuditedPoint) -> f64| {
             away.iter().map(|s| f(s)).sum::<f64>() / away.len() as f64
         };
         let light = mean(&|s| s.traced[1]);

@@ -10,7 +10,7 @@ mod built;
 use built::Room;
 use glam::{DVec3, dvec3};
 use haarlight::scene::{Options, Scene};
-use haarlight::solve::reference::{Reference, Solution};
+use haarlight::solve::reference::{Reference, ReferenceSolution};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::LEAVES;
 use nalgebra::DVector;
@@ -409,7 +409,7 @@ impl TruthOfCase58 {
             }
             // The light has equal energy: what holds for one leaf holds for all.
             let rows: Vec<[f64; LEAVES]> = radiosity.iter().map(|&b| [b; LEAVES]).collect();
-            let solution = Solution {
+            let solution = ReferenceSolution {
                 irradiance: rows.clone(),
                 radiosity: rows,
             };

@@ -8,11 +8,11 @@ mod desk;
 
 use built::{Room, close, sphere};
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Audit, Reference as Traced, Report};
+use haarlight::audit::{Audit, PathReference as Traced, Report};
 use haarlight::color::{KM, Observer};
 use haarlight::gather::Baked;
 use haarlight::keep::Relighter;
-use haarlight::scene::effects::Kind;
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::reference::Reference;
 use haarlight::solve::{Bake, Representation, Settings, Verdict};
@@ -369,7 +369,7 @@ fn what_nothing_excites_costs_nothing() {
         let with = cornell(json!({"fluorescence": dye(excitation, "500,1\n600,1", quantum)}));
         let with = with.unwrap();
         let plan = haarlight::scene::effects::Plan::of(&with);
-        assert!(!plan.runs(Kind::Fluorescence));
+        assert!(!plan.runs(EffectKind::Fluorescence));
         let said = with.warnings.iter().any(|w| w.contains("--range 300..780"));
         assert_eq!(said, quantum > 0.0, "{:?}", with.warnings);
         assert!(written(with) == plain, "{excitation}");
@@ -377,7 +377,7 @@ fn what_nothing_excites_costs_nothing() {
     let with = cornell(json!({"fluorescence": dye("400,0.5\n500,0.5", "500,1\n600,1", 0.5)}));
     let with = with.unwrap();
     let plan = haarlight::scene::effects::Plan::of(&with);
-    assert!(plan.runs(Kind::Fluorescence));
+    assert!(plan.runs(EffectKind::Fluorescence));
     assert!(plan.to_string().contains("1 material: 'green'"), "{plan}");
     assert!(written(with) != plain);
 }
@@ -615,7 +615,7 @@ fn mirrors_and_what_fluoresces_go_together() {
         ..Options::default()
     };
     let bake = baked(Scene::load(path, &options).unwrap(), 1.0);
-    assert!(bake.plan().runs(Kind::Mirrors) && bake.plan().runs(Kind::Fluorescence));
+    assert!(bake.plan().runs(EffectKind::Mirrors) && bake.plan().runs(EffectKind::Fluorescence));
     let flux = &bake.rounds().last().unwrap().flux;
     assert!(flux.fluoresced_lm > 0.03 * flux.emitted_lm, "{flux:?}");
     let reference = Traced::new(&bake, 100, 1 << 13, 3);

@@ -10,7 +10,7 @@ use haarlight::data::{Outside, Table};
 use haarlight::scene::{LightKind, Scene};
 use haarlight::solve::{Bake, Settings, Verdict};
 use haarlight::spectrum::{
-    CmfTree, Control, Estimate, Grid, LEAVES, List, Metric, Partition, Path, Tree, control,
+    CmfTree, Control, DyadicTree, Estimate, Grid, LEAVES, List, Metric, Partition, Path, control,
 };
 
 /// Bakes with default settings and checks what must hold of any room.
@@ -414,8 +414,8 @@ fn spectral_limits_that_exclude_each_other() {
     let light: [f64; LEAVES] = std::array::from_fn(|l| 1.0 + (l as f64 * 0.7).sin());
     let paint: [f64; LEAVES] = std::array::from_fn(|l| 0.5 + 0.4 * (l as f64 * 0.3).cos());
     let (light, paint) = (
-        Tree::<Estimate>::new(&light, &cmf),
-        Tree::<Estimate>::new(&paint, &cmf),
+        DyadicTree::<Estimate>::new(&light, &cmf),
+        DyadicTree::<Estimate>::new(&paint, &cmf),
     );
     for settings in [Control::PAPER, Control::within(1.0)] {
         for [eps_min, eps_max] in [

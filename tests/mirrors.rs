@@ -8,9 +8,9 @@ use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::{NO_PLANE, lambert_polygon};
-use haarlight::scene::effects::Kind;
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::mirror::Mirror;
-use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
+use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use haarlight::scene::{LightKind, Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::{LEAVES, Leaves};
@@ -71,7 +71,7 @@ fn a_lamp_beside_a_mirror_shines_twice() {
         let lamp = dvec3(0.8, 1.5, 2.0);
         room.point(lamp, 4.0 * PI * 100.0);
         let bake = baked(room.scene());
-        assert!(bake.plan().runs(Kind::Mirrors));
+        assert!(bake.plan().runs(EffectKind::Mirrors));
         let image = dvec3(-0.8, 1.5, 2.0);
         for (got, place) in lux(&bake, &floor()).into_iter().zip(floor()) {
             let share = Mirror::reflects(reflectance, at_x(image, place.0));
@@ -200,7 +200,7 @@ fn the_sky_is_seen_in_mirrors() {
     );
     let wish = SkyWish {
         kind: Some(SkyType(5)),
-        brightness: Some(Brightness::Illuminance(100.0)),
+        brightness: Some(SkyBrightness::Illuminance(100.0)),
         ground: Some(0.0),
         ..SkyWish::default()
     };
@@ -243,7 +243,7 @@ fn a_periscope_shows_the_sky() {
     }
     let wish = SkyWish {
         kind: Some(SkyType(5)),
-        brightness: Some(Brightness::Illuminance(100.0)),
+        brightness: Some(SkyBrightness::Illuminance(100.0)),
         ground: Some(0.0),
         ..SkyWish::default()
     };

@@ -12,9 +12,9 @@ use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, de2000};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::document::Document;
-use haarlight::scene::effects::Kind;
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::pane::{Pane, PaneKind, inside_of, slab};
-use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
+use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use haarlight::scene::{Image, LightKind, Texture, Wrap};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::{LEAVES, Leaves};
@@ -549,13 +549,13 @@ fn cards_let_light_through_by_texel() {
 #[test]
 fn panes_that_are_not_there_take_nothing() {
     let bake = baked(lit(0.5).scene());
-    assert!(!bake.plan().runs(Kind::Panes));
+    assert!(!bake.plan().runs(EffectKind::Panes));
     assert_eq!(bake.rounds()[0].flux.sent.in_panes, 0.0);
     let mut room = lit(0.5);
     let pane = room.pane(1.5, CLEAR);
     level(&mut room, 1.0, pane);
     let bake = baked(room.scene());
-    assert!(bake.plan().runs(Kind::Panes));
+    assert!(bake.plan().runs(EffectKind::Panes));
     let sent = bake.rounds()[0].flux.sent;
     assert!((0.02..0.2).contains(&sent.in_panes), "{sent:?}");
     let all = sent.to_fronts + sent.to_backs + sent.outside + sent.in_panes;
@@ -585,7 +585,7 @@ fn glazed(opening: f64) -> Bake {
     room.quad(at(rim, rim), opening * y, opening * x, glass);
     let wish = SkyWish {
         kind: Some(SkyType(5)),
-        brightness: Some(Brightness::Illuminance(100.0)),
+        brightness: Some(SkyBrightness::Illuminance(100.0)),
         ground: Some(0.0),
         ..SkyWish::default()
     };

@@ -6,9 +6,9 @@ mod common;
 
 use built::{Room, baked_to, close, sphere};
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Reference, Report};
+use haarlight::audit::{PathReference, Report};
 use haarlight::keep::Relighter;
-use haarlight::scene::effects::Kind;
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::{LightKind, Options, Scene, Sides};
 use haarlight::solve::{Bake, Settings};
 use haarlight::spectrum::{LEAVES, Leaves};
@@ -309,7 +309,7 @@ fn vertices_show_both_lights() {
 #[test]
 fn the_plan_names_the_material() {
     let bake = divided(0.5, 0.5, 0.3, 0.6, false);
-    assert!(bake.plan().runs(Kind::Sheets));
+    assert!(bake.plan().runs(EffectKind::Sheets));
     let text = bake.plan().to_string();
     let line = "material 'material 1' lets diffuse light through";
     assert!(text.contains(line), "{text}");
@@ -486,7 +486,7 @@ fn wrong_sheets_are_refused_by_name() {
 #[test]
 fn the_path_tracer_agrees() {
     let bake = curtained(0.5);
-    let reference = Reference::new(&bake, 150, 1 << 14, 3);
+    let reference = PathReference::new(&bake, 150, 1 << 14, 3);
     let written = bake.baked(&|_, _| {});
     for report in [
         Report::against(&bake, &reference),

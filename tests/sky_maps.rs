@@ -15,7 +15,7 @@ use haarlight::data::{Leaves, Outside, daylight};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::LightKind;
 use haarlight::scene::sky::{
-    Brightness, Distribution, SkyType, SkyWish, SunPlace, SunWish, direction,
+    Distribution, SkyBrightness, SkyType, SkyWish, SunPlace, SunWish, direction,
 };
 use haarlight::solve::Bake;
 use haarlight::spectrum::Grid;
@@ -80,7 +80,7 @@ fn a_map_of_a_sky_gives_the_light_of_that_sky() {
             [if d.y > 0.0 { sky.radiance(d) } else { 0.0 }; 3]
         });
         let wish = SkyWish {
-            brightness: Some(Brightness::Illuminance(LUX)),
+            brightness: Some(SkyBrightness::Illuminance(LUX)),
             ..of_map(&map)
         };
         let bake = bake(room(0.0, opening, cuts), &wish);
@@ -296,7 +296,7 @@ fn a_map_can_have_open_ground() {
     let folder = TempDir::new().unwrap();
     let map = exr(&folder, 64, |d| [if d.y > 0.0 { 3.0 } else { 77.0 }; 3]);
     let wish = SkyWish {
-        brightness: Some(Brightness::Illuminance(LUX)),
+        brightness: Some(SkyBrightness::Illuminance(LUX)),
         ground: Some(0.3),
         ..of_map(&map)
     };

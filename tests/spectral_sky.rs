@@ -12,7 +12,7 @@ use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::Scene;
-use haarlight::scene::sky::{Brightness, Dome, SkyWish};
+use haarlight::scene::sky::{Dome, SkyBrightness, SkyWish};
 use haarlight::solve::{Bake, Settings};
 use haarlight::spectrum::Leaves;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -96,7 +96,7 @@ fn open_ground_has_the_light_of_the_model() {
         assert!((said / want.y - 1.0).abs() < 1e-3, "{said} {want}");
     }
     let given = SkyWish {
-        brightness: Some(Brightness::Illuminance(LUX)),
+        brightness: Some(SkyBrightness::Illuminance(LUX)),
         ..wish(6.0, 20.0)
     };
     let lux = glanced(floor(), &given).probe(&at)[0].xyz[1];

@@ -10,7 +10,7 @@ use crate::scene::{LightSpectrum, Material, Scene};
 use crate::spectrum::{LEAVES, Leaves};
 
 /// What a path has found.
-pub(super) struct Tally<'a> {
+pub(super) struct PathTally<'a> {
     /// By the leaf that light was found on.
     pub(super) found: Leaves,
     /// What counts leaf by leaf, once wavelengths were changed: all that was found before.
@@ -19,7 +19,7 @@ pub(super) struct Tally<'a> {
     spread: Option<Leaves>,
 }
 
-impl<'a> Tally<'a> {
+impl<'a> PathTally<'a> {
     /// Goes on from a sum.
     pub(super) fn new(sum: &'a mut Leaves) -> Self {
         Self {
@@ -57,7 +57,7 @@ pub(super) fn goes_on(
     albedo: Leaves,
     throughput: &mut Leaves,
     rng: &mut Pcg,
-    tally: &mut Tally,
+    tally: &mut PathTally,
 ) {
     let width = scene.grid.width();
     let reflected = |throughput: &Leaves, chance: f64| -> Leaves {

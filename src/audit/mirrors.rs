@@ -1,7 +1,7 @@
 //! Paths by way of mirrors: each goes on in one direction until it meets something else, however often; lights without extent, which no
 //! path meets, are looked for in their images.
 
-use super::path::{Audit, ByImage, Vertex, survives};
+use super::path::{Audit, ByImage, PathVertex, survives};
 use crate::geometry::sampling::Pcg;
 use crate::geometry::{Hit, NO_PLANE, Segment};
 use crate::hierarchy::Route;
@@ -16,7 +16,7 @@ impl Audit<'_> {
     /// What a ray meets at last, and how often mirrors sent it on.
     pub(super) fn met(
         &self,
-        at: &Vertex,
+        at: &PathVertex,
         direction: &mut DVec3,
         throughput: &mut Leaves,
         rng: &mut Pcg,
@@ -57,7 +57,7 @@ impl Audit<'_> {
     /// Lights without extent, seen in each image.
     pub(super) fn punctual_in_mirrors(
         &self,
-        at: &Vertex,
+        at: &PathVertex,
         square: [f64; 2],
         rng: &mut Pcg,
         throughput: &Leaves,
@@ -66,7 +66,7 @@ impl Audit<'_> {
         let Some(mirrors) = &self.mirrors else { return };
         for image in mirrors.seen_from(at.point, at.normal) {
             let known = &mirrors.images()[image as usize];
-            let from = Vertex {
+            let from = PathVertex {
                 point: known.point(at.point),
                 normal: known.direction(at.normal),
                 plane: NO_PLANE,

@@ -10,9 +10,9 @@ mod path;
 mod rays;
 mod reference;
 mod report;
-mod spread;
+mod summary;
 
 pub use path::{Answer, Audit, BATCHES};
-pub use reference::{Place, Reference};
-pub use report::{HONEST, Honesty, Report, Seen};
-pub use spread::{Measured, Spread};
+pub use reference::{FacePoint, PathReference};
+pub use report::{AuditedPoint, HONEST, Honesty, Report};
+pub use summary::{ErrorSummary, Measured};

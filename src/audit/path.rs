@@ -4,7 +4,7 @@
 //! by the balance heuristic (Veach and Guibas 1995). Paths end by Russian roulette, so no bounce is cut off.
 //! Figures are *measured*: each comes with the standard error of independent batches.
 
-use super::fluorescence::{Tally, goes_on};
+use super::fluorescence::{PathTally, goes_on};
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
 use crate::geometry::openings::Openings;
@@ -69,7 +69,7 @@ impl Answer {
 }
 
 /// A place that light scatters at.
-pub(super) struct Vertex {
+pub(super) struct PathVertex {
     pub(super) point: DVec3,
     pub(super) normal: DVec3,
     pub(super) plane: u32,
@@ -79,7 +79,7 @@ pub(super) struct Vertex {
 #[derive(Clone, Copy)]
 pub(super) struct ByImage<'a> {
     pub(super) image: u32,
-    pub(super) at: &'a Vertex,
+    pub(super) at: &'a PathVertex,
     pub(super) size: f64,
 }
 
@@ -155,7 +155,7 @@ impl<'a> Audit<'a> {
             .enumerate()
             .map(|(k, (&(point, normal, plane), paths))| {
                 let each = paths.div_ceil(BATCHES).max(1);
-                let start = Vertex {
+                let start = PathVertex {
                     point,
                     normal,
                     plane,
@@ -187,15 +187,15 @@ impl<'a> Audit<'a> {
     }
 
     /// Adds one path's irradiance.
-    fn path(&self, start: &Vertex, first: [[f64; 2]; 2], rng: &mut Pcg, sum: &mut Leaves) {
-        let mut tally = Tally::new(sum);
+    fn path(&self, start: &PathVertex, first: [[f64; 2]; 2], rng: &mut Pcg, sum: &mut Leaves) {
+        let mut tally = PathTally::new(sum);
         self.walk(start, first, rng, &mut tally);
         tally.settle();
     }
 
-    fn walk(&self, start: &Vertex, first: [[f64; 2]; 2], rng: &mut Pcg, tally: &mut Tally) {
+    fn walk(&self, start: &PathVertex, first: [[f64; 2]; 2], rng: &mut Pcg, tally: &mut PathTally) {
         let mut throughput = [1.0; LEAVES];
-        let mut at = Vertex { ..*start };
+        let mut at = PathVertex { ..*start };
         let (mut toward_lamp, mut toward_any) = (first[0], first[1]);
         for bounce in 0.. {
             let sum = &mut tally.found;
@@ -257,7 +257,7 @@ impl<'a> Audit<'a> {
             if bounce >= SURE_BOUNCES && !survives(&mut throughput, rng) {
                 return;
             }
-            at = Vertex {
+            at = PathVertex {
                 point,
                 normal,
                 plane: self.mesh.plane[triangle],
@@ -289,7 +289,7 @@ impl<'a> Audit<'a> {
     /// Light straight from a point on a lamp.
     fn lamp_sample(
         &self,
-        at: &Vertex,
+        at: &PathVertex,
         square: [f64; 2],
         rng: &mut Pcg,
         throughput: &Leaves,
@@ -347,7 +347,7 @@ impl<'a> Audit<'a> {
     /// Light of lights without extent, as from a point straight, or as it looks by an image.
     pub(super) fn punctual(
         &self,
-        at: &Vertex,
+        at: &PathVertex,
         by: Option<ByImage>,
         square: [f64; 2],
         rng: &mut Pcg,
@@ -416,7 +416,7 @@ impl<'a> Audit<'a> {
     fn shining(
         &self,
         light: &PunctualLight,
-        at: &Vertex,
+        at: &PathVertex,
         square: [f64; 2],
         rng: &mut Pcg,
     ) -> (f64, DVec3) {

@@ -32,13 +32,13 @@
 
 use super::glare::{self, Viewpoint};
 use crate::color::{
-    Bands, GREATEST_DISTANCE, MEASURES, Measured, Meter, NAMES, Range, Stated, Uniformity,
+    Bands, GREATEST_DISTANCE, LightMeasures, MEASURES, Meter, NAMES, Range, Stated, Uniformity,
 };
 use crate::gather::{Probed, WorkingPlane};
 use crate::scene::Camera;
 use crate::solve::{Bake, Round};
 use crate::spectrum::{Grid, Leaves};
-use crate::survey::{Place, places};
+use crate::survey::{PointLocation, places};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -57,7 +57,7 @@ const RA: usize = 3;
 /// The figures of all points.
 pub(super) struct Metrics {
     stated: Option<Stated>,
-    points: Vec<(Measured, [Option<Range>; MEASURES])>,
+    points: Vec<(LightMeasures, [Option<Range>; MEASURES])>,
     /// Over the points in the room, and how many they are.
     uniformity: Option<(Uniformity, usize)>,
     /// Daylight factors, per cent, and the relative error of the light under the sky, where there is one.
@@ -69,7 +69,7 @@ impl Metrics {
     pub(super) fn new(
         grid: &Grid,
         probed: &[Probed],
-        places: &[Place],
+        places: &[PointLocation],
         last: Option<&Round>,
     ) -> Self {
         let meter = Meter::new(&Bands::leaves(grid));
@@ -79,7 +79,7 @@ impl Metrics {
             .collect();
         let inside = probed.iter().zip(places);
         let lux: Vec<f64> = inside
-            .filter(|(_, place)| **place == Place::Room)
+            .filter(|(_, place)| **place == PointLocation::Room)
             .map(|(light, _)| light.xyz[1])
             .collect();
         Self {
@@ -260,7 +260,7 @@ pub(super) fn of_bake(bake: &Bake, cameras: &[Camera]) -> Value {
 fn on_plane(bake: &Bake, plane: &WorkingPlane, stated: Option<Stated>) -> Option<Value> {
     let scene = bake.scene();
     let places = places(scene, &plane.points).into_iter().enumerate();
-    let inside = |(k, place): (usize, Place)| (place == Place::Room).then_some(k);
+    let inside = |(k, place): (usize, PointLocation)| (place == PointLocation::Room).then_some(k);
     let inside: Vec<usize> = places.filter_map(inside).collect();
     let points: Vec<(DVec3, DVec3)> = inside.iter().map(|&k| plane.points[k]).collect();
     let (probed, mut by_sky) = bake.probe_with_sky(&points);
@@ -326,7 +326,7 @@ fn measured(
     meter: &Meter,
     light: &Leaves,
     stated: Option<Stated>,
-) -> (Measured, [Option<Range>; MEASURES]) {
+) -> (LightMeasures, [Option<Range>; MEASURES]) {
     let measured = meter.measure(light);
     let ranges = stated.map_or([None; MEASURES], |stated| {
         meter.ranges(light, &measured, stated)
@@ -334,7 +334,7 @@ fn measured(
     (measured, ranges)
 }
 
-fn point(measured: &Measured, ranges: &[Option<Range>; MEASURES]) -> Value {
+fn point(measured: &LightMeasures, ranges: &[Option<Range>; MEASURES]) -> Value {
     let mut out = Map::new();
     for (k, name) in NAMES.into_iter().enumerate() {
         let value = measured.values[k].map_err(|reason| reason.to_string());

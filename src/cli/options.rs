@@ -2,10 +2,10 @@
 
 use super::sky::SkyArgs;
 use crate::gather::BakedSurface;
-use crate::output::{Balance, Brightness, Exposure, Packing, Writing};
+use crate::output::{Exposure, ExposureSetting, Packing, WhiteBalance, Writing};
 use crate::scene::{Camera, Options, Scene};
 use crate::spectrum::{Grid, LEAVES};
-use crate::survey::Wishes;
+use crate::survey::SurveyOptions;
 use crate::team::Team;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -44,7 +44,7 @@ pub struct Reading {
     pub spectra: Option<PathBuf>,
     /// Wavelengths to work on, nm; 64 leaves divide them. From 300 on where ultraviolet light excites what fluoresces.
     #[arg(long, value_name = "FROM..TO", default_value = "380..780")]
-    pub range: Range,
+    pub range: WavelengthRange,
     /// Only warn of keys and names in the file of spectra that mean nothing.
     #[arg(long)]
     pub lenient: bool,
@@ -76,8 +76,8 @@ impl Reading {
     }
 
     /// What is decided before the room is looked over.
-    pub fn wishes(&self) -> Wishes {
-        Wishes {
+    pub fn wishes(&self) -> SurveyOptions {
+        SurveyOptions {
             allow_dark: self.allow_dark,
             flip: self.flip,
         }
@@ -108,10 +108,10 @@ pub struct Showing {
         default_value_t,
         allow_hyphen_values = true
     )]
-    pub exposure: Brightness,
+    pub exposure: ExposureSetting,
     /// Which light shows as white: none (D65, colours as they are), auto (the room's) or a colour temperature, K.
     #[arg(long, value_name = "none|auto|KELVIN", default_value_t)]
-    pub white_balance: Balance,
+    pub white_balance: WhiteBalance,
 }
 
 impl Showing {
@@ -150,12 +150,12 @@ impl Storing {
 
 /// A range of wavelengths, typed as `380..780`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
+pub struct WavelengthRange {
     /// First and last wavelength, nm.
     pub nm: [f64; 2],
 }
 
-impl Default for Range {
+impl Default for WavelengthRange {
     fn default() -> Self {
         let grid = Grid::default();
         Self {
@@ -164,14 +164,14 @@ impl Default for Range {
     }
 }
 
-impl Range {
+impl WavelengthRange {
     /// The 64 leaves on this range.
     pub fn grid(self) -> Grid {
         Grid::new(self.nm[0], self.nm[1])
     }
 }
 
-impl FromStr for Range {
+impl FromStr for WavelengthRange {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -207,14 +207,14 @@ mod tests {
 
     #[test]
     fn ranges_are_checked() {
-        let range: Range = "380..700".parse().unwrap();
+        let range: WavelengthRange = "380..700".parse().unwrap();
         assert_eq!(range.grid(), Grid::paper());
-        assert_eq!(Range::default().grid(), Grid::default());
-        assert!("300..780".parse::<Range>().is_ok());
+        assert_eq!(WavelengthRange::default().grid(), Grid::default());
+        assert!("300..780".parse::<WavelengthRange>().is_ok());
         for bad in [
             "380", "380-780", "780..380", "NaN..780", "290..780", "380..400", "a..b",
         ] {
-            assert!(bad.parse::<Range>().is_err(), "{bad}");
+            assert!(bad.parse::<WavelengthRange>().is_err(), "{bad}");
         }
     }
 

@@ -3,7 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::report::page::lamp_spectra;
-use crate::report::{Chart, Scale, Series, plan, polar};
+use crate::report::{LineChart, Scale, Series, plan, polar};
 use crate::scene::facts::Facts;
 use crate::scene::profile::Profile;
 use crate::scene::{Scene, listed, short};
@@ -119,7 +119,7 @@ fn charts(
             name: name.clone(),
             points: steps(leaves),
         };
-        let chart = Chart {
+        let chart = LineChart {
             title: title.to_owned(),
             x: "wavelength, nm".into(),
             y: y.to_owned(),

@@ -25,7 +25,7 @@ use crate::gather::{Glare, Probed};
 use crate::solve::{Bake, Representation, Round, Verdict};
 use crate::spectrum::{Grid, LEAVES};
 use crate::store::file;
-use crate::survey::{Place, places};
+use crate::survey::{PointLocation, places};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -101,7 +101,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let points: Vec<Point> = (read.points.iter())
         .map(|&(place, normal)| (scale * place, normal))
         .collect();
-    let found = Found::at(args, (common, &talk, &stop), &bake, &points)?;
+    let found = ProbeResults::at(args, (common, &talk, &stop), &bake, &points)?;
     talk.clear();
     found.tell(&talk);
 
@@ -143,9 +143,9 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
 }
 
 /// What was found.
-struct Found {
+struct ProbeResults {
     probed: Vec<Probed>,
-    places: Vec<Place>,
+    places: Vec<PointLocation>,
     metrics: Option<Metrics>,
     /// Of the viewpoints.
     views: Vec<Glare>,
@@ -155,7 +155,7 @@ struct Found {
     daylight: Option<Verdict>,
 }
 
-impl Found {
+impl ProbeResults {
     /// Looks at points and from viewpoints.
     fn at(
         args: &ProbeArgs,
@@ -208,7 +208,7 @@ fn measured(
     (common, talk, stop): (&Common, &Talk, &Stop),
     bake: &Bake,
     points: &[Point],
-    (probed, places): (&[Probed], &[Place]),
+    (probed, places): (&[Probed], &[PointLocation]),
 ) -> Result<(Metrics, Option<Verdict>)> {
     let scene = bake.scene();
     let metrics = Metrics::new(&scene.grid, probed, places, bake.rounds().last());
@@ -261,12 +261,12 @@ fn read_points(path: &Path) -> Points {
 }
 
 /// Says how many points are not in the room.
-fn warn_of(places: &[Place], talk: &Talk) {
-    for place in [Place::Inside, Place::Outside] {
+fn warn_of(places: &[PointLocation], talk: &Talk) {
+    for place in [PointLocation::Inside, PointLocation::Outside] {
         let count = places.iter().filter(|p| **p == place).count();
         if count > 0 {
             let where_it_is = match place {
-                Place::Inside => "inside something solid",
+                PointLocation::Inside => "inside something solid",
                 _ => "outside the room",
             };
             talk.warn(&format!(
@@ -311,7 +311,7 @@ fn columns(bands: bool, grid: &Grid) -> Vec<String> {
 fn table(
     columns: &[String],
     rows: &[Vec<f64>],
-    places: &[Place],
+    places: &[PointLocation],
     metrics: Option<&Metrics>,
 ) -> String {
     let mut header = columns.to_vec();

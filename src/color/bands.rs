@@ -79,12 +79,12 @@ impl Bands {
 
 /// Coloured samples under a light: an observer on bands, and times each reflectance.
 #[derive(Debug, Clone)]
-pub(super) struct Samples {
+pub(super) struct ColourSamples {
     white: [Vec<f64>; 3],
     colours: Vec<[Vec<f64>; 3]>,
 }
 
-impl Samples {
+impl ColourSamples {
     pub(super) fn new(bands: &Bands, observer: &[Table; 3], reflectances: &[Table]) -> Self {
         let times = |reflectance: &Table| {
             let function = observer.each_ref();

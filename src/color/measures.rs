@@ -48,7 +48,7 @@ impl fmt::Display for Undefined {
 /// A light, measured.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Measured {
+pub struct LightMeasures {
     /// In the order of [`NAMES`].
     pub values: [Result<f64, Undefined>; MEASURES],
     /// Distance in (u, v) of the light and the reference of Ra; none where Ra is not defined.
@@ -81,11 +81,11 @@ impl Meter {
     }
 
     /// Measures a light: irradiance on the bands, W/m2/nm.
-    pub fn measure(&self, light: &[f64]) -> Measured {
+    pub fn measure(&self, light: &[f64]) -> LightMeasures {
         let xyz = self.observer.each_ref().map(|w| weighted(light, w));
         let mut values = [Err(Undefined::NoLight); MEASURES];
         values[LUX] = Ok(KM * xyz[1].max(0.0));
-        let mut out = Measured {
+        let mut out = LightMeasures {
             values,
             reference_distance: None,
         };
@@ -121,11 +121,11 @@ impl Meter {
     pub fn ranges(
         &self,
         light: &[f64],
-        measured: &Measured,
+        measured: &LightMeasures,
         stated: Stated,
     ) -> [Option<Range>; MEASURES] {
         let others = self.tolerance.variants(light, stated.chromaticity);
-        let others: Option<Vec<Measured>> =
+        let others: Option<Vec<LightMeasures>> =
             others.map(|lights| lights.iter().map(|l| self.measure(l)).collect());
         std::array::from_fn(|k| {
             let value = measured.values[k].ok()?;

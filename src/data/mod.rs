@@ -11,7 +11,7 @@ mod table;
 pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
 pub use daylight::daylight;
 pub use grid::{Grid, LEAVES, Leaves};
-pub use registry::{Kind, Named, named, names, nearest};
+pub use registry::{Named, TableKind, named, names, nearest};
 pub use table::{CsvProblem, Outside, Table};
 
 pub(crate) use nearest::nearest_of;

@@ -169,13 +169,20 @@ impl Bake {
     }
 
     /// How each material of the scene turns irradiance into visible light.
-    pub(crate) fn looks<'a>(&self, upsampler: &'a Upsampler) -> Vec<Look<'a>> {
+    pub(crate) fn looks<'a>(&self, upsampler: &'a Upsampler) -> Vec<SurfaceResponse<'a>> {
         let materials = self.scene().materials.iter();
-        materials.map(|m| Look::new(self, m, upsampler)).collect()
+        materials
+            .map(|m| SurfaceResponse::new(self, m, upsampler))
+            .collect()
     }
 
     /// Emission at a vertex; none on surfaces that do not emit.
-    pub(super) fn glow(&self, vertex: &Vertex, back: bool, look: &Look) -> Option<&[f32]> {
+    pub(super) fn glow(
+        &self,
+        vertex: &Vertex,
+        back: bool,
+        look: &SurfaceResponse,
+    ) -> Option<&[f32]> {
         if !look.emits || vertex.entry == crate::hierarchy::NONE {
             return None;
         }
@@ -194,7 +201,7 @@ impl Bake {
         vertex: &Vertex,
         back: bool,
         row: &[f32; 64],
-        look: &Look,
+        look: &SurfaceResponse,
     ) -> BakedVertex {
         let glow = match self.glow(vertex, back, look) {
             Some(own) => look.shown.unwrap_or_else(|| self.lanes().tristimulus(own)),
@@ -223,7 +230,7 @@ impl Bake {
 }
 
 /// How a material turns irradiance into visible light.
-pub(crate) struct Look<'a> {
+pub(crate) struct SurfaceResponse<'a> {
     /// Reflectance on the spectral leaves, without vertex colours; for diffuse sheets including the transmittance.
     reflectance: Leaves,
     /// Transmittance, and the share of the base colour that is reflected besides.
@@ -255,7 +262,7 @@ fn weighed(row: &[f32; 64], weights: &[[f64; 3]]) -> [f64; 3] {
     xyz
 }
 
-impl<'a> Look<'a> {
+impl<'a> SurfaceResponse<'a> {
     pub(crate) fn new(bake: &Bake, material: &Material, upsampler: &'a Upsampler) -> Self {
         let images = &bake.scene().images;
         let color = material.mean_color(images);

@@ -8,7 +8,7 @@ use crate::color::{Bright, position_index, unified_glare_rating};
 use crate::geometry::{NO_PLANE, Segment, quarters};
 use crate::hierarchy::Node;
 use crate::link::Sight;
-use crate::scene::effects::Kind;
+use crate::scene::effects::EffectKind;
 use crate::scene::{LightKind, PunctualLight};
 use crate::solve::Bake;
 use glam::DVec3;
@@ -145,7 +145,7 @@ impl Bake {
         if !self.scene().panes.is_empty() {
             left_out.push("what panes take from lamps behind them".into());
         }
-        if self.plan().runs(Kind::Mirrors) {
+        if self.plan().runs(EffectKind::Mirrors) {
             left_out.push("lamps as mirrors show them".into());
         }
         let lanes = self.lanes().lanes();

@@ -2,12 +2,16 @@
 
 use crate::hierarchy::NONE;
 use crate::light::mixed;
-use crate::solve::{Bake, Care};
+use crate::solve::{Bake, GatherQuality};
 use crate::transport::{Gathered, Receiver, trace};
 
 impl Bake {
     /// Gathers at points of surfaces, in order; for points of diffuse sheets also behind these, see [`Through`](crate::light::Through).
-    pub(crate) fn gather_shown(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
+    pub(crate) fn gather_shown(
+        &self,
+        receivers: &[Receiver],
+        care: GatherQuality,
+    ) -> Vec<Gathered> {
         let mut gathered = self.gather_with(receivers, care);
         let behind: Vec<(usize, u32, Receiver)> = (receivers.iter().enumerate())
             .filter_map(|(k, to)| self.behind(to).map(|(place, other)| (k, place, other)))

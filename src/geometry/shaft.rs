@@ -13,7 +13,7 @@ use wide::f64x8;
 
 /// A convex end of a shaft, in the space of the index.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Patch {
+pub enum ShaftEnd {
     /// A triangle that sends or receives on its counter-clockwise side, and the id of its plane.
     Triangle {
         /// Corners, counter-clockwise seen from the front.
@@ -83,7 +83,7 @@ const BOX_EDGES: [[usize; 2]; 12] = [
     [3, 7],
 ];
 
-impl Patch {
+impl ShaftEnd {
     fn shape(&self) -> Shape {
         match *self {
             Self::Triangle {
@@ -148,7 +148,7 @@ impl Patch {
 
 impl Shaft {
     /// The shaft between two patches; the order does not matter.
-    pub fn between(a: &Patch, b: &Patch) -> Self {
+    pub fn between(a: &ShaftEnd, b: &ShaftEnd) -> Self {
         let (sa, sb) = (a.shape(), b.shape());
         let mut shaft = Self {
             sides: [HalfSpace {
@@ -285,7 +285,7 @@ impl Shaft {
 
     /// The last step of [`Self::holds`]: is something left of a triangle when all sides have cut it?
     pub(super) fn cut_holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
-        let mut outline = Outline::new(triangle);
+        let mut outline = ConvexOutline::new(triangle);
         for side in self.sides() {
             match outline.cut(side, gap) {
                 Left::Nothing => return false,
@@ -308,7 +308,7 @@ pub(super) fn dot(a: [f64x8; 3], b: [f64x8; 3]) -> f64x8 {
 }
 
 /// A convex polygon of up to eight corners, coordinate by coordinate.
-struct Outline {
+struct ConvexOutline {
     corners: [[f64; 8]; 3],
     count: usize,
 }
@@ -321,7 +321,7 @@ enum Left {
     TooMany,
 }
 
-impl Outline {
+impl ConvexOutline {
     fn new(triangle: &[DVec3; 3]) -> Self {
         let mut outline = Self {
             corners: [[0.0; 8]; 3],

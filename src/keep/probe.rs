@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::gather::Probed;
 use crate::solve::Bake;
 use crate::store::codec::Read;
-use crate::store::{Broken, Kind};
+use crate::store::{Broken, FileKind};
 use crate::transport::trace::{self, Stains};
 use glam::DVec3;
 
@@ -79,6 +79,6 @@ impl Relighter {
             })
         });
         let probed: Read<Vec<Probed>> = probed.collect();
-        probed.map_err(|Broken(what)| other(format!("{what}: {}", Kind::Cache.next())))
+        probed.map_err(|Broken(what)| other(format!("{what}: {}", FileKind::Cache.next())))
     }
 }

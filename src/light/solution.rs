@@ -6,7 +6,7 @@ use super::lanes::Lanes;
 use super::rows::Rows;
 use super::through::Through;
 use crate::hierarchy::{Mesh, NONE, Tree};
-use crate::link::{Graph, Way};
+use crate::link::{Graph, Occlusion};
 use rayon::prelude::*;
 
 /// Light that arrives on a leaf, in brightness, share of the white's.
@@ -154,7 +154,7 @@ impl Light {
 const DARKEST: f64 = 0.02;
 
 /// How much a change of light changes lightness at a brightness, as a multiple of that at white.
-pub(crate) fn keenness(bright: f64) -> f64 {
+pub(crate) fn lightness_sensitivity(bright: f64) -> f64 {
     bright.max(DARKEST).powf(-2.0 / 3.0)
 }
 
@@ -183,7 +183,7 @@ pub(crate) fn weighed(row: &[f32], weights: &[f64]) -> f64 {
 #[derive(Debug, Clone, Default)]
 pub struct Neighbours {
     start: Vec<u32>,
-    ends: Vec<(u32, Way, f32)>,
+    ends: Vec<(u32, Occlusion, f32)>,
     /// Lists that [`Way::Listed`] points into.
     pub blockers: Vec<u32>,
 }
@@ -201,10 +201,10 @@ impl Neighbours {
             start[k + 1] += start[k];
         }
         let mut next = start.clone();
-        let mut ends = vec![(0, Way::Clear, 1.0); start[nodes] as usize];
+        let mut ends = vec![(0, Occlusion::Clear, 1.0); start[nodes] as usize];
         for link in links {
             for (end, other) in [(link.a, link.b), (link.b, link.a)] {
-                ends[next[end as usize] as usize] = (other, link.way, link.visibility());
+                ends[next[end as usize] as usize] = (other, link.occlusion, link.visibility());
                 next[end as usize] += 1;
             }
         }
@@ -216,7 +216,7 @@ impl Neighbours {
     }
 
     /// Other ends of a node's links.
-    pub fn row(&self, node: u32) -> &[(u32, Way, f32)] {
+    pub fn row(&self, node: u32) -> &[(u32, Occlusion, f32)] {
         let k = node as usize;
         // Elements split after the links were made have no links of their own.
         if k + 1 >= self.start.len() {
@@ -228,7 +228,7 @@ impl Neighbours {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         4 * self.start.len()
-            + size_of::<(u32, Way, f32)>() * self.ends.len()
+            + size_of::<(u32, Occlusion, f32)>() * self.ends.len()
             + 4 * self.blockers.len()
     }
 }

@@ -147,7 +147,7 @@ pub fn write(out: &mut dyn Write, arrays: &[Array]) -> io::Result<()> {
 pub type Spectra = Vec<Vec<[f32; LEAVES]>>;
 
 /// Names of layers, and the spectra of each: asked for one after the other, for those of a large room take a gigabyte.
-pub type Parts<'a> = (&'a [String], &'a dyn Fn(usize) -> Spectra);
+pub type LayerSpectra<'a> = (&'a [String], &'a dyn Fn(usize) -> Spectra);
 
 /// Writes the refined mesh with its spectra: see the module's words.
 ///
@@ -173,7 +173,7 @@ pub fn write_parted(
     scene: &Scene,
     surfaces: &[BakedSurface],
     spectra: &[Vec<[f32; LEAVES]>],
-    (names, layer): Parts,
+    (names, layer): LayerSpectra,
 ) -> Result<()> {
     refined::check(scene, surfaces)?;
     let radiosity = flat(surfaces, spectra)?;
@@ -221,7 +221,7 @@ fn whole(
     surfaces: &[BakedSurface],
     radiosity: &[f32],
 ) -> io::Result<()> {
-    let columns = Columns::of(scene, surfaces);
+    let columns = MeshColumns::of(scene, surfaces);
     let mut edges: Vec<f64> = (0..LEAVES).map(|leaf| scene.grid.left(leaf)).collect();
     edges.push(scene.grid.left(LEAVES - 1) + scene.grid.width());
     let count = columns.surface.len();
@@ -249,7 +249,7 @@ fn whole(
 
 /// The refined mesh of all surfaces, column by column: as the arrays of their names.
 #[derive(Default)]
-struct Columns {
+struct MeshColumns {
     positions: Vec<f64>,
     normals: Vec<f32>,
     xyz: Vec<f32>,
@@ -257,7 +257,7 @@ struct Columns {
     triangles: Vec<u32>,
 }
 
-impl Columns {
+impl MeshColumns {
     fn of(scene: &Scene, surfaces: &[BakedSurface]) -> Self {
         let mut all = Self::default();
         for baked in surfaces {

@@ -21,14 +21,14 @@ const BAND: usize = 16;
 
 /// What a sample shows: a triangle and the weights of its corners.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hit {
+pub(super) struct Fragment {
     pub(super) mesh: u32,
     pub(super) triangle: u32,
     pub(super) weights: [f64; 3],
 }
 
 /// Triangles to draw. `corner` must give equal points for equal vertices.
-pub(super) trait Meshes: Sync {
+pub(super) trait RasterMeshes: Sync {
     /// Number of triangles of each mesh.
     fn sizes(&self) -> Vec<usize>;
     /// World positions, counter-clockwise from the front.
@@ -38,17 +38,17 @@ pub(super) trait Meshes: Sync {
     /// Does this mesh have holes at all?
     fn has_holes(&self, mesh: usize) -> bool;
     /// Is this point of a mesh with holes a hole?
-    fn is_hole(&self, hit: &Hit) -> bool;
+    fn is_hole(&self, hit: &Fragment) -> bool;
 }
 
 /// Draws into bands of `BAND` pixel rows with `grid` by `grid` samples a pixel; `finish` turns each row of samples
 /// (`grid` rows of `width * grid`, from the top) into pixels. Rows come back in order.
 pub(super) fn draw<T: Send>(
-    meshes: &impl Meshes,
+    meshes: &impl RasterMeshes,
     view: &View,
     [width, height]: [usize; 2],
     grid: usize,
-    finish: impl Fn(&[Option<Hit>]) -> Vec<T> + Sync,
+    finish: impl Fn(&[Option<Fragment>]) -> Vec<T> + Sync,
 ) -> Vec<T> {
     let bands = bins(meshes, view, [width, height]);
     let rows = bands.par_iter().enumerate().map(|(band, triangles)| {
@@ -75,7 +75,7 @@ struct Setup {
 impl Setup {
     /// None: faces away, has no area, or lies out of sight.
     fn new(
-        meshes: &impl Meshes,
+        meshes: &impl RasterMeshes,
         view: &View,
         mesh: usize,
         triangle: usize,
@@ -175,7 +175,7 @@ fn bounds(
 }
 
 /// For each band the (mesh, triangle) that touch it, in order.
-fn bins(meshes: &impl Meshes, view: &View, size: [usize; 2]) -> Vec<Vec<[u32; 2]>> {
+fn bins(meshes: &impl RasterMeshes, view: &View, size: [usize; 2]) -> Vec<Vec<[u32; 2]>> {
     let mut bands = vec![Vec::new(); size[1].div_ceil(BAND)];
     let last = bands.len().saturating_sub(1);
     for (mesh, triangles) in meshes.sizes().into_iter().enumerate() {
@@ -201,14 +201,14 @@ fn bins(meshes: &impl Meshes, view: &View, size: [usize; 2]) -> Vec<Vec<[u32; 2]
 }
 
 fn draw_band(
-    meshes: &impl Meshes,
+    meshes: &impl RasterMeshes,
     view: &View,
     triangles: &[[u32; 2]],
     width: usize,
     first: usize,
     count: usize,
     grid: usize,
-) -> Vec<Option<Hit>> {
+) -> Vec<Option<Fragment>> {
     let across = width * grid;
     let down = count * grid;
     let step = 1.0 / grid as f64;
@@ -233,7 +233,7 @@ fn draw_band(
                     continue;
                 };
                 let at = row * across + column;
-                let hit = Hit {
+                let hit = Fragment {
                     mesh,
                     triangle,
                     weights,
@@ -260,7 +260,7 @@ impl Bare<'_> {
     }
 }
 
-impl Meshes for Bare<'_> {
+impl RasterMeshes for Bare<'_> {
     fn sizes(&self) -> Vec<usize> {
         let surfaces = self.scene.surfaces.iter();
         surfaces.map(|s| s.triangles.len()).collect()
@@ -280,7 +280,7 @@ impl Meshes for Bare<'_> {
         self.material(mesh).is_some_and(masked)
     }
 
-    fn is_hole(&self, _: &Hit) -> bool {
+    fn is_hole(&self, _: &Fragment) -> bool {
         true
     }
 }
@@ -303,21 +303,21 @@ pub(super) fn seen(scene: &Scene, view: &View, size: [usize; 2], grid: usize) ->
 }
 
 /// The refined mesh.
-pub(super) struct Refined<'a> {
+pub(super) struct RefinedMesh<'a> {
     pub(super) scene: &'a Scene,
     pub(super) surfaces: &'a [BakedSurface],
 }
 
-impl<'a> Refined<'a> {
+impl<'a> RefinedMesh<'a> {
     /// The surface and the corners of a hit.
-    pub(super) fn at(&self, hit: &Hit) -> (&'a Surface, [&'a BakedVertex; 3]) {
+    pub(super) fn at(&self, hit: &Fragment) -> (&'a Surface, [&'a BakedVertex; 3]) {
         let baked = &self.surfaces[hit.mesh as usize];
         let corners = baked.triangles[hit.triangle as usize].map(|v| &baked.vertices[v as usize]);
         (&self.scene.surfaces[baked.surface], corners)
     }
 
     /// Does a texture multiply the light of this hit?
-    pub(super) fn is_textured(&self, hit: &Hit) -> bool {
+    pub(super) fn is_textured(&self, hit: &Fragment) -> bool {
         let surface = &self.scene.surfaces[self.surfaces[hit.mesh as usize].surface];
         self.scene.materials[surface.material].paint.is_some()
     }
@@ -348,7 +348,7 @@ impl<'a> Refined<'a> {
     }
 }
 
-impl Meshes for Refined<'_> {
+impl RasterMeshes for RefinedMesh<'_> {
     fn sizes(&self) -> Vec<usize> {
         self.surfaces.iter().map(|s| s.triangles.len()).collect()
     }
@@ -372,7 +372,7 @@ impl Meshes for Refined<'_> {
         )
     }
 
-    fn is_hole(&self, hit: &Hit) -> bool {
+    fn is_hole(&self, hit: &Fragment) -> bool {
         let (surface, corners) = self.at(hit);
         let Alpha::Mask {
             cutoff,
@@ -403,7 +403,7 @@ mod tests {
     /// A square of two by two, cut into a fan around an inner point.
     struct Fan(DVec3);
 
-    impl Meshes for Fan {
+    impl RasterMeshes for Fan {
         fn sizes(&self) -> Vec<usize> {
             vec![4]
         }
@@ -422,7 +422,7 @@ mod tests {
             false
         }
 
-        fn is_hole(&self, _: &Hit) -> bool {
+        fn is_hole(&self, _: &Fragment) -> bool {
             false
         }
     }

@@ -3,7 +3,7 @@
 //! The document stays as it is, so that what is written has the file's units; turned faces are written turned.
 
 use super::json::short;
-use super::lamps::GREATEST_SIZE;
+use super::lamp_spectra::GREATEST_SIZE;
 use super::pane::PaneKind;
 pub use super::room::Changes;
 use super::{Projection, Scene, luminaires};

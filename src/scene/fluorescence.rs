@@ -28,7 +28,7 @@ use super::bispectral::{Bispectral, UPHILL};
 use super::check::Check;
 use super::json::short;
 use super::reader::Reader;
-use crate::data::{Grid, Kind, LEAVES, Leaves, Outside, Table};
+use crate::data::{Grid, LEAVES, Leaves, Outside, Table, TableKind};
 use serde_json::{Map, Value};
 
 /// Steps over an excitation, 1 nm of most of them: a share of a fifth is asked for.
@@ -87,7 +87,7 @@ impl Fluorescence {
 
 /// What a side file says of fluorescence.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Wish {
+pub(crate) struct FluorescenceWish {
     /// Emission (1/nm) and excitation of each term.
     pub(crate) terms: Vec<[Leaves; 2]>,
     /// In words.
@@ -97,13 +97,13 @@ pub(crate) struct Wish {
 }
 
 /// Reads the fluorescence of a material's entry: an object, or a list of them.
-pub(super) fn read(reader: &mut Reader, value: &Value, place: &str) -> Option<Wish> {
+pub(super) fn read(reader: &mut Reader, value: &Value, place: &str) -> Option<FluorescenceWish> {
     let place = format!("{place}, fluorescence");
     let list = match value {
         Value::Array(list) => list.iter().collect(),
         one => vec![one],
     };
-    let mut wish = Wish::default();
+    let mut wish = FluorescenceWish::default();
     let mut said = Vec::new();
     for (k, value) in list.iter().enumerate() {
         let place = match list.len() {
@@ -150,7 +150,7 @@ fn dye(
             "give the quantum yield, photons given out for each that is absorbed, from 0 to 1";
         reader.check.problem(place, what, next);
     }
-    let mut table = |key: &str, kind: Kind| {
+    let mut table = |key: &str, kind: TableKind| {
         let place = format!("{place}, {key}");
         let Some(value) = object.get(key) else {
             let next = "say {\"excitation\": {\"csv\": ...}, \"emission\": {\"csv\": ...}, \"yield\": ...}";
@@ -161,8 +161,8 @@ fn dye(
         reader.keys(object, &["name", "csv"], &place);
         reader.table(object, kind, &place)
     };
-    let absorbed = table("excitation", Kind::Reflectance);
-    let emission = table("emission", Kind::Illuminant);
+    let absorbed = table("excitation", TableKind::Reflectance);
+    let emission = table("emission", TableKind::Illuminant);
     let ((absorbed, taken), (emission, given), quantum) = (absorbed?, emission?, quantum?);
     if let Some(most) = absorbed.values().iter().copied().find(|x| *x > 1.0) {
         let what = format!("'{}' goes up to {most}", short(&taken));
@@ -221,7 +221,11 @@ fn outside(check: &mut Check, absorbed: &Table, grid: &Grid, place: &str) {
 }
 
 /// A matrix from a CSV.
-fn matrix(reader: &mut Reader, object: &Map<String, Value>, place: &str) -> Option<Wish> {
+fn matrix(
+    reader: &mut Reader,
+    object: &Map<String, Value>,
+    place: &str,
+) -> Option<FluorescenceWish> {
     reader.keys(object, &["csv"], place);
     let (text, from) = reader.text(object, place)?;
     match Bispectral::parse(&text) {
@@ -251,7 +255,7 @@ fn matrix(reader: &mut Reader, object: &Map<String, Value>, place: &str) -> Opti
                 Some([spectrum, reader.grid.means(excitation, Outside::Zero)])
             };
             let diagonal = matrix.diagonal();
-            Some(Wish {
+            Some(FluorescenceWish {
                 terms: terms.all.iter().filter_map(on_grid).collect(),
                 from: said,
                 diagonal: diagonal.map(|table| reader.grid.means(&table, Outside::Hold)),

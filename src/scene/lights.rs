@@ -4,7 +4,7 @@
 
 use super::check::Check;
 use super::json::short;
-use super::lamps::{Lamps, bearable};
+use super::lamp_spectra::{LampSpectra, bearable};
 use super::luminaires::{IesNode, LampWish, Luminaire, ProfileWish, tilt_share};
 use super::profile::Profile;
 use super::raw::{RawLight, RawLightKind};
@@ -21,7 +21,7 @@ pub(crate) fn punctual(
     profiles: &[Option<Arc<Profile>>],
     file: &SpectraFile,
     room: &Path,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> Vec<PunctualLight> {
     let grid = lamps.grid;
@@ -138,7 +138,7 @@ fn measured(
     wish: &ProfileWish,
     spectrum: Option<&Sampled>,
     place: &str,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> Option<PunctualLight> {
     if light.kind == RawLightKind::Directional {
@@ -236,7 +236,7 @@ mod tests {
     ) {
         let grid = Grid::default();
         let upsampler = Upsampler::new(&grid);
-        let mut lamps = Lamps::new(&grid, &upsampler);
+        let mut lamps = LampSpectra::new(&grid, &upsampler);
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
         let mut lights = punctual(

@@ -6,10 +6,10 @@
 //! No gloss, but for mirrors, see [`mirror`]. What lets light through is a pane, see [`pane`].
 
 use super::check::{Check, listed};
+use super::fluorescing;
 use super::json::short;
-use super::kindled;
 use super::known::MaterialSpectra;
-use super::lamps::{Lamp, Lamps, bearable};
+use super::lamp_spectra::{LampSpectra, ScaledSpectrum, bearable};
 use super::luminaires::ProfileWish;
 use super::mirror;
 use super::pane;
@@ -28,13 +28,13 @@ const METALLIC: f32 = 0.5;
 
 /// What the warnings name materials for.
 #[derive(Default)]
-struct Said {
+struct MaterialNotes {
     metals: Vec<String>,
     metals_by_texture: Vec<String>,
     unlit: Vec<String>,
-    panes: pane::Said,
-    sheets: sheets::Said,
-    mirrors: mirror::Said,
+    panes: pane::PaneNotes,
+    sheets: sheets::SheetNotes,
+    mirrors: mirror::MirrorNotes,
     bright: Vec<String>,
 }
 
@@ -51,10 +51,10 @@ pub(crate) fn materials(
     room: &Path,
     grid: &Grid,
     upsampler: &Upsampler,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> (Vec<Material>, Vec<Option<ProfileWish>>) {
-    let mut said = Said::default();
+    let mut said = MaterialNotes::default();
     let made = raw
         .iter()
         .zip(tinted)
@@ -96,7 +96,7 @@ pub(crate) fn materials(
             if let Some(wish) = &spectra.fluorescence {
                 let measured = spectra.reflectance.as_ref().map(|r| r.from.as_str());
                 let excited = &mut lamps.excited;
-                kindled::kindle(&mut material, wish, measured, &place, grid, excited, check);
+                fluorescing::fluoresce(&mut material, wish, measured, &place, grid, excited, check);
             }
             if material.pane.is_none() {
                 // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
@@ -205,11 +205,11 @@ fn emission(
     raw: &RawMaterial,
     spectra: &MaterialSpectra,
     place: &str,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> Option<Emission> {
     let nits = f64::from(raw.emissive_strength) * lamps.luminance(raw.emissive_factor);
-    let lamp: Lamp = match &spectra.emission {
+    let lamp: ScaledSpectrum = match &spectra.emission {
         Some((spectrum, luminance)) => {
             let size = match luminance {
                 Some(luminance) => Some(*luminance),
@@ -257,7 +257,7 @@ fn shining(
     wish: &ProfileWish,
     spectrum: Option<&(Sampled, Option<f64>)>,
     place: &str,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> Option<Emission> {
     if spectrum.is_some_and(|(_, luminance)| luminance.is_some()) {
@@ -294,7 +294,7 @@ fn shining(
     })
 }
 
-impl Said {
+impl MaterialNotes {
     fn hear(&mut self, raw: &RawMaterial, name: &str, bright: bool, is_mirror: bool) {
         if bright {
             self.bright.push(name.into());
@@ -362,7 +362,7 @@ mod tests {
     fn made(raw: &[RawMaterial]) -> (Vec<Material>, Vec<LightSpectrum>, Vec<String>, Vec<String>) {
         let grid = Grid::default();
         let upsampler = Upsampler::new(&grid);
-        let mut lamps = Lamps::new(&grid, &upsampler);
+        let mut lamps = LampSpectra::new(&grid, &upsampler);
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
         let file = SpectraFile::default();
@@ -459,7 +459,7 @@ mod tests {
         ];
         let grid = Grid::default();
         let upsampler = Upsampler::new(&grid);
-        let mut lamps = Lamps::new(&grid, &upsampler);
+        let mut lamps = LampSpectra::new(&grid, &upsampler);
         let mut check = Check::new("room.glb");
         let room = folder.path().join("room.glb");
         let file = SpectraFile::default();

@@ -75,14 +75,14 @@ impl Mirror {
 
 /// What is said once about all mirrors.
 #[derive(Default)]
-pub(super) struct Said {
+pub(super) struct MirrorNotes {
     mirrors: Vec<String>,
     other: Vec<String>,
     glowing: Vec<String>,
     textured: Vec<String>,
 }
 
-impl Said {
+impl MirrorNotes {
     /// The mirror that a material of a reflectance is, if it is one. `wanted`: what the side file says; does it let light through, does
     /// it emit?
     pub(super) fn mirror(

@@ -212,7 +212,7 @@ pub(super) fn blended(
 
 /// What is said once about all panes.
 #[derive(Default)]
-pub(super) struct Said {
+pub(super) struct PaneNotes {
     blended: Vec<String>,
     rough: Vec<String>,
     weak: Vec<String>,
@@ -222,7 +222,7 @@ pub(super) struct Said {
     coloured: Vec<String>,
 }
 
-impl Said {
+impl PaneNotes {
     /// The pane that a material is, if it is one. `metallic`: the share of it that is a metal.
     #[expect(
         clippy::too_many_arguments,
@@ -494,7 +494,7 @@ mod tests {
         };
         change(&mut raw);
         let upsampler = Upsampler::new(&crate::data::Grid::default());
-        let (mut said, mut check) = (Said::default(), Check::new("room.glb"));
+        let (mut said, mut check) = (PaneNotes::default(), Check::new("room.glb"));
         let place = "material 'glass'";
         let (of, of_file) = ((&raw, f64::from(raw.metallic)), of_file.as_ref());
         let pane = said.pane(of, "glass", of_file, false, place, &upsampler, &mut check);

@@ -107,13 +107,13 @@ fn exceeds(
 
 /// What is said once about all sheets.
 #[derive(Default)]
-pub(super) struct Said {
+pub(super) struct SheetNotes {
     panes: Vec<String>,
     glowing: Vec<String>,
     thick: Vec<String>,
 }
 
-impl Said {
+impl SheetNotes {
     pub(super) fn hear(&mut self, raw: &RawMaterial, name: &str, is_pane: bool, emits: bool) {
         if is_pane {
             self.panes.push(name.into());

@@ -30,7 +30,7 @@
 use super::check::{Check, Unknown};
 use super::json::short;
 use super::known::{self, MaterialSpectra};
-use super::layers::Wish;
+use super::layers::LayerWish;
 use super::luminaires::{self, LampWish};
 use super::options::Options;
 use super::reader::Reader;
@@ -50,7 +50,7 @@ pub(crate) struct SpectraFile {
     /// What is said of sky and sun.
     pub(crate) sky: SkyWish,
     /// Which lamps are told apart, see [`layers`](super::layers).
-    pub(crate) layers: Vec<Wish>,
+    pub(crate) layers: Vec<LayerWish>,
 }
 
 impl SpectraFile {

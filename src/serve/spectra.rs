@@ -5,15 +5,15 @@ use crate::spectrum::{LEAVES, Leaves};
 
 /// Irradiance of the vertices of a picture by lanes.
 #[derive(Debug)]
-pub(super) struct Spectra {
+pub(super) struct VertexSpectra {
     lanes: Lanes,
-    rows: Rows,
-    error: Option<Error>,
+    rows: VertexRows,
+    error: Option<ColourError>,
 }
 
 /// Whose rows they are.
 #[derive(Debug)]
-enum Rows {
+enum VertexRows {
     /// One for each vertex of each part.
     Own(Vec<Vec<[f32; LEAVES]>>),
     /// Vertices that lie together share one: for each part, which.
@@ -22,7 +22,7 @@ enum Rows {
 
 /// Mean colour difference, an estimate.
 #[derive(Debug, Clone)]
-pub(super) struct Error {
+pub(super) struct ColourError {
     /// Of the room, CIEDE2000.
     pub(super) mean: f64,
     /// At each vertex of each part over the mean; empty where only that is known.
@@ -31,7 +31,7 @@ pub(super) struct Error {
 
 /// The light at a point.
 #[derive(Debug)]
-pub(super) struct Reading {
+pub(super) struct PointReading {
     /// Irradiance, W/m2/nm.
     pub(super) spectrum: Leaves,
     /// Tristimulus irradiance; Y is illuminance, lx.
@@ -40,10 +40,14 @@ pub(super) struct Reading {
     pub(super) error: Option<(f64, bool)>,
 }
 
-impl Spectra {
+impl VertexSpectra {
     /// Rows of each vertex of the parts.
-    pub(super) fn own(lanes: &Lanes, parts: Vec<Vec<[f32; LEAVES]>>, error: Option<Error>) -> Self {
-        let (lanes, rows) = (lanes.clone(), Rows::Own(parts));
+    pub(super) fn own(
+        lanes: &Lanes,
+        parts: Vec<Vec<[f32; LEAVES]>>,
+        error: Option<ColourError>,
+    ) -> Self {
+        let (lanes, rows) = (lanes.clone(), VertexRows::Own(parts));
         Self { lanes, rows, error }
     }
 
@@ -51,14 +55,14 @@ impl Spectra {
     pub(super) fn shared(lanes: &Lanes, rows: Vec<[f32; LEAVES]>, of: Vec<Vec<u32>>) -> Self {
         Self {
             lanes: lanes.clone(),
-            rows: Rows::Shared(rows, of),
+            rows: VertexRows::Shared(rows, of),
             error: None,
         }
     }
 
     /// The same with an error that is known for the room as a whole.
     pub(super) fn with_mean(self, mean: Option<f64>) -> Self {
-        let error = mean.map(|mean| Error {
+        let error = mean.map(|mean| ColourError {
             mean,
             share: [].into(),
         });
@@ -71,10 +75,10 @@ impl Spectra {
         part: usize,
         vertices: [usize; 3],
         weights: [f64; 3],
-    ) -> Option<Reading> {
+    ) -> Option<PointReading> {
         let row = |vertex: usize| match &self.rows {
-            Rows::Own(parts) => parts.get(part)?.get(vertex),
-            Rows::Shared(rows, of) => rows.get(*of.get(part)?.get(vertex)? as usize),
+            VertexRows::Own(parts) => parts.get(part)?.get(vertex),
+            VertexRows::Shared(rows, of) => rows.get(*of.get(part)?.get(vertex)? as usize),
         };
         let mut mixed = [0.0; LEAVES];
         for (vertex, weight) in vertices.into_iter().zip(weights) {
@@ -93,7 +97,7 @@ impl Spectra {
                 }
                 None => (error.mean, false),
             });
-        Some(Reading {
+        Some(PointReading {
             spectrum: self.lanes.leaves(&mixed),
             xyz: self.lanes.tristimulus(&mixed),
             error,

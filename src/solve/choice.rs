@@ -8,11 +8,11 @@ use super::{Bake, Representation, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
 use crate::light::lanes::Lanes;
 use crate::light::{self, Filters, Rows, guide};
-use crate::scene::effects::Kind;
+use crate::scene::effects::EffectKind;
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;
 use crate::spectrum::{
-    CmfTree, Control, Estimate, LEAVES, Leaves, List, Metric, Partition, Path, Tree, control,
+    CmfTree, Control, DyadicTree, Estimate, LEAVES, Leaves, List, Metric, Partition, Path, control,
     represent,
 };
 use crate::team::Interrupted;
@@ -77,7 +77,7 @@ impl Bake {
             Representation::Characteristic(_)
                 if self.room.panes.is_some()
                     || self.room.mirrors.is_some()
-                    || self.room.plan.runs(Kind::Sheets) =>
+                    || self.room.plan.runs(EffectKind::Sheets) =>
             {
                 Lanes::dense(spectra, weights)
             }
@@ -174,7 +174,7 @@ impl Bake {
                         (room.team, &room.interrupt),
                     )
                 })?;
-                refinement.look_out(room)?;
+                refinement.trace_leaf_rays(room)?;
                 let balance = refinement.balanced(&refinement.link_rows());
                 (shadowed, balance.factor)
             }
@@ -301,21 +301,24 @@ fn paper_cut(scene: &Scene, weights: &[Leaves; 3], tolerance: f64) -> Partition 
         eps_max: scale * Control::PAPER.eps_max,
         ..Control::PAPER
     };
-    let paints: Vec<Tree<Estimate>> = paints(scene).iter().map(|r| Tree::new(r, &cmf)).collect();
+    let paints: Vec<DyadicTree<Estimate>> = paints(scene)
+        .iter()
+        .map(|r| DyadicTree::new(r, &cmf))
+        .collect();
     let mut union = Partition::ROOT;
     for LightSpectrum { power, .. } in &scene.spectra {
         let k = normalization(power, weights);
         if !k.is_finite() {
             continue;
         }
-        let source = Tree::<Estimate>::new(&power.map(|x| k * x), &cmf);
+        let source = DyadicTree::<Estimate>::new(&power.map(|x| k * x), &cmf);
         let light = represent(&source, &cmf, &Metric::Xyz, rules.eps_max);
         union = union.union(light.partition());
         let (mut once, mut twice) = (List::black(), List::black());
         for first in &paints {
             light.reflect(first, &cmf, &mut once);
             let mut path = [first; 2];
-            let mut reflect = |list: &mut List<Estimate>, path: &[&Tree<Estimate>]| {
+            let mut reflect = |list: &mut List<Estimate>, path: &[&DyadicTree<Estimate>]| {
                 let path = Path {
                     source: &source,
                     reflections: path,

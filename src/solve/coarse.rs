@@ -12,7 +12,7 @@ use crate::hierarchy::{NONE, Node, Tree};
 use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
-use crate::link::{Link, LinkRows, Way};
+use crate::link::{Link, LinkRows, Occlusion};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{LEAVES, Leaves};
 use crate::team::NEVER;
@@ -396,7 +396,7 @@ fn pairs(matrix: &[f64], count: usize) -> Vec<Link> {
                     exchange: g as f32,
                     open_exchange: g as f32,
                     variation: 0.0,
-                    way: Way::Clear,
+                    occlusion: Occlusion::Clear,
                 });
             }
         }
@@ -461,7 +461,7 @@ mod tests {
                 exchange: 0.01,
                 open_exchange: 0.01,
                 variation: 0.0,
-                way: Way::Clear,
+                occlusion: Occlusion::Clear,
             })
             .filter(|l| l.a != l.b)
             .collect();

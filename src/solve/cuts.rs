@@ -15,7 +15,7 @@ const UNSEEN: f64 = 1e-3;
 
 /// What a choice of cuts does.
 #[derive(Debug, Clone)]
-pub(crate) struct Choice {
+pub(crate) struct CutChoice {
     /// One cut per light.
     pub cuts: Vec<Partition>,
     /// Mean CIELUV difference of irradiance that they cause on the model.
@@ -35,7 +35,7 @@ impl Coarse {
         tolerance: f64,
         known: Option<Vec<Partition>>,
         copies: Option<&[usize]>,
-    ) -> Choice {
+    ) -> CutChoice {
         let count = self.leaves.len();
         let guided = |lanes: Lanes| match guide {
             Some(guide) => lanes.guided(guide, 1.0),
@@ -62,7 +62,7 @@ impl Coarse {
             let lanes = guided(Lanes::ratio(spectra, &cuts, weights));
             let (error, _) = self.loss(&lanes, &references, &jacobians, total);
             if error <= tolerance {
-                return Choice { cuts, error };
+                return CutChoice { cuts, error };
             }
         }
         let mut cuts = vec![Partition::ROOT; spectra.len()];
@@ -78,7 +78,7 @@ impl Coarse {
                 || worst.is_empty()
                 || lanes.lanes()[0].light.is_none()
             {
-                return Choice { cuts, error };
+                return CutChoice { cuts, error };
             }
             // Split several at once: each split costs a solve, and rows hold 4, 8 or 16 lanes. When padding is being
             // filled, no more than fit.
@@ -96,7 +96,7 @@ impl Coarse {
                 }
             }
             if size == before {
-                return Choice { cuts, error };
+                return CutChoice { cuts, error };
             }
         }
     }

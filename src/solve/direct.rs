@@ -56,7 +56,7 @@ const CHUNK: usize = 32;
 
 /// Direct light at some leaves, in order.
 #[derive(Debug, Default)]
-struct Found {
+struct LeafSamples {
     /// Mean rows.
     rows: Vec<f32>,
     /// Half the range of brightness over a leaf's points; if not measured, minus a bound of it.
@@ -68,7 +68,7 @@ struct Found {
     rays: u64,
 }
 
-impl Packed for Found {
+impl Packed for LeafSamples {
     fn pack(&self, to: &mut Vec<u8>) {
         self.rows.pack(to);
         self.spread.pack(to);
@@ -236,7 +236,7 @@ impl Direct {
         &self,
         (tree, leaf): (&Tree, u32),
         demand: &Demand,
-        look: &impl Look,
+        look: &impl LeafSampler,
         landed: &Landed,
     ) -> bool {
         let stake = Stake::new(tree, leaf, demand);
@@ -254,7 +254,7 @@ impl Direct {
         tree: &mut Tree,
         demand: &Demand,
         coarsest: f64,
-        look: &impl Look,
+        look: &impl LeafSampler,
         (team, interrupt): (Team, &Interrupt),
     ) -> Result<(), Interrupted> {
         let mut open: Vec<u32> = tree.leaves().collect();
@@ -283,7 +283,7 @@ impl Direct {
                 .collect();
             let chunks: Vec<&[(u32, Stake)]> = fresh.chunks(CHUNK).collect();
             let gather = |memory: &mut Memory, chunk: &&[(u32, Stake)]| {
-                let (mut found, before) = (Found::default(), memory.rays);
+                let (mut found, before) = (LeafSamples::default(), memory.rays);
                 for &(leaf, ref stake) in *chunk {
                     let mean = if look.by_chance() {
                         by_chance(tree, leaf, look, stake, memory)
@@ -344,7 +344,11 @@ struct Stake {
 impl Stake {
     pub(crate) fn new(tree: &Tree, leaf: u32, demand: &Demand) -> Self {
         let node = tree.node(leaf);
-        let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
+        let keen = demand
+            .sensitivity
+            .get(leaf as usize)
+            .copied()
+            .unwrap_or(1.0);
         let share = tree.share(leaf).max(LEAST_SHARE);
         let depth = tree.elements[node.element as usize].depth;
         Self {
@@ -359,7 +363,7 @@ impl Stake {
 }
 
 /// How direct light is gathered at points of leaves.
-pub(crate) trait Look: Sync {
+pub(crate) trait LeafSampler: Sync {
     /// What turns a row into brightness, share of white.
     fn weights(&self) -> &[f64];
     /// Direct light at a point; none where something covers it.
@@ -447,7 +451,7 @@ impl Mean {
     }
 
     /// Appends the means to `found`.
-    fn end(self, found: &mut Found, width: usize) {
+    fn end(self, found: &mut LeafSamples, width: usize) {
         let share = if self.total > 0.0 {
             1.0 / self.total
         } else {
@@ -485,7 +489,7 @@ pub(super) fn receiver(tree: &Tree, leaf: u32, at: [f64; 3], seed: u64) -> Recei
 fn by_rule(
     tree: &Tree,
     leaf: u32,
-    look: &impl Look,
+    look: &impl LeafSampler,
     tolerance: f64,
     tiny: bool,
     memory: &mut Memory,
@@ -518,7 +522,13 @@ fn by_rule(
 /// Their number follows from the light without shadows: were more taken where the first are bright, places that are bright
 /// here and there would come out too dark. For the same reason the points that decide whether the leaf is split are left out
 /// of the mean: leaves that stay would be those on which few points found light to be even.
-fn by_chance(tree: &Tree, leaf: u32, look: &impl Look, stake: &Stake, memory: &mut Memory) -> Mean {
+fn by_chance(
+    tree: &Tree,
+    leaf: u32,
+    look: &impl LeafSampler,
+    stake: &Stake,
+    memory: &mut Memory,
+) -> Mean {
     let shift = hash(u64::from(leaf), 3);
     // The tolerance, also for what would be a share of all light that matters.
     let tolerance = stake.tolerance.min(1.0 / stake.flux);

@@ -5,10 +5,10 @@
 //! error is unknown.
 
 use super::direct::Direct;
-use super::outlook::Outlook;
+use super::leaf_rays::LeafRays;
 use super::refinement::Refinement;
 use super::{Bake, Solution};
-use crate::hierarchy::{Grown, NONE};
+use crate::hierarchy::{NONE, TreeSize};
 use crate::light::Rows;
 use crate::spectrum::LEAVES;
 use std::borrow::Cow;
@@ -21,12 +21,12 @@ const ALBEDO: f64 = 0.9;
 
 impl Bake {
     /// Takes back a first round that was interrupted: to the room as prepared.
-    pub(super) fn begin_again(&mut self, grown: &Grown) {
+    pub(super) fn begin_again(&mut self, grown: &TreeSize) {
         let mut tree = std::mem::take(&mut self.refinement.tree);
         tree.shrink(grown);
         self.refinement = Refinement {
             tree,
-            outlook: Outlook::of_team(self.room.team),
+            leaf_rays: LeafRays::of_team(self.room.team),
             ..Refinement::default()
         };
         self.solution = Solution::new(&self.room);
@@ -36,8 +36,8 @@ impl Bake {
     pub(super) fn light_by_landings(&mut self) {
         let leaves = self.refinement.leaves();
         let (room, refinement) = (&self.room, &mut self.refinement);
-        refinement.outlook.open(&refinement.tree);
-        refinement.areas = refinement.outlook.areas(&refinement.tree);
+        refinement.leaf_rays.open(&refinement.tree);
+        refinement.areas = refinement.leaf_rays.areas(&refinement.tree);
         let sources = room
             .painter()
             .paint(&refinement.tree, &leaves, &self.solution.lanes);

@@ -18,7 +18,7 @@
 
 mod lights;
 mod patch;
-mod ways;
+mod visibility;
 
 use crate::color::Upsampler;
 use crate::error::{Error, Result};
@@ -28,13 +28,13 @@ use crate::scene::sheet::Weave;
 use crate::scene::{Scene, short};
 use crate::spectrum::{LEAVES, Leaves};
 use glam::DVec3;
-use lights::Lamps;
+use lights::ReferenceLamps;
 use nalgebra::{DMatrix, DVector};
 pub use patch::Patch;
-use patch::{Place, add, radon};
+use patch::{PatchPoint, add, radon};
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use ways::Ways;
+use visibility::ReferenceVisibility;
 
 /// Fluorescence has settled when it changes on no leaf by more than this share of the brightest.
 const SETTLED: f64 = 1e-12;
@@ -52,7 +52,7 @@ pub struct Reference {
 
 /// What leaves and meets the patches, W/m2/nm, in their order.
 #[derive(Debug, Clone)]
-pub struct Solution {
+pub struct ReferenceSolution {
     /// Radiosity: emitted and reflected.
     pub radiosity: Vec<Leaves>,
     /// Irradiance.
@@ -76,8 +76,8 @@ impl Reference {
             return Err(Error::input(scene.source.place(), what, next));
         }
         let mesh = Mesh::new(scene);
-        let ways = Ways::new(scene, &mesh, rays);
-        let lamps = Lamps {
+        let ways = ReferenceVisibility::new(scene, &mesh, rays);
+        let lamps = ReferenceLamps {
             scene,
             mesh: &mesh,
             ways: &ways,
@@ -111,7 +111,7 @@ impl Reference {
     }
 
     /// Solves all leaves; where surfaces fluoresce, again until their fluorescence settles.
-    pub fn solve(&self) -> Solution {
+    pub fn solve(&self) -> ReferenceSolution {
         let mut glow = vec![[0.0; LEAVES]; self.patches.len()];
         loop {
             let solution = self.solve_with(&glow);
@@ -140,7 +140,7 @@ impl Reference {
     }
 
     /// Solves all leaves, given the fluorescent exitance of the patches.
-    fn solve_with(&self, glow: &[Leaves]) -> Solution {
+    fn solve_with(&self, glow: &[Leaves]) -> ReferenceSolution {
         let n = self.patches.len();
         let mut radiosity = vec![[0.0; LEAVES]; n];
         let mut solved = [false; LEAVES];
@@ -189,7 +189,7 @@ impl Reference {
                 (0..at_once).for_each(|k| row[first + k] += received[(i, k)]);
             }
         }
-        Solution {
+        ReferenceSolution {
             radiosity,
             irradiance,
         }
@@ -200,13 +200,13 @@ impl Reference {
     pub fn gather(
         &self,
         scene: &Scene,
-        solution: &Solution,
+        solution: &ReferenceSolution,
         points: &[(DVec3, DVec3)],
         rays: usize,
     ) -> Vec<Leaves> {
         let mesh = Mesh::new(scene);
-        let ways = Ways::new(scene, &mesh, rays);
-        let lamps = Lamps {
+        let ways = ReferenceVisibility::new(scene, &mesh, rays);
+        let lamps = ReferenceLamps {
             scene,
             mesh: &mesh,
             ways: &ways,
@@ -216,7 +216,7 @@ impl Reference {
             .map(|&(at, normal)| {
                 let at = at - mesh.centre;
                 let plane = plane_at(&mesh, &self.patches, at, normal);
-                let place = Place { at, normal, plane };
+                let place = PatchPoint { at, normal, plane };
                 let mut sum = [0.0; LEAVES];
                 for (patch, radiosity) in self.patches.iter().zip(&solution.radiosity) {
                     match ways.factor(place, patch) {
@@ -260,7 +260,7 @@ pub fn solve_one(factors: &DMatrix<f64>, rho: &[f64], emission: &[f64]) -> DVect
 }
 
 /// `F_ij`, made reciprocal by their means; one matrix for all leaves, or one for each where a pane is coloured.
-fn factors(scene: &Scene, ways: &Ways<'_>, patches: &[Patch]) -> Vec<DMatrix<f64>> {
+fn factors(scene: &Scene, ways: &ReferenceVisibility<'_>, patches: &[Patch]) -> Vec<DMatrix<f64>> {
     let tinted = |s: &crate::scene::Surface| {
         let pane = scene.materials[s.material].pane.as_ref();
         pane.is_some_and(|pane| !pane.is_neutral())

@@ -4,7 +4,7 @@ use super::punctual;
 use super::room::{Room, by_rays};
 use crate::hierarchy::Tree;
 use crate::light::lanes::Lanes;
-use crate::light::{Filters, Glass, Light, Rows, brightness, keenness, weighed};
+use crate::light::{Filters, Glass, Light, Rows, brightness, lightness_sensitivity, weighed};
 use crate::link::Sight;
 use crate::scene::PunctualLight;
 use crate::transport::Gatherer;
@@ -73,14 +73,14 @@ impl Solution {
     }
 
     /// How much a change of its irradiance changes the lightness of every node.
-    pub(super) fn keenness(&self, tree: &Tree) -> Vec<f32> {
+    pub(super) fn lightness_sensitivity(&self, tree: &Tree) -> Vec<f32> {
         let mut keen = vec![0.0_f32; tree.nodes.len()];
         for (k, &leaf) in self.light.leaves.iter().enumerate() {
             let h = brightness(
                 self.lanes.tristimulus(self.light.irradiance.row(k)),
                 self.light.white,
             );
-            keen[leaf as usize] = keenness(h) as f32;
+            keen[leaf as usize] = lightness_sensitivity(h) as f32;
         }
         for k in (0..keen.len()).rev() {
             let node = &tree.nodes[k];

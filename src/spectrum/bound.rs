@@ -206,7 +206,7 @@ pub(crate) mod tests {
     use crate::color::tristimulus;
     use crate::spectrum::partition::tests::any_cut;
     use crate::spectrum::testing::{cmf, patch};
-    use crate::spectrum::{CmfTree, Leaves, List, Representative, Tree};
+    use crate::spectrum::{CmfTree, DyadicTree, Leaves, List, Representative};
     use proptest::prelude::*;
 
     /// Is everything that the list claims true of `exact`? Slack for rounding only.
@@ -255,11 +255,11 @@ pub(crate) mod tests {
         fn products_and_merges_stay_within_their_bounds(spectra in prop::collection::vec(patch(), 2..6), cut in any_cut(), merges in any::<u64>()) {
             let cmf = cmf();
             let mut exact = spectra[0];
-            let mut list = List::new(&Tree::<Bounded>::new(&exact, &cmf), cut);
+            let mut list = List::new(&DyadicTree::<Bounded>::new(&exact, &cmf), cut);
             let mut out = List::black();
             for r in &spectra[1..] {
                 exact = std::array::from_fn(|k| exact[k] * r[k]);
-                list.reflect(&Tree::new(r, &cmf), &cmf, &mut out);
+                list.reflect(&DyadicTree::new(r, &cmf), &cmf, &mut out);
                 std::mem::swap(&mut list, &mut out);
                 prop_assert_eq!(holds(&list, &exact, &cmf), Ok(()));
                 let pairs = list.partition().pairs() & merges;

@@ -286,7 +286,7 @@ mod tests {
     use crate::spectrum::bound::tests::holds;
     use crate::spectrum::partition::tests::any_cut;
     use crate::spectrum::testing::{cmf, patch};
-    use crate::spectrum::{Bounded, Estimate, Leaves, Moment, Partition, Tree};
+    use crate::spectrum::{Bounded, DyadicTree, Estimate, Leaves, Moment, Partition};
     use proptest::prelude::*;
 
     /// Limits of every kind: usual, crossed, out of reach, without end.
@@ -302,8 +302,8 @@ mod tests {
         rule: Control,
     ) -> (List<I>, f64, Leaves) {
         let cmf = cmf();
-        let trees: Vec<Tree<I>> = spectra.iter().map(|s| Tree::new(s, &cmf)).collect();
-        let materials: Vec<&Tree<I>> = trees[1..].iter().collect();
+        let trees: Vec<DyadicTree<I>> = spectra.iter().map(|s| DyadicTree::new(s, &cmf)).collect();
+        let materials: Vec<&DyadicTree<I>> = trees[1..].iter().collect();
         let (mut list, mut out) = (List::new(&trees[0], cut), List::black());
         for material in &materials {
             list.reflect(material, &cmf, &mut out);
@@ -352,7 +352,7 @@ mod tests {
         #[test]
         fn the_ranking_of_pairs_is_the_outcome_of_their_merge(s in patch(), cut in any_cut()) {
             let cmf = cmf();
-            let list = List::new(&Tree::<Moment>::new(&s, &cmf), cut);
+            let list = List::new(&DyadicTree::<Moment>::new(&s, &cmf), cut);
             for rule in [Representative::Mean, Representative::Projection] {
                 let settings = Control { representative: rule, ..Control::within(1.0) };
                 if let Some((first, after)) = best_pair(&list, list.error(), &cmf, &Metric::Xyz, &settings) {

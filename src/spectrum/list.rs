@@ -5,7 +5,7 @@
 
 use super::interval::{Cmf, Interval, Representative};
 use super::partition::Partition;
-use super::tree::{CmfTree, Tree, node};
+use super::tree::{CmfTree, DyadicTree, node};
 use crate::data::{LEAVES, Leaves};
 
 /// A piecewise constant spectrum with its errors.
@@ -19,7 +19,7 @@ pub struct List<I> {
 
 impl<I: Interval> List<I> {
     /// The spectrum of a tree on a cut.
-    pub fn new(tree: &Tree<I>, partition: Partition) -> Self {
+    pub fn new(tree: &DyadicTree<I>, partition: Partition) -> Self {
         let mut list = Self::black();
         list.partition = partition;
         for (slot, (first, len)) in list.intervals.iter_mut().zip(partition.iter()) {

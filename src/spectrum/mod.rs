@@ -113,9 +113,9 @@ pub use list::List;
 pub use partition::{Intervals, Partition};
 pub use product::Path;
 pub use source::represent;
-pub use tree::{CmfTree, NODES, Tree, node, span};
+pub use tree::{CmfTree, DyadicTree, NODES, node, span};
 
 /// The list that patches carry: values, errors with the free part of the neglected term.
 pub type SpectralList = List<Moment>;
 /// The tree that goes with [`SpectralList`].
-pub type SpectralTree = Tree<Moment>;
+pub type SpectralTree = DyadicTree<Moment>;

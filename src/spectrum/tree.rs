@@ -161,12 +161,12 @@ impl CmfTree {
 
 /// A spectrum as a binary tree: for each node the average and what the interval type keeps of its errors.
 #[derive(Debug, Clone)]
-pub struct Tree<I> {
+pub struct DyadicTree<I> {
     leaves: Leaves,
     nodes: [I; NODES],
 }
 
-impl<I: Interval> Tree<I> {
+impl<I: Interval> DyadicTree<I> {
     /// From the leaves (finite).
     pub fn new(f: &Leaves, cmf: &CmfTree) -> Self {
         let mut nodes = [I::default(); NODES];
@@ -249,7 +249,7 @@ mod tests {
         let ramp = std::array::from_fn(|leaf| leaf as f64);
         assert_eq!(blind.average(&ramp, 1), 31.5);
         assert!(
-            Tree::<Estimate>::new(&ramp, &blind)
+            DyadicTree::<Estimate>::new(&ramp, &blind)
                 .validate(&blind)
                 .is_ok()
         );
@@ -259,7 +259,7 @@ mod tests {
         #[test]
         fn the_average_minimises_the_squared_errors(f in patch(), n in 1usize..NODES, step in -0.1..0.1f64) {
             let cmf = cmf();
-            let tree = Tree::<Estimate>::new(&f, &cmf);
+            let tree = DyadicTree::<Estimate>::new(&f, &cmf);
             prop_assert_eq!(tree.validate(&cmf), Ok(()));
             let (first, len) = span(n);
             let squares = |value: f64| (0..3).map(|a| (first..first + len).map(|k| (f[k] - value) * cmf.leaves()[a][k]).sum::<f64>().powi(2)).sum::<f64>();
@@ -271,7 +271,7 @@ mod tests {
         fn under_a_light_the_ratio_has_the_errors_of_the_product(q in patch(), light in patch(), n in 1usize..NODES) {
             let cmf = cmf();
             let under = cmf.under(&light);
-            let node = *Tree::<Estimate>::new(&q, &under).node(n);
+            let node = *DyadicTree::<Estimate>::new(&q, &under).node(n);
             let (first, len) = span(n);
             for a in 0..3 {
                 let exact: f64 = (first..first + len).map(|k| light[k] * (q[k] - node.value) * cmf.leaves()[a][k]).sum();

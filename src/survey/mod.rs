@@ -23,7 +23,7 @@ mod openings;
 mod points;
 mod size;
 
-pub use points::{Place, places};
+pub use points::{PointLocation, places};
 
 use eyes::Eyes;
 
@@ -32,7 +32,7 @@ use crate::scene::Scene;
 
 /// What the user has decided already.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Wishes {
+pub struct SurveyOptions {
     /// A room without light is meant.
     pub allow_dark: bool,
     /// Faces that look reversed are to be turned.
@@ -54,7 +54,7 @@ pub struct Wishes {
 /// assert!(advise(&mut room, Wishes { flip: true, ..Wishes::default() }).is_empty());
 /// # Ok::<(), haarlight::Error>(())
 /// ```
-pub fn advise(scene: &mut Scene, wishes: Wishes) -> Vec<Problem> {
+pub fn advise(scene: &mut Scene, wishes: SurveyOptions) -> Vec<Problem> {
     if let Some(problem) = content::nothing(scene) {
         return vec![problem];
     }

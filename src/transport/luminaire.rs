@@ -10,7 +10,7 @@ use super::receiver::Receiver;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_polygon, quarters};
 use crate::light::Passage;
-use crate::link::{PIECES, View, open_weight};
+use crate::link::{PIECES, Visibility, open_weight};
 use crate::scene::PunctualLight;
 use crate::scene::luminaires::Luminaire;
 use glam::DVec3;
@@ -249,9 +249,9 @@ impl Gatherer<'_> {
         let planes = [to.plane, NO_PLANE];
         let mut parts = Vec::new();
         match self.sight.view_from(to.point, to.normal, &corners, planes) {
-            View::Clear => cut(luminaire, (corners, normal), to, &mut parts),
-            View::Crowded => return None,
-            View::Listed(list) => {
+            Visibility::Clear => cut(luminaire, (corners, normal), to, &mut parts),
+            Visibility::Crowded => return None,
+            Visibility::Listed(list) => {
                 memory.clipper.begin(to.point, &corners);
                 for blocker in self.sight.blockers(&list, planes)? {
                     let outline = || self.sight.mesh.outline(blocker);

@@ -4,14 +4,15 @@
 //! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in proportion to their
 //! light.
 
-use super::gatherer::{CLOSE, Gatherer, Lamp, Linked, Memory, Of};
+use super::gatherer::{CLOSE, Gatherer, LampElement, Linked, Memory, RadiosityPart};
 use super::receiver::{Gathered, Receiver};
-use super::slope::Seen;
+use super::slope::SeenPatch;
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
 use crate::light::{Passage, Tint, accumulate};
 use crate::link::{
-    PIECES, POLYGONS, View, Way, blockers_of, in_front_of, open_weight, pattern, polygons,
+    Occlusion, PIECES, POLYGONS, Visibility, blockers_of, in_front_of, open_weight, pattern,
+    polygons,
 };
 use glam::DVec3;
 
@@ -40,9 +41,15 @@ impl Gatherer<'_> {
     }
 
     /// Adds the patches on the stack, or replaces them by their children. Factors are worked out for eight faces at once.
-    pub(super) fn patches(&self, to: &Receiver, of: Of, memory: &mut Memory, out: &mut Gathered) {
+    pub(super) fn patches(
+        &self,
+        to: &Receiver,
+        of: RadiosityPart,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
         loop {
-            let mut open = [((NONE, Way::Clear, 0.0), 0.0); 8];
+            let mut open = [((NONE, Occlusion::Clear, 0.0), 0.0); 8];
             let mut held = 0;
             let mut faces = [([DVec3::ZERO; 3], 0); 8];
             let mut count = 0;
@@ -53,7 +60,8 @@ impl Gatherer<'_> {
                     break;
                 }
                 memory.stack.pop();
-                if of == Of::Emitted && self.light.bright_emitted[linked.0 as usize] <= 0.0
+                if of == RadiosityPart::Emitted
+                    && self.light.bright_emitted[linked.0 as usize] <= 0.0
                     || !self.can_see(to, node)
                 {
                     continue;
@@ -93,13 +101,13 @@ impl Gatherer<'_> {
     }
 
     /// Reflected and emitted brightness of a node, as far as gathered, as shares of white.
-    fn brightness(&self, id: u32, of: Of) -> (f64, f64) {
+    fn brightness(&self, id: u32, of: RadiosityPart) -> (f64, f64) {
         let reflected = f64::from(self.light.bright_reflected[id as usize]);
         let emitted = f64::from(self.light.bright_emitted[id as usize]);
         match of {
-            Of::All => (reflected, emitted),
-            Of::Reflected => (reflected, 0.0),
-            Of::Emitted => (0.0, emitted),
+            RadiosityPart::All => (reflected, emitted),
+            RadiosityPart::Reflected => (reflected, 0.0),
+            RadiosityPart::Emitted => (0.0, emitted),
         }
     }
 
@@ -108,11 +116,11 @@ impl Gatherer<'_> {
         &self,
         to: &Receiver,
         (id, way, v): Linked,
-        of: Of,
+        of: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        if of == Of::Emitted && self.is_fixture(to, id) {
+        if of == RadiosityPart::Emitted && self.is_fixture(to, id) {
             self.put_off(to, id, memory);
             return;
         }
@@ -125,14 +133,14 @@ impl Gatherer<'_> {
         // their light.
         if near || factor * (0.3 * spread + emitted) > self.tolerance {
             let part = |c: u32| match of {
-                Of::Emitted => self.light.lit[c as usize],
+                RadiosityPart::Emitted => self.light.lit[c as usize],
                 _ => c,
             };
             let parts = node.child_range().map(part).filter(|&c| c != NONE);
             memory.stack.extend(parts.map(|c| (c, way, v)));
             return;
         }
-        if of == Of::Emitted {
+        if of == RadiosityPart::Emitted {
             self.lamps_by_chance(to, id, factor * emitted, memory, out);
             return;
         }
@@ -150,7 +158,7 @@ impl Gatherer<'_> {
         to: &Receiver,
         (id, way, v): Linked,
         factor: f64,
-        of: Of,
+        of: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
@@ -164,7 +172,7 @@ impl Gatherer<'_> {
             (1.0, PARTLY_SHARE * self.tolerance)
         };
         let spread = match of {
-            Of::Emitted => self.uneven(node),
+            RadiosityPart::Emitted => self.uneven(node),
             _ => f64::from(self.light.spread[id as usize]),
         };
         if self.has_parts(node) && (node.element == NONE || factor * spread * size > limit) {
@@ -174,7 +182,7 @@ impl Gatherer<'_> {
         let (reflected, emitted) = self.brightness(id, of);
         let carries = factor * (reflected + emitted);
         if clear {
-            self.see(to, id, factor, Seen::of(1.0), None, of, out);
+            self.see(to, id, factor, SeenPatch::of(1.0), None, of, out);
         } else if let Some((share, clipped)) =
             self.visible(to, (id, way, v), factor, carries, emitted > 0.0, memory)
         {
@@ -184,7 +192,7 @@ impl Gatherer<'_> {
                 to,
                 id,
                 factor,
-                Seen { share, parts },
+                SeenPatch { share, parts },
                 tint.as_ref(),
                 of,
                 out,
@@ -193,8 +201,8 @@ impl Gatherer<'_> {
     }
 
     /// Is a way free? One that links proved clear may lead through a pane.
-    fn is_clear(&self, way: Way) -> bool {
-        self.is_plain() && (way == Way::Clear || !self.sight.occlusion)
+    fn is_clear(&self, way: Occlusion) -> bool {
+        self.is_plain() && (way == Occlusion::Clear || !self.sight.occlusion)
     }
 
     /// What panes leave of the light of the last rays, where these are not blocked; none where no pane is passed.
@@ -219,14 +227,14 @@ impl Gatherer<'_> {
         to: &Receiver,
         id: u32,
         factor: f64,
-        seen: Seen,
+        seen: SeenPatch,
         tint: Option<&Passage>,
-        of: Of,
+        of: RadiosityPart,
         out: &mut Gathered,
     ) {
         self.add(id, factor, seen.share, tint, of, out);
         // Behind panes leaves count as even: in rooms with panes, patches are gathered this way only if they glare.
-        if of != Of::Emitted && tint.is_none() {
+        if of != RadiosityPart::Emitted && tint.is_none() {
             self.slope(to, id, factor, seen, CLEAR_SHARE * self.tolerance, out);
         }
     }
@@ -260,27 +268,27 @@ impl Gatherer<'_> {
         factor: f64,
         visible: f64,
         tint: Option<&Passage>,
-        of: Of,
+        of: RadiosityPart,
         out: &mut Gathered,
     ) {
         let seen = (factor * visible) as f32;
         let k = id as usize;
         let width = self.light.width();
         let filter = tint.map(|passage| &passage.filter);
-        if of != Of::Emitted {
+        if of != RadiosityPart::Emitted {
             out.seen += factor * visible;
             let row = self.light.reflected.row(k);
             accumulate(&mut out.irradiance[..width], seen, row, filter);
         }
-        if of != Of::Reflected && self.light.bright_emitted[k] > 0.0 {
+        if of != RadiosityPart::Reflected && self.light.bright_emitted[k] > 0.0 {
             let row = self.light.emitted.row(k);
             accumulate(&mut out.direct[..width], seen, row, filter);
         }
         if let Some(trace) = &mut out.trace {
             match of {
-                Of::All => trace.patch(id, seen, tint),
-                Of::Reflected => trace.slope(id, seen, tint),
-                Of::Emitted => trace.emitted(id, seen, tint),
+                RadiosityPart::All => trace.patch(id, seen, tint),
+                RadiosityPart::Reflected => trace.slope(id, seen, tint),
+                RadiosityPart::Emitted => trace.emitted(id, seen, tint),
             }
         }
     }
@@ -293,7 +301,7 @@ impl Gatherer<'_> {
         tint: Option<&Passage>,
         out: &mut Gathered,
     ) {
-        self.add(id, factor, 1.0, tint, Of::Emitted, out);
+        self.add(id, factor, 1.0, tint, RadiosityPart::Emitted, out);
     }
 
     /// Could any part of the patch be in front of the receiver, and the receiver in front of any part of the patch?
@@ -349,7 +357,7 @@ impl Gatherer<'_> {
         memory.blocked.clear();
         if !clear {
             self.sight
-                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+                .blocked(&memory.segments, &Visibility::Crowded, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
             visible = open_weight(&memory.weights, &memory.blocked) / factor;
         }
@@ -375,7 +383,7 @@ impl Gatherer<'_> {
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
         let clips = self.is_plain();
-        if clips && let Way::Listed { .. } = way {
+        if clips && let Occlusion::Listed { .. } = way {
             let list = blockers_of(&self.light.neighbours.blockers, way);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
                 return Some(((seen / factor).min(1.0), true));
@@ -388,16 +396,16 @@ impl Gatherer<'_> {
                     .sight
                     .view_from(to.point, to.normal, &element.corners, planes)
                 {
-                    View::Clear => return Some((1.0, false)),
-                    View::Listed(list) => {
+                    Visibility::Clear => return Some((1.0, false)),
+                    Visibility::Listed(list) => {
                         if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
                             return Some(((seen / factor).min(1.0), true));
                         }
                     }
-                    View::Crowded => {}
+                    Visibility::Crowded => {}
                 }
             }
-            memory.lamps.push(Lamp {
+            memory.lamps.push(LampElement {
                 id,
                 fixture: NONE,
                 faces: 0,
@@ -437,7 +445,7 @@ impl Gatherer<'_> {
             }
         }
         self.sight
-            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            .blocked(&memory.segments, &Visibility::Crowded, &mut memory.blocked);
         memory.rays += memory.segments.len() as u64;
         let total: f64 = memory.weights.iter().sum();
         let seen = open_weight(&memory.weights, &memory.blocked);

@@ -1,6 +1,6 @@
 //! Light at a point in cluttered rooms: lamps from the root, bright patches by links, all else by rays.
 
-use super::gatherer::{Gatherer, Memory, Of};
+use super::gatherer::{Gatherer, Memory, RadiosityPart};
 use super::hemisphere::{BEAM, Hemisphere};
 use super::receiver::{Gathered, Receiver};
 use super::via::Arrived;
@@ -87,7 +87,7 @@ impl Gatherer<'_> {
                 memory.open.extend(node.child_range().map(|c| (c, way, v)));
             }
         }
-        self.patches(to, Of::Reflected, memory, out);
+        self.patches(to, RadiosityPart::Reflected, memory, out);
     }
 
     /// Adds the reflected light of all other patches, by the rays cast over the hemisphere, each of a `share`.

@@ -17,13 +17,13 @@ use glam::{DVec3, dvec3};
 use haarlight::color::de2000;
 use haarlight::error::Error;
 use haarlight::gather::{Baked, BakedSurface};
-use haarlight::lightmap::{MapLimits, Page};
+use haarlight::lightmap::{MapLimits, MapPage};
 use haarlight::output::{BakedGlb, Exposure, Packing, Writing, baked_glb};
 use haarlight::scene::layers::{Layers, MOST_LAYERS};
 use haarlight::scene::{LightKind, Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use haarlight::spectrum::LEAVES;
-use haarlight::survey::Place;
+use haarlight::survey::PointLocation;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -212,7 +212,7 @@ fn a_layer_is_the_room_under_its_lamp_alone() {
             }
         }
         let (mut off, mut lack, mut count) = (0.0, 0.0, 0);
-        for (a, b) in places().filter(|(a, _)| a.place == Place::Room) {
+        for (a, b) in places().filter(|(a, _)| a.place == PointLocation::Room) {
             for side in 0..6 {
                 let (all, layer) = (a.light.cube[side], a.layers[k].cube[side]);
                 let with = |own: [f64; 3]| [0, 1, 2].map(|c| all[c] - layer[c] + own[c]);
@@ -368,7 +368,7 @@ fn pages_of_layers_add_up_texel_by_texel() {
         let bake = parted(scene, 4.0);
         let maps = bake.light_maps(&MapLimits::default(), &|_, _| {});
         assert_eq!(maps.layers.len(), layers(&bake).names.len());
-        let numbers = |page: &Page| -> Vec<f64> {
+        let numbers = |page: &MapPage| -> Vec<f64> {
             let texels = page.texels.iter();
             texels
                 .flat_map(|t| t.irradiance.into_iter().chain(t.light))

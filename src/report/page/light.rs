@@ -12,7 +12,7 @@
 //! | illuminance of each layer | 65535ths of that of the file | a 65535th of it |
 //! | spectrum for each lux | mean and principal components, 65535ths of a component's range | stated in the page |
 
-use super::history::{Corner, History, corners};
+use super::history::{History, OutputCorner, corners};
 use crate::color::seen_difference;
 use crate::gather::Baked;
 use crate::solve::Bake;
@@ -32,7 +32,7 @@ const FLOOR: f32 = 1e-7;
 
 /// What the page is told of the planes.
 #[derive(Debug, Serialize)]
-pub(super) struct Index {
+pub(super) struct LightIndex {
     vertices: usize,
     /// For each primitive with light, in the order of the file: does it shine itself?
     glows: Vec<bool>,
@@ -71,7 +71,7 @@ pub(super) fn pack(
     baked: &Baked,
     history: &History,
     order: &[usize],
-) -> (Index, Vec<u8>) {
+) -> (LightIndex, Vec<u8>) {
     let corners = corners(bake, baked, order);
     let drawn = order
         .iter()
@@ -112,7 +112,7 @@ pub(super) fn pack(
         .iter()
         .map(|xyz| f64::from(xyz[1]).max(0.0))
         .collect();
-    let index = Index {
+    let index = LightIndex {
         vertices: count,
         glows: order.iter().map(|&k| glows(bake, baked, k)).collect(),
         rounds,
@@ -156,7 +156,7 @@ pub(crate) fn error_map(
 fn errors(
     bake: &Bake,
     steps: &[(usize, Vec<[f32; 3]>)],
-    corners: &[Corner],
+    corners: &[OutputCorner],
     area: &[f64],
 ) -> Option<(Vec<f64>, f64)> {
     let [.., (_, before), (_, last)] = steps else {
@@ -177,7 +177,7 @@ fn errors(
 }
 
 /// Gives every vertex the mean of the triangles around it. Corners come three to a triangle.
-fn even_out(values: &mut [f64], corners: &[Corner], area: &[f64]) {
+fn even_out(values: &mut [f64], corners: &[OutputCorner], area: &[f64]) {
     let mut sums = vec![0.0; values.len()];
     for triangle in corners.chunks_exact(3) {
         let mean = triangle.iter().map(|c| values[c.vertex]).sum::<f64>() / 3.0;

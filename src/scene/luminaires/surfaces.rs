@@ -5,7 +5,7 @@
 
 use super::super::check::Check;
 use super::super::json::short;
-use super::super::lamps::{GREATEST_SIZE, bearable};
+use super::super::lamp_spectra::{GREATEST_SIZE, bearable};
 use super::super::{LightKind, Material, PunctualLight, Scene, Sides, Surface};
 use super::mounted::{Luminaire, tilt_share};
 use super::wish::ProfileWish;

@@ -105,7 +105,7 @@ pub struct Profile {
 }
 
 /// What a file says of the light: angles in degrees, as measured, with what it leaves out.
-pub(super) struct Measured {
+pub(super) struct MeasuredTable {
     pub(super) angles: Angles,
     pub(super) symmetry: Symmetry,
     /// `polar` of the table, degrees.
@@ -118,8 +118,8 @@ pub(super) struct Measured {
 
 impl Profile {
     /// A profile of nothing but its light; what the file says besides is put in afterwards.
-    pub(super) fn new(measured: Measured) -> Self {
-        let Measured { angles, polar, .. } = measured;
+    pub(super) fn new(measured: MeasuredTable) -> Self {
+        let MeasuredTable { angles, polar, .. } = measured;
         let full = unfolded(measured.symmetry, measured.azimuth, measured.candela);
         let (azimuth, candela): (Vec<f64>, Vec<Vec<f64>>) = full.into_iter().unzip();
         let mut profile = Self {

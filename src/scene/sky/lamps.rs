@@ -2,7 +2,7 @@
 
 use super::Distribution;
 use super::dome::Sky;
-use super::light::{Light, of_sun, usual};
+use super::light::{SkyLight, of_sun, usual};
 use super::parts::PLACES;
 use super::sun::{angles, direction, position};
 use super::wish::{SkyType, SkyWish, SunPlace, TURBIDITY};
@@ -41,9 +41,9 @@ pub(crate) fn join(
     }
     let toward = sun.as_ref().map(|sun| sun.toward);
     let light = match (wish.turbidity.zip(toward), kind, &wish.map) {
-        (Some((turbidity, sun)), ..) => Light::of_air(wish, turbidity, sun, grid, check)?,
-        (None, Some(kind), _) => Light::of_type(wish, kind, toward, grid, check)?,
-        (None, None, Some(path)) => Light::of_map(wish, path, grid, check)?,
+        (Some((turbidity, sun)), ..) => SkyLight::of_air(wish, turbidity, sun, grid, check)?,
+        (None, Some(kind), _) => SkyLight::of_type(wish, kind, toward, grid, check)?,
+        (None, None, Some(path)) => SkyLight::of_map(wish, path, grid, check)?,
         (None, None, None) => return None,
     };
     let mut makes = Makes {
@@ -248,7 +248,7 @@ impl Makes<'_> {
     }
 
     /// Adds the lamps of a sky and of what lies below the horizon; also returns the index of their spectrum.
-    fn sky(&mut self, light: Light) -> (Sky, usize) {
+    fn sky(&mut self, light: SkyLight) -> (Sky, usize) {
         let spectrum = self.add_spectrum(light.spectrum);
         let mut below = light.below;
         if let Some(rho) = light.ground {

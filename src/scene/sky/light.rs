@@ -6,9 +6,9 @@ use super::hosek::Hosek;
 use super::map::{Map, Wanted};
 use super::mixture::Spectral;
 use super::parts::PARTS;
-use super::picture::Picture;
+use super::picture::SkyPicture;
 use super::sun::angles;
-use super::wish::{BRIGHT, Brightness, KELVIN, SkyType, SkyWish};
+use super::wish::{BRIGHT, KELVIN, SkyBrightness, SkyType, SkyWish};
 use crate::color::{KM, Observer, Upsampler, primaries};
 use crate::data::{Grid, LEAVES, Leaves, Outside, Table, blackbody, daylight, named};
 use crate::scene::LightSpectrum;
@@ -30,7 +30,7 @@ const PRIMARIES: [&str; PARTS] = [", red", ", green", ", blue"];
 const MOST_LUX: f64 = BRIGHT[1];
 
 /// What a sky shines with.
-pub(super) struct Light {
+pub(super) struct SkyLight {
     pub(super) dome: Dome,
     pub(super) said: String,
     /// What its parts are called besides.
@@ -46,7 +46,7 @@ pub(super) struct Light {
     pub(super) sun: Option<(DVec3, Leaves)>,
 }
 
-impl Light {
+impl SkyLight {
     /// A sky of ISO 15469.
     pub(super) fn of_type(
         wish: &SkyWish,
@@ -63,8 +63,8 @@ impl Light {
             return None;
         }
         let lux = match wish.brightness {
-            Some(Brightness::Illuminance(lux)) => lux,
-            Some(Brightness::Luminance(zenith)) => zenith / luminance.zenith(),
+            Some(SkyBrightness::Illuminance(lux)) => lux,
+            Some(SkyBrightness::Luminance(zenith)) => zenith / luminance.zenith(),
             None => usual(kind, sun.map(|sun| angles(sun)[0]))[0],
         };
         let kelvin = wish.kelvin.unwrap_or(usual_kelvin(kind));
@@ -123,8 +123,8 @@ impl Light {
         };
         let own = size(&sum_of(*sky.levels()));
         let factor = match wish.brightness {
-            Some(Brightness::Illuminance(lux)) => lux / own,
-            Some(Brightness::Luminance(zenith)) => zenith / size(&sky.exact(DVec3::Y)),
+            Some(SkyBrightness::Illuminance(lux)) => lux / own,
+            Some(SkyBrightness::Luminance(zenith)) => zenith / size(&sky.exact(DVec3::Y)),
             None => 1.0,
         };
         let power = sum_of(*sky.levels()).map(|x| x / own);
@@ -157,7 +157,7 @@ impl Light {
         check: &mut Check,
     ) -> Option<Self> {
         let place = format!("map '{}'", short(&path.display().to_string()));
-        let picture = match Picture::read(path) {
+        let picture = match SkyPicture::read(path) {
             Ok(picture) => picture,
             Err((what, next)) => {
                 check.problem(&place, what, next);
@@ -188,8 +188,8 @@ impl Light {
             levels.iter().zip(&luminance).map(|(e, y)| e * y).sum()
         };
         let white = match wish.brightness {
-            Some(Brightness::Illuminance(wanted)) => wanted / lux(above),
-            Some(Brightness::Luminance(white)) => white,
+            Some(SkyBrightness::Illuminance(wanted)) => wanted / lux(above),
+            Some(SkyBrightness::Luminance(white)) => white,
             None => 1.0,
         };
         let [up, down] = [above, below].map(|levels| white * lux(levels));

@@ -207,7 +207,7 @@ impl Samples {
             let back = lower * at + mean;
             let colour = DVec3::new(back.x, 1.0, back.y);
             let dark = regression[UNSEEN..].iter().any(|g| g.dot(colour) < 0.0);
-            Corner { at, colour, dark }
+            HullCorner { at, colour, dark }
         };
         let mut best: Option<((bool, f64), [DVec3; PARTS])> = None;
         for i in 0..SIDES {
@@ -231,7 +231,7 @@ impl Samples {
 }
 
 /// Where two sides meet.
-struct Corner {
+struct HullCorner {
     /// Among the chromaticities, brought to a standard deviation of 1.
     at: DVec2,
     /// Tristimulus value, of luminance 1.

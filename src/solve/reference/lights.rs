@@ -1,7 +1,7 @@
 //! Direct light of lamps and skies at points and patches of the reference.
 
-use super::patch::{Patch, Place, add, radon};
-use super::ways::Ways;
+use super::patch::{Patch, PatchPoint, add, radon};
+use super::visibility::ReferenceVisibility;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
 use crate::hierarchy::Mesh;
 use crate::scene::{LightKind, PunctualLight, Scene};
@@ -16,13 +16,13 @@ const SHINING_POINTS: u32 = 1024;
 const DOME_RAYS: u32 = 16_384;
 
 /// The lamps of a room, and the ways of their light.
-pub(super) struct Lamps<'a> {
+pub(super) struct ReferenceLamps<'a> {
     pub(super) scene: &'a Scene,
     pub(super) mesh: &'a Mesh,
-    pub(super) ways: &'a Ways<'a>,
+    pub(super) ways: &'a ReferenceVisibility<'a>,
 }
 
-impl Lamps<'_> {
+impl ReferenceLamps<'_> {
     /// Mean irradiance of a patch.
     pub(super) fn on(&self, patch: &Patch) -> Leaves {
         let mut sum = [0.0; LEAVES];
@@ -33,7 +33,7 @@ impl Lamps<'_> {
     }
 
     /// Irradiance at a place.
-    pub(super) fn at(&self, place: Place) -> Leaves {
+    pub(super) fn at(&self, place: PatchPoint) -> Leaves {
         let mut sum = [0.0; LEAVES];
         for light in &self.scene.lights {
             let mut brought = [0.0; LEAVES];
@@ -51,7 +51,7 @@ impl Lamps<'_> {
     }
 
     /// Irradiance by a light without extent, per unit of intensity: `I cos / r^2`.
-    fn point(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
+    fn point(&self, light: &PunctualLight, place: PatchPoint, sum: &mut Leaves) {
         let parallel = light.kind.is_parallel();
         let end = match parallel {
             true => place.at - light.direction * (4.0 * self.mesh.half_size),
@@ -76,7 +76,7 @@ impl Lamps<'_> {
     }
 
     /// Irradiance by a lamp with an extent, per unit of flux: many points, a ray to each.
-    fn surface(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
+    fn surface(&self, light: &PunctualLight, place: PatchPoint, sum: &mut Leaves) {
         let Some(luminaire) = &light.luminaire else {
             return;
         };
@@ -101,7 +101,7 @@ impl Lamps<'_> {
 
     /// Irradiance by a part of the sky that gives open level ground 1, or by ground of exitance 1: the mean over many
     /// directions.
-    fn dome(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
+    fn dome(&self, light: &PunctualLight, place: PatchPoint, sum: &mut Leaves) {
         let Some(sky) = &self.scene.sky else { return };
         for k in 0..DOME_RAYS {
             let d = cosine_direction(place.normal, sequence02(k, 0));

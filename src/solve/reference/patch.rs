@@ -56,7 +56,7 @@ pub(super) fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
 
 /// Where light is asked for.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct PatchPoint {
     pub(super) at: DVec3,
     pub(super) normal: DVec3,
     /// Plane that the place lies in: nothing in this plane blocks.
@@ -65,8 +65,8 @@ pub(super) struct Place {
 
 impl Patch {
     /// A place on the patch, by weights of its corners.
-    pub(super) fn place(&self, w: [f64; 3]) -> Place {
-        Place {
+    pub(super) fn place(&self, w: [f64; 3]) -> PatchPoint {
+        PatchPoint {
             at: self.corners[0] * w[0] + self.corners[1] * w[1] + self.corners[2] * w[2],
             normal: self.normal,
             plane: self.plane,

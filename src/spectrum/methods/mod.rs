@@ -54,9 +54,9 @@ pub trait Method {
 mod tests {
     use super::*;
     use crate::color::de_luv;
-    use crate::spectrum::study::{Chart, Reflectances};
+    use crate::spectrum::study::{ColourChart, Reflectances};
 
-    fn all(chart: &Chart, light: &Leaves, n: usize) -> Vec<Box<dyn Method>> {
+    fn all(chart: &ColourChart, light: &Leaves, n: usize) -> Vec<Box<dyn Method>> {
         let cmf = &chart.cmf;
         let mut all: Vec<Box<dyn Method>> = vec![
             Box::new(sampling(cmf, light, n)),
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn every_method_keeps_the_white() {
-        let chart = Chart::new(Reflectances::Babelcolor);
+        let chart = ColourChart::new(Reflectances::Babelcolor);
         for light in chart.lights() {
             for n in [4, 6, 8, 10, 12, 16] {
                 for method in all(&chart, &light.power, n) {
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn errors_of_a_smooth_reflectance_fall_with_the_number_of_terms() {
-        let chart = Chart::new(Reflectances::Babelcolor);
+        let chart = ColourChart::new(Reflectances::Babelcolor);
         let light = chart.light("D65");
         let exact = crate::color::tristimulus(
             &std::array::from_fn(|k| light.power[k] * chart.reflectances[0][k]),
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn sixty_four_samples_are_the_reference() {
-        let chart = Chart::new(Reflectances::Ohta);
+        let chart = ColourChart::new(Reflectances::Ohta);
         for light in chart.lights() {
             for method in [
                 sampling(&chart.cmf, &light.power, 64),

@@ -3,9 +3,9 @@
 //! Lists come from the guaranteed control of the tests; for every product the bound of the estimator's error is held
 //! against its true error from the 64 leaves.
 
-use super::chart::{Chart, Light};
+use super::colour_chart::{ColourChart, UnitLight};
 use super::modes::percentile;
-use super::walk::{LEVELS, Start, sample};
+use super::walk::{LEVELS, WalkStart, sample};
 use crate::color::tristimulus;
 use crate::spectrum::{Bounded, Control, Metric, control, represent};
 use serde::Serialize;
@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1e-12;
 /// One light and level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Row {
+pub struct BoundsRow {
     /// Name of the light.
     pub light: &'static str,
     /// Name of the level.
@@ -36,8 +36,8 @@ pub struct Row {
 }
 
 /// Checks every product of one light, 24 + 24^2 + 24^3.
-pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
-    let start = Start::<Bounded>::new(chart, light);
+pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<BoundsRow> {
+    let start = WalkStart::<Bounded>::new(chart, light);
     let settings = Control {
         overshoot: crate::spectrum::Overshoot::TakeBack,
         ..Control::PAPER
@@ -71,7 +71,7 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
                 .iter()
                 .filter(|s| s.xyz_error > settings.eps_max)
                 .count();
-            Row {
+            BoundsRow {
                 light: light.name,
                 level: LEVELS[level],
                 products,

@@ -5,9 +5,9 @@
 //! for all pairs of n materials has 127 * 3 * n (n + 1) / 2 numbers. Here it is set against means alone (the corrected
 //! values of a list), on the cuts of perceptual control of the ratio to the light.
 
-use super::chart::{Chart, Light};
-use super::modes::{Spread, ratio};
-use super::walk::{Extent, LEVELS, Start, walk};
+use super::colour_chart::{ColourChart, UnitLight};
+use super::modes::{DifferenceSummary, ratio};
+use super::walk::{Extent, LEVELS, WalkStart, walk};
 use crate::color::{Xyz, de_luv, luv_jacobian, tristimulus};
 use crate::spectrum::{
     CmfTree, Control, Leaves, List, Metric, Moment, NODES, Partition, control, node, represent,
@@ -21,7 +21,7 @@ const LIMIT: f64 = 1.0;
 /// One light and level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Row {
+pub struct CovarianceRow {
     /// Name of the light.
     pub light: &'static str,
     /// Name of the level.
@@ -29,9 +29,9 @@ pub struct Row {
     /// Average number of intervals.
     pub intervals_mean: f64,
     /// dE*uv of products of means.
-    pub means: Spread,
+    pub means: DifferenceSummary,
     /// dE*uv with the covariances of all pairs.
-    pub covariances: Spread,
+    pub covariances: DifferenceSummary,
 }
 
 /// Means and covariances of reflectances on every node, for each tristimulus value.
@@ -104,9 +104,9 @@ fn mean(cmf: &CmfTree, n: usize, f: impl Fn(usize) -> f64) -> Xyz {
 }
 
 /// Measures one light.
-pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
+pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<CovarianceRow> {
     let (chart, one) = ratio(chart, light);
-    let start = Start::<Moment>::new(&chart, &one);
+    let start = WalkStart::<Moment>::new(&chart, &one);
     let moments = Moments::new(&chart.cmf, &chart.reflectances);
     let luv = |colour: Xyz| Metric::Luv(luv_jacobian(colour, light.white));
     let source = represent(start.source(), &chart.cmf, &luv(light.white), LIMIT);
@@ -144,12 +144,12 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
     let rows = errors
         .into_iter()
         .enumerate()
-        .map(|(level, (means, covariances))| Row {
+        .map(|(level, (means, covariances))| CovarianceRow {
             light: light.name,
             level: LEVELS[level],
             intervals_mean: intervals[level] as f64 / means.len() as f64,
-            means: Spread::new(means),
-            covariances: Spread::new(covariances),
+            means: DifferenceSummary::new(means),
+            covariances: DifferenceSummary::new(covariances),
         });
     rows.collect()
 }
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn covariances_make_primary_and_secondary_reflections_exact() {
-        let chart = Chart::new(Reflectances::Babelcolor);
+        let chart = ColourChart::new(Reflectances::Babelcolor);
         let rows = measure(&chart, &chart.light("F2"));
         assert!(rows[0].means.max < 1e-9 && rows[0].covariances.max < 1e-9);
         assert!(rows[1].covariances.max < 1e-9 && rows[1].means.max > 0.01);

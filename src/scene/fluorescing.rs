@@ -1,7 +1,7 @@
 //! Makes materials fluoresce as side files wish, and puts what they give out among the light spectra.
 
 use super::check::Check;
-use super::fluorescence::{Fluorescence, Term, Wish};
+use super::fluorescence::{Fluorescence, FluorescenceWish, Term};
 use super::json::short;
 use super::{LightSpectrum, Material};
 use crate::data::{Grid, LEAVES};
@@ -10,9 +10,9 @@ use crate::data::{Grid, LEAVES};
 const ROUNDING: f64 = 1e-6;
 
 /// Makes a material fluoresce as it is wished; its reflectance, `measured` or not, leaves room for what is given out.
-pub(super) fn kindle(
+pub(super) fn fluoresce(
     material: &mut Material,
-    wish: &Wish,
+    wish: &FluorescenceWish,
     measured: Option<&str>,
     place: &str,
     grid: &Grid,

@@ -13,7 +13,7 @@
 //! chosen independently, and each counts if the other met a front. All light that leaves of these areas send to fronts is
 //! received by leaves: nothing need be scaled.
 
-mod found;
+mod hits;
 mod kept;
 
 use super::flux::Closed;
@@ -24,8 +24,8 @@ use crate::light::rows::Rows;
 use crate::link::Sight;
 use crate::team::{Interrupt, Interrupted, Team};
 use crate::transport::hemisphere::{BEAM, Hemisphere};
-use found::{ALONE, End, Found, Pairs, look_from, start};
 use glam::{DVec3, Vec3};
+use hits::{ALONE, LeafHits, RayEnd, RayPairs, look_from, start};
 use rayon::prelude::*;
 
 /// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, the least, and the most.
@@ -42,7 +42,7 @@ const CHUNK: usize = 64;
 const COVER_RAYS: usize = 4;
 /// How the leaves of a hierarchy look out.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Outlook {
+pub(crate) struct LeafRays {
     /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
     pub target: Vec<f32>,
     /// For each node that is a leaf: share of its area that takes part. NaN elsewhere. Where leaves look for themselves this
@@ -53,7 +53,7 @@ pub(crate) struct Outlook {
     /// The ranks among which the rows of leaves are shared out: rays of other ranks' leaves are not here.
     pub(super) team: Team,
     /// Where the rays of this rank's leaves ended, leaf after leaf.
-    ends: Vec<End>,
+    ends: Vec<RayEnd>,
     /// Which panes those rays pass, and which mirrors they meet.
     pub(super) tints: Tints,
     /// Rays by mirrors in which lamps have no image, ascending: these also bring the emission of their ends.
@@ -65,14 +65,14 @@ pub(crate) struct Outlook {
 }
 
 /// How much was known when it was taken down: nodes, rays, rays by mirrors, and the filters that rays pass.
-pub(super) struct Grown {
+pub(super) struct LeafRaysSize {
     nodes: usize,
     ends: usize,
     lamps: usize,
     filters: usize,
 }
 
-impl Outlook {
+impl LeafRays {
     /// Takes all leaves for uncovered, and all their light to meet fronts, without looking.
     pub(super) fn open(&mut self, tree: &Tree) {
         self.bare = vec![1.0; tree.nodes.len()];
@@ -173,7 +173,7 @@ impl Outlook {
         let team = self.team;
         let own = new.iter().copied().filter(|&k| team.owns(k as usize));
         let own: Vec<u32> = own.collect();
-        let parts: Result<Vec<Vec<Found>>, _> = own
+        let parts: Result<Vec<Vec<LeafHits>>, _> = own
             .par_chunks(CHUNK)
             .map(|chunk| {
                 interrupt.check()?;
@@ -189,7 +189,7 @@ impl Outlook {
             })
             .collect();
         let parts = parts?;
-        let counts = |found: &Found| {
+        let counts = |found: &LeafHits| {
             let fronts = found.ends.iter().filter(|end| end.entry != NONE).count();
             [fronts as u32, found.ends.len() as u32]
         };
@@ -221,7 +221,7 @@ impl Outlook {
         // Nodes lie far apart in memory, and the look-up needs only their children.
         let children: Vec<u32> = tree.nodes.iter().map(|node| node.child).collect();
         let stands = |met: u32| children[(met & !ALONE) as usize] == NONE;
-        let leaf_at = |end: &End| {
+        let leaf_at = |end: &RayEnd| {
             let [v, w] = end.at.map(|x| f64::from(x) / 65536.0);
             let face = tree.face_node[(end.entry & !ALONE) as usize];
             let leaf = leaf_below(face, [1.0 - v - w, v, w], |k| children[k as usize]);
@@ -238,8 +238,8 @@ impl Outlook {
     }
 
     /// How much is known, for [`Outlook::shrink`].
-    pub(super) fn grown(&self) -> Grown {
-        Grown {
+    pub(super) fn grown(&self) -> LeafRaysSize {
+        LeafRaysSize {
             nodes: self.target.len(),
             ends: self.ends.len(),
             lamps: self.lamps.len(),
@@ -248,7 +248,7 @@ impl Outlook {
     }
 
     /// Forgets all that was looked up since `to`; `tree` is the hierarchy as refined since.
-    pub(super) fn shrink(&mut self, tree: &Tree, to: &Grown) {
+    pub(super) fn shrink(&mut self, tree: &Tree, to: &LeafRaysSize) {
         self.target.truncate(to.nodes);
         self.bare.truncate(to.nodes);
         self.certain.truncate(to.nodes);
@@ -411,7 +411,7 @@ impl Outlook {
     /// of their rays; `bright` is the brightness of every patch.
     pub(super) fn variation(&self, leaf: u32, bright: &[f32], seed: u64) -> f64 {
         let (first, count) = self.range[leaf as usize];
-        let pairs = Pairs::new(leaf, count as usize, seed);
+        let pairs = RayPairs::new(leaf, count as usize, seed);
         let mut sums = [[0.0_f64; 3]; 4];
         for k in 0..count as usize {
             // Points that see no fronts tell nothing.
@@ -444,7 +444,7 @@ impl Outlook {
 
     /// Bytes of the rows of this rank's leaves.
     pub(crate) fn row_bytes(&self) -> usize {
-        self.tints.bytes() + (size_of::<End>() + 4) * self.ends.len()
+        self.tints.bytes() + (size_of::<RayEnd>() + 4) * self.ends.len()
     }
 
     /// Bytes held.
@@ -517,7 +517,7 @@ mod tests {
     #[test]
     fn rays_of_a_leaf_start_in_pairs() {
         for (leaf, count) in (0..200).flat_map(|leaf| [(leaf, 16), (leaf, 64), (leaf, 256)]) {
-            let pairs = Pairs::new(leaf, count, 7);
+            let pairs = RayPairs::new(leaf, count, 7);
             let mut rays = vec![Vec::new(); count / 2];
             for k in 0..count {
                 rays[pairs.pair(k)].push(k);
@@ -535,12 +535,12 @@ mod tests {
         nodes.row_mut(1).fill(6.0);
         nodes.row_mut(2).fill(2.0);
         // Pairs of rays: both meet fronts; one does; none does.
-        let outlook = Outlook {
+        let outlook = LeafRays {
             target: vec![1.0],
             bare: vec![0.5],
             range: vec![(0, 6)],
             met: vec![1, 2, 1 | ALONE, NONE, NONE, NONE],
-            ..Outlook::default()
+            ..LeafRays::default()
         };
         let (mut seen, mut whole) = (Rows::zero(1, 4), Rows::zero(1, 4));
         outlook.irradiance::<4>(&[0], &nodes, &mut seen);

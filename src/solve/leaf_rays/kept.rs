@@ -3,8 +3,8 @@
 //! A file holds the rays of all leaves in the order of their numbers, whichever ranks have them: so a bake can go on with any number
 //! of ranks.
 
-use super::Outlook;
-use super::found::{ALONE, End};
+use super::LeafRays;
+use super::hits::{ALONE, RayEnd};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::Filters;
 use crate::light::passed::Passed;
@@ -19,7 +19,7 @@ const TOGETHER: usize = 1 << 16;
 /// Flag, beside what a ray passes, of rays that bring the emission of their ends.
 const LAMP: u32 = 1 << 31;
 
-impl Outlook {
+impl LeafRays {
     /// Writes the outlook: where the rays end, or only the leaves that they met, which is half as much and enough as
     /// long as no leaf is split. In a room with panes or mirrors (then there are `filters`) also what the rays pass.
     pub(in crate::solve) fn encode(
@@ -128,9 +128,9 @@ impl Outlook {
             let entries = outlook.own::<u32>(&counts, from)?;
             let places = outlook.own::<[u16; 2]>(&counts, from)?;
             let ends = entries.into_iter().zip(places);
-            outlook.ends = ends.map(|(entry, at)| End { entry, at }).collect();
+            outlook.ends = ends.map(|(entry, at)| RayEnd { entry, at }).collect();
             let faces = tree.faces.len();
-            let there = |e: &End| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
+            let there = |e: &RayEnd| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
             if !outlook.ends.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }

@@ -41,7 +41,7 @@ const SAME_SHAPE: f64 = 1e-9;
 
 /// A lamp's part: which spectrum, and what to multiply it by.
 #[derive(Debug, Clone)]
-pub(crate) struct Lamp {
+pub(crate) struct ScaledSpectrum {
     /// Index in [`Lamps::spectra`].
     pub(crate) light: usize,
     /// Multiplier for each leaf.
@@ -55,7 +55,7 @@ pub(crate) struct Lamp {
 }
 
 /// The distinct light spectra of a room, in order of first use.
-pub(crate) struct Lamps<'a> {
+pub(crate) struct LampSpectra<'a> {
     pub(crate) grid: &'a Grid,
     upsampler: &'a Upsampler,
     /// KM times the nm-integrals of y_bar.
@@ -65,7 +65,7 @@ pub(crate) struct Lamps<'a> {
     pub(crate) excited: Vec<LightSpectrum>,
 }
 
-impl<'a> Lamps<'a> {
+impl<'a> LampSpectra<'a> {
     /// None yet.
     pub(crate) fn new(grid: &'a Grid, upsampler: &'a Upsampler) -> Self {
         let luminous = Observer::cie1931().weights(grid)[1].map(|y| KM * y);
@@ -79,7 +79,7 @@ impl<'a> Lamps<'a> {
     }
 
     /// A lamp of a linear colour (components at least 0, one above) and a luminous size for (1, 1, 1).
-    pub(crate) fn by_colour(&mut self, color: [f32; 3], size: f64) -> Lamp {
+    pub(crate) fn by_colour(&mut self, color: [f32; 3], size: f64) -> ScaledSpectrum {
         let brightest = color.iter().fold(0.0f32, |m, &c| m.max(c));
         let scale = f64::from(brightest) / LAMP_BRIGHTNESS;
         let color = color.map(|c| (f64::from(c) / scale) as f32);
@@ -88,7 +88,7 @@ impl<'a> Lamps<'a> {
         let (light, _) = self.add(BY_COLOUR, self.grid.means(&d65, Outside::Hold));
         let shape = self.upsampler.reflectance(color).map(|r| r * scale);
         let [r, g, b] = color.map(|c| c / LAMP_BRIGHTNESS as f32);
-        Lamp {
+        ScaledSpectrum {
             light,
             shape,
             color,
@@ -98,11 +98,11 @@ impl<'a> Lamps<'a> {
     }
 
     /// A lamp of a known spectrum and luminous size; none: the size of the spectrum itself.
-    pub(crate) fn by_spectrum(&mut self, spectrum: &Sampled, size: Option<f64>) -> Lamp {
+    pub(crate) fn by_spectrum(&mut self, spectrum: &Sampled, size: Option<f64>) -> ScaledSpectrum {
         let (light, own) = self.add(&spectrum.from, spectrum.leaves);
         let size = size.unwrap_or(own);
         let color = [LAMP_BRIGHTNESS as f32; 3];
-        Lamp {
+        ScaledSpectrum {
             light,
             shape: [size; LEAVES],
             color,

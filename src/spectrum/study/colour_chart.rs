@@ -48,7 +48,7 @@ const PATCHES: [&str; 24] = [
 
 /// Colour matching functions and reflectances.
 #[derive(Debug, Clone)]
-pub struct Chart {
+pub struct ColourChart {
     /// Colour matching functions on the paper's grid.
     pub cmf: CmfTree,
     /// The patches, in chart order.
@@ -57,7 +57,7 @@ pub struct Chart {
 
 /// A light whose Y is 1.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Light {
+pub struct UnitLight {
     /// As in the tables.
     pub name: &'static str,
     /// K S on the leaves.
@@ -66,7 +66,7 @@ pub struct Light {
     pub white: Xyz,
 }
 
-impl Chart {
+impl ColourChart {
     /// The chart as measured by `source`.
     pub fn new(source: Reflectances) -> Self {
         let grid = Grid::paper();
@@ -83,11 +83,11 @@ impl Chart {
     }
 
     /// One of the paper's lights, scaled so that its Y is 1.
-    pub fn light(&self, name: &'static str) -> Light {
+    pub fn light(&self, name: &'static str) -> UnitLight {
         let power = Grid::paper().left_edges(&table(&format!("cie/{name}")), Outside::Zero);
         let k = normalization(&power, self.cmf.leaves());
         let power = power.map(|s| k * s);
-        Light {
+        UnitLight {
             name,
             power,
             white: tristimulus(&power, self.cmf.leaves()),
@@ -95,7 +95,7 @@ impl Chart {
     }
 
     /// The three lights of Table 1.
-    pub fn lights(&self) -> [Light; 3] {
+    pub fn lights(&self) -> [UnitLight; 3] {
         ["C", "D65", "F2"].map(|name| self.light(name))
     }
 }
