@@ -12,13 +12,13 @@ use haarlight::geometry::sampling::{Pcg, on_triangle};
 use haarlight::scene::effects::{EffectKind, Plan};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings, Verdict};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use std::path::Path;
 
 /// Points of a test: enough for a chi-squared sum that tells 1 % from nothing.
 const POINTS: usize = 100;
 
-fn luminous() -> Leaves {
+fn luminous() -> Spectrum {
     Observer::cie1931().weights(&Grid::default())[1].map(|y| KM * y)
 }
 
@@ -177,7 +177,8 @@ fn case_5_7() {
 /// CIE 171, 5.8: mean E = Phi / (96 (1 - rho)), leaf by leaf, over random points.
 #[test]
 fn case_5_8() {
-    let reflectance: Leaves = std::array::from_fn(|l| 0.05 + 0.85 * l as f64 / (LEAVES - 1) as f64);
+    let reflectance: Spectrum =
+        std::array::from_fn(|l| 0.05 + 0.85 * l as f64 / (BANDS - 1) as f64);
     let mut room = Room::new();
     let wall = room.spectral_paint(reflectance);
     room.hollow(DVec3::ZERO, DVec3::splat(4.0), [wall; 6]);
@@ -186,7 +187,7 @@ fn case_5_8() {
     let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
     let power = bake.scene().spectra[0].power;
     // Eight draws of points: their spread holds that of the points and that of the paths.
-    let draws: Vec<Leaves> = (0..8)
+    let draws: Vec<Spectrum> = (0..8)
         .map(|k| {
             let places = points(&bake, |_| true, 40 + k);
             let answers = audit.irradiance(&places, &vec![64; POINTS], k);

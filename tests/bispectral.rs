@@ -12,7 +12,7 @@ use haarlight::color::{KM, Observer};
 use haarlight::scene::{Material, Options, Scene};
 use haarlight::solve::reference::Reference;
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use serde_json::json;
 use std::path::Path;
 
@@ -64,10 +64,10 @@ fn mean(leaf: usize, f: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Exitance on a leaf for irradiance on another, straight from the formula.
-fn matrix() -> Vec<Leaves> {
+fn matrix() -> Vec<Spectrum> {
     let width = grid().width();
     let element = |i: usize, j: usize| width * mean(i, |out| mean(j, |taken| given(out, taken)));
-    (0..LEAVES)
+    (0..BANDS)
         .map(|i| std::array::from_fn(|j| element(i, j)))
         .collect()
 }
@@ -88,18 +88,18 @@ fn read() -> (Scene, Material) {
     (scene, green)
 }
 
-fn xyz(leaves: &Leaves) -> [f64; 3] {
+fn xyz(leaves: &Spectrum) -> [f64; 3] {
     let weights = Observer::cie1931().weights(&grid());
     weights.map(|w| KM * w.iter().zip(leaves).map(|(w, x)| w * x).sum::<f64>())
 }
 
-fn times(matrix: &[Leaves], light: &Leaves) -> Leaves {
+fn times(matrix: &[Spectrum], light: &Spectrum) -> Spectrum {
     std::array::from_fn(|i| matrix[i].iter().zip(light).map(|(m, x)| m * x).sum())
 }
 
 /// Mean wavelength of a spectrum.
-fn centre(leaves: &Leaves) -> f64 {
-    let moment = (0..LEAVES).map(|k| grid().middle(k) * leaves[k]);
+fn centre(leaves: &Spectrum) -> f64 {
+    let moment = (0..BANDS).map(|k| grid().middle(k) * leaves[k]);
     moment.sum::<f64>() / leaves.iter().sum::<f64>()
 }
 
@@ -132,7 +132,7 @@ fn products_are_as_near_as_is_said() {
 }
 
 /// A desk in a closed room; the paper takes half of it.
-fn desk(light: Leaves) -> (Scene, usize) {
+fn desk(light: Spectrum) -> (Scene, usize) {
     let (scene, paper) = read();
     let mut room = Room::over(grid());
     let lamp = room.spectrum("lamp", light);
@@ -153,7 +153,7 @@ fn a_matrix_of_many_products_agrees_with_itself() {
     let raw = matrix();
     let mut centres = Vec::new();
     for middle in [365.0, 430.0] {
-        let lamp: Leaves = std::array::from_fn(|k| {
+        let lamp: Spectrum = std::array::from_fn(|k| {
             let nm = grid().middle(k);
             bell(nm, middle, 10.0) + 0.15 * bell(nm, 600.0, 60.0)
         });
@@ -194,7 +194,7 @@ fn a_matrix_of_many_products_agrees_with_itself() {
                 let light = &reference.gather(&scene, &solution, &[(place, DVec3::Y)], 1)[0];
                 let glow = times(&raw, light);
                 let rho = &scene.materials[sheet].reflectance;
-                let sent: Leaves = std::array::from_fn(|k| rho[k] * light[k] + glow[k]);
+                let sent: Spectrum = std::array::from_fn(|k| rho[k] * light[k] + glow[k]);
                 for (got, want) in vertex.radiosity.into_iter().zip(xyz(&sent)) {
                     close(f64::from(got), want, POINT, &what);
                 }

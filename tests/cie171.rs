@@ -12,7 +12,7 @@ use glam::{DVec3, dvec3};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::reference::{Reference, ReferenceSolution};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use nalgebra::DVector;
 use std::path::Path;
 
@@ -389,7 +389,7 @@ impl TruthOfCase58 {
 
     /// Irradiance at the points, W/m2/nm, if every leaf has its own albedo. Patches are of one size, so that their factors
     /// are symmetric and conjugate gradients find the radiosities.
-    fn at(&self, rho: f64) -> Vec<[f64; LEAVES]> {
+    fn at(&self, rho: f64) -> Vec<[f64; BANDS]> {
         let [coarse, fine] = self.references.each_ref().map(|reference| {
             let first = DVector::from_iterator(
                 reference.patches.len(),
@@ -408,7 +408,7 @@ impl TruthOfCase58 {
                 direction = &residual + residual.norm_squared() / square * direction;
             }
             // The light has equal energy: what holds for one leaf holds for all.
-            let rows: Vec<[f64; LEAVES]> = radiosity.iter().map(|&b| [b; LEAVES]).collect();
+            let rows: Vec<[f64; BANDS]> = radiosity.iter().map(|&b| [b; BANDS]).collect();
             let solution = ReferenceSolution {
                 irradiance: rows.clone(),
                 radiosity: rows,
@@ -427,14 +427,14 @@ fn worst_of_case_5_8(
     bake: &mut Bake,
     count: usize,
     leaves: &[usize],
-    truth: impl Fn(usize) -> Vec<[f64; LEAVES]>,
+    truth: impl Fn(usize) -> Vec<[f64; BANDS]>,
 ) -> f64 {
     bake.run();
     let probed = bake.probe(&floor_points()[..count]);
     let off = leaves.iter().flat_map(|&leaf| {
         let pairs = probed.iter().zip(truth(leaf));
         pairs
-            .map(|(probed, truth)| probed.leaves[leaf] / truth[leaf] - 1.0)
+            .map(|(probed, truth)| probed.spectrum[leaf] / truth[leaf] - 1.0)
             .collect::<Vec<_>>()
     });
     off.fold(0.0, |w: f64, x| if x.abs() > w.abs() { x } else { w })
@@ -452,7 +452,7 @@ fn case_5_8_at_points() {
         println!("rho {rho}: worst point {:+.3} %", 100.0 * worst);
         assert!(worst.abs() < POINT, "rho {rho}: {worst:e}");
     }
-    let reflectance: [f64; LEAVES] =
+    let reflectance: [f64; BANDS] =
         std::array::from_fn(|l| 0.475 - 0.425 * (l as f64 / 63.0 * 9.0).cos());
     // Lanes for the eye merge bands: for each band by itself there are the 64 leaves.
     let settings = Settings {
@@ -485,7 +485,7 @@ fn case_5_8_in_a_corner() {
 /// Wavelength by wavelength: E(l) = Phi(l) / (96 (1 - rho(l))).
 #[test]
 fn case_5_8_in_every_band() {
-    let reflectance: [f64; LEAVES] =
+    let reflectance: [f64; BANDS] =
         std::array::from_fn(|l| 0.475 - 0.425 * (l as f64 / 63.0 * 9.0).cos());
     let scene = cube(|room| room.spectral_paint(reflectance));
     let power = scene.spectra[0].power;
@@ -497,16 +497,16 @@ fn case_5_8_in_every_band() {
         let mut bake = Bake::new(cube(|room| room.spectral_paint(reflectance)), settings);
         bake.run();
         if representation == Representation::Dense {
-            let (mut mean, mut area) = ([0.0; LEAVES], 0.0);
+            let (mut mean, mut area) = ([0.0; BANDS], 0.0);
             for (k, &leaf) in bake.light().leaves.iter().enumerate() {
                 let a = bake.tree().node(leaf).area;
-                let leaves = bake.lanes().leaves(bake.light().irradiance.row(k));
+                let leaves = bake.lanes().spectrum(bake.light().irradiance.row(k));
                 for (m, x) in mean.iter_mut().zip(&leaves) {
                     *m += a * x;
                 }
                 area += a;
             }
-            for leaf in 0..LEAVES {
+            for leaf in 0..BANDS {
                 mean_is(
                     mean[leaf] / area,
                     10_000.0 * power[leaf] / 96.0 / (1.0 - reflectance[leaf]),
@@ -517,7 +517,7 @@ fn case_5_8_in_every_band() {
         let weights = haarlight::color::Observer::cie1931().weights(&bake.scene().grid);
         let mean = bake.mean_irradiance();
         for c in 0..3 {
-            let want: f64 = (0..LEAVES)
+            let want: f64 = (0..BANDS)
                 .map(|l| {
                     haarlight::color::KM * weights[c][l] * power[l] * 10_000.0
                         / 96.0

@@ -13,7 +13,7 @@ use haarlight::scene::profile::Profile;
 use haarlight::scene::sky::{SkyType, SkyWish};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -99,8 +99,8 @@ fn a_grey_room_takes_one_band() {
             for (a, b) in a
                 .xyz
                 .iter()
-                .chain(&a.leaves)
-                .zip(b.xyz.iter().chain(&b.leaves))
+                .chain(&a.spectrum)
+                .zip(b.xyz.iter().chain(&b.spectrum))
             {
                 // Rows are f32 (6e-8); sums run over some hundred terms, iterations over some ten.
                 assert!(
@@ -233,7 +233,7 @@ fn effects_that_are_not_there_cost_nothing() {
             looked,
         )
     };
-    let half = [0.5; LEAVES];
+    let half = [0.5; BANDS];
     let as_it_is = |scene: Scene| scene;
     let (plain, looked) = counted(&|_| None, &as_it_is);
     assert_eq!(looked, 0, "nobody looks for a sky that is not there");
@@ -244,7 +244,7 @@ fn effects_that_are_not_there_cost_nothing() {
             EffectKind::Panes
         }),
         ("sheet", &|room| {
-            room.sheet(half, half, [0.4; LEAVES]);
+            room.sheet(half, half, [0.4; BANDS]);
             EffectKind::Sheets
         }),
         ("mirror", &|room| {

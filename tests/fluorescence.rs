@@ -16,7 +16,7 @@ use haarlight::scene::effects::EffectKind;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::reference::Reference;
 use haarlight::solve::{Bake, Representation, Settings, Verdict};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -26,17 +26,17 @@ fn ultraviolet() -> Grid {
 }
 
 /// A bell on the leaves.
-fn bell(grid: &Grid, height: f64, middle: f64, wide: f64) -> Leaves {
+fn bell(grid: &Grid, height: f64, middle: f64, wide: f64) -> Spectrum {
     std::array::from_fn(|k| height * (-0.5 * ((grid.middle(k) - middle) / wide).powi(2)).exp())
 }
 
 /// Brought to an integral of 1.
-fn unit(grid: &Grid, spectrum: Leaves) -> Leaves {
+fn unit(grid: &Grid, spectrum: Spectrum) -> Spectrum {
     let sum = spectrum.iter().sum::<f64>() * grid.width();
     spectrum.map(|x| x / sum)
 }
 
-fn named(grid: &Grid, name: &str) -> Leaves {
+fn named(grid: &Grid, name: &str) -> Spectrum {
     let table = haarlight::data::named(name).unwrap().table;
     grid.means(&table, haarlight::data::Outside::Zero)
 }
@@ -61,7 +61,7 @@ fn alike(got: [f64; 3], want: [f64; 3], tolerance: f64, what: &str) {
     }
 }
 
-fn xyz(grid: &Grid, leaves: &Leaves) -> [f64; 3] {
+fn xyz(grid: &Grid, leaves: &Spectrum) -> [f64; 3] {
     let weights = Observer::cie1931().weights(grid);
     weights.map(|w| KM * w.iter().zip(leaves).map(|(w, x)| w * x).sum::<f64>())
 }
@@ -87,7 +87,7 @@ fn a_furnace_has_the_gain_of_its_walls() {
     let grid = ultraviolet();
     let w = grid.width();
     let emission = unit(&grid, bell(&grid, 1.0, 440.0, 25.0));
-    let rho: Leaves = std::array::from_fn(|k| 0.15 + 0.5 * k as f64 / 63.0);
+    let rho: Spectrum = std::array::from_fn(|k| 0.15 + 0.5 * k as f64 / 63.0);
     for (height, crowded) in [(0.3, false), (0.7, false), (0.7, true)] {
         let excitation = bell(&grid, height, 395.0, 30.0);
         let mut room = Room::over(grid);
@@ -101,19 +101,19 @@ fn a_furnace_has_the_gain_of_its_walls() {
             room.mesh(corners, triangles, wall);
         }
         let lit = room.power(lamp).map(|p| 100.0 * p);
-        let sum = |f: &dyn Fn(usize) -> f64| (0..LEAVES).map(f).sum::<f64>();
+        let sum = |f: &dyn Fn(usize) -> f64| (0..BANDS).map(f).sum::<f64>();
         let first = w * sum(&|k| excitation[k] * lit[k] / (1.0 - rho[k]));
         let again = w * sum(&|k| excitation[k] * emission[k] / (1.0 - rho[k]));
         let q = first / (1.0 - again);
-        let want: Leaves = std::array::from_fn(|k| (lit[k] + emission[k] * q) / (1.0 - rho[k]));
+        let want: Spectrum = std::array::from_fn(|k| (lit[k] + emission[k] * q) / (1.0 - rho[k]));
         let bake = baked(room.scene(), 0.2);
         let round = bake.rounds().last().unwrap();
         let rounds = round.fluorescence_rounds;
         assert!(rounds > 2, "it excites itself: {rounds}, {again}");
-        let mut mean = [0.0; LEAVES];
+        let mut mean = [0.0; BANDS];
         for k in 0..16 {
             let (x, z) = (0.35 + 0.77 * f64::from(k % 4), 0.3 + 0.8 * f64::from(k / 4));
-            let light = bake.probe(&[(dvec3(x, 0.0, z), DVec3::Y)])[0].leaves;
+            let light = bake.probe(&[(dvec3(x, 0.0, z), DVec3::Y)])[0].spectrum;
             mean = std::array::from_fn(|k| mean[k] + light[k] / 16.0);
         }
         let (got, want) = (xyz(&grid, &mean), xyz(&grid, &want));
@@ -142,10 +142,10 @@ fn a_furnace_has_the_gain_of_its_walls() {
 }
 
 /// A desk with a sheet of brightened paper, half of it not brightened, below a lamp in a coloured room.
-fn desk(light: Leaves, grid: Grid) -> (Room, [Leaves; 3]) {
+fn desk(light: Spectrum, grid: Grid) -> (Room, [Spectrum; 3]) {
     let mut room = Room::over(grid);
     let lamp = room.spectrum("lamp", light);
-    let rise = |low: f64, high: f64, middle: f64| -> Leaves {
+    let rise = |low: f64, high: f64, middle: f64| -> Spectrum {
         std::array::from_fn(|k| {
             low + (high - low) / (1.0 + ((middle - grid.middle(k)) / 15.0).exp())
         })
@@ -171,7 +171,7 @@ fn desk(light: Leaves, grid: Grid) -> (Room, [Leaves; 3]) {
 #[test]
 fn white_paper_agrees_with_the_whole_matrix() {
     let grid = ultraviolet();
-    let cut: Leaves = {
+    let cut: Spectrum = {
         let a = named(&grid, "cie/A");
         std::array::from_fn(|k| if grid.left(k) < 435.0 { 0.0 } else { a[k] })
     };
@@ -226,7 +226,7 @@ fn white_paper_agrees_with_the_whole_matrix() {
                     let taken = excitation.iter().zip(light).map(|(g, e)| g * e);
                     let q = taken.sum::<f64>() * grid.width();
                     let q = if surface == 0 { q } else { 0.0 };
-                    let sent: Leaves =
+                    let sent: Spectrum =
                         std::array::from_fn(|k| paper[k] * light[k] + emission[k] * q);
                     let want = xyz(&grid, &sent);
                     alike(vertex.radiosity.map(f64::from), want, 5e-3, what);
@@ -274,11 +274,11 @@ fn paths_change_their_wavelength() {
         .collect();
     let answers = audit.irradiance(&starts, &vec![1 << 14; starts.len()], 7);
     // The blue that is fluoresced among it: 440 nm.
-    let blue = grid.leaf_of(440.0).unwrap();
+    let blue = grid.band_of(440.0).unwrap();
     let mut chi = [0.0; 2];
     for (answer, truth) in answers.iter().zip(&truth) {
         let luminous = Observer::cie1931().weights(&grid)[1].map(|y| KM * y);
-        let leaf: Leaves = std::array::from_fn(|k| f64::from(u8::from(k == blue)));
+        let leaf: Spectrum = std::array::from_fn(|k| f64::from(u8::from(k == blue)));
         for (chi, weights) in chi.iter_mut().zip([luminous, leaf]) {
             let (mean, error) = answer.linear(&weights);
             let want: f64 = truth.iter().zip(&weights).map(|(x, w)| x * w).sum();
@@ -318,11 +318,11 @@ fn no_more_power_leaves_than_comes() {
             let triangle = bake.tree().faces[node.faces.0 as usize].triangle;
             let material =
                 &bake.scene().materials[bake.mesh().material[triangle as usize] as usize];
-            let e = bake.lanes().leaves(light.irradiance.row(row));
-            let taken = (0..LEAVES).map(|k| (1.0 - material.reflectance[k]) * e[k]);
+            let e = bake.lanes().spectrum(light.irradiance.row(row));
+            let taken = (0..BANDS).map(|k| (1.0 - material.reflectance[k]) * e[k]);
             absorbed += node.area * w * taken.sum::<f64>();
             if material.fluorescence.is_some() {
-                let given = (0..LEAVES).map(|k| excitation[k] * e[k]);
+                let given = (0..BANDS).map(|k| excitation[k] * e[k]);
                 again += node.area * w * given.sum::<f64>();
             }
         }
@@ -461,7 +461,7 @@ fn the_diagonal_is_the_reflectance() {
     let text = "per_band,400,500,600\n400,0.2,0,0\n500,0.3,0.4,0\n600,0,0.1,0.6\n";
     let scene = cornell(json!({"reflectance": null, "fluorescence": {"csv": text}})).unwrap();
     let green = scene.materials.iter().find(|m| m.name == "green").unwrap();
-    let leaf = |nm: f64| green.reflectance[scene.grid.leaf_of(nm).unwrap()];
+    let leaf = |nm: f64| green.reflectance[scene.grid.band_of(nm).unwrap()];
     close(leaf(500.0), 0.4, 0.05, "at 500 nm");
     close(leaf(700.0), 0.6, 1e-9, "beyond");
     assert!(green.reflectance_from.contains("diagonal"));

@@ -17,19 +17,19 @@ use haarlight::scene::pane::{Pane, PaneKind, inside_of, slab};
 use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use haarlight::scene::{Image, LightKind, Texture, Wrap};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::{LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Spectrum};
 use std::f64::consts::PI;
 use std::process::Command;
 
-const CLEAR: Leaves = [1.0; LEAVES];
+const CLEAR: Spectrum = [1.0; BANDS];
 
 /// A glass that lets through long wavelengths.
-fn amber() -> Leaves {
+fn amber() -> Spectrum {
     std::array::from_fn(|k| 0.05 + 0.9 / (1.0 + (-(k as f64 - 34.0) / 3.0).exp()))
 }
 
 /// And one for short ones.
-fn blue() -> Leaves {
+fn blue() -> Spectrum {
     std::array::from_fn(|k| 0.9 - 0.85 / (1.0 + (-(k as f64 - 24.0) / 3.0).exp()))
 }
 
@@ -65,9 +65,9 @@ fn level(room: &mut Room, height: f64, pane: usize) {
     room.quad(dvec3(0.0, height, 0.0), z, x, pane);
 }
 
-fn leaves(bake: &Bake, points: &[DVec3]) -> Vec<Leaves> {
+fn leaves(bake: &Bake, points: &[DVec3]) -> Vec<Spectrum> {
     let up: Vec<_> = points.iter().map(|p| (*p, DVec3::Y)).collect();
-    bake.probe(&up).iter().map(|p| p.leaves).collect()
+    bake.probe(&up).iter().map(|p| p.spectrum).collect()
 }
 
 fn places() -> Vec<DVec3> {
@@ -99,7 +99,7 @@ fn lamps_shine_through_slabs() {
     for inside in [1.0, 0.9] {
         let mut room = lit(0.0);
         let power = room.power(0)[30];
-        let pane = room.pane(1.5, [inside; LEAVES]);
+        let pane = room.pane(1.5, [inside; BANDS]);
         level(&mut room, 1.0, pane);
         let bake = baked(room.scene());
         for (place, got) in places().iter().zip(leaves(&bake, &places())) {
@@ -127,7 +127,7 @@ fn lamps_shine_through_slabs() {
 fn three_panes_in_a_row_multiply() {
     let [one, three] = [1, 3].map(|count| {
         let mut room = lit(0.0);
-        let panes = [amber(), blue(), [0.8; LEAVES]].map(|inside| room.pane(1.0, inside));
+        let panes = [amber(), blue(), [0.8; BANDS]].map(|inside| room.pane(1.0, inside));
         for (k, pane) in panes.into_iter().enumerate().take(count) {
             level(&mut room, 0.5 + 0.2 * k as f64, pane);
         }
@@ -138,7 +138,7 @@ fn three_panes_in_a_row_multiply() {
     let xyz = |leaves: &dyn Fn(usize) -> f64| {
         Observer::cie1931()
             .weights(&Default::default())
-            .map(|w| (0..LEAVES).map(|k| KM * w[k] * leaves(k)).sum::<f64>())
+            .map(|w| (0..BANDS).map(|k| KM * w[k] * leaves(k)).sum::<f64>())
     };
     let got = [xyz(&|k| one[k]), xyz(&|k| three[k])];
     let want = [
@@ -153,10 +153,10 @@ fn three_panes_in_a_row_multiply() {
 /// One quad, a quad and its back, a thin box: one pane.
 #[test]
 fn however_it_is_modelled_a_pane_is_one() {
-    let got: Vec<Leaves> = (0..4)
+    let got: Vec<Spectrum> = (0..4)
         .map(|how| {
             let mut room = lit(0.0);
-            let pane = room.pane(1.5, [0.7; LEAVES]);
+            let pane = room.pane(1.5, [0.7; BANDS]);
             let (x, z) = (DVec3::X * 4.0, DVec3::Z * 4.0);
             let at = dvec3(0.0, 1.0, 0.0);
             match how {
@@ -234,7 +234,7 @@ fn parallel_light_and_spots_pass() {
             room.quad(DVec3::ZERO, DVec3::Z * 4.0, DVec3::X * 4.0, paint);
             room.punctual(kind, dvec3(2.0, 3.0, 2.0), dvec3(0.2, -1.0, 0.1), 500.0);
             if pane {
-                let pane = room.pane(1.5, [0.9; LEAVES]);
+                let pane = room.pane(1.5, [0.9; BANDS]);
                 level(&mut room, 1.5, pane);
             }
             leaves(&baked(room.scene()), &[dvec3(2.4, 0.0, 2.2)])[0][30]
@@ -273,7 +273,7 @@ fn lanes_serve_what_lies_behind_panes() {
     };
     let (adaptive, white, lanes) = at(Settings::default());
     let (dense, ..) = at(exact());
-    assert!(lanes < LEAVES, "{lanes} lanes");
+    assert!(lanes < BANDS, "{lanes} lanes");
     for (adaptive, dense) in adaptive.iter().zip(dense) {
         let off = de2000(*adaptive, dense, white);
         println!("{lanes} lanes: {off:.3}");
@@ -282,7 +282,7 @@ fn lanes_serve_what_lies_behind_panes() {
 }
 
 /// Paint of alpha one half.
-fn film(colour: Leaves) -> Pane {
+fn film(colour: Spectrum) -> Pane {
     Pane {
         kind: PaneKind::Cover { alpha: 0.5, colour },
         texture: None,
@@ -354,7 +354,7 @@ fn solids_absorb_along_the_chord() {
 
 fn wedge(reversed: bool) {
     let mut room = sunlit();
-    let pane = room.pane(1.0, [0.5; LEAVES]);
+    let pane = room.pane(1.0, [0.5; BANDS]);
     // A wedge from 0 to 1 m thick over 2 m; half passes half a metre.
     let at = |x: f64, y: f64, z: f64| dvec3(1.0 + x, 1.0 + y, 1.0 + z);
     let ends = [0.0, 2.0].map(|z| [at(0.0, 0.0, z), at(2.0, 0.0, z), at(2.0, 1.0, z)]);
@@ -394,7 +394,7 @@ fn wedge(reversed: bool) {
 fn a_face_and_its_back_have_the_thickness_of_their_material() {
     for turned in [false, true] {
         let mut room = sunlit();
-        let pane = room.pane(1.0, [0.5; LEAVES]);
+        let pane = room.pane(1.0, [0.5; BANDS]);
         let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
         let corners = corners.map(|[x, z]| dvec3(x, 1.0, z)).to_vec();
         let mut triangles = vec![[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]];
@@ -426,7 +426,7 @@ fn a_block_under_a_sky_absorbs_along_its_chords() {
     let mut room = Room::new();
     let paint = room.paint(0.0);
     room.quad(DVec3::ZERO, DVec3::Z * 4.0, DVec3::X * 4.0, paint);
-    let pane = room.pane(1.0, [INSIDE; LEAVES]);
+    let pane = room.pane(1.0, [INSIDE; BANDS]);
     let faces = built::faces(low, high).into_iter();
     let corners = faces.flat_map(|mut face| {
         face.reverse();
@@ -473,7 +473,7 @@ fn panes_in_the_plane_of_their_frame_leak_nothing() {
     let lux = |inside: f64, over: f64, before: f64, thick: f64| -> Vec<f64> {
         let mut room = Room::new();
         let [corner, u, v] = beside(&mut room);
-        let pane = room.pane(1.5, [inside; LEAVES]);
+        let pane = room.pane(1.5, [inside; BANDS]);
         let (along, up, out) = (
             over * u.normalize(),
             over * v.normalize(),
@@ -522,7 +522,7 @@ fn cards_let_light_through_by_texel() {
     scene.materials[card].pane = Some(Pane {
         kind: PaneKind::Cover {
             alpha: 1.0,
-            colour: [0.0; LEAVES],
+            colour: [0.0; BANDS],
         },
         texture: Some(Texture {
             image: 0,
@@ -581,7 +581,7 @@ fn glazed(opening: f64) -> Bake {
         room.quad(at(4.0 - rim, rim), opening * y, rim * x, paint);
     }
     let inside = inside_of(glass_of_the_report(1.0), INDEX);
-    let glass = room.pane(INDEX, [inside; LEAVES]);
+    let glass = room.pane(INDEX, [inside; BANDS]);
     room.quad(at(rim, rim), opening * y, opening * x, glass);
     let wish = SkyWish {
         kind: Some(SkyType(5)),

@@ -11,7 +11,7 @@ use haarlight::scene::Scene;
 use haarlight::scene::sky::{SkyType, SkyWish};
 use haarlight::solve::reference::{Reference, solve_one};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use nalgebra::DMatrix;
 
 fn near(got: f64, want: f64, tolerance: f64) {
@@ -73,7 +73,7 @@ fn facing_squares() {
 }
 
 /// Lux of leaf values.
-fn lux(leaves: &Leaves) -> f64 {
+fn lux(leaves: &Spectrum) -> f64 {
     let y = Observer::cie1931().weights(&Grid::default())[1];
     leaves.iter().zip(y).map(|(x, y)| KM * x * y).sum()
 }
@@ -185,7 +185,7 @@ fn the_solver_agrees_in_every_leaf() {
         let reference = Reference::new(&scene, depth, 1).unwrap();
         reference.gather(&scene, &reference.solve(), &points, 1)
     });
-    let truth: Vec<[f64; LEAVES]> = (fine.iter().zip(&coarse))
+    let truth: Vec<[f64; BANDS]> = (fine.iter().zip(&coarse))
         .map(|(f, c)| std::array::from_fn(|l| f[l] + (f[l] - c[l]) / 3.0))
         .collect();
     let settings = Settings {
@@ -197,12 +197,12 @@ fn the_solver_agrees_in_every_leaf() {
     bake.run();
     let mut square = 0.0;
     for (probed, truth) in bake.probe(&points).iter().zip(&truth) {
-        for (got, want) in probed.leaves.iter().zip(truth) {
+        for (got, want) in probed.spectrum.iter().zip(truth) {
             let off = got / want - 1.0;
             square += off * off;
         }
     }
-    let rms = (square / (LEAVES * points.len()) as f64).sqrt();
+    let rms = (square / (BANDS * points.len()) as f64).sqrt();
     let claim = bake.rounds().last().unwrap().error.total_relative.value;
     println!("rms {rms:e}, claimed {claim:?}");
     assert!(rms < claim.unwrap() / 0.7, "{rms:e} of {claim:?}");
@@ -360,7 +360,7 @@ fn adaptive_dense_and_reference_agree() {
     let weights = Observer::cie1931()
         .weights(&Grid::default())
         .map(|w| w.map(|x| KM * x));
-    let xyz = |leaves: &Leaves| {
+    let xyz = |leaves: &Spectrum| {
         weights
             .each_ref()
             .map(|w| leaves.iter().zip(w).map(|(x, w)| x * w).sum::<f64>())
@@ -423,14 +423,14 @@ fn off_the_reference(scene: &Scene, rays: usize, points: &[(DVec3, DVec3)]) -> (
     bake.run();
     let mut square = 0.0;
     for (probed, truth) in bake.probe(points).iter().zip(&truth) {
-        println!("{} for {}", probed.leaves[32], truth[32]);
-        for (got, want) in probed.leaves.iter().zip(truth) {
+        println!("{} for {}", probed.spectrum[32], truth[32]);
+        for (got, want) in probed.spectrum.iter().zip(truth) {
             square += (got / want - 1.0).powi(2);
         }
     }
     let claim = bake.rounds().last().unwrap().error.total_relative.value;
     (
-        (square / (LEAVES * points.len()) as f64).sqrt(),
+        (square / (BANDS * points.len()) as f64).sqrt(),
         claim.unwrap(),
     )
 }
@@ -462,7 +462,7 @@ fn below() -> Vec<(DVec3, DVec3)> {
 /// A pane that lets through more red than blue and less at a slant, leaf by leaf, with what comes back up through it.
 #[test]
 fn the_solver_agrees_behind_a_pane() {
-    let amber: Leaves = std::array::from_fn(|l| 0.3 + 0.6 * l as f64 / 63.0);
+    let amber: Spectrum = std::array::from_fn(|l| 0.3 + 0.6 * l as f64 / 63.0);
     let scene = parted(|room| room.pane(1.5, amber));
     let (rms, claim) = off_the_reference(&scene, 9, &below());
     println!("pane: rms {rms:e}, claimed {claim:e}");
@@ -472,8 +472,8 @@ fn the_solver_agrees_behind_a_pane() {
 /// A sheet whose sides differ: what passes from the lamp's side, and what is reflected and let back from the other.
 #[test]
 fn the_solver_agrees_behind_a_sheet() {
-    let green: Leaves = std::array::from_fn(|l| 0.4 - 0.3 * (l as f64 / 31.5 - 1.0).abs());
-    let scene = parted(|room| room.sheet([0.2; LEAVES], [0.5; LEAVES], green));
+    let green: Spectrum = std::array::from_fn(|l| 0.4 - 0.3 * (l as f64 / 31.5 - 1.0).abs());
+    let scene = parted(|room| room.sheet([0.2; BANDS], [0.5; BANDS], green));
     let (rms, claim) = off_the_reference(&scene, 4, &below());
     println!("sheet: rms {rms:e}, claimed {claim:e}");
     assert!(rms < 0.003 && rms < claim / 0.7, "{rms:e} of {claim:e}");
@@ -508,7 +508,7 @@ fn the_solver_agrees_under_a_sky() {
 
 #[test]
 fn mirrors_are_refused() {
-    let scene = parted(|room| room.mirror([0.9; LEAVES]));
+    let scene = parted(|room| room.mirror([0.9; BANDS]));
     let said = Reference::new(&scene, 0, 1).unwrap_err().to_string();
     assert!(
         said.contains("is a mirror") && said.contains("audit"),

@@ -11,7 +11,7 @@ use haarlight::keep::Relighter;
 use haarlight::scene::effects::EffectKind;
 use haarlight::scene::{LightKind, Options, Scene, Sides};
 use haarlight::solve::{Bake, Settings};
-use haarlight::spectrum::{LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Spectrum};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -19,8 +19,8 @@ use std::f64::consts::PI;
 const ERROR: f64 = 0.2;
 
 /// The same at all wavelengths.
-fn even(x: f64) -> Leaves {
-    [x; LEAVES]
+fn even(x: f64) -> Spectrum {
+    [x; BANDS]
 }
 
 /// Mean lux at points.
@@ -371,7 +371,7 @@ fn what_gltf_says_of_a_sheet() {
     let scene = read(&material, &json!({})).unwrap();
     let curtain = &scene.materials[0];
     let sheet = curtain.sheet.as_ref().unwrap();
-    for k in 0..LEAVES {
+    for k in 0..BANDS {
         close(curtain.reflectance[k], 0.45, 1e-6, "reflected");
         close(sheet.transmittance[k], 0.2, 1e-6, "passes");
     }
@@ -390,7 +390,7 @@ fn what_gltf_says_of_a_sheet() {
     let none = self::curtain([0.6; 3], json!(0.0), json!([1, 1, 1]));
     let scene = read(&none, &json!({})).unwrap();
     assert!(scene.materials[0].sheet.is_none() && scene.materials[0].sides == Sides::Front);
-    assert_eq!(scene.materials[0].reflectance, [f64::from(0.6_f32); LEAVES]);
+    assert_eq!(scene.materials[0].reflectance, [f64::from(0.6_f32); BANDS]);
 }
 
 /// A side file takes the place of what glTF says; both sides may reflect by spectra of their own.

@@ -11,7 +11,7 @@ use exr::prelude::*;
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, Upsampler};
-use haarlight::data::{Leaves, Outside, daylight};
+use haarlight::data::{Outside, Spectrum, daylight};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::LightKind;
 use haarlight::scene::sky::{
@@ -317,11 +317,11 @@ fn a_map_can_have_open_ground() {
 
 /// Irradiance on each leaf through an opening, by quadrature over the directions.
 fn spectral(
-    colours: [&Leaves; 3],
+    colours: [&Spectrum; 3],
     sky: &Distribution,
     opening: f64,
     (point, normal): (DVec3, DVec3),
-) -> Leaves {
+) -> Spectrum {
     const N: usize = 600;
     let [corner, u, v] = roof(opening);
     let [_, b, c, d, e] = [-1.0, -0.32, 10.0, -3.0, 0.45];
@@ -524,7 +524,7 @@ fn threads_change_nothing_under_a_map() {
             let probed = bake.probe(&points());
             probed
                 .iter()
-                .flat_map(|p| p.leaves)
+                .flat_map(|p| p.spectrum)
                 .map(f64::to_bits)
                 .collect::<Vec<_>>()
         })

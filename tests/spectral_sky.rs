@@ -14,7 +14,7 @@ use haarlight::geometry::NO_PLANE;
 use haarlight::scene::Scene;
 use haarlight::scene::sky::{Dome, SkyBrightness, SkyWish};
 use haarlight::solve::{Bake, Settings};
-use haarlight::spectrum::Leaves;
+use haarlight::spectrum::Spectrum;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A sky with the sun over y = 4 of the room, without its direct light.
@@ -145,9 +145,10 @@ fn reflected_light_agrees_with_paths() {
         .collect();
     let paths = vec![65_536; places.len()];
     let answers = Audit::new(scene, mesh, bake.rays()).irradiance(&places, &paths, 3);
-    let agree = |weights: &Leaves, slack: f64| {
-        let sum = |leaves: &Leaves| -> f64 { leaves.iter().zip(weights).map(|(x, w)| x * w).sum() };
-        let got: f64 = probed.iter().map(|p| sum(&p.leaves)).sum();
+    let agree = |weights: &Spectrum, slack: f64| {
+        let sum =
+            |leaves: &Spectrum| -> f64 { leaves.iter().zip(weights).map(|(x, w)| x * w).sum() };
+        let got: f64 = probed.iter().map(|p| sum(&p.spectrum)).sum();
         let truth: f64 = answers.iter().map(|answer| answer.linear(weights).0).sum();
         println!("{got:.4} for {truth:.4}");
         assert!((got / truth - 1.0).abs() < slack, "{got} should be {truth}");

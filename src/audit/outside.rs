@@ -7,7 +7,7 @@ use crate::geometry::sampling::on_triangle;
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::Face;
 use crate::scene::sky::Sky;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -81,8 +81,8 @@ impl Audit<'_> {
         &self,
         (at, choice): (&PathVertex, Option<&OpeningDistribution>),
         (direction, mirrors): (DVec3, usize),
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         let Some(sky) = &self.scene.sky else { return };
         if mirrors > 0 {
@@ -101,8 +101,8 @@ impl Audit<'_> {
         &self,
         (at, choice): (&PathVertex, Option<&OpeningDistribution>),
         square: [f64; 2],
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         let Some(sky) = &self.scene.sky else { return };
         let openings = self.openings.as_ref().zip(choice);
@@ -118,8 +118,8 @@ impl Audit<'_> {
         sky: &Sky,
         (at, choice): (&PathVertex, Option<&OpeningDistribution>),
         direction: DVec3,
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         let cosine = at.normal.dot(direction);
         let end = at.point + direction * (4.0 * self.mesh.half_size);
@@ -133,10 +133,17 @@ impl Audit<'_> {
     }
 
     /// Adds a weight times what comes from a direction outside.
-    fn far(&self, sky: &Sky, direction: DVec3, weight: f64, throughput: &Leaves, sum: &mut Leaves) {
+    fn far(
+        &self,
+        sky: &Sky,
+        direction: DVec3,
+        weight: f64,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
+    ) {
         // Not by the parts that the bake knows: what these leave out is an error, too.
         if let Some(radiance) = sky.exact(direction) {
-            for l in 0..LEAVES {
+            for l in 0..BANDS {
                 sum[l] += throughput[l] * weight * radiance[l];
             }
             return;
@@ -146,7 +153,7 @@ impl Audit<'_> {
                 continue;
             };
             let power = &self.scene.spectra[light.light].power;
-            for l in 0..LEAVES {
+            for l in 0..BANDS {
                 sum[l] += throughput[l] * weight * radiance * power[l] * light.shape[l];
             }
         }

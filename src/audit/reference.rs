@@ -10,7 +10,7 @@ use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02};
 use crate::hierarchy::Face;
 use crate::mesh::looks::DIM;
 use crate::solve::Bake;
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use crate::transport::{MOSTLY, Receiver};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -174,7 +174,7 @@ fn shown(
         };
         audit.shares(place.face.triangle as usize, weights, place.face.back)
     };
-    let (on, shares): (Vec<usize>, Vec<[Leaves; 2]>) = (places.iter().enumerate())
+    let (on, shares): (Vec<usize>, Vec<[Spectrum; 2]>) = (places.iter().enumerate())
         .filter_map(|(k, place)| Some((k, shares(place)?)))
         .unzip();
     let behind: Vec<(DVec3, DVec3, u32)> = (on.iter())
@@ -185,7 +185,7 @@ fn shown(
     let shown = on.iter().zip(&shares).zip(behind);
     let shown = shown.map(|((&k, [own, across]), behind)| {
         let mix =
-            |x: &Leaves, y: &Leaves| std::array::from_fn(|l| own[l] * x[l] + across[l] * y[l]);
+            |x: &Spectrum, y: &Spectrum| std::array::from_fn(|l| own[l] * x[l] + across[l] * y[l]);
         let batches = answers[k].batches.iter().zip(&behind.batches);
         Answer {
             mean: mix(&answers[k].mean, &behind.mean),
@@ -223,7 +223,7 @@ fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<FacePoint>, usize) {
     (all, count)
 }
 
-/// Which points lie inside of something: see [`Reference::inside`]. Darker than `dim`, lx, is dark.
+/// Which points lie inside of something: see [`PathReference::inside`]. Darker than `dim`, lx, is dark.
 fn inside(bake: &Bake, places: &[FacePoint], truth: &[[f64; 3]], dim: f64) -> Vec<bool> {
     let one = |(place, truth): (&FacePoint, &[f64; 3])| {
         let to = receiver(bake, place, 0);
@@ -248,11 +248,11 @@ fn receiver(bake: &Bake, place: &FacePoint, seed: u64) -> Receiver {
 }
 
 /// Irradiance of the batches of an answer.
-fn tristimulus(answer: &Answer, weights: &[Leaves; 3]) -> [[f64; 3]; BATCHES] {
-    let xyz = |leaves: &Leaves| {
+fn tristimulus(answer: &Answer, weights: &[Spectrum; 3]) -> [[f64; 3]; BATCHES] {
+    let xyz = |spectrum: &Spectrum| {
         weights
             .each_ref()
-            .map(|w| leaves.iter().zip(w).map(|(x, w)| x * w).sum())
+            .map(|w| spectrum.iter().zip(w).map(|(x, w)| x * w).sum())
     };
     std::array::from_fn(|b| xyz(&answer.batches[b]))
 }

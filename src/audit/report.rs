@@ -1,6 +1,6 @@
 //! How wrong a bake is, *measured*: its light against the path tracer's at random points of its surfaces.
 //!
-//! The path tracer's own noise does not count as error of the bake (see [`Spread`]). Colour differences are CIEDE2000 of
+//! The path tracer's own noise does not count as error of the bake (see [`ErrorSummary`]). Colour differences are CIEDE2000 of
 //! a white surface's light under the bake's adaptation white.
 
 use super::reference::PathReference;

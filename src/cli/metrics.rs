@@ -37,7 +37,7 @@ use crate::color::{
 use crate::gather::{Probed, WorkingPlane};
 use crate::scene::Camera;
 use crate::solve::{Bake, Round};
-use crate::spectrum::{Grid, Leaves};
+use crate::spectrum::{Grid, Spectrum};
 use crate::survey::{PointLocation, places};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -72,10 +72,10 @@ impl Metrics {
         places: &[PointLocation],
         last: Option<&Round>,
     ) -> Self {
-        let meter = Meter::new(&Bands::leaves(grid));
+        let meter = Meter::new(&Bands::of(grid));
         let stated = stated(last);
         let points: Vec<_> = (probed.par_iter())
-            .map(|light| measured(&meter, &light.leaves, stated))
+            .map(|light| measured(&meter, &light.spectrum, stated))
             .collect();
         let inside = probed.iter().zip(places);
         let lux: Vec<f64> = inside
@@ -224,7 +224,7 @@ fn stated(last: Option<&Round>) -> Option<Stated> {
 
 /// The figures of the mean light on all surfaces of a room, as JSON; ranges are those of a point, and the mean errs less.
 pub(super) fn of_room(bake: &Bake) -> Value {
-    let meter = Meter::new(&Bands::leaves(&bake.scene().grid));
+    let meter = Meter::new(&Bands::of(&bake.scene().grid));
     let stated = stated(bake.rounds().last());
     let (measured, ranges) = measured(&meter, &bake.mean_spectrum(), stated);
     point(&measured, &ranges)
@@ -324,7 +324,7 @@ fn daylight_of(factors: Option<Vec<f64>>, may_err: Option<f64>) -> Value {
 /// The figures of a light, and the ranges that the stated error allows.
 fn measured(
     meter: &Meter,
-    light: &Leaves,
+    light: &Spectrum,
     stated: Option<Stated>,
 ) -> (LightMeasures, [Option<Range>; MEASURES]) {
     let measured = meter.measure(light);

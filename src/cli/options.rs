@@ -4,7 +4,7 @@ use super::sky::SkyArgs;
 use crate::gather::BakedSurface;
 use crate::output::{Exposure, ExposureSetting, Packing, WhiteBalance, Writing};
 use crate::scene::{Camera, Options, Scene};
-use crate::spectrum::{Grid, LEAVES};
+use crate::spectrum::{BANDS, Grid};
 use crate::survey::SurveyOptions;
 use crate::team::Team;
 use std::num::NonZeroUsize;
@@ -182,7 +182,7 @@ impl FromStr for WavelengthRange {
             return Err("a range of wavelengths looks like 380..780".into());
         };
         let [least, most] = KNOWN_NM;
-        let widest = LEAVES as f64 * LEAST_LEAF_NM;
+        let widest = BANDS as f64 * LEAST_LEAF_NM;
         // Written so that NaN fails.
         if !(from >= least && to <= most && to - from >= widest) {
             return Err(format!(

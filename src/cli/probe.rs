@@ -23,7 +23,7 @@ use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::gather::{Glare, Probed};
 use crate::solve::{Bake, Representation, Round, Verdict};
-use crate::spectrum::{Grid, LEAVES};
+use crate::spectrum::{BANDS, Grid};
 use crate::store::file;
 use crate::survey::{PointLocation, places};
 use serde_json::json;
@@ -301,7 +301,7 @@ fn columns(bands: bool, grid: &Grid) -> Vec<String> {
         .map(String::from)
         .collect();
     if bands {
-        columns.extend((0..LEAVES).map(|leaf| format!("E_{}", grid.left(leaf))));
+        columns.extend((0..BANDS).map(|band| format!("E_{}", grid.left(band))));
     }
     columns.push("lux".into());
     columns
@@ -335,7 +335,7 @@ fn table(
 fn row((point, normal): &Point, light: &Probed, bands: bool) -> Vec<f64> {
     let mut row = [point.to_array(), normal.to_array(), light.xyz].concat();
     if bands {
-        row.extend(light.leaves);
+        row.extend(light.spectrum);
     }
     row.push(light.xyz[1]);
     row

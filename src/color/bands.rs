@@ -4,7 +4,7 @@
 //! on samples it is the function there, times the step, as the CIE sums (CIE 015:2004, 7.1).
 
 use super::Xyz;
-use crate::data::{Grid, LEAVES, Outside, Table};
+use crate::data::{BANDS, Grid, Outside, Table};
 
 /// Wavelength bands.
 #[derive(Debug, Clone)]
@@ -17,9 +17,9 @@ pub struct Bands {
 
 impl Bands {
     /// The leaves of a grid.
-    pub fn leaves(grid: &Grid) -> Self {
+    pub fn of(grid: &Grid) -> Self {
         Self {
-            edges: (0..LEAVES)
+            edges: (0..BANDS)
                 .map(|leaf| [grid.left(leaf), grid.left(leaf + 1)])
                 .collect(),
             width: grid.width(),

@@ -13,7 +13,7 @@ use std::fmt;
 
 /// How many measures there are.
 pub const MEASURES: usize = 12;
-/// Names with units, in the order of [`Measured::values`].
+/// Names with units, in the order of [`LightMeasures::values`].
 pub const NAMES: [&str; MEASURES] = [
     "lux", "CCT_K", "Duv", "Ra", "R9", "Rf", "Rg", "EDI_sc", "EDI_mc", "EDI_lc", "EDI_rh",
     "EDI_mel",
@@ -401,7 +401,7 @@ mod tests {
     ];
 
     fn meters() -> [(Bands, Meter); 2] {
-        [Bands::samples(380, 780, 5), Bands::leaves(&Grid::default())]
+        [Bands::samples(380, 780, 5), Bands::of(&Grid::default())]
             .map(|bands| (bands.clone(), Meter::new(&bands)))
     }
 

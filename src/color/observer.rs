@@ -4,7 +4,7 @@
 //! With S held constant on each leaf this is k * sum S_leaf w_leaf, w_leaf the integral of a_bar over the leaf, in nm.
 //! The paper samples a_bar at the left edge of the leaf instead.
 
-use crate::data::{Grid, Leaves};
+use crate::data::{Grid, Spectrum};
 use crate::data::{Outside, Table, cmf_1931};
 
 /// Maximum luminous efficacy of radiation, lm/W (CIE 018:2019; 683.002 for the SI's 540 THz, 683 by convention).
@@ -23,7 +23,7 @@ impl Observer {
     }
 
     /// Integrals of x_bar, y_bar, z_bar over each leaf, nm.
-    pub fn weights(&self, grid: &Grid) -> [Leaves; 3] {
+    pub fn weights(&self, grid: &Grid) -> [Spectrum; 3] {
         self.cmf.each_ref().map(|cmf| {
             grid.means(cmf, Outside::Zero)
                 .map(|mean| mean * grid.width())
@@ -31,7 +31,7 @@ impl Observer {
     }
 
     /// x_bar, y_bar, z_bar at the left edge of each leaf: the paper's weights (2.1.1).
-    pub fn samples(&self, grid: &Grid) -> [Leaves; 3] {
+    pub fn samples(&self, grid: &Grid) -> [Spectrum; 3] {
         self.cmf
             .each_ref()
             .map(|cmf| grid.left_edges(cmf, Outside::Zero))

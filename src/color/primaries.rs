@@ -8,7 +8,7 @@
 //! section 5.2).
 
 use super::Upsampler;
-use crate::data::{LEAVES, Leaves};
+use crate::data::{BANDS, Spectrum};
 use nalgebra::{DMatrix, DVector};
 
 /// Penalty of the method. On the grids 380..780, 360..830, 400..700 and 380..700 1 takes 430 to 1100 steps, .1 takes 1700 to 3200.
@@ -17,9 +17,9 @@ const PENALTY: f64 = 1.0;
 const STEPS: usize = 5000;
 const NEAR: f64 = 1e-10;
 /// Values of three functions.
-const UNKNOWNS: usize = 3 * LEAVES;
+const UNKNOWNS: usize = 3 * BANDS;
 /// What they have to meet: the sum in each leaf, and the colours of two; the third then has its own.
-const DEMANDS: usize = LEAVES + 6;
+const DEMANDS: usize = BANDS + 6;
 
 /// Shares of D65 in each leaf that stand for red, green and blue: nonnegative, together 1.
 ///
@@ -30,13 +30,13 @@ const DEMANDS: usize = LEAVES + 6;
 /// let [r, g, b] = upsampler.rgb(&red);
 /// assert!((r - 1.0).abs() < 1e-6 && g.abs() < 1e-6 && b.abs() < 1e-6);
 /// ```
-pub fn primaries(upsampler: &Upsampler) -> [Leaves; 3] {
+pub fn primaries(upsampler: &Upsampler) -> [Spectrum; 3] {
     let (demands, wanted) = demands(upsampler);
     let size = UNKNOWNS + DEMANDS;
     let mut system = DMatrix::zeros(size, size);
-    for (k, row) in (0..UNKNOWNS).map(|k| (k, k % LEAVES)) {
+    for (k, row) in (0..UNKNOWNS).map(|k| (k, k % BANDS)) {
         // Squared differences of neighbours: 1 -2 1, with the ends free.
-        system[(k, k)] = PENALTY + f64::from(u8::from(row > 0) + u8::from(row + 1 < LEAVES));
+        system[(k, k)] = PENALTY + f64::from(u8::from(row > 0) + u8::from(row + 1 < BANDS));
         if row > 0 {
             (system[(k, k - 1)], system[(k - 1, k)]) = (-1.0, -1.0);
         }
@@ -64,23 +64,23 @@ pub fn primaries(upsampler: &Upsampler) -> [Leaves; 3] {
             break;
         }
     }
-    std::array::from_fn(|k| std::array::from_fn(|l| positive[k * LEAVES + l]))
+    std::array::from_fn(|k| std::array::from_fn(|l| positive[k * BANDS + l]))
 }
 
 /// Rows and right sides of what the functions have to meet.
 fn demands(upsampler: &Upsampler) -> (DMatrix<f64>, DVector<f64>) {
     let (mut rows, mut wanted) = (DMatrix::zeros(DEMANDS, UNKNOWNS), DVector::zeros(DEMANDS));
-    for leaf in 0..LEAVES {
+    for leaf in 0..BANDS {
         wanted[leaf] = 1.0;
-        let mut single = [0.0; LEAVES];
+        let mut single = [0.0; BANDS];
         single[leaf] = 1.0;
         let colour = upsampler.rgb(&single);
         for primary in 0..3 {
-            rows[(leaf, primary * LEAVES + leaf)] = 1.0;
+            rows[(leaf, primary * BANDS + leaf)] = 1.0;
         }
         for (primary, channel) in (0..2).flat_map(|p| (0..3).map(move |c| (p, c))) {
-            let row = LEAVES + 3 * primary + channel;
-            rows[(row, primary * LEAVES + leaf)] = colour[channel];
+            let row = BANDS + 3 * primary + channel;
+            rows[(row, primary * BANDS + leaf)] = colour[channel];
             wanted[row] = f64::from(u8::from(primary == channel));
         }
     }
@@ -97,7 +97,7 @@ mod tests {
         for grid in [Grid::default(), Grid::paper(), Grid::new(360.0, 830.0)] {
             let upsampler = Upsampler::new(&grid);
             let found = primaries(&upsampler);
-            for leaf in 0..LEAVES {
+            for leaf in 0..BANDS {
                 let sum: f64 = found.iter().map(|p| p[leaf]).sum();
                 assert!((sum - 1.0).abs() < 1e-8, "{leaf}: {sum}");
                 assert!(found.iter().all(|p| p[leaf] >= 0.0));

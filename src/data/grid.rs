@@ -6,10 +6,10 @@
 use super::{Outside, Table};
 
 /// Number of leaves: 2^6, the finest level of every spectral tree.
-pub const LEAVES: usize = 64;
+pub const BANDS: usize = 64;
 
 /// One value for each leaf.
-pub type Leaves = [f64; LEAVES];
+pub type Spectrum = [f64; BANDS];
 
 /// Where the leaves lie on the wavelength axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,7 @@ impl Grid {
     pub fn new(start: f64, end: f64) -> Self {
         Self {
             start,
-            width: (end - start) / LEAVES as f64,
+            width: (end - start) / BANDS as f64,
         }
     }
 
@@ -41,7 +41,7 @@ impl Grid {
 
     /// Right edge of the last leaf, nm.
     pub fn end(&self) -> f64 {
-        self.left(LEAVES)
+        self.left(BANDS)
     }
 
     /// Left edge of a leaf, nm; `left(64)` is the end of the range.
@@ -60,12 +60,12 @@ impl Grid {
     }
 
     /// The leaf that holds a wavelength; the end of the range belongs to the last leaf.
-    pub fn leaf_of(&self, nm: f64) -> Option<usize> {
+    pub fn band_of(&self, nm: f64) -> Option<usize> {
         if !(self.start..=self.end()).contains(&nm) {
             return None;
         }
         // Not negative as nm >= start; 64 only at the very end.
-        Some((((nm - self.start) / self.width) as usize).min(LEAVES - 1))
+        Some((((nm - self.start) / self.width) as usize).min(BANDS - 1))
     }
 
     /// Mean of the table over each leaf, exact for the piecewise linear table.
@@ -77,14 +77,14 @@ impl Grid {
     /// assert_eq!(means[0], 2.5);
     /// assert_eq!(Grid::paper().left_edges(&ramp, Outside::Zero)[1], 5.0);
     /// ```
-    pub fn means(&self, table: &Table, outside: Outside) -> Leaves {
+    pub fn means(&self, table: &Table, outside: Outside) -> Spectrum {
         std::array::from_fn(|leaf| {
             table.integral(self.left(leaf), self.left(leaf + 1), outside) / self.width
         })
     }
 
     /// Value of the table at the left edge of each leaf: the convention behind the paper's Table 1.
-    pub fn left_edges(&self, table: &Table, outside: Outside) -> Leaves {
+    pub fn left_edges(&self, table: &Table, outside: Outside) -> Spectrum {
         std::array::from_fn(|leaf| table.at(self.left(leaf), outside))
     }
 }
@@ -103,12 +103,12 @@ mod tests {
     #[test]
     fn leaves_tile_the_range() {
         for grid in [Grid::paper(), Grid::default(), Grid::new(360.0, 830.0)] {
-            assert_eq!(grid.leaf_of(grid.start()), Some(0));
-            assert_eq!(grid.leaf_of(grid.end()), Some(63));
-            assert_eq!(grid.leaf_of(grid.end() + 0.1), None);
-            assert_eq!(grid.leaf_of(f64::NAN), None);
-            for leaf in 0..LEAVES {
-                assert_eq!(grid.leaf_of(grid.middle(leaf)), Some(leaf));
+            assert_eq!(grid.band_of(grid.start()), Some(0));
+            assert_eq!(grid.band_of(grid.end()), Some(63));
+            assert_eq!(grid.band_of(grid.end() + 0.1), None);
+            assert_eq!(grid.band_of(f64::NAN), None);
+            for leaf in 0..BANDS {
+                assert_eq!(grid.band_of(grid.middle(leaf)), Some(leaf));
             }
         }
     }

@@ -10,7 +10,7 @@ mod table;
 
 pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
 pub use daylight::daylight;
-pub use grid::{Grid, LEAVES, Leaves};
+pub use grid::{BANDS, Grid, Spectrum};
 pub use registry::{Named, TableKind, named, names, nearest};
 pub use table::{CsvProblem, Outside, Table};
 

@@ -91,9 +91,9 @@ impl File {
 /// The spectrum of that name, none if there is no such name.
 ///
 /// ```
-/// use haarlight::data::{Kind, Outside, named};
+/// use haarlight::data::{Outside, TableKind, named};
 /// let f2 = named("cie/F2").unwrap();
-/// assert_eq!(f2.kind, Kind::Illuminant);
+/// assert_eq!(f2.kind, TableKind::Illuminant);
 /// assert_eq!(f2.table.at(545.0, Outside::Zero), 24.88);
 /// assert_eq!(named("cie/FL2"), Some(f2));
 /// assert_eq!(named("blackbody/2700").unwrap().table.at(560.0, Outside::Zero), 100.0);

@@ -7,7 +7,7 @@ use crate::light::Fluorescent;
 use crate::light::lanes::Lanes;
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use crate::transport::Receiver;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -232,9 +232,9 @@ impl Bake {
 /// How a material turns irradiance into visible light.
 pub(crate) struct SurfaceResponse<'a> {
     /// Reflectance on the spectral leaves, without vertex colours; for diffuse sheets including the transmittance.
-    reflectance: Leaves,
+    reflectance: Spectrum,
     /// Transmittance, and the share of the base colour that is reflected besides.
-    through: Option<(Leaves, f64)>,
+    through: Option<(Spectrum, f64)>,
     /// Base colour with the texture's mean, where vertex colours multiply it.
     base: Option<[f32; 3]>,
     upsampler: &'a Upsampler,
@@ -243,7 +243,7 @@ pub(crate) struct SurfaceResponse<'a> {
     /// The fluorescence, and its tristimulus radiosity per unit of each lane's irradiance.
     fluorescent: Option<(Fluorescent, Vec<[f64; 3]>)>,
     /// Greatest reflectance that fluorescence leaves room for.
-    room: Option<Leaves>,
+    room: Option<Spectrum>,
     /// Mean colour of the texture, which the display multiplies again.
     pub(super) unpainted: Option<[f64; 3]>,
     emits: bool,
@@ -279,7 +279,7 @@ impl<'a> SurfaceResponse<'a> {
         });
         let mut look = Self {
             reflected: Vec::new(),
-            room: (fluorescent.is_some()).then(|| material.bounded([1.0; LEAVES])),
+            room: (fluorescent.is_some()).then(|| material.bounded([1.0; BANDS])),
             fluorescent,
             reflectance,
             through: sheet.map(|sheet| (sheet.transmittance, sheet.left)),
@@ -298,7 +298,7 @@ impl<'a> SurfaceResponse<'a> {
     }
 
     /// A reflectance, limited to what fluorescence leaves room for.
-    fn beside(&self, reflectance: Leaves) -> Leaves {
+    fn beside(&self, reflectance: Spectrum) -> Spectrum {
         match &self.room {
             Some(room) => std::array::from_fn(|k| reflectance[k].min(room[k])),
             None => reflectance,
@@ -306,7 +306,7 @@ impl<'a> SurfaceResponse<'a> {
     }
 
     /// Tristimulus radiosity per unit of each lane's irradiance, for a reflectance and fluorescence.
-    fn sent(&self, lanes: &Lanes, reflectance: &Leaves) -> Vec<[f64; 3]> {
+    fn sent(&self, lanes: &Lanes, reflectance: &Spectrum) -> Vec<[f64; 3]> {
         let mut all = lanes.reflected(reflectance);
         for (all, more) in all
             .iter_mut()
@@ -318,9 +318,9 @@ impl<'a> SurfaceResponse<'a> {
     }
 
     /// Spectral exitance of fluorescence under a row of irradiance, W/m2/nm; none where nothing fluoresces.
-    pub(super) fn fluoresced(&self, lanes: &Lanes, row: &[f32; 64]) -> Option<Leaves> {
+    pub(super) fn fluoresced(&self, lanes: &Lanes, row: &[f32; 64]) -> Option<Spectrum> {
         let (fluorescent, _) = self.fluorescent.as_ref()?;
-        Some(fluorescent.leaves(lanes, row))
+        Some(fluorescent.spectrum(lanes, row))
     }
 
     /// Tristimulus radiosity of a row of irradiance, without vertex colours.
@@ -329,12 +329,12 @@ impl<'a> SurfaceResponse<'a> {
     }
 
     /// Reflectance on the spectral leaves, for a texture its mean; without vertex colours.
-    pub(crate) fn reflectance(&self) -> &Leaves {
+    pub(crate) fn reflectance(&self) -> &Spectrum {
         &self.reflectance
     }
 
     /// Reflectance at a vertex where vertex colours apply; none elsewhere.
-    fn painted(&self, surface: &Surface, vertex: &BakedVertex) -> Option<Leaves> {
+    fn painted(&self, surface: &Surface, vertex: &BakedVertex) -> Option<Spectrum> {
         let base = self.base.filter(|_| surface.colors.is_some())?;
         let color = refined_mesh::vertex_color(surface, vertex);
         let color = std::array::from_fn(|c| base[c] * color[c]);
@@ -347,7 +347,7 @@ impl<'a> SurfaceResponse<'a> {
     }
 
     /// Reflectance at a vertex.
-    pub(super) fn reflectance_at(&self, surface: &Surface, vertex: &BakedVertex) -> Leaves {
+    pub(super) fn reflectance_at(&self, surface: &Surface, vertex: &BakedVertex) -> Spectrum {
         self.painted(surface, vertex).unwrap_or(self.reflectance)
     }
 }

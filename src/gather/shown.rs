@@ -10,9 +10,9 @@ impl Bake {
     pub(crate) fn gather_shown(
         &self,
         receivers: &[Receiver],
-        care: GatherQuality,
+        quality: GatherQuality,
     ) -> Vec<Gathered> {
-        let mut gathered = self.gather_with(receivers, care);
+        let mut gathered = self.gather_with(receivers, quality);
         let behind: Vec<(usize, u32, Receiver)> = (receivers.iter().enumerate())
             .filter_map(|(k, to)| self.behind(to).map(|(place, other)| (k, place, other)))
             .collect();
@@ -20,7 +20,7 @@ impl Bake {
             return gathered;
         }
         let others: Vec<Receiver> = behind.iter().map(|&(.., other)| other).collect();
-        for ((k, place, _), other) in behind.iter().zip(self.gather_with(&others, care)) {
+        for ((k, place, _), other) in behind.iter().zip(self.gather_with(&others, quality)) {
             let Some(shares) = self.light().through.shares(*place) else {
                 continue;
             };

@@ -18,7 +18,7 @@ pub(crate) const WIDTH: usize = 8;
 /// Padding of every box, of the scene's half size. Measured: of 4 million segments aimed at edges and corners of a closed box, none leaks.
 pub(crate) const PAD: f32 = 1e-5;
 
-/// Set in [`Node::children`] for a leaf; the rest is the index of a block.
+/// Set in [`BvhNode::children`] for a leaf; the rest is the index of a block.
 pub(crate) const LEAF: u32 = 1 << 31;
 
 /// Eight boxes, coordinate by coordinate, and what is in them.

@@ -115,7 +115,7 @@ impl Clipper {
     }
 
     /// Takes a shadow away, cast from the point that looks. False when more than `cap` pieces are left.
-    pub fn cut(&mut self, shadow: &Shadow, cap: usize) -> bool {
+    pub fn clip(&mut self, shadow: &Shadow, cap: usize) -> bool {
         if shadow.is_edge_on(self.thin) || shadow.misses(&self.whole, 0.0) {
             return true;
         }
@@ -138,7 +138,9 @@ impl Clipper {
         cap: usize,
     ) -> Option<&Self> {
         let mut shadows = blockers.iter().map(|b| Shadow::new(point, b.as_ref()));
-        shadows.all(|shadow| self.cut(&shadow, cap)).then_some(self)
+        shadows
+            .all(|shadow| self.clip(&shadow, cap))
+            .then_some(self)
     }
 
     /// Form factor of what is left; `whole` is that of the whole polygon.

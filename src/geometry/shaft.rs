@@ -287,7 +287,7 @@ impl Shaft {
     pub(super) fn cut_holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
         let mut outline = ConvexOutline::new(triangle);
         for side in self.sides() {
-            match outline.cut(side, gap) {
+            match outline.clip(side, gap) {
                 Left::Nothing => return false,
                 Left::Some => {}
                 Left::TooMany => return true,
@@ -345,7 +345,7 @@ impl ConvexOutline {
 
     /// Keeps what is deeper than `gap` inside.
     #[inline]
-    fn cut(&mut self, side: &HalfSpace, gap: f64) -> Left {
+    fn clip(&mut self, side: &HalfSpace, gap: f64) -> Left {
         let [x, y, z] = &self.corners;
         let points = [f64x8::new(*x), f64x8::new(*y), f64x8::new(*z)];
         let depth = dot(points, splat(side.normal)) - f64x8::splat(side.offset - gap);

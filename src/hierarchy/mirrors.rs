@@ -3,7 +3,7 @@
 //! All triangles of a material that lie in one plane and face the same way are one plane mirror. What a point sees by way of plane
 //! mirrors `m1, m2, ..` it would see straight from its mirror image `.. R2 R1 p`, `Ri` being the reflection in `mi`, with the mirrors as
 //! windows. So lamps are gathered from the image, with the factors that they have for any other point. Which mirrors may follow one
-//! another is found once; an [`Image`] is such a sequence.
+//! another is found once; a [`MirrorImage`] is such a sequence.
 //!
 //! Surfaces of many small planes are curved mirrors: rays find the light in them, and things have no images there.
 

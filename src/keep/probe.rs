@@ -74,7 +74,7 @@ impl Relighter {
             let row = lit.replayed(found.packed.as_deref(), &stains)?;
             Ok(Probed {
                 xyz: lit.lanes().tristimulus(&row),
-                leaves: lit.lanes().leaves(&row),
+                spectrum: lit.lanes().spectrum(&row),
                 backs: found.backs,
             })
         });

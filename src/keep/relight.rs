@@ -22,7 +22,7 @@ use crate::solve::solver::Convergence;
 use crate::solve::{
     Bake, Closed, DE_PER_PERCENT, NOBODY, RoomAnalysis, Settings, SolveInput, flux, punctual,
 };
-use crate::spectrum::LEAVES;
+use crate::spectrum::BANDS;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, FileKind, Fingerprint, Packs, container};
 use crate::transport::trace::{self, Stains};
@@ -277,14 +277,14 @@ impl Relighter {
         let closed = from
             .get::<[u8; 2]>()?
             .map(|c| if c == 1 { Closed::Yes } else { Closed::No });
-        let known = RoomAnalysis {
+        let analysis = RoomAnalysis {
             spaces,
             parted,
             closed,
             counted: Counted { splits, shares },
             frame: frame.first().copied().map(Frame::of_numbers),
         };
-        let mut bake = Bake::with(scene, settings, Some(known));
+        let mut bake = Bake::with(scene, settings, Some(analysis));
         bake.room.keep = true;
         let guess: [f64; 3] = from.get()?;
         let distance: f64 = from.get()?;
@@ -503,7 +503,7 @@ impl Relighter {
         });
         // Nobody asks for neighbours without casting rays.
         let graph = std::mem::take(&mut bake.refinement.graph);
-        let given = SolveInput {
+        let input = SolveInput {
             sources,
             first,
             reflected,
@@ -512,7 +512,7 @@ impl Relighter {
             // A sweep more, which a first answer does without.
             counted: tolerance <= bake.room.tolerance(),
         };
-        let (convergence, flux) = bake.solve_with::<L>(links, &leaves, given);
+        let (convergence, flux) = bake.solve_with::<L>(links, &leaves, input);
         bake.refinement.graph = graph;
         let guess = bake.room.guess(&bake.refinement.tree).white;
         self.guess = over(bake.solution.light.white, guess, self.guess);
@@ -541,7 +541,7 @@ impl Relighter {
     }
 
     /// Radiosity on the 64 leaves at every vertex of a relit mesh, see [`Bake::radiosity_spectra`].
-    pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
+    pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; BANDS]>> {
         self.bake.radiosity_spectra(baked)
     }
 }

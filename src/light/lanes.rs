@@ -15,7 +15,7 @@
 
 use crate::color::{KM, LinearSrgb, Upsampler};
 use crate::scene::{Emission, GREATEST_ALBEDO, LightSpectrum};
-use crate::spectrum::{LEAVES, Leaves, Partition};
+use crate::spectrum::{BANDS, Partition, Spectrum};
 use nalgebra::Matrix3;
 
 /// One lane.
@@ -36,11 +36,11 @@ enum Base {
     Intervals(Vec<Lane>),
     /// Linear sRGB: the contribution of each leaf of a reflectance under D65, and of each leaf of a radiosity.
     Rgb {
-        paint: Box<[Leaves; 3]>,
-        light: Box<[Leaves; 3]>,
+        paint: Box<[Spectrum; 3]>,
+        light: Box<[Spectrum; 3]>,
     },
     /// Coordinates in an orthonormal basis.
-    Vectors(Vec<Leaves>),
+    Vectors(Vec<Spectrum>),
 }
 
 /// The lanes of all rows.
@@ -49,8 +49,8 @@ pub struct Lanes {
     base: Base,
     /// Tristimulus value of a lane at 1: `Km integral of S abar`, or of `abar` alone.
     xyz: Vec<[f64; 3]>,
-    power: Vec<Leaves>,
-    weights: [Leaves; 3],
+    power: Vec<Spectrum>,
+    weights: [Spectrum; 3],
     /// How light counts besides being visible.
     guide: Option<Box<Guide>>,
 }
@@ -59,7 +59,7 @@ pub struct Lanes {
 #[derive(Debug, Clone)]
 struct Guide {
     /// Weights like the observer's.
-    weights: [Leaves; 3],
+    weights: [Spectrum; 3],
     /// Tristimulus value of each lane at 1 by these weights.
     xyz: Vec<[f64; 3]>,
     /// A share of that, plus the visible tristimulus value.
@@ -69,9 +69,9 @@ struct Guide {
 impl Lanes {
     /// One cut for each light; falls back to [`Lanes::dense`] beyond 64 lanes. `weights` are the integrals of the
     /// colour matching functions over the leaves, nm.
-    pub fn ratio(spectra: &[LightSpectrum], cuts: &[Partition], weights: &[Leaves; 3]) -> Self {
+    pub fn ratio(spectra: &[LightSpectrum], cuts: &[Partition], weights: &[Spectrum; 3]) -> Self {
         assert_eq!(spectra.len(), cuts.len(), "a cut for each light");
-        if cuts.iter().map(|c| c.count()).sum::<usize>() > LEAVES {
+        if cuts.iter().map(|c| c.count()).sum::<usize>() > BANDS {
             return Self::dense(spectra, weights);
         }
         let lanes = cuts.iter().enumerate().flat_map(|(light, cut)| {
@@ -85,8 +85,8 @@ impl Lanes {
     }
 
     /// The ratio to one light on every leaf; other lights are left out.
-    pub fn only(spectra: &[LightSpectrum], light: usize, weights: &[Leaves; 3]) -> Self {
-        let lanes = (0..LEAVES).map(|first| Lane {
+    pub fn only(spectra: &[LightSpectrum], light: usize, weights: &[Spectrum; 3]) -> Self {
+        let lanes = (0..BANDS).map(|first| Lane {
             light: Some(light),
             first,
             count: 1,
@@ -95,12 +95,12 @@ impl Lanes {
     }
 
     /// The 64 leaves, all lights together.
-    pub fn dense(spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
-        Self::absolute(spectra, Partition::LEAVES, weights)
+    pub fn dense(spectra: &[LightSpectrum], weights: &[Spectrum; 3]) -> Self {
+        Self::absolute(spectra, Partition::BANDS, weights)
     }
 
     /// Radiosity itself on the intervals of a cut, all lights together.
-    pub fn absolute(spectra: &[LightSpectrum], cut: Partition, weights: &[Leaves; 3]) -> Self {
+    pub fn absolute(spectra: &[LightSpectrum], cut: Partition, weights: &[Spectrum; 3]) -> Self {
         let lanes = cut.iter().map(|(first, count)| Lane {
             light: None,
             first,
@@ -111,12 +111,12 @@ impl Lanes {
 
     /// The ratio to each light on `bands` intervals of equal width as far as leaves allow; falls back to
     /// [`Lanes::dense`] beyond 64 lanes.
-    pub fn uniform(spectra: &[LightSpectrum], bands: usize, weights: &[Leaves; 3]) -> Self {
-        let bands = bands.clamp(1, LEAVES);
-        if bands * spectra.len() > LEAVES {
+    pub fn uniform(spectra: &[LightSpectrum], count: usize, weights: &[Spectrum; 3]) -> Self {
+        let bands = count.clamp(1, BANDS);
+        if bands * spectra.len() > BANDS {
             return Self::dense(spectra, weights);
         }
-        let edge = |k: usize| k * LEAVES / bands;
+        let edge = |k: usize| k * BANDS / bands;
         let lanes = (0..spectra.len()).flat_map(|light| {
             (0..bands).map(move |k| Lane {
                 light: Some(light),
@@ -128,18 +128,18 @@ impl Lanes {
     }
 
     /// Linear sRGB: reflectances by their colour under D65, lamps by their own. Three numbers, and no way back.
-    pub fn rgb(spectra: &[LightSpectrum], upsampler: &Upsampler, weights: &[Leaves; 3]) -> Self {
-        let one = |leaf: usize| -> Leaves { std::array::from_fn(|k| f64::from(k == leaf)) };
+    pub fn rgb(spectra: &[LightSpectrum], upsampler: &Upsampler, weights: &[Spectrum; 3]) -> Self {
+        let one = |band: usize| -> Spectrum { std::array::from_fn(|k| f64::from(k == band)) };
         let display = LinearSrgb::standard();
-        let (mut paint, mut light) = ([[0.0; LEAVES]; 3], [[0.0; LEAVES]; 3]);
-        for leaf in 0..LEAVES {
+        let (mut paint, mut light) = ([[0.0; BANDS]; 3], [[0.0; BANDS]; 3]);
+        for band in 0..BANDS {
             let colours = [
-                upsampler.rgb(&one(leaf)),
-                display.from_xyz(weights.each_ref().map(|w| w[leaf])),
+                upsampler.rgb(&one(band)),
+                display.from_xyz(weights.each_ref().map(|w| w[band])),
             ];
             for c in 0..3 {
-                paint[c][leaf] = colours[0][c];
-                light[c][leaf] = colours[1][c];
+                paint[c][band] = colours[0][c];
+                light[c][band] = colours[1][c];
             }
         }
         let xyz = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -157,7 +157,11 @@ impl Lanes {
     }
 
     /// Coordinates in an orthonormal basis. Lanes then do not reflect one by one: see [`Lanes::matrix`].
-    pub fn vectors(spectra: &[LightSpectrum], basis: Vec<Leaves>, weights: &[Leaves; 3]) -> Self {
+    pub fn vectors(
+        spectra: &[LightSpectrum],
+        basis: Vec<Spectrum>,
+        weights: &[Spectrum; 3],
+    ) -> Self {
         let xyz = basis
             .iter()
             .map(|e| weights.each_ref().map(|w| KM * dot(e, w)))
@@ -172,14 +176,18 @@ impl Lanes {
     }
 
     /// The given lanes.
-    pub(crate) fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
-        let power: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
+    pub(crate) fn with(
+        lanes: Vec<Lane>,
+        spectra: &[LightSpectrum],
+        weights: &[Spectrum; 3],
+    ) -> Self {
+        let power: Vec<Spectrum> = spectra.iter().map(|s| s.power).collect();
         let xyz = lanes
             .iter()
             .map(|lane| {
-                let leaves = lane.first..lane.first + lane.count;
+                let bands = lane.first..lane.first + lane.count;
                 weights.each_ref().map(|w| {
-                    KM * leaves
+                    KM * bands
                         .clone()
                         .map(|k| w[k] * lane.light.map_or(1.0, |l| power[l][k]))
                         .sum::<f64>()
@@ -198,10 +206,10 @@ impl Lanes {
     /// These lanes, whose averages also follow `weights` besides the observer's: what a surface emits at other wavelengths per unit of
     /// each leaf. A `share` of that is added to brightness.
     #[must_use]
-    pub fn guided(mut self, weights: &[Leaves; 3], share: f64) -> Self {
-        let of = |lane: &Lane, w: &Leaves| {
-            let leaves = lane.first..lane.first + lane.count;
-            KM * leaves.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
+    pub fn guided(mut self, weights: &[Spectrum; 3], share: f64) -> Self {
+        let of = |lane: &Lane, w: &Spectrum| {
+            let bands = lane.first..lane.first + lane.count;
+            KM * bands.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
         };
         let xyz = self.lanes().iter();
         let xyz: Vec<_> = xyz.map(|l| weights.each_ref().map(|w| of(l, w))).collect();
@@ -305,10 +313,10 @@ impl Lanes {
 
     /// Power that a surface takes from each lane at 1, given the share it takes of each leaf and the `width` of a leaf in nm: W/m2. Empty
     /// where lanes are not intervals.
-    pub fn taken(&self, share: &Leaves, width: f64) -> Vec<f32> {
+    pub fn taken(&self, share: &Spectrum, width: f64) -> Vec<f32> {
         let lanes = self.lanes().iter().map(|lane| {
-            let leaves = lane.first..lane.first + lane.count;
-            let sum: f64 = leaves.map(|k| share[k] * self.shape(lane, k)).sum();
+            let bands = lane.first..lane.first + lane.count;
+            let sum: f64 = bands.map(|k| share[k] * self.shape(lane, k)).sum();
             (sum * width) as f32
         });
         lanes.collect()
@@ -316,7 +324,7 @@ impl Lanes {
 
     /// Average of a smooth factor (a reflectance, a lamp's shape) on each lane: eq. 3 under the lane's light. Where
     /// lanes mix, only [`Lanes::matrix`] is meaningful.
-    pub fn averages(&self, f: &Leaves, out: &mut [f32]) {
+    pub fn averages(&self, f: &Spectrum, out: &mut [f32]) {
         match &self.base {
             Base::Intervals(lanes) => {
                 for (out, lane) in out.iter_mut().zip(lanes) {
@@ -334,12 +342,12 @@ impl Lanes {
 
     /// Reflection where lanes mix: `R_ij = sum over leaves of rho E_i E_j`, row by row (paper 2.2.2). Symmetric, its
     /// eigenvalues lie in the range of rho.
-    pub fn matrix(&self, reflectance: &Leaves) -> Vec<f64> {
+    pub fn matrix(&self, reflectance: &Spectrum) -> Vec<f64> {
         let Base::Vectors(basis) = &self.base else {
             return Vec::new();
         };
-        let through = |i: &Leaves, j: &Leaves| -> f64 {
-            (0..LEAVES).map(|k| reflectance[k] * i[k] * j[k]).sum()
+        let through = |i: &Spectrum, j: &Spectrum| -> f64 {
+            (0..BANDS).map(|k| reflectance[k] * i[k] * j[k]).sum()
         };
         basis
             .iter()
@@ -347,18 +355,18 @@ impl Lanes {
             .collect()
     }
 
-    fn average(&self, f: &Leaves, lane: &Lane) -> f64 {
-        let leaves = lane.first..lane.first + lane.count;
+    fn average(&self, f: &Spectrum, lane: &Lane) -> f64 {
+        let bands = lane.first..lane.first + lane.count;
         let first = f[lane.first];
         // Exactly flat stays exactly flat: a grey room must not pick up rounding.
-        if leaves.clone().all(|k| f[k] == first) {
+        if bands.clone().all(|k| f[k] == first) {
             return first;
         }
         let (mut over, mut under) = (0.0, 0.0);
         let more = self.guide.iter().flat_map(|guide| &guide.weights);
         for w in self.weights.iter().chain(more) {
             let (mut whole, mut part) = (0.0, 0.0);
-            for k in leaves.clone() {
+            for k in bands.clone() {
                 let weight = w[k] * lane.light.map_or(1.0, |l| self.power[l][k]);
                 whole += weight;
                 part += weight * f[k];
@@ -369,13 +377,13 @@ impl Lanes {
         if under > 0.0 {
             over / under
         } else {
-            leaves.map(|k| f[k]).sum::<f64>() / lane.count as f64
+            bands.map(|k| f[k]).sum::<f64>() / lane.count as f64
         }
     }
 
     /// Tristimulus values of an emission: `scale` times `shape` of a light.
-    pub(crate) fn emission(&self, light: usize, shape: &Leaves, scale: f64) -> [f64; 3] {
-        let mut row = [0.0_f32; LEAVES];
+    pub(crate) fn emission(&self, light: usize, shape: &Spectrum, scale: f64) -> [f64; 3] {
+        let mut row = [0.0_f32; BANDS];
         self.add_emission(light, shape, scale, &mut row);
         self.tristimulus(&row)
     }
@@ -388,9 +396,9 @@ impl Lanes {
     }
 
     /// Adds an emission of `light` with a shape (see [`crate::scene::Emission`]).
-    pub fn add_emission(&self, light: usize, shape: &Leaves, scale: f64, out: &mut [f32]) {
+    pub fn add_emission(&self, light: usize, shape: &Spectrum, scale: f64, out: &mut [f32]) {
         let radiosity =
-            || -> Leaves { std::array::from_fn(|k| scale * self.power[light][k] * shape[k]) };
+            || -> Spectrum { std::array::from_fn(|k| scale * self.power[light][k] * shape[k]) };
         match &self.base {
             Base::Intervals(lanes) => {
                 let absolute = lanes
@@ -429,10 +437,10 @@ impl Lanes {
 
     /// Tristimulus values of each lane at 1 after one more reflection, with the reflectance at full resolution as far
     /// as lanes can resolve it.
-    pub fn reflected(&self, reflectance: &Leaves) -> Vec<[f64; 3]> {
+    pub fn reflected(&self, reflectance: &Spectrum) -> Vec<[f64; 3]> {
         let through = |spectrum: &dyn Fn(usize) -> f64| {
             self.weights.each_ref().map(|w| {
-                KM * (0..LEAVES)
+                KM * (0..BANDS)
                     .map(|k| reflectance[k] * w[k] * spectrum(k))
                     .sum::<f64>()
             })
@@ -456,17 +464,17 @@ impl Lanes {
     }
 
     /// Value of an interval lane at 1 on a leaf.
-    fn shape(&self, lane: &Lane, leaf: usize) -> f64 {
-        if (lane.first..lane.first + lane.count).contains(&leaf) {
-            lane.light.map_or(1.0, |l| self.power[l][leaf])
+    fn shape(&self, lane: &Lane, band: usize) -> f64 {
+        if (lane.first..lane.first + lane.count).contains(&band) {
+            lane.light.map_or(1.0, |l| self.power[l][band])
         } else {
             0.0
         }
     }
 
     /// The 64 leaf values of a row, W/m2/nm. For linear sRGB the shortest of the many spectra of that colour.
-    pub fn leaves(&self, row: &[f32]) -> Leaves {
-        let mut out = [0.0; LEAVES];
+    pub fn spectrum(&self, row: &[f32]) -> Spectrum {
+        let mut out = [0.0; BANDS];
         match &self.base {
             Base::Intervals(lanes) => {
                 for (x, lane) in row.iter().zip(lanes) {
@@ -507,7 +515,7 @@ fn summed(row: &[f32], xyz: &[[f64; 3]]) -> [f64; 3] {
     sum
 }
 
-fn dot(a: &Leaves, b: &Leaves) -> f64 {
+fn dot(a: &Spectrum, b: &Spectrum) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
@@ -538,7 +546,7 @@ mod tests {
         };
         let first = unit(&spectra[0]);
         let part = dot(&first, &spectra[1].power);
-        let rest: Leaves = std::array::from_fn(|k| spectra[1].power[k] - part * first[k]);
+        let rest: Spectrum = std::array::from_fn(|k| spectra[1].power[k] - part * first[k]);
         let length = dot(&rest, &rest).sqrt();
         let all = [
             Lanes::ratio(
@@ -555,11 +563,11 @@ mod tests {
             let exact = weights.map(|w| KM * dot(&w, &spectrum.power));
             for lanes in &all {
                 let mut row = vec![0.0; lanes.len()];
-                lanes.add_emission(k, &[1.0; LEAVES], 1.0, &mut row);
+                lanes.add_emission(k, &[1.0; BANDS], 1.0, &mut row);
                 let close = |xyz: [f64; 3]| (0..3).all(|c| (xyz[c] / exact[c] - 1.0).abs() < 1e-5);
                 assert!(close(lanes.tristimulus(&row)), "{lanes:?}");
-                let leaves = lanes.leaves(&row);
-                assert!(close(weights.map(|w| KM * dot(&w, &leaves))), "{lanes:?}");
+                let spectrum = lanes.spectrum(&row);
+                assert!(close(weights.map(|w| KM * dot(&w, &spectrum))), "{lanes:?}");
             }
         }
     }
@@ -572,7 +580,7 @@ mod tests {
         let upsampler = Upsampler::new(&grid);
         let lanes = Lanes::rgb(&[light("cie/D65")], &upsampler, &weights);
         let mut row = [0.0; 3];
-        lanes.averages(&[0.5; LEAVES], &mut row);
+        lanes.averages(&[0.5; BANDS], &mut row);
         assert!(row.iter().all(|x| (x - 0.5).abs() < 1e-6), "{row:?}");
         let brick = upsampler.reflectance([0.45, 0.12, 0.08]);
         lanes.averages(&brick, &mut row);
@@ -584,16 +592,16 @@ mod tests {
     #[test]
     fn a_whole_basis_reflects_exactly() {
         let weights = Observer::cie1931().weights(&Grid::default());
-        let basis: Vec<Leaves> = (0..LEAVES)
+        let basis: Vec<Spectrum> = (0..BANDS)
             .map(|i| std::array::from_fn(|k| f64::from(i == k)))
             .collect();
         let lanes = Lanes::vectors(&[light("cie/A")], basis, &weights);
-        let rho: Leaves = std::array::from_fn(|k| 0.01 * k as f64);
+        let rho: Spectrum = std::array::from_fn(|k| 0.01 * k as f64);
         let matrix = lanes.matrix(&rho);
-        for i in 0..LEAVES {
-            for j in 0..LEAVES {
+        for i in 0..BANDS {
+            for j in 0..BANDS {
                 let expected = if i == j { rho[i] } else { 0.0 };
-                assert!((matrix[i * LEAVES + j] - expected).abs() < 1e-15);
+                assert!((matrix[i * BANDS + j] - expected).abs() < 1e-15);
             }
         }
     }

@@ -18,7 +18,7 @@ pub struct Arrival {
     /// Its part straight from lamps.
     pub direct: f32,
     /// Half the range of direct light over the leaf.
-    pub spread: f32,
+    pub half_range: f32,
 }
 
 /// The light in a room after a round.
@@ -44,7 +44,7 @@ pub struct Light {
     /// Greatest brightness of reflected radiosity on any leaf below each node.
     pub brightest: Vec<f32>,
     /// Standard deviation of brightness over the leaves of a node.
-    pub spread: Vec<f32>,
+    pub deviation: Vec<f32>,
     /// Light that arrives on every node that is a leaf; 0 elsewhere.
     pub arrival: Vec<Arrival>,
     /// The hierarchy as rays need it.
@@ -79,7 +79,7 @@ impl Light {
             &self.bright_reflected,
             &self.bright_emitted,
             &self.brightest,
-            &self.spread,
+            &self.deviation,
         ];
         let rows = [
             &self.reflected,
@@ -127,7 +127,7 @@ impl Light {
         }
         let both = |k: usize| f64::from(self.bright_reflected[k] + self.bright_emitted[k]);
         let mut square: Vec<f64> = (0..n).map(|k| both(k) * both(k)).collect();
-        self.spread = vec![0.0; n];
+        self.deviation = vec![0.0; n];
         for k in (0..n).rev() {
             let node = &tree.nodes[k];
             if node.is_leaf() {
@@ -141,7 +141,7 @@ impl Light {
             let mean = both(k);
             // Differences below rounding of f32 rows are not spread.
             let variance = square[k] - mean * mean;
-            self.spread[k] = if variance > 1e-12 * square[k] {
+            self.deviation[k] = if variance > 1e-12 * square[k] {
                 variance.sqrt() as f32
             } else {
                 0.0
@@ -184,7 +184,7 @@ pub(crate) fn weighed(row: &[f32], weights: &[f64]) -> f64 {
 pub struct Neighbours {
     start: Vec<u32>,
     ends: Vec<(u32, Occlusion, f32)>,
-    /// Lists that [`Way::Listed`] points into.
+    /// Lists that [`Occlusion::Listed`] points into.
     pub blockers: Vec<u32>,
 }
 

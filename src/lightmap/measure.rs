@@ -83,7 +83,7 @@ impl LightmapGrowth<'_> {
         points
     }
 
-    /// How far maps are off at points; those that something covers are left out. `Sample::cell` counts points here.
+    /// How far maps are off at points; those that something covers are left out. `ErrorSample::cell` counts points here.
     pub(super) fn compared(&self, points: &[TestPoint], placed: &PlacedCharts) -> Vec<ErrorSample> {
         let cells = self.by_chart();
         let sample = |(cell, point): (usize, &TestPoint)| {

@@ -451,7 +451,7 @@ fn clipped_visibility(
             scratch.clipper.begin(p.point, &corners);
             for outline in &scratch.outlines {
                 let shadow = Shadow::new(p.point, outline.as_ref());
-                if !scratch.clipper.cut(&shadow, PIECES) {
+                if !scratch.clipper.clip(&shadow, PIECES) {
                     return None;
                 }
             }

@@ -55,13 +55,13 @@ impl Demand<'_> {
             // Patches made in this round have no brightness yet: refinement goes one level deeper. If they took that of
             // their ancestors, the Cornell box would take half as long again to reach the same error.
             let bright = f64::from(self.bright.get(source as usize).copied().unwrap_or(0.0));
-            let keen = f64::from(
+            let sensitivity = f64::from(
                 self.sensitivity
                     .get(receiver as usize)
                     .copied()
                     .unwrap_or(1.0),
             );
-            misplaced / area * bright * keen * tree.share(receiver).sqrt()
+            misplaced / area * bright * sensitivity * tree.share(receiver).sqrt()
         };
         at(link.a, link.b).max(at(link.b, link.a))
     }
@@ -165,9 +165,11 @@ impl Graph {
             }
         }
         self.links = kept;
-        let view = |way: Occlusion| match way {
+        let view = |occlusion: Occlusion| match occlusion {
             Occlusion::Clear => Visibility::Clear,
-            Occlusion::Listed { .. } => Visibility::Listed(blockers_of(&blockers, way).to_vec()),
+            Occlusion::Listed { .. } => {
+                Visibility::Listed(blockers_of(&blockers, occlusion).to_vec())
+            }
             Occlusion::Crowded => Visibility::Crowded,
         };
         opened
@@ -197,7 +199,7 @@ impl Graph {
     }
 
     fn keep(&mut self, link: Link, view: &Visibility) {
-        let way = match view {
+        let occlusion = match view {
             Visibility::Clear => Occlusion::Clear,
             Visibility::Crowded => Occlusion::Crowded,
             Visibility::Listed(list) => {
@@ -209,16 +211,13 @@ impl Graph {
                 }
             }
         };
-        self.links.push(Link {
-            occlusion: way,
-            ..link
-        });
+        self.links.push(Link { occlusion, ..link });
     }
 }
 
 /// The triangles listed for a way.
-pub fn blockers_of(blockers: &[u32], way: Occlusion) -> &[u32] {
-    match way {
+pub fn blockers_of(blockers: &[u32], occlusion: Occlusion) -> &[u32] {
+    match occlusion {
         Occlusion::Listed { start, count } => {
             &blockers[start as usize..start as usize + usize::from(count)]
         }

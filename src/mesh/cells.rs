@@ -95,7 +95,7 @@ pub(super) struct Hint {
     pub(super) area: f64,
     /// Share of the area that counts.
     pub(super) counts: f64,
-    /// Share of the area that others see, see `solve::outlook`.
+    /// Share of the area that others see, see `solve::leaf_rays`.
     pub(super) open: f64,
     /// Tristimulus irradiance.
     pub(super) light: [f64; 3],

@@ -35,7 +35,7 @@ type LookKey = ([i64; 6], (u32, bool), bool, Option<u32>);
 /// All looks so far.
 pub(crate) struct Looks<'a> {
     bake: &'a Bake,
-    care: GatherQuality,
+    quality: GatherQuality,
     /// Is it time to end?
     late: &'a (dyn Fn() -> bool + Sync),
     /// Is everything looked at nevertheless?
@@ -56,12 +56,12 @@ impl<'a> Looks<'a> {
     pub(crate) fn new(
         bake: &'a Bake,
         spaces: Vec<(u32, bool)>,
-        care: GatherQuality,
+        quality: GatherQuality,
         late: &'a (dyn Fn() -> bool + Sync),
     ) -> Self {
         Self {
             bake,
-            care,
+            quality,
             late,
             patient: false,
             believing: false,
@@ -201,7 +201,7 @@ impl<'a> Looks<'a> {
         };
         let mut pressed = self.bake.pressed(&receivers(&places)).into_iter();
         places.retain(|_| pressed.next() == Some(false));
-        let gathered = self.bake.gather_shown(&receivers(&places), self.care);
+        let gathered = self.bake.gather_shown(&receivers(&places), self.quality);
         let dark =
             |g: &Gathered| g.backs <= MOSTLY && g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
         let in_doubt = places.iter().zip(&gathered).filter(|(_, g)| dark(g));

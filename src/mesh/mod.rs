@@ -181,13 +181,13 @@ impl Bake {
 
     fn growth<'a>(
         &'a self,
-        care: GatherQuality,
+        quality: GatherQuality,
         late: &'a (dyn Fn() -> bool + Sync),
     ) -> MeshGrowth<'a> {
         let spaces = self.spaces();
         let mut cells = Cells::new(self.scene(), self.mesh(), self.tree(), &spaces);
         hints::give(self, &mut cells);
-        let looks = Looks::new(self, spaces, care, late);
+        let looks = Looks::new(self, spaces, quality, late);
         MeshGrowth::new(
             cells,
             looks,

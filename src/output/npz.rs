@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use crate::gather::refined;
 use crate::scene::Scene;
-use crate::spectrum::LEAVES;
+use crate::spectrum::BANDS;
 use std::io::{self, Write};
 use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{CompressionMethod, DateTime, ZipWriter};
@@ -144,7 +144,7 @@ pub fn write(out: &mut dyn Write, arrays: &[Array]) -> io::Result<()> {
 }
 
 /// Radiosity of the vertices of each surface, W/m2/nm on the leaves.
-pub type Spectra = Vec<Vec<[f32; LEAVES]>>;
+pub type Spectra = Vec<Vec<[f32; BANDS]>>;
 
 /// Names of layers, and the spectra of each: asked for one after the other, for those of a large room take a gigabyte.
 pub type LayerSpectra<'a> = (&'a [String], &'a dyn Fn(usize) -> Spectra);
@@ -159,7 +159,7 @@ pub fn write_baked(
     out: &mut dyn Write,
     scene: &Scene,
     surfaces: &[BakedSurface],
-    spectra: &[Vec<[f32; LEAVES]>],
+    spectra: &[Vec<[f32; BANDS]>],
 ) -> Result<()> {
     write_parted(out, scene, surfaces, spectra, (&[], &|_| Vec::new()))
 }
@@ -172,7 +172,7 @@ pub fn write_parted(
     out: &mut dyn Write,
     scene: &Scene,
     surfaces: &[BakedSurface],
-    spectra: &[Vec<[f32; LEAVES]>],
+    spectra: &[Vec<[f32; BANDS]>],
     (names, layer): LayerSpectra,
 ) -> Result<()> {
     refined::check(scene, surfaces)?;
@@ -195,7 +195,7 @@ pub fn write_parted(
         let radiosity = flat(surfaces, &layer(k))?;
         let array = Array {
             name: &format!("radiosity_{k}"),
-            shape: &[radiosity.len() / LEAVES, LEAVES],
+            shape: &[radiosity.len() / BANDS, BANDS],
             values: Values::F32(&radiosity),
         };
         archive.put(&array).map_err(io)?;
@@ -204,7 +204,7 @@ pub fn write_parted(
 }
 
 /// Spectra of all vertices, one after the other.
-fn flat(surfaces: &[BakedSurface], spectra: &[Vec<[f32; LEAVES]>]) -> Result<Vec<f32>> {
+fn flat(surfaces: &[BakedSurface], spectra: &[Vec<[f32; BANDS]>]) -> Result<Vec<f32>> {
     let of = |(surface, spectra): (&BakedSurface, &Vec<_>)| surface.vertices.len() == spectra.len();
     if surfaces.len() != spectra.len() || !surfaces.iter().zip(spectra).all(of) {
         return Err(Error::Internal(
@@ -222,8 +222,8 @@ fn whole(
     radiosity: &[f32],
 ) -> io::Result<()> {
     let columns = MeshColumns::of(scene, surfaces);
-    let mut edges: Vec<f64> = (0..LEAVES).map(|leaf| scene.grid.left(leaf)).collect();
-    edges.push(scene.grid.left(LEAVES - 1) + scene.grid.width());
+    let mut edges: Vec<f64> = (0..BANDS).map(|band| scene.grid.left(band)).collect();
+    edges.push(scene.grid.left(BANDS - 1) + scene.grid.width());
     let count = columns.surface.len();
     let array = |name, shape, values| Array {
         name,
@@ -239,8 +239,8 @@ fn whole(
             &[columns.triangles.len() / 3, 3],
             Values::U32(&columns.triangles),
         ),
-        array("radiosity", &[count, LEAVES], Values::F32(radiosity)),
-        array("wavelengths", &[LEAVES + 1], Values::F64(&edges)),
+        array("radiosity", &[count, BANDS], Values::F32(radiosity)),
+        array("wavelengths", &[BANDS + 1], Values::F64(&edges)),
         array("xyz", &[count, 3], Values::F32(&columns.xyz)),
     ]
     .iter()

@@ -17,7 +17,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Rows of pixels in a band.
-const BAND: usize = 16;
+const STRIP: usize = 16;
 
 /// What a sample shows: a triangle and the weights of its corners.
 #[derive(Debug, Clone, Copy)]
@@ -50,10 +50,10 @@ pub(super) fn draw<T: Send>(
     grid: usize,
     finish: impl Fn(&[Option<Fragment>]) -> Vec<T> + Sync,
 ) -> Vec<T> {
-    let bands = bins(meshes, view, [width, height]);
-    let rows = bands.par_iter().enumerate().map(|(band, triangles)| {
-        let first = band * BAND;
-        let count = BAND.min(height - first);
+    let strips = bins(meshes, view, [width, height]);
+    let rows = strips.par_iter().enumerate().map(|(strip, triangles)| {
+        let first = strip * STRIP;
+        let count = STRIP.min(height - first);
         let samples = draw_band(meshes, view, triangles, width, first, count, grid);
         samples
             .chunks(width * grid * grid)
@@ -176,28 +176,28 @@ fn bounds(
 
 /// For each band the (mesh, triangle) that touch it, in order.
 fn bins(meshes: &impl RasterMeshes, view: &View, size: [usize; 2]) -> Vec<Vec<[u32; 2]>> {
-    let mut bands = vec![Vec::new(); size[1].div_ceil(BAND)];
-    let last = bands.len().saturating_sub(1);
+    let mut strips = vec![Vec::new(); size[1].div_ceil(STRIP)];
+    let last = strips.len().saturating_sub(1);
     for (mesh, triangles) in meshes.sizes().into_iter().enumerate() {
         let touched: Vec<(u32, usize, usize)> = (0..triangles)
             .into_par_iter()
             .filter_map(|triangle| {
                 let setup = Setup::new(meshes, view, mesh, triangle, size)?;
-                let band = |y: f64| ((y / BAND as f64) as usize).min(last);
+                let strip = |y: f64| ((y / STRIP as f64) as usize).min(last);
                 Some((
                     triangle as u32,
-                    band(setup.bounds[2]),
-                    band(setup.bounds[3]),
+                    strip(setup.bounds[2]),
+                    strip(setup.bounds[3]),
                 ))
             })
             .collect();
         for (triangle, from, to) in touched {
-            bands[from..=to]
+            strips[from..=to]
                 .iter_mut()
-                .for_each(|band| band.push([mesh as u32, triangle]));
+                .for_each(|strip| strip.push([mesh as u32, triangle]));
         }
     }
-    bands
+    strips
 }
 
 fn draw_band(

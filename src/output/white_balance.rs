@@ -85,7 +85,7 @@ impl WhiteBalance {
 }
 
 fn bands() -> Bands {
-    Bands::leaves(&Grid::default())
+    Bands::of(&Grid::default())
 }
 
 /// An eye takes for white what is near the colours of glowing bodies; a coloured light stays coloured.

@@ -16,8 +16,8 @@ pub enum Align {
 /// A table under construction.
 ///
 /// ```
-/// use haarlight::report::{Align, Table};
-/// let mut table = Table::new([("phase", Align::Left), ("s", Align::Right)]);
+/// use haarlight::report::{Align, TextTable};
+/// let mut table = TextTable::new([("phase", Align::Left), ("s", Align::Right)]);
 /// table.row(["links", "0.25"]);
 /// table.row(["gather", "12.00"]);
 /// assert_eq!(table.terminal(), "phase       s\n------  -----\nlinks    0.25\ngather  12.00\n");

@@ -8,7 +8,7 @@ use super::pane::PaneKind;
 pub use super::room::Changes;
 use super::{Projection, Scene, luminaires};
 use crate::color::{KM, Observer};
-use crate::data::{Leaves, nearest_of};
+use crate::data::{Spectrum, nearest_of};
 use crate::error::{Error, Result};
 use glam::{DMat4, DVec3};
 
@@ -102,7 +102,7 @@ impl Scene {
                 format!("the nearest names are {near}"),
             ));
         }
-        let size = |(light, shape): &(usize, &mut Leaves)| -> f64 {
+        let size = |(light, shape): &(usize, &mut Spectrum)| -> f64 {
             let power = self.spectra[*light].power.iter();
             let leaves = power.zip(shape.iter()).zip(&luminous);
             leaves.map(|((p, s), y)| p * s * y).sum()

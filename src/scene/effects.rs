@@ -9,7 +9,7 @@ use super::lacking::lacking;
 use super::sheet::Sheet;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -94,7 +94,7 @@ impl EffectKind {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Effect {
-    /// [`Kind::name`], or the name of an effect that the program lacks.
+    /// [`EffectKind::name`], or the name of an effect that the program lacks.
     pub name: String,
     /// Does it run?
     pub runs: bool,
@@ -198,7 +198,7 @@ impl Plan {
         self.effects.iter().any(|e| e.name == kind.name() && e.runs)
     }
 
-    /// The lines, [`Kind`]s in order, then what the program lacks.
+    /// The lines, [`EffectKind`]s in order, then what the program lacks.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
     }
@@ -348,7 +348,7 @@ fn interreflection(used: &[&Material]) -> (bool, String) {
     }
 }
 
-fn is_flat(spectrum: &Leaves) -> bool {
+fn is_flat(spectrum: &Spectrum) -> bool {
     spectrum.iter().all(|v| *v == spectrum[0])
 }
 

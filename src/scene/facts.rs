@@ -8,7 +8,7 @@
 use super::profile::Profile;
 use super::{LightKind, Material, Projection, PunctualLight, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -251,7 +251,7 @@ struct SceneMeter<'a> {
     scene: &'a Scene,
     upsampler: Upsampler,
     /// KM times the nm-integrals of y_bar.
-    luminous: Leaves,
+    luminous: Spectrum,
 }
 
 impl<'a> SceneMeter<'a> {
@@ -265,7 +265,7 @@ impl<'a> SceneMeter<'a> {
     }
 
     /// Luminous size of a lamp: cd/m2, cd or lx.
-    fn size(&self, light: usize, shape: &Leaves) -> f64 {
+    fn size(&self, light: usize, shape: &Spectrum) -> f64 {
         let power = &self.scene.spectra[light].power;
         power
             .iter()

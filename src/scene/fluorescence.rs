@@ -28,7 +28,7 @@ use super::bispectral::{Bispectral, UPHILL};
 use super::check::Check;
 use super::json::short;
 use super::reader::Reader;
-use crate::data::{Grid, LEAVES, Leaves, Outside, Table, TableKind};
+use crate::data::{BANDS, Grid, Outside, Spectrum, Table, TableKind};
 use serde_json::{Map, Value};
 
 /// Steps over an excitation, 1 nm of most of them: a share of a fifth is asked for.
@@ -50,7 +50,7 @@ pub struct Term {
     /// over the grid.
     pub light: usize,
     /// Power given out for a unit of power that comes, by leaf, in [0, 1): what the text above calls g.
-    pub excitation: Leaves,
+    pub excitation: Spectrum,
     /// Of which layer light must be to excite it; none: any.
     pub layer: Option<usize>,
 }
@@ -63,8 +63,8 @@ impl Fluorescence {
     }
 
     /// Power given out for a unit of power that comes, by leaf, all terms together.
-    pub fn efficiency(&self) -> Leaves {
-        let mut sum = [0.0; LEAVES];
+    pub fn efficiency(&self) -> Spectrum {
+        let mut sum = [0.0; BANDS];
         for term in self.once() {
             (sum.iter_mut().zip(&term.excitation)).for_each(|(s, g)| *s += g);
         }
@@ -73,7 +73,7 @@ impl Fluorescence {
 
     /// The Donaldson matrix without its diagonal of reflection: element `[i][j]` is the spectral exitance on leaf i for a unit of
     /// spectral irradiance on leaf j, `width` the width of a leaf, nm.
-    pub fn matrix(&self, spectra: &[LightSpectrum], width: f64) -> Vec<Leaves> {
+    pub fn matrix(&self, spectra: &[LightSpectrum], width: f64) -> Vec<Spectrum> {
         let element = |i: usize, j: usize| {
             let each = self
                 .once()
@@ -81,7 +81,7 @@ impl Fluorescence {
             each.sum::<f64>() * width
         };
         let row = |i: usize| std::array::from_fn(|j| element(i, j));
-        (0..LEAVES).map(row).collect()
+        (0..BANDS).map(row).collect()
     }
 }
 
@@ -89,11 +89,11 @@ impl Fluorescence {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct FluorescenceWish {
     /// Emission (1/nm) and excitation of each term.
-    pub(crate) terms: Vec<[Leaves; 2]>,
+    pub(crate) terms: Vec<[Spectrum; 2]>,
     /// In words.
     pub(crate) from: String,
     /// Diagonal of a matrix: the reflectance, if it holds one.
-    pub(crate) diagonal: Option<Leaves>,
+    pub(crate) diagonal: Option<Spectrum>,
 }
 
 /// Reads the fluorescence of a material's entry: an object, or a list of them.
@@ -137,7 +137,7 @@ fn dye(
     reader: &mut Reader,
     object: &Map<String, Value>,
     place: &str,
-) -> Option<([Leaves; 2], String)> {
+) -> Option<([Spectrum; 2], String)> {
     reader.keys(object, &["excitation", "emission", "yield", "csv"], place);
     let quantum = object.get("yield").and_then(Value::as_f64);
     let quantum = quantum.filter(|q| (0.0..=1.0).contains(q));
@@ -300,7 +300,7 @@ fn uphill(absorbed: &Table, emission: &Table) -> (f64, f64) {
 }
 
 /// An emission on the grid, 1/nm, the integral of its whole table 1; none of a table of zeros.
-fn normalised(table: &Table, grid: &Grid) -> Option<Leaves> {
+fn normalised(table: &Table, grid: &Grid) -> Option<Spectrum> {
     let [first, last] = table.range();
     let all = table.integral(first, last, Outside::Zero);
     (all > 0.0).then(|| grid.means(table, Outside::Zero).map(|x| x / all))
@@ -323,7 +323,7 @@ fn mean_wavelength(table: &Table) -> f64 {
 }
 
 /// Means over the leaves of a share that depends on the table's value and the wavelength.
-fn power(table: &Table, grid: &Grid, share: impl Fn(f64, f64) -> f64) -> Leaves {
+fn power(table: &Table, grid: &Grid, share: impl Fn(f64, f64) -> f64) -> Spectrum {
     std::array::from_fn(|leaf| {
         let (from, to) = (grid.left(leaf), grid.left(leaf + 1));
         let mut ends = vec![from];

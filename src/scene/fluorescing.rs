@@ -4,7 +4,7 @@ use super::check::Check;
 use super::fluorescence::{Fluorescence, FluorescenceWish, Term};
 use super::json::short;
 use super::{LightSpectrum, Material};
-use crate::data::{Grid, LEAVES};
+use crate::data::{BANDS, Grid};
 
 /// Rounding of measured reflectances and excitations may let their sum exceed 1 by so much.
 const ROUNDING: f64 = 1e-6;
@@ -57,8 +57,8 @@ pub(super) fn fluoresce(
         from: wish.from.clone(),
     };
     let out = fluorescence.efficiency();
-    let rho = measured.map_or([0.0; LEAVES], |_| material.reflectance);
-    let over: Vec<usize> = (0..LEAVES)
+    let rho = measured.map_or([0.0; BANDS], |_| material.reflectance);
+    let over: Vec<usize> = (0..BANDS)
         .filter(|&k| rho[k] + out[k] > 1.0 + ROUNDING)
         .collect();
     if let (Some(first), Some(last)) = (over.first(), over.last()) {

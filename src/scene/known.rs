@@ -73,10 +73,10 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
                 let next = "take the reflectance out, or leave the diagonal at 0";
                 reader.check.problem(place, what, next);
             }
-            (None, Some(leaves)) => {
+            (None, Some(spectrum)) => {
                 spectra.reflectance = Some(Sampled {
                     from: "the matrix's diagonal".into(),
-                    leaves,
+                    spectrum,
                     is_csv: true,
                 });
             }

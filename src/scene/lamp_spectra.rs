@@ -11,7 +11,7 @@ use super::check::Check;
 use super::reader::Sampled;
 use super::{LightSpectrum, Material, PunctualLight};
 use crate::color::{KM, Observer, Upsampler};
-use crate::data::{Grid, LEAVES, Leaves, Outside, named};
+use crate::data::{BANDS, Grid, Outside, Spectrum, named};
 
 /// Name of the spectrum of all lamps that are given by colour.
 const BY_COLOUR: &str = "cie/D65";
@@ -42,10 +42,10 @@ const SAME_SHAPE: f64 = 1e-9;
 /// A lamp's part: which spectrum, and what to multiply it by.
 #[derive(Debug, Clone)]
 pub(crate) struct ScaledSpectrum {
-    /// Index in [`Lamps::spectra`].
+    /// Index in [`LampSpectra::spectra`].
     pub(crate) light: usize,
     /// Multiplier for each leaf.
-    pub(crate) shape: Leaves,
+    pub(crate) shape: Spectrum,
     /// The colour that was upsampled, greatest component 0.5.
     pub(crate) color: [f32; 3],
     /// Multiplier of the upsampled `color`.
@@ -59,7 +59,7 @@ pub(crate) struct LampSpectra<'a> {
     pub(crate) grid: &'a Grid,
     upsampler: &'a Upsampler,
     /// KM times the nm-integrals of y_bar.
-    luminous: Leaves,
+    luminous: Spectrum,
     spectra: Vec<LightSpectrum>,
     /// What materials fluoresce: no lamp's, and not of size 1.
     pub(crate) excited: Vec<LightSpectrum>,
@@ -99,12 +99,12 @@ impl<'a> LampSpectra<'a> {
 
     /// A lamp of a known spectrum and luminous size; none: the size of the spectrum itself.
     pub(crate) fn by_spectrum(&mut self, spectrum: &Sampled, size: Option<f64>) -> ScaledSpectrum {
-        let (light, own) = self.add(&spectrum.from, spectrum.leaves);
+        let (light, own) = self.add(&spectrum.from, spectrum.spectrum);
         let size = size.unwrap_or(own);
         let color = [LAMP_BRIGHTNESS as f32; 3];
         ScaledSpectrum {
             light,
-            shape: [size; LEAVES],
+            shape: [size; BANDS],
             color,
             scale: size / LAMP_BRIGHTNESS,
             from: spectrum.from.clone(),
@@ -113,15 +113,15 @@ impl<'a> LampSpectra<'a> {
 
     /// The luminous size that a spectrum has by itself.
     pub(crate) fn own_size(&self, spectrum: &Sampled) -> f64 {
-        self.size_of(&spectrum.leaves)
+        self.size_of(&spectrum.spectrum)
     }
 
-    fn size_of(&self, power: &Leaves) -> f64 {
+    fn size_of(&self, power: &Spectrum) -> f64 {
         power.iter().zip(&self.luminous).map(|(p, y)| p * y).sum()
     }
 
     /// Shares `power`, brought to luminous size 1, among the lamps of the same spectrum; returns the size it had.
-    fn add(&mut self, name: &str, power: Leaves) -> (usize, f64) {
+    fn add(&mut self, name: &str, power: Spectrum) -> (usize, f64) {
         let size = self.size_of(&power);
         let unit = power.map(|p| p / size);
         let same = self.spectra.iter().position(|s| s.power == unit);
@@ -159,7 +159,7 @@ impl<'a> LampSpectra<'a> {
         if emissions().any(|e| e.texture.is_some()) {
             return self.spectra;
         }
-        let shapes: Vec<Leaves> = emissions()
+        let shapes: Vec<Spectrum> = emissions()
             .map(|e| e.shape)
             .chain(lights.iter().filter(|l| l.light == light).map(|l| l.shape))
             .collect();
@@ -168,7 +168,7 @@ impl<'a> LampSpectra<'a> {
         };
         let one = self.luminous_size(light, first);
         let unit = first.map(|s| s / one);
-        let alike = |shape: &Leaves, size: f64| {
+        let alike = |shape: &Spectrum, size: f64| {
             shape
                 .iter()
                 .zip(&unit)
@@ -192,12 +192,12 @@ impl<'a> LampSpectra<'a> {
             .filter(|e| e.light == light)
         {
             let size = sizes.next().expect("one size for each lamp");
-            emission.shape = [size; LEAVES];
+            emission.shape = [size; BANDS];
             emission.color = [LAMP_BRIGHTNESS as f32; 3];
             emission.scale = size / LAMP_BRIGHTNESS;
         }
         for (lamp, size) in lights.iter_mut().filter(|l| l.light == light).zip(sizes) {
-            lamp.shape = [size; LEAVES];
+            lamp.shape = [size; BANDS];
         }
         if unit.iter().any(|u| *u != unit[0]) {
             self.spectra[light].name = format!("{BY_COLOUR} in one colour");
@@ -211,7 +211,7 @@ impl<'a> LampSpectra<'a> {
     }
 
     /// Tells the luminous size of a finished spectrum under a shape.
-    pub(crate) fn luminous(&self) -> impl Fn(&LightSpectrum, &Leaves) -> f64 + use<> {
+    pub(crate) fn luminous(&self) -> impl Fn(&LightSpectrum, &Spectrum) -> f64 + use<> {
         let luminous = self.luminous;
         move |spectrum, shape| {
             let leaves = spectrum.power.iter().zip(shape).zip(&luminous);
@@ -220,9 +220,9 @@ impl<'a> LampSpectra<'a> {
     }
 
     /// Luminous size of a spectrum under a shape.
-    fn luminous_size(&self, light: usize, shape: &Leaves) -> f64 {
+    fn luminous_size(&self, light: usize, shape: &Spectrum) -> f64 {
         let power = &self.spectra[light].power;
-        (0..LEAVES)
+        (0..BANDS)
             .map(|leaf| power[leaf] * shape[leaf] * self.luminous[leaf])
             .sum()
     }

@@ -15,7 +15,7 @@ use super::spectra_file::SpectraFile;
 use super::{Image, LightSpectrum, Material, Options, PunctualLight, Scene, Surface};
 use super::{lacking, luminaires};
 use crate::color::Upsampler;
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -24,11 +24,11 @@ impl Scene {
     /// Reads a room.
     ///
     /// ```
-    /// use haarlight::scene::{Options, Scene, effects::{Kind, Plan}};
+    /// use haarlight::scene::{Options, Scene, effects::{EffectKind, Plan}};
     /// let room = Scene::load("scenes/convex.glb", &Options::default())?;
     /// assert_eq!(room.materials[0].name, "floor");
     /// // Nothing can block in a convex empty room, so that no visibility is worked out.
-    /// assert!(!Plan::of(&room).runs(Kind::Occlusion));
+    /// assert!(!Plan::of(&room).runs(EffectKind::Occlusion));
     /// # Ok::<(), haarlight::Error>(())
     /// ```
     ///
@@ -137,7 +137,7 @@ impl PaintedScene {
         let excited = std::mem::take(&mut lamps.excited);
         let mut spectra = lamps.finish(&mut materials, &mut lights);
         fluorescing::join(&mut materials, &mut spectra, excited);
-        let size = |light: usize, shape: &Leaves| luminous(&spectra[light], shape);
+        let size = |light: usize, shape: &Spectrum| luminous(&spectra[light], shape);
         let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
         let (panes, surfaces): (Vec<_>, Vec<_>) = surfaces.into_iter().partition(is_pane);
         let scale = options.scale.unwrap_or(1.0);

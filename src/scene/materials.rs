@@ -157,7 +157,7 @@ fn paint(
     let [r, g, b, alpha] = raw.base_color_factor;
     let base_color = [r, g, b].map(|c| c.min(1.0));
     let (reflectance, from) = match measured {
-        Some(measured) => (measured.leaves, measured.from.clone()),
+        Some(measured) => (measured.spectrum, measured.from.clone()),
         None => (
             upsampler.reflectance(base_color),
             format!("colour {r:.3} {g:.3} {b:.3}, upsampled"),
@@ -344,7 +344,7 @@ impl MaterialNotes {
 mod tests {
     use super::*;
     use crate::color::{KM, Observer};
-    use crate::data::LEAVES;
+    use crate::data::BANDS;
     use crate::scene::LightSpectrum;
     use serde_json::json;
 
@@ -391,7 +391,7 @@ mod tests {
     fn luminance(material: &Material, spectra: &[LightSpectrum]) -> f64 {
         let y = Observer::cie1931().weights(&Grid::default())[1];
         let emission = material.emission.as_ref().unwrap();
-        (0..LEAVES)
+        (0..BANDS)
             .map(|i| KM * spectra[emission.light].power[i] * emission.shape[i] * y[i])
             .sum()
     }
@@ -400,8 +400,8 @@ mod tests {
     fn greys_are_flat_and_white_is_brought_down() {
         let (materials, _, problems, warnings) =
             made(&[raw("grey", [0.5; 3]), raw("white", [1.0; 3])]);
-        assert_eq!(materials[0].reflectance, [0.5; LEAVES]);
-        assert_eq!(materials[1].reflectance, [GREATEST_ALBEDO; LEAVES]);
+        assert_eq!(materials[0].reflectance, [0.5; BANDS]);
+        assert_eq!(materials[1].reflectance, [GREATEST_ALBEDO; BANDS]);
         assert_eq!(problems, Vec::<String>::new());
         assert_eq!(warnings.len(), 1);
         assert!(warnings[0].contains("0.999 ('white')"), "{warnings:?}");
@@ -479,7 +479,7 @@ mod tests {
         assert!((luminance(&made[0], &spectra) - 5000.0).abs() < 1e-6);
         // The integral of y_bar is 106.857 nm, less than 0.01 nm of it beyond 380 to 780 nm.
         assert!((luminance(&made[1], &spectra) - 683.0 * 106.857 * 0.01).abs() < 0.1);
-        let leaf = Grid::default().leaf_of(555.0).unwrap();
+        let leaf = Grid::default().band_of(555.0).unwrap();
         let radiance = spectra[1].power[leaf] * made[1].emission.as_ref().unwrap().shape[leaf];
         assert!((radiance - 0.01).abs() < 1e-12);
         assert!((luminance(&made[2], &spectra) - 70.0).abs() < 1e-9);

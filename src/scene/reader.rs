@@ -6,7 +6,7 @@ use super::said;
 use super::uri;
 use crate::color::Observer;
 use crate::data::{
-    Grid, LEAVES, Leaves, Named, Outside, Table, TableKind, named, nearest, nearest_of,
+    BANDS, Grid, Named, Outside, Spectrum, Table, TableKind, named, nearest, nearest_of,
 };
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub(crate) struct Sampled {
     /// `cie/F2` or the CSV's path as written.
     pub(crate) from: String,
     /// Band means.
-    pub(crate) leaves: Leaves,
+    pub(crate) spectrum: Spectrum,
     /// Values of a CSV carry a unit; those of the registry are relative.
     pub(crate) is_csv: bool,
 }
@@ -99,8 +99,8 @@ impl Reader<'_> {
         if !self.is_share(&table, kind, &from, place) {
             return None;
         }
-        let leaves = self.grid.means(&table, outside);
-        if kind == TableKind::Illuminant && leaves.iter().all(|v| *v == 0.0) {
+        let spectrum = self.grid.means(&table, outside);
+        if kind == TableKind::Illuminant && spectrum.iter().all(|v| *v == 0.0) {
             let (start, end) = (self.grid.start(), self.grid.end());
             let what = format!("'{from}' gives no light from {start} to {end} nm");
             self.check.problem(
@@ -111,7 +111,7 @@ impl Reader<'_> {
             return None;
         }
         let luminous = || Observer::cie1931().weights(self.grid)[1];
-        let seen = |y: Leaves| leaves.iter().zip(y).any(|(x, y)| x * y > 0.0);
+        let seen = |y: Spectrum| spectrum.iter().zip(y).any(|(x, y)| x * y > 0.0);
         if kind == TableKind::Illuminant && !seen(luminous()) {
             let what = format!("'{from}' gives no light that an eye sees");
             let next = "lamps are measured by what is seen of them: give the trace of visible light that it has";
@@ -121,7 +121,7 @@ impl Reader<'_> {
         self.note_ultraviolet(&table, kind, &from);
         Some(Sampled {
             from,
-            leaves,
+            spectrum,
             is_csv,
         })
     }
@@ -139,7 +139,7 @@ impl Reader<'_> {
         }
         Some(Sampled {
             from: plain.to_string(),
-            leaves: [plain; LEAVES],
+            spectrum: [plain; BANDS],
             is_csv: false,
         })
     }

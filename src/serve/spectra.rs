@@ -1,7 +1,7 @@
 //! The spectrum of the light at points of a picture, and how wrong it may be there.
 
 use crate::light::lanes::Lanes;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 
 /// Irradiance of the vertices of a picture by lanes.
 #[derive(Debug)]
@@ -15,9 +15,9 @@ pub(super) struct VertexSpectra {
 #[derive(Debug)]
 enum VertexRows {
     /// One for each vertex of each part.
-    Own(Vec<Vec<[f32; LEAVES]>>),
+    Own(Vec<Vec<[f32; BANDS]>>),
     /// Vertices that lie together share one: for each part, which.
-    Shared(Vec<[f32; LEAVES]>, Vec<Vec<u32>>),
+    Shared(Vec<[f32; BANDS]>, Vec<Vec<u32>>),
 }
 
 /// Mean colour difference, an estimate.
@@ -33,7 +33,7 @@ pub(super) struct ColourError {
 #[derive(Debug)]
 pub(super) struct PointReading {
     /// Irradiance, W/m2/nm.
-    pub(super) spectrum: Leaves,
+    pub(super) spectrum: Spectrum,
     /// Tristimulus irradiance; Y is illuminance, lx.
     pub(super) xyz: [f64; 3],
     /// Colour difference (CIEDE2000), an estimate; at this very point, or in the mean of the room?
@@ -44,7 +44,7 @@ impl VertexSpectra {
     /// Rows of each vertex of the parts.
     pub(super) fn own(
         lanes: &Lanes,
-        parts: Vec<Vec<[f32; LEAVES]>>,
+        parts: Vec<Vec<[f32; BANDS]>>,
         error: Option<ColourError>,
     ) -> Self {
         let (lanes, rows) = (lanes.clone(), VertexRows::Own(parts));
@@ -52,7 +52,7 @@ impl VertexSpectra {
     }
 
     /// Rows that vertices share; `of`: which of them each vertex of the parts has.
-    pub(super) fn shared(lanes: &Lanes, rows: Vec<[f32; LEAVES]>, of: Vec<Vec<u32>>) -> Self {
+    pub(super) fn shared(lanes: &Lanes, rows: Vec<[f32; BANDS]>, of: Vec<Vec<u32>>) -> Self {
         Self {
             lanes: lanes.clone(),
             rows: VertexRows::Shared(rows, of),
@@ -80,7 +80,7 @@ impl VertexSpectra {
             VertexRows::Own(parts) => parts.get(part)?.get(vertex),
             VertexRows::Shared(rows, of) => rows.get(*of.get(part)?.get(vertex)? as usize),
         };
-        let mut mixed = [0.0; LEAVES];
+        let mut mixed = [0.0; BANDS];
         for (vertex, weight) in vertices.into_iter().zip(weights) {
             let row = row(vertex)?;
             let pairs = mixed.iter_mut().zip(row);
@@ -98,7 +98,7 @@ impl VertexSpectra {
                 None => (error.mean, false),
             });
         Some(PointReading {
-            spectrum: self.lanes.leaves(&mixed),
+            spectrum: self.lanes.spectrum(&mixed),
             xyz: self.lanes.tristimulus(&mixed),
             error,
         })

@@ -12,7 +12,7 @@ use super::cuts::{CutChoice, split_worst};
 use crate::color::{KM, luv_jacobian};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{
-    Bounded, CmfTree, DyadicTree, Interval, LEAVES, Leaves, Metric, Partition, node,
+    BANDS, Bounded, CmfTree, DyadicTree, Interval, Metric, Partition, Spectrum, node,
 };
 
 /// Bounces at the most.
@@ -86,7 +86,7 @@ impl Coarse {
     pub(super) fn choose_bounded(
         &self,
         spectra: &[LightSpectrum],
-        weights: &[Leaves; 3],
+        weights: &[Spectrum; 3],
         white: [f64; 3],
         tolerance: f64,
     ) -> CutChoice {
@@ -94,10 +94,10 @@ impl Coarse {
         let lights: Vec<LightTrees> = (0..spectra.len())
             .map(|light| {
                 let cmf = all.under(&spectra[light].power);
-                let trees = |rows: &[Leaves]| -> Vec<DyadicTree<Bounded>> {
+                let trees = |rows: &[Spectrum]| -> Vec<DyadicTree<Bounded>> {
                     rows.iter().map(|row| DyadicTree::new(row, &cmf)).collect()
                 };
-                let shown = |rows: &[Leaves]| -> Vec<Option<DyadicTree<Bounded>>> {
+                let shown = |rows: &[Spectrum]| -> Vec<Option<DyadicTree<Bounded>>> {
                     rows.iter()
                         .map(|row| {
                             row.iter()
@@ -123,7 +123,7 @@ impl Coarse {
         loop {
             let (error, harm) = self.bound(&lights, &cuts, white);
             let count: usize = cuts.iter().map(|c| c.count()).sum();
-            if error <= tolerance || count >= LEAVES || harm.is_empty() {
+            if error <= tolerance || count >= BANDS || harm.is_empty() {
                 return CutChoice { cuts, error };
             }
             split_worst(&mut cuts, harm, count);

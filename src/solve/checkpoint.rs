@@ -16,7 +16,7 @@ use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::{self, Lanes};
 use crate::light::{Filters, Light, Neighbours, Rows, Through, padded};
 use crate::link::{Graph, Link, MAX_DEPTH, Occlusion, RowBalance};
-use crate::spectrum::LEAVES;
+use crate::spectrum::BANDS;
 use crate::store::codec::Read;
 use crate::store::{Broken, Decoder, Encoder, FileKind, Fingerprint, Packs, container};
 use std::borrow::Cow;
@@ -301,7 +301,7 @@ impl Bake {
             .map(lane_of)
             .collect::<Read<Vec<lanes::Lane>>>()?;
         let written = lanes.len();
-        if written > LEAVES {
+        if written > BANDS {
             return Err(Broken::new("has an impossible number of lanes"));
         }
         let there =
@@ -406,8 +406,8 @@ fn encode_graph(graph: &Graph, out: &mut Encoder) -> io::Result<()> {
 fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Graph> {
     let ends = from.get_list::<[u32; 2]>()?;
     let figures = from.get_list::<[f32; 3]>()?;
-    let ways = from.get_list::<u16>()?;
-    if figures.len() != ends.len() || ways.len() != ends.len() {
+    let occlusions = from.get_list::<u16>()?;
+    if figures.len() != ends.len() || occlusions.len() != ends.len() {
         return Err(Broken::new("has links in parts that do not fit"));
     }
     let mut starts = from.get_list::<u32>()?;
@@ -416,11 +416,12 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
         return Err(Broken::new("lists a triangle that does not exist"));
     }
     let mut links = Vec::with_capacity(ends.len());
-    for (([a, b], [exchange, open_exchange, variation]), way) in ends.zip(figures).zip(ways) {
+    for (([a, b], [exchange, open_exchange, variation]), code) in ends.zip(figures).zip(occlusions)
+    {
         if a as usize >= nodes || b as usize >= nodes {
             return Err(Broken::new("links a patch that does not exist"));
         }
-        let way = match way {
+        let occlusion = match code {
             CLEAR => Occlusion::Clear,
             CROWDED => Occlusion::Crowded,
             listed => {
@@ -441,7 +442,7 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
             exchange,
             open_exchange,
             variation,
-            occlusion: way,
+            occlusion,
         });
     }
     Ok(Graph { links, blockers })
@@ -450,7 +451,7 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
 fn lane_of([light, first, count]: [u32; 3]) -> Read<lanes::Lane> {
     let (first, count) = (first as usize, count as usize);
     let light = (light != u32::MAX).then_some(light as usize);
-    if count == 0 || first >= LEAVES || count > LEAVES - first {
+    if count == 0 || first >= BANDS || count > BANDS - first {
         return Err(Broken::new("has an impossible lane"));
     }
     Ok(lanes::Lane {

@@ -12,8 +12,8 @@ use crate::scene::effects::EffectKind;
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;
 use crate::spectrum::{
-    CmfTree, Control, DyadicTree, Estimate, LEAVES, Leaves, List, Metric, Partition, Path, control,
-    represent,
+    BANDS, CmfTree, Control, DyadicTree, Estimate, List, Metric, Partition, Path, Spectrum,
+    control, represent,
 };
 use crate::team::Interrupted;
 
@@ -82,7 +82,7 @@ impl Bake {
                 Lanes::dense(spectra, weights)
             }
             Representation::Characteristic(n) if !none => {
-                let lights: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
+                let lights: Vec<Spectrum> = spectra.iter().map(|s| s.power).collect();
                 let basis = basis(&lights, &paints(&self.room.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
@@ -106,7 +106,7 @@ impl Bake {
     /// Ratios to each light on as few intervals as the model of the room allows.
     fn perceptual(
         &mut self,
-        guide: Option<&[Leaves; 3]>,
+        guide: Option<&[Spectrum; 3]>,
         tolerance: f64,
     ) -> Result<Lanes, Interrupted> {
         let mut model = self.model(coarse::PATCHES)?;
@@ -114,7 +114,7 @@ impl Bake {
         model.join(&kin.of, kin.spectra.len());
         let (spectra, weights) = (&kin.spectra, &self.room.weights);
         if guide.is_some() {
-            model.kindle(spectra, weights, self.room.scene.grid.width());
+            model.add_fluorescence(spectra, weights, self.room.scene.grid.width());
         }
         let (known, white) = (self.solution.lanes.cuts(), self.solution.light.white);
         let known = known.map(|cuts| kin.one_of_each(&cuts));
@@ -245,13 +245,13 @@ impl Kin {
         };
         self.copies
             .as_deref()
-            .is_none_or(|copies| lanes(copies) <= LEAVES)
+            .is_none_or(|copies| lanes(copies) <= BANDS)
     }
 }
 
 /// Transmittances of the tinted panes of a scene and reflectances of its tinted mirrors, each once, and the product of all of them.
-fn tints(scene: &Scene) -> Vec<Leaves> {
-    let mut tints: Vec<Leaves> = Vec::new();
+fn tints(scene: &Scene) -> Vec<Spectrum> {
+    let mut tints: Vec<Spectrum> = Vec::new();
     let panes = scene.panes.iter();
     let panes = panes.filter_map(|s| scene.materials[s.material].pane.as_ref());
     let panes = panes.filter(|pane| !pane.is_neutral());
@@ -265,8 +265,8 @@ fn tints(scene: &Scene) -> Vec<Leaves> {
         }
     }
     if tints.len() > 1 {
-        let together = |all: Leaves, one: &Leaves| std::array::from_fn(|k| all[k] * one[k]);
-        tints.push(tints.iter().fold([1.0; LEAVES], together));
+        let together = |all: Spectrum, one: &Spectrum| std::array::from_fn(|k| all[k] * one[k]);
+        tints.push(tints.iter().fold([1.0; BANDS], together));
     }
     tints
 }
@@ -274,15 +274,15 @@ fn tints(scene: &Scene) -> Vec<Leaves> {
 /// Does every lamp shine with the very spectrum of its light? Then its direct light is one number for each light, on
 /// any cut.
 fn lamps_are_flat(scene: &Scene) -> bool {
-    let flat = |shape: &Leaves| shape.iter().all(|&x| x == shape[0]);
+    let flat = |shape: &Spectrum| shape.iter().all(|&x| x == shape[0]);
     let mut emissions = scene.materials.iter().filter_map(|m| m.emission.as_ref());
     emissions.all(|e| e.texture.is_none() && flat(&e.shape))
         && scene.lights.iter().all(|l| flat(&l.shape))
 }
 
 /// Distinct reflectances of a scene, in order of its materials.
-fn paints(scene: &Scene) -> Vec<Leaves> {
-    let mut paints: Vec<Leaves> = Vec::new();
+fn paints(scene: &Scene) -> Vec<Spectrum> {
+    let mut paints: Vec<Spectrum> = Vec::new();
     for material in &scene.materials {
         if paints.len() < MATERIALS && !paints.contains(&material.reflectance) {
             paints.push(material.reflectance);
@@ -293,7 +293,7 @@ fn paints(scene: &Scene) -> Vec<Leaves> {
 
 /// Union of the cuts that the paper's control gives every light and its first and second reflections; `tolerance` is the
 /// colour difference (CIELUV) that spectra may cause.
-fn paper_cut(scene: &Scene, weights: &[Leaves; 3], tolerance: f64) -> Partition {
+fn paper_cut(scene: &Scene, weights: &[Spectrum; 3], tolerance: f64) -> Partition {
     let cmf = CmfTree::new(*weights);
     let scale = tolerance / PAPER_DE_LUV;
     let rules = Control {

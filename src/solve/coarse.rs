@@ -14,7 +14,7 @@ use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
 use crate::link::{Link, LinkRows, Occlusion};
 use crate::scene::LightSpectrum;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use crate::team::NEVER;
 use std::collections::BTreeMap;
 
@@ -31,28 +31,28 @@ pub(crate) struct Coarse {
     factor: Vec<f32>,
     pub(super) areas: Vec<f64>,
     /// Reflectance of each patch.
-    pub(super) reflectance: Vec<Leaves>,
+    pub(super) reflectance: Vec<Spectrum>,
     /// Exitance and direct punctual irradiance of each patch, light by light, as shapes on the spectral leaves.
-    pub(super) emission: Vec<Vec<Leaves>>,
-    pub(super) punctual: Vec<Vec<Leaves>>,
+    pub(super) emission: Vec<Vec<Spectrum>>,
+    pub(super) punctual: Vec<Vec<Spectrum>>,
     /// What passes sheets: a patch, the patch behind it, and the transmittance from that to the patch.
-    pub(super) through: Vec<([u32; 2], Leaves)>,
+    pub(super) through: Vec<([u32; 2], Spectrum)>,
     /// Excitation of each patch by fluorescent light; none for the lights of lamps.
-    excitation: Vec<Option<Vec<Leaves>>>,
+    excitation: Vec<Option<Vec<Spectrum>>>,
 }
 
 /// Spectra of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
 pub(crate) trait Dense {
     /// Reflectance of a leaf node.
-    fn reflectance(&self, leaf: u32) -> Leaves;
+    fn reflectance(&self, leaf: u32) -> Spectrum;
     /// Exitance shape of a leaf node under a light; none if it emits nothing of that light.
-    fn emission(&self, leaf: u32, light: usize) -> Option<Leaves>;
+    fn emission(&self, leaf: u32, light: usize) -> Option<Spectrum>;
     /// Irradiance shape of a leaf node by the punctual lights of one spectrum; none if there are none.
-    fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves>;
+    fn punctual(&self, leaf: u32, light: usize) -> Option<Spectrum>;
     /// Transmittance to a leaf node from the one behind it; none where it is no sheet.
-    fn through(&self, leaf: u32) -> Option<Leaves>;
+    fn through(&self, leaf: u32) -> Option<Spectrum>;
     /// Excitation of a light by fluorescence at a leaf node; none if nothing excites it there.
-    fn excitation(&self, leaf: u32, light: usize) -> Option<Leaves>;
+    fn excitation(&self, leaf: u32, light: usize) -> Option<Spectrum>;
 }
 
 impl Coarse {
@@ -68,7 +68,7 @@ impl Coarse {
         lights: usize,
         patches: usize,
     ) -> Self {
-        let group = cut(tree, patches);
+        let group = frontier(tree, patches);
         let count = group
             .iter()
             .filter(|&&g| g != NONE)
@@ -76,11 +76,11 @@ impl Coarse {
             .max()
             .unwrap_or(0);
         let (mut area, mut counted) = (vec![0.0; count], vec![0.0; count]);
-        let mut reflectance = vec![[0.0; LEAVES]; count];
-        let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
+        let mut reflectance = vec![[0.0; BANDS]; count];
+        let mut emission = vec![vec![[0.0; BANDS]; count]; lights];
         let mut punctual = emission.clone();
-        let mut through: BTreeMap<[u32; 2], Leaves> = BTreeMap::new();
-        let mut excitation: Vec<Option<Vec<Leaves>>> = vec![None; lights];
+        let mut through: BTreeMap<[u32; 2], Spectrum> = BTreeMap::new();
+        let mut excitation: Vec<Option<Vec<Spectrum>>> = vec![None; lights];
         for &leaf in leaves {
             let (g, a) = (group[leaf as usize] as usize, areas[leaf as usize]);
             area[g] += a;
@@ -88,7 +88,7 @@ impl Coarse {
             add(&mut reflectance[g], &dense.reflectance(leaf), a);
             if let Some(passes) = dense.through(leaf) {
                 let pair = [leaf, tree.behind(leaf)].map(|k| group[k as usize]);
-                add(through.entry(pair).or_insert([0.0; LEAVES]), &passes, a);
+                add(through.entry(pair).or_insert([0.0; BANDS]), &passes, a);
             }
             for light in 0..lights {
                 if let Some(e) = dense.emission(leaf, light) {
@@ -100,7 +100,7 @@ impl Coarse {
                 if let Some(x) = dense.excitation(leaf, light) {
                     let all = &mut excitation[light];
                     add(
-                        &mut all.get_or_insert_with(|| vec![[0.0; LEAVES]; count])[g],
+                        &mut all.get_or_insert_with(|| vec![[0.0; BANDS]; count])[g],
                         &x,
                         a,
                     );
@@ -141,26 +141,31 @@ impl Coarse {
 
     /// Adds the fluorescence that the light of lamps excites: enough to choose wavelengths by, as fluorescence itself excites little.
     /// `width` of a spectral leaf, nm.
-    pub(super) fn kindle(&mut self, spectra: &[LightSpectrum], weights: &[Leaves; 3], width: f64) {
-        let mut brought = vec![[0.0; LEAVES]; self.leaves.len()];
+    pub(super) fn add_fluorescence(
+        &mut self,
+        spectra: &[LightSpectrum],
+        weights: &[Spectrum; 3],
+        width: f64,
+    ) {
+        let mut brought = vec![[0.0; BANDS]; self.leaves.len()];
         for light in (0..spectra.len()).filter(|&k| self.excitation[k].is_none()) {
             let lanes = Lanes::only(spectra, light, weights);
             let rows = self.irradiance(&lanes);
             for (k, sum) in brought.iter_mut().enumerate() {
-                add(sum, &lanes.leaves(rows.row(k)), 1.0);
+                add(sum, &lanes.spectrum(rows.row(k)), 1.0);
             }
         }
         for (light, excitation) in self.excitation.iter().enumerate() {
             for (k, excitation) in excitation.iter().flatten().enumerate() {
                 let taken = excitation.iter().zip(&brought[k]);
                 let power = taken.map(|(g, e)| g * e).sum::<f64>() * width;
-                self.emission[light][k] = [power; LEAVES];
+                self.emission[light][k] = [power; BANDS];
             }
         }
     }
 
     /// Puts all light behind a filter.
-    pub(super) fn behind(&mut self, filter: &Leaves) {
+    pub(super) fn behind(&mut self, filter: &Spectrum) {
         for row in self.emission.iter_mut().chain(&mut self.punctual).flatten() {
             *row = std::array::from_fn(|k| row[k] * filter[k]);
         }
@@ -170,7 +175,7 @@ impl Coarse {
     pub(super) fn join(&mut self, of: &[usize], count: usize) {
         for lights in [&mut self.emission, &mut self.punctual] {
             let patches = lights.first().map_or(0, Vec::len);
-            let mut joined = vec![vec![[0.0; LEAVES]; patches]; count];
+            let mut joined = vec![vec![[0.0; BANDS]; patches]; count];
             for (light, &to) in lights.iter().zip(of) {
                 for (sum, shape) in joined[to].iter_mut().zip(light) {
                     add(sum, shape, 1.0);
@@ -289,7 +294,7 @@ impl Coarse {
     }
 }
 
-fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
+fn add(sum: &mut Spectrum, x: &Spectrum, weight: f64) {
     for (s, x) in sum.iter_mut().zip(x) {
         *s += weight * x;
     }
@@ -297,7 +302,7 @@ fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
 
 /// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node whose counted area is greatest
 /// is opened first.
-pub(super) fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
+pub(super) fn frontier(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut open = std::collections::BinaryHeap::new();
     let key = |id: u32| (ordered(tree.node(id).counted), std::cmp::Reverse(id));
     open.push((key(0), 0_u32));
@@ -467,7 +472,7 @@ mod tests {
             .collect();
         let wide: Vec<f64> = factor.iter().map(|&f| f64::from(f)).collect();
         let sums = row_sums(&tree, &LinkRows::new(nodes, &links), &areas, &wide);
-        let group = cut(&tree, 11);
+        let group = frontier(&tree, 11);
         let count = 1 + *group.iter().filter(|&&g| g != NONE).max().unwrap() as usize;
         assert!(count > 8, "{count}");
         let matrix = exchanges(&tree, &links, &factor, &areas, &group, count);

@@ -6,7 +6,7 @@ use crate::color::luv_jacobian;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
 use crate::scene::LightSpectrum;
-use crate::spectrum::{LEAVES, Leaves, Partition};
+use crate::spectrum::{BANDS, Partition, Spectrum};
 
 /// One lane in this many is split at a time.
 const BATCH: usize = 3;
@@ -30,7 +30,7 @@ impl Coarse {
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
-        (weights, guide): (&[Leaves; 3], Option<&[Leaves; 3]>),
+        (weights, guide): (&[Spectrum; 3], Option<&[Spectrum; 3]>),
         white: [f64; 3],
         tolerance: f64,
         known: Option<Vec<Partition>>,
@@ -85,7 +85,7 @@ impl Coarse {
             let (most, room) = match (good, copies) {
                 (true, _) => (padded(size), padded(size) - size),
                 (false, None) => (usize::MAX, lanes.len().div_ceil(BATCH)),
-                (false, Some(_)) => (LEAVES, lanes.len().div_ceil(BATCH)),
+                (false, Some(_)) => (BANDS, lanes.len().div_ceil(BATCH)),
             };
             worst.truncate(room.max(1));
             let before = size;
@@ -121,8 +121,8 @@ impl Coarse {
                 let Some(light) = lane.light else { continue };
                 let (fine, reference) = &references[light];
                 let lost = |xyz: &[[f64; 3]]| {
-                    let leaves = lane.first..lane.first + lane.count;
-                    leaves.fold([0.0; 3], |lost, leaf| {
+                    let bands = lane.first..lane.first + lane.count;
+                    bands.fold([0.0; 3], |lost, leaf| {
                         let difference = f64::from(reference.row(k)[leaf] - rows.row(k)[l]);
                         plus(lost, xyz[leaf].map(|w| w * difference))
                     })

@@ -10,7 +10,7 @@ use super::refinement::Refinement;
 use super::{Bake, Solution};
 use crate::hierarchy::{NONE, TreeSize};
 use crate::light::Rows;
-use crate::spectrum::LEAVES;
+use crate::spectrum::BANDS;
 use std::borrow::Cow;
 
 /// Rays that suffice for the light of a node: its standard deviation is then a quarter.
@@ -55,8 +55,8 @@ impl Bake {
             .sum();
         let albedo = self.albedo(&leaves, &sources.reflectance, &spectrum);
         let even = landed / area * albedo / (1.0 - albedo);
-        let mut rows = Vec::with_capacity(leaves.len() * LEAVES);
-        let mut irradiance = Rows::zero(leaves.len(), LEAVES);
+        let mut rows = Vec::with_capacity(leaves.len() * BANDS);
+        let mut irradiance = Rows::zero(leaves.len(), BANDS);
         let mut reflected = irradiance.clone();
         for (k, direct) in direct.into_iter().enumerate() {
             for (lane, per_lux) in spectrum.iter().enumerate() {
@@ -68,12 +68,12 @@ impl Bake {
         }
         let nodes = self.refinement.tree.nodes.len();
         let even = vec![[0.0, 1.0]; leaves.len()];
-        self.refinement.direct = Direct::known(&leaves, nodes, LEAVES, &rows, &even);
+        self.refinement.direct = Direct::known(&leaves, nodes, BANDS, &rows, &even);
         let emitted = self
             .refinement
-            .on_nodes::<LEAVES>(&sources.emission, &leaves);
-        let on_nodes = self.refinement.on_nodes::<LEAVES>(&reflected, &leaves);
-        let on_nodes = self.without_mirrors::<LEAVES>(Cow::Owned(reflected), on_nodes, &leaves);
+            .on_nodes::<BANDS>(&sources.emission, &leaves);
+        let on_nodes = self.refinement.on_nodes::<BANDS>(&reflected, &leaves);
+        let on_nodes = self.without_mirrors::<BANDS>(Cow::Owned(reflected), on_nodes, &leaves);
         self.shine(&leaves, emitted, on_nodes, irradiance);
         self.light_arrives();
     }
@@ -116,7 +116,7 @@ impl Bake {
 
     /// Irradiance on each lane for one lux of the light of all lamps together; 0 where none shines.
     fn spectrum_of_lamps(&self, leaves: &[u32], emission: &Rows) -> Vec<f64> {
-        let mut sum = [0.0_f32; LEAVES];
+        let mut sum = [0.0_f32; BANDS];
         for (k, &leaf) in leaves.iter().enumerate() {
             let area = self.refinement.tree.node(leaf).area as f32;
             for (sum, x) in sum.iter_mut().zip(emission.row(k)) {

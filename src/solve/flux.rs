@@ -8,7 +8,7 @@ use crate::light::Rows;
 use crate::light::lanes::Lanes;
 use crate::link::Sight;
 use crate::scene::{PunctualLight, Scene};
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use glam::DVec3;
 
 /// Rays that test whether a room is closed.
@@ -136,7 +136,7 @@ pub(crate) struct Guess {
 const DOME: f64 = 0.05;
 
 /// Light spread evenly over all faces: `H = flux / (A (1 - mean albedo))`.
-pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
+pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Spectrum; 3]) -> Guess {
     let lanes = Lanes::dense(&scene.spectra, weights);
     let glow: Vec<[f64; 3]> = (scene.materials.iter())
         .map(|m| lanes.exitance(m.even_emission()))
@@ -146,7 +146,7 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         .materials
         .iter()
         .map(|m| {
-            let luminous = |spectrum: &Leaves| -> f64 {
+            let luminous = |spectrum: &Spectrum| -> f64 {
                 spectrum.iter().zip(&weights[1]).map(|(r, w)| r * w).sum()
             };
             let through = m.sheet.as_ref().map_or(0.0, |s| luminous(&s.transmittance));

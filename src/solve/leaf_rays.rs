@@ -79,7 +79,7 @@ impl LeafRays {
         self.target = vec![1.0; tree.nodes.len()];
     }
 
-    /// An outlook of which nothing is known yet, of the ranks of a team.
+    /// An leaf_rays of which nothing is known yet, of the ranks of a team.
     pub(super) fn of_team(team: Team) -> Self {
         Self {
             team,
@@ -237,7 +237,7 @@ impl LeafRays {
         });
     }
 
-    /// How much is known, for [`Outlook::shrink`].
+    /// How much is known, for [`LeafRays::shrink`].
     pub(super) fn grown(&self) -> LeafRaysSize {
         LeafRaysSize {
             nodes: self.target.len(),
@@ -374,10 +374,10 @@ impl LeafRays {
         sum
     }
 
-    /// An outlook of `leaves` (ascending nodes) whose rays met the patches `seen`.
+    /// An leaf_rays of `leaves` (ascending nodes) whose rays met the patches `seen`.
     #[cfg(test)]
     pub(super) fn of(nodes: usize, leaves: &[u32], seen: &[Vec<u32>]) -> Self {
-        let mut outlook = Self {
+        let mut leaf_rays = Self {
             target: vec![f32::NAN; nodes],
             bare: vec![f32::NAN; nodes],
             range: vec![(0, 0); nodes],
@@ -385,11 +385,11 @@ impl LeafRays {
         };
         for (&leaf, seen) in leaves.iter().zip(seen) {
             let k = leaf as usize;
-            (outlook.target[k], outlook.bare[k]) = (1.0, 1.0);
-            outlook.range[k] = (outlook.met.len() as u32, seen.len() as u32);
-            outlook.met.extend(seen);
+            (leaf_rays.target[k], leaf_rays.bare[k]) = (1.0, 1.0);
+            leaf_rays.range[k] = (leaf_rays.met.len() as u32, seen.len() as u32);
+            leaf_rays.met.extend(seen);
         }
-        outlook
+        leaf_rays
     }
 
     /// The patches met by those rays of a leaf that count, and the divisor of the sum over them for the leaf's
@@ -535,7 +535,7 @@ mod tests {
         nodes.row_mut(1).fill(6.0);
         nodes.row_mut(2).fill(2.0);
         // Pairs of rays: both meet fronts; one does; none does.
-        let outlook = LeafRays {
+        let leaf_rays = LeafRays {
             target: vec![1.0],
             bare: vec![0.5],
             range: vec![(0, 6)],
@@ -543,8 +543,8 @@ mod tests {
             ..LeafRays::default()
         };
         let (mut seen, mut whole) = (Rows::zero(1, 4), Rows::zero(1, 4));
-        outlook.irradiance::<4>(&[0], &nodes, &mut seen);
-        outlook.irradiance_of_whole::<4>(&[0], &nodes, &mut whole);
+        leaf_rays.irradiance::<4>(&[0], &nodes, &mut seen);
+        leaf_rays.irradiance_of_whole::<4>(&[0], &nodes, &mut whole);
         // Openness 1, 1/2 and 0; irradiance (6 + 2) / 2, (6 + 0) / 2 and 0. Of the second point no pair counts.
         let near = |row: &[f32], want: f32| row.iter().all(|x| (x - want).abs() < 1e-6);
         assert!(near(seen.row(0), 8.0 / 3.0) && near(whole.row(0), 14.0 / 6.0));

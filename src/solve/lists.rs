@@ -9,7 +9,7 @@ use super::{Bake, SPECTRUM_SHARE};
 use crate::color::{KM, luv_jacobian};
 use crate::light::lanes::Lanes;
 use crate::scene::LightSpectrum;
-use crate::spectrum::{CmfTree, Control, Leaves, Metric, Partition, SpectralList, coarsen};
+use crate::spectrum::{CmfTree, Control, Metric, Partition, SpectralList, Spectrum, coarsen};
 use rayon::prelude::*;
 
 /// One list for each light.
@@ -39,7 +39,7 @@ impl<'a> Lister<'a> {
     pub(crate) fn new(
         lanes: &'a Lanes,
         spectra: &[LightSpectrum],
-        weights: &[Leaves; 3],
+        weights: &[Spectrum; 3],
         white: [f64; 3],
         limit: f64,
     ) -> Self {
@@ -75,7 +75,7 @@ impl<'a> Lister<'a> {
             let values: Vec<f64> = own().map(|(_, &x)| f64::from(x)).collect();
             let mut list = SpectralList::from_values(cut, &values);
             coarsen(&mut list, cmf, &metric, &Control::within(limit));
-            let leaves = list.leaves();
+            let leaves = list.spectrum();
             let values = list
                 .partition()
                 .iter()

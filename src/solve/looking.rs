@@ -45,7 +45,11 @@ impl Bake {
     }
 
     /// Gathers with care, or just for a picture, see [`Care`].
-    pub(crate) fn gather_with(&self, receivers: &[Receiver], care: GatherQuality) -> Vec<Gathered> {
+    pub(crate) fn gather_with(
+        &self,
+        receivers: &[Receiver],
+        quality: GatherQuality,
+    ) -> Vec<Gathered> {
         if self.solution.light.width() == 0 || self.solution.light.white == [0.0; 3] {
             // A room without light: nothing to gather.
             return vec![Gathered::dark(); receivers.len()];
@@ -53,10 +57,11 @@ impl Bake {
         self.room.with_sight(|sight| {
             let sketched = Hemisphere::sketch();
             let mut gatherer = self.gatherer(sight);
-            if let (GatherQuality::Preview, Some(hemisphere)) = (care, &mut gatherer.hemisphere) {
+            if let (GatherQuality::Preview, Some(hemisphere)) = (quality, &mut gatherer.hemisphere)
+            {
                 *hemisphere = &sketched;
             }
-            if care != GatherQuality::Full {
+            if quality != GatherQuality::Full {
                 gatherer.most_backs = MOSTLY;
             }
             let at = |memory: &mut Memory, r: &Receiver| gatherer.at(r, memory).pack();

@@ -136,9 +136,9 @@ impl Bake {
     }
 
     /// Prepares a room of which rays have already told which faces share a space and what is closed.
-    pub(crate) fn with(scene: Scene, settings: Settings, known: Option<RoomAnalysis>) -> Self {
+    pub(crate) fn with(scene: Scene, settings: Settings, analysis: Option<RoomAnalysis>) -> Self {
         let started = Instant::now();
-        let (room, tree) = Room::new(scene, settings, known);
+        let (room, tree) = Room::new(scene, settings, analysis);
         Self {
             refinement: Refinement {
                 tree,
@@ -212,13 +212,13 @@ impl Bake {
         }
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
-        let (bright, keen) = self.stakes();
+        let (bright, sensitivity) = self.stakes();
         let by_rays = self.room.by_rays();
         let faces = self.refinement.tree.faces.len();
         let shares = ThresholdFactors::of(by_rays, is_small(&self.room.mesh), faces);
         let demand = Demand {
             bright: &bright,
-            sensitivity: &keen,
+            sensitivity: &sensitivity,
             threshold: threshold * shares.link,
             least_area: LEAST_AREA * self.refinement.tree.counted(),
             hidden: !by_rays,

@@ -26,7 +26,7 @@ use crate::geometry::{NO_PLANE, quarters};
 use crate::hierarchy::Mesh;
 use crate::scene::sheet::Weave;
 use crate::scene::{Scene, short};
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
 use lights::ReferenceLamps;
 use nalgebra::{DMatrix, DVector};
@@ -47,16 +47,16 @@ pub struct Reference {
     /// `F_ij`: share of the light leaving i that reaches j, one matrix for all leaves or one for each.
     factors: Vec<DMatrix<f64>>,
     /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a leaf by irradiance on another.
-    pub donaldson: Vec<Option<Vec<Leaves>>>,
+    pub donaldson: Vec<Option<Vec<Spectrum>>>,
 }
 
 /// What leaves and meets the patches, W/m2/nm, in their order.
 #[derive(Debug, Clone)]
 pub struct ReferenceSolution {
     /// Radiosity: emitted and reflected.
-    pub radiosity: Vec<Leaves>,
+    pub radiosity: Vec<Spectrum>,
     /// Irradiance.
-    pub irradiance: Vec<Leaves>,
+    pub irradiance: Vec<Spectrum>,
 }
 
 impl Reference {
@@ -76,18 +76,18 @@ impl Reference {
             return Err(Error::input(scene.source.place(), what, next));
         }
         let mesh = Mesh::new(scene);
-        let ways = ReferenceVisibility::new(scene, &mesh, rays);
+        let visibility = ReferenceVisibility::new(scene, &mesh, rays);
         let lamps = ReferenceLamps {
             scene,
             mesh: &mesh,
-            ways: &ways,
+            visibility: &visibility,
         };
         let mut patches = patches(scene, &mesh, depth);
-        let lit: Vec<Leaves> = patches.par_iter().map(|p| lamps.on(p)).collect();
+        let lit: Vec<Spectrum> = patches.par_iter().map(|p| lamps.on(p)).collect();
         for (patch, lit) in patches.iter_mut().zip(lit) {
             patch.punctual = lit;
         }
-        let factors = factors(scene, &ways, &patches);
+        let factors = factors(scene, &visibility, &patches);
         let width = scene.grid.width();
         let donaldson = scene.materials.iter().map(|m| {
             let fluorescence = m.fluorescence.as_ref()?;
@@ -101,8 +101,8 @@ impl Reference {
     }
 
     /// `F_ij` on a leaf: share of the light leaving i that reaches j.
-    pub fn factors(&self, leaf: usize) -> &DMatrix<f64> {
-        &self.factors[leaf.min(self.factors.len() - 1)]
+    pub fn factors(&self, band: usize) -> &DMatrix<f64> {
+        &self.factors[band.min(self.factors.len() - 1)]
     }
 
     /// Sum of every patch's factors on the first leaf: 1 in a closed room without panes, but for the rule's error.
@@ -112,7 +112,7 @@ impl Reference {
 
     /// Solves all leaves; where surfaces fluoresce, again until their fluorescence settles.
     pub fn solve(&self) -> ReferenceSolution {
-        let mut glow = vec![[0.0; LEAVES]; self.patches.len()];
+        let mut glow = vec![[0.0; BANDS]; self.patches.len()];
         loop {
             let solution = self.solve_with(&glow);
             let next = self.fluoresced(&solution.irradiance);
@@ -127,47 +127,47 @@ impl Reference {
     }
 
     /// Fluorescent exitance of the patches by their irradiance.
-    fn fluoresced(&self, irradiance: &[Leaves]) -> Vec<Leaves> {
+    fn fluoresced(&self, irradiance: &[Spectrum]) -> Vec<Spectrum> {
         let all = self.patches.iter().zip(irradiance);
         let each = all.map(|(patch, light)| match &self.donaldson[patch.material] {
             Some(matrix) => std::array::from_fn(|l| {
                 let row = matrix[l].iter().zip(light);
                 row.map(|(m, x)| m * x).sum()
             }),
-            None => [0.0; LEAVES],
+            None => [0.0; BANDS],
         });
         each.collect()
     }
 
     /// Solves all leaves, given the fluorescent exitance of the patches.
-    fn solve_with(&self, glow: &[Leaves]) -> ReferenceSolution {
+    fn solve_with(&self, glow: &[Spectrum]) -> ReferenceSolution {
         let n = self.patches.len();
-        let mut radiosity = vec![[0.0; LEAVES]; n];
-        let mut solved = [false; LEAVES];
-        for leaf in 0..LEAVES {
-            if solved[leaf] {
+        let mut radiosity = vec![[0.0; BANDS]; n];
+        let mut solved = [false; BANDS];
+        for band in 0..BANDS {
+            if solved[band] {
                 continue;
             }
             let same = |l: usize| {
                 let alike = |p: &Patch| {
-                    p.reflectance[l] == p.reflectance[leaf]
-                        && p.transmittance[l] == p.transmittance[leaf]
+                    p.reflectance[l] == p.reflectance[band]
+                        && p.transmittance[l] == p.transmittance[band]
                 };
-                (l == leaf || self.factors.len() == 1) && self.patches.iter().all(alike)
+                (l == band || self.factors.len() == 1) && self.patches.iter().all(alike)
             };
-            let alike: Vec<usize> = (leaf..LEAVES).filter(|&l| same(l)).collect();
+            let alike: Vec<usize> = (band..BANDS).filter(|&l| same(l)).collect();
             // What leaves a patch, of the light that meets it and its other side.
             let scattered = |i: usize, x: &dyn Fn(usize) -> f64| {
                 let patch = &self.patches[i];
-                let through = |b: usize| patch.transmittance[leaf] * x(b);
-                patch.reflectance[leaf] * x(i) + patch.behind.map_or(0.0, through)
+                let through = |b: usize| patch.transmittance[band] * x(b);
+                patch.reflectance[band] * x(i) + patch.behind.map_or(0.0, through)
             };
             let right = DMatrix::from_fn(n, alike.len(), |i, k| {
-                let (patch, leaf) = (&self.patches[i], alike[k]);
-                let lit = scattered(i, &|i| self.patches[i].punctual[leaf]);
-                patch.exitance[leaf] + glow[i][leaf] + lit
+                let (patch, band) = (&self.patches[i], alike[k]);
+                let lit = scattered(i, &|i| self.patches[i].punctual[band]);
+                patch.exitance[band] + glow[i][band] + lit
             });
-            let factors = self.factors(leaf);
+            let factors = self.factors(band);
             let system = DMatrix::from_fn(n, n, |i, j| {
                 f64::from(u8::from(i == j)) - scattered(i, &|i| factors[(i, j)])
             });
@@ -179,10 +179,10 @@ impl Reference {
                 }
             }
         }
-        let mut irradiance: Vec<Leaves> = self.patches.iter().map(|p| p.punctual).collect();
+        let mut irradiance: Vec<Spectrum> = self.patches.iter().map(|p| p.punctual).collect();
         // All leaves at once, or one by one where each has its own factors.
-        let at_once = LEAVES / self.factors.len();
-        for first in (0..LEAVES).step_by(at_once) {
+        let at_once = BANDS / self.factors.len();
+        for first in (0..BANDS).step_by(at_once) {
             let sources = DMatrix::from_fn(n, at_once, |i, k| radiosity[i][first + k]);
             let received = self.factors(first) * sources;
             for (i, row) in irradiance.iter_mut().enumerate() {
@@ -203,13 +203,13 @@ impl Reference {
         solution: &ReferenceSolution,
         points: &[(DVec3, DVec3)],
         rays: usize,
-    ) -> Vec<Leaves> {
+    ) -> Vec<Spectrum> {
         let mesh = Mesh::new(scene);
-        let ways = ReferenceVisibility::new(scene, &mesh, rays);
+        let visibility = ReferenceVisibility::new(scene, &mesh, rays);
         let lamps = ReferenceLamps {
             scene,
             mesh: &mesh,
-            ways: &ways,
+            visibility: &visibility,
         };
         points
             .par_iter()
@@ -217,9 +217,9 @@ impl Reference {
                 let at = at - mesh.centre;
                 let plane = plane_at(&mesh, &self.patches, at, normal);
                 let place = PatchPoint { at, normal, plane };
-                let mut sum = [0.0; LEAVES];
+                let mut sum = [0.0; BANDS];
                 for (patch, radiosity) in self.patches.iter().zip(&solution.radiosity) {
-                    match ways.factor(place, patch) {
+                    match visibility.factor(place, patch) {
                         (f, None) => add(&mut sum, radiosity, f),
                         (f, Some(passes)) => {
                             let left = std::array::from_fn(|l| passes[l] * radiosity[l]);
@@ -260,13 +260,17 @@ pub fn solve_one(factors: &DMatrix<f64>, rho: &[f64], emission: &[f64]) -> DVect
 }
 
 /// `F_ij`, made reciprocal by their means; one matrix for all leaves, or one for each where a pane is coloured.
-fn factors(scene: &Scene, ways: &ReferenceVisibility<'_>, patches: &[Patch]) -> Vec<DMatrix<f64>> {
+fn factors(
+    scene: &Scene,
+    visibility: &ReferenceVisibility<'_>,
+    patches: &[Patch],
+) -> Vec<DMatrix<f64>> {
     let tinted = |s: &crate::scene::Surface| {
         let pane = scene.materials[s.material].pane.as_ref();
         pane.is_some_and(|pane| !pane.is_neutral())
     };
     let sets = if scene.panes.iter().any(tinted) {
-        LEAVES
+        BANDS
     } else {
         1
     };
@@ -279,7 +283,7 @@ fn factors(scene: &Scene, ways: &ReferenceVisibility<'_>, patches: &[Patch]) -> 
             }
             let own = &mut row[sets * j..sets * (j + 1)];
             for (w, at) in rule {
-                let (f, passes) = ways.factor(from.place(at), to);
+                let (f, passes) = visibility.factor(from.place(at), to);
                 for (k, x) in own.iter_mut().enumerate() {
                     *x += w * f * passes.as_ref().map_or(1.0, |passes| passes[k]);
                 }
@@ -304,13 +308,13 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
     for &face in &mesh.faces {
         let triangle = face.triangle as usize;
         let material = &scene.materials[mesh.material[triangle] as usize];
-        let exitance = material.even_emission().map_or([0.0; LEAVES], |e| {
+        let exitance = material.even_emission().map_or([0.0; BANDS], |e| {
             let power = &scene.spectra[e.light].power;
             std::array::from_fn(|l| PI * power[l] * e.shape[l])
         });
         let [reflectance, transmittance] = match &material.sheet {
             Some(sheet) => material.scatters(sheet, None, Weave::PLAIN, face.back, &upsampler),
-            None => [material.reflectance, [0.0; LEAVES]],
+            None => [material.reflectance, [0.0; BANDS]],
         };
         let mut corners = vec![mesh.corners(face)];
         for _ in 0..depth {
@@ -324,7 +328,7 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
             area,
             reflectance,
             exitance,
-            punctual: [0.0; LEAVES],
+            punctual: [0.0; BANDS],
             material: mesh.material[triangle] as usize,
             transmittance,
             behind: None,

@@ -1,4 +1,4 @@
-//! What rounds refine: the hierarchy, its links, and the outlook of its leaves.
+//! What rounds refine: the hierarchy, its links, and the leaf_rays of its leaves.
 
 use super::direct::Direct;
 use super::leaf_rays::LeafRays;
@@ -65,16 +65,16 @@ impl Refinement {
 
     /// Finds out how new leaves look out; returns the rays cast.
     pub(super) fn trace_leaf_rays(&mut self, room: &Room) -> Result<u64, Interrupted> {
-        let (tree, outlook, seed) = (&self.tree, &mut self.leaf_rays, room.settings.seed);
+        let (tree, leaf_rays, seed) = (&self.tree, &mut self.leaf_rays, room.settings.seed);
         let interrupt = &room.interrupt;
         let rays = room.with_sight(|sight| {
             if by_rays(sight) {
-                outlook.look(tree, sight, &room.hemisphere, seed, interrupt)
+                leaf_rays.look(tree, sight, &room.hemisphere, seed, interrupt)
             } else {
-                outlook.extend(tree, sight, room.closed, seed, interrupt)
+                leaf_rays.extend(tree, sight, room.closed, seed, interrupt)
             }
         })?;
-        self.areas = outlook.areas(tree);
+        self.areas = leaf_rays.areas(tree);
         Ok(rays)
     }
 
@@ -105,9 +105,9 @@ impl Refinement {
             for k in known..nodes as usize {
                 bright.push(bright[self.tree.nodes[k].parent as usize]);
             }
-            let mut keen = demand.sensitivity.to_vec();
-            for k in keen.len()..nodes as usize {
-                keen.push(keen[self.tree.nodes[k].parent as usize]);
+            let mut sensitivity = demand.sensitivity.to_vec();
+            for k in sensitivity.len()..nodes as usize {
+                sensitivity.push(sensitivity[self.tree.nodes[k].parent as usize]);
             }
             let split = (0..nodes)
                 .into_par_iter()
@@ -118,7 +118,7 @@ impl Refinement {
                         && node.area > demand.least_area
                         && self.tree.elements[node.element as usize].depth < MAX_DEPTH
                         && deciding.variation(k, &bright, seed)
-                            * f64::from(keen[k as usize])
+                            * f64::from(sensitivity[k as usize])
                             * self.tree.share(k).sqrt()
                             > demand.threshold
                 })

@@ -13,7 +13,7 @@ use crate::light::lanes::Lanes;
 use crate::link::{Opaque, Sight, is_small};
 use crate::scene::Scene;
 use crate::scene::effects::{EffectKind, Plan};
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use crate::team::{Interrupt, Team};
 use crate::transport::Surroundings;
 use crate::transport::hemisphere::Hemisphere;
@@ -84,7 +84,7 @@ pub(crate) struct Room {
     pub(crate) sent: Sent,
     /// The places where that light lands on faces; empty in a room that is only relit.
     pub(super) landings: Vec<Landing>,
-    pub(crate) weights: [Leaves; 3],
+    pub(crate) weights: [Spectrum; 3],
     /// Turns colours of textures into spectra: its table is made once.
     pub(crate) upsampler: Upsampler,
     pub(crate) hemisphere: Hemisphere,
@@ -148,10 +148,10 @@ impl Room {
     pub(super) fn new(
         scene: Scene,
         settings: Settings,
-        known: Option<RoomAnalysis>,
+        analysis: Option<RoomAnalysis>,
     ) -> (Self, Tree) {
-        let closed = known.as_ref().map(|known| known.closed);
-        let (mut room, tree) = Self::shaped(scene, settings, known);
+        let closed = analysis.as_ref().map(|known| known.closed);
+        let (mut room, tree) = Self::shaped(scene, settings, analysis);
         match closed {
             Some(closed) => {
                 [room.closed, room.sealed] = closed;
@@ -166,11 +166,11 @@ impl Room {
     pub(super) fn shaped(
         scene: Scene,
         settings: Settings,
-        known: Option<RoomAnalysis>,
+        analysis: Option<RoomAnalysis>,
     ) -> (Self, Tree) {
-        let counted = known.as_ref().map(|known| known.counted.clone());
-        let frame = known.as_ref().and_then(|known| known.frame);
-        let (mut room, mut tree) = Self::framed(scene, settings, known, frame);
+        let counted = analysis.as_ref().map(|known| known.counted.clone());
+        let frame = analysis.as_ref().and_then(|known| known.frame);
+        let (mut room, mut tree) = Self::framed(scene, settings, analysis, frame);
         let found = counted.is_none();
         room.counted = counted.unwrap_or_else(|| room.count(&mut tree));
         tree.weigh(&room.counted);
@@ -187,12 +187,12 @@ impl Room {
     fn framed(
         scene: Scene,
         settings: Settings,
-        known: Option<RoomAnalysis>,
+        analysis: Option<RoomAnalysis>,
         frame: Option<Frame>,
     ) -> (Self, Tree) {
         let mesh = Mesh::framed(&scene, frame);
         let mut plan = plan_of(&scene, &mesh);
-        let parting = match known {
+        let parting = match analysis {
             Some(known) => PartedMesh::again(&scene, mesh, known.spaces, known.parted),
             None => PartedMesh::find(&scene, mesh, &plan, settings.seed),
         };

@@ -12,7 +12,7 @@ use super::{Bake, SolveInput};
 use crate::light::{Arrival, Light, Neighbours, Rows, padded, weighed};
 use crate::link::LinkRows;
 use crate::scene::effects::EffectKind;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use std::borrow::Cow;
 
 /// The leaves under direct light, and how they reflect: what the bounces start from.
@@ -86,7 +86,7 @@ impl Bake {
             let row = self.refinement.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
         }
-        let given = SolveInput {
+        let input = SolveInput {
             sources: self
                 .room
                 .painter()
@@ -97,7 +97,7 @@ impl Bake {
             tolerance: self.room.tolerance(),
             counted: true,
         };
-        let solved = self.solve_with::<L>(rows, leaves, given);
+        let solved = self.solve_with::<L>(rows, leaves, input);
         self.light_arrives();
         solved
     }
@@ -107,7 +107,7 @@ impl Bake {
         &mut self,
         rows: &LinkRows,
         leaves: &[u32],
-        given: SolveInput,
+        input: SolveInput,
     ) -> (Convergence, flux::FluxBalance) {
         let SolveInput {
             sources,
@@ -116,7 +116,7 @@ impl Bake {
             emitted,
             tolerance,
             counted,
-        } = given;
+        } = input;
         let emission = sources.emission;
         let by_rays = self.room.by_rays();
         self.refinement.leaf_rays.tints.on(&self.solution.filters);
@@ -263,7 +263,7 @@ impl Bake {
         glow: &Glow,
         reflected: &mut Rows,
     ) -> (Convergence, Rows, Rows) {
-        let one = [1.0; LEAVES];
+        let one = [1.0; BANDS];
         let power = self
             .solution
             .lanes
@@ -288,7 +288,7 @@ impl Bake {
     ) -> Box<dyn Fn(&Rows) -> Rows + 'a> {
         let Refinement {
             tree,
-            leaf_rays: outlook,
+            leaf_rays,
             areas,
             balance,
             ..
@@ -297,7 +297,7 @@ impl Bake {
             return Box::new(move |radiosity| {
                 let mut seen = Rows::zero(leaves.len(), L);
                 let nodes = self.refinement.on_nodes::<L>(radiosity, leaves);
-                outlook.irradiance::<L>(leaves, &nodes, &mut seen);
+                leaf_rays.irradiance::<L>(leaves, &nodes, &mut seen);
                 seen
             });
         }
@@ -479,7 +479,7 @@ impl Bake {
             arrival[leaf as usize] = Arrival {
                 all: bright(light.irradiance.row(k)),
                 direct: bright(self.refinement.direct.row(leaf)),
-                spread: self.refinement.direct.spread(leaf),
+                half_range: self.refinement.direct.half_range(leaf),
             };
         }
         self.solution.light.arrival = arrival;
@@ -492,8 +492,8 @@ impl Bake {
     }
 
     /// The spectrum of the mean irradiance, W/m2/nm on the 64 spectral leaves.
-    pub fn mean_spectrum(&self) -> Leaves {
-        self.mean_over_leaves(|row| self.solution.lanes.leaves(row))
+    pub fn mean_spectrum(&self) -> Spectrum {
+        self.mean_over_leaves(|row| self.solution.lanes.spectrum(row))
     }
 
     /// The mean of `of` irradiance over the area that counts; 0 where there is none.

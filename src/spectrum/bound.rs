@@ -25,7 +25,7 @@ pub struct Bounded {
     /// The true error is within this of the estimate.
     pub radius: Cmf,
     /// The spread sigma is at most this.
-    pub spread: Cmf,
+    pub deviation: Cmf,
     /// The spectrum is nowhere on the interval below this.
     pub low: f64,
     /// Nor above this.
@@ -58,7 +58,7 @@ impl Bounded {
 
 impl Interval for Bounded {
     fn new(average: f64, f: &[f64], cmf: [&[f64]; 3]) -> Self {
-        let spread = cmf.map(|weights| {
+        let deviation = cmf.map(|weights| {
             let total: f64 = weights.iter().sum();
             if total <= 0.0 {
                 return 0.0;
@@ -73,7 +73,7 @@ impl Interval for Bounded {
         Self {
             moment: Moment::new(average, f, cmf),
             radius: [0.0; 3],
-            spread,
+            deviation,
             low: f.iter().copied().fold(f64::INFINITY, f64::min),
             high: f.iter().copied().fold(0.0, f64::max),
         }
@@ -83,7 +83,7 @@ impl Interval for Bounded {
         Self {
             moment: Moment::constant(value),
             radius: [0.0; 3],
-            spread: [0.0; 3],
+            deviation: [0.0; 3],
             low: value,
             high: value,
         }
@@ -102,7 +102,7 @@ impl Interval for Bounded {
             // The mean of S R: around the product of the means by the radius of S and the covariance, and inside what
             // the ranges of S and R allow.
             let middle = mean_s[a] * mean_r[a];
-            let reach = (mean_r[a] * self.radius[a] + self.spread[a] * r.spread[a]) / cmf[a];
+            let reach = (mean_r[a] * self.radius[a] + self.deviation[a] * r.deviation[a]) / cmf[a];
             let from = (middle - reach)
                 .max(self.low * mean_r[a])
                 .max(least * r.low);
@@ -113,14 +113,14 @@ impl Interval for Bounded {
             let (from, to) = (from.min(to), to.max(from));
             moment.0.error[a] = (0.5 * (from + to) - moment.0.value) * cmf[a];
             radius[a] = 0.5 * (to - from) * cmf[a];
-            spread[a] = (r.high * self.spread[a] + most * r.spread[a])
-                .min(mean_r[a] * self.spread[a] + self.high * r.spread[a])
+            spread[a] = (r.high * self.deviation[a] + most * r.deviation[a])
+                .min(mean_r[a] * self.deviation[a] + self.high * r.deviation[a])
                 .min(0.5 * (high - low) * cmf[a].sqrt());
         }
         Self {
             moment,
             radius,
-            spread,
+            deviation: spread,
             low,
             high,
         }
@@ -131,7 +131,7 @@ impl Interval for Bounded {
         let moment = Moment::merged(&left.moment, &right.moment, cmf, share);
         let means = [left.mean(cmf[0]), right.mean(cmf[1])];
         let (low, high) = (left.low.min(right.low), left.high.max(right.high));
-        let spread = std::array::from_fn(|a| {
+        let deviation = std::array::from_fn(|a| {
             let (l, r) = (
                 left.mean_range(means[0][a], a, cmf[0]),
                 right.mean_range(means[1][a], a, cmf[1]),
@@ -143,14 +143,14 @@ impl Interval for Bounded {
             } else {
                 0.0
             };
-            (left.spread[a].powi(2) + right.spread[a].powi(2) + between)
+            (left.deviation[a].powi(2) + right.deviation[a].powi(2) + between)
                 .sqrt()
                 .min(0.5 * (high - low) * whole.sqrt())
         });
         Self {
             moment,
             radius: super::list::add(left.radius, right.radius),
-            spread,
+            deviation,
             low,
             high,
         }
@@ -166,7 +166,7 @@ impl Interval for Bounded {
             }
             let share = half[a] / whole[a];
             share * self.radius[a]
-                + self.spread[a] * (share * (1.0 - share).max(0.0) * whole[a]).sqrt()
+                + self.deviation[a] * (share * (1.0 - share).max(0.0) * whole[a]).sqrt()
         });
         Self {
             moment,
@@ -181,7 +181,7 @@ impl Interval for Bounded {
         Self {
             moment: self.moment.plus(factor, &other.moment),
             radius: sum(&self.radius, &other.radius),
-            spread: sum(&self.spread, &other.spread),
+            deviation: sum(&self.deviation, &other.deviation),
             low: self.low + factor * other.low,
             high: self.high + factor * other.high,
         }
@@ -206,28 +206,32 @@ pub(crate) mod tests {
     use crate::color::tristimulus;
     use crate::spectrum::partition::tests::any_cut;
     use crate::spectrum::testing::{cmf, patch};
-    use crate::spectrum::{CmfTree, DyadicTree, Leaves, List, Representative};
+    use crate::spectrum::{CmfTree, DyadicTree, List, Representative, Spectrum};
     use proptest::prelude::*;
 
     /// Is everything that the list claims true of `exact`? Slack for rounding only.
-    pub(crate) fn holds(list: &List<Bounded>, exact: &Leaves, cmf: &CmfTree) -> Result<(), String> {
+    pub(crate) fn holds(
+        list: &List<Bounded>,
+        exact: &Spectrum,
+        cmf: &CmfTree,
+    ) -> Result<(), String> {
         let scale = exact.iter().copied().fold(0.0, f64::max);
         for (interval, (first, len)) in list.intervals().iter().zip(list.partition().iter()) {
             let over = first..first + len;
             let truth = Bounded::new(
                 interval.value(),
                 &exact[over.clone()],
-                cmf.leaves().each_ref().map(|a| &a[over.clone()]),
+                cmf.weights().each_ref().map(|a| &a[over.clone()]),
             );
             for a in 0..3 {
-                let total: f64 = cmf.leaves()[a][over.clone()].iter().sum();
+                let total: f64 = cmf.weights()[a][over.clone()].iter().sum();
                 let slack = 1e-12 * scale * total;
                 if (truth.error()[a] - interval.error()[a]).abs() > interval.radius[a] + slack {
                     return Err(format!(
                         "error {a} of {first}+{len}: {truth:?} {interval:?}"
                     ));
                 }
-                if truth.spread[a] > interval.spread[a] + 1e-7 * scale * total.sqrt() {
+                if truth.deviation[a] > interval.deviation[a] + 1e-7 * scale * total.sqrt() {
                     return Err(format!(
                         "spread {a} of {first}+{len}: {truth:?} {interval:?}"
                     ));
@@ -240,7 +244,7 @@ pub(crate) mod tests {
             }
         }
         let (error, radius) = (list.error(), list.radius());
-        let truth = tristimulus(exact, cmf.leaves());
+        let truth = tristimulus(exact, cmf.weights());
         for a in 0..3 {
             let off = truth[a] - list.xyz(cmf)[a] - error[a];
             if off.abs() > radius[a] + 1e-12 * scale * cmf.node(1)[a] {

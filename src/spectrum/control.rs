@@ -286,7 +286,7 @@ mod tests {
     use crate::spectrum::bound::tests::holds;
     use crate::spectrum::partition::tests::any_cut;
     use crate::spectrum::testing::{cmf, patch};
-    use crate::spectrum::{Bounded, DyadicTree, Estimate, Leaves, Moment, Partition};
+    use crate::spectrum::{Bounded, DyadicTree, Estimate, Moment, Partition, Spectrum};
     use proptest::prelude::*;
 
     /// Limits of every kind: usual, crossed, out of reach, without end.
@@ -296,11 +296,11 @@ mod tests {
     }
 
     fn run<I: Interval>(
-        spectra: &[Leaves],
+        spectra: &[Spectrum],
         cut: Partition,
         limits: [f64; 2],
         rule: Control,
-    ) -> (List<I>, f64, Leaves) {
+    ) -> (List<I>, f64, Spectrum) {
         let cmf = cmf();
         let trees: Vec<DyadicTree<I>> = spectra.iter().map(|s| DyadicTree::new(s, &cmf)).collect();
         let materials: Vec<&DyadicTree<I>> = trees[1..].iter().collect();
@@ -313,7 +313,7 @@ mod tests {
             source: &trees[0],
             reflections: &materials,
         };
-        let white = tristimulus(&spectra[0], cmf.leaves());
+        let white = tristimulus(&spectra[0], cmf.weights());
         let metric = if rule.pairs == Pairs::Any && white[1] > 0.0 {
             Metric::Luv(luv_jacobian(list.xyz(&cmf), white))
         } else {
@@ -326,7 +326,7 @@ mod tests {
         };
         control(&mut list, &path, &cmf, &metric, &settings);
         let size = metric.size(list.error(), list.radius());
-        (list, size, path.leaves())
+        (list, size, path.spectrum())
     }
 
     proptest! {

@@ -9,7 +9,7 @@
 //! | 2.1.1 | 64 leaves, the reference | [`Grid`], [`Leaves`] |
 //! | 2.1 - 2.2 | the other methods | [`methods`] |
 //! | 3.1.1 | scaling functions, cuts of the range | [`Partition`] |
-//! | 3.1.2 | trees, eqs. 2 and 3 | [`Tree`], [`CmfTree`] |
+//! | 3.1.2 | trees, eqs. 2 and 3 | [`DyadicTree`], [`CmfTree`] |
 //! | 3.1.3 | representation of the light | [`represent`] |
 //! | 3.2 | product and its error, refinement, merge | [`List::reflect`], [`Estimate`], [`Path`], [`control()`] |
 //! | 3.3 | change to XYZ | [`List::xyz`] |
@@ -105,7 +105,7 @@ mod tree;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub use crate::data::{Grid, LEAVES, Leaves};
+pub use crate::data::{BANDS, Grid, Spectrum};
 pub use bound::Bounded;
 pub use control::{Control, Metric, Operation, Overshoot, Pairs, coarsen, control};
 pub use interval::{Cmf, Estimate, Interval, Moment, Representative};

@@ -12,7 +12,7 @@ impl Partition {
     /// One interval over everything.
     pub const ROOT: Self = Self(1);
     /// 64 intervals of one leaf.
-    pub const LEAVES: Self = Self(u64::MAX);
+    pub const BANDS: Self = Self(u64::MAX);
 
     /// A cut from its bits; none if an interval would not be dyadic.
     ///
@@ -227,7 +227,7 @@ pub(crate) mod tests {
     #[test]
     fn uniform_cuts() {
         assert_eq!(Partition::uniform(0), Partition::ROOT);
-        assert_eq!(Partition::uniform(6), Partition::LEAVES);
+        assert_eq!(Partition::uniform(6), Partition::BANDS);
         assert_eq!(
             Partition::uniform(3)
                 .iter()
@@ -235,9 +235,9 @@ pub(crate) mod tests {
                 .collect::<Vec<_>>(),
             vec![8; 8]
         );
-        assert_eq!(Partition::LEAVES.iter().last(), Some((63, 1)));
-        assert_eq!(Partition::LEAVES.len_at(63), 1);
-        assert_eq!(Partition::LEAVES.split(63), None);
+        assert_eq!(Partition::BANDS.iter().last(), Some((63, 1)));
+        assert_eq!(Partition::BANDS.len_at(63), 1);
+        assert_eq!(Partition::BANDS.split(63), None);
         assert_eq!(Partition::ROOT.merge(0), None);
         assert!(!Partition::is_valid(0));
     }

@@ -31,11 +31,11 @@ impl<I: Interval> Path<'_, I> {
     }
 
     /// The exact spectrum on the 64 leaves.
-    pub fn leaves(&self) -> super::Leaves {
+    pub fn spectrum(&self) -> super::Spectrum {
         let product = |leaf: usize| {
             self.reflections
                 .iter()
-                .fold(self.source.leaves()[leaf], |s, r| s * r.leaves()[leaf])
+                .fold(self.source.spectrum()[leaf], |s, r| s * r.spectrum()[leaf])
         };
         std::array::from_fn(product)
     }

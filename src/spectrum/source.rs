@@ -56,7 +56,7 @@ mod tests {
         let grid = Grid::new(382.5, 702.5);
         let cmf = CmfTree::new(Observer::cie1931().samples(&grid));
         let middles = grid.left_edges(&named("cie/C").unwrap().table, Outside::Zero);
-        let k = crate::color::normalization(&middles, cmf.leaves());
+        let k = crate::color::normalization(&middles, cmf.weights());
         let tree = DyadicTree::<Estimate>::new(&middles.map(|s| k * s), &cmf);
         assert_eq!(
             represent(&tree, &cmf, &Metric::Xyz, 2e-3)

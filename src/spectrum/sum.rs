@@ -53,16 +53,16 @@ mod tests {
     use crate::spectrum::partition::tests::any_cut;
     use crate::spectrum::testing::{cmf, patch};
     use crate::spectrum::{
-        Bounded, Control, DyadicTree, Estimate, Leaves, Metric, Moment, coarsen,
+        Bounded, Control, DyadicTree, Estimate, Metric, Moment, Spectrum, coarsen,
     };
     use proptest::prelude::*;
 
-    fn spectra() -> impl Strategy<Value = Vec<(Leaves, Leaves, Partition, f64)>> {
+    fn spectra() -> impl Strategy<Value = Vec<(Spectrum, Spectrum, Partition, f64)>> {
         prop::collection::vec((patch(), patch(), any_cut(), 0.0..1.0f64), 1..6)
     }
 
     /// Factors times products of two spectra, each on its own cut, and the exact sum.
-    fn add_up<I: Interval>(terms: &[(Leaves, Leaves, Partition, f64)]) -> (List<I>, Leaves) {
+    fn add_up<I: Interval>(terms: &[(Spectrum, Spectrum, Partition, f64)]) -> (List<I>, Spectrum) {
         let cmf = cmf();
         let (mut sum, mut exact) = (List::black(), [0.0; 64]);
         let mut term = List::black();

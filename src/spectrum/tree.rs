@@ -7,22 +7,22 @@
 
 use super::interval::{Cmf, Interval, Representative};
 use super::partition::Partition;
-use crate::data::{LEAVES, Leaves};
+use crate::data::{BANDS, Spectrum};
 
 /// Nodes of a tree in heap order; index 0 is not used.
-pub const NODES: usize = 2 * LEAVES;
+pub const NODES: usize = 2 * BANDS;
 
 /// Heap index of the node over `len` leaves from `first`.
 #[inline]
 pub fn node(first: usize, len: usize) -> usize {
     // `len` is a power of two and divides `first`, so the shift is an exact division.
-    (LEAVES + first) >> len.trailing_zeros()
+    (BANDS + first) >> len.trailing_zeros()
 }
 
 /// First leaf and number of leaves of a node.
 pub fn span(node: usize) -> (usize, usize) {
     let level = node.ilog2();
-    let len = LEAVES >> level;
+    let len = BANDS >> level;
     ((node - (1 << level)) * len, len)
 }
 
@@ -31,31 +31,31 @@ pub fn span(node: usize) -> (usize, usize) {
 /// It also fixes how spectra are averaged (eq. 3). Under a light, see [`CmfTree::under`], it weighs by that light.
 #[derive(Debug, Clone)]
 pub struct CmfTree {
-    leaves: [Leaves; 3],
+    weights: [Spectrum; 3],
     nodes: [Cmf; NODES],
     /// For each node with children: the left child's share in the value of both by eq. 3.
-    shares: [f64; LEAVES],
+    shares: [f64; BANDS],
     /// For each node with children: what a difference of 1 between the children's values adds to the errors when they merge.
-    gains: [Cmf; LEAVES],
+    gains: [Cmf; BANDS],
 }
 
 impl CmfTree {
     /// From the weights of the leaves (finite, not negative), e.g. [`crate::color::Observer::weights`].
-    pub fn new(leaves: [Leaves; 3]) -> Self {
+    pub fn new(weights: [Spectrum; 3]) -> Self {
         let mut nodes = [[0.0; 3]; NODES];
-        for leaf in 0..LEAVES {
-            nodes[LEAVES + leaf] = leaves.each_ref().map(|a| a[leaf]);
+        for leaf in 0..BANDS {
+            nodes[BANDS + leaf] = weights.each_ref().map(|a| a[leaf]);
         }
-        for n in (1..LEAVES).rev() {
+        for n in (1..BANDS).rev() {
             nodes[n] = std::array::from_fn(|a| nodes[2 * n][a] + nodes[2 * n + 1][a]);
         }
         let mut this = Self {
-            leaves,
+            weights,
             nodes,
-            shares: [0.5; LEAVES],
-            gains: [[0.0; 3]; LEAVES],
+            shares: [0.5; BANDS],
+            gains: [[0.0; 3]; BANDS],
         };
-        for n in 1..LEAVES {
+        for n in 1..BANDS {
             this.shares[n] = this.projected_share(n);
             this.gains[n] = this.gain(n, this.shares[n]);
         }
@@ -103,17 +103,17 @@ impl CmfTree {
     /// A spectrum B = S q is then held as its ratio q to the light S. Averages, errors and tristimulus values are those
     /// of B although only q, which is smooth even under line spectra, is cut into intervals.
     #[must_use]
-    pub fn under(&self, power: &Leaves) -> Self {
+    pub fn under(&self, power: &Spectrum) -> Self {
         Self::new(
-            self.leaves
+            self.weights
                 .each_ref()
                 .map(|a| std::array::from_fn(|leaf| a[leaf] * power[leaf])),
         )
     }
 
     /// Weights of the leaves.
-    pub fn leaves(&self) -> &[Leaves; 3] {
-        &self.leaves
+    pub fn weights(&self) -> &[Spectrum; 3] {
+        &self.weights
     }
 
     /// Sums over a node.
@@ -123,14 +123,14 @@ impl CmfTree {
     }
 
     /// The value of `f` on a node by eq. 3; the plain mean where all weights are zero.
-    pub fn average(&self, f: &Leaves, node: usize) -> f64 {
+    pub fn average(&self, f: &Spectrum, node: usize) -> f64 {
         let (first, len) = span(node);
         let (mut above, mut below) = (0.0, 0.0);
         for a in 0..3 {
             let whole = self.nodes[node][a];
             above += whole
                 * (first..first + len)
-                    .map(|leaf| f[leaf] * self.leaves[a][leaf])
+                    .map(|leaf| f[leaf] * self.weights[a][leaf])
                     .sum::<f64>();
             below += whole * whole;
         }
@@ -150,8 +150,8 @@ impl CmfTree {
     /// let constant = cmf.weighted_average(&[0.5; 64], Partition::uniform(2));
     /// assert!(constant[..4].iter().all(|v| (v - 0.5).abs() < 1e-15));
     /// ```
-    pub fn weighted_average(&self, f: &Leaves, partition: Partition) -> Leaves {
-        let mut values = [0.0; LEAVES];
+    pub fn weighted_average(&self, f: &Spectrum, partition: Partition) -> Spectrum {
+        let mut values = [0.0; BANDS];
         for (value, (first, len)) in values.iter_mut().zip(partition.iter()) {
             *value = self.average(f, node(first, len));
         }
@@ -162,13 +162,13 @@ impl CmfTree {
 /// A spectrum as a binary tree: for each node the average and what the interval type keeps of its errors.
 #[derive(Debug, Clone)]
 pub struct DyadicTree<I> {
-    leaves: Leaves,
+    spectrum: Spectrum,
     nodes: [I; NODES],
 }
 
 impl<I: Interval> DyadicTree<I> {
     /// From the leaves (finite).
-    pub fn new(f: &Leaves, cmf: &CmfTree) -> Self {
+    pub fn new(f: &Spectrum, cmf: &CmfTree) -> Self {
         let mut nodes = [I::default(); NODES];
         for (n, slot) in nodes.iter_mut().enumerate().skip(1) {
             let (first, len) = span(n);
@@ -182,15 +182,18 @@ impl<I: Interval> DyadicTree<I> {
             *slot = I::new(
                 average,
                 &f[over.clone()],
-                cmf.leaves.each_ref().map(|a| &a[over.clone()]),
+                cmf.weights.each_ref().map(|a| &a[over.clone()]),
             );
         }
-        Self { leaves: *f, nodes }
+        Self {
+            spectrum: *f,
+            nodes,
+        }
     }
 
     /// The leaves it was made from.
-    pub fn leaves(&self) -> &Leaves {
-        &self.leaves
+    pub fn spectrum(&self) -> &Spectrum {
+        &self.spectrum
     }
 
     /// A node by heap index.
@@ -209,10 +212,10 @@ impl<I: Interval> DyadicTree<I> {
             let (value, error) = (self.nodes[n].value(), self.nodes[n].error());
             for a in 0..3 {
                 let exact: f64 = (first..first + len)
-                    .map(|leaf| (self.leaves[leaf] - value) * cmf.leaves[a][leaf])
+                    .map(|leaf| (self.spectrum[leaf] - value) * cmf.weights[a][leaf])
                     .sum();
                 let scale: f64 = (first..first + len)
-                    .map(|leaf| self.leaves[leaf].abs() * cmf.leaves[a][leaf])
+                    .map(|leaf| self.spectrum[leaf].abs() * cmf.weights[a][leaf])
                     .sum();
                 if (error[a] - exact).abs() > 1e-12 * scale || (len == 1 && error[a] != 0.0) {
                     return Err(format!(
@@ -245,7 +248,7 @@ mod tests {
 
     #[test]
     fn without_weights_the_average_is_the_mean() {
-        let blind = CmfTree::new([[0.0; LEAVES]; 3]);
+        let blind = CmfTree::new([[0.0; BANDS]; 3]);
         let ramp = std::array::from_fn(|leaf| leaf as f64);
         assert_eq!(blind.average(&ramp, 1), 31.5);
         assert!(
@@ -262,7 +265,7 @@ mod tests {
             let tree = DyadicTree::<Estimate>::new(&f, &cmf);
             prop_assert_eq!(tree.validate(&cmf), Ok(()));
             let (first, len) = span(n);
-            let squares = |value: f64| (0..3).map(|a| (first..first + len).map(|k| (f[k] - value) * cmf.leaves()[a][k]).sum::<f64>().powi(2)).sum::<f64>();
+            let squares = |value: f64| (0..3).map(|a| (first..first + len).map(|k| (f[k] - value) * cmf.weights()[a][k]).sum::<f64>().powi(2)).sum::<f64>();
             let average = tree.node(n).value;
             prop_assert!(squares(average) <= squares(average + step) + 1e-12);
         }
@@ -274,7 +277,7 @@ mod tests {
             let node = *DyadicTree::<Estimate>::new(&q, &under).node(n);
             let (first, len) = span(n);
             for a in 0..3 {
-                let exact: f64 = (first..first + len).map(|k| light[k] * (q[k] - node.value) * cmf.leaves()[a][k]).sum();
+                let exact: f64 = (first..first + len).map(|k| light[k] * (q[k] - node.value) * cmf.weights()[a][k]).sum();
                 prop_assert!((node.error[a] - exact).abs() < 1e-12);
             }
         }

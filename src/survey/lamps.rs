@@ -176,12 +176,12 @@ enum Facing {
 }
 
 /// What a surface's faces shine on, or would if they were turned.
-fn of_surface(eyes: &Eyes, surface: usize, way: Facing, rays: u32) -> RayCounts {
+fn of_surface(eyes: &Eyes, surface: usize, facing: Facing, rays: u32) -> RayCounts {
     let mesh = &eyes.mesh;
     let range = mesh.first_triangle[surface] as usize..mesh.first_triangle[surface + 1] as usize;
     let total: f64 = mesh.area[range.clone()].iter().sum();
     let mut seen = RayCounts::default();
-    let shift = hash(surface as u64, u64::from(way == Facing::Behind));
+    let shift = hash(surface as u64, u64::from(facing == Facing::Behind));
     let (mut triangle, mut passed) = (range.start, 0.0);
     for k in 0..rays {
         // Rays in steps of area, so that every part of the lamp has its share.
@@ -192,7 +192,7 @@ fn of_surface(eyes: &Eyes, surface: usize, way: Facing, rays: u32) -> RayCounts 
         }
         let corners = mesh.triangles[triangle].map(|v| mesh.positions[v as usize] + mesh.centre);
         let from = on_triangle(&corners, sequence02(k, shift));
-        let normal = match way {
+        let normal = match facing {
             Facing::Ahead => mesh.normal[triangle],
             Facing::Behind => -mesh.normal[triangle],
         };

@@ -44,14 +44,14 @@ pub struct SurveyOptions {
 ///
 /// ```
 /// use haarlight::scene::{Options, Scene};
-/// use haarlight::survey::{Wishes, advise};
+/// use haarlight::survey::{SurveyOptions, advise};
 /// let mut room = Scene::load("scenes/convex.glb", &Options::default())?;
-/// assert!(advise(&mut room, Wishes::default()).is_empty());
+/// assert!(advise(&mut room, SurveyOptions::default()).is_empty());
 /// room.flip(0..room.surfaces.len());
-/// let problems = advise(&mut room, Wishes::default());
+/// let problems = advise(&mut room, SurveyOptions::default());
 /// assert!(problems[0].what.contains("faces look reversed"));
 /// // The same room again.
-/// assert!(advise(&mut room, Wishes { flip: true, ..Wishes::default() }).is_empty());
+/// assert!(advise(&mut room, SurveyOptions { flip: true, ..SurveyOptions::default() }).is_empty());
 /// # Ok::<(), haarlight::Error>(())
 /// ```
 pub fn advise(scene: &mut Scene, wishes: SurveyOptions) -> Vec<Problem> {

@@ -147,7 +147,7 @@ impl SkyReceiver<'_> {
         let blockers = sight.blockers(blockers, [to.plane, NO_PLANE]);
         let fits = blockers.into_iter().flatten().all(|blocker| {
             let outline = sight.mesh.outline(blocker);
-            clipper.cut(&Shadow::new(to.point, outline.as_ref()), PIECES)
+            clipper.clip(&Shadow::new(to.point, outline.as_ref()), PIECES)
         });
         if fits {
             let whole = lambert_edges_x8(to.point, to.normal, &cell.corners);

@@ -114,7 +114,7 @@ impl Gatherer<'_> {
     pub(super) fn lamps_together(
         &self,
         to: &Receiver,
-        of: RadiosityPart,
+        which: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
@@ -144,7 +144,15 @@ impl Gatherer<'_> {
             let each = lamps.iter().zip(&seen).enumerate();
             for (k, (lamp, &seen)) in each.filter(|(_, (_, seen))| **seen > 0.0) {
                 let tint = tints.get(k).or(tints.last());
-                self.see(to, lamp.id, lamp.factor, SeenPatch::of(seen), tint, of, out);
+                self.see(
+                    to,
+                    lamp.id,
+                    lamp.factor,
+                    SeenPatch::of(seen),
+                    tint,
+                    which,
+                    out,
+                );
             }
         }
         memory.lamps = lamps;

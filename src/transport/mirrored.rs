@@ -1,7 +1,7 @@
 //! Light by way of mirrors.
 //!
 //! Rays over the hemisphere that meet mirrors go on, and bring the light of what they meet at last, tinted. Besides, lamps, sun and
-//! openings are gathered in each image, from the point's mirror image ([`Image::point`](crate::hierarchy::Image::point)): with the
+//! openings are gathered in each image, from the point's mirror image ([`MirrorImage::point`](crate::hierarchy::MirrorImage::point)): with the
 //! factors that they have for any point, except for what blocks them. So rays bring emission only where things have no image.
 
 use super::gatherer::{Gatherer, Memory};

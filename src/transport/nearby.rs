@@ -92,7 +92,7 @@ impl Gatherer<'_> {
                 continue;
             }
             path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival.all);
-            if backs <= WITHIN && arrival.spread <= EVEN * arrival.direct {
+            if backs <= WITHIN && arrival.half_range <= EVEN * arrival.direct {
                 path.sum += path.through * f64::from(arrival.direct);
                 continue;
             }

@@ -44,7 +44,7 @@ impl Gatherer<'_> {
     pub(super) fn patches(
         &self,
         to: &Receiver,
-        of: RadiosityPart,
+        which: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
@@ -60,14 +60,14 @@ impl Gatherer<'_> {
                     break;
                 }
                 memory.stack.pop();
-                if of == RadiosityPart::Emitted
+                if which == RadiosityPart::Emitted
                     && self.light.bright_emitted[linked.0 as usize] <= 0.0
                     || !self.can_see(to, node)
                 {
                     continue;
                 }
                 if !plain {
-                    self.cluster(to, linked, of, memory, out);
+                    self.cluster(to, linked, which, memory, out);
                     continue;
                 }
                 let before = count;
@@ -83,7 +83,7 @@ impl Gatherer<'_> {
                 }
             }
             if held == 0 {
-                self.lamps_together(to, of, memory, out);
+                self.lamps_together(to, which, memory, out);
                 return;
             }
             let faces = &faces[..count];
@@ -94,17 +94,17 @@ impl Gatherer<'_> {
             }
             for &(linked, factor) in &open[..held] {
                 if factor > 0.0 {
-                    self.patch(to, linked, factor, of, memory, out);
+                    self.patch(to, linked, factor, which, memory, out);
                 }
             }
         }
     }
 
     /// Reflected and emitted brightness of a node, as far as gathered, as shares of white.
-    fn brightness(&self, id: u32, of: RadiosityPart) -> (f64, f64) {
+    fn brightness(&self, id: u32, which: RadiosityPart) -> (f64, f64) {
         let reflected = f64::from(self.light.bright_reflected[id as usize]);
         let emitted = f64::from(self.light.bright_emitted[id as usize]);
-        match of {
+        match which {
             RadiosityPart::All => (reflected, emitted),
             RadiosityPart::Reflected => (reflected, 0.0),
             RadiosityPart::Emitted => (0.0, emitted),
@@ -115,40 +115,40 @@ impl Gatherer<'_> {
     fn cluster(
         &self,
         to: &Receiver,
-        (id, way, v): Linked,
-        of: RadiosityPart,
+        (id, occlusion, v): Linked,
+        which: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        if of == RadiosityPart::Emitted && self.is_fixture(to, id) {
+        if which == RadiosityPart::Emitted && self.is_fixture(to, id) {
             self.put_off(to, id, memory);
             return;
         }
         let node = self.tree.node(id);
-        let (reflected, emitted) = self.brightness(id, of);
-        let spread = f64::from(self.light.spread[id as usize]);
+        let (reflected, emitted) = self.brightness(id, which);
+        let deviation = f64::from(self.light.deviation[id as usize]);
         let factor = self.bound(to, node);
         let near = (node.centre - to.point).length() < CLOSE * node.radius;
         // Points find a cluster's light to about a third of its spread; with lamps in the cluster, only to the whole of
         // their light.
-        if near || factor * (0.3 * spread + emitted) > self.tolerance {
-            let part = |c: u32| match of {
+        if near || factor * (0.3 * deviation + emitted) > self.tolerance {
+            let part = |c: u32| match which {
                 RadiosityPart::Emitted => self.light.lit[c as usize],
                 _ => c,
             };
             let parts = node.child_range().map(part).filter(|&c| c != NONE);
-            memory.stack.extend(parts.map(|c| (c, way, v)));
+            memory.stack.extend(parts.map(|c| (c, occlusion, v)));
             return;
         }
-        if of == RadiosityPart::Emitted {
+        if which == RadiosityPart::Emitted {
             self.lamps_by_chance(to, id, factor * emitted, memory, out);
             return;
         }
         let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
-        let clear = self.is_clear(way);
+        let clear = self.is_clear(occlusion);
         if let Some((factor, visible)) = self.sampled(to, id, count, clear, memory) {
             let tint = self.tint(memory);
-            self.add(id, factor, visible, tint.as_ref(), of, out);
+            self.add(id, factor, visible, tint.as_ref(), which, out);
         }
     }
 
@@ -156,14 +156,14 @@ impl Gatherer<'_> {
     fn patch(
         &self,
         to: &Receiver,
-        (id, way, v): Linked,
+        (id, occlusion, v): Linked,
         factor: f64,
-        of: RadiosityPart,
+        which: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
         let node = self.tree.node(id);
-        let clear = self.is_clear(way);
+        let clear = self.is_clear(occlusion);
         let (size, limit) = if clear {
             let distance = (node.centre - to.point).length();
             let size = (node.radius / distance.max(1e-300)).min(1.0);
@@ -171,21 +171,28 @@ impl Gatherer<'_> {
         } else {
             (1.0, PARTLY_SHARE * self.tolerance)
         };
-        let spread = match of {
+        let deviation = match which {
             RadiosityPart::Emitted => self.uneven(node),
-            _ => f64::from(self.light.spread[id as usize]),
+            _ => f64::from(self.light.deviation[id as usize]),
         };
-        if self.has_parts(node) && (node.element == NONE || factor * spread * size > limit) {
-            memory.stack.extend(node.child_range().map(|c| (c, way, v)));
+        if self.has_parts(node) && (node.element == NONE || factor * deviation * size > limit) {
+            memory
+                .stack
+                .extend(node.child_range().map(|c| (c, occlusion, v)));
             return;
         }
-        let (reflected, emitted) = self.brightness(id, of);
+        let (reflected, emitted) = self.brightness(id, which);
         let carries = factor * (reflected + emitted);
         if clear {
-            self.see(to, id, factor, SeenPatch::of(1.0), None, of, out);
-        } else if let Some((share, clipped)) =
-            self.visible(to, (id, way, v), factor, carries, emitted > 0.0, memory)
-        {
+            self.see(to, id, factor, SeenPatch::of(1.0), None, which, out);
+        } else if let Some((share, clipped)) = self.visible(
+            to,
+            (id, occlusion, v),
+            factor,
+            carries,
+            emitted > 0.0,
+            memory,
+        ) {
             let tint = self.tint(memory);
             let parts = Some(&memory.clipper).filter(|_| clipped && share < 1.0);
             self.see(
@@ -194,15 +201,15 @@ impl Gatherer<'_> {
                 factor,
                 SeenPatch { share, parts },
                 tint.as_ref(),
-                of,
+                which,
                 out,
             );
         }
     }
 
     /// Is a way free? One that links proved clear may lead through a pane.
-    fn is_clear(&self, way: Occlusion) -> bool {
-        self.is_plain() && (way == Occlusion::Clear || !self.sight.occlusion)
+    fn is_clear(&self, occlusion: Occlusion) -> bool {
+        self.is_plain() && (occlusion == Occlusion::Clear || !self.sight.occlusion)
     }
 
     /// What panes leave of the light of the last rays, where these are not blocked; none where no pane is passed.
@@ -229,12 +236,12 @@ impl Gatherer<'_> {
         factor: f64,
         seen: SeenPatch,
         tint: Option<&Passage>,
-        of: RadiosityPart,
+        which: RadiosityPart,
         out: &mut Gathered,
     ) {
-        self.add(id, factor, seen.share, tint, of, out);
+        self.add(id, factor, seen.share, tint, which, out);
         // Behind panes leaves count as even: in rooms with panes, patches are gathered this way only if they glare.
-        if of != RadiosityPart::Emitted && tint.is_none() {
+        if which != RadiosityPart::Emitted && tint.is_none() {
             self.slope(to, id, factor, seen, CLEAR_SHARE * self.tolerance, out);
         }
     }
@@ -268,24 +275,24 @@ impl Gatherer<'_> {
         factor: f64,
         visible: f64,
         tint: Option<&Passage>,
-        of: RadiosityPart,
+        which: RadiosityPart,
         out: &mut Gathered,
     ) {
         let seen = (factor * visible) as f32;
         let k = id as usize;
         let width = self.light.width();
         let filter = tint.map(|passage| &passage.filter);
-        if of != RadiosityPart::Emitted {
+        if which != RadiosityPart::Emitted {
             out.seen += factor * visible;
             let row = self.light.reflected.row(k);
             accumulate(&mut out.irradiance[..width], seen, row, filter);
         }
-        if of != RadiosityPart::Reflected && self.light.bright_emitted[k] > 0.0 {
+        if which != RadiosityPart::Reflected && self.light.bright_emitted[k] > 0.0 {
             let row = self.light.emitted.row(k);
             accumulate(&mut out.direct[..width], seen, row, filter);
         }
         if let Some(trace) = &mut out.trace {
-            match of {
+            match which {
                 RadiosityPart::All => trace.patch(id, seen, tint),
                 RadiosityPart::Reflected => trace.slope(id, seen, tint),
                 RadiosityPart::Emitted => trace.emitted(id, seen, tint),
@@ -370,7 +377,7 @@ impl Gatherer<'_> {
     fn visible(
         &self,
         to: &Receiver,
-        (id, way, known): Linked,
+        (id, occlusion, known): Linked,
         factor: f64,
         carries: f64,
         lamp: bool,
@@ -383,8 +390,8 @@ impl Gatherer<'_> {
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
         let clips = self.is_plain();
-        if clips && let Occlusion::Listed { .. } = way {
-            let list = blockers_of(&self.light.neighbours.blockers, way);
+        if clips && let Occlusion::Listed { .. } = occlusion {
+            let list = blockers_of(&self.light.neighbours.blockers, occlusion);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
                 return Some(((seen / factor).min(1.0), true));
             }
@@ -478,7 +485,7 @@ impl Gatherer<'_> {
         for blocker in self.sight.blockers(list, planes)? {
             let outline = || self.sight.mesh.outline(blocker);
             let shadow = memory.shadows.of(to.point, blocker, outline);
-            if !memory.clipper.cut(shadow, PIECES) {
+            if !memory.clipper.clip(shadow, PIECES) {
                 return None;
             }
         }

@@ -46,13 +46,13 @@ impl Gatherer<'_> {
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        let way = match known {
+        let sampling = match known {
             _ if self.hemisphere.is_some() && !self.sight.occlusion => SkySampling::Unshadowed,
             Some((open, of)) => SkySampling::Known(open, of),
             None if !self.shafts => SkySampling::Rays(0),
             None => SkySampling::Rays(if own { 2 } else { 1 }),
         };
-        self.come_in(to, way, own, memory, out);
+        self.come_in(to, sampling, own, memory, out);
     }
 
     /// [`Self::outside`] in one of `images` images; `open`, of `of` directions over the hemisphere, lead out of the
@@ -65,18 +65,18 @@ impl Gatherer<'_> {
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        let way = match self.shafts {
+        let sampling = match self.shafts {
             true => SkySampling::Shared(open, of, images),
             false => SkySampling::Glanced(open, of),
         };
-        self.come_in(to, way, true, memory, out);
+        self.come_in(to, sampling, true, memory, out);
     }
 
     /// Adds the light from outside that `way` finds.
     fn come_in(
         &self,
         to: &Receiver,
-        way: SkySampling,
+        sampling: SkySampling,
         own: bool,
         memory: &mut Memory,
         out: &mut Gathered,
@@ -90,7 +90,7 @@ impl Gatherer<'_> {
         };
         let to = &Receiver { seed, ..*to };
         let before = memory.look.rays;
-        let seen = outside.seen((self.sight, Some(self)), to, way, &mut memory.look);
+        let seen = outside.seen((self.sight, Some(self)), to, sampling, &mut memory.look);
         memory.rays += memory.look.rays - before;
         let mut noise = 0.0;
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {

@@ -308,7 +308,7 @@ mod tests {
                     whole[0] = whole[0].max((got(all) / want - 1.0).abs());
                 }
                 whole[1] = whole[1].max((mean / want - 1.0).abs());
-                assert!(clipper.cut(&shadow, 48));
+                assert!(clipper.clip(&shadow, 48));
                 let share = clipper.factor(to.normal, factor) / factor;
                 if !(0.1..0.9).contains(&share) {
                     continue;

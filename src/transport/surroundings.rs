@@ -138,15 +138,15 @@ impl Surroundings {
         &self,
         (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
-        way: SkySampling,
+        sampling: SkySampling,
         look: &mut SkyScratch,
     ) -> [f64; PLACES] {
         (look.noise, look.tints) = ([0.0; PLACES], Default::default());
-        if let SkySampling::Unshadowed = way {
+        if let SkySampling::Unshadowed = sampling {
             return self.unshadowed(to);
         }
         // Many points represent a leaf that looks for itself: for them rays are enough.
-        let one_of_many = sight.panes.is_some() && way.kind() == 0;
+        let one_of_many = sight.panes.is_some() && sampling.kind() == 0;
         if Self::is_exact(&self.sky, sight) && !one_of_many {
             let looker = SkyReceiver {
                 sky: &self.sky,
@@ -154,12 +154,12 @@ impl Surroundings {
                 by: by.filter(|by| by.change_light()),
                 to,
             };
-            looker.look(TINTED[way.kind()], &mut look.found);
+            looker.look(TINTED[sampling.kind()], &mut look.found);
             look.rays += look.found.rays;
             look.tints = std::mem::take(&mut look.found.tints);
             look.found.seen
         } else {
-            self.by_rays((sight, by), to, way, look)
+            self.by_rays((sight, by), to, sampling, look)
         }
     }
 
@@ -211,18 +211,19 @@ impl Surroundings {
         &self,
         (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
-        way: SkySampling,
+        sampling: SkySampling,
         look: &mut SkyScratch,
     ) -> [f64; PLACES] {
-        let [wide, mut narrow, spots] = RAYS[way.kind()];
-        if let (SkySampling::Known(..) | SkySampling::Shared(..), true) = (way, sight.small()) {
+        let [wide, mut narrow, spots] = RAYS[sampling.kind()];
+        if let (SkySampling::Known(..) | SkySampling::Shared(..), true) = (sampling, sight.small())
+        {
             // Rooms of few triangles come here because of mirrors and maps; a ray costs next to nothing in them.
             narrow *= FEW;
         }
-        if let SkySampling::Shared(.., images) = way {
+        if let SkySampling::Shared(.., images) = sampling {
             narrow = (narrow / images.max(1)).max(RAYS[1][1]);
         }
-        let wide = match way {
+        let wide = match sampling {
             SkySampling::Known(open, of)
             | SkySampling::Glanced(open, of)
             | SkySampling::Shared(open, of, _) => {

@@ -67,7 +67,7 @@ impl Gatherer<'_> {
     /// Adds the reflected light of patches brighter than `most`, by links.
     fn bright(&self, to: &Receiver, most: f64, memory: &mut Memory, out: &mut Gathered) {
         memory.open.extend(self.links(to));
-        while let Some((id, way, v)) = memory.open.pop() {
+        while let Some((id, occlusion, v)) = memory.open.pop() {
             let k = id as usize;
             let brightest = f64::from(self.light.brightest[k]);
             // Most links are not that bright, and their patches need not be loaded.
@@ -82,9 +82,11 @@ impl Gatherer<'_> {
             if node.faces.1 <= POLYGONS && even || !self.has_parts(node) {
                 memory.taken[k] = memory.epoch;
                 memory.any_taken = true;
-                memory.stack.push((id, way, v));
+                memory.stack.push((id, occlusion, v));
             } else {
-                memory.open.extend(node.child_range().map(|c| (c, way, v)));
+                memory
+                    .open
+                    .extend(node.child_range().map(|c| (c, occlusion, v)));
             }
         }
         self.patches(to, RadiosityPart::Reflected, memory, out);

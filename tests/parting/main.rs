@@ -22,7 +22,7 @@ use haarlight::output::{BakedGlb, Exposure, Packing, Writing, baked_glb};
 use haarlight::scene::layers::{Layers, MOST_LAYERS};
 use haarlight::scene::{LightKind, Options, Scene};
 use haarlight::solve::{Bake, Settings};
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use haarlight::survey::PointLocation;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -66,8 +66,8 @@ fn layers(bake: &Bake) -> &Layers {
 /// A box with a block in it, a warm surface lamp, a cold one and a point lamp; walls of different reds and greens.
 fn two_lamps() -> Scene {
     let mut room = Room::new();
-    let ramp = |from: f64, to: f64| -> [f64; LEAVES] {
-        std::array::from_fn(|k| from + (to - from) * k as f64 / LEAVES as f64)
+    let ramp = |from: f64, to: f64| -> [f64; BANDS] {
+        std::array::from_fn(|k| from + (to - from) * k as f64 / BANDS as f64)
     };
     let (warm, cold) = (
         room.spectrum("warm", ramp(0.1, 2.0)),
@@ -145,7 +145,7 @@ fn layers_at_vertices_add_up_in_all_kinds_of_rooms() {
     ] {
         let bake = parted(loaded(name, None), 4.0);
         assert_eq!(layers(&bake).names.len(), count, "{name}");
-        assert!(bake.lanes().len() <= LEAVES);
+        assert!(bake.lanes().len() <= BANDS);
         sums_up(&bake, &bake.baked(&|_, _| {}), name);
     }
 }

@@ -80,7 +80,7 @@ impl Openings {
             pieces
         }));
         let most = (EACH * rays).min(PIECES as f64) as usize;
-        self.cut(point, most, choice);
+        self.divide(point, most, choice);
         let [mut open, mut blind] = [0.0; 2];
         for pieces in &choice.parts {
             let part = &self.parts[pieces.part as usize];
@@ -107,7 +107,7 @@ impl Openings {
     }
 
     /// Cuts parts into pieces, coarser ones where they were more than this.
-    fn cut(&self, point: DVec3, most: usize, choice: &mut OpeningDistribution) {
+    fn divide(&self, point: DVec3, most: usize, choice: &mut OpeningDistribution) {
         let (mut length, parts) = (LENGTH, choice.parts.len().max(1));
         let fewest = (most / parts).isqrt().clamp(1, FEWEST);
         loop {

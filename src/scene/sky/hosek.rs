@@ -11,7 +11,7 @@
 
 use crate::color::{KM, Observer};
 use crate::data::{
-    Grid, LEAVES, Leaves, Outside, SKYLIGHT_NM, TERMS, Table, WAVES, named, skylight,
+    BANDS, Grid, Outside, SKYLIGHT_NM, Spectrum, TERMS, Table, WAVES, named, skylight,
 };
 use glam::DVec3;
 
@@ -26,7 +26,7 @@ pub struct Hosek {
     air: [f64; 2],
     terms: [[f64; TERMS]; WAVES],
     /// What a leaf has of each wavelength.
-    leaves: Box<[Leaves; WAVES]>,
+    bands: Box<[Spectrum; WAVES]>,
 }
 
 impl Hosek {
@@ -40,7 +40,7 @@ impl Hosek {
             sun,
             air: [turbidity, albedo],
             terms: skylight(turbidity, albedo, height),
-            leaves: Box::new(std::array::from_fn(|wave| leaves_of(wave, grid))),
+            bands: Box::new(std::array::from_fn(|wave| bands_of(wave, grid))),
         }
     }
 
@@ -72,9 +72,9 @@ impl Hosek {
     }
 
     /// The spectrum that has these values at the wavelengths of the model.
-    pub(super) fn spectrum(&self, values: &[f64; WAVES]) -> Leaves {
+    pub(super) fn spectrum(&self, values: &[f64; WAVES]) -> Spectrum {
         std::array::from_fn(|leaf| {
-            let each = values.iter().zip(self.leaves.iter());
+            let each = values.iter().zip(self.bands.iter());
             each.map(|(value, leaves)| value * leaves[leaf]).sum()
         })
     }
@@ -82,16 +82,16 @@ impl Hosek {
     /// What a radiance of 1 at each wavelength has as a tristimulus value, Y in cd/m2.
     pub(super) fn tristimulus(&self, grid: &Grid) -> [DVec3; WAVES] {
         let observer = Observer::cie1931().weights(grid);
-        self.leaves.each_ref().map(|leaves| {
+        self.bands.each_ref().map(|leaves| {
             let sum =
-                |weights: &Leaves| -> f64 { (0..LEAVES).map(|l| weights[l] * leaves[l]).sum() };
+                |weights: &Spectrum| -> f64 { (0..BANDS).map(|l| weights[l] * leaves[l]).sum() };
             KM * DVec3::from_array(observer.each_ref().map(sum))
         })
     }
 }
 
 /// What the leaves have of a wavelength: the mean of what is 1 there and falls to 0 at its neighbours.
-fn leaves_of(wave: usize, grid: &Grid) -> Leaves {
+fn bands_of(wave: usize, grid: &Grid) -> Spectrum {
     let d65 = named("cie/D65").expect("D65 is built in").table;
     let daylight = |nm: f64| d65.at(nm, Outside::Zero);
     let first = |nm: f64| match wave {

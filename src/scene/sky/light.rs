@@ -10,7 +10,7 @@ use super::picture::SkyPicture;
 use super::sun::angles;
 use super::wish::{BRIGHT, KELVIN, SkyBrightness, SkyType, SkyWish};
 use crate::color::{KM, Observer, Upsampler, primaries};
-use crate::data::{Grid, LEAVES, Leaves, Outside, Table, blackbody, daylight, named};
+use crate::data::{BANDS, Grid, Outside, Spectrum, Table, blackbody, daylight, named};
 use crate::scene::LightSpectrum;
 use crate::scene::check::Check;
 use crate::scene::json::short;
@@ -38,12 +38,12 @@ pub(super) struct SkyLight {
     /// Luminous size 1.
     pub(super) spectrum: LightSpectrum,
     /// Shares of it by part: irradiance of open level ground, and of a plane that looks down.
-    pub(super) above: [Leaves; PARTS],
-    pub(super) below: [Leaves; PARTS],
+    pub(super) above: [Spectrum; PARTS],
+    pub(super) below: [Spectrum; PARTS],
     /// Reflectance of open ground below the horizon, where that is what is seen there.
     pub(super) ground: Option<f64>,
     /// A sun of its own: toward it, and the share of the spectrum across its rays.
-    pub(super) sun: Option<(DVec3, Leaves)>,
+    pub(super) sun: Option<(DVec3, Spectrum)>,
 }
 
 impl SkyLight {
@@ -93,7 +93,7 @@ impl SkyLight {
             names: SHADES,
             spectrum: own,
             above,
-            below: [[0.0; LEAVES]; PARTS],
+            below: [[0.0; BANDS]; PARTS],
             ground: Some(ground),
             sun: None,
         })
@@ -117,7 +117,7 @@ impl SkyLight {
         let ground = wish.ground.unwrap_or(USUAL_GROUND);
         let sky = Spectral::new(Hosek::new(turbidity, ground, sun, grid), grid);
         let luminous = Observer::cie1931().weights(grid)[1];
-        let size = |power: &Leaves| -> f64 {
+        let size = |power: &Spectrum| -> f64 {
             let each = power.iter().zip(&luminous);
             each.map(|(p, y)| KM * p * y).sum()
         };
@@ -143,7 +143,7 @@ impl SkyLight {
                 power,
             },
             dome: Dome::Spectral(Arc::new(sky)),
-            below: [[0.0; LEAVES]; PARTS],
+            below: [[0.0; BANDS]; PARTS],
             ground: Some(ground),
             sun: None,
         })
@@ -268,7 +268,7 @@ pub(super) fn of_sun(kelvin: f64, grid: &Grid) -> LightSpectrum {
     }
 }
 
-fn sum_of(parts: [Leaves; PARTS]) -> Leaves {
+fn sum_of(parts: [Spectrum; PARTS]) -> Spectrum {
     std::array::from_fn(|l| parts.iter().map(|part| part[l]).sum())
 }
 

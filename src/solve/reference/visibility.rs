@@ -5,7 +5,7 @@ use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon};
 use crate::hierarchy::{Glazing, Mesh, Panes, stratified};
 use crate::scene::Scene;
 use crate::scene::effects::{EffectKind, Plan};
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
 
 /// The ways of light in a room.
@@ -34,7 +34,7 @@ impl<'a> ReferenceVisibility<'a> {
     }
 
     /// Form factor from a point to the visible part of a patch, and the transmittance of panes on the way; none: 1.
-    pub(super) fn factor(&self, from: PatchPoint, to: &Patch) -> (f64, Option<Leaves>) {
+    pub(super) fn factor(&self, from: PatchPoint, to: &Patch) -> (f64, Option<Spectrum>) {
         let PatchPoint {
             at: point,
             normal,
@@ -48,7 +48,7 @@ impl<'a> ReferenceVisibility<'a> {
             return (open, None);
         }
         let (mut seen, mut total) = (0.0, 0.0);
-        let mut passed = self.panes.as_ref().map(|_| [0.0; LEAVES]);
+        let mut passed = self.panes.as_ref().map(|_| [0.0; BANDS]);
         for k in 0..self.count {
             let w = stratified(k, self.count, [0.5, 0.5]);
             let q = to.corners[0] * w[0] + to.corners[1] * w[1] + to.corners[2] * w[2];
@@ -74,7 +74,7 @@ impl<'a> ReferenceVisibility<'a> {
     }
 
     /// Adds `amount` of light from `end` to a point, less what panes absorb, unless something blocks it. Nothing in the point's plane does.
-    pub(super) fn bring(&self, sum: &mut Leaves, amount: f64, to: PatchPoint, end: DVec3) {
+    pub(super) fn bring(&self, sum: &mut Spectrum, amount: f64, to: PatchPoint, end: DVec3) {
         if !self.blocked(to.at, end, [to.plane, NO_PLANE]) {
             match self.panes {
                 Some(_) => add(sum, &self.passes(to.at, end), amount),
@@ -88,8 +88,8 @@ impl<'a> ReferenceVisibility<'a> {
     }
 
     /// Transmittance of the panes between two points.
-    fn passes(&self, from: DVec3, to: DVec3) -> Leaves {
-        let mut left = [1.0; LEAVES];
+    fn passes(&self, from: DVec3, to: DVec3) -> Spectrum {
+        let mut left = [1.0; BANDS];
         let Some(panes) = &self.panes else {
             return left;
         };

@@ -26,7 +26,7 @@ pub use pointwise::Pointwise;
 pub use sampling::{bands, sampling};
 pub use segments::segments;
 
-use super::Leaves;
+use super::Spectrum;
 use crate::color::Xyz;
 
 /// A way to hold spectra under one light as a few numbers.
@@ -41,7 +41,7 @@ pub trait Method {
     fn light(&self) -> Vec<f64>;
 
     /// A reflectance, ready for [`Method::reflect`].
-    fn material(&self, reflectance: &Leaves) -> Vec<f64>;
+    fn material(&self, reflectance: &Spectrum) -> Vec<f64>;
 
     /// `out` becomes the spectrum after reflection; both have [`Method::terms`] numbers. Does not allocate.
     fn reflect(&self, spectrum: &[f64], material: &[f64], out: &mut [f64]);
@@ -56,7 +56,7 @@ mod tests {
     use crate::color::de_luv;
     use crate::spectrum::study::{ColourChart, Reflectances};
 
-    fn all(chart: &ColourChart, light: &Leaves, n: usize) -> Vec<Box<dyn Method>> {
+    fn all(chart: &ColourChart, light: &Spectrum, n: usize) -> Vec<Box<dyn Method>> {
         let cmf = &chart.cmf;
         let mut all: Vec<Box<dyn Method>> = vec![
             Box::new(sampling(cmf, light, n)),
@@ -96,7 +96,7 @@ mod tests {
         let light = chart.light("D65");
         let exact = crate::color::tristimulus(
             &std::array::from_fn(|k| light.power[k] * chart.reflectances[0][k]),
-            chart.cmf.leaves(),
+            chart.cmf.weights(),
         );
         for (few, many) in all(&chart, &light.power, 4)
             .iter()
@@ -133,7 +133,7 @@ mod tests {
                     method.reflect(&method.light(), &method.material(r), &mut out);
                     let exact = crate::color::tristimulus(
                         &std::array::from_fn(|k| light.power[k] * r[k]),
-                        chart.cmf.leaves(),
+                        chart.cmf.weights(),
                     );
                     assert!((0..3).all(|a| (method.xyz(&out)[a] - exact[a]).abs() < 1e-12));
                 }

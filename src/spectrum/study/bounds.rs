@@ -49,7 +49,7 @@ pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<BoundsRow> {
     let samples = sample(&start, &list, |list, path| {
         let level = path.reflections.len() - 1;
         let operation = control(list, path, &chart.cmf, &Metric::Xyz, &settings);
-        let truth = tristimulus(&path.leaves(), chart.cmf.leaves());
+        let truth = tristimulus(&path.spectrum(), chart.cmf.weights());
         let (told, radius) = (list.corrected_xyz(&chart.cmf), list.radius());
         let off: [f64; 3] = std::array::from_fn(|a| (truth[a] - told[a]).abs());
         violations[level] += usize::from((0..3).any(|a| off[a] > radius[a] + ROUNDING));

@@ -5,7 +5,7 @@
 
 use crate::color::{Observer, Xyz, normalization, tristimulus};
 use crate::data::{Outside, Table, named};
-use crate::spectrum::{CmfTree, Grid, Leaves};
+use crate::spectrum::{CmfTree, Grid, Spectrum};
 
 /// Which measurement of the chart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,7 +52,7 @@ pub struct ColourChart {
     /// Colour matching functions on the paper's grid.
     pub cmf: CmfTree,
     /// The patches, in chart order.
-    pub reflectances: Vec<Leaves>,
+    pub reflectances: Vec<Spectrum>,
 }
 
 /// A light whose Y is 1.
@@ -61,7 +61,7 @@ pub struct UnitLight {
     /// As in the tables.
     pub name: &'static str,
     /// K S on the leaves.
-    pub power: Leaves,
+    pub power: Spectrum,
     /// Its tristimulus values: the adaptation white of the tests.
     pub white: Xyz,
 }
@@ -85,12 +85,12 @@ impl ColourChart {
     /// One of the paper's lights, scaled so that its Y is 1.
     pub fn light(&self, name: &'static str) -> UnitLight {
         let power = Grid::paper().left_edges(&table(&format!("cie/{name}")), Outside::Zero);
-        let k = normalization(&power, self.cmf.leaves());
+        let k = normalization(&power, self.cmf.weights());
         let power = power.map(|s| k * s);
         UnitLight {
             name,
             power,
-            white: tristimulus(&power, self.cmf.leaves()),
+            white: tristimulus(&power, self.cmf.weights()),
         }
     }
 

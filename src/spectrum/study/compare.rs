@@ -3,7 +3,7 @@
 use super::colour_chart::{ColourChart, UnitLight};
 use super::modes::{adaptive_at_count, percentile};
 use crate::color::{Xyz, de_luv, tristimulus};
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use crate::spectrum::methods::{
     Characteristic, Cubics, Method, bands, gauss_ac1c2, gauss_shared, gauss_xyz, sampling, segments,
 };
@@ -40,7 +40,8 @@ struct Exact([Vec<Xyz>; 3]);
 
 impl Exact {
     fn new(chart: &ColourChart, light: &UnitLight) -> Self {
-        let times = |a: &Leaves, b: &Leaves| -> Leaves { std::array::from_fn(|k| a[k] * b[k]) };
+        let times =
+            |a: &Spectrum, b: &Spectrum| -> Spectrum { std::array::from_fn(|k| a[k] * b[k]) };
         let mut levels = [vec![light.power], Vec::new(), Vec::new(), Vec::new()];
         for level in 0..3 {
             levels[level + 1] = levels[level]
@@ -51,7 +52,7 @@ impl Exact {
         let [_, a, b, c] = levels;
         Self([a, b, c].map(|all| {
             all.iter()
-                .map(|s| tristimulus(s, chart.cmf.leaves()))
+                .map(|s| tristimulus(s, chart.cmf.weights()))
                 .collect()
         }))
     }

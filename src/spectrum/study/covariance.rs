@@ -10,7 +10,7 @@ use super::modes::{DifferenceSummary, ratio};
 use super::walk::{Extent, LEVELS, WalkStart, walk};
 use crate::color::{Xyz, de_luv, luv_jacobian, tristimulus};
 use crate::spectrum::{
-    CmfTree, Control, Leaves, List, Metric, Moment, NODES, Partition, control, node, represent,
+    CmfTree, Control, List, Metric, Moment, NODES, Partition, Spectrum, control, node, represent,
     span,
 };
 use serde::Serialize;
@@ -44,7 +44,7 @@ struct Moments<'a> {
 }
 
 impl<'a> Moments<'a> {
-    fn new(cmf: &'a CmfTree, reflectances: &[Leaves]) -> Self {
+    fn new(cmf: &'a CmfTree, reflectances: &[Spectrum]) -> Self {
         let over_nodes = |f: &dyn Fn(usize) -> Xyz| {
             (0..NODES)
                 .map(|n| if n == 0 { [0.0; 3] } else { f(n) })
@@ -97,7 +97,7 @@ fn mean(cmf: &CmfTree, n: usize, f: impl Fn(usize) -> f64) -> Xyz {
     std::array::from_fn(|a| {
         let total = cmf.node(n)[a];
         let sum: f64 = (first..first + len)
-            .map(|k| f(k) * cmf.leaves()[a][k])
+            .map(|k| f(k) * cmf.weights()[a][k])
             .sum();
         if total > 0.0 { sum / total } else { 0.0 }
     })
@@ -126,7 +126,7 @@ pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<CovarianceRow> {
                 &Control::within(LIMIT),
             );
             let level = path.reflections.len() - 1;
-            let reference = tristimulus(exact, chart.cmf.leaves());
+            let reference = tristimulus(exact, chart.cmf.weights());
             let materials = path_of.next(level);
             errors[level].0.push(de_luv(
                 reference,

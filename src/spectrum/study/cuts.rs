@@ -8,7 +8,7 @@
 use super::colour_chart::{ColourChart, UnitLight};
 use crate::color::{luv_jacobian, tristimulus};
 use crate::spectrum::{
-    Control, DyadicTree, Estimate, LEAVES, Leaves, List, Metric, Partition, Representative,
+    BANDS, Control, DyadicTree, Estimate, List, Metric, Partition, Representative, Spectrum,
     coarsen, represent, span,
 };
 use serde::Serialize;
@@ -52,13 +52,13 @@ pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<CutsRow> {
         .reflectances
         .iter()
         .flat_map(|a| chart.reflectances.iter().map(move |b| (a, b)));
-    let spectra: Vec<Leaves> = pairs
+    let spectra: Vec<Spectrum> = pairs
         .step_by(STRIDE)
         .map(|(a, b)| std::array::from_fn(|k| light.power[k] * a[k] * b[k]))
         .collect();
     for spectrum in &spectra {
         let tree = DyadicTree::<Estimate>::new(spectrum, &chart.cmf);
-        let jacobian = luv_jacobian(tristimulus(spectrum, chart.cmf.leaves()), light.white);
+        let jacobian = luv_jacobian(tristimulus(spectrum, chart.cmf.weights()), light.white);
         let metric = Metric::Luv(jacobian);
         let best = search(&tree, &metric);
         for row in &mut rows {
@@ -103,7 +103,7 @@ fn merged(
     metric: &Metric,
     n: usize,
 ) -> List<Estimate> {
-    let mut list = List::new(tree, Partition::LEAVES);
+    let mut list = List::new(tree, Partition::BANDS);
     let settings = Control {
         representative: Representative::Projection,
         floor: n,
@@ -118,8 +118,8 @@ fn search(tree: &DyadicTree<Estimate>, metric: &Metric) -> Vec<f64> {
     let most = COUNTS[COUNTS.len() - 1];
     let length = |e: &[f64; 3]| metric.size(*e, [0.0; 3]);
     // candidates[node][count]: sums of errors.
-    let mut candidates: Vec<Vec<Vec<[f64; 3]>>> = vec![vec![Vec::new(); most + 1]; 2 * LEAVES];
-    for n in (1..2 * LEAVES).rev() {
+    let mut candidates: Vec<Vec<Vec<[f64; 3]>>> = vec![vec![Vec::new(); most + 1]; 2 * BANDS];
+    for n in (1..2 * BANDS).rev() {
         candidates[n][1].push(tree.node(n).error);
         let (_, len) = span(n);
         for count in 2..=most.min(len) {

@@ -9,7 +9,7 @@ use super::colour_chart::{ColourChart, UnitLight};
 use super::walk::{Extent, LEVELS, WalkStart, WalkStep, sample, walk};
 use crate::color::{Xyz, luv_jacobian};
 use crate::spectrum::{
-    Bounded, Control, Estimate, Interval, LEAVES, List, Metric, Moment, Operation, Path, control,
+    BANDS, Bounded, Control, Estimate, Interval, List, Metric, Moment, Operation, Path, control,
     represent,
 };
 use serde::Serialize;
@@ -126,7 +126,7 @@ pub(super) fn ratio(chart: &ColourChart, light: &UnitLight) -> (ColourChart, Uni
     (
         under,
         UnitLight {
-            power: [1.0; LEAVES],
+            power: [1.0; BANDS],
             ..light.clone()
         },
     )

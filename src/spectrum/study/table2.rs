@@ -24,8 +24,8 @@ use super::lanes::{
 };
 use super::walk::{Extent, WalkStart, walk};
 use crate::spectrum::{
-    Bounded, CmfTree, Control, DyadicTree, Estimate, Interval, LEAVES, Leaves, List, Metric,
-    Moment, Partition, Path, control, represent,
+    BANDS, Bounded, CmfTree, Control, DyadicTree, Estimate, Interval, List, Metric, Moment,
+    Partition, Path, Spectrum, control, represent,
 };
 use serde::Serialize;
 use std::hint::black_box;
@@ -64,7 +64,7 @@ struct Work<'a, I> {
     light: &'a UnitLight,
     /// Lists after control, and the two materials of each.
     lists: Vec<(List<I>, [usize; 2])>,
-    dense: Vec<Leaves>,
+    dense: Vec<Spectrum>,
 }
 
 impl<'a, I: Interval> Work<'a, I> {
@@ -139,7 +139,7 @@ impl<'a, I: Interval> Work<'a, I> {
 
     /// The same with the 24 products of a block side by side.
     fn columns(&self, blocks: &[ColumnCase]) -> [f64; 2] {
-        let mut out = vec![[f32x8::ZERO; SIDE]; LEAVES];
+        let mut out = vec![[f32x8::ZERO; SIDE]; BANDS];
         let alone = self.time(|| {
             for block in blocks {
                 column_products(
@@ -190,15 +190,15 @@ impl<'a, I: Interval> Work<'a, I> {
     }
 
     fn dense_sides(&self) -> Vec<ColumnCase> {
-        let cmf = self.chart.cmf.leaves();
-        let side = |s: &Leaves| {
-            let materials = (0..LEAVES)
+        let cmf = self.chart.cmf.weights();
+        let side = |s: &Spectrum| {
+            let materials = (0..BANDS)
                 .map(|k| self.chart.reflectances.iter().map(|r| r[k]).collect())
                 .collect();
             ColumnCase::new(
                 s,
                 materials,
-                (0..LEAVES)
+                (0..BANDS)
                     .map(|k| [cmf[0][k], cmf[1][k], cmf[2][k]])
                     .collect(),
             )
@@ -234,9 +234,9 @@ impl<'a, I: Interval> Work<'a, I> {
     }
 
     fn dense_blocks(&self) -> Vec<RowCase<f32x16, 4>> {
-        let narrow = |leaves: &Leaves| row(&leaves.map(|v| v as f32));
+        let narrow = |spectrum: &Spectrum| row(&spectrum.map(|v| v as f32));
         let materials: Vec<_> = self.chart.reflectances.iter().map(narrow).collect();
-        let weights = self.chart.cmf.leaves().each_ref().map(narrow);
+        let weights = self.chart.cmf.weights().each_ref().map(narrow);
         self.dense
             .iter()
             .map(|s| RowCase {
@@ -338,7 +338,7 @@ pub fn measure(chart: &ColourChart) -> Vec<Stage> {
     let paper = Work::<Estimate>::new(chart, &light);
     let preparation = paper.time(|| {
         black_box(WalkStart::<Estimate>::new(black_box(chart), &light));
-        black_box(CmfTree::new(*black_box(chart.cmf.leaves())));
+        black_box(CmfTree::new(*black_box(chart.cmf.weights())));
     });
     let dense = paper.vectors(&paper.dense_blocks());
     let mut stages = vec![stage("pre-processing", preparation, None)];

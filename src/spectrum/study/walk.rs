@@ -4,7 +4,7 @@
 
 use super::colour_chart::{ColourChart, UnitLight};
 use crate::color::{de_luv, de2000, tristimulus};
-use crate::spectrum::{CmfTree, DyadicTree, Interval, Leaves, List, Operation, Path};
+use crate::spectrum::{CmfTree, DyadicTree, Interval, List, Operation, Path, Spectrum};
 
 /// Names of the three levels.
 pub const LEVELS: [&str; 3] = ["primary", "secondary", "tertiary"];
@@ -85,7 +85,7 @@ pub fn walk<I: Interval>(
     start: &WalkStart<'_, I>,
     list: &List<I>,
     extent: Extent,
-    mut step: impl FnMut(&mut List<I>, &Path<'_, I>, &Leaves),
+    mut step: impl FnMut(&mut List<I>, &Path<'_, I>, &Spectrum),
 ) {
     let (depth, stride) = match extent {
         Extent::Part { levels, stride } => (levels, stride),
@@ -94,7 +94,7 @@ pub fn walk<I: Interval>(
     let cmf = &start.chart.cmf;
     let (mut first, mut second, mut third) = (List::black(), List::black(), List::black());
     let mut visit =
-        |from: &List<I>, to: &mut List<I>, reflections: &[&DyadicTree<I>], exact: &Leaves| {
+        |from: &List<I>, to: &mut List<I>, reflections: &[&DyadicTree<I>], exact: &Spectrum| {
             from.reflect(reflections[reflections.len() - 1], cmf, to);
             step(
                 to,
@@ -106,10 +106,10 @@ pub fn walk<I: Interval>(
             );
         };
     for (i, a) in start.materials.iter().enumerate() {
-        let once = times(&start.light.power, a.leaves());
+        let once = times(&start.light.power, a.spectrum());
         visit(list, &mut first, &[a], &once);
         for (j, b) in start.materials.iter().enumerate().filter(|_| depth > 1) {
-            let twice = times(&once, b.leaves());
+            let twice = times(&once, b.spectrum());
             visit(&first, &mut second, &[a, b], &twice);
             for (_, c) in start
                 .materials
@@ -117,7 +117,12 @@ pub fn walk<I: Interval>(
                 .enumerate()
                 .filter(|(k, _)| depth > 2 && (i + j + k) % stride == 0)
             {
-                visit(&second, &mut third, &[a, b, c], &times(&twice, c.leaves()));
+                visit(
+                    &second,
+                    &mut third,
+                    &[a, b, c],
+                    &times(&twice, c.spectrum()),
+                );
             }
         }
     }
@@ -128,12 +133,12 @@ impl WalkStep {
     pub fn new<I: Interval>(
         list: &List<I>,
         operation: Operation,
-        exact: &Leaves,
+        exact: &Spectrum,
         light: &UnitLight,
         cmf: &CmfTree,
     ) -> Self {
         let (reference, ours, corrected) = (
-            tristimulus(exact, cmf.leaves()),
+            tristimulus(exact, cmf.weights()),
             list.xyz(cmf),
             list.corrected_xyz(cmf),
         );
@@ -172,6 +177,6 @@ pub fn sample<I: Interval>(
     samples
 }
 
-fn times(a: &Leaves, b: &Leaves) -> Leaves {
+fn times(a: &Spectrum, b: &Spectrum) -> Spectrum {
     std::array::from_fn(|leaf| a[leaf] * b[leaf])
 }

@@ -2,7 +2,7 @@
 
 use crate::data::Data;
 use glam::DVec3;
-use haarlight::audit::{self, Reference};
+use haarlight::audit::{self, PathReference};
 use haarlight::gather::{Baked, BakedSurface, Probed};
 use haarlight::keep::{self, Relighter};
 use haarlight::scene::Scene;
@@ -126,7 +126,7 @@ impl Light {
             ));
         }
         let bake = &self.solved.bake;
-        let reference = Reference::new(bake, points, AUDIT_PATHS, seed ^ AUDIT_SEED);
+        let reference = PathReference::new(bake, points, AUDIT_PATHS, seed ^ AUDIT_SEED);
         Ok(match self.baked() {
             Some(baked) => audit::Report::of_file(bake, baked, &reference),
             None => audit::Report::against(bake, &reference),

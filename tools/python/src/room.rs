@@ -6,11 +6,11 @@ use crate::errors::{warn, wrong};
 use crate::records::plain;
 use crate::result::Lit;
 use crate::work::done;
-use haarlight::cli::options::Range;
+use haarlight::cli::options::WavelengthRange;
 use haarlight::scene::effects::Plan;
 use haarlight::scene::facts::Facts;
 use haarlight::scene::Options;
-use haarlight::survey::Wishes;
+use haarlight::survey::SurveyOptions;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
 use serde_json::json;
@@ -48,7 +48,7 @@ pub(crate) fn load(
     flip: bool,
     allow_dark: bool,
 ) -> PyResult<Room> {
-    let range: Range = format!("{}..{}", range.0, range.1)
+    let range: WavelengthRange = format!("{}..{}", range.0, range.1)
         .parse()
         .map_err(|what: String| wrong(py, "range", what, "give (380, 780)"))?;
     if scale.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
@@ -75,7 +75,7 @@ pub(crate) fn load(
         };
         options.say(json!({ "sky": sky }));
     }
-    let wishes = Wishes { allow_dark, flip };
+    let wishes = SurveyOptions { allow_dark, flip };
     let data = done(py, move || Data::read(path, options, wishes))?;
     warn(py, &data.scene.warnings)?;
     Ok(Room {
