@@ -1,4 +1,4 @@
-//! What does one gather sweep cost on rows of 8 and of 16 lanes, beside all 64 leaves and beside RGB (rows of 4)?
+//! What does one gather sweep cost on rows of 8 and of 16 lanes, beside all 64 bands and beside RGB (rows of 4)?
 //!
 //! The operator of the solve (pull, gather over the links, push) on one thread, on about 2 k, 50 k and 500 k leaves, twice:
 //! the convex room refined to so many, with the links that it then has; and complete trees with 30 links at each leaf, as

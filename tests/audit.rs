@@ -174,7 +174,7 @@ fn case_5_7() {
     accept(chi_squared(&bake, &places, 1024, &truth), 0.02);
 }
 
-/// CIE 171, 5.8: mean E = Phi / (96 (1 - rho)), leaf by leaf, over random points.
+/// CIE 171, 5.8: mean E = Phi / (96 (1 - rho)), band by band, over random points.
 #[test]
 fn case_5_8() {
     let reflectance: Spectrum =
@@ -194,20 +194,20 @@ fn case_5_8() {
             std::array::from_fn(|l| answers.iter().map(|a| a.mean[l]).sum::<f64>() / POINTS as f64)
         })
         .collect();
-    for leaf in [0, 20, 40, 63] {
-        let want = 10_000.0 * power[leaf] / 96.0 / (1.0 - reflectance[leaf]);
-        let mean = draws.iter().map(|d| d[leaf]).sum::<f64>() / 8.0;
+    for band in [0, 20, 40, 63] {
+        let want = 10_000.0 * power[band] / 96.0 / (1.0 - reflectance[band]);
+        let mean = draws.iter().map(|d| d[band]).sum::<f64>() / 8.0;
         let error =
-            (draws.iter().map(|d| (d[leaf] - mean).powi(2)).sum::<f64>() / 7.0 / 8.0).sqrt();
+            (draws.iter().map(|d| (d[band] - mean).powi(2)).sum::<f64>() / 7.0 / 8.0).sqrt();
         println!(
-            "leaf {leaf}: {:+.2} errors of {:.2} %",
+            "band {band}: {:+.2} errors of {:.2} %",
             (mean - want) / error,
             100.0 * error / want
         );
         // Student's t of 7 degrees of freedom exceeds 5.4 once in a thousand.
         assert!(
             (mean - want).abs() < 5.4 * error,
-            "leaf {leaf}: {mean} +- {error}, not {want}"
+            "band {band}: {mean} +- {error}, not {want}"
         );
         assert!(error < 0.02 * want);
     }
@@ -312,11 +312,11 @@ fn the_report_measures_what_finer_rounds_improve() {
     let last = Report::new(&bake, 60, 4096, 9);
     println!("{:?} then {:?}", first.de2000, last.de2000);
     assert!(last.de2000.mean.value < first.de2000.mean.value);
-    for spread in [last.de2000, last.relative] {
-        for m in [spread.mean, spread.rms, spread.p95, spread.max] {
+    for summary in [last.de2000, last.relative] {
+        for m in [summary.mean, summary.rms, summary.p95, summary.max] {
             assert!(m.low <= m.value && m.value <= m.high, "{m:?}");
         }
-        assert!(spread.mean.value <= spread.p95.value && spread.p95.value <= spread.max.value);
+        assert!(summary.mean.value <= summary.p95.value && summary.p95.value <= summary.max.value);
     }
 }
 

@@ -55,15 +55,15 @@ fn csv() -> String {
     text
 }
 
-/// Means over the leaves by the midpoint rule.
-fn mean(leaf: usize, f: impl Fn(f64) -> f64) -> f64 {
+/// Means over the bands by the midpoint rule.
+fn mean(band: usize, f: impl Fn(f64) -> f64) -> f64 {
     const N: u32 = 8;
     let grid = grid();
-    let at = |k: u32| grid.left(leaf) + grid.width() * (f64::from(k) + 0.5) / f64::from(N);
+    let at = |k: u32| grid.left(band) + grid.width() * (f64::from(k) + 0.5) / f64::from(N);
     (0..N).map(|k| f(at(k))).sum::<f64>() / f64::from(N)
 }
 
-/// Exitance on a leaf for irradiance on another, straight from the formula.
+/// Exitance on a band for irradiance on another, straight from the formula.
 fn matrix() -> Vec<Spectrum> {
     let width = grid().width();
     let element = |i: usize, j: usize| width * mean(i, |out| mean(j, |taken| given(out, taken)));
@@ -88,9 +88,9 @@ fn read() -> (Scene, Material) {
     (scene, green)
 }
 
-fn xyz(leaves: &Spectrum) -> [f64; 3] {
+fn xyz(bands: &Spectrum) -> [f64; 3] {
     let weights = Observer::cie1931().weights(&grid());
-    weights.map(|w| KM * w.iter().zip(leaves).map(|(w, x)| w * x).sum::<f64>())
+    weights.map(|w| KM * w.iter().zip(bands).map(|(w, x)| w * x).sum::<f64>())
 }
 
 fn times(matrix: &[Spectrum], light: &Spectrum) -> Spectrum {
@@ -98,12 +98,12 @@ fn times(matrix: &[Spectrum], light: &Spectrum) -> Spectrum {
 }
 
 /// Mean wavelength of a spectrum.
-fn centre(leaves: &Spectrum) -> f64 {
-    let moment = (0..BANDS).map(|k| grid().middle(k) * leaves[k]);
-    moment.sum::<f64>() / leaves.iter().sum::<f64>()
+fn centre(bands: &Spectrum) -> f64 {
+    let moment = (0..BANDS).map(|k| grid().middle(k) * bands[k]);
+    moment.sum::<f64>() / bands.iter().sum::<f64>()
 }
 
-/// How far the products are off is what is said of them, of the matrix on the leaves.
+/// How far the products are off is what is said of them, of the matrix on the bands.
 #[test]
 fn products_are_as_near_as_is_said() {
     let (scene, paper) = read();
@@ -118,7 +118,7 @@ fn products_are_as_near_as_is_said() {
         all += want * want;
     }
     let off = 100.0 * (missed / all).sqrt();
-    println!("{}: {off:.2} % on the leaves", dye.from);
+    println!("{}: {off:.2} % on the bands", dye.from);
     // Between its wavelengths, 4 nm apart, a table is linear: .2 % of bells 22 nm wide.
     assert!((off - said).abs() < 0.3, "{off} {}", dye.from);
     for (k, rho) in paper

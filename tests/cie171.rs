@@ -387,7 +387,7 @@ impl TruthOfCase58 {
         Self { scene, references }
     }
 
-    /// Irradiance at the points, W/m2/nm, if every leaf has its own albedo. Patches are of one size, so that their factors
+    /// Irradiance at the points, W/m2/nm, if every band has its own albedo. Patches are of one size, so that their factors
     /// are symmetric and conjugate gradients find the radiosities.
     fn at(&self, rho: f64) -> Vec<[f64; BANDS]> {
         let [coarse, fine] = self.references.each_ref().map(|reference| {
@@ -407,7 +407,7 @@ impl TruthOfCase58 {
                 residual -= step * applied;
                 direction = &residual + residual.norm_squared() / square * direction;
             }
-            // The light has equal energy: what holds for one leaf holds for all.
+            // The light has equal energy: what holds for one band holds for all.
             let rows: Vec<[f64; BANDS]> = radiosity.iter().map(|&b| [b; BANDS]).collect();
             let solution = ReferenceSolution {
                 irradiance: rows.clone(),
@@ -422,19 +422,19 @@ impl TruthOfCase58 {
     }
 }
 
-/// Worst error at the first `count` points, at some leaves; `truth` by leaf.
+/// Worst error at the first `count` points, at some bands; `truth` by band.
 fn worst_of_case_5_8(
     bake: &mut Bake,
     count: usize,
-    leaves: &[usize],
+    bands: &[usize],
     truth: impl Fn(usize) -> Vec<[f64; BANDS]>,
 ) -> f64 {
     bake.run();
     let probed = bake.probe(&floor_points()[..count]);
-    let off = leaves.iter().flat_map(|&leaf| {
-        let pairs = probed.iter().zip(truth(leaf));
+    let off = bands.iter().flat_map(|&band| {
+        let pairs = probed.iter().zip(truth(band));
         pairs
-            .map(|(probed, truth)| probed.spectrum[leaf] / truth[leaf] - 1.0)
+            .map(|(probed, truth)| probed.spectrum[band] / truth[band] - 1.0)
             .collect::<Vec<_>>()
     });
     off.fold(0.0, |w: f64, x| if x.abs() > w.abs() { x } else { w })
@@ -454,15 +454,15 @@ fn case_5_8_at_points() {
     }
     let reflectance: [f64; BANDS] =
         std::array::from_fn(|l| 0.475 - 0.425 * (l as f64 / 63.0 * 9.0).cos());
-    // Lanes for the eye merge bands: for each band by itself there are the 64 leaves.
+    // Lanes for the eye merge bands: for each by itself there are rows of all 64.
     let settings = Settings {
         error: 0.25,
         representation: Representation::Dense,
         ..Settings::default()
     };
     let mut bake = Bake::new(cube(|room| room.spectral_paint(reflectance)), settings);
-    let worst = worst_of_case_5_8(&mut bake, away, &[3, 20, 30, 41, 60], |leaf| {
-        truth.at(reflectance[leaf])
+    let worst = worst_of_case_5_8(&mut bake, away, &[3, 20, 30, 41, 60], |band| {
+        truth.at(reflectance[band])
     });
     println!("spectral: worst point and band {:+.3} %", 100.0 * worst);
     assert!(worst.abs() < POINT, "{worst:e}");
@@ -500,16 +500,16 @@ fn case_5_8_in_every_band() {
             let (mut mean, mut area) = ([0.0; BANDS], 0.0);
             for (k, &leaf) in bake.light().leaves.iter().enumerate() {
                 let a = bake.tree().node(leaf).area;
-                let leaves = bake.lanes().spectrum(bake.light().irradiance.row(k));
-                for (m, x) in mean.iter_mut().zip(&leaves) {
+                let spectrum = bake.lanes().spectrum(bake.light().irradiance.row(k));
+                for (m, x) in mean.iter_mut().zip(&spectrum) {
                     *m += a * x;
                 }
                 area += a;
             }
-            for leaf in 0..BANDS {
+            for band in 0..BANDS {
                 mean_is(
-                    mean[leaf] / area,
-                    10_000.0 * power[leaf] / 96.0 / (1.0 - reflectance[leaf]),
+                    mean[band] / area,
+                    10_000.0 * power[band] / 96.0 / (1.0 - reflectance[band]),
                 );
             }
         }

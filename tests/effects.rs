@@ -188,7 +188,7 @@ fn one_light_spectrum_keeps_one_tree() {
     let lights = |name: &str| {
         let bake = baked(room(name), Representation::Adaptive);
         let mut lights: Vec<_> = bake.lanes().lanes().iter().map(|l| l.light).collect();
-        // Each light's intervals stand together and tile the 64 leaves once.
+        // Each light's intervals stand together and tile the 64 bands once.
         for light in bake.lanes().lanes().chunk_by(|a, b| a.light == b.light) {
             assert_eq!(light.iter().map(|l| l.count).sum::<usize>(), 64, "{name}");
         }

@@ -25,7 +25,7 @@ fn ultraviolet() -> Grid {
     Grid::new(300.0, 780.0)
 }
 
-/// A bell on the leaves.
+/// A bell on the bands.
 fn bell(grid: &Grid, height: f64, middle: f64, wide: f64) -> Spectrum {
     std::array::from_fn(|k| height * (-0.5 * ((grid.middle(k) - middle) / wide).powi(2)).exp())
 }
@@ -61,9 +61,9 @@ fn alike(got: [f64; 3], want: [f64; 3], tolerance: f64, what: &str) {
     }
 }
 
-fn xyz(grid: &Grid, leaves: &Spectrum) -> [f64; 3] {
+fn xyz(grid: &Grid, bands: &Spectrum) -> [f64; 3] {
     let weights = Observer::cie1931().weights(grid);
-    weights.map(|w| KM * w.iter().zip(leaves).map(|(w, x)| w * x).sum::<f64>())
+    weights.map(|w| KM * w.iter().zip(bands).map(|(w, x)| w * x).sum::<f64>())
 }
 
 fn scene(name: &str, options: &Options) -> Scene {
@@ -80,8 +80,8 @@ fn brightened() -> Scene {
     scene("brightened.glb", &options)
 }
 
-/// A closed room all of whose walls are alike: light is even, and every leaf has a closed form,
-/// `E = (L + e q) / (1 - rho)` with `q = w sum g E`. The emission excites itself, too. By polygons and by rays, and on the leaves.
+/// A closed room all of whose walls are alike: light is even, and every band has a closed form,
+/// `E = (L + e q) / (1 - rho)` with `q = w sum g E`. The emission excites itself, too. By polygons and by rays, and on the bands.
 #[test]
 fn a_furnace_has_the_gain_of_its_walls() {
     let grid = ultraviolet();
@@ -278,8 +278,8 @@ fn paths_change_their_wavelength() {
     let mut chi = [0.0; 2];
     for (answer, truth) in answers.iter().zip(&truth) {
         let luminous = Observer::cie1931().weights(&grid)[1].map(|y| KM * y);
-        let leaf: Spectrum = std::array::from_fn(|k| f64::from(u8::from(k == blue)));
-        for (chi, weights) in chi.iter_mut().zip([luminous, leaf]) {
+        let band: Spectrum = std::array::from_fn(|k| f64::from(u8::from(k == blue)));
+        for (chi, weights) in chi.iter_mut().zip([luminous, band]) {
             let (mean, error) = answer.linear(&weights);
             let want: f64 = truth.iter().zip(&weights).map(|(x, w)| x * w).sum();
             *chi += ((mean - want) / error.max(2e-3 * want)).powi(2);
@@ -326,7 +326,7 @@ fn no_more_power_leaves_than_comes() {
                 again += node.area * w * given.sum::<f64>();
             }
         }
-        // What of the emission lies beyond the leaves is lost.
+        // What of the emission lies beyond the bands is lost.
         close(absorbed - again, input, 5e-3, "power");
         assert!(again > 0.0 && again < absorbed);
     }
@@ -361,7 +361,7 @@ fn dye(excitation: &str, emission: &str, quantum: f64) -> Value {
     json!({"excitation": {"csv": excitation}, "emission": {"csv": emission}, "yield": quantum})
 }
 
-/// A yield of 0, and an excitation that no leaf holds, change no byte, cast no ray and do not run.
+/// A yield of 0, and an excitation that no band holds, change no byte, cast no ray and do not run.
 #[test]
 fn what_nothing_excites_costs_nothing() {
     let plain = written(cornell(json!({})).unwrap());
@@ -461,9 +461,9 @@ fn the_diagonal_is_the_reflectance() {
     let text = "per_band,400,500,600\n400,0.2,0,0\n500,0.3,0.4,0\n600,0,0.1,0.6\n";
     let scene = cornell(json!({"reflectance": null, "fluorescence": {"csv": text}})).unwrap();
     let green = scene.materials.iter().find(|m| m.name == "green").unwrap();
-    let leaf = |nm: f64| green.reflectance[scene.grid.band_of(nm).unwrap()];
-    close(leaf(500.0), 0.4, 0.05, "at 500 nm");
-    close(leaf(700.0), 0.6, 1e-9, "beyond");
+    let band = |nm: f64| green.reflectance[scene.grid.band_of(nm).unwrap()];
+    close(band(500.0), 0.4, 0.05, "at 500 nm");
+    close(band(700.0), 0.6, 1e-9, "beyond");
     assert!(green.reflectance_from.contains("diagonal"));
 }
 

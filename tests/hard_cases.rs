@@ -341,17 +341,17 @@ fn tiny_bright_lamp_beside_a_large_dim_one() {
     }
 }
 
-/// One leaf only, at every place, among them both ends: a line on a band edge ends up in one leaf or the next, whole.
+/// One band only, at every place, among them both ends: a line on a band edge ends up in one band or the next, whole.
 #[test]
 fn line_spectra() {
     let mut room = Room::new();
     let reflectance: [f64; BANDS] = std::array::from_fn(|l| 0.2 + 0.6 * (l % 2) as f64);
     let lines: Vec<usize> = [5, 16, 31, 32, 47, 48]
         .iter()
-        .map(|&leaf| {
+        .map(|&band| {
             let mut power = [0.0; BANDS];
-            power[leaf] = 1.0;
-            room.spectrum(&format!("line {leaf}"), power)
+            power[band] = 1.0;
+            room.spectrum(&format!("line {band}"), power)
         })
         .collect();
     let faces: [usize; 6] = std::array::from_fn(|k| {
@@ -363,7 +363,7 @@ fn line_spectra() {
     let scene = room.scene();
     let want: f64 = [5, 16, 31, 32, 47, 48]
         .iter()
-        .map(|&leaf| 1000.0 / 6.0 / (1.0 - reflectance[leaf]))
+        .map(|&band| 1000.0 / 6.0 / (1.0 - reflectance[band]))
         .sum();
     let bake = baked(scene);
     near(bake.mean_irradiance()[1], want, 2e-3);
@@ -447,7 +447,7 @@ fn spectral_limits_that_exclude_each_other() {
     }
 }
 
-/// Light of one leaf in the deep blue, beside a lamp that does not have it.
+/// Light of one band in the deep blue, beside a lamp that does not have it.
 #[test]
 fn nearly_monochromatic_light() {
     let mut room = Room::new();

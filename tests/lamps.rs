@@ -495,7 +495,7 @@ fn audit_and_reference_agree() {
         let answers = audit.irradiance(&starts, &[65_536; 4], 7);
         for (k, (point, _)) in points.iter().enumerate() {
             let found = lux(&bake, *point);
-            let dot = |leaves: &[f64; 64]| (0..64).map(|l| KM * leaves[l] * y[l]).sum::<f64>();
+            let dot = |bands: &[f64; 64]| (0..64).map(|l| KM * bands[l] * y[l]).sum::<f64>();
             let (mean, error) = answers[k].linear(&y.map(|y| KM * y));
             assert!(
                 (found - mean).abs() < 4.0 * error + 0.01 * mean + 1e-3,

@@ -27,7 +27,7 @@ fn copper() -> Spectrum {
     std::array::from_fn(|k| 0.45 + 0.5 / (1.0 + (-(k as f64 - 32.0) / 3.0).exp()))
 }
 
-fn leaves(bake: &Bake, points: &[(DVec3, DVec3)]) -> Vec<Spectrum> {
+fn spectra(bake: &Bake, points: &[(DVec3, DVec3)]) -> Vec<Spectrum> {
     bake.probe(points).iter().map(|p| p.spectrum).collect()
 }
 
@@ -274,11 +274,11 @@ fn a_lamp_in_a_tinted_mirror_is_tinted() {
     let mut bake = Bake::new(room.scene(), exact);
     bake.run();
     let image = dvec3(-0.8, 1.5, 2.0);
-    for (got, place) in leaves(&bake, &floor()).into_iter().zip(floor()) {
+    for (got, place) in spectra(&bake, &floor()).into_iter().zip(floor()) {
         for (k, normal) in copper().into_iter().enumerate() {
             let share = Mirror::reflects(normal, at_x(image, place.0));
             let want = of_point(lamp, place) + share * of_point(image, place);
-            close(got[k], 100.0 * power[k] * want, 1e-4, "leaf");
+            close(got[k], 100.0 * power[k] * want, 1e-4, "band");
         }
     }
 }

@@ -65,7 +65,7 @@ fn level(room: &mut Room, height: f64, pane: usize) {
     room.quad(dvec3(0.0, height, 0.0), z, x, pane);
 }
 
-fn leaves(bake: &Bake, points: &[DVec3]) -> Vec<Spectrum> {
+fn spectra(bake: &Bake, points: &[DVec3]) -> Vec<Spectrum> {
     let up: Vec<_> = points.iter().map(|p| (*p, DVec3::Y)).collect();
     bake.probe(&up).iter().map(|p| p.spectrum).collect()
 }
@@ -85,9 +85,9 @@ fn a_loss_free_pane_changes_nothing() {
         let mut room = lit(0.5);
         let pane = room.pane(1.0, CLEAR);
         level(&mut room, height, pane);
-        leaves(&baked(room.scene()), &places())
+        spectra(&baked(room.scene()), &places())
     });
-    for ((a, b), exact) in inside.iter().zip(&outside).zip(leaves(&exact, &places())) {
+    for ((a, b), exact) in inside.iter().zip(&outside).zip(spectra(&exact, &places())) {
         close(a[30], b[30], 1e-6, "lux");
         close(a[30], exact[30], 0.0125, "lux by polygons");
     }
@@ -102,7 +102,7 @@ fn lamps_shine_through_slabs() {
         let pane = room.pane(1.5, [inside; BANDS]);
         level(&mut room, 1.0, pane);
         let bake = baked(room.scene());
-        for (place, got) in places().iter().zip(leaves(&bake, &places())) {
+        for (place, got) in places().iter().zip(spectra(&bake, &places())) {
             let d = dvec3(2.0, 2.0, 2.0) - *place;
             let cosine = d.y / d.length();
             let open = power * 1000.0 / (4.0 * PI) * cosine / d.length_squared();
@@ -131,14 +131,14 @@ fn three_panes_in_a_row_multiply() {
         for (k, pane) in panes.into_iter().enumerate().take(count) {
             level(&mut room, 0.5 + 0.2 * k as f64, pane);
         }
-        leaves(&baked(room.scene()), &places()[..1])[0]
+        spectra(&baked(room.scene()), &places()[..1])[0]
     });
-    let plain = leaves(&baked(lit(0.0).scene()), &places()[..1])[0];
+    let plain = spectra(&baked(lit(0.0).scene()), &places()[..1])[0];
     let (amber, blue) = (amber(), blue());
-    let xyz = |leaves: &dyn Fn(usize) -> f64| {
+    let xyz = |bands: &dyn Fn(usize) -> f64| {
         Observer::cie1931()
             .weights(&Default::default())
-            .map(|w| (0..BANDS).map(|k| KM * w[k] * leaves(k)).sum::<f64>())
+            .map(|w| (0..BANDS).map(|k| KM * w[k] * bands(k)).sum::<f64>())
     };
     let got = [xyz(&|k| one[k]), xyz(&|k| three[k])];
     let want = [
@@ -178,7 +178,7 @@ fn however_it_is_modelled_a_pane_is_one() {
                     room.mesh(corners.collect(), quads.collect(), pane);
                 }
             }
-            leaves(&baked(room.scene()), &places()[1..2])[0]
+            spectra(&baked(room.scene()), &places()[1..2])[0]
         })
         .collect();
     for other in &got[1..] {
@@ -237,7 +237,7 @@ fn parallel_light_and_spots_pass() {
                 let pane = room.pane(1.5, [0.9; BANDS]);
                 level(&mut room, 1.5, pane);
             }
-            leaves(&baked(room.scene()), &[dvec3(2.4, 0.0, 2.2)])[0][30]
+            spectra(&baked(room.scene()), &[dvec3(2.4, 0.0, 2.2)])[0][30]
         };
         let cosine = match kind {
             LightKind::Spot { .. } => 3.0 / dvec3(0.4, 3.0, 0.2).length(),
@@ -248,7 +248,7 @@ fn parallel_light_and_spots_pass() {
     }
 }
 
-/// Lanes for the eye merge bands: for each by itself there are the 64 leaves.
+/// Lanes for the eye merge bands: for each by itself there are rows of all 64.
 fn exact() -> Settings {
     Settings {
         representation: Representation::Dense,
@@ -382,9 +382,9 @@ fn wedge(reversed: bool) {
     }
     let mut bake = Bake::new(scene, Settings::default());
     bake.run();
-    let open = leaves(&bake, &[dvec3(0.5, 0.0, 2.0)])[0][30];
+    let open = spectra(&bake, &[dvec3(0.5, 0.0, 2.0)])[0][30];
     for x in [0.3, 1.1, 1.9] {
-        let got = leaves(&bake, &[dvec3(1.0 + x, 0.0, 2.0)])[0][30];
+        let got = spectra(&bake, &[dvec3(1.0 + x, 0.0, 2.0)])[0][30];
         close(got / open, 0.5_f64.powf(x), 1e-4, "through the wedge");
     }
 }
@@ -412,7 +412,7 @@ fn a_face_and_its_back_have_the_thickness_of_their_material() {
         let mut bake = Bake::new(scene, Settings::default());
         bake.run();
         let open = 500.0 * bake.scene().spectra[0].power[30];
-        let got = leaves(&bake, &[dvec3(1.5, 0.0, 2.0)])[0][30];
+        let got = spectra(&bake, &[dvec3(1.5, 0.0, 2.0)])[0][30];
         close(got / open, 0.125, 1e-4, "through both faces");
     }
 }
@@ -535,7 +535,7 @@ fn cards_let_light_through_by_texel() {
     let mut bake = Bake::new(scene, Settings::default());
     bake.run();
     let at = [0.5, 1.5, 2.5, 3.5].map(|x| dvec3(x, 0.0, 2.0));
-    for (got, alpha) in leaves(&bake, &at).iter().zip(alphas.map(f64::from)) {
+    for (got, alpha) in spectra(&bake, &at).iter().zip(alphas.map(f64::from)) {
         let want = open * (1.0 - alpha).powi(2);
         assert!(
             (got[30] - want).abs() < 1e-4 * open,

@@ -72,10 +72,10 @@ fn facing_squares() {
     }
 }
 
-/// Lux of leaf values.
-fn lux(leaves: &Spectrum) -> f64 {
+/// Lux of band values.
+fn lux(bands: &Spectrum) -> f64 {
     let y = Observer::cie1931().weights(&Grid::default())[1];
-    leaves.iter().zip(y).map(|(x, y)| KM * x * y).sum()
+    bands.iter().zip(y).map(|(x, y)| KM * x * y).sum()
 }
 
 /// Points of the box room's surfaces away from edges, with normals.
@@ -175,7 +175,7 @@ fn the_reference_converges() {
     assert!(rms[0] / rms[2] > 12.0, "{rms:?}");
 }
 
-/// The solver in 64 leaves against the reference, leaf by leaf, at points.
+/// The solver in 64 bands against the reference, band by band, at points.
 #[test]
 fn the_solver_agrees_in_every_leaf() {
     let scene = painted_box();
@@ -351,7 +351,7 @@ fn the_order_of_the_solver() {
     assert!(rows[3..].iter().all(|r| r[1] < 3e-4), "{rows:?}");
 }
 
-/// Adaptive rows, rows of 64 leaves and the reference: each pair lies as near as the estimates of both claim.
+/// Adaptive rows, rows of 64 bands and the reference: each pair lies as near as the estimates of both claim.
 #[test]
 fn adaptive_dense_and_reference_agree() {
     let reference = Reference::new(&painted_box(), 3, 1).unwrap();
@@ -360,10 +360,10 @@ fn adaptive_dense_and_reference_agree() {
     let weights = Observer::cie1931()
         .weights(&Grid::default())
         .map(|w| w.map(|x| KM * x));
-    let xyz = |leaves: &Spectrum| {
+    let xyz = |bands: &Spectrum| {
         weights
             .each_ref()
-            .map(|w| leaves.iter().zip(w).map(|(x, w)| x * w).sum::<f64>())
+            .map(|w| bands.iter().zip(w).map(|(x, w)| x * w).sum::<f64>())
     };
     let exact: Vec<[f64; 3]> = truth.iter().map(xyz).collect();
     let bakes = [Representation::Adaptive, Representation::Dense].map(|representation| {
@@ -409,7 +409,7 @@ fn adaptive_dense_and_reference_agree() {
     assert!(bakes[0].lanes().len() < bakes[1].lanes().len());
 }
 
-/// A bake against the reference at points, channel by channel of light: root mean square of what each leaf is off, and what is claimed.
+/// A bake against the reference at points, channel by channel of light: root mean square of what each band is off, and what is claimed.
 /// With patches of 50 cm in place of 25 the reference is off by more than the bake: by .6 % behind a sheet.
 fn off_the_reference(scene: &Scene, rays: usize, points: &[(DVec3, DVec3)]) -> (f64, f64) {
     let reference = Reference::new(scene, 3, rays).unwrap();
@@ -459,7 +459,7 @@ fn below() -> Vec<(DVec3, DVec3)> {
     points
 }
 
-/// A pane that lets through more red than blue and less at a slant, leaf by leaf, with what comes back up through it.
+/// A pane that lets through more red than blue and less at a slant, band by band, with what comes back up through it.
 #[test]
 fn the_solver_agrees_behind_a_pane() {
     let amber: Spectrum = std::array::from_fn(|l| 0.3 + 0.6 * l as f64 / 63.0);

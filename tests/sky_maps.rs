@@ -218,8 +218,8 @@ fn the_sun_of_a_map_shines_by_itself() {
         let lamp = scene.lights.iter().find(|l| l.kind == LightKind::Sun)?;
         let y = Observer::cie1931().weights(&scene.grid)[1];
         let power = &scene.spectra[lamp.light].power;
-        let leaves = power.iter().zip(&lamp.shape).zip(&y);
-        let lux: f64 = leaves.map(|((p, s), y)| KM * p * s * y).sum();
+        let bands = power.iter().zip(&lamp.shape).zip(&y);
+        let lux: f64 = bands.map(|((p, s), y)| KM * p * s * y).sum();
         Some((lux, lamp.direction))
     };
     let plain = scene(of_map(&map));
@@ -315,7 +315,7 @@ fn a_map_can_have_open_ground() {
     assert!((got[1] / (0.3 * LUX) - 1.0).abs() < 1e-5, "{got:?}");
 }
 
-/// Irradiance on each leaf through an opening, by quadrature over the directions.
+/// Irradiance in each band through an opening, by quadrature over the directions.
 fn spectral(
     colours: [&Spectrum; 3],
     sky: &Distribution,

@@ -46,10 +46,10 @@ fn formula(scene: &Scene) -> impl Fn(DVec3) -> DVec3 + Sync {
     let model = sky.model().clone();
     let mut colours = [DVec3::ZERO; 11];
     let observer = Observer::cie1931().weights(&scene.grid);
-    for leaf in 0..64 {
-        let at = ((scene.grid.middle(leaf) - 320.0) / 40.0).min(10.0);
+    for band in 0..64 {
+        let at = ((scene.grid.middle(band) - 320.0) / 40.0).min(10.0);
         let (low, share) = (at.min(9.0).floor(), at - at.min(9.0).floor());
-        let colour = KM * DVec3::from_array(observer.each_ref().map(|weights| weights[leaf]));
+        let colour = KM * DVec3::from_array(observer.each_ref().map(|weights| weights[band]));
         colours[low as usize] += (1.0 - share) * colour;
         colours[low as usize + 1] += share * colour;
     }
@@ -146,8 +146,7 @@ fn reflected_light_agrees_with_paths() {
     let paths = vec![65_536; places.len()];
     let answers = Audit::new(scene, mesh, bake.rays()).irradiance(&places, &paths, 3);
     let agree = |weights: &Spectrum, slack: f64| {
-        let sum =
-            |leaves: &Spectrum| -> f64 { leaves.iter().zip(weights).map(|(x, w)| x * w).sum() };
+        let sum = |bands: &Spectrum| -> f64 { bands.iter().zip(weights).map(|(x, w)| x * w).sum() };
         let got: f64 = probed.iter().map(|p| sum(&p.spectrum)).sum();
         let truth: f64 = answers.iter().map(|answer| answer.linear(weights).0).sum();
         println!("{got:.4} for {truth:.4}");
@@ -157,9 +156,9 @@ fn reflected_light_agrees_with_paths() {
         agree(&weights, 0.01);
     }
     for (first, last) in [(420.0, 490.0), (500.0, 590.0), (600.0, 690.0)] {
-        let within = |leaf: usize| (first..last).contains(&scene.grid.middle(leaf));
+        let within = |band: usize| (first..last).contains(&scene.grid.middle(band));
         agree(
-            &std::array::from_fn(|leaf| f64::from(u8::from(within(leaf)))),
+            &std::array::from_fn(|band| f64::from(u8::from(within(band)))),
             0.015,
         );
     }

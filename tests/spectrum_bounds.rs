@@ -2,7 +2,7 @@
 
 use haarlight::spectrum::study::{ColourChart, Reflectances, bounds, modes};
 
-/// 3 x (24 + 24^2 + 24^3) products, each held against its 64 leaves.
+/// 3 x (24 + 24^2 + 24^3) products, each held against its 64 bands.
 #[test]
 fn no_product_leaves_its_bound() {
     for source in [Reflectances::Babelcolor, Reflectances::Ohta] {

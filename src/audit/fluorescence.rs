@@ -1,7 +1,7 @@
 //! Paths that change their wavelength.
 //!
-//! A path carries all leaves at once, backwards: what it finds on a leaf counts for that leaf. Where a surface fluoresces it may go on by
-//! a term, `B(l) = e(l) sum over j of g(j) E(j) w` with leaves of w nm: from there on whatever it finds, on any leaf, counts for all leaves
+//! A path carries all bands at once, backwards: what it finds on a band counts for that band. Where a surface fluoresces it may go on by
+//! a term, `B(l) = e(l) sum over j of g(j) E(j) w` with bands of w nm: from there on whatever it finds, on any band, counts for all bands
 //! that it came with, in the fixed proportion `t(l) e(l)`, t being what was left of them. So it needs one spectrum more, whatever the
 //! number of changes.
 
@@ -11,11 +11,11 @@ use crate::spectrum::{BANDS, Spectrum};
 
 /// What a path has found.
 pub(super) struct PathTally<'a> {
-    /// By the leaf that light was found on.
+    /// By the band that light was found on.
     pub(super) found: Spectrum,
-    /// What counts leaf by leaf, once wavelengths were changed: all that was found before.
+    /// What counts band by band, once wavelengths were changed: all that was found before.
     sum: &'a mut Spectrum,
-    /// How much of what is found counts for each leaf; none: all of it, for its own.
+    /// How much of what is found counts for each band; none: all of it, for its own.
     shares: Option<Spectrum>,
 }
 
@@ -40,7 +40,7 @@ impl<'a> PathTally<'a> {
         }
     }
 
-    /// From now on what is found on any leaf counts by these shares.
+    /// From now on what is found on any band counts by these shares.
     fn change(&mut self, shares: Spectrum) {
         if self.shares.is_none() {
             *self.sum = std::mem::replace(&mut self.found, [0.0; BANDS]);

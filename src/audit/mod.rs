@@ -1,4 +1,4 @@
-//! An independent answer: unbiased Monte Carlo in all 64 leaves, with confidence intervals.
+//! An independent answer: unbiased Monte Carlo in all 64 bands, with confidence intervals.
 //!
 //! It shares the scene, the welded triangles and the ray index with the solver, and nothing else: no links, no lanes,
 //! no form factors, no balance.

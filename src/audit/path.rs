@@ -1,4 +1,4 @@
-//! Irradiance at a point by path tracing, all leaves along one path (Lambertian surfaces scatter all wavelengths alike).
+//! Irradiance at a point by path tracing, all bands along one path (Lambertian surfaces scatter all wavelengths alike).
 //!
 //! `H = pi * mean of L_i` over cosine-distributed directions; lamps are also sampled by area, and both ways are combined
 //! by the balance heuristic (Veach and Guibas 1995). Paths end by Russian roulette, so no bounce is cut off.
@@ -42,7 +42,7 @@ pub struct Audit<'a> {
     sheets: Vec<Option<SheetMeans>>,
 }
 
-/// Irradiance at a point: mean and standard error per leaf, W/m2/nm, and the batch means for anything derived.
+/// Irradiance at a point: mean and standard error per band, W/m2/nm, and the batch means for anything derived.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Answer {
@@ -53,7 +53,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Mean and standard error of a linear function of the leaves.
+    /// Mean and standard error of a linear function of the bands.
     pub fn linear(&self, weights: &Spectrum) -> (f64, f64) {
         let dot = |x: &Spectrum| x.iter().zip(weights).map(|(x, w)| x * w).sum::<f64>();
         let mean = dot(&self.mean);
@@ -387,8 +387,8 @@ impl<'a> Audit<'a> {
                             .powi(2)
                     }
                     LightKind::Profile => {
-                        let spread = light.luminaire.as_ref();
-                        spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
+                        let luminaire = light.luminaire.as_ref();
+                        luminaire.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
                     }
                     _ => 1.0,
                 };

@@ -7,7 +7,7 @@ use crate::spectrum::Spectrum;
 use glam::DVec3;
 
 impl Audit<'_> {
-    /// What panes between two points leave of light, leaf by leaf.
+    /// What panes between two points leave of light, band by band.
     pub(super) fn filtered(&self, throughput: &Spectrum, from: DVec3, to: DVec3) -> Spectrum {
         let mut left = *throughput;
         let Some(panes) = &self.panes else {

@@ -26,7 +26,7 @@
 //! its range is as if all of the light's error were the sky's; where rows do not keep it apart there is a `reason` instead, and
 //! `probe --metrics` finds it by a bake of its own.
 //!
-//! Light is held on 64 leaves. Against tables at 5 nm, over all 48 illuminants of the CIE, that shifts colour temperature by
+//! Light is held on 64 bands. Against tables at 5 nm, over all 48 illuminants of the CIE, that shifts colour temperature by
 //! up to .5 %, Duv by .0003, Ra by 1.3, R9 by 5, Rf and Rg by .9 and alpha-opic daylight by .5 %, most of it in lamps of
 //! lines; the ranges do not hold this.
 

@@ -14,7 +14,7 @@ use std::str::FromStr;
 /// Shortest wavelength that the tables of daylight and of illuminant A know (CIE 015:2004, table T.1), which is there to excite what
 /// fluoresces, and longest that the observer's table knows (CIE 018:2019, table 6), nm.
 const KNOWN_NM: [f64; 2] = [300.0, 830.0];
-/// Narrowest leaf, nm: the step of the finest tables.
+/// Narrowest band, nm: the step of the finest tables.
 const LEAST_LEAF_NM: f64 = 1.0;
 
 /// Options of all commands.
@@ -42,7 +42,7 @@ pub struct Reading {
     /// Spectra of materials and lights [default: ROOM's name with .spectra.json, if it is there].
     #[arg(long, value_name = "FILE")]
     pub spectra: Option<PathBuf>,
-    /// Wavelengths to work on, nm; 64 leaves divide them. From 300 on where ultraviolet light excites what fluoresces.
+    /// Wavelengths to work on, nm; 64 bands divide them. From 300 on where ultraviolet light excites what fluoresces.
     #[arg(long, value_name = "FROM..TO", default_value = "380..780")]
     pub range: WavelengthRange,
     /// Only warn of keys and names in the file of spectra that mean nothing.
@@ -165,7 +165,7 @@ impl Default for WavelengthRange {
 }
 
 impl WavelengthRange {
-    /// The 64 leaves on this range.
+    /// The 64 bands on this range.
     pub fn grid(self) -> Grid {
         Grid::new(self.nm[0], self.nm[1])
     }

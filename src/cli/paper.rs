@@ -197,7 +197,7 @@ fn control(text: &mut String, rows: &[modes::ModesRow]) -> std::fmt::Result {
         "corrected dE*uv",
         "corrected dE00"
     )?;
-    let spread =
+    let summary =
         |s: &modes::DifferenceSummary| format!("{:.2} / {:.2} / {:.2}", s.mean, s.p95, s.max);
     for r in rows {
         write!(
@@ -206,7 +206,7 @@ fn control(text: &mut String, rows: &[modes::ModesRow]) -> std::fmt::Result {
             r.light, r.mode, r.level, r.limit, r.intervals_mean, r.above_eps_max
         )?;
         for s in [&r.luv, &r.de2000, &r.corrected_luv, &r.corrected_de2000] {
-            write!(text, "{:>22}", spread(s))?;
+            write!(text, "{:>22}", summary(s))?;
         }
         writeln!(text)?;
     }
@@ -356,7 +356,7 @@ fn covariances(text: &mut String, rows: &[covariance::CovarianceRow]) -> std::fm
         "{:7}{:10}{:>10}{:>22}{:>22}",
         "light", "level", "intervals", "means", "covariances"
     )?;
-    let spread =
+    let summary =
         |s: &modes::DifferenceSummary| format!("{:.3} / {:.3} / {:.3}", s.mean, s.p95, s.max);
     for r in rows {
         writeln!(
@@ -365,8 +365,8 @@ fn covariances(text: &mut String, rows: &[covariance::CovarianceRow]) -> std::fm
             r.light,
             r.level,
             r.intervals_mean,
-            spread(&r.means),
-            spread(&r.covariances)
+            summary(&r.means),
+            summary(&r.covariances)
         )?;
     }
     Ok(())

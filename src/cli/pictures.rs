@@ -105,7 +105,7 @@ fn charts(
     spectra: &[(String, Spectrum)],
 ) -> Result<()> {
     let grid = &scene.grid;
-    // A leaf holds the mean of its interval: steps.
+    // A band holds the mean of its interval: steps.
     let steps = |spectrum: &Spectrum| -> Vec<[f64; 2]> {
         let ends = |(k, value): (usize, &f64)| [[grid.left(k), *value], [grid.left(k + 1), *value]];
         spectrum.iter().enumerate().flat_map(ends).collect()

@@ -2,7 +2,7 @@
 //!
 //! The CSV out has a line a point, in the order of the points:
 //! `x,y,z,nx,ny,nz,E_X,E_Y,E_Z` (unit normal; tristimulus irradiance with Km = 683 lm/W), with `--bands` also `E_380 ...`,
-//! one column for each of the 64 leaves by its left edge in nm, W/m2/nm, from a solution on all leaves; then `lux`, which
+//! one column for each of the 64 bands by its left edge in nm, W/m2/nm, from a solution on all bands; then `lux`, which
 //! is `E_Y` under the name that people look for, and `place`: `room`, `inside` something solid or `outside` the room (see
 //! [`places`]). `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
 //! "columns": [names], "rows": [[numbers]], "places": [texts]}`; the columns have all but `place`.
@@ -48,10 +48,10 @@ pub struct ProbeArgs {
     /// The CSV to write [default: stdout].
     #[arg(short, long, value_name = "OUT.csv")]
     pub output: Option<PathBuf>,
-    /// Irradiance on the 64 leaves as well.
+    /// Irradiance on the 64 bands as well.
     #[arg(long)]
     pub bands: bool,
-    /// Colour temperature, rendering, fidelity and alpha-opic daylight as well, each with its range; solves on all leaves. Where
+    /// Colour temperature, rendering, fidelity and alpha-opic daylight as well, each with its range; solves on all bands. Where
     /// there is a sky also the daylight factor, for which the room is solved once more under the sky alone.
     #[arg(long)]
     pub metrics: bool,

@@ -1,6 +1,6 @@
-//! What spectra of light are weighted on: the 64 leaves of a grid, or the samples of a published table.
+//! What spectra of light are weighted on: the 64 bands of a grid, or the samples of a published table.
 //!
-//! A light has one power for each band. On leaves a weight is the exact integral of the weighting function over the leaf;
+//! A light has one power for each band. On a grid a weight is the exact integral of the weighting function over the band;
 //! on samples it is the function there, times the step, as the CIE sums (CIE 015:2004, 7.1).
 
 use super::Xyz;
@@ -16,11 +16,11 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// The leaves of a grid.
+    /// The bands of a grid.
     pub fn of(grid: &Grid) -> Self {
         Self {
             edges: (0..BANDS)
-                .map(|leaf| [grid.left(leaf), grid.left(leaf + 1)])
+                .map(|band| [grid.left(band), grid.left(band + 1)])
                 .collect(),
             width: grid.width(),
         }

@@ -415,7 +415,7 @@ mod tests {
     #[test]
     fn every_illuminant_is_as_a_peer_has_it() {
         // Greatest differences allowed: CCT relative, Duv, Ra, R9, Rf, Rg, daylight relative. At 5 nm ours is the peer's
-        // method but for the colour temperature of Ra's reference (Robertson's there). Leaves of 6.25 nm blur lines.
+        // method but for the colour temperature of Ra's reference (Robertson's there). Bands of 6.25 nm blur lines.
         let allowed = [
             [4e-4, 4e-5, 0.02, 0.1, 0.02, 0.02, 3e-3],
             [4.5e-3, 3.5e-4, 1.3, 5.0, 0.9, 0.8, 4.5e-3],

@@ -1,4 +1,4 @@
-//! Change to tristimulus values (paper 3.3, eq. 1): A = k * sum over the leaves of S a_bar.
+//! Change to tristimulus values (paper 3.3, eq. 1): A = k * sum over the bands of S a_bar.
 //!
 //! The factor k is the caller's: 683 lm/W for absolute values, 1 / sum(S y_bar) for a source that counts as 1.
 
@@ -9,7 +9,7 @@ use crate::data::{BANDS, Spectrum};
 pub fn tristimulus(spectrum: &Spectrum, weights: &[Spectrum; 3]) -> Xyz {
     weights
         .each_ref()
-        .map(|w| (0..BANDS).map(|leaf| spectrum[leaf] * w[leaf]).sum())
+        .map(|w| (0..BANDS).map(|band| spectrum[band] * w[band]).sum())
 }
 
 /// The paper's K = 1 / sum(S y_bar), with which the source has Y = 1; 0 for a source without visible light.

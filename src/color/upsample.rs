@@ -36,12 +36,12 @@ const DARKEST: f64 = 1.0 / 1024.0;
 /// Turns linear sRGB colours into reflectances on a grid.
 #[derive(Debug)]
 pub struct Upsampler {
-    /// weights[a][leaf]: what reflectance 1 in the leaf adds to X, Y, Z under D65; Y of white is 1.
+    /// weights[a][band]: what reflectance 1 in the band adds to X, Y, Z under D65; Y of white is 1.
     weights: [Spectrum; 3],
     /// XYZ of D65 on the grid.
     white: Xyz,
     srgb: LinearSrgb,
-    /// First leaf that the observer sees: what a colour says of shorter waves is that they are reflected like it.
+    /// First band that the observer sees: what a colour says of shorter waves is that they are reflected like it.
     first: usize,
     table: OnceLock<Vec<[f32; BANDS]>>,
 }
@@ -138,11 +138,11 @@ impl Upsampler {
         }
         let [a, b, c, d] = corners.map(|i| &table[i]);
         let [wa, wb, wc, wd] = shares;
-        std::array::from_fn(|leaf| {
-            wa * f64::from(a[leaf])
-                + wb * f64::from(b[leaf])
-                + wc * f64::from(c[leaf])
-                + wd * f64::from(d[leaf])
+        std::array::from_fn(|band| {
+            wa * f64::from(a[band])
+                + wb * f64::from(b[band])
+                + wc * f64::from(c[band])
+                + wd * f64::from(d[band])
         })
     }
 
@@ -219,14 +219,14 @@ impl Upsampler {
     fn residual(&self, c: &[f64; 3], target: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut xyz = [0.0; 3];
         let mut slopes = [[0.0; 3]; 3];
-        for leaf in 0..BANDS {
-            let t = place(leaf);
+        for band in 0..BANDS {
+            let t = place(band);
             let x = (c[0] * t + c[1]) * t + c[2];
             let root = 1.0 / (1.0 + x * x).sqrt();
             let value = 0.5 + 0.5 * x * root;
             let slope = 0.5 * root * root * root;
             for a in 0..3 {
-                let w = self.weights[a][leaf];
+                let w = self.weights[a][band];
                 xyz[a] += w * value;
                 let ws = w * slope;
                 slopes[a][0] += ws * t * t;
@@ -272,14 +272,14 @@ fn node(i: usize) -> f64 {
         .powi(3)
 }
 
-/// The middle of a leaf on [-1, 1].
-fn place(leaf: usize) -> f64 {
-    (2 * leaf + 1) as f64 / BANDS as f64 - 1.0
+/// The middle of a band on [-1, 1].
+fn place(band: usize) -> f64 {
+    (2 * band + 1) as f64 / BANDS as f64 - 1.0
 }
 
 fn evaluate(c: &[f64; 3]) -> Spectrum {
-    std::array::from_fn(|leaf| {
-        let t = place(leaf);
+    std::array::from_fn(|band| {
+        let t = place(band);
         let x = (c[0] * t + c[1]) * t + c[2];
         // Rounding can leave the interval by one bit.
         (0.5 + 0.5 * x / (1.0 + x * x).sqrt()).clamp(0.0, 1.0)

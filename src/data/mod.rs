@@ -1,4 +1,4 @@
-//! Published tables (CIE observer, illuminants, measured reflectances), readers of spectra, and the leaves they are held on.
+//! Published tables (CIE observer, illuminants, measured reflectances), readers of spectra, and the bands they are held on.
 
 mod blackbody;
 mod daylight;

@@ -1,4 +1,4 @@
-//! Spectra at the vertices of the refined mesh: `B(leaf) = rho(leaf) H(leaf) + pi L(leaf)`, W/m2/nm, plus fluorescence.
+//! Spectra at the vertices of the refined mesh: `B(band) = rho(band) H(band) + pi L(band)`, W/m2/nm, plus fluorescence.
 //!
 //! The reflectance is the one behind [`BakedVertex::radiosity`](super::BakedVertex::radiosity): a paint texture enters
 //! with its mean colour. An emissive texture is looked up at the vertex.

@@ -1,7 +1,7 @@
 //! The triangles of an index that may block between two patches.
 //!
 //! The tree's boxes are tested eight at a time against the sides of the [`Shaft`] in f32, the triangles of a leaf in f64; that decides most of
-//! them. What crosses sides without a corner in the shaft is cut.
+//! them. What crosses sides without a corner in the shaft is clipped.
 //!
 //! Safe side: a pair reported as clear has no blocker, but for what reaches less than the index's gap into the shaft (1e-6 of the scene's
 //! half size; neighbours touch it everywhere).
@@ -72,7 +72,7 @@ impl Sides8 {
 }
 
 /// A bit for each triangle of a block that may block, and for each of these that surely does because one of its corners is in the shaft: the
-/// tests of [`Shaft::holds`] before the cut, in f64.
+/// tests of [`Shaft::holds`] before clipping, in f64.
 #[inline(always)]
 fn triangles(shaft: &Shaft, block: &Block, gap: f64) -> (u32, u32) {
     let all = (1 << block.count) - 1;
@@ -218,7 +218,7 @@ impl RayIndex {
                 && (sure >> lane & 1 == 1 || {
                     let [a, b, c] = block.corner_lane(lane);
                     let corner = |p: [f32; 3]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
-                    shaft.cut_holds(&[corner(a), corner(b), corner(c)], gap)
+                    shaft.clipped_holds(&[corner(a), corner(b), corner(c)], gap)
                 });
             if blocks && !found.push(block.ids[lane]) {
                 return false;

@@ -1,6 +1,6 @@
 //! What could block between two patches.
 //!
-//! The shaft is the convex hull of two patches (Haines and Wallace 1991, "Shaft Culling for Efficient Ray-Traced Radiosity"), cut to
+//! The shaft is the convex hull of two patches (Haines and Wallace 1991, "Shaft Culling for Efficient Ray-Traced Radiosity"), clipped to
 //! the front half-space of a patch that is a triangle: light neither leaves nor arrives behind it. The hull's sides pass
 //! through an edge of one patch and a corner of the other; each is pushed out until all corners are inside, so that a rounding never
 //! makes the shaft too small. A triangle is a blocker when something of it, clipped by all sides, is left, and the
@@ -280,11 +280,11 @@ impl Shaft {
         if least >= -gap || most <= gap {
             return false;
         }
-        crossed == 0 || self.cut_holds(triangle, gap)
+        crossed == 0 || self.clipped_holds(triangle, gap)
     }
 
-    /// The last step of [`Self::holds`]: is something left of a triangle when all sides have cut it?
-    pub(super) fn cut_holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
+    /// The last step of [`Self::holds`]: is something left of a triangle when all sides have clipped it?
+    pub(super) fn clipped_holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
         let mut outline = ConvexOutline::new(triangle);
         for side in self.sides() {
             match outline.clip(side, gap) {
@@ -313,7 +313,7 @@ struct ConvexOutline {
     count: usize,
 }
 
-/// What a cut leaves.
+/// What clipping leaves.
 enum Left {
     Nothing,
     Some,

@@ -540,7 +540,7 @@ impl Relighter {
         &self.bake.solution.light
     }
 
-    /// Radiosity on the 64 leaves at every vertex of a relit mesh, see [`Bake::radiosity_spectra`].
+    /// Radiosity on the 64 bands at every vertex of a relit mesh, see [`Bake::radiosity_spectra`].
     pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; BANDS]>> {
         self.bake.radiosity_spectra(baked)
     }

@@ -23,9 +23,9 @@ use nalgebra::Matrix3;
 pub struct Lane {
     /// The light whose ratio the lane holds; none: absolute.
     pub light: Option<usize>,
-    /// First leaf of the interval.
+    /// First band of the interval.
     pub first: usize,
-    /// Leaves in the interval.
+    /// Bands in the interval.
     pub count: usize,
 }
 
@@ -34,7 +34,7 @@ pub struct Lane {
 enum Base {
     /// Values on intervals.
     Intervals(Vec<Lane>),
-    /// Linear sRGB: the contribution of each leaf of a reflectance under D65, and of each leaf of a radiosity.
+    /// Linear sRGB: the contribution of each band of a reflectance under D65, and of each band of a radiosity.
     Rgb {
         paint: Box<[Spectrum; 3]>,
         light: Box<[Spectrum; 3]>,
@@ -68,7 +68,7 @@ struct Guide {
 
 impl Lanes {
     /// One cut for each light; falls back to [`Lanes::dense`] beyond 64 lanes. `weights` are the integrals of the
-    /// colour matching functions over the leaves, nm.
+    /// colour matching functions over the bands, nm.
     pub fn ratio(spectra: &[LightSpectrum], cuts: &[Partition], weights: &[Spectrum; 3]) -> Self {
         assert_eq!(spectra.len(), cuts.len(), "a cut for each light");
         if cuts.iter().map(|c| c.count()).sum::<usize>() > BANDS {
@@ -84,7 +84,7 @@ impl Lanes {
         Self::with(lanes.collect(), spectra, weights)
     }
 
-    /// The ratio to one light on every leaf; other lights are left out.
+    /// The ratio to one light on every band; other lights are left out.
     pub fn only(spectra: &[LightSpectrum], light: usize, weights: &[Spectrum; 3]) -> Self {
         let lanes = (0..BANDS).map(|first| Lane {
             light: Some(light),
@@ -94,7 +94,7 @@ impl Lanes {
         Self::with(lanes.collect(), spectra, weights)
     }
 
-    /// The 64 leaves, all lights together.
+    /// The 64 bands, all lights together.
     pub fn dense(spectra: &[LightSpectrum], weights: &[Spectrum; 3]) -> Self {
         Self::absolute(spectra, Partition::BANDS, weights)
     }
@@ -109,16 +109,16 @@ impl Lanes {
         Self::with(lanes.collect(), spectra, weights)
     }
 
-    /// The ratio to each light on `bands` intervals of equal width as far as leaves allow; falls back to
+    /// The ratio to each light on `count` intervals of equal width as far as bands allow; falls back to
     /// [`Lanes::dense`] beyond 64 lanes.
     pub fn uniform(spectra: &[LightSpectrum], count: usize, weights: &[Spectrum; 3]) -> Self {
-        let bands = count.clamp(1, BANDS);
-        if bands * spectra.len() > BANDS {
+        let count = count.clamp(1, BANDS);
+        if count * spectra.len() > BANDS {
             return Self::dense(spectra, weights);
         }
-        let edge = |k: usize| k * BANDS / bands;
+        let edge = |k: usize| k * BANDS / count;
         let lanes = (0..spectra.len()).flat_map(|light| {
-            (0..bands).map(move |k| Lane {
+            (0..count).map(move |k| Lane {
                 light: Some(light),
                 first: edge(k),
                 count: edge(k + 1) - edge(k),
@@ -157,36 +157,28 @@ impl Lanes {
     }
 
     /// Coordinates in an orthonormal basis. Lanes then do not reflect one by one: see [`Lanes::matrix`].
-    pub fn vectors(
-        spectra: &[LightSpectrum],
-        basis: Vec<Spectrum>,
-        weights: &[Spectrum; 3],
-    ) -> Self {
+    pub fn vectors(spectra: &[LightSpectrum], basis: Vec<Spectrum>, cmf: &[Spectrum; 3]) -> Self {
         let xyz = basis
             .iter()
-            .map(|e| weights.each_ref().map(|w| KM * dot(e, w)))
+            .map(|e| cmf.each_ref().map(|w| KM * dot(e, w)))
             .collect();
         Self {
             base: Base::Vectors(basis),
             xyz,
             power: spectra.iter().map(|s| s.power).collect(),
-            weights: *weights,
+            weights: *cmf,
             guide: None,
         }
     }
 
     /// The given lanes.
-    pub(crate) fn with(
-        lanes: Vec<Lane>,
-        spectra: &[LightSpectrum],
-        weights: &[Spectrum; 3],
-    ) -> Self {
+    pub(crate) fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], cmf: &[Spectrum; 3]) -> Self {
         let power: Vec<Spectrum> = spectra.iter().map(|s| s.power).collect();
         let xyz = lanes
             .iter()
             .map(|lane| {
                 let bands = lane.first..lane.first + lane.count;
-                weights.each_ref().map(|w| {
+                cmf.each_ref().map(|w| {
                     KM * bands
                         .clone()
                         .map(|k| w[k] * lane.light.map_or(1.0, |l| power[l][k]))
@@ -198,7 +190,7 @@ impl Lanes {
             base: Base::Intervals(lanes),
             xyz,
             power,
-            weights: *weights,
+            weights: *cmf,
             guide: None,
         }
     }
@@ -261,7 +253,7 @@ impl Lanes {
             .collect()
     }
 
-    /// For each lane, the lane of `other` that holds the ratio to the same light on its first leaf; none unless both
+    /// For each lane, the lane of `other` that holds the ratio to the same light on its first band; none unless both
     /// hold ratios.
     pub fn places_in(&self, other: &Self) -> Option<Vec<usize>> {
         if !(self.is_ratio() && other.is_ratio()) {
@@ -340,7 +332,7 @@ impl Lanes {
         }
     }
 
-    /// Reflection where lanes mix: `R_ij = sum over leaves of rho E_i E_j`, row by row (paper 2.2.2). Symmetric, its
+    /// Reflection where lanes mix: `R_ij = sum over bands of rho E_i E_j`, row by row (paper 2.2.2). Symmetric, its
     /// eigenvalues lie in the range of rho.
     pub fn matrix(&self, reflectance: &Spectrum) -> Vec<f64> {
         let Base::Vectors(basis) = &self.base else {
@@ -472,7 +464,7 @@ impl Lanes {
         }
     }
 
-    /// The 64 leaf values of a row, W/m2/nm. For linear sRGB the shortest of the many spectra of that colour.
+    /// The 64 band values of a row, W/m2/nm. For linear sRGB the shortest of the many spectra of that colour.
     pub fn spectrum(&self, row: &[f32]) -> Spectrum {
         let mut out = [0.0; BANDS];
         match &self.base {

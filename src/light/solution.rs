@@ -96,7 +96,7 @@ impl Light {
             + 4 * (self.bright_lamps.len() + self.leaves.len() + self.lit.len())
     }
 
-    /// Works out brightness and its spread from the rows, and what rays need of the nodes.
+    /// Works out brightness and its deviation from the rows, and what rays need of the nodes.
     pub fn measure(&mut self, tree: &Tree, mesh: &Mesh, lanes: &Lanes) {
         let white = self.white;
         let scalar = |row: &[f32]| brightness(lanes.notice(row), white) as f32;
@@ -139,7 +139,7 @@ impl Light {
                 .sum::<f64>()
                 / node.area;
             let mean = both(k);
-            // Differences below rounding of f32 rows are not spread.
+            // Differences below rounding of f32 rows are no deviation.
             let variance = square[k] - mean * mean;
             self.deviation[k] = if variance > 1e-12 * square[k] {
                 variance.sqrt() as f32

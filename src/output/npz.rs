@@ -2,8 +2,8 @@
 //!
 //! `numpy.load("room.npz")` gives the arrays of [`write_baked`]:
 //! `positions` (N, 3) f64, world space, the file's units; `normals` (N, 3) f32, unit; `surface` (N,) u32, index of the
-//! surface; `triangles` (T, 3) u32, rows of `positions`; `radiosity` (N, 64) f32, W/m2/nm on the leaves;
-//! `wavelengths` (65,) f64, the leaves' edges in nm; `xyz` (N, 3) f32, tristimulus radiosity, Y in lm/m2. With layers (see
+//! surface; `triangles` (T, 3) u32, rows of `positions`; `radiosity` (N, 64) f32, W/m2/nm on the bands;
+//! `wavelengths` (65,) f64, the bands' edges in nm; `xyz` (N, 3) f32, tristimulus radiosity, Y in lm/m2. With layers (see
 //! [`scene::layers`](crate::scene::layers)) also `layers` (L,) text, their names, and `radiosity_0`, `radiosity_1`, ... of each by
 //! itself, which add up to `radiosity`.
 
@@ -143,7 +143,7 @@ pub fn write(out: &mut dyn Write, arrays: &[Array]) -> io::Result<()> {
     archive.end()
 }
 
-/// Radiosity of the vertices of each surface, W/m2/nm on the leaves.
+/// Radiosity of the vertices of each surface, W/m2/nm on the bands.
 pub type Spectra = Vec<Vec<[f32; BANDS]>>;
 
 /// Names of layers, and the spectra of each: asked for one after the other, for those of a large room take a gigabyte.
@@ -151,7 +151,7 @@ pub type LayerSpectra<'a> = (&'a [String], &'a dyn Fn(usize) -> Spectra);
 
 /// Writes the refined mesh with its spectra: see the module's words.
 ///
-/// `spectra` holds, for each surface of `surfaces`, the radiosity of its vertices on the leaves, W/m2/nm.
+/// `spectra` holds, for each surface of `surfaces`, the radiosity of its vertices on the bands, W/m2/nm.
 ///
 /// # Errors
 /// The spectra do not match the mesh (internal fault), or the writer fails.

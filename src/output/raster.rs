@@ -7,7 +7,7 @@
 //! (e_i of neighbours are exact negatives), so triangles that share an edge neither overlap nor leave a gap.
 //!
 //! Back faces are not drawn: the back of a two-sided surface is a sheet of its own, with its own light. The nearest sample wins, the first triangle of equals.
-//! Bands of rows are drawn in parallel; the result does not depend on their order.
+//! Strips of rows are drawn in parallel; the result does not depend on their order.
 
 use super::camera::View;
 use crate::gather::refined;
@@ -16,7 +16,7 @@ use crate::scene::{Alpha, Material, Scene, Sides, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Rows of pixels in a band.
+/// Rows of pixels in a strip.
 const STRIP: usize = 16;
 
 /// What a sample shows: a triangle and the weights of its corners.
@@ -41,7 +41,7 @@ pub(super) trait RasterMeshes: Sync {
     fn is_hole(&self, hit: &Fragment) -> bool;
 }
 
-/// Draws into bands of `BAND` pixel rows with `grid` by `grid` samples a pixel; `finish` turns each row of samples
+/// Draws into strips of `STRIP` pixel rows with `grid` by `grid` samples a pixel; `finish` turns each row of samples
 /// (`grid` rows of `width * grid`, from the top) into pixels. Rows come back in order.
 pub(super) fn draw<T: Send>(
     meshes: &impl RasterMeshes,
@@ -132,7 +132,7 @@ impl Setup {
     }
 }
 
-/// Pixel box of the part beyond the near plane, cut to the picture.
+/// Pixel box of the part beyond the near plane, clipped to the picture.
 fn bounds(
     corners: &[super::camera::Projected; 3],
     near: f64,
@@ -165,16 +165,16 @@ fn bounds(
             );
         }
     }
-    let cut = [
+    let clipped = [
         bounds[0].max(0.0),
         bounds[1].min(width as f64),
         bounds[2].max(0.0),
         bounds[3].min(height as f64),
     ];
-    (cut[0] <= cut[1] && cut[2] <= cut[3]).then_some(cut)
+    (clipped[0] <= clipped[1] && clipped[2] <= clipped[3]).then_some(clipped)
 }
 
-/// For each band the (mesh, triangle) that touch it, in order.
+/// For each strip the (mesh, triangle) that touch it, in order.
 fn bins(meshes: &impl RasterMeshes, view: &View, size: [usize; 2]) -> Vec<Vec<[u32; 2]>> {
     let mut strips = vec![Vec::new(); size[1].div_ceil(STRIP)];
     let last = strips.len().saturating_sub(1);

@@ -104,8 +104,8 @@ impl Scene {
         }
         let size = |(light, shape): &(usize, &mut Spectrum)| -> f64 {
             let power = self.spectra[*light].power.iter();
-            let leaves = power.zip(shape.iter()).zip(&luminous);
-            leaves.map(|((p, s), y)| p * s * y).sum()
+            let bands = power.zip(shape.iter()).zip(&luminous);
+            bands.map(|((p, s), y)| p * s * y).sum()
         };
         let greatest = shapes.iter().map(size).fold(0.0, f64::max);
         // Written so that NaN fails.

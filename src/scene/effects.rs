@@ -300,11 +300,8 @@ fn number_of(names: &[String], what: &str) -> (bool, String) {
 fn measured(scene: &Scene) -> (bool, String) {
     let luminous = Observer::cie1931().weights(&scene.grid)[1];
     let lumens = |light: &PunctualLight| -> f64 {
-        let leaves = scene.spectra[light.light].power.iter().zip(&light.shape);
-        leaves
-            .zip(&luminous)
-            .map(|((p, s), y)| KM * p * s * y)
-            .sum()
+        let bands = scene.spectra[light.light].power.iter().zip(&light.shape);
+        bands.zip(&luminous).map(|((p, s), y)| KM * p * s * y).sum()
     };
     let lamps = scene.lights.iter().filter_map(|light| {
         let profile = &light.luminaire.as_ref()?.profile;

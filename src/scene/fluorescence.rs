@@ -1,6 +1,6 @@
 //! Fluorescence: surfaces that take in light of some wavelengths and give a part of it out again at others, evenly to all sides.
 //!
-//! With the irradiance E a surface sends out `B(leaf) = rho(leaf) E(leaf) + sum over terms of e(leaf) q`,
+//! With the irradiance E a surface sends out `B(band) = rho(band) E(band) + sum over terms of e(band) q`,
 //! `q = integral of g(mu) E(mu) d mu`: a Donaldson matrix (Donaldson 1954, British Journal of Applied Physics 5, 210) as a diagonal and few
 //! products of an emission spectrum e (1/nm, its integral is 1) and an excitation g, the power that leaves for a unit of power that comes.
 //!
@@ -49,7 +49,7 @@ pub struct Term {
     /// Index in [`Scene::spectra`](crate::scene::Scene::spectra): the emission, whose power there is 1/nm, with an integral of at most 1
     /// over the grid.
     pub light: usize,
-    /// Power given out for a unit of power that comes, by leaf, in [0, 1): what the text above calls g.
+    /// Power given out for a unit of power that comes, by band, in [0, 1): what the text above calls g.
     pub excitation: Spectrum,
     /// Of which layer light must be to excite it; none: any.
     pub layer: Option<usize>,
@@ -62,7 +62,7 @@ impl Fluorescence {
         self.terms.iter().filter(move |t| t.layer == first)
     }
 
-    /// Power given out for a unit of power that comes, by leaf, all terms together.
+    /// Power given out for a unit of power that comes, by band, all terms together.
     pub fn efficiency(&self) -> Spectrum {
         let mut sum = [0.0; BANDS];
         for term in self.once() {
@@ -71,8 +71,8 @@ impl Fluorescence {
         sum
     }
 
-    /// The Donaldson matrix without its diagonal of reflection: element `[i][j]` is the spectral exitance on leaf i for a unit of
-    /// spectral irradiance on leaf j, `width` the width of a leaf, nm.
+    /// The Donaldson matrix without its diagonal of reflection: element `[i][j]` is the spectral exitance on band i for a unit of
+    /// spectral irradiance on band j, `width` the width of a band, nm.
     pub fn matrix(&self, spectra: &[LightSpectrum], width: f64) -> Vec<Spectrum> {
         let element = |i: usize, j: usize| {
             let each = self
@@ -190,7 +190,7 @@ fn dye(
     }
     let mean = mean_wavelength(&emission);
     let out = |nm: f64, share: f64| share * (quantum * nm / mean).min(1.0);
-    // At the table's rows and the edges of the leaves: between them both factors are smooth.
+    // At the table's rows and the edges of the bands: between them both factors are smooth.
     let excitation = power(&absorbed, &grid, out);
     outside(reader.check, &absorbed, &grid, place);
     let most = absorbed.wavelengths().iter().zip(absorbed.values());
@@ -322,10 +322,10 @@ fn mean_wavelength(table: &Table) -> f64 {
     moment / all
 }
 
-/// Means over the leaves of a share that depends on the table's value and the wavelength.
+/// Means over the bands of a share that depends on the table's value and the wavelength.
 fn power(table: &Table, grid: &Grid, share: impl Fn(f64, f64) -> f64) -> Spectrum {
-    std::array::from_fn(|leaf| {
-        let (from, to) = (grid.left(leaf), grid.left(leaf + 1));
+    std::array::from_fn(|band| {
+        let (from, to) = (grid.left(band), grid.left(band + 1));
         let mut ends = vec![from];
         ends.extend(
             table

@@ -1,6 +1,6 @@
 //! The distinct light spectra of a room, and the part that each lamp has in them.
 //!
-//! A lamp is `power(leaf) * shape(leaf)`: `power` is shared by all lamps of one kind ([`LightSpectrum`], here always of
+//! A lamp is `power(band) * shape(band)`: `power` is shared by all lamps of one kind ([`LightSpectrum`], here always of
 //! luminous size 1: `683 lm/W * sum power * y_bar = 1`), `shape` is the lamp's own. A lamp with a measured or named
 //! spectrum has a constant shape, its luminance (cd/m2), intensity (cd) or illuminance (lx). A lamp given by a colour
 //! is D65 shaped by the upsampled colour; its luminous size is glTF's strength or intensity times the luminance Y of
@@ -44,7 +44,7 @@ const SAME_SHAPE: f64 = 1e-9;
 pub(crate) struct ScaledSpectrum {
     /// Index in [`LampSpectra::spectra`].
     pub(crate) light: usize,
-    /// Multiplier for each leaf.
+    /// Multiplier for each band.
     pub(crate) shape: Spectrum,
     /// The colour that was upsampled, greatest component 0.5.
     pub(crate) color: [f32; 3],
@@ -214,8 +214,8 @@ impl<'a> LampSpectra<'a> {
     pub(crate) fn luminous(&self) -> impl Fn(&LightSpectrum, &Spectrum) -> f64 + use<> {
         let luminous = self.luminous;
         move |spectrum, shape| {
-            let leaves = spectrum.power.iter().zip(shape).zip(&luminous);
-            leaves.map(|((p, s), y)| p * s * y).sum()
+            let bands = spectrum.power.iter().zip(shape).zip(&luminous);
+            bands.map(|((p, s), y)| p * s * y).sum()
         }
     }
 
@@ -223,7 +223,7 @@ impl<'a> LampSpectra<'a> {
     fn luminous_size(&self, light: usize, shape: &Spectrum) -> f64 {
         let power = &self.spectra[light].power;
         (0..BANDS)
-            .map(|leaf| power[leaf] * shape[leaf] * self.luminous[leaf])
+            .map(|band| power[band] * shape[band] * self.luminous[band])
             .sum()
     }
 }

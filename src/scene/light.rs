@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub struct LightSpectrum {
     /// `cie/F2`, `blackbody/2700`, a file name ...
     pub name: String,
-    /// Relative power per nm on the grid's leaves.
+    /// Relative power per nm on the grid's bands.
     pub power: Spectrum,
 }
 
@@ -31,7 +31,7 @@ pub struct PunctualLight {
     pub direction: DVec3,
     /// Index in [`Scene::spectra`](crate::scene::Scene::spectra).
     pub light: usize,
-    /// `intensity(leaf) = spectra[light].power[leaf] * shape[leaf]`.
+    /// `intensity(band) = spectra[light].power[band] * shape[band]`.
     pub shape: Spectrum,
     /// How its light is spread, and from where: of the kinds that say so, and of no other.
     pub luminaire: Option<Arc<Luminaire>>,

@@ -19,7 +19,7 @@ pub struct Material {
     pub index: Option<usize>,
     /// Does the back reflect and emit too?
     pub sides: Sides,
-    /// Albedo of the base colour factor (or the measured reflectance) on the grid's leaves, each in [0, 0.999].
+    /// Albedo of the base colour factor (or the measured reflectance) on the grid's bands, each in [0, 0.999].
     pub reflectance: Spectrum,
     /// Where the reflectance comes from, for `inspect`.
     pub reflectance_from: String,
@@ -59,13 +59,13 @@ pub enum Alpha {
     },
 }
 
-/// Lambertian emission: `radiance(leaf) = spectra[light].power[leaf] * shape[leaf]`, W/m2/sr/nm; where there is a
+/// Lambertian emission: `radiance(band) = spectra[light].power[band] * shape[band]`, W/m2/sr/nm; where there is a
 /// texture the shape differs from point to point ([`Emission::shape_at`]).
 #[derive(Debug, Clone)]
 pub struct Emission {
     /// Index in [`Scene::spectra`](crate::scene::Scene::spectra).
     pub light: usize,
-    /// Multiplier of the light's power per leaf, at the emissive factor.
+    /// Multiplier of the light's power per band, at the emissive factor.
     pub shape: Spectrum,
     /// Emissive texture; then the shape of a point is `scale * upsample(factor * texel)`.
     pub texture: Option<Texture>,

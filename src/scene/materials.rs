@@ -1,6 +1,6 @@
 //! Materials: glTF's metallic-roughness model taken as Lambertian, with measured spectra where there are some.
 //!
-//! `reflectance(leaf) = min(upsample(base colour factor), 0.999)`, or the measured table. Metals reflect by their base
+//! `reflectance(band) = min(upsample(base colour factor), 0.999)`, or the measured table. Metals reflect by their base
 //! colour as albedo, unlit materials are painted with it; each is said in a warning.
 //! Emission: luminance = emissive strength (nits) times Y of the linear emissive factor, unless a side file says more.
 //! No gloss, but for mirrors, see [`mirror`]. What lets light through is a pane, see [`pane`].
@@ -479,8 +479,8 @@ mod tests {
         assert!((luminance(&made[0], &spectra) - 5000.0).abs() < 1e-6);
         // The integral of y_bar is 106.857 nm, less than 0.01 nm of it beyond 380 to 780 nm.
         assert!((luminance(&made[1], &spectra) - 683.0 * 106.857 * 0.01).abs() < 0.1);
-        let leaf = Grid::default().band_of(555.0).unwrap();
-        let radiance = spectra[1].power[leaf] * made[1].emission.as_ref().unwrap().shape[leaf];
+        let band = Grid::default().band_of(555.0).unwrap();
+        let radiance = spectra[1].power[band] * made[1].emission.as_ref().unwrap().shape[band];
         assert!((radiance - 0.01).abs() < 1e-12);
         assert!((luminance(&made[2], &spectra) - 70.0).abs() < 1e-9);
         assert!((luminance(&made[3], &spectra) - 300.0).abs() < 1e-9);

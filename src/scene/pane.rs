@@ -105,7 +105,7 @@ impl Pane {
         }
     }
 
-    /// Transmittance by leaf at normal incidence of the pane as it stands.
+    /// Transmittance by band at normal incidence of the pane as it stands.
     pub fn normal(&self) -> Spectrum {
         let thickness = match self.kind {
             PaneKind::Glass { thickness, .. } => thickness,

@@ -1,7 +1,7 @@
 //! Diffuse sheets: curtains, paper, lamp shades and opal covers, which reflect a part of the light that meets them evenly to all sides,
 //! and send another part evenly out of their other side.
 //!
-//! `exitance(front) = rho_front E(front) + tau E(back)`, and the same with front and back exchanged, leaf by leaf. What makes a
+//! `exitance(front) = rho_front E(front) + tau E(back)`, and the same with front and back exchanged, band by band. What makes a
 //! material a sheet is KHR_materials_diffuse_transmission, whose strength f and colour c beside the base colour b mean
 //! `rho = (1 - f) b`, `tau = f c` (the extension's section "Implementation", without its specular layer), or `"transmission"` in a side
 //! file, which is tau itself. A sheet has two sides whatever the file says, and no thickness.
@@ -13,7 +13,7 @@ use crate::data::Spectrum;
 /// What a material lets through, evenly to all sides.
 #[derive(Debug, Clone)]
 pub struct Sheet {
-    /// Share of light that leaves on the other side, on the grid's leaves, where textures are white: tau.
+    /// Share of light that leaves on the other side, on the grid's bands, where textures are white: tau.
     pub transmittance: Spectrum,
     /// Reflectance of the back, if it is not that of the front.
     pub back: Option<Spectrum>,

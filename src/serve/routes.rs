@@ -195,7 +195,7 @@ fn point_of(request: &Request) -> Option<(u64, usize, [usize; 3], [f64; 3])> {
     Some((mesh?.into(), part? as usize, vertices, [u, v, w]))
 }
 
-/// The light at a point: `light` (number of the light), `spectrum` (W/m2/nm on the 64 leaves), `xyz` (tristimulus
+/// The light at a point: `light` (number of the light), `spectrum` (W/m2/nm on the 64 bands), `xyz` (tristimulus
 /// irradiance; Y is lx), `error_de2000` (an estimate, or null) and whether that is the point's own (`error_here`) or the
 /// room's mean.
 fn reading(picture: &LitMesh, found: &PointReading) -> Response {

@@ -130,7 +130,7 @@ impl Coarse {
         }
     }
 
-    /// Bound of the mean colour difference, and the intervals that can be split (light, first leaf) by what they may
+    /// Bound of the mean colour difference, and the intervals that can be split (light, first band) by what they may
     /// cause, the worst first.
     fn bound(
         &self,

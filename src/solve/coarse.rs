@@ -1,7 +1,7 @@
 //! A model of the room in a few hundred patches, to decide on wavelengths.
 //!
-//! The spectral error varies far less from place to place than light does, so the working partition is chosen on a cut
-//! of the hierarchy: the real links, summed between the patches of the cut (Galerkin), with mean reflectances. There a
+//! The spectral error varies far less from place to place than light does, so the working partition is chosen on a frontier
+//! of the hierarchy: the real links, summed between the patches of the frontier (Galerkin), with mean reflectances. There a
 //! solution on all 64 spectral leaves is affordable; what a partition loses is *measured* on the model and is an
 //! *estimate* for the room.
 
@@ -56,7 +56,7 @@ pub(crate) trait Dense {
 }
 
 impl Coarse {
-    /// Sums links and sources over a cut of `tree`, into a limited number of patches.
+    /// Sums links and sources over a frontier of `tree`, into a limited number of patches.
     #[expect(clippy::too_many_arguments, reason = "one caller")]
     pub(crate) fn new(
         tree: &Tree,
@@ -300,18 +300,18 @@ fn add(sum: &mut Spectrum, x: &Spectrum, weight: f64) {
     }
 }
 
-/// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node whose counted area is greatest
+/// Which patch of the model each node lies in; [`NONE`] for nodes above the frontier. The node whose counted area is greatest
 /// is opened first.
 pub(super) fn frontier(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut open = std::collections::BinaryHeap::new();
     let key = |id: u32| (ordered(tree.node(id).counted), std::cmp::Reverse(id));
     open.push((key(0), 0_u32));
     let mut count = 1;
-    let mut is_cut = vec![false; tree.nodes.len()];
+    let mut on_frontier = vec![false; tree.nodes.len()];
     while let Some((_, id)) = open.pop() {
         let node = tree.node(id);
         if node.is_leaf() || count + node.child_range().len() - 1 > patches {
-            is_cut[id as usize] = true;
+            on_frontier[id as usize] = true;
             continue;
         }
         count += node.child_range().len() - 1;
@@ -322,7 +322,7 @@ pub(super) fn frontier(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut group = vec![NONE; tree.nodes.len()];
     let mut next = 0;
     for id in 0..tree.nodes.len() {
-        if is_cut[id] {
+        if on_frontier[id] {
             group[id] = next;
             next += 1;
         } else if id > 0 {
@@ -348,7 +348,7 @@ fn exchanges(
     count: usize,
 ) -> Vec<f64> {
     let mut mean: Vec<f64> = factor.iter().map(|&f| f64::from(f)).collect();
-    // For each node above the cut the patches that a link to it reaches, with their weights.
+    // For each node above the frontier the patches that a link to it reaches, with their weights.
     let mut above: Vec<Vec<(u32, f64)>> = vec![Vec::new(); tree.nodes.len()];
     for (k, node) in tree.nodes.iter().enumerate().rev() {
         if node.is_leaf() {

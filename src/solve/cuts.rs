@@ -122,9 +122,9 @@ impl Coarse {
                 let (fine, reference) = &references[light];
                 let lost = |xyz: &[[f64; 3]]| {
                     let bands = lane.first..lane.first + lane.count;
-                    bands.fold([0.0; 3], |lost, leaf| {
-                        let difference = f64::from(reference.row(k)[leaf] - rows.row(k)[l]);
-                        plus(lost, xyz[leaf].map(|w| w * difference))
+                    bands.fold([0.0; 3], |lost, band| {
+                        let difference = f64::from(reference.row(k)[band] - rows.row(k)[l]);
+                        plus(lost, xyz[band].map(|w| w * difference))
                     })
                 };
                 let seen = lost(fine.xyz());

@@ -40,7 +40,7 @@ const LEAST_BARE: f64 = 1e-3;
 const CHUNK: usize = 64;
 /// Rays that tell whether a point is covered.
 const COVER_RAYS: usize = 4;
-/// How the leaves of a hierarchy look out.
+/// The rays of the leaves of a hierarchy, and what they tell of how the leaves look out.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LeafRays {
     /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.

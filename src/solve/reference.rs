@@ -46,7 +46,7 @@ pub struct Reference {
     pub patches: Vec<Patch>,
     /// `F_ij`: share of the light leaving i that reaches j, one matrix for all leaves or one for each.
     factors: Vec<DMatrix<f64>>,
-    /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a leaf by irradiance on another.
+    /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a band by irradiance on another.
     pub donaldson: Vec<Option<Vec<Spectrum>>>,
 }
 
@@ -105,12 +105,12 @@ impl Reference {
         &self.factors[band.min(self.factors.len() - 1)]
     }
 
-    /// Sum of every patch's factors on the first leaf: 1 in a closed room without panes, but for the rule's error.
+    /// Sum of every patch's factors on the first band: 1 in a closed room without panes, but for the rule's error.
     pub fn row_sums(&self) -> Vec<f64> {
         self.factors(0).row_iter().map(|row| row.sum()).collect()
     }
 
-    /// Solves all leaves; where surfaces fluoresce, again until their fluorescence settles.
+    /// Solves all bands; where surfaces fluoresce, again until their fluorescence settles.
     pub fn solve(&self) -> ReferenceSolution {
         let mut glow = vec![[0.0; BANDS]; self.patches.len()];
         loop {
@@ -139,7 +139,7 @@ impl Reference {
         each.collect()
     }
 
-    /// Solves all leaves, given the fluorescent exitance of the patches.
+    /// Solves all bands, given the fluorescent exitance of the patches.
     fn solve_with(&self, glow: &[Spectrum]) -> ReferenceSolution {
         let n = self.patches.len();
         let mut radiosity = vec![[0.0; BANDS]; n];
@@ -180,7 +180,7 @@ impl Reference {
             }
         }
         let mut irradiance: Vec<Spectrum> = self.patches.iter().map(|p| p.punctual).collect();
-        // All leaves at once, or one by one where each has its own factors.
+        // All bands at once, or one by one where each has its own factors.
         let at_once = BANDS / self.factors.len();
         for first in (0..BANDS).step_by(at_once) {
             let sources = DMatrix::from_fn(n, at_once, |i, k| radiosity[i][first + k]);

@@ -1,12 +1,12 @@
 //! The neglected term, bounded: the paper's open question (section 5).
 //!
-//! With the mean m_a = v + e_a / A_a of a spectrum under the weight a_bar, and its spread
+//! With the mean m_a = v + e_a / A_a of a spectrum under the weight a_bar, and its standard deviation
 //! sigma_a = sqrt(integral over the interval of (f - m_a)^2 a_bar), the errors of a product are exactly
 //!
 //! e'_a = R e_S + S e_R + e_S e_R / A + C_a,   C_a = integral of (S - m_S)(R - m_R) a_bar,   |C_a| <= sigma_S sigma_R
 //!
 //! by Cauchy and Schwarz. C_a also cannot take the integral of S R a_bar out of [min S, max S] times that of R a_bar, nor
-//! the other way round. So an error known to lie within a radius stays known within a radius. The spread of the product
+//! the other way round. So an error known to lie within a radius stays known within a radius. The deviation of the product
 //! is at most the least of
 //!
 //! R_max sigma_S + m_S sigma_R,   S_max sigma_R + m_R sigma_S,   (max - min)/2 sqrt(A).
@@ -24,7 +24,7 @@ pub struct Bounded {
     pub moment: Moment,
     /// The true error is within this of the estimate.
     pub radius: Cmf,
-    /// The spread sigma is at most this.
+    /// The standard deviation sigma is at most this.
     pub deviation: Cmf,
     /// The spectrum is nowhere on the interval below this.
     pub low: f64,
@@ -93,7 +93,7 @@ impl Interval for Bounded {
         let (mean_s, mean_r) = (self.mean(cmf), r.mean(cmf));
         let mut moment = self.moment.times(&r.moment, cmf);
         let (low, high) = (self.low * r.low, self.high * r.high);
-        let (mut radius, mut spread) = ([0.0; 3], [0.0; 3]);
+        let (mut radius, mut deviation) = ([0.0; 3], [0.0; 3]);
         for a in 0..3 {
             if cmf[a] <= 0.0 {
                 continue;
@@ -113,20 +113,20 @@ impl Interval for Bounded {
             let (from, to) = (from.min(to), to.max(from));
             moment.0.error[a] = (0.5 * (from + to) - moment.0.value) * cmf[a];
             radius[a] = 0.5 * (to - from) * cmf[a];
-            spread[a] = (r.high * self.deviation[a] + most * r.deviation[a])
+            deviation[a] = (r.high * self.deviation[a] + most * r.deviation[a])
                 .min(mean_r[a] * self.deviation[a] + self.high * r.deviation[a])
                 .min(0.5 * (high - low) * cmf[a].sqrt());
         }
         Self {
             moment,
             radius,
-            deviation: spread,
+            deviation,
             low,
             high,
         }
     }
 
-    /// Parallel axes: the squares of the spreads add, and the distance of the two means comes on top.
+    /// Parallel axes: the squares of the deviations add, and the distance of the two means comes on top.
     fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], share: f64) -> Self {
         let moment = Moment::merged(&left.moment, &right.moment, cmf, share);
         let means = [left.mean(cmf[0]), right.mean(cmf[1])];
@@ -175,7 +175,7 @@ impl Interval for Bounded {
         }
     }
 
-    /// Errors and radii add; spreads do at most (triangle inequality).
+    /// Errors and radii add; deviations do at most (triangle inequality).
     fn plus(&self, factor: f64, other: &Self) -> Self {
         let sum = |a: &Cmf, b: &Cmf| std::array::from_fn(|c| a[c] + factor * b[c]);
         Self {

@@ -138,7 +138,7 @@ pub enum Operation {
     Fluctuation,
 }
 
-/// The interval with the greatest error that can be split: its first leaf and its node.
+/// The interval with the greatest error that can be split: its first band and its node.
 pub(super) fn worst<I: Interval>(list: &List<I>, metric: &Metric) -> Option<(usize, usize)> {
     let mut found = None;
     let mut greatest = -1.0;
@@ -339,7 +339,7 @@ mod tests {
             let within = Control::within(1.0);
             let (list, size, _) = run::<Moment>(&spectra, cut, limits, within);
             prop_assert_eq!(list.validate(), Ok(()));
-            // Leaves have no error: only rounding can keep the sum above a limit of 0.
+            // Bands have no error: only rounding can keep the sum above a limit of 0.
             prop_assert!(size <= limits[1].max(1e-9), "{size}");
             let (list, size, exact) = run::<Bounded>(&spectra, cut, limits, within);
             prop_assert_eq!(holds(&list, &exact, &cmf()), Ok(()));

@@ -129,7 +129,7 @@ impl<I: Interval> List<I> {
         sum
     }
 
-    /// The list on the 64 leaves.
+    /// The list on the 64 bands.
     pub fn spectrum(&self) -> Spectrum {
         let mut spectrum = [0.0; BANDS];
         for (interval, (first, len)) in self.intervals().iter().zip(self.partition.iter()) {
@@ -138,7 +138,7 @@ impl<I: Interval> List<I> {
         spectrum
     }
 
-    /// Replaces the interval at `first` by two; nothing happens to one of a single leaf.
+    /// Replaces the interval at `first` by two; nothing happens to one of a single band.
     pub fn split(&mut self, first: usize, halves: [I; 2]) {
         let Some(finer) = self.partition.split(first) else {
             return;

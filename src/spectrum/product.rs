@@ -6,7 +6,7 @@ use super::interval::Interval;
 use super::list::List;
 use super::tree::{CmfTree, DyadicTree, node};
 
-/// A light and the materials that it met: the product of their leaves is the exact spectrum.
+/// A light and the materials that it met: the product of their bands is the exact spectrum.
 #[derive(Debug, Clone, Copy)]
 pub struct Path<'a, I> {
     /// The light.
@@ -30,12 +30,12 @@ impl<I: Interval> Path<'_, I> {
         [self.node(2 * n, cmf), self.node(2 * n + 1, cmf)]
     }
 
-    /// The exact spectrum on the 64 leaves.
+    /// The exact spectrum on the 64 bands.
     pub fn spectrum(&self) -> super::Spectrum {
-        let product = |leaf: usize| {
+        let product = |band: usize| {
             self.reflections
                 .iter()
-                .fold(self.source.spectrum()[leaf], |s, r| s * r.spectrum()[leaf])
+                .fold(self.source.spectrum()[band], |s, r| s * r.spectrum()[band])
         };
         std::array::from_fn(product)
     }

@@ -11,7 +11,7 @@ use super::tree::{CmfTree, DyadicTree};
 
 /// The list of a light whose error is at most `limit` in the unit of `metric`.
 ///
-/// It ends: an interval of one leaf has no error, so the worst interval can always be halved.
+/// It ends: an interval of one band has no error, so the worst interval can always be halved.
 pub fn represent<I: Interval>(
     source: &DyadicTree<I>,
     cmf: &CmfTree,
@@ -41,7 +41,7 @@ mod tests {
     use crate::spectrum::{Estimate, Grid};
 
     #[test]
-    fn a_limit_of_nothing_gives_leaves_and_no_limit_gives_one_interval() {
+    fn a_limit_of_nothing_gives_bands_and_no_limit_gives_one_interval() {
         let chart = ColourChart::new(Reflectances::Ohta);
         let tree = DyadicTree::<Estimate>::new(&chart.light("F2").power, &chart.cmf);
         let exact = represent(&tree, &chart.cmf, &Metric::Xyz, 0.0);
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn leaves_sampled_in_their_middle_miss_table_1() {
+    fn bands_sampled_in_their_middle_miss_table_1() {
         // The left edges of this grid are the middles of the paper's.
         let grid = Grid::new(382.5, 702.5);
         let cmf = CmfTree::new(Observer::cie1931().samples(&grid));

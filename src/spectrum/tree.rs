@@ -1,6 +1,6 @@
 //! The data base of the pre-processing step (paper 3.1.2): spectra and colour matching functions as binary trees.
 //!
-//! A tree has 127 nodes, level j in 0..=6 and index i in 0..2^j; node (j, i) covers the leaves
+//! A tree has 127 nodes, level j in 0..=6 and index i in 0..2^j; node (j, i) covers the bands
 //! [i 2^(6-j), (i+1) 2^(6-j)). It is stored as an array in heap order: (j, i) lies at 2^j + i.
 //!
 //! The average of eq. 3 is the value that makes the sum of the squares of the three errors of eq. 2 least.
@@ -12,14 +12,14 @@ use crate::data::{BANDS, Spectrum};
 /// Nodes of a tree in heap order; index 0 is not used.
 pub const NODES: usize = 2 * BANDS;
 
-/// Heap index of the node over `len` leaves from `first`.
+/// Heap index of the node over `len` bands from `first`.
 #[inline]
 pub fn node(first: usize, len: usize) -> usize {
     // `len` is a power of two and divides `first`, so the shift is an exact division.
     (BANDS + first) >> len.trailing_zeros()
 }
 
-/// First leaf and number of leaves of a node.
+/// First band and number of bands of a node.
 pub fn span(node: usize) -> (usize, usize) {
     let level = node.ilog2();
     let len = BANDS >> level;
@@ -40,11 +40,11 @@ pub struct CmfTree {
 }
 
 impl CmfTree {
-    /// From the weights of the leaves (finite, not negative), e.g. [`crate::color::Observer::weights`].
+    /// From the weights of the bands (finite, not negative), e.g. [`crate::color::Observer::weights`].
     pub fn new(weights: [Spectrum; 3]) -> Self {
         let mut nodes = [[0.0; 3]; NODES];
-        for leaf in 0..BANDS {
-            nodes[BANDS + leaf] = weights.each_ref().map(|a| a[leaf]);
+        for band in 0..BANDS {
+            nodes[BANDS + band] = weights.each_ref().map(|a| a[band]);
         }
         for n in (1..BANDS).rev() {
             nodes[n] = std::array::from_fn(|a| nodes[2 * n][a] + nodes[2 * n + 1][a]);
@@ -107,11 +107,11 @@ impl CmfTree {
         Self::new(
             self.weights
                 .each_ref()
-                .map(|a| std::array::from_fn(|leaf| a[leaf] * power[leaf])),
+                .map(|a| std::array::from_fn(|band| a[band] * power[band])),
         )
     }
 
-    /// Weights of the leaves.
+    /// Weights of the bands.
     pub fn weights(&self) -> &[Spectrum; 3] {
         &self.weights
     }
@@ -130,7 +130,7 @@ impl CmfTree {
             let whole = self.nodes[node][a];
             above += whole
                 * (first..first + len)
-                    .map(|leaf| f[leaf] * self.weights[a][leaf])
+                    .map(|band| f[band] * self.weights[a][band])
                     .sum::<f64>();
             below += whole * whole;
         }
@@ -167,13 +167,13 @@ pub struct DyadicTree<I> {
 }
 
 impl<I: Interval> DyadicTree<I> {
-    /// From the leaves (finite).
+    /// From the bands (finite).
     pub fn new(f: &Spectrum, cmf: &CmfTree) -> Self {
         let mut nodes = [I::default(); NODES];
         for (n, slot) in nodes.iter_mut().enumerate().skip(1) {
             let (first, len) = span(n);
             let over = first..first + len;
-            // The average of a leaf is the leaf itself, to the last bit: its errors are exactly 0.
+            // The average of a band is the band itself, to the last bit: its errors are exactly 0.
             let average = if len == 1 {
                 f[first]
             } else {
@@ -191,7 +191,7 @@ impl<I: Interval> DyadicTree<I> {
         }
     }
 
-    /// The leaves it was made from.
+    /// The bands it was made from.
     pub fn spectrum(&self) -> &Spectrum {
         &self.spectrum
     }
@@ -202,7 +202,7 @@ impl<I: Interval> DyadicTree<I> {
         &self.nodes[node]
     }
 
-    /// Checks what must hold: leaves are exact, and the errors of two children are their parent's up to the change of value.
+    /// Checks what must hold: bands are exact, and the errors of two children are their parent's up to the change of value.
     ///
     /// # Errors
     /// The first node that is wrong.
@@ -212,10 +212,10 @@ impl<I: Interval> DyadicTree<I> {
             let (value, error) = (self.nodes[n].value(), self.nodes[n].error());
             for a in 0..3 {
                 let exact: f64 = (first..first + len)
-                    .map(|leaf| (self.spectrum[leaf] - value) * cmf.weights[a][leaf])
+                    .map(|band| (self.spectrum[band] - value) * cmf.weights[a][band])
                     .sum();
                 let scale: f64 = (first..first + len)
-                    .map(|leaf| self.spectrum[leaf].abs() * cmf.weights[a][leaf])
+                    .map(|band| self.spectrum[band].abs() * cmf.weights[a][band])
                     .sum();
                 if (error[a] - exact).abs() > 1e-12 * scale || (len == 1 && error[a] != 0.0) {
                     return Err(format!(
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn without_weights_the_average_is_the_mean() {
         let blind = CmfTree::new([[0.0; BANDS]; 3]);
-        let ramp = std::array::from_fn(|leaf| leaf as f64);
+        let ramp = std::array::from_fn(|band| band as f64);
         assert_eq!(blind.average(&ramp, 1), 31.5);
         assert!(
             DyadicTree::<Estimate>::new(&ramp, &blind)

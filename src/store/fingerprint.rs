@@ -63,8 +63,8 @@ impl Mix {
     fn dome(&mut self, kind: LightKind, dome: &Dome) {
         match (kind, dome) {
             (LightKind::Sky(_), Dome::Cie(sky)) => {
-                let spread = sky.luminance();
-                self.add(spread.kind()).add(spread.sun().to_array());
+                let luminance = sky.luminance();
+                self.add(luminance.kind()).add(luminance.sun().to_array());
             }
             (LightKind::Sky(_), Dome::Spectral(sky)) => {
                 self.add(sky.model().air())

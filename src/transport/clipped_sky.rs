@@ -21,7 +21,7 @@ const FAR: f64 = 8.0;
 const LISTED: usize = 64;
 const PIECES: usize = 64;
 /// How often a far triangle is divided before rays decide: to 3 degrees.
-const CUTS: u32 = 5;
+const SPLITS: u32 = 5;
 /// Rays into a far triangle that is divided no further.
 const LAST_RAYS: u32 = 16;
 /// A part is even if two means of the sky over it differ by less than this share. With .005 points of CIE 171 5.9 are off by .1
@@ -78,7 +78,7 @@ impl SkyReceiver<'_> {
             let cell = SkyTriangle {
                 corners: corners.map(|d| self.to.point + d),
                 up: y.y > 0.0,
-                cuts: CUTS,
+                splits: SPLITS,
             };
             self.cell(&cell, None, found);
         }
@@ -111,11 +111,11 @@ impl SkyReceiver<'_> {
         {
             return;
         }
-        if cell.cuts > 0 {
+        if cell.splits > 0 {
             for corners in quarters(cell.corners) {
                 let part = SkyTriangle {
                     corners,
-                    cuts: cell.cuts - 1,
+                    splits: cell.splits - 1,
                     ..*cell
                 };
                 self.cell(&part, list.as_deref().or(candidates), found);
@@ -320,7 +320,7 @@ struct SkyTriangle {
     /// Is the triangle above the horizon?
     up: bool,
     /// How often the triangle may still be divided.
-    cuts: u32,
+    splits: u32,
 }
 
 /// A triangle of directions over which sky or ground is even.

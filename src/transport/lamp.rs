@@ -76,10 +76,10 @@ fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
             continue;
         }
         // Divided parts go to the end, so that the largest are divided first.
-        let cut = quarters(corners);
-        let factors = lambert_triangles_x8(to.point, to.normal, cut.into_iter()).to_array();
+        let four = quarters(corners);
+        let factors = lambert_triangles_x8(to.point, to.normal, four.into_iter()).to_array();
         parts.remove(next);
-        parts.extend(cut.into_iter().zip(factors).filter(|part| part.1 > 0.0));
+        parts.extend(four.into_iter().zip(factors).filter(|part| part.1 > 0.0));
     }
     parts
 }

@@ -1,7 +1,7 @@
 //! Rooms made in code, without a file.
 //!
 //! All lamps share one light spectrum of equal energy (luminous size 1), so that a figure in lm/m2 is a figure for every
-//! leaf up to one constant.
+//! band up to one constant.
 
 #![allow(dead_code, reason = "no test file uses all of it")]
 
@@ -100,7 +100,7 @@ impl Room {
         self.spectra.len() - 1
     }
 
-    /// Leaf values of a light spectrum, luminous size 1.
+    /// Band values of a light spectrum, luminous size 1.
     pub(crate) fn power(&self, light: usize) -> Spectrum {
         self.spectra[light].power
     }
@@ -110,7 +110,7 @@ impl Room {
         self.spectral_paint([rho; BANDS])
     }
 
-    /// A paint by its reflectance on the leaves.
+    /// A paint by its reflectance on the bands.
     pub(crate) fn spectral_paint(&mut self, reflectance: Spectrum) -> usize {
         self.materials.push(Material {
             name: format!("material {}", self.materials.len()),
@@ -151,7 +151,7 @@ impl Room {
         });
     }
 
-    /// A pane of an index and of what its inside lets through, leaf by leaf; returns its index.
+    /// A pane of an index and of what its inside lets through, band by band; returns its index.
     pub(crate) fn pane(&mut self, ior: f64, inside: Spectrum) -> usize {
         let material = self.paint(0.0);
         self.materials[material].pane = Some(Pane {
@@ -185,7 +185,7 @@ impl Room {
         material
     }
 
-    /// A mirror by what it reflects at normal incidence, leaf by leaf; returns its index.
+    /// A mirror by what it reflects at normal incidence, band by band; returns its index.
     pub(crate) fn mirror(&mut self, reflectance: Spectrum) -> usize {
         let material = self.spectral_paint(reflectance);
         let reflectance = self.materials[material].reflectance;
@@ -196,7 +196,7 @@ impl Room {
         material
     }
 
-    /// Makes a paint fluoresce: an emission whose leaves times their width sum to 1, and the power given out for each that comes.
+    /// Makes a paint fluoresce: an emission whose bands times their width sum to 1, and the power given out for each that comes.
     pub(crate) fn fluoresces(&mut self, paint: usize, emission: Spectrum, excitation: Spectrum) {
         let light = self.spectra.len();
         self.spectra.push(LightSpectrum {

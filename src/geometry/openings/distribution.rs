@@ -106,7 +106,7 @@ impl Openings {
         }
     }
 
-    /// Cuts parts into pieces, coarser ones where they were more than this.
+    /// Divides parts into pieces, coarser ones where they were more than this.
     fn divide(&self, point: DVec3, most: usize, choice: &mut OpeningDistribution) {
         let (mut length, parts) = (LENGTH, choice.parts.len().max(1));
         let fewest = (most / parts).isqrt().clamp(1, FEWEST);

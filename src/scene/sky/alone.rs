@@ -24,8 +24,8 @@ impl Scene {
     pub(crate) fn tristimulus(&self, light: &PunctualLight) -> [f64; 3] {
         let power = &self.spectra[light.light].power;
         Observer::cie1931().weights(&self.grid).map(|weights| {
-            let leaves = power.iter().zip(&light.shape).zip(weights);
-            leaves.map(|((p, s), weight)| KM * p * s * weight).sum()
+            let bands = power.iter().zip(&light.shape).zip(weights);
+            bands.map(|((p, s), weight)| KM * p * s * weight).sum()
         })
     }
 

@@ -58,10 +58,10 @@ impl ReferenceLamps<'_> {
             false => light.position - self.mesh.centre,
         };
         let toward = (end - place.at).normalize_or_zero();
-        let spread = match light.kind {
+        let factor = match light.kind {
             LightKind::Profile => {
-                let spread = light.luminaire.as_ref();
-                spread.map_or(0.0, |l| l.per_lumen(-toward))
+                let luminaire = light.luminaire.as_ref();
+                luminaire.map_or(0.0, |l| l.per_lumen(-toward))
             }
             kind => kind.fall_off(-light.direction.dot(toward)),
         };
@@ -69,7 +69,7 @@ impl ReferenceLamps<'_> {
             true => 1.0,
             false => end.distance_squared(place.at),
         };
-        let factor = place.normal.dot(toward) * spread / square;
+        let factor = place.normal.dot(toward) * factor / square;
         if factor > 0.0 && factor.is_finite() {
             self.visibility.bring(sum, factor, place, end);
         }

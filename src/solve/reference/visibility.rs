@@ -8,7 +8,7 @@ use crate::scene::effects::{EffectKind, Plan};
 use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
 
-/// The ways of light in a room.
+/// What blocks and filters light between two points of a room.
 pub(super) struct ReferenceVisibility<'a> {
     scene: &'a Scene,
     rays: RayIndex,

@@ -28,11 +28,11 @@ impl Cubics {
         }
         let pieces = n / ORDER;
         let mut weights = vec![[0.0; 3]; n];
-        for leaf in 0..BANDS {
-            let (piece, x) = place(leaf, pieces);
+        for band in 0..BANDS {
+            let (piece, x) = place(band, pieces);
             for (i, t) in chebyshev(x).into_iter().enumerate() {
                 for a in 0..3 {
-                    weights[piece * ORDER + i][a] += light[leaf] * cmf.weights()[a][leaf] * t;
+                    weights[piece * ORDER + i][a] += light[band] * cmf.weights()[a][band] * t;
                 }
             }
         }
@@ -40,9 +40,9 @@ impl Cubics {
     }
 }
 
-/// The piece that holds the middle of a leaf, and the position in it, in [-1, 1].
-fn place(leaf: usize, pieces: usize) -> (usize, f64) {
-    let at = (leaf as f64 + 0.5) / BANDS as f64 * pieces as f64;
+/// The piece that holds the middle of a band, and the position in it, in [-1, 1].
+fn place(band: usize, pieces: usize) -> (usize, f64) {
+    let at = (band as f64 + 0.5) / BANDS as f64 * pieces as f64;
     (at as usize, 2.0 * at.fract() - 1.0)
 }
 
@@ -66,7 +66,7 @@ impl Method for Cubics {
             .collect()
     }
 
-    /// Least squares on the leaves of each piece, of which there are at least four.
+    /// Least squares on the bands of each piece, of which there are at least four.
     fn material(&self, reflectance: &Spectrum) -> Vec<f64> {
         let mut all = Vec::with_capacity(self.terms());
         for piece in 0..self.pieces {

@@ -38,8 +38,8 @@ pub fn gauss_shared(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
     let functions: [Spectrum; 3] = cmf
         .weights()
         .each_ref()
-        .map(|a| std::array::from_fn(|leaf| light[leaf] * a[leaf]));
-    let whole: Spectrum = std::array::from_fn(|leaf| functions.iter().map(|f| f[leaf]).sum());
+        .map(|a| std::array::from_fn(|band| light[band] * a[band]));
+    let whole: Spectrum = std::array::from_fn(|band| functions.iter().map(|f| f[band]).sum());
     let (nodes, weights) = rule(&whole, &functions, n);
     let light = vec![1.0; nodes.len()];
     let weights = (0..nodes.len())
@@ -66,10 +66,10 @@ fn build(
         .expect("both spaces are bases");
     let (mut means, mut weights) = (Vec::new(), Vec::new());
     for (row, &count) in counts.iter().enumerate() {
-        let weight = std::array::from_fn(|leaf| {
-            light[leaf]
+        let weight = std::array::from_fn(|band| {
+            light[band]
                 * (0..3)
-                    .map(|a| space[row][a] * cmf.weights()[a][leaf])
+                    .map(|a| space[row][a] * cmf.weights()[a][band])
                     .sum::<f64>()
         });
         let (nodes, [h]) = rule(&weight, &[weight], count);
@@ -82,8 +82,8 @@ fn build(
     Pointwise::new(name, means, weights, light)
 }
 
-/// Nodes (positions in leaves) of the weight |w|, and for each of `targets` the weights of the nodes for the sum over the
-/// leaves of f times the target.
+/// Nodes (positions in bands) of the weight |w|, and for each of `targets` the weights of the nodes for the sum over the
+/// bands of f times the target.
 ///
 /// Stieltjes' procedure gives the recurrence of the polynomials that are orthonormal under |w|; the eigenvalues of its
 /// Jacobi matrix are the nodes (Golub and Welsch 1969).
@@ -93,9 +93,9 @@ fn rule<const N: usize>(
     count: usize,
 ) -> (Vec<f64>, [Vec<f64>; N]) {
     let total: f64 = w.iter().map(|w| w.abs()).sum();
-    // Fewer nodes than asked for if the weight lives on fewer leaves.
+    // Fewer nodes than asked for if the weight lives on fewer bands.
     let count = count.min(w.iter().filter(|w| **w != 0.0).count());
-    let x = |leaf: usize| leaf as f64 / BANDS as f64;
+    let x = |band: usize| band as f64 / BANDS as f64;
     let mut jacobi = DMatrix::zeros(count, count);
     let mut polynomials: Vec<Spectrum> = vec![[1.0 / total.sqrt(); BANDS]];
     let inner = |p: &Spectrum, q: &Spectrum, power: i32| {

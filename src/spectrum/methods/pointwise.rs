@@ -1,15 +1,15 @@
-//! Methods whose product is term by term: each term is a weighted mean of the leaves, and tristimulus values are sums of
+//! Methods whose product is term by term: each term is a weighted mean of the bands, and tristimulus values are sums of
 //! the terms with fixed weights.
 
 use super::Method;
 use crate::color::Xyz;
 use crate::spectrum::{BANDS, Spectrum};
 
-/// n terms, each a mean of the leaves.
+/// n terms, each a mean of the bands.
 #[derive(Debug, Clone)]
 pub struct Pointwise {
     name: &'static str,
-    /// The means: for each term the weights of the leaves, of sum 1.
+    /// The means: for each term the weights of the bands, of sum 1.
     means: Vec<Spectrum>,
     /// Tristimulus weights of each term.
     weights: Vec<Xyz>,
@@ -49,10 +49,10 @@ impl Pointwise {
 
 /// The mean of a spectrum with given weights.
 pub(super) fn mean_of(mean: &Spectrum, spectrum: &Spectrum) -> f64 {
-    (0..BANDS).map(|leaf| mean[leaf] * spectrum[leaf]).sum()
+    (0..BANDS).map(|band| mean[band] * spectrum[band]).sum()
 }
 
-/// The mean that is the value at a position in leaves (leaf k's value holds at k), linear between, in [0, 63].
+/// The mean that is the value at a position in bands (band k's value holds at k), linear between, in [0, 63].
 pub(super) fn value_at(position: f64) -> Spectrum {
     let position = position.clamp(0.0, (BANDS - 1) as f64);
     let below = (position as usize).min(BANDS - 2);

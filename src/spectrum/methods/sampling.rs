@@ -5,7 +5,7 @@
 use super::pointwise::{Pointwise, mean_of};
 use crate::spectrum::{BANDS, CmfTree, Spectrum};
 
-/// n samples (in 1..=64), each the leaf in the middle of the n-th part of the range.
+/// n samples (in 1..=64), each the band in the middle of the n-th part of the range.
 pub fn sampling(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
     let means: Vec<Spectrum> = (0..n)
         .map(|i| {
@@ -17,18 +17,18 @@ pub fn sampling(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
     finish("point samples", means, cmf, light)
 }
 
-/// n bands of equal width (n in 1..=64): means of light and reflectances, sums of the colour matching functions.
+/// n bands of equal width, wider ones than the 64 (n in 1..=64): means of light and reflectances, sums of the colour matching functions.
 pub fn bands(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
     let means: Vec<Spectrum> = (0..n)
         .map(|i| {
-            // A leaf that two bands share counts in both by its part.
+            // A band of the grid that two of these share counts in both by its part.
             let (from, to) = (
                 (i * BANDS) as f64 / n as f64,
                 ((i + 1) * BANDS) as f64 / n as f64,
             );
             let width = to - from;
-            std::array::from_fn(|leaf| {
-                ((to.min(leaf as f64 + 1.0) - from.max(leaf as f64)).max(0.0)) / width
+            std::array::from_fn(|band| {
+                ((to.min(band as f64 + 1.0) - from.max(band as f64)).max(0.0)) / width
             })
         })
         .collect();

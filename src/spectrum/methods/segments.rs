@@ -8,7 +8,7 @@
 use super::pointwise::{Pointwise, value_at};
 use crate::spectrum::{BANDS, CmfTree, Spectrum};
 
-/// A leaf is a line where the light exceeds the mean of its neighbours by this share of it.
+/// A band is a line where the light exceeds the mean of its neighbours by this share of it.
 const LINE: f64 = 0.5;
 
 /// n segments, of which at most half are spent on lines, the strongest first.
@@ -31,7 +31,7 @@ pub fn segments(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
     let mut pieces = vec![Vec::new(); parts];
     let mut before = 0.0;
     for k in rest {
-        // The leaf goes where its middle falls; the share is below 1, so the index is below `parts`.
+        // The band goes where its middle falls; the share is below 1, so the index is below `parts`.
         let share = (before + 0.5 * visible[k]) / total;
         pieces[((share * parts as f64) as usize).min(parts - 1)].push(k);
         before += visible[k];

@@ -1,7 +1,7 @@
 //! How good the bound of the neglected term is: violations (there must be none) and looseness.
 //!
 //! Lists come from the guaranteed control of the tests; for every product the bound of the estimator's error is held
-//! against its true error from the 64 leaves.
+//! against its true error from the 64 bands.
 
 use super::colour_chart::{ColourChart, UnitLight};
 use super::modes::percentile;
@@ -57,7 +57,7 @@ pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<BoundsRow> {
             Metric::Xyz.size(off, [0.0; 3]),
             Metric::Xyz.size([0.0; 3], radius),
         );
-        // A product on leaves alone has no error and no radius.
+        // A product on bands alone has no error and no radius.
         if error > ROUNDING {
             loose[level].push(bound / error);
         }

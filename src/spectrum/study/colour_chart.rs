@@ -1,6 +1,6 @@
 //! The data of the paper's tests (4.1): lights C, D65 and F2, and the 24 patches of the ColorChecker.
 //!
-//! Paper grid, leaves take the value at their left edge, K = 1 / sum(S y_bar) is multiplied into the source.
+//! Paper grid, bands take the value at their left edge, K = 1 / sum(S y_bar) is multiplied into the source.
 //! The reflectances that the paper used are not published; two measured charts stand in for them.
 
 use crate::color::{Observer, Xyz, normalization, tristimulus};
@@ -60,7 +60,7 @@ pub struct ColourChart {
 pub struct UnitLight {
     /// As in the tables.
     pub name: &'static str,
-    /// K S on the leaves.
+    /// K S on the bands.
     pub power: Spectrum,
     /// Its tristimulus values: the adaptation white of the tests.
     pub white: Xyz,

@@ -1,4 +1,4 @@
-//! Spectra as vectors of f32, for measuring what a product and a change to XYZ cost at best: dense (64 leaves, four vectors
+//! Spectra as vectors of f32, for measuring what a product and a change to XYZ cost at best: dense (64 bands, four vectors
 //! of 16) and on a given cut (8 or 16 lanes, zeros in the spare ones). Both run the same code.
 
 use std::ops::{Add, Mul};
@@ -86,7 +86,7 @@ pub(super) fn tristimulus<V: SimdVector, const N: usize>(
     }
 }
 
-/// Several spectra side by side: for each leaf or interval, the values of all of them in M vectors. Sums over intervals
+/// Several spectra side by side: for each band or interval, the values of all of them in M vectors. Sums over intervals
 /// then need no sum over lanes.
 pub(super) type Columns<V, const M: usize> = Vec<[V; M]>;
 

@@ -280,7 +280,7 @@ fn row(
     limit: f64,
     samples: &[WalkStep],
 ) -> ModesRow {
-    let spread =
+    let summary =
         |f: &dyn Fn(&WalkStep) -> f64| DifferenceSummary::new(samples.iter().map(f).collect());
     let above = samples
         .iter()
@@ -294,9 +294,9 @@ fn row(
         intervals_mean: samples.iter().map(|s| s.intervals as f64).sum::<f64>()
             / samples.len() as f64,
         above_eps_max: 100.0 * above as f64 / samples.len() as f64,
-        luv: spread(&|s| s.luv_error),
-        de2000: spread(&|s| s.de2000),
-        corrected_luv: spread(&|s| s.corrected_luv),
-        corrected_de2000: spread(&|s| s.corrected_de2000),
+        luv: summary(&|s| s.luv_error),
+        de2000: summary(&|s| s.de2000),
+        corrected_luv: summary(&|s| s.corrected_luv),
+        corrected_de2000: summary(&|s| s.corrected_de2000),
     }
 }

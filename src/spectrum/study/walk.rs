@@ -1,6 +1,6 @@
 //! All reflections of a light by the chart: 24 primary, 24^2 secondary, 24^3 tertiary (paper 4.1).
 //!
-//! Every list is the product of the controlled list of the level before; the exact colour comes from the 64 leaves.
+//! Every list is the product of the controlled list of the level before; the exact colour comes from the 64 bands.
 
 use super::colour_chart::{ColourChart, UnitLight};
 use crate::color::{de_luv, de2000, tristimulus};
@@ -79,7 +79,7 @@ pub enum Extent {
     Whole,
 }
 
-/// Calls `step` with every product: the list on the cut of the level before, the path that leads to it, the exact leaves.
+/// Calls `step` with every product: the list on the cut of the level before, the path that leads to it, the exact bands.
 /// What `step` makes of the list is what the next level starts from.
 pub fn walk<I: Interval>(
     start: &WalkStart<'_, I>,
@@ -129,7 +129,7 @@ pub fn walk<I: Interval>(
 }
 
 impl WalkStep {
-    /// Measures a list against the exact leaves.
+    /// Measures a list against the exact bands.
     pub fn new<I: Interval>(
         list: &List<I>,
         operation: Operation,
@@ -178,5 +178,5 @@ pub fn sample<I: Interval>(
 }
 
 fn times(a: &Spectrum, b: &Spectrum) -> Spectrum {
-    std::array::from_fn(|leaf| a[leaf] * b[leaf])
+    std::array::from_fn(|band| a[band] * b[band])
 }

@@ -25,7 +25,7 @@ use std::sync::Arc;
 ///         `room.spectra.json` beside the room: `{"materials": {"wall": {"reflectance": {"name": "macbeth/white"}}}}`.
 ///         In place of `{"name": ...}` or `{"csv": ...}` arrays may stand: `{"wavelengths": nm, "values": ...}`.
 ///     sky: `"overcast"`, `"clear"` ... or a dictionary as under `"sky"` in a file of spectra, with the sun in it.
-///     range: first and last wavelength, nm; 64 leaves divide them.
+///     range: first and last wavelength, nm; 64 bands divide them.
 ///     lenient: only warn of keys and names in `spectra` that mean nothing.
 ///     scale: metres for each unit of the file.
 ///     flip: turn the faces that look reversed.
@@ -141,7 +141,7 @@ impl Room {
     ///         Without it there are `probe`, `relight` and `audit`.
     ///     keep: keep where light comes from, which `relight` needs.
     ///     vertices: vertices of the mesh at the most.
-    ///     spectrum: how spectra are carried: "perceptual", "guaranteed", "dense" (all 64 leaves), "rgb" ...
+    ///     spectrum: how spectra are carried: "perceptual", "guaranteed", "dense" (all 64 bands), "rgb" ...
     ///     rounds: rounds at the most.
     ///     seed: of all sampling patterns; equal seeds give equal results.
     ///
