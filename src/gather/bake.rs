@@ -231,7 +231,7 @@ impl Bake {
 
 /// How a material turns irradiance into visible light.
 pub(crate) struct SurfaceResponse<'a> {
-    /// Reflectance on the spectral leaves, without vertex colours; for diffuse sheets including the transmittance.
+    /// Reflectance on the bands, without vertex colours; for diffuse sheets including the transmittance.
     reflectance: Spectrum,
     /// Transmittance, and the share of the base colour that is reflected besides.
     through: Option<(Spectrum, f64)>,
@@ -328,7 +328,7 @@ impl<'a> SurfaceResponse<'a> {
         weighed(row, &self.reflected)
     }
 
-    /// Reflectance on the spectral leaves, for a texture its mean; without vertex colours.
+    /// Reflectance on the bands, for a texture its mean; without vertex colours.
     pub(crate) fn reflectance(&self) -> &Spectrum {
         &self.reflectance
     }

@@ -15,7 +15,7 @@ const PROBE_INSET: f64 = 1e-5;
 pub struct Probed {
     /// Tristimulus irradiance; Y is lux.
     pub xyz: [f64; 3],
-    /// Irradiance on the 64 spectral leaves, W/m2/nm.
+    /// Irradiance on the 64 bands, W/m2/nm.
     pub spectrum: Spectrum,
     /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`](super::MOSTLY) a vertex there counts as covered.
     pub backs: f64,

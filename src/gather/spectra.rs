@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 impl Bake {
-    /// Radiosity on the 64 spectral leaves at every vertex, W/m2/nm, surface by surface, own emission included.
+    /// Radiosity on the 64 bands at every vertex, W/m2/nm, surface by surface, own emission included.
     pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; BANDS]>> {
         self.spectra_of(baked, None)
     }

@@ -74,7 +74,7 @@ impl Fluorescent {
     }
 }
 
-/// Weights of light by what it excites, besides the observer's: for each spectral leaf the tristimulus values that a surface
+/// Weights of light by what it excites, besides the observer's: for each band the tristimulus values that a surface
 /// fluoresces under it, the greatest of all materials; none where nothing fluoresces.
 pub(crate) fn guide(scene: &Scene, weights: &[Spectrum; 3]) -> Option<[Spectrum; 3]> {
     let width = scene.grid.width();

@@ -3,7 +3,7 @@
 //! Each light spectrum S(lambda) of the room is kept exactly; a lane holds the *ratio* radiosity / S on one interval of
 //! that light's dyadic cut. Reflectances are averaged by the paper's eq. 3 with `S abar` in place of `abar`, so that a
 //! grey room needs one lane a light, whatever its lines, and a first reflection keeps its tristimulus values. Where all
-//! lights together would need more than 64 lanes, the rows hold the 64 spectral leaves (leaves, here).
+//! lights together would need more than 64 lanes, the rows hold the 64 bands.
 //!
 //! Other ways to hold spectra serve for comparison: radiosity itself on intervals (the paper's way), linear sRGB, and
 //! coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
@@ -196,7 +196,7 @@ impl Lanes {
     }
 
     /// These lanes, whose averages also follow `weights` besides the observer's: what a surface emits at other wavelengths per unit of
-    /// each leaf. A `share` of that is added to brightness.
+    /// each band. A `share` of that is added to brightness.
     #[must_use]
     pub fn guided(mut self, weights: &[Spectrum; 3], share: f64) -> Self {
         let of = |lane: &Lane, w: &Spectrum| {
@@ -303,7 +303,7 @@ impl Lanes {
         summed(row, self.excites().unwrap_or_default())
     }
 
-    /// Power that a surface takes from each lane at 1, given the share it takes of each leaf and the `width` of a leaf in nm: W/m2. Empty
+    /// Power that a surface takes from each lane at 1, given the share it takes of each band and the `width` of a band in nm: W/m2. Empty
     /// where lanes are not intervals.
     pub fn taken(&self, share: &Spectrum, width: f64) -> Vec<f32> {
         let lanes = self.lanes().iter().map(|lane| {
@@ -455,7 +455,7 @@ impl Lanes {
         }
     }
 
-    /// Value of an interval lane at 1 on a leaf.
+    /// Value of an interval lane at 1 on a band.
     fn shape(&self, lane: &Lane, band: usize) -> f64 {
         if (lane.first..lane.first + lane.count).contains(&band) {
             lane.light.map_or(1.0, |l| self.power[l][band])

@@ -2,7 +2,7 @@
 //!
 //! The spectral error varies far less from place to place than light does, so the working partition is chosen on a frontier
 //! of the hierarchy: the real links, summed between the patches of the frontier (Galerkin), with mean reflectances. There a
-//! solution on all 64 spectral leaves is affordable; what a partition loses is *measured* on the model and is an
+//! solution on all 64 bands is affordable; what a partition loses is *measured* on the model and is an
 //! *estimate* for the room.
 
 use super::operator::Operator;
@@ -32,7 +32,7 @@ pub(crate) struct Coarse {
     pub(super) areas: Vec<f64>,
     /// Reflectance of each patch.
     pub(super) reflectance: Vec<Spectrum>,
-    /// Exitance and direct punctual irradiance of each patch, light by light, as shapes on the spectral leaves.
+    /// Exitance and direct punctual irradiance of each patch, light by light, as shapes on the bands.
     pub(super) emission: Vec<Vec<Spectrum>>,
     pub(super) punctual: Vec<Vec<Spectrum>>,
     /// What passes sheets: a patch, the patch behind it, and the transmittance from that to the patch.
@@ -140,7 +140,7 @@ impl Coarse {
     }
 
     /// Adds the fluorescence that the light of lamps excites: enough to choose wavelengths by, as fluorescence itself excites little.
-    /// `width` of a spectral leaf, nm.
+    /// `width` of a band, nm.
     pub(super) fn add_fluorescence(
         &mut self,
         spectra: &[LightSpectrum],
@@ -338,7 +338,7 @@ fn ordered(area: f64) -> u64 {
 }
 
 /// Exchange between the patches of the model, as in the rows of the real leaves: the exchange of a link with a node above the
-/// cut is shared among the patches below it by area, and balance factors enter by their mean over a part's leaves.
+/// frontier is shared among the patches below it by area, and balance factors enter by their mean over a part's leaves.
 fn exchanges(
     tree: &Tree,
     links: &[Link],

@@ -1,5 +1,5 @@
 //! The choice of a cut for each light spectrum on the model of the room (`coarse`), by the loss of lanes against all 64
-//! spectral leaves.
+//! bands.
 
 use super::coarse::Coarse;
 use crate::color::luv_jacobian;
@@ -26,7 +26,7 @@ impl Coarse {
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
     /// padding would waste. `known` cuts are kept if they are good enough, and one for each light: a lamp with a new
     /// spectrum may have changed the number of lights. `copies`: how many lights of each spectrum rows hold, which must
-    /// not become wider than rows can be; none: one of each, and spectral leaves in place of more than 64 lanes.
+    /// not become wider than rows can be; none: one of each, and bands in place of more than 64 lanes.
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
@@ -101,7 +101,7 @@ impl Coarse {
         }
     }
 
-    /// Mean difference that the lanes cause, and the lanes (of more than one spectral leaf) by their share of it, the
+    /// Mean difference that the lanes cause, and the lanes (of more than one band) by their share of it, the
     /// worst first.
     fn loss(
         &self,
@@ -117,7 +117,7 @@ impl Coarse {
             let area = self.tree.node(self.leaves[k]).counted / total;
             let (mut all, mut excited) = ([0.0; 3], [0.0; 3]);
             for (l, lane) in lanes.lanes().iter().enumerate() {
-                // Lanes of a single spectral leaf are exact.
+                // Lanes of a single band are exact.
                 let Some(light) = lane.light else { continue };
                 let (fine, reference) = &references[light];
                 let lost = |xyz: &[[f64; 3]]| {
@@ -147,7 +147,7 @@ impl Coarse {
     }
 }
 
-/// Splits a share of the intervals (light, first spectral leaf), those first in the list, several at once: each step
+/// Splits a share of the intervals (light, first band), those first in the list, several at once: each step
 /// costs a solve.
 pub(super) fn split_worst(cuts: &mut [Partition], worst: Vec<(usize, usize)>, count: usize) {
     let most = count.div_ceil(BATCH).max(1);

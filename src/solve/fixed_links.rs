@@ -1,6 +1,6 @@
 //! Held links: a solution that differs from the last round in nothing but how spectra are carried.
 //!
-//! This shows by itself what lanes do to colours: the solution is compared with one on all 64 spectral leaves of the
+//! This shows by itself what lanes do to colours: the solution is compared with one on all 64 bands of the
 //! same links, with direct light gathered at the same points of the same elements.
 
 use super::direct::Direct;

@@ -79,7 +79,7 @@ impl LeafRays {
         self.target = vec![1.0; tree.nodes.len()];
     }
 
-    /// An leaf_rays of which nothing is known yet, of the ranks of a team.
+    /// Rays of which nothing is known yet, of the ranks of a team.
     pub(super) fn of_team(team: Team) -> Self {
         Self {
             team,
@@ -372,24 +372,6 @@ impl LeafRays {
             }
         }
         sum
-    }
-
-    /// An leaf_rays of `leaves` (ascending nodes) whose rays met the patches `seen`.
-    #[cfg(test)]
-    pub(super) fn of(nodes: usize, leaves: &[u32], seen: &[Vec<u32>]) -> Self {
-        let mut leaf_rays = Self {
-            target: vec![f32::NAN; nodes],
-            bare: vec![f32::NAN; nodes],
-            range: vec![(0, 0); nodes],
-            ..Self::default()
-        };
-        for (&leaf, seen) in leaves.iter().zip(seen) {
-            let k = leaf as usize;
-            (leaf_rays.target[k], leaf_rays.bare[k]) = (1.0, 1.0);
-            leaf_rays.range[k] = (leaf_rays.met.len() as u32, seen.len() as u32);
-            leaf_rays.met.extend(seen);
-        }
-        leaf_rays
     }
 
     /// The patches met by those rays of a leaf that count, and the divisor of the sum over them for the leaf's

@@ -44,7 +44,7 @@ impl Bake {
         self.gather_with(receivers, GatherQuality::Full)
     }
 
-    /// Gathers with care, or just for a picture, see [`Care`].
+    /// Gathers with care, or just for a picture, see [`GatherQuality`].
     pub(crate) fn gather_with(
         &self,
         receivers: &[Receiver],

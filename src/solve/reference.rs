@@ -1,4 +1,4 @@
-//! A plain reference: every patch sees every patch, on all 64 spectral leaves (leaves, here), each solved directly.
+//! A plain reference: every patch sees every patch, on all 64 bands, each solved directly.
 //! Slow and right.
 //!
 //! `B_i = E_i + rho_i (P_i + sum_j F_ij B_j)` (Goral, Torrance, Greenberg and Battaile 1984), P the irradiance from
@@ -9,7 +9,7 @@
 //! What fluoresces adds the 64 x 64 Donaldson matrix of its material times its irradiance, found in rounds, each of which
 //! loses energy.
 //! A sheet has a patch on each side, and what meets one side leaves the other by the transmittance. Panes filter each ray of a factor by
-//! incidence and leaf; where they are coloured every leaf has factors of its own, which takes 64 times the memory. Sky light comes from
+//! incidence and band; where they are coloured every band has factors of its own, which takes 64 times the memory. Sky light comes from
 //! 16,384 directions a point, from the sky's parts and not from its formula; the sun is parallel, without its disc. Rooms with mirrors are
 //! refused.
 //!
@@ -36,7 +36,7 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use visibility::ReferenceVisibility;
 
-/// Fluorescence has settled when it changes on no leaf by more than this share of the brightest.
+/// Fluorescence has settled when it changes on no band by more than this share of the brightest.
 const SETTLED: f64 = 1e-12;
 
 /// The patches of a room and who sees whom.
@@ -44,7 +44,7 @@ const SETTLED: f64 = 1e-12;
 pub struct Reference {
     /// The patches: every side of every triangle of the scene, quartered equally often.
     pub patches: Vec<Patch>,
-    /// `F_ij`: share of the light leaving i that reaches j, one matrix for all leaves or one for each.
+    /// `F_ij`: share of the light leaving i that reaches j, one matrix for all bands or one for each.
     factors: Vec<DMatrix<f64>>,
     /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a band by irradiance on another.
     pub donaldson: Vec<Option<Vec<Spectrum>>>,
@@ -100,7 +100,7 @@ impl Reference {
         })
     }
 
-    /// `F_ij` on a leaf: share of the light leaving i that reaches j.
+    /// `F_ij` on a band: share of the light leaving i that reaches j.
     pub fn factors(&self, band: usize) -> &DMatrix<f64> {
         &self.factors[band.min(self.factors.len() - 1)]
     }
@@ -259,7 +259,7 @@ pub fn solve_one(factors: &DMatrix<f64>, rho: &[f64], emission: &[f64]) -> DVect
     solve(factors, rho, right).column(0).into_owned()
 }
 
-/// `F_ij`, made reciprocal by their means; one matrix for all leaves, or one for each where a pane is coloured.
+/// `F_ij`, made reciprocal by their means; one matrix for all bands, or one for each where a pane is coloured.
 fn factors(
     scene: &Scene,
     visibility: &ReferenceVisibility<'_>,

@@ -1,4 +1,4 @@
-//! What rounds refine: the hierarchy, its links, and the leaf_rays of its leaves.
+//! What rounds refine: the hierarchy, its links, and the rays of its leaves.
 
 use super::direct::Direct;
 use super::leaf_rays::LeafRays;

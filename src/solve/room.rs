@@ -273,7 +273,7 @@ impl Room {
         Painter::new(&self.scene, &self.mesh, &self.upsampler)
     }
 
-    /// Radiosity itself on the 64 spectral leaves: lanes that serve every light.
+    /// Radiosity itself on the 64 bands: lanes that serve every light.
     pub(crate) fn dense_lanes(&self) -> Lanes {
         Lanes::dense(&self.scene.spectra, &self.weights)
     }

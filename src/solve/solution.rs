@@ -36,7 +36,7 @@ pub(crate) struct Solution {
 }
 
 impl Solution {
-    /// No light yet, on the 64 spectral leaves.
+    /// No light yet, on the 64 bands.
     pub(super) fn new(room: &Room) -> Self {
         let lanes = room.dense_lanes();
         Self {

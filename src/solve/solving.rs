@@ -491,7 +491,7 @@ impl Bake {
         self.mean_over_leaves(|row| self.solution.lanes.tristimulus(row))
     }
 
-    /// The spectrum of the mean irradiance, W/m2/nm on the 64 spectral leaves.
+    /// The spectrum of the mean irradiance, W/m2/nm on the 64 bands.
     pub fn mean_spectrum(&self) -> Spectrum {
         self.mean_over_leaves(|row| self.solution.lanes.spectrum(row))
     }

@@ -295,7 +295,7 @@ pub(crate) fn weights_of(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     [1.0 - wb - wc, wb, wc]
 }
 
-/// What single leaves reflect, emit and get from punctual lights, on all 64 spectral leaves.
+/// What single leaves reflect, emit and get from punctual lights, on all 64 bands.
 pub(crate) struct DenseSources<'a> {
     painter: &'a Painter<'a>,
     tree: &'a Tree,

@@ -20,7 +20,7 @@ const TOGETHER: usize = 1 << 16;
 const LAMP: u32 = 1 << 31;
 
 impl LeafRays {
-    /// Writes the leaf_rays: where the rays end, or only the leaves that they met, which is half as much and enough as
+    /// Writes the rays: where the rays end, or only the leaves that they met, which is half as much and enough as
     /// long as no leaf is split. In a room with panes or mirrors (then there are `filters`) also what the rays pass.
     pub(in crate::solve) fn encode(
         &self,
@@ -65,7 +65,7 @@ impl LeafRays {
         })
     }
 
-    /// Reads back what [`Outlook::encode_passed`] wrote.
+    /// Reads back what [`LeafRays::encode_passed`] wrote.
     fn decode_passed(&mut self, counts: &[u32], filters: &Filters, from: &mut Decoder) -> Read<()> {
         let all = tinted::all_of(&from.get_all::<u64>()?, filters)?;
         let mut of = self.own::<u32>(counts, from)?;
