@@ -1,4 +1,4 @@
-//! What do spectra cost in a whole bake? Three rooms, adaptive lanes beside all 64 leaves and beside linear sRGB: CPU
+//! What do spectra cost in a whole bake? Three rooms, adaptive lanes beside all 64 bands and beside linear sRGB: CPU
 //! seconds from the room as read to the light at the vertices, all threads. Bakes of the three kinds alternate and the
 //! fastest of each counts.
 //!

@@ -7,7 +7,7 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use glam::{DVec3, Mat4, Vec3, Vec3A, vec3};
 use haarlight::geometry::sampling::{Pcg, hash, sequence02, triangle_weights};
-use haarlight::geometry::{NO_PLANE, Patch, RayIndex, Segment, Shaft, ShaftContents};
+use haarlight::geometry::{NO_PLANE, RayIndex, Segment, Shaft, ShaftContents, ShaftEnd};
 use haarlight::geometry::{lambert_visible, lanes, plane_ids};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
@@ -515,11 +515,11 @@ fn shaft(room: &Room, k: usize) -> Shaft {
     let planes = room.pairs[16 * k].planes;
     let [a, b] = room.patches[k];
     Shaft::between(
-        &Patch::Triangle {
+        &ShaftEnd::Triangle {
             corners: a,
             plane: planes[0],
         },
-        &Patch::Triangle {
+        &ShaftEnd::Triangle {
             corners: b,
             plane: planes[1],
         },
@@ -633,13 +633,13 @@ fn light_from_points(bencher: Bencher<'_, '_>) {
             let mut sum = 0.0;
             for (k, [a, _]) in black_box(&room.patches).iter().enumerate() {
                 let (at, normal) = ((a[0] + a[1] + a[2]) / 3.0, normal(a));
-                let from = Patch::Point {
+                let from = ShaftEnd::Point {
                     at,
                     normal,
                     plane: room.pairs[16 * k].planes[0],
                 };
                 for light in &light {
-                    let to = Patch::Triangle {
+                    let to = ShaftEnd::Triangle {
                         corners: *light,
                         plane: room.planes[2],
                     };

@@ -1,4 +1,4 @@
-//! What does one gather sweep cost on rows of 8 and of 16 lanes, beside all 64 leaves and beside RGB (rows of 4)?
+//! What does one gather sweep cost on rows of 8 and of 16 lanes, beside all 64 bands and beside RGB (rows of 4)?
 //!
 //! The operator of the solve (pull, gather over the links, push) on one thread, on about 2 k, 50 k and 500 k leaves, twice:
 //! the convex room refined to so many, with the links that it then has; and complete trees with 30 links at each leaf, as
@@ -11,7 +11,7 @@
 use haarlight::geometry::sampling::hash;
 use haarlight::hierarchy::{NONE, Node, Tree};
 use haarlight::light::Rows;
-use haarlight::link::{Demand, Graph, Link, LinkRows, Sight, Way};
+use haarlight::link::{Demand, Graph, Link, LinkRows, Occlusion, Sight};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Operator, Settings};
 use haarlight::team::NEVER;
@@ -71,7 +71,7 @@ fn links(leaves: &[u32]) -> Vec<Link> {
                     exchange: 1.0 / 32.0,
                     open_exchange: 1.0 / 32.0,
                     variation: 0.0,
-                    way: Way::Clear,
+                    occlusion: Occlusion::Clear,
                 });
             }
         }
@@ -137,7 +137,7 @@ fn room(leaves: usize) -> (Tree, Vec<Link>) {
     while tree.leaves().count() < leaves {
         let demand = Demand {
             bright: &even,
-            keen: &even,
+            sensitivity: &even,
             threshold,
             least_area: 0.0,
             hidden: true,

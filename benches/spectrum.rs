@@ -3,18 +3,18 @@
 
 use divan::{Bencher, black_box};
 use haarlight::color::luv_jacobian;
-use haarlight::spectrum::study::{Chart, Light, Reflectances};
+use haarlight::spectrum::study::{ColourChart, Reflectances, UnitLight};
 use haarlight::spectrum::{
-    Bounded, Control, Estimate, Interval, List, Metric, Moment, Partition, Path, Tree, coarsen,
-    control, represent,
+    Bounded, Control, DyadicTree, Estimate, Interval, List, Metric, Moment, Partition, Path,
+    coarsen, control, represent,
 };
 
 fn main() {
     divan::main();
 }
 
-fn chart() -> (Chart, Light) {
-    let chart = Chart::new(Reflectances::Babelcolor);
+fn chart() -> (ColourChart, UnitLight) {
+    let chart = ColourChart::new(Reflectances::Babelcolor);
     let light = chart.light("D65");
     (chart, light)
 }
@@ -23,14 +23,14 @@ fn chart() -> (Chart, Light) {
 #[divan::bench(types = [Estimate, Bounded])]
 fn tree<I: Interval>(bencher: Bencher) {
     let (chart, _) = chart();
-    bencher.bench(|| Tree::<I>::new(black_box(&chart.reflectances[0]), &chart.cmf));
+    bencher.bench(|| DyadicTree::<I>::new(black_box(&chart.reflectances[0]), &chart.cmf));
 }
 
 /// Representation of the light (3.1.3).
 #[divan::bench]
 fn source(bencher: Bencher) {
     let (chart, light) = chart();
-    let tree = Tree::<Estimate>::new(&light.power, &chart.cmf);
+    let tree = DyadicTree::<Estimate>::new(&light.power, &chart.cmf);
     bencher.bench(|| {
         represent(
             black_box(&tree),
@@ -46,10 +46,10 @@ fn source(bencher: Bencher) {
 fn product_of_8_intervals<I: Interval>(bencher: Bencher) {
     let (chart, light) = chart();
     let list = List::new(
-        &Tree::<I>::new(&light.power, &chart.cmf),
+        &DyadicTree::<I>::new(&light.power, &chart.cmf),
         Partition::uniform(3),
     );
-    let material = Tree::new(&chart.reflectances[0], &chart.cmf);
+    let material = DyadicTree::new(&chart.reflectances[0], &chart.cmf);
     let mut out = List::black();
     bencher.bench_local(|| {
         black_box(&list).reflect(black_box(&material), &chart.cmf, black_box(&mut out))
@@ -60,8 +60,8 @@ fn product_of_8_intervals<I: Interval>(bencher: Bencher) {
 #[divan::bench(args = ["paper", "perceptual"])]
 fn control_of_a_product(bencher: Bencher, mode: &str) {
     let (chart, light) = chart();
-    let source = Tree::<Moment>::new(&light.power, &chart.cmf);
-    let material = Tree::new(&chart.reflectances[5], &chart.cmf);
+    let source = DyadicTree::<Moment>::new(&light.power, &chart.cmf);
+    let material = DyadicTree::new(&chart.reflectances[5], &chart.cmf);
     let (mut product, mut list) = (List::black(), List::black());
     List::new(&source, Partition::uniform(4)).reflect(&material, &chart.cmf, &mut product);
     bencher.bench_local(|| {
@@ -99,7 +99,7 @@ fn coarsen_16_values(bencher: Bencher) {
 fn xyz_of_8_intervals(bencher: Bencher) {
     let (chart, light) = chart();
     let list = List::new(
-        &Tree::<Estimate>::new(&light.power, &chart.cmf),
+        &DyadicTree::<Estimate>::new(&light.power, &chart.cmf),
         Partition::uniform(3),
     );
     bencher.bench_local(|| black_box(&list).xyz(&chart.cmf));
@@ -109,7 +109,7 @@ fn xyz_of_8_intervals(bencher: Bencher) {
 #[divan::bench(types = [Moment, Bounded])]
 fn sum_on_different_cuts<I: Interval>(bencher: Bencher) {
     let (chart, light) = chart();
-    let tree = Tree::<I>::new(&light.power, &chart.cmf);
+    let tree = DyadicTree::<I>::new(&light.power, &chart.cmf);
     let (coarse, fine) = (
         List::new(&tree, Partition::uniform(2)),
         List::new(&tree, Partition::uniform(3)),

@@ -4,7 +4,7 @@
 
 use haarlight::Result;
 use haarlight::mesh::Limits;
-use haarlight::output::{Balance, Brightness, Exposure, Writing, baked_glb, camera};
+use haarlight::output::{Exposure, ExposureSetting, WhiteBalance, Writing, baked_glb, camera};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use haarlight::store::file;
@@ -35,8 +35,8 @@ fn main() -> Result<()> {
         bake.scene(),
         &baked.surfaces,
         &cameras,
-        Brightness::default(),
-        Balance::default(),
+        ExposureSetting::default(),
+        WhiteBalance::default(),
     );
     let glb = baked_glb(bake.scene(), &baked.surfaces, &exposure, Writing::default())?;
     file::write_atomic(Path::new(&to), Some(Path::new(&room)), |w| {

@@ -13,9 +13,9 @@ fn main() {
     let cmf = CmfTree::new(Observer::cie1931().weights(&grid));
     let table = |name: &str| named(name).expect("a built-in spectrum").table;
     let light = grid.means(&table("cie/F11"), Outside::Zero);
-    let k = normalization(&light, cmf.leaves());
+    let k = normalization(&light, cmf.weights());
     let light = light.map(|s| k * s);
-    let white = tristimulus(&light, cmf.leaves());
+    let white = tristimulus(&light, cmf.weights());
     let paint = grid.means(&table("macbeth/orange"), Outside::Hold);
     let (source, material) = (
         SpectralTree::new(&light, &cmf),
@@ -25,7 +25,7 @@ fn main() {
         source: &source,
         reflections: &[&material],
     };
-    let exact = tristimulus(&path.leaves(), cmf.leaves());
+    let exact = tristimulus(&path.spectrum(), cmf.weights());
     println!("asked for  intervals  dE*uv");
     for asked in [4.0, 2.0, 1.0, 0.5, 0.25] {
         let list = represent(

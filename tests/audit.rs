@@ -4,20 +4,20 @@ use crate::common::built;
 
 use built::{Room, sphere};
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Audit, BATCHES, Honesty, Reference, Report};
+use haarlight::audit::{Audit, BATCHES, Honesty, PathReference, Report};
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::lambert_polygon;
 use haarlight::geometry::sampling::{Pcg, on_triangle};
-use haarlight::scene::effects::{Kind, Plan};
+use haarlight::scene::effects::{EffectKind, Plan};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings, Verdict};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use std::path::Path;
 
 /// Points of a test: enough for a chi-squared sum that tells 1 % from nothing.
 const POINTS: usize = 100;
 
-fn luminous() -> Leaves {
+fn luminous() -> Spectrum {
     Observer::cie1931().weights(&Grid::default())[1].map(|y| KM * y)
 }
 
@@ -173,10 +173,11 @@ fn case_5_7() {
     accept(chi_squared(&bake, &places, 1024, &truth), 0.02);
 }
 
-/// CIE 171, 5.8: mean E = Phi / (96 (1 - rho)), leaf by leaf, over random points.
+/// CIE 171, 5.8: mean E = Phi / (96 (1 - rho)), band by band, over random points.
 #[test]
 fn case_5_8() {
-    let reflectance: Leaves = std::array::from_fn(|l| 0.05 + 0.85 * l as f64 / (LEAVES - 1) as f64);
+    let reflectance: Spectrum =
+        std::array::from_fn(|l| 0.05 + 0.85 * l as f64 / (BANDS - 1) as f64);
     let mut room = Room::new();
     let wall = room.spectral_paint(reflectance);
     room.hollow(DVec3::ZERO, DVec3::splat(4.0), [wall; 6]);
@@ -185,27 +186,27 @@ fn case_5_8() {
     let audit = Audit::new(bake.scene(), bake.mesh(), bake.rays());
     let power = bake.scene().spectra[0].power;
     // Eight draws of points: their spread holds that of the points and that of the paths.
-    let draws: Vec<Leaves> = (0..8)
+    let draws: Vec<Spectrum> = (0..8)
         .map(|k| {
             let places = points(&bake, |_| true, 40 + k);
             let answers = audit.irradiance(&places, &vec![64; POINTS], k);
             std::array::from_fn(|l| answers.iter().map(|a| a.mean[l]).sum::<f64>() / POINTS as f64)
         })
         .collect();
-    for leaf in [0, 20, 40, 63] {
-        let want = 10_000.0 * power[leaf] / 96.0 / (1.0 - reflectance[leaf]);
-        let mean = draws.iter().map(|d| d[leaf]).sum::<f64>() / 8.0;
+    for band in [0, 20, 40, 63] {
+        let want = 10_000.0 * power[band] / 96.0 / (1.0 - reflectance[band]);
+        let mean = draws.iter().map(|d| d[band]).sum::<f64>() / 8.0;
         let error =
-            (draws.iter().map(|d| (d[leaf] - mean).powi(2)).sum::<f64>() / 7.0 / 8.0).sqrt();
+            (draws.iter().map(|d| (d[band] - mean).powi(2)).sum::<f64>() / 7.0 / 8.0).sqrt();
         println!(
-            "leaf {leaf}: {:+.2} errors of {:.2} %",
+            "band {band}: {:+.2} errors of {:.2} %",
             (mean - want) / error,
             100.0 * error / want
         );
         // Student's t of 7 degrees of freedom exceeds 5.4 once in a thousand.
         assert!(
             (mean - want).abs() < 5.4 * error,
-            "leaf {leaf}: {mean} +- {error}, not {want}"
+            "band {band}: {mean} +- {error}, not {want}"
         );
         assert!(error < 0.02 * want);
     }
@@ -310,11 +311,11 @@ fn the_report_measures_what_finer_rounds_improve() {
     let last = Report::new(&bake, 60, 4096, 9);
     println!("{:?} then {:?}", first.de2000, last.de2000);
     assert!(last.de2000.mean.value < first.de2000.mean.value);
-    for spread in [last.de2000, last.relative] {
-        for m in [spread.mean, spread.rms, spread.p95, spread.max] {
+    for summary in [last.de2000, last.relative] {
+        for m in [summary.mean, summary.rms, summary.p95, summary.max] {
             assert!(m.low <= m.value && m.value <= m.high, "{m:?}");
         }
-        assert!(spread.mean.value <= spread.p95.value && spread.p95.value <= spread.max.value);
+        assert!(summary.mean.value <= summary.p95.value && summary.p95.value <= summary.max.value);
     }
 }
 
@@ -335,7 +336,7 @@ fn a_reference_serves_several_bakes() {
         bake
     };
     // Made before any round, by a bake that is asked for the same error.
-    let reference = Reference::new(&bake(0.5, 0), 30, 2048, 5);
+    let reference = PathReference::new(&bake(0.5, 0), 30, 2048, 5);
     assert_eq!(reference.points.len() + reference.covered, 30);
     let all = 0..reference.points.len();
     let interval: f64 = all.map(|k| reference.interval(k)).sum();
@@ -366,7 +367,7 @@ fn a_file_is_not_held_to_what_lies_inside_of_something() {
     room.quad(low + DVec3::Z, DVec3::X, up, wall);
     let mut bake = Bake::new(room.scene(), Settings::default());
     bake.run();
-    let reference = Reference::new(&bake, 600, 1 << 12, 3);
+    let reference = PathReference::new(&bake, 600, 1 << 12, 3);
     let points = Report::against(&bake, &reference);
     let file = Report::of_file(&bake, &bake.baked(&|_, _| {}), &reference);
     let below = |report: &Report| {
@@ -417,7 +418,12 @@ fn calibrate(path: &Path, points: usize, most_paths: usize) -> Vec<String> {
     let scene = Scene::load(path, &Options::default()).unwrap();
     let plan = Plan::of(&scene);
     // Where rays carry all light the default takes minutes.
-    let by_rays = [Kind::Panes, Kind::Sheets, Kind::Mirrors, Kind::Fluorescence];
+    let by_rays = [
+        EffectKind::Panes,
+        EffectKind::Sheets,
+        EffectKind::Mirrors,
+        EffectKind::Fluorescence,
+    ];
     let error = if by_rays.into_iter().any(|kind| plan.runs(kind)) {
         1.0
     } else {
@@ -428,7 +434,7 @@ fn calibrate(path: &Path, points: usize, most_paths: usize) -> Vec<String> {
         ..Settings::default()
     };
     let mut bake = Bake::new(scene, settings);
-    let reference = Reference::new(&bake, points, most_paths, 1);
+    let reference = PathReference::new(&bake, points, most_paths, 1);
     let name = path.file_stem().unwrap().to_string_lossy().into_owned();
     let mut wrong = Vec::new();
     while bake.verdict().is_none() {
@@ -535,7 +541,7 @@ fn has_no_plateau(room: &str, asked: f64, paths: usize) {
         };
         Bake::new(scene, settings)
     };
-    let reference = Reference::new(&bake(0.5), 200, paths, 3);
+    let reference = PathReference::new(&bake(0.5), 200, paths, 3);
     for (error, least, colour) in [(0.5, 0.01, 0.5), (asked, 0.003, 0.2)] {
         let mut bake = bake(error);
         bake.run();
@@ -562,7 +568,7 @@ fn has_no_plateau(room: &str, asked: f64, paths: usize) {
             .filter(|s| !near_edge(s.point))
             .collect();
         assert!(away.len() > 120, "{}", away.len());
-        let mean = |f: &dyn Fn(&haarlight::audit::Seen) -> f64| {
+        let mean = |f: &dyn Fn(&haarlight::audit::AuditedPoint) -> f64| {
             away.iter().map(|s| f(s)).sum::<f64>() / away.len() as f64
         };
         let light = mean(&|s| s.traced[1]);

@@ -185,7 +185,7 @@ fn vertex_colours_are_in_the_radiosity() {
             continue;
         }
         for (v, vertex) in sheet.vertices.iter().enumerate() {
-            let irradiance = bake.lanes().leaves(&baked.irradiance[k][v]);
+            let irradiance = bake.lanes().spectrum(&baked.irradiance[k][v]);
             let y: f64 = (0..64)
                 .map(|l| KM * weights[1][l] * wanted[l] * irradiance[l])
                 .sum();

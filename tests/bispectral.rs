@@ -10,7 +10,7 @@ use haarlight::color::{KM, Observer};
 use haarlight::scene::{Material, Options, Scene};
 use haarlight::solve::reference::Reference;
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use serde_json::json;
 use std::path::Path;
 
@@ -53,19 +53,19 @@ fn csv() -> String {
     text
 }
 
-/// Means over the leaves by the midpoint rule.
-fn mean(leaf: usize, f: impl Fn(f64) -> f64) -> f64 {
+/// Means over the bands by the midpoint rule.
+fn mean(band: usize, f: impl Fn(f64) -> f64) -> f64 {
     const N: u32 = 8;
     let grid = grid();
-    let at = |k: u32| grid.left(leaf) + grid.width() * (f64::from(k) + 0.5) / f64::from(N);
+    let at = |k: u32| grid.left(band) + grid.width() * (f64::from(k) + 0.5) / f64::from(N);
     (0..N).map(|k| f(at(k))).sum::<f64>() / f64::from(N)
 }
 
-/// Exitance on a leaf for irradiance on another, straight from the formula.
-fn matrix() -> Vec<Leaves> {
+/// Exitance on a band for irradiance on another, straight from the formula.
+fn matrix() -> Vec<Spectrum> {
     let width = grid().width();
     let element = |i: usize, j: usize| width * mean(i, |out| mean(j, |taken| given(out, taken)));
-    (0..LEAVES)
+    (0..BANDS)
         .map(|i| std::array::from_fn(|j| element(i, j)))
         .collect()
 }
@@ -86,22 +86,22 @@ fn read() -> (Scene, Material) {
     (scene, green)
 }
 
-fn xyz(leaves: &Leaves) -> [f64; 3] {
+fn xyz(bands: &Spectrum) -> [f64; 3] {
     let weights = Observer::cie1931().weights(&grid());
-    weights.map(|w| KM * w.iter().zip(leaves).map(|(w, x)| w * x).sum::<f64>())
+    weights.map(|w| KM * w.iter().zip(bands).map(|(w, x)| w * x).sum::<f64>())
 }
 
-fn times(matrix: &[Leaves], light: &Leaves) -> Leaves {
+fn times(matrix: &[Spectrum], light: &Spectrum) -> Spectrum {
     std::array::from_fn(|i| matrix[i].iter().zip(light).map(|(m, x)| m * x).sum())
 }
 
 /// Mean wavelength of a spectrum.
-fn centre(leaves: &Leaves) -> f64 {
-    let moment = (0..LEAVES).map(|k| grid().middle(k) * leaves[k]);
-    moment.sum::<f64>() / leaves.iter().sum::<f64>()
+fn centre(bands: &Spectrum) -> f64 {
+    let moment = (0..BANDS).map(|k| grid().middle(k) * bands[k]);
+    moment.sum::<f64>() / bands.iter().sum::<f64>()
 }
 
-/// How far the products are off is what is said of them, of the matrix on the leaves.
+/// How far the products are off is what is said of them, of the matrix on the bands.
 #[test]
 fn products_are_as_near_as_is_said() {
     let (scene, paper) = read();
@@ -116,7 +116,7 @@ fn products_are_as_near_as_is_said() {
         all += want * want;
     }
     let off = 100.0 * (missed / all).sqrt();
-    println!("{}: {off:.2} % on the leaves", dye.from);
+    println!("{}: {off:.2} % on the bands", dye.from);
     // Between its wavelengths, 4 nm apart, a table is linear: .2 % of bells 22 nm wide.
     assert!((off - said).abs() < 0.3, "{off} {}", dye.from);
     for (k, rho) in paper
@@ -130,7 +130,7 @@ fn products_are_as_near_as_is_said() {
 }
 
 /// A desk in a closed room; the paper takes half of it.
-fn desk(light: Leaves) -> (Scene, usize) {
+fn desk(light: Spectrum) -> (Scene, usize) {
     let (scene, paper) = read();
     let mut room = Room::over(grid());
     let lamp = room.spectrum("lamp", light);
@@ -151,7 +151,7 @@ fn a_matrix_of_many_products_agrees_with_itself() {
     let raw = matrix();
     let mut centres = Vec::new();
     for middle in [365.0, 430.0] {
-        let lamp: Leaves = std::array::from_fn(|k| {
+        let lamp: Spectrum = std::array::from_fn(|k| {
             let nm = grid().middle(k);
             bell(nm, middle, 10.0) + 0.15 * bell(nm, 600.0, 60.0)
         });
@@ -192,7 +192,7 @@ fn a_matrix_of_many_products_agrees_with_itself() {
                 let light = &reference.gather(&scene, &solution, &[(place, DVec3::Y)], 1)[0];
                 let glow = times(&raw, light);
                 let rho = &scene.materials[sheet].reflectance;
-                let sent: Leaves = std::array::from_fn(|k| rho[k] * light[k] + glow[k]);
+                let sent: Spectrum = std::array::from_fn(|k| rho[k] * light[k] + glow[k]);
                 for (got, want) in vertex.radiosity.into_iter().zip(xyz(&sent)) {
                     close(f64::from(got), want, POINT, &what);
                 }

@@ -9,7 +9,7 @@ use haarlight::geometry::{NO_PLANE, nearest_point};
 use haarlight::output::{Exposure, Format, Picture, camera};
 use haarlight::scene::{Camera, LightKind, Options, Projection, Scene, Sides};
 use haarlight::solve::{Bake, Settings};
-use haarlight::spectrum::Leaves;
+use haarlight::spectrum::Spectrum;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -62,9 +62,9 @@ struct Lamps {
 impl Lamps {
     fn of(scene: &Scene) -> Self {
         let weights = Observer::cie1931().weights(&scene.grid);
-        let y = |light: usize, shape: &Leaves| {
+        let y = |light: usize, shape: &Spectrum| {
             let power = &scene.spectra[light].power;
-            let product: Leaves = std::array::from_fn(|k| power[k] * shape[k]);
+            let product: Spectrum = std::array::from_fn(|k| power[k] * shape[k]);
             KM * tristimulus(&product, &weights)[1]
         };
         let mut lamps = Self {

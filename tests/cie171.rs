@@ -9,9 +9,9 @@ use crate::common::built;
 use built::Room;
 use glam::{DVec3, dvec3};
 use haarlight::scene::{Options, Scene};
-use haarlight::solve::reference::{Reference, Solution};
+use haarlight::solve::reference::{Reference, ReferenceSolution};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use nalgebra::DVector;
 use std::path::Path;
 
@@ -386,9 +386,9 @@ impl TruthOfCase58 {
         Self { scene, references }
     }
 
-    /// Irradiance at the points, W/m2/nm, if every leaf has its own albedo. Patches are of one size, so that their factors
+    /// Irradiance at the points, W/m2/nm, if every band has its own albedo. Patches are of one size, so that their factors
     /// are symmetric and conjugate gradients find the radiosities.
-    fn at(&self, rho: f64) -> Vec<[f64; LEAVES]> {
+    fn at(&self, rho: f64) -> Vec<[f64; BANDS]> {
         let [coarse, fine] = self.references.each_ref().map(|reference| {
             let first = DVector::from_iterator(
                 reference.patches.len(),
@@ -406,9 +406,9 @@ impl TruthOfCase58 {
                 residual -= step * applied;
                 direction = &residual + residual.norm_squared() / square * direction;
             }
-            // The light has equal energy: what holds for one leaf holds for all.
-            let rows: Vec<[f64; LEAVES]> = radiosity.iter().map(|&b| [b; LEAVES]).collect();
-            let solution = Solution {
+            // The light has equal energy: what holds for one band holds for all.
+            let rows: Vec<[f64; BANDS]> = radiosity.iter().map(|&b| [b; BANDS]).collect();
+            let solution = ReferenceSolution {
                 irradiance: rows.clone(),
                 radiosity: rows,
             };
@@ -421,19 +421,19 @@ impl TruthOfCase58 {
     }
 }
 
-/// Worst error at the first `count` points, at some leaves; `truth` by leaf.
+/// Worst error at the first `count` points, at some bands; `truth` by band.
 fn worst_of_case_5_8(
     bake: &mut Bake,
     count: usize,
-    leaves: &[usize],
-    truth: impl Fn(usize) -> Vec<[f64; LEAVES]>,
+    bands: &[usize],
+    truth: impl Fn(usize) -> Vec<[f64; BANDS]>,
 ) -> f64 {
     bake.run();
     let probed = bake.probe(&floor_points()[..count]);
-    let off = leaves.iter().flat_map(|&leaf| {
-        let pairs = probed.iter().zip(truth(leaf));
+    let off = bands.iter().flat_map(|&band| {
+        let pairs = probed.iter().zip(truth(band));
         pairs
-            .map(|(probed, truth)| probed.leaves[leaf] / truth[leaf] - 1.0)
+            .map(|(probed, truth)| probed.spectrum[band] / truth[band] - 1.0)
             .collect::<Vec<_>>()
     });
     off.fold(0.0, |w: f64, x| if x.abs() > w.abs() { x } else { w })
@@ -451,17 +451,17 @@ fn case_5_8_at_points() {
         println!("rho {rho}: worst point {:+.3} %", 100.0 * worst);
         assert!(worst.abs() < POINT, "rho {rho}: {worst:e}");
     }
-    let reflectance: [f64; LEAVES] =
+    let reflectance: [f64; BANDS] =
         std::array::from_fn(|l| 0.475 - 0.425 * (l as f64 / 63.0 * 9.0).cos());
-    // Lanes for the eye merge bands: for each band by itself there are the 64 leaves.
+    // Lanes for the eye merge bands: for each by itself there are rows of all 64.
     let settings = Settings {
         error: 0.25,
         representation: Representation::Dense,
         ..Settings::default()
     };
     let mut bake = Bake::new(cube(|room| room.spectral_paint(reflectance)), settings);
-    let worst = worst_of_case_5_8(&mut bake, away, &[3, 20, 30, 41, 60], |leaf| {
-        truth.at(reflectance[leaf])
+    let worst = worst_of_case_5_8(&mut bake, away, &[3, 20, 30, 41, 60], |band| {
+        truth.at(reflectance[band])
     });
     println!("spectral: worst point and band {:+.3} %", 100.0 * worst);
     assert!(worst.abs() < POINT, "{worst:e}");
@@ -484,7 +484,7 @@ fn case_5_8_in_a_corner() {
 /// Wavelength by wavelength: E(l) = Phi(l) / (96 (1 - rho(l))).
 #[test]
 fn case_5_8_in_every_band() {
-    let reflectance: [f64; LEAVES] =
+    let reflectance: [f64; BANDS] =
         std::array::from_fn(|l| 0.475 - 0.425 * (l as f64 / 63.0 * 9.0).cos());
     let scene = cube(|room| room.spectral_paint(reflectance));
     let power = scene.spectra[0].power;
@@ -496,19 +496,19 @@ fn case_5_8_in_every_band() {
         let mut bake = Bake::new(cube(|room| room.spectral_paint(reflectance)), settings);
         bake.run();
         if representation == Representation::Dense {
-            let (mut mean, mut area) = ([0.0; LEAVES], 0.0);
+            let (mut mean, mut area) = ([0.0; BANDS], 0.0);
             for (k, &leaf) in bake.light().leaves.iter().enumerate() {
                 let a = bake.tree().node(leaf).area;
-                let leaves = bake.lanes().leaves(bake.light().irradiance.row(k));
-                for (m, x) in mean.iter_mut().zip(&leaves) {
+                let spectrum = bake.lanes().spectrum(bake.light().irradiance.row(k));
+                for (m, x) in mean.iter_mut().zip(&spectrum) {
                     *m += a * x;
                 }
                 area += a;
             }
-            for leaf in 0..LEAVES {
+            for band in 0..BANDS {
                 mean_is(
-                    mean[leaf] / area,
-                    10_000.0 * power[leaf] / 96.0 / (1.0 - reflectance[leaf]),
+                    mean[band] / area,
+                    10_000.0 * power[band] / 96.0 / (1.0 - reflectance[band]),
                 );
             }
         }
@@ -516,7 +516,7 @@ fn case_5_8_in_every_band() {
         let weights = haarlight::color::Observer::cie1931().weights(&bake.scene().grid);
         let mean = bake.mean_irradiance();
         for c in 0..3 {
-            let want: f64 = (0..LEAVES)
+            let want: f64 = (0..BANDS)
                 .map(|l| {
                     haarlight::color::KM * weights[c][l] * power[l] * 10_000.0
                         / 96.0

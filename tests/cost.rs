@@ -1,4 +1,4 @@
-//! What each way to carry spectra claims, held against the 64 leaves on the same links; and the sweep as a command.
+//! What each way to carry spectra claims, held against the 64 bands on the same links; and the sweep as a command.
 
 use haarlight::cost::{HeldRun, Knob, Sweep, choose, held};
 use haarlight::data::{Outside, named};
@@ -85,7 +85,7 @@ fn every_way_keeps_what_it_claims_under_line_spectra() {
     }
 }
 
-/// All 64 intervals, or all 64 vectors, are the 64 leaves in another form.
+/// All 64 intervals, or all 64 vectors, are the 64 bands in another form.
 #[test]
 fn whole_sets_are_exact() {
     let mut bake = Bake::new(

@@ -64,7 +64,7 @@ fn everything(room: &str, threads: usize, talk: bool) -> (Vec<String>, Vec<u8>) 
         {
             let at = (corners[0] + corners[1] + corners[2]) / 3.0 + bake.mesh().centre;
             for probed in bake.probe(&[(at, normal)]) {
-                bytes.extend(probed.leaves.iter().flat_map(|x| x.to_le_bytes()));
+                bytes.extend(probed.spectrum.iter().flat_map(|x| x.to_le_bytes()));
             }
         }
         (log, bytes)

@@ -5,7 +5,7 @@ use crate::common::built;
 
 use built::baked;
 use glam::{DMat4, DVec3};
-use haarlight::audit::{Reference, Report};
+use haarlight::audit::{PathReference, Report};
 use haarlight::color::de2000;
 use haarlight::geometry::sampling::{Pcg, sphere_direction};
 use haarlight::scene::{Options, Scene};
@@ -60,7 +60,7 @@ fn mean(x: &[f64]) -> [f64; 2] {
 #[test]
 fn error_changes_smoothly_with_dust() {
     let clean = Bake::new(cornell(), Settings::default());
-    let reference = Reference::new(&clean, 200, 1 << 15, 3);
+    let reference = PathReference::new(&clean, 200, 1 << 15, 3);
     let seen = Report::against(&clean, &reference).seen;
     let points: Vec<(DVec3, DVec3)> = seen.iter().map(|s| (s.point, s.normal)).collect();
     let mesh = clean.mesh();

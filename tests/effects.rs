@@ -5,13 +5,13 @@ use crate::common::every_effect;
 
 use built::{Room, sun};
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Reference, Report};
-use haarlight::scene::effects::{Kind, Plan};
+use haarlight::audit::{PathReference, Report};
+use haarlight::scene::effects::{EffectKind, Plan};
 use haarlight::scene::profile::Profile;
 use haarlight::scene::sky::{SkyType, SkyWish};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -80,7 +80,7 @@ fn a_grey_room_takes_one_band() {
         ("grey box", &grey_box),
     ];
     for (name, scene) in rooms {
-        assert!(!Plan::of(&scene()).runs(Kind::Colour), "{name}");
+        assert!(!Plan::of(&scene()).runs(EffectKind::Colour), "{name}");
         let one = solve(scene(), Representation::Adaptive);
         let all = solve(scene(), Representation::Dense);
         for round in one.rounds() {
@@ -97,8 +97,8 @@ fn a_grey_room_takes_one_band() {
             for (a, b) in a
                 .xyz
                 .iter()
-                .chain(&a.leaves)
-                .zip(b.xyz.iter().chain(&b.leaves))
+                .chain(&a.spectrum)
+                .zip(b.xyz.iter().chain(&b.spectrum))
             {
                 // Rows are f32 (6e-8); sums run over some hundred terms, iterations over some ten.
                 assert!(
@@ -114,7 +114,7 @@ fn a_grey_room_takes_one_band() {
 #[test]
 fn a_coloured_room_takes_more() {
     let bake = baked(room("cornell.glb"), Representation::Adaptive);
-    assert!(bake.plan().runs(Kind::Colour));
+    assert!(bake.plan().runs(EffectKind::Colour));
     assert!(bake.rounds().iter().all(|r| r.intervals_working > 1));
 }
 
@@ -128,7 +128,7 @@ fn a_convex_room_casts_no_ray() {
         "cie171-5.8.glb",
     ] {
         let bake = baked(room(name), Representation::Adaptive);
-        assert!(!bake.plan().runs(Kind::Occlusion), "{name}");
+        assert!(!bake.plan().runs(EffectKind::Occlusion), "{name}");
         assert_eq!(
             bake.rounds().iter().map(|r| r.rays).sum::<u64>(),
             0,
@@ -151,7 +151,7 @@ fn black_walls_take_no_iteration() {
         "cie171-5.7.glb",
     ] {
         let bake = baked(room(name), Representation::Adaptive);
-        assert!(!bake.plan().runs(Kind::Interreflection), "{name}");
+        assert!(!bake.plan().runs(EffectKind::Interreflection), "{name}");
         for round in bake.rounds() {
             assert_eq!(round.iterations, 0, "{name}");
             assert!(round.flux.absorbed_lm > 0.0, "{name} is lit");
@@ -167,7 +167,7 @@ fn a_room_without_textures_has_none_to_sample() {
     for name in ["cornell.glb", "two-rooms.glb", "convex.glb"] {
         let scene = room(name);
         assert!(
-            !Plan::of(&scene).runs(Kind::Textures) && scene.images.is_empty(),
+            !Plan::of(&scene).runs(EffectKind::Textures) && scene.images.is_empty(),
             "{name}"
         );
         let textured = scene
@@ -177,7 +177,7 @@ fn a_room_without_textures_has_none_to_sample() {
         assert!(!textured, "{name}");
     }
     let scene = room("furnished.glb");
-    assert!(Plan::of(&scene).runs(Kind::Textures) && !scene.images.is_empty());
+    assert!(Plan::of(&scene).runs(EffectKind::Textures) && !scene.images.is_empty());
 }
 
 /// One light spectrum keeps one cut of one tree; two keep two.
@@ -186,12 +186,12 @@ fn one_light_spectrum_keeps_one_tree() {
     let lights = |name: &str| {
         let bake = baked(room(name), Representation::Adaptive);
         let mut lights: Vec<_> = bake.lanes().lanes().iter().map(|l| l.light).collect();
-        // Each light's intervals stand together and tile the 64 leaves once.
+        // Each light's intervals stand together and tile the 64 bands once.
         for light in bake.lanes().lanes().chunk_by(|a, b| a.light == b.light) {
             assert_eq!(light.iter().map(|l| l.count).sum::<usize>(), 64, "{name}");
         }
         lights.dedup();
-        (lights, bake.plan().runs(Kind::LightSpectra))
+        (lights, bake.plan().runs(EffectKind::LightSpectra))
     };
     assert_eq!(lights("cornell.glb"), (vec![Some(0)], false));
     assert_eq!(lights("two-rooms.glb"), (vec![Some(0), Some(1)], true));
@@ -201,7 +201,8 @@ fn one_light_spectrum_keeps_one_tree() {
 /// more, and the same light. (Fluorescence: `tests/fluorescence.rs`.) That it is closed takes as many rays in any room.
 #[test]
 fn effects_that_are_not_there_cost_nothing() {
-    let counted = |more: &dyn Fn(&mut Room) -> Option<Kind>, change: &dyn Fn(Scene) -> Scene| {
+    let counted = |more: &dyn Fn(&mut Room) -> Option<EffectKind>,
+                   change: &dyn Fn(Scene) -> Scene| {
         let mut room = Room::new();
         let paint = room.paint(0.5);
         room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 3.0), [paint; 6]);
@@ -230,23 +231,23 @@ fn effects_that_are_not_there_cost_nothing() {
             looked,
         )
     };
-    let half = [0.5; LEAVES];
+    let half = [0.5; BANDS];
     let as_it_is = |scene: Scene| scene;
     let (plain, looked) = counted(&|_| None, &as_it_is);
     assert_eq!(looked, 0, "nobody looks for a sky that is not there");
-    type Adds<'a> = &'a dyn Fn(&mut Room) -> Kind;
+    type Adds<'a> = &'a dyn Fn(&mut Room) -> EffectKind;
     let unused: [(&str, Adds); 3] = [
         ("pane", &|room| {
             room.pane(1.5, half);
-            Kind::Panes
+            EffectKind::Panes
         }),
         ("sheet", &|room| {
-            room.sheet(half, half, [0.4; LEAVES]);
-            Kind::Sheets
+            room.sheet(half, half, [0.4; BANDS]);
+            EffectKind::Sheets
         }),
         ("mirror", &|room| {
             room.mirror(half);
-            Kind::Mirrors
+            EffectKind::Mirrors
         }),
     ];
     for (name, more) in unused {
@@ -261,7 +262,7 @@ fn effects_that_are_not_there_cost_nothing() {
     };
     let lamp = |room: &mut Room| {
         room.lamp(0.1, 100.0);
-        Some(Kind::MeasuredLamps)
+        Some(EffectKind::MeasuredLamps)
     };
     assert!(counted(&lamp, &profiled) == (plain.clone(), 0), "profile");
     let overcast = SkyWish {
@@ -274,9 +275,9 @@ fn effects_that_are_not_there_cost_nothing() {
         ..SkyWish::default()
     };
     for (wish, kind) in [
-        (&overcast, Kind::Sky),
-        (&sunny, Kind::Sky),
-        (&sunny, Kind::Sun),
+        (&overcast, EffectKind::Sky),
+        (&sunny, EffectKind::Sky),
+        (&sunny, EffectKind::Sun),
     ] {
         let under = |scene: Scene| scene.under(wish).unwrap();
         let (with, looked) = counted(&|_| Some(kind), &under);
@@ -302,20 +303,20 @@ fn paths_agree_with_all_effects_at_once() {
     let bake = baked(every_effect::room(), Representation::Adaptive);
     let plan = bake.plan();
     for kind in [
-        Kind::MeasuredLamps,
-        Kind::Sky,
-        Kind::Sun,
-        Kind::Panes,
-        Kind::Sheets,
-        Kind::Mirrors,
-        Kind::Fluorescence,
+        EffectKind::MeasuredLamps,
+        EffectKind::Sky,
+        EffectKind::Sun,
+        EffectKind::Panes,
+        EffectKind::Sheets,
+        EffectKind::Mirrors,
+        EffectKind::Fluorescence,
     ] {
         assert!(plan.runs(kind), "{plan}");
     }
     // A few bright paths make some references uncertain: each counts by how narrow its interval is.
     let (mut bias, mut weights) = (0.0, 0.0);
     for seed in 3..7 {
-        let reference = Reference::new(&bake, 150, 1 << 14, seed);
+        let reference = PathReference::new(&bake, 150, 1 << 14, seed);
         let report = Report::against(&bake, &reference);
         println!(
             "dE00 {:?}, bias {:?}, noise {:.3}, estimate {:?}",

@@ -13,7 +13,7 @@ use daylit::{
 use glam::DVec3;
 use haarlight::scene::pane::{inside_of, slab};
 use haarlight::scene::sky::{Distribution, direction};
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use std::f64::consts::{PI, TAU};
 
 /// Greatest error of a point.
@@ -37,7 +37,7 @@ fn cie_171_case_5_12() {
         let mut room = Room::new();
         let window = facade(&mut room, all);
         let inside = inside_of(glass_of_the_report(1.0), INDEX);
-        let glass = room.pane(INDEX, [inside; LEAVES]);
+        let glass = room.pane(INDEX, [inside; BANDS]);
         let [corner, u, v] = window;
         room.quad(corner, v, u, glass);
         let bake = bake(room, &wish(kind));

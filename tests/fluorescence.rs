@@ -6,15 +6,15 @@ use crate::common::desk;
 
 use built::{Room, close, sphere};
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Audit, Reference as Traced, Report};
+use haarlight::audit::{Audit, PathReference as Traced, Report};
 use haarlight::color::{KM, Observer};
 use haarlight::gather::Baked;
 use haarlight::keep::Relighter;
-use haarlight::scene::effects::Kind;
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::reference::Reference;
 use haarlight::solve::{Bake, Representation, Settings, Verdict};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -23,18 +23,18 @@ fn ultraviolet() -> Grid {
     Grid::new(300.0, 780.0)
 }
 
-/// A bell on the leaves.
-fn bell(grid: &Grid, height: f64, middle: f64, wide: f64) -> Leaves {
+/// A bell on the bands.
+fn bell(grid: &Grid, height: f64, middle: f64, wide: f64) -> Spectrum {
     std::array::from_fn(|k| height * (-0.5 * ((grid.middle(k) - middle) / wide).powi(2)).exp())
 }
 
 /// Brought to an integral of 1.
-fn unit(grid: &Grid, spectrum: Leaves) -> Leaves {
+fn unit(grid: &Grid, spectrum: Spectrum) -> Spectrum {
     let sum = spectrum.iter().sum::<f64>() * grid.width();
     spectrum.map(|x| x / sum)
 }
 
-fn named(grid: &Grid, name: &str) -> Leaves {
+fn named(grid: &Grid, name: &str) -> Spectrum {
     let table = haarlight::data::named(name).unwrap().table;
     grid.means(&table, haarlight::data::Outside::Zero)
 }
@@ -59,9 +59,9 @@ fn alike(got: [f64; 3], want: [f64; 3], tolerance: f64, what: &str) {
     }
 }
 
-fn xyz(grid: &Grid, leaves: &Leaves) -> [f64; 3] {
+fn xyz(grid: &Grid, bands: &Spectrum) -> [f64; 3] {
     let weights = Observer::cie1931().weights(grid);
-    weights.map(|w| KM * w.iter().zip(leaves).map(|(w, x)| w * x).sum::<f64>())
+    weights.map(|w| KM * w.iter().zip(bands).map(|(w, x)| w * x).sum::<f64>())
 }
 
 fn scene(name: &str, options: &Options) -> Scene {
@@ -78,14 +78,14 @@ fn brightened() -> Scene {
     scene("brightened.glb", &options)
 }
 
-/// A closed room all of whose walls are alike: light is even, and every leaf has a closed form,
-/// `E = (L + e q) / (1 - rho)` with `q = w sum g E`. The emission excites itself, too. By polygons and by rays, and on the leaves.
+/// A closed room all of whose walls are alike: light is even, and every band has a closed form,
+/// `E = (L + e q) / (1 - rho)` with `q = w sum g E`. The emission excites itself, too. By polygons and by rays, and on the bands.
 #[test]
 fn a_furnace_has_the_gain_of_its_walls() {
     let grid = ultraviolet();
     let w = grid.width();
     let emission = unit(&grid, bell(&grid, 1.0, 440.0, 25.0));
-    let rho: Leaves = std::array::from_fn(|k| 0.15 + 0.5 * k as f64 / 63.0);
+    let rho: Spectrum = std::array::from_fn(|k| 0.15 + 0.5 * k as f64 / 63.0);
     for (height, crowded) in [(0.3, false), (0.7, false), (0.7, true)] {
         let excitation = bell(&grid, height, 395.0, 30.0);
         let mut room = Room::over(grid);
@@ -99,19 +99,19 @@ fn a_furnace_has_the_gain_of_its_walls() {
             room.mesh(corners, triangles, wall);
         }
         let lit = room.power(lamp).map(|p| 100.0 * p);
-        let sum = |f: &dyn Fn(usize) -> f64| (0..LEAVES).map(f).sum::<f64>();
+        let sum = |f: &dyn Fn(usize) -> f64| (0..BANDS).map(f).sum::<f64>();
         let first = w * sum(&|k| excitation[k] * lit[k] / (1.0 - rho[k]));
         let again = w * sum(&|k| excitation[k] * emission[k] / (1.0 - rho[k]));
         let q = first / (1.0 - again);
-        let want: Leaves = std::array::from_fn(|k| (lit[k] + emission[k] * q) / (1.0 - rho[k]));
+        let want: Spectrum = std::array::from_fn(|k| (lit[k] + emission[k] * q) / (1.0 - rho[k]));
         let bake = baked(room.scene(), 0.2);
         let round = bake.rounds().last().unwrap();
         let rounds = round.fluorescence_rounds;
         assert!(rounds > 2, "it excites itself: {rounds}, {again}");
-        let mut mean = [0.0; LEAVES];
+        let mut mean = [0.0; BANDS];
         for k in 0..16 {
             let (x, z) = (0.35 + 0.77 * f64::from(k % 4), 0.3 + 0.8 * f64::from(k / 4));
-            let light = bake.probe(&[(dvec3(x, 0.0, z), DVec3::Y)])[0].leaves;
+            let light = bake.probe(&[(dvec3(x, 0.0, z), DVec3::Y)])[0].spectrum;
             mean = std::array::from_fn(|k| mean[k] + light[k] / 16.0);
         }
         let (got, want) = (xyz(&grid, &mean), xyz(&grid, &want));
@@ -140,10 +140,10 @@ fn a_furnace_has_the_gain_of_its_walls() {
 }
 
 /// A desk with a sheet of brightened paper, half of it not brightened, below a lamp in a coloured room.
-fn desk(light: Leaves, grid: Grid) -> (Room, [Leaves; 3]) {
+fn desk(light: Spectrum, grid: Grid) -> (Room, [Spectrum; 3]) {
     let mut room = Room::over(grid);
     let lamp = room.spectrum("lamp", light);
-    let rise = |low: f64, high: f64, middle: f64| -> Leaves {
+    let rise = |low: f64, high: f64, middle: f64| -> Spectrum {
         std::array::from_fn(|k| {
             low + (high - low) / (1.0 + ((middle - grid.middle(k)) / 15.0).exp())
         })
@@ -169,7 +169,7 @@ fn desk(light: Leaves, grid: Grid) -> (Room, [Leaves; 3]) {
 #[test]
 fn white_paper_agrees_with_the_whole_matrix() {
     let grid = ultraviolet();
-    let cut: Leaves = {
+    let cut: Spectrum = {
         let a = named(&grid, "cie/A");
         std::array::from_fn(|k| if grid.left(k) < 435.0 { 0.0 } else { a[k] })
     };
@@ -224,7 +224,7 @@ fn white_paper_agrees_with_the_whole_matrix() {
                     let taken = excitation.iter().zip(light).map(|(g, e)| g * e);
                     let q = taken.sum::<f64>() * grid.width();
                     let q = if surface == 0 { q } else { 0.0 };
-                    let sent: Leaves =
+                    let sent: Spectrum =
                         std::array::from_fn(|k| paper[k] * light[k] + emission[k] * q);
                     let want = xyz(&grid, &sent);
                     alike(vertex.radiosity.map(f64::from), want, 5e-3, what);
@@ -272,12 +272,12 @@ fn paths_change_their_wavelength() {
         .collect();
     let answers = audit.irradiance(&starts, &vec![1 << 14; starts.len()], 7);
     // The blue that is fluoresced among it: 440 nm.
-    let blue = grid.leaf_of(440.0).unwrap();
+    let blue = grid.band_of(440.0).unwrap();
     let mut chi = [0.0; 2];
     for (answer, truth) in answers.iter().zip(&truth) {
         let luminous = Observer::cie1931().weights(&grid)[1].map(|y| KM * y);
-        let leaf: Leaves = std::array::from_fn(|k| f64::from(u8::from(k == blue)));
-        for (chi, weights) in chi.iter_mut().zip([luminous, leaf]) {
+        let band: Spectrum = std::array::from_fn(|k| f64::from(u8::from(k == blue)));
+        for (chi, weights) in chi.iter_mut().zip([luminous, band]) {
             let (mean, error) = answer.linear(&weights);
             let want: f64 = truth.iter().zip(&weights).map(|(x, w)| x * w).sum();
             *chi += ((mean - want) / error.max(2e-3 * want)).powi(2);
@@ -316,15 +316,15 @@ fn no_more_power_leaves_than_comes() {
             let triangle = bake.tree().faces[node.faces.0 as usize].triangle;
             let material =
                 &bake.scene().materials[bake.mesh().material[triangle as usize] as usize];
-            let e = bake.lanes().leaves(light.irradiance.row(row));
-            let taken = (0..LEAVES).map(|k| (1.0 - material.reflectance[k]) * e[k]);
+            let e = bake.lanes().spectrum(light.irradiance.row(row));
+            let taken = (0..BANDS).map(|k| (1.0 - material.reflectance[k]) * e[k]);
             absorbed += node.area * w * taken.sum::<f64>();
             if material.fluorescence.is_some() {
-                let given = (0..LEAVES).map(|k| excitation[k] * e[k]);
+                let given = (0..BANDS).map(|k| excitation[k] * e[k]);
                 again += node.area * w * given.sum::<f64>();
             }
         }
-        // What of the emission lies beyond the leaves is lost.
+        // What of the emission lies beyond the bands is lost.
         close(absorbed - again, input, 5e-3, "power");
         assert!(again > 0.0 && again < absorbed);
     }
@@ -359,7 +359,7 @@ fn dye(excitation: &str, emission: &str, quantum: f64) -> Value {
     json!({"excitation": {"csv": excitation}, "emission": {"csv": emission}, "yield": quantum})
 }
 
-/// A yield of 0, and an excitation that no leaf holds, change no byte, cast no ray and do not run.
+/// A yield of 0, and an excitation that no band holds, change no byte, cast no ray and do not run.
 #[test]
 fn what_nothing_excites_costs_nothing() {
     let plain = written(cornell(json!({})).unwrap());
@@ -367,7 +367,7 @@ fn what_nothing_excites_costs_nothing() {
         let with = cornell(json!({"fluorescence": dye(excitation, "500,1\n600,1", quantum)}));
         let with = with.unwrap();
         let plan = haarlight::scene::effects::Plan::of(&with);
-        assert!(!plan.runs(Kind::Fluorescence));
+        assert!(!plan.runs(EffectKind::Fluorescence));
         let said = with.warnings.iter().any(|w| w.contains("--range 300..780"));
         assert_eq!(said, quantum > 0.0, "{:?}", with.warnings);
         assert!(written(with) == plain, "{excitation}");
@@ -375,7 +375,7 @@ fn what_nothing_excites_costs_nothing() {
     let with = cornell(json!({"fluorescence": dye("400,0.5\n500,0.5", "500,1\n600,1", 0.5)}));
     let with = with.unwrap();
     let plan = haarlight::scene::effects::Plan::of(&with);
-    assert!(plan.runs(Kind::Fluorescence));
+    assert!(plan.runs(EffectKind::Fluorescence));
     assert!(plan.to_string().contains("1 material: 'green'"), "{plan}");
     assert!(written(with) != plain);
 }
@@ -459,9 +459,9 @@ fn the_diagonal_is_the_reflectance() {
     let text = "per_band,400,500,600\n400,0.2,0,0\n500,0.3,0.4,0\n600,0,0.1,0.6\n";
     let scene = cornell(json!({"reflectance": null, "fluorescence": {"csv": text}})).unwrap();
     let green = scene.materials.iter().find(|m| m.name == "green").unwrap();
-    let leaf = |nm: f64| green.reflectance[scene.grid.leaf_of(nm).unwrap()];
-    close(leaf(500.0), 0.4, 0.05, "at 500 nm");
-    close(leaf(700.0), 0.6, 1e-9, "beyond");
+    let band = |nm: f64| green.reflectance[scene.grid.band_of(nm).unwrap()];
+    close(band(500.0), 0.4, 0.05, "at 500 nm");
+    close(band(700.0), 0.6, 1e-9, "beyond");
     assert!(green.reflectance_from.contains("diagonal"));
 }
 
@@ -613,7 +613,7 @@ fn mirrors_and_what_fluoresces_go_together() {
         ..Options::default()
     };
     let bake = baked(Scene::load(path, &options).unwrap(), 1.0);
-    assert!(bake.plan().runs(Kind::Mirrors) && bake.plan().runs(Kind::Fluorescence));
+    assert!(bake.plan().runs(EffectKind::Mirrors) && bake.plan().runs(EffectKind::Fluorescence));
     let flux = &bake.rounds().last().unwrap().flux;
     assert!(flux.fluoresced_lm > 0.03 * flux.emitted_lm, "{flux:?}");
     let reference = Traced::new(&bake, 100, 1 << 13, 3);

@@ -8,7 +8,7 @@ use glam::{DVec3, dvec3};
 use haarlight::link::exchange;
 use haarlight::scene::Scene;
 use haarlight::solve::{Bake, Closed, Settings};
-use haarlight::spectrum::{Grid, LEAVES};
+use haarlight::spectrum::{BANDS, Grid};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -376,7 +376,7 @@ proptest! {
     #[test]
     fn flux_balance_of_random_rooms(angles in angles(), height in 0.3..3.0_f64, tilt in -0.5..0.5_f64, rho in 0.1..0.95_f64) {
         let mut room = Room::new();
-        let red = room.spectral_paint(std::array::from_fn(|l| rho * l as f64 / (LEAVES - 1) as f64));
+        let red = room.spectral_paint(std::array::from_fn(|l| rho * l as f64 / (BANDS - 1) as f64));
         let lamp = room.lamp(rho, 100.0);
         let walls = prism(&angles, height, tilt);
         let mut flux = 0.0;

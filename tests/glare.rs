@@ -6,7 +6,7 @@ use built::{Room, baked_to};
 use glam::{DVec3, dvec3};
 use haarlight::color::position_index;
 use haarlight::scene::LightKind;
-use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
+use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use std::f64::consts::PI;
 
 /// Errors of bakes.
@@ -133,7 +133,7 @@ fn daylight_factors_are_those_of_the_sky_alone() {
     room.punctual(LightKind::Point, lamp, DVec3::NEG_Y, 5000.0);
     let wish = SkyWish {
         kind: Some(SkyType(5)),
-        brightness: Some(Brightness::Illuminance(8000.0)),
+        brightness: Some(SkyBrightness::Illuminance(8000.0)),
         ..SkyWish::default()
     };
     let scene = room.scene().under(&wish).unwrap();

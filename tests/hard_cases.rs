@@ -9,7 +9,7 @@ use haarlight::data::{Outside, Table};
 use haarlight::scene::{LightKind, Scene};
 use haarlight::solve::{Bake, Settings, Verdict};
 use haarlight::spectrum::{
-    CmfTree, Control, Estimate, Grid, LEAVES, List, Metric, Partition, Path, Tree, control,
+    BANDS, CmfTree, Control, DyadicTree, Estimate, Grid, List, Metric, Partition, Path, control,
 };
 
 /// Bakes with default settings and checks what must hold of any room.
@@ -340,17 +340,17 @@ fn tiny_bright_lamp_beside_a_large_dim_one() {
     }
 }
 
-/// One leaf only, at every place, among them both ends: a line on a band edge ends up in one leaf or the next, whole.
+/// One band only, at every place, among them both ends: a line on a band edge ends up in one band or the next, whole.
 #[test]
 fn line_spectra() {
     let mut room = Room::new();
-    let reflectance: [f64; LEAVES] = std::array::from_fn(|l| 0.2 + 0.6 * (l % 2) as f64);
+    let reflectance: [f64; BANDS] = std::array::from_fn(|l| 0.2 + 0.6 * (l % 2) as f64);
     let lines: Vec<usize> = [5, 16, 31, 32, 47, 48]
         .iter()
-        .map(|&leaf| {
-            let mut power = [0.0; LEAVES];
-            power[leaf] = 1.0;
-            room.spectrum(&format!("line {leaf}"), power)
+        .map(|&band| {
+            let mut power = [0.0; BANDS];
+            power[band] = 1.0;
+            room.spectrum(&format!("line {band}"), power)
         })
         .collect();
     let faces: [usize; 6] = std::array::from_fn(|k| {
@@ -362,7 +362,7 @@ fn line_spectra() {
     let scene = room.scene();
     let want: f64 = [5, 16, 31, 32, 47, 48]
         .iter()
-        .map(|&leaf| 1000.0 / 6.0 / (1.0 - reflectance[leaf]))
+        .map(|&band| 1000.0 / 6.0 / (1.0 - reflectance[band]))
         .sum();
     let bake = baked(scene);
     near(bake.mean_irradiance()[1], want, 2e-3);
@@ -381,10 +381,8 @@ fn lines_on_band_edges() {
         // At an end half of the line lies outside.
         let inside = if leaf % 64 == 0 { 0.5 } else { 1.0 };
         near(energy, 50.0 * inside, 1e-12);
-        let lit: Vec<usize> = (0..LEAVES).filter(|&l| means[l] > 0.0).collect();
-        let wanted: Vec<usize> = (0..LEAVES)
-            .filter(|&l| l + 1 == leaf || l == leaf)
-            .collect();
+        let lit: Vec<usize> = (0..BANDS).filter(|&l| means[l] > 0.0).collect();
+        let wanted: Vec<usize> = (0..BANDS).filter(|&l| l + 1 == leaf || l == leaf).collect();
         assert_eq!(lit, wanted, "edge {leaf}");
         // The room gets all of it, whatever lanes the solver chooses.
         let mut room = Room::new();
@@ -410,11 +408,11 @@ fn lines_on_band_edges() {
 #[test]
 fn spectral_limits_that_exclude_each_other() {
     let cmf = CmfTree::new(haarlight::color::Observer::cie1931().weights(&Grid::default()));
-    let light: [f64; LEAVES] = std::array::from_fn(|l| 1.0 + (l as f64 * 0.7).sin());
-    let paint: [f64; LEAVES] = std::array::from_fn(|l| 0.5 + 0.4 * (l as f64 * 0.3).cos());
+    let light: [f64; BANDS] = std::array::from_fn(|l| 1.0 + (l as f64 * 0.7).sin());
+    let paint: [f64; BANDS] = std::array::from_fn(|l| 0.5 + 0.4 * (l as f64 * 0.3).cos());
     let (light, paint) = (
-        Tree::<Estimate>::new(&light, &cmf),
-        Tree::<Estimate>::new(&paint, &cmf),
+        DyadicTree::<Estimate>::new(&light, &cmf),
+        DyadicTree::<Estimate>::new(&paint, &cmf),
     );
     for settings in [Control::PAPER, Control::within(1.0)] {
         for [eps_min, eps_max] in [
@@ -448,11 +446,11 @@ fn spectral_limits_that_exclude_each_other() {
     }
 }
 
-/// Light of one leaf in the deep blue, beside a lamp that does not have it.
+/// Light of one band in the deep blue, beside a lamp that does not have it.
 #[test]
 fn nearly_monochromatic_light() {
     let mut room = Room::new();
-    let mut power = [0.0; LEAVES];
+    let mut power = [0.0; BANDS];
     power[10] = 1.0;
     power[11] = 1e-9;
     let line = room.spectrum("line", power);

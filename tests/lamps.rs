@@ -9,7 +9,7 @@ use haarlight::color::{KM, Observer};
 use haarlight::geometry::NO_PLANE;
 use haarlight::geometry::lambert_polygon;
 use haarlight::keep::Relighter;
-use haarlight::scene::effects::{Kind, Plan};
+use haarlight::scene::effects::{EffectKind, Plan};
 use haarlight::scene::facts::Facts;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings, reference::Reference};
@@ -246,13 +246,13 @@ fn a_lamp_is_named_with_its_profile_and_lumens() {
     assert!((profile.flux_lm / (800.0 * PI) - 1.0).abs() < 3e-3);
     assert!((lamp.flux_lm.unwrap() / (0.5 * profile.flux_lm) - 1.0).abs() < 1e-9);
     let plan = Plan::of(&scene);
-    assert!(plan.runs(Kind::MeasuredLamps) && !plan.runs(Kind::PointLights));
+    assert!(plan.runs(EffectKind::MeasuredLamps) && !plan.runs(EffectKind::PointLights));
     let text = plan.to_string();
     let lumens = lamp.flux_lm.unwrap();
     let said = format!("'lamp' as 'Lopsided', {lumens:.0} lm");
     assert!(text.contains(&said), "{said}: {text}");
     let plain = Plan::of(&loaded(&point_light(), &[]).unwrap());
-    assert!(!plain.runs(Kind::MeasuredLamps));
+    assert!(!plain.runs(EffectKind::MeasuredLamps));
 }
 
 /// A black room around the lamp receives the lumens of the file, wherever it hangs and from whatever it shines.
@@ -495,7 +495,7 @@ fn audit_and_reference_agree() {
         let answers = audit.irradiance(&starts, &[65_536; 4], 7);
         for (k, (point, _)) in points.iter().enumerate() {
             let found = lux(&bake, *point);
-            let dot = |leaves: &[f64; 64]| (0..64).map(|l| KM * leaves[l] * y[l]).sum::<f64>();
+            let dot = |bands: &[f64; 64]| (0..64).map(|l| KM * bands[l] * y[l]).sum::<f64>();
             let (mean, error) = answers[k].linear(&y.map(|y| KM * y));
             assert!(
                 (found - mean).abs() < 4.0 * error + 0.01 * mean + 1e-3,
@@ -611,7 +611,7 @@ fn what_no_surface_shows_gives_no_light() {
     ];
     let scene = loaded(&room, &files).unwrap();
     assert_eq!(scene.spectra.len(), 1);
-    assert!(!Plan::of(&scene).runs(Kind::LightSpectra));
+    assert!(!Plan::of(&scene).runs(EffectKind::LightSpectra));
 }
 
 /// The rooms of this project load as they did: nothing measured, nothing of it in the plan.

@@ -332,3 +332,53 @@ fn no_circle_of_files() {
     }
     assert!(circles.is_empty(), "circles of files: {circles:#?}");
 }
+
+/// The name of the type that a line declares at the level of its module, and whether other files can see it.
+fn declared(line: &str) -> Option<(bool, &str)> {
+    let (is_visible, rest) = match line.strip_prefix("pub") {
+        Some(rest) if rest.starts_with('(') => (true, rest.split_once(") ")?.1),
+        Some(rest) => (true, rest.strip_prefix(' ')?),
+        None => (false, line),
+    };
+    let (what, name) = rest.split_once(' ')?;
+    let is_type = matches!(what, "struct" | "enum" | "trait" | "type");
+    let end = name.find(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+    is_type.then(|| (is_visible, &name[..end.unwrap_or(name.len())]))
+}
+
+#[test]
+fn a_name_of_a_type_has_one_meaning() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let mut names: BTreeMap<String, (bool, BTreeSet<PathBuf>)> = BTreeMap::new();
+    for file in files {
+        let text = code(&std::fs::read_to_string(&file).unwrap());
+        for (is_visible, name) in text.lines().filter_map(declared) {
+            let of = names.entry(name.to_owned()).or_default();
+            of.0 |= is_visible;
+            of.1.insert(file.clone());
+        }
+    }
+    assert!(names.len() > 500, "{} names found", names.len());
+    names.retain(|_, (is_visible, files)| *is_visible && files.len() > 1);
+    assert!(names.is_empty(), "declared more than once: {names:#?}");
+}
+
+#[test]
+fn declarations_of_types_are_found() {
+    let lines = [
+        "pub(in crate::a) struct A<'a> {",
+        "pub enum B {",
+        "type C = u8;",
+    ];
+    let expected = [(true, "A"), (true, "B"), (false, "C")];
+    assert_eq!(lines.map(|line| declared(line).unwrap()), expected);
+    let others = [
+        "pub use a::B;",
+        "    struct D;",
+        "fn e() {}",
+        "pub fn f() {",
+    ];
+    assert!(others.iter().all(|line| declared(line).is_none()));
+}

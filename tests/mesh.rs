@@ -4,7 +4,7 @@ use crate::common::built;
 
 use built::Room;
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Reference, Report};
+use haarlight::audit::{PathReference, Report};
 use haarlight::gather::Baked;
 use haarlight::gather::refined::position;
 use haarlight::mesh::Limits;
@@ -75,7 +75,7 @@ fn a_mesh_that_is_cut_short_is_whole_and_measured() {
         assert!(found.points > 300, "{after}: {found:?}");
         assert!(after > 0 || !found.is_met(), "{found:?}");
         let stated = bake.error_of(&baked).unwrap();
-        let measured = Report::of_file(&bake, &baked, &Reference::new(&bake, 300, 4096, 7));
+        let measured = Report::of_file(&bake, &baked, &PathReference::new(&bake, 300, 4096, 7));
         let mean = measured.de2000.mean.value;
         assert!(
             (0.6..1.7).contains(&(stated / mean)),
@@ -203,7 +203,7 @@ fn the_file_has_the_error_that_is_stated() {
         interpolation.is_met() && interpolation.rms > 0.0,
         "{interpolation:?}"
     );
-    let reference = Reference::new(&bake, 120, 4096, 3);
+    let reference = PathReference::new(&bake, 120, 4096, 3);
     let report = Report::of_file(&bake, &baked, &reference);
     let look = Exposure::auto(bake.scene(), &baked.surfaces);
     let writing = Writing {

@@ -7,12 +7,12 @@ use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::{NO_PLANE, lambert_polygon};
-use haarlight::scene::effects::Kind;
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::mirror::Mirror;
-use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
+use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use haarlight::scene::{LightKind, Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::{LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Spectrum};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::path::Path;
@@ -22,12 +22,12 @@ use std::process::Command;
 const BRIGHT: f64 = 0.999;
 
 /// A metal that reflects long wavelengths.
-fn copper() -> Leaves {
+fn copper() -> Spectrum {
     std::array::from_fn(|k| 0.45 + 0.5 / (1.0 + (-(k as f64 - 32.0) / 3.0).exp()))
 }
 
-fn leaves(bake: &Bake, points: &[(DVec3, DVec3)]) -> Vec<Leaves> {
-    bake.probe(points).iter().map(|p| p.leaves).collect()
+fn spectra(bake: &Bake, points: &[(DVec3, DVec3)]) -> Vec<Spectrum> {
+    bake.probe(points).iter().map(|p| p.spectrum).collect()
 }
 
 fn lux(bake: &Bake, points: &[(DVec3, DVec3)]) -> Vec<f64> {
@@ -35,7 +35,7 @@ fn lux(bake: &Bake, points: &[(DVec3, DVec3)]) -> Vec<f64> {
 }
 
 /// A black floor of 4 m x 4 m, and an upright mirror of 3 m height over its edge x = 0.
-fn beside(mirror: Leaves) -> Room {
+fn beside(mirror: Spectrum) -> Room {
     let mut room = Room::new();
     let black = room.paint(0.0);
     room.quad(DVec3::ZERO, DVec3::Z * 4.0, DVec3::X * 4.0, black);
@@ -66,11 +66,11 @@ fn at_x(lamp: DVec3, point: DVec3) -> f64 {
 #[test]
 fn a_lamp_beside_a_mirror_shines_twice() {
     for reflectance in [BRIGHT, 0.6] {
-        let mut room = beside([reflectance; LEAVES]);
+        let mut room = beside([reflectance; BANDS]);
         let lamp = dvec3(0.8, 1.5, 2.0);
         room.point(lamp, 4.0 * PI * 100.0);
         let bake = baked(room.scene());
-        assert!(bake.plan().runs(Kind::Mirrors));
+        assert!(bake.plan().runs(EffectKind::Mirrors));
         let image = dvec3(-0.8, 1.5, 2.0);
         for (got, place) in lux(&bake, &floor()).into_iter().zip(floor()) {
             let share = Mirror::reflects(reflectance, at_x(image, place.0));
@@ -83,7 +83,7 @@ fn a_lamp_beside_a_mirror_shines_twice() {
 /// A panel that faces the floor, and the sun.
 #[test]
 fn panels_and_the_sun_shine_twice() {
-    let mut room = beside([BRIGHT; LEAVES]);
+    let mut room = beside([BRIGHT; BANDS]);
     let panel = room.lamp(0.0, 1000.0);
     let corners = |x: [f64; 2]| {
         let [low, high] = x;
@@ -96,7 +96,7 @@ fn panels_and_the_sun_shine_twice() {
         let want = 1000.0 * (seen([0.6, 1.0]) + BRIGHT * seen([-1.0, -0.6]));
         close(got, want, 5e-3, "lux by a panel");
     }
-    let mut room = beside([BRIGHT; LEAVES]);
+    let mut room = beside([BRIGHT; BANDS]);
     let toward = dvec3(0.5, 1.0, 0.2).normalize();
     room.punctual(LightKind::Directional, DVec3::ONE, -toward, 500.0);
     for (k, got) in lux(&baked(room.scene()), &floor()).into_iter().enumerate() {
@@ -109,8 +109,8 @@ fn panels_and_the_sun_shine_twice() {
 /// In a corner of two mirrors a lamp has three images.
 #[test]
 fn two_mirrors_at_a_right_angle_make_three_lamps() {
-    let mut room = beside([BRIGHT; LEAVES]);
-    let other = room.mirror([0.7; LEAVES]);
+    let mut room = beside([BRIGHT; BANDS]);
+    let other = room.mirror([0.7; BANDS]);
     room.quad(DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 3.0, other);
     let lamp = dvec3(0.8, 1.5, 1.2);
     room.point(lamp, 4.0 * PI * 100.0);
@@ -133,7 +133,7 @@ fn two_mirrors_at_a_right_angle_make_three_lamps() {
 }
 
 /// Two mirrors at 45 degrees, one above the other, and a black wall that hides what they show.
-fn periscope(reflectance: Leaves) -> Room {
+fn periscope(reflectance: Spectrum) -> Room {
     let mut room = Room::new();
     let mirror = room.mirror(reflectance);
     let black = room.paint(0.0);
@@ -167,7 +167,7 @@ fn periscope(reflectance: Leaves) -> Room {
 
 #[test]
 fn a_periscope_shows_a_lamp() {
-    let mut room = periscope([0.8; LEAVES]);
+    let mut room = periscope([0.8; BANDS]);
     let panel = room.lamp(0.0, 1000.0);
     let corners = [[-0.1, -0.1], [-0.1, 0.1], [0.1, 0.1], [0.1, -0.1]];
     room.polygon(&corners.map(|[y, z]| dvec3(2.0, 2.0 + y, z)), panel);
@@ -190,7 +190,7 @@ fn the_sky_is_seen_in_mirrors() {
     let mut room = Room::new();
     let black = room.paint(0.0);
     room.quad(DVec3::ZERO, DVec3::Z * 4.0, DVec3::X * 4.0, black);
-    let mirror = room.mirror([BRIGHT; LEAVES]);
+    let mirror = room.mirror([BRIGHT; BANDS]);
     room.quad(
         dvec3(0.0, 0.0, -20.0),
         DVec3::Y * 20.0,
@@ -199,7 +199,7 @@ fn the_sky_is_seen_in_mirrors() {
     );
     let wish = SkyWish {
         kind: Some(SkyType(5)),
-        brightness: Some(Brightness::Illuminance(100.0)),
+        brightness: Some(SkyBrightness::Illuminance(100.0)),
         ground: Some(0.0),
         ..SkyWish::default()
     };
@@ -214,7 +214,7 @@ fn the_sky_is_seen_in_mirrors() {
 #[test]
 fn a_periscope_shows_the_sky() {
     let mut room = Room::new();
-    let mirror = room.mirror([BRIGHT; LEAVES]);
+    let mirror = room.mirror([BRIGHT; BANDS]);
     let black = room.paint(0.0);
     // A closed box below an open shaft; the mirror in it turns the look up the shaft.
     let corner = |x: f64, y: f64, z: f64| dvec3(x, y, z);
@@ -242,7 +242,7 @@ fn a_periscope_shows_the_sky() {
     }
     let wish = SkyWish {
         kind: Some(SkyType(5)),
-        brightness: Some(Brightness::Illuminance(100.0)),
+        brightness: Some(SkyBrightness::Illuminance(100.0)),
         ground: Some(0.0),
         ..SkyWish::default()
     };
@@ -273,11 +273,11 @@ fn a_lamp_in_a_tinted_mirror_is_tinted() {
     let mut bake = Bake::new(room.scene(), exact);
     bake.run();
     let image = dvec3(-0.8, 1.5, 2.0);
-    for (got, place) in leaves(&bake, &floor()).into_iter().zip(floor()) {
+    for (got, place) in spectra(&bake, &floor()).into_iter().zip(floor()) {
         for (k, normal) in copper().into_iter().enumerate() {
             let share = Mirror::reflects(normal, at_x(image, place.0));
             let want = of_point(lamp, place) + share * of_point(image, place);
-            close(got[k], 100.0 * power[k] * want, 1e-4, "leaf");
+            close(got[k], 100.0 * power[k] * want, 1e-4, "band");
         }
     }
 }
@@ -315,7 +315,7 @@ fn agrees(bake: &Bake, points: &[(DVec3, DVec3)], paths: usize, slack: f64) {
 }
 
 /// A room of 4 m x 3 m x 4 m with a mirror before one wall.
-fn furnished(mirror: Leaves, rho: f64) -> Room {
+fn furnished(mirror: Spectrum, rho: f64) -> Room {
     let mut room = Room::new();
     let paint = room.paint(rho);
     room.hollow(DVec3::ZERO, dvec3(4.0, 3.0, 4.0), [paint; 6]);
@@ -339,7 +339,7 @@ fn upwards(places: &[(f64, f64)]) -> Vec<(DVec3, DVec3)> {
 #[test]
 fn the_path_tracer_agrees() {
     let places = upwards(&[(0.5, 2.0), (1.5, 1.0), (2.2, 3.2)]);
-    let mut room = furnished([0.9; LEAVES], 0.6);
+    let mut room = furnished([0.9; BANDS], 0.6);
     room.point(dvec3(1.2, 2.2, 2.4), 1000.0);
     agrees(&baked(room.scene()), &places, 1 << 15, 0.01);
     let mut room = furnished(copper(), 0.6);
@@ -354,7 +354,7 @@ fn a_ball_agrees_within_its_noise() {
     let mut room = Room::new();
     let paint = room.paint(0.5);
     room.hollow(DVec3::ZERO, dvec3(4.0, 3.0, 4.0), [paint; 6]);
-    let mirror = room.mirror([0.9; LEAVES]);
+    let mirror = room.mirror([0.9; BANDS]);
     let (corners, triangles) = built::sphere(dvec3(2.0, 0.8, 2.0), 0.6, 3);
     room.mesh(corners, triangles, mirror);
     let panel = room.lamp(0.2, 2000.0);
@@ -380,7 +380,7 @@ fn no_light_is_lost_or_made() {
     for rho in [0.0, 0.5] {
         let mut room = Room::new();
         let paint = room.paint(rho);
-        let mirror = room.mirror([BRIGHT; LEAVES]);
+        let mirror = room.mirror([BRIGHT; BANDS]);
         let walls = [mirror, paint, paint, paint, paint, paint];
         room.hollow(DVec3::ZERO, dvec3(4.0, 3.0, 4.0), walls);
         room.point(dvec3(1.7, 1.6, 2.2), 1000.0);
@@ -396,7 +396,7 @@ fn no_light_is_lost_or_made() {
 fn a_box_of_mirrors_agrees() {
     let mut room = Room::new();
     let black = room.paint(0.0);
-    let mirror = room.mirror([0.5; LEAVES]);
+    let mirror = room.mirror([0.5; BANDS]);
     let walls = [mirror, mirror, black, mirror, mirror, mirror];
     room.hollow(DVec3::ZERO, dvec3(4.0, 3.0, 4.0), walls);
     let panel = room.lamp(0.0, 1000.0);
@@ -415,7 +415,7 @@ fn threads_change_nothing() {
             let panel = room.lamp(0.2, 2000.0);
             room.quad(dvec3(1.0, 2.99, 1.6), DVec3::X * 0.6, DVec3::Z * 0.6, panel);
             let (corners, triangles) = built::sphere(dvec3(2.0, 0.8, 3.2), 0.4, 1);
-            let ball = room.mirror([0.8; LEAVES]);
+            let ball = room.mirror([0.8; BANDS]);
             room.mesh(corners, triangles, ball);
             let settings = Settings {
                 rounds: 2,
@@ -427,7 +427,7 @@ fn threads_change_nothing() {
             let bits = |x: &f64| x.to_bits();
             let probed: Vec<u64> = probed
                 .iter()
-                .flat_map(|p| p.leaves.iter().map(bits))
+                .flat_map(|p| p.spectrum.iter().map(bits))
                 .collect();
             let light = bake.light();
             let rows = (0..light.irradiance.len()).flat_map(|k| light.irradiance.row(k).to_vec());

@@ -4,7 +4,7 @@ use crate::output_room;
 
 use haarlight::gather::refined;
 use haarlight::output::npz;
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use std::collections::BTreeMap;
 
 fn u16_at(bytes: &[u8], at: usize) -> usize {
@@ -56,7 +56,7 @@ fn arrays_come_back() {
         number += 0.5;
         number
     };
-    let spectra: Vec<Vec<[f32; LEAVES]>> = surfaces
+    let spectra: Vec<Vec<[f32; BANDS]>> = surfaces
         .iter()
         .map(|s| {
             s.vertices
@@ -102,8 +102,8 @@ fn arrays_come_back() {
     };
     let edges = doubles("wavelengths.npy");
     assert_eq!(
-        (edges[0], edges[LEAVES], edges.len()),
-        (380.0, 780.0, LEAVES + 1)
+        (edges[0], edges[BANDS], edges.len()),
+        (380.0, 780.0, BANDS + 1)
     );
     let positions = doubles("positions.npy");
     let wanted: Vec<f64> = surfaces

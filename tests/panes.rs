@@ -10,24 +10,24 @@ use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, de2000};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::document::Document;
-use haarlight::scene::effects::Kind;
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::pane::{Pane, PaneKind, inside_of, slab};
-use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
+use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use haarlight::scene::{Image, LightKind, Texture, Wrap};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::{LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Spectrum};
 use std::f64::consts::PI;
 use std::process::Command;
 
-const CLEAR: Leaves = [1.0; LEAVES];
+const CLEAR: Spectrum = [1.0; BANDS];
 
 /// A glass that lets through long wavelengths.
-fn amber() -> Leaves {
+fn amber() -> Spectrum {
     std::array::from_fn(|k| 0.05 + 0.9 / (1.0 + (-(k as f64 - 34.0) / 3.0).exp()))
 }
 
 /// And one for short ones.
-fn blue() -> Leaves {
+fn blue() -> Spectrum {
     std::array::from_fn(|k| 0.9 - 0.85 / (1.0 + (-(k as f64 - 24.0) / 3.0).exp()))
 }
 
@@ -63,9 +63,9 @@ fn level(room: &mut Room, height: f64, pane: usize) {
     room.quad(dvec3(0.0, height, 0.0), z, x, pane);
 }
 
-fn leaves(bake: &Bake, points: &[DVec3]) -> Vec<Leaves> {
+fn spectra(bake: &Bake, points: &[DVec3]) -> Vec<Spectrum> {
     let up: Vec<_> = points.iter().map(|p| (*p, DVec3::Y)).collect();
-    bake.probe(&up).iter().map(|p| p.leaves).collect()
+    bake.probe(&up).iter().map(|p| p.spectrum).collect()
 }
 
 fn places() -> Vec<DVec3> {
@@ -83,9 +83,9 @@ fn a_loss_free_pane_changes_nothing() {
         let mut room = lit(0.5);
         let pane = room.pane(1.0, CLEAR);
         level(&mut room, height, pane);
-        leaves(&baked(room.scene()), &places())
+        spectra(&baked(room.scene()), &places())
     });
-    for ((a, b), exact) in inside.iter().zip(&outside).zip(leaves(&exact, &places())) {
+    for ((a, b), exact) in inside.iter().zip(&outside).zip(spectra(&exact, &places())) {
         close(a[30], b[30], 1e-6, "lux");
         close(a[30], exact[30], 0.0125, "lux by polygons");
     }
@@ -97,10 +97,10 @@ fn lamps_shine_through_slabs() {
     for inside in [1.0, 0.9] {
         let mut room = lit(0.0);
         let power = room.power(0)[30];
-        let pane = room.pane(1.5, [inside; LEAVES]);
+        let pane = room.pane(1.5, [inside; BANDS]);
         level(&mut room, 1.0, pane);
         let bake = baked(room.scene());
-        for (place, got) in places().iter().zip(leaves(&bake, &places())) {
+        for (place, got) in places().iter().zip(spectra(&bake, &places())) {
             let d = dvec3(2.0, 2.0, 2.0) - *place;
             let cosine = d.y / d.length();
             let open = power * 1000.0 / (4.0 * PI) * cosine / d.length_squared();
@@ -125,18 +125,18 @@ fn lamps_shine_through_slabs() {
 fn three_panes_in_a_row_multiply() {
     let [one, three] = [1, 3].map(|count| {
         let mut room = lit(0.0);
-        let panes = [amber(), blue(), [0.8; LEAVES]].map(|inside| room.pane(1.0, inside));
+        let panes = [amber(), blue(), [0.8; BANDS]].map(|inside| room.pane(1.0, inside));
         for (k, pane) in panes.into_iter().enumerate().take(count) {
             level(&mut room, 0.5 + 0.2 * k as f64, pane);
         }
-        leaves(&baked(room.scene()), &places()[..1])[0]
+        spectra(&baked(room.scene()), &places()[..1])[0]
     });
-    let plain = leaves(&baked(lit(0.0).scene()), &places()[..1])[0];
+    let plain = spectra(&baked(lit(0.0).scene()), &places()[..1])[0];
     let (amber, blue) = (amber(), blue());
-    let xyz = |leaves: &dyn Fn(usize) -> f64| {
+    let xyz = |bands: &dyn Fn(usize) -> f64| {
         Observer::cie1931()
             .weights(&Default::default())
-            .map(|w| (0..LEAVES).map(|k| KM * w[k] * leaves(k)).sum::<f64>())
+            .map(|w| (0..BANDS).map(|k| KM * w[k] * bands(k)).sum::<f64>())
     };
     let got = [xyz(&|k| one[k]), xyz(&|k| three[k])];
     let want = [
@@ -151,10 +151,10 @@ fn three_panes_in_a_row_multiply() {
 /// One quad, a quad and its back, a thin box: one pane.
 #[test]
 fn however_it_is_modelled_a_pane_is_one() {
-    let got: Vec<Leaves> = (0..4)
+    let got: Vec<Spectrum> = (0..4)
         .map(|how| {
             let mut room = lit(0.0);
-            let pane = room.pane(1.5, [0.7; LEAVES]);
+            let pane = room.pane(1.5, [0.7; BANDS]);
             let (x, z) = (DVec3::X * 4.0, DVec3::Z * 4.0);
             let at = dvec3(0.0, 1.0, 0.0);
             match how {
@@ -176,7 +176,7 @@ fn however_it_is_modelled_a_pane_is_one() {
                     room.mesh(corners.collect(), quads.collect(), pane);
                 }
             }
-            leaves(&baked(room.scene()), &places()[1..2])[0]
+            spectra(&baked(room.scene()), &places()[1..2])[0]
         })
         .collect();
     for other in &got[1..] {
@@ -232,10 +232,10 @@ fn parallel_light_and_spots_pass() {
             room.quad(DVec3::ZERO, DVec3::Z * 4.0, DVec3::X * 4.0, paint);
             room.punctual(kind, dvec3(2.0, 3.0, 2.0), dvec3(0.2, -1.0, 0.1), 500.0);
             if pane {
-                let pane = room.pane(1.5, [0.9; LEAVES]);
+                let pane = room.pane(1.5, [0.9; BANDS]);
                 level(&mut room, 1.5, pane);
             }
-            leaves(&baked(room.scene()), &[dvec3(2.4, 0.0, 2.2)])[0][30]
+            spectra(&baked(room.scene()), &[dvec3(2.4, 0.0, 2.2)])[0][30]
         };
         let cosine = match kind {
             LightKind::Spot { .. } => 3.0 / dvec3(0.4, 3.0, 0.2).length(),
@@ -246,7 +246,7 @@ fn parallel_light_and_spots_pass() {
     }
 }
 
-/// Lanes for the eye merge bands: for each by itself there are the 64 leaves.
+/// Lanes for the eye merge bands: for each by itself there are rows of all 64.
 fn exact() -> Settings {
     Settings {
         representation: Representation::Dense,
@@ -271,7 +271,7 @@ fn lanes_serve_what_lies_behind_panes() {
     };
     let (adaptive, white, lanes) = at(Settings::default());
     let (dense, ..) = at(exact());
-    assert!(lanes < LEAVES, "{lanes} lanes");
+    assert!(lanes < BANDS, "{lanes} lanes");
     for (adaptive, dense) in adaptive.iter().zip(dense) {
         let off = de2000(*adaptive, dense, white);
         println!("{lanes} lanes: {off:.3}");
@@ -280,7 +280,7 @@ fn lanes_serve_what_lies_behind_panes() {
 }
 
 /// Paint of alpha one half.
-fn film(colour: Leaves) -> Pane {
+fn film(colour: Spectrum) -> Pane {
     Pane {
         kind: PaneKind::Cover { alpha: 0.5, colour },
         texture: None,
@@ -352,7 +352,7 @@ fn solids_absorb_along_the_chord() {
 
 fn wedge(reversed: bool) {
     let mut room = sunlit();
-    let pane = room.pane(1.0, [0.5; LEAVES]);
+    let pane = room.pane(1.0, [0.5; BANDS]);
     // A wedge from 0 to 1 m thick over 2 m; half passes half a metre.
     let at = |x: f64, y: f64, z: f64| dvec3(1.0 + x, 1.0 + y, 1.0 + z);
     let ends = [0.0, 2.0].map(|z| [at(0.0, 0.0, z), at(2.0, 0.0, z), at(2.0, 1.0, z)]);
@@ -380,9 +380,9 @@ fn wedge(reversed: bool) {
     }
     let mut bake = Bake::new(scene, Settings::default());
     bake.run();
-    let open = leaves(&bake, &[dvec3(0.5, 0.0, 2.0)])[0][30];
+    let open = spectra(&bake, &[dvec3(0.5, 0.0, 2.0)])[0][30];
     for x in [0.3, 1.1, 1.9] {
-        let got = leaves(&bake, &[dvec3(1.0 + x, 0.0, 2.0)])[0][30];
+        let got = spectra(&bake, &[dvec3(1.0 + x, 0.0, 2.0)])[0][30];
         close(got / open, 0.5_f64.powf(x), 1e-4, "through the wedge");
     }
 }
@@ -392,7 +392,7 @@ fn wedge(reversed: bool) {
 fn a_face_and_its_back_have_the_thickness_of_their_material() {
     for turned in [false, true] {
         let mut room = sunlit();
-        let pane = room.pane(1.0, [0.5; LEAVES]);
+        let pane = room.pane(1.0, [0.5; BANDS]);
         let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
         let corners = corners.map(|[x, z]| dvec3(x, 1.0, z)).to_vec();
         let mut triangles = vec![[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]];
@@ -410,7 +410,7 @@ fn a_face_and_its_back_have_the_thickness_of_their_material() {
         let mut bake = Bake::new(scene, Settings::default());
         bake.run();
         let open = 500.0 * bake.scene().spectra[0].power[30];
-        let got = leaves(&bake, &[dvec3(1.5, 0.0, 2.0)])[0][30];
+        let got = spectra(&bake, &[dvec3(1.5, 0.0, 2.0)])[0][30];
         close(got / open, 0.125, 1e-4, "through both faces");
     }
 }
@@ -424,7 +424,7 @@ fn a_block_under_a_sky_absorbs_along_its_chords() {
     let mut room = Room::new();
     let paint = room.paint(0.0);
     room.quad(DVec3::ZERO, DVec3::Z * 4.0, DVec3::X * 4.0, paint);
-    let pane = room.pane(1.0, [INSIDE; LEAVES]);
+    let pane = room.pane(1.0, [INSIDE; BANDS]);
     let faces = built::faces(low, high).into_iter();
     let corners = faces.flat_map(|mut face| {
         face.reverse();
@@ -471,7 +471,7 @@ fn panes_in_the_plane_of_their_frame_leak_nothing() {
     let lux = |inside: f64, over: f64, before: f64, thick: f64| -> Vec<f64> {
         let mut room = Room::new();
         let [corner, u, v] = beside(&mut room);
-        let pane = room.pane(1.5, [inside; LEAVES]);
+        let pane = room.pane(1.5, [inside; BANDS]);
         let (along, up, out) = (
             over * u.normalize(),
             over * v.normalize(),
@@ -520,7 +520,7 @@ fn cards_let_light_through_by_texel() {
     scene.materials[card].pane = Some(Pane {
         kind: PaneKind::Cover {
             alpha: 1.0,
-            colour: [0.0; LEAVES],
+            colour: [0.0; BANDS],
         },
         texture: Some(Texture {
             image: 0,
@@ -533,7 +533,7 @@ fn cards_let_light_through_by_texel() {
     let mut bake = Bake::new(scene, Settings::default());
     bake.run();
     let at = [0.5, 1.5, 2.5, 3.5].map(|x| dvec3(x, 0.0, 2.0));
-    for (got, alpha) in leaves(&bake, &at).iter().zip(alphas.map(f64::from)) {
+    for (got, alpha) in spectra(&bake, &at).iter().zip(alphas.map(f64::from)) {
         let want = open * (1.0 - alpha).powi(2);
         assert!(
             (got[30] - want).abs() < 1e-4 * open,
@@ -547,13 +547,13 @@ fn cards_let_light_through_by_texel() {
 #[test]
 fn panes_that_are_not_there_take_nothing() {
     let bake = baked(lit(0.5).scene());
-    assert!(!bake.plan().runs(Kind::Panes));
+    assert!(!bake.plan().runs(EffectKind::Panes));
     assert_eq!(bake.rounds()[0].flux.sent.in_panes, 0.0);
     let mut room = lit(0.5);
     let pane = room.pane(1.5, CLEAR);
     level(&mut room, 1.0, pane);
     let bake = baked(room.scene());
-    assert!(bake.plan().runs(Kind::Panes));
+    assert!(bake.plan().runs(EffectKind::Panes));
     let sent = bake.rounds()[0].flux.sent;
     assert!((0.02..0.2).contains(&sent.in_panes), "{sent:?}");
     let all = sent.to_fronts + sent.to_backs + sent.outside + sent.in_panes;
@@ -579,11 +579,11 @@ fn glazed(opening: f64) -> Bake {
         room.quad(at(4.0 - rim, rim), opening * y, rim * x, paint);
     }
     let inside = inside_of(glass_of_the_report(1.0), INDEX);
-    let glass = room.pane(INDEX, [inside; LEAVES]);
+    let glass = room.pane(INDEX, [inside; BANDS]);
     room.quad(at(rim, rim), opening * y, opening * x, glass);
     let wish = SkyWish {
         kind: Some(SkyType(5)),
-        brightness: Some(Brightness::Illuminance(100.0)),
+        brightness: Some(SkyBrightness::Illuminance(100.0)),
         ground: Some(0.0),
         ..SkyWish::default()
     };

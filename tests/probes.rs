@@ -7,10 +7,10 @@ use glam::{DVec3, dvec3};
 use haarlight::color::de2000;
 use haarlight::gather::Air;
 use haarlight::output::Exposure;
-use haarlight::output::probes::{Grid, MOST_PROBES, Probes, to_volume};
+use haarlight::output::probes::{MOST_PROBES, ProbeGrid, Probes, to_volume};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
-use haarlight::survey::Place;
+use haarlight::survey::PointLocation;
 use serde_json::Value;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -53,13 +53,13 @@ fn a_probe_is_what_probe_finds() {
         ("daylit.glb", 1.5),
     ] {
         let bake = solved(loaded(name), 1.0);
-        let points = Grid::of(bake.scene(), spacing).unwrap().points();
+        let points = ProbeGrid::of(bake.scene(), spacing).unwrap().points();
         let air = bake.air(&points);
         let here = || {
             points
                 .iter()
                 .zip(&air)
-                .filter(|(_, a)| a.place == Place::Room)
+                .filter(|(_, a)| a.place == PointLocation::Room)
         };
         assert!(here().count() >= 4, "{name}");
         // Alone, a point has the same pattern of rays.
@@ -162,7 +162,7 @@ fn hall() -> Bake {
 #[test]
 fn probes_in_solids_are_marked_and_lent_light() {
     let bake = hall();
-    let grid = Grid::within([DVec3::ZERO, dvec3(6.0, 3.0, 4.0)], 0.5).unwrap();
+    let grid = ProbeGrid::within([DVec3::ZERO, dvec3(6.0, 3.0, 4.0)], 0.5).unwrap();
     assert_eq!(grid.counts, [12, 6, 8]);
     assert_eq!(grid.points()[1], dvec3(0.75, 0.25, 0.25));
     let points = grid.points();
@@ -170,7 +170,7 @@ fn probes_in_solids_are_marked_and_lent_light() {
     for (point, air) in points.iter().zip(&air) {
         let inside =
             point.x > 2.0 && point.x < 4.0 && point.y < 2.0 && point.z > 1.0 && point.z < 3.0;
-        assert_eq!(air.place == Place::Inside, inside, "{point}");
+        assert_eq!(air.place == PointLocation::Inside, inside, "{point}");
     }
     let probes = unscaled(&bake, &grid, air);
     assert_eq!(
@@ -188,7 +188,7 @@ fn probes_in_solids_are_marked_and_lent_light() {
     );
     // Outside of the walls.
     let out = bake.air(&[dvec3(-1.0, 1.0, 1.0)]);
-    assert_eq!(out[0].place, Place::Outside);
+    assert_eq!(out[0].place, PointLocation::Outside);
 }
 
 /// A half float.
@@ -211,7 +211,7 @@ fn half(bytes: [u8; 2]) -> f64 {
 #[test]
 fn the_texture_has_bevys_layout() {
     let bake = hall();
-    let grid = Grid::within([DVec3::ZERO, dvec3(6.0, 3.0, 4.0)], 2.0).unwrap();
+    let grid = ProbeGrid::within([DVec3::ZERO, dvec3(6.0, 3.0, 4.0)], 2.0).unwrap();
     let air = bake.air(&grid.points());
     let probes = unscaled(&bake, &grid, air);
     let bytes = to_volume(&probes);
@@ -246,22 +246,22 @@ fn the_texture_has_bevys_layout() {
 #[test]
 fn grids_are_bounded() {
     let box_ = [DVec3::ZERO, dvec3(8.0, 4.0, 2.0)];
-    let grid = Grid::within(box_, 0.13).unwrap();
+    let grid = ProbeGrid::within(box_, 0.13).unwrap();
     assert!(
         grid.step().max_element() <= 0.13 && grid.counts.iter().product::<usize>() <= MOST_PROBES
     );
-    let problem = Grid::within(box_, 0.01).unwrap_err().to_string();
+    let problem = ProbeGrid::within(box_, 0.01).unwrap_err().to_string();
     assert!(problem.contains("800 x 400 x 200"), "{problem}");
     // A floor alone takes one layer.
     assert_eq!(
-        Grid::within([DVec3::ZERO, dvec3(2.0, 0.0, 2.0)], 1.0)
+        ProbeGrid::within([DVec3::ZERO, dvec3(2.0, 0.0, 2.0)], 1.0)
             .unwrap()
             .counts,
         [2, 1, 2]
     );
     // What light reaches, not what is far away in the file.
     let bake = solved(loaded("convex.glb"), 4.0);
-    let grid = Grid::of(bake.scene(), 0.5).unwrap();
+    let grid = ProbeGrid::of(bake.scene(), 0.5).unwrap();
     let (centre, half) = (bake.mesh().centre, bake.mesh().half_size);
     assert!((grid.low + 0.5 * grid.size - centre).length() < 0.05 * half);
 }
@@ -349,7 +349,7 @@ fn the_file_says_what_probe_prints() {
 }
 
 /// Probes as they are written at an exposure of 1.
-fn unscaled(bake: &Bake, grid: &Grid, air: Vec<Air>) -> Probes {
+fn unscaled(bake: &Bake, grid: &ProbeGrid, air: Vec<Air>) -> Probes {
     let exposure = Exposure::new(1.0);
     Probes::new(bake.scene(), grid, air, &exposure, None, "k".into())
 }

@@ -10,7 +10,7 @@ use haarlight::scene::Scene;
 use haarlight::scene::sky::{SkyType, SkyWish};
 use haarlight::solve::reference::{Reference, solve_one};
 use haarlight::solve::{Bake, Representation, Settings};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use nalgebra::DMatrix;
 
 fn near(got: f64, want: f64, tolerance: f64) {
@@ -71,10 +71,10 @@ fn facing_squares() {
     }
 }
 
-/// Lux of leaf values.
-fn lux(leaves: &Leaves) -> f64 {
+/// Lux of band values.
+fn lux(bands: &Spectrum) -> f64 {
     let y = Observer::cie1931().weights(&Grid::default())[1];
-    leaves.iter().zip(y).map(|(x, y)| KM * x * y).sum()
+    bands.iter().zip(y).map(|(x, y)| KM * x * y).sum()
 }
 
 /// Points of the box room's surfaces away from edges, with normals.
@@ -174,7 +174,7 @@ fn the_reference_converges() {
     assert!(rms[0] / rms[2] > 12.0, "{rms:?}");
 }
 
-/// The solver in 64 leaves against the reference, leaf by leaf, at points.
+/// The solver in 64 bands against the reference, band by band, at points.
 #[test]
 fn the_solver_agrees_in_every_leaf() {
     let scene = painted_box();
@@ -184,7 +184,7 @@ fn the_solver_agrees_in_every_leaf() {
         let reference = Reference::new(&scene, depth, 1).unwrap();
         reference.gather(&scene, &reference.solve(), &points, 1)
     });
-    let truth: Vec<[f64; LEAVES]> = (fine.iter().zip(&coarse))
+    let truth: Vec<[f64; BANDS]> = (fine.iter().zip(&coarse))
         .map(|(f, c)| std::array::from_fn(|l| f[l] + (f[l] - c[l]) / 3.0))
         .collect();
     let settings = Settings {
@@ -196,12 +196,12 @@ fn the_solver_agrees_in_every_leaf() {
     bake.run();
     let mut square = 0.0;
     for (probed, truth) in bake.probe(&points).iter().zip(&truth) {
-        for (got, want) in probed.leaves.iter().zip(truth) {
+        for (got, want) in probed.spectrum.iter().zip(truth) {
             let off = got / want - 1.0;
             square += off * off;
         }
     }
-    let rms = (square / (LEAVES * points.len()) as f64).sqrt();
+    let rms = (square / (BANDS * points.len()) as f64).sqrt();
     let claim = bake.rounds().last().unwrap().error.total_relative.value;
     println!("rms {rms:e}, claimed {claim:?}");
     assert!(rms < claim.unwrap() / 0.7, "{rms:e} of {claim:?}");
@@ -350,7 +350,7 @@ fn the_order_of_the_solver() {
     assert!(rows[3..].iter().all(|r| r[1] < 3e-4), "{rows:?}");
 }
 
-/// Adaptive rows, rows of 64 leaves and the reference: each pair lies as near as the estimates of both claim.
+/// Adaptive rows, rows of 64 bands and the reference: each pair lies as near as the estimates of both claim.
 #[test]
 fn adaptive_dense_and_reference_agree() {
     let reference = Reference::new(&painted_box(), 3, 1).unwrap();
@@ -359,10 +359,10 @@ fn adaptive_dense_and_reference_agree() {
     let weights = Observer::cie1931()
         .weights(&Grid::default())
         .map(|w| w.map(|x| KM * x));
-    let xyz = |leaves: &Leaves| {
+    let xyz = |bands: &Spectrum| {
         weights
             .each_ref()
-            .map(|w| leaves.iter().zip(w).map(|(x, w)| x * w).sum::<f64>())
+            .map(|w| bands.iter().zip(w).map(|(x, w)| x * w).sum::<f64>())
     };
     let exact: Vec<[f64; 3]> = truth.iter().map(xyz).collect();
     let bakes = [Representation::Adaptive, Representation::Dense].map(|representation| {
@@ -408,7 +408,7 @@ fn adaptive_dense_and_reference_agree() {
     assert!(bakes[0].lanes().len() < bakes[1].lanes().len());
 }
 
-/// A bake against the reference at points, channel by channel of light: root mean square of what each leaf is off, and what is claimed.
+/// A bake against the reference at points, channel by channel of light: root mean square of what each band is off, and what is claimed.
 /// With patches of 50 cm in place of 25 the reference is off by more than the bake: by .6 % behind a sheet.
 fn off_the_reference(scene: &Scene, rays: usize, points: &[(DVec3, DVec3)]) -> (f64, f64) {
     let reference = Reference::new(scene, 3, rays).unwrap();
@@ -422,14 +422,14 @@ fn off_the_reference(scene: &Scene, rays: usize, points: &[(DVec3, DVec3)]) -> (
     bake.run();
     let mut square = 0.0;
     for (probed, truth) in bake.probe(points).iter().zip(&truth) {
-        println!("{} for {}", probed.leaves[32], truth[32]);
-        for (got, want) in probed.leaves.iter().zip(truth) {
+        println!("{} for {}", probed.spectrum[32], truth[32]);
+        for (got, want) in probed.spectrum.iter().zip(truth) {
             square += (got / want - 1.0).powi(2);
         }
     }
     let claim = bake.rounds().last().unwrap().error.total_relative.value;
     (
-        (square / (LEAVES * points.len()) as f64).sqrt(),
+        (square / (BANDS * points.len()) as f64).sqrt(),
         claim.unwrap(),
     )
 }
@@ -458,10 +458,10 @@ fn below() -> Vec<(DVec3, DVec3)> {
     points
 }
 
-/// A pane that lets through more red than blue and less at a slant, leaf by leaf, with what comes back up through it.
+/// A pane that lets through more red than blue and less at a slant, band by band, with what comes back up through it.
 #[test]
 fn the_solver_agrees_behind_a_pane() {
-    let amber: Leaves = std::array::from_fn(|l| 0.3 + 0.6 * l as f64 / 63.0);
+    let amber: Spectrum = std::array::from_fn(|l| 0.3 + 0.6 * l as f64 / 63.0);
     let scene = parted(|room| room.pane(1.5, amber));
     let (rms, claim) = off_the_reference(&scene, 9, &below());
     println!("pane: rms {rms:e}, claimed {claim:e}");
@@ -471,8 +471,8 @@ fn the_solver_agrees_behind_a_pane() {
 /// A sheet whose sides differ: what passes from the lamp's side, and what is reflected and let back from the other.
 #[test]
 fn the_solver_agrees_behind_a_sheet() {
-    let green: Leaves = std::array::from_fn(|l| 0.4 - 0.3 * (l as f64 / 31.5 - 1.0).abs());
-    let scene = parted(|room| room.sheet([0.2; LEAVES], [0.5; LEAVES], green));
+    let green: Spectrum = std::array::from_fn(|l| 0.4 - 0.3 * (l as f64 / 31.5 - 1.0).abs());
+    let scene = parted(|room| room.sheet([0.2; BANDS], [0.5; BANDS], green));
     let (rms, claim) = off_the_reference(&scene, 4, &below());
     println!("sheet: rms {rms:e}, claimed {claim:e}");
     assert!(rms < 0.003 && rms < claim / 0.7, "{rms:e} of {claim:e}");
@@ -507,7 +507,7 @@ fn the_solver_agrees_under_a_sky() {
 
 #[test]
 fn mirrors_are_refused() {
-    let scene = parted(|room| room.mirror([0.9; LEAVES]));
+    let scene = parted(|room| room.mirror([0.9; BANDS]));
     let said = Reference::new(&scene, 0, 1).unwrap_err().to_string();
     assert!(
         said.contains("is a mirror") && said.contains("audit"),

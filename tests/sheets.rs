@@ -5,12 +5,12 @@ use crate::common::built;
 
 use built::{Room, baked_to, close, sphere};
 use glam::{DVec3, dvec3};
-use haarlight::audit::{Reference, Report};
+use haarlight::audit::{PathReference, Report};
 use haarlight::keep::Relighter;
-use haarlight::scene::effects::Kind;
+use haarlight::scene::effects::EffectKind;
 use haarlight::scene::{LightKind, Options, Scene, Sides};
 use haarlight::solve::{Bake, Settings};
-use haarlight::spectrum::{LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Spectrum};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -18,8 +18,8 @@ use std::f64::consts::PI;
 const ERROR: f64 = 0.2;
 
 /// The same at all wavelengths.
-fn even(x: f64) -> Leaves {
-    [x; LEAVES]
+fn even(x: f64) -> Spectrum {
+    [x; BANDS]
 }
 
 /// Mean lux at points.
@@ -308,7 +308,7 @@ fn vertices_show_both_lights() {
 #[test]
 fn the_plan_names_the_material() {
     let bake = divided(0.5, 0.5, 0.3, 0.6, false);
-    assert!(bake.plan().runs(Kind::Sheets));
+    assert!(bake.plan().runs(EffectKind::Sheets));
     let text = bake.plan().to_string();
     let line = "material 'material 1' lets diffuse light through";
     assert!(text.contains(line), "{text}");
@@ -370,7 +370,7 @@ fn what_gltf_says_of_a_sheet() {
     let scene = read(&material, &json!({})).unwrap();
     let curtain = &scene.materials[0];
     let sheet = curtain.sheet.as_ref().unwrap();
-    for k in 0..LEAVES {
+    for k in 0..BANDS {
         close(curtain.reflectance[k], 0.45, 1e-6, "reflected");
         close(sheet.transmittance[k], 0.2, 1e-6, "passes");
     }
@@ -389,7 +389,7 @@ fn what_gltf_says_of_a_sheet() {
     let none = self::curtain([0.6; 3], json!(0.0), json!([1, 1, 1]));
     let scene = read(&none, &json!({})).unwrap();
     assert!(scene.materials[0].sheet.is_none() && scene.materials[0].sides == Sides::Front);
-    assert_eq!(scene.materials[0].reflectance, [f64::from(0.6_f32); LEAVES]);
+    assert_eq!(scene.materials[0].reflectance, [f64::from(0.6_f32); BANDS]);
 }
 
 /// A side file takes the place of what glTF says; both sides may reflect by spectra of their own.
@@ -485,7 +485,7 @@ fn wrong_sheets_are_refused_by_name() {
 #[test]
 fn the_path_tracer_agrees() {
     let bake = curtained(0.5);
-    let reference = Reference::new(&bake, 150, 1 << 14, 3);
+    let reference = PathReference::new(&bake, 150, 1 << 14, 3);
     let written = bake.baked(&|_, _| {});
     for report in [
         Report::against(&bake, &reference),

@@ -15,7 +15,7 @@ use haarlight::geometry::NO_PLANE;
 use haarlight::output::Exposure;
 use haarlight::output::picture::{Format, Picture};
 use haarlight::scene::sky::{
-    Brightness, Distribution, SkyType, SkyWish, SunPlace, SunWish, direction,
+    Distribution, SkyBrightness, SkyType, SkyWish, SunPlace, SunWish, direction,
 };
 use haarlight::scene::{Camera, LightKind, Projection, Scene};
 use std::f64::consts::PI;
@@ -143,7 +143,7 @@ fn an_even_sky_gives_open_ground_pi_l() {
     let paint = room.paint(0.5);
     room.quad(DVec3::ZERO, DVec3::Z * 5.0, DVec3::X * 5.0, paint);
     let wish = SkyWish {
-        brightness: Some(Brightness::Luminance(1000.0)),
+        brightness: Some(SkyBrightness::Luminance(1000.0)),
         ..wish(5)
     };
     let bake = bake(room, &wish);
@@ -166,7 +166,7 @@ fn the_sun_lights_a_patch_of_the_floor() {
             illuminance: Some(80_000.0),
             kelvin: Some(5000.0),
         },
-        brightness: Some(Brightness::Illuminance(0.0)),
+        brightness: Some(SkyBrightness::Illuminance(0.0)),
         ..wish(12)
     };
     for cuts in [1, 6] {
@@ -194,7 +194,7 @@ fn the_sun_lights_a_patch_of_the_floor() {
 fn the_edge_of_a_sun_patch_is_as_wide_as_its_disc() {
     let wish = SkyWish {
         sun: sun([60.0, 90.0], 80_000.0),
-        brightness: Some(Brightness::Illuminance(0.0)),
+        brightness: Some(SkyBrightness::Illuminance(0.0)),
         ..wish(12)
     };
     let bake = bake_at(room(0.0, 1.0, 1), &wish, 1.0);

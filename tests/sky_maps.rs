@@ -9,11 +9,11 @@ use exr::prelude::*;
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, Upsampler};
-use haarlight::data::{Leaves, Outside, daylight};
+use haarlight::data::{Outside, Spectrum, daylight};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::LightKind;
 use haarlight::scene::sky::{
-    Brightness, Distribution, SkyType, SkyWish, SunPlace, SunWish, direction,
+    Distribution, SkyBrightness, SkyType, SkyWish, SunPlace, SunWish, direction,
 };
 use haarlight::solve::Bake;
 use haarlight::spectrum::Grid;
@@ -78,7 +78,7 @@ fn a_map_of_a_sky_gives_the_light_of_that_sky() {
             [if d.y > 0.0 { sky.radiance(d) } else { 0.0 }; 3]
         });
         let wish = SkyWish {
-            brightness: Some(Brightness::Illuminance(LUX)),
+            brightness: Some(SkyBrightness::Illuminance(LUX)),
             ..of_map(&map)
         };
         let bake = bake(room(0.0, opening, cuts), &wish);
@@ -216,8 +216,8 @@ fn the_sun_of_a_map_shines_by_itself() {
         let lamp = scene.lights.iter().find(|l| l.kind == LightKind::Sun)?;
         let y = Observer::cie1931().weights(&scene.grid)[1];
         let power = &scene.spectra[lamp.light].power;
-        let leaves = power.iter().zip(&lamp.shape).zip(&y);
-        let lux: f64 = leaves.map(|((p, s), y)| KM * p * s * y).sum();
+        let bands = power.iter().zip(&lamp.shape).zip(&y);
+        let lux: f64 = bands.map(|((p, s), y)| KM * p * s * y).sum();
         Some((lux, lamp.direction))
     };
     let plain = scene(of_map(&map));
@@ -294,7 +294,7 @@ fn a_map_can_have_open_ground() {
     let folder = TempDir::new().unwrap();
     let map = exr(&folder, 64, |d| [if d.y > 0.0 { 3.0 } else { 77.0 }; 3]);
     let wish = SkyWish {
-        brightness: Some(Brightness::Illuminance(LUX)),
+        brightness: Some(SkyBrightness::Illuminance(LUX)),
         ground: Some(0.3),
         ..of_map(&map)
     };
@@ -313,13 +313,13 @@ fn a_map_can_have_open_ground() {
     assert!((got[1] / (0.3 * LUX) - 1.0).abs() < 1e-5, "{got:?}");
 }
 
-/// Irradiance on each leaf through an opening, by quadrature over the directions.
+/// Irradiance in each band through an opening, by quadrature over the directions.
 fn spectral(
-    colours: [&Leaves; 3],
+    colours: [&Spectrum; 3],
     sky: &Distribution,
     opening: f64,
     (point, normal): (DVec3, DVec3),
-) -> Leaves {
+) -> Spectrum {
     const N: usize = 600;
     let [corner, u, v] = roof(opening);
     let [_, b, c, d, e] = [-1.0, -0.32, 10.0, -3.0, 0.45];
@@ -522,7 +522,7 @@ fn threads_change_nothing_under_a_map() {
             let probed = bake.probe(&points());
             probed
                 .iter()
-                .flat_map(|p| p.leaves)
+                .flat_map(|p| p.spectrum)
                 .map(f64::to_bits)
                 .collect::<Vec<_>>()
         })

@@ -10,9 +10,9 @@ use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::Scene;
-use haarlight::scene::sky::{Brightness, Dome, SkyWish};
+use haarlight::scene::sky::{Dome, SkyBrightness, SkyWish};
 use haarlight::solve::{Bake, Settings};
-use haarlight::spectrum::Leaves;
+use haarlight::spectrum::Spectrum;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A sky with the sun over y = 4 of the room, without its direct light.
@@ -44,10 +44,10 @@ fn formula(scene: &Scene) -> impl Fn(DVec3) -> DVec3 + Sync {
     let model = sky.model().clone();
     let mut colours = [DVec3::ZERO; 11];
     let observer = Observer::cie1931().weights(&scene.grid);
-    for leaf in 0..64 {
-        let at = ((scene.grid.middle(leaf) - 320.0) / 40.0).min(10.0);
+    for band in 0..64 {
+        let at = ((scene.grid.middle(band) - 320.0) / 40.0).min(10.0);
         let (low, share) = (at.min(9.0).floor(), at - at.min(9.0).floor());
-        let colour = KM * DVec3::from_array(observer.each_ref().map(|weights| weights[leaf]));
+        let colour = KM * DVec3::from_array(observer.each_ref().map(|weights| weights[band]));
         colours[low as usize] += (1.0 - share) * colour;
         colours[low as usize + 1] += share * colour;
     }
@@ -94,7 +94,7 @@ fn open_ground_has_the_light_of_the_model() {
         assert!((said / want.y - 1.0).abs() < 1e-3, "{said} {want}");
     }
     let given = SkyWish {
-        brightness: Some(Brightness::Illuminance(LUX)),
+        brightness: Some(SkyBrightness::Illuminance(LUX)),
         ..wish(6.0, 20.0)
     };
     let lux = glanced(floor(), &given).probe(&at)[0].xyz[1];
@@ -143,9 +143,9 @@ fn reflected_light_agrees_with_paths() {
         .collect();
     let paths = vec![65_536; places.len()];
     let answers = Audit::new(scene, mesh, bake.rays()).irradiance(&places, &paths, 3);
-    let agree = |weights: &Leaves, slack: f64| {
-        let sum = |leaves: &Leaves| -> f64 { leaves.iter().zip(weights).map(|(x, w)| x * w).sum() };
-        let got: f64 = probed.iter().map(|p| sum(&p.leaves)).sum();
+    let agree = |weights: &Spectrum, slack: f64| {
+        let sum = |bands: &Spectrum| -> f64 { bands.iter().zip(weights).map(|(x, w)| x * w).sum() };
+        let got: f64 = probed.iter().map(|p| sum(&p.spectrum)).sum();
         let truth: f64 = answers.iter().map(|answer| answer.linear(weights).0).sum();
         println!("{got:.4} for {truth:.4}");
         assert!((got / truth - 1.0).abs() < slack, "{got} should be {truth}");
@@ -154,9 +154,9 @@ fn reflected_light_agrees_with_paths() {
         agree(&weights, 0.01);
     }
     for (first, last) in [(420.0, 490.0), (500.0, 590.0), (600.0, 690.0)] {
-        let within = |leaf: usize| (first..last).contains(&scene.grid.middle(leaf));
+        let within = |band: usize| (first..last).contains(&scene.grid.middle(band));
         agree(
-            &std::array::from_fn(|leaf| f64::from(u8::from(within(leaf)))),
+            &std::array::from_fn(|band| f64::from(u8::from(within(band)))),
             0.015,
         );
     }

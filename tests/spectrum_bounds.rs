@@ -1,12 +1,12 @@
 //! The open questions of Rougeron and Péroche 1997 (section 5), answered on all of the paper's products.
 
-use haarlight::spectrum::study::{Chart, Reflectances, bounds, modes};
+use haarlight::spectrum::study::{ColourChart, Reflectances, bounds, modes};
 
-/// 3 x (24 + 24^2 + 24^3) products, each held against its 64 leaves.
+/// 3 x (24 + 24^2 + 24^3) products, each held against its 64 bands.
 #[test]
 fn no_product_leaves_its_bound() {
     for source in [Reflectances::Babelcolor, Reflectances::Ohta] {
-        let chart = Chart::new(source);
+        let chart = ColourChart::new(source);
         for light in chart.lights() {
             let rows = bounds::measure(&chart, &light);
             assert_eq!(
@@ -24,7 +24,11 @@ fn no_product_leaves_its_bound() {
 }
 
 /// Mean over the three lights of a figure of one mode, for each level.
-fn mean(rows: &[modes::Row], mode: &str, figure: impl Fn(&modes::Row) -> f64) -> [f64; 3] {
+fn mean(
+    rows: &[modes::ModesRow],
+    mode: &str,
+    figure: impl Fn(&modes::ModesRow) -> f64,
+) -> [f64; 3] {
     ["primary", "secondary", "tertiary"].map(|level| {
         let picked: Vec<f64> = rows
             .iter()
@@ -37,7 +41,7 @@ fn mean(rows: &[modes::Row], mode: &str, figure: impl Fn(&modes::Row) -> f64) ->
 
 #[test]
 fn perceptual_control_beats_the_papers_at_equal_interval_count() {
-    let chart = Chart::new(Reflectances::Babelcolor);
+    let chart = ColourChart::new(Reflectances::Babelcolor);
     let rows: Vec<_> = chart
         .lights()
         .iter()

@@ -1,6 +1,6 @@
 //! `haarlight paper` through the binary, and the comparison of the methods of section 2.
 
-use haarlight::spectrum::study::{Chart, Reflectances, compare};
+use haarlight::spectrum::study::{ColourChart, Reflectances, compare};
 use serde_json::Value;
 use std::process::Command;
 
@@ -79,7 +79,7 @@ fn unknown_reflectances_are_refused() {
 /// Mean dE*uv of the tertiary reflections over the three lights, at 4, 6, 12 and 16 terms.
 #[test]
 fn adaptive_lists_beat_the_other_methods_at_equal_terms() {
-    let chart = Chart::new(Reflectances::Babelcolor);
+    let chart = ColourChart::new(Reflectances::Babelcolor);
     let rows: Vec<_> = chart
         .lights()
         .iter()

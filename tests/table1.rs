@@ -1,10 +1,10 @@
 //! Table 1 of Rougeron and Péroche 1997.
 
 use haarlight::spectrum::study::table1::{Column, PRINTED, ROWS, mean_differences};
-use haarlight::spectrum::study::{Chart, Reflectances};
+use haarlight::spectrum::study::{ColourChart, Reflectances};
 
 fn measured(source: Reflectances) -> [Column; 3] {
-    let chart = Chart::new(source);
+    let chart = ColourChart::new(source);
     chart.lights().map(|light| Column::measure(&chart, &light))
 }
 

@@ -1,50 +1,50 @@
 //! Paths that change their wavelength.
 //!
-//! A path carries all leaves at once, backwards: what it finds on a leaf counts for that leaf. Where a surface fluoresces it may go on by
-//! a term, `B(l) = e(l) sum over j of g(j) E(j) w` with leaves of w nm: from there on whatever it finds, on any leaf, counts for all leaves
+//! A path carries all bands at once, backwards: what it finds on a band counts for that band. Where a surface fluoresces it may go on by
+//! a term, `B(l) = e(l) sum over j of g(j) E(j) w` with bands of w nm: from there on whatever it finds, on any band, counts for all bands
 //! that it came with, in the fixed proportion `t(l) e(l)`, t being what was left of them. So it needs one spectrum more, whatever the
 //! number of changes.
 
 use crate::geometry::sampling::Pcg;
 use crate::scene::{LightSpectrum, Material, Scene};
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 
 /// What a path has found.
-pub(super) struct Tally<'a> {
-    /// By the leaf that light was found on.
-    pub(super) found: Leaves,
-    /// What counts leaf by leaf, once wavelengths were changed: all that was found before.
-    sum: &'a mut Leaves,
-    /// How much of what is found counts for each leaf; none: all of it, for its own.
-    spread: Option<Leaves>,
+pub(super) struct PathTally<'a> {
+    /// By the band that light was found on.
+    pub(super) found: Spectrum,
+    /// What counts band by band, once wavelengths were changed: all that was found before.
+    sum: &'a mut Spectrum,
+    /// How much of what is found counts for each band; none: all of it, for its own.
+    shares: Option<Spectrum>,
 }
 
-impl<'a> Tally<'a> {
+impl<'a> PathTally<'a> {
     /// Goes on from a sum.
-    pub(super) fn new(sum: &'a mut Leaves) -> Self {
+    pub(super) fn new(sum: &'a mut Spectrum) -> Self {
         Self {
             found: *sum,
             sum,
-            spread: None,
+            shares: None,
         }
     }
 
     /// Adds what was found to the sum.
     pub(super) fn settle(self) {
-        match self.spread {
+        match self.shares {
             None => *self.sum = self.found,
-            Some(spread) => {
+            Some(shares) => {
                 let all: f64 = self.found.iter().sum();
-                (self.sum.iter_mut().zip(&spread)).for_each(|(sum, share)| *sum += share * all);
+                (self.sum.iter_mut().zip(&shares)).for_each(|(sum, share)| *sum += share * all);
             }
         }
     }
 
-    /// From now on what is found on any leaf counts by these shares.
-    fn change(&mut self, spread: Leaves) {
-        if self.spread.is_none() {
-            *self.sum = std::mem::replace(&mut self.found, [0.0; LEAVES]);
-            self.spread = Some(spread);
+    /// From now on what is found on any band counts by these shares.
+    fn change(&mut self, shares: Spectrum) {
+        if self.shares.is_none() {
+            *self.sum = std::mem::replace(&mut self.found, [0.0; BANDS]);
+            self.shares = Some(shares);
         }
     }
 }
@@ -54,23 +54,23 @@ impl<'a> Tally<'a> {
 pub(super) fn goes_on(
     scene: &Scene,
     material: &Material,
-    albedo: Leaves,
-    throughput: &mut Leaves,
+    albedo: Spectrum,
+    throughput: &mut Spectrum,
     rng: &mut Pcg,
-    tally: &mut Tally,
+    tally: &mut PathTally,
 ) {
     let width = scene.grid.width();
-    let reflected = |throughput: &Leaves, chance: f64| -> Leaves {
+    let reflected = |throughput: &Spectrum, chance: f64| -> Spectrum {
         std::array::from_fn(|l| throughput[l] * albedo[l] / chance)
     };
     let Some(fluorescence) = &material.fluorescence else {
         *throughput = reflected(throughput, 1.0);
         return;
     };
-    let emission = |light: &LightSpectrum, t: &Leaves| -> Leaves {
+    let emission = |light: &LightSpectrum, t: &Spectrum| -> Spectrum {
         std::array::from_fn(|l| t[l] * light.power[l] * width)
     };
-    let greatest = |x: &Leaves| x.iter().copied().fold(0.0, f64::max);
+    let greatest = |x: &Spectrum| x.iter().copied().fold(0.0, f64::max);
     let mut ways = vec![greatest(&reflected(throughput, 1.0))];
     let terms: Vec<_> = fluorescence.once().collect();
     for term in &terms {
@@ -95,7 +95,7 @@ pub(super) fn goes_on(
         // By rounding it may be one that is never chosen.
         *throughput = match chance > 0.0 {
             true => reflected(throughput, chance),
-            false => [0.0; LEAVES],
+            false => [0.0; BANDS],
         };
         return;
     }

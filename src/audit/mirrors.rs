@@ -1,12 +1,12 @@
 //! Paths by way of mirrors: each goes on in one direction until it meets something else, however often; lights without extent, which no
 //! path meets, are looked for in their images.
 
-use super::path::{Audit, ByImage, Vertex, survives};
+use super::path::{Audit, ByImage, PathVertex, survives};
 use crate::geometry::sampling::Pcg;
 use crate::geometry::{Hit, NO_PLANE, Segment};
 use crate::hierarchy::Route;
 use crate::scene::mirror::Mirror;
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use glam::DVec3;
 
 /// Mirrors after which roulette decides.
@@ -16,9 +16,9 @@ impl Audit<'_> {
     /// What a ray meets at last, and how often mirrors sent it on.
     pub(super) fn met(
         &self,
-        at: &Vertex,
+        at: &PathVertex,
         direction: &mut DVec3,
-        throughput: &mut Leaves,
+        throughput: &mut Spectrum,
         rng: &mut Pcg,
     ) -> (Option<Hit>, usize) {
         let (mut from, mut plane) = (at.point, at.plane);
@@ -34,7 +34,7 @@ impl Audit<'_> {
             let along = self.mesh.normal[triangle].dot(*direction);
             self.reflected(self.mesh.material[triangle], along.abs(), throughput);
             if count >= SURE && !survives(throughput, rng) {
-                *throughput = [0.0; crate::spectrum::LEAVES];
+                *throughput = [0.0; crate::spectrum::BANDS];
                 return (None, count);
             }
             let [v, w] = on.uv.map(f64::from);
@@ -46,7 +46,7 @@ impl Audit<'_> {
         (None, 0)
     }
 
-    fn reflected(&self, material: u32, cosine: f64, throughput: &mut Leaves) {
+    fn reflected(&self, material: u32, cosine: f64, throughput: &mut Spectrum) {
         if let Some(mirror) = &self.scene.materials[material as usize].mirror {
             for (t, normal) in throughput.iter_mut().zip(&mirror.reflectance) {
                 *t *= Mirror::reflects(*normal, cosine);
@@ -57,16 +57,16 @@ impl Audit<'_> {
     /// Lights without extent, seen in each image.
     pub(super) fn punctual_in_mirrors(
         &self,
-        at: &Vertex,
+        at: &PathVertex,
         square: [f64; 2],
         rng: &mut Pcg,
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         let Some(mirrors) = &self.mirrors else { return };
         for image in mirrors.seen_from(at.point, at.normal) {
             let known = &mirrors.images()[image as usize];
-            let from = Vertex {
+            let from = PathVertex {
                 point: known.point(at.point),
                 normal: known.direction(at.normal),
                 plane: NO_PLANE,
@@ -85,8 +85,8 @@ impl Audit<'_> {
         &self,
         by: Option<ByImage>,
         segment: &Segment,
-        throughput: &Leaves,
-    ) -> Option<Leaves> {
+        throughput: &Spectrum,
+    ) -> Option<Spectrum> {
         let (from, to) = (segment.from.as_dvec3(), segment.to.as_dvec3());
         let Some(by) = by else {
             let open = !self.blocked(segment);

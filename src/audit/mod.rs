@@ -1,4 +1,4 @@
-//! An independent answer: unbiased Monte Carlo in all 64 leaves, with confidence intervals.
+//! An independent answer: unbiased Monte Carlo in all 64 bands, with confidence intervals.
 //!
 //! It shares the scene, the welded triangles and the ray index with the solver, and nothing else: no links, no lanes,
 //! no form factors, no balance.
@@ -10,9 +10,9 @@ mod path;
 mod rays;
 mod reference;
 mod report;
-mod spread;
+mod summary;
 
 pub use path::{Answer, Audit, BATCHES};
-pub use reference::{Place, Reference};
-pub use report::{HONEST, Honesty, Report, Seen};
-pub use spread::{Measured, Spread};
+pub use reference::{FacePoint, PathReference};
+pub use report::{AuditedPoint, HONEST, Honesty, Report};
+pub use summary::{ErrorSummary, Measured};

@@ -1,13 +1,13 @@
 //! What paths bring from sky and ground: where they leave the room, straight through small openings and straight from bright spots of a
 //! map, weighted against each other by the balance heuristic (Veach and Guibas 1995).
 
-use super::path::{Audit, Vertex};
-use crate::geometry::openings::{BEAM, Choice, Openings, Start, Wall};
+use super::path::{Audit, PathVertex};
+use crate::geometry::openings::{BEAM, OpeningDistribution, Openings, RayStart, Wall};
 use crate::geometry::sampling::on_triangle;
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::Face;
 use crate::scene::sky::Sky;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -32,13 +32,13 @@ impl Audit<'_> {
         let start = |share: f64, square: [f64; 2]| {
             let k = upto.partition_point(|&upto| upto <= share * area);
             let face = *mesh.faces.get(k)?;
-            Some(Start {
+            Some(RayStart {
                 point: on_triangle(&mesh.corners(face), square),
                 normal: mesh.face_normal(face),
                 plane: mesh.plane[face.triangle as usize],
             })
         };
-        let meet = |start: &Start, ways: &[DVec3; BEAM]| {
+        let meet = |start: &RayStart, ways: &[DVec3; BEAM]| {
             ways.map(|way| {
                 let hit = self.closest(start.point, way, start.plane)?;
                 Some(Wall {
@@ -52,15 +52,21 @@ impl Audit<'_> {
     }
 
     /// What each opening may bring to a point; none where they are found by chance.
-    pub(super) fn openings_from(&self, at: &Vertex) -> Option<Choice> {
+    pub(super) fn openings_from(&self, at: &PathVertex) -> Option<OpeningDistribution> {
         let (sky, openings) = (self.scene.sky.as_ref()?, self.openings.as_ref()?);
-        let mut choice = Choice::default();
+        let mut choice = OpeningDistribution::default();
         openings.weigh(PATHS, (at.point, at.normal), |d| sky.plain(d), &mut choice);
         Some(choice)
     }
 
     /// Density, by solid angle, of a direction that one path of each kind takes.
-    fn density(&self, sky: &Sky, at: &Vertex, choice: Option<&Choice>, direction: DVec3) -> f64 {
+    fn density(
+        &self,
+        sky: &Sky,
+        at: &PathVertex,
+        choice: Option<&OpeningDistribution>,
+        direction: DVec3,
+    ) -> f64 {
         let cosine = at.normal.dot(direction);
         let through = match (&self.openings, choice) {
             (Some(openings), Some(choice)) => openings.density(choice, at.point, direction),
@@ -73,10 +79,10 @@ impl Audit<'_> {
     /// not looked for otherwise.
     pub(super) fn outside(
         &self,
-        (at, choice): (&Vertex, Option<&Choice>),
+        (at, choice): (&PathVertex, Option<&OpeningDistribution>),
         (direction, mirrors): (DVec3, usize),
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         let Some(sky) = &self.scene.sky else { return };
         if mirrors > 0 {
@@ -93,10 +99,10 @@ impl Audit<'_> {
     /// Light straight through a small opening, and straight from a bright spot of a map.
     pub(super) fn aimed_outside(
         &self,
-        (at, choice): (&Vertex, Option<&Choice>),
+        (at, choice): (&PathVertex, Option<&OpeningDistribution>),
         square: [f64; 2],
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         let Some(sky) = &self.scene.sky else { return };
         let openings = self.openings.as_ref().zip(choice);
@@ -110,10 +116,10 @@ impl Audit<'_> {
     fn straight(
         &self,
         sky: &Sky,
-        (at, choice): (&Vertex, Option<&Choice>),
+        (at, choice): (&PathVertex, Option<&OpeningDistribution>),
         direction: DVec3,
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         let cosine = at.normal.dot(direction);
         let end = at.point + direction * (4.0 * self.mesh.half_size);
@@ -127,10 +133,17 @@ impl Audit<'_> {
     }
 
     /// Adds a weight times what comes from a direction outside.
-    fn far(&self, sky: &Sky, direction: DVec3, weight: f64, throughput: &Leaves, sum: &mut Leaves) {
+    fn far(
+        &self,
+        sky: &Sky,
+        direction: DVec3,
+        weight: f64,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
+    ) {
         // Not by the parts that the bake knows: what these leave out is an error, too.
         if let Some(radiance) = sky.exact(direction) {
-            for l in 0..LEAVES {
+            for l in 0..BANDS {
                 sum[l] += throughput[l] * weight * radiance[l];
             }
             return;
@@ -140,7 +153,7 @@ impl Audit<'_> {
                 continue;
             };
             let power = &self.scene.spectra[light.light].power;
-            for l in 0..LEAVES {
+            for l in 0..BANDS {
                 sum[l] += throughput[l] * weight * radiance * power[l] * light.shape[l];
             }
         }

@@ -1,10 +1,10 @@
-//! Irradiance at a point by path tracing, all leaves along one path (Lambertian surfaces scatter all wavelengths alike).
+//! Irradiance at a point by path tracing, all bands along one path (Lambertian surfaces scatter all wavelengths alike).
 //!
 //! `H = pi * mean of L_i` over cosine-distributed directions; lamps are also sampled by area, and both ways are combined
 //! by the balance heuristic (Veach and Guibas 1995). Paths end by Russian roulette, so no bounce is cut off.
 //! Figures are *measured*: each comes with the standard error of independent batches.
 
-use super::fluorescence::{Tally, goes_on};
+use super::fluorescence::{PathTally, goes_on};
 use crate::color::Upsampler;
 use crate::geometry::RayIndex;
 use crate::geometry::openings::Openings;
@@ -14,7 +14,7 @@ use crate::hierarchy::{Face, Mesh, Mirrors, Panes};
 use crate::scene::sheet::SheetMeans;
 use crate::scene::sky::SUN_RADIUS;
 use crate::scene::{Alpha, LightKind, Material, PunctualLight, Scene, Sides, Texture};
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -42,20 +42,20 @@ pub struct Audit<'a> {
     sheets: Vec<Option<SheetMeans>>,
 }
 
-/// Irradiance at a point: mean and standard error per leaf, W/m2/nm, and the batch means for anything derived.
+/// Irradiance at a point: mean and standard error per band, W/m2/nm, and the batch means for anything derived.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Answer {
     /// Mean.
-    pub mean: Leaves,
+    pub mean: Spectrum,
     /// Means of the batches.
-    pub batches: Vec<Leaves>,
+    pub batches: Vec<Spectrum>,
 }
 
 impl Answer {
-    /// Mean and standard error of a linear function of the leaves.
-    pub fn linear(&self, weights: &Leaves) -> (f64, f64) {
-        let dot = |x: &Leaves| x.iter().zip(weights).map(|(x, w)| x * w).sum::<f64>();
+    /// Mean and standard error of a linear function of the bands.
+    pub fn linear(&self, weights: &Spectrum) -> (f64, f64) {
+        let dot = |x: &Spectrum| x.iter().zip(weights).map(|(x, w)| x * w).sum::<f64>();
         let mean = dot(&self.mean);
         let n = self.batches.len() as f64;
         let variance = self
@@ -69,7 +69,7 @@ impl Answer {
 }
 
 /// A place that light scatters at.
-pub(super) struct Vertex {
+pub(super) struct PathVertex {
     pub(super) point: DVec3,
     pub(super) normal: DVec3,
     pub(super) plane: u32,
@@ -79,12 +79,12 @@ pub(super) struct Vertex {
 #[derive(Clone, Copy)]
 pub(super) struct ByImage<'a> {
     pub(super) image: u32,
-    pub(super) at: &'a Vertex,
+    pub(super) at: &'a PathVertex,
     pub(super) size: f64,
 }
 
 /// Does a path go on? If so it stands for those that end, too.
-pub(super) fn survives(throughput: &mut Leaves, rng: &mut Pcg) -> bool {
+pub(super) fn survives(throughput: &mut Spectrum, rng: &mut Pcg) -> bool {
     // Exactly what is left: a smaller chance would let weights grow without bound where albedos are near 1. Paths end, as no albedo
     // exceeds 0.999.
     let chance = throughput.iter().copied().fold(0.0, f64::max).min(1.0);
@@ -155,16 +155,16 @@ impl<'a> Audit<'a> {
             .enumerate()
             .map(|(k, (&(point, normal, plane), paths))| {
                 let each = paths.div_ceil(BATCHES).max(1);
-                let start = Vertex {
+                let start = PathVertex {
                     point,
                     normal,
                     plane,
                 };
-                let batches: Vec<Leaves> = (0..BATCHES)
+                let batches: Vec<Spectrum> = (0..BATCHES)
                     .map(|batch| {
                         let mut rng = Pcg::new(hash(hash(seed, k as u64), batch as u64));
                         let (shift_a, shift_b) = (rng_u64(&mut rng), rng_u64(&mut rng));
-                        let mut sum = [0.0; LEAVES];
+                        let mut sum = [0.0; BANDS];
                         for path in 0..each {
                             let first = [
                                 sequence02(path as u32, shift_a),
@@ -175,7 +175,7 @@ impl<'a> Audit<'a> {
                         sum.map(|x| x / each as f64)
                     })
                     .collect();
-                let mut mean = [0.0; LEAVES];
+                let mut mean = [0.0; BANDS];
                 for b in &batches {
                     for (m, x) in mean.iter_mut().zip(b) {
                         *m += x / BATCHES as f64;
@@ -187,15 +187,15 @@ impl<'a> Audit<'a> {
     }
 
     /// Adds one path's irradiance.
-    fn path(&self, start: &Vertex, first: [[f64; 2]; 2], rng: &mut Pcg, sum: &mut Leaves) {
-        let mut tally = Tally::new(sum);
+    fn path(&self, start: &PathVertex, first: [[f64; 2]; 2], rng: &mut Pcg, sum: &mut Spectrum) {
+        let mut tally = PathTally::new(sum);
         self.walk(start, first, rng, &mut tally);
         tally.settle();
     }
 
-    fn walk(&self, start: &Vertex, first: [[f64; 2]; 2], rng: &mut Pcg, tally: &mut Tally) {
-        let mut throughput = [1.0; LEAVES];
-        let mut at = Vertex { ..*start };
+    fn walk(&self, start: &PathVertex, first: [[f64; 2]; 2], rng: &mut Pcg, tally: &mut PathTally) {
+        let mut throughput = [1.0; BANDS];
+        let mut at = PathVertex { ..*start };
         let (mut toward_lamp, mut toward_any) = (first[0], first[1]);
         for bounce in 0.. {
             let sum = &mut tally.found;
@@ -237,7 +237,7 @@ impl<'a> Audit<'a> {
                     0 => by_direction / (by_direction + by_area),
                     _ => 1.0,
                 };
-                for l in 0..LEAVES {
+                for l in 0..BANDS {
                     tally.found[l] += throughput[l] * PI * radiance[l] * share;
                 }
             }
@@ -257,7 +257,7 @@ impl<'a> Audit<'a> {
             if bounce >= SURE_BOUNCES && !survives(&mut throughput, rng) {
                 return;
             }
-            at = Vertex {
+            at = PathVertex {
                 point,
                 normal,
                 plane: self.mesh.plane[triangle],
@@ -289,11 +289,11 @@ impl<'a> Audit<'a> {
     /// Light straight from a point on a lamp.
     fn lamp_sample(
         &self,
-        at: &Vertex,
+        at: &PathVertex,
         square: [f64; 2],
         rng: &mut Pcg,
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         if self.lamps.is_empty() {
             return;
@@ -339,7 +339,7 @@ impl<'a> Audit<'a> {
         let by_direction = c1 / PI;
         let factor = c1 / (by_area + by_direction);
         let throughput = &self.filtered(throughput, at.point, q);
-        for l in 0..LEAVES {
+        for l in 0..BANDS {
             sum[l] += throughput[l] * radiance[l] * factor;
         }
     }
@@ -347,12 +347,12 @@ impl<'a> Audit<'a> {
     /// Light of lights without extent, as from a point straight, or as it looks by an image.
     pub(super) fn punctual(
         &self,
-        at: &Vertex,
+        at: &PathVertex,
         by: Option<ByImage>,
         square: [f64; 2],
         rng: &mut Pcg,
-        throughput: &Leaves,
-        sum: &mut Leaves,
+        throughput: &Spectrum,
+        sum: &mut Spectrum,
     ) {
         let size = by.map_or(1.0, |by| by.size);
         for light in &self.scene.lights {
@@ -387,8 +387,8 @@ impl<'a> Audit<'a> {
                             .powi(2)
                     }
                     LightKind::Profile => {
-                        let spread = light.luminaire.as_ref();
-                        spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
+                        let luminaire = light.luminaire.as_ref();
+                        luminaire.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
                     }
                     _ => 1.0,
                 };
@@ -406,7 +406,7 @@ impl<'a> Audit<'a> {
                 continue;
             };
             let power = &self.scene.spectra[light.light].power;
-            for l in 0..LEAVES {
+            for l in 0..BANDS {
                 sum[l] += throughput[l] * factor * power[l] * light.shape[l];
             }
         }
@@ -416,7 +416,7 @@ impl<'a> Audit<'a> {
     fn shining(
         &self,
         light: &PunctualLight,
-        at: &Vertex,
+        at: &PathVertex,
         square: [f64; 2],
         rng: &mut Pcg,
     ) -> (f64, DVec3) {
@@ -444,7 +444,7 @@ impl<'a> Audit<'a> {
     }
 
     /// Emitted radiance at a point of a triangle, W/m2/sr/nm.
-    fn radiance(&self, triangle: usize, weights: [f32; 3]) -> Option<Leaves> {
+    fn radiance(&self, triangle: usize, weights: [f32; 3]) -> Option<Spectrum> {
         let e = self.scene.materials[self.mesh.material[triangle] as usize].even_emission()?;
         let weights = self.mesh.on_origin_f32(triangle, weights);
         let power = &self.scene.spectra[e.light].power;
@@ -459,7 +459,7 @@ impl<'a> Audit<'a> {
         Some(std::array::from_fn(|l| power[l] * shape[l]))
     }
 
-    fn albedo(&self, triangle: usize, weights: [f32; 3]) -> Leaves {
+    fn albedo(&self, triangle: usize, weights: [f32; 3]) -> Spectrum {
         let material = &self.scene.materials[self.mesh.material[triangle] as usize];
         match self.color(material, triangle, weights) {
             Some(color) => material.bounded(self.upsampler.reflectance_fast(color)),
@@ -468,10 +468,10 @@ impl<'a> Audit<'a> {
     }
 
     /// What one side of a sheet reflects, and what it lets through.
-    fn both_sides(&self, triangle: usize, weights: [f32; 3], back: bool) -> [Leaves; 2] {
+    fn both_sides(&self, triangle: usize, weights: [f32; 3], back: bool) -> [Spectrum; 2] {
         let material = &self.scene.materials[self.mesh.material[triangle] as usize];
         let Some(sheet) = &material.sheet else {
-            return [self.albedo(triangle, weights), [0.0; LEAVES]];
+            return [self.albedo(triangle, weights), [0.0; BANDS]];
         };
         let color = self.color(material, triangle, weights);
         let weights = self.mesh.on_origin_f32(triangle, weights);
@@ -486,14 +486,14 @@ impl<'a> Audit<'a> {
         triangle: usize,
         weights: [f32; 3],
         back: bool,
-    ) -> Option<[Leaves; 2]> {
+    ) -> Option<[Spectrum; 2]> {
         let number = self.mesh.material[triangle] as usize;
         let material = &self.scene.materials[number];
         let (sheet, means) = (material.sheet.as_ref()?, self.sheets[number].as_ref()?);
         let weights = self.mesh.on_origin_f32(triangle, weights);
         let weave = sheet.weave(|texture| self.texel(texture, triangle, weights));
         let [own, across] = material.scatters(sheet, means.color, weave, back, &self.upsampler);
-        let share = |of: Leaves, none: f64| -> Leaves {
+        let share = |of: Spectrum, none: f64| -> Spectrum {
             std::array::from_fn(|k| match means.shown[k] > 0.0 {
                 true => of[k] / means.shown[k],
                 false => none,
@@ -544,13 +544,13 @@ impl<'a> Audit<'a> {
 
 /// Which of two ways light goes on, and by what it is multiplied: by chance, each as often as it may carry on the most of what is left,
 /// so that weights do not grow.
-fn one_side(sides: [Leaves; 2], throughput: &Leaves, rng: &mut Pcg) -> (Leaves, bool) {
+fn one_side(sides: [Spectrum; 2], throughput: &Spectrum, rng: &mut Pcg) -> (Spectrum, bool) {
     let [reflected, through] = sides.each_ref().map(|side| {
         let carried = side.iter().zip(throughput).map(|(s, t)| s * t);
         carried.fold(0.0, f64::max)
     });
     if reflected + through <= 0.0 {
-        return ([0.0; LEAVES], false);
+        return ([0.0; BANDS], false);
     }
     let chance = through / (reflected + through);
     let passes = rng.f64() < chance;

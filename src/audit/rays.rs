@@ -3,12 +3,12 @@
 use super::path::Audit;
 use crate::geometry::{Hit, Segment};
 use crate::hierarchy::{Glazing, alpha};
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use glam::DVec3;
 
 impl Audit<'_> {
-    /// What panes between two points leave of light, leaf by leaf.
-    pub(super) fn filtered(&self, throughput: &Leaves, from: DVec3, to: DVec3) -> Leaves {
+    /// What panes between two points leave of light, band by band.
+    pub(super) fn filtered(&self, throughput: &Spectrum, from: DVec3, to: DVec3) -> Spectrum {
         let mut left = *throughput;
         let Some(panes) = &self.panes else {
             return left;

@@ -10,7 +10,7 @@ use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02};
 use crate::hierarchy::Face;
 use crate::mesh::looks::DIM;
 use crate::solve::Bake;
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use crate::transport::{MOSTLY, Receiver};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -26,7 +26,7 @@ const LOOKS: u32 = 64;
 /// A point of a face.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
-pub struct Place {
+pub struct FacePoint {
     /// The face.
     pub face: Face,
     /// Barycentric weights of the corners of the face.
@@ -40,9 +40,9 @@ pub struct Place {
 /// What the path tracer says at points of a room.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
-pub struct Reference {
+pub struct PathReference {
     /// The points.
-    pub points: Vec<Place>,
+    pub points: Vec<FacePoint>,
     /// Irradiance at each point, lm/m2.
     pub truth: Vec<[f64; 3]>,
     /// The same by independent batches, of which `truth` is the mean.
@@ -61,7 +61,7 @@ pub struct Reference {
     pub seed: u64,
 }
 
-impl Reference {
+impl PathReference {
     /// Traces at `points` random points by the area that counts, at most `most_paths` paths a point (and a pilot): as many as bring the
     /// standard error to a quarter of the error that `bake` is asked for. Of the bake only the room, its triangles and
     /// its rays are used, whatever rounds it has done. The same numbers for the same seed at any number of threads.
@@ -160,12 +160,12 @@ impl Reference {
 /// Which points lie on diffuse sheets, and what they show: what meets them, and with as many paths again what meets their other side.
 fn shown(
     audit: &Audit,
-    places: &[Place],
+    places: &[FacePoint],
     starts: &[(DVec3, DVec3, u32)],
     paths: &[usize],
     (answers, seed): (Vec<Answer>, u64),
 ) -> (Vec<usize>, Vec<Answer>) {
-    let shares = |place: &Place| {
+    let shares = |place: &FacePoint| {
         let [a, b, c] = place.weights.map(|w| w as f32);
         let weights = if place.face.back {
             [a, c, b]
@@ -174,7 +174,7 @@ fn shown(
         };
         audit.shares(place.face.triangle as usize, weights, place.face.back)
     };
-    let (on, shares): (Vec<usize>, Vec<[Leaves; 2]>) = (places.iter().enumerate())
+    let (on, shares): (Vec<usize>, Vec<[Spectrum; 2]>) = (places.iter().enumerate())
         .filter_map(|(k, place)| Some((k, shares(place)?)))
         .unzip();
     let behind: Vec<(DVec3, DVec3, u32)> = (on.iter())
@@ -185,7 +185,7 @@ fn shown(
     let shown = on.iter().zip(&shares).zip(behind);
     let shown = shown.map(|((&k, [own, across]), behind)| {
         let mix =
-            |x: &Leaves, y: &Leaves| std::array::from_fn(|l| own[l] * x[l] + across[l] * y[l]);
+            |x: &Spectrum, y: &Spectrum| std::array::from_fn(|l| own[l] * x[l] + across[l] * y[l]);
         let batches = answers[k].batches.iter().zip(&behind.batches);
         Answer {
             mean: mix(&answers[k].mean, &behind.mean),
@@ -197,7 +197,7 @@ fn shown(
 }
 
 /// Random points by the area that counts, one stratum each, those that are not covered; and how many are.
-fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
+fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<FacePoint>, usize) {
     let tree = bake.tree();
     let mut rng = Pcg::new(seed ^ 0x00a0_d177);
     let mut all = Vec::with_capacity(points);
@@ -206,7 +206,7 @@ fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
             let share = (k as f64 + rng.f64()) / points as f64;
             let (entry, weights) = tree.random(share, [rng.f64(), rng.f64()]);
             let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
-            all.push(Place {
+            all.push(FacePoint {
                 face: tree.faces[entry],
                 weights,
                 point: element.at(weights) + bake.mesh().centre,
@@ -223,9 +223,9 @@ fn places(bake: &Bake, points: usize, seed: u64) -> (Vec<Place>, usize) {
     (all, count)
 }
 
-/// Which points lie inside of something: see [`Reference::inside`]. Darker than `dim`, lx, is dark.
-fn inside(bake: &Bake, places: &[Place], truth: &[[f64; 3]], dim: f64) -> Vec<bool> {
-    let one = |(place, truth): (&Place, &[f64; 3])| {
+/// Which points lie inside of something: see [`PathReference::inside`]. Darker than `dim`, lx, is dark.
+fn inside(bake: &Bake, places: &[FacePoint], truth: &[[f64; 3]], dim: f64) -> Vec<bool> {
+    let one = |(place, truth): (&FacePoint, &[f64; 3])| {
         let to = receiver(bake, place, 0);
         let way = |k: u32| cosine_direction(to.normal, sequence02(k, 0));
         let backs = (0..LOOKS).filter(|&k| bake.meets_back(&to, way(k)));
@@ -235,7 +235,7 @@ fn inside(bake: &Bake, places: &[Place], truth: &[[f64; 3]], dim: f64) -> Vec<bo
     places.par_iter().zip(truth).map(one).collect()
 }
 
-fn receiver(bake: &Bake, place: &Place, seed: u64) -> Receiver {
+fn receiver(bake: &Bake, place: &FacePoint, seed: u64) -> Receiver {
     let (tree, triangle) = (bake.tree(), place.face.triangle as usize);
     let entry = tree.entry[triangle][usize::from(place.face.back)];
     Receiver {
@@ -248,11 +248,11 @@ fn receiver(bake: &Bake, place: &Place, seed: u64) -> Receiver {
 }
 
 /// Irradiance of the batches of an answer.
-fn tristimulus(answer: &Answer, weights: &[Leaves; 3]) -> [[f64; 3]; BATCHES] {
-    let xyz = |leaves: &Leaves| {
+fn tristimulus(answer: &Answer, weights: &[Spectrum; 3]) -> [[f64; 3]; BATCHES] {
+    let xyz = |spectrum: &Spectrum| {
         weights
             .each_ref()
-            .map(|w| leaves.iter().zip(w).map(|(x, w)| x * w).sum())
+            .map(|w| spectrum.iter().zip(w).map(|(x, w)| x * w).sum())
     };
     std::array::from_fn(|b| xyz(&answer.batches[b]))
 }

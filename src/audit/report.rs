@@ -1,10 +1,10 @@
 //! How wrong a bake is, *measured*: its light against the path tracer's at random points of its surfaces.
 //!
-//! The path tracer's own noise does not count as error of the bake (see [`Spread`]). Colour differences are CIEDE2000 of
+//! The path tracer's own noise does not count as error of the bake (see [`ErrorSummary`]). Colour differences are CIEDE2000 of
 //! a white surface's light under the bake's adaptation white.
 
-use super::reference::Reference;
-use super::spread::{Measured, Spread};
+use super::reference::PathReference;
+use super::summary::{ErrorSummary, Measured};
 use crate::color::de2000;
 use crate::gather::Baked;
 use crate::lightmap::LightMaps;
@@ -49,9 +49,9 @@ pub struct Report {
     /// Seed of points and paths.
     pub seed: u64,
     /// CIEDE2000.
-    pub de2000: Spread,
+    pub de2000: ErrorSummary,
     /// Relative error of illuminance, without sign.
-    pub relative: Spread,
+    pub relative: ErrorSummary,
     /// Error of the mean illuminance, with sign: bake less truth, over truth. Points in the dark weigh as little as their light.
     pub bias: Measured,
     /// Mean standard error of the audit itself, CIEDE2000: what the figures cannot see below.
@@ -62,13 +62,13 @@ pub struct Report {
     pub honesty: Honesty,
     /// What was seen at each point.
     #[serde(skip)]
-    pub seen: Vec<Seen>,
+    pub seen: Vec<AuditedPoint>,
 }
 
 /// One point of an audit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub struct Seen {
+pub struct AuditedPoint {
     /// World space.
     pub point: DVec3,
     /// Unit normal.
@@ -97,11 +97,11 @@ impl Report {
     /// # Ok::<(), haarlight::Error>(())
     /// ```
     pub fn new(bake: &Bake, points: usize, most_paths: usize, seed: u64) -> Self {
-        Self::against(bake, &Reference::new(bake, points, most_paths, seed))
+        Self::against(bake, &PathReference::new(bake, points, most_paths, seed))
     }
 
     /// Compares a bake with a reference of the same room: light gathered at the points.
-    pub fn against(bake: &Bake, reference: &Reference) -> Self {
+    pub fn against(bake: &Bake, reference: &PathReference) -> Self {
         let gathered = bake.gather(&reference.receivers(bake));
         let light = gathered.iter();
         let light = light.map(|g| Some(bake.lanes().tristimulus(&g.irradiance)));
@@ -111,7 +111,7 @@ impl Report {
     }
 
     /// Compares a baked mesh with a reference of the same room: light as a viewer draws it, interpolated between vertices.
-    pub fn of_file(bake: &Bake, baked: &Baked, reference: &Reference) -> Self {
+    pub fn of_file(bake: &Bake, baked: &Baked, reference: &PathReference) -> Self {
         let reference = &*reference.as_shown();
         let points = reference.points.iter();
         let places: Vec<_> = points.map(|p| (p.face, p.point)).collect();
@@ -120,7 +120,7 @@ impl Report {
     }
 
     /// Compares light maps with a reference of the same room: light as a bilinear look-up has it.
-    pub fn of_maps(bake: &Bake, maps: &LightMaps, reference: &Reference) -> Self {
+    pub fn of_maps(bake: &Bake, maps: &LightMaps, reference: &PathReference) -> Self {
         let reference = &*reference.as_shown();
         let points = reference.points.iter();
         let places: Vec<_> = points
@@ -133,7 +133,7 @@ impl Report {
     /// Compares what is drawn at the points, save those inside of something, which count as covered.
     fn drawn(
         bake: &Bake,
-        reference: &Reference,
+        reference: &PathReference,
         light: Vec<Option<[f64; 3]>>,
         estimate: Option<f64>,
     ) -> Self {
@@ -145,19 +145,19 @@ impl Report {
     /// Compares light at the points; those without are left out.
     fn of(
         bake: &Bake,
-        reference: &Reference,
+        reference: &PathReference,
         light: Vec<Option<[f64; 3]>>,
         estimate: Option<f64>,
     ) -> Self {
         let white = bake.light().white;
-        let seen: Vec<Seen> = light
+        let seen: Vec<AuditedPoint> = light
             .iter()
             .enumerate()
             .filter_map(|(k, baked)| {
                 let baked = (*baked)?;
                 let (place, traced) = (&reference.points[k], reference.truth[k]);
                 let scale = traced[1].max(DARK * white[1]).max(f64::MIN_POSITIVE);
-                Some(Seen {
+                Some(AuditedPoint {
                     point: place.point,
                     normal: place.normal,
                     baked,
@@ -176,14 +176,14 @@ impl Report {
         let colour: Vec<[f64; 2]> = seen.iter().map(|s| s.de2000).collect();
         let relative: Vec<[f64; 2]> = seen.iter().map(|s| s.relative).collect();
         let lux: Vec<[f64; 2]> = seen.iter().map(|s| [s.baked[1], s.traced[1]]).collect();
-        let de2000 = Spread::of(&colour);
+        let de2000 = ErrorSummary::of(&colour);
         Self {
             record: "audit",
             points: seen.len(),
             covered: reference.covered + light.len() - seen.len(),
             paths: reference.paths,
             seed: reference.seed,
-            relative: Spread::of(&relative),
+            relative: ErrorSummary::of(&relative),
             bias: Measured::excess(&lux),
             noise_de2000: colour.iter().map(|c| c[1]).sum::<f64>() / colour.len().max(1) as f64,
             estimate_de2000: estimate,

@@ -5,7 +5,7 @@
 //! the same bytes.
 
 pub use super::bake_args::BakeArgs;
-use super::baking::{Kept, Order};
+use super::baking::{Order, Recorders};
 use super::options::Common;
 use super::paths;
 use super::rooms::load;
@@ -59,7 +59,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         grid: grid.as_ref(),
         told,
     };
-    let mut kept = Kept::new(order, load_s)?;
+    let mut kept = Recorders::new(order, load_s)?;
     let mut bake = order.begin(scene, &mut kept)?;
     let verdict = order.rounds(&mut bake, &mut kept)?;
     let lit = order.gather(&bake, verdict, &mut kept)?;

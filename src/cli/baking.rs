@@ -2,27 +2,28 @@
 
 use super::bake_args::BakeArgs;
 use super::log::{
-    End, Outputs, PlanRecord, RoundRecord, Seconds, SnapshotsRecord, VerdictRecord, exit_code,
+    FinalRecord, Outputs, PlanRecord, RoundRecord, Seconds, SnapshotsRecord, VerdictRecord,
+    exit_code,
 };
 use super::maps;
 use super::metrics;
 use super::options::Common;
 use super::parting;
 use super::paths::text;
-use super::report::Report;
+use super::report::PageBuilder;
 use super::results::print;
 use super::rooms::{prepare, write_npz};
 use super::snapshots::Snapshots;
 use super::stop::Stop;
 use super::summary;
 use super::talk::Talk;
-use crate::audit::{self, Reference};
+use crate::audit::{self, PathReference};
 use crate::error::{Error, Result};
 use crate::gather::Baked;
 use crate::lightmap::LightMaps;
 use crate::mesh::Limits;
 use crate::output::gltf::{Packing, Writing};
-use crate::output::probes::Grid;
+use crate::output::probes::ProbeGrid;
 use crate::output::{BakedGlb, Exposure, baked_glb, mapped_glb, vertices_within};
 use crate::report::Log;
 use crate::scene::{Camera, Scene};
@@ -55,15 +56,15 @@ pub(super) struct Order<'a> {
     pub(super) cache: Option<&'a Path>,
     pub(super) cameras: &'a [Camera],
     /// Where probes stand.
-    pub(super) grid: Option<&'a Grid>,
+    pub(super) grid: Option<&'a ProbeGrid>,
     /// Is the verdict asked for, by this rank or another?
     pub(super) told: bool,
 }
 
 /// What is kept of a bake while it goes on.
-pub(super) struct Kept {
+pub(super) struct Recorders {
     log: Option<Log<File>>,
-    report: Option<Report>,
+    report: Option<PageBuilder>,
     snapshots: Option<Snapshots>,
     outputs: Outputs,
     seconds: Seconds,
@@ -74,14 +75,14 @@ pub(super) struct Kept {
 }
 
 /// The light that is written.
-pub(super) struct Lit {
+pub(super) struct WrittenLight {
     maps: Option<LightMaps>,
     /// At vertices of the written mesh; with maps, what pictures are exposed by.
     of_vertices: Baked,
     verdict: Verdict,
 }
 
-impl Lit {
+impl WrittenLight {
     fn baked(&self) -> &Baked {
         self.maps
             .as_ref()
@@ -97,7 +98,7 @@ pub(super) struct Written {
     uncached: Option<Error>,
 }
 
-impl Kept {
+impl Recorders {
     /// Opens what is written on the way; reading took `load_s` seconds.
     pub(super) fn new(order: Order, load_s: f64) -> Result<Self> {
         let Order { args, common, .. } = order;
@@ -143,7 +144,7 @@ impl Kept {
 
 impl Order<'_> {
     /// Prepares the room, or goes on where a checkpoint ends.
-    pub(super) fn begin(self, scene: Scene, kept: &mut Kept) -> Result<Bake> {
+    pub(super) fn begin(self, scene: Scene, kept: &mut Recorders) -> Result<Bake> {
         let Self {
             args, common, talk, ..
         } = self;
@@ -154,7 +155,7 @@ impl Order<'_> {
         }
         let plan = PlanRecord::new(&bake, args.solving.time);
         kept.log(&plan)?;
-        let report = args.report().map(|path| Report::new(path, &plan));
+        let report = args.report().map(|path| PageBuilder::new(path, &plan));
         kept.report = report.transpose()?;
         let resumed = args.checkpoint.as_deref();
         if let Some(path) = resumed.filter(|path| common.team.first_says(path.exists())) {
@@ -172,7 +173,7 @@ impl Order<'_> {
     }
 
     /// Rounds until it is enough.
-    pub(super) fn rounds(self, bake: &mut Bake, kept: &mut Kept) -> Result<Verdict> {
+    pub(super) fn rounds(self, bake: &mut Bake, kept: &mut Recorders) -> Result<Verdict> {
         let vertices = most_vertices(self.args, bake.scene())?;
         let ahead = |bake: &Bake, round: &Round| {
             let rounds = round.remaining_s?;
@@ -200,7 +201,7 @@ impl Order<'_> {
     }
 
     /// Pictures of a round, as long as they take little of the time.
-    fn pictures(self, bake: &Bake, round: &Round, kept: &mut Kept) -> Result<()> {
+    fn pictures(self, bake: &Bake, round: &Round, kept: &mut Recorders) -> Result<()> {
         let (talk, stop, team) = (self.talk, self.stop, self.common.team);
         let free = (self.args.solving.time).map_or(PICTURES_FREE_S, |time| PICTURES_SHARE * time);
         // Those of the result are drawn in any case.
@@ -237,7 +238,12 @@ impl Order<'_> {
     }
 
     /// Looks up the light that is written: pictures on the way are sketches, the result is looked at more closely.
-    pub(super) fn gather(self, bake: &Bake, verdict: Verdict, kept: &mut Kept) -> Result<Lit> {
+    pub(super) fn gather(
+        self,
+        bake: &Bake,
+        verdict: Verdict,
+        kept: &mut Recorders,
+    ) -> Result<WrittenLight> {
         let Self {
             args, stop, talk, ..
         } = self;
@@ -252,7 +258,7 @@ impl Order<'_> {
             Some(_) => maps::metered(bake),
             None => bake.baked_within(&limits, &|done, of| talk.progress("gathering", done, of)),
         };
-        let mut lit = Lit {
+        let mut lit = WrittenLight {
             maps,
             of_vertices,
             verdict,
@@ -275,7 +281,12 @@ impl Order<'_> {
     }
 
     /// Writes all but the page.
-    pub(super) fn write(self, bake: &Bake, lit: &Lit, kept: &mut Kept) -> Result<Written> {
+    pub(super) fn write(
+        self,
+        bake: &Bake,
+        lit: &WrittenLight,
+        kept: &mut Recorders,
+    ) -> Result<Written> {
         let Self {
             args, talk, output, ..
         } = self;
@@ -325,7 +336,7 @@ impl Order<'_> {
     }
 
     /// Writes the cache, if one is asked for; what went wrong.
-    fn write_cache(self, bake: &Bake, baked: &Baked, kept: &mut Kept) -> Option<Error> {
+    fn write_cache(self, bake: &Bake, baked: &Baked, kept: &mut Recorders) -> Option<Error> {
         let path = self.cache?;
         match bake.write_cache(baked, path, self.args.cache_limit << 20) {
             Ok(size) => {
@@ -342,14 +353,14 @@ impl Order<'_> {
     pub(super) fn audit(
         self,
         bake: &Bake,
-        lit: &Lit,
-        kept: &mut Kept,
+        lit: &WrittenLight,
+        kept: &mut Recorders,
     ) -> Result<Option<audit::Report>> {
         let clock = Instant::now();
         let audit = self.args.audit.map(|points| {
             self.talk.phase("auditing");
             let seed = self.common.seed ^ AUDIT_SEED;
-            let reference = Reference::new(bake, points, AUDIT_PATHS, seed);
+            let reference = PathReference::new(bake, points, AUDIT_PATHS, seed);
             match &lit.maps {
                 Some(maps) => audit::Report::of_maps(bake, maps, &reference),
                 None => audit::Report::of_file(bake, lit.baked(), &reference),
@@ -366,10 +377,10 @@ impl Order<'_> {
     pub(super) fn end(
         self,
         bake: &Bake,
-        lit: &Lit,
+        lit: &WrittenLight,
         written: Written,
         audit: Option<&audit::Report>,
-        mut kept: Kept,
+        mut kept: Recorders,
     ) -> Result<u8> {
         let Self {
             args, stop, talk, ..
@@ -380,7 +391,7 @@ impl Order<'_> {
             false => metrics::of_room(bake),
         };
         kept.seconds.total = stop.elapsed_s();
-        let record = VerdictRecord::new(End {
+        let record = VerdictRecord::new(FinalRecord {
             bake,
             verdict: lit.verdict,
             baked: lit.baked(),
@@ -410,9 +421,9 @@ impl Order<'_> {
     /// Writes the page.
     fn page(
         self,
-        report: &Report,
+        report: &PageBuilder,
         (record, audit): (&VerdictRecord, Option<&audit::Report>),
-        (bake, lit): (&Bake, &Lit),
+        (bake, lit): (&Bake, &WrittenLight),
         written: &Written,
     ) -> Result<()> {
         let baked = lit.baked();

@@ -70,8 +70,8 @@ pub fn run(cli: &Cli) -> Result<u8> {
             .build_global()
             .map_err(|problem| Error::Internal(format!("threads: {problem}")))?;
     }
-    let spread = matches!(cli.command, Command::Bake(_) | Command::Report(_));
-    if !spread && !cli.common.team.is_alone() {
+    let by_ranks = matches!(cli.command, Command::Bake(_) | Command::Report(_));
+    if !by_ranks && !cli.common.team.is_alone() {
         return Err(Error::input(
             format!("{} ranks", cli.common.team.ranks()),
             "were started for a command that one does by itself: `bake` and `report` are spread over ranks",

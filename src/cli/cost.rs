@@ -2,7 +2,7 @@
 //!
 //! Writes `cost.csv`, `cost.md` and the plots that it shows into a folder, and prints the table and the choice.
 //! `--json` prints one object instead: `{"version": 1, "choice": {...}, "runs": [...], "held": [...], "balance": [...]}`
-//! with the fields of `cost::Run`, `cost::HeldRun` and `cost::Balance`.
+//! with the fields of `cost::Run`, `cost::HeldRun` and `cost::KnobComparison`.
 
 use super::options::{Common, Reading, positive};
 use super::results::print;

@@ -79,7 +79,7 @@ use crate::gather::{Baked, Interpolation};
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::effects::Plan;
 use crate::scene::facts::Facts;
-use crate::solve::record::{Figure, Kind, LOG_VERSION};
+use crate::solve::record::{Figure, FigureKind, LOG_VERSION};
 use crate::solve::{Averages, Bake, Representation, Round, Verdict};
 use serde::Serialize;
 
@@ -235,7 +235,7 @@ impl LayerRecord {
             name: name.clone(),
             interpolation_de2000: Figure {
                 value: Some(found.mean),
-                kind: Kind::Measured,
+                kind: FigureKind::Measured,
             },
         };
         names.zip(&baked.layers).map(one).collect()
@@ -331,7 +331,7 @@ pub struct VerdictRecord {
 }
 
 /// Everything that the last line tells of.
-pub(super) struct End<'a> {
+pub(super) struct FinalRecord<'a> {
     pub(super) bake: &'a Bake,
     pub(super) verdict: Verdict,
     pub(super) baked: &'a Baked,
@@ -344,7 +344,7 @@ pub(super) struct End<'a> {
 }
 
 impl VerdictRecord {
-    pub(super) fn new(end: End) -> Self {
+    pub(super) fn new(end: FinalRecord) -> Self {
         let rounds = end.bake.rounds();
         let links_s: f64 = rounds
             .iter()
@@ -372,7 +372,7 @@ impl VerdictRecord {
             light_de2000: rounds.last().map_or(unknown, |r| r.error.total_de2000),
             interpolation_de2000: Figure {
                 value: end.baked.interpolation.map(|i| i.mean),
-                kind: Kind::Measured,
+                kind: FigureKind::Measured,
             },
             interpolation: end.baked.interpolation,
             layers: LayerRecord::of(end.bake, end.baked),

@@ -26,19 +26,19 @@
 //! its range is as if all of the light's error were the sky's; where rows do not keep it apart there is a `reason` instead, and
 //! `probe --metrics` finds it by a bake of its own.
 //!
-//! Light is held on 64 leaves. Against tables at 5 nm, over all 48 illuminants of the CIE, that shifts colour temperature by
+//! Light is held on 64 bands. Against tables at 5 nm, over all 48 illuminants of the CIE, that shifts colour temperature by
 //! up to .5 %, Duv by .0003, Ra by 1.3, R9 by 5, Rf and Rg by .9 and alpha-opic daylight by .5 %, most of it in lamps of
 //! lines; the ranges do not hold this.
 
 use super::glare::{self, Viewpoint};
 use crate::color::{
-    Bands, GREATEST_DISTANCE, MEASURES, Measured, Meter, NAMES, Range, Stated, Uniformity,
+    Bands, GREATEST_DISTANCE, LightMeasures, MEASURES, Meter, NAMES, Range, Stated, Uniformity,
 };
 use crate::gather::{Probed, WorkingPlane};
 use crate::scene::Camera;
 use crate::solve::{Bake, Round};
-use crate::spectrum::{Grid, Leaves};
-use crate::survey::{Place, places};
+use crate::spectrum::{Grid, Spectrum};
+use crate::survey::{PointLocation, places};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -57,7 +57,7 @@ const RA: usize = 3;
 /// The figures of all points.
 pub(super) struct Metrics {
     stated: Option<Stated>,
-    points: Vec<(Measured, [Option<Range>; MEASURES])>,
+    points: Vec<(LightMeasures, [Option<Range>; MEASURES])>,
     /// Over the points in the room, and how many they are.
     uniformity: Option<(Uniformity, usize)>,
     /// Daylight factors, per cent, and the relative error of the light under the sky, where there is one.
@@ -69,17 +69,17 @@ impl Metrics {
     pub(super) fn new(
         grid: &Grid,
         probed: &[Probed],
-        places: &[Place],
+        places: &[PointLocation],
         last: Option<&Round>,
     ) -> Self {
-        let meter = Meter::new(&Bands::leaves(grid));
+        let meter = Meter::new(&Bands::of(grid));
         let stated = stated(last);
         let points: Vec<_> = (probed.par_iter())
-            .map(|light| measured(&meter, &light.leaves, stated))
+            .map(|light| measured(&meter, &light.spectrum, stated))
             .collect();
         let inside = probed.iter().zip(places);
         let lux: Vec<f64> = inside
-            .filter(|(_, place)| **place == Place::Room)
+            .filter(|(_, place)| **place == PointLocation::Room)
             .map(|(light, _)| light.xyz[1])
             .collect();
         Self {
@@ -224,7 +224,7 @@ fn stated(last: Option<&Round>) -> Option<Stated> {
 
 /// The figures of the mean light on all surfaces of a room, as JSON; ranges are those of a point, and the mean errs less.
 pub(super) fn of_room(bake: &Bake) -> Value {
-    let meter = Meter::new(&Bands::leaves(&bake.scene().grid));
+    let meter = Meter::new(&Bands::of(&bake.scene().grid));
     let stated = stated(bake.rounds().last());
     let (measured, ranges) = measured(&meter, &bake.mean_spectrum(), stated);
     point(&measured, &ranges)
@@ -260,7 +260,7 @@ pub(super) fn of_bake(bake: &Bake, cameras: &[Camera]) -> Value {
 fn on_plane(bake: &Bake, plane: &WorkingPlane, stated: Option<Stated>) -> Option<Value> {
     let scene = bake.scene();
     let places = places(scene, &plane.points).into_iter().enumerate();
-    let inside = |(k, place): (usize, Place)| (place == Place::Room).then_some(k);
+    let inside = |(k, place): (usize, PointLocation)| (place == PointLocation::Room).then_some(k);
     let inside: Vec<usize> = places.filter_map(inside).collect();
     let points: Vec<(DVec3, DVec3)> = inside.iter().map(|&k| plane.points[k]).collect();
     let (probed, mut by_sky) = bake.probe_with_sky(&points);
@@ -324,9 +324,9 @@ fn daylight_of(factors: Option<Vec<f64>>, may_err: Option<f64>) -> Value {
 /// The figures of a light, and the ranges that the stated error allows.
 fn measured(
     meter: &Meter,
-    light: &Leaves,
+    light: &Spectrum,
     stated: Option<Stated>,
-) -> (Measured, [Option<Range>; MEASURES]) {
+) -> (LightMeasures, [Option<Range>; MEASURES]) {
     let measured = meter.measure(light);
     let ranges = stated.map_or([None; MEASURES], |stated| {
         meter.ranges(light, &measured, stated)
@@ -334,7 +334,7 @@ fn measured(
     (measured, ranges)
 }
 
-fn point(measured: &Measured, ranges: &[Option<Range>; MEASURES]) -> Value {
+fn point(measured: &LightMeasures, ranges: &[Option<Range>; MEASURES]) -> Value {
     let mut out = Map::new();
     for (k, name) in NAMES.into_iter().enumerate() {
         let value = measured.values[k].map_err(|reason| reason.to_string());

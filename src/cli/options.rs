@@ -2,10 +2,10 @@
 
 use super::sky::SkyArgs;
 use crate::gather::BakedSurface;
-use crate::output::{Balance, Brightness, Exposure, Packing, Writing};
+use crate::output::{Exposure, ExposureSetting, Packing, WhiteBalance, Writing};
 use crate::scene::{Camera, Options, Scene};
-use crate::spectrum::{Grid, LEAVES};
-use crate::survey::Wishes;
+use crate::spectrum::{BANDS, Grid};
+use crate::survey::SurveyOptions;
 use crate::team::Team;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use std::str::FromStr;
 /// Shortest wavelength that the tables of daylight and of illuminant A know (CIE 015:2004, table T.1), which is there to excite what
 /// fluoresces, and longest that the observer's table knows (CIE 018:2019, table 6), nm.
 const KNOWN_NM: [f64; 2] = [300.0, 830.0];
-/// Narrowest leaf, nm: the step of the finest tables.
+/// Narrowest band, nm: the step of the finest tables.
 const LEAST_LEAF_NM: f64 = 1.0;
 
 /// Options of all commands.
@@ -42,9 +42,9 @@ pub struct Reading {
     /// Spectra of materials and lights [default: ROOM's name with .spectra.json, if it is there].
     #[arg(long, value_name = "FILE")]
     pub spectra: Option<PathBuf>,
-    /// Wavelengths to work on, nm; 64 leaves divide them. From 300 on where ultraviolet light excites what fluoresces.
+    /// Wavelengths to work on, nm; 64 bands divide them. From 300 on where ultraviolet light excites what fluoresces.
     #[arg(long, value_name = "FROM..TO", default_value = "380..780")]
-    pub range: Range,
+    pub range: WavelengthRange,
     /// Only warn of keys and names in the file of spectra that mean nothing.
     #[arg(long)]
     pub lenient: bool,
@@ -76,8 +76,8 @@ impl Reading {
     }
 
     /// What is decided before the room is looked over.
-    pub fn wishes(&self) -> Wishes {
-        Wishes {
+    pub fn wishes(&self) -> SurveyOptions {
+        SurveyOptions {
             allow_dark: self.allow_dark,
             flip: self.flip,
         }
@@ -108,10 +108,10 @@ pub struct Showing {
         default_value_t,
         allow_hyphen_values = true
     )]
-    pub exposure: Brightness,
+    pub exposure: ExposureSetting,
     /// Which light shows as white: none (D65, colours as they are), auto (the room's) or a colour temperature, K.
     #[arg(long, value_name = "none|auto|KELVIN", default_value_t)]
-    pub white_balance: Balance,
+    pub white_balance: WhiteBalance,
 }
 
 impl Showing {
@@ -150,12 +150,12 @@ impl Storing {
 
 /// A range of wavelengths, typed as `380..780`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
+pub struct WavelengthRange {
     /// First and last wavelength, nm.
     pub nm: [f64; 2],
 }
 
-impl Default for Range {
+impl Default for WavelengthRange {
     fn default() -> Self {
         let grid = Grid::default();
         Self {
@@ -164,14 +164,14 @@ impl Default for Range {
     }
 }
 
-impl Range {
-    /// The 64 leaves on this range.
+impl WavelengthRange {
+    /// The 64 bands on this range.
     pub fn grid(self) -> Grid {
         Grid::new(self.nm[0], self.nm[1])
     }
 }
 
-impl FromStr for Range {
+impl FromStr for WavelengthRange {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -182,7 +182,7 @@ impl FromStr for Range {
             return Err("a range of wavelengths looks like 380..780".into());
         };
         let [least, most] = KNOWN_NM;
-        let widest = LEAVES as f64 * LEAST_LEAF_NM;
+        let widest = BANDS as f64 * LEAST_LEAF_NM;
         // Written so that NaN fails.
         if !(from >= least && to <= most && to - from >= widest) {
             return Err(format!(
@@ -207,14 +207,14 @@ mod tests {
 
     #[test]
     fn ranges_are_checked() {
-        let range: Range = "380..700".parse().unwrap();
+        let range: WavelengthRange = "380..700".parse().unwrap();
         assert_eq!(range.grid(), Grid::paper());
-        assert_eq!(Range::default().grid(), Grid::default());
-        assert!("300..780".parse::<Range>().is_ok());
+        assert_eq!(WavelengthRange::default().grid(), Grid::default());
+        assert!("300..780".parse::<WavelengthRange>().is_ok());
         for bad in [
             "380", "380-780", "780..380", "NaN..780", "290..780", "380..400", "a..b",
         ] {
-            assert!(bad.parse::<Range>().is_err(), "{bad}");
+            assert!(bad.parse::<WavelengthRange>().is_err(), "{bad}");
         }
     }
 

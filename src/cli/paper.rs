@@ -5,7 +5,7 @@
 
 use crate::spectrum::study::table1::{Column, PRINTED, ROWS, mean_differences};
 use crate::spectrum::study::{
-    Chart, LEVELS, Light, Reflectances, bounds, compare, covariance, cuts, modes, table2,
+    ColourChart, LEVELS, Reflectances, UnitLight, bounds, compare, covariance, cuts, modes, table2,
 };
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -25,12 +25,12 @@ pub struct PaperArgs {
 /// Everything that is measured.
 struct Results {
     columns: [Column; 3],
-    control: Vec<modes::Row>,
-    bounds: Vec<bounds::Row>,
-    methods: Vec<compare::Row>,
+    control: Vec<modes::ModesRow>,
+    bounds: Vec<bounds::BoundsRow>,
+    methods: Vec<compare::ComparisonRow>,
     table2: Vec<table2::Stage>,
-    cuts: Vec<cuts::Row>,
-    covariances: Vec<covariance::Row>,
+    cuts: Vec<cuts::CutsRow>,
+    covariances: Vec<covariance::CovarianceRow>,
 }
 
 /// Runs the tests and prints them.
@@ -50,7 +50,7 @@ pub fn run(args: &PaperArgs) -> crate::Result<()> {
 }
 
 fn measure(source: Reflectances) -> Results {
-    let chart = Chart::new(source);
+    let chart = ColourChart::new(source);
     let lights = chart.lights();
     let white = chart.light("D65").white;
     let mut control: Vec<_> = lights
@@ -61,7 +61,7 @@ fn measure(source: Reflectances) -> Results {
     for light in lights.iter().filter(|light| light.white != white) {
         control.extend(modes::measure(
             &chart,
-            &Light {
+            &UnitLight {
                 white,
                 ..light.clone()
             },
@@ -178,7 +178,7 @@ fn table1(text: &mut String, columns: &[Column; 3]) -> std::fmt::Result {
     )
 }
 
-fn control(text: &mut String, rows: &[modes::Row]) -> std::fmt::Result {
+fn control(text: &mut String, rows: &[modes::ModesRow]) -> std::fmt::Result {
     writeln!(
         text,
         "What controls the error (dE as mean / 95th percentile / max; corrected: estimated error added back)\n"
@@ -197,7 +197,8 @@ fn control(text: &mut String, rows: &[modes::Row]) -> std::fmt::Result {
         "corrected dE*uv",
         "corrected dE00"
     )?;
-    let spread = |s: &modes::Spread| format!("{:.2} / {:.2} / {:.2}", s.mean, s.p95, s.max);
+    let summary =
+        |s: &modes::DifferenceSummary| format!("{:.2} / {:.2} / {:.2}", s.mean, s.p95, s.max);
     for r in rows {
         write!(
             text,
@@ -205,14 +206,14 @@ fn control(text: &mut String, rows: &[modes::Row]) -> std::fmt::Result {
             r.light, r.mode, r.level, r.limit, r.intervals_mean, r.above_eps_max
         )?;
         for s in [&r.luv, &r.de2000, &r.corrected_luv, &r.corrected_de2000] {
-            write!(text, "{:>22}", spread(s))?;
+            write!(text, "{:>22}", summary(s))?;
         }
         writeln!(text)?;
     }
     writeln!(text)
 }
 
-fn bound(text: &mut String, rows: &[bounds::Row]) -> std::fmt::Result {
+fn bound(text: &mut String, rows: &[bounds::BoundsRow]) -> std::fmt::Result {
     writeln!(
         text,
         "Bound of the neglected term (control by the bound, the paper's eps; looseness: bound / true error of the estimator)\n"
@@ -273,7 +274,7 @@ fn timings(text: &mut String, stages: &[table2::Stage]) -> std::fmt::Result {
 }
 
 /// Means over the lights of dE*uv: mean (max) of each level.
-fn methods(text: &mut String, rows: &[compare::Row]) -> std::fmt::Result {
+fn methods(text: &mut String, rows: &[compare::ComparisonRow]) -> std::fmt::Result {
     writeln!(
         text,
         "Methods at equal numbers of terms: dE*uv mean (max) of tertiary reflections, mean (max) over the lights\n"
@@ -293,7 +294,7 @@ fn methods(text: &mut String, rows: &[compare::Row]) -> std::fmt::Result {
         write!(text, "{name:28}")?;
         let mut time = None;
         for n in compare::TERMS {
-            let same: Vec<&compare::Row> = rows
+            let same: Vec<&compare::ComparisonRow> = rows
                 .iter()
                 .filter(|r| r.method == name && r.terms == n)
                 .collect();
@@ -325,7 +326,7 @@ fn methods(text: &mut String, rows: &[compare::Row]) -> std::fmt::Result {
     )
 }
 
-fn greedy(text: &mut String, rows: &[cuts::Row]) -> std::fmt::Result {
+fn greedy(text: &mut String, rows: &[cuts::CutsRow]) -> std::fmt::Result {
     writeln!(
         text,
         "\nGreedy cuts against the best known (secondary reflections, mean dE*uv, no correction)\n"
@@ -345,7 +346,7 @@ fn greedy(text: &mut String, rows: &[cuts::Row]) -> std::fmt::Result {
     Ok(())
 }
 
-fn covariances(text: &mut String, rows: &[covariance::Row]) -> std::fmt::Result {
+fn covariances(text: &mut String, rows: &[covariance::CovarianceRow]) -> std::fmt::Result {
     writeln!(
         text,
         "\nRatio lists, error added back: means alone, and with the covariances of all pairs of reflectances (dE*uv)\n"
@@ -355,7 +356,8 @@ fn covariances(text: &mut String, rows: &[covariance::Row]) -> std::fmt::Result 
         "{:7}{:10}{:>10}{:>22}{:>22}",
         "light", "level", "intervals", "means", "covariances"
     )?;
-    let spread = |s: &modes::Spread| format!("{:.3} / {:.3} / {:.3}", s.mean, s.p95, s.max);
+    let summary =
+        |s: &modes::DifferenceSummary| format!("{:.3} / {:.3} / {:.3}", s.mean, s.p95, s.max);
     for r in rows {
         writeln!(
             text,
@@ -363,8 +365,8 @@ fn covariances(text: &mut String, rows: &[covariance::Row]) -> std::fmt::Result 
             r.light,
             r.level,
             r.intervals_mean,
-            spread(&r.means),
-            spread(&r.covariances)
+            summary(&r.means),
+            summary(&r.covariances)
         )?;
     }
     Ok(())

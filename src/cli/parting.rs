@@ -5,11 +5,11 @@ use super::paths::text as text_of;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::output::Exposure;
-use crate::output::probes::{Grid, Probes, to_volume};
+use crate::output::probes::{ProbeGrid, Probes, to_volume};
 use crate::scene::Scene;
 use crate::solve::{Bake, Representation};
 use crate::store::file;
-use crate::survey::Place;
+use crate::survey::PointLocation;
 use std::path::Path;
 
 /// What is written beside the light of surfaces.
@@ -42,9 +42,11 @@ impl Parting {
     ///
     /// # Errors
     /// They are too many.
-    pub(super) fn grid(self, scene: &Scene) -> Result<Option<Grid>> {
+    pub(super) fn grid(self, scene: &Scene) -> Result<Option<ProbeGrid>> {
         let spacing = self.probes.map(|spacing| spacing * scene.changes.scale);
-        spacing.map(|spacing| Grid::of(scene, spacing)).transpose()
+        spacing
+            .map(|spacing| ProbeGrid::of(scene, spacing))
+            .transpose()
     }
 
     /// How spectra are carried that does not go with layers.
@@ -59,7 +61,7 @@ impl Parting {
 /// Gathers the light of probes and writes it beside the glb; names of the files.
 pub(super) fn write_probes(
     bake: &Bake,
-    grid: &Grid,
+    grid: &ProbeGrid,
     (output, room): (&Path, &Path),
     look: &Exposure,
     talk: &Talk,
@@ -67,7 +69,7 @@ pub(super) fn write_probes(
     let [json, ktx2] = ["probes.json", "probes.ktx2"].map(|end| output.with_extension(end));
     let air = bake.air(&grid.points());
     let count = |place| air.iter().filter(|a| a.place == place).count();
-    let (inside, outside) = (count(Place::Inside), count(Place::Outside));
+    let (inside, outside) = (count(PointLocation::Inside), count(PointLocation::Outside));
     let name = ktx2.file_name().map(|n| n.to_string_lossy().into_owned());
     let error = bake.rounds().last().map(|round| round.error.total_de2000);
     let name = name.unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use crate::error::Problem;
 use crate::scene::Scene;
-use crate::scene::uri::{self, Place};
+use crate::scene::uri::{self, UriTarget};
 use std::path::{Path, PathBuf};
 
 /// A path as it is said.
@@ -77,7 +77,7 @@ pub(super) fn parts(scene: &Scene) -> Vec<PathBuf> {
         .flatten()
         .filter_map(|entry| entry.get("uri")?.as_str());
     uris.filter_map(|uri| match uri::locate(folder, uri) {
-        Ok(Place::File(path)) => Some(path),
+        Ok(UriTarget::File(path)) => Some(path),
         _ => None,
     })
     .collect()

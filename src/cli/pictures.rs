@@ -3,11 +3,11 @@
 
 use crate::error::{Error, Result};
 use crate::report::page::lamp_spectra;
-use crate::report::{Chart, Scale, Series, plan, polar};
+use crate::report::{LineChart, Scale, Series, plan, polar};
 use crate::scene::facts::Facts;
 use crate::scene::profile::Profile;
 use crate::scene::{Scene, listed, short};
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use crate::store::file;
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub(super) fn write(folder: &Path, scene: &Scene, facts: &Facts) -> Result<()> {
     let title = format!("{room} from above");
     put(&folder.join("plan.svg"), &plan::svg(scene, &title))?;
     let lamps = facts.lights.iter().zip(lamp_spectra(scene));
-    let lamps: Vec<(String, Leaves)> = lamps
+    let lamps: Vec<(String, Spectrum)> = lamps
         .map(|(fact, power)| {
             let peak = power.iter().copied().fold(0.0, f64::max);
             let scale = if peak > 0.0 { peak } else { 1.0 };
@@ -33,7 +33,7 @@ pub(super) fn write(folder: &Path, scene: &Scene, facts: &Facts) -> Result<()> {
         })
         .collect();
     let used = scene.materials.iter().zip(&facts.materials);
-    let materials: Vec<(String, Leaves)> = used
+    let materials: Vec<(String, Spectrum)> = used
         .filter(|(_, fact)| fact.triangles > 0)
         .flat_map(|(material, fact)| {
             let less = if fact.textured { " less texture" } else { "" };
@@ -102,24 +102,24 @@ fn charts(
     title: &str,
     y: &str,
     scene: &Scene,
-    spectra: &[(String, Leaves)],
+    spectra: &[(String, Spectrum)],
 ) -> Result<()> {
     let grid = &scene.grid;
-    // A leaf holds the mean of its interval: steps.
-    let steps = |leaves: &Leaves| -> Vec<[f64; 2]> {
+    // A band holds the mean of its interval: steps.
+    let steps = |spectrum: &Spectrum| -> Vec<[f64; 2]> {
         let ends = |(k, value): (usize, &f64)| [[grid.left(k), *value], [grid.left(k + 1), *value]];
-        leaves.iter().enumerate().flat_map(ends).collect()
+        spectrum.iter().enumerate().flat_map(ends).collect()
     };
     for (page, part) in spectra.chunks(PLOTTED).enumerate() {
         let number = match page {
             0 => String::new(),
             page => format!("-{}", page + 1),
         };
-        let series = |(name, leaves): &(String, Leaves)| Series {
+        let series = |(name, spectrum): &(String, Spectrum)| Series {
             name: name.clone(),
-            points: steps(leaves),
+            points: steps(spectrum),
         };
-        let chart = Chart {
+        let chart = LineChart {
             title: title.to_owned(),
             x: "wavelength, nm".into(),
             y: y.to_owned(),

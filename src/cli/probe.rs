@@ -2,7 +2,7 @@
 //!
 //! The CSV out has a line a point, in the order of the points:
 //! `x,y,z,nx,ny,nz,E_X,E_Y,E_Z` (unit normal; tristimulus irradiance with Km = 683 lm/W), with `--bands` also `E_380 ...`,
-//! one column for each of the 64 leaves by its left edge in nm, W/m2/nm, from a solution on all leaves; then `lux`, which
+//! one column for each of the 64 bands by its left edge in nm, W/m2/nm, from a solution on all bands; then `lux`, which
 //! is `E_Y` under the name that people look for, and `place`: `room`, `inside` something solid or `outside` the room (see
 //! [`places`]). `--json` prints one object instead: `{"version": 1, "verdict": ..., "rounds": n, "error_de2000": figure,
 //! "columns": [names], "rows": [[numbers]], "places": [texts]}`; the columns have all but `place`.
@@ -23,9 +23,9 @@ use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::gather::{Glare, Probed};
 use crate::solve::{Bake, Representation, Round, Verdict};
-use crate::spectrum::{Grid, LEAVES};
+use crate::spectrum::{BANDS, Grid};
 use crate::store::file;
-use crate::survey::{Place, places};
+use crate::survey::{PointLocation, places};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -48,10 +48,10 @@ pub struct ProbeArgs {
     /// The CSV to write [default: stdout].
     #[arg(short, long, value_name = "OUT.csv")]
     pub output: Option<PathBuf>,
-    /// Irradiance on the 64 leaves as well.
+    /// Irradiance on the 64 bands as well.
     #[arg(long)]
     pub bands: bool,
-    /// Colour temperature, rendering, fidelity and alpha-opic daylight as well, each with its range; solves on all leaves. Where
+    /// Colour temperature, rendering, fidelity and alpha-opic daylight as well, each with its range; solves on all bands. Where
     /// there is a sky also the daylight factor, for which the room is solved once more under the sky alone.
     #[arg(long)]
     pub metrics: bool,
@@ -101,7 +101,7 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
     let points: Vec<Point> = (read.points.iter())
         .map(|&(place, normal)| (scale * place, normal))
         .collect();
-    let found = Found::at(args, (common, &talk, &stop), &bake, &points)?;
+    let found = ProbeResults::at(args, (common, &talk, &stop), &bake, &points)?;
     talk.clear();
     found.tell(&talk);
 
@@ -143,9 +143,9 @@ pub fn run(args: &ProbeArgs, common: &Common) -> Result<u8> {
 }
 
 /// What was found.
-struct Found {
+struct ProbeResults {
     probed: Vec<Probed>,
-    places: Vec<Place>,
+    places: Vec<PointLocation>,
     metrics: Option<Metrics>,
     /// Of the viewpoints.
     views: Vec<Glare>,
@@ -155,7 +155,7 @@ struct Found {
     daylight: Option<Verdict>,
 }
 
-impl Found {
+impl ProbeResults {
     /// Looks at points and from viewpoints.
     fn at(
         args: &ProbeArgs,
@@ -208,7 +208,7 @@ fn measured(
     (common, talk, stop): (&Common, &Talk, &Stop),
     bake: &Bake,
     points: &[Point],
-    (probed, places): (&[Probed], &[Place]),
+    (probed, places): (&[Probed], &[PointLocation]),
 ) -> Result<(Metrics, Option<Verdict>)> {
     let scene = bake.scene();
     let metrics = Metrics::new(&scene.grid, probed, places, bake.rounds().last());
@@ -261,12 +261,12 @@ fn read_points(path: &Path) -> Points {
 }
 
 /// Says how many points are not in the room.
-fn warn_of(places: &[Place], talk: &Talk) {
-    for place in [Place::Inside, Place::Outside] {
+fn warn_of(places: &[PointLocation], talk: &Talk) {
+    for place in [PointLocation::Inside, PointLocation::Outside] {
         let count = places.iter().filter(|p| **p == place).count();
         if count > 0 {
             let where_it_is = match place {
-                Place::Inside => "inside something solid",
+                PointLocation::Inside => "inside something solid",
                 _ => "outside the room",
             };
             talk.warn(&format!(
@@ -301,7 +301,7 @@ fn columns(bands: bool, grid: &Grid) -> Vec<String> {
         .map(String::from)
         .collect();
     if bands {
-        columns.extend((0..LEAVES).map(|leaf| format!("E_{}", grid.left(leaf))));
+        columns.extend((0..BANDS).map(|band| format!("E_{}", grid.left(band))));
     }
     columns.push("lux".into());
     columns
@@ -311,7 +311,7 @@ fn columns(bands: bool, grid: &Grid) -> Vec<String> {
 fn table(
     columns: &[String],
     rows: &[Vec<f64>],
-    places: &[Place],
+    places: &[PointLocation],
     metrics: Option<&Metrics>,
 ) -> String {
     let mut header = columns.to_vec();
@@ -335,7 +335,7 @@ fn table(
 fn row((point, normal): &Point, light: &Probed, bands: bool) -> Vec<f64> {
     let mut row = [point.to_array(), normal.to_array(), light.xyz].concat();
     if bands {
-        row.extend(light.leaves);
+        row.extend(light.spectrum);
     }
     row.push(light.xyz[1]);
     row

@@ -14,14 +14,14 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// A page in the making.
-pub(super) struct Report {
+pub(super) struct PageBuilder {
     pub(super) path: PathBuf,
     plan: Value,
     rounds: Vec<Value>,
     history: History,
 }
 
-impl Report {
+impl PageBuilder {
     pub(super) fn new(path: PathBuf, plan: &PlanRecord) -> Result<Self> {
         Ok(Self {
             path,

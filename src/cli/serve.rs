@@ -10,7 +10,7 @@ use super::rooms::load;
 use super::stop::KILLED;
 use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
-use crate::serve::{Server, Wishes};
+use crate::serve::{ServeOptions, Server};
 use crate::solve::{Representation, Settings};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -76,7 +76,7 @@ pub fn run(args: &ServeArgs, common: &Common) -> Result<u8> {
         end();
     })
     .map_err(|problem| Error::Internal(format!("Ctrl-C: {problem}")))?;
-    let wishes = Wishes {
+    let wishes = ServeOptions {
         settings: Settings {
             error: args.error,
             representation: args.spectrum,

@@ -1,7 +1,7 @@
 //! What is outside, as typed.
 
 use crate::scene::sky::{
-    BRIGHT, Brightness, KELVIN, SUN_KELVIN, SkyName, SkyWish, SunPlace, SunWish, TURN,
+    BRIGHT, KELVIN, SUN_KELVIN, SkyBrightness, SkyName, SkyWish, SunPlace, SunWish, TURN,
 };
 
 /// Options of sky and sun. Each wins over what the file of spectra says.
@@ -55,7 +55,7 @@ pub struct SkyArgs {
 impl SkyArgs {
     /// What is meant.
     pub(super) fn wish(&self) -> SkyWish {
-        let lux = self.sky_lux.map(Brightness::Illuminance);
+        let lux = self.sky_lux.map(SkyBrightness::Illuminance);
         let (kind, turbidity, map) = match &self.name {
             Some(SkyName::Type(kind)) => (Some(*kind), None, None),
             Some(SkyName::Hosek(turbidity)) => (None, Some(*turbidity), None),
@@ -66,7 +66,7 @@ impl SkyArgs {
             kind,
             turbidity,
             map,
-            brightness: lux.or(self.sky_luminance.map(Brightness::Luminance)),
+            brightness: lux.or(self.sky_luminance.map(SkyBrightness::Luminance)),
             kelvin: self.sky_cct,
             horizon_kelvin: self.horizon_cct,
             sunward_kelvin: self.sunward_cct,

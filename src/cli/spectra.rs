@@ -3,9 +3,9 @@
 //! One line a spectrum: name, what it is (`light` or `reflectance`), first and last wavelength in nm.
 
 use super::results::print;
-use crate::data::{Kind, Named, named, names, nearest};
+use crate::data::{Named, TableKind, named, names, nearest};
 use crate::error::{Error, Result};
-use crate::report::{Align, Chart, Scale, Series, Table};
+use crate::report::{Align, LineChart, Scale, Series, TextTable};
 use crate::store::file;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ pub fn run(args: &SpectraArgs) -> Result<()> {
         plot(path, pattern, &found)?;
     }
     use Align::{Left, Right};
-    let mut table = Table::new([
+    let mut table = TextTable::new([
         ("name", Left),
         ("is", Left),
         ("from nm", Right),
@@ -78,10 +78,10 @@ fn matching(pattern: &str) -> Vec<(String, Named)> {
         .collect()
 }
 
-fn kind(kind: Kind) -> &'static str {
+fn kind(kind: TableKind) -> &'static str {
     match kind {
-        Kind::Illuminant => "light",
-        Kind::Reflectance => "reflectance",
+        TableKind::Illuminant => "light",
+        TableKind::Reflectance => "reflectance",
     }
 }
 
@@ -94,7 +94,9 @@ fn plot(path: &Path, pattern: &str, found: &[(String, Named)]) -> Result<()> {
         );
         return Err(Error::input(place, what, "give more of the name"));
     }
-    let lights = found.iter().filter(|(_, s)| s.kind == Kind::Illuminant);
+    let lights = found
+        .iter()
+        .filter(|(_, s)| s.kind == TableKind::Illuminant);
     let y = match lights.count() {
         0 => "reflectance",
         n if n == found.len() => "power, share of its peak",
@@ -103,8 +105,8 @@ fn plot(path: &Path, pattern: &str, found: &[(String, Named)]) -> Result<()> {
     let series = |(name, spectrum): &(String, Named)| {
         let table = &spectrum.table;
         let peak = match spectrum.kind {
-            Kind::Illuminant => table.values().iter().copied().fold(0.0, f64::max),
-            Kind::Reflectance => 1.0,
+            TableKind::Illuminant => table.values().iter().copied().fold(0.0, f64::max),
+            TableKind::Reflectance => 1.0,
         };
         let points = table.wavelengths().iter().zip(table.values());
         Series {
@@ -112,7 +114,7 @@ fn plot(path: &Path, pattern: &str, found: &[(String, Named)]) -> Result<()> {
             points: points.map(|(nm, value)| [*nm, value / peak]).collect(),
         }
     };
-    let chart = Chart {
+    let chart = LineChart {
         title: match pattern {
             "" => "Spectra".into(),
             pattern => format!("Spectra: {pattern}"),

@@ -3,7 +3,7 @@
 use super::log::{LayerRecord, VerdictRecord};
 use crate::audit::{Honesty, Report};
 use crate::gather::Interpolation;
-use crate::report::{Align, Table};
+use crate::report::{Align, TextTable};
 use crate::solve::{Round, Verdict};
 use serde_json::Value;
 
@@ -22,7 +22,7 @@ pub(super) fn rounds(rounds: &[Round]) -> String {
         "rays",
         "s",
     ];
-    let mut table = Table::new(titles.map(|title| (title, Right)));
+    let mut table = TextTable::new(titles.map(|title| (title, Right)));
     let error = |value: Option<f64>| value.map_or("-".into(), |v| format!("{v:.3}"));
     for r in rounds {
         table.row([

@@ -71,12 +71,12 @@ impl Work {
 
 /// Says which part of a phase begins.
 #[derive(Debug, Clone)]
-pub struct Parts {
+pub struct PhaseParts {
     bar: ProgressBar,
     work: Work,
 }
 
-impl Parts {
+impl PhaseParts {
     /// A part begins.
     pub fn begins(&self, phase: &str, part: &'static str) {
         self.bar.set_message(part);
@@ -145,9 +145,9 @@ impl Talk {
     }
 
     /// For whoever knows the parts of phases.
-    pub fn parts(&self) -> Parts {
+    pub fn parts(&self) -> PhaseParts {
         self.spin();
-        Parts {
+        PhaseParts {
             bar: self.bar.clone(),
             work: self.work.clone(),
         }

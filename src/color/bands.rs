@@ -1,10 +1,10 @@
-//! What spectra of light are weighted on: the 64 leaves of a grid, or the samples of a published table.
+//! What spectra of light are weighted on: the 64 bands of a grid, or the samples of a published table.
 //!
-//! A light has one power for each band. On leaves a weight is the exact integral of the weighting function over the leaf;
+//! A light has one power for each band. On a grid a weight is the exact integral of the weighting function over the band;
 //! on samples it is the function there, times the step, as the CIE sums (CIE 015:2004, 7.1).
 
 use super::Xyz;
-use crate::data::{Grid, LEAVES, Outside, Table};
+use crate::data::{BANDS, Grid, Outside, Table};
 
 /// Wavelength bands.
 #[derive(Debug, Clone)]
@@ -16,11 +16,11 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// The leaves of a grid.
-    pub fn leaves(grid: &Grid) -> Self {
+    /// The bands of a grid.
+    pub fn of(grid: &Grid) -> Self {
         Self {
-            edges: (0..LEAVES)
-                .map(|leaf| [grid.left(leaf), grid.left(leaf + 1)])
+            edges: (0..BANDS)
+                .map(|band| [grid.left(band), grid.left(band + 1)])
                 .collect(),
             width: grid.width(),
         }
@@ -79,12 +79,12 @@ impl Bands {
 
 /// Coloured samples under a light: an observer on bands, and times each reflectance.
 #[derive(Debug, Clone)]
-pub(super) struct Samples {
+pub(super) struct ColourSamples {
     white: [Vec<f64>; 3],
     colours: Vec<[Vec<f64>; 3]>,
 }
 
-impl Samples {
+impl ColourSamples {
     pub(super) fn new(bands: &Bands, observer: &[Table; 3], reflectances: &[Table]) -> Self {
         let times = |reflectance: &Table| {
             let function = observer.each_ref();

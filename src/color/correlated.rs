@@ -5,7 +5,7 @@
 //! neighbours and the light, exact near the locus, and of the parabola through the three distances, exact far from it.
 //! The first holds where |Duv| < .002. Rows are .25 % apart, in f64: his correction of 1 % rows (.99991) is not needed.
 //!
-//! The locus is worked out on the bands of the light, so that a blackbody on 64 leaves lies on it.
+//! The locus is worked out on the bands of the light, so that a blackbody on 64 bands lies on it.
 
 use super::Xyz;
 use super::bands::{Bands, weighted};

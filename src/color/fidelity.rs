@@ -2,7 +2,7 @@
 //! under a reference of the same colour temperature, in CAM02-UCS with the 10 degree observer.
 
 use super::appearance::{Appearance, Viewer};
-use super::bands::{Bands, Samples, weighted};
+use super::bands::{Bands, ColourSamples, weighted};
 use crate::data::{blackbody, cmf_1931, cmf_1964, colour_evaluation, daylight};
 
 /// Between these the reference is a mixture of Planck and daylight, K.
@@ -28,7 +28,7 @@ pub struct EvaluationColours {
     bands: Bands,
     /// y_bar of the 2 degree observer, by which mixtures are weighed.
     luminous: Vec<f64>,
-    samples: Samples,
+    samples: ColourSamples,
 }
 
 impl EvaluationColours {
@@ -36,7 +36,7 @@ impl EvaluationColours {
     pub fn new(bands: &Bands) -> Self {
         Self {
             luminous: bands.weights(&cmf_1931()[1]),
-            samples: Samples::new(bands, &cmf_1964(), &colour_evaluation()),
+            samples: ColourSamples::new(bands, &cmf_1964(), &colour_evaluation()),
             bands: bands.clone(),
         }
     }

@@ -13,7 +13,7 @@ use std::fmt;
 
 /// How many measures there are.
 pub const MEASURES: usize = 12;
-/// Names with units, in the order of [`Measured::values`].
+/// Names with units, in the order of [`LightMeasures::values`].
 pub const NAMES: [&str; MEASURES] = [
     "lux", "CCT_K", "Duv", "Ra", "R9", "Rf", "Rg", "EDI_sc", "EDI_mc", "EDI_lc", "EDI_rh",
     "EDI_mel",
@@ -48,7 +48,7 @@ impl fmt::Display for Undefined {
 /// A light, measured.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Measured {
+pub struct LightMeasures {
     /// In the order of [`NAMES`].
     pub values: [Result<f64, Undefined>; MEASURES],
     /// Distance in (u, v) of the light and the reference of Ra; none where Ra is not defined.
@@ -81,11 +81,11 @@ impl Meter {
     }
 
     /// Measures a light: irradiance on the bands, W/m2/nm.
-    pub fn measure(&self, light: &[f64]) -> Measured {
+    pub fn measure(&self, light: &[f64]) -> LightMeasures {
         let xyz = self.observer.each_ref().map(|w| weighted(light, w));
         let mut values = [Err(Undefined::NoLight); MEASURES];
         values[LUX] = Ok(KM * xyz[1].max(0.0));
-        let mut out = Measured {
+        let mut out = LightMeasures {
             values,
             reference_distance: None,
         };
@@ -121,11 +121,11 @@ impl Meter {
     pub fn ranges(
         &self,
         light: &[f64],
-        measured: &Measured,
+        measured: &LightMeasures,
         stated: Stated,
     ) -> [Option<Range>; MEASURES] {
         let others = self.tolerance.variants(light, stated.chromaticity);
-        let others: Option<Vec<Measured>> =
+        let others: Option<Vec<LightMeasures>> =
             others.map(|lights| lights.iter().map(|l| self.measure(l)).collect());
         std::array::from_fn(|k| {
             let value = measured.values[k].ok()?;
@@ -401,7 +401,7 @@ mod tests {
     ];
 
     fn meters() -> [(Bands, Meter); 2] {
-        [Bands::samples(380, 780, 5), Bands::leaves(&Grid::default())]
+        [Bands::samples(380, 780, 5), Bands::of(&Grid::default())]
             .map(|bands| (bands.clone(), Meter::new(&bands)))
     }
 
@@ -415,7 +415,7 @@ mod tests {
     #[test]
     fn every_illuminant_is_as_a_peer_has_it() {
         // Greatest differences allowed: CCT relative, Duv, Ra, R9, Rf, Rg, daylight relative. At 5 nm ours is the peer's
-        // method but for the colour temperature of Ra's reference (Robertson's there). Leaves of 6.25 nm blur lines.
+        // method but for the colour temperature of Ra's reference (Robertson's there). Bands of 6.25 nm blur lines.
         let allowed = [
             [4e-4, 4e-5, 0.02, 0.1, 0.02, 0.02, 3e-3],
             [4.5e-3, 3.5e-4, 1.3, 5.0, 0.9, 0.8, 4.5e-3],

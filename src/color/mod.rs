@@ -27,7 +27,7 @@ pub use difference::{de_luv, de2000, lab, luv, luv_jacobian};
 pub use display::{LinearSrgb, decode, encode, encode_byte};
 pub use fidelity::{EvaluationColours, Fidelity};
 pub use glare::{Bright, glare_range, position_index, unified_glare_rating};
-pub use measures::{MEASURES, Measured, Meter, NAMES, Undefined};
+pub use measures::{LightMeasures, MEASURES, Meter, NAMES, Undefined};
 pub use observer::{KM, Observer};
 pub use primaries::primaries;
 pub use rendering::{GREATEST_DISTANCE, Rendering, TestColours};

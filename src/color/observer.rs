@@ -1,10 +1,10 @@
-//! The CIE 1931 2 degree standard observer on the leaves of a grid.
+//! The CIE 1931 2 degree standard observer on the bands of a grid.
 //!
 //! A = k * integral of S(lambda) a_bar(lambda) d lambda, for A in X, Y, Z (paper eq. 1; CIE 015:2004, section 7).
-//! With S held constant on each leaf this is k * sum S_leaf w_leaf, w_leaf the integral of a_bar over the leaf, in nm.
-//! The paper samples a_bar at the left edge of the leaf instead.
+//! With S held constant on each band this is k * sum S_leaf w_leaf, w_leaf the integral of a_bar over the band, in nm.
+//! The paper samples a_bar at the left edge of the band instead.
 
-use crate::data::{Grid, Leaves};
+use crate::data::{Grid, Spectrum};
 use crate::data::{Outside, Table, cmf_1931};
 
 /// Maximum luminous efficacy of radiation, lm/W (CIE 018:2019; 683.002 for the SI's 540 THz, 683 by convention).
@@ -22,16 +22,16 @@ impl Observer {
         Self { cmf: cmf_1931() }
     }
 
-    /// Integrals of x_bar, y_bar, z_bar over each leaf, nm.
-    pub fn weights(&self, grid: &Grid) -> [Leaves; 3] {
+    /// Integrals of x_bar, y_bar, z_bar over each band, nm.
+    pub fn weights(&self, grid: &Grid) -> [Spectrum; 3] {
         self.cmf.each_ref().map(|cmf| {
             grid.means(cmf, Outside::Zero)
                 .map(|mean| mean * grid.width())
         })
     }
 
-    /// x_bar, y_bar, z_bar at the left edge of each leaf: the paper's weights (2.1.1).
-    pub fn samples(&self, grid: &Grid) -> [Leaves; 3] {
+    /// x_bar, y_bar, z_bar at the left edge of each band: the paper's weights (2.1.1).
+    pub fn samples(&self, grid: &Grid) -> [Spectrum; 3] {
         self.cmf
             .each_ref()
             .map(|cmf| grid.left_edges(cmf, Outside::Zero))
@@ -90,19 +90,19 @@ mod tests {
     }
 
     #[test]
-    fn leaves_give_the_white_point_of_the_1_nm_table() {
+    fn bands_give_the_white_point_of_the_1_nm_table() {
         let observer = Observer::cie1931();
         let grid = Grid::new(360.0, 830.0);
         for name in ["cie/A", "cie/D65", "cie/F2"] {
             let table = named(name).unwrap().table;
             let fine = chromaticity(summed(&table, 360, 830, 1));
-            let leaves = chromaticity(tristimulus(
+            let bands = chromaticity(tristimulus(
                 &grid.means(&table, Outside::Hold),
                 &observer.weights(&grid),
             ));
             assert!(
-                (fine[0] - leaves[0]).hypot(fine[1] - leaves[1]) < 1e-3,
-                "{name}: {fine:?} {leaves:?}"
+                (fine[0] - bands[0]).hypot(fine[1] - bands[1]) < 1e-3,
+                "{name}: {fine:?} {bands:?}"
             );
         }
     }

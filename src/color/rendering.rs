@@ -4,7 +4,7 @@
 //! are compared in W*U*V* after a von Kries adaptation; R = 100 - 4.6 dE.
 
 use super::Xyz;
-use super::bands::{Bands, Samples};
+use super::bands::{Bands, ColourSamples};
 use super::correlated::uv_1960;
 use crate::data::{blackbody, cmf_1931, daylight, test_colours};
 
@@ -33,14 +33,14 @@ pub struct Rendering {
 #[derive(Debug, Clone)]
 pub struct TestColours {
     bands: Bands,
-    samples: Samples,
+    samples: ColourSamples,
 }
 
 impl TestColours {
     /// The samples on bands.
     pub fn new(bands: &Bands) -> Self {
         Self {
-            samples: Samples::new(bands, &cmf_1931(), &test_colours()),
+            samples: ColourSamples::new(bands, &cmf_1931(), &test_colours()),
             bands: bands.clone(),
         }
     }

@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn variants_are_as_far_as_stated_and_as_bright() {
-        let bands = Bands::leaves(&Grid::default());
+        let bands = Bands::of(&Grid::default());
         let observer = cmf_1931().map(|cmf| bands.weights(&cmf));
         let tolerance = Tolerance::new(&bands, observer.clone());
         for name in ["cie/A", "cie/D65", "cie/F2", "cie/F11", "cie/LED-RGB1"] {

@@ -1,19 +1,19 @@
-//! Change to tristimulus values (paper 3.3, eq. 1): A = k * sum over the leaves of S a_bar.
+//! Change to tristimulus values (paper 3.3, eq. 1): A = k * sum over the bands of S a_bar.
 //!
 //! The factor k is the caller's: 683 lm/W for absolute values, 1 / sum(S y_bar) for a source that counts as 1.
 
 use super::Xyz;
-use crate::data::{LEAVES, Leaves};
+use crate::data::{BANDS, Spectrum};
 
 /// `sum spectrum * weights` for X, Y, Z, without a factor.
-pub fn tristimulus(spectrum: &Leaves, weights: &[Leaves; 3]) -> Xyz {
+pub fn tristimulus(spectrum: &Spectrum, weights: &[Spectrum; 3]) -> Xyz {
     weights
         .each_ref()
-        .map(|w| (0..LEAVES).map(|leaf| spectrum[leaf] * w[leaf]).sum())
+        .map(|w| (0..BANDS).map(|band| spectrum[band] * w[band]).sum())
 }
 
 /// The paper's K = 1 / sum(S y_bar), with which the source has Y = 1; 0 for a source without visible light.
-pub fn normalization(source: &Leaves, weights: &[Leaves; 3]) -> f64 {
+pub fn normalization(source: &Spectrum, weights: &[Spectrum; 3]) -> f64 {
     let y = tristimulus(source, weights)[1];
     if y > 0.0 { 1.0 / y } else { 0.0 }
 }
@@ -43,6 +43,6 @@ mod tests {
             let k = normalization(&source, &weights);
             assert!((k * tristimulus(&source, &weights)[1] - 1.0).abs() < 1e-15);
         }
-        assert_eq!(normalization(&[0.0; LEAVES], &weights), 0.0);
+        assert_eq!(normalization(&[0.0; BANDS], &weights), 0.0);
     }
 }

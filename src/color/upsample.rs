@@ -11,7 +11,7 @@
 
 use super::display::LinearSrgb;
 use super::{Observer, Xyz, lab};
-use crate::data::{Grid, LEAVES, Leaves};
+use crate::data::{BANDS, Grid, Spectrum};
 use crate::data::{Outside, named};
 use std::sync::OnceLock;
 
@@ -36,14 +36,14 @@ const DARKEST: f64 = 1.0 / 1024.0;
 /// Turns linear sRGB colours into reflectances on a grid.
 #[derive(Debug)]
 pub struct Upsampler {
-    /// weights[a][leaf]: what reflectance 1 in the leaf adds to X, Y, Z under D65; Y of white is 1.
-    weights: [Leaves; 3],
+    /// weights[a][band]: what reflectance 1 in the band adds to X, Y, Z under D65; Y of white is 1.
+    weights: [Spectrum; 3],
     /// XYZ of D65 on the grid.
     white: Xyz,
     srgb: LinearSrgb,
-    /// First leaf that the observer sees: what a colour says of shorter waves is that they are reflected like it.
+    /// First band that the observer sees: what a colour says of shorter waves is that they are reflected like it.
     first: usize,
-    table: OnceLock<Vec<[f32; LEAVES]>>,
+    table: OnceLock<Vec<[f32; BANDS]>>,
 }
 
 impl Upsampler {
@@ -63,7 +63,7 @@ impl Upsampler {
             weights,
             white,
             srgb: LinearSrgb::with_white(white),
-            first: (0..LEAVES)
+            first: (0..BANDS)
                 .find(|&k| weights.iter().any(|row| row[k] > 0.0))
                 .unwrap_or(0),
             table: OnceLock::new(),
@@ -71,12 +71,12 @@ impl Upsampler {
     }
 
     /// The linear sRGB colour of a reflectance under D65; the inverse of [`Self::reflectance`].
-    pub fn rgb(&self, reflectance: &Leaves) -> [f64; 3] {
+    pub fn rgb(&self, reflectance: &Spectrum) -> [f64; 3] {
         self.srgb.from_xyz(self.xyz(reflectance))
     }
 
     /// Tristimulus values of a reflectance under D65; Y of white is 1.
-    pub fn xyz(&self, reflectance: &Leaves) -> Xyz {
+    pub fn xyz(&self, reflectance: &Spectrum) -> Xyz {
         self.weights
             .each_ref()
             .map(|row| row.iter().zip(reflectance).map(|(w, r)| w * r).sum())
@@ -103,15 +103,15 @@ impl Upsampler {
     /// assert!((back[0] - 0.45).abs() < 1e-4 && (back[1] - 0.12).abs() < 1e-4);
     /// assert_eq!(upsampler.reflectance([1.0, 1.0, 1.0]), [1.0; 64]);
     /// ```
-    pub fn reflectance(&self, rgb: [f32; 3]) -> Leaves {
+    pub fn reflectance(&self, rgb: [f32; 3]) -> Spectrum {
         self.solve(inside(rgb))
     }
 
     /// The same from a table, for colours by the thousand; greys stay exactly flat. The table is made at the first call.
-    pub fn reflectance_fast(&self, rgb: [f32; 3]) -> Leaves {
+    pub fn reflectance_fast(&self, rgb: [f32; 3]) -> Spectrum {
         let rgb = inside(rgb);
         if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
-            return [rgb[0]; LEAVES];
+            return [rgb[0]; BANDS];
         }
         let table = self.table();
         // Cell and place in the cell along each axis; rounding to a neighbouring cell puts the place on its edge.
@@ -138,20 +138,20 @@ impl Upsampler {
         }
         let [a, b, c, d] = corners.map(|i| &table[i]);
         let [wa, wb, wc, wd] = shares;
-        std::array::from_fn(|leaf| {
-            wa * f64::from(a[leaf])
-                + wb * f64::from(b[leaf])
-                + wc * f64::from(c[leaf])
-                + wd * f64::from(d[leaf])
+        std::array::from_fn(|band| {
+            wa * f64::from(a[band])
+                + wb * f64::from(b[band])
+                + wc * f64::from(c[band])
+                + wd * f64::from(d[band])
         })
     }
 
     /// The table, which is made at the first call.
-    pub(crate) fn table(&self) -> &[[f32; LEAVES]] {
+    pub(crate) fn table(&self) -> &[[f32; BANDS]] {
         self.table.get_or_init(|| self.make_table())
     }
 
-    fn make_table(&self) -> Vec<[f32; LEAVES]> {
+    fn make_table(&self) -> Vec<[f32; BANDS]> {
         use rayon::prelude::*;
         (0..(STEPS + 1).pow(3))
             .into_par_iter()
@@ -163,9 +163,9 @@ impl Upsampler {
     }
 
     /// `rgb` in [0, 1].
-    fn solve(&self, rgb: [f64; 3]) -> Leaves {
+    fn solve(&self, rgb: [f64; 3]) -> Spectrum {
         if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
-            return [rgb[0]; LEAVES];
+            return [rgb[0]; BANDS];
         }
         let brightest = rgb.iter().fold(0.0f64, |m, &c| m.max(c));
         if brightest < DARKEST {
@@ -177,11 +177,11 @@ impl Upsampler {
     }
 
     /// The spectrum of coefficients, held below what the observer sees.
-    fn evaluate(&self, c: &[f64; 3]) -> Leaves {
-        let mut leaves = evaluate(c);
-        let held = leaves[self.first];
-        leaves[..self.first].fill(held);
-        leaves
+    fn evaluate(&self, c: &[f64; 3]) -> Spectrum {
+        let mut spectrum = evaluate(c);
+        let held = spectrum[self.first];
+        spectrum[..self.first].fill(held);
+        spectrum
     }
 
     /// Levenberg-Marquardt on the three L*a*b* residuals, from the grey of the same luminance.
@@ -219,14 +219,14 @@ impl Upsampler {
     fn residual(&self, c: &[f64; 3], target: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut xyz = [0.0; 3];
         let mut slopes = [[0.0; 3]; 3];
-        for leaf in 0..LEAVES {
-            let t = place(leaf);
+        for band in 0..BANDS {
+            let t = place(band);
             let x = (c[0] * t + c[1]) * t + c[2];
             let root = 1.0 / (1.0 + x * x).sqrt();
             let value = 0.5 + 0.5 * x * root;
             let slope = 0.5 * root * root * root;
             for a in 0..3 {
-                let w = self.weights[a][leaf];
+                let w = self.weights[a][band];
                 xyz[a] += w * value;
                 let ws = w * slope;
                 slopes[a][0] += ws * t * t;
@@ -272,14 +272,14 @@ fn node(i: usize) -> f64 {
         .powi(3)
 }
 
-/// The middle of a leaf on [-1, 1].
-fn place(leaf: usize) -> f64 {
-    (2 * leaf + 1) as f64 / LEAVES as f64 - 1.0
+/// The middle of a band on [-1, 1].
+fn place(band: usize) -> f64 {
+    (2 * band + 1) as f64 / BANDS as f64 - 1.0
 }
 
-fn evaluate(c: &[f64; 3]) -> Leaves {
-    std::array::from_fn(|leaf| {
-        let t = place(leaf);
+fn evaluate(c: &[f64; 3]) -> Spectrum {
+    std::array::from_fn(|band| {
+        let t = place(band);
         let x = (c[0] * t + c[1]) * t + c[2];
         // Rounding can leave the interval by one bit.
         (0.5 + 0.5 * x / (1.0 + x * x).sqrt()).clamp(0.0, 1.0)
@@ -328,7 +328,7 @@ mod tests {
     use crate::color::{de2000, tristimulus};
     use proptest::prelude::*;
 
-    fn difference(upsampler: &Upsampler, rgb: [f32; 3], reflectance: &Leaves) -> f64 {
+    fn difference(upsampler: &Upsampler, rgb: [f32; 3], reflectance: &Spectrum) -> f64 {
         let asked = upsampler.srgb.to_xyz(rgb.map(f64::from));
         de2000(asked, upsampler.xyz(reflectance), upsampler.white)
     }
@@ -370,10 +370,10 @@ mod tests {
     fn greys_are_exactly_flat() {
         let upsampler = Upsampler::new(&Grid::default());
         for grey in [0.0, 1e-6, 0.18, 0.5, 0.95, 1.0f32] {
-            assert_eq!(upsampler.reflectance([grey; 3]), [f64::from(grey); LEAVES]);
+            assert_eq!(upsampler.reflectance([grey; 3]), [f64::from(grey); BANDS]);
             assert_eq!(
                 upsampler.reflectance_fast([grey; 3]),
-                [f64::from(grey); LEAVES]
+                [f64::from(grey); BANDS]
             );
         }
     }
@@ -381,11 +381,11 @@ mod tests {
     #[test]
     fn colours_outside_are_brought_in() {
         let upsampler = Upsampler::new(&Grid::default());
-        assert_eq!(upsampler.reflectance([2.0, 5.0, 1.5]), [1.0; LEAVES]);
-        assert_eq!(upsampler.reflectance([f32::NAN, -1.0, 0.0]), [0.0; LEAVES]);
+        assert_eq!(upsampler.reflectance([2.0, 5.0, 1.5]), [1.0; BANDS]);
+        assert_eq!(upsampler.reflectance([f32::NAN, -1.0, 0.0]), [0.0; BANDS]);
         assert_eq!(
             upsampler.reflectance_fast([f32::NAN, -1.0, 0.0]),
-            [0.0; LEAVES]
+            [0.0; BANDS]
         );
     }
 
@@ -397,7 +397,7 @@ mod tests {
             [[0.6, 0.5, 0.1], [0.1, 0.3, 0.7]],
             [[0.5, 0.5, 0.5], [0.8, 0.1, 0.1]],
         ] {
-            let mut before: Option<Leaves> = None;
+            let mut before: Option<Spectrum> = None;
             for i in 0..=200 {
                 let s = i as f32 / 200.0;
                 let now = upsampler.reflectance(std::array::from_fn(|a| {
@@ -416,7 +416,7 @@ mod tests {
     }
 
     /// The weights of another lamp, Y of white is 1.
-    fn under(lamp: &str) -> ([Leaves; 3], Xyz) {
+    fn under(lamp: &str) -> ([Spectrum; 3], Xyz) {
         let grid = Grid::default();
         let power = grid.means(&named(lamp).unwrap().table, Outside::Hold);
         let mut weights = Observer::cie1931().weights(&grid);

@@ -1,6 +1,6 @@
 //! Geometry held fixed: the links of one bake, solved again with other lanes.
 //!
-//! The truth here is the solution on all 64 leaves of the same links, so that what is left is what the lanes do.
+//! The truth here is the solution on all 64 bands of the same links, so that what is left is what the lanes do.
 //! Differences are of the irradiance of the elements, area-weighted means.
 
 use crate::color::{de_luv, de2000};
@@ -26,7 +26,7 @@ pub struct HeldRun {
     pub seconds: f64,
     /// What the choice believed to cost, mean CIELUV: an estimate, under guaranteed control a bound.
     pub believed: Option<f64>,
-    /// Mean difference from the 64 leaves, CIELUV.
+    /// Mean difference from the 64 bands, CIELUV.
     pub de_luv: f64,
     /// The same, CIEDE2000.
     pub de2000: f64,

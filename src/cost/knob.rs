@@ -36,7 +36,7 @@ impl Pair {
 /// The automatic run of an error beside the best fixed pair.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
-pub struct Balance {
+pub struct KnobComparison {
     /// The automatic run.
     pub automatic: Run,
     /// The fastest pair that is as accurate; none if no pair is.
@@ -59,7 +59,7 @@ pub fn pairs(errors: &[f64]) -> Vec<Pair> {
 }
 
 /// Compares the automatic runs among `runs` with runs of fixed pairs.
-pub fn balance(runs: &[Run], fixed: &[Run]) -> Vec<Balance> {
+pub fn balance(runs: &[Run], fixed: &[Run]) -> Vec<KnobComparison> {
     if fixed.is_empty() {
         return Vec::new();
     }
@@ -71,7 +71,7 @@ pub fn balance(runs: &[Run], fixed: &[Run]) -> Vec<Balance> {
                 .filter(|f| f.de2000.value <= AS_GOOD * automatic.de2000.value)
                 .min_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s))
                 .cloned();
-            Balance {
+            KnobComparison {
                 automatic: automatic.clone(),
                 ratio: best
                     .as_ref()

@@ -21,6 +21,6 @@ pub mod tables;
 
 pub use choice::{Choice, choose};
 pub use held::{HeldRun, held};
-pub use knob::{Balance, Pair, balance, pairs};
+pub use knob::{KnobComparison, Pair, balance, pairs};
 pub use run::{Run, Task};
 pub use sweep::{Knob, Study, Sweep};

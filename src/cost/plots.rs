@@ -2,7 +2,7 @@
 
 use super::run::{PHASES, Run};
 use super::sweep::Study;
-use crate::report::{Bars, Chart, Scale, Series};
+use crate::report::{Bars, LineChart, Scale, Series};
 use crate::solve::Representation;
 
 /// File names and what they show, in the order of the page.
@@ -58,7 +58,7 @@ fn lines(runs: &[Run], point: impl Fn(&Run) -> [f64; 2]) -> Vec<Series> {
 }
 
 fn error_time(study: &Study, room: &str) -> String {
-    Chart {
+    LineChart {
         title: format!("{room}: measured error against time"),
         x: "CPU time of a whole bake, s".into(),
         y: "mean CIEDE2000 at random points".into(),
@@ -70,7 +70,7 @@ fn error_time(study: &Study, room: &str) -> String {
 }
 
 fn memory(study: &Study, room: &str) -> String {
-    Chart {
+    LineChart {
         title: format!("{room}: memory against measured error"),
         x: "hierarchy, links and rows, MB".into(),
         y: "mean CIEDE2000 at random points".into(),
@@ -145,7 +145,7 @@ fn intervals(study: &Study, room: &str) -> String {
             }
         })
         .collect();
-    Chart {
+    LineChart {
         title: format!("{room}: spectra alone, on the same links"),
         x: "numbers a patch holds".into(),
         y: "mean CIEDE2000 from 64 leaves".into(),

@@ -4,7 +4,7 @@
 //! counted. `memory` is what hierarchy, links and rows hold, without the room itself and its ray index.
 
 use super::clock;
-use crate::audit::{Measured, Reference, Report};
+use crate::audit::{Measured, PathReference, Report};
 use crate::scene::Scene;
 use crate::solve::{Bake, Representation, Round, Settings};
 use serde::Serialize;
@@ -77,7 +77,13 @@ fn ends<S: serde::Serializer>(m: &Measured, serializer: S) -> Result<S::Ok, S::E
 
 impl Run {
     /// Bakes `scene` and compares. `white` is the irradiance of the adaptation white.
-    pub fn new(scene: Scene, task: Task, truth: &Reference, white: [f64; 3], seed: u64) -> Self {
+    pub fn new(
+        scene: Scene,
+        task: Task,
+        truth: &PathReference,
+        white: [f64; 3],
+        seed: u64,
+    ) -> Self {
         let (cpu, wall) = (clock::seconds(), Instant::now());
         let laps = Arc::new(Mutex::new((cpu, Vec::<(&'static str, f64)>::new())));
         let lap = {

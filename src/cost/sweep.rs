@@ -1,9 +1,9 @@
 //! All bakes of a room against one reference: the path tracer's answer at random points, traced once.
 
 use super::held::{HeldRun, held};
-use super::knob::{Balance, Pair, balance, pairs};
+use super::knob::{KnobComparison, Pair, balance, pairs};
 use super::run::{Run, Task, settings};
-use crate::audit::Reference;
+use crate::audit::PathReference;
 use crate::scene::Scene;
 use crate::solve::{Bake, Representation};
 
@@ -51,7 +51,7 @@ pub struct Study {
     /// Elements and links of the held solution.
     pub held_on: [usize; 2],
     /// Fixed combinations of tolerances beside the automatic one; empty if not asked for.
-    pub balance: Vec<Balance>,
+    pub balance: Vec<KnobComparison>,
     /// Points of the reference.
     pub points: usize,
     /// Irradiance of the adaptation white, tristimulus.
@@ -123,10 +123,10 @@ impl Sweep {
     }
 
     /// The path tracer's answer, its noise brought to a share of the least error asked for, and the white of the room.
-    fn reference(&self, scene: &Scene, least: f64) -> (Reference, [f64; 3]) {
+    fn reference(&self, scene: &Scene, least: f64) -> (PathReference, [f64; 3]) {
         let mut first = Bake::new(scene.clone(), settings(adaptive(least), None, self.seed));
         first.step();
-        let truth = Reference::new(&first, self.points, MOST_PATHS, self.seed ^ TRUTH_SEED);
+        let truth = PathReference::new(&first, self.points, MOST_PATHS, self.seed ^ TRUTH_SEED);
         let n = truth.truth.len().max(1) as f64;
         let white = truth.truth.iter().fold([0.0; 3], |sum, xyz| {
             std::array::from_fn(|c| sum[c] + 2.0 * xyz[c] / n)

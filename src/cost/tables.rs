@@ -3,7 +3,7 @@
 use super::choice::Choice;
 use super::run::{PHASES, Run};
 use super::sweep::Study;
-use crate::report::{Align, Table};
+use crate::report::{Align, TextTable};
 
 /// Version of the CSV's columns.
 pub const CSV_VERSION: u32 = 1;
@@ -34,7 +34,7 @@ pub fn csv(study: &Study) -> String {
     ];
     let phases = PHASES.map(|p| format!("{p}_s"));
     let all = titles.map(String::from).into_iter().chain(phases);
-    let mut table = Table::new(all.map(|t| (t, Align::Right)));
+    let mut table = TextTable::new(all.map(|t| (t, Align::Right)));
     let option = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x}"));
     let fixed = study.balance.iter().filter_map(|b| b.best.as_ref());
     let kinds = study
@@ -73,9 +73,9 @@ pub fn csv(study: &Study) -> String {
 }
 
 /// The bakes as a table for people.
-pub fn runs(runs: &[Run]) -> Table {
+pub fn runs(runs: &[Run]) -> TextTable {
     use Align::{Left, Right};
-    let mut table = Table::new([
+    let mut table = TextTable::new([
         ("spectra", Left),
         ("asked", Right),
         ("measured", Right),
@@ -107,9 +107,9 @@ pub fn runs(runs: &[Run]) -> Table {
 }
 
 /// The solutions on held links.
-pub fn held(study: &Study) -> Table {
+pub fn held(study: &Study) -> TextTable {
     use Align::{Left, Right};
-    let mut table = Table::new([
+    let mut table = TextTable::new([
         ("spectra", Left),
         ("asked", Right),
         ("lanes", Right),
@@ -139,9 +139,9 @@ pub fn held(study: &Study) -> Table {
 }
 
 /// The automatic balance beside the best fixed pairs.
-pub fn balance(study: &Study) -> Table {
+pub fn balance(study: &Study) -> TextTable {
     use Align::Right;
-    let mut table = Table::new([
+    let mut table = TextTable::new([
         ("--error", Right),
         ("measured", Right),
         ("CPU s", Right),

@@ -1,74 +1,74 @@
-//! The 64 leaves that every spectrum is held on (paper 2.1.1).
+//! The 64 bands that every spectrum is held on (paper 2.1.1).
 //!
-//! Two ways to bring a table onto the leaves: the exact band means of the piecewise linear table, and the paper's
-//! convention, the value at the left edge of the leaf (380, 385, ... 695 nm). Units: nm.
+//! Two ways to bring a table onto the bands: the exact band means of the piecewise linear table, and the paper's
+//! convention, the value at the left edge of the band (380, 385, ... 695 nm). Units: nm.
 
 use super::{Outside, Table};
 
-/// Number of leaves: 2^6, the finest level of every spectral tree.
-pub const LEAVES: usize = 64;
+/// Number of bands: 2^6, the finest level of every spectral tree.
+pub const BANDS: usize = 64;
 
-/// One value for each leaf.
-pub type Leaves = [f64; LEAVES];
+/// One value for each band.
+pub type Spectrum = [f64; BANDS];
 
-/// Where the leaves lie on the wavelength axis.
+/// Where the bands lie on the wavelength axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// Left edge of the first leaf, nm.
+    /// Left edge of the first band, nm.
     start: f64,
-    /// Width of a leaf, nm.
+    /// Width of a band, nm.
     width: f64,
 }
 
 impl Grid {
-    /// Leaves over `start..end` nm.
+    /// Bands over `start..end` nm.
     pub fn new(start: f64, end: f64) -> Self {
         Self {
             start,
-            width: (end - start) / LEAVES as f64,
+            width: (end - start) / BANDS as f64,
         }
     }
 
-    /// The paper's range: 380 to 700 nm, 5 nm a leaf.
+    /// The paper's range: 380 to 700 nm, 5 nm a band.
     pub fn paper() -> Self {
         Self::new(380.0, 700.0)
     }
 
-    /// Left edge of the first leaf, nm.
+    /// Left edge of the first band, nm.
     pub fn start(&self) -> f64 {
         self.start
     }
 
-    /// Right edge of the last leaf, nm.
+    /// Right edge of the last band, nm.
     pub fn end(&self) -> f64 {
-        self.left(LEAVES)
+        self.left(BANDS)
     }
 
-    /// Left edge of a leaf, nm; `left(64)` is the end of the range.
-    pub fn left(&self, leaf: usize) -> f64 {
-        self.start + self.width * leaf as f64
+    /// Left edge of a band, nm; `left(64)` is the end of the range.
+    pub fn left(&self, band: usize) -> f64 {
+        self.start + self.width * band as f64
     }
 
-    /// Middle of a leaf, nm.
-    pub fn middle(&self, leaf: usize) -> f64 {
-        self.start + self.width * (leaf as f64 + 0.5)
+    /// Middle of a band, nm.
+    pub fn middle(&self, band: usize) -> f64 {
+        self.start + self.width * (band as f64 + 0.5)
     }
 
-    /// Width of a leaf, nm.
+    /// Width of a band, nm.
     pub fn width(&self) -> f64 {
         self.width
     }
 
-    /// The leaf that holds a wavelength; the end of the range belongs to the last leaf.
-    pub fn leaf_of(&self, nm: f64) -> Option<usize> {
+    /// The band that holds a wavelength; the end of the range belongs to the last band.
+    pub fn band_of(&self, nm: f64) -> Option<usize> {
         if !(self.start..=self.end()).contains(&nm) {
             return None;
         }
         // Not negative as nm >= start; 64 only at the very end.
-        Some((((nm - self.start) / self.width) as usize).min(LEAVES - 1))
+        Some((((nm - self.start) / self.width) as usize).min(BANDS - 1))
     }
 
-    /// Mean of the table over each leaf, exact for the piecewise linear table.
+    /// Mean of the table over each band, exact for the piecewise linear table.
     ///
     /// ```
     /// use haarlight::{data::{Outside, Table}, spectrum::Grid};
@@ -77,20 +77,20 @@ impl Grid {
     /// assert_eq!(means[0], 2.5);
     /// assert_eq!(Grid::paper().left_edges(&ramp, Outside::Zero)[1], 5.0);
     /// ```
-    pub fn means(&self, table: &Table, outside: Outside) -> Leaves {
-        std::array::from_fn(|leaf| {
-            table.integral(self.left(leaf), self.left(leaf + 1), outside) / self.width
+    pub fn means(&self, table: &Table, outside: Outside) -> Spectrum {
+        std::array::from_fn(|band| {
+            table.integral(self.left(band), self.left(band + 1), outside) / self.width
         })
     }
 
-    /// Value of the table at the left edge of each leaf: the convention behind the paper's Table 1.
-    pub fn left_edges(&self, table: &Table, outside: Outside) -> Leaves {
-        std::array::from_fn(|leaf| table.at(self.left(leaf), outside))
+    /// Value of the table at the left edge of each band: the convention behind the paper's Table 1.
+    pub fn left_edges(&self, table: &Table, outside: Outside) -> Spectrum {
+        std::array::from_fn(|band| table.at(self.left(band), outside))
     }
 }
 
 impl Default for Grid {
-    /// 380 to 780 nm, 6.25 nm a leaf.
+    /// 380 to 780 nm, 6.25 nm a band.
     fn default() -> Self {
         Self::new(380.0, 780.0)
     }
@@ -101,14 +101,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn leaves_tile_the_range() {
+    fn bands_tile_the_range() {
         for grid in [Grid::paper(), Grid::default(), Grid::new(360.0, 830.0)] {
-            assert_eq!(grid.leaf_of(grid.start()), Some(0));
-            assert_eq!(grid.leaf_of(grid.end()), Some(63));
-            assert_eq!(grid.leaf_of(grid.end() + 0.1), None);
-            assert_eq!(grid.leaf_of(f64::NAN), None);
-            for leaf in 0..LEAVES {
-                assert_eq!(grid.leaf_of(grid.middle(leaf)), Some(leaf));
+            assert_eq!(grid.band_of(grid.start()), Some(0));
+            assert_eq!(grid.band_of(grid.end()), Some(63));
+            assert_eq!(grid.band_of(grid.end() + 0.1), None);
+            assert_eq!(grid.band_of(f64::NAN), None);
+            for band in 0..BANDS {
+                assert_eq!(grid.band_of(grid.middle(band)), Some(band));
             }
         }
     }

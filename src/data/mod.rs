@@ -1,4 +1,4 @@
-//! Published tables (CIE observer, illuminants, measured reflectances), readers of spectra, and the leaves they are held on.
+//! Published tables (CIE observer, illuminants, measured reflectances), readers of spectra, and the bands they are held on.
 
 mod blackbody;
 mod daylight;
@@ -10,8 +10,8 @@ mod table;
 
 pub use blackbody::{SECOND_RADIATION_CONSTANT, blackbody};
 pub use daylight::daylight;
-pub use grid::{Grid, LEAVES, Leaves};
-pub use registry::{Kind, Named, named, names, nearest};
+pub use grid::{BANDS, Grid, Spectrum};
+pub use registry::{Named, TableKind, named, names, nearest};
 pub use table::{CsvProblem, Outside, Table};
 
 pub(crate) use nearest::nearest_of;

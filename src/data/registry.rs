@@ -3,12 +3,12 @@
 //! The tables lie beside this file as CSV, each with its source, edition, step, range, units and licence.
 
 use super::nearest::nearest_of;
-use super::table::Columns;
+use super::table::CsvColumns;
 use super::{Table, blackbody};
 
 /// What a named table is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum TableKind {
     /// Relative spectral power.
     Illuminant,
     /// Reflectance factor, [0, 1].
@@ -22,7 +22,7 @@ pub struct Named {
     /// Its values.
     pub table: Table,
     /// What they mean.
-    pub kind: Kind,
+    pub kind: TableKind,
 }
 
 /// Temperatures that `blackbody/...` takes, K.
@@ -30,70 +30,70 @@ const TEMPERATURES: std::ops::RangeInclusive<f64> = 500.0..=50_000.0;
 
 struct File {
     prefix: &'static str,
-    kind: Kind,
+    kind: TableKind,
     csv: &'static str,
 }
 
 const FILES: [File; 9] = [
     File {
         prefix: "cie",
-        kind: Kind::Illuminant,
+        kind: TableKind::Illuminant,
         csv: include_str!("illuminants.csv"),
     },
     File {
         prefix: "cie",
-        kind: Kind::Illuminant,
+        kind: TableKind::Illuminant,
         csv: include_str!("fluorescent.csv"),
     },
     File {
         prefix: "cie",
-        kind: Kind::Illuminant,
+        kind: TableKind::Illuminant,
         csv: include_str!("fluorescent_fl3.csv"),
     },
     File {
         prefix: "cie",
-        kind: Kind::Illuminant,
+        kind: TableKind::Illuminant,
         csv: include_str!("discharge.csv"),
     },
     File {
         prefix: "cie",
-        kind: Kind::Illuminant,
+        kind: TableKind::Illuminant,
         csv: include_str!("led.csv"),
     },
     File {
         prefix: "macbeth",
-        kind: Kind::Reflectance,
+        kind: TableKind::Reflectance,
         csv: include_str!("colorchecker_ohta.csv"),
     },
     File {
         prefix: "babelcolor",
-        kind: Kind::Reflectance,
+        kind: TableKind::Reflectance,
         csv: include_str!("colorchecker_babelcolor.csv"),
     },
     File {
         prefix: "cornell",
-        kind: Kind::Reflectance,
+        kind: TableKind::Reflectance,
         csv: include_str!("cornell_walls.csv"),
     },
     File {
         prefix: "cornell",
-        kind: Kind::Illuminant,
+        kind: TableKind::Illuminant,
         csv: include_str!("cornell_light.csv"),
     },
 ];
 
 impl File {
-    fn columns(&self) -> Columns {
-        Columns::parse(self.csv).expect("built-in tables are well formed")
+    fn columns(&self) -> CsvColumns {
+        CsvColumns::parse(self.csv).expect("built-in tables are well formed")
     }
 }
 
 /// The spectrum of that name, none if there is no such name.
 ///
 /// ```
-/// use haarlight::data::{Kind, Outside, named};
+/// use haarlight::data::{Outside, TableKind, named};
 /// let f2 = named("cie/F2").unwrap();
-/// assert_eq!(f2.kind, Kind::Illuminant);
+/// assert_eq!(f2.kind, TableKind::Illuminant);
 /// assert_eq!(f2.table.at(545.0, Outside::Zero), 24.88);
 /// assert_eq!(named("cie/FL2"), Some(f2));
 /// assert_eq!(named("blackbody/2700").unwrap().table.at(560.0, Outside::Zero), 100.0);
@@ -108,7 +108,7 @@ pub fn named(name: &str) -> Option<Named> {
             .filter(|kelvin| TEMPERATURES.contains(kelvin))?;
         return Some(Named {
             table: blackbody(kelvin),
-            kind: Kind::Illuminant,
+            kind: TableKind::Illuminant,
         });
     }
     // CIE 015:2004 renamed F1-F12 to FL1-FL12.
@@ -190,7 +190,7 @@ pub(crate) fn colour_evaluation() -> Vec<Table> {
 }
 
 fn columns_of<const N: usize>(csv: &str, names: [&str; N]) -> [Table; N] {
-    let columns = Columns::parse(csv).expect("built-in tables are well formed");
+    let columns = CsvColumns::parse(csv).expect("built-in tables are well formed");
     names.map(|name| {
         columns
             .table(name)
@@ -199,7 +199,7 @@ fn columns_of<const N: usize>(csv: &str, names: [&str; N]) -> [Table; N] {
 }
 
 fn all_of(csv: &str) -> Vec<Table> {
-    let columns = Columns::parse(csv).expect("built-in tables are well formed");
+    let columns = CsvColumns::parse(csv).expect("built-in tables are well formed");
     (columns.names.iter())
         .filter_map(|name| columns.table(name))
         .collect()
@@ -242,7 +242,7 @@ mod tests {
     fn reflectances_are_physical() {
         for name in names() {
             let named = named(&name).unwrap();
-            if named.kind == Kind::Reflectance {
+            if named.kind == TableKind::Reflectance {
                 assert!(
                     named.table.values().iter().all(|v| (0.0..=1.0).contains(v)),
                     "{name}"

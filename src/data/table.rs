@@ -103,7 +103,7 @@ impl Table {
     /// # Errors
     /// The first line that breaks a rule, with the rule.
     pub fn parse_csv(text: &str) -> Result<Self, CsvProblem> {
-        let columns = Columns::parse(text)?;
+        let columns = CsvColumns::parse(text)?;
         let [values] = <[_; 1]>::try_from(columns.values).map_err(|all| CsvProblem {
             line: columns.first_line,
             what: format!("{} cells in a row, 2 are meant", all.len() + 1),
@@ -178,7 +178,7 @@ impl Table {
 
 /// A CSV of one or more spectra on the same wavelengths.
 #[derive(Debug)]
-pub(super) struct Columns {
+pub(super) struct CsvColumns {
     /// Names of the value columns; empty without a header.
     pub(super) names: Vec<String>,
     /// Wavelengths, nm.
@@ -189,7 +189,7 @@ pub(super) struct Columns {
     first_line: usize,
 }
 
-impl Columns {
+impl CsvColumns {
     pub(super) fn parse(text: &str) -> Result<Self, CsvProblem> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut this = Self {

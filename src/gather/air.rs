@@ -12,15 +12,13 @@
 //! The ambient cube (Mitchell, McTaggart and Green 2006) is E to +X, -X, +Y, -Y, +Z and -Z.
 
 use super::LayerLanes;
+use crate::color::Xyz;
 use crate::solve::Bake;
-use crate::survey::{Place, places};
+use crate::survey::{PointLocation, places};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
-
-/// Tristimulus values.
-type Xyz = [f64; 3];
 
 /// Directions at a point.
 const DIRECTIONS: usize = 26;
@@ -40,7 +38,7 @@ pub struct Around {
 #[derive(Debug, Clone)]
 pub struct Air {
     /// Is the point in the room? If not, no light is gathered.
-    pub place: Place,
+    pub place: PointLocation,
     /// All light.
     pub light: Around,
     /// The light of each layer, if there are any; layers add up to `light`.
@@ -165,20 +163,20 @@ impl Bake {
         let aimless: Vec<(DVec3, DVec3)> = points.iter().map(|&p| (p, DVec3::ZERO)).collect();
         let places = places(self.scene(), &aimless);
         let directions = directions();
-        let looking = |(point, _): (&DVec3, &Place)| {
+        let looking = |(point, _): (&DVec3, &PointLocation)| {
             let spot = self.spot(*point, |_| true);
             // One pattern for all: neighbours err alike, which does not show.
             directions.map(|(normal, _)| self.receiver_at(&spot, normal, 0))
         };
         let receivers: Vec<Receiver> = (points.par_iter().zip(&places))
-            .filter(|(_, place)| **place == Place::Room)
+            .filter(|(_, place)| **place == PointLocation::Room)
             .flat_map_iter(looking)
             .collect();
         let gathered = self.gather(&receivers);
         let mut gathered = gathered.chunks_exact(DIRECTIONS);
-        let one = |place: Place| {
+        let one = |place: PointLocation| {
             let rows = match place {
-                Place::Room => gathered.next(),
+                PointLocation::Room => gathered.next(),
                 _ => None,
             };
             self.air_at(place, rows.unwrap_or(&[]), layers)
@@ -186,7 +184,7 @@ impl Bake {
         places.into_iter().map(one).collect()
     }
 
-    fn air_at(&self, place: Place, rows: &[Gathered], layers: &[LayerLanes]) -> Air {
+    fn air_at(&self, place: PointLocation, rows: &[Gathered], layers: &[LayerLanes]) -> Air {
         let mut all = [[0.0; 3]; DIRECTIONS];
         let mut parts = vec![all; layers.len()];
         for (k, gathered) in rows.iter().enumerate() {

@@ -7,7 +7,7 @@ use crate::light::Fluorescent;
 use crate::light::lanes::Lanes;
 use crate::scene::{Material, Surface};
 use crate::solve::Bake;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use crate::transport::Receiver;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -169,13 +169,20 @@ impl Bake {
     }
 
     /// How each material of the scene turns irradiance into visible light.
-    pub(crate) fn looks<'a>(&self, upsampler: &'a Upsampler) -> Vec<Look<'a>> {
+    pub(crate) fn looks<'a>(&self, upsampler: &'a Upsampler) -> Vec<SurfaceResponse<'a>> {
         let materials = self.scene().materials.iter();
-        materials.map(|m| Look::new(self, m, upsampler)).collect()
+        materials
+            .map(|m| SurfaceResponse::new(self, m, upsampler))
+            .collect()
     }
 
     /// Emission at a vertex; none on surfaces that do not emit.
-    pub(super) fn glow(&self, vertex: &Vertex, back: bool, look: &Look) -> Option<&[f32]> {
+    pub(super) fn glow(
+        &self,
+        vertex: &Vertex,
+        back: bool,
+        look: &SurfaceResponse,
+    ) -> Option<&[f32]> {
         if !look.emits || vertex.entry == crate::hierarchy::NONE {
             return None;
         }
@@ -194,7 +201,7 @@ impl Bake {
         vertex: &Vertex,
         back: bool,
         row: &[f32; 64],
-        look: &Look,
+        look: &SurfaceResponse,
     ) -> BakedVertex {
         let glow = match self.glow(vertex, back, look) {
             Some(own) => look.shown.unwrap_or_else(|| self.lanes().tristimulus(own)),
@@ -223,11 +230,11 @@ impl Bake {
 }
 
 /// How a material turns irradiance into visible light.
-pub(crate) struct Look<'a> {
-    /// Reflectance on the spectral leaves, without vertex colours; for diffuse sheets including the transmittance.
-    reflectance: Leaves,
+pub(crate) struct SurfaceResponse<'a> {
+    /// Reflectance on the bands, without vertex colours; for diffuse sheets including the transmittance.
+    reflectance: Spectrum,
     /// Transmittance, and the share of the base colour that is reflected besides.
-    through: Option<(Leaves, f64)>,
+    through: Option<(Spectrum, f64)>,
     /// Base colour with the texture's mean, where vertex colours multiply it.
     base: Option<[f32; 3]>,
     upsampler: &'a Upsampler,
@@ -236,7 +243,7 @@ pub(crate) struct Look<'a> {
     /// The fluorescence, and its tristimulus radiosity per unit of each lane's irradiance.
     fluorescent: Option<(Fluorescent, Vec<[f64; 3]>)>,
     /// Greatest reflectance that fluorescence leaves room for.
-    room: Option<Leaves>,
+    room: Option<Spectrum>,
     /// Mean colour of the texture, which the display multiplies again.
     pub(super) unpainted: Option<[f64; 3]>,
     emits: bool,
@@ -255,7 +262,7 @@ fn weighed(row: &[f32; 64], weights: &[[f64; 3]]) -> [f64; 3] {
     xyz
 }
 
-impl<'a> Look<'a> {
+impl<'a> SurfaceResponse<'a> {
     pub(crate) fn new(bake: &Bake, material: &Material, upsampler: &'a Upsampler) -> Self {
         let images = &bake.scene().images;
         let color = material.mean_color(images);
@@ -272,7 +279,7 @@ impl<'a> Look<'a> {
         });
         let mut look = Self {
             reflected: Vec::new(),
-            room: (fluorescent.is_some()).then(|| material.bounded([1.0; LEAVES])),
+            room: (fluorescent.is_some()).then(|| material.bounded([1.0; BANDS])),
             fluorescent,
             reflectance,
             through: sheet.map(|sheet| (sheet.transmittance, sheet.left)),
@@ -291,7 +298,7 @@ impl<'a> Look<'a> {
     }
 
     /// A reflectance, limited to what fluorescence leaves room for.
-    fn beside(&self, reflectance: Leaves) -> Leaves {
+    fn beside(&self, reflectance: Spectrum) -> Spectrum {
         match &self.room {
             Some(room) => std::array::from_fn(|k| reflectance[k].min(room[k])),
             None => reflectance,
@@ -299,7 +306,7 @@ impl<'a> Look<'a> {
     }
 
     /// Tristimulus radiosity per unit of each lane's irradiance, for a reflectance and fluorescence.
-    fn sent(&self, lanes: &Lanes, reflectance: &Leaves) -> Vec<[f64; 3]> {
+    fn sent(&self, lanes: &Lanes, reflectance: &Spectrum) -> Vec<[f64; 3]> {
         let mut all = lanes.reflected(reflectance);
         for (all, more) in all
             .iter_mut()
@@ -311,9 +318,9 @@ impl<'a> Look<'a> {
     }
 
     /// Spectral exitance of fluorescence under a row of irradiance, W/m2/nm; none where nothing fluoresces.
-    pub(super) fn fluoresced(&self, lanes: &Lanes, row: &[f32; 64]) -> Option<Leaves> {
+    pub(super) fn fluoresced(&self, lanes: &Lanes, row: &[f32; 64]) -> Option<Spectrum> {
         let (fluorescent, _) = self.fluorescent.as_ref()?;
-        Some(fluorescent.leaves(lanes, row))
+        Some(fluorescent.spectrum(lanes, row))
     }
 
     /// Tristimulus radiosity of a row of irradiance, without vertex colours.
@@ -321,13 +328,13 @@ impl<'a> Look<'a> {
         weighed(row, &self.reflected)
     }
 
-    /// Reflectance on the spectral leaves, for a texture its mean; without vertex colours.
-    pub(crate) fn reflectance(&self) -> &Leaves {
+    /// Reflectance on the bands, for a texture its mean; without vertex colours.
+    pub(crate) fn reflectance(&self) -> &Spectrum {
         &self.reflectance
     }
 
     /// Reflectance at a vertex where vertex colours apply; none elsewhere.
-    fn painted(&self, surface: &Surface, vertex: &BakedVertex) -> Option<Leaves> {
+    fn painted(&self, surface: &Surface, vertex: &BakedVertex) -> Option<Spectrum> {
         let base = self.base.filter(|_| surface.colors.is_some())?;
         let color = refined_mesh::vertex_color(surface, vertex);
         let color = std::array::from_fn(|c| base[c] * color[c]);
@@ -340,7 +347,7 @@ impl<'a> Look<'a> {
     }
 
     /// Reflectance at a vertex.
-    pub(super) fn reflectance_at(&self, surface: &Surface, vertex: &BakedVertex) -> Leaves {
+    pub(super) fn reflectance_at(&self, surface: &Surface, vertex: &BakedVertex) -> Spectrum {
         self.painted(surface, vertex).unwrap_or(self.reflectance)
     }
 }

@@ -8,7 +8,7 @@ use crate::color::{Bright, position_index, unified_glare_rating};
 use crate::geometry::{NO_PLANE, Segment, quarters};
 use crate::hierarchy::Node;
 use crate::link::Sight;
-use crate::scene::effects::Kind;
+use crate::scene::effects::EffectKind;
 use crate::scene::{LightKind, PunctualLight};
 use crate::solve::Bake;
 use glam::DVec3;
@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 /// Size of parts as seen by the eye, radians: position indices of neighbours then differ by 2 % at the most.
 const PART: f64 = 0.02;
 /// Divisions at the most: a lamp right before the eye ends in 4^6 parts.
-const CUTS: u32 = 6;
+const SPLITS: u32 = 6;
 /// Distance before a lamp at which rays end, share of the room's half size: f32 positions are off by 1e-7 of that.
 const BEFORE: f64 = 1e-5;
 
@@ -64,12 +64,12 @@ impl Eye<'_> {
             return;
         }
         let mut left = vec![(triangle.map(|p| p + self.lift * normal), 0)];
-        while let Some((corners, cuts)) = left.pop() {
+        while let Some((corners, splits)) = left.pop() {
             let [a, b, c] = corners.map(|p| p - self.at);
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
             let middle = (a + b + c) / 3.0;
-            if longest > PART * middle.length() && cuts < CUTS {
-                left.extend(quarters(corners).map(|part| (part, cuts + 1)));
+            if longest > PART * middle.length() && splits < SPLITS {
+                left.extend(quarters(corners).map(|part| (part, splits + 1)));
             } else if self.sees(self.at + middle) {
                 let position = position_index(self.forward, self.up, middle);
                 out.add(
@@ -145,7 +145,7 @@ impl Bake {
         if !self.scene().panes.is_empty() {
             left_out.push("what panes take from lamps behind them".into());
         }
-        if self.plan().runs(Kind::Mirrors) {
+        if self.plan().runs(EffectKind::Mirrors) {
             left_out.push("lamps as mirrors show them".into());
         }
         let lanes = self.lanes().lanes();

@@ -1,7 +1,7 @@
 //! The light of each layer of lamps (see `scene::layers`): rows hold every light spectrum separately, and a layer is
 //! some of their lanes. So the layers of a vertex are parts of one sum, and add up to it but for rounding.
 
-use super::bake::{Look, Vertex};
+use super::bake::{SurfaceResponse, Vertex};
 use crate::color::LinearSrgb;
 use crate::light::lanes::Lane;
 use crate::scene::layers::Layers;
@@ -50,7 +50,7 @@ impl Bake {
         &self,
         layers: &[LayerLanes],
         (vertex, back, row): (&Vertex, bool, &[f32; 64]),
-        look: &Look,
+        look: &SurfaceResponse,
         shown: &mut [Vec<[f32; 3]>],
     ) {
         for (k, (lanes, out)) in layers.iter().zip(shown).enumerate() {
@@ -64,7 +64,7 @@ impl Bake {
         k: usize,
         lanes: &LayerLanes,
         (vertex, back, row): (&Vertex, bool, &[f32; 64]),
-        look: &Look,
+        look: &SurfaceResponse,
     ) -> [f32; 3] {
         let reflected = look.reflect(&lanes.of(row));
         let glow = match (self.glow(vertex, back, look), look.shown) {

@@ -13,7 +13,7 @@ mod working_plane;
 pub use crate::transport::MOSTLY;
 pub use air::{Air, Around};
 pub use bake::{Baked, Interpolation};
-pub(crate) use bake::{KeptVertex, Look, Vertex, lend};
+pub(crate) use bake::{KeptVertex, SurfaceResponse, Vertex, lend};
 pub use glare::Glare;
 pub(crate) use layers::LayerLanes;
 pub use probe::Probed;

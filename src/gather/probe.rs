@@ -1,7 +1,7 @@
 //! The light at any point: on a face, whose links are then used, or in the air.
 
 use crate::solve::{Bake, weights_of};
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 
@@ -15,8 +15,8 @@ const PROBE_INSET: f64 = 1e-5;
 pub struct Probed {
     /// Tristimulus irradiance; Y is lux.
     pub xyz: [f64; 3],
-    /// Irradiance on the 64 spectral leaves, W/m2/nm.
-    pub leaves: Leaves,
+    /// Irradiance on the 64 bands, W/m2/nm.
+    pub spectrum: Spectrum,
     /// Share of the rays that met a black back, see [`Gathered::backs`]; above [`MOSTLY`](super::MOSTLY) a vertex there counts as covered.
     pub backs: f64,
 }
@@ -40,7 +40,7 @@ impl Bake {
         Probed {
             backs: point.backs,
             xyz: self.lanes().tristimulus(&point.irradiance),
-            leaves: self.lanes().leaves(&point.irradiance),
+            spectrum: self.lanes().spectrum(&point.irradiance),
         }
     }
 
@@ -63,11 +63,11 @@ impl Bake {
     }
 
     /// The lanes that hold light of the sky; none where some also hold other light, and without a sky.
-    fn lanes_of_sky(&self) -> Option<[bool; LEAVES]> {
+    fn lanes_of_sky(&self) -> Option<[bool; BANDS]> {
         let scene = self.scene();
         scene.sky.as_ref()?;
         if !scene.shines_beside_sky() {
-            return Some([true; LEAVES]);
+            return Some([true; BANDS]);
         }
         let own = scene
             .spectra_of_sky_alone()

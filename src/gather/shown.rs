@@ -2,13 +2,17 @@
 
 use crate::hierarchy::NONE;
 use crate::light::mixed;
-use crate::solve::{Bake, Care};
+use crate::solve::{Bake, GatherQuality};
 use crate::transport::{Gathered, Receiver, trace};
 
 impl Bake {
     /// Gathers at points of surfaces, in order; for points of diffuse sheets also behind these, see [`Through`](crate::light::Through).
-    pub(crate) fn gather_shown(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
-        let mut gathered = self.gather_with(receivers, care);
+    pub(crate) fn gather_shown(
+        &self,
+        receivers: &[Receiver],
+        quality: GatherQuality,
+    ) -> Vec<Gathered> {
+        let mut gathered = self.gather_with(receivers, quality);
         let behind: Vec<(usize, u32, Receiver)> = (receivers.iter().enumerate())
             .filter_map(|(k, to)| self.behind(to).map(|(place, other)| (k, place, other)))
             .collect();
@@ -16,7 +20,7 @@ impl Bake {
             return gathered;
         }
         let others: Vec<Receiver> = behind.iter().map(|&(.., other)| other).collect();
-        for ((k, place, _), other) in behind.iter().zip(self.gather_with(&others, care)) {
+        for ((k, place, _), other) in behind.iter().zip(self.gather_with(&others, quality)) {
             let Some(shares) = self.light().through.shares(*place) else {
                 continue;
             };

@@ -3,10 +3,10 @@
 //! The walk of `packet`, nearest boxes first; every ray ends at the nearest hit so far, and a box that starts behind the
 //! farthest of these ends is passed by. Rays that leave a point in a narrow beam share most of their way.
 
+use super::bvh::{BvhNode, LEAF, WIDTH};
 use super::index::{Hit, Nearest, RayIndex};
 use super::packet::Packet;
 use super::segment::{NO_PLANE, Segment};
-use super::tree::{LEAF, Node, WIDTH};
 use super::triangle::PACKET;
 use super::walk::Stack;
 use glam::Vec3;
@@ -139,7 +139,7 @@ impl Beam<'_> {
 
     /// Puts the children that rays of `lanes` meet on the stack, the nearest last.
     #[inline(always)]
-    fn enter(&self, node: &Node, lanes: u32, stack: &mut Stack<(f32, u32, u32)>) {
+    fn enter(&self, node: &BvhNode, lanes: u32, stack: &mut Stack<(f32, u32, u32)>) {
         let mut sorted = [(0.0_f32, 0_u32, 0_u32); WIDTH];
         let mut count = 0;
         let mut boxes = self.packet.boxes(node);

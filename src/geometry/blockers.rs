@@ -1,15 +1,15 @@
 //! The triangles of an index that may block between two patches.
 //!
 //! The tree's boxes are tested eight at a time against the sides of the [`Shaft`] in f32, the triangles of a leaf in f64; that decides most of
-//! them. What crosses sides without a corner in the shaft is cut.
+//! them. What crosses sides without a corner in the shaft is clipped.
 //!
 //! Safe side: a pair reported as clear has no blocker, but for what reaches less than the index's gap into the shaft (1e-6 of the scene's
 //! half size; neighbours touch it everywhere).
 
+use super::bvh::{BvhNode, LEAF};
 use super::index::RayIndex;
 use super::segment::NO_PLANE;
 use super::shaft::{SIDES, Shaft, dot, splat};
-use super::tree::{LEAF, Node};
 use super::triangle::{BLOCK, Block};
 use super::walk::Stack;
 use glam::{DVec3, Vec3};
@@ -53,7 +53,7 @@ impl Sides8 {
 
     /// A bit for each child whose box may reach into the shaft. The boxes are padded by ten gaps, which covers the roundings.
     #[inline(always)]
-    fn boxes(&self, node: &Node) -> u32 {
+    fn boxes(&self, node: &BvhNode) -> u32 {
         let mut out = f32x8::ZERO;
         for axis in 0..3 {
             out |= node.bounds[0][axis].simd_gt(f32x8::splat(self.high[axis]))
@@ -72,7 +72,7 @@ impl Sides8 {
 }
 
 /// A bit for each triangle of a block that may block, and for each of these that surely does because one of its corners is in the shaft: the
-/// tests of [`Shaft::holds`] before the cut, in f64.
+/// tests of [`Shaft::holds`] before clipping, in f64.
 #[inline(always)]
 fn triangles(shaft: &Shaft, block: &Block, gap: f64) -> (u32, u32) {
     let all = (1 << block.count) - 1;
@@ -139,12 +139,12 @@ fn widen(point: &[f32x8; 3]) -> [f64x8; 3] {
 }
 
 /// The list as it grows.
-struct Found {
+struct BlockerList {
     ids: Vec<u32>,
     cap: usize,
 }
 
-impl Found {
+impl BlockerList {
     /// False when this is one too many.
     fn push(&mut self, id: u32) -> bool {
         if self.ids.len() == self.cap {
@@ -162,7 +162,7 @@ impl RayIndex {
     /// The triangles that may block in a shaft, if at most `cap`. `candidates`: the only triangles to look at, as found for a
     /// shaft that encloses this one (that of the link that was refined); None: all.
     pub fn blockers(&self, shaft: &Shaft, candidates: Option<&[u32]>, cap: usize) -> ShaftContents {
-        let mut found = Found {
+        let mut found = BlockerList {
             ids: Vec::new(),
             cap,
         };
@@ -183,7 +183,7 @@ impl RayIndex {
     }
 
     /// False when there are too many.
-    fn search(&self, shaft: &Shaft, found: &mut Found) -> bool {
+    fn search(&self, shaft: &Shaft, found: &mut BlockerList) -> bool {
         if self.tree.nodes.is_empty() {
             return true;
         }
@@ -208,7 +208,7 @@ impl RayIndex {
     }
 
     /// Adds the triangles of a block that may block; false when there are too many.
-    fn sift(&self, shaft: &Shaft, block: &Block, found: &mut Found) -> bool {
+    fn sift(&self, shaft: &Shaft, block: &Block, found: &mut BlockerList) -> bool {
         let gap = f64::from(self.gap);
         let (mut open, sure) = triangles(shaft, block, gap);
         while open != 0 {
@@ -218,7 +218,7 @@ impl RayIndex {
                 && (sure >> lane & 1 == 1 || {
                     let [a, b, c] = block.corner_lane(lane);
                     let corner = |p: [f32; 3]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
-                    shaft.cut_holds(&[corner(a), corner(b), corner(c)], gap)
+                    shaft.clipped_holds(&[corner(a), corner(b), corner(c)], gap)
                 });
             if blocks && !found.push(block.ids[lane]) {
                 return false;
@@ -252,7 +252,7 @@ fn own_plane(shaft: &Shaft, block: &Block, lane: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Patch;
+    use crate::geometry::ShaftEnd;
     use crate::geometry::sampling::{Pcg, on_triangle};
     use glam::Vec3;
 
@@ -298,11 +298,11 @@ mod tests {
             let index = index_of(&scene);
             let (ta, tb) = (scene[0], scene[1]);
             let shaft = Shaft::between(
-                &Patch::Triangle {
+                &ShaftEnd::Triangle {
                     corners: ta,
                     plane: 0,
                 },
-                &Patch::Triangle {
+                &ShaftEnd::Triangle {
                     corners: tb,
                     plane: 1,
                 },
@@ -378,8 +378,8 @@ mod tests {
             let index = index_of(&scene);
             let corner = [point(1.0), point(1.0)];
             let boxes = corner.map(|low| (low, low + point(0.3)));
-            let patches = boxes.map(|(low, high)| Patch::Box { low, high });
-            let triangle = Patch::Triangle {
+            let patches = boxes.map(|(low, high)| ShaftEnd::Box { low, high });
+            let triangle = ShaftEnd::Triangle {
                 corners: scene[0],
                 plane: 0,
             };
@@ -389,18 +389,18 @@ mod tests {
                     _ => Vec::new(),
                 };
                 for _ in 0..50 {
-                    let mut on = |patch: &Patch| match patch {
-                        Patch::Point { at, .. } => *at,
-                        Patch::Triangle { corners, .. } => {
+                    let mut on = |patch: &ShaftEnd| match patch {
+                        ShaftEnd::Point { at, .. } => *at,
+                        ShaftEnd::Triangle { corners, .. } => {
                             on_triangle(corners, [random.f64(), random.f64()])
                         }
-                        Patch::Box { low, high } => {
+                        ShaftEnd::Box { low, high } => {
                             *low + (*high - *low)
                                 * DVec3::new(random.f64(), random.f64(), random.f64())
                         }
                     };
                     let (p, q) = (on(a), on(b));
-                    if matches!(a, Patch::Triangle { corners, .. } if !front(corners, q)) {
+                    if matches!(a, ShaftEnd::Triangle { corners, .. } if !front(corners, q)) {
                         continue;
                     }
                     for (k, t) in scene.iter().enumerate().skip(1) {
@@ -427,12 +427,12 @@ mod tests {
             let (at, target) = (point(1.0), scene[0]);
             let normal = (target[0] + target[1] + target[2]) / 3.0 - at;
             let patches = [
-                Patch::Point {
+                ShaftEnd::Point {
                     at,
                     normal,
                     plane: NO_PLANE,
                 },
-                Patch::Triangle {
+                ShaftEnd::Triangle {
                     corners: target,
                     plane: 0,
                 },
@@ -487,7 +487,7 @@ mod tests {
             DVec3::new(0.4, 0.6, 0.5),
         ]);
         let index = index_of(&scene);
-        let patch = |k: u32| Patch::Triangle {
+        let patch = |k: u32| ShaftEnd::Triangle {
             corners: scene[k as usize],
             plane: k,
         };
@@ -503,7 +503,7 @@ mod tests {
         }
         assert!(clear >= 10, "{clear}");
         // A small patch in a corner of the floor and one on the wall beside it.
-        let small = |o: DVec3, x: DVec3, y: DVec3| Patch::Triangle {
+        let small = |o: DVec3, x: DVec3, y: DVec3| ShaftEnd::Triangle {
             corners: [o, o + x * 0.2, o + y * 0.2],
             plane: 99,
         };

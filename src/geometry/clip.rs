@@ -35,7 +35,7 @@ pub fn visible_part(
 ) -> Option<Vec<Vec<DVec3>>> {
     let mut clipper = Clipper::default();
     clipper.begin(point, polygon);
-    let pieces = clipper.cut_all(point, blockers, cap)?.pieces.iter();
+    let pieces = clipper.clip_all(point, blockers, cap)?.pieces.iter();
     let back = |piece: &[DVec3]| piece.iter().map(|&q| q + point).collect();
     Some(pieces.map(back).collect())
 }
@@ -52,7 +52,7 @@ pub fn lambert_visible(
     let mut clipper = Clipper::default();
     clipper.begin(point, polygon);
     let whole = lambert_edges_x8(point, normal, polygon);
-    let left = clipper.cut_all(point, blockers, cap)?;
+    let left = clipper.clip_all(point, blockers, cap)?;
     Some(left.factor(normal, whole))
 }
 
@@ -115,7 +115,7 @@ impl Clipper {
     }
 
     /// Takes a shadow away, cast from the point that looks. False when more than `cap` pieces are left.
-    pub fn cut(&mut self, shadow: &Shadow, cap: usize) -> bool {
+    pub fn clip(&mut self, shadow: &Shadow, cap: usize) -> bool {
         if shadow.is_edge_on(self.thin) || shadow.misses(&self.whole, 0.0) {
             return true;
         }
@@ -131,14 +131,16 @@ impl Clipper {
     }
 
     /// Takes the shadows of all blockers away; none when more than `cap` pieces are left.
-    fn cut_all(
+    fn clip_all(
         &mut self,
         point: DVec3,
         blockers: &[impl AsRef<[DVec3]>],
         cap: usize,
     ) -> Option<&Self> {
         let mut shadows = blockers.iter().map(|b| Shadow::new(point, b.as_ref()));
-        shadows.all(|shadow| self.cut(&shadow, cap)).then_some(self)
+        shadows
+            .all(|shadow| self.clip(&shadow, cap))
+            .then_some(self)
     }
 
     /// Form factor of what is left; `whole` is that of the whole polygon.
@@ -203,7 +205,7 @@ impl HalfSpace {
     }
 
     /// The parts of a convex polygon inside and outside (Sutherland and Hodgman 1974); empty if no corner is deeper than
-    /// `thin`. Corners nearer to the plane than `thin` count as on it, so that no sliver is cut off there.
+    /// `thin`. Corners nearer to the plane than `thin` count as on it, so that no sliver is clipped off there.
     pub(crate) fn split(
         &self,
         polygon: &[DVec3],
@@ -220,9 +222,9 @@ impl HalfSpace {
             let d1 = self.outside(corner);
             (least, most) = (least.min(d1), most.max(d1));
             if (d0 < -thin && d1 > thin) || (d0 > thin && d1 < -thin) {
-                let cut = before + (corner - before) * (d0 / (d0 - d1));
-                inside.push(cut);
-                outside.push(cut);
+                let crossing = before + (corner - before) * (d0 / (d0 - d1));
+                inside.push(crossing);
+                outside.push(crossing);
             }
             if d1 <= thin {
                 inside.push(corner);

@@ -6,8 +6,8 @@
 //! Triangles block from both sides. Those with an alpha mask ask the caller, in the `_with` variants, whether the point is
 //! opaque; the others never do.
 
+use super::bvh::{Bvh, Input, LEAF};
 use super::segment::{NO_PLANE, Segment};
-use super::tree::{Input, LEAF, Tree};
 use super::triangle::{BLOCK, Block, Shear};
 use super::walk::{Slabs, Stack, push_by_distance};
 use glam::Vec3;
@@ -35,7 +35,7 @@ pub struct Hit {
 /// A tree over triangles that answers visibility queries.
 #[derive(Clone, Debug)]
 pub struct RayIndex {
-    pub(crate) tree: Tree,
+    pub(crate) tree: Bvh,
     /// Hits within this distance of an end do not count.
     pub(crate) gap: f32,
     /// For each triangle `block * 8 + lane`.
@@ -54,7 +54,7 @@ impl RayIndex {
         planes: &[u32],
         masked: &[bool],
     ) -> Self {
-        let tree = Tree::build(Input {
+        let tree = Bvh::build(Input {
             positions,
             triangles,
             planes,

@@ -1,6 +1,6 @@
 //! The form factor of [`super::polygon`] for eight pairs of element and triangle at once, f64.
 //!
-//! The triangle is cut at the horizon without branches: each edge keeps the part above it, and a fourth edge runs along the horizon
+//! The triangle is clipped at the horizon without branches: each edge keeps the part above it, and a fourth edge runs along the horizon
 //! from where the outline goes down to where it comes up.
 
 use super::polygon::{IN_PLANE, lambert_polygon};

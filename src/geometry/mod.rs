@@ -40,6 +40,7 @@
 
 mod beam;
 pub mod blockers;
+mod bvh;
 pub mod clip;
 pub mod index;
 pub mod lanes;
@@ -52,7 +53,6 @@ pub mod polygon;
 pub mod sampling;
 pub mod segment;
 pub mod shaft;
-mod tree;
 mod triangle;
 mod walk;
 
@@ -65,4 +65,4 @@ pub use plane::plane_ids;
 pub use polygon::lambert_polygon;
 pub(crate) use polygon::quarters;
 pub use segment::{NO_PLANE, Segment};
-pub use shaft::{Patch, Shaft};
+pub use shaft::{Shaft, ShaftEnd};

@@ -1,7 +1,7 @@
 //! Which triangles may touch a box?
 
+use super::bvh::LEAF;
 use super::index::RayIndex;
-use super::tree::LEAF;
 use glam::Vec3;
 
 impl RayIndex {

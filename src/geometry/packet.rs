@@ -5,9 +5,9 @@
 //! plane are dropped, eight at a time, and the others tested one after another against those segments that are
 //! still open. The answers are the same bits as from one segment at a time.
 
+use super::bvh::{BvhNode, LEAF};
 use super::index::RayIndex;
 use super::segment::{NO_PLANE, Segment};
-use super::tree::{LEAF, Node};
 use super::triangle::{Block, Edges, PACKET, meet_lines};
 use super::walk::{LEAST_COMPONENT, Stack};
 use glam::Vec3;
@@ -214,14 +214,14 @@ impl Packet {
 
     /// A bit for each segment that meets the box of one child.
     #[inline(always)]
-    fn enter(&self, node: &Node, child: usize) -> u32 {
+    fn enter(&self, node: &BvhNode, child: usize) -> u32 {
         let (near, far) = self.slabs(node, child, f32x16::ONE);
         near.simd_le(far).to_bitmask()
     }
 
     /// The same for segments that end at their nearest hit, and where the first enters.
     #[inline(always)]
-    pub(super) fn enter_near(&self, node: &Node, child: usize) -> (f32, u32) {
+    pub(super) fn enter_near(&self, node: &BvhNode, child: usize) -> (f32, u32) {
         let (near, far) = self.slabs(node, child, self.range[1]);
         let met = near.simd_le(far);
         (range_of(met.select(near, f32x16::ONE))[0], met.to_bitmask())
@@ -229,7 +229,7 @@ impl Packet {
 
     /// Where the segments enter and leave the box of one child.
     #[inline(always)]
-    fn slabs(&self, node: &Node, child: usize, end: f32x16) -> (f32x16, f32x16) {
+    fn slabs(&self, node: &BvhNode, child: usize, end: f32x16) -> (f32x16, f32x16) {
         let mut near = f32x16::ZERO;
         let mut far = end;
         for axis in 0..3 {
@@ -250,7 +250,7 @@ impl Packet {
 
     /// A bit for each child whose box some segment might meet.
     #[inline(always)]
-    pub(super) fn boxes(&self, node: &Node) -> u32 {
+    pub(super) fn boxes(&self, node: &BvhNode) -> u32 {
         self.bundle.enter(node)
     }
 
@@ -471,7 +471,7 @@ impl Bundle {
 
     /// A bit for each child whose box some segment of the bundle might meet.
     #[inline(always)]
-    fn enter(&self, node: &Node) -> u32 {
+    fn enter(&self, node: &BvhNode) -> u32 {
         let mut near = f32x8::ZERO;
         let mut far = f32x8::ONE;
         let mut apart = f32x8::ZERO;

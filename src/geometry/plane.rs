@@ -55,7 +55,7 @@ pub fn plane_ids(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<u32> {
 
     let mut leaders: Vec<Plane> = Vec::new();
     let mut leader_of = vec![usize::MAX; triangles.len()];
-    let mut grid = Grid::new(
+    let mut grid = PlaneHash::new(
         FIRST_CELL,
         tolerance,
         centre.distance(high),
@@ -124,7 +124,7 @@ fn own_plane([a, b, c]: &[DVec3; 3], tolerance: f64) -> Option<Plane> {
 
 /// Planes by normal and offset, in cells of one size; both signs of a plane are looked up. A table of chains: a bucket may hold
 /// planes of several cells, which the caller tells apart anyway.
-struct Grid {
+struct PlaneHash {
     cell: f64,
     offset_cell: f64,
     tolerance: f64,
@@ -138,7 +138,7 @@ struct Grid {
 /// End of a chain.
 const NONE: u32 = u32::MAX;
 
-impl Grid {
+impl PlaneHash {
     fn new(cell: f64, tolerance: f64, radius: f64, capacity: usize) -> Self {
         Self {
             cell,

@@ -2,7 +2,7 @@
 //! Solutions Through the Use of Analytically Determined Form-Factors").
 //!
 //! F = 1/(2 pi) | sum_i gamma_i n . (r_i x r_i+1)/|r_i x r_i+1| |, r_i the corners seen from the point, gamma_i the angle between r_i
-//! and r_i+1 by atan2(|r_i x r_i+1|, r_i . r_i+1), the polygon cut at the horizon first. No unit. This is the share of the light of the
+//! and r_i+1 by atan2(|r_i x r_i+1|, r_i . r_i+1), the polygon clipped at the horizon first. No unit. This is the share of the light of the
 //! element that leaves for the polygon, whichever way the polygon faces and with nothing between; who may see whom is the caller's.
 
 use glam::DVec3;

@@ -1,6 +1,6 @@
 //! What could block between two patches.
 //!
-//! The shaft is the convex hull of two patches (Haines and Wallace 1991, "Shaft Culling for Efficient Ray-Traced Radiosity"), cut to
+//! The shaft is the convex hull of two patches (Haines and Wallace 1991, "Shaft Culling for Efficient Ray-Traced Radiosity"), clipped to
 //! the front half-space of a patch that is a triangle: light neither leaves nor arrives behind it. The hull's sides pass
 //! through an edge of one patch and a corner of the other; each is pushed out until all corners are inside, so that a rounding never
 //! makes the shaft too small. A triangle is a blocker when something of it, clipped by all sides, is left, and the
@@ -13,7 +13,7 @@ use wide::f64x8;
 
 /// A convex end of a shaft, in the space of the index.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Patch {
+pub enum ShaftEnd {
     /// A triangle that sends or receives on its counter-clockwise side, and the id of its plane.
     Triangle {
         /// Corners, counter-clockwise seen from the front.
@@ -83,7 +83,7 @@ const BOX_EDGES: [[usize; 2]; 12] = [
     [3, 7],
 ];
 
-impl Patch {
+impl ShaftEnd {
     fn shape(&self) -> Shape {
         match *self {
             Self::Triangle {
@@ -148,7 +148,7 @@ impl Patch {
 
 impl Shaft {
     /// The shaft between two patches; the order does not matter.
-    pub fn between(a: &Patch, b: &Patch) -> Self {
+    pub fn between(a: &ShaftEnd, b: &ShaftEnd) -> Self {
         let (sa, sb) = (a.shape(), b.shape());
         let mut shaft = Self {
             sides: [HalfSpace {
@@ -280,14 +280,14 @@ impl Shaft {
         if least >= -gap || most <= gap {
             return false;
         }
-        crossed == 0 || self.cut_holds(triangle, gap)
+        crossed == 0 || self.clipped_holds(triangle, gap)
     }
 
-    /// The last step of [`Self::holds`]: is something left of a triangle when all sides have cut it?
-    pub(super) fn cut_holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
-        let mut outline = Outline::new(triangle);
+    /// The last step of [`Self::holds`]: is something left of a triangle when all sides have clipped it?
+    pub(super) fn clipped_holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
+        let mut outline = ConvexOutline::new(triangle);
         for side in self.sides() {
-            match outline.cut(side, gap) {
+            match outline.clip(side, gap) {
                 Left::Nothing => return false,
                 Left::Some => {}
                 Left::TooMany => return true,
@@ -308,12 +308,12 @@ pub(super) fn dot(a: [f64x8; 3], b: [f64x8; 3]) -> f64x8 {
 }
 
 /// A convex polygon of up to eight corners, coordinate by coordinate.
-struct Outline {
+struct ConvexOutline {
     corners: [[f64; 8]; 3],
     count: usize,
 }
 
-/// What a cut leaves.
+/// What clipping leaves.
 enum Left {
     Nothing,
     Some,
@@ -321,7 +321,7 @@ enum Left {
     TooMany,
 }
 
-impl Outline {
+impl ConvexOutline {
     fn new(triangle: &[DVec3; 3]) -> Self {
         let mut outline = Self {
             corners: [[0.0; 8]; 3],
@@ -345,7 +345,7 @@ impl Outline {
 
     /// Keeps what is deeper than `gap` inside.
     #[inline]
-    fn cut(&mut self, side: &HalfSpace, gap: f64) -> Left {
+    fn clip(&mut self, side: &HalfSpace, gap: f64) -> Left {
         let [x, y, z] = &self.corners;
         let points = [f64x8::new(*x), f64x8::new(*y), f64x8::new(*z)];
         let depth = dot(points, splat(side.normal)) - f64x8::splat(side.offset - gap);

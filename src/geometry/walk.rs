@@ -1,6 +1,6 @@
 //! What every walk through the tree needs: one line against the eight boxes of a node, and a stack.
 
-use super::tree::{Node, WIDTH};
+use super::bvh::{BvhNode, WIDTH};
 use glam::Vec3;
 use wide::f32x8;
 
@@ -52,7 +52,7 @@ impl Slabs {
 
     /// Where the line enters the eight boxes, and a bit for each that it meets before `t_max`.
     #[inline(always)]
-    pub(crate) fn enter(&self, node: &Node, t_max: f32) -> (f32x8, u32) {
+    pub(crate) fn enter(&self, node: &BvhNode, t_max: f32) -> (f32x8, u32) {
         let mut near = f32x8::ZERO;
         let mut far = f32x8::splat(t_max);
         for axis in 0..3 {
@@ -109,7 +109,7 @@ impl<T: Copy> Stack<T> {
 /// Pushes the children that the line meets, the farthest first.
 #[inline(always)]
 pub(crate) fn push_by_distance(
-    node: &Node,
+    node: &BvhNode,
     slabs: &Slabs,
     t_max: f32,
     stack: &mut Stack<(f32, u32)>,

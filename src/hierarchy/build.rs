@@ -11,7 +11,7 @@ use glam::DVec3;
 const BINS: usize = 8;
 
 /// What the builder knows of a face.
-struct Item {
+struct BuildFace {
     face: u32,
     centre: DVec3,
     low: DVec3,
@@ -41,7 +41,7 @@ impl Bounds {
         count: 0,
     };
 
-    fn add(&mut self, item: &Item) {
+    fn add(&mut self, item: &BuildFace) {
         self.low = self.low.min(item.low);
         self.high = self.high.max(item.high);
         self.normal += item.normal * item.area;
@@ -77,7 +77,7 @@ impl Tree {
     /// Builds the clusters over all faces of `mesh`; only the topmost hold faces of more than one space. `spaces` has
     /// the space of each face.
     pub fn new(mesh: &Mesh, spaces: &[u32]) -> Self {
-        let mut items: Vec<Item> = mesh
+        let mut items: Vec<BuildFace> = mesh
             .faces
             .iter()
             .enumerate()
@@ -87,7 +87,7 @@ impl Tree {
                 let high = corners[0].max(corners[1]).max(corners[2]);
                 let t = face.triangle as usize;
                 let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-                Item {
+                BuildFace {
                     face: k as u32,
                     centre,
                     low,
@@ -159,7 +159,7 @@ fn placeholder(parent: u32, first: usize, count: usize) -> Node {
 }
 
 /// Where to split items of several spaces, ordered by space: between two spaces, near the middle.
-fn between_spaces(items: &[Item]) -> Option<usize> {
+fn between_spaces(items: &[BuildFace]) -> Option<usize> {
     let (first, last) = (items.first()?.space, items.last()?.space);
     if first == last {
         return None;
@@ -172,10 +172,10 @@ fn between_spaces(items: &[Item]) -> Option<usize> {
 }
 
 /// Reorders `items` into two parts and returns the size of the first.
-fn split(items: &mut [Item]) -> usize {
+fn split(items: &mut [BuildFace]) -> usize {
     let mut best = (f64::INFINITY, 0, 0.0);
     for axis in 0..6 {
-        let key = |item: &Item| {
+        let key = |item: &BuildFace| {
             if axis < 3 {
                 item.centre[axis]
             } else {
@@ -192,7 +192,7 @@ fn split(items: &mut [Item]) -> usize {
             continue;
         }
         let scale = BINS as f64 / (high - low);
-        let bin = |item: &Item| (((key(item) - low) * scale) as usize).min(BINS - 1);
+        let bin = |item: &BuildFace| (((key(item) - low) * scale) as usize).min(BINS - 1);
         let mut bins = [Bounds::EMPTY; BINS];
         for item in items.iter() {
             bins[bin(item)].add(item);

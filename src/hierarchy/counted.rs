@@ -21,7 +21,7 @@ const PIECE: usize = 16;
 const WORTH: f64 = 0.01;
 
 /// Where light landed: the entry of a face, and weights of its corners.
-pub(crate) type Landing = (u32, [f64; 3]);
+pub(crate) type LandingPoint = (u32, [f64; 3]);
 
 /// How much of a hierarchy counts; empty where everything does.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -33,7 +33,7 @@ pub(crate) struct Counted {
 }
 
 /// The state of finding what counts.
-struct Finder {
+struct SplitSearch {
     /// Least density of landings that counts in full, 1/m2.
     full: f64,
     /// Dark parts below this area are not worth a split.
@@ -45,14 +45,14 @@ struct Finder {
 
 impl Tree {
     /// Finds what counts, and splits elements that lie partly in the room.
-    pub(crate) fn count(&mut self, mut landings: Vec<Landing>) -> Counted {
+    pub(crate) fn count(&mut self, mut landings: Vec<LandingPoint>) -> Counted {
         landings.sort_by_key(|landing| landing.0);
         let mut pieces = Vec::new();
         self.pieces(0, &mut landings.clone(), &mut pieces);
         let Some(usual) = usual(pieces) else {
             return Counted::default();
         };
-        let mut finder = Finder {
+        let mut finder = SplitSearch {
             full: DARK * usual,
             worth: WORTH * landings.len() as f64 / usual,
             splits: Vec::new(),
@@ -152,7 +152,11 @@ impl Tree {
     }
 
     /// Children of a node that have landings, each with these.
-    fn by_child<'a>(&self, id: u32, landings: &'a mut [Landing]) -> Vec<(u32, &'a mut [Landing])> {
+    fn by_child<'a>(
+        &self,
+        id: u32,
+        landings: &'a mut [LandingPoint],
+    ) -> Vec<(u32, &'a mut [LandingPoint])> {
         let node = self.node(id);
         if node.element != NONE {
             let parts = by_quarter(landings);
@@ -172,7 +176,7 @@ impl Tree {
     }
 
     /// Area and landings of pieces, each as large as needed to hold some.
-    fn pieces(&self, id: u32, landings: &mut [Landing], pieces: &mut Vec<(f64, usize)>) {
+    fn pieces(&self, id: u32, landings: &mut [LandingPoint], pieces: &mut Vec<(f64, usize)>) {
         let node = self.node(id);
         if node.element != NONE {
             pieces_of_element(node.area, landings, pieces);
@@ -186,7 +190,7 @@ impl Tree {
     }
 }
 
-fn pieces_of_element(area: f64, landings: &mut [Landing], pieces: &mut Vec<(f64, usize)>) {
+fn pieces_of_element(area: f64, landings: &mut [LandingPoint], pieces: &mut Vec<(f64, usize)>) {
     if landings.len() <= PIECE || area < f64::MIN_POSITIVE {
         pieces.push((area, landings.len()));
         return;
@@ -197,8 +201,8 @@ fn pieces_of_element(area: f64, landings: &mut [Landing], pieces: &mut Vec<(f64,
 }
 
 /// Landings on the quarters of an element, with their weights there.
-fn by_quarter(landings: &mut [Landing]) -> [&mut [Landing]; 4] {
-    let mut tagged: Vec<(u32, Landing)> = (landings.iter())
+fn by_quarter(landings: &mut [LandingPoint]) -> [&mut [LandingPoint]; 4] {
+    let mut tagged: Vec<(u32, LandingPoint)> = (landings.iter())
         .map(|&(entry, mut weights)| (quarter(&mut weights), (entry, weights)))
         .collect();
     tagged.sort_by_key(|(part, _)| *part);
@@ -230,7 +234,7 @@ fn usual(pieces: Vec<(f64, usize)>) -> Option<f64> {
     middle.map(|piece| piece.0)
 }
 
-impl Finder {
+impl SplitSearch {
     /// Is an area large enough for landings to tell whether it counts?
     fn tells(&self, area: f64) -> bool {
         area * self.full >= EVIDENCE
@@ -241,7 +245,7 @@ impl Finder {
     }
 
     /// How much of an element's area counts.
-    fn lit(&self, area: f64, landings: &mut [Landing]) -> f64 {
+    fn lit(&self, area: f64, landings: &mut [LandingPoint]) -> f64 {
         if landings.is_empty() {
             return 0.0;
         }
@@ -260,7 +264,7 @@ impl Finder {
         self.shares[id as usize] = share as f32;
     }
 
-    fn find(&mut self, tree: &mut Tree, id: u32, landings: &mut [Landing]) {
+    fn find(&mut self, tree: &mut Tree, id: u32, landings: &mut [LandingPoint]) {
         let node = tree.node(id).clone();
         if node.element == NONE {
             let told = node
@@ -340,7 +344,7 @@ mod tests {
     }
 
     /// Landings all over the first face, and on a corner of the second that is as large as the first.
-    fn landings(on: [usize; 2]) -> Vec<Landing> {
+    fn landings(on: [usize; 2]) -> Vec<LandingPoint> {
         let mut random = Pcg::new(7);
         let mut all = Vec::new();
         for (entry, count) in [(0, on[0]), (1, on[1])] {

@@ -130,7 +130,7 @@ impl Cut {
     }
 
     /// Adopts the points on the triangle's edges: own points move onto them, those of neighbours are added.
-    fn share(&mut self, vertices: [u32; 3], edges: &BTreeMap<Edge, Vec<f64>>) {
+    fn share(&mut self, vertices: [u32; 3], edges: &BTreeMap<VertexPair, Vec<f64>>) {
         for w in &mut self.points {
             if let Some((edge, x)) = on_edge(vertices, *w)
                 && let Some(points) = edges.get(&edge)
@@ -386,14 +386,14 @@ pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
 }
 
 /// The lower and the higher vertex of an edge.
-type Edge = (u32, u32);
+type VertexPair = (u32, u32);
 
-fn key(a: u32, b: u32) -> Edge {
+fn key(a: u32, b: u32) -> VertexPair {
     (a.min(b), a.max(b))
 }
 
 /// For a point on an edge, the edge with the share of the way from its lower to its higher vertex.
-fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<(Edge, f64)> {
+fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<(VertexPair, f64)> {
     let k = w.iter().position(|&x| x == 0.0)?;
     let (i, j) = ((k + 1) % 3, (k + 2) % 3);
     if w[i] == 0.0 || w[j] == 0.0 {
@@ -404,8 +404,8 @@ fn on_edge(vertices: [u32; 3], w: [f64; 3]) -> Option<(Edge, f64)> {
 }
 
 /// Shares of the way along each edge at which cuts have points, ascending; merged where both sides have the same point.
-fn points_on_edges(mesh: &Mesh, cuts: &[Cut]) -> BTreeMap<Edge, Vec<f64>> {
-    let mut edges: BTreeMap<Edge, Vec<f64>> = BTreeMap::new();
+fn points_on_edges(mesh: &Mesh, cuts: &[Cut]) -> BTreeMap<VertexPair, Vec<f64>> {
+    let mut edges: BTreeMap<VertexPair, Vec<f64>> = BTreeMap::new();
     for cut in cuts {
         let vertices = mesh.triangles[cut.triangle as usize];
         for &w in &cut.points {
@@ -478,7 +478,7 @@ impl Mesh {
         cut: &Cut,
         vertices: [u32; 3],
         plane: &Plane,
-        welded: &mut HashMap<(Edge, u64), u32>,
+        welded: &mut HashMap<(VertexPair, u64), u32>,
     ) -> Vec<u32> {
         let id = |&w: &[f64; 3]| {
             if let Some(k) = w.iter().position(|&x| x == 1.0) {
@@ -520,7 +520,7 @@ impl Mesh {
 }
 
 /// Weights of a point on an edge, with the same bits from both sides.
-fn edge_weights(vertices: [u32; 3], (low, high): Edge, t: f64) -> [f64; 3] {
+fn edge_weights(vertices: [u32; 3], (low, high): VertexPair, t: f64) -> [f64; 3] {
     vertices.map(|v| {
         if v == low {
             1.0 - t

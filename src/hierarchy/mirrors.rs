@@ -3,7 +3,7 @@
 //! All triangles of a material that lie in one plane and face the same way are one plane mirror. What a point sees by way of plane
 //! mirrors `m1, m2, ..` it would see straight from its mirror image `.. R2 R1 p`, `Ri` being the reflection in `mi`, with the mirrors as
 //! windows. So lamps are gathered from the image, with the factors that they have for any other point. Which mirrors may follow one
-//! another is found once; an [`Image`] is such a sequence.
+//! another is found once; a [`MirrorImage`] is such a sequence.
 //!
 //! Surfaces of many small planes are curved mirrors: rays find the light in them, and things have no images there.
 
@@ -66,7 +66,7 @@ impl Plane {
 
 /// A sequence of plane mirrors in which something may be seen.
 #[derive(Debug, Clone)]
-pub struct Image {
+pub struct MirrorImage {
     planes: Sequence,
     /// Takes a receiving point to its mirror image.
     turn: DMat3,
@@ -75,7 +75,7 @@ pub struct Image {
     windows: Vec<Plane>,
 }
 
-impl Image {
+impl MirrorImage {
     /// The image in no mirrors, to be continued.
     fn straight() -> Self {
         Self {
@@ -200,7 +200,7 @@ pub struct Mirrors {
     /// By triangle, for its front and its back: number of the plane, [`CURVED`], or [`NONE`] where it is no mirror.
     of: Vec<[u32; 2]>,
     planes: Vec<Plane>,
-    images: Vec<Image>,
+    images: Vec<MirrorImage>,
     numbers: BTreeMap<Sequence, u32>,
     left_out: usize,
     curved: bool,
@@ -323,8 +323,8 @@ impl Mirrors {
                     .collect()
             })
             .collect();
-        let mut images: Vec<Image> = Vec::new();
-        let start = Image::straight();
+        let mut images: Vec<MirrorImage> = Vec::new();
+        let start = MirrorImage::straight();
         let mut level = vec![start];
         for depth in 0..BOUNCES {
             let mut next = Vec::new();
@@ -348,7 +348,7 @@ impl Mirrors {
     }
 
     /// A sequence with one more mirror, if light can go that way.
-    fn followed(&self, image: &Image, k: u32) -> Option<Image> {
+    fn followed(&self, image: &MirrorImage, k: u32) -> Option<MirrorImage> {
         let mirror = &self.planes[k as usize];
         let depth = image.depth();
         let earlier = image.planes[..depth].iter().rev();
@@ -365,7 +365,7 @@ impl Mirrors {
         let n = mirror.normal;
         let across = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
         let turn = DMat3::IDENTITY - 2.0 * across;
-        Some(Image {
+        Some(MirrorImage {
             planes,
             turn: turn * image.turn,
             shift: turn * image.shift + 2.0 * mirror.offset * n,
@@ -399,7 +399,7 @@ impl Mirrors {
     }
 
     /// All images in which something may be seen.
-    pub fn images(&self) -> &[Image] {
+    pub fn images(&self) -> &[MirrorImage] {
         &self.images
     }
 
@@ -414,7 +414,7 @@ impl Mirrors {
 
     /// Numbers of the images in which a point with a normal may see something.
     pub fn seen_from(&self, point: DVec3, normal: DVec3) -> impl Iterator<Item = u32> {
-        let open = move |image: &Image| image.is_open_to(point, normal, self.least);
+        let open = move |image: &MirrorImage| image.is_open_to(point, normal, self.least);
         let images = (0..).zip(&self.images);
         images.filter(move |(_, image)| open(image)).map(|(k, _)| k)
     }
@@ -504,7 +504,7 @@ mod tests {
     #[test]
     fn images_between_parallel_mirrors_stand_in_a_row() {
         let mut mirrors = parallel();
-        let start = Image::straight();
+        let start = MirrorImage::straight();
         let once = mirrors.followed(&start, 0).unwrap();
         let twice = mirrors.followed(&once, 1).unwrap();
         let (eye, place) = (0.5 * DVec3::X, DVec3::new(1.0, 0.7, 0.0));

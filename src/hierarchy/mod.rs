@@ -13,13 +13,13 @@ mod spaces;
 mod tree;
 mod validate;
 
-pub(crate) use counted::{Counted, Landing};
+pub(crate) use counted::{Counted, LandingPoint};
 pub use cut::{Cut, cuts};
 pub use halves::{Blocker, Outline};
 pub(crate) use mesh::Frame;
 pub use mesh::{Face, Mesh, Raised};
-pub use mirrors::{BOUNCES, Image, Mirrors, Route};
+pub use mirrors::{BOUNCES, MirrorImage, Mirrors, Route};
 pub use panes::{Crossing, Glazing, Panes};
 pub use spaces::{Spaces, spaces};
-pub use tree::{Element, Grown, NONE, Node, Sample, Tree};
+pub use tree::{Element, NONE, Node, Sample, Tree, TreeSize};
 pub(crate) use tree::{leaf_below, stratified};

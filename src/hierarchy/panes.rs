@@ -43,7 +43,7 @@ pub struct Crossing {
 
 /// A triangle of a pane.
 #[derive(Debug, Clone, Copy)]
-struct Face {
+struct PaneFace {
     /// Index in [`Scene::panes`], and of the triangle there.
     surface: u32,
     triangle: u32,
@@ -76,7 +76,7 @@ impl Part {
 #[derive(Debug, Clone)]
 pub struct Panes {
     rays: RayIndex,
-    faces: Vec<Face>,
+    faces: Vec<PaneFace>,
     parts: Vec<Part>,
     /// For each part: is it a solid whose faces look inwards?
     reversed: Vec<bool>,
@@ -102,10 +102,10 @@ impl Glazing<'_> {
 
 /// A face that a ray crosses.
 #[derive(Debug, Clone, Copy)]
-struct Hit {
+struct PaneHit {
     /// Distance from the start of the ray.
     at: f64,
-    face: Face,
+    face: PaneFace,
     enters: bool,
     cosine: f64,
     texel: f64,
@@ -126,7 +126,7 @@ impl Panes {
             for (k, (corners, part)) in surface.triangles.iter().zip(of).enumerate() {
                 let [a, b, c] = corners.map(|i| surface.positions[i as usize]);
                 triangles.push(corners.map(|i| first + i));
-                faces.push(Face {
+                faces.push(PaneFace {
                     surface: number as u32,
                     triangle: k as u32,
                     material: surface.material as u32,
@@ -177,12 +177,12 @@ impl Panes {
         }
         let (from, to) = (from.as_dvec3(), to.as_dvec3());
         let direction = (to - from).normalize_or_zero();
-        let mut hits: Vec<Hit> = met
+        let mut hits: Vec<PaneHit> = met
             .into_iter()
             .map(|(triangle, u, v)| self.hit(scene, from, direction, (triangle, u, v)))
             .collect();
         hits.sort_by(|a, b| {
-            let key = |h: &Hit| (h.face.surface, h.face.triangle);
+            let key = |h: &PaneHit| (h.face.surface, h.face.triangle);
             a.at.total_cmp(&b.at).then(key(a).cmp(&key(b)))
         });
         self.panes_of(scene, &hits, from.distance(to))
@@ -194,14 +194,14 @@ impl Panes {
         from: DVec3,
         direction: DVec3,
         (triangle, u, v): (u32, f32, f32),
-    ) -> Hit {
+    ) -> PaneHit {
         let face = self.faces[triangle as usize];
         let weights = [1.0 - u - v, u, v];
         let corners = self.rays.triangle(triangle).unwrap_or_default();
         let point: Vec3 = corners.into_iter().zip(weights).map(|(c, w)| c * w).sum();
         let along = face.normal.dot(direction);
         let surface = &scene.panes[face.surface as usize];
-        Hit {
+        PaneHit {
             at: (point.as_dvec3() - from).dot(direction),
             face,
             enters: (along < 0.0) != self.reversed[face.part as usize],
@@ -211,19 +211,19 @@ impl Panes {
     }
 
     /// Combines faces that bound one pane.
-    fn panes_of(&self, scene: &Scene, hits: &[Hit], length: f64) -> Vec<Crossing> {
+    fn panes_of(&self, scene: &Scene, hits: &[PaneHit], length: f64) -> Vec<Crossing> {
         let mut out = Vec::new();
         // Faces entered and not yet left; and the last face that was finished.
-        let mut open: Vec<Hit> = Vec::new();
-        let mut last: Option<Hit> = None;
+        let mut open: Vec<PaneHit> = Vec::new();
+        let mut last: Option<PaneHit> = None;
         for hit in hits {
-            let same = |other: &Hit| {
+            let same = |other: &PaneHit| {
                 other.face.material == hit.face.material
                     && other.face.normal.dot(hit.face.normal).abs() > PARALLEL
                     && (hit.at - other.at).abs() <= self.together
             };
             // An edge shared by two triangles, or a back that lies right on its front.
-            let here = |o: &&Hit| hit.at - o.at <= self.together;
+            let here = |o: &&PaneHit| hit.at - o.at <= self.together;
             let mut near = open.iter().rev().take_while(here);
             let again = near.any(|o| o.enters == hit.enters && same(o));
             if again || last.is_some_and(|last| same(&last)) {
@@ -245,7 +245,7 @@ impl Panes {
     }
 
     /// Do two faces bound the same glass?
-    fn bound(&self, entry: &Hit, exit: &Hit) -> bool {
+    fn bound(&self, entry: &PaneHit, exit: &PaneHit) -> bool {
         let [a, b] = [entry.face, exit.face];
         let near = (exit.at - entry.at) * entry.cosine <= NEAR && is_parallel(entry, exit);
         // A cavity counts as a part of its own.
@@ -254,7 +254,7 @@ impl Panes {
     }
 
     /// The panes between two faces.
-    fn between(&self, scene: &Scene, entry: &Hit, exit: &Hit, out: &mut Vec<Crossing>) {
+    fn between(&self, scene: &Scene, entry: &PaneHit, exit: &PaneHit, out: &mut Vec<Crossing>) {
         let Some(pane) = pane_of(scene, entry) else {
             return;
         };
@@ -286,7 +286,7 @@ impl Panes {
     }
 
     /// A single face; a ray that starts or ends within a solid passes `chord` of it.
-    fn alone(&self, scene: &Scene, hit: &Hit, chord: f64) -> Crossing {
+    fn alone(&self, scene: &Scene, hit: &PaneHit, chord: f64) -> Crossing {
         let solid = self.parts[hit.face.part as usize].closed;
         match pane_of(scene, hit).map(|p| &p.kind) {
             Some(&PaneKind::Glass {
@@ -300,7 +300,7 @@ impl Panes {
     }
 }
 
-impl Hit {
+impl PaneHit {
     fn crossing(&self, thickness: f64) -> Crossing {
         Crossing {
             material: self.face.material,
@@ -311,7 +311,7 @@ impl Hit {
     }
 }
 
-fn is_parallel(a: &Hit, b: &Hit) -> bool {
+fn is_parallel(a: &PaneHit, b: &PaneHit) -> bool {
     a.face.normal.dot(b.face.normal).abs() > PARALLEL
 }
 
@@ -322,7 +322,7 @@ fn refracted(ior: f64, cosine: f64) -> f64 {
         .sqrt()
 }
 
-fn pane_of<'a>(scene: &'a Scene, hit: &Hit) -> Option<&'a Pane> {
+fn pane_of<'a>(scene: &'a Scene, hit: &PaneHit) -> Option<&'a Pane> {
     scene.materials[hit.face.material as usize].pane.as_ref()
 }
 

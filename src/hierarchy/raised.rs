@@ -15,7 +15,7 @@ const RAISED: f64 = 5e-5;
 const COMMON: f64 = 1e-3;
 
 /// A face in its plane.
-struct Flat {
+struct PlanarFace {
     surface: u32,
     triangle: u32,
     /// Does the face look along the normal of the plane?
@@ -27,7 +27,7 @@ struct Flat {
 }
 
 /// Common areas of surfaces, by their numbers and by whether they look along the normal.
-type Common = BTreeMap<(u32, u32, bool), f64>;
+type SharedAreas = BTreeMap<(u32, u32, bool), f64>;
 
 impl Mesh {
     /// The surfaces that lie in others, and the displacements of their vertices.
@@ -43,7 +43,8 @@ impl Mesh {
                 continue;
             }
             let normal = self.normal[faces[0].triangle as usize];
-            let mut flat: Vec<Flat> = faces.iter().map(|face| self.flat(face, normal)).collect();
+            let mut flat: Vec<PlanarFace> =
+                faces.iter().map(|face| self.flat(face, normal)).collect();
             flat.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
             let common = common(&flat);
             if !common.is_empty() {
@@ -53,7 +54,7 @@ impl Mesh {
         (raised, moves)
     }
 
-    fn flat(&self, face: &Face, normal: DVec3) -> Flat {
+    fn flat(&self, face: &Face, normal: DVec3) -> PlanarFace {
         let [right, up] = tangents(normal);
         let flat = |p: DVec3| DVec2::new(p.dot(right), p.dot(up));
         let corners = self
@@ -63,7 +64,7 @@ impl Mesh {
             })
             .map(flat);
         let [a, b, c] = corners;
-        Flat {
+        PlanarFace {
             surface: self.origin[face.triangle as usize].0,
             triangle: face.triangle,
             along: self.face_normal(*face).dot(normal) > 0.0,
@@ -77,8 +78,8 @@ impl Mesh {
     /// Stacks the surfaces of a plane, those that cover most of it first.
     fn raise(
         &self,
-        flat: &[Flat],
-        common: &Common,
+        flat: &[PlanarFace],
+        common: &SharedAreas,
         normal: DVec3,
         input: &[&[[u32; 3]]],
         (raised, moves): (&mut Vec<Raised>, &mut Moves),
@@ -125,9 +126,9 @@ impl Mesh {
 }
 
 /// Common areas of faces of different surfaces that look the same way; faces are sorted from the left.
-fn common(faces: &[Flat]) -> Common {
-    let mut found = Common::new();
-    let mut open: Vec<&Flat> = Vec::new();
+fn common(faces: &[PlanarFace]) -> SharedAreas {
+    let mut found = SharedAreas::new();
+    let mut open: Vec<&PlanarFace> = Vec::new();
     for face in faces {
         open.retain(|other| other.high.x > face.low.x);
         for other in &open {

@@ -59,7 +59,7 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
         } else {
             RAYS
         };
-        let met: Vec<(u32, Meets)> = open
+        let met: Vec<(u32, SpaceHit)> = open
             .par_iter()
             .flat_map_iter(|&id| {
                 let seed = hash(hash(seed, pass), u64::from(id));
@@ -70,12 +70,12 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
         for (a, meets) in met {
             let part = (a as usize).checked_sub(faces);
             match meets {
-                Meets::Front(b) => {
+                SpaceHit::Front(b) => {
                     join(&mut above, a, b);
                     part.into_iter().for_each(|part| fronts[part] += 1);
                 }
-                Meets::Back => part.into_iter().for_each(|part| fronts[part] -= 1),
-                Meets::Nothing => {}
+                SpaceHit::Back => part.into_iter().for_each(|part| fronts[part] -= 1),
+                SpaceHit::Nothing => {}
             }
         }
         let largest = largest(&mut above);
@@ -113,7 +113,7 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
 }
 
 /// What a ray meets.
-enum Meets {
+enum SpaceHit {
     /// A face or part.
     Front(u32),
     /// The black back of something.
@@ -194,7 +194,7 @@ impl<'a> Rooms<'a> {
     }
 
     /// What ray `k` of a face or part meets.
-    fn meet(&self, id: u32, k: u32, seed: u64) -> Meets {
+    fn meet(&self, id: u32, k: u32, seed: u64) -> SpaceHit {
         let mesh = self.mesh;
         let (triangle, back, from) = match mesh.faces.get(id as usize) {
             Some(&face) => {
@@ -214,21 +214,21 @@ impl<'a> Rooms<'a> {
         let plane = mesh.plane[triangle as usize];
         let (from32, direction32) = (from.as_vec3(), direction.as_vec3());
         let Some(hit) = self.rays.closest(from32, direction32, reach, plane) else {
-            return Meets::Nothing;
+            return SpaceHit::Nothing;
         };
         let (triangle, side) = (hit.triangle as usize, usize::from(hit.from_behind));
         if self.sides[triangle][side] == NONE {
-            return Meets::Back;
+            return SpaceHit::Back;
         }
         if self.cut_of[triangle] == NONE {
-            return Meets::Front(self.sides[triangle][side]);
+            return SpaceHit::Front(self.sides[triangle][side]);
         }
         let part = &self.parts[self.cut_of[triangle] as usize];
         let at = from + direction * f64::from(hit.t);
         let mut polygons = part.polygons.iter();
         match polygons.position(|p| self.holds(p, part.triangle, at)) {
-            Some(polygon) => Meets::Front(part.first[side] + polygon as u32),
-            None => Meets::Nothing,
+            Some(polygon) => SpaceHit::Front(part.first[side] + polygon as u32),
+            None => SpaceHit::Nothing,
         }
     }
 

@@ -180,7 +180,7 @@ pub struct Tree {
 
 /// Size of a hierarchy: nodes are only ever appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Grown {
+pub struct TreeSize {
     nodes: usize,
     elements: usize,
     behind: usize,
@@ -256,8 +256,8 @@ impl Tree {
     }
 
     /// The size of the hierarchy, for [`Tree::shrink`].
-    pub fn grown(&self) -> Grown {
-        Grown {
+    pub fn grown(&self) -> TreeSize {
+        TreeSize {
             nodes: self.nodes.len(),
             elements: self.elements.len(),
             behind: self.behind.len(),
@@ -265,7 +265,7 @@ impl Tree {
     }
 
     /// Takes back every split since `to`.
-    pub fn shrink(&mut self, to: &Grown) {
+    pub fn shrink(&mut self, to: &TreeSize) {
         self.nodes.truncate(to.nodes);
         self.elements.truncate(to.elements);
         self.behind.truncate(to.behind);

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::gather::Probed;
 use crate::solve::Bake;
 use crate::store::codec::Read;
-use crate::store::{Broken, Kind};
+use crate::store::{Broken, FileKind};
 use crate::transport::trace::{self, Stains};
 use glam::DVec3;
 
@@ -74,11 +74,11 @@ impl Relighter {
             let row = lit.replayed(found.packed.as_deref(), &stains)?;
             Ok(Probed {
                 xyz: lit.lanes().tristimulus(&row),
-                leaves: lit.lanes().leaves(&row),
+                spectrum: lit.lanes().spectrum(&row),
                 backs: found.backs,
             })
         });
         let probed: Read<Vec<Probed>> = probed.collect();
-        probed.map_err(|Broken(what)| other(format!("{what}: {}", Kind::Cache.next())))
+        probed.map_err(|Broken(what)| other(format!("{what}: {}", FileKind::Cache.next())))
     }
 }

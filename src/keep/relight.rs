@@ -9,7 +9,7 @@
 //! A cache belongs to a shape: surfaces, sides, holes, places of lights. Where that changed it is refused with what
 //! changed; so is a room in which a surface gives out light that did not (lamps may go out). A bake with layers is relit with layers.
 
-use super::relit::Kept;
+use super::relit::TracedSide;
 use crate::color::de2000;
 use crate::error::{Error, Result};
 use crate::gather::Baked;
@@ -19,10 +19,12 @@ use crate::light::{Light, Rows, padded};
 use crate::link::LinkRows;
 use crate::scene::Scene;
 use crate::solve::solver::Convergence;
-use crate::solve::{Bake, Closed, DE_PER_PERCENT, Given, Known, NOBODY, Settings, flux, punctual};
-use crate::spectrum::LEAVES;
+use crate::solve::{
+    Bake, Closed, DE_PER_PERCENT, NOBODY, RoomAnalysis, Settings, SolveInput, flux, punctual,
+};
+use crate::spectrum::BANDS;
 use crate::store::codec::Read;
-use crate::store::{Broken, Decoder, Fingerprint, Kind, Packs, container};
+use crate::store::{Broken, Decoder, FileKind, Fingerprint, Packs, container};
 use crate::transport::trace::{self, Stains};
 use std::path::Path;
 use std::time::Instant;
@@ -50,9 +52,9 @@ pub struct Relighter {
     solved: Convergence,
     /// Was it solved for a first answer only?
     rough: bool,
-    flux: flux::Balance,
+    flux: flux::FluxBalance,
     leaves: Packs,
-    kept: Vec<Kept>,
+    kept: Vec<TracedSide>,
     /// What the bake estimated for geometry, over what its last two rounds differ by at the watched points with the same
     /// light on the patches.
     geometry: Option<f64>,
@@ -85,7 +87,7 @@ pub struct RelitRecord {
     /// are now.
     pub error_de2000: crate::solve::record::Figure,
     /// Where the light went; all 0 of a first answer, which does not count it.
-    pub flux: flux::Balance,
+    pub flux: flux::FluxBalance,
     /// Seconds: choice of lanes, direct light, solve, light of the vertices.
     pub lanes_s: f64,
     /// Direct light of the leaves.
@@ -148,7 +150,7 @@ impl Bake {
         };
         let settings = serde_json::to_string(&self.room.settings)
             .map_err(|problem| Error::Internal(format!("settings: {problem}")))?;
-        container::write(path, Kind::Cache, |out| {
+        container::write(path, FileKind::Cache, |out| {
             Fingerprint::shape(&self.room.scene).encode(out)?;
             out.put(u8::from(self.room.scene.changes.layers.is_some()))?;
             Fingerprint::paint(&self.room.scene).encode(out)?;
@@ -165,7 +167,7 @@ impl Bake {
             self.encode_state(false, &factor, out)?;
             out.put(baked.surfaces.len() as u64)?;
             for (surface, kept) in baked.surfaces.iter().zip(&baked.kept) {
-                Kept::encode(surface, kept, out)?;
+                TracedSide::encode(surface, kept, out)?;
             }
             Ok(())
         })
@@ -217,7 +219,7 @@ impl Bake {
                 .sum::<usize>()
             + rows
             + 12 * self.refinement.tree.nodes.len()
-            + self.refinement.outlook.bytes()
+            + self.refinement.leaf_rays.bytes()
             + 22 * self.refinement.graph.links.len()
             + 4 * self.refinement.graph.blockers.len()
             + 4 * self.room.spaces.len()) as u64
@@ -234,7 +236,7 @@ impl Relighter {
         let now = Fingerprint::shape(&scene);
         let place = cache.display().to_string();
         let mut opened = Err(Error::Internal("a cache that was not read".into()));
-        container::read(cache, Kind::Cache, |from| {
+        container::read(cache, FileKind::Cache, |from| {
             let changed = Fingerprint::decode(from)?.change(&now);
             let ready = match changed {
                 None => parted(scene, from.get::<u8>()? == 1),
@@ -251,14 +253,14 @@ impl Relighter {
             Ok(())
         })?;
         let opened = opened?;
-        match opened.kindled(&opened.bake.room.scene) {
+        match opened.newly_emitting(&opened.bake.room.scene) {
             None => Ok(opened),
             Some(what) => Err(refused(&place, &what)),
         }
     }
 
     /// A surface that gives out light and did not: nobody looked for its shadows.
-    fn kindled(&self, scene: &Scene) -> Option<String> {
+    fn newly_emitting(&self, scene: &Scene) -> Option<String> {
         let now = lit(scene);
         let new = (0..now.len()).find(|&k| now[k] > self.lit[k])?;
         let name = &scene.surfaces[new].name;
@@ -275,14 +277,14 @@ impl Relighter {
         let closed = from
             .get::<[u8; 2]>()?
             .map(|c| if c == 1 { Closed::Yes } else { Closed::No });
-        let known = Known {
+        let analysis = RoomAnalysis {
             spaces,
             parted,
             closed,
             counted: Counted { splits, shares },
             frame: frame.first().copied().map(Frame::of_numbers),
         };
-        let mut bake = Bake::with(scene, settings, Some(known));
+        let mut bake = Bake::with(scene, settings, Some(analysis));
         bake.room.keep = true;
         let guess: [f64; 3] = from.get()?;
         let distance: f64 = from.get()?;
@@ -296,7 +298,7 @@ impl Relighter {
         }
         let mut kept = Vec::new();
         for _ in 0..from.get::<u64>()? {
-            kept.push(Kept::decode(&bake.room.mesh, from)?);
+            kept.push(TracedSide::decode(&bake.room.mesh, from)?);
         }
         let white = bake.solution.light.white;
         Ok(Self {
@@ -329,7 +331,7 @@ impl Relighter {
     /// Its shape is another; its lamps make more layers than rows hold.
     pub fn change(&mut self, scene: Scene) -> Result<()> {
         let changed = self.shape.change(&Fingerprint::shape(&scene));
-        if let Some(what) = changed.or_else(|| self.kindled(&scene)) {
+        if let Some(what) = changed.or_else(|| self.newly_emitting(&scene)) {
             return Err(refused(&scene.source.path.display().to_string(), &what));
         }
         let layers = self.bake.room.scene.changes.layers.is_some();
@@ -361,7 +363,7 @@ impl Relighter {
 
     fn relit_within(&mut self, tolerance: f64) -> Result<Relit> {
         self.relit(tolerance)
-            .map_err(|Broken(what)| Error::input("the cache", what, Kind::Cache.next()))
+            .map_err(|Broken(what)| Error::input("the cache", what, FileKind::Cache.next()))
     }
 
     fn relit(&mut self, tolerance: f64) -> Read<Relit> {
@@ -451,7 +453,7 @@ impl Relighter {
     fn solve<const L: usize>(
         &mut self,
         tolerance: f64,
-    ) -> Read<(Convergence, flux::Balance, [f64; 2])> {
+    ) -> Read<(Convergence, flux::FluxBalance, [f64; 2])> {
         let clock = Instant::now();
         let bake = &mut self.bake;
         let leaves = bake.solution.light.leaves.clone();
@@ -489,7 +491,7 @@ impl Relighter {
         let direct_s = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
-        let looks = bake.refinement.outlook.looks();
+        let looks = bake.refinement.leaf_rays.looks();
         // Where leaves look for themselves a solve asks for no links.
         let links = self.links.get_or_insert_with(|| {
             let links = if looks {
@@ -501,7 +503,7 @@ impl Relighter {
         });
         // Nobody asks for neighbours without casting rays.
         let graph = std::mem::take(&mut bake.refinement.graph);
-        let given = Given {
+        let input = SolveInput {
             sources,
             first,
             reflected,
@@ -510,7 +512,7 @@ impl Relighter {
             // A sweep more, which a first answer does without.
             counted: tolerance <= bake.room.tolerance(),
         };
-        let (convergence, flux) = bake.solve_with::<L>(links, &leaves, given);
+        let (convergence, flux) = bake.solve_with::<L>(links, &leaves, input);
         bake.refinement.graph = graph;
         let guess = bake.room.guess(&bake.refinement.tree).white;
         self.guess = over(bake.solution.light.white, guess, self.guess);
@@ -538,8 +540,8 @@ impl Relighter {
         &self.bake.solution.light
     }
 
-    /// Radiosity on the 64 leaves at every vertex of a relit mesh, see [`Bake::radiosity_spectra`].
-    pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; LEAVES]>> {
+    /// Radiosity on the 64 bands at every vertex of a relit mesh, see [`Bake::radiosity_spectra`].
+    pub fn radiosity_spectra(&self, baked: &Baked) -> Vec<Vec<[f32; BANDS]>> {
         self.bake.radiosity_spectra(baked)
     }
 }
@@ -584,6 +586,6 @@ fn refused(place: &str, what: &str) -> Error {
     Error::input(
         place,
         format!("the cache belongs to a room of another shape: {what}"),
-        Kind::Cache.next(),
+        FileKind::Cache.next(),
     )
 }

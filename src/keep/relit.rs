@@ -13,7 +13,7 @@ use std::io;
 
 /// One side of a surface: mesh and traces.
 #[derive(Debug)]
-pub(crate) struct Kept {
+pub(crate) struct TracedSide {
     surface: usize,
     back: bool,
     /// Triangle of the mesh of each vertex, and weights of its corners.
@@ -25,7 +25,7 @@ pub(crate) struct Kept {
     traces: Packs,
 }
 
-impl Kept {
+impl TracedSide {
     /// Writes a surface down.
     pub(crate) fn encode(
         surface: &BakedSurface,
@@ -88,7 +88,7 @@ impl Kept {
 
 impl Bake {
     /// The kept mesh under the present light.
-    pub(crate) fn relit(&self, kept: &[Kept]) -> Read<Baked> {
+    pub(crate) fn relit(&self, kept: &[TracedSide]) -> Read<Baked> {
         match padded(self.lanes().len()) {
             4 => self.relit_lanes::<4>(kept),
             8 => self.relit_lanes::<8>(kept),
@@ -98,7 +98,7 @@ impl Bake {
         }
     }
 
-    fn relit_lanes<const L: usize>(&self, kept: &[Kept]) -> Read<Baked> {
+    fn relit_lanes<const L: usize>(&self, kept: &[TracedSide]) -> Read<Baked> {
         let (looks, layers) = (self.looks(self.upsampler()), self.layer_lanes());
         let stains = Stains::new(&self.solution.filters);
         let mut out = Baked::default();
@@ -146,7 +146,7 @@ impl Bake {
     }
 
     /// The place of the leaf of a vertex among the leaves of the solution, if it is one of a sheet: the leaf that it was gathered on.
-    fn place(&self, kept: &Kept, vertex: &(u32, [f64; 3])) -> Option<u32> {
+    fn place(&self, kept: &TracedSide, vertex: &(u32, [f64; 3])) -> Option<u32> {
         let vertex = kept.on_element(vertex, self);
         let to = self.receiver(&vertex, kept.surface, kept.back);
         self.place_on_sheet(to.leaf?)

@@ -10,11 +10,11 @@ use crate::hierarchy::{Crossing, Glazing, Route};
 use crate::scene::Scene;
 use crate::scene::mirror::Mirror;
 use crate::scene::pane::Pane;
-use crate::spectrum::LEAVES;
+use crate::spectrum::BANDS;
 use glam::Vec3;
 
 /// Transmittance or reflectance by lane.
-pub type Filter = [f32; LEAVES];
+pub type Filter = [f32; BANDS];
 
 /// The spectra of panes and mirrors on some lanes.
 #[derive(Debug, Clone, Default)]
@@ -93,7 +93,7 @@ impl Filters {
 
     /// The filter of what light passes.
     pub(crate) fn of(&self, passed: &[[i32; 4]]) -> Filter {
-        let mut filter = [1.0; LEAVES];
+        let mut filter = [1.0; BANDS];
         for &one in passed {
             let one = passed::crossing(one);
             match self.panes[one.material as usize] {
@@ -132,7 +132,7 @@ impl Filters {
         if let Some(steps) = kept {
             return self.past(passed::met(glazing.as_ref(), route, steps));
         }
-        let mut filter = [1.0; LEAVES];
+        let mut filter = [1.0; BANDS];
         for &(material, cosine) in route.bounces() {
             self.mirror(material, cosine, &mut filter);
         }
@@ -179,14 +179,14 @@ impl Passage {
 
     /// A passage past nothing.
     pub(crate) fn free() -> Self {
-        Self::plain([1.0; LEAVES])
+        Self::plain([1.0; BANDS])
     }
 }
 
 /// A weighted mean of what is left of light on several ways, being summed.
 #[derive(Debug, Clone)]
 pub(crate) struct Tint {
-    sum: [f64; LEAVES],
+    sum: [f64; BANDS],
     all: f64,
     by: Vec<(Passed, f64)>,
     /// Weight of ways on which nothing is lost.
@@ -196,7 +196,7 @@ pub(crate) struct Tint {
 impl Default for Tint {
     fn default() -> Self {
         Self {
-            sum: [0.0; LEAVES],
+            sum: [0.0; BANDS],
             all: 0.0,
             by: Vec::new(),
             free: 0.0,
@@ -249,7 +249,7 @@ impl Glass<'_> {
         if crossings.is_empty() {
             return None;
         }
-        let mut filter = [1.0; LEAVES];
+        let mut filter = [1.0; BANDS];
         for crossing in &crossings {
             self.filters.pass(crossing, &mut filter);
         }

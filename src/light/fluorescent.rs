@@ -4,13 +4,13 @@
 use super::lanes::Lanes;
 use crate::scene::Scene;
 use crate::scene::fluorescence::Fluorescence;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 
 /// A material's terms.
 #[derive(Debug, Clone)]
 pub struct Fluorescent {
     /// For each term: what each lane of irradiance at 1 excites, and the row that excitation 1 emits; padded with 0.
-    terms: Vec<([f32; LEAVES], [f32; LEAVES])>,
+    terms: Vec<([f32; BANDS], [f32; BANDS])>,
 }
 
 impl Fluorescent {
@@ -18,7 +18,7 @@ impl Fluorescent {
     pub fn new(fluorescence: &Fluorescence, lanes: &Lanes, scene: &Scene) -> Self {
         let layers = scene.changes.layers.as_ref();
         let terms = fluorescence.terms.iter().map(|term| {
-            let (mut taken, mut given) = ([0.0; LEAVES], [0.0; LEAVES]);
+            let (mut taken, mut given) = ([0.0; BANDS], [0.0; BANDS]);
             let all = lanes.taken(&term.excitation, scene.grid.width());
             for ((to, share), lane) in taken.iter_mut().zip(all).zip(lanes.lanes()) {
                 let layer = lane
@@ -33,7 +33,7 @@ impl Fluorescent {
                 };
                 *to = if own { share } else { 0.0 };
             }
-            lanes.add_emission(term.light, &[1.0; LEAVES], 1.0, &mut given);
+            lanes.add_emission(term.light, &[1.0; BANDS], 1.0, &mut given);
             (taken, given)
         });
         Self {
@@ -60,7 +60,7 @@ impl Fluorescent {
             .map(|(t, given)| (t, lanes.tristimulus(given)))
             .collect();
         let lane = |l: usize| {
-            let add = |sum: [f64; 3], (taken, xyz): &(&[f32; LEAVES], [f64; 3])| {
+            let add = |sum: [f64; 3], (taken, xyz): &(&[f32; BANDS], [f64; 3])| {
                 std::array::from_fn(|c| sum[c] + f64::from(taken[l]) * xyz[c])
             };
             terms.iter().fold([0.0; 3], add)
@@ -69,16 +69,16 @@ impl Fluorescent {
     }
 
     /// Spectral exitance under an irradiance, W/m2/nm.
-    pub fn leaves(&self, lanes: &Lanes, irradiance: &[f32; LEAVES]) -> Leaves {
-        lanes.leaves(&self.of(irradiance))
+    pub fn spectrum(&self, lanes: &Lanes, irradiance: &[f32; BANDS]) -> Spectrum {
+        lanes.spectrum(&self.of(irradiance))
     }
 }
 
-/// Weights of light by what it excites, besides the observer's: for each spectral leaf the tristimulus values that a surface
+/// Weights of light by what it excites, besides the observer's: for each band the tristimulus values that a surface
 /// fluoresces under it, the greatest of all materials; none where nothing fluoresces.
-pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]> {
+pub(crate) fn guide(scene: &Scene, weights: &[Spectrum; 3]) -> Option<[Spectrum; 3]> {
     let width = scene.grid.width();
-    let mut more = [[0.0_f64; LEAVES]; 3];
+    let mut more = [[0.0_f64; BANDS]; 3];
     let mut any = false;
     let used = scene.surfaces.iter().map(|s| s.material);
     let used: std::collections::BTreeSet<usize> = used.collect();
@@ -87,7 +87,7 @@ pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]>
         .filter_map(|&m| scene.materials[m].fluorescence.as_ref())
     {
         any = true;
-        let mut own = [[0.0; LEAVES]; 3];
+        let mut own = [[0.0; BANDS]; 3];
         for term in fluorescence.once() {
             let power = &scene.spectra[term.light].power;
             for (own, w) in own.iter_mut().zip(weights) {
@@ -104,11 +104,11 @@ pub(crate) fn guide(scene: &Scene, weights: &[Leaves; 3]) -> Option<[Leaves; 3]>
 
 /// Share of excitation that counts in brightness beside visible light: such that the most exciting lamp counts no more than the most
 /// visible one, or errors of one would vanish beside the other.
-pub(crate) fn balance(scene: &Scene, weights: &[Leaves; 3], guide: &[Leaves; 3]) -> f64 {
+pub(crate) fn balance(scene: &Scene, weights: &[Spectrum; 3], guide: &[Spectrum; 3]) -> f64 {
     let surfaces = scene.materials.iter().filter_map(|m| m.emission.as_ref());
     let surfaces = surfaces.map(|e| (e.light, &e.shape));
     let lights = scene.lights.iter().map(|l| (l.light, &l.shape));
-    let share = |lamps: &mut dyn Iterator<Item = (usize, &Leaves)>| {
+    let share = |lamps: &mut dyn Iterator<Item = (usize, &Spectrum)>| {
         let mut most = [0.0_f64; 2];
         for (light, shape) in lamps {
             let power = shape.iter().zip(&scene.spectra[light].power);

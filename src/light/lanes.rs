@@ -3,7 +3,7 @@
 //! Each light spectrum S(lambda) of the room is kept exactly; a lane holds the *ratio* radiosity / S on one interval of
 //! that light's dyadic cut. Reflectances are averaged by the paper's eq. 3 with `S abar` in place of `abar`, so that a
 //! grey room needs one lane a light, whatever its lines, and a first reflection keeps its tristimulus values. Where all
-//! lights together would need more than 64 lanes, the rows hold the 64 spectral leaves (leaves, here).
+//! lights together would need more than 64 lanes, the rows hold the 64 bands.
 //!
 //! Other ways to hold spectra serve for comparison: radiosity itself on intervals (the paper's way), linear sRGB, and
 //! coordinates in a trained basis (the paper's 2.2.2), under which a reflectance is a matrix.
@@ -15,7 +15,7 @@
 
 use crate::color::{KM, LinearSrgb, Upsampler};
 use crate::scene::{Emission, GREATEST_ALBEDO, LightSpectrum};
-use crate::spectrum::{LEAVES, Leaves, Partition};
+use crate::spectrum::{BANDS, Partition, Spectrum};
 use nalgebra::Matrix3;
 
 /// One lane.
@@ -23,9 +23,9 @@ use nalgebra::Matrix3;
 pub struct Lane {
     /// The light whose ratio the lane holds; none: absolute.
     pub light: Option<usize>,
-    /// First leaf of the interval.
+    /// First band of the interval.
     pub first: usize,
-    /// Leaves in the interval.
+    /// Bands in the interval.
     pub count: usize,
 }
 
@@ -34,13 +34,13 @@ pub struct Lane {
 enum Base {
     /// Values on intervals.
     Intervals(Vec<Lane>),
-    /// Linear sRGB: the contribution of each leaf of a reflectance under D65, and of each leaf of a radiosity.
+    /// Linear sRGB: the contribution of each band of a reflectance under D65, and of each band of a radiosity.
     Rgb {
-        paint: Box<[Leaves; 3]>,
-        light: Box<[Leaves; 3]>,
+        paint: Box<[Spectrum; 3]>,
+        light: Box<[Spectrum; 3]>,
     },
     /// Coordinates in an orthonormal basis.
-    Vectors(Vec<Leaves>),
+    Vectors(Vec<Spectrum>),
 }
 
 /// The lanes of all rows.
@@ -49,8 +49,8 @@ pub struct Lanes {
     base: Base,
     /// Tristimulus value of a lane at 1: `Km integral of S abar`, or of `abar` alone.
     xyz: Vec<[f64; 3]>,
-    power: Vec<Leaves>,
-    weights: [Leaves; 3],
+    power: Vec<Spectrum>,
+    weights: [Spectrum; 3],
     /// How light counts besides being visible.
     guide: Option<Box<Guide>>,
 }
@@ -59,7 +59,7 @@ pub struct Lanes {
 #[derive(Debug, Clone)]
 struct Guide {
     /// Weights like the observer's.
-    weights: [Leaves; 3],
+    weights: [Spectrum; 3],
     /// Tristimulus value of each lane at 1 by these weights.
     xyz: Vec<[f64; 3]>,
     /// A share of that, plus the visible tristimulus value.
@@ -68,10 +68,10 @@ struct Guide {
 
 impl Lanes {
     /// One cut for each light; falls back to [`Lanes::dense`] beyond 64 lanes. `weights` are the integrals of the
-    /// colour matching functions over the leaves, nm.
-    pub fn ratio(spectra: &[LightSpectrum], cuts: &[Partition], weights: &[Leaves; 3]) -> Self {
+    /// colour matching functions over the bands, nm.
+    pub fn ratio(spectra: &[LightSpectrum], cuts: &[Partition], weights: &[Spectrum; 3]) -> Self {
         assert_eq!(spectra.len(), cuts.len(), "a cut for each light");
-        if cuts.iter().map(|c| c.count()).sum::<usize>() > LEAVES {
+        if cuts.iter().map(|c| c.count()).sum::<usize>() > BANDS {
             return Self::dense(spectra, weights);
         }
         let lanes = cuts.iter().enumerate().flat_map(|(light, cut)| {
@@ -84,9 +84,9 @@ impl Lanes {
         Self::with(lanes.collect(), spectra, weights)
     }
 
-    /// The ratio to one light on every leaf; other lights are left out.
-    pub fn only(spectra: &[LightSpectrum], light: usize, weights: &[Leaves; 3]) -> Self {
-        let lanes = (0..LEAVES).map(|first| Lane {
+    /// The ratio to one light on every band; other lights are left out.
+    pub fn only(spectra: &[LightSpectrum], light: usize, weights: &[Spectrum; 3]) -> Self {
+        let lanes = (0..BANDS).map(|first| Lane {
             light: Some(light),
             first,
             count: 1,
@@ -94,13 +94,13 @@ impl Lanes {
         Self::with(lanes.collect(), spectra, weights)
     }
 
-    /// The 64 leaves, all lights together.
-    pub fn dense(spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
-        Self::absolute(spectra, Partition::LEAVES, weights)
+    /// The 64 bands, all lights together.
+    pub fn dense(spectra: &[LightSpectrum], weights: &[Spectrum; 3]) -> Self {
+        Self::absolute(spectra, Partition::BANDS, weights)
     }
 
     /// Radiosity itself on the intervals of a cut, all lights together.
-    pub fn absolute(spectra: &[LightSpectrum], cut: Partition, weights: &[Leaves; 3]) -> Self {
+    pub fn absolute(spectra: &[LightSpectrum], cut: Partition, weights: &[Spectrum; 3]) -> Self {
         let lanes = cut.iter().map(|(first, count)| Lane {
             light: None,
             first,
@@ -109,16 +109,16 @@ impl Lanes {
         Self::with(lanes.collect(), spectra, weights)
     }
 
-    /// The ratio to each light on `bands` intervals of equal width as far as leaves allow; falls back to
+    /// The ratio to each light on `count` intervals of equal width as far as bands allow; falls back to
     /// [`Lanes::dense`] beyond 64 lanes.
-    pub fn uniform(spectra: &[LightSpectrum], bands: usize, weights: &[Leaves; 3]) -> Self {
-        let bands = bands.clamp(1, LEAVES);
-        if bands * spectra.len() > LEAVES {
+    pub fn uniform(spectra: &[LightSpectrum], count: usize, weights: &[Spectrum; 3]) -> Self {
+        let count = count.clamp(1, BANDS);
+        if count * spectra.len() > BANDS {
             return Self::dense(spectra, weights);
         }
-        let edge = |k: usize| k * LEAVES / bands;
+        let edge = |k: usize| k * BANDS / count;
         let lanes = (0..spectra.len()).flat_map(|light| {
-            (0..bands).map(move |k| Lane {
+            (0..count).map(move |k| Lane {
                 light: Some(light),
                 first: edge(k),
                 count: edge(k + 1) - edge(k),
@@ -128,18 +128,18 @@ impl Lanes {
     }
 
     /// Linear sRGB: reflectances by their colour under D65, lamps by their own. Three numbers, and no way back.
-    pub fn rgb(spectra: &[LightSpectrum], upsampler: &Upsampler, weights: &[Leaves; 3]) -> Self {
-        let one = |leaf: usize| -> Leaves { std::array::from_fn(|k| f64::from(k == leaf)) };
+    pub fn rgb(spectra: &[LightSpectrum], upsampler: &Upsampler, weights: &[Spectrum; 3]) -> Self {
+        let one = |band: usize| -> Spectrum { std::array::from_fn(|k| f64::from(k == band)) };
         let display = LinearSrgb::standard();
-        let (mut paint, mut light) = ([[0.0; LEAVES]; 3], [[0.0; LEAVES]; 3]);
-        for leaf in 0..LEAVES {
+        let (mut paint, mut light) = ([[0.0; BANDS]; 3], [[0.0; BANDS]; 3]);
+        for band in 0..BANDS {
             let colours = [
-                upsampler.rgb(&one(leaf)),
-                display.from_xyz(weights.each_ref().map(|w| w[leaf])),
+                upsampler.rgb(&one(band)),
+                display.from_xyz(weights.each_ref().map(|w| w[band])),
             ];
             for c in 0..3 {
-                paint[c][leaf] = colours[0][c];
-                light[c][leaf] = colours[1][c];
+                paint[c][band] = colours[0][c];
+                light[c][band] = colours[1][c];
             }
         }
         let xyz = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -157,29 +157,29 @@ impl Lanes {
     }
 
     /// Coordinates in an orthonormal basis. Lanes then do not reflect one by one: see [`Lanes::matrix`].
-    pub fn vectors(spectra: &[LightSpectrum], basis: Vec<Leaves>, weights: &[Leaves; 3]) -> Self {
+    pub fn vectors(spectra: &[LightSpectrum], basis: Vec<Spectrum>, cmf: &[Spectrum; 3]) -> Self {
         let xyz = basis
             .iter()
-            .map(|e| weights.each_ref().map(|w| KM * dot(e, w)))
+            .map(|e| cmf.each_ref().map(|w| KM * dot(e, w)))
             .collect();
         Self {
             base: Base::Vectors(basis),
             xyz,
             power: spectra.iter().map(|s| s.power).collect(),
-            weights: *weights,
+            weights: *cmf,
             guide: None,
         }
     }
 
     /// The given lanes.
-    pub(crate) fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], weights: &[Leaves; 3]) -> Self {
-        let power: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
+    pub(crate) fn with(lanes: Vec<Lane>, spectra: &[LightSpectrum], cmf: &[Spectrum; 3]) -> Self {
+        let power: Vec<Spectrum> = spectra.iter().map(|s| s.power).collect();
         let xyz = lanes
             .iter()
             .map(|lane| {
-                let leaves = lane.first..lane.first + lane.count;
-                weights.each_ref().map(|w| {
-                    KM * leaves
+                let bands = lane.first..lane.first + lane.count;
+                cmf.each_ref().map(|w| {
+                    KM * bands
                         .clone()
                         .map(|k| w[k] * lane.light.map_or(1.0, |l| power[l][k]))
                         .sum::<f64>()
@@ -190,18 +190,18 @@ impl Lanes {
             base: Base::Intervals(lanes),
             xyz,
             power,
-            weights: *weights,
+            weights: *cmf,
             guide: None,
         }
     }
 
     /// These lanes, whose averages also follow `weights` besides the observer's: what a surface emits at other wavelengths per unit of
-    /// each leaf. A `share` of that is added to brightness.
+    /// each band. A `share` of that is added to brightness.
     #[must_use]
-    pub fn guided(mut self, weights: &[Leaves; 3], share: f64) -> Self {
-        let of = |lane: &Lane, w: &Leaves| {
-            let leaves = lane.first..lane.first + lane.count;
-            KM * leaves.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
+    pub fn guided(mut self, weights: &[Spectrum; 3], share: f64) -> Self {
+        let of = |lane: &Lane, w: &Spectrum| {
+            let bands = lane.first..lane.first + lane.count;
+            KM * bands.map(|k| w[k] * self.shape(lane, k)).sum::<f64>()
         };
         let xyz = self.lanes().iter();
         let xyz: Vec<_> = xyz.map(|l| weights.each_ref().map(|w| of(l, w))).collect();
@@ -253,7 +253,7 @@ impl Lanes {
             .collect()
     }
 
-    /// For each lane, the lane of `other` that holds the ratio to the same light on its first leaf; none unless both
+    /// For each lane, the lane of `other` that holds the ratio to the same light on its first band; none unless both
     /// hold ratios.
     pub fn places_in(&self, other: &Self) -> Option<Vec<usize>> {
         if !(self.is_ratio() && other.is_ratio()) {
@@ -303,12 +303,12 @@ impl Lanes {
         summed(row, self.excites().unwrap_or_default())
     }
 
-    /// Power that a surface takes from each lane at 1, given the share it takes of each leaf and the `width` of a leaf in nm: W/m2. Empty
+    /// Power that a surface takes from each lane at 1, given the share it takes of each band and the `width` of a band in nm: W/m2. Empty
     /// where lanes are not intervals.
-    pub fn taken(&self, share: &Leaves, width: f64) -> Vec<f32> {
+    pub fn taken(&self, share: &Spectrum, width: f64) -> Vec<f32> {
         let lanes = self.lanes().iter().map(|lane| {
-            let leaves = lane.first..lane.first + lane.count;
-            let sum: f64 = leaves.map(|k| share[k] * self.shape(lane, k)).sum();
+            let bands = lane.first..lane.first + lane.count;
+            let sum: f64 = bands.map(|k| share[k] * self.shape(lane, k)).sum();
             (sum * width) as f32
         });
         lanes.collect()
@@ -316,7 +316,7 @@ impl Lanes {
 
     /// Average of a smooth factor (a reflectance, a lamp's shape) on each lane: eq. 3 under the lane's light. Where
     /// lanes mix, only [`Lanes::matrix`] is meaningful.
-    pub fn averages(&self, f: &Leaves, out: &mut [f32]) {
+    pub fn averages(&self, f: &Spectrum, out: &mut [f32]) {
         match &self.base {
             Base::Intervals(lanes) => {
                 for (out, lane) in out.iter_mut().zip(lanes) {
@@ -332,14 +332,14 @@ impl Lanes {
         }
     }
 
-    /// Reflection where lanes mix: `R_ij = sum over leaves of rho E_i E_j`, row by row (paper 2.2.2). Symmetric, its
+    /// Reflection where lanes mix: `R_ij = sum over bands of rho E_i E_j`, row by row (paper 2.2.2). Symmetric, its
     /// eigenvalues lie in the range of rho.
-    pub fn matrix(&self, reflectance: &Leaves) -> Vec<f64> {
+    pub fn matrix(&self, reflectance: &Spectrum) -> Vec<f64> {
         let Base::Vectors(basis) = &self.base else {
             return Vec::new();
         };
-        let through = |i: &Leaves, j: &Leaves| -> f64 {
-            (0..LEAVES).map(|k| reflectance[k] * i[k] * j[k]).sum()
+        let through = |i: &Spectrum, j: &Spectrum| -> f64 {
+            (0..BANDS).map(|k| reflectance[k] * i[k] * j[k]).sum()
         };
         basis
             .iter()
@@ -347,18 +347,18 @@ impl Lanes {
             .collect()
     }
 
-    fn average(&self, f: &Leaves, lane: &Lane) -> f64 {
-        let leaves = lane.first..lane.first + lane.count;
+    fn average(&self, f: &Spectrum, lane: &Lane) -> f64 {
+        let bands = lane.first..lane.first + lane.count;
         let first = f[lane.first];
         // Exactly flat stays exactly flat: a grey room must not pick up rounding.
-        if leaves.clone().all(|k| f[k] == first) {
+        if bands.clone().all(|k| f[k] == first) {
             return first;
         }
         let (mut over, mut under) = (0.0, 0.0);
         let more = self.guide.iter().flat_map(|guide| &guide.weights);
         for w in self.weights.iter().chain(more) {
             let (mut whole, mut part) = (0.0, 0.0);
-            for k in leaves.clone() {
+            for k in bands.clone() {
                 let weight = w[k] * lane.light.map_or(1.0, |l| self.power[l][k]);
                 whole += weight;
                 part += weight * f[k];
@@ -369,13 +369,13 @@ impl Lanes {
         if under > 0.0 {
             over / under
         } else {
-            leaves.map(|k| f[k]).sum::<f64>() / lane.count as f64
+            bands.map(|k| f[k]).sum::<f64>() / lane.count as f64
         }
     }
 
     /// Tristimulus values of an emission: `scale` times `shape` of a light.
-    pub(crate) fn emission(&self, light: usize, shape: &Leaves, scale: f64) -> [f64; 3] {
-        let mut row = [0.0_f32; LEAVES];
+    pub(crate) fn emission(&self, light: usize, shape: &Spectrum, scale: f64) -> [f64; 3] {
+        let mut row = [0.0_f32; BANDS];
         self.add_emission(light, shape, scale, &mut row);
         self.tristimulus(&row)
     }
@@ -388,9 +388,9 @@ impl Lanes {
     }
 
     /// Adds an emission of `light` with a shape (see [`crate::scene::Emission`]).
-    pub fn add_emission(&self, light: usize, shape: &Leaves, scale: f64, out: &mut [f32]) {
+    pub fn add_emission(&self, light: usize, shape: &Spectrum, scale: f64, out: &mut [f32]) {
         let radiosity =
-            || -> Leaves { std::array::from_fn(|k| scale * self.power[light][k] * shape[k]) };
+            || -> Spectrum { std::array::from_fn(|k| scale * self.power[light][k] * shape[k]) };
         match &self.base {
             Base::Intervals(lanes) => {
                 let absolute = lanes
@@ -429,10 +429,10 @@ impl Lanes {
 
     /// Tristimulus values of each lane at 1 after one more reflection, with the reflectance at full resolution as far
     /// as lanes can resolve it.
-    pub fn reflected(&self, reflectance: &Leaves) -> Vec<[f64; 3]> {
+    pub fn reflected(&self, reflectance: &Spectrum) -> Vec<[f64; 3]> {
         let through = |spectrum: &dyn Fn(usize) -> f64| {
             self.weights.each_ref().map(|w| {
-                KM * (0..LEAVES)
+                KM * (0..BANDS)
                     .map(|k| reflectance[k] * w[k] * spectrum(k))
                     .sum::<f64>()
             })
@@ -455,18 +455,18 @@ impl Lanes {
         }
     }
 
-    /// Value of an interval lane at 1 on a leaf.
-    fn shape(&self, lane: &Lane, leaf: usize) -> f64 {
-        if (lane.first..lane.first + lane.count).contains(&leaf) {
-            lane.light.map_or(1.0, |l| self.power[l][leaf])
+    /// Value of an interval lane at 1 on a band.
+    fn shape(&self, lane: &Lane, band: usize) -> f64 {
+        if (lane.first..lane.first + lane.count).contains(&band) {
+            lane.light.map_or(1.0, |l| self.power[l][band])
         } else {
             0.0
         }
     }
 
-    /// The 64 leaf values of a row, W/m2/nm. For linear sRGB the shortest of the many spectra of that colour.
-    pub fn leaves(&self, row: &[f32]) -> Leaves {
-        let mut out = [0.0; LEAVES];
+    /// The 64 band values of a row, W/m2/nm. For linear sRGB the shortest of the many spectra of that colour.
+    pub fn spectrum(&self, row: &[f32]) -> Spectrum {
+        let mut out = [0.0; BANDS];
         match &self.base {
             Base::Intervals(lanes) => {
                 for (x, lane) in row.iter().zip(lanes) {
@@ -507,7 +507,7 @@ fn summed(row: &[f32], xyz: &[[f64; 3]]) -> [f64; 3] {
     sum
 }
 
-fn dot(a: &Leaves, b: &Leaves) -> f64 {
+fn dot(a: &Spectrum, b: &Spectrum) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
@@ -538,7 +538,7 @@ mod tests {
         };
         let first = unit(&spectra[0]);
         let part = dot(&first, &spectra[1].power);
-        let rest: Leaves = std::array::from_fn(|k| spectra[1].power[k] - part * first[k]);
+        let rest: Spectrum = std::array::from_fn(|k| spectra[1].power[k] - part * first[k]);
         let length = dot(&rest, &rest).sqrt();
         let all = [
             Lanes::ratio(
@@ -555,11 +555,11 @@ mod tests {
             let exact = weights.map(|w| KM * dot(&w, &spectrum.power));
             for lanes in &all {
                 let mut row = vec![0.0; lanes.len()];
-                lanes.add_emission(k, &[1.0; LEAVES], 1.0, &mut row);
+                lanes.add_emission(k, &[1.0; BANDS], 1.0, &mut row);
                 let close = |xyz: [f64; 3]| (0..3).all(|c| (xyz[c] / exact[c] - 1.0).abs() < 1e-5);
                 assert!(close(lanes.tristimulus(&row)), "{lanes:?}");
-                let leaves = lanes.leaves(&row);
-                assert!(close(weights.map(|w| KM * dot(&w, &leaves))), "{lanes:?}");
+                let spectrum = lanes.spectrum(&row);
+                assert!(close(weights.map(|w| KM * dot(&w, &spectrum))), "{lanes:?}");
             }
         }
     }
@@ -572,7 +572,7 @@ mod tests {
         let upsampler = Upsampler::new(&grid);
         let lanes = Lanes::rgb(&[light("cie/D65")], &upsampler, &weights);
         let mut row = [0.0; 3];
-        lanes.averages(&[0.5; LEAVES], &mut row);
+        lanes.averages(&[0.5; BANDS], &mut row);
         assert!(row.iter().all(|x| (x - 0.5).abs() < 1e-6), "{row:?}");
         let brick = upsampler.reflectance([0.45, 0.12, 0.08]);
         lanes.averages(&brick, &mut row);
@@ -584,16 +584,16 @@ mod tests {
     #[test]
     fn a_whole_basis_reflects_exactly() {
         let weights = Observer::cie1931().weights(&Grid::default());
-        let basis: Vec<Leaves> = (0..LEAVES)
+        let basis: Vec<Spectrum> = (0..BANDS)
             .map(|i| std::array::from_fn(|k| f64::from(i == k)))
             .collect();
         let lanes = Lanes::vectors(&[light("cie/A")], basis, &weights);
-        let rho: Leaves = std::array::from_fn(|k| 0.01 * k as f64);
+        let rho: Spectrum = std::array::from_fn(|k| 0.01 * k as f64);
         let matrix = lanes.matrix(&rho);
-        for i in 0..LEAVES {
-            for j in 0..LEAVES {
+        for i in 0..BANDS {
+            for j in 0..BANDS {
                 let expected = if i == j { rho[i] } else { 0.0 };
-                assert!((matrix[i * LEAVES + j] - expected).abs() < 1e-15);
+                assert!((matrix[i * BANDS + j] - expected).abs() < 1e-15);
             }
         }
     }

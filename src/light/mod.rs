@@ -18,6 +18,6 @@ pub use fluorescent::Fluorescent;
 pub(crate) use fluorescent::{balance, guide};
 pub use rows::{Rows, padded};
 pub use solution::{Arrival, Light, Neighbours};
-pub(crate) use solution::{brightness, keenness, weighed};
+pub(crate) use solution::{brightness, lightness_sensitivity, weighed};
 pub use through::Through;
 pub(crate) use through::mixed;

@@ -6,7 +6,7 @@ use super::lanes::Lanes;
 use super::rows::Rows;
 use super::through::Through;
 use crate::hierarchy::{Mesh, NONE, Tree};
-use crate::link::{Graph, Way};
+use crate::link::{Graph, Occlusion};
 use rayon::prelude::*;
 
 /// Light that arrives on a leaf, in brightness, share of the white's.
@@ -18,7 +18,7 @@ pub struct Arrival {
     /// Its part straight from lamps.
     pub direct: f32,
     /// Half the range of direct light over the leaf.
-    pub spread: f32,
+    pub half_range: f32,
 }
 
 /// The light in a room after a round.
@@ -44,7 +44,7 @@ pub struct Light {
     /// Greatest brightness of reflected radiosity on any leaf below each node.
     pub brightest: Vec<f32>,
     /// Standard deviation of brightness over the leaves of a node.
-    pub spread: Vec<f32>,
+    pub deviation: Vec<f32>,
     /// Light that arrives on every node that is a leaf; 0 elsewhere.
     pub arrival: Vec<Arrival>,
     /// The hierarchy as rays need it.
@@ -79,7 +79,7 @@ impl Light {
             &self.bright_reflected,
             &self.bright_emitted,
             &self.brightest,
-            &self.spread,
+            &self.deviation,
         ];
         let rows = [
             &self.reflected,
@@ -96,7 +96,7 @@ impl Light {
             + 4 * (self.bright_lamps.len() + self.leaves.len() + self.lit.len())
     }
 
-    /// Works out brightness and its spread from the rows, and what rays need of the nodes.
+    /// Works out brightness and its deviation from the rows, and what rays need of the nodes.
     pub fn measure(&mut self, tree: &Tree, mesh: &Mesh, lanes: &Lanes) {
         let white = self.white;
         let scalar = |row: &[f32]| brightness(lanes.notice(row), white) as f32;
@@ -127,7 +127,7 @@ impl Light {
         }
         let both = |k: usize| f64::from(self.bright_reflected[k] + self.bright_emitted[k]);
         let mut square: Vec<f64> = (0..n).map(|k| both(k) * both(k)).collect();
-        self.spread = vec![0.0; n];
+        self.deviation = vec![0.0; n];
         for k in (0..n).rev() {
             let node = &tree.nodes[k];
             if node.is_leaf() {
@@ -139,9 +139,9 @@ impl Light {
                 .sum::<f64>()
                 / node.area;
             let mean = both(k);
-            // Differences below rounding of f32 rows are not spread.
+            // Differences below rounding of f32 rows are no deviation.
             let variance = square[k] - mean * mean;
-            self.spread[k] = if variance > 1e-12 * square[k] {
+            self.deviation[k] = if variance > 1e-12 * square[k] {
                 variance.sqrt() as f32
             } else {
                 0.0
@@ -154,7 +154,7 @@ impl Light {
 const DARKEST: f64 = 0.02;
 
 /// How much a change of light changes lightness at a brightness, as a multiple of that at white.
-pub(crate) fn keenness(bright: f64) -> f64 {
+pub(crate) fn lightness_sensitivity(bright: f64) -> f64 {
     bright.max(DARKEST).powf(-2.0 / 3.0)
 }
 
@@ -183,8 +183,8 @@ pub(crate) fn weighed(row: &[f32], weights: &[f64]) -> f64 {
 #[derive(Debug, Clone, Default)]
 pub struct Neighbours {
     start: Vec<u32>,
-    ends: Vec<(u32, Way, f32)>,
-    /// Lists that [`Way::Listed`] points into.
+    ends: Vec<(u32, Occlusion, f32)>,
+    /// Lists that [`Occlusion::Listed`] points into.
     pub blockers: Vec<u32>,
 }
 
@@ -201,10 +201,10 @@ impl Neighbours {
             start[k + 1] += start[k];
         }
         let mut next = start.clone();
-        let mut ends = vec![(0, Way::Clear, 1.0); start[nodes] as usize];
+        let mut ends = vec![(0, Occlusion::Clear, 1.0); start[nodes] as usize];
         for link in links {
             for (end, other) in [(link.a, link.b), (link.b, link.a)] {
-                ends[next[end as usize] as usize] = (other, link.way, link.visibility());
+                ends[next[end as usize] as usize] = (other, link.occlusion, link.visibility());
                 next[end as usize] += 1;
             }
         }
@@ -216,7 +216,7 @@ impl Neighbours {
     }
 
     /// Other ends of a node's links.
-    pub fn row(&self, node: u32) -> &[(u32, Way, f32)] {
+    pub fn row(&self, node: u32) -> &[(u32, Occlusion, f32)] {
         let k = node as usize;
         // Elements split after the links were made have no links of their own.
         if k + 1 >= self.start.len() {
@@ -228,7 +228,7 @@ impl Neighbours {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         4 * self.start.len()
-            + size_of::<(u32, Way, f32)>() * self.ends.len()
+            + size_of::<(u32, Occlusion, f32)>() * self.ends.len()
             + 4 * self.blockers.len()
     }
 }

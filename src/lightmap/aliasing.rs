@@ -3,9 +3,9 @@
 //! The mean is that of nine places half a texel apart with weights 1/4, 1/8, 1/16 (the linear filter that look-ups use, two
 //! texels wide). Some of them were looked at when the cells beside were tested.
 
-use super::cells::{Cell, DEPTH, Lattice};
-use super::grow::Growth;
-use super::sampler::Sample;
+use super::cells::{ChartCell, DEPTH, Lattice};
+use super::grow::LightmapGrowth;
+use super::sampler::LatticeSample;
 use std::collections::BTreeSet;
 
 /// A cell at the finest level whose light is off by this many times what is allowed has an edge in it.
@@ -16,14 +16,14 @@ const SHARE: f64 = 0.5;
 const MOVED: f64 = 1e-3;
 
 /// A texel by its chart and place in the lattice.
-pub(super) type Key = (u32, [u32; 2]);
+pub(super) type TexelKey = (u32, [u32; 2]);
 /// Means of the light around texels at edges.
-pub(super) type Smoothed = Vec<(Key, Vec<(f64, Sample)>)>;
+pub(super) type Smoothed = Vec<(TexelKey, Vec<(f64, LatticeSample)>)>;
 
-impl Growth<'_> {
+impl LightmapGrowth<'_> {
     /// Looks around the texels of cells with edges; these texels with their places and weights.
     pub(super) fn smooth(&mut self, allowed: f64, progress: &dyn Fn(usize, usize)) -> Smoothed {
-        let is_finest = |c: &Cell, l: &Lattice| !l.single && c.level == l.finest;
+        let is_finest = |c: &ChartCell, l: &Lattice| !l.single && c.level == l.finest;
         let mut rough: Vec<usize> = (0..self.cells.len())
             .filter(|&k| {
                 let cell = &self.cells[k];
@@ -35,7 +35,7 @@ impl Growth<'_> {
         rough.sort_by(|&a, &b| square(b).total_cmp(&square(a)).then(a.cmp(&b)));
         // A cell shares its corners with three others, and asks for three new places a corner.
         rough.truncate((SHARE * self.sampler.looks.len() as f64 / 3.0) as usize);
-        let keys: BTreeSet<Key> = rough
+        let keys: BTreeSet<TexelKey> = rough
             .iter()
             .flat_map(|&k| self.cells[k].corners().map(|p| (self.cells[k].chart, p)))
             .collect();
@@ -49,7 +49,7 @@ impl Growth<'_> {
     }
 
     /// The nine places around a texel, those that are on the chart.
-    fn around(&mut self, number: u32, point: [u32; 2]) -> Vec<(f64, Sample)> {
+    fn around(&mut self, number: u32, point: [u32; 2]) -> Vec<(f64, LatticeSample)> {
         let lattice = self.lattices[number as usize];
         let half = lattice
             .finest

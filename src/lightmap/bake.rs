@@ -1,20 +1,20 @@
 //! From the solved light to maps.
 
-use super::aliasing::{Key, Smoothed};
-use super::cells::Cell;
+use super::aliasing::{Smoothed, TexelKey};
+use super::cells::ChartCell;
 use super::charts::{Chart, charts};
-use super::grow::{Budget, Growth};
-use super::maps::{LightMaps, Page, Placed, margin};
+use super::grow::{Budget, LightmapGrowth};
+use super::maps::{LightMaps, MapPage, PlacedCharts, margin};
 use super::pack::pack;
-use super::sampler::{Sample, Sampler};
+use super::sampler::{LatticeSample, Sampler};
 use super::seams::close;
-use super::texels::{Corners, Patch, Texel, lend, patch};
+use super::texels::{ChartTexels, Corners, Texel, lend, patch};
 use super::unwrap::Conformal;
-use crate::gather::{Baked, BakedSurface, LayerLanes, Look, MapPlace};
+use crate::gather::{Baked, BakedSurface, LayerLanes, MapPlace, SurfaceResponse};
 use crate::mesh::looks::Looks;
 use crate::mesh::measure::summed;
 use crate::mesh::turns::Turns;
-use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
+use crate::solve::{Bake, GatherQuality, INTERPOLATION_SHARE};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
@@ -49,7 +49,7 @@ impl Default for MapLimits<'_> {
 }
 
 /// Number and lanes of a layer.
-pub(super) type Part<'a> = (usize, &'a LayerLanes);
+pub(super) type NumberedLayer<'a> = (usize, &'a LayerLanes);
 
 impl Bake {
     /// The light of the room in maps, whose interpolation error, measured, is within its share of the error asked for.
@@ -57,7 +57,7 @@ impl Bake {
     pub fn light_maps(&self, limits: &MapLimits, progress: &dyn Fn(usize, usize)) -> LightMaps {
         let spaces = self.spaces();
         let all = charts(self.scene(), self.mesh(), self.tree(), &spaces, &Conformal);
-        let mut looks = Looks::new(self, spaces.clone(), Care::Vertex, limits.late);
+        let mut looks = Looks::new(self, spaces.clone(), GatherQuality::Vertex, limits.late);
         looks.indirect = limits.indirect;
         let more = AT / self.settings().error;
         let budget = Budget {
@@ -65,7 +65,7 @@ impl Bake {
             texels: usize::MAX,
             page: limits.page,
         };
-        let mut growth = Growth::new(self, all, Sampler::new(looks), budget);
+        let mut growth = LightmapGrowth::new(self, all, Sampler::new(looks), budget);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
         growth.unknown = allowed * allowed;
         growth.begin(progress);
@@ -105,23 +105,24 @@ impl Bake {
     /// copies. `part`: number and lanes of the layer whose light they have; none: all light.
     pub(super) fn placed(
         &self,
-        growth: &Growth,
+        growth: &LightmapGrowth,
         smoothed: &Smoothed,
-        part: Option<Part>,
-    ) -> (Placed, usize) {
+        part: Option<NumberedLayer>,
+    ) -> (PlacedCharts, usize) {
         let looks = self.looks(self.upsampler());
-        let mut cells: Vec<Vec<&Cell>> = vec![Vec::new(); growth.charts.len()];
+        let mut cells: Vec<Vec<&ChartCell>> = vec![Vec::new(); growth.charts.len()];
         for cell in &growth.cells {
             cells[cell.chart as usize].push(cell);
         }
-        let mut means: HashMap<Key, &[(f64, Sample)]> = HashMap::new();
+        let mut means: HashMap<TexelKey, &[(f64, LatticeSample)]> = HashMap::new();
         means.extend(smoothed.iter().map(|(key, parts)| (*key, parts.as_slice())));
-        let made: Vec<(Patch, usize)> = (0..growth.charts.len())
+        let made: Vec<(ChartTexels, usize)> = (0..growth.charts.len())
             .into_par_iter()
             .map(|k| {
                 let (chart, lattice) = (&growth.charts[k], &growth.lattices[k]);
                 let look = &looks[self.scene().surfaces[chart.surface].material];
-                let texel = |sample: &Sample| self.texel_of(growth, chart, look, part, sample);
+                let texel =
+                    |sample: &LatticeSample| self.texel_of(growth, chart, look, part, sample);
                 let mut corners = Corners::new();
                 for point in cells[k].iter().flat_map(|cell| cell.corners()) {
                     corners.entry(point).or_insert_with(|| {
@@ -147,7 +148,7 @@ impl Bake {
             .collect();
         let covered = made.iter().map(|(_, covered)| covered).sum();
         let patches = made.into_iter().map(|(patch, _)| patch).collect();
-        let placed = Placed {
+        let placed = PlacedCharts {
             sizes: growth.charts.iter().map(|c| c.size).collect(),
             lattices: growth.lattices.clone(),
             patches,
@@ -160,11 +161,11 @@ impl Bake {
     /// What was seen at a place; none: something covers it.
     fn texel_of(
         &self,
-        growth: &Growth,
+        growth: &LightmapGrowth,
         chart: &Chart,
-        look: &Look,
-        part: Option<Part>,
-        sample: &Sample,
+        look: &SurfaceResponse,
+        part: Option<NumberedLayer>,
+        sample: &LatticeSample,
     ) -> Option<Texel> {
         let seen = growth.sampler.looks.at(sample.look)?;
         if let Some((k, lanes)) = part {
@@ -183,7 +184,12 @@ impl Bake {
     }
 
     /// Pages, and the mesh with its coordinates on them.
-    fn written(&self, growth: Growth, mut placed: Placed, layers: &[Vec<Patch>]) -> LightMaps {
+    fn written(
+        &self,
+        growth: LightmapGrowth,
+        mut placed: PlacedCharts,
+        layers: &[Vec<ChartTexels>],
+    ) -> LightMaps {
         placed.charts = growth.charts;
         let shares = placed.share_dark();
         let outer = |k: usize| {
@@ -195,13 +201,13 @@ impl Bake {
         let (found, pages) = pack(&sizes, growth.budget.page);
         let place = |k: &usize| own.binary_search(k).map(|at| found[at]).unwrap_or_default();
         placed.places = shares.iter().map(place).collect();
-        let page = |[width, height]: [usize; 2]| Page {
+        let page = |[width, height]: [usize; 2]| MapPage {
             width,
             height,
             texels: vec![Texel::default(); width * height],
             surfaces: vec![u32::MAX; width * height],
         };
-        let mut pages: Vec<Page> = pages.into_iter().map(page).collect();
+        let mut pages: Vec<MapPage> = pages.into_iter().map(page).collect();
         for &k in &own {
             placed.fill(
                 k,
@@ -231,7 +237,7 @@ impl Bake {
     }
 
     /// The room's own mesh, a part for each side of a surface and page.
-    fn meshes(&self, placed: &Placed, pages: &[Page], baked: &mut Baked) {
+    fn meshes(&self, placed: &PlacedCharts, pages: &[MapPage], baked: &mut Baked) {
         let mut parts: BTreeMap<(usize, bool, usize), Vec<usize>> = BTreeMap::new();
         for (k, chart) in placed.charts.iter().enumerate() {
             let key = (chart.surface, chart.back, placed.places[k].page);

@@ -57,7 +57,7 @@ impl Lattice {
 
 /// How far light in a cell is from what its corners say.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Doubt {
+pub(super) struct ChartCellError {
     /// Mean square of the colour difference, as far as it is known.
     pub(super) square: f64,
     /// Was it looked at, or is it only expected?
@@ -71,7 +71,7 @@ pub(super) struct Doubt {
 
 /// A rectangle of a chart.
 #[derive(Debug, Clone)]
-pub(super) struct Cell {
+pub(super) struct ChartCell {
     pub(super) chart: u32,
     /// The corner with the least coordinates, on the finest possible lattice.
     pub(super) low: [u32; 2],
@@ -83,10 +83,10 @@ pub(super) struct Cell {
     pub(super) hints: Vec<u32>,
     /// Area of the chart in it, in the plane.
     pub(super) area: f64,
-    pub(super) doubt: Doubt,
+    pub(super) doubt: ChartCellError,
 }
 
-impl Cell {
+impl ChartCell {
     /// Steps of the finest possible lattice along each axis.
     pub(super) fn span(&self) -> [u32; 2] {
         self.level.map(|level| 1 << (DEPTH - u32::from(level)))
@@ -144,7 +144,7 @@ impl Cell {
                 let mut child = Self {
                     low,
                     level,
-                    doubt: Doubt::default(),
+                    doubt: ChartCellError::default(),
                     ..self.clone()
                 };
                 child.clip(chart, lattice);
@@ -163,24 +163,29 @@ impl Cell {
 }
 
 /// The first cells of a chart.
-pub(super) fn first(number: u32, chart: &Chart, lattice: &Lattice, hints: &[DVec2]) -> Vec<Cell> {
-    let whole = Cell {
+pub(super) fn first(
+    number: u32,
+    chart: &Chart,
+    lattice: &Lattice,
+    hints: &[DVec2],
+) -> Vec<ChartCell> {
+    let whole = ChartCell {
         chart: number,
         low: [0, 0],
         level: [0, 0],
         facets: (0..chart.flat.len() as u32).collect(),
         hints: Vec::new(),
         area: chart.area,
-        doubt: Doubt::default(),
+        doubt: ChartCellError::default(),
     };
     if lattice.single {
         let hints = (0..hints.len() as u32).collect();
-        return vec![Cell { hints, ..whole }];
+        return vec![ChartCell { hints, ..whole }];
     }
     let [nx, ny] = lattice.counts;
-    let mut cells: Vec<Cell> = (0..ny)
+    let mut cells: Vec<ChartCell> = (0..ny)
         .flat_map(|y| (0..nx).map(move |x| [x << DEPTH, y << DEPTH]))
-        .map(|low| Cell {
+        .map(|low| ChartCell {
             low,
             facets: Vec::new(),
             ..whole.clone()

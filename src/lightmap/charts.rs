@@ -1,7 +1,7 @@
 //! Charts: pieces of a side of a surface that lie flat in the plane, in the file's units, turned to fit a small rectangle.
 
 use super::finder::Finder;
-use super::regions::{Region, Side};
+use super::regions::{Region, RegionInput};
 use super::unwrap::{Flat, Unwrap};
 use crate::gather::Vertex;
 use crate::hierarchy::{Mesh, Tree};
@@ -85,7 +85,7 @@ pub(super) fn charts(
     for (number, surface) in scene.surfaces.iter().enumerate() {
         let both = scene.materials[surface.material].sides == Sides::Both;
         for back in [false, true].into_iter().filter(|back| both || !back) {
-            let side = Side {
+            let side = RegionInput {
                 mesh,
                 tree,
                 spaces,
@@ -102,7 +102,7 @@ pub(super) fn charts(
 }
 
 /// The charts of a region: one if it is flat.
-fn curved(side: &Side, region: &Region, unwrap: &dyn Unwrap, out: &mut Vec<Chart>) {
+fn curved(side: &RegionInput, region: &Region, unwrap: &dyn Unwrap, out: &mut Vec<Chart>) {
     if region.flat {
         out.push(chart(side, &region.triangles, &plane(side, region)));
         return;
@@ -148,7 +148,7 @@ fn turned([a, b, c]: [u32; 3], back: bool) -> [u32; 3] {
 }
 
 /// Corners of the triangles of a flat region, in its plane.
-fn plane(side: &Side, region: &Region) -> Vec<[DVec2; 3]> {
+fn plane(side: &RegionInput, region: &Region) -> Vec<[DVec2; 3]> {
     let mesh = side.mesh;
     // The largest triangle knows its normal best.
     let area = |t: &&u32| mesh.area[**t as usize];
@@ -210,7 +210,7 @@ fn extent(flat: &[[DVec2; 3]], along: DVec2) -> DVec2 {
 }
 
 /// A chart of triangles whose corners in the plane are known.
-fn chart(side: &Side, triangles: &[u32], corners: &[[DVec2; 3]]) -> Chart {
+fn chart(side: &RegionInput, triangles: &[u32], corners: &[[DVec2; 3]]) -> Chart {
     let (mesh, surface) = (side.mesh, side.surface);
     let along = best_turn(corners);
     let mut flat: Vec<[DVec2; 3]> = corners

@@ -17,7 +17,7 @@ pub(super) struct Finder {
 }
 
 /// Triangle, weights of its corners at the nearest place in it, distance to that.
-pub(super) type Found = (u32, [f64; 3], f64);
+pub(super) type NearestTriangle = (u32, [f64; 3], f64);
 
 impl Finder {
     /// Over triangles that lie in [0, `extent`].
@@ -54,9 +54,9 @@ impl Finder {
     }
 
     /// The nearest place on any triangle.
-    pub(super) fn nearest(&self, triangles: &[[DVec2; 3]], at: DVec2) -> Option<Found> {
+    pub(super) fn nearest(&self, triangles: &[[DVec2; 3]], at: DVec2) -> Option<NearestTriangle> {
         let middle = self.bucket(at);
-        let mut best: Option<Found> = None;
+        let mut best: Option<NearestTriangle> = None;
         for ring in 0..self.counts[0].max(self.counts[1]) {
             // What is in this ring of buckets is at least so far away.
             let least = (ring as f64 - 1.0) * self.size.min_element();

@@ -6,12 +6,12 @@
 //! asks for; what the looks of a coarse cell say of the texels in it is interpolated, so smooth parts of a chart with a shadow
 //! on it cost bytes but no rays.
 
-use super::cells::{Cell, DEPTH, Doubt, Lattice, bilinear, first};
+use super::cells::{ChartCell, ChartCellError, DEPTH, Lattice, bilinear, first};
 use super::charts::Chart;
 use super::maps::{MARGIN, margin};
-use super::sampler::{Sample, Sampler};
+use super::sampler::{LatticeSample, Sampler};
 use crate::color::seen_difference;
-use crate::mesh::turns::{BENDS, BY_CHANCE, EXCESS, End, RANGE, largest};
+use crate::mesh::turns::{BENDS, BY_CHANCE, EXCESS, GrowthOutcome, RANGE, largest};
 use crate::solve::Bake;
 use glam::DVec2;
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ const SHRINK: f64 = 0.125;
 
 /// What the solved light says at a place of a chart.
 #[derive(Debug, Clone, Copy)]
-struct Hint {
+struct ChartHint {
     area: f64,
     /// What of it others see.
     open: f64,
@@ -44,13 +44,13 @@ pub(super) struct Budget {
 }
 
 /// Charts with texels that grow.
-pub(super) struct Growth<'a> {
+pub(super) struct LightmapGrowth<'a> {
     pub(super) charts: Vec<Chart>,
     pub(super) lattices: Vec<Lattice>,
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<ChartCell>,
     pub(super) sampler: Sampler<'a>,
     pub(super) budget: Budget,
-    hints: Vec<Vec<Hint>>,
+    hints: Vec<Vec<ChartHint>>,
     hints_at: Vec<Vec<DVec2>>,
     white: [f64; 3],
     /// Mean square of a cell until something is known of it.
@@ -59,7 +59,7 @@ pub(super) struct Growth<'a> {
     pub(super) noise: f64,
 }
 
-impl<'a> Growth<'a> {
+impl<'a> LightmapGrowth<'a> {
     pub(super) fn new(
         bake: &Bake,
         charts: Vec<Chart>,
@@ -103,7 +103,7 @@ impl<'a> Growth<'a> {
         seen_difference(a, b, self.white)
     }
 
-    fn want(&mut self, cell: usize, point: [u32; 2]) -> Sample {
+    fn want(&mut self, cell: usize, point: [u32; 2]) -> LatticeSample {
         let chart = self.cells[cell].chart;
         let k = chart as usize;
         self.sampler
@@ -111,7 +111,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Light at the corners of a cell; what is covered gets the mean of the others, as in the map.
-    pub(super) fn light(&self, cell: &Cell) -> Option<[[f64; 3]; 4]> {
+    pub(super) fn light(&self, cell: &ChartCell) -> Option<[[f64; 3]; 4]> {
         let lattice = &self.lattices[cell.chart as usize];
         let seen = cell.corners().map(|corner| {
             let sample = self.sampler.known(cell.chart, lattice, corner)?;
@@ -127,7 +127,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Can anybody see anything of a cell?
-    pub(super) fn is_seen(&self, cell: &Cell) -> bool {
+    pub(super) fn is_seen(&self, cell: &ChartCell) -> bool {
         let hints = &self.hints[cell.chart as usize];
         self.light(cell).is_some() || cell.hints.iter().any(|&h| hints[h as usize].open > 0.0)
     }
@@ -139,7 +139,7 @@ impl<'a> Growth<'a> {
     }
 
     /// Mean square of what the solved light differs by, as far as others see it, and its worst place.
-    fn told(&self, cell: &Cell, light: &[[f64; 3]; 4]) -> (f64, Option<(DVec2, f64)>) {
+    fn told(&self, cell: &ChartCell, light: &[[f64; 3]; 4]) -> (f64, Option<(DVec2, f64)>) {
         let k = cell.chart as usize;
         let (mut sum, mut area, mut worst) = (0.0, 0.0, None::<(DVec2, f64)>);
         for &h in &cell.hints {
@@ -209,21 +209,21 @@ impl<'a> Growth<'a> {
     }
 
     /// Grows until the sum of all shares is at most `goal`.
-    pub(super) fn grow(&mut self, goal: f64, progress: &dyn Fn(usize, usize)) -> End {
+    pub(super) fn grow(&mut self, goal: f64, progress: &dyn Fn(usize, usize)) -> GrowthOutcome {
         loop {
             let excess = self.sum() - goal;
             if excess <= 0.0 {
-                return End::Reached;
+                return GrowthOutcome::Reached;
             }
             if self.sampler.looks.is_late() {
-                return End::Late;
+                return GrowthOutcome::Late;
             }
             if self.sampler.looks.len() >= self.budget.looks {
-                return End::Most;
+                return GrowthOutcome::Most;
             }
             let picked = self.pick(excess);
             if picked.is_empty() {
-                return End::Smallest;
+                return GrowthOutcome::Smallest;
             }
             let is_tested = |&k: &usize| self.cells[k].doubt.tested;
             let (tested, untested): (Vec<usize>, Vec<usize>) =
@@ -273,13 +273,13 @@ impl<'a> Growth<'a> {
     }
 
     /// Halvings that a chart lacks for a cell to be split along some axes.
-    fn more(&self, cell: &Cell, axes: [bool; 2]) -> [u8; 2] {
+    fn more(&self, cell: &ChartCell, axes: [bool; 2]) -> [u8; 2] {
         let lattice = &self.lattices[cell.chart as usize];
         [0, 1].map(|k| u8::from(axes[k] && cell.level[k] == lattice.finest[k]))
     }
 
     /// The axes along which a tested cell is to be split; none if nothing bends, or if there is no room.
-    fn axes(&self, cell: &Cell, texels: usize) -> Option<[bool; 2]> {
+    fn axes(&self, cell: &ChartCell, texels: usize) -> Option<[bool; 2]> {
         let lattice = &self.lattices[cell.chart as usize];
         let doubt = &cell.doubt;
         let worst = doubt.bent[0].max(doubt.bent[1]);
@@ -322,16 +322,16 @@ impl<'a> Growth<'a> {
     }
 
     /// What a tested cell becomes.
-    fn children(&mut self, k: usize) -> Vec<Cell> {
+    fn children(&mut self, k: usize) -> Vec<ChartCell> {
         let number = self.cells[k].chart as usize;
         let (chart, hints) = (&self.charts[number], &self.hints_at[number]);
         let lattice = &mut self.lattices[number];
         let doubt = self.cells[k].doubt;
-        let heir = |cell: Cell, square: f64| Cell {
-            doubt: Doubt {
+        let heir = |cell: ChartCell, square: f64| ChartCell {
+            doubt: ChartCellError {
                 square,
                 trust: doubt.trust,
-                ..Doubt::default()
+                ..ChartCellError::default()
             },
             ..cell
         };
@@ -380,7 +380,7 @@ impl<'a> Growth<'a> {
             let light = self.light(&self.cells[k]).unwrap_or_default();
             let (told, worst) = self.told(&self.cells[k], &light);
             let cell = &self.cells[k];
-            let is_inside = |sample: &Sample| within(cell.share(&lattice, sample.at));
+            let is_inside = |sample: &LatticeSample| within(cell.share(&lattice, sample.at));
             let few = middles.iter().filter(|s| is_inside(s)).count() < 2;
             let (chart, lattice) = (&self.charts[number], &self.lattices[number]);
             let inside = match worst.filter(|(_, d)| cell.hints.len() > 1 && *d > 0.0) {
@@ -400,11 +400,11 @@ impl<'a> Growth<'a> {
     /// What is known of a cell now, from looks in it.
     fn judged(
         &self,
-        cell: &Cell,
-        middles: &[Sample],
-        inside: Option<(Sample, f64)>,
+        cell: &ChartCell,
+        middles: &[LatticeSample],
+        inside: Option<(LatticeSample, f64)>,
         told: f64,
-    ) -> Doubt {
+    ) -> ChartCellError {
         let lattice = &self.lattices[cell.chart as usize];
         let Some(light) = self.light(cell) else {
             let any = middles
@@ -412,14 +412,14 @@ impl<'a> Growth<'a> {
                 .any(|sample| self.sampler.seen(sample).is_some());
             // It lies below something, or its corners do: all of it is in doubt then.
             let square = if any { self.unknown } else { 0.0 };
-            return Doubt {
+            return ChartCellError {
                 square,
                 tested: true,
                 inside: square.sqrt(),
-                ..Doubt::default()
+                ..ChartCellError::default()
             };
         };
-        let off = |sample: &Sample| {
+        let off = |sample: &LatticeSample| {
             let share = cell.share(lattice, sample.at);
             if !within(share) {
                 return None;
@@ -457,7 +457,7 @@ impl<'a> Growth<'a> {
             .into_iter()
             .chain(extra)
             .fold(0.0, f64::max);
-        Doubt {
+        ChartCellError {
             square,
             tested: true,
             bent,
@@ -468,7 +468,7 @@ impl<'a> Growth<'a> {
 }
 
 /// Light and leaves of the hierarchy in a chart.
-fn told_by(bake: &Bake, chart: &Chart) -> (Vec<Hint>, Vec<DVec2>) {
+fn told_by(bake: &Bake, chart: &Chart) -> (Vec<ChartHint>, Vec<DVec2>) {
     let (tree, light) = (bake.tree(), bake.light());
     let (mut hints, mut places) = (Vec::new(), Vec::new());
     for (k, facet) in chart.facets.iter().enumerate() {
@@ -480,7 +480,7 @@ fn told_by(bake: &Bake, chart: &Chart) -> (Vec<Hint>, Vec<DVec2>) {
         crate::mesh::hints::leaves(tree, face, chart.back, area, |leaf, [v, w], area| {
             let known = light.leaves.binary_search(&leaf).ok();
             if let Some(place) = known.filter(|place| *place < light.irradiance.len()) {
-                hints.push(Hint {
+                hints.push(ChartHint {
                     area,
                     open: bake.openness(leaf),
                     light: bake.lanes().tristimulus(light.irradiance.row(place)),
@@ -493,7 +493,7 @@ fn told_by(bake: &Bake, chart: &Chart) -> (Vec<Hint>, Vec<DVec2>) {
 }
 
 /// What a cell adds to the mean square, times the area of all.
-fn share(cell: &Cell) -> f64 {
+fn share(cell: &ChartCell) -> f64 {
     cell.area * cell.doubt.square
 }
 

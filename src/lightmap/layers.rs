@@ -5,28 +5,28 @@
 
 use super::aliasing::Smoothed;
 use super::charts::Chart;
-use super::grow::Growth;
-use super::maps::{Page, Placed, margin};
+use super::grow::LightmapGrowth;
+use super::maps::{MapPage, PlacedCharts, margin};
 use super::seams::close;
-use super::texels::{Patch, Texel};
+use super::texels::{ChartTexels, Texel};
 use crate::solve::Bake;
 
 impl Bake {
     /// The texels of each layer, chart by chart; `whole` are those of all light, seams closed.
     pub(super) fn layers_of_maps(
         &self,
-        growth: &Growth,
+        growth: &LightmapGrowth,
         smoothed: &Smoothed,
         spaces: &[(u32, bool)],
-        whole: &Placed,
-    ) -> Vec<Vec<Patch>> {
+        whole: &PlacedCharts,
+    ) -> Vec<Vec<ChartTexels>> {
         let lanes = self.layer_lanes();
         let one = |part| {
             let (mut placed, _) = self.placed(growth, smoothed, Some(part));
             close(self, &growth.charts, spaces, &mut placed);
             placed.patches
         };
-        let mut layers: Vec<Vec<Patch>> = lanes.iter().enumerate().map(one).collect();
+        let mut layers: Vec<Vec<ChartTexels>> = lanes.iter().enumerate().map(one).collect();
         for (chart, patch) in whole.patches.iter().enumerate() {
             for (t, texel) in patch.texels.iter().enumerate() {
                 complete(&mut layers, [chart, t], texel);
@@ -37,7 +37,7 @@ impl Bake {
 }
 
 /// Brings the sum of the layers' texels to `whole`.
-fn complete(layers: &mut [Vec<Patch>], [chart, t]: [usize; 2], whole: &Texel) {
+fn complete(layers: &mut [Vec<ChartTexels>], [chart, t]: [usize; 2], whole: &Texel) {
     let bright = |k: usize| layers[k][chart].texels[t].irradiance[1];
     let order = |a: &usize, b: &usize| bright(*a).total_cmp(&bright(*b));
     let Some(brightest) = (0..layers.len()).max_by(order) else {
@@ -50,12 +50,17 @@ fn complete(layers: &mut [Vec<Patch>], [chart, t]: [usize; 2], whole: &Texel) {
 }
 
 /// Pages of a layer, laid out as those of the whole. Charts that are dark there have become one texel.
-pub(super) fn pages(placed: &Placed, own: &[usize], layer: &[Patch], like: &[Page]) -> Vec<Page> {
-    let dark = |page: &Page| Page {
+pub(super) fn pages(
+    placed: &PlacedCharts,
+    own: &[usize],
+    layer: &[ChartTexels],
+    like: &[MapPage],
+) -> Vec<MapPage> {
+    let dark = |page: &MapPage| MapPage {
         texels: vec![Texel::default(); page.texels.len()],
         ..page.clone()
     };
-    let mut pages: Vec<Page> = like.iter().map(dark).collect();
+    let mut pages: Vec<MapPage> = like.iter().map(dark).collect();
     for &k in own {
         let (patch, margin) = (&placed.patches[k], margin(&placed.lattices[k]));
         if patch.texels.len() == layer[k].texels.len() {
@@ -65,9 +70,9 @@ pub(super) fn pages(placed: &Placed, own: &[usize], layer: &[Patch], like: &[Pag
     pages
 }
 
-impl Placed {
+impl PlacedCharts {
     /// Writes the texels of a chart to its page; the margin goes on with the outermost ones.
-    pub(super) fn fill(&self, k: usize, patch: &Patch, margin: usize, pages: &mut [Page]) {
+    pub(super) fn fill(&self, k: usize, patch: &ChartTexels, margin: usize, pages: &mut [MapPage]) {
         let chart: &Chart = &self.charts[k];
         let (place, surface) = (self.places[k], chart.surface as u32);
         let page = &mut pages[place.page];

@@ -2,8 +2,8 @@
 
 use super::cells::{Lattice, bilinear};
 use super::charts::Chart;
-use super::pack::Place;
-use super::texels::{Patch, Texel};
+use super::pack::AtlasPlace;
+use super::texels::{ChartTexels, Texel};
 use crate::gather::Baked;
 use crate::hierarchy::{Face, Mesh};
 use crate::solve::weights_of;
@@ -27,7 +27,7 @@ pub(super) fn margin(lattice: &Lattice) -> usize {
 
 /// A page of texels, row by row from the top: texel (x, y) has its centre at texture coordinates ((x + .5) / width, (y + .5) / height).
 #[derive(Debug, Clone)]
-pub struct Page {
+pub struct MapPage {
     /// Texels along each axis.
     pub width: usize,
     /// Texels along each axis.
@@ -41,9 +41,9 @@ pub struct Page {
 /// Light maps of a room, and the room's own mesh with texture coordinates on them.
 pub struct LightMaps {
     /// The pages.
-    pub pages: Vec<Page>,
+    pub pages: Vec<MapPage>,
     /// The pages of each layer of lamps, which add up to the pages; none without layers.
-    pub layers: Vec<Vec<Page>>,
+    pub layers: Vec<Vec<MapPage>>,
     /// One mesh for each side of a surface and page; light at its vertices is that of the map there.
     pub baked: Baked,
     /// Texels that light was looked at for, all others are interpolated.
@@ -52,21 +52,21 @@ pub struct LightMaps {
     pub charts: usize,
     /// Is light that comes straight from lamps and the sky left out?
     pub indirect: bool,
-    pub(super) placed: Placed,
+    pub(super) placed: PlacedCharts,
 }
 
 /// Charts with their texels.
-pub(super) struct Placed {
+pub(super) struct PlacedCharts {
     /// Empty as long as the maps grow.
     pub(super) charts: Vec<Chart>,
     /// Of each chart.
     pub(super) sizes: Vec<DVec2>,
     pub(super) lattices: Vec<Lattice>,
-    pub(super) patches: Vec<Patch>,
-    pub(super) places: Vec<Place>,
+    pub(super) patches: Vec<ChartTexels>,
+    pub(super) places: Vec<AtlasPlace>,
 }
 
-impl Placed {
+impl PlacedCharts {
     /// Makes charts without any light one texel, the same for all; for each chart the one whose place it shares, its own for the
     /// most.
     pub(super) fn share_dark(&mut self) -> Vec<usize> {
@@ -109,7 +109,7 @@ impl Placed {
     }
 }
 
-impl Patch {
+impl ChartTexels {
     /// Numbers and weights of the four texels around a place; beyond the outermost texels these go on.
     pub(super) fn corners(&self, step: DVec2) -> [(usize, f64); 4] {
         let most = DVec2::new((self.width - 1) as f64, (self.height - 1) as f64);

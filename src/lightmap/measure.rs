@@ -3,11 +3,11 @@
 //! As between vertices (`mesh::measure`): every point is looked at twice, and what looks differ by chance is taken off.
 
 use super::cells::bilinear;
-use super::grow::Growth;
-use super::maps::Placed;
-use super::sampler::Sample as Place;
+use super::grow::LightmapGrowth;
+use super::maps::PlacedCharts;
+use super::sampler::LatticeSample as Place;
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
-use crate::mesh::measure::{CHANCE, POINTS, SHARE, SURPRISE, Sample};
+use crate::mesh::measure::{CHANCE, ErrorSample, POINTS, SHARE, SURPRISE};
 use crate::solve::Bake;
 use glam::DVec2;
 
@@ -15,20 +15,20 @@ use glam::DVec2;
 const SEED: u64 = 0x0067_0a55;
 
 /// A random point of a chart, looked at twice.
-pub(super) struct Point {
+pub(super) struct TestPoint {
     chart: usize,
     place: Place,
     looks: [u32; 2],
 }
 
-impl Growth<'_> {
+impl LightmapGrowth<'_> {
     /// Looks at random points that were never looked at before, one in each stratum of equal area.
     pub(super) fn points(
         &mut self,
         bake: &Bake,
         turn: u64,
         progress: &dyn Fn(usize, usize),
-    ) -> Vec<Point> {
+    ) -> Vec<TestPoint> {
         let count = match self.sampler.looks.is_late() {
             true => POINTS[0],
             false => (self.sampler.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]),
@@ -70,7 +70,7 @@ impl Growth<'_> {
                 at: chart.at(facet as u32, vertex.weights),
                 vertex,
             };
-            points.push(Point {
+            points.push(TestPoint {
                 chart: number,
                 place,
                 looks,
@@ -83,10 +83,10 @@ impl Growth<'_> {
         points
     }
 
-    /// How far maps are off at points; those that something covers are left out. `Sample::cell` counts points here.
-    pub(super) fn compared(&self, points: &[Point], placed: &Placed) -> Vec<Sample> {
+    /// How far maps are off at points; those that something covers are left out. `ErrorSample::cell` counts points here.
+    pub(super) fn compared(&self, points: &[TestPoint], placed: &PlacedCharts) -> Vec<ErrorSample> {
         let cells = self.by_chart();
-        let sample = |(cell, point): (usize, &Point)| {
+        let sample = |(cell, point): (usize, &TestPoint)| {
             let [one, two] = point
                 .looks
                 .map(|look| self.sampler.looks.at(look).map(|s| s.xyz));
@@ -98,7 +98,7 @@ impl Growth<'_> {
             let noise = 0.5 * self.difference(one, two).powi(2);
             let seen =
                 0.5 * (self.difference(drawn, one).powi(2) + self.difference(drawn, two).powi(2));
-            Some(Sample {
+            Some(ErrorSample {
                 cell,
                 square: seen - (1.0 + self.shared(point, &cells)) * noise,
                 noise,
@@ -108,7 +108,7 @@ impl Growth<'_> {
     }
 
     /// Sum of squares of the weights of the looks that a point's light is interpolated from.
-    fn shared(&self, point: &Point, cells: &[Vec<usize>]) -> f64 {
+    fn shared(&self, point: &TestPoint, cells: &[Vec<usize>]) -> f64 {
         let of_cell = |k: usize| {
             let cell = &self.cells[k];
             let share = cell.share(&self.lattices[point.chart], point.place.at);
@@ -129,7 +129,7 @@ impl Growth<'_> {
         cells
     }
 
-    fn cell_at(&self, point: &Point, cells: &[Vec<usize>]) -> Option<usize> {
+    fn cell_at(&self, point: &TestPoint, cells: &[Vec<usize>]) -> Option<usize> {
         let lattice = &self.lattices[point.chart];
         let holds = |k: &usize| {
             let share = self.cells[*k].share(lattice, point.place.at);
@@ -139,7 +139,7 @@ impl Growth<'_> {
     }
 
     /// Takes what was seen at random points for what is to be expected of their cells, where it is a surprise.
-    pub(super) fn learn(&mut self, points: &[Point], samples: &[Sample]) {
+    pub(super) fn learn(&mut self, points: &[TestPoint], samples: &[ErrorSample]) {
         let cells = self.by_chart();
         for sample in samples {
             let square = sample.square - CHANCE * sample.noise;

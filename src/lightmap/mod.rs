@@ -20,5 +20,5 @@ mod texels;
 mod unwrap;
 
 pub use bake::MapLimits;
-pub use maps::{LightMaps, Page};
+pub use maps::{LightMaps, MapPage};
 pub use texels::Texel;

@@ -8,7 +8,7 @@ const WIDTHS: [f64; 6] = [1.02, 1.08, 1.2, 1.4, 1.7, 2.2];
 
 /// Where a rectangle lies.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct AtlasPlace {
     pub(super) page: usize,
     pub(super) x: usize,
     pub(super) y: usize,
@@ -16,11 +16,11 @@ pub(super) struct Place {
 
 /// Places rectangles (width, height) on as few pages as this finds, none larger than `most` or the largest rectangle along an
 /// axis; and the pages' sizes.
-pub(super) fn pack(sizes: &[[usize; 2]], most: usize) -> (Vec<Place>, Vec<[usize; 2]>) {
+pub(super) fn pack(sizes: &[[usize; 2]], most: usize) -> (Vec<AtlasPlace>, Vec<[usize; 2]>) {
     // Whoever asks for more than a page gets a larger one.
     let most = sizes.iter().flatten().copied().fold(most, usize::max);
     let mut places = vec![
-        Place {
+        AtlasPlace {
             page: 0,
             x: 0,
             y: 0
@@ -53,7 +53,7 @@ pub(super) fn pack(sizes: &[[usize; 2]], most: usize) -> (Vec<Place>, Vec<[usize
             break;
         };
         for &(k, x, y) in &best.put {
-            places[k] = Place {
+            places[k] = AtlasPlace {
                 page: pages.len(),
                 x,
                 y,

@@ -22,7 +22,7 @@ pub(super) struct Region {
 }
 
 /// What regions are made from.
-pub(super) struct Side<'a> {
+pub(super) struct RegionInput<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) tree: &'a Tree,
     /// Space of each entry of the hierarchy, and whether something covers it.
@@ -33,7 +33,7 @@ pub(super) struct Side<'a> {
     pub(super) back: bool,
 }
 
-impl Side<'_> {
+impl RegionInput<'_> {
     /// Entry in the hierarchy.
     pub(super) fn entry(&self, triangle: u32) -> u32 {
         self.tree.entry[triangle as usize][usize::from(self.back)]

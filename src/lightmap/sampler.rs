@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 /// Where light was looked at for a place of a lattice.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
+pub(super) struct LatticeSample {
     /// The look's number.
     pub(super) look: u32,
     /// In the chart's plane.
@@ -20,7 +20,7 @@ pub(super) struct Sample {
 /// All looks so far, by chart and place.
 pub(super) struct Sampler<'a> {
     pub(super) looks: Looks<'a>,
-    known: HashMap<(u32, [u32; 2]), Sample>,
+    known: HashMap<(u32, [u32; 2]), LatticeSample>,
 }
 
 impl<'a> Sampler<'a> {
@@ -38,7 +38,7 @@ impl<'a> Sampler<'a> {
         chart: &Chart,
         lattice: &Lattice,
         point: [u32; 2],
-    ) -> Sample {
+    ) -> LatticeSample {
         let point = if lattice.single { [u32::MAX; 2] } else { point };
         if let Some(sample) = self.known.get(&(number, point)) {
             return *sample;
@@ -53,23 +53,28 @@ impl<'a> Sampler<'a> {
     }
 
     /// Asks for any place.
-    pub(super) fn want_at(&mut self, chart: &Chart, at: DVec2) -> Sample {
+    pub(super) fn want_at(&mut self, chart: &Chart, at: DVec2) -> LatticeSample {
         // A chart has a triangle at least, and that a nearest place.
         let (facet, weights, _) = chart.finder.nearest(&chart.flat, at).unwrap_or_default();
         let vertex = chart.vertex(facet, weights);
         let at = chart.at(facet, vertex.weights);
         let look = self.looks.want_texel(&vertex, chart.surface, chart.back);
-        Sample { look, at, vertex }
+        LatticeSample { look, at, vertex }
     }
 
     /// The place of a lattice, if it was asked for.
-    pub(super) fn known(&self, chart: u32, lattice: &Lattice, point: [u32; 2]) -> Option<&Sample> {
+    pub(super) fn known(
+        &self,
+        chart: u32,
+        lattice: &Lattice,
+        point: [u32; 2],
+    ) -> Option<&LatticeSample> {
         let point = if lattice.single { [u32::MAX; 2] } else { point };
         self.known.get(&(chart, point))
     }
 
     /// Tristimulus irradiance that was seen; none: something covers the place.
-    pub(super) fn seen(&self, sample: &Sample) -> Option<[f64; 3]> {
+    pub(super) fn seen(&self, sample: &LatticeSample) -> Option<[f64; 3]> {
         self.looks.at(sample.look).map(|seen| seen.xyz)
     }
 }

@@ -5,7 +5,7 @@
 //! `(c . d + g)^2 + STAY |d|^2` is least where `(C^T C + STAY) d = -C^T g`, solved by conjugate gradients.
 
 use super::charts::Chart;
-use super::maps::Placed;
+use super::maps::PlacedCharts;
 use super::texels::Texel;
 use crate::gather::Vertex;
 use crate::solve::Bake;
@@ -37,7 +37,7 @@ struct Side {
 
 /// A place on a seam: texels (number among those that may change) with weights.
 type Row = Vec<(usize, f64)>;
-type Light = [f64; WIDTH];
+type TexelLight = [f64; WIDTH];
 
 /// Texels that lie at seams.
 #[derive(Default)]
@@ -55,7 +55,14 @@ impl Unknowns {
     }
 
     /// Adds the texels of a look-up.
-    fn look_up(&mut self, placed: &Placed, chart: usize, at: DVec2, sign: f64, row: &mut Row) {
+    fn look_up(
+        &mut self,
+        placed: &PlacedCharts,
+        chart: usize,
+        at: DVec2,
+        sign: f64,
+        row: &mut Row,
+    ) {
         let patch = &placed.patches[chart];
         let step = placed.step(chart, at);
         for (texel, weight) in patch.corners(step) {
@@ -71,7 +78,7 @@ pub(super) fn close(
     bake: &Bake,
     charts: &[Chart],
     spaces: &[(u32, bool)],
-    placed: &mut Placed,
+    placed: &mut PlacedCharts,
 ) -> usize {
     let (mut unknowns, mut rows) = (Unknowns::default(), Vec::new());
     for sides in edges(bake, charts, spaces).into_values() {
@@ -100,7 +107,7 @@ pub(super) fn close(
             }
         }
     }
-    let before: Vec<Light> = (unknowns.texels.iter())
+    let before: Vec<TexelLight> = (unknowns.texels.iter())
         .map(|&(chart, texel)| flat(&placed.patches[chart].texels[texel]))
         .collect();
     let changes = solve(&rows, &before);
@@ -109,7 +116,8 @@ pub(super) fn close(
         .into_iter()
         .zip(before.into_iter().zip(changes))
     {
-        let light: Light = std::array::from_fn(|c| (before[c] + change[c]).max(before[c].min(0.0)));
+        let light: TexelLight =
+            std::array::from_fn(|c| (before[c] + change[c]).max(before[c].min(0.0)));
         placed.patches[chart].texels[texel] = Texel {
             irradiance: [light[0], light[1], light[2]].map(|x| x as f32),
             light: [light[3], light[4], light[5]].map(|x| x as f32),
@@ -118,7 +126,7 @@ pub(super) fn close(
     rows.len()
 }
 
-fn flat(texel: &Texel) -> Light {
+fn flat(texel: &Texel) -> TexelLight {
     let [x, y, z] = texel.irradiance.map(f64::from);
     let [r, g, b] = texel.light.map(f64::from);
     [x, y, z, r, g, b]
@@ -162,10 +170,10 @@ fn edges(bake: &Bake, charts: &[Chart], spaces: &[(u32, bool)]) -> BTreeMap<[u32
 }
 
 /// Changes of texels that close the seams.
-fn solve(rows: &[Row], before: &[Light]) -> Vec<Light> {
+fn solve(rows: &[Row], before: &[TexelLight]) -> Vec<TexelLight> {
     let zero = [0.0; WIDTH];
-    let product = |x: &[Light]| {
-        let mut out: Vec<Light> = x.iter().map(|x| x.map(|x| STAY * x)).collect();
+    let product = |x: &[TexelLight]| {
+        let mut out: Vec<TexelLight> = x.iter().map(|x| x.map(|x| STAY * x)).collect();
         for row in rows {
             let there = dot(row, x);
             for &(k, w) in row {
@@ -181,7 +189,7 @@ fn solve(rows: &[Row], before: &[Light]) -> Vec<Light> {
             (0..WIDTH).for_each(|c| residual[k][c] -= w * gap[c]);
         }
     }
-    let squares = |x: &[Light], y: &[Light]| -> Light {
+    let squares = |x: &[TexelLight], y: &[TexelLight]| -> TexelLight {
         std::array::from_fn(|c| x.iter().zip(y).map(|(x, y)| x[c] * y[c]).sum())
     };
     let mut found = vec![zero; before.len()];
@@ -212,7 +220,7 @@ fn solve(rows: &[Row], before: &[Light]) -> Vec<Light> {
     found
 }
 
-fn dot(row: &Row, x: &[Light]) -> Light {
+fn dot(row: &Row, x: &[TexelLight]) -> TexelLight {
     let mut sum = [0.0; WIDTH];
     for &(k, w) in row {
         (0..WIDTH).for_each(|c| sum[c] += w * x[k][c]);

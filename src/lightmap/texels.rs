@@ -1,6 +1,6 @@
 //! The texels of a chart: what was looked at as it is, the rest interpolated in its cell, what is off the chart filled up.
 
-use super::cells::{Cell, DEPTH, Lattice, bilinear};
+use super::cells::{ChartCell, DEPTH, Lattice, bilinear};
 use glam::DVec2;
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
@@ -31,7 +31,7 @@ impl Texel {
 
 /// Texels of a chart without margins.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Patch {
+pub(super) struct ChartTexels {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) texels: Vec<Texel>,
@@ -42,7 +42,7 @@ pub(super) type Corners = BTreeMap<[u32; 2], Option<Texel>>;
 
 /// Gives covered corners the mean of the other corners of their cells, ring by ring; how many there were. What no light
 /// surrounds stays dark.
-pub(super) fn lend(corners: &mut Corners, cells: &[&Cell]) -> usize {
+pub(super) fn lend(corners: &mut Corners, cells: &[&ChartCell]) -> usize {
     let dark = corners.values().filter(|t| t.is_none()).count();
     loop {
         let mut lent: BTreeMap<[u32; 2], Vec<Texel>> = BTreeMap::new();
@@ -72,11 +72,11 @@ pub(super) fn lend(corners: &mut Corners, cells: &[&Cell]) -> usize {
 }
 
 /// The texels of a chart from the corners of its cells, all of which are known.
-pub(super) fn patch(lattice: &Lattice, cells: &[&Cell], corners: &Corners) -> Patch {
+pub(super) fn patch(lattice: &Lattice, cells: &[&ChartCell], corners: &Corners) -> ChartTexels {
     let [width, height] = lattice.texels([0, 0]);
     if lattice.single {
         let known = corners.values().next().copied().flatten();
-        return Patch {
+        return ChartTexels {
             width,
             height,
             texels: vec![known.unwrap_or_default()],
@@ -84,7 +84,7 @@ pub(super) fn patch(lattice: &Lattice, cells: &[&Cell], corners: &Corners) -> Pa
     }
     let mut texels: Vec<Option<Texel>> = vec![None; width * height];
     // Finer cells know better what lies on an edge with a coarser one.
-    let mut order: Vec<&&Cell> = cells.iter().collect();
+    let mut order: Vec<&&ChartCell> = cells.iter().collect();
     order.sort_by_key(|c| (c.level[0] + c.level[1], c.low));
     let step = lattice
         .finest
@@ -112,7 +112,7 @@ pub(super) fn patch(lattice: &Lattice, cells: &[&Cell], corners: &Corners) -> Pa
             texels[y * width + x] = *texel;
         }
     }
-    Patch {
+    ChartTexels {
         width,
         height,
         texels: filled(texels, width, height),

@@ -21,7 +21,7 @@ const GREATEST: f64 = 4.0;
 
 /// Row factors, and how far row sums are from their targets.
 #[derive(Debug, Clone, Default)]
-pub struct Balance {
+pub struct RowBalance {
     /// Factor of each node that is a leaf (1 elsewhere).
     pub factor: Vec<f32>,
     /// Area-weighted mean and greatest distance of row sums from their targets before balancing.
@@ -34,7 +34,7 @@ pub struct Balance {
 
 /// Balances the rows of a hierarchy; `target` holds what the row of each leaf node must sum to, in [0, 1].
 /// `areas` are the areas of all nodes that take part.
-pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> Balance {
+pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> RowBalance {
     let leaves: Vec<usize> = (0..tree.nodes.len())
         .filter(|&k| tree.nodes[k].is_leaf())
         .collect();
@@ -60,7 +60,7 @@ pub fn balance(tree: &Tree, rows: &LinkRows, areas: &[f64], target: &[f32]) -> B
             break;
         }
     }
-    Balance {
+    RowBalance {
         defect_before,
         defect_after: defect(areas, &leaves, &sums, target),
         limited: leaves.iter().filter(|&&k| factor[k] == GREATEST).count(),

@@ -5,8 +5,8 @@
 //! lies in [0, 1] however near the polygon is.
 
 use super::contour::exchange;
-use super::visibility::{PIECES, View, segment};
-use super::{Link, Room, Way};
+use super::visibility::{PIECES, Visibility, segment};
+use super::{Link, LinkContext, Occlusion};
 use crate::geometry::lanes::{all_lanes, lambert_x8, lanes_of};
 use crate::geometry::{Clipper, Segment, Shadow, nearest_point};
 use crate::hierarchy::{Node, Outline, Sample, Tree};
@@ -185,7 +185,7 @@ struct Ends<'a> {
 
 impl<'a> Ends<'a> {
     /// Samples the smaller end and takes the larger as the polygon: the factor varies less over a small patch.
-    fn of(room: &'a Room, a: u32, b: u32) -> Self {
+    fn of(room: &'a LinkContext, a: u32, b: u32) -> Self {
         let (na, nb) = (room.tree.node(a), room.tree.node(b));
         let a_sampled = match (simple(na), simple(nb)) {
             (true, false) => false,
@@ -263,24 +263,33 @@ impl<'a> Ends<'a> {
 
     /// The visible share, and the view between the ends.
     #[inline]
-    fn visible(&self, room: &Room, parents: &View, scratch: &mut Scratch) -> (f64, View) {
+    fn visible(
+        &self,
+        room: &LinkContext,
+        parents: &Visibility,
+        scratch: &mut Scratch,
+    ) -> (f64, Visibility) {
         let (sight, tree, shift) = (room.sight, room.tree, self.shift);
         let (s, t) = (self.sampled, self.other);
         let view = || sight.view(tree, self.s, self.t, parents);
         // In cluttered rooms a look into the shaft costs as much as many rays. It is worth while where it starts from a
         // list, or where rays suggest that it may come out clear.
-        let (view, rays) = if *parents == View::Crowded && !sight.small() && sight.occlusion {
-            let rays = sampled_visibility(room, s, t, shift, &View::Crowded, scratch);
-            let view = if rays == 1.0 { view() } else { View::Crowded };
+        let (view, rays) = if *parents == Visibility::Crowded && !sight.small() && sight.occlusion {
+            let rays = sampled_visibility(room, s, t, shift, &Visibility::Crowded, scratch);
+            let view = if rays == 1.0 {
+                view()
+            } else {
+                Visibility::Crowded
+            };
             (view, Some(rays))
         } else {
             (view(), None)
         };
         let share = match (&view, rays) {
-            (View::Clear, _) => 1.0,
+            (Visibility::Clear, _) => 1.0,
             // Where a plane cuts one end, perhaps none of its points lies in front of the other end; then the other end
             // is sampled.
-            (View::Listed(list), _) if simple(self.t) => {
+            (Visibility::Listed(list), _) if simple(self.t) => {
                 clipped_visibility(room, s, t, shift, list, scratch)
                     .or_else(|| {
                         if simple(self.s) {
@@ -317,12 +326,12 @@ pub(super) fn unmet(a: &Node, b: &Node) -> f64 {
 /// Works out the link between two patches and the view between them; none if they exchange nothing. `parents` is the
 /// view of a pair that contains this one.
 pub fn evaluate(
-    room: &Room,
+    room: &LinkContext,
     a: u32,
     b: u32,
-    parents: &View,
+    parents: &Visibility,
     scratch: &mut Scratch,
-) -> Option<(Link, View)> {
+) -> Option<(Link, Visibility)> {
     let ends = Ends::of(room, a, b);
     let Some((open, variation)) = ends.unoccluded(room.tree, scratch) else {
         if ends.are_polygons() {
@@ -335,9 +344,9 @@ pub fn evaluate(
             exchange: 0.0,
             open_exchange: 0.0,
             variation: 0.0,
-            way: Way::Crowded,
+            occlusion: Occlusion::Crowded,
         };
-        return Some((link, View::Crowded));
+        return Some((link, Visibility::Crowded));
     };
     let (visible, view) = ends.visible(room, parents, scratch);
     let link = Link {
@@ -346,10 +355,10 @@ pub fn evaluate(
         exchange: (open * visible) as f32,
         open_exchange: open as f32,
         variation: variation as f32,
-        way: if view == View::Clear {
-            Way::Clear
+        occlusion: if view == Visibility::Clear {
+            Occlusion::Clear
         } else {
-            Way::Crowded
+            Occlusion::Crowded
         },
     };
     Some((link, view))
@@ -413,7 +422,7 @@ fn contours(tree: &Tree, a: &Node, b: &Node) -> f64 {
 /// Visible share by points on one end, each of which sees exactly the unblocked part of the polygons of the other. None
 /// if that takes too many pieces, or if no point is in front of the other end.
 fn clipped_visibility(
-    room: &Room,
+    room: &LinkContext,
     s: u32,
     t: u32,
     shift: [f64; 2],
@@ -442,7 +451,7 @@ fn clipped_visibility(
             scratch.clipper.begin(p.point, &corners);
             for outline in &scratch.outlines {
                 let shadow = Shadow::new(p.point, outline.as_ref());
-                if !scratch.clipper.cut(&shadow, PIECES) {
+                if !scratch.clipper.clip(&shadow, PIECES) {
                     return None;
                 }
             }
@@ -461,11 +470,11 @@ fn clipped_visibility(
 
 /// Visible share by rays between points of both ends, each weighted by the light it would carry.
 fn sampled_visibility(
-    room: &Room,
+    room: &LinkContext,
     s: u32,
     t: u32,
     shift: [f64; 2],
-    view: &View,
+    view: &Visibility,
     scratch: &mut Scratch,
 ) -> f64 {
     let (u, v) = (

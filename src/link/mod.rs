@@ -9,14 +9,14 @@ mod store;
 mod visibility;
 
 pub(crate) use balance::row_sums;
-pub use balance::{Balance, balance};
+pub use balance::{RowBalance, balance};
 pub use contour::exchange;
 pub(crate) use kernel::{POLYGONS, in_front_of, open_weight, pattern, polygons};
 pub use kernel::{Scratch, evaluate, facing, point_factors};
 pub use mirrored::Mirrored;
 pub use refine::{Demand, Graph, MAX_DEPTH, Refined, blockers_of};
 pub use store::LinkRows;
-pub use visibility::{Opaque, Sight, View};
+pub use visibility::{Opaque, Sight, Visibility};
 pub(crate) use visibility::{PIECES, is_small};
 
 use crate::hierarchy::Tree;
@@ -35,7 +35,7 @@ pub struct Link {
     /// Relative variation of the point-to-patch factor: half of (greatest - least), over the mean.
     pub variation: f32,
     /// What may block this exchange.
-    pub way: Way,
+    pub occlusion: Occlusion,
 }
 
 impl Link {
@@ -51,7 +51,7 @@ impl Link {
 
 /// What may stand between the ends of a link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum Occlusion {
     /// Nothing: proved.
     Clear,
     /// Only a few triangles: `Graph::blockers[start..start + count]`.
@@ -67,7 +67,7 @@ pub enum Way {
 
 /// What links are worked out from: the patches and what may stand between them.
 #[derive(Clone, Copy)]
-pub struct Room<'a> {
+pub struct LinkContext<'a> {
     /// The patches.
     pub tree: &'a Tree,
     /// What blocks rays.

@@ -6,8 +6,8 @@
 //! parallel and splits elements in order, so the result does not depend on the number of threads.
 
 use super::kernel::unmet;
-use super::visibility::View;
-use super::{Link, Room, Scratch, Sight, Way, evaluate, facing};
+use super::visibility::Visibility;
+use super::{Link, LinkContext, Occlusion, Scratch, Sight, evaluate, facing};
 use crate::hierarchy::{NONE, Node, Tree};
 use crate::team::{Interrupt, Interrupted};
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ pub struct Demand<'a> {
     pub bright: &'a [f32],
     /// How much a change of irradiance changes the lightness of every node: `(H / white)^(-2/3)`, as in CIELAB; 1 at the
     /// white.
-    pub keen: &'a [f32],
+    pub sensitivity: &'a [f32],
     /// Greatest error that a link may keep: share of white, weighted by the root of the receiver's share of counted area.
     pub threshold: f64,
     /// Elements below this area are not split.
@@ -40,7 +40,7 @@ impl Demand<'_> {
         let visibility = f64::from(link.visibility());
         // An unproved visibility of 0 or 1 is right to about one in the number of rays cast; one in between misplaces
         // light like a coin toss.
-        let doubt = if link.way == Way::Clear || !self.hidden {
+        let doubt = if link.occlusion == Occlusion::Clear || !self.hidden {
             0.0
         } else {
             (visibility * (1.0 - visibility)).sqrt().max(0.1)
@@ -55,8 +55,13 @@ impl Demand<'_> {
             // Patches made in this round have no brightness yet: refinement goes one level deeper. If they took that of
             // their ancestors, the Cornell box would take half as long again to reach the same error.
             let bright = f64::from(self.bright.get(source as usize).copied().unwrap_or(0.0));
-            let keen = f64::from(self.keen.get(receiver as usize).copied().unwrap_or(1.0));
-            misplaced / area * bright * keen * tree.share(receiver).sqrt()
+            let sensitivity = f64::from(
+                self.sensitivity
+                    .get(receiver as usize)
+                    .copied()
+                    .unwrap_or(1.0),
+            );
+            misplaced / area * bright * sensitivity * tree.share(receiver).sqrt()
         };
         at(link.a, link.b).max(at(link.b, link.a))
     }
@@ -112,15 +117,15 @@ impl Graph {
                 .into_iter()
                 .map(|(a, b)| (a, b, 0))
                 .collect();
-            let room = Room { tree, sight, seed };
-            let fresh = evaluate_all(&room, &pairs, &[View::Crowded], interrupt, &mut done)?;
+            let room = LinkContext { tree, sight, seed };
+            let fresh = evaluate_all(&room, &pairs, &[Visibility::Crowded], interrupt, &mut done)?;
             self.sort_out(tree, demand, fresh, &mut open, &mut done);
         } else {
             open = self.open(tree, demand, &mut done);
         }
         while !open.is_empty() {
             let (pairs, views) = split(tree, demand, open);
-            let room = Room { tree, sight, seed };
+            let room = LinkContext { tree, sight, seed };
             let fresh = evaluate_all(&room, &pairs, &views, interrupt, &mut done)?;
             open = Vec::new();
             self.sort_out(tree, demand, fresh, &mut open, &mut done);
@@ -129,7 +134,12 @@ impl Graph {
     }
 
     /// Takes out the links that exceed the demand and can be split, with their views.
-    fn open(&mut self, tree: &Tree, demand: &Demand, done: &mut Refined) -> Vec<(Link, View)> {
+    fn open(
+        &mut self,
+        tree: &Tree,
+        demand: &Demand,
+        done: &mut Refined,
+    ) -> Vec<(Link, Visibility)> {
         let wants: Vec<bool> = self
             .links
             .par_iter()
@@ -148,21 +158,23 @@ impl Graph {
         // The lists of opened links are dropped; the others move up.
         let blockers = std::mem::take(&mut self.blockers);
         for link in &mut kept {
-            if let Way::Listed { count, .. } = link.way {
+            if let Occlusion::Listed { count, .. } = link.occlusion {
                 let start = self.blockers.len() as u32;
-                self.blockers.extend(blockers_of(&blockers, link.way));
-                link.way = Way::Listed { start, count };
+                self.blockers.extend(blockers_of(&blockers, link.occlusion));
+                link.occlusion = Occlusion::Listed { start, count };
             }
         }
         self.links = kept;
-        let view = |way: Way| match way {
-            Way::Clear => View::Clear,
-            Way::Listed { .. } => View::Listed(blockers_of(&blockers, way).to_vec()),
-            Way::Crowded => View::Crowded,
+        let view = |occlusion: Occlusion| match occlusion {
+            Occlusion::Clear => Visibility::Clear,
+            Occlusion::Listed { .. } => {
+                Visibility::Listed(blockers_of(&blockers, occlusion).to_vec())
+            }
+            Occlusion::Crowded => Visibility::Crowded,
         };
         opened
             .into_par_iter()
-            .map(|link| (link, view(link.way)))
+            .map(|link| (link, view(link.occlusion)))
             .collect()
     }
 
@@ -171,8 +183,8 @@ impl Graph {
         &mut self,
         tree: &Tree,
         demand: &Demand,
-        fresh: Vec<(Link, View)>,
-        open: &mut Vec<(Link, View)>,
+        fresh: Vec<(Link, Visibility)>,
+        open: &mut Vec<(Link, Visibility)>,
         done: &mut Refined,
     ) {
         for (link, view) in fresh {
@@ -186,30 +198,30 @@ impl Graph {
         }
     }
 
-    fn keep(&mut self, link: Link, view: &View) {
-        let way = match view {
-            View::Clear => Way::Clear,
-            View::Crowded => Way::Crowded,
-            View::Listed(list) => {
+    fn keep(&mut self, link: Link, view: &Visibility) {
+        let occlusion = match view {
+            Visibility::Clear => Occlusion::Clear,
+            Visibility::Crowded => Occlusion::Crowded,
+            Visibility::Listed(list) => {
                 let start = self.blockers.len() as u32;
                 self.blockers.extend(list);
-                Way::Listed {
+                Occlusion::Listed {
                     start,
                     count: list.len() as u8,
                 }
             }
         };
-        self.links.push(Link { way, ..link });
+        self.links.push(Link { occlusion, ..link });
     }
 }
 
 /// The triangles listed for a way.
-pub fn blockers_of(blockers: &[u32], way: Way) -> &[u32] {
-    match way {
-        Way::Listed { start, count } => {
+pub fn blockers_of(blockers: &[u32], occlusion: Occlusion) -> &[u32] {
+    match occlusion {
+        Occlusion::Listed { start, count } => {
             &blockers[start as usize..start as usize + usize::from(count)]
         }
-        Way::Clear | Way::Crowded => &[],
+        Occlusion::Clear | Occlusion::Crowded => &[],
     }
 }
 
@@ -235,8 +247,8 @@ fn splittable(tree: &Tree, link: &Link, demand: &Demand) -> Option<(u32, u32)> {
 fn split(
     tree: &mut Tree,
     demand: &Demand,
-    open: Vec<(Link, View)>,
-) -> (Vec<(u32, u32, u32)>, Vec<View>) {
+    open: Vec<(Link, Visibility)>,
+) -> (Vec<(u32, u32, u32)>, Vec<Visibility>) {
     let mut pairs = Vec::with_capacity(4 * open.len());
     let mut views = Vec::with_capacity(open.len());
     for (link, view) in open {
@@ -254,12 +266,12 @@ fn split(
 
 /// Evaluates pairs (a, b, index of their parents' view), in order.
 fn evaluate_all(
-    room: &Room,
+    room: &LinkContext,
     pairs: &[(u32, u32, u32)],
-    views: &[View],
+    views: &[Visibility],
     interrupt: &Interrupt,
     done: &mut Refined,
-) -> Result<Vec<(Link, View)>, Interrupted> {
+) -> Result<Vec<(Link, Visibility)>, Interrupted> {
     let parts: Result<Vec<_>, _> = pairs
         .par_chunks(CHUNK)
         .map(|chunk| {

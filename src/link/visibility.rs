@@ -1,6 +1,6 @@
 //! Is the way between two patches clear? Exact where the shaft between them is empty, by rays elsewhere.
 
-use crate::geometry::{Hit, Patch, RayIndex, Segment, Shaft, ShaftContents};
+use crate::geometry::{Hit, RayIndex, Segment, Shaft, ShaftContents, ShaftEnd};
 use crate::hierarchy::{Blocker, Glazing, Mesh, Mirrors, Node, Sample, Tree};
 use glam::{DVec3, Vec3};
 
@@ -32,7 +32,7 @@ pub struct Sight<'a> {
 
 /// What is known of the way between two patches.
 #[derive(Debug, Clone, PartialEq)]
-pub enum View {
+pub enum Visibility {
     /// Nothing blocks.
     Clear,
     /// Only these triangles can.
@@ -53,20 +53,20 @@ impl Sight<'_> {
     }
 
     /// Looks into the shaft between two patches. `parents` is the view of a pair that contains this one.
-    pub fn view(&self, tree: &Tree, a: &Node, b: &Node, parents: &View) -> View {
+    pub fn view(&self, tree: &Tree, a: &Node, b: &Node, parents: &Visibility) -> Visibility {
         let candidates = match parents {
-            View::Clear => return View::Clear,
-            View::Listed(list) => Some(list.as_slice()),
-            View::Crowded => None,
+            Visibility::Clear => return Visibility::Clear,
+            Visibility::Listed(list) => Some(list.as_slice()),
+            Visibility::Crowded => None,
         };
         if !self.occlusion {
-            return View::Clear;
+            return Visibility::Clear;
         }
         let shaft = Shaft::between(&patch(tree, a), &patch(tree, b));
         match self.rays.blockers(&shaft, candidates, LISTED) {
-            ShaftContents::Clear => View::Clear,
-            ShaftContents::Few(list) => View::Listed(list),
-            ShaftContents::Many => View::Crowded,
+            ShaftContents::Clear => Visibility::Clear,
+            ShaftContents::Few(list) => Visibility::Listed(list),
+            ShaftContents::Many => Visibility::Crowded,
         }
     }
 
@@ -89,23 +89,23 @@ impl Sight<'_> {
         normal: DVec3,
         polygon: &[DVec3; 3],
         planes: [u32; 2],
-    ) -> View {
-        let point = Patch::Point {
+    ) -> Visibility {
+        let point = ShaftEnd::Point {
             at,
             normal,
             plane: planes[0],
         };
         let shaft = Shaft::between(
             &point,
-            &Patch::Triangle {
+            &ShaftEnd::Triangle {
                 corners: *polygon,
                 plane: planes[1],
             },
         );
         match self.rays.blockers(&shaft, None, LISTED) {
-            ShaftContents::Clear => View::Clear,
-            ShaftContents::Few(list) => View::Listed(list),
-            ShaftContents::Many => View::Crowded,
+            ShaftContents::Clear => Visibility::Clear,
+            ShaftContents::Few(list) => Visibility::Listed(list),
+            ShaftContents::Many => Visibility::Crowded,
         }
     }
 
@@ -141,19 +141,21 @@ impl Sight<'_> {
     }
 
     /// For each segment: is it blocked?
-    pub fn blocked(&self, segments: &[Segment], view: &View, out: &mut Vec<bool>) {
+    pub fn blocked(&self, segments: &[Segment], view: &Visibility, out: &mut Vec<bool>) {
         out.clear();
         out.resize(segments.len(), false);
         match (view, self.opaque) {
-            (View::Clear, _) => {}
-            (View::Listed(list), Some(opaque)) => {
+            (Visibility::Clear, _) => {}
+            (Visibility::Listed(list), Some(opaque)) => {
                 self.rays.occluded_by(list, segments, out, &opaque)
             }
-            (View::Listed(list), None) => {
+            (Visibility::Listed(list), None) => {
                 self.rays.occluded_by(list, segments, out, &|_, _, _| true)
             }
-            (View::Crowded, Some(opaque)) => self.rays.occluded_many_with(segments, out, &opaque),
-            (View::Crowded, None) => self.rays.occluded_many(segments, out),
+            (Visibility::Crowded, Some(opaque)) => {
+                self.rays.occluded_many_with(segments, out, &opaque)
+            }
+            (Visibility::Crowded, None) => self.rays.occluded_many(segments, out),
         }
     }
 }
@@ -164,13 +166,13 @@ pub(super) fn segment(s: &Sample, t: &Sample) -> Segment {
 }
 
 /// A node as the end of a shaft.
-fn patch(tree: &Tree, node: &Node) -> Patch {
+fn patch(tree: &Tree, node: &Node) -> ShaftEnd {
     match tree.element(node) {
-        Some(e) => Patch::Triangle {
+        Some(e) => ShaftEnd::Triangle {
             corners: e.corners,
             plane: tree.face_plane[e.face as usize],
         },
-        None => Patch::Box {
+        None => ShaftEnd::Box {
             low: node.low,
             high: node.high,
         },

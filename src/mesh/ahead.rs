@@ -5,7 +5,7 @@
 
 use super::grow::share;
 use super::turns::SQUARE;
-use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
+use crate::solve::{Bake, GatherQuality, INTERPOLATION_SHARE};
 
 /// Triangles that a vertex adds to a mesh.
 const A_VERTEX: usize = 2;
@@ -15,7 +15,7 @@ const DOUBLINGS: usize = 40;
 impl Bake {
     /// Expected number of triangles of the output's mesh, within a limit of vertices if there is one.
     pub fn triangles_ahead(&self, vertices: Option<usize>) -> usize {
-        let mut growth = self.growth(Care::Sketch, &|| false);
+        let mut growth = self.growth(GatherQuality::Preview, &|| false);
         growth.believe(true);
         growth.begin(&|_, _| {});
         let (cells, used) = (growth.cells.all.len(), growth.used());

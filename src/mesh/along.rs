@@ -1,7 +1,7 @@
 //! Splits the triangles that growing picks: along edges of shadows where there are any, else at edges over which light
 //! bends.
 
-use super::grow::{Growth, SHRINK};
+use super::grow::{MeshGrowth, SHRINK};
 use super::shades::COVER;
 
 /// What edges of shadows may take once the error is met: share of the triangles, and triangles of a small room.
@@ -10,7 +10,7 @@ const LINES: usize = 400;
 /// How often in one call lines are carried on into the next triangles.
 const TURNS: usize = 6;
 
-impl Growth<'_> {
+impl MeshGrowth<'_> {
     /// Splits cells that were looked at; returns the new cells.
     pub(super) fn split(&mut self, tested: &[usize]) -> Vec<usize> {
         let wanted = match self.looking {

@@ -46,7 +46,7 @@ pub(super) struct Edge {
 
 /// A place where the edge of a shadow bends or ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum ShadowEnd {
     Point(u32),
     /// Where this edge is to be split.
     Crossing(u32),
@@ -54,7 +54,7 @@ pub(super) enum End {
 
 /// How far the light in a triangle is from that between its corners.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Doubt {
+pub(super) struct CellError {
     /// Mean square of the colour difference, as far as known.
     pub(super) square: f64,
     /// Was light looked at here, or is the difference only expected?
@@ -84,7 +84,7 @@ pub(super) struct Cell {
     pub(super) counts: f64,
     /// The range of the sheet's hints that lie in the triangle.
     pub(super) hints: (u32, u32),
-    pub(super) doubt: Doubt,
+    pub(super) doubt: CellError,
 }
 
 /// The solved light at a place.
@@ -95,7 +95,7 @@ pub(super) struct Hint {
     pub(super) area: f64,
     /// Share of the area that counts.
     pub(super) counts: f64,
-    /// Share of the area that others see, see `solve::outlook`.
+    /// Share of the area that others see, see `solve::leaf_rays`.
     pub(super) open: f64,
     /// Tristimulus irradiance.
     pub(super) light: [f64; 3],
@@ -103,7 +103,7 @@ pub(super) struct Hint {
 
 /// One side of one surface.
 #[derive(Debug, Default)]
-pub(super) struct Sheet {
+pub(super) struct SurfaceSide {
     pub(super) surface: usize,
     pub(super) back: bool,
     pub(super) vertices: Vec<Vertex>,
@@ -124,7 +124,7 @@ pub(super) struct Sheet {
 /// All triangles.
 #[derive(Debug)]
 pub(super) struct Cells {
-    pub(super) sheets: Vec<Sheet>,
+    pub(super) sheets: Vec<SurfaceSide>,
     pub(super) all: Vec<Cell>,
     pub(super) edges: Vec<Edge>,
     pub(super) points: Vec<DVec3>,
@@ -133,7 +133,7 @@ pub(super) struct Cells {
     /// Of these points, those that are new.
     pub(super) sharpened: Vec<u32>,
     /// Edges of shadows that are to become edges of triangles at the next split.
-    pub(super) lines: Vec<([End; 2], u64)>,
+    pub(super) lines: Vec<([ShadowEnd; 2], u64)>,
     pub(super) along: HashMap<(u32, u32), u64>,
     /// Triangles made by points put inside others.
     pub(super) starred: Vec<usize>,
@@ -204,10 +204,10 @@ impl Cells {
     /// bare one.
     fn add(&mut self, start: &mut Start, number: usize, surface: &Surface, back: bool) {
         let (mesh, number_of_sheet) = (start.mesh, self.sheets.len() as u32);
-        let mut sheet = Sheet {
+        let mut sheet = SurfaceSide {
             surface: number,
             back,
-            ..Sheet::default()
+            ..SurfaceSide::default()
         };
         let mut known: HashMap<(u64, u32, u32), u32> = HashMap::new();
         let all = mesh.first_triangle[number]..mesh.first_triangle[number + 1];
@@ -261,7 +261,7 @@ impl Cells {
                 area: mesh.area[triangle as usize],
                 counts: 1.0,
                 hints: (0, 0),
-                doubt: Doubt::default(),
+                doubt: CellError::default(),
             });
         }
         self.sheets.push(sheet);
@@ -480,11 +480,11 @@ impl Cells {
             area: share * area,
             counts,
             hints,
-            doubt: Doubt {
+            doubt: CellError {
                 square: shrink * doubt.square,
                 trust: doubt.trust,
                 missed,
-                ..Doubt::default()
+                ..CellError::default()
             },
         };
         let first = half(
@@ -522,7 +522,7 @@ impl Cells {
 /// Triangles of a sheet by their vertices, with the triangle of the mesh that each is part of.
 pub(super) type Triangles = (Vec<[u32; 3]>, Vec<u32>);
 
-impl Sheet {
+impl SurfaceSide {
     /// Vertex at share `at` from `a` to `b`; for `way` see [`Cells::way_along`].
     fn between(
         &mut self,

@@ -5,10 +5,10 @@
 //! shadow is looked for where its edges would meet if both ran on straight. All other triangles are bisected, and
 //! looked at again.
 
-use super::cells::{Cell, Cells, End, FENCE, within};
+use super::cells::{Cell, Cells, FENCE, ShadowEnd, within};
 use super::lines::Sharp;
 use super::shades::{COVER, Shades, each};
-use super::shadow::{Crossing, Found, Mark, Plan};
+use super::shadow::{EdgeCrossing, Mark, ShadowEdge, ShadowFinding};
 use crate::link::Sight;
 use crate::transport::Receiver;
 use glam::{DVec2, DVec3, dvec2};
@@ -49,7 +49,7 @@ const FINISHING: usize = 24;
 const BISECTED: f64 = 4e-3;
 
 /// A cell that is searched for edges of shadows.
-struct Look<'a> {
+struct CellLook<'a> {
     shades: &'a Shades<'a>,
     sight: &'a Sight<'a>,
     cells: &'a Cells,
@@ -69,7 +69,7 @@ fn flat(w: [f64; 3]) -> DVec2 {
     dvec2(w[1], w[2])
 }
 
-impl Look<'_> {
+impl CellLook<'_> {
     fn receiver(&self, weights: [f64; 3]) -> Receiver {
         let sheet = &self.cells.sheets[self.cell.sheet as usize];
         self.shades.place(self.cell, sheet, weights)
@@ -124,7 +124,7 @@ impl Look<'_> {
         [corners[edge].weights, corners[(edge + 1) % 3].weights]
     }
 
-    fn crossings(&self) -> Vec<Crossing> {
+    fn crossings(&self) -> Vec<EdgeCrossing> {
         let mut found = Vec::new();
         for edge in 0..3 {
             let length = self.cells.edges[self.cell.edges[edge] as usize].length;
@@ -135,7 +135,7 @@ impl Look<'_> {
             let [a, b] = self.ends(edge);
             for at in self.flips(a, b, PARTS, margin) {
                 let weights = between(a, b, at);
-                found.push(Crossing { edge, at, weights });
+                found.push(EdgeCrossing { edge, at, weights });
             }
         }
         found
@@ -229,21 +229,21 @@ impl Look<'_> {
     fn line(&self, marks: [Mark; 2]) -> ([Mark; 2], u64) {
         let [a, b] = [0, 1].map(|k| self.weights(&marks[k]));
         let others = each(self.lamps).filter(|&lamp| {
-            let look = Look { lamp, ..*self };
+            let look = CellLook { lamp, ..*self };
             lamp == self.lamp || look.is_edge(a, b)
         });
         (marks, others.fold(0, |all, lamp| all | lamp))
     }
 
-    fn look(&self) -> Found {
+    fn look(&self) -> ShadowFinding {
         let crossings = self.crossings();
         // Neighbours may have put both ends of a bent edge on corners.
         let ends = (0..3).filter(|&k| self.cells.lamps_at(self.cell, k) & self.lamp != 0);
         if crossings.is_empty() && ends.count() < 2 {
-            return Found::Even;
+            return ShadowFinding::Even;
         }
         if crossings.len() > CROSSINGS {
-            return Found::Other;
+            return ShadowFinding::Other;
         }
         let mut marks: Vec<Mark> = crossings.into_iter().map(Mark::Crossing).collect();
         let found = marks.len();
@@ -260,20 +260,20 @@ impl Look<'_> {
         };
         for (p, q) in pairs().filter(apart) {
             if self.is_edge(self.weights(&p), self.weights(&q)) {
-                return Found::Edge(Plan {
+                return ShadowFinding::Edge(ShadowEdge {
                     inside: None,
                     lines: vec![self.line([p, q])],
                 });
             }
         }
         if !self.shades.is_hard(self.lamp) {
-            return Found::Even;
+            return ShadowFinding::Even;
         }
         for depth in DEPTHS {
             for (p, q) in pairs() {
                 if let Some(at) = self.bend(&p, &q, depth) {
                     let lines = [p, q].map(|end| self.line([end, Mark::Inside(at)]));
-                    return Found::Edge(Plan {
+                    return ShadowFinding::Edge(ShadowEdge {
                         inside: Some(at),
                         lines: lines.to_vec(),
                     });
@@ -281,8 +281,8 @@ impl Look<'_> {
             }
         }
         match found {
-            0 => Found::Even,
-            _ => Found::Other,
+            0 => ShadowFinding::Even,
+            _ => ShadowFinding::Other,
         }
     }
 }
@@ -307,7 +307,7 @@ impl Cells {
                     let ends = cells.lamps_at(cell, e) | cells.lamps_at(cell, e + 1);
                     let unknown = ends & !cells.sharp_along(cell, e) & !FENCE;
                     let along = each(unknown).filter(|&lamp| {
-                        let look = Look {
+                        let look = CellLook {
                             shades,
                             sight,
                             cells,
@@ -336,14 +336,14 @@ impl Cells {
         }
     }
 
-    fn look_into(&mut self, shades: &Shades, wanted: &[(usize, u64)]) -> Vec<Found> {
+    fn look_into(&mut self, shades: &Shades, wanted: &[(usize, u64)]) -> Vec<ShadowFinding> {
         self.find_edges(shades, wanted);
         let half_size = shades.bake().mesh().half_size;
         shades.bake().room.with_sight(|sight| {
             let look = |(): &mut (), &(k, lamps): &(usize, u64)| {
-                let mut best = Found::Even;
+                let mut best = ShadowFinding::Even;
                 for lamp in each(lamps) {
-                    let look = Look {
+                    let look = CellLook {
                         shades,
                         sight,
                         cells: self,
@@ -353,9 +353,9 @@ impl Cells {
                         half_size,
                     };
                     match look.look() {
-                        Found::Even => {}
-                        Found::Edge(plan) => return Found::Edge(plan),
-                        Found::Other => best = Found::Other,
+                        ShadowFinding::Even => {}
+                        ShadowFinding::Edge(plan) => return ShadowFinding::Edge(plan),
+                        ShadowFinding::Other => best = ShadowFinding::Other,
                     }
                 }
                 best
@@ -365,7 +365,7 @@ impl Cells {
     }
 
     /// Requests what a plan needs, unless something else was requested before.
-    fn ask(&mut self, k: usize, plan: &Plan, near: f64) {
+    fn ask(&mut self, k: usize, plan: &ShadowEdge, near: f64) {
         // Edges are referred to by number before the cell becomes three.
         let mut ends = Vec::new();
         for mark in plan.lines.iter().flat_map(|(marks, _)| marks) {
@@ -374,7 +374,7 @@ impl Cells {
                     Some(end) => Some(end),
                     None => return,
                 },
-                Mark::Corner(c) => Some(End::Point(self.all[k].corners[*c].point)),
+                Mark::Corner(c) => Some(ShadowEnd::Point(self.all[k].corners[*c].point)),
                 Mark::Inside(_) => None,
             });
         }
@@ -438,14 +438,14 @@ impl Cells {
             let wanted: Vec<(usize, u64)> = all.filter(|(_, lamps)| *lamps != 0).collect();
             let found = self.look_into(shades, &wanted);
             // Finished cells take nothing of what is allowed.
-            let is_open = |(wanted, found): &(&(usize, u64), &Found)| match found {
-                Found::Edge(_) => true,
-                Found::Other => self.size(&self.all[wanted.0]) > least,
+            let is_open = |(wanted, found): &(&(usize, u64), &ShadowFinding)| match found {
+                ShadowFinding::Edge(_) => true,
+                ShadowFinding::Other => self.size(&self.all[wanted.0]) > least,
                 _ => false,
             };
             let room = full.saturating_sub(self.all.len());
             let open = wanted.iter().zip(&found).filter(is_open).take(room);
-            let (wanted, found): (Vec<(usize, u64)>, Vec<Found>) =
+            let (wanted, found): (Vec<(usize, u64)>, Vec<ShadowFinding>) =
                 open.map(|(wanted, found)| (*wanted, found.clone())).unzip();
             some = self.split_found(shades, &wanted, &found, least, shrink);
             if some.is_empty() || late() {
@@ -463,19 +463,19 @@ impl Cells {
         &mut self,
         shades: &Shades,
         wanted: &[(usize, u64)],
-        found: &[Found],
+        found: &[ShadowFinding],
         least: f64,
         shrink: f64,
     ) -> Vec<usize> {
         let near = NEAR * shades.bake().mesh().half_size;
         for ((k, _), found) in wanted.iter().zip(found) {
-            if let Found::Edge(plan) = found {
+            if let ShadowFinding::Edge(plan) = found {
                 self.ask(*k, plan, near);
             }
         }
         for ((k, _), found) in wanted.iter().zip(found) {
             let cell = &self.all[*k];
-            if matches!(found, Found::Other) && self.size(cell) > least {
+            if matches!(found, ShadowFinding::Other) && self.size(cell) > least {
                 self.mark(*k, self.longest(cell));
             }
         }

@@ -29,13 +29,13 @@ const ALONG: [f64; 3] = [0.2, 0.5, 0.8];
 const ALIKE: f64 = 0.999;
 
 /// A corner of a cell, or the edge that begins at this corner.
-type Of = (usize, usize);
+type CellCorner = (usize, usize);
 
 /// How a vertex is divided: its sheet, and the corners around it in sectors, the first of which keeps it.
 struct Parted {
     sheet: u32,
     vertex: u32,
-    sectors: Vec<Vec<Of>>,
+    sectors: Vec<Vec<CellCorner>>,
 }
 
 impl Cells {
@@ -70,7 +70,7 @@ impl Cells {
 
     /// Edges on which something stands.
     fn fenced(&self, shades: &Shades, spaces: &[(u32, bool)]) -> BTreeSet<u32> {
-        let mut around: Vec<(u32, Of)> = Vec::with_capacity(3 * self.all.len());
+        let mut around: Vec<(u32, CellCorner)> = Vec::with_capacity(3 * self.all.len());
         let is_bare = |cell: &Cell| !spaces.get(cell.of.1 as usize).is_some_and(|space| space.1);
         let bare = self.all.iter().enumerate();
         for (k, cell) in bare.filter(|(_, cell)| is_bare(cell)) {
@@ -82,9 +82,9 @@ impl Cells {
             );
         }
         around.sort_unstable();
-        let edges: Vec<&[(u32, Of)]> = around.chunk_by(|a, b| a.0 == b.0).collect();
+        let edges: Vec<&[(u32, CellCorner)]> = around.chunk_by(|a, b| a.0 == b.0).collect();
         shades.bake().room.with_sight(|sight| {
-            let stands = |cells: &[(u32, Of)]| {
+            let stands = |cells: &[(u32, CellCorner)]| {
                 let few = &cells[..cells.len().min(MOST)];
                 let all = few.iter().enumerate();
                 all.flat_map(|(k, a)| few[k + 1..].iter().map(move |b| (a.1, b.1)))
@@ -97,7 +97,13 @@ impl Cells {
 
     /// Does something stand on the edge that two cells share? Both must belong to one sheet, or face the same
     /// direction.
-    fn stands_between(&self, shades: &Shades, sight: &Sight, (a, e): Of, (b, f): Of) -> bool {
+    fn stands_between(
+        &self,
+        shades: &Shades,
+        sight: &Sight,
+        (a, e): CellCorner,
+        (b, f): CellCorner,
+    ) -> bool {
         let mesh = shades.bake().mesh();
         let [a, b] = [(a, e), (b, f)].map(|(k, e)| (&self.all[k], e));
         let (Some((at_a, normal_a)), Some((at_b, normal_b))) =
@@ -132,7 +138,7 @@ impl Cells {
 
     /// How the vertices at ends of fenced edges are divided.
     fn parted(&self, fenced: &BTreeSet<u32>, points: &BTreeSet<u32>) -> Vec<Parted> {
-        let mut corners: BTreeMap<(u32, u32), Vec<Of>> = BTreeMap::new();
+        let mut corners: BTreeMap<(u32, u32), Vec<CellCorner>> = BTreeMap::new();
         for (k, cell) in self.all.iter().enumerate() {
             for (c, corner) in cell.corners.iter().enumerate() {
                 if points.contains(&corner.point) {
@@ -150,8 +156,8 @@ impl Cells {
     }
 
     /// Corners around a vertex in sets that are connected by edges on which nothing stands.
-    fn sectors(&self, about: &[Of], fenced: &BTreeSet<u32>) -> Vec<Vec<Of>> {
-        let open = |(k, c): Of| {
+    fn sectors(&self, about: &[CellCorner], fenced: &BTreeSet<u32>) -> Vec<Vec<CellCorner>> {
+        let open = |(k, c): CellCorner| {
             let edges = [c, (c + 2) % 3].map(|e| self.all[k].edges[e]);
             edges.into_iter().filter(|edge| !fenced.contains(edge))
         };
@@ -180,7 +186,7 @@ impl Cells {
 
     /// Gives the corners of the `k`-th sector around a vertex one vertex: the first sector keeps the old one, others
     /// get a new one.
-    fn give_vertex(&mut self, sheet: u32, (parted, k): (u32, usize), sector: &[Of]) {
+    fn give_vertex(&mut self, sheet: u32, (parted, k): (u32, usize), sector: &[CellCorner]) {
         let (cell, c) = sector[0];
         let Cell { of, corners, .. } = self.all[cell];
         let own = Vertex {

@@ -5,14 +5,14 @@
 //! of what they miss in the middles of its three edges together (the rule of edge middles, exact to the second degree), and these were
 //! looked at. Every vertex is moved by the mean of that over the triangles around it, by area.
 
-use super::grow::Growth;
+use super::grow::MeshGrowth;
 
 /// Where lines miss more than this share of the light at the darkest corner of a triangle, they miss the edge of a shadow and not a curve, and no
 /// vertex is moved: beside sun patches dark corners got up to twice their light, and streaks ran from them. With .1, .25 and .5 the error between
 /// vertices is .250, .226 and .227 in two rooms, .292, .292 and .291 in cornell, .229, .233 and .233 in daylit, and the same in convex and gallery.
 const MOST: f64 = 0.25;
 
-impl Growth<'_> {
+impl MeshGrowth<'_> {
     /// Factor of the light of each look where it belongs to a vertex. The same for all vertices of a look, so that there is no seam;
     /// only a factor, so that the light of each lamp keeps its share and can be changed afterwards.
     pub(super) fn fitted(&self) -> Vec<f32> {

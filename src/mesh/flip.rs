@@ -5,7 +5,7 @@
 //! share the other diagonal. The diagonal with fewer creases is drawn: creases are the sum, over the edges around, of length times the
 //! jump of the gradient of lightness, which an eye takes for a line (data-dependent triangulation, Dyn, Levin & Rippa 1990).
 
-use super::cells::{Cells, Sheet, Triangles, key};
+use super::cells::{Cells, SurfaceSide, Triangles, key};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -27,7 +27,7 @@ pub(super) struct Ground {
 
 /// The unchanging parts of all sheets.
 pub(super) fn grounds(cells: &Cells) -> Vec<Ground> {
-    let ground = |sheet: &Sheet| Ground {
+    let ground = |sheet: &SurfaceSide| Ground {
         at: vec![DVec3::ZERO; sheet.vertices.len()],
         lines: HashSet::new(),
     };

@@ -6,10 +6,10 @@
 //! become alike, which takes the fewest vertices for a sum. Squares are used although growing ends by the mean: teeth along
 //! shadows are few, and visible.
 
-use super::cells::{Cell, Cells, Corner, Doubt, Hint, within};
+use super::cells::{Cell, CellError, Cells, Corner, Hint, within};
 use super::looks::Looks;
 use super::shades::Shades;
-use super::turns::{BENDS, BY_CHANCE, EXCESS, End, RANGE, largest};
+use super::turns::{BENDS, BY_CHANCE, EXCESS, GrowthOutcome, RANGE, largest};
 use crate::color::seen_difference;
 use crate::gather::Vertex;
 use crate::geometry::sampling::{hash, triangle_weights};
@@ -35,7 +35,7 @@ const FULL: usize = 64;
 /// Light at the corners of a cell, mean square of its difference from the solved light, and the worst place.
 type Told = ([[f64; 3]; 3], f64, Option<(Hint, f64)>);
 /// Looks in the middles of edges and inside, and weights of the corners at the last.
-type Asked = ([u32; 3], u32, [f64; 3]);
+type LookRequest = ([u32; 3], u32, [f64; 3]);
 
 /// Sum of the light of neighbours of covered vertices, and their number.
 type Lent = HashMap<u32, ([f64; 3], f64)>;
@@ -44,7 +44,7 @@ type Lent = HashMap<u32, ([f64; 3], f64)>;
 pub(super) type PointLooks = (usize, ([u32; 3], [f64; 3]), [u32; 2]);
 
 /// A mesh that grows.
-pub(super) struct Growth<'a> {
+pub(super) struct MeshGrowth<'a> {
     pub(super) cells: Cells,
     pub(super) looks: Looks<'a>,
     /// The lamps that throw shadows.
@@ -74,7 +74,7 @@ pub(super) struct Growth<'a> {
     pub(super) for_lines: usize,
 }
 
-impl<'a> Growth<'a> {
+impl<'a> MeshGrowth<'a> {
     /// Starts with cells.
     pub(super) fn new(
         cells: Cells,
@@ -261,7 +261,7 @@ impl<'a> Growth<'a> {
             .map(|&k| {
                 let light = self.light(k);
                 let told = self.told(k, &light).0;
-                let Doubt { square, trust, .. } = self.cells.all[k].doubt;
+                let CellError { square, trust, .. } = self.cells.all[k].doubt;
                 if !self.is_seen(k) {
                     return 0.0;
                 }
@@ -303,21 +303,21 @@ impl<'a> Growth<'a> {
     }
 
     /// Grows until the sum of all shares is at most `goal`.
-    pub(super) fn grow(&mut self, goal: f64, progress: &dyn Fn(usize, usize)) -> End {
+    pub(super) fn grow(&mut self, goal: f64, progress: &dyn Fn(usize, usize)) -> GrowthOutcome {
         loop {
             let excess = self.sum() - goal;
             if excess <= 0.0 {
                 if self.looking && !self.strict && !self.looks.is_late() {
                     self.finish_lines(progress);
                 }
-                return End::Reached;
+                return GrowthOutcome::Reached;
             }
             let is_late = match self.until {
                 Some(until) => Instant::now() > until,
                 None => self.looking && self.looks.is_late(),
             };
             if is_late {
-                return End::Late;
+                return GrowthOutcome::Late;
             }
             let left = self.most.saturating_sub(self.used());
             let batch = if self.strict {
@@ -326,12 +326,12 @@ impl<'a> Growth<'a> {
                 usize::MAX
             };
             if left == 0 || batch == 0 || batch < self.most / (SPLIT * FULL) {
-                return End::Most;
+                return GrowthOutcome::Most;
             }
             let mut picked = self.pick(excess);
             picked.truncate(batch);
             if picked.is_empty() {
-                return End::Smallest;
+                return GrowthOutcome::Smallest;
             }
             let looking = self.looking;
             let (tested, untested): (Vec<usize>, Vec<usize>) = picked
@@ -442,8 +442,8 @@ impl<'a> Growth<'a> {
         &self,
         k: usize,
         (light, told, worst): Told,
-        (middles, inside, weights): Asked,
-    ) -> Doubt {
+        (middles, inside, weights): LookRequest,
+    ) -> CellError {
         let off = |look: u32, weights: [f64; 3]| {
             let seen = self.looks.at(look)?.xyz;
             let off = self.difference(mix(&light, weights), seen);
@@ -456,9 +456,9 @@ impl<'a> Growth<'a> {
         let mut looks = middles.into_iter().chain([inside]);
         if !seen.contains(&true) && looks.all(|look| self.looks.at(look).is_none()) {
             // The cell lies below something.
-            return Doubt {
+            return CellError {
                 tested: true,
-                ..Doubt::default()
+                ..CellError::default()
             };
         }
         let bent = [0, 1, 2].map(|e| {
@@ -486,7 +486,7 @@ impl<'a> Growth<'a> {
             (None, None) => ((0.25 * edges).max(before * before * told), before),
         };
         let inside = inside.unwrap_or(square.sqrt());
-        Doubt {
+        CellError {
             square,
             tested: true,
             bent: bent.map(|d| d as f32),
@@ -510,18 +510,18 @@ pub(super) fn mix(light: &[[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::Care;
+    use crate::solve::GatherQuality;
     use crate::transport::tests::baked;
 
     /// However flat the triangle was of which they are halves.
     #[test]
     fn halves_expect_something_of_the_difference_of_their_corners() {
         let bake = baked("cornell.glb", 1);
-        let mut growth = bake.growth(Care::Vertex, &|| false);
+        let mut growth = bake.growth(GatherQuality::Vertex, &|| false);
         growth.begin(&|_, _| {});
         let all: Vec<usize> = (0..growth.cells.all.len()).collect();
         for &k in &all {
-            growth.cells.all[k].doubt = Doubt::default();
+            growth.cells.all[k].doubt = CellError::default();
         }
         growth.expect(&all, false, &|_, _| {});
         let mut apart = 0;

@@ -5,7 +5,7 @@
 //! belongs to, that light a place right beside the point. So each side has its own light, and the mesh is as connected as
 //! before.
 
-use super::cells::{Cell, Cells, Corner, Doubt, End, Sheet, key, within};
+use super::cells::{Cell, CellError, Cells, Corner, ShadowEnd, SurfaceSide, key, within};
 use crate::gather::Vertex;
 
 /// A corner of a cell that lies on the edge of a shadow: cell, corner, lamps.
@@ -14,7 +14,7 @@ pub(super) type Sharp = (usize, usize, u64);
 impl Cells {
     /// Requests the split of an edge of a cell at a share of the way from corner `k` to the next. None where another split
     /// was requested before, further than `near` from there.
-    pub(super) fn cross(&mut self, cell: usize, k: usize, at: f64, near: f64) -> Option<End> {
+    pub(super) fn cross(&mut self, cell: usize, k: usize, at: f64, near: f64) -> Option<ShadowEnd> {
         let Cell { corners, edges, .. } = &self.all[cell];
         let (id, first) = (edges[k], corners[k].point);
         let edge = &mut self.edges[id as usize];
@@ -24,11 +24,11 @@ impl Cells {
         }
         let known = *edge.crossed.get_or_insert(at);
         edge.marked = true;
-        ((known - at).abs() * edge.length <= near).then_some(End::Crossing(id))
+        ((known - at).abs() * edge.length <= near).then_some(ShadowEnd::Crossing(id))
     }
 
     /// Requests that a line between two points become an edge at the next split, if possible.
-    pub(super) fn line(&mut self, ends: [End; 2], lamps: u64) {
+    pub(super) fn line(&mut self, ends: [ShadowEnd; 2], lamps: u64) {
         self.lines.push((ends, lamps));
     }
 
@@ -36,8 +36,8 @@ impl Cells {
     pub(super) fn draw_lines(&mut self) {
         for (ends, lamps) in std::mem::take(&mut self.lines) {
             let point = |end| match end {
-                End::Point(point) => Some(point),
-                End::Crossing(edge) => Some(self.edges[edge as usize].split?.0),
+                ShadowEnd::Point(point) => Some(point),
+                ShadowEnd::Crossing(edge) => Some(self.edges[edge as usize].split?.0),
             };
             let (Some(a), Some(b)) = (point(ends[0]), point(ends[1])) else {
                 continue;
@@ -59,7 +59,7 @@ impl Cells {
     }
 
     /// Puts a point inside a cell, which becomes three.
-    pub(super) fn star(&mut self, k: usize, weights: [f64; 3]) -> End {
+    pub(super) fn star(&mut self, k: usize, weights: [f64; 3]) -> ShadowEnd {
         let cell = self.all[k].clone();
         let own = within(&cell.corners, [weights[1], weights[2]]);
         let places = cell.corners.map(|c| self.points[c.point as usize]);
@@ -93,7 +93,7 @@ impl Cells {
                 edges: [cell.edges[e], spokes[n], spokes[e]],
                 area: cell.area * own[(e + 2) % 3],
                 hints,
-                doubt: Doubt {
+                doubt: CellError {
                     tested: false,
                     ..cell.doubt
                 },
@@ -105,7 +105,7 @@ impl Cells {
                 _ => self.all.push(part),
             }
         }
-        End::Point(point)
+        ShadowEnd::Point(point)
     }
 
     /// Moves those hints to the front that lie in a triangle; returns their range.
@@ -175,7 +175,7 @@ impl Cells {
 /// corner.
 const INTO: f64 = 0.05;
 
-impl Sheet {
+impl SurfaceSide {
     /// Light of a vertex in the middle of a line from `a` to `b` is looked at between the places of both ends, on the
     /// side of `c`.
     pub(super) fn beside_line(

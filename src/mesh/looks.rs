@@ -1,7 +1,7 @@
 //! Looks at light: each place with its normal is gathered once, whichever triangles ask for it.
 
 use crate::gather::{MOSTLY, Vertex};
-use crate::solve::{Bake, Care};
+use crate::solve::{Bake, GatherQuality};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -19,7 +19,7 @@ const PART: usize = 2048;
 
 /// The light at a place.
 #[derive(Debug)]
-pub(crate) struct Seen {
+pub(crate) struct PlaceLight {
     /// Irradiance by lane.
     pub(crate) row: Box<[f32; 64]>,
     /// Tristimulus irradiance.
@@ -30,12 +30,12 @@ pub(crate) struct Seen {
 
 /// Place and normal, rounded; space; is the light of its leaf taken as it is? And the material of a diffuse sheet, whose light is
 /// shown with what passes it, or of a fluorescent surface, on which exciting light also counts.
-type Key = ([i64; 6], (u32, bool), bool, Option<u32>);
+type LookKey = ([i64; 6], (u32, bool), bool, Option<u32>);
 
 /// All looks so far.
 pub(crate) struct Looks<'a> {
     bake: &'a Bake,
-    care: Care,
+    quality: GatherQuality,
     /// Is it time to end?
     late: &'a (dyn Fn() -> bool + Sync),
     /// Is everything looked at nevertheless?
@@ -45,10 +45,10 @@ pub(crate) struct Looks<'a> {
     /// Is direct light of lamps left out?
     pub(crate) indirect: bool,
     spaces: Vec<(u32, bool)>,
-    known: HashMap<Key, u32>,
+    known: HashMap<LookKey, u32>,
     places: Vec<(Receiver, bool)>,
     /// None: something solid covers the place, or lies right upon it.
-    seen: Vec<Option<Seen>>,
+    seen: Vec<Option<PlaceLight>>,
     pub(crate) rays: u64,
 }
 
@@ -56,12 +56,12 @@ impl<'a> Looks<'a> {
     pub(crate) fn new(
         bake: &'a Bake,
         spaces: Vec<(u32, bool)>,
-        care: Care,
+        quality: GatherQuality,
         late: &'a (dyn Fn() -> bool + Sync),
     ) -> Self {
         Self {
             bake,
-            care,
+            quality,
             late,
             patient: false,
             believing: false,
@@ -108,14 +108,14 @@ impl<'a> Looks<'a> {
         })
     }
 
-    fn seen_as(&self, to: &Receiver, row: [f32; 64], trace: Option<Box<[u8]>>) -> Seen {
+    fn seen_as(&self, to: &Receiver, row: [f32; 64], trace: Option<Box<[u8]>>) -> PlaceLight {
         let lanes = self.bake.lanes();
         let mut xyz = lanes.tristimulus(&row);
         if lanes.excites().is_some() && self.fluoresces(to) {
             let excited = lanes.excited(&row);
             xyz = std::array::from_fn(|c| xyz[c] + excited[c]);
         }
-        Seen {
+        PlaceLight {
             xyz,
             row: Box::new(row),
             trace,
@@ -165,7 +165,7 @@ impl<'a> Looks<'a> {
     }
 
     /// The light that a look found.
-    pub(crate) fn at(&self, look: u32) -> Option<&Seen> {
+    pub(crate) fn at(&self, look: u32) -> Option<&PlaceLight> {
         self.seen[look as usize].as_ref()
     }
 
@@ -201,7 +201,7 @@ impl<'a> Looks<'a> {
         };
         let mut pressed = self.bake.pressed(&receivers(&places)).into_iter();
         places.retain(|_| pressed.next() == Some(false));
-        let gathered = self.bake.gather_shown(&receivers(&places), self.care);
+        let gathered = self.bake.gather_shown(&receivers(&places), self.quality);
         let dark =
             |g: &Gathered| g.backs <= MOSTLY && g.seen < 1e-3 && g.direct.iter().all(|&x| x == 0.0);
         let in_doubt = places.iter().zip(&gathered).filter(|(_, g)| dark(g));
@@ -222,12 +222,12 @@ impl<'a> Looks<'a> {
     }
 
     /// Does a place lie inside something whose back is black from there? Then it is dark, and a black back is above it.
-    fn is_inside(&self, to: &Receiver, seen: &Seen) -> bool {
+    fn is_inside(&self, to: &Receiver, seen: &PlaceLight) -> bool {
         seen.xyz[1] < DIM * self.bake.light().white[1] && self.bake.meets_back(to, to.normal)
     }
 
     /// The light of a leaf.
-    fn told(&self, to: &Receiver) -> Option<Seen> {
+    fn told(&self, to: &Receiver) -> Option<PlaceLight> {
         let light = self.bake.light();
         let known = light
             .irradiance

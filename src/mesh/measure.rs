@@ -8,7 +8,7 @@
 //! in their mean.
 
 use super::cells::Cell;
-use super::grow::{Growth, PointLooks, mix};
+use super::grow::{MeshGrowth, PointLooks, mix};
 use super::write::Settled;
 use crate::color::seen_difference;
 use crate::gather::{Interpolation, LayerLanes, Vertex};
@@ -28,8 +28,12 @@ pub(crate) const CHANCE: f64 = 4.0;
 const SEED: u64 = 0x0067_0f11;
 
 /// The interpolation error of a file, from its samples.
-pub(crate) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) -> Interpolation {
-    let root = |s: &Sample| s.square.abs().sqrt().copysign(s.square);
+pub(crate) fn summed(
+    samples: &[ErrorSample],
+    allowed: f64,
+    capped: Option<usize>,
+) -> Interpolation {
+    let root = |s: &ErrorSample| s.square.abs().sqrt().copysign(s.square);
     let mut off: Vec<f64> = samples.iter().map(root).collect();
     off.sort_by(f64::total_cmp);
     let n = off.len().max(1) as f64;
@@ -49,7 +53,7 @@ pub(crate) fn summed(samples: &[Sample], allowed: f64, capped: Option<usize>) ->
 
 /// A random point.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sample {
+pub(crate) struct ErrorSample {
     pub(crate) cell: usize,
     /// Square of the colour difference due to interpolation; below 0 by chance.
     pub(crate) square: f64,
@@ -82,7 +86,7 @@ impl Parts {
     }
 }
 
-impl Growth<'_> {
+impl MeshGrowth<'_> {
     /// Looks at new random points, one in each stratum of equal counted area.
     pub(super) fn measured(
         &mut self,
@@ -90,7 +94,7 @@ impl Growth<'_> {
         settled: &[Settled],
         turn: u64,
         progress: &dyn Fn(usize, usize),
-    ) -> Vec<Sample> {
+    ) -> Vec<ErrorSample> {
         let count = match self.looks.is_late() {
             true => POINTS[0],
             false => (self.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]),
@@ -149,7 +153,12 @@ impl Growth<'_> {
     }
 
     /// Light drawn at the points of the last measurement against light seen there: all light, or that of a layer.
-    fn compared(&self, bake: &Bake, settled: &[Settled], part: Option<&LayerLanes>) -> Vec<Sample> {
+    fn compared(
+        &self,
+        bake: &Bake,
+        settled: &[Settled],
+        part: Option<&LayerLanes>,
+    ) -> Vec<ErrorSample> {
         let white = bake.light().white;
         let shown = |row: &[f32; 64]| match part {
             Some(lanes) => bake.lanes().tristimulus(&lanes.of(row)),
@@ -167,7 +176,7 @@ impl Growth<'_> {
             let seen = 0.5 * (difference(drawn, one).powi(2) + difference(drawn, two).powi(2));
             let of_vertices: f64 = weights.iter().map(|w| w * w).sum();
             let square = seen - (1.0 + of_vertices) * noise;
-            Some(Sample {
+            Some(ErrorSample {
                 cell,
                 square,
                 noise,
@@ -177,7 +186,7 @@ impl Growth<'_> {
     }
 
     /// Sets the expected error of triangles to that seen at random points, where it is a surprise.
-    pub(super) fn learn(&mut self, samples: &[Sample]) {
+    pub(super) fn learn(&mut self, samples: &[ErrorSample]) {
         for sample in samples {
             let doubt = &mut self.cells.all[sample.cell].doubt;
             let square = sample.square - CHANCE * sample.noise;

@@ -22,14 +22,14 @@ pub(crate) mod turns;
 mod write;
 
 use crate::gather::Baked;
-use crate::solve::{Bake, Care, INTERPOLATION_SHARE};
+use crate::solve::{Bake, GatherQuality, INTERPOLATION_SHARE};
 use cells::Cells;
-use grow::Growth;
+use grow::MeshGrowth;
 use looks::Looks;
 use measure::summed;
 use shades::Shades;
 use std::time::{Duration, Instant};
-use turns::{End, Turns};
+use turns::{GrowthOutcome, Turns};
 
 /// Vertices at the most, besides those of the input, at an asked-for error of [`AT`]; half as many at twice the error. At 1 a
 /// furnished room of 12,000 triangles ends within its error at 96,000 vertices (mean .41; with a quarter of them 1.1) and a
@@ -77,7 +77,7 @@ impl Bake {
 
     /// [`Bake::baked`] within limits: where these end growing, with the error reached.
     pub fn baked_within(&self, limits: &Limits, progress: &dyn Fn(usize, usize)) -> Baked {
-        let mut growth = self.growth(Care::Vertex, limits.late);
+        let mut growth = self.growth(GatherQuality::Vertex, limits.late);
         let allowed = INTERPOLATION_SHARE * self.settings().error;
         growth.allowed = allowed;
         if let Some(vertices) = limits.vertices {
@@ -103,12 +103,15 @@ impl Bake {
             let cells = growth.cells.all.len();
             let end = growth.grow(turns.aim, progress);
             // Where there was no time to grow, the last measurement still holds.
-            if end != End::Late || growth.cells.all.len() != cells {
+            if end != GrowthOutcome::Late || growth.cells.all.len() != cells {
                 settled = self.settled(&growth);
                 samples = growth.measured(self, &settled, turns.turn, progress);
             }
-            let interpolation =
-                summed(&samples, allowed, (end == End::Most).then_some(growth.most));
+            let interpolation = summed(
+                &samples,
+                allowed,
+                (end == GrowthOutcome::Most).then_some(growth.most),
+            );
             let ended = (end, limits.is_late());
             if turns.is_over(interpolation, growth.cells.all.len(), ended, growth.sum()) {
                 let capped = growth.unfinished(allowed * allowed);
@@ -142,7 +145,7 @@ impl Bake {
         late: &(dyn Fn() -> bool + Sync),
         progress: &dyn Fn(usize, usize),
     ) -> Baked {
-        let mut growth = self.growth(Care::Sketch, late);
+        let mut growth = self.growth(GatherQuality::Preview, late);
         growth.believe(true);
         growth.begin(progress);
         self.grow_unseen(&mut growth, progress);
@@ -157,7 +160,7 @@ impl Bake {
     }
 
     /// Grows by the solved light, without looking.
-    fn grow_unseen(&self, growth: &mut Growth, progress: &dyn Fn(usize, usize)) {
+    fn grow_unseen(&self, growth: &mut MeshGrowth, progress: &dyn Fn(usize, usize)) {
         growth.believe(true);
         let allowed = (SKETCH * self.settings().error).min(SKETCH_MOST);
         let area: f64 = growth.cells.all.iter().map(|c| c.counted()).sum();
@@ -176,12 +179,16 @@ impl Bake {
         (MOST_VERTICES * AT / self.settings().error) as usize
     }
 
-    fn growth<'a>(&'a self, care: Care, late: &'a (dyn Fn() -> bool + Sync)) -> Growth<'a> {
+    fn growth<'a>(
+        &'a self,
+        quality: GatherQuality,
+        late: &'a (dyn Fn() -> bool + Sync),
+    ) -> MeshGrowth<'a> {
         let spaces = self.spaces();
         let mut cells = Cells::new(self.scene(), self.mesh(), self.tree(), &spaces);
         hints::give(self, &mut cells);
-        let looks = Looks::new(self, spaces, care, late);
-        Growth::new(
+        let looks = Looks::new(self, spaces, quality, late);
+        MeshGrowth::new(
             cells,
             looks,
             Shades::new(self),

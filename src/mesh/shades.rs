@@ -1,7 +1,7 @@
 //! Does light come straight from a lamp to a place? Told by rays to the middles of lamps, and to the rims of those with an
 //! extent.
 
-use super::cells::{Cell, FENCE, Sheet};
+use super::cells::{Cell, FENCE, SurfaceSide};
 use crate::gather::Vertex;
 use crate::geometry::sampling::around;
 use crate::geometry::{NO_PLANE, Segment};
@@ -21,7 +21,7 @@ const RIM: u32 = 4;
 
 /// Where rays to a lamp end.
 #[derive(Debug, Clone, Copy)]
-enum Aim {
+enum RayTarget {
     /// Far away in a direction.
     Far(DVec3),
     At(DVec3),
@@ -29,12 +29,12 @@ enum Aim {
 
 /// A lamp as a source of shadows.
 #[derive(Debug)]
-struct Lamp {
+struct ShadowLamp {
     /// Index among the punctual lights.
     number: usize,
-    middle: Aim,
+    middle: RayTarget,
     /// Empty for a lamp without extent.
-    rim: Vec<Aim>,
+    rim: Vec<RayTarget>,
     /// Tristimulus intensity.
     light: [f64; 3],
 }
@@ -42,30 +42,30 @@ struct Lamp {
 /// The lamps whose shadows have edges.
 pub(super) struct Shades<'a> {
     bake: &'a Bake,
-    lamps: Vec<Lamp>,
+    lamps: Vec<ShadowLamp>,
 }
 
 impl<'a> Shades<'a> {
     pub(super) fn new(bake: &'a Bake) -> Self {
-        let mut lamps: Vec<Lamp> = (bake.lamps().iter().enumerate())
+        let mut lamps: Vec<ShadowLamp> = (bake.lamps().iter().enumerate())
             .filter_map(|(number, (lamp, row))| {
                 let (middle, rim) = match lamp.kind {
                     LightKind::Sky(_) | LightKind::Ground(_) | LightKind::Surface => return None,
-                    LightKind::Directional => (Aim::Far(-lamp.direction), Vec::new()),
+                    LightKind::Directional => (RayTarget::Far(-lamp.direction), Vec::new()),
                     LightKind::Sun => {
                         let turn = |k| f64::from(k) / f64::from(RIM);
                         let at = |k| around(-lamp.direction, SUN_RADIUS.cos(), turn(k));
-                        let rim = (0..RIM).map(|k| Aim::Far(at(k)));
-                        (Aim::Far(-lamp.direction), rim.collect())
+                        let rim = (0..RIM).map(|k| RayTarget::Far(at(k)));
+                        (RayTarget::Far(-lamp.direction), rim.collect())
                     }
                     LightKind::Point | LightKind::Spot { .. } | LightKind::Profile => {
-                        (Aim::At(lamp.position), Vec::new())
+                        (RayTarget::At(lamp.position), Vec::new())
                     }
                 };
                 let mut all = [0.0; 64];
                 all[..row.len()].copy_from_slice(row);
                 let light = bake.lanes().tristimulus(&all);
-                Some(Lamp {
+                Some(ShadowLamp {
                     number,
                     middle,
                     rim,
@@ -83,7 +83,7 @@ impl<'a> Shades<'a> {
     }
 
     /// A place of a cell as a receiver, by weights of the corners of its triangle of the mesh.
-    pub(super) fn place(&self, cell: &Cell, sheet: &Sheet, weights: [f64; 3]) -> Receiver {
+    pub(super) fn place(&self, cell: &Cell, sheet: &SurfaceSide, weights: [f64; 3]) -> Receiver {
         let vertex = Vertex {
             triangle: cell.of.0,
             weights,
@@ -132,14 +132,14 @@ impl<'a> Shades<'a> {
         matches!(lamp, COVER | FENCE) || self.of(lamp).rim.is_empty()
     }
 
-    fn of(&self, lamp: u64) -> &Lamp {
+    fn of(&self, lamp: u64) -> &ShadowLamp {
         &self.lamps[lamp.trailing_zeros() as usize]
     }
 
-    fn reaches(&self, sight: &Sight, aim: Aim, to: &Receiver) -> bool {
+    fn reaches(&self, sight: &Sight, aim: RayTarget, to: &Receiver) -> bool {
         let end = match aim {
-            Aim::Far(direction) => to.point + direction * (4.0 * self.bake.light().half_size),
-            Aim::At(place) => place,
+            RayTarget::Far(direction) => to.point + direction * (4.0 * self.bake.light().half_size),
+            RayTarget::At(place) => place,
         };
         !sight.blocks_one(&Segment::new(to.point, end, [to.plane, NO_PLANE]))
     }

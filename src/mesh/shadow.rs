@@ -7,7 +7,7 @@ use crate::team::Packed;
 /// A place on the edge of a cell where light ends: edge, share of the edge, weights of the corners of the triangle of the
 /// mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Crossing {
+pub(super) struct EdgeCrossing {
     pub(super) edge: usize,
     pub(super) at: f64,
     pub(super) weights: [f64; 3],
@@ -16,14 +16,14 @@ pub(super) struct Crossing {
 /// An end of the edge of a shadow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Mark {
-    Crossing(Crossing),
+    Crossing(EdgeCrossing),
     Corner(usize),
     Inside([f64; 3]),
 }
 
 /// The edge of a shadow in a cell.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Plan {
+pub(super) struct ShadowEdge {
     pub(super) inside: Option<[f64; 3]>,
     /// Lines with the lamps whose light ends along them.
     pub(super) lines: Vec<([Mark; 2], u64)>,
@@ -31,10 +31,10 @@ pub(super) struct Plan {
 
 /// The result of searching a cell.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Found {
+pub(super) enum ShadowFinding {
     /// No light ends in the cell, or only gently.
     Even,
-    Edge(Plan),
+    Edge(ShadowEdge),
     /// Light ends there, but not along a line.
     Other,
 }
@@ -53,7 +53,7 @@ impl Packed for Mark {
 
     fn unpack(from: &mut Decoder) -> Read<Self> {
         Ok(match from.get::<u8>()? {
-            0 => Self::Crossing(Crossing {
+            0 => Self::Crossing(EdgeCrossing {
                 edge: from.get::<u64>()? as usize,
                 at: from.get()?,
                 weights: from.get()?,
@@ -65,7 +65,7 @@ impl Packed for Mark {
     }
 }
 
-impl Packed for Found {
+impl Packed for ShadowFinding {
     fn pack(&self, to: &mut Vec<u8>) {
         match self {
             Self::Even => 0_u8.pack(to),
@@ -92,7 +92,7 @@ impl Packed for Found {
                 let inside = from.get()?;
                 let count = from.get::<u64>()?;
                 let line = |_| Ok(([Mark::unpack(from)?, Mark::unpack(from)?], from.get()?));
-                Self::Edge(Plan {
+                Self::Edge(ShadowEdge {
                     inside: is_inside.then_some(inside),
                     lines: (0..count).map(line).collect::<Read<_>>()?,
                 })
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn what_is_found_is_told_whole() {
-        let crossing = Mark::Crossing(Crossing {
+        let crossing = Mark::Crossing(EdgeCrossing {
             edge: 2,
             at: 0.25,
             weights: [0.75, 0.0, 0.25],
@@ -119,16 +119,21 @@ mod tests {
             ([Mark::Inside(inside), crossing], 1 << 63),
         ];
         let plan = |inside| {
-            Found::Edge(Plan {
+            ShadowFinding::Edge(ShadowEdge {
                 inside,
                 lines: lines.clone(),
             })
         };
-        for found in [Found::Even, Found::Other, plan(None), plan(Some(inside))] {
+        for found in [
+            ShadowFinding::Even,
+            ShadowFinding::Other,
+            plan(None),
+            plan(Some(inside)),
+        ] {
             let mut bytes = Vec::new();
             found.pack(&mut bytes);
             let mut from = Decoder::new(&bytes);
-            assert_eq!(Found::unpack(&mut from).unwrap(), found);
+            assert_eq!(ShadowFinding::unpack(&mut from).unwrap(), found);
             from.end().unwrap();
         }
     }

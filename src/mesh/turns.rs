@@ -30,7 +30,7 @@ pub(crate) const RANGE: f64 = 0.1;
 
 /// How growing ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum End {
+pub(crate) enum GrowthOutcome {
     /// The expected error is within the goal.
     Reached,
     /// No remaining cell can be split.
@@ -71,7 +71,7 @@ impl Turns {
         &mut self,
         found: Interpolation,
         cells: usize,
-        (end, is_late): (End, bool),
+        (end, is_late): (GrowthOutcome, bool),
         sum: f64,
     ) -> bool {
         let has_grown = cells as f64 > GROWN * self.cells as f64;
@@ -79,7 +79,12 @@ impl Turns {
         if has_grown {
             (self.cells, self.before) = (cells, found);
         }
-        if found.is_met() || end != End::Reached || self.turn == MEASURED || stalled || is_late {
+        if found.is_met()
+            || end != GrowthOutcome::Reached
+            || self.turn == MEASURED
+            || stalled
+            || is_late
+        {
             return true;
         }
         let wrong = (found.mean / self.allowed).powi(2);

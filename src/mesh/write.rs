@@ -2,7 +2,7 @@
 
 use super::cells::Triangles;
 use super::flip::{Ground, grounds, turn};
-use super::grow::Growth;
+use super::grow::MeshGrowth;
 use crate::color::lab;
 use crate::gather::{Baked, BakedSurface, KeptVertex, lend};
 use crate::solve::Bake;
@@ -28,7 +28,7 @@ pub(super) struct Settled {
     covered: usize,
 }
 
-impl Growth<'_> {
+impl MeshGrowth<'_> {
     /// Joins again those vertices divided by a thing on an edge or by the edge of a shadow whose light proved alike on both sides: no
     /// further apart than the allowed mean error.
     fn join(
@@ -54,7 +54,7 @@ impl Growth<'_> {
 
 impl Bake {
     /// The light of a mesh, as written.
-    pub(super) fn settled(&self, growth: &Growth) -> Vec<Settled> {
+    pub(super) fn settled(&self, growth: &MeshGrowth) -> Vec<Settled> {
         let fitted = growth.fitted();
         let sheets = growth.cells.triangles().into_iter();
         let sheets = sheets.zip(grounds(&growth.cells)).enumerate();
@@ -65,7 +65,7 @@ impl Bake {
 
     fn settle(
         &self,
-        growth: &Growth,
+        growth: &MeshGrowth,
         fitted: &[f32],
         sheet: usize,
         mut faces: Triangles,
@@ -102,7 +102,7 @@ impl Bake {
     }
 
     /// The vertices with their colours, as the writers need them.
-    pub(super) fn write_down(&self, growth: Growth, settled: Vec<Settled>) -> Baked {
+    pub(super) fn write_down(&self, growth: MeshGrowth, settled: Vec<Settled>) -> Baked {
         let looks = self.looks(self.upsampler());
         let layers = self.layer_lanes();
         let mut out = Baked {

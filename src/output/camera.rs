@@ -3,7 +3,7 @@
 //! A view maps a world point to homogeneous pixel coordinates (X, Y, W): the pixel is (X / W, Y / W), y down from the
 //! top; W is the distance along the view for a perspective and 1 for an orthographic projection.
 
-use super::viewpoint::{self, Viewpoint};
+use super::default_view::{self, DefaultView};
 use crate::scene::{Camera, Projection, Scene};
 use glam::{DMat4, DVec3};
 
@@ -116,7 +116,7 @@ pub fn cameras(scene: &Scene) -> Vec<Camera> {
 /// open or culled side, if that shows more. At least one; the best comes first.
 pub fn own(scene: &Scene) -> Vec<Camera> {
     let bounds = Bounds::of(scene);
-    let views = viewpoint::views(scene, INSIDE_VIEW, &candidates(&bounds));
+    let views = default_view::views(scene, INSIDE_VIEW, &candidates(&bounds));
     let mut cameras: Vec<Camera> = (views.iter().enumerate())
         .map(|(k, view)| Camera {
             name: match k {
@@ -139,7 +139,7 @@ pub fn own(scene: &Scene) -> Vec<Camera> {
 
 /// Cameras that show a room whatever its light: from outside, +z (towards the viewer in glTF) before the others, and from
 /// the corners.
-fn candidates(bounds: &Bounds) -> Vec<Viewpoint> {
+fn candidates(bounds: &Bounds) -> Vec<DefaultView> {
     let (centre, size) = (bounds.centre(), bounds.size());
     let mut views = Vec::new();
     for side in [DVec3::Z, DVec3::X, DVec3::NEG_X, DVec3::NEG_Z] {
@@ -148,7 +148,7 @@ fn candidates(bounds: &Bounds) -> Vec<Viewpoint> {
         // Far enough that the nearest face of the bounds fits, in a picture of 4 by 3.
         let distance = MARGIN * (0.5 * size.y).max(0.5 * across * 0.75) / tangent;
         let depth = 0.5 * (size * side).length();
-        views.push(Viewpoint {
+        views.push(DefaultView {
             eye: centre + side * (depth + distance),
             target: centre,
             angle: OUTSIDE_VIEW,
@@ -156,7 +156,7 @@ fn candidates(bounds: &Bounds) -> Vec<Viewpoint> {
     }
     for (x, z) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
         let offset = DVec3::new(x * (0.5 - INSET), EYE_HEIGHT - 0.5, z * (0.5 - INSET)) * size;
-        views.push(Viewpoint {
+        views.push(DefaultView {
             eye: centre + offset,
             // Down a little, to the middle of the floor's half of the room.
             target: centre - DVec3::new(0.0, 0.12 * size.y, 0.0),

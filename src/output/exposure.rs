@@ -12,10 +12,10 @@
 //! dark, or under a dark texture (COLOR_0 holds light before the texture and ends at 1), the share `BELOW_WHITE` of what
 //! is seen is at most `WHITISH` in COLOR_0, before the curve.
 
-use super::balance::{Balance, IDENTITY, Matrix};
 use super::camera::{self, View};
 use super::curve;
-use super::raster::{self, Hit, Refined};
+use super::raster::{self, Fragment, RefinedMesh};
+use super::white_balance::{IDENTITY, Matrix, WhiteBalance};
 use crate::color::{Xyz, multiply};
 use crate::gather::BakedSurface;
 use crate::gather::refined;
@@ -47,20 +47,20 @@ const GREY: f64 = 0.18;
 /// How bright the room is to be shown. Written `auto`, `auto+1`, `auto-0.5` (stops) or an exposure value for ISO 100.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub enum Brightness {
+pub enum ExposureSetting {
     /// As metered, brighter by so many stops.
     Auto(f64),
     /// A luminance of 0.125 * 2^EV cd/m2 shows as grey of 18 %.
     Ev(f64),
 }
 
-impl Default for Brightness {
+impl Default for ExposureSetting {
     fn default() -> Self {
         Self::Auto(0.0)
     }
 }
 
-impl FromStr for Brightness {
+impl FromStr for ExposureSetting {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -79,7 +79,7 @@ impl FromStr for Brightness {
     }
 }
 
-impl fmt::Display for Brightness {
+impl fmt::Display for ExposureSetting {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Auto(0.0) => f.write_str("auto"),
@@ -134,7 +134,7 @@ impl Exposure {
     /// Meters the room as its own cameras see it: see the module's words.
     pub fn auto(scene: &Scene, surfaces: &[BakedSurface]) -> Self {
         let cameras = camera::cameras(scene);
-        let (brightness, balance) = (Brightness::default(), Balance::default());
+        let (brightness, balance) = (ExposureSetting::default(), WhiteBalance::default());
         Self::metered(scene, surfaces, &cameras, brightness, balance)
     }
 
@@ -143,33 +143,34 @@ impl Exposure {
         scene: &Scene,
         surfaces: &[BakedSurface],
         cameras: &[Camera],
-        brightness: Brightness,
-        balance: Balance,
+        brightness: ExposureSetting,
+        balance: WhiteBalance,
     ) -> Self {
-        let meshes = Refined { scene, surfaces };
-        let seen: Vec<Vec<Reading>> = cameras.iter().map(|c| seen(&meshes, c)).collect();
-        let (lamps, things): (Vec<Reading>, Vec<Reading>) =
+        let meshes = RefinedMesh { scene, surfaces };
+        let seen: Vec<Vec<PixelReading>> = cameras.iter().map(|c| seen(&meshes, c)).collect();
+        let (lamps, things): (Vec<PixelReading>, Vec<PixelReading>) =
             seen.iter().flatten().copied().partition(|r| r.lamp);
         let (things, lamps) = (lit(things), lit(lamps));
         let readings = if things.is_empty() { &lamps } else { &things };
-        let level = Level::of(readings);
+        let level = AdaptationLevel::of(readings);
         let balance = level.map_or(IDENTITY, |level| balance.matrix(level.white));
-        let whitest = |of: &[Reading]| WHITISH / quantile(of, BELOW_WHITE, |r| r.shown(&balance));
+        let whitest =
+            |of: &[PixelReading]| WHITISH / quantile(of, BELOW_WHITE, |r| r.shown(&balance));
         // No picture may be white all over because another is dark.
-        let of_picture = |seen: &Vec<Reading>| {
+        let of_picture = |seen: &Vec<PixelReading>| {
             let things = lit(seen.iter().filter(|r| !r.lamp).copied().collect());
             (!things.is_empty()).then(|| whitest(&things))
         };
         let scale = match (brightness, level) {
-            (Brightness::Ev(ev), _) => GREY / (PI * EV_0 * ev.exp2()),
-            (Brightness::Auto(_), None) => 1.0,
-            (Brightness::Auto(stops), Some(level)) => {
+            (ExposureSetting::Ev(ev), _) => GREY / (PI * EV_0 * ev.exp2()),
+            (ExposureSetting::Auto(_), None) => 1.0,
+            (ExposureSetting::Auto(stops), Some(level)) => {
                 let most = seen.iter().filter_map(of_picture).reduce(f64::min);
                 let most = most.unwrap_or_else(|| whitest(readings));
                 (KEY / level.level).min(most) * stops.exp2()
             }
         };
-        let over = |r: &&Reading| scale * r.shown(&balance) > curve::KNEE;
+        let over = |r: &&PixelReading| scale * r.shown(&balance) > curve::KNEE;
         let compressed = readings.iter().filter(over).count() as f64 / readings.len().max(1) as f64;
         Self {
             scale,
@@ -181,7 +182,7 @@ impl Exposure {
 
 /// What a pixel shows, lm/m2.
 #[derive(Debug, Clone, Copy)]
-struct Reading {
+struct PixelReading {
     /// Geometric mean of radiosity and of a white surface's there.
     level: f64,
     /// Linear light, and what it is multiplied by in COLOR_0.
@@ -194,7 +195,7 @@ struct Reading {
     lamp: bool,
 }
 
-impl Reading {
+impl PixelReading {
     /// Strongest channel of what COLOR_0 holds, after a white balance.
     fn shown(&self, balance: &Matrix) -> f64 {
         if *balance == IDENTITY {
@@ -206,7 +207,7 @@ impl Reading {
 }
 
 /// Those that light reaches.
-fn lit(mut readings: Vec<Reading>) -> Vec<Reading> {
+fn lit(mut readings: Vec<PixelReading>) -> Vec<PixelReading> {
     readings.retain(|r| r.strongest > 0.0 && (r.level * r.strongest).is_finite());
     if !readings.is_empty() {
         let least = UNLIT * quantile(&readings, 0.95, |r| r.level);
@@ -216,7 +217,7 @@ fn lit(mut readings: Vec<Reading>) -> Vec<Reading> {
 }
 
 /// The value that a share of the readings, which are not none, stays below.
-fn quantile(readings: &[Reading], share: f64, value: impl Fn(&Reading) -> f64) -> f64 {
+fn quantile(readings: &[PixelReading], share: f64, value: impl Fn(&PixelReading) -> f64) -> f64 {
     let mut values: Vec<f64> = readings.iter().map(value).collect();
     values.sort_by(f64::total_cmp);
     values[((share * values.len() as f64) as usize).min(values.len() - 1)].max(f64::MIN_POSITIVE)
@@ -224,14 +225,14 @@ fn quantile(readings: &[Reading], share: f64, value: impl Fn(&Reading) -> f64) -
 
 /// What an eye adapts to.
 #[derive(Debug, Clone, Copy)]
-struct Level {
+struct AdaptationLevel {
     level: f64,
     /// Colour of the light, tristimulus, Y = 1.
     white: Xyz,
 }
 
-impl Level {
-    fn of(readings: &[Reading]) -> Option<Self> {
+impl AdaptationLevel {
+    fn of(readings: &[PixelReading]) -> Option<Self> {
         if readings.is_empty() {
             return None;
         }
@@ -239,7 +240,7 @@ impl Level {
         let (mut white, mut voters) = ([0.0; 3], 0.0);
         for _ in 0..TURNS {
             let before = level;
-            let near = |r: &&Reading| (r.level / before).log2().abs() <= STOPS;
+            let near = |r: &&PixelReading| (r.level / before).log2().abs() <= STOPS;
             let (mut sum, mut count) = (0.0, 0.0);
             white = [0.0; 3];
             for r in readings.iter().filter(near) {
@@ -265,9 +266,9 @@ impl Level {
 }
 
 /// One reading for each pixel of a small picture that shows a surface.
-fn seen(meshes: &Refined, camera: &Camera) -> Vec<Reading> {
+fn seen(meshes: &RefinedMesh, camera: &Camera) -> Vec<PixelReading> {
     let [width, height] = TRIAL;
-    let read = |hit: &Hit| {
+    let read = |hit: &Fragment| {
         let (surface, corners) = meshes.at(hit);
         let material = &meshes.scene.materials[surface.material];
         let paint = |k: usize| match material.vertex_paint {
@@ -282,7 +283,7 @@ fn seen(meshes: &Refined, camera: &Camera) -> Vec<Reading> {
         let radiosity = mix(&|k| f64::from(corners[k].radiosity[1]));
         // No surface reflects more than a white one; a lamp's own light is its level.
         let white_y = white[1].max(radiosity);
-        Reading {
+        PixelReading {
             level: (white_y * radiosity.max(BLACK * white_y)).max(0.0).sqrt(),
             light,
             paint,
@@ -302,8 +303,8 @@ fn seen(meshes: &Refined, camera: &Camera) -> Vec<Reading> {
 mod tests {
     use super::*;
 
-    fn readings(levels: impl IntoIterator<Item = (f64, usize)>) -> Vec<Reading> {
-        let one = |level| Reading {
+    fn readings(levels: impl IntoIterator<Item = (f64, usize)>) -> Vec<PixelReading> {
+        let one = |level| PixelReading {
             level,
             light: [level; 3],
             paint: [1.0; 3],
@@ -319,7 +320,7 @@ mod tests {
     #[test]
     fn sun_patches_dark_corners_and_wrong_vertices_have_no_vote() {
         let plain = readings([(50.0, 300), (100.0, 400), (200.0, 300)]);
-        let level = Level::of(&plain).unwrap().level;
+        let level = AdaptationLevel::of(&plain).unwrap().level;
         assert!((level / 100.0 - 1.0).abs() < 1e-9);
         let disturbed = [(1e4, 250), (1e9, 3), (0.5, 200)];
         let all = readings(
@@ -327,9 +328,9 @@ mod tests {
                 .into_iter()
                 .chain(disturbed),
         );
-        let level = Level::of(&lit(all)).unwrap().level;
+        let level = AdaptationLevel::of(&lit(all)).unwrap().level;
         assert!((level / 100.0 - 1.0).abs() < 1e-9, "{level}");
-        assert!(Level::of(&lit(readings([(0.0, 9)]))).is_none());
+        assert!(AdaptationLevel::of(&lit(readings([(0.0, 9)]))).is_none());
     }
 
     #[test]
@@ -338,14 +339,14 @@ mod tests {
         let scale = GREY / (PI * EV_0 * 7f64.exp2());
         assert!((Exposure::new(scale).ev() - 7.0).abs() < 1e-12);
         assert!((GREY * Exposure::new(scale).white_luminance() - 16.0).abs() < 1e-9);
-        assert_eq!("auto".parse(), Ok(Brightness::Auto(0.0)));
-        assert_eq!("auto-1.5".parse(), Ok(Brightness::Auto(-1.5)));
-        assert_eq!("-3".parse(), Ok(Brightness::Ev(-3.0)));
+        assert_eq!("auto".parse(), Ok(ExposureSetting::Auto(0.0)));
+        assert_eq!("auto-1.5".parse(), Ok(ExposureSetting::Auto(-1.5)));
+        assert_eq!("-3".parse(), Ok(ExposureSetting::Ev(-3.0)));
         for bad in ["", "auto1", "auto+", "bright", "NaN", "1e9"] {
-            assert!(bad.parse::<Brightness>().is_err(), "{bad}");
+            assert!(bad.parse::<ExposureSetting>().is_err(), "{bad}");
         }
         for shown in ["auto", "auto+1", "auto-0.5", "7.5"] {
-            assert_eq!(shown.parse::<Brightness>().unwrap().to_string(), shown);
+            assert_eq!(shown.parse::<ExposureSetting>().unwrap().to_string(), shown);
         }
     }
 }

@@ -25,7 +25,7 @@ const PASSED: usize = 8;
 
 /// What a ray meets.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Met {
+pub(super) struct PathHit {
     pub(super) direction: DVec3,
     pub(super) distance: f64,
     pub(super) point: DVec3,
@@ -40,19 +40,19 @@ pub(super) struct Met {
 pub(super) type Leg = [DVec3; 2];
 
 /// A room, with what is known of its light.
-pub(super) struct Room<'a> {
+pub(super) struct LitRoom<'a> {
     pub(super) scene: &'a Scene,
     pub(super) mesh: Mesh,
     pub(super) rays: RayIndex,
     /// Cells in which paths ended; empty: everything counts as lit.
     lit: HashSet<[i64; 4]>,
     /// The first end in each cell.
-    pub(super) places: Vec<Met>,
+    pub(super) places: Vec<PathHit>,
     /// Free path.
     pub(super) path: f64,
 }
 
-impl<'a> Room<'a> {
+impl<'a> LitRoom<'a> {
     /// Follows light through a room; returns segments that it runs along, see [`Self::explore`].
     pub(super) fn new(scene: &'a Scene) -> (Self, Vec<Leg>) {
         let mesh = Mesh::new(scene);
@@ -74,7 +74,7 @@ impl<'a> Room<'a> {
     }
 
     /// The first side that is drawn, and whether a back was met before.
-    pub(super) fn see(&self, from: DVec3, direction: DVec3, plane: u32) -> (Option<Met>, bool) {
+    pub(super) fn see(&self, from: DVec3, direction: DVec3, plane: u32) -> (Option<PathHit>, bool) {
         let solid =
             |t: u32, u: f32, v: f32| !is_hole(self.scene, &self.mesh, t, [1.0 - u - v, u, v]);
         let reach = from.length() + 2.0 * self.mesh.half_size;
@@ -99,7 +99,7 @@ impl<'a> Room<'a> {
             let normal = self.mesh.normal[t];
             let surface = self.mesh.origin[t].0;
             let material = self.mesh.material[t] as usize;
-            let met = Met {
+            let met = PathHit {
                 direction,
                 distance: gone,
                 point: from + direction * gone,
@@ -119,7 +119,7 @@ impl<'a> Room<'a> {
         let starts = self.starts();
         let lamps = !starts.is_empty();
         let starts = if lamps { starts } else { self.anywhere() };
-        let paths: Vec<Vec<(Option<Leg>, Met)>> = (0..PATHS)
+        let paths: Vec<Vec<(Option<Leg>, PathHit)>> = (0..PATHS)
             .into_par_iter()
             .filter(|_| !starts.is_empty())
             .map(|k| self.follow(&starts, k))
@@ -143,7 +143,7 @@ impl<'a> Room<'a> {
         if first.len() >= FEW { first } else { all }
     }
 
-    fn follow(&self, starts: &[Start], k: u32) -> Vec<(Option<Leg>, Met)> {
+    fn follow(&self, starts: &[Start], k: u32) -> Vec<(Option<Leg>, PathHit)> {
         let (turn, which) = (k / starts.len() as u32, k as usize % starts.len());
         let start = starts[which];
         let mut ends = Vec::new();
@@ -227,13 +227,13 @@ impl<'a> Room<'a> {
     }
 
     /// The cell of an end: its place and which way it looks.
-    fn cell(&self, met: &Met) -> [i64; 4] {
+    fn cell(&self, met: &PathHit) -> [i64; 4] {
         let size = (self.mesh.half_size / CELLS).max(f64::MIN_POSITIVE);
         let [x, y, z] = (met.point / size).to_array().map(|c| c.floor() as i64);
         [x, y, z, axis(met.normal)]
     }
 
-    pub(super) fn is_lit(&self, met: &Met) -> bool {
+    pub(super) fn is_lit(&self, met: &PathHit) -> bool {
         self.lit.is_empty() || self.lit.contains(&self.cell(met))
     }
 }
@@ -273,7 +273,7 @@ impl Start {
     }
 
     /// From, direction, plane that is left.
-    fn ray(&self, room: &Room, k: u32, seed: u64) -> (DVec3, DVec3, u32) {
+    fn ray(&self, room: &LitRoom, k: u32, seed: u64) -> (DVec3, DVec3, u32) {
         let [u, v] = [0, 1].map(|turn| sequence02(k, hash(seed, turn)));
         match *self {
             Self::Face(face) => {

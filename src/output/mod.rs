@@ -1,21 +1,21 @@
 //! What the program writes: the baked room, pictures, arrays.
 
-pub mod balance;
 pub mod camera;
 pub mod curve;
+mod default_view;
 pub mod exposure;
 pub mod exr;
 pub mod gltf;
 mod lit_space;
 pub mod maps;
 pub mod npz;
-mod outside;
 pub mod picture;
 pub mod probes;
 mod raster;
-mod viewpoint;
+mod sky_background;
+pub mod white_balance;
 
-pub use balance::Balance;
-pub use exposure::{Brightness, Exposure};
+pub use exposure::{Exposure, ExposureSetting};
 pub use gltf::{BakedGlb, Packing, Writing, baked_glb, mapped_glb, vertices_within};
 pub use picture::{Format, Picture};
+pub use white_balance::WhiteBalance;

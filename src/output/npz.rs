@@ -2,8 +2,8 @@
 //!
 //! `numpy.load("room.npz")` gives the arrays of [`write_baked`]:
 //! `positions` (N, 3) f64, world space, the file's units; `normals` (N, 3) f32, unit; `surface` (N,) u32, index of the
-//! surface; `triangles` (T, 3) u32, rows of `positions`; `radiosity` (N, 64) f32, W/m2/nm on the leaves;
-//! `wavelengths` (65,) f64, the leaves' edges in nm; `xyz` (N, 3) f32, tristimulus radiosity, Y in lm/m2. With layers (see
+//! surface; `triangles` (T, 3) u32, rows of `positions`; `radiosity` (N, 64) f32, W/m2/nm on the bands;
+//! `wavelengths` (65,) f64, the bands' edges in nm; `xyz` (N, 3) f32, tristimulus radiosity, Y in lm/m2. With layers (see
 //! [`scene::layers`](crate::scene::layers)) also `layers` (L,) text, their names, and `radiosity_0`, `radiosity_1`, ... of each by
 //! itself, which add up to `radiosity`.
 
@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
 use crate::gather::refined;
 use crate::scene::Scene;
-use crate::spectrum::LEAVES;
+use crate::spectrum::BANDS;
 use std::io::{self, Write};
 use zip::write::{SimpleFileOptions, StreamWriter};
 use zip::{CompressionMethod, DateTime, ZipWriter};
@@ -143,15 +143,15 @@ pub fn write(out: &mut dyn Write, arrays: &[Array]) -> io::Result<()> {
     archive.end()
 }
 
-/// Radiosity of the vertices of each surface, W/m2/nm on the leaves.
-pub type Spectra = Vec<Vec<[f32; LEAVES]>>;
+/// Radiosity of the vertices of each surface, W/m2/nm on the bands.
+pub type Spectra = Vec<Vec<[f32; BANDS]>>;
 
 /// Names of layers, and the spectra of each: asked for one after the other, for those of a large room take a gigabyte.
-pub type Parts<'a> = (&'a [String], &'a dyn Fn(usize) -> Spectra);
+pub type LayerSpectra<'a> = (&'a [String], &'a dyn Fn(usize) -> Spectra);
 
 /// Writes the refined mesh with its spectra: see the module's words.
 ///
-/// `spectra` holds, for each surface of `surfaces`, the radiosity of its vertices on the leaves, W/m2/nm.
+/// `spectra` holds, for each surface of `surfaces`, the radiosity of its vertices on the bands, W/m2/nm.
 ///
 /// # Errors
 /// The spectra do not match the mesh (internal fault), or the writer fails.
@@ -159,7 +159,7 @@ pub fn write_baked(
     out: &mut dyn Write,
     scene: &Scene,
     surfaces: &[BakedSurface],
-    spectra: &[Vec<[f32; LEAVES]>],
+    spectra: &[Vec<[f32; BANDS]>],
 ) -> Result<()> {
     write_parted(out, scene, surfaces, spectra, (&[], &|_| Vec::new()))
 }
@@ -172,8 +172,8 @@ pub fn write_parted(
     out: &mut dyn Write,
     scene: &Scene,
     surfaces: &[BakedSurface],
-    spectra: &[Vec<[f32; LEAVES]>],
-    (names, layer): Parts,
+    spectra: &[Vec<[f32; BANDS]>],
+    (names, layer): LayerSpectra,
 ) -> Result<()> {
     refined::check(scene, surfaces)?;
     let radiosity = flat(surfaces, spectra)?;
@@ -195,7 +195,7 @@ pub fn write_parted(
         let radiosity = flat(surfaces, &layer(k))?;
         let array = Array {
             name: &format!("radiosity_{k}"),
-            shape: &[radiosity.len() / LEAVES, LEAVES],
+            shape: &[radiosity.len() / BANDS, BANDS],
             values: Values::F32(&radiosity),
         };
         archive.put(&array).map_err(io)?;
@@ -204,7 +204,7 @@ pub fn write_parted(
 }
 
 /// Spectra of all vertices, one after the other.
-fn flat(surfaces: &[BakedSurface], spectra: &[Vec<[f32; LEAVES]>]) -> Result<Vec<f32>> {
+fn flat(surfaces: &[BakedSurface], spectra: &[Vec<[f32; BANDS]>]) -> Result<Vec<f32>> {
     let of = |(surface, spectra): (&BakedSurface, &Vec<_>)| surface.vertices.len() == spectra.len();
     if surfaces.len() != spectra.len() || !surfaces.iter().zip(spectra).all(of) {
         return Err(Error::Internal(
@@ -221,9 +221,9 @@ fn whole(
     surfaces: &[BakedSurface],
     radiosity: &[f32],
 ) -> io::Result<()> {
-    let columns = Columns::of(scene, surfaces);
-    let mut edges: Vec<f64> = (0..LEAVES).map(|leaf| scene.grid.left(leaf)).collect();
-    edges.push(scene.grid.left(LEAVES - 1) + scene.grid.width());
+    let columns = MeshColumns::of(scene, surfaces);
+    let mut edges: Vec<f64> = (0..BANDS).map(|band| scene.grid.left(band)).collect();
+    edges.push(scene.grid.left(BANDS - 1) + scene.grid.width());
     let count = columns.surface.len();
     let array = |name, shape, values| Array {
         name,
@@ -239,8 +239,8 @@ fn whole(
             &[columns.triangles.len() / 3, 3],
             Values::U32(&columns.triangles),
         ),
-        array("radiosity", &[count, LEAVES], Values::F32(radiosity)),
-        array("wavelengths", &[LEAVES + 1], Values::F64(&edges)),
+        array("radiosity", &[count, BANDS], Values::F32(radiosity)),
+        array("wavelengths", &[BANDS + 1], Values::F64(&edges)),
         array("xyz", &[count, 3], Values::F32(&columns.xyz)),
     ]
     .iter()
@@ -249,7 +249,7 @@ fn whole(
 
 /// The refined mesh of all surfaces, column by column: as the arrays of their names.
 #[derive(Default)]
-struct Columns {
+struct MeshColumns {
     positions: Vec<f64>,
     normals: Vec<f32>,
     xyz: Vec<f32>,
@@ -257,7 +257,7 @@ struct Columns {
     triangles: Vec<u32>,
 }
 
-impl Columns {
+impl MeshColumns {
     fn of(scene: &Scene, surfaces: &[BakedSurface]) -> Self {
         let mut all = Self::default();
         for baked in surfaces {

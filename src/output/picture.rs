@@ -7,8 +7,8 @@
 use super::camera::View;
 use super::curve;
 use super::exposure::Exposure;
-use super::outside::Outside;
-use super::raster::{self, Hit, Refined};
+use super::raster::{self, Fragment, RefinedMesh};
+use super::sky_background::SkyBackground;
 use crate::color::{self, LinearSrgb};
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
@@ -107,16 +107,16 @@ impl Picture {
             ));
         }
         refined::check(scene, surfaces)?;
-        let meshes = Refined { scene, surfaces };
+        let meshes = RefinedMesh { scene, surfaces };
         let srgb = LinearSrgb::standard();
-        let shade = |hit: &Hit| shade(&meshes, &srgb, look, hit);
+        let shade = |hit: &Fragment| shade(&meshes, &srgb, look, hit);
         let view = View::new(scene, camera, width, height);
         let mut pixels = raster::draw(&meshes, &view, [width, height], grid, |samples| {
             (0..width)
                 .map(|x| pixel(&meshes, samples, [x, width, grid], &shade))
                 .collect()
         });
-        let outside = Outside::new(scene);
+        let outside = SkyBackground::new(scene);
         let beyond = |(k, pixel): (usize, &mut Pixel)| {
             let place = [k % width, k / width].map(|k| k as f64 + 0.5);
             let seen = outside.as_ref().map(|o| o.radiance(view.direction(place)));
@@ -186,7 +186,7 @@ pub fn seen(scene: &Scene, pictures: &[(&Camera, Format)]) -> Vec<Vec<bool>> {
 /// What one sample shows, in f64: rgb and xyz radiance in cd/m2, then the display value.
 type Shade = [[f64; 3]; 3];
 
-fn shade(meshes: &Refined, srgb: &LinearSrgb, look: &Exposure, hit: &Hit) -> Shade {
+fn shade(meshes: &RefinedMesh, srgb: &LinearSrgb, look: &Exposure, hit: &Fragment) -> Shade {
     let (surface, corners) = meshes.at(hit);
     let material = &meshes.scene.materials[surface.material];
     let mix = |value: &dyn Fn(usize) -> [f32; 3]| -> [f64; 3] {
@@ -235,17 +235,17 @@ fn shade(meshes: &Refined, srgb: &LinearSrgb, look: &Exposure, hit: &Hit) -> Sha
 /// Light is linear over a triangle: its samples in a pixel are shaded once, at their mean place. Texels are not:
 /// a textured triangle is shaded at every sample.
 fn pixel(
-    meshes: &Refined,
-    samples: &[Option<Hit>],
+    meshes: &RefinedMesh,
+    samples: &[Option<Fragment>],
     place: [usize; 3],
-    shade: &impl Fn(&Hit) -> Shade,
+    shade: &impl Fn(&Fragment) -> Shade,
 ) -> Pixel {
     let [x, width, grid] = place;
     // (triangle, with the sum of its samples' weights; number of samples)
-    let mut groups: Vec<(Hit, f64)> = Vec::new();
+    let mut groups: Vec<(Fragment, f64)> = Vec::new();
     for row in samples.chunks(width * grid) {
         for hit in row[x * grid..][..grid].iter().flatten() {
-            let same = |(other, _): &&mut (Hit, f64)| {
+            let same = |(other, _): &&mut (Fragment, f64)| {
                 other.mesh == hit.mesh && other.triangle == hit.triangle
             };
             match groups.iter_mut().rev().find(same) {

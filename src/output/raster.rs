@@ -7,7 +7,7 @@
 //! (e_i of neighbours are exact negatives), so triangles that share an edge neither overlap nor leave a gap.
 //!
 //! Back faces are not drawn: the back of a two-sided surface is a sheet of its own, with its own light. The nearest sample wins, the first triangle of equals.
-//! Bands of rows are drawn in parallel; the result does not depend on their order.
+//! Strips of rows are drawn in parallel; the result does not depend on their order.
 
 use super::camera::View;
 use crate::gather::refined;
@@ -16,19 +16,19 @@ use crate::scene::{Alpha, Material, Scene, Sides, Surface};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Rows of pixels in a band.
-const BAND: usize = 16;
+/// Rows of pixels in a strip.
+const STRIP: usize = 16;
 
 /// What a sample shows: a triangle and the weights of its corners.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hit {
+pub(super) struct Fragment {
     pub(super) mesh: u32,
     pub(super) triangle: u32,
     pub(super) weights: [f64; 3],
 }
 
 /// Triangles to draw. `corner` must give equal points for equal vertices.
-pub(super) trait Meshes: Sync {
+pub(super) trait RasterMeshes: Sync {
     /// Number of triangles of each mesh.
     fn sizes(&self) -> Vec<usize>;
     /// World positions, counter-clockwise from the front.
@@ -38,22 +38,22 @@ pub(super) trait Meshes: Sync {
     /// Does this mesh have holes at all?
     fn has_holes(&self, mesh: usize) -> bool;
     /// Is this point of a mesh with holes a hole?
-    fn is_hole(&self, hit: &Hit) -> bool;
+    fn is_hole(&self, hit: &Fragment) -> bool;
 }
 
-/// Draws into bands of `BAND` pixel rows with `grid` by `grid` samples a pixel; `finish` turns each row of samples
+/// Draws into strips of `STRIP` pixel rows with `grid` by `grid` samples a pixel; `finish` turns each row of samples
 /// (`grid` rows of `width * grid`, from the top) into pixels. Rows come back in order.
 pub(super) fn draw<T: Send>(
-    meshes: &impl Meshes,
+    meshes: &impl RasterMeshes,
     view: &View,
     [width, height]: [usize; 2],
     grid: usize,
-    finish: impl Fn(&[Option<Hit>]) -> Vec<T> + Sync,
+    finish: impl Fn(&[Option<Fragment>]) -> Vec<T> + Sync,
 ) -> Vec<T> {
-    let bands = bins(meshes, view, [width, height]);
-    let rows = bands.par_iter().enumerate().map(|(band, triangles)| {
-        let first = band * BAND;
-        let count = BAND.min(height - first);
+    let strips = bins(meshes, view, [width, height]);
+    let rows = strips.par_iter().enumerate().map(|(strip, triangles)| {
+        let first = strip * STRIP;
+        let count = STRIP.min(height - first);
         let samples = draw_band(meshes, view, triangles, width, first, count, grid);
         samples
             .chunks(width * grid * grid)
@@ -75,7 +75,7 @@ struct Setup {
 impl Setup {
     /// None: faces away, has no area, or lies out of sight.
     fn new(
-        meshes: &impl Meshes,
+        meshes: &impl RasterMeshes,
         view: &View,
         mesh: usize,
         triangle: usize,
@@ -132,7 +132,7 @@ impl Setup {
     }
 }
 
-/// Pixel box of the part beyond the near plane, cut to the picture.
+/// Pixel box of the part beyond the near plane, clipped to the picture.
 fn bounds(
     corners: &[super::camera::Projected; 3],
     near: f64,
@@ -165,50 +165,50 @@ fn bounds(
             );
         }
     }
-    let cut = [
+    let clipped = [
         bounds[0].max(0.0),
         bounds[1].min(width as f64),
         bounds[2].max(0.0),
         bounds[3].min(height as f64),
     ];
-    (cut[0] <= cut[1] && cut[2] <= cut[3]).then_some(cut)
+    (clipped[0] <= clipped[1] && clipped[2] <= clipped[3]).then_some(clipped)
 }
 
-/// For each band the (mesh, triangle) that touch it, in order.
-fn bins(meshes: &impl Meshes, view: &View, size: [usize; 2]) -> Vec<Vec<[u32; 2]>> {
-    let mut bands = vec![Vec::new(); size[1].div_ceil(BAND)];
-    let last = bands.len().saturating_sub(1);
+/// For each strip the (mesh, triangle) that touch it, in order.
+fn bins(meshes: &impl RasterMeshes, view: &View, size: [usize; 2]) -> Vec<Vec<[u32; 2]>> {
+    let mut strips = vec![Vec::new(); size[1].div_ceil(STRIP)];
+    let last = strips.len().saturating_sub(1);
     for (mesh, triangles) in meshes.sizes().into_iter().enumerate() {
         let touched: Vec<(u32, usize, usize)> = (0..triangles)
             .into_par_iter()
             .filter_map(|triangle| {
                 let setup = Setup::new(meshes, view, mesh, triangle, size)?;
-                let band = |y: f64| ((y / BAND as f64) as usize).min(last);
+                let strip = |y: f64| ((y / STRIP as f64) as usize).min(last);
                 Some((
                     triangle as u32,
-                    band(setup.bounds[2]),
-                    band(setup.bounds[3]),
+                    strip(setup.bounds[2]),
+                    strip(setup.bounds[3]),
                 ))
             })
             .collect();
         for (triangle, from, to) in touched {
-            bands[from..=to]
+            strips[from..=to]
                 .iter_mut()
-                .for_each(|band| band.push([mesh as u32, triangle]));
+                .for_each(|strip| strip.push([mesh as u32, triangle]));
         }
     }
-    bands
+    strips
 }
 
 fn draw_band(
-    meshes: &impl Meshes,
+    meshes: &impl RasterMeshes,
     view: &View,
     triangles: &[[u32; 2]],
     width: usize,
     first: usize,
     count: usize,
     grid: usize,
-) -> Vec<Option<Hit>> {
+) -> Vec<Option<Fragment>> {
     let across = width * grid;
     let down = count * grid;
     let step = 1.0 / grid as f64;
@@ -233,7 +233,7 @@ fn draw_band(
                     continue;
                 };
                 let at = row * across + column;
-                let hit = Hit {
+                let hit = Fragment {
                     mesh,
                     triangle,
                     weights,
@@ -260,7 +260,7 @@ impl Bare<'_> {
     }
 }
 
-impl Meshes for Bare<'_> {
+impl RasterMeshes for Bare<'_> {
     fn sizes(&self) -> Vec<usize> {
         let surfaces = self.scene.surfaces.iter();
         surfaces.map(|s| s.triangles.len()).collect()
@@ -280,7 +280,7 @@ impl Meshes for Bare<'_> {
         self.material(mesh).is_some_and(masked)
     }
 
-    fn is_hole(&self, _: &Hit) -> bool {
+    fn is_hole(&self, _: &Fragment) -> bool {
         true
     }
 }
@@ -303,21 +303,21 @@ pub(super) fn seen(scene: &Scene, view: &View, size: [usize; 2], grid: usize) ->
 }
 
 /// The refined mesh.
-pub(super) struct Refined<'a> {
+pub(super) struct RefinedMesh<'a> {
     pub(super) scene: &'a Scene,
     pub(super) surfaces: &'a [BakedSurface],
 }
 
-impl<'a> Refined<'a> {
+impl<'a> RefinedMesh<'a> {
     /// The surface and the corners of a hit.
-    pub(super) fn at(&self, hit: &Hit) -> (&'a Surface, [&'a BakedVertex; 3]) {
+    pub(super) fn at(&self, hit: &Fragment) -> (&'a Surface, [&'a BakedVertex; 3]) {
         let baked = &self.surfaces[hit.mesh as usize];
         let corners = baked.triangles[hit.triangle as usize].map(|v| &baked.vertices[v as usize]);
         (&self.scene.surfaces[baked.surface], corners)
     }
 
     /// Does a texture multiply the light of this hit?
-    pub(super) fn is_textured(&self, hit: &Hit) -> bool {
+    pub(super) fn is_textured(&self, hit: &Fragment) -> bool {
         let surface = &self.scene.surfaces[self.surfaces[hit.mesh as usize].surface];
         self.scene.materials[surface.material].paint.is_some()
     }
@@ -348,7 +348,7 @@ impl<'a> Refined<'a> {
     }
 }
 
-impl Meshes for Refined<'_> {
+impl RasterMeshes for RefinedMesh<'_> {
     fn sizes(&self) -> Vec<usize> {
         self.surfaces.iter().map(|s| s.triangles.len()).collect()
     }
@@ -372,7 +372,7 @@ impl Meshes for Refined<'_> {
         )
     }
 
-    fn is_hole(&self, hit: &Hit) -> bool {
+    fn is_hole(&self, hit: &Fragment) -> bool {
         let (surface, corners) = self.at(hit);
         let Alpha::Mask {
             cutoff,
@@ -403,7 +403,7 @@ mod tests {
     /// A square of two by two, cut into a fan around an inner point.
     struct Fan(DVec3);
 
-    impl Meshes for Fan {
+    impl RasterMeshes for Fan {
         fn sizes(&self) -> Vec<usize> {
             vec![4]
         }
@@ -422,7 +422,7 @@ mod tests {
             false
         }
 
-        fn is_hole(&self, _: &Hit) -> bool {
+        fn is_hole(&self, _: &Fragment) -> bool {
             false
         }
     }

@@ -2,7 +2,7 @@
 
 mod axis;
 pub mod bars;
-pub mod chart;
+pub mod line_chart;
 pub mod log;
 pub mod page;
 pub mod plan;
@@ -12,6 +12,6 @@ pub mod table;
 
 pub use axis::Scale;
 pub use bars::Bars;
-pub use chart::{Chart, Series};
+pub use line_chart::{LineChart, Series};
 pub use log::Log;
-pub use table::{Align, Table};
+pub use table::{Align, TextTable};

@@ -16,19 +16,19 @@ pub enum Align {
 /// A table under construction.
 ///
 /// ```
-/// use haarlight::report::{Align, Table};
-/// let mut table = Table::new([("phase", Align::Left), ("s", Align::Right)]);
+/// use haarlight::report::{Align, TextTable};
+/// let mut table = TextTable::new([("phase", Align::Left), ("s", Align::Right)]);
 /// table.row(["links", "0.25"]);
 /// table.row(["gather", "12.00"]);
 /// assert_eq!(table.terminal(), "phase       s\n------  -----\nlinks    0.25\ngather  12.00\n");
 /// ```
 #[derive(Debug, Clone)]
-pub struct Table {
+pub struct TextTable {
     columns: Vec<(String, Align)>,
     rows: Vec<Vec<String>>,
 }
 
-impl Table {
+impl TextTable {
     /// Columns by title.
     pub fn new<T: Into<String>>(columns: impl IntoIterator<Item = (T, Align)>) -> Self {
         Self {
@@ -135,8 +135,8 @@ impl Table {
 mod tests {
     use super::*;
 
-    fn table() -> Table {
-        let mut table = Table::new([("paint", Align::Left), ("ΔE", Align::Right)]);
+    fn table() -> TextTable {
+        let mut table = TextTable::new([("paint", Align::Left), ("ΔE", Align::Right)]);
         table.row(["a|b", "0.5"]);
         table.row(["\"q\", r"]);
         table

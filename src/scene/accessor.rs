@@ -22,7 +22,7 @@ const AGAIN: &str = "export the file again";
 
 /// What an accessor holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Layout {
+pub(crate) struct AccessorLayout {
     pub(crate) component: ComponentType,
     /// Components of an element: 1 to 4.
     pub(crate) width: usize,
@@ -33,14 +33,14 @@ pub(crate) struct Layout {
 
 /// An accessor that a document has.
 #[derive(Debug)]
-pub(crate) struct Found {
+pub(crate) struct DocumentAccessor {
     accessor: Accessor,
     /// Does it name no view at all?
     pub(crate) is_bare: bool,
     place: String,
 }
 
-impl Layout {
+impl AccessorLayout {
     fn element(self) -> usize {
         self.component.size() * self.width
     }
@@ -71,7 +71,7 @@ impl<'a> Accessors<'a> {
         index: usize,
         place: &str,
         check: &mut Check,
-    ) -> Option<(Found, Layout)> {
+    ) -> Option<(DocumentAccessor, AccessorLayout)> {
         let mut item = json::referred(self.json, "accessors", "accessor", index, place, check)?;
         item.place = format!("{place}, {}", item.place);
         let accessor = item.read::<Accessor>(check)?;
@@ -91,7 +91,7 @@ impl<'a> Accessors<'a> {
                 return None;
             }
         };
-        let layout = Layout {
+        let layout = AccessorLayout {
             component,
             width,
             count: size(accessor.count),
@@ -101,7 +101,7 @@ impl<'a> Accessors<'a> {
         let is_bare = !item.has("bufferView");
         let place = item.place;
         Some((
-            Found {
+            DocumentAccessor {
                 accessor,
                 is_bare,
                 place,
@@ -157,7 +157,12 @@ impl<'a> Accessors<'a> {
     }
 
     /// All elements, tightly packed, with the sparse ones put in.
-    fn elements(&mut self, found: &Found, layout: Layout, check: &mut Check) -> Option<Vec<u8>> {
+    fn elements(
+        &mut self,
+        found: &DocumentAccessor,
+        layout: AccessorLayout,
+        check: &mut Check,
+    ) -> Option<Vec<u8>> {
         let (accessor, at) = (&found.accessor, &found.place);
         let mut bytes = match accessor.buffer_view {
             Some(view) => {
@@ -190,7 +195,7 @@ impl<'a> Accessors<'a> {
         &mut self,
         sparse: &Sparse,
         at: &str,
-        layout: Layout,
+        layout: AccessorLayout,
         bytes: &mut [u8],
         check: &mut Check,
     ) -> Option<()> {
@@ -205,14 +210,14 @@ impl<'a> Accessors<'a> {
             check.problem(at, what, AGAIN);
             return None;
         };
-        let index_layout = Layout {
+        let index_layout = AccessorLayout {
             component,
             width: 1,
             count,
             normalized: false,
         };
-        let value_layout = Layout { count, ..layout };
-        let mut part = |view: Index<View>, offset: USize64, layout: Layout| {
+        let value_layout = AccessorLayout { count, ..layout };
+        let mut part = |view: Index<View>, offset: USize64, layout: AccessorLayout| {
             let span = self.views.view(view.value(), at, check)?;
             packed(&span, size(offset), layout, false)
                 .map_err(|what| check.problem(at, what, AGAIN))
@@ -237,7 +242,12 @@ impl<'a> Accessors<'a> {
 }
 
 /// Elements of a span, tightly packed; `strided`: the span's stride holds (it does not for sparse parts).
-fn packed(span: &Span, offset: usize, layout: Layout, strided: bool) -> Result<Vec<u8>, String> {
+fn packed(
+    span: &Span,
+    offset: usize,
+    layout: AccessorLayout,
+    strided: bool,
+) -> Result<Vec<u8>, String> {
     let element = layout.element();
     let stride = span.stride.filter(|_| strided).unwrap_or(element);
     if stride < element {

@@ -63,7 +63,7 @@ pub(crate) fn size(number: USize64) -> usize {
 
 /// What EXT_meshopt_compression says besides where its bytes are.
 #[derive(Debug, Deserialize)]
-struct Packed {
+struct MeshoptView {
     #[serde(default)]
     count: usize,
     #[serde(default)]
@@ -150,7 +150,7 @@ impl<'a> Views<'a> {
     fn unpack(&mut self, packed: &Item<'_>, check: &mut Check) -> Option<Span> {
         let source = self.stretch(packed, check)?;
         let stride = source.stride.unwrap_or(0);
-        let Packed {
+        let MeshoptView {
             count,
             mode,
             filter,

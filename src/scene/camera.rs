@@ -3,7 +3,7 @@
 
 use crate::scene::check::Check;
 use crate::scene::json::{self, Item};
-use crate::scene::nodes::Placed;
+use crate::scene::nodes::PlacedNode;
 use glam::DMat4;
 use gltf::json::Node;
 use gltf::json::camera::Type;
@@ -35,7 +35,7 @@ pub enum Projection {
 }
 
 /// One entry for each node of the scene that carries a camera.
-pub(crate) fn cameras(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<Camera> {
+pub(crate) fn cameras(json: &Value, placed: &[PlacedNode], check: &mut Check) -> Vec<Camera> {
     let mut cameras = Vec::new();
     for placed in placed {
         let Some(node) = json::item(json, "nodes", "node", placed.node) else {
@@ -67,7 +67,7 @@ pub(crate) fn cameras(json: &Value, placed: &[Placed], check: &mut Check) -> Vec
 
 /// A camera as far as it says what is seen. gltf's type asks for clipping planes, and nothing here is clipped.
 #[derive(Debug, Deserialize)]
-struct View {
+struct CameraData {
     #[serde(rename = "type")]
     kind: Option<Checked<Type>>,
     perspective: Option<Lens>,
@@ -85,7 +85,7 @@ struct Lens {
 }
 
 fn lens(item: &Item<'_>, check: &mut Check) -> Option<(Projection, Option<f64>)> {
-    let view = item.read::<View>(check)?;
+    let view = item.read::<CameraData>(check)?;
     match view.kind? {
         Valid(Type::Perspective) => {
             let lens = view.perspective?;

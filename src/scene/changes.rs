@@ -3,12 +3,12 @@
 //! The document stays as it is, so that what is written has the file's units; turned faces are written turned.
 
 use super::json::short;
-use super::lamps::GREATEST_SIZE;
+use super::lamp_spectra::GREATEST_SIZE;
 use super::pane::PaneKind;
 pub use super::room::Changes;
 use super::{Projection, Scene, luminaires};
 use crate::color::{KM, Observer};
-use crate::data::{Leaves, nearest_of};
+use crate::data::{Spectrum, nearest_of};
 use crate::error::{Error, Result};
 use glam::{DMat4, DVec3};
 
@@ -102,10 +102,10 @@ impl Scene {
                 format!("the nearest names are {near}"),
             ));
         }
-        let size = |(light, shape): &(usize, &mut Leaves)| -> f64 {
+        let size = |(light, shape): &(usize, &mut Spectrum)| -> f64 {
             let power = self.spectra[*light].power.iter();
-            let leaves = power.zip(shape.iter()).zip(&luminous);
-            leaves.map(|((p, s), y)| p * s * y).sum()
+            let bands = power.zip(shape.iter()).zip(&luminous);
+            bands.map(|((p, s), y)| p * s * y).sum()
         };
         let greatest = shapes.iter().map(size).fold(0.0, f64::max);
         // Written so that NaN fails.

@@ -10,7 +10,7 @@ use crate::scene::check::Check;
 use crate::scene::compression;
 use crate::scene::container;
 use crate::scene::json::{self, Item};
-use crate::scene::nodes::{self, Placed};
+use crate::scene::nodes::{self, PlacedNode};
 use crate::scene::raw;
 pub use crate::scene::raw::{AlphaMode, RawLight, RawLightKind, RawMaterial};
 use crate::scene::texture_info::Slots;
@@ -79,7 +79,7 @@ pub struct Document {
     /// Extensions that the document uses and this program does not read, sorted.
     pub unsupported: Vec<String>,
     pub(crate) buffers: Buffers,
-    pub(crate) placed: Vec<Placed>,
+    pub(crate) placed: Vec<PlacedNode>,
     pub(crate) slots: Slots,
     pub(crate) materials: Vec<RawMaterial>,
     pub(crate) check: Check,
@@ -282,8 +282,8 @@ fn shared(
     files: &mut BTreeMap<PathBuf, Arc<[u8]>>,
 ) -> std::result::Result<Arc<[u8]>, String> {
     let path = match uri::locate(folder, given)? {
-        uri::Place::Here(bytes) => return Ok(bytes.into()),
-        uri::Place::File(path) => path,
+        uri::UriTarget::Here(bytes) => return Ok(bytes.into()),
+        uri::UriTarget::File(path) => path,
     };
     if let Some(known) = files.get(&path) {
         return Ok(Arc::clone(known));

@@ -9,7 +9,7 @@ use super::lacking::lacking;
 use super::sheet::Sheet;
 use super::{Alpha, Image, LightKind, Material, PunctualLight, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,7 +25,7 @@ const CONVEX_PAIRS: usize = 100_000_000;
 /// The effects, in the order of the list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
-pub enum Kind {
+pub enum EffectKind {
     /// Light that surfaces pass on.
     Interreflection,
     /// Surfaces that block light.
@@ -64,7 +64,7 @@ pub enum Kind {
     Fluorescence,
 }
 
-impl Kind {
+impl EffectKind {
     /// The effect's name in plans and logs.
     pub fn name(self) -> &'static str {
         match self {
@@ -94,7 +94,7 @@ impl Kind {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Effect {
-    /// [`Kind::name`], or the name of an effect that the program lacks.
+    /// [`EffectKind::name`], or the name of an effect that the program lacks.
     pub name: String,
     /// Does it run?
     pub runs: bool,
@@ -124,22 +124,22 @@ impl Plan {
         let mut plan = Self {
             effects: Vec::new(),
         };
-        plan.add(Kind::Interreflection, interreflection(&used));
-        plan.add(Kind::Occlusion, occlusion(scene));
-        plan.add(Kind::Colour, colour(scene, &used));
-        plan.add(Kind::LightSpectra, light_spectra(scene));
+        plan.add(EffectKind::Interreflection, interreflection(&used));
+        plan.add(EffectKind::Occlusion, occlusion(scene));
+        plan.add(EffectKind::Colour, colour(scene, &used));
+        plan.add(EffectKind::LightSpectra, light_spectra(scene));
         let textured = |m: &&&Material| is_textured(m);
         plan.add(
-            Kind::Textures,
+            EffectKind::Textures,
             counted(used.iter().filter(textured), "material"),
         );
         let masked = |m: &&&Material| matches!(m.alpha, Alpha::Mask { .. });
         plan.add(
-            Kind::AlphaMasks,
+            EffectKind::AlphaMasks,
             counted(used.iter().filter(masked), "material"),
         );
         plan.add(
-            Kind::EmissiveSurfaces,
+            EffectKind::EmissiveSurfaces,
             counted(used.iter().filter(|m| m.emission.is_some()), "material"),
         );
         let lights = |is: fn(&LightKind) -> bool| {
@@ -151,31 +151,37 @@ impl Plan {
                 .collect();
             number_of(&names, "light")
         };
-        plan.add(Kind::PointLights, lights(|k| matches!(k, LightKind::Point)));
         plan.add(
-            Kind::SpotLights,
+            EffectKind::PointLights,
+            lights(|k| matches!(k, LightKind::Point)),
+        );
+        plan.add(
+            EffectKind::SpotLights,
             lights(|k| matches!(k, LightKind::Spot { .. })),
         );
         plan.add(
-            Kind::DirectionalLights,
+            EffectKind::DirectionalLights,
             lights(|k| matches!(k, LightKind::Directional)),
         );
-        plan.add(Kind::MeasuredLamps, measured(scene));
+        plan.add(EffectKind::MeasuredLamps, measured(scene));
         let sky = scene.sky.as_ref();
         let said = |text: Option<&String>| match text {
             Some(text) => (true, text.clone()),
             None => (false, "none is described".into()),
         };
-        plan.add(Kind::Sky, said(sky.map(|sky| &sky.said)));
-        plan.add(Kind::Sun, said(sky.and_then(|sky| sky.sun_said.as_ref())));
+        plan.add(EffectKind::Sky, said(sky.map(|sky| &sky.said)));
         plan.add(
-            Kind::TwoSided,
+            EffectKind::Sun,
+            said(sky.and_then(|sky| sky.sun_said.as_ref())),
+        );
+        plan.add(
+            EffectKind::TwoSided,
             counted(used.iter().filter(|m| m.sides == Sides::Both), "material"),
         );
-        plan.add(Kind::Panes, panes(scene));
-        plan.add(Kind::Sheets, sheets(&used));
-        plan.add(Kind::Mirrors, mirrors(scene, &used));
-        plan.add(Kind::Fluorescence, fluorescence(&used));
+        plan.add(EffectKind::Panes, panes(scene));
+        plan.add(EffectKind::Sheets, sheets(&used));
+        plan.add(EffectKind::Mirrors, mirrors(scene, &used));
+        plan.add(EffectKind::Fluorescence, fluorescence(&used));
         for lack in lacking(&scene.source.json) {
             plan.effects.push(Effect {
                 name: lack.effect,
@@ -188,17 +194,17 @@ impl Plan {
     }
 
     /// Does this effect run?
-    pub fn runs(&self, kind: Kind) -> bool {
+    pub fn runs(&self, kind: EffectKind) -> bool {
         self.effects.iter().any(|e| e.name == kind.name() && e.runs)
     }
 
-    /// The lines, [`Kind`]s in order, then what the program lacks.
+    /// The lines, [`EffectKind`]s in order, then what the program lacks.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
     }
 
     /// Takes an effect off.
-    pub(crate) fn off(&mut self, kind: Kind, reason: &str) {
+    pub(crate) fn off(&mut self, kind: EffectKind, reason: &str) {
         let mut named = self.effects.iter_mut().filter(|e| e.name == kind.name());
         if let Some(effect) = named.next() {
             (effect.runs, effect.reason) = (false, reason.into());
@@ -206,7 +212,7 @@ impl Plan {
     }
 
     /// Lets an effect run that does not.
-    pub(crate) fn on(&mut self, kind: Kind, reason: &str) {
+    pub(crate) fn on(&mut self, kind: EffectKind, reason: &str) {
         let mut named = self.effects.iter_mut().filter(|e| e.name == kind.name());
         if let Some(effect) = named.find(|effect| !effect.runs) {
             (effect.runs, effect.reason) = (true, reason.into());
@@ -214,14 +220,14 @@ impl Plan {
     }
 
     /// Says more of an effect.
-    pub(crate) fn say(&mut self, kind: Kind, more: &str) {
+    pub(crate) fn say(&mut self, kind: EffectKind, more: &str) {
         let mut named = self.effects.iter_mut().filter(|e| e.name == kind.name());
         if let Some(effect) = named.next() {
             effect.reason += &format!("; {more}");
         }
     }
 
-    fn add(&mut self, kind: Kind, (runs, reason): (bool, String)) {
+    fn add(&mut self, kind: EffectKind, (runs, reason): (bool, String)) {
         self.effects.push(Effect {
             name: kind.name().into(),
             runs,
@@ -294,11 +300,8 @@ fn number_of(names: &[String], what: &str) -> (bool, String) {
 fn measured(scene: &Scene) -> (bool, String) {
     let luminous = Observer::cie1931().weights(&scene.grid)[1];
     let lumens = |light: &PunctualLight| -> f64 {
-        let leaves = scene.spectra[light.light].power.iter().zip(&light.shape);
-        leaves
-            .zip(&luminous)
-            .map(|((p, s), y)| KM * p * s * y)
-            .sum()
+        let bands = scene.spectra[light.light].power.iter().zip(&light.shape);
+        bands.zip(&luminous).map(|((p, s), y)| KM * p * s * y).sum()
     };
     let lamps = scene.lights.iter().filter_map(|light| {
         let profile = &light.luminaire.as_ref()?.profile;
@@ -342,7 +345,7 @@ fn interreflection(used: &[&Material]) -> (bool, String) {
     }
 }
 
-fn is_flat(spectrum: &Leaves) -> bool {
+fn is_flat(spectrum: &Spectrum) -> bool {
     spectrum.iter().all(|v| *v == spectrum[0])
 }
 

@@ -8,7 +8,7 @@
 use super::profile::Profile;
 use super::{LightKind, Material, Projection, PunctualLight, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -32,7 +32,7 @@ pub struct Facts {
     /// Lowest and highest corner of the bounds, m.
     pub bounds_m: [[f64; 3]; 2],
     /// Does the geometry enclose?
-    pub closed: Closed,
+    pub closed: ClosedHint,
     /// First and last wavelength of the grid, nm.
     pub range_nm: [f64; 2],
     /// Names of the distinct light spectra.
@@ -51,7 +51,7 @@ pub struct Facts {
 /// T-vertex, a block on a floor) have open edges and may be tight all the same.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
-pub struct Closed {
+pub struct ClosedHint {
     /// Parts that hang together by vertices.
     pub parts: usize,
     /// Parts without an open edge.
@@ -185,7 +185,7 @@ struct Sums {
 impl Facts {
     /// The facts of a scene.
     pub fn of(scene: &Scene) -> Self {
-        let meter = Meter::new(scene);
+        let meter = SceneMeter::new(scene);
         let mut sums = vec![Sums::default(); scene.materials.len()];
         for surface in &scene.surfaces {
             if let Some(material) = scene.materials.get(surface.material) {
@@ -247,14 +247,14 @@ fn spot_flux(intensity: f64, inner: f64, outer: f64) -> f64 {
 }
 
 /// Photometry of a scene.
-struct Meter<'a> {
+struct SceneMeter<'a> {
     scene: &'a Scene,
     upsampler: Upsampler,
     /// KM times the nm-integrals of y_bar.
-    luminous: Leaves,
+    luminous: Spectrum,
 }
 
-impl<'a> Meter<'a> {
+impl<'a> SceneMeter<'a> {
     fn new(scene: &'a Scene) -> Self {
         let luminous = Observer::cie1931().weights(&scene.grid)[1].map(|y| KM * y);
         Self {
@@ -265,7 +265,7 @@ impl<'a> Meter<'a> {
     }
 
     /// Luminous size of a lamp: cd/m2, cd or lx.
-    fn size(&self, light: usize, shape: &Leaves) -> f64 {
+    fn size(&self, light: usize, shape: &Spectrum) -> f64 {
         let power = &self.scene.spectra[light].power;
         power
             .iter()
@@ -407,7 +407,7 @@ impl<'a> Meter<'a> {
 }
 
 /// Matches edges: each must be run through as often one way as the other.
-fn closed(surfaces: &[Surface], weld: f64) -> Closed {
+fn closed(surfaces: &[Surface], weld: f64) -> ClosedHint {
     let mut ids: BTreeMap<[i64; 3], usize> = BTreeMap::new();
     let mut points: Vec<DVec3> = Vec::new();
     let mut parent: Vec<usize> = Vec::new();
@@ -455,7 +455,7 @@ fn closed(surfaces: &[Surface], weld: f64) -> Closed {
     }
     let size = |(low, high, _): &(DVec3, DVec3, usize)| (*high - *low).length();
     let largest = parts.values().max_by(|a, b| size(a).total_cmp(&size(b)));
-    Closed {
+    ClosedHint {
         parts: parts.len(),
         closed_parts: parts.values().filter(|p| p.2 == 0).count(),
         open_edges: parts.values().map(|p| p.2).sum(),

@@ -1,6 +1,6 @@
 //! Fluorescence: surfaces that take in light of some wavelengths and give a part of it out again at others, evenly to all sides.
 //!
-//! With the irradiance E a surface sends out `B(leaf) = rho(leaf) E(leaf) + sum over terms of e(leaf) q`,
+//! With the irradiance E a surface sends out `B(band) = rho(band) E(band) + sum over terms of e(band) q`,
 //! `q = integral of g(mu) E(mu) d mu`: a Donaldson matrix (Donaldson 1954, British Journal of Applied Physics 5, 210) as a diagonal and few
 //! products of an emission spectrum e (1/nm, its integral is 1) and an excitation g, the power that leaves for a unit of power that comes.
 //!
@@ -28,7 +28,7 @@ use super::bispectral::{Bispectral, UPHILL};
 use super::check::Check;
 use super::json::short;
 use super::reader::Reader;
-use crate::data::{Grid, Kind, LEAVES, Leaves, Outside, Table};
+use crate::data::{BANDS, Grid, Outside, Spectrum, Table, TableKind};
 use serde_json::{Map, Value};
 
 /// Steps over an excitation, 1 nm of most of them: a share of a fifth is asked for.
@@ -49,8 +49,8 @@ pub struct Term {
     /// Index in [`Scene::spectra`](crate::scene::Scene::spectra): the emission, whose power there is 1/nm, with an integral of at most 1
     /// over the grid.
     pub light: usize,
-    /// Power given out for a unit of power that comes, by leaf, in [0, 1): what the text above calls g.
-    pub excitation: Leaves,
+    /// Power given out for a unit of power that comes, by band, in [0, 1): what the text above calls g.
+    pub excitation: Spectrum,
     /// Of which layer light must be to excite it; none: any.
     pub layer: Option<usize>,
 }
@@ -62,18 +62,18 @@ impl Fluorescence {
         self.terms.iter().filter(move |t| t.layer == first)
     }
 
-    /// Power given out for a unit of power that comes, by leaf, all terms together.
-    pub fn efficiency(&self) -> Leaves {
-        let mut sum = [0.0; LEAVES];
+    /// Power given out for a unit of power that comes, by band, all terms together.
+    pub fn efficiency(&self) -> Spectrum {
+        let mut sum = [0.0; BANDS];
         for term in self.once() {
             (sum.iter_mut().zip(&term.excitation)).for_each(|(s, g)| *s += g);
         }
         sum
     }
 
-    /// The Donaldson matrix without its diagonal of reflection: element `[i][j]` is the spectral exitance on leaf i for a unit of
-    /// spectral irradiance on leaf j, `width` the width of a leaf, nm.
-    pub fn matrix(&self, spectra: &[LightSpectrum], width: f64) -> Vec<Leaves> {
+    /// The Donaldson matrix without its diagonal of reflection: element `[i][j]` is the spectral exitance on band i for a unit of
+    /// spectral irradiance on band j, `width` the width of a band, nm.
+    pub fn matrix(&self, spectra: &[LightSpectrum], width: f64) -> Vec<Spectrum> {
         let element = |i: usize, j: usize| {
             let each = self
                 .once()
@@ -81,29 +81,29 @@ impl Fluorescence {
             each.sum::<f64>() * width
         };
         let row = |i: usize| std::array::from_fn(|j| element(i, j));
-        (0..LEAVES).map(row).collect()
+        (0..BANDS).map(row).collect()
     }
 }
 
 /// What a side file says of fluorescence.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Wish {
+pub(crate) struct FluorescenceWish {
     /// Emission (1/nm) and excitation of each term.
-    pub(crate) terms: Vec<[Leaves; 2]>,
+    pub(crate) terms: Vec<[Spectrum; 2]>,
     /// In words.
     pub(crate) from: String,
     /// Diagonal of a matrix: the reflectance, if it holds one.
-    pub(crate) diagonal: Option<Leaves>,
+    pub(crate) diagonal: Option<Spectrum>,
 }
 
 /// Reads the fluorescence of a material's entry: an object, or a list of them.
-pub(super) fn read(reader: &mut Reader, value: &Value, place: &str) -> Option<Wish> {
+pub(super) fn read(reader: &mut Reader, value: &Value, place: &str) -> Option<FluorescenceWish> {
     let place = format!("{place}, fluorescence");
     let list = match value {
         Value::Array(list) => list.iter().collect(),
         one => vec![one],
     };
-    let mut wish = Wish::default();
+    let mut wish = FluorescenceWish::default();
     let mut said = Vec::new();
     for (k, value) in list.iter().enumerate() {
         let place = match list.len() {
@@ -137,7 +137,7 @@ fn dye(
     reader: &mut Reader,
     object: &Map<String, Value>,
     place: &str,
-) -> Option<([Leaves; 2], String)> {
+) -> Option<([Spectrum; 2], String)> {
     reader.keys(object, &["excitation", "emission", "yield", "csv"], place);
     let quantum = object.get("yield").and_then(Value::as_f64);
     let quantum = quantum.filter(|q| (0.0..=1.0).contains(q));
@@ -150,7 +150,7 @@ fn dye(
             "give the quantum yield, photons given out for each that is absorbed, from 0 to 1";
         reader.check.problem(place, what, next);
     }
-    let mut table = |key: &str, kind: Kind| {
+    let mut table = |key: &str, kind: TableKind| {
         let place = format!("{place}, {key}");
         let Some(value) = object.get(key) else {
             let next = "say {\"excitation\": {\"csv\": ...}, \"emission\": {\"csv\": ...}, \"yield\": ...}";
@@ -161,8 +161,8 @@ fn dye(
         reader.keys(object, &["name", "csv"], &place);
         reader.table(object, kind, &place)
     };
-    let absorbed = table("excitation", Kind::Reflectance);
-    let emission = table("emission", Kind::Illuminant);
+    let absorbed = table("excitation", TableKind::Reflectance);
+    let emission = table("emission", TableKind::Illuminant);
     let ((absorbed, taken), (emission, given), quantum) = (absorbed?, emission?, quantum?);
     if let Some(most) = absorbed.values().iter().copied().find(|x| *x > 1.0) {
         let what = format!("'{}' goes up to {most}", short(&taken));
@@ -190,7 +190,7 @@ fn dye(
     }
     let mean = mean_wavelength(&emission);
     let out = |nm: f64, share: f64| share * (quantum * nm / mean).min(1.0);
-    // At the table's rows and the edges of the leaves: between them both factors are smooth.
+    // At the table's rows and the edges of the bands: between them both factors are smooth.
     let excitation = power(&absorbed, &grid, out);
     outside(reader.check, &absorbed, &grid, place);
     let most = absorbed.wavelengths().iter().zip(absorbed.values());
@@ -221,7 +221,11 @@ fn outside(check: &mut Check, absorbed: &Table, grid: &Grid, place: &str) {
 }
 
 /// A matrix from a CSV.
-fn matrix(reader: &mut Reader, object: &Map<String, Value>, place: &str) -> Option<Wish> {
+fn matrix(
+    reader: &mut Reader,
+    object: &Map<String, Value>,
+    place: &str,
+) -> Option<FluorescenceWish> {
     reader.keys(object, &["csv"], place);
     let (text, from) = reader.text(object, place)?;
     match Bispectral::parse(&text) {
@@ -251,7 +255,7 @@ fn matrix(reader: &mut Reader, object: &Map<String, Value>, place: &str) -> Opti
                 Some([spectrum, reader.grid.means(excitation, Outside::Zero)])
             };
             let diagonal = matrix.diagonal();
-            Some(Wish {
+            Some(FluorescenceWish {
                 terms: terms.all.iter().filter_map(on_grid).collect(),
                 from: said,
                 diagonal: diagonal.map(|table| reader.grid.means(&table, Outside::Hold)),
@@ -296,7 +300,7 @@ fn uphill(absorbed: &Table, emission: &Table) -> (f64, f64) {
 }
 
 /// An emission on the grid, 1/nm, the integral of its whole table 1; none of a table of zeros.
-fn normalised(table: &Table, grid: &Grid) -> Option<Leaves> {
+fn normalised(table: &Table, grid: &Grid) -> Option<Spectrum> {
     let [first, last] = table.range();
     let all = table.integral(first, last, Outside::Zero);
     (all > 0.0).then(|| grid.means(table, Outside::Zero).map(|x| x / all))
@@ -318,10 +322,10 @@ fn mean_wavelength(table: &Table) -> f64 {
     moment / all
 }
 
-/// Means over the leaves of a share that depends on the table's value and the wavelength.
-fn power(table: &Table, grid: &Grid, share: impl Fn(f64, f64) -> f64) -> Leaves {
-    std::array::from_fn(|leaf| {
-        let (from, to) = (grid.left(leaf), grid.left(leaf + 1));
+/// Means over the bands of a share that depends on the table's value and the wavelength.
+fn power(table: &Table, grid: &Grid, share: impl Fn(f64, f64) -> f64) -> Spectrum {
+    std::array::from_fn(|band| {
+        let (from, to) = (grid.left(band), grid.left(band + 1));
         let mut ends = vec![from];
         ends.extend(
             table

@@ -8,7 +8,7 @@ use crate::scene::accessor::Accessors;
 use crate::scene::check::{Check, Tally};
 use crate::scene::document::Document;
 use crate::scene::json::{self, Item};
-use crate::scene::nodes::Placed;
+use crate::scene::nodes::PlacedNode;
 use crate::scene::primitive::{self, MAX_TEXCOORDS, Outcome, Primitive};
 use crate::scene::{Camera, Image, Surface, camera, image, instances, world};
 use glam::DMat4;
@@ -59,7 +59,7 @@ impl Document {
     pub fn load_geometry(&self) -> Geometry {
         let mut check = self.check.clone();
         let json = &self.source.json;
-        let mut reader = Reader {
+        let mut reader = GeometryReader {
             document: self,
             json,
             accessors: Accessors::new(json, &self.buffers),
@@ -120,7 +120,7 @@ impl Document {
     }
 }
 
-struct Reader<'a> {
+struct GeometryReader<'a> {
     document: &'a Document,
     json: &'a Value,
     accessors: Accessors<'a>,
@@ -134,7 +134,7 @@ struct Reader<'a> {
     placed: usize,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> GeometryReader<'a> {
     /// Adds up what the scene claims to hold before anything is read.
     fn fits(&self, check: &mut Check) -> bool {
         let mut by_mesh: BTreeMap<usize, [usize; 3]> = BTreeMap::new();
@@ -190,7 +190,7 @@ impl<'a> Reader<'a> {
         claims
     }
 
-    fn place(&mut self, placed: &Placed, surfaces: &mut Vec<Surface>, check: &mut Check) {
+    fn place(&mut self, placed: &PlacedNode, surfaces: &mut Vec<Surface>, check: &mut Check) {
         let Some(node) = json::item(self.json, "nodes", "node", placed.node) else {
             return;
         };

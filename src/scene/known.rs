@@ -5,7 +5,7 @@ use super::json::short;
 use super::luminaires::{self, ProfileWish};
 use super::reader::{Reader, Sampled};
 use super::transmittance;
-use crate::data::Kind;
+use crate::data::TableKind;
 use serde_json::{Map, Value};
 
 /// What is known of a material.
@@ -26,7 +26,7 @@ pub(crate) struct MaterialSpectra {
     /// Is it a mirror? None: as its roughness says.
     pub(crate) mirror: Option<bool>,
     /// What it fluoresces.
-    pub(crate) fluorescence: Option<fluorescence::Wish>,
+    pub(crate) fluorescence: Option<fluorescence::FluorescenceWish>,
 }
 
 impl MaterialSpectra {
@@ -73,10 +73,10 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
                 let next = "take the reflectance out, or leave the diagonal at 0";
                 reader.check.problem(place, what, next);
             }
-            (None, Some(leaves)) => {
+            (None, Some(spectrum)) => {
                 spectra.reflectance = Some(Sampled {
                     from: "the matrix's diagonal".into(),
-                    leaves,
+                    spectrum,
                     is_csv: true,
                 });
             }
@@ -104,7 +104,7 @@ pub(super) fn read(reader: &mut Reader, entry: &Value, place: &str) -> MaterialS
             reader.keys(object, &luminaires::OF_EMISSION, &place);
             let luminance = luminance(reader, object, &place);
             if luminaires::says_spectrum(object) || !object.contains_key("profile") {
-                let sampled = reader.sampled(object, Kind::Illuminant, &place);
+                let sampled = reader.sampled(object, TableKind::Illuminant, &place);
                 spectra.emission = sampled.map(|s| (s, luminance));
             }
         }

@@ -19,7 +19,7 @@
 pub const MOST_LAYERS: usize = 16;
 
 /// A layer that is wished for: its name, and those of its lamps.
-pub(crate) type Wish = (String, Vec<String>);
+pub(crate) type LayerWish = (String, Vec<String>);
 
 /// The groups of lamps of a room, and what they are of its spectra.
 #[derive(Debug, Clone, PartialEq)]

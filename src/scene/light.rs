@@ -2,7 +2,7 @@
 
 use super::luminaires::Luminaire;
 use super::sky::PARTS;
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -11,8 +11,8 @@ use std::sync::Arc;
 pub struct LightSpectrum {
     /// `cie/F2`, `blackbody/2700`, a file name ...
     pub name: String,
-    /// Relative power per nm on the grid's leaves.
-    pub power: Leaves,
+    /// Relative power per nm on the grid's bands.
+    pub power: Spectrum,
 }
 
 /// A light without extent, or one of a sky. Radiant intensity in W/sr/nm (point, spot), irradiance in W/m2/nm across its rays
@@ -31,8 +31,8 @@ pub struct PunctualLight {
     pub direction: DVec3,
     /// Index in [`Scene::spectra`](crate::scene::Scene::spectra).
     pub light: usize,
-    /// `intensity(leaf) = spectra[light].power[leaf] * shape[leaf]`.
-    pub shape: Leaves,
+    /// `intensity(band) = spectra[light].power[band] * shape[band]`.
+    pub shape: Spectrum,
     /// How its light is spread, and from where: of the kinds that say so, and of no other.
     pub luminaire: Option<Arc<Luminaire>>,
 }

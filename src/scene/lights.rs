@@ -4,7 +4,7 @@
 
 use super::check::Check;
 use super::json::short;
-use super::lamps::{Lamps, bearable};
+use super::lamp_spectra::{LampSpectra, bearable};
 use super::luminaires::{IesNode, LampWish, Luminaire, ProfileWish, tilt_share};
 use super::profile::Profile;
 use super::raw::{RawLight, RawLightKind};
@@ -21,7 +21,7 @@ pub(crate) fn punctual(
     profiles: &[Option<Arc<Profile>>],
     file: &SpectraFile,
     room: &Path,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> Vec<PunctualLight> {
     let grid = lamps.grid;
@@ -138,7 +138,7 @@ fn measured(
     wish: &ProfileWish,
     spectrum: Option<&Sampled>,
     place: &str,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> Option<PunctualLight> {
     if light.kind == RawLightKind::Directional {
@@ -206,7 +206,7 @@ mod tests {
     use super::super::LightSpectrum;
     use super::*;
     use crate::color::{Observer, Upsampler};
-    use crate::data::{Grid, LEAVES};
+    use crate::data::{BANDS, Grid};
     use glam::DMat4;
     use serde_json::json;
 
@@ -236,7 +236,7 @@ mod tests {
     ) {
         let grid = Grid::default();
         let upsampler = Upsampler::new(&grid);
-        let mut lamps = Lamps::new(&grid, &upsampler);
+        let mut lamps = LampSpectra::new(&grid, &upsampler);
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
         let mut lights = punctual(
@@ -261,7 +261,7 @@ mod tests {
     fn size(light: &PunctualLight, spectra: &[LightSpectrum]) -> f64 {
         let y = Observer::cie1931().weights(&Grid::default())[1];
         let power = &spectra[light.light].power;
-        (0..LEAVES)
+        (0..BANDS)
             .map(|i| 683.0 * power[i] * light.shape[i] * y[i])
             .sum()
     }
@@ -270,7 +270,7 @@ mod tests {
     fn a_white_lamp_has_its_candela_and_one_flat_shape() {
         let (lights, spectra, ..) = made(&[raw(RawLightKind::Point, [1.0; 3], 100.0)]);
         assert!((size(&lights[0], &spectra) - 100.0).abs() < 1e-9);
-        assert_eq!(lights[0].shape, [lights[0].shape[0]; LEAVES]);
+        assert_eq!(lights[0].shape, [lights[0].shape[0]; BANDS]);
         assert_eq!((spectra.len(), spectra[0].name.as_str()), (1, "cie/D65"));
         assert_eq!(lights[0].position, glam::dvec3(1.0, 2.0, 3.0));
         assert_eq!(lights[0].direction, DVec3::NEG_Z);
@@ -303,7 +303,7 @@ mod tests {
         ]);
         assert_eq!(spectra.len(), 1);
         assert_eq!(spectra[0].name, "cie/D65 in one colour");
-        assert!(lights.iter().all(|l| l.shape == [l.shape[0]; LEAVES]));
+        assert!(lights.iter().all(|l| l.shape == [l.shape[0]; BANDS]));
         assert!((size(&lights[1], &spectra) / size(&lights[0], &spectra) - 3.0).abs() < 1e-12);
 
         let (lights, spectra, ..) = made(&[
@@ -311,7 +311,7 @@ mod tests {
             raw(RawLightKind::Point, [0.6, 0.8, 1.0], 10.0),
         ]);
         assert_eq!((spectra.len(), spectra[0].name.as_str()), (1, "cie/D65"));
-        assert!(lights.iter().all(|l| l.shape != [l.shape[0]; LEAVES]));
+        assert!(lights.iter().all(|l| l.shape != [l.shape[0]; BANDS]));
     }
 
     #[test]

@@ -3,9 +3,9 @@
 use super::changes::Changes;
 use super::check::{Check, Unknown};
 use super::document::{Document, RawLight};
-use super::kindled;
-use super::lamps::Lamps;
-use super::layers::Wish;
+use super::fluorescing;
+use super::lamp_spectra::LampSpectra;
+use super::layers::LayerWish;
 use super::lights;
 use super::materials;
 use super::pane;
@@ -15,7 +15,7 @@ use super::spectra_file::SpectraFile;
 use super::{Image, LightSpectrum, Material, Options, PunctualLight, Scene, Surface};
 use super::{lacking, luminaires};
 use crate::color::Upsampler;
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -24,11 +24,11 @@ impl Scene {
     /// Reads a room.
     ///
     /// ```
-    /// use haarlight::scene::{Options, Scene, effects::{Kind, Plan}};
+    /// use haarlight::scene::{Options, Scene, effects::{EffectKind, Plan}};
     /// let room = Scene::load("scenes/convex.glb", &Options::default())?;
     /// assert_eq!(room.materials[0].name, "floor");
     /// // Nothing can block in a convex empty room, so that no visibility is worked out.
-    /// assert!(!Plan::of(&room).runs(Kind::Occlusion));
+    /// assert!(!Plan::of(&room).runs(EffectKind::Occlusion));
     /// # Ok::<(), haarlight::Error>(())
     /// ```
     ///
@@ -47,7 +47,7 @@ impl Scene {
         let geometry = document.load_geometry();
         let mut check = Check::new(document.source.place());
         let (surfaces, images) = (geometry.surfaces, geometry.images);
-        let mut lit = Lit::of(&document, surfaces, &images, options, &mut check);
+        let mut lit = PaintedScene::of(&document, surfaces, &images, options, &mut check);
         let sky = lit.under_sky(&document, options, &mut check);
         lit.calm();
         let unknown = match options.lenient {
@@ -95,7 +95,7 @@ impl Scene {
 }
 
 /// Surfaces with their paint, and lamps.
-struct Lit {
+struct PaintedScene {
     surfaces: Vec<Surface>,
     panes: Vec<Surface>,
     materials: Vec<Material>,
@@ -104,10 +104,10 @@ struct Lit {
     /// What the file of spectra says of the sky.
     sky: SkyWish,
     /// And of layers.
-    layers: Vec<Wish>,
+    layers: Vec<LayerWish>,
 }
 
-impl Lit {
+impl PaintedScene {
     fn of(
         document: &Document,
         surfaces: Vec<Surface>,
@@ -122,7 +122,7 @@ impl Lit {
         let light_names: Vec<String> = raw_lights.iter().map(lights::name_of).collect();
         let file = SpectraFile::open(path, options, &names, &light_names, check);
         let upsampler = Upsampler::new(grid);
-        let mut lamps = Lamps::new(grid, &upsampler);
+        let mut lamps = LampSpectra::new(grid, &upsampler);
         let tinted = tinted(raw.len(), &surfaces);
         let (mut materials, shining) = materials::materials(
             raw, &tinted, images, &file, path, grid, &upsampler, &mut lamps, check,
@@ -136,8 +136,8 @@ impl Lit {
         let luminous = lamps.luminous();
         let excited = std::mem::take(&mut lamps.excited);
         let mut spectra = lamps.finish(&mut materials, &mut lights);
-        kindled::join(&mut materials, &mut spectra, excited);
-        let size = |light: usize, shape: &Leaves| luminous(&spectra[light], shape);
+        fluorescing::join(&mut materials, &mut spectra, excited);
+        let size = |light: usize, shape: &Spectrum| luminous(&spectra[light], shape);
         let is_pane = |s: &Surface| materials.get(s.material).is_some_and(|m| m.pane.is_some());
         let (panes, surfaces): (Vec<_>, Vec<_>) = surfaces.into_iter().partition(is_pane);
         let scale = options.scale.unwrap_or(1.0);

@@ -7,7 +7,7 @@ use super::profile::Profile;
 use super::sheet::{Sheet, SheetMeans, Weave, bounded};
 use super::{GREATEST_ALBEDO, Image, Sides, Texture};
 use crate::color::Upsampler;
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use std::sync::Arc;
 
 /// A Lambertian material, one- or two-sided.
@@ -19,8 +19,8 @@ pub struct Material {
     pub index: Option<usize>,
     /// Does the back reflect and emit too?
     pub sides: Sides,
-    /// Albedo of the base colour factor (or the measured reflectance) on the grid's leaves, each in [0, 0.999].
-    pub reflectance: Leaves,
+    /// Albedo of the base colour factor (or the measured reflectance) on the grid's bands, each in [0, 0.999].
+    pub reflectance: Spectrum,
     /// Where the reflectance comes from, for `inspect`.
     pub reflectance_from: String,
     /// Linear base colour factor; [1, 1, 1] where the reflectance is measured.
@@ -59,14 +59,14 @@ pub enum Alpha {
     },
 }
 
-/// Lambertian emission: `radiance(leaf) = spectra[light].power[leaf] * shape[leaf]`, W/m2/sr/nm; where there is a
+/// Lambertian emission: `radiance(band) = spectra[light].power[band] * shape[band]`, W/m2/sr/nm; where there is a
 /// texture the shape differs from point to point ([`Emission::shape_at`]).
 #[derive(Debug, Clone)]
 pub struct Emission {
     /// Index in [`Scene::spectra`](crate::scene::Scene::spectra).
     pub light: usize,
-    /// Multiplier of the light's power per leaf, at the emissive factor.
-    pub shape: Leaves,
+    /// Multiplier of the light's power per band, at the emissive factor.
+    pub shape: Spectrum,
     /// Emissive texture; then the shape of a point is `scale * upsample(factor * texel)`.
     pub texture: Option<Texture>,
     /// Linear emissive factor.
@@ -90,7 +90,7 @@ impl Material {
 impl Material {
     /// The reflectance where paint (texel times vertex colour, linear) multiplies the base colour; `[1, 1, 1]`, and any
     /// paint on a measured material, leave [`Material::reflectance`]. Greys come out exactly flat.
-    pub fn reflectance_at(&self, paint: [f32; 3], upsampler: &Upsampler) -> Leaves {
+    pub fn reflectance_at(&self, paint: [f32; 3], upsampler: &Upsampler) -> Spectrum {
         if paint == [1.0; 3] || self.paint.is_none() && !self.vertex_paint {
             return self.reflectance;
         }
@@ -109,7 +109,7 @@ impl Material {
         weave: Weave,
         back: bool,
         upsampler: &Upsampler,
-    ) -> [Leaves; 2] {
+    ) -> [Spectrum; 2] {
         let through = sheet.transmittance_at(weave, upsampler);
         let own = sheet.back.filter(|_| back);
         let reflected = match (own, color) {
@@ -163,7 +163,7 @@ impl Material {
 
 impl Material {
     /// A reflectance brought down to what the albedo may be, beside what fluoresces.
-    pub(crate) fn bounded(&self, reflectance: Leaves) -> Leaves {
+    pub(crate) fn bounded(&self, reflectance: Spectrum) -> Spectrum {
         match &self.fluorescence {
             None => reflectance.map(|r| r.min(GREATEST_ALBEDO)),
             Some(fluorescence) => {
@@ -195,7 +195,7 @@ pub(crate) const DARKEST_PAINT: f32 = 1e-3;
 
 impl Emission {
     /// The shape at a point whose emissive texture has this linear value; `[1, 1, 1]` gives [`Emission::shape`].
-    pub fn shape_at(&self, texel: [f32; 3], upsampler: &Upsampler) -> Leaves {
+    pub fn shape_at(&self, texel: [f32; 3], upsampler: &Upsampler) -> Spectrum {
         if texel == [1.0; 3] {
             return self.shape;
         }

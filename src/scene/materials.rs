@@ -1,15 +1,15 @@
 //! Materials: glTF's metallic-roughness model taken as Lambertian, with measured spectra where there are some.
 //!
-//! `reflectance(leaf) = min(upsample(base colour factor), 0.999)`, or the measured table. Metals reflect by their base
+//! `reflectance(band) = min(upsample(base colour factor), 0.999)`, or the measured table. Metals reflect by their base
 //! colour as albedo, unlit materials are painted with it; each is said in a warning.
 //! Emission: luminance = emissive strength (nits) times Y of the linear emissive factor, unless a side file says more.
 //! No gloss, but for mirrors, see [`mirror`]. What lets light through is a pane, see [`pane`].
 
 use super::check::{Check, listed};
+use super::fluorescing;
 use super::json::short;
-use super::kindled;
 use super::known::MaterialSpectra;
-use super::lamps::{Lamp, Lamps, bearable};
+use super::lamp_spectra::{LampSpectra, ScaledSpectrum, bearable};
 use super::luminaires::ProfileWish;
 use super::mirror;
 use super::pane;
@@ -28,13 +28,13 @@ const METALLIC: f32 = 0.5;
 
 /// What the warnings name materials for.
 #[derive(Default)]
-struct Said {
+struct MaterialNotes {
     metals: Vec<String>,
     metals_by_texture: Vec<String>,
     unlit: Vec<String>,
-    panes: pane::Said,
-    sheets: sheets::Said,
-    mirrors: mirror::Said,
+    panes: pane::PaneNotes,
+    sheets: sheets::SheetNotes,
+    mirrors: mirror::MirrorNotes,
     bright: Vec<String>,
 }
 
@@ -51,10 +51,10 @@ pub(crate) fn materials(
     room: &Path,
     grid: &Grid,
     upsampler: &Upsampler,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> (Vec<Material>, Vec<Option<ProfileWish>>) {
-    let mut said = Said::default();
+    let mut said = MaterialNotes::default();
     let made = raw
         .iter()
         .zip(tinted)
@@ -96,7 +96,7 @@ pub(crate) fn materials(
             if let Some(wish) = &spectra.fluorescence {
                 let measured = spectra.reflectance.as_ref().map(|r| r.from.as_str());
                 let excited = &mut lamps.excited;
-                kindled::kindle(&mut material, wish, measured, &place, grid, excited, check);
+                fluorescing::fluoresce(&mut material, wish, measured, &place, grid, excited, check);
             }
             if material.pane.is_none() {
                 // A factor of 1 under a texture or vertex colours is the rule and says nothing of the albedo.
@@ -157,7 +157,7 @@ fn paint(
     let [r, g, b, alpha] = raw.base_color_factor;
     let base_color = [r, g, b].map(|c| c.min(1.0));
     let (reflectance, from) = match measured {
-        Some(measured) => (measured.leaves, measured.from.clone()),
+        Some(measured) => (measured.spectrum, measured.from.clone()),
         None => (
             upsampler.reflectance(base_color),
             format!("colour {r:.3} {g:.3} {b:.3}, upsampled"),
@@ -205,11 +205,11 @@ fn emission(
     raw: &RawMaterial,
     spectra: &MaterialSpectra,
     place: &str,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> Option<Emission> {
     let nits = f64::from(raw.emissive_strength) * lamps.luminance(raw.emissive_factor);
-    let lamp: Lamp = match &spectra.emission {
+    let lamp: ScaledSpectrum = match &spectra.emission {
         Some((spectrum, luminance)) => {
             let size = match luminance {
                 Some(luminance) => Some(*luminance),
@@ -257,7 +257,7 @@ fn shining(
     wish: &ProfileWish,
     spectrum: Option<&(Sampled, Option<f64>)>,
     place: &str,
-    lamps: &mut Lamps,
+    lamps: &mut LampSpectra,
     check: &mut Check,
 ) -> Option<Emission> {
     if spectrum.is_some_and(|(_, luminance)| luminance.is_some()) {
@@ -294,7 +294,7 @@ fn shining(
     })
 }
 
-impl Said {
+impl MaterialNotes {
     fn hear(&mut self, raw: &RawMaterial, name: &str, bright: bool, is_mirror: bool) {
         if bright {
             self.bright.push(name.into());
@@ -344,7 +344,7 @@ impl Said {
 mod tests {
     use super::*;
     use crate::color::{KM, Observer};
-    use crate::data::LEAVES;
+    use crate::data::BANDS;
     use crate::scene::LightSpectrum;
     use serde_json::json;
 
@@ -362,7 +362,7 @@ mod tests {
     fn made(raw: &[RawMaterial]) -> (Vec<Material>, Vec<LightSpectrum>, Vec<String>, Vec<String>) {
         let grid = Grid::default();
         let upsampler = Upsampler::new(&grid);
-        let mut lamps = Lamps::new(&grid, &upsampler);
+        let mut lamps = LampSpectra::new(&grid, &upsampler);
         let mut check = Check::new("room.glb");
         let room = Path::new("room.glb");
         let file = SpectraFile::default();
@@ -391,7 +391,7 @@ mod tests {
     fn luminance(material: &Material, spectra: &[LightSpectrum]) -> f64 {
         let y = Observer::cie1931().weights(&Grid::default())[1];
         let emission = material.emission.as_ref().unwrap();
-        (0..LEAVES)
+        (0..BANDS)
             .map(|i| KM * spectra[emission.light].power[i] * emission.shape[i] * y[i])
             .sum()
     }
@@ -400,8 +400,8 @@ mod tests {
     fn greys_are_flat_and_white_is_brought_down() {
         let (materials, _, problems, warnings) =
             made(&[raw("grey", [0.5; 3]), raw("white", [1.0; 3])]);
-        assert_eq!(materials[0].reflectance, [0.5; LEAVES]);
-        assert_eq!(materials[1].reflectance, [GREATEST_ALBEDO; LEAVES]);
+        assert_eq!(materials[0].reflectance, [0.5; BANDS]);
+        assert_eq!(materials[1].reflectance, [GREATEST_ALBEDO; BANDS]);
         assert_eq!(problems, Vec::<String>::new());
         assert_eq!(warnings.len(), 1);
         assert!(warnings[0].contains("0.999 ('white')"), "{warnings:?}");
@@ -459,7 +459,7 @@ mod tests {
         ];
         let grid = Grid::default();
         let upsampler = Upsampler::new(&grid);
-        let mut lamps = Lamps::new(&grid, &upsampler);
+        let mut lamps = LampSpectra::new(&grid, &upsampler);
         let mut check = Check::new("room.glb");
         let room = folder.path().join("room.glb");
         let file = SpectraFile::default();
@@ -479,8 +479,8 @@ mod tests {
         assert!((luminance(&made[0], &spectra) - 5000.0).abs() < 1e-6);
         // The integral of y_bar is 106.857 nm, less than 0.01 nm of it beyond 380 to 780 nm.
         assert!((luminance(&made[1], &spectra) - 683.0 * 106.857 * 0.01).abs() < 0.1);
-        let leaf = Grid::default().leaf_of(555.0).unwrap();
-        let radiance = spectra[1].power[leaf] * made[1].emission.as_ref().unwrap().shape[leaf];
+        let band = Grid::default().band_of(555.0).unwrap();
+        let radiance = spectra[1].power[band] * made[1].emission.as_ref().unwrap().shape[band];
         assert!((radiance - 0.01).abs() < 1e-12);
         assert!((luminance(&made[2], &spectra) - 70.0).abs() < 1e-9);
         assert!((luminance(&made[3], &spectra) - 300.0).abs() < 1e-9);

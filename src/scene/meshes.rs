@@ -58,7 +58,7 @@ pub struct PointLamp {
 
 /// Triangles of one paint.
 #[derive(Debug, Clone, PartialEq)]
-struct Mesh {
+struct PaintedMesh {
     name: String,
     positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
@@ -88,7 +88,7 @@ struct Mesh {
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Meshes {
-    meshes: Vec<Mesh>,
+    meshes: Vec<PaintedMesh>,
     paints: Vec<Paint>,
     lamps: Vec<PointLamp>,
 }
@@ -109,7 +109,7 @@ impl Meshes {
         triangles: &[[u32; 3]],
         paint: usize,
     ) {
-        self.meshes.push(Mesh {
+        self.meshes.push(PaintedMesh {
             name: name.into(),
             positions: positions.into(),
             triangles: triangles.into(),

@@ -14,7 +14,7 @@ use super::json::short;
 use super::raw::RawMaterial;
 use super::{GREATEST_ALBEDO, Image};
 use crate::color::encode;
-use crate::data::Leaves;
+use crate::data::Spectrum;
 
 /// Metallic from here on a texel is a metal: it may have been through JPEG.
 const METAL_TEXEL: f64 = 0.95;
@@ -49,7 +49,7 @@ fn is_metal_everywhere(raw: &RawMaterial, images: &[Image]) -> bool {
 #[derive(Debug, Clone)]
 pub struct Mirror {
     /// Reflectance at normal incidence, in [0, 0.999].
-    pub reflectance: Leaves,
+    pub reflectance: Spectrum,
     /// What makes it a mirror, for `inspect`.
     pub from: String,
 }
@@ -62,7 +62,7 @@ impl Mirror {
     }
 
     /// What of diffuse light is reflected: the mean of [`reflects`](Self::reflects) over the cosine, `2 int F cos dcos`.
-    pub fn overall(&self) -> Leaves {
+    pub fn overall(&self) -> Spectrum {
         let mean = |r: f64| r + (1.0 - r) / 21.0;
         self.reflectance.map(|r| mean(r).min(GREATEST_ALBEDO))
     }
@@ -75,14 +75,14 @@ impl Mirror {
 
 /// What is said once about all mirrors.
 #[derive(Default)]
-pub(super) struct Said {
+pub(super) struct MirrorNotes {
     mirrors: Vec<String>,
     other: Vec<String>,
     glowing: Vec<String>,
     textured: Vec<String>,
 }
 
-impl Said {
+impl MirrorNotes {
     /// The mirror that a material of a reflectance is, if it is one. `wanted`: what the side file says; does it let light through, does
     /// it emit?
     pub(super) fn mirror(
@@ -90,7 +90,7 @@ impl Said {
         (raw, name): (&RawMaterial, &str),
         wanted: Option<bool>,
         [passes, emits]: [bool; 2],
-        reflectance: &Leaves,
+        reflectance: &Spectrum,
         images: &[Image],
     ) -> Option<Mirror> {
         let rough = raw.roughness.unwrap_or(1.0);
@@ -150,14 +150,14 @@ impl Said {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::LEAVES;
+    use crate::data::BANDS;
 
     /// By plain quadrature.
     #[test]
     fn diffuse_light_is_reflected_by_the_mean_over_angles() {
         for normal in [0.0, 0.04, 0.5, 0.9] {
             let mirror = Mirror {
-                reflectance: [normal; LEAVES],
+                reflectance: [normal; BANDS],
                 from: String::new(),
             };
             let n = 10_000;

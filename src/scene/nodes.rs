@@ -14,7 +14,7 @@ const AGAIN: &str = "mend the node hierarchy and export again";
 
 /// A node of the scene.
 #[derive(Debug, Clone)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedNode {
     /// Index in the document.
     pub(crate) node: usize,
     /// Node to world.
@@ -22,7 +22,7 @@ pub(crate) struct Placed {
 }
 
 /// The nodes of the document's scene, parents before children, in the order of the file.
-pub(crate) fn walk(json: &Value, check: &mut Check) -> Vec<Placed> {
+pub(crate) fn walk(json: &Value, check: &mut Check) -> Vec<PlacedNode> {
     let count = json::len(json, "nodes");
     let mut seen = vec![false; count];
     let mut stack: Vec<(usize, DMat4, Option<usize>)> = Vec::new();
@@ -47,7 +47,7 @@ pub(crate) fn walk(json: &Value, check: &mut Check) -> Vec<Placed> {
             check.problem(&item.place, "has a transform that is not finite", AGAIN);
             continue;
         }
-        placed.push(Placed { node, to_world });
+        placed.push(PlacedNode { node, to_world });
         let children = item.read::<Node>(check).and_then(|node| node.children);
         for child in children.into_iter().flatten().rev() {
             stack.push((child.value(), to_world, Some(node)));
@@ -163,7 +163,7 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn walked(json: &Value) -> (Vec<Placed>, Vec<String>, Vec<String>) {
+    fn walked(json: &Value) -> (Vec<PlacedNode>, Vec<String>, Vec<String>) {
         let mut check = Check::new("f");
         let placed = walk(json, &mut check);
         let (problems, warnings) = check.into_parts();
@@ -174,7 +174,7 @@ mod tests {
         )
     }
 
-    fn order(placed: &[Placed]) -> Vec<usize> {
+    fn order(placed: &[PlacedNode]) -> Vec<usize> {
         placed.iter().map(|p| p.node).collect()
     }
 

@@ -15,7 +15,7 @@ use super::raw::{AlphaMode, METAL, RawMaterial, RawVolume};
 use super::reader::Sampled;
 use super::{Image, Surface, Texture};
 use crate::color::Upsampler;
-use crate::data::{LEAVES, Leaves};
+use crate::data::{BANDS, Spectrum};
 
 /// Materials that let through less than this, by KHR_materials_transmission, are taken as opaque: most of what they do with
 /// light is to scatter it.
@@ -45,7 +45,7 @@ pub enum PaneKind {
         /// Refractive index, at least 1.
         ior: f64,
         /// What its inside lets through over the unit of its thickness, in [0, 1].
-        inside: Leaves,
+        inside: Spectrum,
         /// What thicknesses are counted in, in the file's units; none: the pane as it stands is one.
         unit: Option<f64>,
         /// Thickness of a lone face, in units.
@@ -58,13 +58,13 @@ pub enum PaneKind {
         /// Share that is covered.
         alpha: f64,
         /// What the paint lets through where it covers once, in [0, 1].
-        colour: Leaves,
+        colour: Spectrum,
     },
 }
 
 impl Pane {
     /// What the inside of a pane lets through over a unit of thickness, or its paint: the spectrum that [`Pane::passing`] takes.
-    pub fn spectrum(&self) -> &Leaves {
+    pub fn spectrum(&self) -> &Spectrum {
         match &self.kind {
             PaneKind::Glass { inside, .. } => inside,
             PaneKind::Cover { colour, .. } => colour,
@@ -105,8 +105,8 @@ impl Pane {
         }
     }
 
-    /// Transmittance by leaf at normal incidence of the pane as it stands.
-    pub fn normal(&self) -> Leaves {
+    /// Transmittance by band at normal incidence of the pane as it stands.
+    pub fn normal(&self) -> Spectrum {
         let thickness = match self.kind {
             PaneKind::Glass { thickness, .. } => thickness,
             PaneKind::Cover { .. } => 1.0,
@@ -212,7 +212,7 @@ pub(super) fn blended(
 
 /// What is said once about all panes.
 #[derive(Default)]
-pub(super) struct Said {
+pub(super) struct PaneNotes {
     blended: Vec<String>,
     rough: Vec<String>,
     weak: Vec<String>,
@@ -222,7 +222,7 @@ pub(super) struct Said {
     coloured: Vec<String>,
 }
 
-impl Said {
+impl PaneNotes {
     /// The pane that a material is, if it is one. `metallic`: the share of it that is a metal.
     #[expect(
         clippy::too_many_arguments,
@@ -261,7 +261,7 @@ impl Said {
         let [r, g, b, alpha] = raw.base_color_factor;
         let tint = upsampler.reflectance([r, g, b].map(|c| c.min(1.0)));
         if let Some(measured) = measured {
-            let most = measured.leaves.iter().copied().fold(0.0, f64::max);
+            let most = measured.spectrum.iter().copied().fold(0.0, f64::max);
             let usual = ior;
             let ior = index_for(most, usual);
             if ior < usual {
@@ -274,7 +274,7 @@ impl Said {
             return Some(Pane {
                 kind: PaneKind::Glass {
                     ior,
-                    inside: measured.leaves.map(|t| inside_of(t, ior)),
+                    inside: measured.spectrum.map(|t| inside_of(t, ior)),
                     unit: None,
                     thickness: 1.0,
                     share: 1.0,
@@ -365,7 +365,13 @@ fn index(raw: &RawMaterial, place: &str, check: &mut Check) -> f64 {
 }
 
 /// Glass by KHR_materials_transmission and KHR_materials_volume. The base colour tints once, the volume by the way.
-fn glass_of(raw: &RawMaterial, share: f64, ior: f64, tint: Leaves, upsampler: &Upsampler) -> Pane {
+fn glass_of(
+    raw: &RawMaterial,
+    share: f64,
+    ior: f64,
+    tint: Spectrum,
+    upsampler: &Upsampler,
+) -> Pane {
     let (mut inside, mut unit, mut thickness) = (tint, None, 1.0);
     let mut from = format!("transmission {share:.3}, index {ior:.3}");
     if let Some(volume) = raw.volume.filter(|v| v.thickness > 0.0) {
@@ -373,7 +379,7 @@ fn glass_of(raw: &RawMaterial, share: f64, ior: f64, tint: Leaves, upsampler: &U
         let distance = volume.distance.unwrap_or(1.0);
         inside = match volume.distance {
             Some(_) => upsampler.reflectance(volume.colour),
-            None => [1.0; LEAVES],
+            None => [1.0; BANDS],
         };
         // Both tints are one spectrum where the volume is plain.
         let plain = inside.iter().all(|x| *x == 1.0);
@@ -460,13 +466,13 @@ mod tests {
         let pane = |alpha: f64| Pane {
             kind: PaneKind::Cover {
                 alpha,
-                colour: [0.2; LEAVES],
+                colour: [0.2; BANDS],
             },
             texture: None,
             from: String::new(),
         };
-        assert_eq!(pane(0.0).normal(), [1.0; LEAVES]);
-        assert_eq!(pane(1.0).normal(), [0.0; LEAVES]);
+        assert_eq!(pane(0.0).normal(), [1.0; BANDS]);
+        assert_eq!(pane(1.0).normal(), [0.0; BANDS]);
         assert!((pane(0.5).passing(0.3, 1.0, 1.0)(0.2) - 0.5 * 0.6).abs() < 1e-12);
         assert!((pane(0.5).passing(0.3, 1.0, 0.5)(0.2) - 0.75 * 0.8).abs() < 1e-12);
     }
@@ -482,7 +488,7 @@ mod tests {
     ) -> (Option<Pane>, String, String) {
         let of_file = transmittance.map(|share| Sampled {
             from: share.to_string(),
-            leaves: [share; LEAVES],
+            spectrum: [share; BANDS],
             is_csv: false,
         });
         let mut raw = RawMaterial {
@@ -494,7 +500,7 @@ mod tests {
         };
         change(&mut raw);
         let upsampler = Upsampler::new(&crate::data::Grid::default());
-        let (mut said, mut check) = (Said::default(), Check::new("room.glb"));
+        let (mut said, mut check) = (PaneNotes::default(), Check::new("room.glb"));
         let place = "material 'glass'";
         let (of, of_file) = ((&raw, f64::from(raw.metallic)), of_file.as_ref());
         let pane = said.pane(of, "glass", of_file, false, place, &upsampler, &mut check);

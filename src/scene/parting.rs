@@ -3,7 +3,7 @@
 use super::check::{Check, Unknown};
 use super::fluorescence::Term;
 use super::json::short;
-use super::layers::{Layers, MOST_LAYERS, Wish};
+use super::layers::{LayerWish, Layers, MOST_LAYERS};
 use super::sky::LIT_GROUND;
 use super::{LightKind, LightSpectrum, PunctualLight, Scene, Surface};
 use crate::data::nearest_of;
@@ -79,7 +79,7 @@ fn names_of_light<'a>(
 
 /// Says which names of wished layers mean no lamp.
 pub(super) fn check_names(
-    wishes: &[Wish],
+    wishes: &[LayerWish],
     json: &Value,
     (surfaces, lights): (&[Surface], &[PunctualLight]),
     materials: &[super::Material],
@@ -136,7 +136,7 @@ pub(super) fn check_names(
 
 /// Layers and spectra as they are found.
 struct Split<'a> {
-    wishes: &'a [Wish],
+    wishes: &'a [LayerWish],
     names: Vec<String>,
     /// Layer and spectrum of each new spectrum.
     pairs: Vec<(usize, usize)>,
@@ -145,7 +145,7 @@ struct Split<'a> {
 impl Split<'_> {
     /// The spectrum of a lamp that goes by some names and has had the spectrum `light`.
     fn light(&mut self, names: &[&str], light: usize) -> usize {
-        let has = |(_, lamps): &&Wish| lamps.iter().any(|lamp| names.contains(&lamp.as_str()));
+        let has = |(_, lamps): &&LayerWish| lamps.iter().any(|lamp| names.contains(&lamp.as_str()));
         let wished = self.wishes.iter().find(has).map(|(name, _)| name.as_str());
         let name = wished.unwrap_or(names[0]);
         let layer = self.names.iter().position(|n| n == name);

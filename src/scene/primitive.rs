@@ -208,7 +208,7 @@ fn draco(
         check.problem(&item.place, what, "export without this compression");
         return Err(Reported);
     }
-    let Packed { buffer_view } = item.extension(compression::DRACO, check).ok_or(Reported)?;
+    let DracoView { buffer_view } = item.extension(compression::DRACO, check).ok_or(Reported)?;
     let place = format!("{}, {}", item.place, compression::DRACO);
     let span = accessors.views.view(buffer_view.value(), &place, check);
     let span = span.ok_or(Reported)?;
@@ -234,7 +234,7 @@ fn draco(
 /// Where KHR_draco_mesh_compression has its bytes; the rest of it is the decoder's.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Packed {
+struct DracoView {
     buffer_view: Index<View>,
 }
 

@@ -8,7 +8,7 @@ use crate::scene::Texture;
 use crate::scene::check::Check;
 use crate::scene::json::{self, Item, double};
 use crate::scene::luminaires::{IesNode, ies_node};
-use crate::scene::nodes::Placed;
+use crate::scene::nodes::PlacedNode;
 use crate::scene::texture_info::Slots;
 use glam::DMat4;
 use gltf::json::extensions::material::{
@@ -395,7 +395,7 @@ fn weight(value: &Value) -> usize {
 }
 
 /// The punctual lights at the nodes of the scene.
-pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<RawLight> {
+pub(crate) fn lights(json: &Value, placed: &[PlacedNode], check: &mut Check) -> Vec<RawLight> {
     const NAME: &str = "KHR_lights_punctual";
     let table = json.get("extensions").and_then(|e| e.get(NAME));
     let nothing = Value::Null;
@@ -432,7 +432,7 @@ pub(crate) fn lights(json: &Value, placed: &[Placed], check: &mut Check) -> Vec<
 }
 
 /// A light that only EXT_lights_ies describes.
-fn measured(ies: IesNode, node: &Item<'_>, placed: &Placed) -> RawLight {
+fn measured(ies: IesNode, node: &Item<'_>, placed: &PlacedNode) -> RawLight {
     let name = if ies.name.is_empty() {
         node.name()
     } else {
@@ -453,7 +453,12 @@ fn measured(ies: IesNode, node: &Item<'_>, placed: &Placed) -> RawLight {
     }
 }
 
-fn light(item: &Item<'_>, node: &Item<'_>, placed: &Placed, check: &mut Check) -> Option<RawLight> {
+fn light(
+    item: &Item<'_>,
+    node: &Item<'_>,
+    placed: &PlacedNode,
+    check: &mut Check,
+) -> Option<RawLight> {
     let given = item.read::<Light>(check)?;
     let kind = match given.type_ {
         Valid(Type::Point) => RawLightKind::Point,

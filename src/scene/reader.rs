@@ -5,7 +5,9 @@ use super::json::short;
 use super::said;
 use super::uri;
 use crate::color::Observer;
-use crate::data::{Grid, Kind, LEAVES, Leaves, Named, Outside, Table, named, nearest, nearest_of};
+use crate::data::{
+    BANDS, Grid, Named, Outside, Spectrum, Table, TableKind, named, nearest, nearest_of,
+};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
@@ -21,7 +23,7 @@ pub(crate) struct Sampled {
     /// `cie/F2` or the CSV's path as written.
     pub(crate) from: String,
     /// Band means.
-    pub(crate) leaves: Leaves,
+    pub(crate) spectrum: Spectrum,
     /// Values of a CSV carry a unit; those of the registry are relative.
     pub(crate) is_csv: bool,
 }
@@ -39,7 +41,7 @@ impl Reader<'_> {
     pub(super) fn table(
         &mut self,
         object: &Map<String, Value>,
-        kind: Kind,
+        kind: TableKind,
         place: &str,
     ) -> Option<(Table, String)> {
         let (table, from, _) = self.given(object, kind, place)?;
@@ -51,7 +53,7 @@ impl Reader<'_> {
     fn given(
         &mut self,
         object: &Map<String, Value>,
-        kind: Kind,
+        kind: TableKind,
         place: &str,
     ) -> Option<(Table, String, bool)> {
         let text = |key: &str| object.get(key).map(|v| v.as_str().map(str::to_owned));
@@ -68,8 +70,9 @@ impl Reader<'_> {
     }
 
     /// Reflectances are shares, not percent; what is none is said.
-    fn is_share(&mut self, table: &Table, kind: Kind, from: &str, place: &str) -> bool {
-        let wrong = kind == Kind::Reflectance && table.values().iter().any(|v| *v > NOT_A_FRACTION);
+    fn is_share(&mut self, table: &Table, kind: TableKind, from: &str, place: &str) -> bool {
+        let wrong =
+            kind == TableKind::Reflectance && table.values().iter().any(|v| *v > NOT_A_FRACTION);
         if wrong {
             let what = format!("'{from}' holds reflectances above {NOT_A_FRACTION}");
             self.check.problem(
@@ -85,19 +88,19 @@ impl Reader<'_> {
     pub(super) fn sampled(
         &mut self,
         object: &Map<String, Value>,
-        kind: Kind,
+        kind: TableKind,
         place: &str,
     ) -> Option<Sampled> {
         let outside = match kind {
-            Kind::Reflectance => Outside::Hold,
-            Kind::Illuminant => Outside::Zero,
+            TableKind::Reflectance => Outside::Hold,
+            TableKind::Illuminant => Outside::Zero,
         };
         let (table, from, is_csv) = self.given(object, kind, place)?;
         if !self.is_share(&table, kind, &from, place) {
             return None;
         }
-        let leaves = self.grid.means(&table, outside);
-        if kind == Kind::Illuminant && leaves.iter().all(|v| *v == 0.0) {
+        let spectrum = self.grid.means(&table, outside);
+        if kind == TableKind::Illuminant && spectrum.iter().all(|v| *v == 0.0) {
             let (start, end) = (self.grid.start(), self.grid.end());
             let what = format!("'{from}' gives no light from {start} to {end} nm");
             self.check.problem(
@@ -108,8 +111,8 @@ impl Reader<'_> {
             return None;
         }
         let luminous = || Observer::cie1931().weights(self.grid)[1];
-        let seen = |y: Leaves| leaves.iter().zip(y).any(|(x, y)| x * y > 0.0);
-        if kind == Kind::Illuminant && !seen(luminous()) {
+        let seen = |y: Spectrum| spectrum.iter().zip(y).any(|(x, y)| x * y > 0.0);
+        if kind == TableKind::Illuminant && !seen(luminous()) {
             let what = format!("'{from}' gives no light that an eye sees");
             let next = "lamps are measured by what is seen of them: give the trace of visible light that it has";
             self.check.problem(place, what, next);
@@ -118,7 +121,7 @@ impl Reader<'_> {
         self.note_ultraviolet(&table, kind, &from);
         Some(Sampled {
             from,
-            leaves,
+            spectrum,
             is_csv,
         })
     }
@@ -128,7 +131,7 @@ impl Reader<'_> {
         let Some(plain) = value.as_f64() else {
             let object = self.object(value, place)?;
             self.keys(object, &["name", "csv"], place);
-            return self.sampled(object, Kind::Reflectance, place);
+            return self.sampled(object, TableKind::Reflectance, place);
         };
         if !(0.0..=1.0).contains(&plain) {
             self.goes_beyond(&plain.to_string(), place);
@@ -136,7 +139,7 @@ impl Reader<'_> {
         }
         Some(Sampled {
             from: plain.to_string(),
-            leaves: [plain; LEAVES],
+            spectrum: [plain; BANDS],
             is_csv: false,
         })
     }
@@ -149,12 +152,12 @@ impl Reader<'_> {
     }
 
     /// Says where a spectrum has no data in the ultraviolet that is asked for.
-    fn note_ultraviolet(&mut self, table: &Table, kind: Kind, from: &str) {
+    fn note_ultraviolet(&mut self, table: &Table, kind: TableKind, from: &str) {
         let (start, first) = (self.grid.start(), table.range()[0]);
         if start < VISIBLE_NM && first > start {
             let taken = match kind {
-                Kind::Reflectance => "held at its first value",
-                Kind::Illuminant => "taken as 0",
+                TableKind::Reflectance => "held at its first value",
+                TableKind::Illuminant => "taken as 0",
             };
             let from = short(from);
             self.check.warn(format!(
@@ -193,13 +196,13 @@ impl Reader<'_> {
         }
     }
 
-    fn named(&mut self, name: &str, kind: Kind, place: &str) -> Option<Table> {
+    fn named(&mut self, name: &str, kind: TableKind, place: &str) -> Option<Table> {
         match named(name) {
             Some(Named { table, kind: found }) if found == kind => Some(table),
             Some(_) => {
                 let (is, wanted) = match kind {
-                    Kind::Reflectance => ("the light of a lamp", "a reflectance"),
-                    Kind::Illuminant => ("a reflectance", "the light of a lamp"),
+                    TableKind::Reflectance => ("the light of a lamp", "a reflectance"),
+                    TableKind::Illuminant => ("a reflectance", "the light of a lamp"),
                 };
                 let what = format!("'{name}' is {is}, not {wanted}");
                 self.check.problem(place, what, format!("name {wanted}"));

@@ -1,6 +1,6 @@
 //! A room in memory.
 
-use super::layers::{Layers, Wish};
+use super::layers::{LayerWish, Layers};
 use super::sky::Sky;
 use super::{Camera, Image, LightSpectrum, Material, PunctualLight, Source, Surface};
 use crate::data::Grid;
@@ -48,7 +48,7 @@ pub struct Changes {
     /// The lamps in groups, if they were parted.
     pub layers: Option<Layers>,
     /// Which groups the side file asks for.
-    pub(crate) layers_wished: Vec<Wish>,
+    pub(crate) layers_wished: Vec<LayerWish>,
 }
 
 impl Default for Changes {

@@ -1,22 +1,22 @@
 //! Diffuse sheets: curtains, paper, lamp shades and opal covers, which reflect a part of the light that meets them evenly to all sides,
 //! and send another part evenly out of their other side.
 //!
-//! `exitance(front) = rho_front E(front) + tau E(back)`, and the same with front and back exchanged, leaf by leaf. What makes a
+//! `exitance(front) = rho_front E(front) + tau E(back)`, and the same with front and back exchanged, band by band. What makes a
 //! material a sheet is KHR_materials_diffuse_transmission, whose strength f and colour c beside the base colour b mean
 //! `rho = (1 - f) b`, `tau = f c` (the extension's section "Implementation", without its specular layer), or `"transmission"` in a side
 //! file, which is tau itself. A sheet has two sides whatever the file says, and no thickness.
 
 use super::{GREATEST_ALBEDO, Image, Texture};
 use crate::color::Upsampler;
-use crate::data::Leaves;
+use crate::data::Spectrum;
 
 /// What a material lets through, evenly to all sides.
 #[derive(Debug, Clone)]
 pub struct Sheet {
-    /// Share of light that leaves on the other side, on the grid's leaves, where textures are white: tau.
-    pub transmittance: Leaves,
+    /// Share of light that leaves on the other side, on the grid's bands, where textures are white: tau.
+    pub transmittance: Spectrum,
     /// Reflectance of the back, if it is not that of the front.
-    pub back: Option<Leaves>,
+    pub back: Option<Spectrum>,
     /// Share of light that is not reflected but let through, by KHR_materials_diffuse_transmission, in [0, 1].
     pub strength: f64,
     /// Multiplies the strength (alpha channel).
@@ -54,17 +54,17 @@ pub struct SheetMeans {
     /// Base colour, linear; none where it has no texture.
     pub color: Option<[f32; 3]>,
     /// Share of light that leaves on the other side.
-    pub transmittance: Leaves,
+    pub transmittance: Spectrum,
     /// Share of the base colour that is reflected.
     pub left: f64,
     /// What leaves the side that reflects more, of the same light on both sides: reflectance and transmittance together. The light of
     /// both sides is shown by it.
-    pub shown: Leaves,
+    pub shown: Spectrum,
 }
 
 impl Sheet {
     /// Transmittance where textures have these values, each in [0, 0.999].
-    pub fn transmittance_at(&self, weave: Weave, upsampler: &Upsampler) -> Leaves {
+    pub fn transmittance_at(&self, weave: Weave, upsampler: &Upsampler) -> Spectrum {
         let (Some(color), true) = (self.color, weave != Weave::PLAIN) else {
             return self.transmittance;
         };
@@ -107,6 +107,6 @@ impl Sheet {
 
 /// What one side reflects of a sheet whose front reflects `front`, painted or not: no more than the transmittance leaves of
 /// [`GREATEST_ALBEDO`].
-pub(crate) fn bounded(front: Leaves, transmittance: &Leaves) -> Leaves {
+pub(crate) fn bounded(front: Spectrum, transmittance: &Spectrum) -> Spectrum {
     std::array::from_fn(|k| front[k].min(GREATEST_ALBEDO - transmittance[k]).max(0.0))
 }

@@ -10,7 +10,7 @@ use super::known::MaterialSpectra;
 use super::raw::{METAL, RawMaterial};
 use super::sheet::{Sheet, bounded};
 use crate::color::Upsampler;
-use crate::data::{Grid, LEAVES, Leaves};
+use crate::data::{BANDS, Grid, Spectrum};
 
 /// The sheet that a material is, if it is one; what both sides reflect goes into `reflectance`, which holds the whole base colour or
 /// what was measured. `textured`: is the base colour multiplied by a texture or by vertex colours? `metallic`: the share of it that is a
@@ -18,7 +18,7 @@ use crate::data::{Grid, LEAVES, Leaves};
 pub(super) fn sheet(
     (raw, textured, metallic): (&RawMaterial, bool, f64),
     spectra: &MaterialSpectra,
-    reflectance: &mut Leaves,
+    reflectance: &mut Spectrum,
     place: &str,
     grid: &Grid,
     upsampler: &Upsampler,
@@ -45,7 +45,7 @@ pub(super) fn sheet(
         *reflectance = reflectance.map(|r| (1.0 - strength) * r);
     }
     let transmittance = match measured {
-        Some(measured) => measured.leaves,
+        Some(measured) => measured.spectrum,
         None => (upsampler.reflectance(color)).map(|t| strength * t.min(GREATEST_ALBEDO)),
     };
     let back = spectra.back.as_ref();
@@ -57,7 +57,7 @@ pub(super) fn sheet(
         }
     };
     let front = (&*reflectance, spectra.reflectance.as_ref(), "front");
-    let other = back.map(|b| (&b.leaves, Some(b), "back"));
+    let other = back.map(|b| (&b.spectrum, Some(b), "back"));
     // Under a texture or vertex colours a base colour says nothing of the albedo; what they come to is bounded place by place.
     let front = Some(front).filter(|_| spectra.reflectance.is_some() || !textured);
     for (rho, known, side) in [front, other].into_iter().flatten() {
@@ -68,7 +68,7 @@ pub(super) fn sheet(
     let plain = measured.is_none();
     Some(Sheet {
         transmittance: transmittance.map(|t| t.min(GREATEST_ALBEDO)),
-        back: back.map(|back| bounded(back.leaves, &transmittance)),
+        back: back.map(|back| bounded(back.spectrum, &transmittance)),
         strength,
         shares: spectra.reflectance.is_none(),
         strength_texture: given.and_then(|given| given.strength_texture.clone()),
@@ -82,7 +82,7 @@ pub(super) fn sheet(
 
 /// Says where more light would leave a sheet than meets it.
 fn exceeds(
-    [rho, tau]: [&Leaves; 2],
+    [rho, tau]: [&Spectrum; 2],
     [of, through]: [&str; 2],
     side: &str,
     place: &str,
@@ -90,7 +90,7 @@ fn exceeds(
     check: &mut Check,
 ) {
     let sum = |k: usize| rho[k] + tau[k];
-    let over: Vec<usize> = (0..LEAVES).filter(|&k| sum(k) >= 1.0).collect();
+    let over: Vec<usize> = (0..BANDS).filter(|&k| sum(k) >= 1.0).collect();
     let (Some(first), Some(last)) = (over.first(), over.last()) else {
         return;
     };
@@ -107,13 +107,13 @@ fn exceeds(
 
 /// What is said once about all sheets.
 #[derive(Default)]
-pub(super) struct Said {
+pub(super) struct SheetNotes {
     panes: Vec<String>,
     glowing: Vec<String>,
     thick: Vec<String>,
 }
 
-impl Said {
+impl SheetNotes {
     pub(super) fn hear(&mut self, raw: &RawMaterial, name: &str, is_pane: bool, emits: bool) {
         if is_pane {
             self.panes.push(name.into());

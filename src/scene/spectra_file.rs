@@ -30,7 +30,7 @@
 use super::check::{Check, Unknown};
 use super::json::short;
 use super::known::{self, MaterialSpectra};
-use super::layers::Wish;
+use super::layers::LayerWish;
 use super::luminaires::{self, LampWish};
 use super::options::Options;
 use super::reader::Reader;
@@ -50,7 +50,7 @@ pub(crate) struct SpectraFile {
     /// What is said of sky and sun.
     pub(crate) sky: SkyWish,
     /// Which lamps are told apart, see [`layers`](super::layers).
-    pub(crate) layers: Vec<Wish>,
+    pub(crate) layers: Vec<LayerWish>,
 }
 
 impl SpectraFile {
@@ -237,9 +237,9 @@ mod tests {
         let wall = file.materials["wall"].reflectance.as_ref().unwrap();
         let rows = json!({"materials": {"wall": {"reflectance": {"csv": "400,0.2\n700,0.5"}}}});
         let rows = open(&rows, &[]).0.materials["wall"].reflectance.clone();
-        assert_eq!(rows.unwrap().leaves, wall.leaves);
+        assert_eq!(rows.unwrap().spectrum, wall.spectrum);
         // Held beyond its rows.
-        assert!((wall.leaves[0] - 0.2).abs() < 1e-12 && (wall.leaves[63] - 0.5).abs() < 1e-12);
+        assert!((wall.spectrum[0] - 0.2).abs() < 1e-12 && (wall.spectrum[63] - 0.5).abs() < 1e-12);
         assert!(wall.is_csv);
         let (lamp, luminance) = file.materials["lamp"].emission.as_ref().unwrap();
         assert_eq!(
@@ -270,7 +270,7 @@ mod tests {
             ];
             let given: Vec<_> = all.into_iter().flatten().collect();
             assert_eq!(given.len(), 1, "{key}");
-            assert_eq!(given[0].leaves, [0.25; 64]);
+            assert_eq!(given[0].spectrum, [0.25; 64]);
             for number in [1.5, -0.1] {
                 let said = of(number).1.join("\n");
                 let text = format!("material 'wall', {key}: '{number}' goes beyond 0 to 1");

@@ -30,7 +30,7 @@ pub(super) fn read(
 pub(super) fn share(reader: &mut Reader, value: &Value, key: &str, place: &str) -> Option<Sampled> {
     let place = format!("{place}, {key}");
     let sampled = reader.share(value, &place)?;
-    if !sampled.leaves.iter().all(|t| (0.0..=1.0).contains(t)) {
+    if !sampled.spectrum.iter().all(|t| (0.0..=1.0).contains(t)) {
         reader.goes_beyond(&sampled.from, &place);
         return None;
     }
@@ -43,7 +43,7 @@ mod tests {
     use super::super::check::Check;
     use super::super::spectra_file::SpectraFile;
     use super::*;
-    use crate::data::{Grid, LEAVES};
+    use crate::data::{BANDS, Grid};
     use serde_json::json;
 
     /// What a side file with this entry comes to, and its problems.
@@ -66,7 +66,7 @@ mod tests {
     fn panes_let_through_from_nothing_to_all() {
         let (glass, problems) = of(&json!({"transmittance": 0.8}));
         assert_eq!(problems, Vec::<String>::new());
-        assert_eq!(glass.unwrap().leaves, [0.8; LEAVES]);
+        assert_eq!(glass.unwrap().spectrum, [0.8; BANDS]);
         for (wall, text) in [
             (
                 json!({"transmittance": 1.5}),

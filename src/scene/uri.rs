@@ -13,7 +13,7 @@ const SHOWN: usize = 80;
 
 /// Where the bytes of a URI are.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum UriTarget {
     /// In the URI itself; decoded.
     Here(Vec<u8>),
     /// In a file of the document's folder; two URIs of one file give the same path.
@@ -21,20 +21,20 @@ pub(crate) enum Place {
 }
 
 /// Follows a URI, or says in one sentence why not.
-pub(crate) fn locate(folder: &Path, uri: &str) -> Result<Place, String> {
+pub(crate) fn locate(folder: &Path, uri: &str) -> Result<UriTarget, String> {
     if has_prefix(uri, "data:") {
         return data(uri)
-            .map(Place::Here)
+            .map(UriTarget::Here)
             .map_err(|e| format!("the data URI {e}"));
     }
-    resolve(folder, uri).map(Place::File)
+    resolve(folder, uri).map(UriTarget::File)
 }
 
 /// The bytes behind a URI, or one sentence on why not.
 pub(crate) fn read(folder: &Path, uri: &str) -> Result<Vec<u8>, String> {
     match locate(folder, uri)? {
-        Place::Here(bytes) => Ok(bytes),
-        Place::File(path) => read_file(&path).map_err(|e| format!("'{}' {e}", shown(uri))),
+        UriTarget::Here(bytes) => Ok(bytes),
+        UriTarget::File(path) => read_file(&path).map_err(|e| format!("'{}' {e}", shown(uri))),
     }
 }
 

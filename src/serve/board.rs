@@ -3,7 +3,7 @@
 //! There is one state, which is replaced as a whole; a waiter is told that there is a newer one than it knows. So nothing piles
 //! up for those who are slow.
 
-use super::picture::Picture;
+use super::picture::LitMesh;
 use serde::Serialize;
 use serde_json::Value;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -84,9 +84,9 @@ pub(super) struct State {
 }
 
 #[derive(Debug)]
-struct Held {
+struct BoardContents {
     state: State,
-    picture: Option<Arc<Picture>>,
+    picture: Option<Arc<LitMesh>>,
     /// What the page is told of the room.
     room: Option<Arc<str>>,
     over: bool,
@@ -95,14 +95,14 @@ struct Held {
 /// The board.
 #[derive(Debug)]
 pub(super) struct Board {
-    held: Mutex<Held>,
+    held: Mutex<BoardContents>,
     news: Condvar,
 }
 
 impl Board {
     pub(super) fn new(asked_de2000: f64) -> Self {
         Self {
-            held: Mutex::new(Held {
+            held: Mutex::new(BoardContents {
                 state: State {
                     number: 1,
                     doing: Doing::Preparing,
@@ -127,12 +127,12 @@ impl Board {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Held> {
+    fn lock(&self) -> MutexGuard<'_, BoardContents> {
         // Nobody panics while holding it; and what is there is whole.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn tell(&self, mut held: MutexGuard<Held>) {
+    fn tell(&self, mut held: MutexGuard<BoardContents>) {
         held.state.number += 1;
         self.news.notify_all();
     }
@@ -145,7 +145,7 @@ impl Board {
     }
 
     /// Shows a picture, and changes the state with it.
-    pub(super) fn show(&self, picture: Picture, change: impl FnOnce(&mut State)) {
+    pub(super) fn show(&self, picture: LitMesh, change: impl FnOnce(&mut State)) {
         let mut held = self.lock();
         held.state.picture = Some(picture.numbers());
         held.picture = Some(Arc::new(picture));
@@ -164,7 +164,7 @@ impl Board {
     }
 
     /// The picture, once there is one.
-    pub(super) fn picture(&self) -> Option<Arc<Picture>> {
+    pub(super) fn picture(&self) -> Option<Arc<LitMesh>> {
         self.lock().picture.clone()
     }
 

@@ -21,14 +21,14 @@ const MOST: f64 = 1000.0;
 
 /// Reads a room with changes.
 #[derive(Debug)]
-pub(super) struct Reader {
+pub(super) struct RoomReader {
     path: std::path::PathBuf,
     options: Options,
     /// Surfaces whose faces were turned.
     flipped: BTreeSet<usize>,
 }
 
-impl Reader {
+impl RoomReader {
     /// Reads a room again as `scene` was read.
     pub(super) fn new(options: Options, scene: &Scene) -> Self {
         Self {
@@ -133,7 +133,7 @@ fn unknown(place: String, name: &str, known: Vec<String>) -> Problem {
 }
 
 /// A lamp that shines and was dark when the room was solved: nobody looked for its shadows.
-pub(super) fn kindled(before: &Scene, now: &Scene) -> Option<String> {
+pub(super) fn newly_emitting(before: &Scene, now: &Scene) -> Option<String> {
     let shines = |shape: &[f64]| shape.iter().any(|&x| x > 0.0);
     let materials = |scene: &Scene| -> Vec<bool> {
         let emissions = scene.materials.iter().map(|m| m.emission.as_ref());

@@ -5,7 +5,7 @@
 //! to come from this one, and all need the token. The browser is opened with a ticket that is good once, in place of the token:
 //! command lines are seen by all users of a machine.
 
-use super::http::{Answer, Request};
+use super::http::{Request, Response};
 use crate::error::{Error, Result};
 use std::sync::{Mutex, PoisonError};
 
@@ -53,8 +53,8 @@ impl Guard {
     }
 
     /// Lets a request in, or says why not; the answer may also be the way from a ticket to the page.
-    pub(super) fn check(&self, request: &Request) -> std::result::Result<(), Answer> {
-        let forbidden = |what| Err(Answer::refusal(403, what));
+    pub(super) fn check(&self, request: &Request) -> std::result::Result<(), Response> {
+        let forbidden = |what| Err(Response::refusal(403, what));
         let known = |host: &str| self.hosts.iter().any(|own| own.eq_ignore_ascii_case(host));
         if !request.header("host")?.is_some_and(known) {
             return forbidden("this server answers to 127.0.0.1 and localhost only");
@@ -68,7 +68,7 @@ impl Guard {
         {
             let mut held = self.ticket.lock().unwrap_or_else(PoisonError::into_inner);
             if held.take_if(|held| same(held, ticket)).is_some() {
-                let page = Answer::refusal(303, "see there").with("Location", self.page());
+                let page = Response::refusal(303, "see there").with("Location", self.page());
                 return Err(page);
             }
         }

@@ -42,7 +42,7 @@ pub(super) struct Request {
 
 impl Request {
     /// Reads one; the answer to give where it is none.
-    pub(super) fn read(stream: &mut TcpStream) -> Result<Self, Answer> {
+    pub(super) fn read(stream: &mut TcpStream) -> Result<Self, Response> {
         let end = Instant::now() + ASKING;
         let mut bytes = Vec::new();
         let length = loop {
@@ -50,18 +50,24 @@ impl Request {
                 break at;
             }
             if bytes.len() > HEAD {
-                return Err(Answer::refusal(431, "the head of the request is too long"));
+                return Err(Response::refusal(
+                    431,
+                    "the head of the request is too long",
+                ));
             }
             more(stream, end, &mut bytes)?;
         };
         let mut body = bytes.split_off(length + 4);
         if length > HEAD {
-            return Err(Answer::refusal(431, "the head of the request is too long"));
+            return Err(Response::refusal(
+                431,
+                "the head of the request is too long",
+            ));
         }
         let mut request = Self::parse(&bytes[..length])?;
         let size = request.size()?;
         if size > BODY {
-            return Err(Answer::refusal(413, "the body is larger than 1 MiB"));
+            return Err(Response::refusal(413, "the body is larger than 1 MiB"));
         }
         while body.len() < size {
             more(stream, end, &mut body)?;
@@ -71,8 +77,8 @@ impl Request {
         Ok(request)
     }
 
-    pub(super) fn parse(head: &[u8]) -> Result<Self, Answer> {
-        let bad = |what: &str| Answer::refusal(400, what);
+    pub(super) fn parse(head: &[u8]) -> Result<Self, Response> {
+        let bad = |what: &str| Response::refusal(400, what);
         let head = std::str::from_utf8(head).map_err(|_| bad("the head is not text"))?;
         let mut lines = head.split("\r\n");
         let line: Vec<&str> = lines.next().unwrap_or("").split(' ').collect();
@@ -80,7 +86,7 @@ impl Request {
             return Err(bad("the first line is not METHOD TARGET VERSION"));
         };
         if !matches!(version, "HTTP/1.1" | "HTTP/1.0") {
-            return Err(Answer::refusal(505, "HTTP/1.1 is spoken here"));
+            return Err(Response::refusal(505, "HTTP/1.1 is spoken here"));
         }
         if !target.starts_with('/') {
             return Err(bad("the target does not begin with a slash"));
@@ -105,9 +111,9 @@ impl Request {
     }
 
     /// Bytes of the body.
-    fn size(&self) -> Result<usize, Answer> {
+    fn size(&self) -> Result<usize, Response> {
         if self.all("transfer-encoding").next().is_some() {
-            return Err(Answer::refusal(411, "say how long the body is"));
+            return Err(Response::refusal(411, "say how long the body is"));
         }
         let lengths: Vec<&str> = self.all("content-length").collect();
         match lengths[..] {
@@ -116,7 +122,10 @@ impl Request {
                 // More digits than fit are too many bytes.
                 Ok(one.parse().unwrap_or(usize::MAX))
             }
-            _ => Err(Answer::refusal(400, "the length of the body is no number")),
+            _ => Err(Response::refusal(
+                400,
+                "the length of the body is no number",
+            )),
         }
     }
 
@@ -126,12 +135,12 @@ impl Request {
     }
 
     /// A header that may be there once at the most; an error where it is there more often.
-    pub(super) fn header(&self, name: &str) -> Result<Option<&str>, Answer> {
+    pub(super) fn header(&self, name: &str) -> Result<Option<&str>, Response> {
         let mut all = self.all(name);
         let first = all.next();
         match all.next() {
             None => Ok(first),
-            Some(_) => Err(Answer::refusal(400, &format!("there are two of {name}"))),
+            Some(_) => Err(Response::refusal(400, &format!("there are two of {name}"))),
         }
     }
 
@@ -146,16 +155,16 @@ impl Request {
 }
 
 /// Reads what is there, until `end`.
-fn more(stream: &mut TcpStream, end: Instant, bytes: &mut Vec<u8>) -> Result<(), Answer> {
+fn more(stream: &mut TcpStream, end: Instant, bytes: &mut Vec<u8>) -> Result<(), Response> {
     let mut piece = [0; 4096];
-    let late = || Answer::refusal(408, "the request took too long");
+    let late = || Response::refusal(408, "the request took too long");
     let left = end.saturating_duration_since(Instant::now());
     if left.is_zero() {
         return Err(late());
     }
     stream.set_read_timeout(Some(left)).map_err(|_| late())?;
     match stream.read(&mut piece) {
-        Ok(0) => Err(Answer::refusal(400, "the request ends too early")),
+        Ok(0) => Err(Response::refusal(400, "the request ends too early")),
         Ok(n) => {
             bytes.extend(&piece[..n]);
             Ok(())
@@ -167,14 +176,14 @@ fn more(stream: &mut TcpStream, end: Instant, bytes: &mut Vec<u8>) -> Result<(),
 
 /// An answer.
 #[derive(Debug)]
-pub(super) struct Answer {
+pub(super) struct Response {
     pub(super) status: u16,
     kind: &'static str,
     headers: Vec<(&'static str, String)>,
     body: Vec<u8>,
 }
 
-impl Answer {
+impl Response {
     /// A body of some media type.
     pub(super) fn of(kind: &'static str, body: impl Into<Vec<u8>>) -> Self {
         Self {

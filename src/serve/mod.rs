@@ -24,15 +24,15 @@ mod board;
 mod changes;
 mod guard;
 mod http;
+mod options;
 mod patches;
 mod picture;
-mod place;
 mod routes;
 mod scratch;
 mod server;
 mod session;
+mod slot;
 mod spectra;
-mod wishes;
 
+pub use options::ServeOptions;
 pub use server::Server;
-pub use wishes::Wishes;

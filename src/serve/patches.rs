@@ -4,8 +4,8 @@
 //! that are there. It shows the mean, by area, of the leaves around it: those of its plane, or where the file has shading
 //! normals those with its normal.
 
-use super::picture::{Grown, Shape};
-use super::spectra::Spectra;
+use super::picture::{PartGrowth, PictureMesh};
+use super::spectra::VertexSpectra;
 use crate::error::Result;
 use crate::gather::{BakedSurface, BakedVertex, Vertex};
 use crate::hierarchy::{Face, NONE};
@@ -27,7 +27,7 @@ struct Part {
     vertices: Vec<Vertex>,
     /// Whose light a vertex shares.
     group: Vec<u32>,
-    grown: Grown,
+    grown: PartGrowth,
 }
 
 /// The patches as meshes.
@@ -48,7 +48,7 @@ pub(super) struct Patches {
 
 /// Corners that are one vertex, and those that share their light.
 #[derive(Default)]
-struct Known {
+struct SharedCorners {
     vertices: HashMap<(u32, bool, u32, u32), u32>,
     groups: HashMap<(u32, u32, [i32; 3]), u32>,
 }
@@ -81,7 +81,7 @@ impl Patches {
             back: sides[k].1,
             vertices: Vec::new(),
             group: Vec::new(),
-            grown: Grown::default(),
+            grown: PartGrowth::default(),
         });
         let mut out = Self {
             mesh,
@@ -94,7 +94,7 @@ impl Patches {
             group_midpoints: HashMap::new(),
             had: Vec::new(),
         };
-        let mut known = Known::default();
+        let mut known = SharedCorners::default();
         for (entry, &node) in tree.face_node.iter().enumerate() {
             out.corners[node as usize] = out.face(bake, entry, &mut known);
         }
@@ -113,7 +113,7 @@ impl Patches {
     }
 
     /// The corners of a face as vertices.
-    fn face(&mut self, bake: &Bake, entry: usize, known: &mut Known) -> [u32; 3] {
+    fn face(&mut self, bake: &Bake, entry: usize, known: &mut SharedCorners) -> [u32; 3] {
         let (mesh, part) = (bake.mesh(), self.part_of[entry]);
         let face = bake.tree().faces[entry];
         let t = face.triangle as usize;
@@ -268,7 +268,7 @@ impl Patches {
     }
 
     /// The patches under the light of a bake of this hierarchy, and its spectra.
-    pub(super) fn lit(&self, bake: &Bake) -> (Vec<BakedSurface>, Spectra) {
+    pub(super) fn lit(&self, bake: &Bake) -> (Vec<BakedSurface>, VertexSpectra) {
         let (tree, light) = (bake.tree(), bake.light());
         let mut sums = vec![([0.0_f32; 64], 0.0_f64); self.groups as usize];
         let known = light.irradiance.len();
@@ -314,12 +314,12 @@ impl Patches {
         let surfaces = self.parts.iter().map(of_part).collect();
         let rows = sums.into_iter().map(|(row, _)| row).collect();
         let of = self.parts.iter().map(|part| part.group.clone()).collect();
-        (surfaces, Spectra::shared(bake.lanes(), rows, of))
+        (surfaces, VertexSpectra::shared(bake.lanes(), rows, of))
     }
 
     /// The mesh as it is now.
-    pub(super) fn shape(&self) -> Shape {
-        Shape {
+    pub(super) fn shape(&self) -> PictureMesh {
+        PictureMesh {
             mesh: self.mesh,
             glb: Arc::clone(&self.glb),
             had: self.had.clone(),

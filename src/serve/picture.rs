@@ -14,7 +14,7 @@
 //!
 //! Parts are the primitives with light, in the order of the file.
 
-use super::spectra::Spectra;
+use super::spectra::VertexSpectra;
 use crate::gather::BakedSurface;
 use crate::output::Exposure;
 use crate::output::gltf::{self, color_0};
@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 /// A part of a mesh beyond the GLB.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Grown {
+pub(super) struct PartGrowth {
     /// Vertices of the part in the GLB.
     pub(super) base: usize,
     /// Ends of the edges whose midpoints came after them.
@@ -35,22 +35,22 @@ pub(super) struct Grown {
 
 /// A mesh.
 #[derive(Debug, Clone)]
-pub(super) struct Shape {
+pub(super) struct PictureMesh {
     /// Number of the mesh.
     pub(super) mesh: u32,
     pub(super) glb: Arc<[u8]>,
     /// For each shape that it had, the midpoints of each part. The first has none.
     pub(super) had: Vec<Vec<u32>>,
-    pub(super) parts: Vec<Grown>,
+    pub(super) parts: Vec<PartGrowth>,
 }
 
-impl Shape {
+impl PictureMesh {
     /// A mesh that does not grow; `counts`: vertices of its parts.
     pub(super) fn fixed(mesh: u32, glb: Vec<u8>, counts: impl Iterator<Item = usize>) -> Self {
-        let parts: Vec<Grown> = counts
-            .map(|base| Grown {
+        let parts: Vec<PartGrowth> = counts
+            .map(|base| PartGrowth {
                 base,
-                ..Grown::default()
+                ..PartGrowth::default()
             })
             .collect();
         Self {
@@ -64,21 +64,21 @@ impl Shape {
 
 /// A mesh with its light.
 #[derive(Debug)]
-pub(super) struct Picture {
-    pub(super) shape: Arc<Shape>,
+pub(super) struct LitMesh {
+    pub(super) shape: Arc<PictureMesh>,
     light: u32,
     values: Vec<[f32; 4]>,
     /// What stands behind the values.
-    pub(super) spectra: Arc<Spectra>,
+    pub(super) spectra: Arc<VertexSpectra>,
 }
 
-impl Picture {
+impl LitMesh {
     /// The light of `surfaces`, which have the vertices of `shape`. `light` numbers it.
     pub(super) fn new(
-        shape: Arc<Shape>,
+        shape: Arc<PictureMesh>,
         light: u32,
         scene: &Scene,
-        (surfaces, spectra): (&[BakedSurface], Arc<Spectra>),
+        (surfaces, spectra): (&[BakedSurface], Arc<VertexSpectra>),
         exposure: &Exposure,
     ) -> Self {
         let mut values = Vec::new();
@@ -155,21 +155,21 @@ mod tests {
     #[test]
     fn who_has_a_part_gets_the_rest() {
         let lanes = crate::light::lanes::Lanes::dense(&[], &[[0.0; 64]; 3]);
-        let shape = Shape {
+        let shape = PictureMesh {
             mesh: 3,
             glb: Arc::new([]),
             had: vec![vec![0], vec![1], vec![2]],
-            parts: vec![Grown {
+            parts: vec![PartGrowth {
                 base: 3,
                 midpoints: vec![[0, 1], [1, 3]],
                 triangles: vec![[0, 3, 2]],
             }],
         };
-        let picture = Picture {
+        let picture = LitMesh {
             shape: Arc::new(shape),
             light: 9,
             values: vec![[0.0; 4]; 5],
-            spectra: Arc::new(Spectra::own(&lanes, Vec::new(), None)),
+            spectra: Arc::new(VertexSpectra::own(&lanes, Vec::new(), None)),
         };
         let words = |had| -> Vec<u32> {
             let bytes = picture.since(3, had).unwrap();

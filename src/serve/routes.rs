@@ -13,11 +13,11 @@
 //! | `POST /change` | 202, or 400 with what is wrong, see `changes` |
 
 use super::guard::Guard;
-use super::http::{Answer, Request, TAKING, stream_head};
-use super::picture::Picture;
-use super::place::Place;
-use super::session::{Command, Shared};
-use super::spectra::Reading;
+use super::http::{Request, Response, TAKING, stream_head};
+use super::picture::LitMesh;
+use super::session::{SessionCommand, Shared};
+use super::slot::Slot;
+use super::spectra::PointReading;
 use crate::error::Error;
 use crate::report::page::{KEYS, NOTICES, PICTURE, STYLE, VIEWER, escaped};
 use serde_json::json;
@@ -38,7 +38,7 @@ const STREAMS: usize = 16;
 /// What is needed to answer.
 pub(super) struct Routes {
     pub(super) guard: Guard,
-    pub(super) commands: Sender<Command>,
+    pub(super) commands: Sender<SessionCommand>,
     pub(super) streams: Arc<AtomicUsize>,
 }
 
@@ -60,8 +60,8 @@ impl Routes {
         let _ = answer.send(&mut stream);
     }
 
-    fn answer(&self, request: &Request, asked: Instant, shared: &Shared) -> Answer {
-        let unknown = || Answer::refusal(404, "there is no such thing here");
+    fn answer(&self, request: &Request, asked: Instant, shared: &Shared) -> Response {
+        let unknown = || Response::refusal(404, "there is no such thing here");
         let reads = [
             "/",
             "/viewer.js",
@@ -78,35 +78,36 @@ impl Routes {
             "GET" if reads.contains(&path) => self.read(request, shared),
             "POST" if acts.contains(&path) => self.act(request, asked, shared),
             _ if reads.contains(&path) => {
-                Answer::refusal(405, "this is asked for by GET").with("Allow", "GET")
+                Response::refusal(405, "this is asked for by GET").with("Allow", "GET")
             }
             _ if acts.contains(&path) => {
-                Answer::refusal(405, "this is asked for by POST").with("Allow", "POST")
+                Response::refusal(405, "this is asked for by POST").with("Allow", "POST")
             }
             _ => unknown(),
         }
     }
 
-    fn read(&self, request: &Request, shared: &Shared) -> Answer {
-        let early = || Answer::refusal(503, "the room is being prepared").with("Retry-After", "1");
+    fn read(&self, request: &Request, shared: &Shared) -> Response {
+        let early =
+            || Response::refusal(503, "the room is being prepared").with("Retry-After", "1");
         let board = &shared.board;
         match request.path.as_str() {
-            "/" => Answer::of("text/html; charset=utf-8", self.page()),
-            "/viewer.js" => Answer::of("text/javascript; charset=utf-8", VIEWER)
+            "/" => Response::of("text/html; charset=utf-8", self.page()),
+            "/viewer.js" => Response::of("text/javascript; charset=utf-8", VIEWER)
                 .with("Content-Encoding", "gzip"),
-            "/page.css" => Answer::of("text/css; charset=utf-8", format!("{STYLE}{OWN_STYLE}")),
+            "/page.css" => Response::of("text/css; charset=utf-8", format!("{STYLE}{OWN_STYLE}")),
             "/room" => board.room().map_or_else(early, |room| {
-                Answer::of("application/json", room.as_bytes())
+                Response::of("application/json", room.as_bytes())
             }),
             "/point" => match point_of(request) {
                 Some((mesh, part, vertices, weights)) => {
                     board.picture().map_or_else(early, |picture| {
                         let same = Some(&picture).filter(|p| p.numbers()[0] == mesh);
                         let found = same.and_then(|p| p.spectra.at(part, vertices, weights));
-                        found.map_or_else(Answer::nothing, |found| reading(&picture, &found))
+                        found.map_or_else(Response::nothing, |found| reading(&picture, &found))
                     })
                 }
-                None => Answer::refusal(
+                None => Response::refusal(
                     400,
                     "say mesh=M, part=P, vertices=A,B,C and weights=U,V,W from 0 to 1",
                 ),
@@ -114,18 +115,18 @@ impl Routes {
             "/mesh" => board.picture().map_or_else(early, |picture| {
                 let [mesh, ..] = picture.numbers();
                 let glb = &picture.shape.glb[..];
-                Answer::of("model/gltf-binary", glb).with("X-Mesh", mesh.to_string())
+                Response::of("model/gltf-binary", glb).with("X-Mesh", mesh.to_string())
             }),
             _ => {
                 let number = |key| request.asked(key).and_then(|n| n.parse::<u32>().ok());
                 let (Some(mesh), Some(had)) = (number("mesh"), number("had")) else {
-                    return Answer::refusal(400, "say mesh=NUMBER and had=NUMBER");
+                    return Response::refusal(400, "say mesh=NUMBER and had=NUMBER");
                 };
-                let lacks = |picture: Arc<Picture>| {
+                let lacks = |picture: Arc<LitMesh>| {
                     picture
                         .since(mesh, had as usize)
-                        .map_or_else(Answer::nothing, |bytes| {
-                            Answer::of("application/octet-stream", bytes)
+                        .map_or_else(Response::nothing, |bytes| {
+                            Response::of("application/octet-stream", bytes)
                         })
                 };
                 board.picture().map_or_else(early, lacks)
@@ -133,29 +134,29 @@ impl Routes {
         }
     }
 
-    fn act(&self, request: &Request, asked: Instant, shared: &Shared) -> Answer {
+    fn act(&self, request: &Request, asked: Instant, shared: &Shared) -> Response {
         let command = match request.path.as_str() {
             "/stop" => {
                 shared.stop.store(true, Ordering::SeqCst);
-                Command::Stop
+                SessionCommand::Stop
             }
-            "/go" => Command::Go,
-            "/save" => Command::Save,
-            "/expose" => Command::Expose,
+            "/go" => SessionCommand::Go,
+            "/save" => SessionCommand::Save,
+            "/expose" => SessionCommand::Expose,
             _ => {
                 let Some(reader) = shared.reader.get() else {
-                    return Answer::refusal(503, "the room is being prepared");
+                    return Response::refusal(503, "the room is being prepared");
                 };
                 match reader.read(&request.body) {
-                    Ok((scene, changes)) => Command::Change(Box::new(scene), changes, asked),
-                    Err(Error::Internal(fault)) => return Answer::refusal(500, &fault),
-                    Err(problem) => return Answer::refusal(400, &problem.to_string()),
+                    Ok((scene, changes)) => SessionCommand::Change(Box::new(scene), changes, asked),
+                    Err(Error::Internal(fault)) => return Response::refusal(500, &fault),
+                    Err(problem) => return Response::refusal(400, &problem.to_string()),
                 }
             }
         };
         match self.commands.send(command) {
-            Ok(()) => Answer::refusal(202, "heard"),
-            Err(_) => Answer::refusal(503, "the program is ending"),
+            Ok(()) => Response::refusal(202, "heard"),
+            Err(_) => Response::refusal(503, "the program is ending"),
         }
     }
 
@@ -168,8 +169,8 @@ impl Routes {
 
     /// The state, whenever it is another, until nobody listens.
     fn events(&self, mut stream: TcpStream, shared: &Shared) {
-        let Some(_place) = Place::take(&self.streams, STREAMS) else {
-            let full = Answer::refusal(503, "there are too many windows of this room");
+        let Some(_place) = Slot::take(&self.streams, STREAMS) else {
+            let full = Response::refusal(503, "there are too many windows of this room");
             let _ = full.send(&mut stream);
             return;
         };
@@ -194,10 +195,10 @@ fn point_of(request: &Request) -> Option<(u64, usize, [usize; 3], [f64; 3])> {
     Some((mesh?.into(), part? as usize, vertices, [u, v, w]))
 }
 
-/// The light at a point: `light` (number of the light), `spectrum` (W/m2/nm on the 64 leaves), `xyz` (tristimulus
+/// The light at a point: `light` (number of the light), `spectrum` (W/m2/nm on the 64 bands), `xyz` (tristimulus
 /// irradiance; Y is lx), `error_de2000` (an estimate, or null) and whether that is the point's own (`error_here`) or the
 /// room's mean.
-fn reading(picture: &Picture, found: &Reading) -> Answer {
+fn reading(picture: &LitMesh, found: &PointReading) -> Response {
     let [.., light] = picture.numbers();
     let body = json!({
         "light": light,
@@ -206,7 +207,7 @@ fn reading(picture: &Picture, found: &Reading) -> Answer {
         "error_de2000": found.error.map(|(error, _)| error),
         "error_here": found.error.is_some_and(|(_, here)| here),
     });
-    Answer::of("application/json", body.to_string())
+    Response::of("application/json", body.to_string())
 }
 
 fn tell(stream: &mut TcpStream, shared: &Shared) -> std::io::Result<()> {

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 /// The folder; it is made when it is first needed.
 #[derive(Debug, Clone)]
-pub(super) struct Scratch(PathBuf);
+pub(super) struct ScratchFolder(PathBuf);
 
-impl Scratch {
+impl ScratchFolder {
     /// A name that nobody else uses; `mark` is part of it.
     pub(super) fn new(mark: &str) -> Self {
         let name = format!("haarlight-{}-{mark}", std::process::id());

@@ -1,13 +1,13 @@
 //! The listener: a thread for each connection, and the session beside them.
 
 use super::board::Board;
-use super::changes::Reader;
+use super::changes::RoomReader;
 use super::guard::Guard;
-use super::place::Place;
+use super::options::ServeOptions;
 use super::routes::Routes;
-use super::scratch::Scratch;
-use super::session::{Command, Session, Shared};
-use super::wishes::Wishes;
+use super::scratch::ScratchFolder;
+use super::session::{Session, SessionCommand, Shared};
+use super::slot::Slot;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use std::net::{Ipv4Addr, TcpListener};
@@ -24,14 +24,14 @@ pub struct Server {
     listener: TcpListener,
     routes: Arc<Routes>,
     shared: Arc<Shared>,
-    scratch: Scratch,
-    commands: Receiver<Command>,
-    ended: Sender<End>,
-    end: Receiver<End>,
+    scratch: ScratchFolder,
+    commands: Receiver<SessionCommand>,
+    ended: Sender<SessionResult>,
+    end: Receiver<SessionResult>,
 }
 
 /// How a session ended.
-type End = std::thread::Result<Result<()>>;
+type SessionResult = std::thread::Result<Result<()>>;
 
 impl Server {
     /// Listens on a port of 127.0.0.1; 0: one that is free. Requests wait until [`Server::run`].
@@ -64,7 +64,7 @@ impl Server {
                 writing: Mutex::new(()),
                 reader: OnceLock::new(),
             }),
-            scratch: Scratch::new(&port.to_string()),
+            scratch: ScratchFolder::new(&port.to_string()),
             commands,
             ended,
             end,
@@ -98,13 +98,13 @@ impl Server {
     ///
     /// # Panics
     /// Where the session does.
-    pub fn run(self, scene: Scene, wishes: Wishes) -> Result<()> {
+    pub fn run(self, scene: Scene, wishes: ServeOptions) -> Result<()> {
         let (routes, shared) = (self.routes, Arc::clone(&self.shared));
         std::thread::spawn(move || listen(&self.listener, &routes, &shared));
         let (shared, scratch) = (Arc::clone(&self.shared), self.scratch.clone());
         std::thread::spawn(move || {
             let work = || {
-                let reader = Reader::new(wishes.options.clone(), &scene);
+                let reader = RoomReader::new(wishes.options.clone(), &scene);
                 // It is set here only.
                 let _ = shared.reader.set(reader);
                 Session::new(scene, &wishes, &shared, &scratch)?.run(&self.commands)
@@ -132,7 +132,7 @@ fn listen(listener: &TcpListener, routes: &Arc<Routes>, shared: &Arc<Shared>) {
             continue;
         };
         let _ = stream.set_nodelay(true);
-        let Some(place) = Place::take(&open, CONNECTIONS) else {
+        let Some(place) = Slot::take(&open, CONNECTIONS) else {
             continue;
         };
         let (routes, shared) = (Arc::clone(routes), Arc::clone(shared));

@@ -5,13 +5,13 @@
 //! there. To go on after a change is to solve the changed room anew. So is a lamp that was dark when the room was solved.
 
 use super::board::{Board, Doing, RelitLine, RoundLine, State};
-use super::changes::kindled;
+use super::changes::newly_emitting;
+use super::options::ServeOptions;
 use super::patches::Patches;
-use super::picture::{Picture, Shape};
-use super::scratch::Scratch;
-use super::spectra::{Error as PointError, Spectra};
-use super::wishes::Wishes;
-use crate::data::{Kind, named, names};
+use super::picture::{LitMesh, PictureMesh};
+use super::scratch::ScratchFolder;
+use super::spectra::{ColourError as PointError, VertexSpectra};
+use crate::data::{TableKind, named, names};
 use crate::error::Result;
 use crate::gather::Baked;
 use crate::keep::{Relighter, Relit};
@@ -37,7 +37,7 @@ const PROGRESS: Duration = Duration::from_millis(100);
 const KEPT: u64 = 2048 << 20;
 
 /// What is asked of the session.
-pub(super) enum Command {
+pub(super) enum SessionCommand {
     /// No further round; a gather ends soon.
     Stop,
     /// On with the rounds; the changed room is solved anew.
@@ -58,12 +58,12 @@ pub(super) struct Shared {
     /// Held while the file is written: nobody ends the program meanwhile.
     pub(super) writing: Mutex<()>,
     /// Reads the room with changes, once it is known.
-    pub(super) reader: std::sync::OnceLock<super::changes::Reader>,
+    pub(super) reader: std::sync::OnceLock<super::changes::RoomReader>,
 }
 
 /// How far the room is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stage {
+enum SessionStage {
     Solving,
     Stopped,
     Done,
@@ -71,15 +71,15 @@ enum Stage {
 
 /// A bake that is watched.
 pub(super) struct Session<'a> {
-    wishes: &'a Wishes,
+    wishes: &'a ServeOptions,
     shared: &'a Shared,
-    scratch: &'a Scratch,
+    scratch: &'a ScratchFolder,
     bake: Bake,
     patches: Patches,
     cameras: Vec<Camera>,
-    stage: Stage,
+    stage: SessionStage,
     /// Waiting commands.
-    queue: VecDeque<Command>,
+    queue: VecDeque<SessionCommand>,
     /// The light at the vertices of the file and their mesh, of the last round that was gathered.
     fine: Option<Fine>,
     /// The light of the last two rounds.
@@ -102,8 +102,8 @@ pub(super) struct Session<'a> {
 struct Fine {
     /// Its irradiance rows are in `spectra`.
     baked: Baked,
-    shape: Arc<Shape>,
-    spectra: Arc<Spectra>,
+    shape: Arc<PictureMesh>,
+    spectra: Arc<VertexSpectra>,
     /// Where the error of the light is, see [`PointError`].
     share: Option<Arc<[Vec<f32>]>>,
 }
@@ -129,7 +129,7 @@ fn own_spectra(
     baked: &mut Baked,
     mean: Option<f64>,
     share: Option<Arc<[Vec<f32>]>>,
-) -> Spectra {
+) -> VertexSpectra {
     let mut rows = std::mem::take(&mut baked.irradiance);
     let order = gltf::order(scene, &baked.surfaces).into_iter();
     let parts = order.map(|k| rows.get_mut(k).map(std::mem::take).unwrap_or_default());
@@ -137,16 +137,16 @@ fn own_spectra(
         mean,
         share: share.unwrap_or_else(|| [].into()),
     });
-    Spectra::own(lanes, parts.collect(), error)
+    VertexSpectra::own(lanes, parts.collect(), error)
 }
 
 impl<'a> Session<'a> {
     /// Prepares a room.
     pub(super) fn new(
         scene: Scene,
-        wishes: &'a Wishes,
+        wishes: &'a ServeOptions,
         shared: &'a Shared,
-        scratch: &'a Scratch,
+        scratch: &'a ScratchFolder,
     ) -> Result<Self> {
         let warnings = scene.warnings.clone();
         let bake = begun(scene, wishes);
@@ -161,7 +161,7 @@ impl<'a> Session<'a> {
             bake,
             patches,
             cameras,
-            stage: Stage::Solving,
+            stage: SessionStage::Solving,
             queue: VecDeque::new(),
             fine: None,
             history: page::History::default(),
@@ -179,7 +179,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// Faults of our own. What a command meets is put on the board.
-    pub(super) fn run(&mut self, commands: &Receiver<Command>) -> Result<()> {
+    pub(super) fn run(&mut self, commands: &Receiver<SessionCommand>) -> Result<()> {
         self.rest();
         loop {
             if self.listen(commands).is_err() {
@@ -205,16 +205,20 @@ impl<'a> Session<'a> {
     }
 
     /// Takes up commands, and waits for one where there is nothing else to do. Of changes the last counts.
-    fn listen(&mut self, commands: &Receiver<Command>) -> std::result::Result<(), RecvError> {
-        let idle = self.stage != Stage::Solving && self.rough.is_none();
+    fn listen(
+        &mut self,
+        commands: &Receiver<SessionCommand>,
+    ) -> std::result::Result<(), RecvError> {
+        let idle = self.stage != SessionStage::Solving && self.rough.is_none();
         if idle && self.queue.is_empty() {
             self.queue.push_back(commands.recv()?);
         }
         loop {
             match commands.try_recv() {
                 Ok(command) => {
-                    if matches!(command, Command::Change(..)) {
-                        self.queue.retain(|c| !matches!(c, Command::Change(..)));
+                    if matches!(command, SessionCommand::Change(..)) {
+                        self.queue
+                            .retain(|c| !matches!(c, SessionCommand::Change(..)));
                     }
                     self.queue.push_back(command);
                 }
@@ -224,22 +228,22 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn obey(&mut self, command: Command) -> Result<()> {
+    fn obey(&mut self, command: SessionCommand) -> Result<()> {
         match command {
-            Command::Stop => {
+            SessionCommand::Stop => {
                 self.shared.stop.store(false, Ordering::SeqCst);
-                if self.stage == Stage::Solving {
-                    self.stage = Stage::Stopped;
+                if self.stage == SessionStage::Solving {
+                    self.stage = SessionStage::Stopped;
                 }
             }
-            Command::Go => match self.changed.take() {
+            SessionCommand::Go => match self.changed.take() {
                 Some(scene) => self.restart(scene)?,
-                None if self.stage == Stage::Stopped => self.stage = Stage::Solving,
+                None if self.stage == SessionStage::Stopped => self.stage = SessionStage::Solving,
                 None => {}
             },
-            Command::Save => self.save()?,
-            Command::Change(scene, changes, asked) => self.change(*scene, changes, asked)?,
-            Command::Expose => self.expose(),
+            SessionCommand::Save => self.save()?,
+            SessionCommand::Change(scene, changes, asked) => self.change(*scene, changes, asked)?,
+            SessionCommand::Expose => self.expose(),
         }
         Ok(())
     }
@@ -263,9 +267,9 @@ impl<'a> Session<'a> {
     fn rest(&self) {
         self.doing(match self.stage {
             _ if self.rough.is_some() => Doing::Relighting,
-            Stage::Solving => Doing::Solving,
-            Stage::Stopped => Doing::Stopped,
-            Stage::Done => Doing::Done,
+            SessionStage::Solving => Doing::Solving,
+            SessionStage::Stopped => Doing::Stopped,
+            SessionStage::Done => Doing::Done,
         });
     }
 
@@ -288,7 +292,7 @@ impl<'a> Session<'a> {
         let shape = Arc::new(self.patches.shape());
         self.lights += 1;
         let scene = self.bake.scene();
-        let picture = Picture::new(shape, self.lights, scene, (&lit, spectra), &self.exposure);
+        let picture = LitMesh::new(shape, self.lights, scene, (&lit, spectra), &self.exposure);
         let rounds = self.bake.rounds().iter().map(|r| RoundLine {
             round: r.round,
             de2000: r.error.total_de2000.value,
@@ -326,7 +330,7 @@ impl<'a> Session<'a> {
         let order = gltf::order(scene, &baked.surfaces);
         let counts = order.iter().map(|&k| baked.surfaces[k].vertices.len());
         self.meshes += 1;
-        let shape = Arc::new(Shape::fixed(self.meshes, glb.bytes, counts));
+        let shape = Arc::new(PictureMesh::fixed(self.meshes, glb.bytes, counts));
         self.lights += 1;
         let map = page::error_map(&self.bake, &baked, &self.history, &order);
         let share = map.map(|(map, mean)| {
@@ -337,7 +341,7 @@ impl<'a> Session<'a> {
         let (lanes, mean) = (self.bake.lanes(), self.estimate());
         let spectra = own_spectra(scene, lanes, &mut baked, mean, Option::clone(&share));
         let spectra = Arc::new(spectra);
-        let picture = Picture::new(
+        let picture = LitMesh::new(
             Arc::clone(&shape),
             self.lights,
             scene,
@@ -367,7 +371,7 @@ impl<'a> Session<'a> {
     /// The last round was done.
     fn finish(&mut self) -> Result<()> {
         self.gather()?;
-        self.stage = Stage::Done;
+        self.stage = SessionStage::Done;
         let reached = self.bake.verdict() == Some(Verdict::Reached);
         let asked = self.bake.settings().error;
         self.board().set(|state| {
@@ -391,8 +395,8 @@ impl<'a> Session<'a> {
 
     /// Other lamps and paints.
     fn change(&mut self, scene: Scene, changes: Value, asked: Instant) -> Result<()> {
-        if self.stage == Stage::Solving {
-            self.stage = Stage::Stopped;
+        if self.stage == SessionStage::Solving {
+            self.stage = SessionStage::Stopped;
         }
         // Together, so that nobody takes the old light for the changed one's.
         self.board().set(|state| {
@@ -403,7 +407,7 @@ impl<'a> Session<'a> {
         if self.bake.rounds().is_empty() {
             return self.restart(scene);
         }
-        if let Some(lamp) = kindled(self.bake.scene(), &scene) {
+        if let Some(lamp) = newly_emitting(self.bake.scene(), &scene) {
             self.restart(scene)?;
             self.note(Some(format!(
                 "{lamp} was dark when the room was solved, so that its shadows are not known: the room is solved anew"
@@ -482,7 +486,7 @@ impl<'a> Session<'a> {
             }
         };
         self.lights += 1;
-        let picture = Picture::new(shape, self.lights, scene, (lit, spectra), &self.exposure);
+        let picture = LitMesh::new(shape, self.lights, scene, (lit, spectra), &self.exposure);
         self.board().show(picture, |_| {});
     }
 
@@ -494,7 +498,7 @@ impl<'a> Session<'a> {
         self.bake = begun(scene, self.wishes);
         self.meshes += 1;
         self.patches = Patches::new(&self.bake, self.meshes)?;
-        self.stage = Stage::Solving;
+        self.stage = SessionStage::Solving;
         self.board().set(|state| {
             state.rounds.clear();
             state.reached = false;
@@ -553,7 +557,7 @@ impl<'a> Session<'a> {
     }
 
     fn metered(&self, scene: &Scene, lit: &[crate::gather::BakedSurface]) -> Exposure {
-        let Wishes {
+        let ServeOptions {
             brightness,
             balance,
             ..
@@ -563,7 +567,7 @@ impl<'a> Session<'a> {
 }
 
 /// A bake that keeps its rows.
-fn begun(scene: Scene, wishes: &Wishes) -> Bake {
+fn begun(scene: Scene, wishes: &ServeOptions) -> Bake {
     let mut bake = Bake::new(scene, wishes.settings.clone());
     bake.keep();
     bake
@@ -578,7 +582,7 @@ fn about(bake: &Bake, cameras: &[Camera]) -> Value {
         .file_stem()
         .unwrap_or_default()
         .to_string_lossy();
-    let of = |kind: Kind| -> Vec<String> {
+    let of = |kind: TableKind| -> Vec<String> {
         let is = |name: &String| named(name).is_some_and(|n| n.kind == kind);
         names().into_iter().filter(is).collect()
     };
@@ -590,7 +594,7 @@ fn about(bake: &Bake, cameras: &[Camera]) -> Value {
         // The first lamps are materials, the last so many lights.
         "lone_lights": alone,
         "room": page::room(bake, cameras),
-        "lights": of(Kind::Illuminant),
-        "paints": of(Kind::Reflectance),
+        "lights": of(TableKind::Illuminant),
+        "paints": of(TableKind::Reflectance),
     })
 }

@@ -1,28 +1,28 @@
 //! The spectrum of the light at points of a picture, and how wrong it may be there.
 
 use crate::light::lanes::Lanes;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 
 /// Irradiance of the vertices of a picture by lanes.
 #[derive(Debug)]
-pub(super) struct Spectra {
+pub(super) struct VertexSpectra {
     lanes: Lanes,
-    rows: Rows,
-    error: Option<Error>,
+    rows: VertexRows,
+    error: Option<ColourError>,
 }
 
 /// Whose rows they are.
 #[derive(Debug)]
-enum Rows {
+enum VertexRows {
     /// One for each vertex of each part.
-    Own(Vec<Vec<[f32; LEAVES]>>),
+    Own(Vec<Vec<[f32; BANDS]>>),
     /// Vertices that lie together share one: for each part, which.
-    Shared(Vec<[f32; LEAVES]>, Vec<Vec<u32>>),
+    Shared(Vec<[f32; BANDS]>, Vec<Vec<u32>>),
 }
 
 /// Mean colour difference, an estimate.
 #[derive(Debug, Clone)]
-pub(super) struct Error {
+pub(super) struct ColourError {
     /// Of the room, CIEDE2000.
     pub(super) mean: f64,
     /// At each vertex of each part over the mean; empty where only that is known.
@@ -31,34 +31,38 @@ pub(super) struct Error {
 
 /// The light at a point.
 #[derive(Debug)]
-pub(super) struct Reading {
+pub(super) struct PointReading {
     /// Irradiance, W/m2/nm.
-    pub(super) spectrum: Leaves,
+    pub(super) spectrum: Spectrum,
     /// Tristimulus irradiance; Y is illuminance, lx.
     pub(super) xyz: [f64; 3],
     /// Colour difference (CIEDE2000), an estimate; at this very point, or in the mean of the room?
     pub(super) error: Option<(f64, bool)>,
 }
 
-impl Spectra {
+impl VertexSpectra {
     /// Rows of each vertex of the parts.
-    pub(super) fn own(lanes: &Lanes, parts: Vec<Vec<[f32; LEAVES]>>, error: Option<Error>) -> Self {
-        let (lanes, rows) = (lanes.clone(), Rows::Own(parts));
+    pub(super) fn own(
+        lanes: &Lanes,
+        parts: Vec<Vec<[f32; BANDS]>>,
+        error: Option<ColourError>,
+    ) -> Self {
+        let (lanes, rows) = (lanes.clone(), VertexRows::Own(parts));
         Self { lanes, rows, error }
     }
 
     /// Rows that vertices share; `of`: which of them each vertex of the parts has.
-    pub(super) fn shared(lanes: &Lanes, rows: Vec<[f32; LEAVES]>, of: Vec<Vec<u32>>) -> Self {
+    pub(super) fn shared(lanes: &Lanes, rows: Vec<[f32; BANDS]>, of: Vec<Vec<u32>>) -> Self {
         Self {
             lanes: lanes.clone(),
-            rows: Rows::Shared(rows, of),
+            rows: VertexRows::Shared(rows, of),
             error: None,
         }
     }
 
     /// The same with an error that is known for the room as a whole.
     pub(super) fn with_mean(self, mean: Option<f64>) -> Self {
-        let error = mean.map(|mean| Error {
+        let error = mean.map(|mean| ColourError {
             mean,
             share: [].into(),
         });
@@ -71,12 +75,12 @@ impl Spectra {
         part: usize,
         vertices: [usize; 3],
         weights: [f64; 3],
-    ) -> Option<Reading> {
+    ) -> Option<PointReading> {
         let row = |vertex: usize| match &self.rows {
-            Rows::Own(parts) => parts.get(part)?.get(vertex),
-            Rows::Shared(rows, of) => rows.get(*of.get(part)?.get(vertex)? as usize),
+            VertexRows::Own(parts) => parts.get(part)?.get(vertex),
+            VertexRows::Shared(rows, of) => rows.get(*of.get(part)?.get(vertex)? as usize),
         };
-        let mut mixed = [0.0; LEAVES];
+        let mut mixed = [0.0; BANDS];
         for (vertex, weight) in vertices.into_iter().zip(weights) {
             let row = row(vertex)?;
             let pairs = mixed.iter_mut().zip(row);
@@ -93,8 +97,8 @@ impl Spectra {
                 }
                 None => (error.mean, false),
             });
-        Some(Reading {
-            spectrum: self.lanes.leaves(&mixed),
+        Some(PointReading {
+            spectrum: self.lanes.spectrum(&mixed),
             xyz: self.lanes.tristimulus(&mixed),
             error,
         })

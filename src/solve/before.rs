@@ -6,18 +6,18 @@
 
 use super::Bake;
 use super::direct::Direct;
-use super::outlook;
+use super::leaf_rays;
 use super::solution::Solution;
-use crate::hierarchy::Grown;
+use crate::hierarchy::TreeSize;
 use crate::light::{Light, Neighbours, Rows};
-use crate::link::{Balance, Graph};
+use crate::link::{Graph, RowBalance};
 
 /// A bake between two rounds.
 pub(super) struct Before {
-    tree: Grown,
-    outlook: outlook::Grown,
+    tree: TreeSize,
+    leaf_rays: leaf_rays::LeafRaysSize,
     graph: Graph,
-    balance: Balance,
+    balance: RowBalance,
     direct: Direct,
     /// Of its light only irradiance, the white, the leaves and mirrors are kept.
     solution: Solution,
@@ -38,7 +38,7 @@ impl Bake {
         }
         Before {
             tree: refinement.tree.grown(),
-            outlook: refinement.outlook.grown(),
+            leaf_rays: refinement.leaf_rays.grown(),
             graph: refinement.graph.clone(),
             balance: refinement.balance.clone(),
             direct: refinement.direct.clone(),
@@ -65,14 +65,16 @@ impl Bake {
     /// Takes back what was done since `before`.
     pub(super) fn take_back(&mut self, before: Before) {
         let refinement = &mut self.refinement;
-        refinement.outlook.shrink(&refinement.tree, &before.outlook);
+        refinement
+            .leaf_rays
+            .shrink(&refinement.tree, &before.leaf_rays);
         refinement.tree.shrink(&before.tree);
-        refinement.areas = refinement.outlook.areas(&refinement.tree);
+        refinement.areas = refinement.leaf_rays.areas(&refinement.tree);
         refinement.graph = before.graph;
         refinement.balance = before.balance;
         refinement.direct = before.direct;
         self.solution = before.solution;
-        let tints = &mut refinement.outlook.tints;
+        let tints = &mut refinement.leaf_rays.tints;
         tints.on(&self.solution.filters);
         self.light_up(&before.reflected);
         self.light_arrives();

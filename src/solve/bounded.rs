@@ -8,10 +8,12 @@
 //! is some 3 to 6 times the true error, as in the paper's own tests.
 
 use super::coarse::Coarse;
-use super::cuts::{Choice, split_worst};
+use super::cuts::{CutChoice, split_worst};
 use crate::color::{KM, luv_jacobian};
 use crate::scene::LightSpectrum;
-use crate::spectrum::{Bounded, CmfTree, Interval, LEAVES, Leaves, Metric, Partition, Tree, node};
+use crate::spectrum::{
+    BANDS, Bounded, CmfTree, DyadicTree, Interval, Metric, Partition, Spectrum, node,
+};
 
 /// Bounces at the most.
 const BOUNCES: usize = 400;
@@ -19,16 +21,16 @@ const BOUNCES: usize = 400;
 const TAIL: f64 = 1e-6;
 
 /// What the model's patches are made of, under one light.
-struct Lit {
+struct LightTrees {
     cmf: CmfTree,
-    reflectance: Vec<Tree<Bounded>>,
+    reflectance: Vec<DyadicTree<Bounded>>,
     /// What passes sheets: a patch, the patch behind it, and the transmittance between them.
-    through: Vec<([u32; 2], Tree<Bounded>)>,
-    emission: Vec<Option<Tree<Bounded>>>,
-    punctual: Vec<Option<Tree<Bounded>>>,
+    through: Vec<([u32; 2], DyadicTree<Bounded>)>,
+    emission: Vec<Option<DyadicTree<Bounded>>>,
+    punctual: Vec<Option<DyadicTree<Bounded>>>,
 }
 
-impl Lit {
+impl LightTrees {
     /// What a bounce multiplies light by at the most: greatest albedo times greatest row sum.
     fn ratio(&self, factors: &[Vec<(usize, f64)>]) -> f64 {
         let mut albedo: Vec<f64> = self.reflectance.iter().map(|t| t.node(1).high).collect();
@@ -41,7 +43,7 @@ impl Lit {
 
     /// Radiosity of every patch by the light that arrives, on intervals that are these nodes of a spectrum's tree.
     fn reflect(&self, arrives: &[Vec<Bounded>], nodes: &[usize]) -> Vec<Vec<Bounded>> {
-        let times = |row: &[Bounded], by: &Tree<Bounded>| -> Vec<Bounded> {
+        let times = |row: &[Bounded], by: &DyadicTree<Bounded>| -> Vec<Bounded> {
             let lanes = row.iter().zip(nodes);
             lanes
                 .map(|(x, &n)| x.times(by.node(n), self.cmf.node(n)))
@@ -84,26 +86,30 @@ impl Coarse {
     pub(super) fn choose_bounded(
         &self,
         spectra: &[LightSpectrum],
-        weights: &[Leaves; 3],
+        weights: &[Spectrum; 3],
         white: [f64; 3],
         tolerance: f64,
-    ) -> Choice {
+    ) -> CutChoice {
         let all = CmfTree::new(*weights);
-        let lights: Vec<Lit> = (0..spectra.len())
+        let lights: Vec<LightTrees> = (0..spectra.len())
             .map(|light| {
                 let cmf = all.under(&spectra[light].power);
-                let trees = |rows: &[Leaves]| -> Vec<Tree<Bounded>> {
-                    rows.iter().map(|row| Tree::new(row, &cmf)).collect()
+                let trees = |rows: &[Spectrum]| -> Vec<DyadicTree<Bounded>> {
+                    rows.iter().map(|row| DyadicTree::new(row, &cmf)).collect()
                 };
-                let shown = |rows: &[Leaves]| -> Vec<Option<Tree<Bounded>>> {
+                let shown = |rows: &[Spectrum]| -> Vec<Option<DyadicTree<Bounded>>> {
                     rows.iter()
-                        .map(|row| row.iter().any(|&x| x > 0.0).then(|| Tree::new(row, &cmf)))
+                        .map(|row| {
+                            row.iter()
+                                .any(|&x| x > 0.0)
+                                .then(|| DyadicTree::new(row, &cmf))
+                        })
                         .collect()
                 };
                 let through = self.through.iter();
-                Lit {
+                LightTrees {
                     through: through
-                        .map(|(pair, t)| (*pair, Tree::new(t, &cmf)))
+                        .map(|(pair, t)| (*pair, DyadicTree::new(t, &cmf)))
                         .collect(),
                     reflectance: trees(&self.reflectance),
                     emission: shown(&self.emission[light]),
@@ -117,18 +123,18 @@ impl Coarse {
         loop {
             let (error, harm) = self.bound(&lights, &cuts, white);
             let count: usize = cuts.iter().map(|c| c.count()).sum();
-            if error <= tolerance || count >= LEAVES || harm.is_empty() {
-                return Choice { cuts, error };
+            if error <= tolerance || count >= BANDS || harm.is_empty() {
+                return CutChoice { cuts, error };
             }
             split_worst(&mut cuts, harm, count);
         }
     }
 
-    /// Bound of the mean colour difference, and the intervals that can be split (light, first leaf) by what they may
+    /// Bound of the mean colour difference, and the intervals that can be split (light, first band) by what they may
     /// cause, the worst first.
     fn bound(
         &self,
-        lights: &[Lit],
+        lights: &[LightTrees],
         cuts: &[Partition],
         white: [f64; 3],
     ) -> (f64, Vec<(usize, usize)>) {
@@ -188,12 +194,13 @@ impl Coarse {
     }
 
     /// Irradiance of every patch on the intervals of a cut, all bounces.
-    fn bounces(&self, lit: &Lit, cut: Partition) -> Vec<Vec<Bounded>> {
+    fn bounces(&self, lit: &LightTrees, cut: Partition) -> Vec<Vec<Bounded>> {
         let nodes: Vec<usize> = cut.iter().map(|(first, len)| node(first, len)).collect();
         let factors = self.factors();
-        let rows = |trees: &[Option<Tree<Bounded>>]| -> Vec<Vec<Bounded>> {
+        let rows = |trees: &[Option<DyadicTree<Bounded>>]| -> Vec<Vec<Bounded>> {
             let dark = Bounded::constant(0.0);
-            let of = |tree: &Option<Tree<Bounded>>, n| tree.as_ref().map_or(dark, |t| *t.node(n));
+            let of =
+                |tree: &Option<DyadicTree<Bounded>>, n| tree.as_ref().map_or(dark, |t| *t.node(n));
             trees
                 .iter()
                 .map(|tree| nodes.iter().map(|&n| of(tree, n)).collect())

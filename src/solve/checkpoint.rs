@@ -8,17 +8,17 @@
 //! Bytes: 4 a split, 22 a link and 4 for each of its blockers, 12 a node (16 and 8 a ray where leaves look for themselves, 12 in rooms with panes or mirrors),
 //! `4 (2 padded lanes + lanes) + 4` a leaf; a cache for relighting has 4 (8) a ray and `4 padded lanes` a leaf: the rest follows from where light comes from.
 
-use super::outlook::Outlook;
+use super::leaf_rays::LeafRays;
 use super::sources::Sources;
 use super::{Bake, NOBODY, Representation, direct};
 use crate::error::{Error, Result};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::{self, Lanes};
 use crate::light::{Filters, Light, Neighbours, Rows, Through, padded};
-use crate::link::{Balance, Graph, Link, MAX_DEPTH, Way};
-use crate::spectrum::LEAVES;
+use crate::link::{Graph, Link, MAX_DEPTH, Occlusion, RowBalance};
+use crate::spectrum::BANDS;
 use crate::store::codec::Read;
-use crate::store::{Broken, Decoder, Encoder, Fingerprint, Kind, Packs, container};
+use crate::store::{Broken, Decoder, Encoder, FileKind, Fingerprint, Packs, container};
 use std::borrow::Cow;
 use std::io;
 use std::path::Path;
@@ -43,7 +43,7 @@ impl Bake {
             out.put(self.elapsed().as_secs_f64())
         };
         match self.room.team.is_first() {
-            true => container::write(path, Kind::Checkpoint, body),
+            true => container::write(path, FileKind::Checkpoint, body),
             false => container::unwritten(path, body).map(|()| 0),
         }
     }
@@ -55,7 +55,7 @@ impl Bake {
     pub fn resume(&mut self, path: &Path) -> Result<()> {
         let now = self.fingerprint();
         let mut changed = None;
-        container::read(path, Kind::Checkpoint, |from| {
+        container::read(path, FileKind::Checkpoint, |from| {
             changed = Fingerprint::decode(from)?.change(&now);
             if changed.is_some() {
                 // The rest belongs to something else.
@@ -88,7 +88,7 @@ impl Bake {
             Some(what) => Err(Error::input(
                 path.display().to_string(),
                 format!("belongs to another bake: {what}"),
-                Kind::Checkpoint.next(),
+                FileKind::Checkpoint.next(),
             )),
         }
     }
@@ -143,7 +143,7 @@ impl Bake {
         out.put(self.solution.spectrum_error.unwrap_or(f64::NAN))?;
         out.put(self.solution.light.white)?;
         self.refinement
-            .outlook
+            .leaf_rays
             .encode(whole, self.filtered(), out)?;
         out.put_all(factor)?;
         out.put([
@@ -238,7 +238,7 @@ impl Bake {
         self.refinement.graph = decode_graph(nodes, self.room.mesh.triangles.len(), from)?;
         let (gone, kept) = self.take_up_lanes(whole, from)?;
         let white = from.get()?;
-        self.refinement.outlook = Outlook::decode(
+        self.refinement.leaf_rays = LeafRays::decode(
             &self.refinement.tree,
             self.room.team,
             whole,
@@ -249,17 +249,17 @@ impl Bake {
         // Where leaves look for themselves nothing is balanced.
         let by_rays = self.room.by_rays();
         let wanted = if by_rays && whole { 0 } else { nodes };
-        if factor.len() != wanted || self.refinement.outlook.looks() != by_rays {
+        if factor.len() != wanted || self.refinement.leaf_rays.looks() != by_rays {
             return Err(Broken::new("does not know what its leaves see"));
         }
         let [defect_before, defect_after] = from.get()?;
-        self.refinement.balance = Balance {
+        self.refinement.balance = RowBalance {
             factor,
             defect_before,
             defect_after,
             limited: from.get::<u64>()? as usize,
         };
-        self.refinement.areas = self.refinement.outlook.areas(&self.refinement.tree);
+        self.refinement.areas = self.refinement.leaf_rays.areas(&self.refinement.tree);
         let leaves: Vec<u32> = self.refinement.leaves();
         let (count, width) = (leaves.len(), padded(kept));
         let mut reflected = rows(from, count, width)?;
@@ -301,7 +301,7 @@ impl Bake {
             .map(lane_of)
             .collect::<Read<Vec<lanes::Lane>>>()?;
         let written = lanes.len();
-        if written > LEAVES {
+        if written > BANDS {
             return Err(Broken::new("has an impossible number of lanes"));
         }
         let there =
@@ -386,16 +386,16 @@ fn encode_graph(graph: &Graph, out: &mut Encoder) -> io::Result<()> {
     )?;
     out.put_list(
         links.len(),
-        links.iter().map(|l| match l.way {
-            Way::Clear => CLEAR,
-            Way::Crowded => CROWDED,
-            Way::Listed { count, .. } => LISTED + u16::from(count),
+        links.iter().map(|l| match l.occlusion {
+            Occlusion::Clear => CLEAR,
+            Occlusion::Crowded => CROWDED,
+            Occlusion::Listed { count, .. } => LISTED + u16::from(count),
         }),
     )?;
     let starts: Vec<u32> = links
         .iter()
-        .filter_map(|l| match l.way {
-            Way::Listed { start, .. } => Some(start),
+        .filter_map(|l| match l.occlusion {
+            Occlusion::Listed { start, .. } => Some(start),
             _ => None,
         })
         .collect();
@@ -406,8 +406,8 @@ fn encode_graph(graph: &Graph, out: &mut Encoder) -> io::Result<()> {
 fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Graph> {
     let ends = from.get_list::<[u32; 2]>()?;
     let figures = from.get_list::<[f32; 3]>()?;
-    let ways = from.get_list::<u16>()?;
-    if figures.len() != ends.len() || ways.len() != ends.len() {
+    let occlusions = from.get_list::<u16>()?;
+    if figures.len() != ends.len() || occlusions.len() != ends.len() {
         return Err(Broken::new("has links in parts that do not fit"));
     }
     let mut starts = from.get_list::<u32>()?;
@@ -416,13 +416,14 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
         return Err(Broken::new("lists a triangle that does not exist"));
     }
     let mut links = Vec::with_capacity(ends.len());
-    for (([a, b], [exchange, open_exchange, variation]), way) in ends.zip(figures).zip(ways) {
+    for (([a, b], [exchange, open_exchange, variation]), code) in ends.zip(figures).zip(occlusions)
+    {
         if a as usize >= nodes || b as usize >= nodes {
             return Err(Broken::new("links a patch that does not exist"));
         }
-        let way = match way {
-            CLEAR => Way::Clear,
-            CROWDED => Way::Crowded,
+        let occlusion = match code {
+            CLEAR => Occlusion::Clear,
+            CROWDED => Occlusion::Crowded,
             listed => {
                 let count = u8::try_from(listed - LISTED).ok();
                 let list = starts.next().zip(count);
@@ -432,7 +433,7 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
                 let (start, count) = list
                     .filter(there)
                     .ok_or_else(|| Broken::new("lists blockers that are not there"))?;
-                Way::Listed { start, count }
+                Occlusion::Listed { start, count }
             }
         };
         links.push(Link {
@@ -441,7 +442,7 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
             exchange,
             open_exchange,
             variation,
-            way,
+            occlusion,
         });
     }
     Ok(Graph { links, blockers })
@@ -450,7 +451,7 @@ fn decode_graph(nodes: usize, triangles: usize, from: &mut Decoder) -> Read<Grap
 fn lane_of([light, first, count]: [u32; 3]) -> Read<lanes::Lane> {
     let (first, count) = (first as usize, count as usize);
     let light = (light != u32::MAX).then_some(light as usize);
-    if count == 0 || first >= LEAVES || count > LEAVES - first {
+    if count == 0 || first >= BANDS || count > BANDS - first {
         return Err(Broken::new("has an impossible lane"));
     }
     Ok(lanes::Lane {

@@ -8,12 +8,12 @@ use super::{Bake, Representation, SPECTRUM_SHARE, coarse, direct, punctual};
 use crate::color::normalization;
 use crate::light::lanes::Lanes;
 use crate::light::{self, Filters, Rows, guide};
-use crate::scene::effects::Kind;
+use crate::scene::effects::EffectKind;
 use crate::scene::{LightSpectrum, Scene};
 use crate::spectrum::methods::basis;
 use crate::spectrum::{
-    CmfTree, Control, Estimate, LEAVES, Leaves, List, Metric, Partition, Path, Tree, control,
-    represent,
+    BANDS, CmfTree, Control, DyadicTree, Estimate, List, Metric, Partition, Path, Spectrum,
+    control, represent,
 };
 use crate::team::Interrupted;
 
@@ -77,12 +77,12 @@ impl Bake {
             Representation::Characteristic(_)
                 if self.room.panes.is_some()
                     || self.room.mirrors.is_some()
-                    || self.room.plan.runs(Kind::Sheets) =>
+                    || self.room.plan.runs(EffectKind::Sheets) =>
             {
                 Lanes::dense(spectra, weights)
             }
             Representation::Characteristic(n) if !none => {
-                let lights: Vec<Leaves> = spectra.iter().map(|s| s.power).collect();
+                let lights: Vec<Spectrum> = spectra.iter().map(|s| s.power).collect();
                 let basis = basis(&lights, &paints(&self.room.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
@@ -106,7 +106,7 @@ impl Bake {
     /// Ratios to each light on as few intervals as the model of the room allows.
     fn perceptual(
         &mut self,
-        guide: Option<&[Leaves; 3]>,
+        guide: Option<&[Spectrum; 3]>,
         tolerance: f64,
     ) -> Result<Lanes, Interrupted> {
         let mut model = self.model(coarse::PATCHES)?;
@@ -114,7 +114,7 @@ impl Bake {
         model.join(&kin.of, kin.spectra.len());
         let (spectra, weights) = (&kin.spectra, &self.room.weights);
         if guide.is_some() {
-            model.kindle(spectra, weights, self.room.scene.grid.width());
+            model.add_fluorescence(spectra, weights, self.room.scene.grid.width());
         }
         let (known, white) = (self.solution.lanes.cuts(), self.solution.light.white);
         let known = known.map(|cuts| kin.one_of_each(&cuts));
@@ -174,7 +174,7 @@ impl Bake {
                         (room.team, &room.interrupt),
                     )
                 })?;
-                refinement.look_out(room)?;
+                refinement.trace_leaf_rays(room)?;
                 let balance = refinement.balanced(&refinement.link_rows());
                 (shadowed, balance.factor)
             }
@@ -245,13 +245,13 @@ impl Kin {
         };
         self.copies
             .as_deref()
-            .is_none_or(|copies| lanes(copies) <= LEAVES)
+            .is_none_or(|copies| lanes(copies) <= BANDS)
     }
 }
 
 /// Transmittances of the tinted panes of a scene and reflectances of its tinted mirrors, each once, and the product of all of them.
-fn tints(scene: &Scene) -> Vec<Leaves> {
-    let mut tints: Vec<Leaves> = Vec::new();
+fn tints(scene: &Scene) -> Vec<Spectrum> {
+    let mut tints: Vec<Spectrum> = Vec::new();
     let panes = scene.panes.iter();
     let panes = panes.filter_map(|s| scene.materials[s.material].pane.as_ref());
     let panes = panes.filter(|pane| !pane.is_neutral());
@@ -265,8 +265,8 @@ fn tints(scene: &Scene) -> Vec<Leaves> {
         }
     }
     if tints.len() > 1 {
-        let together = |all: Leaves, one: &Leaves| std::array::from_fn(|k| all[k] * one[k]);
-        tints.push(tints.iter().fold([1.0; LEAVES], together));
+        let together = |all: Spectrum, one: &Spectrum| std::array::from_fn(|k| all[k] * one[k]);
+        tints.push(tints.iter().fold([1.0; BANDS], together));
     }
     tints
 }
@@ -274,15 +274,15 @@ fn tints(scene: &Scene) -> Vec<Leaves> {
 /// Does every lamp shine with the very spectrum of its light? Then its direct light is one number for each light, on
 /// any cut.
 fn lamps_are_flat(scene: &Scene) -> bool {
-    let flat = |shape: &Leaves| shape.iter().all(|&x| x == shape[0]);
+    let flat = |shape: &Spectrum| shape.iter().all(|&x| x == shape[0]);
     let mut emissions = scene.materials.iter().filter_map(|m| m.emission.as_ref());
     emissions.all(|e| e.texture.is_none() && flat(&e.shape))
         && scene.lights.iter().all(|l| flat(&l.shape))
 }
 
 /// Distinct reflectances of a scene, in order of its materials.
-fn paints(scene: &Scene) -> Vec<Leaves> {
-    let mut paints: Vec<Leaves> = Vec::new();
+fn paints(scene: &Scene) -> Vec<Spectrum> {
+    let mut paints: Vec<Spectrum> = Vec::new();
     for material in &scene.materials {
         if paints.len() < MATERIALS && !paints.contains(&material.reflectance) {
             paints.push(material.reflectance);
@@ -293,7 +293,7 @@ fn paints(scene: &Scene) -> Vec<Leaves> {
 
 /// Union of the cuts that the paper's control gives every light and its first and second reflections; `tolerance` is the
 /// colour difference (CIELUV) that spectra may cause.
-fn paper_cut(scene: &Scene, weights: &[Leaves; 3], tolerance: f64) -> Partition {
+fn paper_cut(scene: &Scene, weights: &[Spectrum; 3], tolerance: f64) -> Partition {
     let cmf = CmfTree::new(*weights);
     let scale = tolerance / PAPER_DE_LUV;
     let rules = Control {
@@ -301,21 +301,24 @@ fn paper_cut(scene: &Scene, weights: &[Leaves; 3], tolerance: f64) -> Partition 
         eps_max: scale * Control::PAPER.eps_max,
         ..Control::PAPER
     };
-    let paints: Vec<Tree<Estimate>> = paints(scene).iter().map(|r| Tree::new(r, &cmf)).collect();
+    let paints: Vec<DyadicTree<Estimate>> = paints(scene)
+        .iter()
+        .map(|r| DyadicTree::new(r, &cmf))
+        .collect();
     let mut union = Partition::ROOT;
     for LightSpectrum { power, .. } in &scene.spectra {
         let k = normalization(power, weights);
         if !k.is_finite() {
             continue;
         }
-        let source = Tree::<Estimate>::new(&power.map(|x| k * x), &cmf);
+        let source = DyadicTree::<Estimate>::new(&power.map(|x| k * x), &cmf);
         let light = represent(&source, &cmf, &Metric::Xyz, rules.eps_max);
         union = union.union(light.partition());
         let (mut once, mut twice) = (List::black(), List::black());
         for first in &paints {
             light.reflect(first, &cmf, &mut once);
             let mut path = [first; 2];
-            let mut reflect = |list: &mut List<Estimate>, path: &[&Tree<Estimate>]| {
+            let mut reflect = |list: &mut List<Estimate>, path: &[&DyadicTree<Estimate>]| {
                 let path = Path {
                     source: &source,
                     reflections: path,

@@ -1,8 +1,8 @@
 //! A model of the room in a few hundred patches, to decide on wavelengths.
 //!
-//! The spectral error varies far less from place to place than light does, so the working partition is chosen on a cut
-//! of the hierarchy: the real links, summed between the patches of the cut (Galerkin), with mean reflectances. There a
-//! solution on all 64 spectral leaves is affordable; what a partition loses is *measured* on the model and is an
+//! The spectral error varies far less from place to place than light does, so the working partition is chosen on a frontier
+//! of the hierarchy: the real links, summed between the patches of the frontier (Galerkin), with mean reflectances. There a
+//! solution on all 64 bands is affordable; what a partition loses is *measured* on the model and is an
 //! *estimate* for the room.
 
 use super::operator::Operator;
@@ -12,9 +12,9 @@ use crate::hierarchy::{NONE, Node, Tree};
 use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
-use crate::link::{Link, LinkRows, Way};
+use crate::link::{Link, LinkRows, Occlusion};
 use crate::scene::LightSpectrum;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use crate::team::NEVER;
 use std::collections::BTreeMap;
 
@@ -31,32 +31,32 @@ pub(crate) struct Coarse {
     factor: Vec<f32>,
     pub(super) areas: Vec<f64>,
     /// Reflectance of each patch.
-    pub(super) reflectance: Vec<Leaves>,
-    /// Exitance and direct punctual irradiance of each patch, light by light, as shapes on the spectral leaves.
-    pub(super) emission: Vec<Vec<Leaves>>,
-    pub(super) punctual: Vec<Vec<Leaves>>,
+    pub(super) reflectance: Vec<Spectrum>,
+    /// Exitance and direct punctual irradiance of each patch, light by light, as shapes on the bands.
+    pub(super) emission: Vec<Vec<Spectrum>>,
+    pub(super) punctual: Vec<Vec<Spectrum>>,
     /// What passes sheets: a patch, the patch behind it, and the transmittance from that to the patch.
-    pub(super) through: Vec<([u32; 2], Leaves)>,
+    pub(super) through: Vec<([u32; 2], Spectrum)>,
     /// Excitation of each patch by fluorescent light; none for the lights of lamps.
-    excitation: Vec<Option<Vec<Leaves>>>,
+    excitation: Vec<Option<Vec<Spectrum>>>,
 }
 
 /// Spectra of the real leaves, to be averaged: reflectance, and for each light exitance and punctual irradiance shapes.
 pub(crate) trait Dense {
     /// Reflectance of a leaf node.
-    fn reflectance(&self, leaf: u32) -> Leaves;
+    fn reflectance(&self, leaf: u32) -> Spectrum;
     /// Exitance shape of a leaf node under a light; none if it emits nothing of that light.
-    fn emission(&self, leaf: u32, light: usize) -> Option<Leaves>;
+    fn emission(&self, leaf: u32, light: usize) -> Option<Spectrum>;
     /// Irradiance shape of a leaf node by the punctual lights of one spectrum; none if there are none.
-    fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves>;
+    fn punctual(&self, leaf: u32, light: usize) -> Option<Spectrum>;
     /// Transmittance to a leaf node from the one behind it; none where it is no sheet.
-    fn through(&self, leaf: u32) -> Option<Leaves>;
+    fn through(&self, leaf: u32) -> Option<Spectrum>;
     /// Excitation of a light by fluorescence at a leaf node; none if nothing excites it there.
-    fn excitation(&self, leaf: u32, light: usize) -> Option<Leaves>;
+    fn excitation(&self, leaf: u32, light: usize) -> Option<Spectrum>;
 }
 
 impl Coarse {
-    /// Sums links and sources over a cut of `tree`, into a limited number of patches.
+    /// Sums links and sources over a frontier of `tree`, into a limited number of patches.
     #[expect(clippy::too_many_arguments, reason = "one caller")]
     pub(crate) fn new(
         tree: &Tree,
@@ -68,7 +68,7 @@ impl Coarse {
         lights: usize,
         patches: usize,
     ) -> Self {
-        let group = cut(tree, patches);
+        let group = frontier(tree, patches);
         let count = group
             .iter()
             .filter(|&&g| g != NONE)
@@ -76,11 +76,11 @@ impl Coarse {
             .max()
             .unwrap_or(0);
         let (mut area, mut counted) = (vec![0.0; count], vec![0.0; count]);
-        let mut reflectance = vec![[0.0; LEAVES]; count];
-        let mut emission = vec![vec![[0.0; LEAVES]; count]; lights];
+        let mut reflectance = vec![[0.0; BANDS]; count];
+        let mut emission = vec![vec![[0.0; BANDS]; count]; lights];
         let mut punctual = emission.clone();
-        let mut through: BTreeMap<[u32; 2], Leaves> = BTreeMap::new();
-        let mut excitation: Vec<Option<Vec<Leaves>>> = vec![None; lights];
+        let mut through: BTreeMap<[u32; 2], Spectrum> = BTreeMap::new();
+        let mut excitation: Vec<Option<Vec<Spectrum>>> = vec![None; lights];
         for &leaf in leaves {
             let (g, a) = (group[leaf as usize] as usize, areas[leaf as usize]);
             area[g] += a;
@@ -88,7 +88,7 @@ impl Coarse {
             add(&mut reflectance[g], &dense.reflectance(leaf), a);
             if let Some(passes) = dense.through(leaf) {
                 let pair = [leaf, tree.behind(leaf)].map(|k| group[k as usize]);
-                add(through.entry(pair).or_insert([0.0; LEAVES]), &passes, a);
+                add(through.entry(pair).or_insert([0.0; BANDS]), &passes, a);
             }
             for light in 0..lights {
                 if let Some(e) = dense.emission(leaf, light) {
@@ -100,7 +100,7 @@ impl Coarse {
                 if let Some(x) = dense.excitation(leaf, light) {
                     let all = &mut excitation[light];
                     add(
-                        &mut all.get_or_insert_with(|| vec![[0.0; LEAVES]; count])[g],
+                        &mut all.get_or_insert_with(|| vec![[0.0; BANDS]; count])[g],
                         &x,
                         a,
                     );
@@ -140,27 +140,32 @@ impl Coarse {
     }
 
     /// Adds the fluorescence that the light of lamps excites: enough to choose wavelengths by, as fluorescence itself excites little.
-    /// `width` of a spectral leaf, nm.
-    pub(super) fn kindle(&mut self, spectra: &[LightSpectrum], weights: &[Leaves; 3], width: f64) {
-        let mut brought = vec![[0.0; LEAVES]; self.leaves.len()];
+    /// `width` of a band, nm.
+    pub(super) fn add_fluorescence(
+        &mut self,
+        spectra: &[LightSpectrum],
+        weights: &[Spectrum; 3],
+        width: f64,
+    ) {
+        let mut brought = vec![[0.0; BANDS]; self.leaves.len()];
         for light in (0..spectra.len()).filter(|&k| self.excitation[k].is_none()) {
             let lanes = Lanes::only(spectra, light, weights);
             let rows = self.irradiance(&lanes);
             for (k, sum) in brought.iter_mut().enumerate() {
-                add(sum, &lanes.leaves(rows.row(k)), 1.0);
+                add(sum, &lanes.spectrum(rows.row(k)), 1.0);
             }
         }
         for (light, excitation) in self.excitation.iter().enumerate() {
             for (k, excitation) in excitation.iter().flatten().enumerate() {
                 let taken = excitation.iter().zip(&brought[k]);
                 let power = taken.map(|(g, e)| g * e).sum::<f64>() * width;
-                self.emission[light][k] = [power; LEAVES];
+                self.emission[light][k] = [power; BANDS];
             }
         }
     }
 
     /// Puts all light behind a filter.
-    pub(super) fn behind(&mut self, filter: &Leaves) {
+    pub(super) fn behind(&mut self, filter: &Spectrum) {
         for row in self.emission.iter_mut().chain(&mut self.punctual).flatten() {
             *row = std::array::from_fn(|k| row[k] * filter[k]);
         }
@@ -170,7 +175,7 @@ impl Coarse {
     pub(super) fn join(&mut self, of: &[usize], count: usize) {
         for lights in [&mut self.emission, &mut self.punctual] {
             let patches = lights.first().map_or(0, Vec::len);
-            let mut joined = vec![vec![[0.0; LEAVES]; patches]; count];
+            let mut joined = vec![vec![[0.0; BANDS]; patches]; count];
             for (light, &to) in lights.iter().zip(of) {
                 for (sum, shape) in joined[to].iter_mut().zip(light) {
                     add(sum, shape, 1.0);
@@ -289,24 +294,24 @@ impl Coarse {
     }
 }
 
-fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
+fn add(sum: &mut Spectrum, x: &Spectrum, weight: f64) {
     for (s, x) in sum.iter_mut().zip(x) {
         *s += weight * x;
     }
 }
 
-/// Which patch of the model each node lies in; [`NONE`] for nodes above the cut. The node whose counted area is greatest
+/// Which patch of the model each node lies in; [`NONE`] for nodes above the frontier. The node whose counted area is greatest
 /// is opened first.
-pub(super) fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
+pub(super) fn frontier(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut open = std::collections::BinaryHeap::new();
     let key = |id: u32| (ordered(tree.node(id).counted), std::cmp::Reverse(id));
     open.push((key(0), 0_u32));
     let mut count = 1;
-    let mut is_cut = vec![false; tree.nodes.len()];
+    let mut on_frontier = vec![false; tree.nodes.len()];
     while let Some((_, id)) = open.pop() {
         let node = tree.node(id);
         if node.is_leaf() || count + node.child_range().len() - 1 > patches {
-            is_cut[id as usize] = true;
+            on_frontier[id as usize] = true;
             continue;
         }
         count += node.child_range().len() - 1;
@@ -317,7 +322,7 @@ pub(super) fn cut(tree: &Tree, patches: usize) -> Vec<u32> {
     let mut group = vec![NONE; tree.nodes.len()];
     let mut next = 0;
     for id in 0..tree.nodes.len() {
-        if is_cut[id] {
+        if on_frontier[id] {
             group[id] = next;
             next += 1;
         } else if id > 0 {
@@ -333,7 +338,7 @@ fn ordered(area: f64) -> u64 {
 }
 
 /// Exchange between the patches of the model, as in the rows of the real leaves: the exchange of a link with a node above the
-/// cut is shared among the patches below it by area, and balance factors enter by their mean over a part's leaves.
+/// frontier is shared among the patches below it by area, and balance factors enter by their mean over a part's leaves.
 fn exchanges(
     tree: &Tree,
     links: &[Link],
@@ -343,7 +348,7 @@ fn exchanges(
     count: usize,
 ) -> Vec<f64> {
     let mut mean: Vec<f64> = factor.iter().map(|&f| f64::from(f)).collect();
-    // For each node above the cut the patches that a link to it reaches, with their weights.
+    // For each node above the frontier the patches that a link to it reaches, with their weights.
     let mut above: Vec<Vec<(u32, f64)>> = vec![Vec::new(); tree.nodes.len()];
     for (k, node) in tree.nodes.iter().enumerate().rev() {
         if node.is_leaf() {
@@ -396,7 +401,7 @@ fn pairs(matrix: &[f64], count: usize) -> Vec<Link> {
                     exchange: g as f32,
                     open_exchange: g as f32,
                     variation: 0.0,
-                    way: Way::Clear,
+                    occlusion: Occlusion::Clear,
                 });
             }
         }
@@ -461,13 +466,13 @@ mod tests {
                 exchange: 0.01,
                 open_exchange: 0.01,
                 variation: 0.0,
-                way: Way::Clear,
+                occlusion: Occlusion::Clear,
             })
             .filter(|l| l.a != l.b)
             .collect();
         let wide: Vec<f64> = factor.iter().map(|&f| f64::from(f)).collect();
         let sums = row_sums(&tree, &LinkRows::new(nodes, &links), &areas, &wide);
-        let group = cut(&tree, 11);
+        let group = frontier(&tree, 11);
         let count = 1 + *group.iter().filter(|&&g| g != NONE).max().unwrap() as usize;
         assert!(count > 8, "{count}");
         let matrix = exchanges(&tree, &links, &factor, &areas, &group, count);

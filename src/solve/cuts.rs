@@ -1,12 +1,12 @@
 //! The choice of a cut for each light spectrum on the model of the room (`coarse`), by the loss of lanes against all 64
-//! spectral leaves.
+//! bands.
 
 use super::coarse::Coarse;
 use crate::color::luv_jacobian;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
 use crate::scene::LightSpectrum;
-use crate::spectrum::{LEAVES, Leaves, Partition};
+use crate::spectrum::{BANDS, Partition, Spectrum};
 
 /// One lane in this many is split at a time.
 const BATCH: usize = 3;
@@ -15,7 +15,7 @@ const UNSEEN: f64 = 1e-3;
 
 /// What a choice of cuts does.
 #[derive(Debug, Clone)]
-pub(crate) struct Choice {
+pub(crate) struct CutChoice {
     /// One cut per light.
     pub cuts: Vec<Partition>,
     /// Mean CIELUV difference of irradiance that they cause on the model.
@@ -26,16 +26,16 @@ impl Coarse {
     /// Splits intervals, the most harmful first, until the mean difference meets `tolerance`; then fills the lanes that
     /// padding would waste. `known` cuts are kept if they are good enough, and one for each light: a lamp with a new
     /// spectrum may have changed the number of lights. `copies`: how many lights of each spectrum rows hold, which must
-    /// not become wider than rows can be; none: one of each, and spectral leaves in place of more than 64 lanes.
+    /// not become wider than rows can be; none: one of each, and bands in place of more than 64 lanes.
     pub(super) fn choose(
         &self,
         spectra: &[LightSpectrum],
-        (weights, guide): (&[Leaves; 3], Option<&[Leaves; 3]>),
+        (weights, guide): (&[Spectrum; 3], Option<&[Spectrum; 3]>),
         white: [f64; 3],
         tolerance: f64,
         known: Option<Vec<Partition>>,
         copies: Option<&[usize]>,
-    ) -> Choice {
+    ) -> CutChoice {
         let count = self.leaves.len();
         let guided = |lanes: Lanes| match guide {
             Some(guide) => lanes.guided(guide, 1.0),
@@ -62,7 +62,7 @@ impl Coarse {
             let lanes = guided(Lanes::ratio(spectra, &cuts, weights));
             let (error, _) = self.loss(&lanes, &references, &jacobians, total);
             if error <= tolerance {
-                return Choice { cuts, error };
+                return CutChoice { cuts, error };
             }
         }
         let mut cuts = vec![Partition::ROOT; spectra.len()];
@@ -78,14 +78,14 @@ impl Coarse {
                 || worst.is_empty()
                 || lanes.lanes()[0].light.is_none()
             {
-                return Choice { cuts, error };
+                return CutChoice { cuts, error };
             }
             // Split several at once: each split costs a solve, and rows hold 4, 8 or 16 lanes. When padding is being
             // filled, no more than fit.
             let (most, room) = match (good, copies) {
                 (true, _) => (padded(size), padded(size) - size),
                 (false, None) => (usize::MAX, lanes.len().div_ceil(BATCH)),
-                (false, Some(_)) => (LEAVES, lanes.len().div_ceil(BATCH)),
+                (false, Some(_)) => (BANDS, lanes.len().div_ceil(BATCH)),
             };
             worst.truncate(room.max(1));
             let before = size;
@@ -96,12 +96,12 @@ impl Coarse {
                 }
             }
             if size == before {
-                return Choice { cuts, error };
+                return CutChoice { cuts, error };
             }
         }
     }
 
-    /// Mean difference that the lanes cause, and the lanes (of more than one spectral leaf) by their share of it, the
+    /// Mean difference that the lanes cause, and the lanes (of more than one band) by their share of it, the
     /// worst first.
     fn loss(
         &self,
@@ -117,14 +117,14 @@ impl Coarse {
             let area = self.tree.node(self.leaves[k]).counted / total;
             let (mut all, mut excited) = ([0.0; 3], [0.0; 3]);
             for (l, lane) in lanes.lanes().iter().enumerate() {
-                // Lanes of a single spectral leaf are exact.
+                // Lanes of a single band are exact.
                 let Some(light) = lane.light else { continue };
                 let (fine, reference) = &references[light];
                 let lost = |xyz: &[[f64; 3]]| {
-                    let leaves = lane.first..lane.first + lane.count;
-                    leaves.fold([0.0; 3], |lost, leaf| {
-                        let difference = f64::from(reference.row(k)[leaf] - rows.row(k)[l]);
-                        plus(lost, xyz[leaf].map(|w| w * difference))
+                    let bands = lane.first..lane.first + lane.count;
+                    bands.fold([0.0; 3], |lost, band| {
+                        let difference = f64::from(reference.row(k)[band] - rows.row(k)[l]);
+                        plus(lost, xyz[band].map(|w| w * difference))
                     })
                 };
                 let seen = lost(fine.xyz());
@@ -147,7 +147,7 @@ impl Coarse {
     }
 }
 
-/// Splits a share of the intervals (light, first spectral leaf), those first in the list, several at once: each step
+/// Splits a share of the intervals (light, first band), those first in the list, several at once: each step
 /// costs a solve.
 pub(super) fn split_worst(cuts: &mut [Partition], worst: Vec<(usize, usize)>, count: usize) {
     let most = count.div_ceil(BATCH).max(1);

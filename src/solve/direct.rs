@@ -5,7 +5,7 @@
 //!
 //! In rooms of few triangles a quadrature rule finds the mean over a leaf, and covered points are left out. Where leaves
 //! look for themselves the points are random, weighted by their openness (a leaf counts as far as others see it, see
-//! `outlook`): without bias whatever lies across the leaf, from two points upwards. Leaves that matter more get more
+//! `leaf_rays`): without bias whatever lies across the leaf, from two points upwards. Leaves that matter more get more
 //! points.
 
 use super::landed::Landed;
@@ -56,11 +56,11 @@ const CHUNK: usize = 32;
 
 /// Direct light at some leaves, in order.
 #[derive(Debug, Default)]
-struct Found {
+struct LeafSamples {
     /// Mean rows.
     rows: Vec<f32>,
     /// Half the range of brightness over a leaf's points; if not measured, minus a bound of it.
-    spread: Vec<f32>,
+    half_range: Vec<f32>,
     /// Mean brightness of the whole leaf over that of the part others see.
     whole: Vec<f32>,
     /// Where the light comes from, if that is kept.
@@ -68,10 +68,10 @@ struct Found {
     rays: u64,
 }
 
-impl Packed for Found {
+impl Packed for LeafSamples {
     fn pack(&self, to: &mut Vec<u8>) {
         self.rows.pack(to);
-        self.spread.pack(to);
+        self.half_range.pack(to);
         self.whole.pack(to);
         self.traces.pack(to);
         self.rays.pack(to);
@@ -80,7 +80,7 @@ impl Packed for Found {
     fn unpack(from: &mut Decoder) -> Read<Self> {
         Ok(Self {
             rows: Packed::unpack(from)?,
-            spread: Packed::unpack(from)?,
+            half_range: Packed::unpack(from)?,
             whole: Packed::unpack(from)?,
             traces: Packed::unpack(from)?,
             rays: from.get()?,
@@ -100,7 +100,7 @@ pub(crate) struct Direct {
     /// Places whose rows are no longer needed.
     free: Vec<u32>,
     /// Half the range of brightness over a leaf's points; if not measured, minus a bound of it.
-    spread: Vec<f32>,
+    half_range: Vec<f32>,
     /// Mean brightness of the whole leaf over that of the part others see.
     whole: Vec<f32>,
     /// Where each leaf's light comes from: a range of `bytes`; empty unless kept. The traces of leaves that were split stay
@@ -125,20 +125,20 @@ impl Direct {
             width,
             place: vec![NONE; nodes],
             rows: rows.to_vec(),
-            spread: vec![0.0; nodes],
+            half_range: vec![0.0; nodes],
             whole: vec![1.0; nodes],
             ..Self::default()
         };
         for (k, &leaf) in leaves.iter().enumerate() {
             known.place[leaf as usize] = k as u32;
-            [known.spread[leaf as usize], known.whole[leaf as usize]] = figures[k];
+            [known.half_range[leaf as usize], known.whole[leaf as usize]] = figures[k];
         }
         known
     }
 
     /// What is known of a leaf besides its row.
     pub(super) fn figures(&self, leaf: u32) -> [f32; 2] {
-        [self.spread[leaf as usize], self.whole[leaf as usize]]
+        [self.half_range[leaf as usize], self.whole[leaf as usize]]
     }
 
     /// Where the light of leaves comes from, as read from a file.
@@ -167,15 +167,15 @@ impl Direct {
         size_of_val(self.place.as_slice())
             + size_of_val(self.rows.as_slice())
             + size_of_val(self.free.as_slice())
-            + size_of_val(self.spread.as_slice())
+            + size_of_val(self.half_range.as_slice())
             + size_of_val(self.whole.as_slice())
             + size_of_val(self.traces.as_slice())
             + self.bytes.len()
     }
 
     /// Half the range of brightness over a leaf's points, or a bound of it.
-    pub(super) fn spread(&self, leaf: u32) -> f32 {
-        self.spread[leaf as usize].abs()
+    pub(super) fn half_range(&self, leaf: u32) -> f32 {
+        self.half_range[leaf as usize].abs()
     }
 
     /// Mean brightness of the whole leaf over that of the part others see.
@@ -208,7 +208,7 @@ impl Direct {
             }
         };
         self.place[leaf as usize] = place;
-        [self.spread[leaf as usize], self.whole[leaf as usize]] = figures;
+        [self.half_range[leaf as usize], self.whole[leaf as usize]] = figures;
     }
 
     /// Frees the row of a node that is a leaf no longer.
@@ -236,14 +236,14 @@ impl Direct {
         &self,
         (tree, leaf): (&Tree, u32),
         demand: &Demand,
-        look: &impl Look,
+        look: &impl LeafSampler,
         landed: &Landed,
     ) -> bool {
         let stake = Stake::new(tree, leaf, demand);
         let found = weighed(self.row(leaf), look.weights()) * f64::from(self.whole(leaf));
         let missing = landed.missing(leaf, tree.node(leaf).area, found);
-        let spread = f64::from(self.spread[leaf as usize]).max(missing);
-        spread * stake.split > 1.0 && stake.may_split
+        let half_range = f64::from(self.half_range[leaf as usize]).max(missing);
+        half_range * stake.split > 1.0 && stake.may_split
     }
 
     /// Gathers at all new leaves, each rank of the team at its own, and splits them until direct light varies less than the demand allows.
@@ -254,7 +254,7 @@ impl Direct {
         tree: &mut Tree,
         demand: &Demand,
         coarsest: f64,
-        look: &impl Look,
+        look: &impl LeafSampler,
         (team, interrupt): (Team, &Interrupt),
     ) -> Result<(), Interrupted> {
         let mut open: Vec<u32> = tree.leaves().collect();
@@ -266,7 +266,7 @@ impl Direct {
         }
         while !open.is_empty() {
             self.place.resize(tree.nodes.len(), NONE);
-            self.spread.resize(tree.nodes.len(), 0.0);
+            self.half_range.resize(tree.nodes.len(), 0.0);
             self.whole.resize(tree.nodes.len(), 1.0);
             let landed = look.landed(tree);
             let stake = |leaf: u32| {
@@ -278,12 +278,12 @@ impl Direct {
                 .map(|&leaf| (leaf, stake(leaf)))
                 .filter(|(leaf, stake)| {
                     let k = *leaf as usize;
-                    self.place[k] == NONE || f64::from(-self.spread[k]) * stake.split > 1.0
+                    self.place[k] == NONE || f64::from(-self.half_range[k]) * stake.split > 1.0
                 })
                 .collect();
             let chunks: Vec<&[(u32, Stake)]> = fresh.chunks(CHUNK).collect();
             let gather = |memory: &mut Memory, chunk: &&[(u32, Stake)]| {
-                let (mut found, before) = (Found::default(), memory.rays);
+                let (mut found, before) = (LeafSamples::default(), memory.rays);
                 for &(leaf, ref stake) in *chunk {
                     let mean = if look.by_chance() {
                         by_chance(tree, leaf, look, stake, memory)
@@ -301,7 +301,7 @@ impl Direct {
                 self.rays += part.rays;
                 for (k, &(leaf, _)) in leaves.iter().enumerate() {
                     let row = &part.rows[k * self.width..(k + 1) * self.width];
-                    self.put(leaf, row, [part.spread[k], part.whole[k]]);
+                    self.put(leaf, row, [part.half_range[k], part.whole[k]]);
                     self.keep_trace(leaf, part.traces[k].as_deref());
                 }
             }
@@ -344,11 +344,15 @@ struct Stake {
 impl Stake {
     pub(crate) fn new(tree: &Tree, leaf: u32, demand: &Demand) -> Self {
         let node = tree.node(leaf);
-        let keen = demand.keen.get(leaf as usize).copied().unwrap_or(1.0);
+        let sensitivity = demand
+            .sensitivity
+            .get(leaf as usize)
+            .copied()
+            .unwrap_or(1.0);
         let share = tree.share(leaf).max(LEAST_SHARE);
         let depth = tree.elements[node.element as usize].depth;
         Self {
-            split: f64::from(keen) * share.sqrt() / demand.threshold,
+            split: f64::from(sensitivity) * share.sqrt() / demand.threshold,
             // The white is twice the mean.
             flux: share / (0.5 * FLUX_SHARE),
             tolerance: NOISE * demand.threshold / share.sqrt(),
@@ -359,7 +363,7 @@ impl Stake {
 }
 
 /// How direct light is gathered at points of leaves.
-pub(crate) trait Look: Sync {
+pub(crate) trait LeafSampler: Sync {
     /// What turns a row into brightness, share of white.
     fn weights(&self) -> &[f64];
     /// Direct light at a point; none where something covers it.
@@ -392,7 +396,7 @@ struct Mean {
     open: [f64; 4],
     trace: Option<Trace>,
     /// Half the range of brightness, see [`Direct`].
-    spread: f64,
+    half_range: f64,
 }
 
 impl Mean {
@@ -405,7 +409,7 @@ impl Mean {
             points: 0,
             open: [0.0; 4],
             trace: None,
-            spread: 0.0,
+            half_range: 0.0,
         }
     }
 
@@ -447,7 +451,7 @@ impl Mean {
     }
 
     /// Appends the means to `found`.
-    fn end(self, found: &mut Found, width: usize) {
+    fn end(self, found: &mut LeafSamples, width: usize) {
         let share = if self.total > 0.0 {
             1.0 / self.total
         } else {
@@ -455,7 +459,7 @@ impl Mean {
         };
         let row = &self.row[..width];
         found.rows.extend(row.iter().map(|x| x * share));
-        found.spread.push(self.spread as f32);
+        found.half_range.push(self.half_range as f32);
         let seen = self.bright[0] * f64::from(share);
         let all = self.bright[1] / self.points.max(1) as f64;
         found
@@ -485,7 +489,7 @@ pub(super) fn receiver(tree: &Tree, leaf: u32, at: [f64; 3], seed: u64) -> Recei
 fn by_rule(
     tree: &Tree,
     leaf: u32,
-    look: &impl Look,
+    look: &impl LeafSampler,
     tolerance: f64,
     tiny: bool,
     memory: &mut Memory,
@@ -506,7 +510,7 @@ fn by_rule(
             mean.add(&row, weight as f32, look.weights(), memory);
         }
     }
-    mean.spread = mean.half_range();
+    mean.half_range = mean.half_range();
     // By the rule, the whole leaf is as bright as its uncovered points.
     mean.bright[1] = mean.bright[0] / f64::from(mean.total.max(f32::MIN_POSITIVE));
     mean.points = 1;
@@ -518,7 +522,13 @@ fn by_rule(
 /// Their number follows from the light without shadows: were more taken where the first are bright, places that are bright
 /// here and there would come out too dark. For the same reason the points that decide whether the leaf is split are left out
 /// of the mean: leaves that stay would be those on which few points found light to be even.
-fn by_chance(tree: &Tree, leaf: u32, look: &impl Look, stake: &Stake, memory: &mut Memory) -> Mean {
+fn by_chance(
+    tree: &Tree,
+    leaf: u32,
+    look: &impl LeafSampler,
+    stake: &Stake,
+    memory: &mut Memory,
+) -> Mean {
     let shift = hash(u64::from(leaf), 3);
     // The tolerance, also for what would be a share of all light that matters.
     let tolerance = stake.tolerance.min(1.0 / stake.flux);
@@ -544,19 +554,22 @@ fn by_chance(tree: &Tree, leaf: u32, look: &impl Look, stake: &Stake, memory: &m
     let count = enough.clamp(RANDOM[0], RANDOM[2]).next_power_of_two();
     if most * stake.split <= 1.0 {
         return Mean {
-            spread: -most,
+            half_range: -most,
             ..gather(0..count)
         };
     }
     // Points beyond those that the mean may use.
     let decide = gather(RANDOM[2]..RANDOM[2] + RANDOM[1]);
     // Half the range of a uniform distribution of this variance.
-    let spread = (3.0 * decide.variance()).sqrt();
-    if stake.may_split && spread * stake.split > 1.0 {
-        return Mean { spread, ..decide };
+    let half_range = (3.0 * decide.variance()).sqrt();
+    if stake.may_split && half_range * stake.split > 1.0 {
+        return Mean {
+            half_range,
+            ..decide
+        };
     }
     Mean {
-        spread,
+        half_range,
         ..gather(0..count.max(RANDOM[1]))
     }
 }

@@ -5,12 +5,12 @@
 //! error is unknown.
 
 use super::direct::Direct;
-use super::outlook::Outlook;
+use super::leaf_rays::LeafRays;
 use super::refinement::Refinement;
 use super::{Bake, Solution};
-use crate::hierarchy::{Grown, NONE};
+use crate::hierarchy::{NONE, TreeSize};
 use crate::light::Rows;
-use crate::spectrum::LEAVES;
+use crate::spectrum::BANDS;
 use std::borrow::Cow;
 
 /// Rays that suffice for the light of a node: its standard deviation is then a quarter.
@@ -21,12 +21,12 @@ const ALBEDO: f64 = 0.9;
 
 impl Bake {
     /// Takes back a first round that was interrupted: to the room as prepared.
-    pub(super) fn begin_again(&mut self, grown: &Grown) {
+    pub(super) fn begin_again(&mut self, grown: &TreeSize) {
         let mut tree = std::mem::take(&mut self.refinement.tree);
         tree.shrink(grown);
         self.refinement = Refinement {
             tree,
-            outlook: Outlook::of_team(self.room.team),
+            leaf_rays: LeafRays::of_team(self.room.team),
             ..Refinement::default()
         };
         self.solution = Solution::new(&self.room);
@@ -36,8 +36,8 @@ impl Bake {
     pub(super) fn light_by_landings(&mut self) {
         let leaves = self.refinement.leaves();
         let (room, refinement) = (&self.room, &mut self.refinement);
-        refinement.outlook.open(&refinement.tree);
-        refinement.areas = refinement.outlook.areas(&refinement.tree);
+        refinement.leaf_rays.open(&refinement.tree);
+        refinement.areas = refinement.leaf_rays.areas(&refinement.tree);
         let sources = room
             .painter()
             .paint(&refinement.tree, &leaves, &self.solution.lanes);
@@ -55,8 +55,8 @@ impl Bake {
             .sum();
         let albedo = self.albedo(&leaves, &sources.reflectance, &spectrum);
         let even = landed / area * albedo / (1.0 - albedo);
-        let mut rows = Vec::with_capacity(leaves.len() * LEAVES);
-        let mut irradiance = Rows::zero(leaves.len(), LEAVES);
+        let mut rows = Vec::with_capacity(leaves.len() * BANDS);
+        let mut irradiance = Rows::zero(leaves.len(), BANDS);
         let mut reflected = irradiance.clone();
         for (k, direct) in direct.into_iter().enumerate() {
             for (lane, per_lux) in spectrum.iter().enumerate() {
@@ -68,12 +68,12 @@ impl Bake {
         }
         let nodes = self.refinement.tree.nodes.len();
         let even = vec![[0.0, 1.0]; leaves.len()];
-        self.refinement.direct = Direct::known(&leaves, nodes, LEAVES, &rows, &even);
+        self.refinement.direct = Direct::known(&leaves, nodes, BANDS, &rows, &even);
         let emitted = self
             .refinement
-            .on_nodes::<LEAVES>(&sources.emission, &leaves);
-        let on_nodes = self.refinement.on_nodes::<LEAVES>(&reflected, &leaves);
-        let on_nodes = self.without_mirrors::<LEAVES>(Cow::Owned(reflected), on_nodes, &leaves);
+            .on_nodes::<BANDS>(&sources.emission, &leaves);
+        let on_nodes = self.refinement.on_nodes::<BANDS>(&reflected, &leaves);
+        let on_nodes = self.without_mirrors::<BANDS>(Cow::Owned(reflected), on_nodes, &leaves);
         self.shine(&leaves, emitted, on_nodes, irradiance);
         self.light_arrives();
     }
@@ -116,7 +116,7 @@ impl Bake {
 
     /// Irradiance on each lane for one lux of the light of all lamps together; 0 where none shines.
     fn spectrum_of_lamps(&self, leaves: &[u32], emission: &Rows) -> Vec<f64> {
-        let mut sum = [0.0_f32; LEAVES];
+        let mut sum = [0.0_f32; BANDS];
         for (k, &leaf) in leaves.iter().enumerate() {
             let area = self.refinement.tree.node(leaf).area as f32;
             for (sum, x) in sum.iter_mut().zip(emission.row(k)) {

@@ -25,7 +25,7 @@ const SHARE_OF_RAYS: f64 = 0.95;
 
 /// Watched points.
 #[derive(Default)]
-pub(crate) struct Probes {
+pub(crate) struct WatchedPoints {
     /// Face entry, weights on the face, point and normal.
     pub(super) points: Vec<(u32, [f64; 3], DVec3, DVec3)>,
 }
@@ -50,7 +50,7 @@ impl Distance {
     }
 }
 
-impl Probes {
+impl WatchedPoints {
     /// Random points, distributed by counted area.
     pub(crate) fn new(tree: &Tree, seed: u64) -> Self {
         let mut rng = Pcg::new(seed ^ 0x009b_0be5);

@@ -12,7 +12,7 @@ use crate::hierarchy::{Mesh, Tree};
 use crate::light::lanes::Lanes;
 use crate::light::{Fluorescent, Rows};
 use crate::scene::{GREATEST_ALBEDO, Material, Scene};
-use crate::spectrum::LEAVES;
+use crate::spectrum::BANDS;
 use crate::team::Interrupt;
 use rayon::prelude::*;
 
@@ -86,7 +86,7 @@ fn back(scene: &Scene) -> f64 {
         let used = scene.materials.iter();
         used.filter_map(|m| Some((m, m.fluorescence.as_ref()?)))
     };
-    let mut emitted = [false; LEAVES];
+    let mut emitted = [false; BANDS];
     for term in fluorescent().flat_map(|(_, f)| &f.terms) {
         let power = &scene.spectra[term.light].power;
         (emitted.iter_mut().zip(power)).for_each(|(e, p)| *e |= *p > 0.0);
@@ -94,7 +94,7 @@ fn back(scene: &Scene) -> f64 {
     let of = |(m, f): (&Material, &crate::scene::fluorescence::Fluorescence)| {
         let out = f.efficiency();
         let painted = m.paint.is_some() || m.vertex_paint;
-        (0..LEAVES)
+        (0..BANDS)
             .filter(|&k| emitted[k])
             .fold(0.0, |most: f64, k| {
                 let rho = match painted {

@@ -8,7 +8,7 @@ use crate::light::Rows;
 use crate::light::lanes::Lanes;
 use crate::link::Sight;
 use crate::scene::{PunctualLight, Scene};
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use glam::DVec3;
 
 /// Rays that test whether a room is closed.
@@ -136,7 +136,7 @@ pub(crate) struct Guess {
 const DOME: f64 = 0.05;
 
 /// Light spread evenly over all faces: `H = flux / (A (1 - mean albedo))`.
-pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 3]) -> Guess {
+pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Spectrum; 3]) -> Guess {
     let lanes = Lanes::dense(&scene.spectra, weights);
     let glow: Vec<[f64; 3]> = (scene.materials.iter())
         .map(|m| lanes.exitance(m.even_emission()))
@@ -146,7 +146,7 @@ pub(crate) fn guess(scene: &Scene, mesh: &Mesh, tree: &Tree, weights: &[Leaves; 
         .materials
         .iter()
         .map(|m| {
-            let luminous = |spectrum: &Leaves| -> f64 {
+            let luminous = |spectrum: &Spectrum| -> f64 {
                 spectrum.iter().zip(&weights[1]).map(|(r, w)| r * w).sum()
             };
             let through = m.sheet.as_ref().map_or(0.0, |s| luminous(&s.transmittance));
@@ -250,7 +250,7 @@ pub(super) fn conserve(
 
 /// Flux balance of a solution. `emitted = absorbed + escaped` must hold for every band.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Balance {
+pub struct FluxBalance {
     /// Luminous flux emitted evenly by surfaces, lm (lamps with a profile are among `sent`). Light of a sky, of the sun and
     /// of parallel lights counts from where it is received: what does not enter the room is in no sum.
     pub emitted_lm: f64,
@@ -281,7 +281,7 @@ fn add(sums: &mut [f64; 5], area: f64, densities: [f64; 5]) {
     }
 }
 
-impl Balance {
+impl FluxBalance {
     /// The balance of fluxes by lane (emitted, received, absorbed, escaped, fluoresced).
     fn of(fluxes: &[[f64; 5]], lanes: &Lanes) -> Self {
         let lit = fluxes.iter().filter(|sums| sums[1] + sums[4] > 0.0);
@@ -342,7 +342,7 @@ pub(super) fn flux(
     leaves: &[u32],
     rows: &FluxRows,
     row_sums: &[f64],
-) -> Balance {
+) -> FluxBalance {
     let mut fluxes = vec![[0.0; 5]; lanes.len()];
     for (k, &leaf) in leaves.iter().enumerate() {
         let area = areas[leaf as usize];
@@ -360,7 +360,7 @@ pub(super) fn flux(
             add(sums, area, [e, f, (1.0 - rho) * h, out, given]);
         }
     }
-    Balance::of(&fluxes, lanes)
+    FluxBalance::of(&fluxes, lanes)
 }
 
 /// What the leaves receive as wholes, however much of them others see.
@@ -384,7 +384,7 @@ pub(super) fn flux_by_rays(
     leaves: &[u32],
     rows: &FluxRows,
     whole: &Whole,
-) -> Balance {
+) -> FluxBalance {
     let mut fluxes = vec![[0.0; 5]; lanes.len()];
     for (k, &leaf) in leaves.iter().enumerate() {
         let (area, seen) = ((whole.area)(leaf), areas[leaf as usize]);
@@ -408,7 +408,7 @@ pub(super) fn flux_by_rays(
             );
         }
     }
-    Balance::of(&fluxes, lanes)
+    FluxBalance::of(&fluxes, lanes)
 }
 
 /// Rows by leaf from which the flux is summed.

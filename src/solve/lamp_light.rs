@@ -1,7 +1,7 @@
 //! Direct light on the leaves of a bake: what [`Direct`](super::direct::Direct) needs of points.
 
 use super::Bake;
-use super::direct::{Look, receiver};
+use super::direct::{LeafSampler, receiver};
 use super::flux::{self, Closed};
 use super::landed::Landed;
 use super::refinement::Refinement;
@@ -32,7 +32,7 @@ const PLACES: [[f64; 3]; 4] = [
 const MIRRORED: f64 = 2.0;
 
 /// Gathers at points of leaves while the hierarchy is being refined.
-struct Looker<'a> {
+struct LampLightSampler<'a> {
     room: &'a Room,
     solution: &'a Solution,
     sight: &'a Sight<'a>,
@@ -41,7 +41,7 @@ struct Looker<'a> {
     weights: Vec<f64>,
 }
 
-impl Look for Looker<'_> {
+impl LeafSampler for LampLightSampler<'_> {
     fn weights(&self) -> &[f64] {
         &self.weights
     }
@@ -125,7 +125,7 @@ impl Bake {
         solution.light.bright_lamps = solution.bright_lamps();
         let Refinement { tree, direct, .. } = &mut self.refinement;
         room.with_sight(|sight| {
-            let look = Looker {
+            let look = LampLightSampler {
                 room,
                 solution,
                 sight,
@@ -149,7 +149,7 @@ impl Bake {
         let leaves = refinement.leaves();
         let painter = room.painter();
         let sources = painter.paint(&refinement.tree, &leaves, &solution.lanes);
-        refinement.look_out(room)?;
+        refinement.trace_leaf_rays(room)?;
         let nodes = refinement.tree.nodes.len();
         let light = &mut solution.light;
         light.emitted = refinement.on_nodes::<L>(&sources.emission, &leaves);

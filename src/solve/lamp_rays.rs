@@ -15,7 +15,7 @@ const OFF: f64 = 1e-5;
 
 impl Room {
     /// Lamps with their tristimulus flux, except those that shine from far away.
-    pub(super) fn sending(&self, tree: &Tree, lanes: &Lanes) -> Vec<([f64; 3], Lamp<'_>)> {
+    pub(super) fn sending(&self, tree: &Tree, lanes: &Lanes) -> Vec<([f64; 3], LampSource<'_>)> {
         let exitance: Vec<[f64; 3]> = (self.scene.materials.iter())
             .map(|m| lanes.exitance(m.even_emission()))
             .collect();
@@ -23,7 +23,7 @@ impl Room {
             let triangle = tree.faces[entry].triangle as usize;
             let exitance = exitance[self.mesh.material[triangle] as usize];
             let flux = exitance.map(|x| x * self.mesh.area[triangle]);
-            (flux[1] > 0.0).then_some((flux, Lamp::Face(entry)))
+            (flux[1] > 0.0).then_some((flux, LampSource::Face(entry)))
         });
         let mut lamps: Vec<_> = faces.collect();
         for light in &self.scene.lights {
@@ -32,7 +32,7 @@ impl Room {
             };
             let flux = lanes.emission(light.light, &light.shape, solid);
             if flux[1] > 0.0 {
-                lamps.push((flux, Lamp::Punctual(light)));
+                lamps.push((flux, LampSource::Punctual(light)));
             }
         }
         lamps
@@ -41,20 +41,20 @@ impl Room {
 
 /// A source of light.
 #[derive(Clone, Copy)]
-pub(super) enum Lamp<'a> {
+pub(super) enum LampSource<'a> {
     /// An entry of the hierarchy's faces.
     Face(usize),
     Punctual(&'a PunctualLight),
 }
 
-impl Lamp<'_> {
+impl LampSource<'_> {
     /// Start, direction and plane of the `k`-th ray, and its weight: 1 in the mean.
     pub(super) fn ray(self, room: &Room, tree: &Tree, k: u32) -> (DVec3, DVec3, u32, f64) {
         // Two shifts of one sequence are correlated.
         let mut random = Pcg::new(hash(13, u64::from(k)));
         let (u, v) = (sequence02(k, 11), [random.f64(), random.f64()]);
         match self {
-            Lamp::Face(entry) => {
+            LampSource::Face(entry) => {
                 let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
                 let direction = cosine_direction(tree.face_normal[entry], v);
                 (
@@ -64,7 +64,7 @@ impl Lamp<'_> {
                     1.0,
                 )
             }
-            Lamp::Punctual(light) => {
+            LampSource::Punctual(light) => {
                 let place = light.position - room.mesh.centre;
                 if let Some(luminaire) = &light.luminaire {
                     let ray = luminaire.ray(u, v);

@@ -30,7 +30,7 @@ const PARTS: usize = 16;
 type Ray = (DVec3, DVec3, [f64; 3]);
 
 /// Where a ray from a lamp ended.
-struct End {
+struct LampRayEnd {
     /// What the ray met; none if it left the room.
     hit: Option<Hit>,
     /// Entry of the hierarchy's faces that the ray met; [`NONE`] for a black back or nothing.
@@ -39,7 +39,7 @@ struct End {
     through: f64,
 }
 
-impl End {
+impl LampRayEnd {
     /// The landing of a ray of `flux`, if it met a front.
     fn landing(&self, flux: [f64; 3]) -> Option<Landing> {
         let hit = self.hit.filter(|_| self.entry != NONE)?;
@@ -63,7 +63,7 @@ struct Follower<'a> {
 
 impl Follower<'_> {
     /// Where rays that start in one plane end.
-    fn follow(&self, rays: &[Ray], plane: u32) -> Vec<End> {
+    fn follow(&self, rays: &[Ray], plane: u32) -> Vec<LampRayEnd> {
         let mut ends = Vec::with_capacity(rays.len());
         for rays in rays.chunks(TOGETHER) {
             // The last packet is filled up with its first ray.
@@ -76,7 +76,7 @@ impl Follower<'_> {
                 let hit = hits[k];
                 let reach = hit.map_or(self.reach, |hit| hit.t.min(self.reach));
                 let end = from[k] + reach * directions[k];
-                End {
+                LampRayEnd {
                     hit,
                     entry: hit.map_or(NONE, |hit| self.tree.met(&hit)),
                     through: (self.glass).map_or(1.0, |glass| glass.brightness(from[k], end)),
@@ -104,7 +104,7 @@ impl Follower<'_> {
             };
             cells.iter().flat_map(within).collect()
         };
-        let landings = |rays: &[Ray], ends: &[End]| {
+        let landings = |rays: &[Ray], ends: &[LampRayEnd]| {
             let landed = rays
                 .iter()
                 .zip(ends)

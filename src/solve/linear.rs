@@ -35,7 +35,7 @@ const GREATEST: f32 = 2.0;
 /// Shares of a link's ends, less 1, in units of 1 / [`FINE`]: at two corners of the receiver and two of the source. The
 /// third makes the sum 0; all are 0 where an end has no children.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct Shares {
+struct CornerShares {
     receiver: [i16; 2],
     source: [i16; 2],
 }
@@ -52,7 +52,7 @@ pub(crate) struct Slopes<'a> {
     /// For each node its place among leaves or `inner`.
     place: Vec<u32>,
     /// For each entry of the rows of links.
-    shares: Vec<Shares>,
+    shares: Vec<CornerShares>,
     /// For each leaf what its row must sum to.
     target: Vec<f32>,
     /// For each leaf what its row is scaled by to sum to that.
@@ -82,7 +82,7 @@ impl<'a> Slopes<'a> {
             .flat_map_iter(|some| {
                 let mut scratch = Scratch::default();
                 let rows = some.iter().map(|&node| {
-                    let shares = |&(source, _): &(u32, f32)| Shares {
+                    let shares = |&(source, _): &(u32, f32)| CornerShares {
                         receiver: shares(tree, node, source, &mut scratch),
                         source: shares(tree, source, node, &mut scratch),
                     };
@@ -244,7 +244,7 @@ impl<'a> Slopes<'a> {
         sums.map(|sum| scaled(&sum, inverse))
     }
 
-    fn row(&self, node: usize) -> impl Iterator<Item = (&(u32, f32), &Shares)> {
+    fn row(&self, node: usize) -> impl Iterator<Item = (&(u32, f32), &CornerShares)> {
         let shares = &self.shares[self.links.range(node)];
         self.links.row(node).iter().zip(shares)
     }
@@ -302,7 +302,7 @@ mod tests {
     use super::*;
     use crate::geometry::lambert_polygon;
     use crate::hierarchy::Mesh;
-    use crate::link::{Link, Way};
+    use crate::link::{Link, Occlusion};
     use crate::scene::{Options, Scene};
     use std::path::Path;
 
@@ -324,7 +324,7 @@ mod tests {
             exchange: 0.2,
             open_exchange: 0.2,
             variation: 1.0,
-            way: Way::Clear,
+            occlusion: Occlusion::Clear,
         };
         let links = LinkRows::new(tree.nodes.len(), &[link]);
         (tree, links, to, from)

@@ -9,13 +9,13 @@ use super::{Bake, SPECTRUM_SHARE};
 use crate::color::{KM, luv_jacobian};
 use crate::light::lanes::Lanes;
 use crate::scene::LightSpectrum;
-use crate::spectrum::{CmfTree, Control, Leaves, Metric, Partition, SpectralList, coarsen};
+use crate::spectrum::{CmfTree, Control, Metric, Partition, SpectralList, Spectrum, coarsen};
 use rayon::prelude::*;
 
 /// One list for each light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PatchList {
-    /// Partition and values: where bit k is set, an interval starts at spectral leaf k; values are ratios to the
+    /// Partition and values: where bit k is set, an interval starts at band k; values are ratios to the
     /// light's power.
     pub lights: Vec<(Partition, Vec<f64>)>,
 }
@@ -39,7 +39,7 @@ impl<'a> Lister<'a> {
     pub(crate) fn new(
         lanes: &'a Lanes,
         spectra: &[LightSpectrum],
-        weights: &[Leaves; 3],
+        weights: &[Spectrum; 3],
         white: [f64; 3],
         limit: f64,
     ) -> Self {
@@ -53,7 +53,7 @@ impl<'a> Lister<'a> {
         }
     }
 
-    /// The list of a row. A row of the 64 spectral leaves stays as it is: they belong to no one light.
+    /// The list of a row. A row of the 64 bands stays as it is: they belong to no one light.
     pub(super) fn list(&self, row: &[f32]) -> PatchList {
         let xyz = self.lanes.tristimulus(row).map(|x| x / KM);
         let metric = Metric::Luv(luv_jacobian(xyz, self.white));
@@ -75,11 +75,11 @@ impl<'a> Lister<'a> {
             let values: Vec<f64> = own().map(|(_, &x)| f64::from(x)).collect();
             let mut list = SpectralList::from_values(cut, &values);
             coarsen(&mut list, cmf, &metric, &Control::within(limit));
-            let leaves = list.leaves();
+            let spectrum = list.spectrum();
             let values = list
                 .partition()
                 .iter()
-                .map(|(first, _)| leaves[first])
+                .map(|(first, _)| spectrum[first])
                 .collect();
             lights.push((list.partition(), values));
         }
@@ -110,7 +110,7 @@ impl Bake {
     }
 
     /// The interval lists that every `step`-th leaf of the hierarchy needs for its irradiance, in order of
-    /// [`Light::leaves`](crate::light::Light::leaves); empty where the rows hold the 64 spectral leaves.
+    /// [`Light::leaves`](crate::light::Light::leaves); empty where the rows hold the 64 bands.
     pub fn lists(&self, step: usize) -> Vec<PatchList> {
         if !self.solution.lanes.is_ratio() {
             return Vec::new();

@@ -7,7 +7,7 @@
 use super::Bake;
 use super::room::Room;
 use crate::geometry::sampling::{Pcg, cosine_direction, hash};
-use crate::hierarchy::{Counted, Frame, Landing, NONE, Tree};
+use crate::hierarchy::{Counted, Frame, LandingPoint, NONE, Tree};
 use crate::link::Sight;
 use rayon::prelude::*;
 
@@ -79,7 +79,7 @@ impl Room {
     }
 
     /// Where light of the lamps lands: paths are shared among lamps by flux.
-    fn landings(&self, tree: &Tree, sight: &Sight, paths: u32) -> Vec<Landing> {
+    fn landings(&self, tree: &Tree, sight: &Sight, paths: u32) -> Vec<LandingPoint> {
         let lamps = self.sending(tree, &self.dense_lanes());
         let sums: Vec<f64> = (lamps.iter())
             .scan(0.0, |sum, lamp| {
@@ -117,7 +117,7 @@ impl Room {
             }
             landed
         };
-        let landed: Vec<Vec<Landing>> = (0..paths).into_par_iter().map(path).collect();
+        let landed: Vec<Vec<LandingPoint>> = (0..paths).into_par_iter().map(path).collect();
         landed.concat()
     }
 }

@@ -1,7 +1,7 @@
 //! What a solution can be asked: light at receivers, and which receivers are covered.
 
 use super::estimate::{self, Distance};
-use super::{Bake, Care, Closed, flux};
+use super::{Bake, Closed, GatherQuality, flux};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::NONE;
 use crate::link::Sight;
@@ -41,11 +41,15 @@ impl Bake {
 
     /// Gathers at receivers, in order.
     pub fn gather(&self, receivers: &[Receiver]) -> Vec<Gathered> {
-        self.gather_with(receivers, Care::Full)
+        self.gather_with(receivers, GatherQuality::Full)
     }
 
-    /// Gathers with care, or just for a picture, see [`Care`].
-    pub(crate) fn gather_with(&self, receivers: &[Receiver], care: Care) -> Vec<Gathered> {
+    /// Gathers with care, or just for a picture, see [`GatherQuality`].
+    pub(crate) fn gather_with(
+        &self,
+        receivers: &[Receiver],
+        quality: GatherQuality,
+    ) -> Vec<Gathered> {
         if self.solution.light.width() == 0 || self.solution.light.white == [0.0; 3] {
             // A room without light: nothing to gather.
             return vec![Gathered::dark(); receivers.len()];
@@ -53,10 +57,11 @@ impl Bake {
         self.room.with_sight(|sight| {
             let sketched = Hemisphere::sketch();
             let mut gatherer = self.gatherer(sight);
-            if let (Care::Sketch, Some(hemisphere)) = (care, &mut gatherer.hemisphere) {
+            if let (GatherQuality::Preview, Some(hemisphere)) = (quality, &mut gatherer.hemisphere)
+            {
                 *hemisphere = &sketched;
             }
-            if care != Care::Full {
+            if quality != GatherQuality::Full {
                 gatherer.most_backs = MOSTLY;
             }
             let at = |memory: &mut Memory, r: &Receiver| gatherer.at(r, memory).pack();
@@ -127,7 +132,7 @@ impl Bake {
 
     /// Share of a leaf that others see.
     pub(crate) fn openness(&self, leaf: u32) -> f64 {
-        f64::from(self.refinement.outlook.bare[leaf as usize])
+        f64::from(self.refinement.leaf_rays.bare[leaf as usize])
     }
 
     /// For each entry of the hierarchy's faces the space that it belongs to, and whether something solid covers it.

@@ -4,7 +4,7 @@
 
 use crate::light::lanes::Lanes;
 use crate::light::rows::Rows;
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -23,7 +23,7 @@ pub(crate) struct Mixed {
 
 impl Mixed {
     /// Matrices for paints, and the paint of each leaf.
-    pub(crate) fn new(paints: &[Leaves], of: Vec<u32>, lanes: &Lanes, width: usize) -> Self {
+    pub(crate) fn new(paints: &[Spectrum], of: Vec<u32>, lanes: &Lanes, width: usize) -> Self {
         let m = lanes.len();
         let each: Vec<(Rows, f64)> = paints
             .par_iter()

@@ -11,23 +11,23 @@ mod cuts;
 mod direct;
 mod early;
 mod estimate;
+mod fixed_links;
 mod fluorescing;
 pub(crate) mod flux;
 pub mod forecast;
-mod held;
 mod lamp_light;
 mod lamp_rays;
 mod landed;
 mod landing;
+mod leaf_rays;
 mod linear;
 mod lists;
 mod lit;
 mod looking;
 mod mixed;
 mod operator;
-mod outlook;
 mod outside;
-mod parting;
+mod parted_mesh;
 pub(crate) mod punctual;
 pub mod record;
 mod recording;
@@ -36,12 +36,12 @@ mod refinement;
 mod reflection;
 mod representation;
 mod room;
-mod shares;
 mod solution;
 pub(crate) mod solver;
 mod solving;
 mod sources;
 mod sums;
+mod threshold_factors;
 mod tinted;
 
 pub use lists::PatchList;
@@ -59,18 +59,18 @@ use crate::link::{Demand, is_small};
 use crate::scene::effects::Plan;
 use crate::scene::{PunctualLight, Scene};
 use crate::team::{Asked, Interrupt, Interrupted, Team};
+pub use fixed_links::FixedLinkSolve;
 pub use flux::Closed;
 use forecast::{BY_LINKS, BY_RAYS, Goal, Past};
-pub use held::Held;
 pub use operator::Operator;
 pub use outside::running;
 use refinement::Refinement;
 pub use room::Settings;
-pub(crate) use room::{Known, Room};
-use shares::Shares;
+pub(crate) use room::{Room, RoomAnalysis};
 pub(crate) use solution::{DE_PER_PERCENT, Solution};
 use sources::Sources;
 use std::time::Instant;
+use threshold_factors::ThresholdFactors;
 
 /// Threshold of the first round, share of white (see [`Demand::threshold`]); each round divides it.
 const FIRST_THRESHOLD: f64 = 0.02;
@@ -93,13 +93,13 @@ pub(crate) const NOBODY: &str = "nobody interrupts it";
 
 /// What a gather is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Care {
+pub(crate) enum GatherQuality {
     /// Points anywhere.
     Full,
     /// Vertices: nobody sees those that lie inside something.
     Vertex,
     /// A picture of an unfinished bake.
-    Sketch,
+    Preview,
 }
 
 /// A room being baked.
@@ -115,7 +115,7 @@ pub struct Bake {
 }
 
 /// What a solve starts from, by leaf.
-pub(crate) struct Given {
+pub(crate) struct SolveInput {
     pub(crate) sources: Sources,
     /// Direct irradiance.
     pub(crate) first: Rows,
@@ -136,9 +136,9 @@ impl Bake {
     }
 
     /// Prepares a room of which rays have already told which faces share a space and what is closed.
-    pub(crate) fn with(scene: Scene, settings: Settings, known: Option<Known>) -> Self {
+    pub(crate) fn with(scene: Scene, settings: Settings, analysis: Option<RoomAnalysis>) -> Self {
         let started = Instant::now();
-        let (room, tree) = Room::new(scene, settings, known);
+        let (room, tree) = Room::new(scene, settings, analysis);
         Self {
             refinement: Refinement {
                 tree,
@@ -212,13 +212,13 @@ impl Bake {
         }
         let threshold = FIRST_THRESHOLD / THRESHOLD_STEP.powi(round as i32);
 
-        let (bright, keen) = self.stakes();
+        let (bright, sensitivity) = self.stakes();
         let by_rays = self.room.by_rays();
         let faces = self.refinement.tree.faces.len();
-        let shares = Shares::of(by_rays, is_small(&self.room.mesh), faces);
+        let shares = ThresholdFactors::of(by_rays, is_small(&self.room.mesh), faces);
         let demand = Demand {
             bright: &bright,
-            keen: &keen,
+            sensitivity: &sensitivity,
             threshold: threshold * shares.link,
             least_area: LEAST_AREA * self.refinement.tree.counted(),
             hidden: !by_rays,
@@ -251,7 +251,7 @@ impl Bake {
         clock.lap("direct");
 
         let (leaves, rows) = (self.refinement.leaves(), self.refinement.link_rows());
-        escape_rays += self.refinement.look_out(&self.room)?;
+        escape_rays += self.refinement.trace_leaf_rays(&self.room)?;
         // Rays need no balance: their rows sum to what they must as they are.
         if !by_rays {
             self.refinement.balance = self.refinement.balanced(&rows);
@@ -266,7 +266,7 @@ impl Bake {
 
         let distance = self.distance();
         clock.lap("estimate");
-        Ok(self.recorded(record::Measured {
+        Ok(self.recorded(record::RoundMeasurements {
             threshold,
             refined: &refined,
             convergence: &convergence,
@@ -292,7 +292,10 @@ impl Bake {
             self.solution.light.white = self.room.landed_white(tree, self.solution.light.white);
         }
         let bright = &self.solution.light.bright_reflected;
-        (bright[..nodes].to_vec(), self.solution.keenness(tree))
+        (
+            bright[..nodes].to_vec(),
+            self.solution.lightness_sensitivity(tree),
+        )
     }
 }
 
@@ -325,7 +328,7 @@ impl Bake {
     /// Spreads the work over a team: from here on all ranks must get the same calls, and reach the same results.
     pub fn spread_over(&mut self, team: Team) {
         self.room.team = team;
-        self.refinement.outlook.team = team;
+        self.refinement.leaf_rays.team = team;
     }
 
     /// The ranks that bake this room together.

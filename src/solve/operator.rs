@@ -253,7 +253,7 @@ pub(super) fn pull<V: Vector, const N: usize>(tree: &Tree, areas: &[f64], rows: 
 mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
-    use crate::link::{Link, Way};
+    use crate::link::{Link, Occlusion};
 
     /// Nodes by their parents; leaves of area 1 and 2 in turn.
     fn tree(parents: &[u32]) -> (Tree, Vec<f64>, Vec<u32>) {
@@ -335,7 +335,7 @@ mod tests {
                         exchange: rng.f32(),
                         open_exchange: 1.0,
                         variation: 0.0,
-                        way: Way::Clear,
+                        occlusion: Occlusion::Clear,
                     });
                 }
             }

@@ -6,8 +6,8 @@ use crate::geometry::openings::Openings;
 use crate::hierarchy::{Mesh, Mirrors, Tree};
 use crate::light::Filters;
 use crate::scene::Scene;
-use crate::scene::effects::{Kind, Plan};
-use crate::transport::{Outside, find_openings};
+use crate::scene::effects::{EffectKind, Plan};
+use crate::transport::{Surroundings, find_openings};
 
 /// Why a closed room has neither sky nor sun.
 const CLOSED: &str = "the room is closed: no ray leaves it";
@@ -19,7 +19,7 @@ pub fn running(scene: Scene) -> Plan {
         let mesh = Mesh::new(&scene);
         let mut plan = plan_of(&scene, &mesh);
         if let Some(mirrors) = Mirrors::new(&scene, &mesh) {
-            plan.say(Kind::Mirrors, &mirrors.said());
+            plan.say(EffectKind::Mirrors, &mirrors.said());
         }
         return plan;
     }
@@ -65,19 +65,19 @@ impl Room {
         }
         // Where rays meet only fronts and black backs, none leaves the room either.
         if self.sealed == Closed::Yes {
-            let has_sun = self.plan.runs(Kind::Sun);
+            let has_sun = self.plan.runs(EffectKind::Sun);
             self.scene.shut_out_sky();
-            let occlusion = self.plan.runs(Kind::Occlusion);
+            let occlusion = self.plan.runs(EffectKind::Occlusion);
             self.plan = Plan::of(&self.scene);
             if occlusion {
-                self.plan.on(Kind::Occlusion, RAISED);
+                self.plan.on(EffectKind::Occlusion, RAISED);
             }
             if let Some(mirrors) = &self.mirrors {
-                self.plan.say(Kind::Mirrors, &mirrors.said());
+                self.plan.say(EffectKind::Mirrors, &mirrors.said());
             }
-            self.plan.off(Kind::Sky, CLOSED);
+            self.plan.off(EffectKind::Sky, CLOSED);
             if has_sun {
-                self.plan.off(Kind::Sun, CLOSED);
+                self.plan.off(EffectKind::Sun, CLOSED);
             }
             return;
         }
@@ -88,12 +88,12 @@ impl Room {
             return;
         };
         let is_exact =
-            self.panes.is_none() && self.with_sight(|sight| Outside::is_exact(&sky, sight));
+            self.panes.is_none() && self.with_sight(|sight| Surroundings::is_exact(&sky, sight));
         let openings = match is_exact {
             true => Openings::default(),
             false => found.unwrap_or_else(|| self.find_openings(tree)),
         };
-        self.outside = Some(Outside { sky, openings });
+        self.outside = Some(Surroundings { sky, openings });
     }
 
     /// Finds where rays leave the room, and counts the rays cast.

@@ -3,12 +3,12 @@
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Mesh, Sample, Tree};
 use crate::light::lanes::Lanes;
-use crate::link::{Sight, View};
+use crate::link::{Sight, Visibility};
 use crate::scene::sky::PLACES;
 use crate::scene::{LightKind, PunctualLight, Scene};
 use crate::team::{Interrupt, Interrupted, Team};
-use crate::transport::{Look, Outside};
 use crate::transport::{Receiver, punctual_factor};
+use crate::transport::{SkyScratch, Surroundings};
 use std::f64::consts::PI;
 
 /// Points of an element at which a light is gathered.
@@ -68,8 +68,8 @@ fn at_samples(
     lights: &[PunctualLight],
     sight: &Sight,
     half_size: f64,
-    outside: Option<&Outside>,
-    look: &mut Look,
+    outside: Option<&Surroundings>,
+    look: &mut SkyScratch,
 ) -> Vec<[f64; POINTS]> {
     let mut samples: Vec<Sample> = Vec::with_capacity(POINTS);
     let corners = tree.elements[tree.node(leaf).element as usize].corners;
@@ -123,7 +123,7 @@ fn at_samples(
                 }
             }
             if sight.occlusion && !segments.is_empty() {
-                sight.blocked(&segments, &View::Crowded, &mut blocked);
+                sight.blocked(&segments, &Visibility::Crowded, &mut blocked);
                 look.rays += segments.len() as u64;
                 for (&k, &b) in which.iter().zip(&blocked) {
                     if b {
@@ -143,7 +143,7 @@ pub(super) fn factors(
     sight: &Sight,
     scene: &Scene,
     mesh: &Mesh,
-    outside: Option<&Outside>,
+    outside: Option<&Surroundings>,
     (team, interrupt): (Team, &Interrupt),
 ) -> Result<Shadowed, Interrupted> {
     let lights = recentred(scene, mesh);
@@ -159,7 +159,7 @@ pub(super) fn factors(
         &chunks,
         || (),
         |(), chunk| {
-            let mut look = Look::default();
+            let mut look = SkyScratch::default();
             let lists = chunk
                 .iter()
                 .map(|&leaf| {

@@ -1,7 +1,7 @@
 //! What is written down after every round: the lines of the log.
 
 use super::estimate::Distance;
-use super::flux::Balance;
+use super::flux::FluxBalance;
 use super::solver::Convergence;
 use crate::link::Refined;
 use serde::{Deserialize, Serialize};
@@ -65,7 +65,7 @@ pub struct Figure {
     /// The value; none if not known yet.
     pub value: Option<f64>,
     /// `bound`, `estimate` or `measured`.
-    pub kind: Kind,
+    pub kind: FigureKind,
 }
 
 impl Figure {
@@ -73,7 +73,7 @@ impl Figure {
     pub fn estimate(value: Option<f64>) -> Self {
         Self {
             value: value.filter(|v| v.is_finite()),
-            kind: Kind::Estimate,
+            kind: FigureKind::Estimate,
         }
     }
 }
@@ -81,7 +81,7 @@ impl Figure {
 /// What an error figure is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum FigureKind {
     /// Cannot be exceeded.
     Bound,
     /// Our best guess.
@@ -191,7 +191,7 @@ pub struct Round {
     /// Errors by source.
     pub error: Errors,
     /// Where the light went.
-    pub flux: Balance,
+    pub flux: FluxBalance,
     /// Distance of row sums from 1 before balancing: area-weighted mean and greatest.
     pub row_sum_defect: [f64; 2],
     /// The same distances after balancing.
@@ -215,12 +215,12 @@ pub enum Verdict {
 }
 
 /// What a round measured, before it is written down.
-pub(crate) struct Measured<'a> {
+pub(crate) struct RoundMeasurements<'a> {
     pub(super) threshold: f64,
     pub(super) refined: &'a Refined,
     pub(super) convergence: &'a Convergence,
     pub(super) distance: Option<Distance>,
-    pub(super) flux: Balance,
+    pub(super) flux: FluxBalance,
     pub(super) link_bytes: usize,
     pub(super) rays: u64,
     pub(super) clock: &'a Clock,

@@ -2,13 +2,13 @@
 
 use super::estimate::Distance;
 use super::forecast::{Past, next_round};
-use super::record::{Errors, Figure, Kind, Measured, Round};
+use super::record::{Errors, Figure, FigureKind, Round, RoundMeasurements};
 use super::{Bake, DE_PER_PERCENT, Representation};
-use crate::link::Way;
+use crate::link::Occlusion;
 
 impl Bake {
     /// The record of a round.
-    pub(super) fn recorded(&self, m: Measured) -> Round {
+    pub(super) fn recorded(&self, m: RoundMeasurements) -> Round {
         let bake = self;
         let light = &bake.solution.light;
         let errors = bake.errors(&m);
@@ -54,12 +54,12 @@ impl Bake {
                 .graph
                 .links
                 .iter()
-                .filter(|l| l.way == Way::Clear)
+                .filter(|l| l.occlusion == Occlusion::Clear)
                 .count(),
             intervals_working: bake.solution.lanes.len(),
             intervals_mean: bake.intervals_mean(),
             memory_bytes: of_links + of_elements,
-            row_bytes: self.refinement.outlook.row_bytes(),
+            row_bytes: self.refinement.leaf_rays.row_bytes(),
             bytes_per_link: per(of_links, bake.refinement.graph.links.len()),
             bytes_per_element: per(of_elements, light.leaves.len()),
             iterations: m.convergence.iterations,
@@ -72,7 +72,7 @@ impl Bake {
     }
 
     /// Memory of links and what belongs to them, bytes.
-    fn bytes_of_links(&self, m: &Measured) -> usize {
+    fn bytes_of_links(&self, m: &RoundMeasurements) -> usize {
         m.link_bytes
             + size_of_val(self.refinement.graph.links.as_slice())
             + size_of_val(self.refinement.graph.blockers.as_slice())
@@ -86,11 +86,11 @@ impl Bake {
             + self.refinement.direct.bytes()
             + size_of_val(self.refinement.areas.as_slice())
             + size_of_val(self.refinement.balance.factor.as_slice())
-            + self.refinement.outlook.bytes()
+            + self.refinement.leaf_rays.bytes()
     }
 
     /// What is known of the error, by source.
-    fn errors(&self, m: &Measured) -> Errors {
+    fn errors(&self, m: &RoundMeasurements) -> Errors {
         let estimate = Figure::estimate;
         let spectrum = self.solution.spectrum_error.unwrap_or(0.0);
         let convergence_de = m.convergence.bound * 100.0 * DE_PER_PERCENT;
@@ -109,13 +109,13 @@ impl Bake {
             spectrum_de_luv: Figure {
                 value: self.solution.spectrum_error.filter(|e| e.is_finite()),
                 kind: match self.room.settings.representation {
-                    Representation::Guaranteed => Kind::Bound,
-                    _ => Kind::Estimate,
+                    Representation::Guaranteed => FigureKind::Bound,
+                    _ => FigureKind::Estimate,
                 },
             },
             convergence: Figure {
                 value: Some(m.convergence.bound).filter(|e| e.is_finite()),
-                kind: Kind::Bound,
+                kind: FigureKind::Bound,
             },
             convergence_de_luv: estimate(Some(convergence_de)),
             total_xyz: of(&|d| d.relative * white / 6.0),

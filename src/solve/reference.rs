@@ -1,4 +1,4 @@
-//! A plain reference: every patch sees every patch, on all 64 spectral leaves (leaves, here), each solved directly.
+//! A plain reference: every patch sees every patch, on all 64 bands, each solved directly.
 //! Slow and right.
 //!
 //! `B_i = E_i + rho_i (P_i + sum_j F_ij B_j)` (Goral, Torrance, Greenberg and Battaile 1984), P the irradiance from
@@ -9,7 +9,7 @@
 //! What fluoresces adds the 64 x 64 Donaldson matrix of its material times its irradiance, found in rounds, each of which
 //! loses energy.
 //! A sheet has a patch on each side, and what meets one side leaves the other by the transmittance. Panes filter each ray of a factor by
-//! incidence and leaf; where they are coloured every leaf has factors of its own, which takes 64 times the memory. Sky light comes from
+//! incidence and band; where they are coloured every band has factors of its own, which takes 64 times the memory. Sky light comes from
 //! 16,384 directions a point, from the sky's parts and not from its formula; the sun is parallel, without its disc. Rooms with mirrors are
 //! refused.
 //!
@@ -18,7 +18,7 @@
 
 mod lights;
 mod patch;
-mod ways;
+mod visibility;
 
 use crate::color::Upsampler;
 use crate::error::{Error, Result};
@@ -26,17 +26,17 @@ use crate::geometry::{NO_PLANE, quarters};
 use crate::hierarchy::Mesh;
 use crate::scene::sheet::Weave;
 use crate::scene::{Scene, short};
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
-use lights::Lamps;
+use lights::ReferenceLamps;
 use nalgebra::{DMatrix, DVector};
 pub use patch::Patch;
-use patch::{Place, add, radon};
+use patch::{PatchPoint, add, radon};
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use ways::Ways;
+use visibility::ReferenceVisibility;
 
-/// Fluorescence has settled when it changes on no leaf by more than this share of the brightest.
+/// Fluorescence has settled when it changes on no band by more than this share of the brightest.
 const SETTLED: f64 = 1e-12;
 
 /// The patches of a room and who sees whom.
@@ -44,19 +44,19 @@ const SETTLED: f64 = 1e-12;
 pub struct Reference {
     /// The patches: every side of every triangle of the scene, quartered equally often.
     pub patches: Vec<Patch>,
-    /// `F_ij`: share of the light leaving i that reaches j, one matrix for all leaves or one for each.
+    /// `F_ij`: share of the light leaving i that reaches j, one matrix for all bands or one for each.
     factors: Vec<DMatrix<f64>>,
-    /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a leaf by irradiance on another.
-    pub donaldson: Vec<Option<Vec<Leaves>>>,
+    /// For each material the Donaldson matrix of what it fluoresces, row by row: exitance on a band by irradiance on another.
+    pub donaldson: Vec<Option<Vec<Spectrum>>>,
 }
 
 /// What leaves and meets the patches, W/m2/nm, in their order.
 #[derive(Debug, Clone)]
-pub struct Solution {
+pub struct ReferenceSolution {
     /// Radiosity: emitted and reflected.
-    pub radiosity: Vec<Leaves>,
+    pub radiosity: Vec<Spectrum>,
     /// Irradiance.
-    pub irradiance: Vec<Leaves>,
+    pub irradiance: Vec<Spectrum>,
 }
 
 impl Reference {
@@ -76,18 +76,18 @@ impl Reference {
             return Err(Error::input(scene.source.place(), what, next));
         }
         let mesh = Mesh::new(scene);
-        let ways = Ways::new(scene, &mesh, rays);
-        let lamps = Lamps {
+        let visibility = ReferenceVisibility::new(scene, &mesh, rays);
+        let lamps = ReferenceLamps {
             scene,
             mesh: &mesh,
-            ways: &ways,
+            visibility: &visibility,
         };
         let mut patches = patches(scene, &mesh, depth);
-        let lit: Vec<Leaves> = patches.par_iter().map(|p| lamps.on(p)).collect();
+        let lit: Vec<Spectrum> = patches.par_iter().map(|p| lamps.on(p)).collect();
         for (patch, lit) in patches.iter_mut().zip(lit) {
             patch.punctual = lit;
         }
-        let factors = factors(scene, &ways, &patches);
+        let factors = factors(scene, &visibility, &patches);
         let width = scene.grid.width();
         let donaldson = scene.materials.iter().map(|m| {
             let fluorescence = m.fluorescence.as_ref()?;
@@ -100,19 +100,19 @@ impl Reference {
         })
     }
 
-    /// `F_ij` on a leaf: share of the light leaving i that reaches j.
-    pub fn factors(&self, leaf: usize) -> &DMatrix<f64> {
-        &self.factors[leaf.min(self.factors.len() - 1)]
+    /// `F_ij` on a band: share of the light leaving i that reaches j.
+    pub fn factors(&self, band: usize) -> &DMatrix<f64> {
+        &self.factors[band.min(self.factors.len() - 1)]
     }
 
-    /// Sum of every patch's factors on the first leaf: 1 in a closed room without panes, but for the rule's error.
+    /// Sum of every patch's factors on the first band: 1 in a closed room without panes, but for the rule's error.
     pub fn row_sums(&self) -> Vec<f64> {
         self.factors(0).row_iter().map(|row| row.sum()).collect()
     }
 
-    /// Solves all leaves; where surfaces fluoresce, again until their fluorescence settles.
-    pub fn solve(&self) -> Solution {
-        let mut glow = vec![[0.0; LEAVES]; self.patches.len()];
+    /// Solves all bands; where surfaces fluoresce, again until their fluorescence settles.
+    pub fn solve(&self) -> ReferenceSolution {
+        let mut glow = vec![[0.0; BANDS]; self.patches.len()];
         loop {
             let solution = self.solve_with(&glow);
             let next = self.fluoresced(&solution.irradiance);
@@ -127,47 +127,47 @@ impl Reference {
     }
 
     /// Fluorescent exitance of the patches by their irradiance.
-    fn fluoresced(&self, irradiance: &[Leaves]) -> Vec<Leaves> {
+    fn fluoresced(&self, irradiance: &[Spectrum]) -> Vec<Spectrum> {
         let all = self.patches.iter().zip(irradiance);
         let each = all.map(|(patch, light)| match &self.donaldson[patch.material] {
             Some(matrix) => std::array::from_fn(|l| {
                 let row = matrix[l].iter().zip(light);
                 row.map(|(m, x)| m * x).sum()
             }),
-            None => [0.0; LEAVES],
+            None => [0.0; BANDS],
         });
         each.collect()
     }
 
-    /// Solves all leaves, given the fluorescent exitance of the patches.
-    fn solve_with(&self, glow: &[Leaves]) -> Solution {
+    /// Solves all bands, given the fluorescent exitance of the patches.
+    fn solve_with(&self, glow: &[Spectrum]) -> ReferenceSolution {
         let n = self.patches.len();
-        let mut radiosity = vec![[0.0; LEAVES]; n];
-        let mut solved = [false; LEAVES];
-        for leaf in 0..LEAVES {
-            if solved[leaf] {
+        let mut radiosity = vec![[0.0; BANDS]; n];
+        let mut solved = [false; BANDS];
+        for band in 0..BANDS {
+            if solved[band] {
                 continue;
             }
             let same = |l: usize| {
                 let alike = |p: &Patch| {
-                    p.reflectance[l] == p.reflectance[leaf]
-                        && p.transmittance[l] == p.transmittance[leaf]
+                    p.reflectance[l] == p.reflectance[band]
+                        && p.transmittance[l] == p.transmittance[band]
                 };
-                (l == leaf || self.factors.len() == 1) && self.patches.iter().all(alike)
+                (l == band || self.factors.len() == 1) && self.patches.iter().all(alike)
             };
-            let alike: Vec<usize> = (leaf..LEAVES).filter(|&l| same(l)).collect();
+            let alike: Vec<usize> = (band..BANDS).filter(|&l| same(l)).collect();
             // What leaves a patch, of the light that meets it and its other side.
             let scattered = |i: usize, x: &dyn Fn(usize) -> f64| {
                 let patch = &self.patches[i];
-                let through = |b: usize| patch.transmittance[leaf] * x(b);
-                patch.reflectance[leaf] * x(i) + patch.behind.map_or(0.0, through)
+                let through = |b: usize| patch.transmittance[band] * x(b);
+                patch.reflectance[band] * x(i) + patch.behind.map_or(0.0, through)
             };
             let right = DMatrix::from_fn(n, alike.len(), |i, k| {
-                let (patch, leaf) = (&self.patches[i], alike[k]);
-                let lit = scattered(i, &|i| self.patches[i].punctual[leaf]);
-                patch.exitance[leaf] + glow[i][leaf] + lit
+                let (patch, band) = (&self.patches[i], alike[k]);
+                let lit = scattered(i, &|i| self.patches[i].punctual[band]);
+                patch.exitance[band] + glow[i][band] + lit
             });
-            let factors = self.factors(leaf);
+            let factors = self.factors(band);
             let system = DMatrix::from_fn(n, n, |i, j| {
                 f64::from(u8::from(i == j)) - scattered(i, &|i| factors[(i, j)])
             });
@@ -179,17 +179,17 @@ impl Reference {
                 }
             }
         }
-        let mut irradiance: Vec<Leaves> = self.patches.iter().map(|p| p.punctual).collect();
-        // All leaves at once, or one by one where each has its own factors.
-        let at_once = LEAVES / self.factors.len();
-        for first in (0..LEAVES).step_by(at_once) {
+        let mut irradiance: Vec<Spectrum> = self.patches.iter().map(|p| p.punctual).collect();
+        // All bands at once, or one by one where each has its own factors.
+        let at_once = BANDS / self.factors.len();
+        for first in (0..BANDS).step_by(at_once) {
             let sources = DMatrix::from_fn(n, at_once, |i, k| radiosity[i][first + k]);
             let received = self.factors(first) * sources;
             for (i, row) in irradiance.iter_mut().enumerate() {
                 (0..at_once).for_each(|k| row[first + k] += received[(i, k)]);
             }
         }
-        Solution {
+        ReferenceSolution {
             radiosity,
             irradiance,
         }
@@ -200,26 +200,26 @@ impl Reference {
     pub fn gather(
         &self,
         scene: &Scene,
-        solution: &Solution,
+        solution: &ReferenceSolution,
         points: &[(DVec3, DVec3)],
         rays: usize,
-    ) -> Vec<Leaves> {
+    ) -> Vec<Spectrum> {
         let mesh = Mesh::new(scene);
-        let ways = Ways::new(scene, &mesh, rays);
-        let lamps = Lamps {
+        let visibility = ReferenceVisibility::new(scene, &mesh, rays);
+        let lamps = ReferenceLamps {
             scene,
             mesh: &mesh,
-            ways: &ways,
+            visibility: &visibility,
         };
         points
             .par_iter()
             .map(|&(at, normal)| {
                 let at = at - mesh.centre;
                 let plane = plane_at(&mesh, &self.patches, at, normal);
-                let place = Place { at, normal, plane };
-                let mut sum = [0.0; LEAVES];
+                let place = PatchPoint { at, normal, plane };
+                let mut sum = [0.0; BANDS];
                 for (patch, radiosity) in self.patches.iter().zip(&solution.radiosity) {
-                    match ways.factor(place, patch) {
+                    match visibility.factor(place, patch) {
                         (f, None) => add(&mut sum, radiosity, f),
                         (f, Some(passes)) => {
                             let left = std::array::from_fn(|l| passes[l] * radiosity[l]);
@@ -259,14 +259,18 @@ pub fn solve_one(factors: &DMatrix<f64>, rho: &[f64], emission: &[f64]) -> DVect
     solve(factors, rho, right).column(0).into_owned()
 }
 
-/// `F_ij`, made reciprocal by their means; one matrix for all leaves, or one for each where a pane is coloured.
-fn factors(scene: &Scene, ways: &Ways<'_>, patches: &[Patch]) -> Vec<DMatrix<f64>> {
+/// `F_ij`, made reciprocal by their means; one matrix for all bands, or one for each where a pane is coloured.
+fn factors(
+    scene: &Scene,
+    visibility: &ReferenceVisibility<'_>,
+    patches: &[Patch],
+) -> Vec<DMatrix<f64>> {
     let tinted = |s: &crate::scene::Surface| {
         let pane = scene.materials[s.material].pane.as_ref();
         pane.is_some_and(|pane| !pane.is_neutral())
     };
     let sets = if scene.panes.iter().any(tinted) {
-        LEAVES
+        BANDS
     } else {
         1
     };
@@ -279,7 +283,7 @@ fn factors(scene: &Scene, ways: &Ways<'_>, patches: &[Patch]) -> Vec<DMatrix<f64
             }
             let own = &mut row[sets * j..sets * (j + 1)];
             for (w, at) in rule {
-                let (f, passes) = ways.factor(from.place(at), to);
+                let (f, passes) = visibility.factor(from.place(at), to);
                 for (k, x) in own.iter_mut().enumerate() {
                     *x += w * f * passes.as_ref().map_or(1.0, |passes| passes[k]);
                 }
@@ -304,13 +308,13 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
     for &face in &mesh.faces {
         let triangle = face.triangle as usize;
         let material = &scene.materials[mesh.material[triangle] as usize];
-        let exitance = material.even_emission().map_or([0.0; LEAVES], |e| {
+        let exitance = material.even_emission().map_or([0.0; BANDS], |e| {
             let power = &scene.spectra[e.light].power;
             std::array::from_fn(|l| PI * power[l] * e.shape[l])
         });
         let [reflectance, transmittance] = match &material.sheet {
             Some(sheet) => material.scatters(sheet, None, Weave::PLAIN, face.back, &upsampler),
-            None => [material.reflectance, [0.0; LEAVES]],
+            None => [material.reflectance, [0.0; BANDS]],
         };
         let mut corners = vec![mesh.corners(face)];
         for _ in 0..depth {
@@ -324,7 +328,7 @@ fn patches(scene: &Scene, mesh: &Mesh, depth: u32) -> Vec<Patch> {
             area,
             reflectance,
             exitance,
-            punctual: [0.0; LEAVES],
+            punctual: [0.0; BANDS],
             material: mesh.material[triangle] as usize,
             transmittance,
             behind: None,

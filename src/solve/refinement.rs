@@ -1,14 +1,14 @@
-//! What rounds refine: the hierarchy, its links, and the outlook of its leaves.
+//! What rounds refine: the hierarchy, its links, and the rays of its leaves.
 
 use super::direct::Direct;
+use super::leaf_rays::LeafRays;
 use super::operator;
-use super::outlook::Outlook;
 use super::punctual::Shadowed;
 use super::room::{Room, by_rays};
 use crate::geometry::sampling::hash;
 use crate::hierarchy::Tree;
 use crate::light::{Light, Rows};
-use crate::link::{Balance, Demand, Graph, LinkRows, MAX_DEPTH, Refined, balance};
+use crate::link::{Demand, Graph, LinkRows, MAX_DEPTH, Refined, RowBalance, balance};
 use crate::team::Interrupted;
 use rayon::prelude::*;
 
@@ -22,10 +22,10 @@ const DECIDING: u64 = 0xdec1de;
 pub(crate) struct Refinement {
     pub(crate) tree: Tree,
     pub(crate) graph: Graph,
-    pub(crate) outlook: Outlook,
+    pub(crate) leaf_rays: LeafRays,
     /// Area of each node that takes part.
     pub(crate) areas: Vec<f64>,
-    pub(crate) balance: Balance,
+    pub(crate) balance: RowBalance,
     pub(crate) direct: Direct,
     /// What the choice of lanes may take as given when lamps and paints change: shadows of punctual lights, balance.
     pub(crate) frozen: Option<(Shadowed, Vec<f32>)>,
@@ -49,8 +49,8 @@ impl Refinement {
     }
 
     /// The factors by which rows of links sum to their targets.
-    pub(crate) fn balanced(&self, rows: &LinkRows) -> Balance {
-        balance(&self.tree, rows, &self.areas, &self.outlook.target)
+    pub(crate) fn balanced(&self, rows: &LinkRows) -> RowBalance {
+        balance(&self.tree, rows, &self.areas, &self.leaf_rays.target)
     }
 
     /// Refines the links until none exceeds the demand.
@@ -64,17 +64,17 @@ impl Refinement {
     }
 
     /// Finds out how new leaves look out; returns the rays cast.
-    pub(super) fn look_out(&mut self, room: &Room) -> Result<u64, Interrupted> {
-        let (tree, outlook, seed) = (&self.tree, &mut self.outlook, room.settings.seed);
+    pub(super) fn trace_leaf_rays(&mut self, room: &Room) -> Result<u64, Interrupted> {
+        let (tree, leaf_rays, seed) = (&self.tree, &mut self.leaf_rays, room.settings.seed);
         let interrupt = &room.interrupt;
         let rays = room.with_sight(|sight| {
             if by_rays(sight) {
-                outlook.look(tree, sight, &room.hemisphere, seed, interrupt)
+                leaf_rays.look(tree, sight, &room.hemisphere, seed, interrupt)
             } else {
-                outlook.extend(tree, sight, room.closed, seed, interrupt)
+                leaf_rays.extend(tree, sight, room.closed, seed, interrupt)
             }
         })?;
-        self.areas = outlook.areas(tree);
+        self.areas = leaf_rays.areas(tree);
         Ok(rays)
     }
 
@@ -92,7 +92,7 @@ impl Refinement {
             return Ok(0);
         }
         let seed = hash(room.settings.seed, DECIDING);
-        let mut deciding = Outlook::of_team(room.team);
+        let mut deciding = LeafRays::of_team(room.team);
         let mut rays = 0;
         for _ in 0..LEVELS {
             rays += room.with_sight(|sight| {
@@ -105,9 +105,9 @@ impl Refinement {
             for k in known..nodes as usize {
                 bright.push(bright[self.tree.nodes[k].parent as usize]);
             }
-            let mut keen = demand.keen.to_vec();
-            for k in keen.len()..nodes as usize {
-                keen.push(keen[self.tree.nodes[k].parent as usize]);
+            let mut sensitivity = demand.sensitivity.to_vec();
+            for k in sensitivity.len()..nodes as usize {
+                sensitivity.push(sensitivity[self.tree.nodes[k].parent as usize]);
             }
             let split = (0..nodes)
                 .into_par_iter()
@@ -118,7 +118,7 @@ impl Refinement {
                         && node.area > demand.least_area
                         && self.tree.elements[node.element as usize].depth < MAX_DEPTH
                         && deciding.variation(k, &bright, seed)
-                            * f64::from(keen[k as usize])
+                            * f64::from(sensitivity[k as usize])
                             * self.tree.share(k).sqrt()
                             > demand.threshold
                 })

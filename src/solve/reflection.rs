@@ -64,9 +64,9 @@ impl Reflection {
         [over, without]: [[f64; L]; 2],
     ) {
         if self.mixed.is_some() {
-            // Where lanes are not bands, energy is kept on each of the 64 spectral leaves.
-            let leaves_of = |sum: [f64; L]| lanes.leaves(&sum.map(|x| x as f32));
-            let (over, without) = (leaves_of(over), leaves_of(without));
+            // Where lanes are not bands, energy is kept on each of the 64 bands.
+            let spectrum_of = |sum: [f64; L]| lanes.spectrum(&sum.map(|x| x as f32));
+            let (over, without) = (spectrum_of(over), spectrum_of(without));
             let scale = std::array::from_fn(|k| linear::amplitude(over[k], without[k]));
             let whole = vec![0; irradiance.len()];
             *irradiance = Mixed::new(&[scale], whole, lanes, L).reflect::<L>(irradiance);

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Bands and vectors at the most: the spectral leaves.
+/// Intervals and vectors at the most: the bands.
 const MOST: u8 = 64;
 
 /// How spectra are carried by the rows.
@@ -23,7 +23,7 @@ pub enum Representation {
     Uniform(u8),
     /// Coordinates in a basis of this many vectors made for the room (paper 2.2.2), in 1..=64.
     Characteristic(u8),
-    /// All 64 spectral leaves.
+    /// All 64 bands.
     Dense,
     /// Linear sRGB: reflectances and lamps are reduced to three numbers before anything is solved.
     Rgb,

@@ -1,9 +1,9 @@
 //! The room that is baked: all that stays the same from the first round to the last.
 
-use super::estimate::Probes;
+use super::estimate::WatchedPoints;
 use super::flux::{self, Closed, Sent};
 use super::landed::Landing;
-use super::parting::Parting;
+use super::parted_mesh::PartedMesh;
 use super::representation::Representation;
 use super::sources::Painter;
 use crate::color::{Observer, Upsampler};
@@ -12,10 +12,10 @@ use crate::hierarchy::{Counted, Frame, Glazing, Mesh, Mirrors, Panes, Tree};
 use crate::light::lanes::Lanes;
 use crate::link::{Opaque, Sight, is_small};
 use crate::scene::Scene;
-use crate::scene::effects::{Kind, Plan};
-use crate::spectrum::Leaves;
+use crate::scene::effects::{EffectKind, Plan};
+use crate::spectrum::Spectrum;
 use crate::team::{Interrupt, Team};
-use crate::transport::Outside;
+use crate::transport::Surroundings;
 use crate::transport::hemisphere::Hemisphere;
 
 /// What the user asks for.
@@ -77,14 +77,14 @@ pub(crate) struct Room {
     /// As `closed`, leaving out points that something solid covers.
     pub(crate) sealed: Closed,
     /// What is outside; none where no light comes from outside.
-    pub(crate) outside: Option<Outside>,
+    pub(crate) outside: Option<Surroundings>,
     /// Rays that looked for openings to a sky.
     pub(super) opening_rays: u64,
     /// Where the light of lamps goes first.
     pub(crate) sent: Sent,
     /// The places where that light lands on faces; empty in a room that is only relit.
     pub(super) landings: Vec<Landing>,
-    pub(crate) weights: [Leaves; 3],
+    pub(crate) weights: [Spectrum; 3],
     /// Turns colours of textures into spectra: its table is made once.
     pub(crate) upsampler: Upsampler,
     pub(crate) hemisphere: Hemisphere,
@@ -93,7 +93,7 @@ pub(crate) struct Room {
     /// The box around that part, if most of the file lies outside it.
     pub(crate) frame: Option<Frame>,
     /// Points that are watched from round to round.
-    pub(crate) probes: Probes,
+    pub(crate) probes: WatchedPoints,
     /// Space of each face, and which cuts were made for spaces, see [`spaces`](crate::hierarchy::spaces).
     pub(crate) spaces: Vec<u32>,
     pub(crate) parted: Vec<u32>,
@@ -106,7 +106,7 @@ pub(crate) struct Room {
 }
 
 /// What rays have told of a room before the first round.
-pub(crate) struct Known {
+pub(crate) struct RoomAnalysis {
     pub(crate) spaces: Vec<u32>,
     /// Which cuts of triangles were made for spaces.
     pub(crate) parted: Vec<u32>,
@@ -126,8 +126,8 @@ pub(super) fn by_rays(sight: &Sight) -> bool {
 
 /// The share of the error for which a room chooses its directions.
 fn directions(plan: &Plan, mesh: &Mesh) -> f64 {
-    let filtered = plan.runs(Kind::Panes) || plan.runs(Kind::Mirrors);
-    match (filtered && is_small(mesh), plan.runs(Kind::Sheets)) {
+    let filtered = plan.runs(EffectKind::Panes) || plan.runs(EffectKind::Mirrors);
+    match (filtered && is_small(mesh), plan.runs(EffectKind::Sheets)) {
         (true, _) => GLAZED_DIRECTIONS,
         (_, true) => SHEET_DIRECTIONS,
         _ => 1.0,
@@ -138,16 +138,20 @@ fn directions(plan: &Plan, mesh: &Mesh) -> f64 {
 pub(super) fn plan_of(scene: &Scene, mesh: &Mesh) -> Plan {
     let mut plan = Plan::of(scene);
     if !mesh.raised.is_empty() {
-        plan.on(Kind::Occlusion, RAISED);
+        plan.on(EffectKind::Occlusion, RAISED);
     }
     plan
 }
 
 impl Room {
     /// Welds a scene, finds its spaces and the first hierarchy of its faces, and looks around outside.
-    pub(super) fn new(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
-        let closed = known.as_ref().map(|known| known.closed);
-        let (mut room, tree) = Self::shaped(scene, settings, known);
+    pub(super) fn new(
+        scene: Scene,
+        settings: Settings,
+        analysis: Option<RoomAnalysis>,
+    ) -> (Self, Tree) {
+        let closed = analysis.as_ref().map(|known| known.closed);
+        let (mut room, tree) = Self::shaped(scene, settings, analysis);
         match closed {
             Some(closed) => {
                 [room.closed, room.sealed] = closed;
@@ -159,10 +163,14 @@ impl Room {
     }
 
     /// [`Self::new`] without looking around outside.
-    pub(super) fn shaped(scene: Scene, settings: Settings, known: Option<Known>) -> (Self, Tree) {
-        let counted = known.as_ref().map(|known| known.counted.clone());
-        let frame = known.as_ref().and_then(|known| known.frame);
-        let (mut room, mut tree) = Self::framed(scene, settings, known, frame);
+    pub(super) fn shaped(
+        scene: Scene,
+        settings: Settings,
+        analysis: Option<RoomAnalysis>,
+    ) -> (Self, Tree) {
+        let counted = analysis.as_ref().map(|known| known.counted.clone());
+        let frame = analysis.as_ref().and_then(|known| known.frame);
+        let (mut room, mut tree) = Self::framed(scene, settings, analysis, frame);
         let found = counted.is_none();
         room.counted = counted.unwrap_or_else(|| room.count(&mut tree));
         tree.weigh(&room.counted);
@@ -171,7 +179,7 @@ impl Room {
             room.counted = room.count(&mut tree);
             tree.weigh(&room.counted);
         }
-        room.probes = Probes::new(&tree, room.settings.seed);
+        room.probes = WatchedPoints::new(&tree, room.settings.seed);
         (room, tree)
     }
 
@@ -179,16 +187,16 @@ impl Room {
     fn framed(
         scene: Scene,
         settings: Settings,
-        known: Option<Known>,
+        analysis: Option<RoomAnalysis>,
         frame: Option<Frame>,
     ) -> (Self, Tree) {
         let mesh = Mesh::framed(&scene, frame);
         let mut plan = plan_of(&scene, &mesh);
-        let parting = match known {
-            Some(known) => Parting::again(&scene, mesh, known.spaces, known.parted),
-            None => Parting::find(&scene, mesh, &plan, settings.seed),
+        let parting = match analysis {
+            Some(known) => PartedMesh::again(&scene, mesh, known.spaces, known.parted),
+            None => PartedMesh::find(&scene, mesh, &plan, settings.seed),
         };
-        let Parting {
+        let PartedMesh {
             mesh,
             rays,
             spaces,
@@ -197,7 +205,7 @@ impl Room {
         let tree = Tree::new(&mesh, &spaces);
         let mirrors = Mirrors::new(&scene, &mesh);
         if let Some(mirrors) = &mirrors {
-            plan.say(Kind::Mirrors, &mirrors.said());
+            plan.say(EffectKind::Mirrors, &mirrors.said());
         }
         let room = Self {
             closed: Closed::No,
@@ -213,7 +221,7 @@ impl Room {
             hemisphere: Hemisphere::for_error(settings.error * directions(&plan, &mesh)),
             counted: Counted::default(),
             frame,
-            probes: Probes::default(),
+            probes: WatchedPoints::default(),
             keep: false,
             team: Team::default(),
             interrupt: Interrupt::default(),
@@ -234,7 +242,7 @@ impl Room {
             let at = [1.0 - u - v, u, v];
             !crate::hierarchy::alpha::is_hole(&self.scene, &self.mesh, triangle, at)
         };
-        let opaque: Option<&Opaque> = if self.plan.runs(Kind::AlphaMasks) {
+        let opaque: Option<&Opaque> = if self.plan.runs(EffectKind::AlphaMasks) {
             Some(&opaque)
         } else {
             None
@@ -245,7 +253,7 @@ impl Room {
             opaque,
             panes: self.glazing(),
             mirrors: self.mirrors.as_ref(),
-            occlusion: self.plan.runs(Kind::Occlusion),
+            occlusion: self.plan.runs(EffectKind::Occlusion),
         })
     }
 
@@ -265,7 +273,7 @@ impl Room {
         Painter::new(&self.scene, &self.mesh, &self.upsampler)
     }
 
-    /// Radiosity itself on the 64 spectral leaves: lanes that serve every light.
+    /// Radiosity itself on the 64 bands: lanes that serve every light.
     pub(crate) fn dense_lanes(&self) -> Lanes {
         Lanes::dense(&self.scene.spectra, &self.weights)
     }

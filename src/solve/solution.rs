@@ -4,7 +4,7 @@ use super::punctual;
 use super::room::{Room, by_rays};
 use crate::hierarchy::Tree;
 use crate::light::lanes::Lanes;
-use crate::light::{Filters, Glass, Light, Rows, brightness, keenness, weighed};
+use crate::light::{Filters, Glass, Light, Rows, brightness, lightness_sensitivity, weighed};
 use crate::link::Sight;
 use crate::scene::PunctualLight;
 use crate::transport::Gatherer;
@@ -36,7 +36,7 @@ pub(crate) struct Solution {
 }
 
 impl Solution {
-    /// No light yet, on the 64 spectral leaves.
+    /// No light yet, on the 64 bands.
     pub(super) fn new(room: &Room) -> Self {
         let lanes = room.dense_lanes();
         Self {
@@ -73,26 +73,26 @@ impl Solution {
     }
 
     /// How much a change of its irradiance changes the lightness of every node.
-    pub(super) fn keenness(&self, tree: &Tree) -> Vec<f32> {
-        let mut keen = vec![0.0_f32; tree.nodes.len()];
+    pub(super) fn lightness_sensitivity(&self, tree: &Tree) -> Vec<f32> {
+        let mut sensitivity = vec![0.0_f32; tree.nodes.len()];
         for (k, &leaf) in self.light.leaves.iter().enumerate() {
             let h = brightness(
                 self.lanes.tristimulus(self.light.irradiance.row(k)),
                 self.light.white,
             );
-            keen[leaf as usize] = keenness(h) as f32;
+            sensitivity[leaf as usize] = lightness_sensitivity(h) as f32;
         }
-        for k in (0..keen.len()).rev() {
+        for k in (0..sensitivity.len()).rev() {
             let node = &tree.nodes[k];
             if !node.is_leaf() {
                 let sum: f64 = node
                     .child_range()
-                    .map(|c| f64::from(keen[c as usize]) * tree.node(c).area)
+                    .map(|c| f64::from(sensitivity[c as usize]) * tree.node(c).area)
                     .sum();
-                keen[k] = (sum / node.area) as f32;
+                sensitivity[k] = (sum / node.area) as f32;
             }
         }
-        keen
+        sensitivity
     }
 
     /// Reflected radiosity of the last round on the leaves of the present one: a new element starts from its nearest ancestor.

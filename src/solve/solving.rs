@@ -8,15 +8,15 @@ use super::operator::Operator;
 use super::refinement::Refinement;
 use super::reflection::Reflection;
 use super::solver::{Convergence, System, step};
-use super::{Bake, Given};
+use super::{Bake, SolveInput};
 use crate::light::{Arrival, Light, Neighbours, Rows, padded, weighed};
 use crate::link::LinkRows;
-use crate::scene::effects::Kind;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::scene::effects::EffectKind;
+use crate::spectrum::{BANDS, Spectrum};
 use std::borrow::Cow;
 
 /// The leaves under direct light, and how they reflect: what the bounces start from.
-struct Lit<'a> {
+struct BounceStart<'a> {
     leaves: &'a [u32],
     /// Direct irradiance by leaf.
     first: &'a Rows,
@@ -65,7 +65,7 @@ impl Bake {
         &mut self,
         rows: &LinkRows,
         leaves: &[u32],
-    ) -> (Convergence, flux::Balance) {
+    ) -> (Convergence, flux::FluxBalance) {
         match padded(self.solution.lanes.len()) {
             4 => self.solve_on::<4>(rows, leaves),
             8 => self.solve_on::<8>(rows, leaves),
@@ -80,13 +80,13 @@ impl Bake {
         &mut self,
         rows: &LinkRows,
         leaves: &[u32],
-    ) -> (Convergence, flux::Balance) {
+    ) -> (Convergence, flux::FluxBalance) {
         let mut first = Rows::zero(leaves.len(), L);
         for (k, &leaf) in leaves.iter().enumerate() {
             let row = self.refinement.direct.row(leaf);
             first.row_mut(k)[..row.len()].copy_from_slice(row);
         }
-        let given = Given {
+        let input = SolveInput {
             sources: self
                 .room
                 .painter()
@@ -97,7 +97,7 @@ impl Bake {
             tolerance: self.room.tolerance(),
             counted: true,
         };
-        let solved = self.solve_with::<L>(rows, leaves, given);
+        let solved = self.solve_with::<L>(rows, leaves, input);
         self.light_arrives();
         solved
     }
@@ -107,19 +107,19 @@ impl Bake {
         &mut self,
         rows: &LinkRows,
         leaves: &[u32],
-        given: Given,
-    ) -> (Convergence, flux::Balance) {
-        let Given {
+        input: SolveInput,
+    ) -> (Convergence, flux::FluxBalance) {
+        let SolveInput {
             sources,
             mut first,
             mut reflected,
             emitted,
             tolerance,
             counted,
-        } = given;
+        } = input;
         let emission = sources.emission;
         let by_rays = self.room.by_rays();
-        self.refinement.outlook.tints.on(&self.solution.filters);
+        self.refinement.leaf_rays.tints.on(&self.solution.filters);
         self.add_lamps_in_mirrors::<L>(&emission, leaves, &mut first);
         let mut scaled = flux::Scaled::default();
         if self.room.sealed == Closed::Yes && !by_rays {
@@ -132,9 +132,9 @@ impl Bake {
             sheets: sources.sheets,
         };
         let sums = self.sums_of(rows);
-        let runs = self.room.plan.runs(Kind::Interreflection);
+        let runs = self.room.plan.runs(EffectKind::Interreflection);
         let bounced = if runs {
-            let lit = Lit {
+            let lit = BounceStart {
                 leaves,
                 first: &first,
                 reflection: &reflection,
@@ -155,7 +155,7 @@ impl Bake {
         let on_nodes = self.refinement.on_nodes::<L>(&sent, leaves);
         let through = reflection.sheets.as_ref();
         let through = through.map(|s| s.shown.clone()).unwrap_or_default();
-        let mut flux = flux::Balance::default();
+        let mut flux = flux::FluxBalance::default();
         if counted {
             let fluxes = flux::FluxRows {
                 emission: &emission,
@@ -197,7 +197,7 @@ impl Bake {
         let emitted = self.refinement.on_nodes::<L>(emission, leaves);
         if let Some(more) = self
             .refinement
-            .outlook
+            .leaf_rays
             .lamps_in_mirrors::<L>(leaves, &emitted)
         {
             step::<L>(first, &more, [1.0; L]);
@@ -207,7 +207,7 @@ impl Bake {
     /// All bounces, and fluorescence.
     fn all_bounces<const L: usize>(
         &self,
-        lit: &Lit,
+        lit: &BounceStart,
         rows: &LinkRows,
         sums: &[f64],
         glow: Option<&Glow>,
@@ -236,7 +236,11 @@ impl Bake {
     }
 
     /// All bounces, before links are looked at once more: how the solve went, and irradiance by reflected light.
-    fn bounce<const L: usize>(&self, lit: &Lit, reflected: &mut Rows) -> (Convergence, Rows) {
+    fn bounce<const L: usize>(
+        &self,
+        lit: &BounceStart,
+        reflected: &mut Rows,
+    ) -> (Convergence, Rows) {
         let system = System {
             reflection: lit.reflection,
             areas: self.areas_of(lit.leaves),
@@ -255,11 +259,11 @@ impl Bake {
     /// [`Self::bounce`] where surfaces fluoresce: also the fluorescent exitance, and irradiance by both.
     fn fluoresce<const L: usize>(
         &self,
-        lit: &Lit,
+        lit: &BounceStart,
         glow: &Glow,
         reflected: &mut Rows,
     ) -> (Convergence, Rows, Rows) {
-        let one = [1.0; LEAVES];
+        let one = [1.0; BANDS];
         let power = self
             .solution
             .lanes
@@ -272,7 +276,7 @@ impl Bake {
             interrupt: &self.room.interrupt,
         };
         rounds.solve::<L>(lit.first, reflected, lit.receive, |first, reflected| {
-            self.bounce::<L>(&Lit { first, ..*lit }, reflected)
+            self.bounce::<L>(&BounceStart { first, ..*lit }, reflected)
         })
     }
 
@@ -284,7 +288,7 @@ impl Bake {
     ) -> Box<dyn Fn(&Rows) -> Rows + 'a> {
         let Refinement {
             tree,
-            outlook,
+            leaf_rays,
             areas,
             balance,
             ..
@@ -293,7 +297,7 @@ impl Bake {
             return Box::new(move |radiosity| {
                 let mut seen = Rows::zero(leaves.len(), L);
                 let nodes = self.refinement.on_nodes::<L>(radiosity, leaves);
-                outlook.irradiance::<L>(leaves, &nodes, &mut seen);
+                leaf_rays.irradiance::<L>(leaves, &nodes, &mut seen);
                 seen
             });
         }
@@ -335,7 +339,7 @@ impl Bake {
     /// found anew with them.
     fn slope<const L: usize>(
         &self,
-        lit: &Lit,
+        lit: &BounceStart,
         rows: &LinkRows,
         sums: &[f64],
         reflected: &mut Rows,
@@ -383,14 +387,14 @@ impl Bake {
         rows: &flux::FluxRows,
         on_nodes: &Rows,
         sums: &[f64],
-    ) -> flux::Balance {
+    ) -> flux::FluxBalance {
         let (refinement, lanes) = (&self.refinement, &self.solution.lanes);
         if !self.room.by_rays() {
             return flux::flux(&refinement.areas, lanes, leaves, rows, sums);
         }
         let mut whole = Rows::zero(leaves.len(), L);
-        if self.room.plan.runs(Kind::Interreflection) {
-            (refinement.outlook).irradiance_of_whole::<L>(leaves, on_nodes, &mut whole);
+        if self.room.plan.runs(EffectKind::Interreflection) {
+            (refinement.leaf_rays).irradiance_of_whole::<L>(leaves, on_nodes, &mut whole);
         }
         let whole = flux::Whole {
             indirect: &whole,
@@ -475,7 +479,7 @@ impl Bake {
             arrival[leaf as usize] = Arrival {
                 all: bright(light.irradiance.row(k)),
                 direct: bright(self.refinement.direct.row(leaf)),
-                spread: self.refinement.direct.spread(leaf),
+                half_range: self.refinement.direct.half_range(leaf),
             };
         }
         self.solution.light.arrival = arrival;
@@ -487,9 +491,9 @@ impl Bake {
         self.mean_over_leaves(|row| self.solution.lanes.tristimulus(row))
     }
 
-    /// The spectrum of the mean irradiance, W/m2/nm on the 64 spectral leaves.
-    pub fn mean_spectrum(&self) -> Leaves {
-        self.mean_over_leaves(|row| self.solution.lanes.leaves(row))
+    /// The spectrum of the mean irradiance, W/m2/nm on the 64 bands.
+    pub fn mean_spectrum(&self) -> Spectrum {
+        self.mean_over_leaves(|row| self.solution.lanes.spectrum(row))
     }
 
     /// The mean of `of` irradiance over the area that counts; 0 where there is none.

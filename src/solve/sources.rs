@@ -11,7 +11,7 @@ use crate::light::rows::{Rows, padded};
 use crate::scene::mirror::Mirror;
 use crate::scene::sheet::SheetMeans;
 use crate::scene::{Emission, GREATEST_ALBEDO, Material, Scene, Surface, Texture};
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -171,7 +171,7 @@ impl<'a> Painter<'a> {
 
     /// Reflectance and transmittance of an element of a sheet; its reflectance without the pattern of its paint, which viewers add;
     /// and the reflectance that its light is shown by. None where it is no sheet.
-    pub(super) fn woven(&self, tree: &Tree, element: &Element) -> Option<[Leaves; 4]> {
+    pub(super) fn woven(&self, tree: &Tree, element: &Element) -> Option<[Spectrum; 4]> {
         let face = tree.faces[element.face as usize];
         let triangle = face.triangle as usize;
         let material = self.mesh.material[triangle] as usize;
@@ -189,7 +189,8 @@ impl<'a> Painter<'a> {
 
     /// The matrices of the given leaves, for lanes that reflect into each other.
     pub(super) fn mixed(&self, tree: &Tree, leaves: &[u32], lanes: &Lanes) -> Mixed {
-        let mut paints: Vec<Leaves> = self.scene.materials.iter().map(|m| m.reflectance).collect();
+        let mut paints: Vec<Spectrum> =
+            self.scene.materials.iter().map(|m| m.reflectance).collect();
         let mut of = Vec::with_capacity(leaves.len());
         for &leaf in leaves {
             let element = tree.elements[tree.node(leaf).element as usize];
@@ -208,7 +209,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Albedo of a linear colour on a material: bounded below 1, so that light ends.
-    fn clamped(&self, m: &Material, color: [f32; 3]) -> Leaves {
+    fn clamped(&self, m: &Material, color: [f32; 3]) -> Spectrum {
         m.bounded(self.upsampler.reflectance_fast(color))
     }
 
@@ -246,7 +247,7 @@ impl<'a> Painter<'a> {
         m: &'m Material,
         triangle: usize,
         element: &Element,
-    ) -> Option<(&'m Emission, Leaves)> {
+    ) -> Option<(&'m Emission, Spectrum)> {
         let e = m.even_emission()?;
         let texture = e.texture.as_ref()?;
         let surface = &self.scene.surfaces[self.mesh.origin[triangle].0 as usize];
@@ -294,7 +295,7 @@ pub(crate) fn weights_of(p: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     [1.0 - wb - wc, wb, wc]
 }
 
-/// What single leaves reflect, emit and get from punctual lights, on all 64 spectral leaves.
+/// What single leaves reflect, emit and get from punctual lights, on all 64 bands.
 pub(crate) struct DenseSources<'a> {
     painter: &'a Painter<'a>,
     tree: &'a Tree,
@@ -334,7 +335,7 @@ impl<'a> DenseSources<'a> {
 }
 
 impl super::coarse::Dense for DenseSources<'_> {
-    fn reflectance(&self, leaf: u32) -> Leaves {
+    fn reflectance(&self, leaf: u32) -> Spectrum {
         let (m, triangle, element) = self.of(leaf);
         if let Some([rho, ..]) = self.painter.woven(self.tree, &element) {
             return rho;
@@ -345,14 +346,14 @@ impl super::coarse::Dense for DenseSources<'_> {
         }
     }
 
-    fn through(&self, leaf: u32) -> Option<Leaves> {
+    fn through(&self, leaf: u32) -> Option<Spectrum> {
         let element = self.tree.elements[self.tree.node(leaf).element as usize];
         (self.tree.behind(leaf) != NONE)
             .then(|| self.painter.woven(self.tree, &element))?
             .map(|[_, through, ..]| through)
     }
 
-    fn emission(&self, leaf: u32, light: usize) -> Option<Leaves> {
+    fn emission(&self, leaf: u32, light: usize) -> Option<Spectrum> {
         let (m, triangle, element) = self.of(leaf);
         let e = m.even_emission().filter(|e| e.light == light)?;
         Some(match self.painter.glow_of(m, triangle, &element) {
@@ -361,19 +362,19 @@ impl super::coarse::Dense for DenseSources<'_> {
         })
     }
 
-    fn excitation(&self, leaf: u32, light: usize) -> Option<Leaves> {
+    fn excitation(&self, leaf: u32, light: usize) -> Option<Spectrum> {
         let (m, ..) = self.of(leaf);
         let terms = m.fluorescence.iter().flat_map(|f| &f.terms);
         let excited = terms.filter(|t| t.light == light).map(|t| t.excitation);
         excited.reduce(|a, b| std::array::from_fn(|k| a[k] + b[k]))
     }
 
-    fn punctual(&self, leaf: u32, light: usize) -> Option<Leaves> {
-        let mut sum: Option<Leaves> = None;
+    fn punctual(&self, leaf: u32, light: usize) -> Option<Spectrum> {
+        let mut sum: Option<Spectrum> = None;
         for &(lamp, factor) in &self.shadowed.by_leaf[self.place[leaf as usize] as usize] {
             let lamp = &self.painter.scene.lights[lamp as usize];
             if lamp.light == light {
-                let sum = sum.get_or_insert([0.0; crate::spectrum::LEAVES]);
+                let sum = sum.get_or_insert([0.0; crate::spectrum::BANDS]);
                 for (s, x) in sum.iter_mut().zip(&lamp.shape) {
                     *s += f64::from(factor) * x;
                 }

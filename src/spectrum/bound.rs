@@ -1,12 +1,12 @@
 //! The neglected term, bounded: the paper's open question (section 5).
 //!
-//! With the mean m_a = v + e_a / A_a of a spectrum under the weight a_bar, and its spread
+//! With the mean m_a = v + e_a / A_a of a spectrum under the weight a_bar, and its standard deviation
 //! sigma_a = sqrt(integral over the interval of (f - m_a)^2 a_bar), the errors of a product are exactly
 //!
 //! e'_a = R e_S + S e_R + e_S e_R / A + C_a,   C_a = integral of (S - m_S)(R - m_R) a_bar,   |C_a| <= sigma_S sigma_R
 //!
 //! by Cauchy and Schwarz. C_a also cannot take the integral of S R a_bar out of [min S, max S] times that of R a_bar, nor
-//! the other way round. So an error known to lie within a radius stays known within a radius. The spread of the product
+//! the other way round. So an error known to lie within a radius stays known within a radius. The deviation of the product
 //! is at most the least of
 //!
 //! R_max sigma_S + m_S sigma_R,   S_max sigma_R + m_R sigma_S,   (max - min)/2 sqrt(A).
@@ -24,8 +24,8 @@ pub struct Bounded {
     pub moment: Moment,
     /// The true error is within this of the estimate.
     pub radius: Cmf,
-    /// The spread sigma is at most this.
-    pub spread: Cmf,
+    /// The standard deviation sigma is at most this.
+    pub deviation: Cmf,
     /// The spectrum is nowhere on the interval below this.
     pub low: f64,
     /// Nor above this.
@@ -58,7 +58,7 @@ impl Bounded {
 
 impl Interval for Bounded {
     fn new(average: f64, f: &[f64], cmf: [&[f64]; 3]) -> Self {
-        let spread = cmf.map(|weights| {
+        let deviation = cmf.map(|weights| {
             let total: f64 = weights.iter().sum();
             if total <= 0.0 {
                 return 0.0;
@@ -73,7 +73,7 @@ impl Interval for Bounded {
         Self {
             moment: Moment::new(average, f, cmf),
             radius: [0.0; 3],
-            spread,
+            deviation,
             low: f.iter().copied().fold(f64::INFINITY, f64::min),
             high: f.iter().copied().fold(0.0, f64::max),
         }
@@ -83,7 +83,7 @@ impl Interval for Bounded {
         Self {
             moment: Moment::constant(value),
             radius: [0.0; 3],
-            spread: [0.0; 3],
+            deviation: [0.0; 3],
             low: value,
             high: value,
         }
@@ -93,7 +93,7 @@ impl Interval for Bounded {
         let (mean_s, mean_r) = (self.mean(cmf), r.mean(cmf));
         let mut moment = self.moment.times(&r.moment, cmf);
         let (low, high) = (self.low * r.low, self.high * r.high);
-        let (mut radius, mut spread) = ([0.0; 3], [0.0; 3]);
+        let (mut radius, mut deviation) = ([0.0; 3], [0.0; 3]);
         for a in 0..3 {
             if cmf[a] <= 0.0 {
                 continue;
@@ -102,7 +102,7 @@ impl Interval for Bounded {
             // The mean of S R: around the product of the means by the radius of S and the covariance, and inside what
             // the ranges of S and R allow.
             let middle = mean_s[a] * mean_r[a];
-            let reach = (mean_r[a] * self.radius[a] + self.spread[a] * r.spread[a]) / cmf[a];
+            let reach = (mean_r[a] * self.radius[a] + self.deviation[a] * r.deviation[a]) / cmf[a];
             let from = (middle - reach)
                 .max(self.low * mean_r[a])
                 .max(least * r.low);
@@ -113,25 +113,25 @@ impl Interval for Bounded {
             let (from, to) = (from.min(to), to.max(from));
             moment.0.error[a] = (0.5 * (from + to) - moment.0.value) * cmf[a];
             radius[a] = 0.5 * (to - from) * cmf[a];
-            spread[a] = (r.high * self.spread[a] + most * r.spread[a])
-                .min(mean_r[a] * self.spread[a] + self.high * r.spread[a])
+            deviation[a] = (r.high * self.deviation[a] + most * r.deviation[a])
+                .min(mean_r[a] * self.deviation[a] + self.high * r.deviation[a])
                 .min(0.5 * (high - low) * cmf[a].sqrt());
         }
         Self {
             moment,
             radius,
-            spread,
+            deviation,
             low,
             high,
         }
     }
 
-    /// Parallel axes: the squares of the spreads add, and the distance of the two means comes on top.
+    /// Parallel axes: the squares of the deviations add, and the distance of the two means comes on top.
     fn merged(left: &Self, right: &Self, cmf: [&Cmf; 2], share: f64) -> Self {
         let moment = Moment::merged(&left.moment, &right.moment, cmf, share);
         let means = [left.mean(cmf[0]), right.mean(cmf[1])];
         let (low, high) = (left.low.min(right.low), left.high.max(right.high));
-        let spread = std::array::from_fn(|a| {
+        let deviation = std::array::from_fn(|a| {
             let (l, r) = (
                 left.mean_range(means[0][a], a, cmf[0]),
                 right.mean_range(means[1][a], a, cmf[1]),
@@ -143,14 +143,14 @@ impl Interval for Bounded {
             } else {
                 0.0
             };
-            (left.spread[a].powi(2) + right.spread[a].powi(2) + between)
+            (left.deviation[a].powi(2) + right.deviation[a].powi(2) + between)
                 .sqrt()
                 .min(0.5 * (high - low) * whole.sqrt())
         });
         Self {
             moment,
             radius: super::list::add(left.radius, right.radius),
-            spread,
+            deviation,
             low,
             high,
         }
@@ -166,7 +166,7 @@ impl Interval for Bounded {
             }
             let share = half[a] / whole[a];
             share * self.radius[a]
-                + self.spread[a] * (share * (1.0 - share).max(0.0) * whole[a]).sqrt()
+                + self.deviation[a] * (share * (1.0 - share).max(0.0) * whole[a]).sqrt()
         });
         Self {
             moment,
@@ -175,13 +175,13 @@ impl Interval for Bounded {
         }
     }
 
-    /// Errors and radii add; spreads do at most (triangle inequality).
+    /// Errors and radii add; deviations do at most (triangle inequality).
     fn plus(&self, factor: f64, other: &Self) -> Self {
         let sum = |a: &Cmf, b: &Cmf| std::array::from_fn(|c| a[c] + factor * b[c]);
         Self {
             moment: self.moment.plus(factor, &other.moment),
             radius: sum(&self.radius, &other.radius),
-            spread: sum(&self.spread, &other.spread),
+            deviation: sum(&self.deviation, &other.deviation),
             low: self.low + factor * other.low,
             high: self.high + factor * other.high,
         }
@@ -206,28 +206,32 @@ pub(crate) mod tests {
     use crate::color::tristimulus;
     use crate::spectrum::partition::tests::any_cut;
     use crate::spectrum::testing::{cmf, patch};
-    use crate::spectrum::{CmfTree, Leaves, List, Representative, Tree};
+    use crate::spectrum::{CmfTree, DyadicTree, List, Representative, Spectrum};
     use proptest::prelude::*;
 
     /// Is everything that the list claims true of `exact`? Slack for rounding only.
-    pub(crate) fn holds(list: &List<Bounded>, exact: &Leaves, cmf: &CmfTree) -> Result<(), String> {
+    pub(crate) fn holds(
+        list: &List<Bounded>,
+        exact: &Spectrum,
+        cmf: &CmfTree,
+    ) -> Result<(), String> {
         let scale = exact.iter().copied().fold(0.0, f64::max);
         for (interval, (first, len)) in list.intervals().iter().zip(list.partition().iter()) {
             let over = first..first + len;
             let truth = Bounded::new(
                 interval.value(),
                 &exact[over.clone()],
-                cmf.leaves().each_ref().map(|a| &a[over.clone()]),
+                cmf.weights().each_ref().map(|a| &a[over.clone()]),
             );
             for a in 0..3 {
-                let total: f64 = cmf.leaves()[a][over.clone()].iter().sum();
+                let total: f64 = cmf.weights()[a][over.clone()].iter().sum();
                 let slack = 1e-12 * scale * total;
                 if (truth.error()[a] - interval.error()[a]).abs() > interval.radius[a] + slack {
                     return Err(format!(
                         "error {a} of {first}+{len}: {truth:?} {interval:?}"
                     ));
                 }
-                if truth.spread[a] > interval.spread[a] + 1e-7 * scale * total.sqrt() {
+                if truth.deviation[a] > interval.deviation[a] + 1e-7 * scale * total.sqrt() {
                     return Err(format!(
                         "spread {a} of {first}+{len}: {truth:?} {interval:?}"
                     ));
@@ -240,7 +244,7 @@ pub(crate) mod tests {
             }
         }
         let (error, radius) = (list.error(), list.radius());
-        let truth = tristimulus(exact, cmf.leaves());
+        let truth = tristimulus(exact, cmf.weights());
         for a in 0..3 {
             let off = truth[a] - list.xyz(cmf)[a] - error[a];
             if off.abs() > radius[a] + 1e-12 * scale * cmf.node(1)[a] {
@@ -255,11 +259,11 @@ pub(crate) mod tests {
         fn products_and_merges_stay_within_their_bounds(spectra in prop::collection::vec(patch(), 2..6), cut in any_cut(), merges in any::<u64>()) {
             let cmf = cmf();
             let mut exact = spectra[0];
-            let mut list = List::new(&Tree::<Bounded>::new(&exact, &cmf), cut);
+            let mut list = List::new(&DyadicTree::<Bounded>::new(&exact, &cmf), cut);
             let mut out = List::black();
             for r in &spectra[1..] {
                 exact = std::array::from_fn(|k| exact[k] * r[k]);
-                list.reflect(&Tree::new(r, &cmf), &cmf, &mut out);
+                list.reflect(&DyadicTree::new(r, &cmf), &cmf, &mut out);
                 std::mem::swap(&mut list, &mut out);
                 prop_assert_eq!(holds(&list, &exact, &cmf), Ok(()));
                 let pairs = list.partition().pairs() & merges;

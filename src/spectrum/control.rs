@@ -138,7 +138,7 @@ pub enum Operation {
     Fluctuation,
 }
 
-/// The interval with the greatest error that can be split: its first leaf and its node.
+/// The interval with the greatest error that can be split: its first band and its node.
 pub(super) fn worst<I: Interval>(list: &List<I>, metric: &Metric) -> Option<(usize, usize)> {
     let mut found = None;
     let mut greatest = -1.0;
@@ -286,7 +286,7 @@ mod tests {
     use crate::spectrum::bound::tests::holds;
     use crate::spectrum::partition::tests::any_cut;
     use crate::spectrum::testing::{cmf, patch};
-    use crate::spectrum::{Bounded, Estimate, Leaves, Moment, Partition, Tree};
+    use crate::spectrum::{Bounded, DyadicTree, Estimate, Moment, Partition, Spectrum};
     use proptest::prelude::*;
 
     /// Limits of every kind: usual, crossed, out of reach, without end.
@@ -296,14 +296,14 @@ mod tests {
     }
 
     fn run<I: Interval>(
-        spectra: &[Leaves],
+        spectra: &[Spectrum],
         cut: Partition,
         limits: [f64; 2],
         rule: Control,
-    ) -> (List<I>, f64, Leaves) {
+    ) -> (List<I>, f64, Spectrum) {
         let cmf = cmf();
-        let trees: Vec<Tree<I>> = spectra.iter().map(|s| Tree::new(s, &cmf)).collect();
-        let materials: Vec<&Tree<I>> = trees[1..].iter().collect();
+        let trees: Vec<DyadicTree<I>> = spectra.iter().map(|s| DyadicTree::new(s, &cmf)).collect();
+        let materials: Vec<&DyadicTree<I>> = trees[1..].iter().collect();
         let (mut list, mut out) = (List::new(&trees[0], cut), List::black());
         for material in &materials {
             list.reflect(material, &cmf, &mut out);
@@ -313,7 +313,7 @@ mod tests {
             source: &trees[0],
             reflections: &materials,
         };
-        let white = tristimulus(&spectra[0], cmf.leaves());
+        let white = tristimulus(&spectra[0], cmf.weights());
         let metric = if rule.pairs == Pairs::Any && white[1] > 0.0 {
             Metric::Luv(luv_jacobian(list.xyz(&cmf), white))
         } else {
@@ -326,7 +326,7 @@ mod tests {
         };
         control(&mut list, &path, &cmf, &metric, &settings);
         let size = metric.size(list.error(), list.radius());
-        (list, size, path.leaves())
+        (list, size, path.spectrum())
     }
 
     proptest! {
@@ -339,7 +339,7 @@ mod tests {
             let within = Control::within(1.0);
             let (list, size, _) = run::<Moment>(&spectra, cut, limits, within);
             prop_assert_eq!(list.validate(), Ok(()));
-            // Leaves have no error: only rounding can keep the sum above a limit of 0.
+            // Bands have no error: only rounding can keep the sum above a limit of 0.
             prop_assert!(size <= limits[1].max(1e-9), "{size}");
             let (list, size, exact) = run::<Bounded>(&spectra, cut, limits, within);
             prop_assert_eq!(holds(&list, &exact, &cmf()), Ok(()));
@@ -352,7 +352,7 @@ mod tests {
         #[test]
         fn the_ranking_of_pairs_is_the_outcome_of_their_merge(s in patch(), cut in any_cut()) {
             let cmf = cmf();
-            let list = List::new(&Tree::<Moment>::new(&s, &cmf), cut);
+            let list = List::new(&DyadicTree::<Moment>::new(&s, &cmf), cut);
             for rule in [Representative::Mean, Representative::Projection] {
                 let settings = Control { representative: rule, ..Control::within(1.0) };
                 if let Some((first, after)) = best_pair(&list, list.error(), &cmf, &Metric::Xyz, &settings) {

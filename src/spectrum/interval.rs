@@ -18,7 +18,7 @@ pub enum Representative {
 
 /// A spectrum on one interval: its value and what is known of the error of that value.
 pub trait Interval: Copy + Default + std::fmt::Debug {
-    /// The value `average` held for the leaves `f` under the colour matching functions `cmf` (same leaves).
+    /// The value `average` held for the bands `f` under the colour matching functions `cmf` (same bands).
     fn new(average: f64, f: &[f64], cmf: [&[f64]; 3]) -> Self;
 
     /// A value that stands for a spectrum known to be constant on the interval.

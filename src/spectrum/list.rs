@@ -5,21 +5,21 @@
 
 use super::interval::{Cmf, Interval, Representative};
 use super::partition::Partition;
-use super::tree::{CmfTree, Tree, node};
-use crate::data::{LEAVES, Leaves};
+use super::tree::{CmfTree, DyadicTree, node};
+use crate::data::{BANDS, Spectrum};
 
 /// A piecewise constant spectrum with its errors.
 #[derive(Debug, Clone)]
 pub struct List<I> {
     partition: Partition,
-    intervals: [I; LEAVES],
+    intervals: [I; BANDS],
     /// Radius of the error of the whole: the sum over the intervals, or less where an interval was halved blindly.
     radius: Cmf,
 }
 
 impl<I: Interval> List<I> {
     /// The spectrum of a tree on a cut.
-    pub fn new(tree: &Tree<I>, partition: Partition) -> Self {
+    pub fn new(tree: &DyadicTree<I>, partition: Partition) -> Self {
         let mut list = Self::black();
         list.partition = partition;
         for (slot, (first, len)) in list.intervals.iter_mut().zip(partition.iter()) {
@@ -55,7 +55,7 @@ impl<I: Interval> List<I> {
     pub fn black() -> Self {
         Self {
             partition: Partition::ROOT,
-            intervals: [I::default(); LEAVES],
+            intervals: [I::default(); BANDS],
             radius: [0.0; 3],
         }
     }
@@ -129,16 +129,16 @@ impl<I: Interval> List<I> {
         sum
     }
 
-    /// The list on the 64 leaves.
-    pub fn leaves(&self) -> Leaves {
-        let mut leaves = [0.0; LEAVES];
+    /// The list on the 64 bands.
+    pub fn spectrum(&self) -> Spectrum {
+        let mut spectrum = [0.0; BANDS];
         for (interval, (first, len)) in self.intervals().iter().zip(self.partition.iter()) {
-            leaves[first..first + len].fill(interval.value());
+            spectrum[first..first + len].fill(interval.value());
         }
-        leaves
+        spectrum
     }
 
-    /// Replaces the interval at `first` by two; nothing happens to one of a single leaf.
+    /// Replaces the interval at `first` by two; nothing happens to one of a single band.
     pub fn split(&mut self, first: usize, halves: [I; 2]) {
         let Some(finer) = self.partition.split(first) else {
             return;

@@ -6,10 +6,10 @@
 //!
 //! | paper | what | here |
 //! |---|---|---|
-//! | 2.1.1 | 64 leaves, the reference | [`Grid`], [`Leaves`] |
+//! | 2.1.1 | 64 bands, the reference | [`Grid`], [`Spectrum`] |
 //! | 2.1 - 2.2 | the other methods | [`methods`] |
 //! | 3.1.1 | scaling functions, cuts of the range | [`Partition`] |
-//! | 3.1.2 | trees, eqs. 2 and 3 | [`Tree`], [`CmfTree`] |
+//! | 3.1.2 | trees, eqs. 2 and 3 | [`DyadicTree`], [`CmfTree`] |
 //! | 3.1.3 | representation of the light | [`represent`] |
 //! | 3.2 | product and its error, refinement, merge | [`List::reflect`], [`Estimate`], [`Path`], [`control()`] |
 //! | 3.3 | change to XYZ | [`List::xyz`] |
@@ -26,7 +26,7 @@
 //!
 //! Each decision was measured against Table 1 (`haarlight paper`).
 //!
-//! - Leaves take the table's value at their left edge, and K = 1 / sum(S y_bar): so the source rows come out to the last
+//! - Bands take the table's value at their left edge, and K = 1 / sum(S y_bar): so the source rows come out to the last
 //!   printed digit. Middles give 9 intervals for C instead of 8.
 //! - K is multiplied into the light. Errors of a product are then right without it, and trees hold none.
 //! - The loop of 3.4 goes round for ever on 2 to 5 % of the products. It stops at the first change of direction. Whether the
@@ -66,9 +66,9 @@
 //! let grid = Grid::default();
 //! let cmf = CmfTree::new(Observer::cie1931().weights(&grid));
 //! let light = grid.means(&named("cie/D65").unwrap().table, Outside::Zero);
-//! let k = normalization(&light, cmf.leaves());
+//! let k = normalization(&light, cmf.weights());
 //! let light = light.map(|s| k * s);
-//! let white = tristimulus(&light, cmf.leaves());
+//! let white = tristimulus(&light, cmf.weights());
 //! let paint = grid.means(&named("macbeth/orange").unwrap().table, Outside::Hold);
 //!
 //! // The light, to dE*uv 0.5, and its reflection by the paint, held to the same.
@@ -80,7 +80,7 @@
 //! let metric = Metric::Luv(luv_jacobian(reflected.corrected_xyz(&cmf), white));
 //! control(&mut reflected, &path, &cmf, &metric, &Control::within(0.5));
 //!
-//! let exact = tristimulus(&path.leaves(), cmf.leaves());
+//! let exact = tristimulus(&path.spectrum(), cmf.weights());
 //! let error = haarlight::color::de_luv(exact, reflected.corrected_xyz(&cmf), white);
 //! assert!(reflected.partition().count() <= 16 && error < 0.5);
 //! ```
@@ -105,7 +105,7 @@ mod tree;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub use crate::data::{Grid, LEAVES, Leaves};
+pub use crate::data::{BANDS, Grid, Spectrum};
 pub use bound::Bounded;
 pub use control::{Control, Metric, Operation, Overshoot, Pairs, coarsen, control};
 pub use interval::{Cmf, Estimate, Interval, Moment, Representative};
@@ -113,9 +113,9 @@ pub use list::List;
 pub use partition::{Intervals, Partition};
 pub use product::Path;
 pub use source::represent;
-pub use tree::{CmfTree, NODES, Tree, node, span};
+pub use tree::{CmfTree, DyadicTree, NODES, node, span};
 
 /// The list that patches carry: values, errors with the free part of the neglected term.
 pub type SpectralList = List<Moment>;
 /// The tree that goes with [`SpectralList`].
-pub type SpectralTree = Tree<Moment>;
+pub type SpectralTree = DyadicTree<Moment>;

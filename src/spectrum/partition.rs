@@ -1,18 +1,18 @@
 //! A dyadic cut of the wavelength range (paper 3.1.1): the intervals on which a spectrum is held constant.
 //!
-//! Every interval is [i 2^(6-j), (i+1) 2^(6-j)) in leaves, for a level j in 0..=6, so the whole cut fits one `u64`:
-//! bit k is set where an interval starts at leaf k. The union of two cuts (intervals of either, whichever is finer)
+//! Every interval is [i 2^(6-j), (i+1) 2^(6-j)) in bands, for a level j in 0..=6, so the whole cut fits one `u64`:
+//! bit k is set where an interval starts at band k. The union of two cuts (intervals of either, whichever is finer)
 //! is OR, the number of intervals is a popcount.
 
-/// A dyadic cut; bit k set means that an interval starts at leaf k.
+/// A dyadic cut; bit k set means that an interval starts at band k.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Partition(u64);
 
 impl Partition {
     /// One interval over everything.
     pub const ROOT: Self = Self(1);
-    /// 64 intervals of one leaf.
-    pub const LEAVES: Self = Self(u64::MAX);
+    /// 64 intervals of one band.
+    pub const BANDS: Self = Self(u64::MAX);
 
     /// A cut from its bits; none if an interval would not be dyadic.
     ///
@@ -33,10 +33,10 @@ impl Partition {
                 .all(|(first, len)| len.is_power_of_two() && first % len == 0)
     }
 
-    /// The coarsest cut whose intervals start at all the given leaves; bits that are no dyadic cut are completed.
+    /// The coarsest cut whose intervals start at all the given bands; bits that are no dyadic cut are completed.
     pub fn covering(bits: u64) -> Self {
         let mut all = Self::ROOT.0;
-        // An interval that starts at k of level j has a sibling: every ancestor of leaf k is split, down to where
+        // An interval that starts at k of level j has a sibling: every ancestor of band k is split, down to where
         // k is the start of a right child.
         for k in (1..64).filter(|k| bits >> k & 1 == 1) {
             let mut len = 64;
@@ -84,62 +84,62 @@ impl Partition {
         self.0 & other.0 == other.0
     }
 
-    /// Does an interval start at this leaf (in 0..64)?
+    /// Does an interval start at this band (in 0..64)?
     #[inline]
-    pub fn starts(self, leaf: usize) -> bool {
-        self.0 >> leaf & 1 == 1
+    pub fn starts(self, band: usize) -> bool {
+        self.0 >> band & 1 == 1
     }
 
-    /// Index of the interval that starts at `leaf`, which must be the start of one.
+    /// Index of the interval that starts at `band`, which must be the start of one.
     #[inline]
-    pub fn rank(self, leaf: usize) -> usize {
-        (self.0 & ((1 << leaf) - 1)).count_ones() as usize
+    pub fn rank(self, band: usize) -> usize {
+        (self.0 & ((1 << band) - 1)).count_ones() as usize
     }
 
-    /// Number of leaves of the interval that starts at `leaf`.
+    /// Number of bands of the interval that starts at `band`.
     #[inline]
-    pub fn len_at(self, leaf: usize) -> usize {
-        // `>> 1` first: a shift by 64 would overflow for the last leaf.
-        let after = self.0 >> leaf >> 1;
-        (after.trailing_zeros() as usize + 1).min(64 - leaf)
+    pub fn len_at(self, band: usize) -> usize {
+        // `>> 1` first: a shift by 64 would overflow for the last band.
+        let after = self.0 >> band >> 1;
+        (after.trailing_zeros() as usize + 1).min(64 - band)
     }
 
-    /// Intervals as (first leaf, number of leaves), in order of wavelength.
+    /// Intervals as (first band, number of bands), in order of wavelength.
     #[inline]
     pub fn iter(self) -> Intervals {
         Intervals(self.0)
     }
 
-    /// The cut with the interval at `leaf` halved; none if it is one leaf or no interval starts there.
+    /// The cut with the interval at `band` halved; none if it is one band or no interval starts there.
     #[inline]
-    pub fn split(self, leaf: usize) -> Option<Self> {
-        if leaf >= 64 || !self.starts(leaf) {
+    pub fn split(self, band: usize) -> Option<Self> {
+        if band >= 64 || !self.starts(band) {
             return None;
         }
-        let half = self.len_at(leaf) / 2;
-        (half > 0).then(|| Self(self.0 | 1 << (leaf + half)))
+        let half = self.len_at(band) / 2;
+        (half > 0).then(|| Self(self.0 | 1 << (band + half)))
     }
 
-    /// The start of the interval that forms, with the one at `leaf`, the whole of their parent; none if there is no such
+    /// The start of the interval that forms, with the one at `band`, the whole of their parent; none if there is no such
     /// interval in the cut (the sibling is split further, or the cut is the root).
     #[inline]
-    pub fn sibling(self, leaf: usize) -> Option<usize> {
-        if leaf >= 64 || !self.starts(leaf) {
+    pub fn sibling(self, band: usize) -> Option<usize> {
+        if band >= 64 || !self.starts(band) {
             return None;
         }
-        let len = self.len_at(leaf);
+        let len = self.len_at(band);
         if len == 64 {
             return None;
         }
-        let sibling = leaf ^ len;
+        let sibling = band ^ len;
         (self.starts(sibling) && self.len_at(sibling) == len).then_some(sibling)
     }
 
-    /// The cut with the interval at `leaf` and its sibling made one; none if the sibling is not in the cut.
+    /// The cut with the interval at `band` and its sibling made one; none if the sibling is not in the cut.
     #[inline]
-    pub fn merge(self, leaf: usize) -> Option<Self> {
-        let sibling = self.sibling(leaf)?;
-        Some(Self(self.0 & !(1 << leaf.max(sibling))))
+    pub fn merge(self, band: usize) -> Option<Self> {
+        let sibling = self.sibling(band)?;
+        Some(Self(self.0 & !(1 << band.max(sibling))))
     }
 
     /// Starts of the left halves of all sibling pairs in the cut, as bits.
@@ -148,11 +148,11 @@ impl Partition {
         (0..6).fold(0, |all, height| all | self.pairs_of(height))
     }
 
-    /// The pairs whose halves have 2^height leaves, height in 0..6.
+    /// The pairs whose halves have 2^height bands, height in 0..6.
     #[inline]
     pub(super) fn pairs_of(self, height: u32) -> u64 {
         let (bits, len) = (self.0, 1u32 << height);
-        // A start at k + len means that the parent over 2 len leaves is halved.
+        // A start at k + len means that the parent over 2 len bands is halved.
         let halved = bits & bits >> len & PARENTS[height as usize];
         // An interval that is split has a start at its middle.
         let middle = len / 2;
@@ -164,7 +164,7 @@ impl Partition {
     }
 }
 
-/// Multiples of 2, 4, ... 64 as bits: where the parents of intervals of 1, 2, ... 32 leaves start.
+/// Multiples of 2, 4, ... 64 as bits: where the parents of intervals of 1, 2, ... 32 bands start.
 const PARENTS: [u64; 6] = [
     0x5555_5555_5555_5555,
     0x1111_1111_1111_1111,
@@ -188,7 +188,7 @@ impl TryFrom<u64> for Partition {
     }
 }
 
-/// Intervals of a [`Partition`] as (first leaf, number of leaves).
+/// Intervals of a [`Partition`] as (first band, number of bands).
 #[derive(Debug, Clone)]
 pub struct Intervals(u64);
 
@@ -227,7 +227,7 @@ pub(crate) mod tests {
     #[test]
     fn uniform_cuts() {
         assert_eq!(Partition::uniform(0), Partition::ROOT);
-        assert_eq!(Partition::uniform(6), Partition::LEAVES);
+        assert_eq!(Partition::uniform(6), Partition::BANDS);
         assert_eq!(
             Partition::uniform(3)
                 .iter()
@@ -235,16 +235,16 @@ pub(crate) mod tests {
                 .collect::<Vec<_>>(),
             vec![8; 8]
         );
-        assert_eq!(Partition::LEAVES.iter().last(), Some((63, 1)));
-        assert_eq!(Partition::LEAVES.len_at(63), 1);
-        assert_eq!(Partition::LEAVES.split(63), None);
+        assert_eq!(Partition::BANDS.iter().last(), Some((63, 1)));
+        assert_eq!(Partition::BANDS.len_at(63), 1);
+        assert_eq!(Partition::BANDS.split(63), None);
         assert_eq!(Partition::ROOT.merge(0), None);
         assert!(!Partition::is_valid(0));
     }
 
     proptest! {
         #[test]
-        fn every_operation_keeps_the_cut_dyadic(a in any_cut(), b in any_cut(), leaf in 0usize..64) {
+        fn every_operation_keeps_the_cut_dyadic(a in any_cut(), b in any_cut(), band in 0usize..64) {
             for cut in [a, a.union(b), a.intersection(b)] {
                 prop_assert!(Partition::is_valid(cut.bits()), "{:x}", cut.bits());
             }
@@ -255,11 +255,11 @@ pub(crate) mod tests {
                 prop_assert_eq!(a.rank(first), rank);
                 prop_assert_eq!(a.len_at(first), len);
             }
-            if let Some(finer) = a.split(leaf) {
+            if let Some(finer) = a.split(band) {
                 prop_assert!(Partition::is_valid(finer.bits()));
-                prop_assert_eq!(finer.merge(leaf), Some(a));
-                prop_assert_eq!(finer.sibling(leaf), Some(leaf + a.len_at(leaf) / 2));
-                prop_assert!(finer.pairs() >> leaf & 1 == 1);
+                prop_assert_eq!(finer.merge(band), Some(a));
+                prop_assert_eq!(finer.sibling(band), Some(band + a.len_at(band) / 2));
+                prop_assert!(finer.pairs() >> band & 1 == 1);
             }
             for k in 0..64 {
                 let is_left = a.sibling(k).is_some_and(|sibling| sibling > k);

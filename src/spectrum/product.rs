@@ -4,15 +4,15 @@
 
 use super::interval::Interval;
 use super::list::List;
-use super::tree::{CmfTree, Tree, node};
+use super::tree::{CmfTree, DyadicTree, node};
 
-/// A light and the materials that it met: the product of their leaves is the exact spectrum.
+/// A light and the materials that it met: the product of their bands is the exact spectrum.
 #[derive(Debug, Clone, Copy)]
 pub struct Path<'a, I> {
     /// The light.
-    pub source: &'a Tree<I>,
+    pub source: &'a DyadicTree<I>,
     /// The materials in the order met.
-    pub reflections: &'a [&'a Tree<I>],
+    pub reflections: &'a [&'a DyadicTree<I>],
 }
 
 impl<I: Interval> Path<'_, I> {
@@ -30,12 +30,12 @@ impl<I: Interval> Path<'_, I> {
         [self.node(2 * n, cmf), self.node(2 * n + 1, cmf)]
     }
 
-    /// The exact spectrum on the 64 leaves.
-    pub fn leaves(&self) -> super::Leaves {
-        let product = |leaf: usize| {
+    /// The exact spectrum on the 64 bands.
+    pub fn spectrum(&self) -> super::Spectrum {
+        let product = |band: usize| {
             self.reflections
                 .iter()
-                .fold(self.source.leaves()[leaf], |s, r| s * r.leaves()[leaf])
+                .fold(self.source.spectrum()[band], |s, r| s * r.spectrum()[band])
         };
         std::array::from_fn(product)
     }
@@ -44,7 +44,7 @@ impl<I: Interval> Path<'_, I> {
 impl<I: Interval> List<I> {
     /// `out` becomes this list after reflection by a material, on the same cut.
     #[inline]
-    pub fn reflect(&self, reflectance: &Tree<I>, cmf: &CmfTree, out: &mut Self) {
+    pub fn reflect(&self, reflectance: &DyadicTree<I>, cmf: &CmfTree, out: &mut Self) {
         let room = out.reset(self.partition());
         for ((slot, s), (first, len)) in room
             .iter_mut()

@@ -7,13 +7,13 @@ use super::interval::Interval;
 use super::list::List;
 use super::partition::Partition;
 use super::product::Path;
-use super::tree::{CmfTree, Tree};
+use super::tree::{CmfTree, DyadicTree};
 
 /// The list of a light whose error is at most `limit` in the unit of `metric`.
 ///
-/// It ends: an interval of one leaf has no error, so the worst interval can always be halved.
+/// It ends: an interval of one band has no error, so the worst interval can always be halved.
 pub fn represent<I: Interval>(
-    source: &Tree<I>,
+    source: &DyadicTree<I>,
     cmf: &CmfTree,
     metric: &Metric,
     limit: f64,
@@ -37,13 +37,13 @@ mod tests {
     use super::*;
     use crate::color::Observer;
     use crate::data::{Outside, named};
-    use crate::spectrum::study::{Chart, Reflectances};
+    use crate::spectrum::study::{ColourChart, Reflectances};
     use crate::spectrum::{Estimate, Grid};
 
     #[test]
-    fn a_limit_of_nothing_gives_leaves_and_no_limit_gives_one_interval() {
-        let chart = Chart::new(Reflectances::Ohta);
-        let tree = Tree::<Estimate>::new(&chart.light("F2").power, &chart.cmf);
+    fn a_limit_of_nothing_gives_bands_and_no_limit_gives_one_interval() {
+        let chart = ColourChart::new(Reflectances::Ohta);
+        let tree = DyadicTree::<Estimate>::new(&chart.light("F2").power, &chart.cmf);
         let exact = represent(&tree, &chart.cmf, &Metric::Xyz, 0.0);
         assert_eq!(exact.error(), [0.0; 3]);
         let coarse = represent(&tree, &chart.cmf, &Metric::Xyz, f64::INFINITY);
@@ -51,13 +51,13 @@ mod tests {
     }
 
     #[test]
-    fn leaves_sampled_in_their_middle_miss_table_1() {
+    fn bands_sampled_in_their_middle_miss_table_1() {
         // The left edges of this grid are the middles of the paper's.
         let grid = Grid::new(382.5, 702.5);
         let cmf = CmfTree::new(Observer::cie1931().samples(&grid));
         let middles = grid.left_edges(&named("cie/C").unwrap().table, Outside::Zero);
-        let k = crate::color::normalization(&middles, cmf.leaves());
-        let tree = Tree::<Estimate>::new(&middles.map(|s| k * s), &cmf);
+        let k = crate::color::normalization(&middles, cmf.weights());
+        let tree = DyadicTree::<Estimate>::new(&middles.map(|s| k * s), &cmf);
         assert_eq!(
             represent(&tree, &cmf, &Metric::Xyz, 2e-3)
                 .partition()

@@ -52,20 +52,26 @@ mod tests {
     use crate::spectrum::bound::tests::holds;
     use crate::spectrum::partition::tests::any_cut;
     use crate::spectrum::testing::{cmf, patch};
-    use crate::spectrum::{Bounded, Control, Estimate, Leaves, Metric, Moment, Tree, coarsen};
+    use crate::spectrum::{
+        Bounded, Control, DyadicTree, Estimate, Metric, Moment, Spectrum, coarsen,
+    };
     use proptest::prelude::*;
 
-    fn spectra() -> impl Strategy<Value = Vec<(Leaves, Leaves, Partition, f64)>> {
+    fn spectra() -> impl Strategy<Value = Vec<(Spectrum, Spectrum, Partition, f64)>> {
         prop::collection::vec((patch(), patch(), any_cut(), 0.0..1.0f64), 1..6)
     }
 
     /// Factors times products of two spectra, each on its own cut, and the exact sum.
-    fn add_up<I: Interval>(terms: &[(Leaves, Leaves, Partition, f64)]) -> (List<I>, Leaves) {
+    fn add_up<I: Interval>(terms: &[(Spectrum, Spectrum, Partition, f64)]) -> (List<I>, Spectrum) {
         let cmf = cmf();
         let (mut sum, mut exact) = (List::black(), [0.0; 64]);
         let mut term = List::black();
         for (s, r, cut, factor) in terms {
-            List::new(&Tree::<I>::new(s, &cmf), *cut).reflect(&Tree::new(r, &cmf), &cmf, &mut term);
+            List::new(&DyadicTree::<I>::new(s, &cmf), *cut).reflect(
+                &DyadicTree::new(r, &cmf),
+                &cmf,
+                &mut term,
+            );
             sum.add_scaled(*factor, &term, &cmf);
             exact = std::array::from_fn(|k| exact[k] + factor * s[k] * r[k]);
         }
@@ -80,7 +86,7 @@ mod tests {
             prop_assert_eq!(holds(&sum, &exact, &cmf), Ok(()));
             // Also after a further product, where the halves count one by one.
             let mut product = List::black();
-            sum.reflect(&Tree::new(&more, &cmf), &cmf, &mut product);
+            sum.reflect(&DyadicTree::new(&more, &cmf), &cmf, &mut product);
             let reflected = std::array::from_fn(|k| exact[k] * more[k]);
             prop_assert_eq!(holds(&product, &reflected, &cmf), Ok(()));
             // And after compression, which keeps the limit wherever the sum itself was within it.
@@ -98,7 +104,7 @@ mod tests {
             let (sum, exact) = add_up::<Estimate>(&same);
             let fine = cut.union(Partition::ROOT);
             prop_assert_eq!(sum.partition(), fine);
-            let direct = List::new(&Tree::<Estimate>::new(&exact, &cmf()), fine);
+            let direct = List::new(&DyadicTree::<Estimate>::new(&exact, &cmf()), fine);
             for (ours, theirs) in sum.intervals().iter().zip(direct.intervals()) {
                 prop_assert!((ours.value - theirs.value).abs() < 1e-12);
                 prop_assert!((0..3).all(|a| (ours.error[a] - theirs.error[a]).abs() < 1e-11));
@@ -108,7 +114,7 @@ mod tests {
         #[test]
         fn halving_keeps_the_error_of_the_whole(s in patch(), coarse in any_cut(), fine in any_cut()) {
             let cmf = cmf();
-            let mut list = List::new(&Tree::<Moment>::new(&s, &cmf), coarse);
+            let mut list = List::new(&DyadicTree::<Moment>::new(&s, &cmf), coarse);
             let (error, xyz) = (list.error(), list.xyz(&cmf));
             list.refine_to(fine, &cmf);
             prop_assert_eq!(list.partition(), coarse.union(fine));

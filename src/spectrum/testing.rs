@@ -1,6 +1,6 @@
 //! What the unit tests of this module share.
 
-use super::{CmfTree, Grid, Leaves};
+use super::{CmfTree, Grid, Spectrum};
 use crate::color::Observer;
 use proptest::prelude::*;
 
@@ -10,7 +10,7 @@ pub(crate) fn cmf() -> CmfTree {
 }
 
 /// Any reflectance, smooth or rough.
-pub(crate) fn patch() -> impl Strategy<Value = Leaves> {
+pub(crate) fn patch() -> impl Strategy<Value = Spectrum> {
     (prop::array::uniform32(0.0..1.0f64), 1usize..64)
         .prop_map(|(v, step)| std::array::from_fn(|k| v[(k * step / 63) % 32]))
 }

@@ -1,28 +1,28 @@
 //! The data base of the pre-processing step (paper 3.1.2): spectra and colour matching functions as binary trees.
 //!
-//! A tree has 127 nodes, level j in 0..=6 and index i in 0..2^j; node (j, i) covers the leaves
+//! A tree has 127 nodes, level j in 0..=6 and index i in 0..2^j; node (j, i) covers the bands
 //! [i 2^(6-j), (i+1) 2^(6-j)). It is stored as an array in heap order: (j, i) lies at 2^j + i.
 //!
 //! The average of eq. 3 is the value that makes the sum of the squares of the three errors of eq. 2 least.
 
 use super::interval::{Cmf, Interval, Representative};
 use super::partition::Partition;
-use crate::data::{LEAVES, Leaves};
+use crate::data::{BANDS, Spectrum};
 
 /// Nodes of a tree in heap order; index 0 is not used.
-pub const NODES: usize = 2 * LEAVES;
+pub const NODES: usize = 2 * BANDS;
 
-/// Heap index of the node over `len` leaves from `first`.
+/// Heap index of the node over `len` bands from `first`.
 #[inline]
 pub fn node(first: usize, len: usize) -> usize {
     // `len` is a power of two and divides `first`, so the shift is an exact division.
-    (LEAVES + first) >> len.trailing_zeros()
+    (BANDS + first) >> len.trailing_zeros()
 }
 
-/// First leaf and number of leaves of a node.
+/// First band and number of bands of a node.
 pub fn span(node: usize) -> (usize, usize) {
     let level = node.ilog2();
-    let len = LEAVES >> level;
+    let len = BANDS >> level;
     ((node - (1 << level)) * len, len)
 }
 
@@ -31,31 +31,31 @@ pub fn span(node: usize) -> (usize, usize) {
 /// It also fixes how spectra are averaged (eq. 3). Under a light, see [`CmfTree::under`], it weighs by that light.
 #[derive(Debug, Clone)]
 pub struct CmfTree {
-    leaves: [Leaves; 3],
+    weights: [Spectrum; 3],
     nodes: [Cmf; NODES],
     /// For each node with children: the left child's share in the value of both by eq. 3.
-    shares: [f64; LEAVES],
+    shares: [f64; BANDS],
     /// For each node with children: what a difference of 1 between the children's values adds to the errors when they merge.
-    gains: [Cmf; LEAVES],
+    gains: [Cmf; BANDS],
 }
 
 impl CmfTree {
-    /// From the weights of the leaves (finite, not negative), e.g. [`crate::color::Observer::weights`].
-    pub fn new(leaves: [Leaves; 3]) -> Self {
+    /// From the weights of the bands (finite, not negative), e.g. [`crate::color::Observer::weights`].
+    pub fn new(weights: [Spectrum; 3]) -> Self {
         let mut nodes = [[0.0; 3]; NODES];
-        for leaf in 0..LEAVES {
-            nodes[LEAVES + leaf] = leaves.each_ref().map(|a| a[leaf]);
+        for band in 0..BANDS {
+            nodes[BANDS + band] = weights.each_ref().map(|a| a[band]);
         }
-        for n in (1..LEAVES).rev() {
+        for n in (1..BANDS).rev() {
             nodes[n] = std::array::from_fn(|a| nodes[2 * n][a] + nodes[2 * n + 1][a]);
         }
         let mut this = Self {
-            leaves,
+            weights,
             nodes,
-            shares: [0.5; LEAVES],
-            gains: [[0.0; 3]; LEAVES],
+            shares: [0.5; BANDS],
+            gains: [[0.0; 3]; BANDS],
         };
-        for n in 1..LEAVES {
+        for n in 1..BANDS {
             this.shares[n] = this.projected_share(n);
             this.gains[n] = this.gain(n, this.shares[n]);
         }
@@ -103,17 +103,17 @@ impl CmfTree {
     /// A spectrum B = S q is then held as its ratio q to the light S. Averages, errors and tristimulus values are those
     /// of B although only q, which is smooth even under line spectra, is cut into intervals.
     #[must_use]
-    pub fn under(&self, power: &Leaves) -> Self {
+    pub fn under(&self, power: &Spectrum) -> Self {
         Self::new(
-            self.leaves
+            self.weights
                 .each_ref()
-                .map(|a| std::array::from_fn(|leaf| a[leaf] * power[leaf])),
+                .map(|a| std::array::from_fn(|band| a[band] * power[band])),
         )
     }
 
-    /// Weights of the leaves.
-    pub fn leaves(&self) -> &[Leaves; 3] {
-        &self.leaves
+    /// Weights of the bands.
+    pub fn weights(&self) -> &[Spectrum; 3] {
+        &self.weights
     }
 
     /// Sums over a node.
@@ -123,14 +123,14 @@ impl CmfTree {
     }
 
     /// The value of `f` on a node by eq. 3; the plain mean where all weights are zero.
-    pub fn average(&self, f: &Leaves, node: usize) -> f64 {
+    pub fn average(&self, f: &Spectrum, node: usize) -> f64 {
         let (first, len) = span(node);
         let (mut above, mut below) = (0.0, 0.0);
         for a in 0..3 {
             let whole = self.nodes[node][a];
             above += whole
                 * (first..first + len)
-                    .map(|leaf| f[leaf] * self.leaves[a][leaf])
+                    .map(|band| f[band] * self.weights[a][band])
                     .sum::<f64>();
             below += whole * whole;
         }
@@ -150,8 +150,8 @@ impl CmfTree {
     /// let constant = cmf.weighted_average(&[0.5; 64], Partition::uniform(2));
     /// assert!(constant[..4].iter().all(|v| (v - 0.5).abs() < 1e-15));
     /// ```
-    pub fn weighted_average(&self, f: &Leaves, partition: Partition) -> Leaves {
-        let mut values = [0.0; LEAVES];
+    pub fn weighted_average(&self, f: &Spectrum, partition: Partition) -> Spectrum {
+        let mut values = [0.0; BANDS];
         for (value, (first, len)) in values.iter_mut().zip(partition.iter()) {
             *value = self.average(f, node(first, len));
         }
@@ -161,19 +161,19 @@ impl CmfTree {
 
 /// A spectrum as a binary tree: for each node the average and what the interval type keeps of its errors.
 #[derive(Debug, Clone)]
-pub struct Tree<I> {
-    leaves: Leaves,
+pub struct DyadicTree<I> {
+    spectrum: Spectrum,
     nodes: [I; NODES],
 }
 
-impl<I: Interval> Tree<I> {
-    /// From the leaves (finite).
-    pub fn new(f: &Leaves, cmf: &CmfTree) -> Self {
+impl<I: Interval> DyadicTree<I> {
+    /// From the bands (finite).
+    pub fn new(f: &Spectrum, cmf: &CmfTree) -> Self {
         let mut nodes = [I::default(); NODES];
         for (n, slot) in nodes.iter_mut().enumerate().skip(1) {
             let (first, len) = span(n);
             let over = first..first + len;
-            // The average of a leaf is the leaf itself, to the last bit: its errors are exactly 0.
+            // The average of a band is the band itself, to the last bit: its errors are exactly 0.
             let average = if len == 1 {
                 f[first]
             } else {
@@ -182,15 +182,18 @@ impl<I: Interval> Tree<I> {
             *slot = I::new(
                 average,
                 &f[over.clone()],
-                cmf.leaves.each_ref().map(|a| &a[over.clone()]),
+                cmf.weights.each_ref().map(|a| &a[over.clone()]),
             );
         }
-        Self { leaves: *f, nodes }
+        Self {
+            spectrum: *f,
+            nodes,
+        }
     }
 
-    /// The leaves it was made from.
-    pub fn leaves(&self) -> &Leaves {
-        &self.leaves
+    /// The bands it was made from.
+    pub fn spectrum(&self) -> &Spectrum {
+        &self.spectrum
     }
 
     /// A node by heap index.
@@ -199,7 +202,7 @@ impl<I: Interval> Tree<I> {
         &self.nodes[node]
     }
 
-    /// Checks what must hold: leaves are exact, and the errors of two children are their parent's up to the change of value.
+    /// Checks what must hold: bands are exact, and the errors of two children are their parent's up to the change of value.
     ///
     /// # Errors
     /// The first node that is wrong.
@@ -209,10 +212,10 @@ impl<I: Interval> Tree<I> {
             let (value, error) = (self.nodes[n].value(), self.nodes[n].error());
             for a in 0..3 {
                 let exact: f64 = (first..first + len)
-                    .map(|leaf| (self.leaves[leaf] - value) * cmf.leaves[a][leaf])
+                    .map(|band| (self.spectrum[band] - value) * cmf.weights[a][band])
                     .sum();
                 let scale: f64 = (first..first + len)
-                    .map(|leaf| self.leaves[leaf].abs() * cmf.leaves[a][leaf])
+                    .map(|band| self.spectrum[band].abs() * cmf.weights[a][band])
                     .sum();
                 if (error[a] - exact).abs() > 1e-12 * scale || (len == 1 && error[a] != 0.0) {
                     return Err(format!(
@@ -245,11 +248,11 @@ mod tests {
 
     #[test]
     fn without_weights_the_average_is_the_mean() {
-        let blind = CmfTree::new([[0.0; LEAVES]; 3]);
-        let ramp = std::array::from_fn(|leaf| leaf as f64);
+        let blind = CmfTree::new([[0.0; BANDS]; 3]);
+        let ramp = std::array::from_fn(|band| band as f64);
         assert_eq!(blind.average(&ramp, 1), 31.5);
         assert!(
-            Tree::<Estimate>::new(&ramp, &blind)
+            DyadicTree::<Estimate>::new(&ramp, &blind)
                 .validate(&blind)
                 .is_ok()
         );
@@ -259,10 +262,10 @@ mod tests {
         #[test]
         fn the_average_minimises_the_squared_errors(f in patch(), n in 1usize..NODES, step in -0.1..0.1f64) {
             let cmf = cmf();
-            let tree = Tree::<Estimate>::new(&f, &cmf);
+            let tree = DyadicTree::<Estimate>::new(&f, &cmf);
             prop_assert_eq!(tree.validate(&cmf), Ok(()));
             let (first, len) = span(n);
-            let squares = |value: f64| (0..3).map(|a| (first..first + len).map(|k| (f[k] - value) * cmf.leaves()[a][k]).sum::<f64>().powi(2)).sum::<f64>();
+            let squares = |value: f64| (0..3).map(|a| (first..first + len).map(|k| (f[k] - value) * cmf.weights()[a][k]).sum::<f64>().powi(2)).sum::<f64>();
             let average = tree.node(n).value;
             prop_assert!(squares(average) <= squares(average + step) + 1e-12);
         }
@@ -271,10 +274,10 @@ mod tests {
         fn under_a_light_the_ratio_has_the_errors_of_the_product(q in patch(), light in patch(), n in 1usize..NODES) {
             let cmf = cmf();
             let under = cmf.under(&light);
-            let node = *Tree::<Estimate>::new(&q, &under).node(n);
+            let node = *DyadicTree::<Estimate>::new(&q, &under).node(n);
             let (first, len) = span(n);
             for a in 0..3 {
-                let exact: f64 = (first..first + len).map(|k| light[k] * (q[k] - node.value) * cmf.leaves()[a][k]).sum();
+                let exact: f64 = (first..first + len).map(|k| light[k] * (q[k] - node.value) * cmf.weights()[a][k]).sum();
                 prop_assert!((node.error[a] - exact).abs() < 1e-12);
             }
         }

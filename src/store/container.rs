@@ -31,14 +31,14 @@ const PLACE: usize = 16;
 
 /// What a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum FileKind {
     /// The state of a bake between two rounds.
     Checkpoint,
     /// What relighting needs.
     Cache,
 }
 
-impl Kind {
+impl FileKind {
     fn tag(self) -> [u8; 4] {
         match self {
             Self::Checkpoint => *b"ckpt",
@@ -77,7 +77,7 @@ impl Kind {
 /// As [`file::write_atomic`].
 pub fn write(
     path: &Path,
-    kind: Kind,
+    kind: FileKind,
     body: impl FnOnce(&mut Encoder) -> io::Result<()>,
 ) -> Result<u64> {
     let mut size = 0;
@@ -102,7 +102,7 @@ pub fn unwritten(path: &Path, body: impl FnOnce(&mut Encoder) -> io::Result<()>)
 }
 
 /// What is wrong with a header, if anything is.
-fn check(header: &[u8], kind: Kind) -> Read<()> {
+fn check(header: &[u8], kind: FileKind) -> Read<()> {
     let name = kind.name();
     if !header.starts_with(&MAGIC) {
         return Err(Broken::new(format!("is no {name} of this program")));
@@ -121,7 +121,7 @@ fn check(header: &[u8], kind: Kind) -> Read<()> {
     Ok(())
 }
 
-fn short(kind: Kind) -> Broken {
+fn short(kind: FileKind) -> Broken {
     Broken::new(format!("is a {} cut short or damaged", kind.name()))
 }
 
@@ -134,7 +134,7 @@ struct Opened {
 }
 
 /// Reads all but what stands aside.
-fn open(path: &Path, kind: Kind) -> io::Result<Read<Opened>> {
+fn open(path: &Path, kind: FileKind) -> io::Result<Read<Opened>> {
     let mut file = File::open(path)?;
     let size = file.metadata()?.len();
     let mut bytes = Vec::new();
@@ -218,7 +218,11 @@ pub fn checksum(bytes: &[u8]) -> u64 {
 /// # Errors
 /// [`Error::Io`] if the file cannot be read; [`Error::Input`] for a file that is foreign, of another kind or version, cut
 /// short or garbled, and for what `decode` finds.
-pub fn read<T>(path: &Path, kind: Kind, decode: impl FnOnce(&mut Decoder) -> Read<T>) -> Result<T> {
+pub fn read<T>(
+    path: &Path,
+    kind: FileKind,
+    decode: impl FnOnce(&mut Decoder) -> Read<T>,
+) -> Result<T> {
     let opened = open(path, kind).map_err(|problem| Error::io(path, problem))?;
     let decoded = opened.and_then(
         |Opened {
@@ -243,7 +247,7 @@ mod tests {
     fn file(list: &[u32]) -> (tempfile::TempDir, std::path::PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
-        let size = write(&path, Kind::Cache, |out| out.put_all(list)).unwrap();
+        let size = write(&path, FileKind::Cache, |out| out.put_all(list)).unwrap();
         assert_eq!(size, std::fs::metadata(&path).unwrap().len());
         (folder, path)
     }
@@ -251,7 +255,7 @@ mod tests {
     #[test]
     fn what_is_written_is_read_back() {
         let (_folder, path) = file(&[1, 2, 3]);
-        let list = read(&path, Kind::Cache, |from| from.get_all::<u32>()).unwrap();
+        let list = read(&path, FileKind::Cache, |from| from.get_all::<u32>()).unwrap();
         assert_eq!(list, [1, 2, 3]);
     }
 
@@ -263,16 +267,16 @@ mod tests {
             assert_eq!(error.exit_code(), 2);
             error.to_string()
         };
-        assert!(refused(&path, Kind::Checkpoint).contains("something else than a checkpoint"));
-        let part = read(&path, Kind::Cache, |_| Ok(())).unwrap_err();
+        assert!(refused(&path, FileKind::Checkpoint).contains("something else than a checkpoint"));
+        let part = read(&path, FileKind::Cache, |_| Ok(())).unwrap_err();
         assert!(part.to_string().contains("after its end"), "{part}");
         let mut bytes = std::fs::read(&path).unwrap();
         bytes[12] = 9;
         std::fs::write(&path, &bytes).unwrap();
-        assert!(refused(&path, Kind::Cache).contains("version 9"));
+        assert!(refused(&path, FileKind::Cache).contains("version 9"));
         std::fs::write(&path, b"").unwrap();
-        assert!(refused(&path, Kind::Cache).contains("no cache"));
-        let text = refused(&folder.path().join("nowhere"), Kind::Cache);
+        assert!(refused(&path, FileKind::Cache).contains("no cache"));
+        let text = refused(&folder.path().join("nowhere"), FileKind::Cache);
         assert!(text.contains("nowhere"), "{text}");
     }
 
@@ -285,7 +289,7 @@ mod tests {
             prop_assert_eq!(&checksum(&whole).to_le_bytes()[..], &whole[whole.len() - 8..]);
             let taken = |bytes: &[u8]| {
                 std::fs::write(&path, bytes).unwrap();
-                read(&path, Kind::Cache, |from| from.get_all::<u32>()).is_ok()
+                read(&path, FileKind::Cache, |from| from.get_all::<u32>()).is_ok()
             };
             prop_assert!(taken(&whole));
             let mut garbled = whole.clone();

@@ -63,8 +63,8 @@ impl Mix {
     fn dome(&mut self, kind: LightKind, dome: &Dome) {
         match (kind, dome) {
             (LightKind::Sky(_), Dome::Cie(sky)) => {
-                let spread = sky.luminance();
-                self.add(spread.kind()).add(spread.sun().to_array());
+                let luminance = sky.luminance();
+                self.add(luminance.kind()).add(luminance.sun().to_array());
             }
             (LightKind::Sky(_), Dome::Spectral(sky)) => {
                 self.add(sky.model().air())
@@ -385,7 +385,7 @@ fn images(scene: &Scene) -> Vec<u64> {
 mod tests {
     use super::*;
     use crate::scene::Options;
-    use crate::scene::sky::{Brightness, SkyWish, SunWish};
+    use crate::scene::sky::{SkyBrightness, SkyWish, SunWish};
     use proptest::prelude::*;
 
     fn room() -> Scene {
@@ -453,7 +453,7 @@ mod tests {
         let shape = |turbidity: f64| {
             let wish = SkyWish {
                 turbidity: Some(turbidity),
-                brightness: Some(Brightness::Illuminance(100.0)),
+                brightness: Some(SkyBrightness::Illuminance(100.0)),
                 sun: SunWish {
                     place: Some("40,200".parse().unwrap()),
                     ..SunWish::default()

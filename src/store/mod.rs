@@ -15,6 +15,6 @@ pub mod fingerprint;
 pub mod packs;
 
 pub use codec::{Broken, Decoder, Encoder};
-pub use container::{Kind, read, write};
+pub use container::{FileKind, read, write};
 pub use fingerprint::Fingerprint;
 pub use packs::Packs;

@@ -13,13 +13,13 @@ const MISSING: u32 = u32::MAX;
 #[derive(Debug)]
 pub struct Packs {
     lengths: Vec<u32>,
-    blocks: Vec<Block>,
+    blocks: Vec<BlockEntry>,
     bytes: Aside,
 }
 
 /// Where the pieces of a block stand, and the checksum of their bytes.
 #[derive(Debug)]
-struct Block {
+struct BlockEntry {
     start: u64,
     length: usize,
     sum: u64,
@@ -64,7 +64,7 @@ impl Packs {
         for (lengths, sum) in lengths.chunks(Self::BLOCK).zip(sums) {
             let there = lengths.iter().filter(|&&length| length != MISSING);
             let length: u64 = there.map(|&length| u64::from(length)).sum();
-            blocks.push(Block {
+            blocks.push(BlockEntry {
                 start: end,
                 length: length as usize,
                 sum,
@@ -100,7 +100,7 @@ impl Packs {
         k: usize,
         buffer: &'b mut Vec<u8>,
     ) -> Read<impl Iterator<Item = Option<&'b [u8]>>> {
-        let Block { start, length, sum } = self.blocks[k];
+        let BlockEntry { start, length, sum } = self.blocks[k];
         buffer.resize(length, 0);
         self.bytes.read(start, buffer)?;
         if xxh64(buffer, 0) != sum {
@@ -154,7 +154,7 @@ impl Packs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::{Kind, container};
+    use crate::store::{FileKind, container};
     use proptest::prelude::*;
 
     proptest! {
@@ -166,13 +166,13 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a");
             let all: Vec<Option<&[u8]>> = pieces.iter().map(Option::as_deref).collect();
-            container::write(&path, Kind::Cache, |out| {
+            container::write(&path, FileKind::Cache, |out| {
                 out.put(1_u8)?;
                 Packs::encode(&all, out)?;
                 out.put(2_u8)
             })
             .unwrap();
-            let read = |path| container::read(path, Kind::Cache, |from| {
+            let read = |path| container::read(path, FileKind::Cache, |from| {
                 assert_eq!(from.get::<u8>()?, 1);
                 let packs = Packs::decode(from)?;
                 assert_eq!(from.get::<u8>()?, 2);

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 /// What was met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Met {
+pub(super) enum SurveyHit {
     /// A side of this surface that takes part.
     Front(usize),
     /// The black back of this surface.
@@ -34,16 +34,16 @@ impl<'a> Eyes<'a> {
     }
 
     /// Looks from a point (world space) into a direction; what lies in `plane` is passed over.
-    pub(super) fn look(&self, from: DVec3, direction: DVec3, plane: u32) -> Met {
+    pub(super) fn look(&self, from: DVec3, direction: DVec3, plane: u32) -> SurveyHit {
         let Some(hit) = self.hit(from, direction, plane) else {
-            return Met::Nothing;
+            return SurveyHit::Nothing;
         };
         let surface = self.mesh.origin[hit.triangle as usize].0 as usize;
         let sides = self.scene.materials[self.scene.surfaces[surface].material].sides;
         match (hit.from_behind, sides) {
-            (false, _) => Met::Front(surface),
-            (true, Sides::Both) => Met::Behind(surface),
-            (true, Sides::Front) => Met::Back(surface),
+            (false, _) => SurveyHit::Front(surface),
+            (true, Sides::Both) => SurveyHit::Behind(surface),
+            (true, Sides::Front) => SurveyHit::Back(surface),
         }
     }
 
@@ -60,7 +60,7 @@ impl<'a> Eyes<'a> {
     }
 
     /// The same from a point in the air.
-    pub(super) fn look_around(&self, from: DVec3, direction: DVec3) -> Met {
+    pub(super) fn look_around(&self, from: DVec3, direction: DVec3) -> SurveyHit {
         self.look(from, direction, NO_PLANE)
     }
 }

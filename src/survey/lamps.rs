@@ -8,7 +8,7 @@
 //! Sky, sun and parallel light come from outside: rays from fronts find the way to them, also through an opening that hardly any ray
 //! from outside would meet. Where no ray leaves the room it is closed to them, whichever way its faces look.
 
-use super::eyes::{Eyes, Met};
+use super::eyes::{Eyes, SurveyHit};
 use super::openings::Fronts;
 use crate::error::Problem;
 use crate::geometry::sampling::{
@@ -42,7 +42,7 @@ pub(super) struct Away {
 
 /// What rays met.
 #[derive(Debug, Default, Clone, Copy)]
-struct Seen {
+struct RayCounts {
     /// Fronts of what is no lamp.
     things: usize,
     /// Fronts of other lamps.
@@ -53,14 +53,14 @@ struct Seen {
     own: usize,
 }
 
-impl Seen {
-    fn add(&mut self, scene: &Scene, lamp: Option<usize>, met: Met) {
+impl RayCounts {
+    fn add(&mut self, scene: &Scene, lamp: Option<usize>, met: SurveyHit) {
         match met {
-            Met::Front(s) | Met::Behind(s) if Some(s) == lamp => self.own += 1,
-            Met::Front(s) | Met::Behind(s) if emits(scene, s) => self.lamps += 1,
-            Met::Front(_) | Met::Behind(_) => self.things += 1,
-            Met::Back(s) if Some(s) != lamp => self.backs += 1,
-            Met::Back(_) | Met::Nothing => {}
+            SurveyHit::Front(s) | SurveyHit::Behind(s) if Some(s) == lamp => self.own += 1,
+            SurveyHit::Front(s) | SurveyHit::Behind(s) if emits(scene, s) => self.lamps += 1,
+            SurveyHit::Front(_) | SurveyHit::Behind(_) => self.things += 1,
+            SurveyHit::Back(s) if Some(s) != lamp => self.backs += 1,
+            SurveyHit::Back(_) | SurveyHit::Nothing => {}
         }
     }
 }
@@ -112,11 +112,11 @@ fn look(eyes: &Eyes, rays: u32) -> Option<Away> {
         found.lights.push(k);
     }
     for surface in (0..scene.surfaces.len()).filter(|&s| emits(scene, s)) {
-        let ahead = of_surface(eyes, surface, Way::Ahead, rays);
+        let ahead = of_surface(eyes, surface, Facing::Ahead, rays);
         if ahead.things > 0 {
             return None;
         }
-        let behind = of_surface(eyes, surface, Way::Behind, rays);
+        let behind = of_surface(eyes, surface, Facing::Behind, rays);
         let one_sided = scene.materials[scene.surfaces[surface].material].sides == Sides::Front;
         if !one_sided && behind.things > 0 {
             return None;
@@ -170,18 +170,18 @@ fn reached(eyes: &Eyes, outside: &[&PunctualLight], rays: u32) -> (bool, bool) {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
+enum Facing {
     Ahead,
     Behind,
 }
 
 /// What a surface's faces shine on, or would if they were turned.
-fn of_surface(eyes: &Eyes, surface: usize, way: Way, rays: u32) -> Seen {
+fn of_surface(eyes: &Eyes, surface: usize, facing: Facing, rays: u32) -> RayCounts {
     let mesh = &eyes.mesh;
     let range = mesh.first_triangle[surface] as usize..mesh.first_triangle[surface + 1] as usize;
     let total: f64 = mesh.area[range.clone()].iter().sum();
-    let mut seen = Seen::default();
-    let shift = hash(surface as u64, u64::from(way == Way::Behind));
+    let mut seen = RayCounts::default();
+    let shift = hash(surface as u64, u64::from(facing == Facing::Behind));
     let (mut triangle, mut passed) = (range.start, 0.0);
     for k in 0..rays {
         // Rays in steps of area, so that every part of the lamp has its share.
@@ -192,9 +192,9 @@ fn of_surface(eyes: &Eyes, surface: usize, way: Way, rays: u32) -> Seen {
         }
         let corners = mesh.triangles[triangle].map(|v| mesh.positions[v as usize] + mesh.centre);
         let from = on_triangle(&corners, sequence02(k, shift));
-        let normal = match way {
-            Way::Ahead => mesh.normal[triangle],
-            Way::Behind => -mesh.normal[triangle],
+        let normal = match facing {
+            Facing::Ahead => mesh.normal[triangle],
+            Facing::Behind => -mesh.normal[triangle],
         };
         let direction = cosine_direction(normal, sequence02(k, hash(shift, 1)));
         let met = eyes.look(from, direction, mesh.plane[triangle]);
@@ -204,8 +204,8 @@ fn of_surface(eyes: &Eyes, surface: usize, way: Way, rays: u32) -> Seen {
 }
 
 /// What a light without extent shines on.
-fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> Seen {
-    let mut seen = Seen::default();
+fn of_light(eyes: &Eyes, light: &PunctualLight, rays: u32) -> RayCounts {
+    let mut seen = RayCounts::default();
     for k in 0..rays {
         let (from, direction, _) = ray_of(eyes, light, k);
         seen.add(eyes.scene, None, eyes.look_around(from, direction));

@@ -23,7 +23,7 @@ mod openings;
 mod points;
 mod size;
 
-pub use points::{Place, places};
+pub use points::{PointLocation, places};
 
 use eyes::Eyes;
 
@@ -32,7 +32,7 @@ use crate::scene::Scene;
 
 /// What the user has decided already.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Wishes {
+pub struct SurveyOptions {
     /// A room without light is meant.
     pub allow_dark: bool,
     /// Faces that look reversed are to be turned.
@@ -44,17 +44,17 @@ pub struct Wishes {
 ///
 /// ```
 /// use haarlight::scene::{Options, Scene};
-/// use haarlight::survey::{Wishes, advise};
+/// use haarlight::survey::{SurveyOptions, advise};
 /// let mut room = Scene::load("scenes/convex.glb", &Options::default())?;
-/// assert!(advise(&mut room, Wishes::default()).is_empty());
+/// assert!(advise(&mut room, SurveyOptions::default()).is_empty());
 /// room.flip(0..room.surfaces.len());
-/// let problems = advise(&mut room, Wishes::default());
+/// let problems = advise(&mut room, SurveyOptions::default());
 /// assert!(problems[0].what.contains("faces look reversed"));
 /// // The same room again.
-/// assert!(advise(&mut room, Wishes { flip: true, ..Wishes::default() }).is_empty());
+/// assert!(advise(&mut room, SurveyOptions { flip: true, ..SurveyOptions::default() }).is_empty());
 /// # Ok::<(), haarlight::Error>(())
 /// ```
-pub fn advise(scene: &mut Scene, wishes: Wishes) -> Vec<Problem> {
+pub fn advise(scene: &mut Scene, wishes: SurveyOptions) -> Vec<Problem> {
     if let Some(problem) = content::nothing(scene) {
         return vec![problem];
     }

@@ -1,7 +1,7 @@
 //! Is the room open to a sky that nobody describes? Rays from its fronts tell. None is invented: all that is outside is black, and
 //! that is said.
 
-use super::eyes::{Eyes, Met};
+use super::eyes::{Eyes, SurveyHit};
 use crate::geometry::sampling::{Pcg, cosine_direction, triangle_weights};
 use glam::DVec3;
 
@@ -28,13 +28,13 @@ pub(super) fn hint(eyes: &Eyes) -> Option<String> {
 /// Share of the rays from fronts that leave the room.
 fn share(eyes: &Eyes) -> f64 {
     let fronts = Fronts::new(eyes);
-    let leaves = |ray: &Ray| fronts.leaves(ray, ray.direction);
+    let leaves = |ray: &FrontRay| fronts.leaves(ray, ray.direction);
     let away = fronts.rays(RAYS).filter(leaves).count();
     away as f64 / RAYS as f64
 }
 
 /// A ray from a front: where it starts, its direction, and the plane that it starts from.
-pub(super) struct Ray {
+pub(super) struct FrontRay {
     from: DVec3,
     pub(super) direction: DVec3,
     pub(super) normal: DVec3,
@@ -61,7 +61,7 @@ impl<'a> Fronts<'a> {
     }
 
     /// Rays from points evenly over the fronts, in directions as they send light.
-    pub(super) fn rays(&self, count: usize) -> impl Iterator<Item = Ray> {
+    pub(super) fn rays(&self, count: usize) -> impl Iterator<Item = FrontRay> {
         let mesh = &self.eyes.mesh;
         let mut random = Pcg::new(0x0be7);
         let area = self.sums.last().copied().unwrap_or(0.0);
@@ -74,7 +74,7 @@ impl<'a> Fronts<'a> {
             let [a, b, c] = mesh.corners(*face);
             let w = triangle_weights([random.f64(), random.f64()]);
             let normal = mesh.face_normal(*face);
-            Some(Ray {
+            Some(FrontRay {
                 from: a * w[0] + b * w[1] + c * w[2] + mesh.centre,
                 direction: cosine_direction(normal, [random.f64(), random.f64()]),
                 normal,
@@ -84,8 +84,8 @@ impl<'a> Fronts<'a> {
     }
 
     /// Does it leave the room if it goes in this direction?
-    pub(super) fn leaves(&self, ray: &Ray, direction: DVec3) -> bool {
-        self.eyes.look(ray.from, direction, ray.plane) == Met::Nothing
+    pub(super) fn leaves(&self, ray: &FrontRay, direction: DVec3) -> bool {
+        self.eyes.look(ray.from, direction, ray.plane) == SurveyHit::Nothing
     }
 }
 

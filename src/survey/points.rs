@@ -5,7 +5,7 @@
 //! or as much of nothing as of backs (below the floor), is outside. Surfaces whose both sides take part show no back, so
 //! a solid made of them cannot be told from a room.
 
-use super::eyes::{Eyes, Met};
+use super::eyes::{Eyes, SurveyHit};
 use crate::geometry::sampling::{sequence02, sphere_direction};
 use crate::scene::Scene;
 use glam::DVec3;
@@ -19,7 +19,7 @@ const ABOVE: f64 = 1e-4;
 
 /// Where a point is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum PointLocation {
     /// Where light may come.
     Room,
     /// Its rays meet backs.
@@ -28,7 +28,7 @@ pub enum Place {
     Outside,
 }
 
-impl Place {
+impl PointLocation {
     /// `room`, `inside`, `outside`.
     pub fn name(self) -> &'static str {
         match self {
@@ -40,7 +40,7 @@ impl Place {
 }
 
 /// Where points (world space, with unit normals) are.
-pub fn places(scene: &Scene, points: &[(DVec3, DVec3)]) -> Vec<Place> {
+pub fn places(scene: &Scene, points: &[(DVec3, DVec3)]) -> Vec<PointLocation> {
     let eyes = Eyes::new(scene);
     let step = ABOVE * eyes.mesh.half_size;
     let of = |&(point, normal): &(DVec3, DVec3)| {
@@ -48,21 +48,21 @@ pub fn places(scene: &Scene, points: &[(DVec3, DVec3)]) -> Vec<Place> {
         let (mut backs, mut escapes) = (0, 0);
         for k in 0..RAYS {
             match eyes.look_around(from, sphere_direction(sequence02(k, 0))) {
-                Met::Back(_) => backs += 1,
-                Met::Nothing => escapes += 1,
-                Met::Front(_) | Met::Behind(_) => {}
+                SurveyHit::Back(_) => backs += 1,
+                SurveyHit::Nothing => escapes += 1,
+                SurveyHit::Front(_) | SurveyHit::Behind(_) => {}
             }
         }
         let fronts = RAYS - backs - escapes;
         let enclosed = 2 * escapes < backs;
         if 2 * backs > RAYS && enclosed {
-            Place::Inside
+            PointLocation::Inside
         } else if 8 * fronts >= ROOM * RAYS {
-            Place::Room
+            PointLocation::Room
         } else if enclosed {
-            Place::Inside
+            PointLocation::Inside
         } else {
-            Place::Outside
+            PointLocation::Outside
         }
     };
     points.iter().map(of).collect()

@@ -3,11 +3,11 @@
 //! All directions are covered by eight triangles, far away, less the shadows of blockers; the rest is divided until the sky is even over
 //! each part, whose factor is exact. Panes cast no shadows: their transmittance is a mean over directions among these parts.
 
+use super::obstacles::Obstacles;
 use super::receiver::Receiver;
-use super::ways::Ways;
 use crate::geometry::sampling::{sequence02, triangle_weights};
 use crate::geometry::{
-    Clipper, NO_PLANE, Patch, Segment, Shadow, Shaft, ShaftContents, lambert_edges_x8, quarters,
+    Clipper, NO_PLANE, Segment, Shadow, Shaft, ShaftContents, ShaftEnd, lambert_edges_x8, quarters,
 };
 use crate::light::{Passage, Tint};
 use crate::link::Sight;
@@ -21,7 +21,7 @@ const FAR: f64 = 8.0;
 const LISTED: usize = 64;
 const PIECES: usize = 64;
 /// How often a far triangle is divided before rays decide: to 3 degrees.
-const CUTS: u32 = 5;
+const SPLITS: u32 = 5;
 /// Rays into a far triangle that is divided no further.
 const LAST_RAYS: u32 = 16;
 /// A part is even if two means of the sky over it differ by less than this share. With .005 points of CIE 171 5.9 are off by .1
@@ -37,7 +37,7 @@ const DEPTH: u32 = 6;
 
 /// Memory of a look outside, and what it found.
 #[derive(Debug, Default)]
-pub(super) struct Found {
+pub(super) struct SkyIrradiance {
     clipper: Clipper,
     /// Irradiance by each part of the sky, where open level ground has 1, and by the ground.
     pub(super) seen: [f64; PLACES],
@@ -49,17 +49,17 @@ pub(super) struct Found {
 }
 
 /// A point that looks outside.
-pub(super) struct Looker<'a> {
+pub(super) struct SkyReceiver<'a> {
     pub(super) sky: &'a Sky,
     pub(super) sight: &'a Sight<'a>,
     /// What changes light on its way; none where nothing does.
-    pub(super) by: Option<&'a dyn Ways>,
+    pub(super) by: Option<&'a dyn Obstacles>,
     pub(super) to: &'a Receiver,
 }
 
-impl Looker<'_> {
+impl SkyReceiver<'_> {
     /// Looks outside; `samples` directions find the transmittance of panes.
-    pub(super) fn look(&self, samples: usize, found: &mut Found) {
+    pub(super) fn look(&self, samples: usize, found: &mut SkyIrradiance) {
         (found.seen, found.tints, found.rays) = ([0.0; PLACES], Default::default(), 0);
         found.parts.clear();
         let far = FAR * self.sight.mesh.half_size;
@@ -75,10 +75,10 @@ impl Looker<'_> {
             } else {
                 [x, y, z]
             };
-            let cell = Cell {
+            let cell = SkyTriangle {
                 corners: corners.map(|d| self.to.point + d),
                 up: y.y > 0.0,
-                cuts: CUTS,
+                splits: SPLITS,
             };
             self.cell(&cell, None, found);
         }
@@ -88,14 +88,14 @@ impl Looker<'_> {
     }
 
     /// Adds the visible part of a far triangle; its blockers are only known to be among the candidates.
-    fn cell(&self, cell: &Cell, candidates: Option<&[u32]>, found: &mut Found) {
+    fn cell(&self, cell: &SkyTriangle, candidates: Option<&[u32]>, found: &mut SkyIrradiance) {
         let (sight, to) = (self.sight, self.to);
-        let point = Patch::Point {
+        let point = ShaftEnd::Point {
             at: to.point,
             normal: to.normal,
             plane: to.plane,
         };
-        let far = Patch::Triangle {
+        let far = ShaftEnd::Triangle {
             corners: cell.corners,
             plane: NO_PLANE,
         };
@@ -111,11 +111,11 @@ impl Looker<'_> {
         {
             return;
         }
-        if cell.cuts > 0 {
+        if cell.splits > 0 {
             for corners in quarters(cell.corners) {
-                let part = Cell {
+                let part = SkyTriangle {
                     corners,
-                    cuts: cell.cuts - 1,
+                    splits: cell.splits - 1,
                     ..*cell
                 };
                 self.cell(&part, list.as_deref().or(candidates), found);
@@ -140,14 +140,14 @@ impl Looker<'_> {
 
     /// Adds the part of a far triangle that is visible past these blockers; false, and nothing is added, if it falls into too
     /// many pieces.
-    fn clip(&self, cell: &Cell, blockers: &[u32], found: &mut Found) -> bool {
+    fn clip(&self, cell: &SkyTriangle, blockers: &[u32], found: &mut SkyIrradiance) -> bool {
         let (sight, to) = (self.sight, self.to);
         let mut clipper = std::mem::take(&mut found.clipper);
         clipper.begin(to.point, &cell.corners);
         let blockers = sight.blockers(blockers, [to.plane, NO_PLANE]);
         let fits = blockers.into_iter().flatten().all(|blocker| {
             let outline = sight.mesh.outline(blocker);
-            clipper.cut(&Shadow::new(to.point, outline.as_ref()), PIECES)
+            clipper.clip(&Shadow::new(to.point, outline.as_ref()), PIECES)
         });
         if fits {
             let whole = lambert_edges_x8(to.point, to.normal, &cell.corners);
@@ -162,7 +162,7 @@ impl Looker<'_> {
     }
 
     /// Adds a polygon of directions (of any length) above or below the horizon, of which a share is free.
-    fn add(&self, (up, share): (bool, f64), polygon: &[DVec3], found: &mut Found) {
+    fn add(&self, (up, share): (bool, f64), polygon: &[DVec3], found: &mut SkyIrradiance) {
         if self.by.is_none() && (!up || self.sky.is_even()) {
             let factor = share * lambert_edges_x8(DVec3::ZERO, self.to.normal, polygon);
             return found.add(up, [factor; PARTS]);
@@ -192,7 +192,7 @@ impl Looker<'_> {
         corners: [DVec3; 3],
         radiance: [[f64; PARTS]; 3],
         depth: u32,
-        found: &mut Found,
+        found: &mut SkyIrradiance,
     ) {
         let ([a, b, c], normal) = (corners, self.to.normal);
         if corners.iter().all(|d| d.dot(normal) <= 0.0) {
@@ -250,7 +250,12 @@ impl Looker<'_> {
     /// Mean transmittance of panes for each part of the sky and of the ground: each even free part is sampled separately, at the centroids
     /// of triangles in proportion to its irradiance. Point A of CIE 171 5.10, close below a roof of glass along which all its light comes
     /// in, is off by .8 % with 256 random directions, by .4 % with as many centroids, and by half of that with twice as many.
-    fn tinted(&self, by: &dyn Ways, samples: usize, parts: &[Part]) -> [Option<Passage>; PLACES] {
+    fn tinted(
+        &self,
+        by: &dyn Obstacles,
+        samples: usize,
+        parts: &[Part],
+    ) -> [Option<Passage>; PLACES] {
         let (mut tints, mut all): ([Tint; PLACES], Tint) = Default::default();
         let bright = |part: &Part| self.sky.brightness(part.up, part.brings);
         let total: f64 = parts.iter().map(bright).sum();
@@ -274,7 +279,7 @@ impl Looker<'_> {
     }
 
     /// Transmittance of panes in one direction of a part, and the weight of that direction.
-    fn asked(&self, by: &dyn Ways, part: &Part, [u, v]: [f64; 2]) -> (Option<Passage>, f64) {
+    fn asked(&self, by: &dyn Obstacles, part: &Part, [u, v]: [f64; 2]) -> (Option<Passage>, f64) {
         let [a, b, c] = part.corners;
         let at = a * u + b * v + c * (1.0 - u - v);
         let direction = at.normalize();
@@ -299,7 +304,7 @@ fn middles(rows: usize) -> impl Iterator<Item = [f64; 2]> {
     })
 }
 
-impl Found {
+impl SkyIrradiance {
     /// Adds irradiance by the parts of one half.
     fn add(&mut self, up: bool, brings: [f64; PARTS]) {
         let first = if up { 0 } else { PARTS };
@@ -310,12 +315,12 @@ impl Found {
 }
 
 /// A far triangle.
-struct Cell {
+struct SkyTriangle {
     corners: [DVec3; 3],
     /// Is the triangle above the horizon?
     up: bool,
     /// How often the triangle may still be divided.
-    cuts: u32,
+    splits: u32,
 }
 
 /// A triangle of directions over which sky or ground is even.
@@ -331,7 +336,7 @@ struct Part {
 #[cfg(test)]
 mod tests {
     use super::super::gatherer::Memory;
-    use super::super::outside::Way;
+    use super::super::surroundings::SkySampling;
     use super::*;
     use crate::transport::tests::{baked, middle};
 
@@ -362,11 +367,11 @@ mod tests {
             let mut look = Memory::default().look;
             for leaf in tree.leaves() {
                 let to = middle(tree, leaf);
-                let ways = (sight, Some(&gatherer as &dyn Ways));
+                let ways = (sight, Some(&gatherer as &dyn Obstacles));
                 let area = tree.node(leaf).area;
-                let seen = outside.seen(ways, &to, Way::Rays(2), &mut look);
+                let seen = outside.seen(ways, &to, SkySampling::Rays(2), &mut look);
                 add(&mut clipped, area, seen, &look.tints);
-                let seen = outside.by_rays(ways, &to, Way::Rays(2), &mut look);
+                let seen = outside.by_rays(ways, &to, SkySampling::Rays(2), &mut look);
                 add(&mut cast, area, seen, &look.tints);
             }
         });

@@ -1,16 +1,16 @@
 //! What a gather works with, and the memory of one thread.
 
 use super::hemisphere::Hemisphere;
-use super::outside::{Look, Outside};
 use super::receiver::Gathered;
 use super::shadows::Shadows;
+use super::surroundings::{SkyScratch, Surroundings};
 use super::trace::Trace;
 use super::via::{Arrived, Via};
 use crate::geometry::{Clipper, Hit, Segment};
 use crate::hierarchy::{Sample, Tree};
 use crate::light::passed::Steps;
 use crate::light::{Filters, Glass, Light, Passage};
-use crate::link::{Sight, Way};
+use crate::link::{Occlusion, Sight};
 use crate::scene::PunctualLight;
 use glam::DVec3;
 
@@ -18,11 +18,11 @@ use glam::DVec3;
 pub(super) const CLOSE: f64 = 1.5;
 
 /// A patch that a point is linked to: its node, what may stand between, and the visible share that the link found.
-pub(super) type Linked = (u32, Way, f32);
+pub(super) type Linked = (u32, Occlusion, f32);
 
 /// Which light of patches is gathered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Of {
+pub(super) enum RadiosityPart {
     All,
     Reflected,
     Emitted,
@@ -31,7 +31,7 @@ pub(super) enum Of {
 /// An element of a lamp whose visible share is found by rays: its exact factor, and the irradiance it would bring
 /// unblocked, share of white.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Lamp {
+pub(super) struct LampElement {
     pub(super) id: u32,
     /// The cluster of elements that emit alike and lie together, see [`Fixtures`](crate::light::Fixtures); [`NONE`] for a single
     /// element.
@@ -65,7 +65,7 @@ pub struct Memory {
     /// The hits close by.
     pub(super) near: Vec<(u32, Hit)>,
     /// Lamps held back until all of them are known.
-    pub(super) lamps: Vec<Lamp>,
+    pub(super) lamps: Vec<LampElement>,
     /// Factors of the faces of lamps with many faces, lamp after lamp.
     pub(super) faces: Vec<f64>,
     /// The path that each segment to a lamp belongs to, and what the lamp brings.
@@ -73,7 +73,7 @@ pub struct Memory {
     /// What the rays of a point met by way of mirrors.
     pub(super) mirrored: Vec<Arrived>,
     /// Memory of a look outside.
-    pub(super) look: Look,
+    pub(super) look: SkyScratch,
     /// Directions in which the rays of a point leave the room.
     pub(super) escaped: Vec<DVec3>,
     /// Rays cast.
@@ -109,7 +109,7 @@ pub struct Gatherer<'a> {
     /// Punctual lights with their rows of radiant intensity (or normal irradiance), recentred.
     pub lamps: &'a [(PunctualLight, Vec<f32>)],
     /// What is outside; none where no light comes from outside.
-    pub(crate) sky: Option<&'a Outside>,
+    pub(crate) sky: Option<&'a Surroundings>,
     /// The panes, through which light passes; none where the room has none.
     pub(crate) glass: Option<Glass<'a>>,
     /// What mirrors leave of light.

@@ -4,15 +4,15 @@
 //! go to parts in proportion to this. The number of rays is fixed beforehand: stopping where the first few agree overlooks
 //! thin things, and lost 4 to 8 % of the light of lamps behind louvres.
 
-use super::gatherer::{Gatherer, Lamp, Memory, Of};
+use super::gatherer::{Gatherer, LampElement, Memory, RadiosityPart};
 use super::luminaire;
 use super::punctual::punctual_factor;
 use super::receiver::{Gathered, Receiver};
-use super::slope::Seen;
+use super::slope::SeenPatch;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
-use crate::light::{Passage, Tint, keenness};
+use crate::light::{Passage, Tint, lightness_sensitivity};
 use crate::link::open_weight;
 use crate::scene::LightKind;
 use glam::DVec3;
@@ -39,7 +39,7 @@ type Part = ([DVec3; 3], f64);
 
 /// State of the rays to a lamp: the parts of its face, and which of its faces the last ray went to.
 #[derive(Default)]
-struct Aim {
+struct RayProgress {
     parts: Vec<Part>,
     face: (usize, f64),
 }
@@ -76,10 +76,10 @@ fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
             continue;
         }
         // Divided parts go to the end, so that the largest are divided first.
-        let cut = quarters(corners);
-        let factors = lambert_triangles_x8(to.point, to.normal, cut.into_iter()).to_array();
+        let four = quarters(corners);
+        let factors = lambert_triangles_x8(to.point, to.normal, four.into_iter()).to_array();
         parts.remove(next);
-        parts.extend(cut.into_iter().zip(factors).filter(|part| part.1 > 0.0));
+        parts.extend(four.into_iter().zip(factors).filter(|part| part.1 > 0.0));
     }
     parts
 }
@@ -114,7 +114,7 @@ impl Gatherer<'_> {
     pub(super) fn lamps_together(
         &self,
         to: &Receiver,
-        of: Of,
+        which: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
@@ -144,7 +144,15 @@ impl Gatherer<'_> {
             let each = lamps.iter().zip(&seen).enumerate();
             for (k, (lamp, &seen)) in each.filter(|(_, (_, seen))| **seen > 0.0) {
                 let tint = tints.get(k).or(tints.last());
-                self.see(to, lamp.id, lamp.factor, Seen::of(seen), tint, of, out);
+                self.see(
+                    to,
+                    lamp.id,
+                    lamp.factor,
+                    SeenPatch::of(seen),
+                    tint,
+                    which,
+                    out,
+                );
             }
         }
         memory.lamps = lamps;
@@ -159,7 +167,7 @@ impl Gatherer<'_> {
     fn look_at_each(
         &self,
         to: &Receiver,
-        lamps: &[Lamp],
+        lamps: &[LampElement],
         owners: &[usize],
         seen: &mut [f64],
         memory: &mut Memory,
@@ -176,7 +184,9 @@ impl Gatherer<'_> {
                 continue;
             }
             let sample = sequence02(k as u32, hash(to.seed ^ 2, u64::from(lamp.id)));
-            if let Some((segment, _)) = self.ray_to(to, lamp, sample, &mut Aim::default(), memory) {
+            if let Some((segment, _)) =
+                self.ray_to(to, lamp, sample, &mut RayProgress::default(), memory)
+            {
                 memory.rays += 1;
                 let hidden = self.sight.blocks_one(&segment);
                 seen[k] = if hidden { 0.0 } else { 1.0 };
@@ -221,7 +231,7 @@ impl Gatherer<'_> {
             .leaf
             .and_then(|leaf| self.light.arrival.get(leaf as usize));
         let here = here.map_or(all, |arrival| f64::from(arrival.all));
-        let wanted = 0.5 * all * keenness(here) / (PATCHES * self.tolerance);
+        let wanted = 0.5 * all * lightness_sensitivity(here) / (PATCHES * self.tolerance);
         match self.shafts {
             true => (wanted.powf(4.0 / 3.0).ceil() as usize).clamp(RAYS[0], RAYS[1]),
             false => LEAF_RAYS,
@@ -230,7 +240,13 @@ impl Gatherer<'_> {
 
     /// Aims rays at lamps, as many as `all` their light needs, and stores them with their weights in the memory; returns the
     /// lamp of each.
-    fn aim(&self, to: &Receiver, lamps: &[Lamp], all: f64, memory: &mut Memory) -> Vec<usize> {
+    fn aim(
+        &self,
+        to: &Receiver,
+        lamps: &[LampElement],
+        all: f64,
+        memory: &mut Memory,
+    ) -> Vec<usize> {
         let count = self.rays_to_lamps(to, all);
         let turn = hash(to.seed, u64::from(lamps[0].id));
         let mut samples: Vec<[f64; 2]> = (0..count as u32).map(|k| sequence02(k, turn)).collect();
@@ -244,7 +260,7 @@ impl Gatherer<'_> {
                 true => f64::INFINITY,
                 false => before + lamp.carries,
             };
-            let mut aim = Aim::default();
+            let mut aim = RayProgress::default();
             while let Some([u, v]) = samples.next_if(|sample| sample[0] * all < upto) {
                 // The rest of the number after the choice of a lamp chooses the point.
                 let u = ((u * all - before) / lamp.carries).clamp(0.0, 1.0);
@@ -264,9 +280,9 @@ impl Gatherer<'_> {
     fn ray_to(
         &self,
         to: &Receiver,
-        lamp: &Lamp,
+        lamp: &LampElement,
         [mut u, v]: [f64; 2],
-        aim: &mut Aim,
+        aim: &mut RayProgress,
         memory: &Memory,
     ) -> Option<(Segment, f64)> {
         let (mut id, mut chance) = (lamp.id, 1.0);

@@ -10,7 +10,7 @@ use super::receiver::Receiver;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment, lambert_polygon, quarters};
 use crate::light::Passage;
-use crate::link::{PIECES, View, open_weight};
+use crate::link::{PIECES, Visibility, open_weight};
 use crate::scene::PunctualLight;
 use crate::scene::luminaires::Luminaire;
 use glam::DVec3;
@@ -118,7 +118,7 @@ fn facing(
 
 /// Divides a triangle, the nearest part first, until no part is near or there are [`PARTS`], and adds the parts that bring
 /// something. Near ones use the exact form factor, so that only the variation of the profile over a part is left to the rule.
-fn cut(
+fn split(
     luminaire: &Luminaire,
     (triangle, normal): ([DVec3; 3], DVec3),
     to: &Receiver,
@@ -190,7 +190,7 @@ pub(super) fn whole(
     let luminaire = lamp.luminaire.as_deref()?;
     let mut parts = Vec::new();
     for triangle in facing(lamp, luminaire, to, half_size) {
-        cut(luminaire, triangle, to, &mut parts);
+        split(luminaire, triangle, to, &mut parts);
     }
     let all = parts.iter().map(|part| part.brings).sum();
     let (part, left) = choose(&parts, all, u)?;
@@ -220,13 +220,13 @@ impl Gatherer<'_> {
                 true => None,
                 false => {
                     let mut whole = Vec::new();
-                    cut(luminaire, triangle, to, &mut whole);
+                    split(luminaire, triangle, to, &mut whole);
                     Some(whole.iter().map(|part| part.brings).sum())
                 }
             };
             match known {
                 Some(known) => seen += known,
-                None => cut(luminaire, triangle, to, &mut parts),
+                None => split(luminaire, triangle, to, &mut parts),
             }
         }
         if parts.is_empty() {
@@ -249,14 +249,14 @@ impl Gatherer<'_> {
         let planes = [to.plane, NO_PLANE];
         let mut parts = Vec::new();
         match self.sight.view_from(to.point, to.normal, &corners, planes) {
-            View::Clear => cut(luminaire, (corners, normal), to, &mut parts),
-            View::Crowded => return None,
-            View::Listed(list) => {
+            Visibility::Clear => split(luminaire, (corners, normal), to, &mut parts),
+            Visibility::Crowded => return None,
+            Visibility::Listed(list) => {
                 memory.clipper.begin(to.point, &corners);
                 for blocker in self.sight.blockers(&list, planes)? {
                     let outline = || self.sight.mesh.outline(blocker);
                     let shadow = memory.shadows.of(to.point, blocker, outline);
-                    if !memory.clipper.cut(shadow, PIECES) {
+                    if !memory.clipper.clip(shadow, PIECES) {
                         return None;
                     }
                 }
@@ -267,7 +267,7 @@ impl Gatherer<'_> {
                 for piece in memory.clipper.visible() {
                     for two in piece[1..].windows(2) {
                         let fan = [piece[0], two[0], two[1]].map(|p| p + to.point);
-                        cut(luminaire, (fan, normal), to, &mut parts);
+                        split(luminaire, (fan, normal), to, &mut parts);
                     }
                 }
             }

@@ -1,17 +1,17 @@
 //! Light by way of mirrors.
 //!
 //! Rays over the hemisphere that meet mirrors go on, and bring the light of what they meet at last, tinted. Besides, lamps, sun and
-//! openings are gathered in each image, from the point's mirror image ([`Image::point`](crate::hierarchy::Image::point)): with the
+//! openings are gathered in each image, from the point's mirror image ([`MirrorImage::point`](crate::hierarchy::MirrorImage::point)): with the
 //! factors that they have for any point, except for what blocks them. So rays bring emission only where things have no image.
 
 use super::gatherer::{Gatherer, Memory};
 use super::receiver::{Gathered, Receiver};
-use super::via::{Arrived, End, Via};
+use super::via::{Arrived, PathEnd, Via};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
 use crate::geometry::{Hit, Segment};
 use crate::hierarchy::Route;
 use crate::light::{Passage, accumulate};
-use crate::link::View;
+use crate::link::Visibility;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -22,7 +22,7 @@ impl Gatherer<'_> {
     /// For each segment: is it blocked, straight or by way of mirrors?
     pub(super) fn blocked(&self, segments: &[Segment], out: &mut Vec<bool>) {
         let Some(via) = self.via else {
-            return self.sight.blocked(segments, &View::Crowded, out);
+            return self.sight.blocked(segments, &Visibility::Crowded, out);
         };
         out.clear();
         out.extend(segments.iter().map(|s| !self.is_open(via, s)));
@@ -203,10 +203,10 @@ impl Gatherer<'_> {
             return false;
         };
         let end = match way.hit {
-            None => Some(End::Outside(way.direction)),
+            None => Some(PathEnd::Outside(way.direction)),
             Some(hit) => self.met(&hit).map(|leaf| match self.is_mirror(&hit) {
-                true => End::Mirror(leaf),
-                false => End::Leaf(leaf),
+                true => PathEnd::Mirror(leaf),
+                false => PathEnd::Leaf(leaf),
             }),
         };
         if let Some(end) = end {
@@ -241,7 +241,7 @@ impl Gatherer<'_> {
             let way = hit.and_then(|hit| self.sight.mirrored(from[0], direction, &hit));
             if let Some(way) = way.filter(|way| way.hit.is_none()) {
                 memory.mirrored.push(Arrived {
-                    end: End::Outside(way.direction),
+                    end: PathEnd::Outside(way.direction),
                     image: way.image,
                     passage: Box::new(self.along(&way.route)),
                 });
@@ -258,15 +258,15 @@ impl Gatherer<'_> {
             let passage = &*arrived.passage;
             let filter = Some(&passage.filter);
             let (leaf, row) = match arrived.end {
-                End::Leaf(leaf) => (leaf, self.light.reflected.row(leaf as usize)),
-                End::Mirror(leaf) => (leaf, self.light.mirrors.row(leaf as usize)),
-                End::Outside(_) => continue,
+                PathEnd::Leaf(leaf) => (leaf, self.light.reflected.row(leaf as usize)),
+                PathEnd::Mirror(leaf) => (leaf, self.light.mirrors.row(leaf as usize)),
+                PathEnd::Outside(_) => continue,
             };
             out.seen += f64::from(share);
             accumulate(&mut out.irradiance[..width], share, row, filter);
             if let Some(trace) = &mut out.trace {
                 match arrived.end {
-                    End::Mirror(_) => trace.mirror(leaf, share, passage),
+                    PathEnd::Mirror(_) => trace.mirror(leaf, share, passage),
                     _ => trace.hit(leaf, share, Some(passage)),
                 }
             }

@@ -22,7 +22,7 @@ mod lamp;
 mod luminaire;
 mod mirrored;
 mod nearby;
-mod outside;
+mod obstacles;
 mod patches;
 mod point;
 mod punctual;
@@ -30,14 +30,14 @@ mod receiver;
 mod shadows;
 mod sky;
 mod slope;
+mod surroundings;
 mod sweep;
 #[cfg(test)]
 pub(crate) mod tests;
 pub(crate) mod trace;
 mod via;
-mod ways;
 
 pub use gatherer::{Gatherer, Memory};
-pub(crate) use outside::{Look, Outside, find_openings};
 pub use punctual::punctual_factor;
 pub use receiver::{Gathered, MOSTLY, Receiver};
+pub(crate) use surroundings::{SkyScratch, Surroundings, find_openings};

@@ -13,7 +13,7 @@ use super::gatherer::{Gatherer, Memory};
 use super::receiver::Receiver;
 use crate::geometry::Hit;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02};
-use crate::link::View;
+use crate::link::Visibility;
 
 /// A point of whose rays more than this share meet black backs lies inside something: then everything is close by.
 const WITHIN: f64 = 1.0 / 16.0;
@@ -25,7 +25,7 @@ const FOLLOWED: usize = 64;
 const EVEN: f32 = 0.05;
 
 /// The light reflected at a point close by, by one path.
-struct Path {
+struct LightPath {
     /// Index of the path's sample.
     sample: u32,
     /// The leaf and the point that the path has reached, while it goes on.
@@ -54,10 +54,10 @@ impl Gatherer<'_> {
         memory: &mut Memory,
     ) -> f64 {
         let count = hits.len().min(FOLLOWED);
-        let mut paths: Vec<Path> = (0..count)
+        let mut paths: Vec<LightPath> = (0..count)
             .map(|k| {
                 let (leaf, hit) = hits[k * hits.len() / count];
-                Path {
+                LightPath {
                     sample: k as u32,
                     end: Some((leaf, self.receiver(leaf, &hit))),
                     through: 1.0,
@@ -78,7 +78,7 @@ impl Gatherer<'_> {
     }
 
     /// Adds the direct light at the ends of paths; ends those where no light arrives.
-    fn light_ends(&self, paths: &mut [Path], backs: f64, samples: u64, memory: &mut Memory) {
+    fn light_ends(&self, paths: &mut [LightPath], backs: f64, samples: u64, memory: &mut Memory) {
         let mut to_lamps = std::mem::take(&mut memory.to_lamps);
         memory.segments.clear();
         to_lamps.clear();
@@ -92,7 +92,7 @@ impl Gatherer<'_> {
                 continue;
             }
             path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival.all);
-            if backs <= WITHIN && arrival.spread <= EVEN * arrival.direct {
+            if backs <= WITHIN && arrival.half_range <= EVEN * arrival.direct {
                 path.sum += path.through * f64::from(arrival.direct);
                 continue;
             }
@@ -105,7 +105,7 @@ impl Gatherer<'_> {
             path.sum += path.through * self.one_in_mirrors(&to, sample);
         }
         self.sight
-            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            .blocked(&memory.segments, &Visibility::Crowded, &mut memory.blocked);
         memory.rays += memory.segments.len() as u64;
         let ways = memory.segments.iter().zip(&memory.blocked);
         for (&(k, bright), (segment, blocked)) in to_lamps.iter().zip(ways) {
@@ -120,7 +120,7 @@ impl Gatherer<'_> {
     /// on a leaf whose reflected light is taken.
     fn go_on(
         &self,
-        paths: &mut [Path],
+        paths: &mut [LightPath],
         last: impl Fn(u32, &Hit) -> bool,
         samples: u64,
         memory: &mut Memory,

@@ -4,14 +4,15 @@
 //! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in proportion to their
 //! light.
 
-use super::gatherer::{CLOSE, Gatherer, Lamp, Linked, Memory, Of};
+use super::gatherer::{CLOSE, Gatherer, LampElement, Linked, Memory, RadiosityPart};
 use super::receiver::{Gathered, Receiver};
-use super::slope::Seen;
+use super::slope::SeenPatch;
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
 use crate::light::{Passage, Tint, accumulate};
 use crate::link::{
-    PIECES, POLYGONS, View, Way, blockers_of, in_front_of, open_weight, pattern, polygons,
+    Occlusion, PIECES, POLYGONS, Visibility, blockers_of, in_front_of, open_weight, pattern,
+    polygons,
 };
 use glam::DVec3;
 
@@ -40,9 +41,15 @@ impl Gatherer<'_> {
     }
 
     /// Adds the patches on the stack, or replaces them by their children. Factors are worked out for eight faces at once.
-    pub(super) fn patches(&self, to: &Receiver, of: Of, memory: &mut Memory, out: &mut Gathered) {
+    pub(super) fn patches(
+        &self,
+        to: &Receiver,
+        which: RadiosityPart,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
         loop {
-            let mut open = [((NONE, Way::Clear, 0.0), 0.0); 8];
+            let mut open = [((NONE, Occlusion::Clear, 0.0), 0.0); 8];
             let mut held = 0;
             let mut faces = [([DVec3::ZERO; 3], 0); 8];
             let mut count = 0;
@@ -53,13 +60,14 @@ impl Gatherer<'_> {
                     break;
                 }
                 memory.stack.pop();
-                if of == Of::Emitted && self.light.bright_emitted[linked.0 as usize] <= 0.0
+                if which == RadiosityPart::Emitted
+                    && self.light.bright_emitted[linked.0 as usize] <= 0.0
                     || !self.can_see(to, node)
                 {
                     continue;
                 }
                 if !plain {
-                    self.cluster(to, linked, of, memory, out);
+                    self.cluster(to, linked, which, memory, out);
                     continue;
                 }
                 let before = count;
@@ -75,7 +83,7 @@ impl Gatherer<'_> {
                 }
             }
             if held == 0 {
-                self.lamps_together(to, of, memory, out);
+                self.lamps_together(to, which, memory, out);
                 return;
             }
             let faces = &faces[..count];
@@ -86,20 +94,20 @@ impl Gatherer<'_> {
             }
             for &(linked, factor) in &open[..held] {
                 if factor > 0.0 {
-                    self.patch(to, linked, factor, of, memory, out);
+                    self.patch(to, linked, factor, which, memory, out);
                 }
             }
         }
     }
 
     /// Reflected and emitted brightness of a node, as far as gathered, as shares of white.
-    fn brightness(&self, id: u32, of: Of) -> (f64, f64) {
+    fn brightness(&self, id: u32, which: RadiosityPart) -> (f64, f64) {
         let reflected = f64::from(self.light.bright_reflected[id as usize]);
         let emitted = f64::from(self.light.bright_emitted[id as usize]);
-        match of {
-            Of::All => (reflected, emitted),
-            Of::Reflected => (reflected, 0.0),
-            Of::Emitted => (0.0, emitted),
+        match which {
+            RadiosityPart::All => (reflected, emitted),
+            RadiosityPart::Reflected => (reflected, 0.0),
+            RadiosityPart::Emitted => (0.0, emitted),
         }
     }
 
@@ -107,40 +115,40 @@ impl Gatherer<'_> {
     fn cluster(
         &self,
         to: &Receiver,
-        (id, way, v): Linked,
-        of: Of,
+        (id, occlusion, v): Linked,
+        which: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        if of == Of::Emitted && self.is_fixture(to, id) {
+        if which == RadiosityPart::Emitted && self.is_fixture(to, id) {
             self.put_off(to, id, memory);
             return;
         }
         let node = self.tree.node(id);
-        let (reflected, emitted) = self.brightness(id, of);
-        let spread = f64::from(self.light.spread[id as usize]);
+        let (reflected, emitted) = self.brightness(id, which);
+        let deviation = f64::from(self.light.deviation[id as usize]);
         let factor = self.bound(to, node);
         let near = (node.centre - to.point).length() < CLOSE * node.radius;
         // Points find a cluster's light to about a third of its spread; with lamps in the cluster, only to the whole of
         // their light.
-        if near || factor * (0.3 * spread + emitted) > self.tolerance {
-            let part = |c: u32| match of {
-                Of::Emitted => self.light.lit[c as usize],
+        if near || factor * (0.3 * deviation + emitted) > self.tolerance {
+            let part = |c: u32| match which {
+                RadiosityPart::Emitted => self.light.lit[c as usize],
                 _ => c,
             };
             let parts = node.child_range().map(part).filter(|&c| c != NONE);
-            memory.stack.extend(parts.map(|c| (c, way, v)));
+            memory.stack.extend(parts.map(|c| (c, occlusion, v)));
             return;
         }
-        if of == Of::Emitted {
+        if which == RadiosityPart::Emitted {
             self.lamps_by_chance(to, id, factor * emitted, memory, out);
             return;
         }
         let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];
-        let clear = self.is_clear(way);
+        let clear = self.is_clear(occlusion);
         if let Some((factor, visible)) = self.sampled(to, id, count, clear, memory) {
             let tint = self.tint(memory);
-            self.add(id, factor, visible, tint.as_ref(), of, out);
+            self.add(id, factor, visible, tint.as_ref(), which, out);
         }
     }
 
@@ -148,14 +156,14 @@ impl Gatherer<'_> {
     fn patch(
         &self,
         to: &Receiver,
-        (id, way, v): Linked,
+        (id, occlusion, v): Linked,
         factor: f64,
-        of: Of,
+        which: RadiosityPart,
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
         let node = self.tree.node(id);
-        let clear = self.is_clear(way);
+        let clear = self.is_clear(occlusion);
         let (size, limit) = if clear {
             let distance = (node.centre - to.point).length();
             let size = (node.radius / distance.max(1e-300)).min(1.0);
@@ -163,38 +171,45 @@ impl Gatherer<'_> {
         } else {
             (1.0, PARTLY_SHARE * self.tolerance)
         };
-        let spread = match of {
-            Of::Emitted => self.uneven(node),
-            _ => f64::from(self.light.spread[id as usize]),
+        let deviation = match which {
+            RadiosityPart::Emitted => self.uneven(node),
+            _ => f64::from(self.light.deviation[id as usize]),
         };
-        if self.has_parts(node) && (node.element == NONE || factor * spread * size > limit) {
-            memory.stack.extend(node.child_range().map(|c| (c, way, v)));
+        if self.has_parts(node) && (node.element == NONE || factor * deviation * size > limit) {
+            memory
+                .stack
+                .extend(node.child_range().map(|c| (c, occlusion, v)));
             return;
         }
-        let (reflected, emitted) = self.brightness(id, of);
+        let (reflected, emitted) = self.brightness(id, which);
         let carries = factor * (reflected + emitted);
         if clear {
-            self.see(to, id, factor, Seen::of(1.0), None, of, out);
-        } else if let Some((share, clipped)) =
-            self.visible(to, (id, way, v), factor, carries, emitted > 0.0, memory)
-        {
+            self.see(to, id, factor, SeenPatch::of(1.0), None, which, out);
+        } else if let Some((share, clipped)) = self.visible(
+            to,
+            (id, occlusion, v),
+            factor,
+            carries,
+            emitted > 0.0,
+            memory,
+        ) {
             let tint = self.tint(memory);
             let parts = Some(&memory.clipper).filter(|_| clipped && share < 1.0);
             self.see(
                 to,
                 id,
                 factor,
-                Seen { share, parts },
+                SeenPatch { share, parts },
                 tint.as_ref(),
-                of,
+                which,
                 out,
             );
         }
     }
 
     /// Is a way free? One that links proved clear may lead through a pane.
-    fn is_clear(&self, way: Way) -> bool {
-        self.is_plain() && (way == Way::Clear || !self.sight.occlusion)
+    fn is_clear(&self, occlusion: Occlusion) -> bool {
+        self.is_plain() && (occlusion == Occlusion::Clear || !self.sight.occlusion)
     }
 
     /// What panes leave of the light of the last rays, where these are not blocked; none where no pane is passed.
@@ -219,14 +234,14 @@ impl Gatherer<'_> {
         to: &Receiver,
         id: u32,
         factor: f64,
-        seen: Seen,
+        seen: SeenPatch,
         tint: Option<&Passage>,
-        of: Of,
+        which: RadiosityPart,
         out: &mut Gathered,
     ) {
-        self.add(id, factor, seen.share, tint, of, out);
+        self.add(id, factor, seen.share, tint, which, out);
         // Behind panes leaves count as even: in rooms with panes, patches are gathered this way only if they glare.
-        if of != Of::Emitted && tint.is_none() {
+        if which != RadiosityPart::Emitted && tint.is_none() {
             self.slope(to, id, factor, seen, CLEAR_SHARE * self.tolerance, out);
         }
     }
@@ -260,27 +275,27 @@ impl Gatherer<'_> {
         factor: f64,
         visible: f64,
         tint: Option<&Passage>,
-        of: Of,
+        which: RadiosityPart,
         out: &mut Gathered,
     ) {
         let seen = (factor * visible) as f32;
         let k = id as usize;
         let width = self.light.width();
         let filter = tint.map(|passage| &passage.filter);
-        if of != Of::Emitted {
+        if which != RadiosityPart::Emitted {
             out.seen += factor * visible;
             let row = self.light.reflected.row(k);
             accumulate(&mut out.irradiance[..width], seen, row, filter);
         }
-        if of != Of::Reflected && self.light.bright_emitted[k] > 0.0 {
+        if which != RadiosityPart::Reflected && self.light.bright_emitted[k] > 0.0 {
             let row = self.light.emitted.row(k);
             accumulate(&mut out.direct[..width], seen, row, filter);
         }
         if let Some(trace) = &mut out.trace {
-            match of {
-                Of::All => trace.patch(id, seen, tint),
-                Of::Reflected => trace.slope(id, seen, tint),
-                Of::Emitted => trace.emitted(id, seen, tint),
+            match which {
+                RadiosityPart::All => trace.patch(id, seen, tint),
+                RadiosityPart::Reflected => trace.slope(id, seen, tint),
+                RadiosityPart::Emitted => trace.emitted(id, seen, tint),
             }
         }
     }
@@ -293,7 +308,7 @@ impl Gatherer<'_> {
         tint: Option<&Passage>,
         out: &mut Gathered,
     ) {
-        self.add(id, factor, 1.0, tint, Of::Emitted, out);
+        self.add(id, factor, 1.0, tint, RadiosityPart::Emitted, out);
     }
 
     /// Could any part of the patch be in front of the receiver, and the receiver in front of any part of the patch?
@@ -349,7 +364,7 @@ impl Gatherer<'_> {
         memory.blocked.clear();
         if !clear {
             self.sight
-                .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+                .blocked(&memory.segments, &Visibility::Crowded, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
             visible = open_weight(&memory.weights, &memory.blocked) / factor;
         }
@@ -362,7 +377,7 @@ impl Gatherer<'_> {
     fn visible(
         &self,
         to: &Receiver,
-        (id, way, known): Linked,
+        (id, occlusion, known): Linked,
         factor: f64,
         carries: f64,
         lamp: bool,
@@ -375,8 +390,8 @@ impl Gatherer<'_> {
         let plane = self.tree.face_plane[element.face as usize];
         let planes = [to.plane, plane];
         let clips = self.is_plain();
-        if clips && let Way::Listed { .. } = way {
-            let list = blockers_of(&self.light.neighbours.blockers, way);
+        if clips && let Occlusion::Listed { .. } = occlusion {
+            let list = blockers_of(&self.light.neighbours.blockers, occlusion);
             if let Some(seen) = self.past(list, planes, to, element, factor, memory) {
                 return Some(((seen / factor).min(1.0), true));
             }
@@ -388,16 +403,16 @@ impl Gatherer<'_> {
                     .sight
                     .view_from(to.point, to.normal, &element.corners, planes)
                 {
-                    View::Clear => return Some((1.0, false)),
-                    View::Listed(list) => {
+                    Visibility::Clear => return Some((1.0, false)),
+                    Visibility::Listed(list) => {
                         if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
                             return Some(((seen / factor).min(1.0), true));
                         }
                     }
-                    View::Crowded => {}
+                    Visibility::Crowded => {}
                 }
             }
-            memory.lamps.push(Lamp {
+            memory.lamps.push(LampElement {
                 id,
                 fixture: NONE,
                 faces: 0,
@@ -437,7 +452,7 @@ impl Gatherer<'_> {
             }
         }
         self.sight
-            .blocked(&memory.segments, &View::Crowded, &mut memory.blocked);
+            .blocked(&memory.segments, &Visibility::Crowded, &mut memory.blocked);
         memory.rays += memory.segments.len() as u64;
         let total: f64 = memory.weights.iter().sum();
         let seen = open_weight(&memory.weights, &memory.blocked);
@@ -470,7 +485,7 @@ impl Gatherer<'_> {
         for blocker in self.sight.blockers(list, planes)? {
             let outline = || self.sight.mesh.outline(blocker);
             let shadow = memory.shadows.of(to.point, blocker, outline);
-            if !memory.clipper.cut(shadow, PIECES) {
+            if !memory.clipper.clip(shadow, PIECES) {
                 return None;
             }
         }

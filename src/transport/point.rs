@@ -3,10 +3,10 @@
 //!
 //! `H(p) = sum over patches F(p -> b) V(p, b) B_b` plus the irradiance by punctual lights.
 
-use super::gatherer::{Gatherer, Linked, Memory, Of};
+use super::gatherer::{Gatherer, Linked, Memory, RadiosityPart};
 use super::receiver::{Gathered, Receiver};
 use crate::hierarchy::NONE;
-use crate::link::Way;
+use crate::link::Occlusion;
 
 impl Gatherer<'_> {
     /// Gathers the direct light of lamps.
@@ -31,7 +31,7 @@ impl Gatherer<'_> {
         let room = to.leaf.is_none() && !self.tree.nodes.is_empty();
         std::iter::successors(to.leaf, parent)
             .flat_map(|id| self.light.neighbours.row(id).iter().copied())
-            .chain(room.then_some((0, Way::Crowded, 0.5)))
+            .chain(room.then_some((0, Occlusion::Crowded, 0.5)))
     }
 
     /// Gathers emission of patches. Where links tell little about blockers, lamps are searched from the root: a lamp is then
@@ -40,14 +40,16 @@ impl Gatherer<'_> {
         memory.stack.clear();
         if self.hemisphere.is_some() {
             let root = self.light.lit.first().filter(|&&id| id != NONE);
-            memory.stack.extend(root.map(|&id| (id, Way::Crowded, 0.5)));
+            memory
+                .stack
+                .extend(root.map(|&id| (id, Occlusion::Crowded, 0.5)));
         } else {
             let lit = |id: u32| self.light.bright_emitted[id as usize] > 0.0;
             memory
                 .stack
                 .extend(self.links(to).filter(|&(id, ..)| lit(id)));
         }
-        self.patches(to, Of::Emitted, memory, out);
+        self.patches(to, RadiosityPart::Emitted, memory, out);
     }
 
     /// Gathers at a point.
@@ -61,7 +63,7 @@ impl Gatherer<'_> {
         }
         memory.stack.clear();
         memory.stack.extend(self.links(to));
-        self.patches(to, Of::All, memory, &mut out);
+        self.patches(to, RadiosityPart::All, memory, &mut out);
         if self.closed && out.seen > 0.5 {
             let scale = (1.0 / out.seen) as f32;
             for x in &mut out.irradiance {

@@ -100,8 +100,8 @@ pub fn punctual_factor(
     }
     let spot = match lamp.kind {
         LightKind::Profile => {
-            let spread = lamp.luminaire.as_ref();
-            spread.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
+            let luminaire = lamp.luminaire.as_ref();
+            luminaire.map_or(0.0, |l| l.per_lumen(-d / r2.sqrt()))
         }
         kind => kind.fall_off(-lamp.direction.dot(d) / r2.sqrt()),
     };

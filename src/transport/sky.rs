@@ -1,9 +1,9 @@
 //! Sky, ground below the horizon and the sun's disc at a point.
 
 use super::gatherer::{Gatherer, Memory};
-use super::outside::Way;
+use super::obstacles::Obstacles;
 use super::receiver::{Gathered, Receiver};
-use super::ways::Ways;
+use super::surroundings::SkySampling;
 use crate::geometry::sampling::{around, cosine_direction, hash, sequence02};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::light::{Passage, accumulate};
@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 /// Rays to the sun's disc: from a random point of a leaf, and from other points.
 const SUN_RAYS: [u32; 2] = [4, 16];
 
-impl Ways for Gatherer<'_> {
+impl Obstacles for Gatherer<'_> {
     fn block(&self, segments: &[Segment], out: &mut Vec<bool>) {
         self.blocked(segments, out);
     }
@@ -46,13 +46,13 @@ impl Gatherer<'_> {
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        let way = match known {
-            _ if self.hemisphere.is_some() && !self.sight.occlusion => Way::Unshadowed,
-            Some((open, of)) => Way::Known(open, of),
-            None if !self.shafts => Way::Rays(0),
-            None => Way::Rays(if own { 2 } else { 1 }),
+        let sampling = match known {
+            _ if self.hemisphere.is_some() && !self.sight.occlusion => SkySampling::Unshadowed,
+            Some((open, of)) => SkySampling::Known(open, of),
+            None if !self.shafts => SkySampling::Rays(0),
+            None => SkySampling::Rays(if own { 2 } else { 1 }),
         };
-        self.come_in(to, way, own, memory, out);
+        self.come_in(to, sampling, own, memory, out);
     }
 
     /// [`Self::outside`] in one of `images` images; `open`, of `of` directions over the hemisphere, lead out of the
@@ -65,15 +65,22 @@ impl Gatherer<'_> {
         memory: &mut Memory,
         out: &mut Gathered,
     ) {
-        let way = match self.shafts {
-            true => Way::Shared(open, of, images),
-            false => Way::Glanced(open, of),
+        let sampling = match self.shafts {
+            true => SkySampling::Shared(open, of, images),
+            false => SkySampling::Glanced(open, of),
         };
-        self.come_in(to, way, true, memory, out);
+        self.come_in(to, sampling, true, memory, out);
     }
 
     /// Adds the light from outside that `way` finds.
-    fn come_in(&self, to: &Receiver, way: Way, own: bool, memory: &mut Memory, out: &mut Gathered) {
+    fn come_in(
+        &self,
+        to: &Receiver,
+        sampling: SkySampling,
+        own: bool,
+        memory: &mut Memory,
+        out: &mut Gathered,
+    ) {
         let Some(outside) = self.sky else { return };
         // Points for their own sake share one pattern where links serve them: the remaining error is smooth.
         let seed = if self.hemisphere.is_some() || !own {
@@ -83,7 +90,7 @@ impl Gatherer<'_> {
         };
         let to = &Receiver { seed, ..*to };
         let before = memory.look.rays;
-        let seen = outside.seen((self.sight, Some(self)), to, way, &mut memory.look);
+        let seen = outside.seen((self.sight, Some(self)), to, sampling, &mut memory.look);
         memory.rays += memory.look.rays - before;
         let mut noise = 0.0;
         for (k, (lamp, row)) in self.lamps.iter().enumerate() {

@@ -25,14 +25,14 @@ const EVEN: f64 = 2e-3;
 
 /// The part of a patch that a point sees.
 #[derive(Clone, Copy)]
-pub(super) struct Seen<'a> {
+pub(super) struct SeenPatch<'a> {
     /// The visible share of the patch's factor.
     pub(super) share: f64,
     /// The visible parts, if clipped.
     pub(super) parts: Option<&'a Clipper>,
 }
 
-impl Seen<'_> {
+impl SeenPatch<'_> {
     /// The same share of all parts.
     pub(super) fn of(share: f64) -> Self {
         Self { share, parts: None }
@@ -57,7 +57,7 @@ impl Gatherer<'_> {
         to: &Receiver,
         id: u32,
         factor: f64,
-        seen: Seen,
+        seen: SeenPatch,
         limit: f64,
         out: &mut Gathered,
     ) {
@@ -291,11 +291,11 @@ mod tests {
                     continue;
                 }
                 let mean = rise(element.at([1.0 / 3.0; 3]));
-                let clipped = |clipper| Seen {
+                let clipped = |clipper| SeenPatch {
                     share: 1.0,
                     parts: Some(clipper),
                 };
-                let got = |seen: Seen| {
+                let got = |seen: SeenPatch| {
                     let mut out = gatherer.start();
                     gatherer.slope(&to, id, factor, seen, 0.0, &mut out);
                     mean + f64::from(out.irradiance[0]) / (factor * seen.share)
@@ -304,11 +304,11 @@ mod tests {
                 let want = sum / all;
                 let mut clipper = Clipper::default();
                 clipper.begin(to.point, &corners);
-                for all in [Seen::of(1.0), clipped(&clipper)] {
+                for all in [SeenPatch::of(1.0), clipped(&clipper)] {
                     whole[0] = whole[0].max((got(all) / want - 1.0).abs());
                 }
                 whole[1] = whole[1].max((mean / want - 1.0).abs());
-                assert!(clipper.cut(&shadow, 48));
+                assert!(clipper.clip(&shadow, 48));
                 let share = clipper.factor(to.normal, factor) / factor;
                 if !(0.1..0.9).contains(&share) {
                     continue;
@@ -317,7 +317,7 @@ mod tests {
                 let [sum, all] = by_quadrature(&to, corners, rise, |p| !part(p));
                 let parts = Some(&clipper);
                 let want = sum / all;
-                cut[0] = cut[0].max((got(Seen { share, parts }) / want - 1.0).abs());
+                cut[0] = cut[0].max((got(SeenPatch { share, parts }) / want - 1.0).abs());
                 cut[1] = cut[1].max((mean / want - 1.0).abs());
             }
         });

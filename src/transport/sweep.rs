@@ -1,6 +1,6 @@
 //! Light at a point in cluttered rooms: lamps from the root, bright patches by links, all else by rays.
 
-use super::gatherer::{Gatherer, Memory, Of};
+use super::gatherer::{Gatherer, Memory, RadiosityPart};
 use super::hemisphere::{BEAM, Hemisphere};
 use super::receiver::{Gathered, Receiver};
 use super::via::Arrived;
@@ -67,7 +67,7 @@ impl Gatherer<'_> {
     /// Adds the reflected light of patches brighter than `most`, by links.
     fn bright(&self, to: &Receiver, most: f64, memory: &mut Memory, out: &mut Gathered) {
         memory.open.extend(self.links(to));
-        while let Some((id, way, v)) = memory.open.pop() {
+        while let Some((id, occlusion, v)) = memory.open.pop() {
             let k = id as usize;
             let brightest = f64::from(self.light.brightest[k]);
             // Most links are not that bright, and their patches need not be loaded.
@@ -82,12 +82,14 @@ impl Gatherer<'_> {
             if node.faces.1 <= POLYGONS && even || !self.has_parts(node) {
                 memory.taken[k] = memory.epoch;
                 memory.any_taken = true;
-                memory.stack.push((id, way, v));
+                memory.stack.push((id, occlusion, v));
             } else {
-                memory.open.extend(node.child_range().map(|c| (c, way, v)));
+                memory
+                    .open
+                    .extend(node.child_range().map(|c| (c, occlusion, v)));
             }
         }
-        self.patches(to, Of::Reflected, memory, out);
+        self.patches(to, RadiosityPart::Reflected, memory, out);
     }
 
     /// Adds the reflected light of all other patches, by the rays cast over the hemisphere, each of a `share`.

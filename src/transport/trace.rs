@@ -15,9 +15,9 @@ mod tinted;
 use crate::light::{Light, Passage};
 use crate::scene::PunctualLight;
 use crate::store::codec::Read;
-use bytes::{Packed, broken, number};
+use bytes::{TraceReader, broken, number};
 pub(crate) use tinted::Stains;
-use tinted::{Entry, Kind, Tinted};
+use tinted::{Entry, EntryKind, TintedEntries};
 
 /// Weights of patches, lamps and rays, as they are gathered.
 #[derive(Debug, Clone, Default)]
@@ -32,7 +32,7 @@ pub(crate) struct Trace {
     /// Final factor of the patches' reflected light.
     scale: f32,
     /// Light that came through panes or by way of mirrors.
-    tinted: Tinted,
+    tinted: TintedEntries,
 }
 
 impl Trace {
@@ -47,37 +47,37 @@ impl Trace {
     /// Adds a patch with its visible factor. `tint`: what is left of the light on its way, for this and the following;
     /// none: all.
     pub(super) fn patch(&mut self, id: u32, seen: f32, tint: Option<&Passage>) {
-        self.add(Kind::Patch, id, seen, tint);
+        self.add(EntryKind::Patch, id, seen, tint);
     }
 
     /// Adds the emission of a patch with its visible factor.
     pub(super) fn emitted(&mut self, id: u32, seen: f32, tint: Option<&Passage>) {
-        self.add(Kind::Emitted, id, seen, tint);
+        self.add(EntryKind::Emitted, id, seen, tint);
     }
 
     /// Adds a punctual light with the factor from its intensity to irradiance.
     pub(super) fn lamp(&mut self, lamp: usize, factor: f32, tint: Option<&Passage>) {
-        self.add(Kind::Lamp, lamp as u32, factor, tint);
+        self.add(EntryKind::Lamp, lamp as u32, factor, tint);
     }
 
     /// Adds to (or takes from) the reflected light of a patch.
     pub(super) fn slope(&mut self, id: u32, more: f32, tint: Option<&Passage>) {
-        self.add(Kind::Slope, id, more, tint);
+        self.add(EntryKind::Slope, id, more, tint);
     }
 
     /// Adds a ray of weight `share` that met a leaf.
     pub(super) fn hit(&mut self, leaf: u32, share: f32, tint: Option<&Passage>) {
         self.share = share;
-        self.add(Kind::Hit, leaf, 1.0, tint);
+        self.add(EntryKind::Hit, leaf, 1.0, tint);
     }
 
     /// Adds a ray of weight `share` that met a leaf of a mirror, one mirror too many.
     pub(super) fn mirror(&mut self, leaf: u32, share: f32, tint: &Passage) {
         self.share = share;
-        self.add(Kind::Mirror, leaf, 1.0, Some(tint));
+        self.add(EntryKind::Mirror, leaf, 1.0, Some(tint));
     }
 
-    fn add(&mut self, kind: Kind, id: u32, weight: f32, tint: Option<&Passage>) {
+    fn add(&mut self, kind: EntryKind, id: u32, weight: f32, tint: Option<&Passage>) {
         match tint.map(|tint| &*tint.by).filter(|by| !by.is_empty()) {
             None => self.add_plain(kind, id, weight),
             Some(by) => {
@@ -92,18 +92,18 @@ impl Trace {
         }
     }
 
-    fn add_plain(&mut self, kind: Kind, id: u32, weight: f32) {
+    fn add_plain(&mut self, kind: EntryKind, id: u32, weight: f32) {
         match kind {
-            Kind::Patch => self.patches.push((id, weight)),
-            Kind::Emitted => {
+            EntryKind::Patch => self.patches.push((id, weight)),
+            EntryKind::Emitted => {
                 self.patches.push((id, weight));
                 self.slopes.push((id, -weight));
             }
-            Kind::Lamp => self.lamps.push((id, weight)),
-            Kind::Slope => self.slopes.push((id, weight)),
-            Kind::Hit => self.hits.push(id),
+            EntryKind::Lamp => self.lamps.push((id, weight)),
+            EntryKind::Slope => self.slopes.push((id, weight)),
+            EntryKind::Hit => self.hits.push(id),
             // A ray that ends on a mirror has met others before, so it is never plain.
-            Kind::Mirror => {}
+            EntryKind::Mirror => {}
         }
     }
 
@@ -183,7 +183,7 @@ pub(crate) fn joined(own: &[u8], behind: &[u8]) -> Box<[u8]> {
 /// # Errors
 /// [`Broken`]: the bytes are not two traces.
 pub(crate) fn parted(both: &[u8]) -> Read<[&[u8]; 2]> {
-    let mut from = Packed { rest: both };
+    let mut from = TraceReader { rest: both };
     let own = usize::try_from(from.number()?).unwrap_or(usize::MAX);
     let (own, behind) = from.rest.split_at_checked(own).ok_or_else(broken)?;
     Ok([own, behind])
@@ -202,7 +202,7 @@ pub(crate) fn replay<const L: usize>(
 ) -> Read<[f32; L]> {
     let (reflected, emitted) = (light.reflected.all::<L>(), light.emitted.all::<L>());
     let dark = reflected.is_empty();
-    let mut from = Packed { rest: packed };
+    let mut from = TraceReader { rest: packed };
     let scale = from.float()?;
     let (mut bounced, mut straight) = ([0.0_f32; L], [0.0_f32; L]);
     from.weights(emitted.len(), |id, w| {
@@ -237,7 +237,7 @@ pub(crate) fn replay<const L: usize>(
             add(&mut met, &reflected[id as usize], count as f32);
         }
     }
-    let mut sums = tinted::Sums {
+    let mut sums = tinted::TraceSums {
         bounced,
         straight,
         met,
@@ -262,7 +262,7 @@ fn add<const L: usize>(sum: &mut [f32; L], row: &[f32; L], w: f32) {
 /// # Errors
 /// As [`replay`].
 pub(crate) fn lamps_of(packed: &[u8], nodes: usize, lamps: usize) -> Read<Vec<(u32, f32)>> {
-    let mut from = Packed { rest: packed };
+    let mut from = TraceReader { rest: packed };
     from.float()?;
     from.weights(nodes, |_, _| {})?;
     let mut list = Vec::new();
@@ -275,7 +275,7 @@ pub(crate) fn lamps_of(packed: &[u8], nodes: usize, lamps: usize) -> Read<Vec<(u
         }
     }
     tinted::entries(&mut from, |entry| {
-        if let Kind::Lamp = entry.kind {
+        if let EntryKind::Lamp = entry.kind {
             list.push((entry.id, entry.weight));
         }
         Ok(())

@@ -15,14 +15,14 @@ pub(crate) struct Via {
 /// What a ray met by way of mirrors.
 #[derive(Debug, Clone)]
 pub(super) struct Arrived {
-    pub(super) end: End,
+    pub(super) end: PathEnd,
     /// The image that the ray went by; none where things have none.
     pub(super) image: Option<u32>,
     pub(super) passage: Box<Passage>,
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) enum End {
+pub(super) enum PathEnd {
     Leaf(u32),
     /// One mirror too many: it is taken for a matt surface.
     Mirror(u32),
@@ -34,7 +34,7 @@ impl Arrived {
     /// The direction in which the ray left the room, if it did.
     pub(super) fn outside(&self) -> Option<DVec3> {
         match self.end {
-            End::Outside(direction) => Some(direction),
+            PathEnd::Outside(direction) => Some(direction),
             _ => None,
         }
     }

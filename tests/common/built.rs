@@ -1,7 +1,7 @@
 //! Rooms made in code, without a file.
 //!
 //! All lamps share one light spectrum of equal energy (luminous size 1), so that a figure in lm/m2 is a figure for every
-//! leaf up to one constant.
+//! band up to one constant.
 
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
@@ -15,7 +15,7 @@ use haarlight::scene::{
     Sides, Source, Surface,
 };
 use haarlight::solve::{Bake, Settings};
-use haarlight::spectrum::{Grid, LEAVES, Leaves};
+use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use std::f64::consts::PI;
 
 /// A sun at an elevation and azimuth, degrees, and its illuminance across its rays, lx.
@@ -84,12 +84,12 @@ impl Room {
             lights: Vec::new(),
             sky: None,
         };
-        room.spectrum("equal energy", [1.0; LEAVES]);
+        room.spectrum("equal energy", [1.0; BANDS]);
         room
     }
 
     /// A further light spectrum, brought to luminous size 1; returns its index.
-    pub(crate) fn spectrum(&mut self, name: &str, power: Leaves) -> usize {
+    pub(crate) fn spectrum(&mut self, name: &str, power: Spectrum) -> usize {
         let size = luminous(&self.grid, &power);
         self.spectra.push(LightSpectrum {
             name: name.into(),
@@ -98,18 +98,18 @@ impl Room {
         self.spectra.len() - 1
     }
 
-    /// Leaf values of a light spectrum, luminous size 1.
-    pub(crate) fn power(&self, light: usize) -> Leaves {
+    /// Band values of a light spectrum, luminous size 1.
+    pub(crate) fn power(&self, light: usize) -> Spectrum {
         self.spectra[light].power
     }
 
     /// A grey paint; returns its index.
     pub(crate) fn paint(&mut self, rho: f64) -> usize {
-        self.spectral_paint([rho; LEAVES])
+        self.spectral_paint([rho; BANDS])
     }
 
-    /// A paint by its reflectance on the leaves.
-    pub(crate) fn spectral_paint(&mut self, reflectance: Leaves) -> usize {
+    /// A paint by its reflectance on the bands.
+    pub(crate) fn spectral_paint(&mut self, reflectance: Spectrum) -> usize {
         self.materials.push(Material {
             name: format!("material {}", self.materials.len()),
             index: None,
@@ -140,7 +140,7 @@ impl Room {
     pub(crate) fn glow(&mut self, paint: usize, light: usize, exitance: f64) {
         self.materials[paint].emission = Some(Emission {
             light,
-            shape: [exitance / PI; LEAVES],
+            shape: [exitance / PI; BANDS],
             texture: None,
             color: [0.5; 3],
             scale: 2.0 * exitance / PI,
@@ -149,8 +149,8 @@ impl Room {
         });
     }
 
-    /// A pane of an index and of what its inside lets through, leaf by leaf; returns its index.
-    pub(crate) fn pane(&mut self, ior: f64, inside: Leaves) -> usize {
+    /// A pane of an index and of what its inside lets through, band by band; returns its index.
+    pub(crate) fn pane(&mut self, ior: f64, inside: Spectrum) -> usize {
         let material = self.paint(0.0);
         self.materials[material].pane = Some(Pane {
             kind: PaneKind::Glass {
@@ -167,7 +167,7 @@ impl Room {
     }
 
     /// A diffuse sheet by what its front and its back reflect, and what it lets through; returns its index.
-    pub(crate) fn sheet(&mut self, front: Leaves, back: Leaves, through: Leaves) -> usize {
+    pub(crate) fn sheet(&mut self, front: Spectrum, back: Spectrum, through: Spectrum) -> usize {
         let material = self.spectral_paint(front);
         self.materials[material].sides = Sides::Both;
         self.materials[material].sheet = Some(Sheet {
@@ -183,8 +183,8 @@ impl Room {
         material
     }
 
-    /// A mirror by what it reflects at normal incidence, leaf by leaf; returns its index.
-    pub(crate) fn mirror(&mut self, reflectance: Leaves) -> usize {
+    /// A mirror by what it reflects at normal incidence, band by band; returns its index.
+    pub(crate) fn mirror(&mut self, reflectance: Spectrum) -> usize {
         let material = self.spectral_paint(reflectance);
         let reflectance = self.materials[material].reflectance;
         self.materials[material].mirror = Some(Mirror {
@@ -194,8 +194,8 @@ impl Room {
         material
     }
 
-    /// Makes a paint fluoresce: an emission whose leaves times their width sum to 1, and the power given out for each that comes.
-    pub(crate) fn fluoresces(&mut self, paint: usize, emission: Leaves, excitation: Leaves) {
+    /// Makes a paint fluoresce: an emission whose bands times their width sum to 1, and the power given out for each that comes.
+    pub(crate) fn fluoresces(&mut self, paint: usize, emission: Spectrum, excitation: Spectrum) {
         let light = self.spectra.len();
         self.spectra.push(LightSpectrum {
             name: format!("fluorescence {light}"),
@@ -291,7 +291,7 @@ impl Room {
             position,
             direction: direction.normalize(),
             light: 0,
-            shape: [intensity; LEAVES],
+            shape: [intensity; BANDS],
             luminaire: None,
         });
     }
@@ -355,7 +355,7 @@ fn terms(materials: &[Material]) -> impl Iterator<Item = &Term> {
 }
 
 /// `Km sum of power ybar`: lm for W.
-pub(crate) fn luminous(grid: &Grid, power: &Leaves) -> f64 {
+pub(crate) fn luminous(grid: &Grid, power: &Spectrum) -> f64 {
     let y = Observer::cie1931().weights(grid)[1];
     power.iter().zip(y).map(|(p, y)| KM * p * y).sum()
 }

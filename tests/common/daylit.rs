@@ -2,7 +2,7 @@
 
 use crate::common::built::{Room, sun};
 use glam::{DVec3, dvec3};
-use haarlight::scene::sky::{Brightness, SkyType, SkyWish};
+use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use haarlight::solve::{Bake, Settings};
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ pub(crate) fn cie(x: f64, y: f64, z: f64) -> DVec3 {
 pub(crate) fn wish(kind: u8) -> SkyWish {
     SkyWish {
         kind: Some(SkyType(kind)),
-        brightness: Some(Brightness::Illuminance(LUX)),
+        brightness: Some(SkyBrightness::Illuminance(LUX)),
         ground: Some(0.3),
         sun: sun([60.0, 0.0], 0.0),
         ..SkyWish::default()

@@ -8,7 +8,7 @@ use crate::common::built;
 
 use file::{Mapped, Texels};
 use glam::{DVec2, DVec3, dvec3};
-use haarlight::audit::{Reference, Report};
+use haarlight::audit::{PathReference, Report};
 use haarlight::color::{LinearSrgb, de2000};
 use haarlight::hierarchy::Face;
 use haarlight::lightmap::{LightMaps, MapLimits};
@@ -217,7 +217,7 @@ fn three_js_shows_what_probe_finds() {
 #[test]
 fn the_stated_error_is_what_the_audit_measures() {
     let file = written(solved(room(), 1.0), &MapLimits::default());
-    let reference = Reference::new(&file.bake, 200, 4096, 5);
+    let reference = PathReference::new(&file.bake, 200, 4096, 5);
     let report = Report::of_maps(&file.bake, &file.maps, &reference);
     assert!(
         report.de2000.mean.low < file.bake.error_of(&file.maps.baked).unwrap(),

@@ -6,7 +6,7 @@
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use haarlight::gather::{BakedSurface, BakedVertex};
 use haarlight::scene::*;
-use haarlight::spectrum::{Grid, LEAVES};
+use haarlight::spectrum::{BANDS, Grid};
 use serde_json::{Value, json};
 
 /// Side of the quads.
@@ -124,7 +124,7 @@ fn material(name: &str, index: usize) -> Material {
         name: name.into(),
         index: Some(index),
         sides: Sides::Front,
-        reflectance: [0.5; LEAVES],
+        reflectance: [0.5; BANDS],
         reflectance_from: "base colour".into(),
         base_color: [0.5; 3],
         paint: None,
@@ -237,7 +237,7 @@ pub(crate) fn room() -> Scene {
     let mut light = material("light", 2);
     light.emission = Some(Emission {
         light: 0,
-        shape: [1.0; LEAVES],
+        shape: [1.0; BANDS],
         texture: None,
         color: [1.0; 3],
         scale: 1.0,
@@ -286,7 +286,7 @@ pub(crate) fn room() -> Scene {
         images: vec![image],
         spectra: vec![LightSpectrum {
             name: "cie/D65".into(),
-            power: [1.0; LEAVES],
+            power: [1.0; BANDS],
         }],
         lights: Vec::new(),
         sky: None,

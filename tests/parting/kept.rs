@@ -40,7 +40,7 @@ fn spectra_of_layers_add_up() {
         assert!(bake.layer_spectra(&baked, names.len()).is_empty());
         let mut file = Vec::new();
         let layer = |k: usize| each[k].clone();
-        let parts: npz::Parts = (names, &layer);
+        let parts: npz::LayerSpectra = (names, &layer);
         npz::write_parted(&mut file, bake.scene(), &baked.surfaces, &whole, parts).unwrap();
         let has = |text: &str| file.windows(text.len()).any(|w| w == text.as_bytes());
         assert!(has("layers.npy") && !has(&format!("radiosity_{}.npy", names.len())));

@@ -10,13 +10,13 @@ use glam::{DVec3, dvec3};
 use haarlight::color::de2000;
 use haarlight::error::Error;
 use haarlight::gather::{Baked, BakedSurface};
-use haarlight::lightmap::{MapLimits, Page};
+use haarlight::lightmap::{MapLimits, MapPage};
 use haarlight::output::{BakedGlb, Exposure, Packing, Writing, baked_glb};
 use haarlight::scene::layers::{Layers, MOST_LAYERS};
 use haarlight::scene::{LightKind, Options, Scene};
 use haarlight::solve::{Bake, Settings};
-use haarlight::spectrum::LEAVES;
-use haarlight::survey::Place;
+use haarlight::spectrum::BANDS;
+use haarlight::survey::PointLocation;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -59,8 +59,8 @@ fn layers(bake: &Bake) -> &Layers {
 /// A box with a block in it, a warm surface lamp, a cold one and a point lamp; walls of different reds and greens.
 fn two_lamps() -> Scene {
     let mut room = Room::new();
-    let ramp = |from: f64, to: f64| -> [f64; LEAVES] {
-        std::array::from_fn(|k| from + (to - from) * k as f64 / LEAVES as f64)
+    let ramp = |from: f64, to: f64| -> [f64; BANDS] {
+        std::array::from_fn(|k| from + (to - from) * k as f64 / BANDS as f64)
     };
     let (warm, cold) = (
         room.spectrum("warm", ramp(0.1, 2.0)),
@@ -138,7 +138,7 @@ fn layers_at_vertices_add_up_in_all_kinds_of_rooms() {
     ] {
         let bake = parted(loaded(name, None), 4.0);
         assert_eq!(layers(&bake).names.len(), count, "{name}");
-        assert!(bake.lanes().len() <= LEAVES);
+        assert!(bake.lanes().len() <= BANDS);
         sums_up(&bake, &bake.baked(&|_, _| {}), name);
     }
 }
@@ -205,7 +205,7 @@ fn a_layer_is_the_room_under_its_lamp_alone() {
             }
         }
         let (mut off, mut lack, mut count) = (0.0, 0.0, 0);
-        for (a, b) in places().filter(|(a, _)| a.place == Place::Room) {
+        for (a, b) in places().filter(|(a, _)| a.place == PointLocation::Room) {
             for side in 0..6 {
                 let (all, layer) = (a.light.cube[side], a.layers[k].cube[side]);
                 let with = |own: [f64; 3]| [0, 1, 2].map(|c| all[c] - layer[c] + own[c]);
@@ -361,7 +361,7 @@ fn pages_of_layers_add_up_texel_by_texel() {
         let bake = parted(scene, 4.0);
         let maps = bake.light_maps(&MapLimits::default(), &|_, _| {});
         assert_eq!(maps.layers.len(), layers(&bake).names.len());
-        let numbers = |page: &Page| -> Vec<f64> {
+        let numbers = |page: &MapPage| -> Vec<f64> {
             let texels = page.texels.iter();
             texels
                 .flat_map(|t| t.irradiance.into_iter().chain(t.light))

@@ -37,7 +37,7 @@ ROWS = [
     ("mirror", "mirrors", "a_periscope_shows_a_lamp", "the lamp through two mirrors"),
     ("mirror", "mirrors", "the_sky_is_seen_in_mirrors", "sky and its image"),
     ("mirror", "mirrors", "a_periscope_shows_the_sky", "an opening through two mirrors"),
-    ("mirror", "mirrors", "a_lamp_in_a_tinted_mirror_is_tinted", "Fresnel's share, leaf by leaf"),
+    ("mirror", "mirrors", "a_lamp_in_a_tinted_mirror_is_tinted", "Fresnel's share, band by band"),
     ("mirror", "mirrors", "the_path_tracer_agrees", "path tracer (its noise included)"),
     ("dye", "fluorescence", "a_furnace_has_the_gain_of_its_walls", "E = (L + e q) / (1 - rho)"),
     ("dye", "fluorescence", "white_paper_agrees_with_the_whole_matrix", "dense reference with the 64 x 64 matrix"),

@@ -43,18 +43,18 @@ class Peer:
 
     # The scene
 
-    def value(self, rgb, leaves):
+    def value(self, rgb, bands):
         """A reflectance or a power in the way that this variant has it."""
         if self.kind == "mono":
             return {"type": "uniform", "value": float(self.spectra.to_xyz[1] @ rgb)}
         if self.kind == "rgb":
             return {"type": "rgb", "value": [float(c) for c in rgb]}
-        if not np.any(leaves):
+        if not np.any(bands):
             return {"type": "uniform", "value": 0.0}
-        left = spectra.START + spectra.WIDTH * np.arange(spectra.LEAVES)
+        left = spectra.START + spectra.WIDTH * np.arange(spectra.BANDS)
         nm = np.stack([left + 1e-3, left + spectra.WIDTH - 1e-3], 1).ravel()
         join = lambda numbers: ", ".join(f"{x:.9g}" for x in numbers)
-        return {"type": "irregular", "wavelengths": join(nm), "values": join(np.repeat(leaves, 2))}
+        return {"type": "irregular", "wavelengths": join(nm), "values": join(np.repeat(bands, 2))}
 
     def bitmap(self, texture, factor, most=None):
         if texture.wrap[0] != texture.wrap[1]:
@@ -254,10 +254,10 @@ class Peer:
         sums = [mi.Float(0), mi.Float(0), mi.Float(0)]
         for k in range(len(wavelengths)):
             place = (wavelengths[k] - spectra.START) / spectra.WIDTH
-            leaf = mi.UInt32(dr.clip(place, 0, spectra.LEAVES - 1))
-            density = dr.select((place >= 0) & (place < spectra.LEAVES), light[k] * per_wave[k], 0) / len(wavelengths)
+            band = mi.UInt32(dr.clip(place, 0, spectra.BANDS - 1))
+            density = dr.select((place >= 0) & (place < spectra.BANDS), light[k] * per_wave[k], 0) / len(wavelengths)
             for c in range(3):
-                sums[c] += density * dr.gather(mi.Float, matching[c], leaf)
+                sums[c] += density * dr.gather(mi.Float, matching[c], band)
         return sums
 
 

@@ -1,6 +1,6 @@
 //! The side of haarlight in the comparison with other programs: irradiance at points, with the CPU time it took.
 //!
-//! `points ROOM COUNT scene OUT.json` writes the room as other programs need it (triangles, spectra on the leaves), COUNT
+//! `points ROOM COUNT scene OUT.json` writes the room as other programs need it (triangles, spectra on the bands), COUNT
 //! points on it, and the audit's irradiance there.
 //! `points ROOM COUNT run ERROR` bakes the room round by round and prints a line of JSON after each round: CPU seconds
 //! from an empty machine (loading excepted) to the irradiance at all points, and that irradiance (tristimulus).
@@ -80,7 +80,7 @@ fn export(scene: &Scene, count: usize) -> Result<serde_json::Value> {
                 "two_sided": m.sides == Sides::Both, "textured": m.paint.is_some() })
         })
         .collect();
-    // W/m2/nm on a leaf to lx.
+    // W/m2/nm on a band to lx.
     let weights = Observer::cie1931()
         .weights(&scene.grid)
         .map(|w| w.map(|x| KM * x));

@@ -32,7 +32,7 @@ class Material:
     emission: np.ndarray  # nits by linear colour
     emission_texture: Texture | None
     spectra: dict = field(default_factory=dict)  # measured ones, by the file's extras
-    reflectance: np.ndarray | None = None  # on the leaves, once spectra.give was there
+    reflectance: np.ndarray | None = None  # on the bands, once spectra.give was there
     power: np.ndarray | None = None
 
     def shines(self):

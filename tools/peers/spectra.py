@@ -1,4 +1,4 @@
-"""Spectra as haarlight has them: constant on 64 leaves from 380 to 780 nm, measured, or upsampled from a linear colour
+"""Spectra as haarlight has them: constant on 64 bands from 380 to 780 nm, measured, or upsampled from a linear colour
 after Jakob and Hanika (2019). Written anew from the description, so that the two programs check each other; the tables
 are haarlight's own (src/data)."""
 
@@ -8,8 +8,8 @@ import os
 
 import numpy as np
 
-LEAVES, START, END = 64, 380.0, 780.0
-WIDTH = (END - START) / LEAVES
+BANDS, START, END = 64, 380.0, 780.0
+WIDTH = (END - START) / BANDS
 KM = 683.0  # lm/W
 LAMP_BRIGHTNESS = 0.5  # greatest component of a lamp's colour where it is upsampled
 GREATEST_ALBEDO = 0.999
@@ -44,9 +44,9 @@ def columns(path):
 
 
 def means(table, hold):
-    """Mean over each leaf of a table that is linear between its rows, and beyond them held or zero."""
+    """Mean over each band of a table that is linear between its rows, and beyond them held or zero."""
     nm, values = table
-    edges = START + WIDTH * np.arange(LEAVES + 1)
+    edges = START + WIDTH * np.arange(BANDS + 1)
     outside = {} if hold else {"left": 0.0, "right": 0.0}
     knots = np.unique(np.concatenate([edges, nm[(nm > START) & (nm < END)]]))
     if not hold:
@@ -63,7 +63,7 @@ class Spectra:
 
     def __init__(self):
         observer = columns(os.path.join(DATA, "cmf_1931.csv"))
-        # Integrals of the matching functions over each leaf, nm.
+        # Integrals of the matching functions over each band, nm.
         self.weights = np.array([means(table, False) * WIDTH for table in observer.values()])
         d65 = means(named("cie/D65")[0], True)
         self.d65 = d65 / (KM * self.weights[1] @ d65)
@@ -75,11 +75,11 @@ class Spectra:
         """A smooth reflectance that has this linear colour under D65."""
         rgb = np.clip(np.asarray(rgb, dtype=np.float64), 0, 1)
         if np.ptp(rgb) == 0:
-            return np.full(LEAVES, rgb[0])
+            return np.full(BANDS, rgb[0])
         if rgb.max() < DARKEST:
             return self.reflectance(rgb / rgb.max() * DARKEST) * rgb.max() / DARKEST
-        t = (2 * np.arange(LEAVES) + 1) / LEAVES - 1
-        powers = np.stack([t * t, t, np.ones(LEAVES)])
+        t = (2 * np.arange(BANDS) + 1) / BANDS - 1
+        powers = np.stack([t * t, t, np.ones(BANDS)])
         weights = KM * self.weights * self.d65
         curve = lambda c: 0.5 + (x := c @ powers) / (2 * np.sqrt(1 + x * x))
         target = self.lab(self.to_xyz @ rgb)
@@ -94,7 +94,7 @@ class Spectra:
         return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
 
     def lamp(self, rgb):
-        """D65 shaped by a colour: power on the leaves, its luminous size the luminance of the colour."""
+        """D65 shaped by a colour: power on the bands, its luminous size the luminance of the colour."""
         rgb = np.asarray(rgb, dtype=np.float64)
         scale = rgb.max() / LAMP_BRIGHTNESS
         return self.reflectance(rgb / scale) * scale * self.d65
@@ -139,7 +139,7 @@ def named(name):
 
 
 def sampled(entry, folder, hold):
-    """Leaves of `{"name": ...}` or `{"csv": ...}`, and whether they carry a unit."""
+    """Bands of `{"name": ...}` or `{"csv": ...}`, and whether they carry a unit."""
     if "name" in entry:
         table, _ = named(entry["name"])
         return means(table, True), False
@@ -159,7 +159,7 @@ def side_file(path):
 
 
 def give(room, path):
-    """Gives every material and lamp of a room its spectra: `reflectance`, `power` on the leaves."""
+    """Gives every material and lamp of a room its spectra: `reflectance`, `power` on the bands."""
     spectra, file, folder = Spectra(), side_file(path), os.path.dirname(path)
     for material in room.materials:
         own = material.spectra | file.get("materials", {}).get(material.name, {})

@@ -69,12 +69,12 @@ class Mitsuba:
             properties["emitter"] = mi.load_dict({"type": "area", "radiance": self.spectrum(material["emission"])})
         return properties
 
-    def spectrum(self, leaves):
-        """Constant on each leaf, zero outside."""
+    def spectrum(self, bands):
+        """Constant on each band, zero outside."""
         start, width = self.room["start_nm"], self.room["width_nm"]
-        left = start + width * np.arange(len(leaves))
+        left = start + width * np.arange(len(bands))
         nm = np.stack([left + 1e-3, left + width - 1e-3], 1).ravel()
-        values = np.repeat(leaves, 2)
+        values = np.repeat(bands, 2)
         join = lambda list: ", ".join(f"{x:.9g}" for x in list)
         return {"type": "irregular", "wavelengths": join(nm), "values": join(values)}
 
@@ -102,12 +102,12 @@ class Mitsuba:
         sums = [mi.Float(0), mi.Float(0), mi.Float(0)]
         for k in range(len(wavelengths)):
             place = (wavelengths[k] - room["start_nm"]) / room["width_nm"]
-            leaf = mi.UInt32(dr.clip(place, 0, 63))
-            reflectance = dr.gather(mi.Float, self.reflectance, leaf + 64 * owner)
+            band = mi.UInt32(dr.clip(place, 0, 63))
+            reflectance = dr.gather(mi.Float, self.reflectance, band + 64 * owner)
             density = radiance[k] * weight[k] * dr.pi / dr.maximum(reflectance, 1e-6)
             density = dr.select((place >= 0) & (place < 64), density, 0)
             for c in range(3):
-                sums[c] += density * dr.gather(mi.Float, self.matching[c], leaf) / len(wavelengths)
+                sums[c] += density * dr.gather(mi.Float, self.matching[c], band) / len(wavelengths)
         xyz = [dr.block_sum(x, samples) / samples for x in sums]
         dr.eval(xyz)
         return np.stack([np.array(x, dtype=np.float64) for x in xyz], 1)

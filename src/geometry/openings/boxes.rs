@@ -24,13 +24,13 @@ const BEYOND: f64 = 8.0;
 
 /// A box that an opening lies in: flat along an axis unless that is at several depths.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Part {
+pub(super) struct OpeningBox {
     pub(super) low: DVec3,
     pub(super) high: DVec3,
     pub(super) axis: usize,
 }
 
-impl Part {
+impl OpeningBox {
     pub(super) fn size(&self) -> DVec3 {
         self.high - self.low
     }
@@ -156,11 +156,11 @@ impl Group {
     }
 
     /// The box with what gaps may have missed at its edges. `least`: widths that an opening is known to, and of one that is flat.
-    fn part(&self, axis: usize, [least, flat]: [DVec3; 2]) -> Part {
+    fn part(&self, axis: usize, [least, flat]: [DVec3; 2]) -> OpeningBox {
         let size = self.tight.size();
         let mut more = size.max(least) * (BEYOND / self.tight.count as f64);
         more[axis] = 0.0;
-        Part {
+        OpeningBox {
             low: (self.tight.low - more).max(self.low) - flat,
             high: (self.tight.high + more).min(self.high) + flat,
             axis,
@@ -209,7 +209,7 @@ pub(super) fn enclose(
     within: [DVec3; 2],
     widths: [DVec3; 2],
     most: usize,
-) -> Vec<Part> {
+) -> Vec<OpeningBox> {
     gaps.sort_by_key(|g| g.axis);
     let mut groups: Vec<Group> = (0..3)
         .map(|axis| {
@@ -251,8 +251,8 @@ mod tests {
         Gap { place, at, axis }
     }
 
-    fn area(parts: &[Part]) -> f64 {
-        let area = |p: &Part| {
+    fn area(parts: &[OpeningBox]) -> f64 {
+        let area = |p: &OpeningBox| {
             let [u, v] = across(p.axis).map(|k| p.size()[k]);
             u * v
         };
@@ -276,7 +276,7 @@ mod tests {
         let stray = [0.2, 0.45, 0.7].map(|y| gap(0.95, y, 0.5));
         gaps.extend(stray);
         let parts = enclose(&mut gaps, WITHIN, WIDTHS, 16);
-        let holds = |p: &Part, at: DVec3| at.cmpge(p.low).all() && at.cmple(p.high).all();
+        let holds = |p: &OpeningBox, at: DVec3| at.cmpge(p.low).all() && at.cmple(p.high).all();
         let held = |g: &&Gap| parts.iter().any(|p| holds(p, g.at));
         assert_eq!(gaps.iter().filter(held).count(), gaps.len() - stray.len());
         let all = area(&parts);

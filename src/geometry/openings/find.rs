@@ -3,7 +3,7 @@
 use super::aim::Aim;
 use super::boxes::enclose;
 use super::gaps::{Exit, Gap};
-use super::sides::{BEAM, KINDS, MARGIN, Openings, Start, Wall};
+use super::sides::{BEAM, KINDS, MARGIN, Openings, RayStart, Wall};
 use crate::geometry::sampling::{Pcg, cosine_direction, hash, sequence02};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -26,12 +26,12 @@ impl Openings {
     /// the unit square; `meet`: what rays from a point of a surface meet.
     pub(crate) fn find(
         points: &[DVec3],
-        start: impl Fn(f64, [f64; 2]) -> Option<Start> + Sync,
-        meet: impl Fn(&Start, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync,
+        start: impl Fn(f64, [f64; 2]) -> Option<RayStart> + Sync,
+        meet: impl Fn(&RayStart, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync,
         seed: u64,
     ) -> Self {
         let mut openings = Self::around(points);
-        let starts: Vec<Start> = (0..POINTS)
+        let starts: Vec<RayStart> = (0..POINTS)
             .filter_map(|k| {
                 let mut random = Pcg::new(hash(seed ^ 0x0be7, k as u64));
                 let share = (k as f64 + random.f64()) / POINTS as f64;
@@ -84,9 +84,9 @@ impl Openings {
     /// Gaps on the ways of some of the rays that left each place, spread over these.
     fn gaps(
         &self,
-        starts: &[Start],
+        starts: &[RayStart],
         exits: &[Exit],
-        meet: &(impl Fn(&Start, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
+        meet: &(impl Fn(&RayStart, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
         seed: u64,
     ) -> Vec<Gap> {
         let [mut left, mut seen] = [vec![0_usize; KINDS], vec![0_usize; KINDS]];
@@ -106,8 +106,8 @@ impl Openings {
 
 /// The rays that leave from some of the points.
 fn exits(
-    (starts, places, some): (&[Start], &[usize], &[usize]),
-    meet: &(impl Fn(&Start, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
+    (starts, places, some): (&[RayStart], &[usize], &[usize]),
+    meet: &(impl Fn(&RayStart, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
     ways: impl Fn(usize) -> [DVec3; BEAM] + Sync,
 ) -> Vec<Exit> {
     let from_chunk = |chunk: &[usize]| {

@@ -11,19 +11,19 @@
 
 mod aim;
 mod boxes;
-mod choice;
+mod distribution;
 mod find;
 mod gaps;
 mod narrow;
 mod shown;
 mod sides;
 
-pub(crate) use choice::Choice;
-pub(crate) use sides::{BEAM, Openings, Start, Wall};
+pub(crate) use distribution::OpeningDistribution;
+pub(crate) use sides::{BEAM, Openings, RayStart, Wall};
 
 #[cfg(test)]
 mod tests {
-    use super::boxes::Part;
+    use super::boxes::OpeningBox;
     use super::sides::KINDS;
     use super::*;
     use crate::geometry::sampling::sequence02;
@@ -35,7 +35,7 @@ mod tests {
     fn openings() -> Openings {
         let mut openings =
             Openings::around(&[DVec3::new(-2.0, 0.0, -2.0), DVec3::new(2.0, 3.0, 2.0)]);
-        let part = |low: [f64; 3], high: [f64; 3]| Part {
+        let part = |low: [f64; 3], high: [f64; 3]| OpeningBox {
             low: DVec3::from(low),
             high: DVec3::from(high),
             axis: 1,
@@ -57,7 +57,7 @@ mod tests {
         let openings = openings();
         for point in [DVec3::new(0.7, 0.2, -0.4), DVec3::new(0.1, 2.6, 0.3)] {
             let normal = DVec3::Y;
-            let mut choice = Choice::default();
+            let mut choice = OpeningDistribution::default();
             openings.weigh(1e3, (point, normal), |_| 1.0, &mut choice);
             // Many sequences of few points, as points take them.
             let n = 1 << 20;
@@ -97,13 +97,13 @@ mod tests {
         for outside in [0.0, 2.0] {
             let corners = [DVec3::new(-2.0, 0.0, -outside), DVec3::new(2.0, 3.0, 16.0)];
             let start = |share: f64, [u, _]: [f64; 2]| {
-                Some(Start {
+                Some(RayStart {
                     point: DVec3::new(4.0 * u - 2.0, 0.0, 4.0 + 12.0 * share),
                     normal: DVec3::Y,
                     plane: 0,
                 })
             };
-            let meet = |start: &Start, ways: &[DVec3; BEAM]| {
+            let meet = |start: &RayStart, ways: &[DVec3; BEAM]| {
                 ways.map(|d| {
                     let distance = -start.point.z / d.z;
                     let is_open = d.z < 0.0 && open(start.point + d * distance);
@@ -112,7 +112,7 @@ mod tests {
                 })
             };
             let openings = Openings::find(&corners, start, meet, 1);
-            let mut choice = Choice::default();
+            let mut choice = OpeningDistribution::default();
             for point in [[-1.7, 0.0, 15.0], [0.3, 0.0, 8.0], [1.2, 0.0, 4.5]].map(DVec3::from) {
                 openings.weigh(1e3, (point, DVec3::Y), |_| 1.0, &mut choice);
                 let n = 1000;

@@ -1,7 +1,7 @@
 //! Where the way of a ray that left a room is narrowest.
 
 use super::gaps::{Exit, Gap};
-use super::sides::{BEAM, Openings, Start, Wall};
+use super::sides::{BEAM, Openings, RayStart, Wall};
 use crate::geometry::sampling::{Pcg, around};
 use glam::DVec3;
 
@@ -17,9 +17,9 @@ impl Openings {
     /// the box around the room if nothing is near, or on one side only.
     pub(super) fn gap(
         &self,
-        start: &Start,
+        start: &RayStart,
         exit: &Exit,
-        meet: &(impl Fn(&Start, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
+        meet: &(impl Fn(&RayStart, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
         seed: u64,
     ) -> Gap {
         let Exit { place, way, .. } = *exit;

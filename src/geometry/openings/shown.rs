@@ -4,8 +4,8 @@
 //! out among the parts that it crosses as they would have found it, again and again by the shares that come out (expectation and
 //! maximisation, Dempster, Laird and Rubin 1977): inside of the house the window takes all, and outside the sides of the yard.
 
-use super::choice::Choice;
-use super::sides::{BEAM, KINDS, Openings, Start, Wall};
+use super::distribution::OpeningDistribution;
+use super::sides::{BEAM, KINDS, Openings, RayStart, Wall};
 use crate::geometry::sampling::{Pcg, hash};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -29,27 +29,27 @@ struct Ray {
 
 /// What points asked of a part: what it would bring if it were open, and rays to it.
 #[derive(Debug, Clone, Copy, Default)]
-struct Asked {
+struct PartRequest {
     worth: f64,
     rays: f64,
 }
 
 /// What is known of a part: the share that is open, and how many rays that counts for.
 #[derive(Debug, Clone, Copy, Default)]
-struct Known {
+struct PartOpenness {
     open: f64,
     counts: f64,
 }
 
 /// What a point asked: of each part from each place, and the rays that left.
-type Answers = (Vec<(usize, usize, Asked)>, Vec<Ray>);
+type Answers = (Vec<(usize, usize, PartRequest)>, Vec<Ray>);
 
 impl Openings {
     /// Finds which share of each part is open, seen from each kind of place, by rays from points to the parts.
     pub(super) fn look_at_parts(
         &mut self,
-        (starts, places): (&[Start], &[usize]),
-        meet: &(impl Fn(&Start, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
+        (starts, places): (&[RayStart], &[usize]),
+        meet: &(impl Fn(&RayStart, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
         seed: u64,
     ) {
         let parts = self.parts.len();
@@ -59,7 +59,7 @@ impl Openings {
         self.shown = vec![1.0; KINDS * parts];
         let look = |k: usize| self.ask(&starts[k], places[k], meet, hash(seed, k as u64));
         let answers: Vec<Answers> = (0..starts.len()).into_par_iter().map(look).collect();
-        let mut asked = vec![Asked::default(); KINDS * parts];
+        let mut asked = vec![PartRequest::default(); KINDS * parts];
         let mut rays = Vec::new();
         for (some, left) in answers {
             for (place, part, by) in some {
@@ -70,7 +70,7 @@ impl Openings {
             rays.extend(left);
         }
         rays.sort_by_key(|ray| ray.place);
-        let places: Vec<(&[Ray], &[Asked])> = (0..KINDS)
+        let places: Vec<(&[Ray], &[PartRequest])> = (0..KINDS)
             .map(|place| {
                 let [first, end] =
                     [place, place + 1].map(|p| rays.partition_point(|r| r.place < p));
@@ -78,9 +78,9 @@ impl Openings {
             })
             .collect();
         // What is known of a part: how open it is to the places that see much of it.
-        let alone: Vec<Shares> = places
+        let alone: Vec<PartShares> = places
             .par_iter()
-            .map(|(rays, asked)| share_out(rays, asked, |_| Known::default()))
+            .map(|(rays, asked)| share_out(rays, asked, |_| PartOpenness::default()))
             .collect();
         let open = |part: usize| {
             let seeing = places.iter().zip(&alone).filter(|(_, s)| s[part][0] > MUCH);
@@ -91,11 +91,11 @@ impl Openings {
         };
         let cell = self.cell();
         let cell = (cell.x * cell.y).max(cell.y * cell.z).max(cell.z * cell.x);
-        let known: Vec<Known> = (0..parts)
+        let known: Vec<PartOpenness> = (0..parts)
             .map(|part| {
                 let small = (cell / self.parts[part].area()).min(1.0);
                 let open = open(part);
-                Known {
+                PartOpenness {
                     open,
                     counts: PRIOR * small,
                 }
@@ -114,18 +114,18 @@ impl Openings {
     /// Rays from a point to the parts as if all were open.
     fn ask(
         &self,
-        start: &Start,
+        start: &RayStart,
         place: usize,
-        meet: &(impl Fn(&Start, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
+        meet: &(impl Fn(&RayStart, &[DVec3; BEAM]) -> [Option<Wall>; BEAM] + Sync),
         seed: u64,
     ) -> Answers {
         let (point, normal) = (start.point, start.normal);
-        let mut choice = Choice::default();
+        let mut choice = OpeningDistribution::default();
         self.weigh(f64::INFINITY, (point, normal), |_| 1.0, &mut choice);
         let total = choice.total();
         let asked = choice.worths().map(|(part, worth)| {
             let rays = BEAM as f64 * worth / total.max(1e-300);
-            (place, part, Asked { worth, rays })
+            (place, part, PartRequest { worth, rays })
         });
         let mut random = Pcg::new(seed);
         let chosen: [Option<DVec3>; BEAM] = std::array::from_fn(|_| {
@@ -152,10 +152,14 @@ impl Openings {
 }
 
 /// Of each part what it brings, as a share of what it would if it were open, and as it is.
-type Shares = Vec<[f64; 2]>;
+type PartShares = Vec<[f64; 2]>;
 
 /// Shares out rays by what is known of the parts before.
-fn share_out(rays: &[Ray], asked: &[Asked], known: impl Fn(usize) -> Known) -> Shares {
+fn share_out(
+    rays: &[Ray],
+    asked: &[PartRequest],
+    known: impl Fn(usize) -> PartOpenness,
+) -> PartShares {
     let mut shares = vec![[1.0, 0.0]; asked.len()];
     for _ in 0..TIMES {
         let mut brings = vec![0.0; asked.len()];
@@ -167,8 +171,8 @@ fn share_out(rays: &[Ray], asked: &[Asked], known: impl Fn(usize) -> Known) -> S
             }
         }
         for (part, share) in shares.iter_mut().enumerate() {
-            let Asked { worth, rays } = asked[part];
-            let Known { open, counts } = known(part);
+            let PartRequest { worth, rays } = asked[part];
+            let PartOpenness { open, counts } = known(part);
             let found = if worth > 0.0 {
                 brings[part] / worth
             } else {

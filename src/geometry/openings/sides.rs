@@ -1,6 +1,6 @@
 //! The box around a room, and what is known of where rays leave it.
 
-use super::boxes::Part;
+use super::boxes::OpeningBox;
 use glam::DVec3;
 
 /// Rays from a point.
@@ -16,7 +16,7 @@ pub(super) const MARGIN: f64 = 2e-5;
 
 /// A point of a surface that rays start from.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Start {
+pub(crate) struct RayStart {
     pub(crate) point: DVec3,
     pub(crate) normal: DVec3,
     pub(crate) plane: u32,
@@ -34,7 +34,7 @@ pub(crate) struct Wall {
 pub(crate) struct Openings {
     pub(super) low: DVec3,
     pub(super) high: DVec3,
-    pub(super) parts: Vec<Part>,
+    pub(super) parts: Vec<OpeningBox>,
     /// Share of each part that is open, seen from each kind of place.
     pub(super) shown: Vec<f32>,
     /// Of rays all over the hemispheres of the surfaces.

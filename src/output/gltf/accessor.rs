@@ -10,14 +10,14 @@ use crate::scene::check::Check;
 use serde_json::Value;
 
 /// Vertex data as numbers: `components` values for each element.
-pub(super) struct Table {
+pub(super) struct AttributeTable {
     pub(super) components: usize,
     /// glTF component type that the numbers were read from.
     pub(super) component: u64,
     pub(super) values: Vec<f64>,
 }
 
-impl Table {
+impl AttributeTable {
     /// One element.
     pub(super) fn row(&self, element: usize) -> &[f64] {
         &self.values[element * self.components..][..self.components]
@@ -26,7 +26,7 @@ impl Table {
 
 /// How the elements of an accessor are laid out.
 #[derive(Clone, Copy)]
-pub(super) struct Layout {
+pub(super) struct ElementLayout {
     /// glTF component type: 5120 i8, 5121 u8, 5122 i16, 5123 u16, 5125 u32, 5126 f32.
     pub(super) component: u64,
     components: usize,
@@ -35,7 +35,7 @@ pub(super) struct Layout {
     normalized: bool,
 }
 
-impl Layout {
+impl ElementLayout {
     pub(super) fn of(accessor: &Value) -> Option<Self> {
         let component = accessor.get("componentType")?.as_u64()?;
         let width = component_width(component)?;
@@ -129,9 +129,9 @@ impl<'a> Data<'a> {
     }
 
     /// Reads an accessor of exactly `count` scalars or vectors. None: another count, a matrix, or out of bounds.
-    pub(super) fn read(&mut self, accessor: usize, count: usize) -> Option<Table> {
+    pub(super) fn read(&mut self, accessor: usize, count: usize) -> Option<AttributeTable> {
         let accessor = list(&self.source.json, "accessors").get(accessor)?;
-        let layout = Layout::of(accessor)?;
+        let layout = ElementLayout::of(accessor)?;
         if index(accessor, "count")? != count || layout.components > 4 {
             return None;
         }
@@ -151,7 +151,7 @@ impl<'a> Data<'a> {
                     .copy_from_slice(element);
             }
         }
-        Some(Table {
+        Some(AttributeTable {
             components: layout.components,
             component: layout.component,
             values,
@@ -159,7 +159,7 @@ impl<'a> Data<'a> {
     }
 
     /// (element numbers, their values) of a sparse accessor (section 3.6.2.3).
-    fn sparse(&mut self, sparse: &Value, layout: Layout) -> Option<(Vec<usize>, Vec<f64>)> {
+    fn sparse(&mut self, sparse: &Value, layout: ElementLayout) -> Option<(Vec<usize>, Vec<f64>)> {
         let count = index(sparse, "count")?;
         let mut part = |part: &Value, size: usize| {
             self.packed(
@@ -171,7 +171,7 @@ impl<'a> Data<'a> {
         };
         let places = sparse.get("indices")?;
         let component = places.get("componentType")?.as_u64()?;
-        let scalar = Layout {
+        let scalar = ElementLayout {
             component,
             components: 1,
             size: component_width(component)?,
@@ -184,7 +184,7 @@ impl<'a> Data<'a> {
     }
 }
 
-fn numbers(bytes: &[u8], layout: Layout) -> Vec<f64> {
+fn numbers(bytes: &[u8], layout: ElementLayout) -> Vec<f64> {
     let scale = |value: f64, full: f64| {
         if layout.normalized {
             (value / full).max(-1.0)
@@ -228,7 +228,7 @@ pub(super) fn is_draco(primitive: &Value) -> bool {
 pub(super) fn is_quantized(source: &Source, name: &str, accessor: usize) -> bool {
     let Some(layout) = list(&source.json, "accessors")
         .get(accessor)
-        .and_then(Layout::of)
+        .and_then(ElementLayout::of)
     else {
         return false;
     };
@@ -248,7 +248,7 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn read(source: &Source, accessor: usize, count: usize) -> Option<Table> {
+    fn read(source: &Source, accessor: usize, count: usize) -> Option<AttributeTable> {
         let buffers = Buffers::sound(source.buffers.clone());
         Data::new(source, &buffers).read(accessor, count)
     }

@@ -3,9 +3,9 @@
 //! Input attributes are interpolated from the document's own data in f64; from the scene's world-space copy (brought
 //! back by the inverse transform) where the data sits in a Draco stream. Everything is written as f32.
 
-use super::accessor::{self, Data, Table};
+use super::accessor::{self, AttributeTable, Data};
 use super::json::index;
-use super::packing::Grid;
+use super::packing::QuantizationGrid;
 use super::writer::Writer;
 use crate::error::{Error, Result};
 use crate::gather::refined;
@@ -24,7 +24,7 @@ impl Writer<'_> {
         let scene = self.scene;
         let surface = &scene.surfaces[baked.surface];
         let turned = scene.is_flipped(baked.surface);
-        let input = Input::new(primitive, surface, turned, &mut self.data)?;
+        let input = PrimitiveInput::new(primitive, surface, turned, &mut self.data)?;
         let mut out = Map::new();
 
         let positions = input.positions(baked, self.apart);
@@ -82,18 +82,26 @@ impl Writer<'_> {
     }
 
     /// The grid that the positions of some refined primitives of a mesh lie on.
-    pub(super) fn grid(&mut self, parts: &[(&Value, &BakedSurface)]) -> Result<Option<Grid>> {
+    pub(super) fn grid(
+        &mut self,
+        parts: &[(&Value, &BakedSurface)],
+    ) -> Result<Option<QuantizationGrid>> {
         let mut all = Vec::new();
         for (primitive, baked) in parts {
             let surface = &self.scene.surfaces[baked.surface];
             let turned = self.scene.is_flipped(baked.surface);
-            let input = Input::new(primitive, surface, turned, &mut self.data)?;
+            let input = PrimitiveInput::new(primitive, surface, turned, &mut self.data)?;
             all.extend(input.positions(baked, self.apart));
         }
-        Ok(Grid::around(&all))
+        Ok(QuantizationGrid::around(&all))
     }
 
-    fn any_width(&mut self, input: &Input, baked: &BakedSurface, name: &str) -> Option<usize> {
+    fn any_width(
+        &mut self,
+        input: &PrimitiveInput,
+        baked: &BakedSurface,
+        name: &str,
+    ) -> Option<usize> {
         match input.table(name)?.components {
             1 => input
                 .rows::<1>(baked, name)
@@ -162,17 +170,17 @@ pub fn color_0(
 }
 
 /// The attributes of an input primitive, by name.
-struct Input<'a> {
+struct PrimitiveInput<'a> {
     surface: &'a Surface,
     primitive: &'a Value,
-    tables: Vec<(String, Table)>,
+    tables: Vec<(String, AttributeTable)>,
     /// Were its faces turned since the document was read?
     turned: bool,
     /// World to local, where it exists and the document's own positions cannot be read.
     to_local: Option<glam::DMat4>,
 }
 
-impl<'a> Input<'a> {
+impl<'a> PrimitiveInput<'a> {
     fn new(
         primitive: &'a Value,
         surface: &'a Surface,
@@ -219,7 +227,7 @@ impl<'a> Input<'a> {
             .collect()
     }
 
-    fn table(&self, name: &str) -> Option<&Table> {
+    fn table(&self, name: &str) -> Option<&AttributeTable> {
         self.tables
             .iter()
             .find(|(n, _)| n == name)
@@ -227,7 +235,7 @@ impl<'a> Input<'a> {
     }
 
     /// Three-component data.
-    fn vectors(&self, name: &str) -> Option<&Table> {
+    fn vectors(&self, name: &str) -> Option<&AttributeTable> {
         self.table(name).filter(|t| t.components == 3)
     }
 
@@ -328,7 +336,7 @@ impl<'a> Input<'a> {
     }
 
     /// First three components, interpolated.
-    fn blend(&self, table: &Table, vertex: &BakedVertex) -> DVec3 {
+    fn blend(&self, table: &AttributeTable, vertex: &BakedVertex) -> DVec3 {
         let corners = refined::corners(self.surface, vertex);
         let at = |k: usize| vertex.weights[k] * DVec3::from_slice(table.row(corners[k]));
         at(0) + at(1) + at(2)

@@ -1,6 +1,6 @@
 //! The one binary buffer of the output, with its views and accessors (glTF 2.0, sections 3.6.1 and 3.6.2).
 
-use super::packing::{self, Grid, Mode, Packing};
+use super::packing::{self, Mode, Packing, QuantizationGrid};
 use crate::error::Result;
 use serde_json::{Value, json};
 
@@ -123,7 +123,7 @@ impl Bin {
     }
 
     /// Adds positions as whole steps of a grid.
-    pub(super) fn on_grid(&mut self, grid: &Grid, values: &[[f32; 3]]) -> usize {
+    pub(super) fn on_grid(&mut self, grid: &QuantizationGrid, values: &[[f32; 3]]) -> usize {
         self.quantized = true;
         let steps: Vec<[f32; 3]> = values.iter().map(|p| grid.steps(*p)).collect();
         let accessor = self.short(&steps, |v| v as u16);

@@ -3,7 +3,7 @@
 //!
 //! Data is copied without the gaps and neighbours of its old view, so nothing of the replaced meshes is dragged along.
 
-use super::accessor::Layout;
+use super::accessor::ElementLayout;
 use super::buffer::Use;
 use super::json::{extension, index, list};
 use super::writer::Writer;
@@ -39,7 +39,7 @@ impl Writer<'_> {
             .get(old)
             .cloned()
             .unwrap_or_else(|| json!({}));
-        let layout = Layout::of(&accessor);
+        let layout = ElementLayout::of(&accessor);
         let count = index(&accessor, "count").unwrap_or(0);
         let bytes = layout
             .zip(index(&accessor, "bufferView"))
@@ -82,7 +82,7 @@ impl Writer<'_> {
         new
     }
 
-    fn keep_sparse(&mut self, accessor: &mut Value, layout: Option<Layout>) {
+    fn keep_sparse(&mut self, accessor: &mut Value, layout: Option<ElementLayout>) {
         let (Some(sparse), Some(layout)) = (accessor.get_mut("sparse"), layout) else {
             return;
         };

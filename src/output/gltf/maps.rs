@@ -13,7 +13,7 @@ use super::writer::Writer;
 use crate::color::encode;
 use crate::error::{Error, Result};
 use crate::gather::BakedSurface;
-use crate::lightmap::{LightMaps, Page, Texel};
+use crate::lightmap::{LightMaps, MapPage, Texel};
 use crate::output::curve;
 use glam::Vec3;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -36,7 +36,7 @@ impl Writer<'_> {
             json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 });
         let sampler = self.append("samplers", sampler);
         let bases = self.bases();
-        let light = |page: &Page| -> Vec<[f64; 3]> {
+        let light = |page: &MapPage| -> Vec<[f64; 3]> {
             let shown = |(texel, surface): (&Texel, &u32)| {
                 let base = bases.get(*surface as usize).copied().unwrap_or([1.0; 3]);
                 let light = self.look.shown(texel.light.map(f64::from));
@@ -164,7 +164,7 @@ impl Writer<'_> {
 }
 
 /// The page's bytes as PNG.
-fn png(bytes: &[u8], page: &Page, kind: ExtendedColorType) -> Result<Vec<u8>> {
+fn png(bytes: &[u8], page: &MapPage, kind: ExtendedColorType) -> Result<Vec<u8>> {
     let mut out = Vec::new();
     let encoder =
         PngEncoder::new_with_quality(&mut out, CompressionType::Best, FilterType::Adaptive);

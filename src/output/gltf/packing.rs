@@ -52,13 +52,13 @@ impl fmt::Display for Packing {
 
 /// Whole steps that stand for positions.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Grid {
+pub(super) struct QuantizationGrid {
     low: Vec3,
     /// Of one step; alike in all directions, so that normals stay what they are.
     size: f32,
 }
 
-impl Grid {
+impl QuantizationGrid {
     /// The grid around some positions; none if there are none, or all lie in one place.
     pub(super) fn around(positions: &[[f32; 3]]) -> Option<Self> {
         let places = || positions.iter().map(|p| Vec3::from(*p));

@@ -2,7 +2,7 @@
 
 use super::accessor::Data;
 use super::buffer::Bin;
-use super::packing::{Grid, Packing};
+use super::packing::{Packing, QuantizationGrid};
 use crate::gather::BakedSurface;
 use crate::output::Exposure;
 use crate::scene::Scene;
@@ -84,7 +84,7 @@ pub(super) struct Writer<'a> {
     /// What colour sets of layers are multiplied by.
     pub(super) layer_scale: f64,
     /// What positions of the mesh at hand are rounded to; none: they are floats.
-    pub(super) grid: Option<Grid>,
+    pub(super) grid: Option<QuantizationGrid>,
     /// The refined meshes by (node, instance), then primitive.
     pub(super) baked: BTreeMap<(usize, Option<usize>), Primitives<'a>>,
     pub(super) data: Data<'a>,

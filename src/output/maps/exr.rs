@@ -3,14 +3,14 @@
 use super::super::exr::encoded;
 use super::texels;
 use crate::error::Result;
-use crate::lightmap::Page;
+use crate::lightmap::MapPage;
 use exr::prelude::*;
 
 /// The file's bytes; see the module above for the numbers.
 ///
 /// # Errors
 /// An internal fault of the encoder.
-pub fn to_exr(page: &Page, lux_per_unit: f64) -> Result<Vec<u8>> {
+pub fn to_exr(page: &MapPage, lux_per_unit: f64) -> Result<Vec<u8>> {
     let texels = texels(page, lux_per_unit);
     let channels = ["R", "G", "B"]
         .into_iter()

@@ -2,7 +2,7 @@
 
 use super::texels;
 use crate::PROGRAM;
-use crate::lightmap::Page;
+use crate::lightmap::MapPage;
 use exr::prelude::f16;
 
 /// The file begins with this (section 3.1).
@@ -20,7 +20,7 @@ const TEXEL: u32 = 8;
 const ALIGN: usize = 8;
 
 /// The file's bytes; alpha is 1. See the module above for the numbers.
-pub fn to_ktx2(page: &Page, lux_per_unit: f64) -> Vec<u8> {
+pub fn to_ktx2(page: &MapPage, lux_per_unit: f64) -> Vec<u8> {
     ktx2([page.width, page.height, 0], &texels(page, lux_per_unit))
 }
 

@@ -15,7 +15,7 @@ mod ktx2;
 use crate::PROGRAM;
 use crate::color::LinearSrgb;
 use crate::error::{Error, Result};
-use crate::lightmap::{LightMaps, Page};
+use crate::lightmap::{LightMaps, MapPage};
 use crate::output::{BakedGlb, Exposure};
 use crate::scene::Scene;
 pub use exr::to_exr;
@@ -122,7 +122,7 @@ fn rgb(xyz: [f32; 3]) -> [f64; 3] {
 }
 
 /// Texels in linear sRGB, in units.
-fn texels(page: &Page, lux_per_unit: f64) -> Vec<[f32; 3]> {
+fn texels(page: &MapPage, lux_per_unit: f64) -> Vec<[f32; 3]> {
     let srgb = LinearSrgb::standard();
     let texel = |t: &crate::lightmap::Texel| {
         srgb.from_xyz(t.irradiance.map(f64::from))
@@ -165,8 +165,8 @@ pub fn index(
             });
         }
     }
-    let pages = |pages: &[Page], layer: Option<usize>| -> Vec<PageEntry> {
-        let page = |(k, page): (usize, &Page)| PageEntry {
+    let pages = |pages: &[MapPage], layer: Option<usize>| -> Vec<PageEntry> {
+        let page = |(k, page): (usize, &MapPage)| PageEntry {
             width: page.width,
             height: page.height,
             exr: name(k, layer, "exr"),
@@ -175,7 +175,7 @@ pub fn index(
         pages.iter().enumerate().map(page).collect()
     };
     let names = scene.changes.layers.iter().flat_map(|l| &l.names);
-    let layer = |(l, (own, name)): (usize, (&Vec<Page>, &String))| LayerEntry {
+    let layer = |(l, (own, name)): (usize, (&Vec<MapPage>, &String))| LayerEntry {
         name: name.clone(),
         pages: pages(own, Some(l)),
     };

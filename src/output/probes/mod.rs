@@ -17,14 +17,14 @@
 mod volume;
 
 use super::Exposure;
-use super::lit_space::Room;
+use super::lit_space::LitRoom;
 use crate::PROGRAM;
 use crate::color::LinearSrgb;
 use crate::error::{Error, Result};
 use crate::gather::{Air, Around};
 use crate::scene::Scene;
 use crate::solve::record::Figure;
-use crate::survey::Place;
+use crate::survey::PointLocation;
 use glam::DVec3;
 use serde::Serialize;
 pub use volume::to_volume;
@@ -38,7 +38,7 @@ const GREATEST: f64 = 32_768.0;
 
 /// Where probes stand.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
+pub struct ProbeGrid {
     /// Least corner of the box, world space, metres.
     pub low: DVec3,
     /// Its size.
@@ -47,13 +47,13 @@ pub struct Grid {
     pub counts: [usize; 3],
 }
 
-impl Grid {
+impl ProbeGrid {
     /// The grid of a room's lit space with probes `spacing` metres apart at the most.
     ///
     /// # Errors
     /// More than [`MOST_PROBES`].
     pub fn of(scene: &Scene, spacing: f64) -> Result<Self> {
-        let (room, _) = Room::new(scene);
+        let (room, _) = LitRoom::new(scene);
         let places = || room.places.iter().map(|met| met.point);
         let low = places().fold(DVec3::INFINITY, DVec3::min);
         let high = places().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -128,7 +128,7 @@ impl Grid {
 
     /// Gives probes that are not in the room the mean of those beside them, ring by ring.
     fn lend(&self, air: &mut [Air]) {
-        let mut known: Vec<bool> = air.iter().map(|a| a.place == Place::Room).collect();
+        let mut known: Vec<bool> = air.iter().map(|a| a.place == PointLocation::Room).collect();
         loop {
             let ring: Vec<(usize, Vec<usize>)> = (0..air.len())
                 .filter(|&k| !known[k])
@@ -228,13 +228,13 @@ impl Probes {
     /// What is written of the probes of a grid; `air` are its points in order, `ktx2` the name of the texture's file.
     pub fn new(
         scene: &Scene,
-        grid: &Grid,
+        grid: &ProbeGrid,
         mut air: Vec<Air>,
         look: &Exposure,
         error_de2000: Option<Figure>,
         ktx2: String,
     ) -> Self {
-        let here: Vec<f64> = (air.iter().filter(|a| a.place == Place::Room))
+        let here: Vec<f64> = (air.iter().filter(|a| a.place == PointLocation::Room))
             .map(|a| a.truncation)
             .collect();
         let truncation = Truncation {

@@ -14,19 +14,19 @@ use glam::DVec3;
 /// The light on the leaves, round by round.
 #[derive(Debug, Default)]
 pub struct History {
-    rounds: Vec<Held>,
+    rounds: Vec<RoundLight>,
 }
 
 /// A round's leaves with their tristimulus irradiance, lm/m2.
 #[derive(Debug)]
-struct Held {
+struct RoundLight {
     round: usize,
     leaves: Vec<u32>,
     light: Vec<[f32; 3]>,
 }
 
 /// A corner of a triangle of the output: vertex, leaf of the finished hierarchy there, area that it speaks for.
-pub(super) struct Corner {
+pub(super) struct OutputCorner {
     pub(super) vertex: usize,
     leaf: u32,
     pub(super) area: f64,
@@ -38,7 +38,7 @@ impl History {
         let light = bake.light();
         let count = light.leaves.len().min(light.irradiance.len());
         let xyz = |k| bake.lanes().tristimulus(light.irradiance.row(k));
-        self.rounds.push(Held {
+        self.rounds.push(RoundLight {
             round: bake.rounds().len(),
             leaves: light.leaves[..count].to_vec(),
             light: (0..count).map(|k| xyz(k).map(|x| x as f32)).collect(),
@@ -56,10 +56,10 @@ impl History {
     pub(super) fn at(
         &self,
         tree: &Tree,
-        corners: &[Corner],
+        corners: &[OutputCorner],
         count: usize,
     ) -> Vec<(usize, Vec<[f32; 3]>)> {
-        let round = |held: &Held| {
+        let round = |held: &RoundLight| {
             let mut place = vec![NONE; tree.nodes.len()];
             for (k, &leaf) in held.leaves.iter().enumerate() {
                 place[leaf as usize] = k as u32;
@@ -88,7 +88,7 @@ impl History {
 }
 
 /// The corners of all triangles, three each, of some surfaces of a baked mesh; vertices count on from surface to surface.
-pub(super) fn corners(bake: &Bake, baked: &Baked, order: &[usize]) -> Vec<Corner> {
+pub(super) fn corners(bake: &Bake, baked: &Baked, order: &[usize]) -> Vec<OutputCorner> {
     let (mesh, tree) = (bake.mesh(), bake.tree());
     let mut out = Vec::new();
     let mut first = 0;
@@ -113,7 +113,7 @@ pub(super) fn corners(bake: &Bake, baked: &Baked, order: &[usize]) -> Vec<Corner
                     NONE => NONE,
                     entry => tree.leaf_at(entry, weights_of(point, face[0], face[1], face[2])),
                 };
-                out.push(Corner {
+                out.push(OutputCorner {
                     vertex: first + vertex as usize,
                     leaf,
                     area,

@@ -12,11 +12,11 @@
 //! | illuminance of each layer | 65535ths of that of the file | a 65535th of it |
 //! | spectrum for each lux | mean and principal components, 65535ths of a component's range | stated in the page |
 
-use super::history::{Corner, History, corners};
+use super::history::{History, OutputCorner, corners};
 use crate::color::seen_difference;
 use crate::gather::Baked;
 use crate::solve::Bake;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use nalgebra::{DMatrix, SymmetricEigen};
 use serde::Serialize;
 
@@ -32,7 +32,7 @@ const FLOOR: f32 = 1e-7;
 
 /// What the page is told of the planes.
 #[derive(Debug, Serialize)]
-pub(super) struct Index {
+pub(super) struct LightIndex {
     vertices: usize,
     /// For each primitive with light, in the order of the file: does it shine itself?
     glows: Vec<bool>,
@@ -71,7 +71,7 @@ pub(super) fn pack(
     baked: &Baked,
     history: &History,
     order: &[usize],
-) -> (Index, Vec<u8>) {
+) -> (LightIndex, Vec<u8>) {
     let corners = corners(bake, baked, order);
     let drawn = order
         .iter()
@@ -112,7 +112,7 @@ pub(super) fn pack(
         .iter()
         .map(|xyz| f64::from(xyz[1]).max(0.0))
         .collect();
-    let index = Index {
+    let index = LightIndex {
         vertices: count,
         glows: order.iter().map(|&k| glows(bake, baked, k)).collect(),
         rounds,
@@ -156,7 +156,7 @@ pub(crate) fn error_map(
 fn errors(
     bake: &Bake,
     steps: &[(usize, Vec<[f32; 3]>)],
-    corners: &[Corner],
+    corners: &[OutputCorner],
     area: &[f64],
 ) -> Option<(Vec<f64>, f64)> {
     let [.., (_, before), (_, last)] = steps else {
@@ -177,7 +177,7 @@ fn errors(
 }
 
 /// Gives every vertex the mean of the triangles around it. Corners come three to a triangle.
-fn even_out(values: &mut [f64], corners: &[Corner], area: &[f64]) {
+fn even_out(values: &mut [f64], corners: &[OutputCorner], area: &[f64]) {
     let mut sums = vec![0.0; values.len()];
     for triangle in corners.chunks_exact(3) {
         let mean = triangle.iter().map(|c| values[c.vertex]).sum::<f64>() / 3.0;
@@ -277,9 +277,9 @@ impl Coding {
 /// What each layer brings of the illuminance of the vertices, as a share, goes to `bytes`; names of the layers.
 fn layers(bake: &Bake, baked: &Baked, order: &[usize], bytes: &mut Vec<u8>) -> Vec<String> {
     let rows = || order.iter().flat_map(|&k| &baked.irradiance[k]);
-    let lux = |row: &[f32; LEAVES]| bake.lanes().tristimulus(row)[1];
+    let lux = |row: &[f32; BANDS]| bake.lanes().tristimulus(row)[1];
     for lanes in bake.layer_lanes() {
-        let code = |row: &[f32; LEAVES]| {
+        let code = |row: &[f32; BANDS]| {
             let share = lux(&lanes.of(row)) / lux(row);
             // In the dark none brings anything.
             (65535.0 * share.clamp(0.0, 1.0)).round() as u16
@@ -295,26 +295,26 @@ fn layers(bake: &Bake, baked: &Baked, order: &[usize], bytes: &mut Vec<u8>) -> V
 fn spectra(bake: &Bake, baked: &Baked, order: &[usize], bytes: &mut Vec<u8>) -> Components {
     // Worked out again for every sum: a large room has a gigabyte of them.
     let rows = || order.iter().flat_map(|&k| &baked.irradiance[k]);
-    let shape = |row: &[f32; LEAVES]| -> Option<Leaves> {
+    let shape = |row: &[f32; BANDS]| -> Option<Spectrum> {
         let lux = bake.lanes().tristimulus(row)[1];
-        (lux > 0.0).then(|| bake.lanes().leaves(row).map(|x| x / lux))
+        (lux > 0.0).then(|| bake.lanes().spectrum(row).map(|x| x / lux))
     };
     let lit = || rows().filter_map(shape);
     let n = lit().count().max(1) as f64;
-    let mut mean = [0.0; LEAVES];
+    let mut mean = [0.0; BANDS];
     lit().for_each(|s| mean.iter_mut().zip(s).for_each(|(m, x)| *m += x / n));
-    let mut spread = DMatrix::<f64>::zeros(LEAVES, LEAVES);
+    let mut covariance = DMatrix::<f64>::zeros(BANDS, BANDS);
     for shape in lit() {
-        for i in 0..LEAVES {
+        for i in 0..BANDS {
             let a = shape[i] - mean[i];
             for j in 0..=i {
-                spread[(i, j)] += a * (shape[j] - mean[j]) / n;
+                covariance[(i, j)] += a * (shape[j] - mean[j]) / n;
             }
         }
     }
-    spread.fill_upper_triangle_with_lower_triangle();
-    let eigen = SymmetricEigen::new(spread);
-    let mut rank: Vec<usize> = (0..LEAVES).collect();
+    covariance.fill_upper_triangle_with_lower_triangle();
+    let eigen = SymmetricEigen::new(covariance);
+    let mut rank: Vec<usize> = (0..BANDS).collect();
     rank.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     let size: f64 = mean
         .iter()
@@ -337,7 +337,7 @@ fn spectra(bake: &Bake, baked: &Baked, order: &[usize], bytes: &mut Vec<u8>) -> 
         let axis: Vec<f64> = eigen.eigenvectors.column(i).iter().copied().collect();
         let along = |row| {
             let s = shape(row)?;
-            Some((0..LEAVES).map(|k| axis[k] * (s[k] - mean[k])).sum::<f64>())
+            Some((0..BANDS).map(|k| axis[k] * (s[k] - mean[k])).sum::<f64>())
         };
         let values: Vec<f64> = rows().map(|row| along(row).unwrap_or(0.0)).collect();
         let low = values.iter().copied().fold(0.0, f64::min);

@@ -4,7 +4,7 @@ use crate::color::{KM, LinearSrgb, Observer};
 use crate::scene::facts::Facts;
 use crate::scene::{Camera, LightKind, Projection, Scene};
 use crate::solve::Bake;
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use serde_json::{Value, json};
 
 /// The room of a bake.
@@ -40,8 +40,8 @@ pub fn of(bake: &Bake, cameras: &[Camera]) -> Value {
 
 /// What lamps give, in the order of the facts: emissive materials, then punctual lights. W/m2/sr/nm, W/sr/nm or W/m2/nm;
 /// that of a textured surface where the texture is white.
-pub fn lamp_spectra(scene: &Scene) -> Vec<Leaves> {
-    let power = |light: usize, shape: &Leaves| -> Leaves {
+pub fn lamp_spectra(scene: &Scene) -> Vec<Spectrum> {
+    let power = |light: usize, shape: &Spectrum| -> Spectrum {
         let power = &scene.spectra[light].power;
         std::array::from_fn(|k| power[k] * shape[k])
     };
@@ -86,11 +86,14 @@ fn views(cameras: &[Camera]) -> Vec<Value> {
 }
 
 /// Six digits are as many as a plot shows.
-fn rounded(leaves: &Leaves) -> Vec<f64> {
-    let most = leaves.iter().copied().fold(0.0_f64, f64::max);
+fn rounded(spectrum: &Spectrum) -> Vec<f64> {
+    let most = spectrum.iter().copied().fold(0.0_f64, f64::max);
     if most <= 0.0 {
-        return leaves.to_vec();
+        return spectrum.to_vec();
     }
     let scale = 10f64.powi(5 - most.log10().floor() as i32);
-    leaves.iter().map(|x| (x * scale).round() / scale).collect()
+    spectrum
+        .iter()
+        .map(|x| (x * scale).round() / scale)
+        .collect()
 }

@@ -60,24 +60,24 @@ fn black_walls_pass_nothing_on_and_grey_ones_need_one_band() {
 #[test]
 fn two_lamps_are_two_light_spectra() {
     let scene = room("two-rooms.glb");
-    assert!(Plan::of(&scene).runs(Kind::LightSpectra));
+    assert!(Plan::of(&scene).runs(EffectKind::LightSpectra));
     assert_eq!(scene.spectra.len(), 2);
 }
 
 #[test]
 fn a_lamp_outside_of_a_convex_room_is_blocked_by_its_walls() {
     let mut scene = room("cie171-5.4.glb");
-    assert!(!Plan::of(&scene).runs(Kind::Occlusion));
+    assert!(!Plan::of(&scene).runs(EffectKind::Occlusion));
     scene.lights[0].position = DVec3::new(2.0, 5.0, -2.0);
-    assert!(Plan::of(&scene).runs(Kind::Occlusion));
+    assert!(Plan::of(&scene).runs(EffectKind::Occlusion));
     // Sunlight meets the backs of a closed room.
     scene.lights[0].kind = LightKind::Directional;
-    assert!(Plan::of(&scene).runs(Kind::Occlusion));
+    assert!(Plan::of(&scene).runs(EffectKind::Occlusion));
     // But an open floor it lights without anything between.
     let mut floor = room("cie171-5.2-isotropic.glb");
     floor.lights[0].kind = LightKind::Directional;
     floor.lights[0].direction = DVec3::NEG_Y;
-    assert!(!Plan::of(&floor).runs(Kind::Occlusion));
+    assert!(!Plan::of(&floor).runs(EffectKind::Occlusion));
 }
 
 #[test]
@@ -85,10 +85,10 @@ fn a_dent_or_an_object_is_no_convex_room() {
     let mut scene = room("cie171-5.4.glb");
     // A corner drawn in by more than rounding.
     scene.surfaces[0].positions[0] += DVec3::splat(0.01);
-    assert!(Plan::of(&scene).runs(Kind::Occlusion));
-    assert!(Plan::of(&room("corridor.glb")).runs(Kind::Occlusion));
+    assert!(Plan::of(&scene).runs(EffectKind::Occlusion));
+    assert!(Plan::of(&room("corridor.glb")).runs(EffectKind::Occlusion));
     // A single floor from which the walls were taken has nothing before it.
-    assert!(!Plan::of(&room("cie171-5.2.glb")).runs(Kind::Occlusion));
+    assert!(!Plan::of(&room("cie171-5.2.glb")).runs(EffectKind::Occlusion));
 }
 
 #[test]
@@ -104,17 +104,17 @@ fn grey_paint_with_grey_texture_and_vertices_stays_one_band() {
         wrap: [super::super::Wrap::Repeat; 2],
     });
     let plan = Plan::of(&scene);
-    assert!(plan.runs(Kind::Textures) && !plan.runs(Kind::Colour));
+    assert!(plan.runs(EffectKind::Textures) && !plan.runs(EffectKind::Colour));
     scene.surfaces[0].colors = Some(vec![
         [0.5, 0.5, 0.5, 1.0];
         scene.surfaces[0].positions.len()
     ]);
-    assert!(!Plan::of(&scene).runs(Kind::Colour));
+    assert!(!Plan::of(&scene).runs(EffectKind::Colour));
     scene.surfaces[0].colors.as_mut().unwrap()[0][0] = 0.6;
-    assert!(Plan::of(&scene).runs(Kind::Colour));
+    assert!(Plan::of(&scene).runs(EffectKind::Colour));
     scene.surfaces[0].colors = None;
     scene.images[0].pixels[0][2] = 0.2;
-    assert!(Plan::of(&scene).runs(Kind::Colour));
+    assert!(Plan::of(&scene).runs(EffectKind::Colour));
 }
 
 #[test]

@@ -5,11 +5,11 @@
 
 use super::super::check::Check;
 use super::super::json::short;
-use super::super::lamps::{GREATEST_SIZE, bearable};
+use super::super::lamp_spectra::{GREATEST_SIZE, bearable};
 use super::super::{LightKind, Material, PunctualLight, Scene, Sides, Surface};
 use super::mounted::{Luminaire, tilt_share};
 use super::wish::ProfileWish;
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ pub(in crate::scene) fn add(
     materials: &mut [Material],
     lights: &mut Vec<PunctualLight>,
     scale: f64,
-    size: impl Fn(usize, &Leaves) -> f64,
+    size: impl Fn(usize, &Spectrum) -> f64,
     check: &mut Check,
 ) {
     for (m, (wish, material)) in wishes.iter().zip(materials).enumerate() {

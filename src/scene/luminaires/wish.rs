@@ -9,7 +9,7 @@ use super::super::json::short;
 use super::super::profile::Profile;
 use super::super::reader::{Reader, Sampled};
 use super::super::uri;
-use crate::data::Kind;
+use crate::data::TableKind;
 use serde_json::{Map, Value};
 use std::sync::Arc;
 
@@ -59,7 +59,7 @@ pub(in crate::scene) fn read(reader: &mut Reader, entry: &Value, place: &str) ->
     reader.keys(entry, &OF_LIGHT, place);
     let profile = read_profile(reader, entry, place);
     let silent = entry.contains_key("profile") && !says_spectrum(entry);
-    let spectrum = (!silent).then(|| reader.sampled(entry, Kind::Illuminant, place));
+    let spectrum = (!silent).then(|| reader.sampled(entry, TableKind::Illuminant, place));
     Some(LampWish {
         spectrum: spectrum.flatten(),
         profile,

@@ -16,7 +16,7 @@
 
 use super::Fault;
 use super::numbers::Lines;
-use super::table::{Angles, BRIGHTEST, MOST_ANGLES, Measured, Profile, Symmetry};
+use super::table::{Angles, BRIGHTEST, MOST_ANGLES, MeasuredTable, Profile, Symmetry};
 
 /// Greatest type indicator: 0 point source, 1 one that is alike all around, 2 linear, 3 any other; nothing follows from it here.
 const MOST_TYPE: usize = 3;
@@ -106,14 +106,14 @@ pub(super) fn parse(text: &str) -> Result<Profile, Fault> {
 }
 
 /// The first set of lamps.
-struct Lamps {
+struct LampSet {
     sets: usize,
     /// Of the set, lm.
     lumens: f64,
     absolute: bool,
 }
 
-fn lamps(lines: &mut Lines) -> Result<Lamps, Fault> {
+fn lamps(lines: &mut Lines) -> Result<LampSet, Fault> {
     let sets = lines.line_number("the number of sets of lamps")?;
     let sets = lines.count(sets, MOST_SETS, "the number of sets of lamps")?;
     if sets == 0 {
@@ -131,7 +131,7 @@ fn lamps(lines: &mut Lines) -> Result<Lamps, Fault> {
         ] {
             lines.next_line(what)?;
         }
-        first.get_or_insert(Lamps {
+        first.get_or_insert(LampSet {
             sets,
             lumens,
             absolute: count < 0.0,
@@ -147,7 +147,7 @@ fn table(
     planes: usize,
     rows: usize,
     scale: f64,
-) -> Result<Measured, Fault> {
+) -> Result<MeasuredTable, Fault> {
     let mut circle = Vec::new();
     for _ in 0..planes {
         let angle = lines.line_number("a C plane")?;
@@ -199,7 +199,7 @@ fn table(
         candela.push(candela[0].clone());
     }
     reaches(lines, kind, [azimuth[0], azimuth[azimuth.len() - 1]])?;
-    Ok(Measured {
+    Ok(MeasuredTable {
         angles: Angles::C,
         symmetry: kind,
         polar,

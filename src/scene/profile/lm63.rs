@@ -12,7 +12,7 @@
 
 use super::Fault;
 use super::numbers::Lines;
-use super::table::{Angles, BRIGHTEST, MOST_ANGLES, Measured, Profile, Symmetry};
+use super::table::{Angles, BRIGHTEST, MOST_ANGLES, MeasuredTable, Profile, Symmetry};
 
 /// Metres in a foot (exact, 1959).
 const FOOT: f64 = 0.3048;
@@ -214,7 +214,7 @@ fn table(
     rows: usize,
     planes: usize,
     factor: f64,
-) -> Result<Measured, Fault> {
+) -> Result<MeasuredTable, Fault> {
     let (low, high) = match angles {
         Angles::C => ([0.0, 180.0], [0.0, 360.0]),
         Angles::A => ([-90.0, 90.0], [-180.0, 180.0]),
@@ -266,7 +266,7 @@ fn table(
             return Err(lines.fault(what, next));
         }
     };
-    Ok(Measured {
+    Ok(MeasuredTable {
         angles,
         symmetry,
         polar: vertical,
@@ -287,7 +287,7 @@ fn sideways(
     vertical: &[f64],
     horizontal: &[f64],
     candela: Vec<Vec<f64>>,
-) -> Measured {
+) -> MeasuredTable {
     let from_axis = |list: &[f64]| list.iter().map(|a| 90.0 + a).collect();
     let (polar, azimuth, candela) = match angles {
         Angles::B => {
@@ -297,7 +297,7 @@ fn sideways(
         }
         _ => (from_axis(vertical), horizontal.to_vec(), candela),
     };
-    Measured {
+    MeasuredTable {
         angles,
         symmetry: Symmetry::None,
         polar,

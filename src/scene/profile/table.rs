@@ -105,7 +105,7 @@ pub struct Profile {
 }
 
 /// What a file says of the light: angles in degrees, as measured, with what it leaves out.
-pub(super) struct Measured {
+pub(super) struct MeasuredTable {
     pub(super) angles: Angles,
     pub(super) symmetry: Symmetry,
     /// `polar` of the table, degrees.
@@ -118,8 +118,8 @@ pub(super) struct Measured {
 
 impl Profile {
     /// A profile of nothing but its light; what the file says besides is put in afterwards.
-    pub(super) fn new(measured: Measured) -> Self {
-        let Measured { angles, polar, .. } = measured;
+    pub(super) fn new(measured: MeasuredTable) -> Self {
+        let MeasuredTable { angles, polar, .. } = measured;
         let full = unfolded(measured.symmetry, measured.azimuth, measured.candela);
         let (azimuth, candela): (Vec<f64>, Vec<Vec<f64>>) = full.into_iter().unzip();
         let mut profile = Self {
@@ -223,7 +223,7 @@ impl Profile {
         let mean =
             |row: usize| 0.5 * (self.candela[plane * rows + row] + self.candela[next * rows + row]);
         let (p, q) = (self.polar[row], self.polar[row + 1]);
-        let flux = (to - from) * band(p, q, mean(row), mean(row + 1));
+        let flux = (to - from) * zone(p, q, mean(row), mean(row + 1));
         ([from, to, p, q], flux)
     }
 
@@ -284,7 +284,7 @@ fn between(a: f64, b: f64, share: f64) -> f64 {
 }
 
 /// `int (I_p + (I_q - I_p) (t - p) / (q - p)) sin t dt` from p to q.
-fn band(p: f64, q: f64, at_p: f64, at_q: f64) -> f64 {
+fn zone(p: f64, q: f64, at_p: f64, at_q: f64) -> f64 {
     let width = q - p;
     if width <= 0.0 {
         return 0.0;

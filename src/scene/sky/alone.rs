@@ -2,7 +2,7 @@
 
 use super::LIT_GROUND;
 use crate::color::{KM, Observer};
-use crate::data::{LEAVES, Leaves};
+use crate::data::{BANDS, Spectrum};
 use crate::scene::{LightKind, Material, PunctualLight, Scene};
 
 /// Is a light the sky, or the ground that the sky lights?
@@ -24,8 +24,8 @@ impl Scene {
     pub(crate) fn tristimulus(&self, light: &PunctualLight) -> [f64; 3] {
         let power = &self.spectra[light.light].power;
         Observer::cie1931().weights(&self.grid).map(|weights| {
-            let leaves = power.iter().zip(&light.shape).zip(weights);
-            leaves.map(|((p, s), weight)| KM * p * s * weight).sum()
+            let bands = power.iter().zip(&light.shape).zip(weights);
+            bands.map(|((p, s), weight)| KM * p * s * weight).sum()
         })
     }
 
@@ -46,7 +46,7 @@ impl Scene {
 
     /// Does anything shine but the sky and the ground that it lights?
     pub(crate) fn shines_beside_sky(&self) -> bool {
-        let bright = |shape: &Leaves| shape.iter().any(|&x| x > 0.0);
+        let bright = |shape: &Spectrum| shape.iter().any(|&x| x > 0.0);
         let emission = |m: &Material| m.emission.as_ref().is_some_and(|e| bright(&e.shape));
         (self.lights.iter()).any(|l| !is_of_sky(l) && bright(&l.shape))
             || self.materials.iter().any(emission)
@@ -60,14 +60,14 @@ impl Scene {
         }
         let mut scene = self.clone();
         for light in scene.lights.iter_mut().filter(|l| !is_of_sky(l)) {
-            light.shape = [0.0; LEAVES];
+            light.shape = [0.0; BANDS];
         }
         let emissions = scene
             .materials
             .iter_mut()
             .filter_map(|m| m.emission.as_mut());
         for emission in emissions {
-            emission.shape = [0.0; LEAVES];
+            emission.shape = [0.0; BANDS];
             emission.scale = 0.0;
         }
         Some(scene)

@@ -9,7 +9,7 @@ use super::cie::{Distribution, STEPS, level};
 use super::map::Map;
 use super::mixture::Spectral;
 use super::parts::{PARTS, PLACES};
-use crate::data::Leaves;
+use crate::data::Spectrum;
 use glam::DVec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -129,7 +129,7 @@ impl Sky {
     }
 
     /// What comes from a direction by the formula itself, W/(m2 sr nm), where the parts only stand for it.
-    pub(crate) fn exact(&self, direction: DVec3) -> Option<Leaves> {
+    pub(crate) fn exact(&self, direction: DVec3) -> Option<Spectrum> {
         match &self.dome {
             Dome::Spectral(sky) if direction.y > 0.0 => Some(sky.exact(direction)),
             _ => None,

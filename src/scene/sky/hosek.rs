@@ -11,7 +11,7 @@
 
 use crate::color::{KM, Observer};
 use crate::data::{
-    Grid, LEAVES, Leaves, Outside, SKYLIGHT_NM, TERMS, Table, WAVES, named, skylight,
+    BANDS, Grid, Outside, SKYLIGHT_NM, Spectrum, TERMS, Table, WAVES, named, skylight,
 };
 use glam::DVec3;
 
@@ -25,8 +25,8 @@ pub struct Hosek {
     /// Turbidity of the air, and reflectance of the ground under it.
     air: [f64; 2],
     terms: [[f64; TERMS]; WAVES],
-    /// What a leaf has of each wavelength.
-    leaves: Box<[Leaves; WAVES]>,
+    /// What a band has of each wavelength.
+    bands: Box<[Spectrum; WAVES]>,
 }
 
 impl Hosek {
@@ -40,7 +40,7 @@ impl Hosek {
             sun,
             air: [turbidity, albedo],
             terms: skylight(turbidity, albedo, height),
-            leaves: Box::new(std::array::from_fn(|wave| leaves_of(wave, grid))),
+            bands: Box::new(std::array::from_fn(|wave| bands_of(wave, grid))),
         }
     }
 
@@ -72,26 +72,26 @@ impl Hosek {
     }
 
     /// The spectrum that has these values at the wavelengths of the model.
-    pub(super) fn spectrum(&self, values: &[f64; WAVES]) -> Leaves {
-        std::array::from_fn(|leaf| {
-            let each = values.iter().zip(self.leaves.iter());
-            each.map(|(value, leaves)| value * leaves[leaf]).sum()
+    pub(super) fn spectrum(&self, values: &[f64; WAVES]) -> Spectrum {
+        std::array::from_fn(|band| {
+            let each = values.iter().zip(self.bands.iter());
+            each.map(|(value, bands)| value * bands[band]).sum()
         })
     }
 
     /// What a radiance of 1 at each wavelength has as a tristimulus value, Y in cd/m2.
     pub(super) fn tristimulus(&self, grid: &Grid) -> [DVec3; WAVES] {
         let observer = Observer::cie1931().weights(grid);
-        self.leaves.each_ref().map(|leaves| {
+        self.bands.each_ref().map(|bands| {
             let sum =
-                |weights: &Leaves| -> f64 { (0..LEAVES).map(|l| weights[l] * leaves[l]).sum() };
+                |weights: &Spectrum| -> f64 { (0..BANDS).map(|l| weights[l] * bands[l]).sum() };
             KM * DVec3::from_array(observer.each_ref().map(sum))
         })
     }
 }
 
-/// What the leaves have of a wavelength: the mean of what is 1 there and falls to 0 at its neighbours.
-fn leaves_of(wave: usize, grid: &Grid) -> Leaves {
+/// What the bands have of a wavelength: the mean of what is 1 there and falls to 0 at its neighbours.
+fn bands_of(wave: usize, grid: &Grid) -> Spectrum {
     let d65 = named("cie/D65").expect("D65 is built in").table;
     let daylight = |nm: f64| d65.at(nm, Outside::Zero);
     let first = |nm: f64| match wave {
@@ -174,18 +174,18 @@ mod tests {
         }
     }
 
-    /// The mean of a leaf between two wavelengths is that of the line; above the last it is held, below the first it falls off.
+    /// The mean of a band between two wavelengths is that of the line; above the last it is held, below the first it falls off.
     #[test]
     fn spectra_are_lines_between_the_wavelengths() {
         let grid = Grid::new(300.0, 780.0);
         let sky = Hosek::new(3.0, 0.2, direction(40.0, 0.0), &grid);
         let values = std::array::from_fn(|k| 1.0 + (k * k) as f64);
-        let leaves = sky.spectrum(&values);
-        for (leaf, got) in leaves.into_iter().enumerate() {
-            let nm = grid.middle(leaf);
+        let bands = sky.spectrum(&values);
+        for (band, got) in bands.into_iter().enumerate() {
+            let nm = grid.middle(band);
             let k = ((nm - 320.0) / 40.0).clamp(0.0, 9.0) as usize;
             let line = values[k] + (values[k + 1] - values[k]) * (nm - SKYLIGHT_NM[k]) / 40.0;
-            // A kink lies in every fifth leaf or so.
+            // A kink lies in every fifth band or so.
             match nm {
                 nm if nm < 307.0 => assert!(got < 0.2),
                 nm if nm < 322.0 => assert!(got <= values[0]),

@@ -2,12 +2,12 @@
 
 use super::Distribution;
 use super::dome::Sky;
-use super::light::{Light, of_sun, usual};
+use super::light::{SkyLight, of_sun, usual};
 use super::parts::PLACES;
 use super::sun::{angles, direction, position};
 use super::wish::{SkyType, SkyWish, SunPlace, TURBIDITY};
 use crate::color::{KM, Observer};
-use crate::data::{Grid, LEAVES, Leaves, nearest_of};
+use crate::data::{BANDS, Grid, Spectrum, nearest_of};
 use crate::scene::check::{Check, listed};
 use crate::scene::json::short;
 use crate::scene::{LightKind, LightSpectrum, PunctualLight};
@@ -41,9 +41,9 @@ pub(crate) fn join(
     }
     let toward = sun.as_ref().map(|sun| sun.toward);
     let light = match (wish.turbidity.zip(toward), kind, &wish.map) {
-        (Some((turbidity, sun)), ..) => Light::of_air(wish, turbidity, sun, grid, check)?,
-        (None, Some(kind), _) => Light::of_type(wish, kind, toward, grid, check)?,
-        (None, None, Some(path)) => Light::of_map(wish, path, grid, check)?,
+        (Some((turbidity, sun)), ..) => SkyLight::of_air(wish, turbidity, sun, grid, check)?,
+        (None, Some(kind), _) => SkyLight::of_type(wish, kind, toward, grid, check)?,
+        (None, None, Some(path)) => SkyLight::of_map(wish, path, grid, check)?,
         (None, None, None) => return None,
     };
     let mut makes = Makes {
@@ -225,7 +225,7 @@ struct Shining {
     /// The light of the file that it is.
     light: Option<usize>,
     spectrum: usize,
-    shape: Leaves,
+    shape: Spectrum,
     /// Its colour, in words.
     said: String,
 }
@@ -248,7 +248,7 @@ impl Makes<'_> {
     }
 
     /// Adds the lamps of a sky and of what lies below the horizon; also returns the index of their spectrum.
-    fn sky(&mut self, light: Light) -> (Sky, usize) {
+    fn sky(&mut self, light: SkyLight) -> (Sky, usize) {
         let spectrum = self.add_spectrum(light.spectrum);
         let mut below = light.below;
         if let Some(rho) = light.ground {
@@ -302,7 +302,7 @@ impl Makes<'_> {
             toward: sun.toward,
             light: sun.light,
             spectrum: self.add_spectrum(of_sun(kelvin, self.grid)),
-            shape: [lux; LEAVES],
+            shape: [lux; BANDS],
             said: format!("{kelvin:.0} K"),
         })
     }
@@ -313,7 +313,7 @@ impl Makes<'_> {
         wish: &SkyWish,
         toward: DVec3,
         spectrum: usize,
-        shape: Leaves,
+        shape: Spectrum,
     ) -> Option<Shining> {
         let own = self.size(spectrum, &shape);
         let lux = wish.sun.illuminance.unwrap_or(own);
@@ -323,7 +323,7 @@ impl Makes<'_> {
         let (spectrum, shape, said) = match wish.sun.kelvin {
             Some(kelvin) => {
                 let spectrum = self.add_spectrum(of_sun(kelvin, self.grid));
-                (spectrum, [lux; LEAVES], format!("{kelvin:.0} K"))
+                (spectrum, [lux; BANDS], format!("{kelvin:.0} K"))
             }
             None => (spectrum, shape.map(|x| x * lux / own), "of the map".into()),
         };
@@ -361,10 +361,10 @@ impl Makes<'_> {
     }
 
     /// Luminous size of a spectrum times a shape.
-    fn size(&self, spectrum: usize, shape: &Leaves) -> f64 {
+    fn size(&self, spectrum: usize, shape: &Spectrum) -> f64 {
         let luminous = Observer::cie1931().weights(self.grid)[1];
         let power = &self.spectra[spectrum].power;
-        (0..LEAVES)
+        (0..BANDS)
             .map(|l| KM * power[l] * shape[l] * luminous[l])
             .sum()
     }
@@ -385,7 +385,14 @@ impl Makes<'_> {
     }
 
     /// Adds a lamp, if it shines.
-    fn lamp(&mut self, name: &str, kind: LightKind, direction: DVec3, light: usize, shape: Leaves) {
+    fn lamp(
+        &mut self,
+        name: &str,
+        kind: LightKind,
+        direction: DVec3,
+        light: usize,
+        shape: Spectrum,
+    ) {
         if shape.iter().any(|&x| x > 0.0) {
             self.lights.push(PunctualLight {
                 name: name.into(),

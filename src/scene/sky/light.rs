@@ -6,11 +6,11 @@ use super::hosek::Hosek;
 use super::map::{Map, Wanted};
 use super::mixture::Spectral;
 use super::parts::PARTS;
-use super::picture::Picture;
+use super::picture::SkyPicture;
 use super::sun::angles;
-use super::wish::{BRIGHT, Brightness, KELVIN, SkyType, SkyWish};
+use super::wish::{BRIGHT, KELVIN, SkyBrightness, SkyType, SkyWish};
 use crate::color::{KM, Observer, Upsampler, primaries};
-use crate::data::{Grid, LEAVES, Leaves, Outside, Table, blackbody, daylight, named};
+use crate::data::{BANDS, Grid, Outside, Spectrum, Table, blackbody, daylight, named};
 use crate::scene::LightSpectrum;
 use crate::scene::check::Check;
 use crate::scene::json::short;
@@ -30,7 +30,7 @@ const PRIMARIES: [&str; PARTS] = [", red", ", green", ", blue"];
 const MOST_LUX: f64 = BRIGHT[1];
 
 /// What a sky shines with.
-pub(super) struct Light {
+pub(super) struct SkyLight {
     pub(super) dome: Dome,
     pub(super) said: String,
     /// What its parts are called besides.
@@ -38,15 +38,15 @@ pub(super) struct Light {
     /// Luminous size 1.
     pub(super) spectrum: LightSpectrum,
     /// Shares of it by part: irradiance of open level ground, and of a plane that looks down.
-    pub(super) above: [Leaves; PARTS],
-    pub(super) below: [Leaves; PARTS],
+    pub(super) above: [Spectrum; PARTS],
+    pub(super) below: [Spectrum; PARTS],
     /// Reflectance of open ground below the horizon, where that is what is seen there.
     pub(super) ground: Option<f64>,
     /// A sun of its own: toward it, and the share of the spectrum across its rays.
-    pub(super) sun: Option<(DVec3, Leaves)>,
+    pub(super) sun: Option<(DVec3, Spectrum)>,
 }
 
-impl Light {
+impl SkyLight {
     /// A sky of ISO 15469.
     pub(super) fn of_type(
         wish: &SkyWish,
@@ -63,8 +63,8 @@ impl Light {
             return None;
         }
         let lux = match wish.brightness {
-            Some(Brightness::Illuminance(lux)) => lux,
-            Some(Brightness::Luminance(zenith)) => zenith / luminance.zenith(),
+            Some(SkyBrightness::Illuminance(lux)) => lux,
+            Some(SkyBrightness::Luminance(zenith)) => zenith / luminance.zenith(),
             None => usual(kind, sun.map(|sun| angles(sun)[0]))[0],
         };
         let kelvin = wish.kelvin.unwrap_or(usual_kelvin(kind));
@@ -93,7 +93,7 @@ impl Light {
             names: SHADES,
             spectrum: own,
             above,
-            below: [[0.0; LEAVES]; PARTS],
+            below: [[0.0; BANDS]; PARTS],
             ground: Some(ground),
             sun: None,
         })
@@ -117,14 +117,14 @@ impl Light {
         let ground = wish.ground.unwrap_or(USUAL_GROUND);
         let sky = Spectral::new(Hosek::new(turbidity, ground, sun, grid), grid);
         let luminous = Observer::cie1931().weights(grid)[1];
-        let size = |power: &Leaves| -> f64 {
+        let size = |power: &Spectrum| -> f64 {
             let each = power.iter().zip(&luminous);
             each.map(|(p, y)| KM * p * y).sum()
         };
         let own = size(&sum_of(*sky.levels()));
         let factor = match wish.brightness {
-            Some(Brightness::Illuminance(lux)) => lux / own,
-            Some(Brightness::Luminance(zenith)) => zenith / size(&sky.exact(DVec3::Y)),
+            Some(SkyBrightness::Illuminance(lux)) => lux / own,
+            Some(SkyBrightness::Luminance(zenith)) => zenith / size(&sky.exact(DVec3::Y)),
             None => 1.0,
         };
         let power = sum_of(*sky.levels()).map(|x| x / own);
@@ -143,7 +143,7 @@ impl Light {
                 power,
             },
             dome: Dome::Spectral(Arc::new(sky)),
-            below: [[0.0; LEAVES]; PARTS],
+            below: [[0.0; BANDS]; PARTS],
             ground: Some(ground),
             sun: None,
         })
@@ -157,7 +157,7 @@ impl Light {
         check: &mut Check,
     ) -> Option<Self> {
         let place = format!("map '{}'", short(&path.display().to_string()));
-        let picture = match Picture::read(path) {
+        let picture = match SkyPicture::read(path) {
             Ok(picture) => picture,
             Err((what, next)) => {
                 check.problem(&place, what, next);
@@ -188,8 +188,8 @@ impl Light {
             levels.iter().zip(&luminance).map(|(e, y)| e * y).sum()
         };
         let white = match wish.brightness {
-            Some(Brightness::Illuminance(wanted)) => wanted / lux(above),
-            Some(Brightness::Luminance(white)) => white,
+            Some(SkyBrightness::Illuminance(wanted)) => wanted / lux(above),
+            Some(SkyBrightness::Luminance(white)) => white,
             None => 1.0,
         };
         let [up, down] = [above, below].map(|levels| white * lux(levels));
@@ -268,7 +268,7 @@ pub(super) fn of_sun(kelvin: f64, grid: &Grid) -> LightSpectrum {
     }
 }
 
-fn sum_of(parts: [Leaves; PARTS]) -> Leaves {
+fn sum_of(parts: [Spectrum; PARTS]) -> Spectrum {
     std::array::from_fn(|l| parts.iter().map(|part| part[l]).sum())
 }
 

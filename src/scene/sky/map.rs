@@ -8,7 +8,7 @@
 //! compensation").
 
 use super::parts::PARTS;
-use super::picture::Picture;
+use super::picture::SkyPicture;
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -55,7 +55,7 @@ impl Map {
     /// Of a picture, with what is taken out of it as its sun where one is looked for. `luminance`: of red, green and blue; `north`: where it is,
     /// radians clockwise from -Z.
     pub(super) fn new(
-        picture: Picture,
+        picture: SkyPicture,
         luminance: [f64; PARTS],
         north: f64,
         wanted: Wanted,
@@ -272,7 +272,7 @@ mod tests {
         let height = width / 2;
         let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let texels = places.map(|(x, y)| texel(x, y)).collect();
-        let picture = Picture::shrunk(width, height, texels);
+        let picture = SkyPicture::shrunk(width, height, texels);
         let wanted = Wanted {
             sun: false,
             below: true,

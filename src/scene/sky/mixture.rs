@@ -14,7 +14,7 @@
 use super::cie::level;
 use super::hosek::Hosek;
 use super::parts::PARTS;
-use crate::data::{Grid, Leaves, WAVES};
+use crate::data::{Grid, Spectrum, WAVES};
 use glam::{DMat2, DMat3, DVec2, DVec3, dvec2};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -38,7 +38,7 @@ pub struct Spectral {
     /// What each wavelength of the model brings to the radiance of each part, of which open level ground has an irradiance of 1.
     shares: [[f64; WAVES]; PARTS],
     /// Spectral irradiance of open level ground by each part, W/(m2 nm).
-    levels: [Leaves; PARTS],
+    levels: [Spectrum; PARTS],
 }
 
 impl Spectral {
@@ -99,7 +99,7 @@ impl Spectral {
     }
 
     /// Spectral irradiance of open level ground by each part, W/(m2 nm).
-    pub(super) fn levels(&self) -> &[Leaves; PARTS] {
+    pub(super) fn levels(&self) -> &[Spectrum; PARTS] {
         &self.levels
     }
 
@@ -114,7 +114,7 @@ impl Spectral {
     }
 
     /// What comes from a direction by the model itself, W/(m2 sr nm).
-    pub(super) fn exact(&self, direction: DVec3) -> Leaves {
+    pub(super) fn exact(&self, direction: DVec3) -> Spectrum {
         let radiance = self.model.radiance(direction);
         self.model.spectrum(&radiance.map(|x| self.scale * x))
     }
@@ -207,7 +207,7 @@ impl Samples {
             let back = lower * at + mean;
             let colour = DVec3::new(back.x, 1.0, back.y);
             let dark = regression[UNSEEN..].iter().any(|g| g.dot(colour) < 0.0);
-            Corner { at, colour, dark }
+            HullCorner { at, colour, dark }
         };
         let mut best: Option<((bool, f64), [DVec3; PARTS])> = None;
         for i in 0..SIDES {
@@ -231,7 +231,7 @@ impl Samples {
 }
 
 /// Where two sides meet.
-struct Corner {
+struct HullCorner {
     /// Among the chromaticities, brought to a standard deviation of 1.
     at: DVec2,
     /// Tristimulus value, of luminance 1.
@@ -269,7 +269,7 @@ mod tests {
                         360.0 * v,
                     );
                     let (exact, parts) = (sky.exact(d), sky.radiance(d));
-                    let mixed: Leaves = std::array::from_fn(|l| {
+                    let mixed: Spectrum = std::array::from_fn(|l| {
                         (0..PARTS).map(|k| parts[k] * sky.levels()[k][l]).sum()
                     });
                     let mean = exact.iter().sum::<f64>() / exact.len() as f64;
@@ -310,8 +310,8 @@ mod tests {
                 assert!((one - 1.0).abs() < 1e-3, "{turbidity} {height}: {one}");
             }
             let exact: [f64; 64] = level([64, 128], |d| sky.exact(d));
-            let mixed: Leaves = std::array::from_fn(|l| sky.levels().iter().map(|s| s[l]).sum());
-            let size = |s: &Leaves| -> f64 { s.iter().zip(&luminous).map(|(p, y)| p * y).sum() };
+            let mixed: Spectrum = std::array::from_fn(|l| sky.levels().iter().map(|s| s[l]).sum());
+            let size = |s: &Spectrum| -> f64 { s.iter().zip(&luminous).map(|(p, y)| p * y).sum() };
             assert!((size(&exact) / size(&mixed) - 1.0).abs() < 1e-3);
             for (l, (a, b)) in exact.iter().zip(mixed).enumerate() {
                 assert!(

@@ -46,4 +46,4 @@ pub use mixture::Spectral;
 pub use parts::{PARTS, PLACES};
 pub use sun::{Hours, direction};
 pub use wish::{BRIGHT, KELVIN, SUN_KELVIN, TURN};
-pub use wish::{Brightness, SkyName, SkyType, SkyWish, SunPlace, SunWish};
+pub use wish::{SkyBrightness, SkyName, SkyType, SkyWish, SunPlace, SunWish};

@@ -27,7 +27,7 @@ const SAME: f32 = 0.005;
 
 /// A picture of all directions, row by row from the top.
 #[derive(Debug)]
-pub(super) struct Picture {
+pub(super) struct SkyPicture {
     pub(super) width: usize,
     pub(super) height: usize,
     /// Red, green, blue: linear, finite, not negative.
@@ -37,7 +37,7 @@ pub(super) struct Picture {
     pub(super) warnings: Vec<String>,
 }
 
-impl Picture {
+impl SkyPicture {
     /// Reads a file.
     ///
     /// # Errors
@@ -193,7 +193,7 @@ mod tests {
         let mean = |texels: &[[f32; 3]], c: usize| {
             texels.iter().map(|t| f64::from(t[c])).sum::<f64>() / texels.len() as f64
         };
-        let small = Picture::shrunk(width, height, texels.clone());
+        let small = SkyPicture::shrunk(width, height, texels.clone());
         assert_eq!((small.width, small.height), (2048, 1024));
         for c in 0..3 {
             let [a, b] = [mean(&texels, c), mean(&small.texels, c)];

@@ -22,7 +22,7 @@
 use super::sun::Hours;
 use crate::scene::json::short;
 use crate::scene::reader::Reader;
-use crate::scene::uri::{self, Place};
+use crate::scene::uri::{self, UriTarget};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -115,7 +115,7 @@ impl FromStr for SkyName {
 /// How bright the sky is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub enum Brightness {
+pub enum SkyBrightness {
     /// Of open level ground, by the sky alone, lx.
     Illuminance(f64),
     /// Of the zenith, cd/m2.
@@ -217,7 +217,7 @@ pub struct SkyWish {
     /// What kind of sky.
     pub kind: Option<SkyType>,
     /// How bright: of a map, its white.
-    pub brightness: Option<Brightness>,
+    pub brightness: Option<SkyBrightness>,
     /// Turbidity of the sky of Hosek and Wilkie in the place of a kind.
     pub turbidity: Option<f64>,
     /// A picture of all directions in the place of a kind.
@@ -320,8 +320,8 @@ impl SkyWish {
                 reader.check.problem(place, what, next);
                 None
             }
-            (Some(lux), None) => Some(Brightness::Illuminance(lux)),
-            (None, luminance) => luminance.map(Brightness::Luminance),
+            (Some(lux), None) => Some(SkyBrightness::Illuminance(lux)),
+            (None, luminance) => luminance.map(SkyBrightness::Luminance),
         };
         match sky.get("sun") {
             None => {}
@@ -409,8 +409,8 @@ fn map(sky: &Map<String, Value>, place: &str, reader: &mut Reader) -> Option<Pat
     };
     let next = "name a .hdr or .exr inside the folder of the file that names it";
     match located {
-        Ok(Place::File(path)) => return Some(path),
-        Ok(Place::Here(_)) => reader.check.problem(place, "map is a data URI", next),
+        Ok(UriTarget::File(path)) => return Some(path),
+        Ok(UriTarget::Here(_)) => reader.check.problem(place, "map is a data URI", next),
         Err(why) => reader.check.problem(place, why, next),
     }
     None

@@ -14,7 +14,7 @@ fn open(to: &Receiver) -> f32 {
     if to.point.z > 0.0 { 1.0 } else { 0.25 }
 }
 
-impl Look for Fake {
+impl LeafSampler for Fake {
     fn weights(&self) -> &[f64] {
         &[1.0]
     }
@@ -59,7 +59,7 @@ fn random_points_find_the_light_that_others_see() {
             let area = tree.node(leaf).area;
             let mut memory = Memory::default();
             let mean = by_chance(&tree, leaf, &Fake, &stake, &mut memory);
-            let mut ended = Found::default();
+            let mut ended = LeafSamples::default();
             mean.end(&mut ended, 1);
             found[0] += area * f64::from(ended.rows[0]);
             found[1] += area * f64::from(ended.rows[0] * ended.whole[0]);

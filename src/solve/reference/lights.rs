@@ -1,11 +1,11 @@
 //! Direct light of lamps and skies at points and patches of the reference.
 
-use super::patch::{Patch, Place, add, radon};
-use super::ways::Ways;
+use super::patch::{Patch, PatchPoint, add, radon};
+use super::visibility::ReferenceVisibility;
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
 use crate::hierarchy::Mesh;
 use crate::scene::{LightKind, PunctualLight, Scene};
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 use std::f64::consts::PI;
 
 /// Points on a triangle of a lamp with a profile: where a shadow's edge crosses the lamp, irradiance is off by about .3
@@ -16,16 +16,16 @@ const SHINING_POINTS: u32 = 1024;
 const DOME_RAYS: u32 = 16_384;
 
 /// The lamps of a room, and the ways of their light.
-pub(super) struct Lamps<'a> {
+pub(super) struct ReferenceLamps<'a> {
     pub(super) scene: &'a Scene,
     pub(super) mesh: &'a Mesh,
-    pub(super) ways: &'a Ways<'a>,
+    pub(super) visibility: &'a ReferenceVisibility<'a>,
 }
 
-impl Lamps<'_> {
+impl ReferenceLamps<'_> {
     /// Mean irradiance of a patch.
-    pub(super) fn on(&self, patch: &Patch) -> Leaves {
-        let mut sum = [0.0; LEAVES];
+    pub(super) fn on(&self, patch: &Patch) -> Spectrum {
+        let mut sum = [0.0; BANDS];
         for (w, at) in radon() {
             add(&mut sum, &self.at(patch.place(at)), w);
         }
@@ -33,17 +33,17 @@ impl Lamps<'_> {
     }
 
     /// Irradiance at a place.
-    pub(super) fn at(&self, place: Place) -> Leaves {
-        let mut sum = [0.0; LEAVES];
+    pub(super) fn at(&self, place: PatchPoint) -> Spectrum {
+        let mut sum = [0.0; BANDS];
         for light in &self.scene.lights {
-            let mut brought = [0.0; LEAVES];
+            let mut brought = [0.0; BANDS];
             match light.kind {
                 LightKind::Sky(_) | LightKind::Ground(_) => self.dome(light, place, &mut brought),
                 LightKind::Surface => self.surface(light, place, &mut brought),
                 _ => self.point(light, place, &mut brought),
             }
             let power = &self.scene.spectra[light.light].power;
-            for l in 0..LEAVES {
+            for l in 0..BANDS {
                 sum[l] += brought[l] * power[l] * light.shape[l];
             }
         }
@@ -51,17 +51,17 @@ impl Lamps<'_> {
     }
 
     /// Irradiance by a light without extent, per unit of intensity: `I cos / r^2`.
-    fn point(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
+    fn point(&self, light: &PunctualLight, place: PatchPoint, sum: &mut Spectrum) {
         let parallel = light.kind.is_parallel();
         let end = match parallel {
             true => place.at - light.direction * (4.0 * self.mesh.half_size),
             false => light.position - self.mesh.centre,
         };
         let toward = (end - place.at).normalize_or_zero();
-        let spread = match light.kind {
+        let factor = match light.kind {
             LightKind::Profile => {
-                let spread = light.luminaire.as_ref();
-                spread.map_or(0.0, |l| l.per_lumen(-toward))
+                let luminaire = light.luminaire.as_ref();
+                luminaire.map_or(0.0, |l| l.per_lumen(-toward))
             }
             kind => kind.fall_off(-light.direction.dot(toward)),
         };
@@ -69,14 +69,14 @@ impl Lamps<'_> {
             true => 1.0,
             false => end.distance_squared(place.at),
         };
-        let factor = place.normal.dot(toward) * spread / square;
+        let factor = place.normal.dot(toward) * factor / square;
         if factor > 0.0 && factor.is_finite() {
-            self.ways.bring(sum, factor, place, end);
+            self.visibility.bring(sum, factor, place, end);
         }
     }
 
     /// Irradiance by a lamp with an extent, per unit of flux: many points, a ray to each.
-    fn surface(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
+    fn surface(&self, light: &PunctualLight, place: PatchPoint, sum: &mut Spectrum) {
         let Some(luminaire) = &light.luminaire else {
             return;
         };
@@ -93,7 +93,7 @@ impl Lamps<'_> {
                 if sent > 0.0 {
                     let part = sent * 0.5 * cross.length() / f64::from(SHINING_POINTS);
                     let before = from + own * (1e-5 * self.mesh.half_size);
-                    self.ways.bring(sum, part, place, before);
+                    self.visibility.bring(sum, part, place, before);
                 }
             }
         }
@@ -101,14 +101,14 @@ impl Lamps<'_> {
 
     /// Irradiance by a part of the sky that gives open level ground 1, or by ground of exitance 1: the mean over many
     /// directions.
-    fn dome(&self, light: &PunctualLight, place: Place, sum: &mut Leaves) {
+    fn dome(&self, light: &PunctualLight, place: PatchPoint, sum: &mut Spectrum) {
         let Some(sky) = &self.scene.sky else { return };
         for k in 0..DOME_RAYS {
             let d = cosine_direction(place.normal, sequence02(k, 0));
             if let Some(radiance) = sky.part(light.kind.place(), d) {
                 let end = place.at + d * (4.0 * self.mesh.half_size);
                 let part = PI * radiance / f64::from(DOME_RAYS);
-                self.ways.bring(sum, part, place, end);
+                self.visibility.bring(sum, part, place, end);
             }
         }
     }

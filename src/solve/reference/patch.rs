@@ -1,6 +1,6 @@
 //! Patches of the reference, and rules over them.
 
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use glam::DVec3;
 
 /// A flat triangular patch, one side.
@@ -15,15 +15,15 @@ pub struct Patch {
     /// Area.
     pub area: f64,
     /// Albedo.
-    pub reflectance: Leaves,
+    pub reflectance: Spectrum,
     /// Exitance, W/m2/nm.
-    pub exitance: Leaves,
+    pub exitance: Spectrum,
     /// Irradiance from punctual lights, W/m2/nm.
-    pub punctual: Leaves,
+    pub punctual: Spectrum,
     /// Index of the material.
     pub material: usize,
     /// Share of the light on the patch's other side that leaves this one.
-    pub transmittance: Leaves,
+    pub transmittance: Spectrum,
     /// The patch on the other side, if the material lets light through.
     pub behind: Option<usize>,
 }
@@ -48,7 +48,7 @@ pub(super) fn radon() -> [(f64, [f64; 3]); 7] {
     ]
 }
 
-pub(super) fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
+pub(super) fn add(sum: &mut Spectrum, x: &Spectrum, weight: f64) {
     for (s, x) in sum.iter_mut().zip(x) {
         *s += weight * x;
     }
@@ -56,7 +56,7 @@ pub(super) fn add(sum: &mut Leaves, x: &Leaves, weight: f64) {
 
 /// Where light is asked for.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct PatchPoint {
     pub(super) at: DVec3,
     pub(super) normal: DVec3,
     /// Plane that the place lies in: nothing in this plane blocks.
@@ -65,8 +65,8 @@ pub(super) struct Place {
 
 impl Patch {
     /// A place on the patch, by weights of its corners.
-    pub(super) fn place(&self, w: [f64; 3]) -> Place {
-        Place {
+    pub(super) fn place(&self, w: [f64; 3]) -> PatchPoint {
+        PatchPoint {
             at: self.corners[0] * w[0] + self.corners[1] * w[1] + self.corners[2] * w[2],
             normal: self.normal,
             plane: self.plane,

@@ -5,20 +5,20 @@
 
 use super::Method;
 use crate::color::Xyz;
-use crate::spectrum::{CmfTree, LEAVES, Leaves};
+use crate::spectrum::{BANDS, CmfTree, Spectrum};
 use nalgebra::{SMatrix, SymmetricEigen};
 
 /// m orthonormal vectors (in 1..=64) for lights and the reflectances of a scene, that of the greatest eigenvalue first.
-pub fn basis(lights: &[Leaves], reflectances: &[Leaves], m: usize) -> Vec<Leaves> {
-    let mut moments = SMatrix::<f64, LEAVES, LEAVES>::zeros();
-    let mut add = |spectrum: &Leaves| {
-        let v = SMatrix::<f64, LEAVES, 1>::from_fn(|k, _| spectrum[k]);
+pub fn basis(lights: &[Spectrum], reflectances: &[Spectrum], m: usize) -> Vec<Spectrum> {
+    let mut moments = SMatrix::<f64, BANDS, BANDS>::zeros();
+    let mut add = |spectrum: &Spectrum| {
+        let v = SMatrix::<f64, BANDS, 1>::from_fn(|k, _| spectrum[k]);
         moments.ger(1.0, &v, &v, 1.0);
     };
     for light in lights {
         add(light);
         for first in reflectances {
-            let once: Leaves = std::array::from_fn(|k| light[k] * first[k]);
+            let once: Spectrum = std::array::from_fn(|k| light[k] * first[k]);
             add(&once);
             for second in reflectances {
                 add(&std::array::from_fn(|k| once[k] * second[k]));
@@ -26,7 +26,7 @@ pub fn basis(lights: &[Leaves], reflectances: &[Leaves], m: usize) -> Vec<Leaves
         }
     }
     let eigen = SymmetricEigen::new(moments);
-    let mut order: Vec<usize> = (0..LEAVES).collect();
+    let mut order: Vec<usize> = (0..BANDS).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     order
         .iter()
@@ -38,20 +38,20 @@ pub fn basis(lights: &[Leaves], reflectances: &[Leaves], m: usize) -> Vec<Leaves
 /// Spectra as coordinates in a trained basis.
 #[derive(Debug, Clone)]
 pub struct Characteristic {
-    basis: Vec<Leaves>,
+    basis: Vec<Spectrum>,
     light: Vec<f64>,
     weights: Vec<Xyz>,
 }
 
 impl Characteristic {
     /// m vectors (in 1..=64) for a light and the reflectances of a scene.
-    pub fn new(cmf: &CmfTree, light: &Leaves, reflectances: &[Leaves], m: usize) -> Self {
+    pub fn new(cmf: &CmfTree, light: &Spectrum, reflectances: &[Spectrum], m: usize) -> Self {
         let basis = basis(&[*light], reflectances, m);
-        let dot = |a: &Leaves, b: &Leaves| (0..LEAVES).map(|k| a[k] * b[k]).sum::<f64>();
+        let dot = |a: &Spectrum, b: &Spectrum| (0..BANDS).map(|k| a[k] * b[k]).sum::<f64>();
         let coordinates = basis.iter().map(|e| dot(e, light)).collect();
         let weights = basis
             .iter()
-            .map(|e| cmf.leaves().each_ref().map(|a| dot(e, a)))
+            .map(|e| cmf.weights().each_ref().map(|a| dot(e, a)))
             .collect();
         Self {
             basis,
@@ -75,9 +75,9 @@ impl Method for Characteristic {
     }
 
     /// The matrix R_ij row by row.
-    fn material(&self, reflectance: &Leaves) -> Vec<f64> {
-        let entry = |i: &Leaves, j: &Leaves| {
-            (0..LEAVES)
+    fn material(&self, reflectance: &Spectrum) -> Vec<f64> {
+        let entry = |i: &Spectrum, j: &Spectrum| {
+            (0..BANDS)
                 .map(|k| reflectance[k] * i[k] * j[k])
                 .sum::<f64>()
         };

@@ -6,7 +6,7 @@
 
 use super::Method;
 use crate::color::Xyz;
-use crate::spectrum::{CmfTree, LEAVES, Leaves};
+use crate::spectrum::{BANDS, CmfTree, Spectrum};
 use nalgebra::{DMatrix, DVector};
 
 /// Coefficients of a piece.
@@ -22,17 +22,17 @@ pub struct Cubics {
 
 impl Cubics {
     /// n / 4 pieces; none unless n is a multiple of 4 in 4..=64.
-    pub fn new(cmf: &CmfTree, light: &Leaves, n: usize) -> Option<Self> {
-        if n == 0 || !n.is_multiple_of(ORDER) || n > LEAVES {
+    pub fn new(cmf: &CmfTree, light: &Spectrum, n: usize) -> Option<Self> {
+        if n == 0 || !n.is_multiple_of(ORDER) || n > BANDS {
             return None;
         }
         let pieces = n / ORDER;
         let mut weights = vec![[0.0; 3]; n];
-        for leaf in 0..LEAVES {
-            let (piece, x) = place(leaf, pieces);
+        for band in 0..BANDS {
+            let (piece, x) = place(band, pieces);
             for (i, t) in chebyshev(x).into_iter().enumerate() {
                 for a in 0..3 {
-                    weights[piece * ORDER + i][a] += light[leaf] * cmf.leaves()[a][leaf] * t;
+                    weights[piece * ORDER + i][a] += light[band] * cmf.weights()[a][band] * t;
                 }
             }
         }
@@ -40,9 +40,9 @@ impl Cubics {
     }
 }
 
-/// The piece that holds the middle of a leaf, and the position in it, in [-1, 1].
-fn place(leaf: usize, pieces: usize) -> (usize, f64) {
-    let at = (leaf as f64 + 0.5) / LEAVES as f64 * pieces as f64;
+/// The piece that holds the middle of a band, and the position in it, in [-1, 1].
+fn place(band: usize, pieces: usize) -> (usize, f64) {
+    let at = (band as f64 + 0.5) / BANDS as f64 * pieces as f64;
     (at as usize, 2.0 * at.fract() - 1.0)
 }
 
@@ -66,11 +66,11 @@ impl Method for Cubics {
             .collect()
     }
 
-    /// Least squares on the leaves of each piece, of which there are at least four.
-    fn material(&self, reflectance: &Leaves) -> Vec<f64> {
+    /// Least squares on the bands of each piece, of which there are at least four.
+    fn material(&self, reflectance: &Spectrum) -> Vec<f64> {
         let mut all = Vec::with_capacity(self.terms());
         for piece in 0..self.pieces {
-            let inside: Vec<(f64, f64)> = (0..LEAVES)
+            let inside: Vec<(f64, f64)> = (0..BANDS)
                 .filter_map(|k| {
                     Some(place(k, self.pieces))
                         .filter(|p| p.0 == piece)
@@ -121,10 +121,10 @@ mod tests {
 
     #[test]
     fn product_of_a_line_and_a_parabola_is_exact() {
-        let method = Cubics::new(&cmf(), &[1.0; LEAVES], 8).unwrap();
-        let line: Leaves = std::array::from_fn(|k| 0.2 + k as f64 / 100.0);
-        let parabola: Leaves = std::array::from_fn(|k| 0.9 - (k as f64 / 70.0).powi(2));
-        let product: Leaves = std::array::from_fn(|k| line[k] * parabola[k]);
+        let method = Cubics::new(&cmf(), &[1.0; BANDS], 8).unwrap();
+        let line: Spectrum = std::array::from_fn(|k| 0.2 + k as f64 / 100.0);
+        let parabola: Spectrum = std::array::from_fn(|k| 0.9 - (k as f64 / 70.0).powi(2));
+        let product: Spectrum = std::array::from_fn(|k| line[k] * parabola[k]);
         let mut out = vec![0.0; 8];
         method.reflect(
             &method.material(&line),

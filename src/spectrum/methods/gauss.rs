@@ -4,7 +4,7 @@
 //! C1 and C2 change sign, so their nodes are those of |w|, and their weights are interpolatory for w itself.
 
 use super::pointwise::{Pointwise, value_at};
-use crate::spectrum::{CmfTree, LEAVES, Leaves};
+use crate::spectrum::{BANDS, CmfTree, Spectrum};
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
 
 /// XYZ to AC1C2 (Meyer 1988, "Wavelength selection for synthetic image generation").
@@ -15,7 +15,7 @@ const AC1C2: [[f64; 3]; 3] = [
 ];
 
 /// n nodes (at least 3) shared out over X, Y and Z; X, which has two humps, gets the first of a rest.
-pub fn gauss_xyz(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
+pub fn gauss_xyz(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
     let counts = [n.div_ceil(3), (n + 1) / 3, n / 3];
     build(
         "Gauss XYZ",
@@ -27,19 +27,19 @@ pub fn gauss_xyz(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
 }
 
 /// n nodes (at least 4): half for A, a quarter for C1, the rest for C2, as in Meyer's 2 + 1 + 1.
-pub fn gauss_ac1c2(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
+pub fn gauss_ac1c2(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
     let (a, c1) = (n / 2, n.div_ceil(4));
     build("Gauss AC1C2", cmf, light, AC1C2, [a, c1, n - a - c1])
 }
 
 /// n nodes shared by X, Y and Z: those of light times (x_bar + y_bar + z_bar), with interpolatory weights for each of the
 /// three. Not in the publications; the errors of X, Y and Z then go together, which colour differences reward.
-pub fn gauss_shared(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
-    let functions: [Leaves; 3] = cmf
-        .leaves()
+pub fn gauss_shared(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
+    let functions: [Spectrum; 3] = cmf
+        .weights()
         .each_ref()
-        .map(|a| std::array::from_fn(|leaf| light[leaf] * a[leaf]));
-    let whole: Leaves = std::array::from_fn(|leaf| functions.iter().map(|f| f[leaf]).sum());
+        .map(|a| std::array::from_fn(|band| light[band] * a[band]));
+    let whole: Spectrum = std::array::from_fn(|band| functions.iter().map(|f| f[band]).sum());
     let (nodes, weights) = rule(&whole, &functions, n);
     let light = vec![1.0; nodes.len()];
     let weights = (0..nodes.len())
@@ -57,7 +57,7 @@ pub fn gauss_shared(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
 fn build(
     name: &'static str,
     cmf: &CmfTree,
-    light: &Leaves,
+    light: &Spectrum,
     space: [[f64; 3]; 3],
     counts: [usize; 3],
 ) -> Pointwise {
@@ -66,10 +66,10 @@ fn build(
         .expect("both spaces are bases");
     let (mut means, mut weights) = (Vec::new(), Vec::new());
     for (row, &count) in counts.iter().enumerate() {
-        let weight = std::array::from_fn(|leaf| {
-            light[leaf]
+        let weight = std::array::from_fn(|band| {
+            light[band]
                 * (0..3)
-                    .map(|a| space[row][a] * cmf.leaves()[a][leaf])
+                    .map(|a| space[row][a] * cmf.weights()[a][band])
                     .sum::<f64>()
         });
         let (nodes, [h]) = rule(&weight, &[weight], count);
@@ -82,31 +82,31 @@ fn build(
     Pointwise::new(name, means, weights, light)
 }
 
-/// Nodes (positions in leaves) of the weight |w|, and for each of `targets` the weights of the nodes for the sum over the
-/// leaves of f times the target.
+/// Nodes (positions in bands) of the weight |w|, and for each of `targets` the weights of the nodes for the sum over the
+/// bands of f times the target.
 ///
 /// Stieltjes' procedure gives the recurrence of the polynomials that are orthonormal under |w|; the eigenvalues of its
 /// Jacobi matrix are the nodes (Golub and Welsch 1969).
 fn rule<const N: usize>(
-    w: &Leaves,
-    targets: &[Leaves; N],
+    w: &Spectrum,
+    targets: &[Spectrum; N],
     count: usize,
 ) -> (Vec<f64>, [Vec<f64>; N]) {
     let total: f64 = w.iter().map(|w| w.abs()).sum();
-    // Fewer nodes than asked for if the weight lives on fewer leaves.
+    // Fewer nodes than asked for if the weight lives on fewer bands.
     let count = count.min(w.iter().filter(|w| **w != 0.0).count());
-    let x = |leaf: usize| leaf as f64 / LEAVES as f64;
+    let x = |band: usize| band as f64 / BANDS as f64;
     let mut jacobi = DMatrix::zeros(count, count);
-    let mut polynomials: Vec<Leaves> = vec![[1.0 / total.sqrt(); LEAVES]];
-    let inner = |p: &Leaves, q: &Leaves, power: i32| {
-        (0..LEAVES)
+    let mut polynomials: Vec<Spectrum> = vec![[1.0 / total.sqrt(); BANDS]];
+    let inner = |p: &Spectrum, q: &Spectrum, power: i32| {
+        (0..BANDS)
             .map(|k| p[k] * q[k] * w[k].abs() * x(k).powi(power))
             .sum::<f64>()
     };
     for j in 0..count {
         let p = polynomials[j];
         jacobi[(j, j)] = inner(&p, &p, 1);
-        let mut next: Leaves = std::array::from_fn(|k| x(k) * p[k]);
+        let mut next: Spectrum = std::array::from_fn(|k| x(k) * p[k]);
         // Against all that came before, not the last two alone: rounding would spoil the orthogonality.
         for q in &polynomials {
             let along = inner(q, &next, 0);
@@ -120,15 +120,11 @@ fn rule<const N: usize>(
         }
     }
     let eigen = SymmetricEigen::new(jacobi);
-    let nodes = eigen
-        .eigenvalues
-        .iter()
-        .map(|x| x * LEAVES as f64)
-        .collect();
+    let nodes = eigen.eigenvalues.iter().map(|x| x * BANDS as f64).collect();
     let weights = targets.each_ref().map(|target| {
         let moments: Vec<f64> = polynomials
             .iter()
-            .map(|p| (0..LEAVES).map(|k| p[k] * target[k]).sum())
+            .map(|p| (0..BANDS).map(|k| p[k] * target[k]).sum())
             .collect();
         // Components of an eigenvector are the polynomials at the node times the root of its weight under |w|.
         let weight = |i: usize| {
@@ -152,12 +148,12 @@ mod tests {
 
     #[test]
     fn n_nodes_are_exact_for_polynomials_of_degree_2n_minus_1() {
-        let w: Leaves = std::array::from_fn(|k| 1.0 + (k as f64 / 9.0).sin());
+        let w: Spectrum = std::array::from_fn(|k| 1.0 + (k as f64 / 9.0).sin());
         for n in 1..=5 {
             let (nodes, [weights]) = rule(&w, &[w], n);
             for degree in 0..2 * n as i32 {
                 let f = |x: f64| (x / 64.0).powi(degree);
-                let exact: f64 = (0..LEAVES).map(|k| w[k] * f(k as f64)).sum();
+                let exact: f64 = (0..BANDS).map(|k| w[k] * f(k as f64)).sum();
                 let ours: f64 = nodes.iter().zip(&weights).map(|(x, h)| h * f(*x)).sum();
                 assert!((ours - exact).abs() < 1e-10 * exact, "{n} {degree}");
             }
@@ -166,12 +162,12 @@ mod tests {
 
     #[test]
     fn a_weight_that_changes_sign_is_exact_to_degree_n_minus_1() {
-        let w: Leaves = std::array::from_fn(|k| (k as f64 / 9.0).sin());
+        let w: Spectrum = std::array::from_fn(|k| (k as f64 / 9.0).sin());
         for n in 1..=5 {
             let (nodes, [weights]) = rule(&w, &[w], n);
             for degree in 0..n as i32 {
                 let f = |x: f64| (x / 64.0).powi(degree);
-                let exact: f64 = (0..LEAVES).map(|k| w[k] * f(k as f64)).sum();
+                let exact: f64 = (0..BANDS).map(|k| w[k] * f(k as f64)).sum();
                 assert!(
                     (nodes
                         .iter()

@@ -26,7 +26,7 @@ pub use pointwise::Pointwise;
 pub use sampling::{bands, sampling};
 pub use segments::segments;
 
-use super::Leaves;
+use super::Spectrum;
 use crate::color::Xyz;
 
 /// A way to hold spectra under one light as a few numbers.
@@ -41,7 +41,7 @@ pub trait Method {
     fn light(&self) -> Vec<f64>;
 
     /// A reflectance, ready for [`Method::reflect`].
-    fn material(&self, reflectance: &Leaves) -> Vec<f64>;
+    fn material(&self, reflectance: &Spectrum) -> Vec<f64>;
 
     /// `out` becomes the spectrum after reflection; both have [`Method::terms`] numbers. Does not allocate.
     fn reflect(&self, spectrum: &[f64], material: &[f64], out: &mut [f64]);
@@ -54,9 +54,9 @@ pub trait Method {
 mod tests {
     use super::*;
     use crate::color::de_luv;
-    use crate::spectrum::study::{Chart, Reflectances};
+    use crate::spectrum::study::{ColourChart, Reflectances};
 
-    fn all(chart: &Chart, light: &Leaves, n: usize) -> Vec<Box<dyn Method>> {
+    fn all(chart: &ColourChart, light: &Spectrum, n: usize) -> Vec<Box<dyn Method>> {
         let cmf = &chart.cmf;
         let mut all: Vec<Box<dyn Method>> = vec![
             Box::new(sampling(cmf, light, n)),
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn every_method_keeps_the_white() {
-        let chart = Chart::new(Reflectances::Babelcolor);
+        let chart = ColourChart::new(Reflectances::Babelcolor);
         for light in chart.lights() {
             for n in [4, 6, 8, 10, 12, 16] {
                 for method in all(&chart, &light.power, n) {
@@ -92,11 +92,11 @@ mod tests {
 
     #[test]
     fn errors_of_a_smooth_reflectance_fall_with_the_number_of_terms() {
-        let chart = Chart::new(Reflectances::Babelcolor);
+        let chart = ColourChart::new(Reflectances::Babelcolor);
         let light = chart.light("D65");
         let exact = crate::color::tristimulus(
             &std::array::from_fn(|k| light.power[k] * chart.reflectances[0][k]),
-            chart.cmf.leaves(),
+            chart.cmf.weights(),
         );
         for (few, many) in all(&chart, &light.power, 4)
             .iter()
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn sixty_four_samples_are_the_reference() {
-        let chart = Chart::new(Reflectances::Ohta);
+        let chart = ColourChart::new(Reflectances::Ohta);
         for light in chart.lights() {
             for method in [
                 sampling(&chart.cmf, &light.power, 64),
@@ -133,7 +133,7 @@ mod tests {
                     method.reflect(&method.light(), &method.material(r), &mut out);
                     let exact = crate::color::tristimulus(
                         &std::array::from_fn(|k| light.power[k] * r[k]),
-                        chart.cmf.leaves(),
+                        chart.cmf.weights(),
                     );
                     assert!((0..3).all(|a| (method.xyz(&out)[a] - exact[a]).abs() < 1e-12));
                 }

@@ -1,16 +1,16 @@
-//! Methods whose product is term by term: each term is a weighted mean of the leaves, and tristimulus values are sums of
+//! Methods whose product is term by term: each term is a weighted mean of the bands, and tristimulus values are sums of
 //! the terms with fixed weights.
 
 use super::Method;
 use crate::color::Xyz;
-use crate::spectrum::{LEAVES, Leaves};
+use crate::spectrum::{BANDS, Spectrum};
 
-/// n terms, each a mean of the leaves.
+/// n terms, each a mean of the bands.
 #[derive(Debug, Clone)]
 pub struct Pointwise {
     name: &'static str,
-    /// The means: for each term the weights of the leaves, of sum 1.
-    means: Vec<Leaves>,
+    /// The means: for each term the weights of the bands, of sum 1.
+    means: Vec<Spectrum>,
     /// Tristimulus weights of each term.
     weights: Vec<Xyz>,
     /// The light's terms; all 1 where the light is in the weights.
@@ -21,7 +21,7 @@ impl Pointwise {
     /// From means, weights and the light's terms. The weights are scaled so that the light has Y = 1.
     pub(super) fn new(
         name: &'static str,
-        means: Vec<Leaves>,
+        means: Vec<Spectrum>,
         weights: Vec<Xyz>,
         light: Vec<f64>,
     ) -> Self {
@@ -39,7 +39,7 @@ impl Pointwise {
     }
 
     /// The terms of a spectrum.
-    pub fn terms_of(&self, spectrum: &Leaves) -> Vec<f64> {
+    pub fn terms_of(&self, spectrum: &Spectrum) -> Vec<f64> {
         self.means
             .iter()
             .map(|mean| mean_of(mean, spectrum))
@@ -48,15 +48,15 @@ impl Pointwise {
 }
 
 /// The mean of a spectrum with given weights.
-pub(super) fn mean_of(mean: &Leaves, spectrum: &Leaves) -> f64 {
-    (0..LEAVES).map(|leaf| mean[leaf] * spectrum[leaf]).sum()
+pub(super) fn mean_of(mean: &Spectrum, spectrum: &Spectrum) -> f64 {
+    (0..BANDS).map(|band| mean[band] * spectrum[band]).sum()
 }
 
-/// The mean that is the value at a position in leaves (leaf k's value holds at k), linear between, in [0, 63].
-pub(super) fn value_at(position: f64) -> Leaves {
-    let position = position.clamp(0.0, (LEAVES - 1) as f64);
-    let below = (position as usize).min(LEAVES - 2);
-    let mut mean = [0.0; LEAVES];
+/// The mean that is the value at a position in bands (band k's value holds at k), linear between, in [0, 63].
+pub(super) fn value_at(position: f64) -> Spectrum {
+    let position = position.clamp(0.0, (BANDS - 1) as f64);
+    let below = (position as usize).min(BANDS - 2);
+    let mut mean = [0.0; BANDS];
     mean[below] = 1.0 - (position - below as f64);
     mean[below + 1] = position - below as f64;
     mean
@@ -75,7 +75,7 @@ impl Method for Pointwise {
         self.light.clone()
     }
 
-    fn material(&self, reflectance: &Leaves) -> Vec<f64> {
+    fn material(&self, reflectance: &Spectrum) -> Vec<f64> {
         self.terms_of(reflectance)
     }
 

@@ -6,24 +6,24 @@
 //! cut: here into pieces of equal weight.
 
 use super::pointwise::{Pointwise, value_at};
-use crate::spectrum::{CmfTree, LEAVES, Leaves};
+use crate::spectrum::{BANDS, CmfTree, Spectrum};
 
-/// A leaf is a line where the light exceeds the mean of its neighbours by this share of it.
+/// A band is a line where the light exceeds the mean of its neighbours by this share of it.
 const LINE: f64 = 0.5;
 
 /// n segments, of which at most half are spent on lines, the strongest first.
-pub fn segments(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
-    let visible: Leaves =
-        std::array::from_fn(|k| light[k] * cmf.leaves().iter().map(|a| a[k]).sum::<f64>());
-    let continuum = |k: usize| 0.5 * (light[k.max(1) - 1] + light[(k + 1).min(LEAVES - 1)]);
-    let mut lines: Vec<usize> = (0..LEAVES)
+pub fn segments(cmf: &CmfTree, light: &Spectrum, n: usize) -> Pointwise {
+    let visible: Spectrum =
+        std::array::from_fn(|k| light[k] * cmf.weights().iter().map(|a| a[k]).sum::<f64>());
+    let continuum = |k: usize| 0.5 * (light[k.max(1) - 1] + light[(k + 1).min(BANDS - 1)]);
+    let mut lines: Vec<usize> = (0..BANDS)
         .filter(|&k| light[k] > (1.0 + LINE) * continuum(k) && visible[k] > 0.0)
         .collect();
     lines.sort_by(|&a, &b| visible[b].total_cmp(&visible[a]));
     lines.truncate(n / 2);
 
     let mut groups: Vec<Vec<usize>> = lines.iter().map(|&k| vec![k]).collect();
-    let rest: Vec<usize> = (0..LEAVES)
+    let rest: Vec<usize> = (0..BANDS)
         .filter(|k| visible[*k] > 0.0 && !lines.contains(k))
         .collect();
     let total: f64 = rest.iter().map(|&k| visible[k]).sum();
@@ -31,7 +31,7 @@ pub fn segments(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
     let mut pieces = vec![Vec::new(); parts];
     let mut before = 0.0;
     for k in rest {
-        // The leaf goes where its middle falls; the share is below 1, so the index is below `parts`.
+        // The band goes where its middle falls; the share is below 1, so the index is below `parts`.
         let share = (before + 0.5 * visible[k]) / total;
         pieces[((share * parts as f64) as usize).min(parts - 1)].push(k);
         before += visible[k];
@@ -41,12 +41,12 @@ pub fn segments(cmf: &CmfTree, light: &Leaves, n: usize) -> Pointwise {
     let weights = groups
         .iter()
         .map(|group| {
-            cmf.leaves()
+            cmf.weights()
                 .each_ref()
                 .map(|a| group.iter().map(|&k| light[k] * a[k]).sum())
         })
         .collect();
-    let means: Vec<Leaves> = groups
+    let means: Vec<Spectrum> = groups
         .iter()
         .map(|group| {
             let weight: f64 = group.iter().map(|&k| visible[k]).sum();

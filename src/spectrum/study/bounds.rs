@@ -1,11 +1,11 @@
 //! How good the bound of the neglected term is: violations (there must be none) and looseness.
 //!
 //! Lists come from the guaranteed control of the tests; for every product the bound of the estimator's error is held
-//! against its true error from the 64 leaves.
+//! against its true error from the 64 bands.
 
-use super::chart::{Chart, Light};
+use super::colour_chart::{ColourChart, UnitLight};
 use super::modes::percentile;
-use super::walk::{LEVELS, Start, sample};
+use super::walk::{LEVELS, WalkStart, sample};
 use crate::color::tristimulus;
 use crate::spectrum::{Bounded, Control, Metric, control, represent};
 use serde::Serialize;
@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1e-12;
 /// One light and level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Row {
+pub struct BoundsRow {
     /// Name of the light.
     pub light: &'static str,
     /// Name of the level.
@@ -36,8 +36,8 @@ pub struct Row {
 }
 
 /// Checks every product of one light, 24 + 24^2 + 24^3.
-pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
-    let start = Start::<Bounded>::new(chart, light);
+pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<BoundsRow> {
+    let start = WalkStart::<Bounded>::new(chart, light);
     let settings = Control {
         overshoot: crate::spectrum::Overshoot::TakeBack,
         ..Control::PAPER
@@ -49,7 +49,7 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
     let samples = sample(&start, &list, |list, path| {
         let level = path.reflections.len() - 1;
         let operation = control(list, path, &chart.cmf, &Metric::Xyz, &settings);
-        let truth = tristimulus(&path.leaves(), chart.cmf.leaves());
+        let truth = tristimulus(&path.spectrum(), chart.cmf.weights());
         let (told, radius) = (list.corrected_xyz(&chart.cmf), list.radius());
         let off: [f64; 3] = std::array::from_fn(|a| (truth[a] - told[a]).abs());
         violations[level] += usize::from((0..3).any(|a| off[a] > radius[a] + ROUNDING));
@@ -57,7 +57,7 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
             Metric::Xyz.size(off, [0.0; 3]),
             Metric::Xyz.size([0.0; 3], radius),
         );
-        // A product on leaves alone has no error and no radius.
+        // A product on bands alone has no error and no radius.
         if error > ROUNDING {
             loose[level].push(bound / error);
         }
@@ -71,7 +71,7 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
                 .iter()
                 .filter(|s| s.xyz_error > settings.eps_max)
                 .count();
-            Row {
+            BoundsRow {
                 light: light.name,
                 level: LEVELS[level],
                 products,

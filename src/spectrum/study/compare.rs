@@ -1,9 +1,9 @@
 //! The methods of section 2 and the adaptive list on the same work, at equal numbers of terms.
 
-use super::chart::{Chart, Light};
+use super::colour_chart::{ColourChart, UnitLight};
 use super::modes::{adaptive_at_count, percentile};
 use crate::color::{Xyz, de_luv, tristimulus};
-use crate::spectrum::Leaves;
+use crate::spectrum::Spectrum;
 use crate::spectrum::methods::{
     Characteristic, Cubics, Method, bands, gauss_ac1c2, gauss_shared, gauss_xyz, sampling, segments,
 };
@@ -16,7 +16,7 @@ pub const TERMS: [usize; 6] = [4, 6, 8, 10, 12, 16];
 /// One light, method and number of terms.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Row {
+pub struct ComparisonRow {
     /// Name of the light.
     pub light: &'static str,
     /// Name of the method.
@@ -39,8 +39,9 @@ pub struct Row {
 struct Exact([Vec<Xyz>; 3]);
 
 impl Exact {
-    fn new(chart: &Chart, light: &Light) -> Self {
-        let times = |a: &Leaves, b: &Leaves| -> Leaves { std::array::from_fn(|k| a[k] * b[k]) };
+    fn new(chart: &ColourChart, light: &UnitLight) -> Self {
+        let times =
+            |a: &Spectrum, b: &Spectrum| -> Spectrum { std::array::from_fn(|k| a[k] * b[k]) };
         let mut levels = [vec![light.power], Vec::new(), Vec::new(), Vec::new()];
         for level in 0..3 {
             levels[level + 1] = levels[level]
@@ -51,14 +52,14 @@ impl Exact {
         let [_, a, b, c] = levels;
         Self([a, b, c].map(|all| {
             all.iter()
-                .map(|s| tristimulus(s, chart.cmf.leaves()))
+                .map(|s| tristimulus(s, chart.cmf.weights()))
                 .collect()
         }))
     }
 }
 
 /// Compares everything under one light.
-pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
+pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<ComparisonRow> {
     let exact = Exact::new(chart, light);
     let mut rows = Vec::new();
     for n in TERMS {
@@ -79,15 +80,15 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
         );
         for (name, samples) in adaptive_at_count(chart, light, n) {
             let figures = samples.map(figures);
-            rows.push(Row::new(light, name, n, figures, None));
+            rows.push(ComparisonRow::new(light, name, n, figures, None));
         }
     }
     rows
 }
 
-impl Row {
+impl ComparisonRow {
     fn new(
-        light: &Light,
+        light: &UnitLight,
         method: &'static str,
         terms: usize,
         levels: [[f64; 3]; 3],
@@ -118,7 +119,13 @@ fn figures(mut values: Vec<f64>) -> [f64; 3] {
     ]
 }
 
-fn fixed(method: &dyn Method, chart: &Chart, light: &Light, exact: &Exact, n: usize) -> Row {
+fn fixed(
+    method: &dyn Method,
+    chart: &ColourChart,
+    light: &UnitLight,
+    exact: &Exact,
+    n: usize,
+) -> ComparisonRow {
     let materials: Vec<Vec<f64>> = chart
         .reflectances
         .iter()
@@ -155,5 +162,5 @@ fn fixed(method: &dyn Method, chart: &Chart, light: &Light, exact: &Exact, n: us
                 .collect(),
         )
     });
-    Row::new(light, method.name(), n, levels, Some(time))
+    ComparisonRow::new(light, method.name(), n, levels, Some(time))
 }

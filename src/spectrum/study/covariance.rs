@@ -5,12 +5,12 @@
 //! for all pairs of n materials has 127 * 3 * n (n + 1) / 2 numbers. Here it is set against means alone (the corrected
 //! values of a list), on the cuts of perceptual control of the ratio to the light.
 
-use super::chart::{Chart, Light};
-use super::modes::{Spread, ratio};
-use super::walk::{Extent, LEVELS, Start, walk};
+use super::colour_chart::{ColourChart, UnitLight};
+use super::modes::{DifferenceSummary, ratio};
+use super::walk::{Extent, LEVELS, WalkStart, walk};
 use crate::color::{Xyz, de_luv, luv_jacobian, tristimulus};
 use crate::spectrum::{
-    CmfTree, Control, Leaves, List, Metric, Moment, NODES, Partition, control, node, represent,
+    CmfTree, Control, List, Metric, Moment, NODES, Partition, Spectrum, control, node, represent,
     span,
 };
 use serde::Serialize;
@@ -21,7 +21,7 @@ const LIMIT: f64 = 1.0;
 /// One light and level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Row {
+pub struct CovarianceRow {
     /// Name of the light.
     pub light: &'static str,
     /// Name of the level.
@@ -29,9 +29,9 @@ pub struct Row {
     /// Average number of intervals.
     pub intervals_mean: f64,
     /// dE*uv of products of means.
-    pub means: Spread,
+    pub means: DifferenceSummary,
     /// dE*uv with the covariances of all pairs.
-    pub covariances: Spread,
+    pub covariances: DifferenceSummary,
 }
 
 /// Means and covariances of reflectances on every node, for each tristimulus value.
@@ -44,7 +44,7 @@ struct Moments<'a> {
 }
 
 impl<'a> Moments<'a> {
-    fn new(cmf: &'a CmfTree, reflectances: &[Leaves]) -> Self {
+    fn new(cmf: &'a CmfTree, reflectances: &[Spectrum]) -> Self {
         let over_nodes = |f: &dyn Fn(usize) -> Xyz| {
             (0..NODES)
                 .map(|n| if n == 0 { [0.0; 3] } else { f(n) })
@@ -97,16 +97,16 @@ fn mean(cmf: &CmfTree, n: usize, f: impl Fn(usize) -> f64) -> Xyz {
     std::array::from_fn(|a| {
         let total = cmf.node(n)[a];
         let sum: f64 = (first..first + len)
-            .map(|k| f(k) * cmf.leaves()[a][k])
+            .map(|k| f(k) * cmf.weights()[a][k])
             .sum();
         if total > 0.0 { sum / total } else { 0.0 }
     })
 }
 
 /// Measures one light.
-pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
+pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<CovarianceRow> {
     let (chart, one) = ratio(chart, light);
-    let start = Start::<Moment>::new(&chart, &one);
+    let start = WalkStart::<Moment>::new(&chart, &one);
     let moments = Moments::new(&chart.cmf, &chart.reflectances);
     let luv = |colour: Xyz| Metric::Luv(luv_jacobian(colour, light.white));
     let source = represent(start.source(), &chart.cmf, &luv(light.white), LIMIT);
@@ -126,7 +126,7 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
                 &Control::within(LIMIT),
             );
             let level = path.reflections.len() - 1;
-            let reference = tristimulus(exact, chart.cmf.leaves());
+            let reference = tristimulus(exact, chart.cmf.weights());
             let materials = path_of.next(level);
             errors[level].0.push(de_luv(
                 reference,
@@ -144,12 +144,12 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
     let rows = errors
         .into_iter()
         .enumerate()
-        .map(|(level, (means, covariances))| Row {
+        .map(|(level, (means, covariances))| CovarianceRow {
             light: light.name,
             level: LEVELS[level],
             intervals_mean: intervals[level] as f64 / means.len() as f64,
-            means: Spread::new(means),
-            covariances: Spread::new(covariances),
+            means: DifferenceSummary::new(means),
+            covariances: DifferenceSummary::new(covariances),
         });
     rows.collect()
 }
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn covariances_make_primary_and_secondary_reflections_exact() {
-        let chart = Chart::new(Reflectances::Babelcolor);
+        let chart = ColourChart::new(Reflectances::Babelcolor);
         let rows = measure(&chart, &chart.light("F2"));
         assert!(rows[0].means.max < 1e-9 && rows[0].covariances.max < 1e-9);
         assert!(rows[1].covariances.max < 1e-9 && rows[1].means.max > 0.01);

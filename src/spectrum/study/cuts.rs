@@ -5,11 +5,11 @@
 //! interval, so the table of the best sums for each node and count keeps several candidates, not one: what is found
 //! is the best known, an upper bound of the optimum.
 
-use super::chart::{Chart, Light};
+use super::colour_chart::{ColourChart, UnitLight};
 use crate::color::{luv_jacobian, tristimulus};
 use crate::spectrum::{
-    Control, Estimate, LEAVES, Leaves, List, Metric, Partition, Representative, Tree, coarsen,
-    represent, span,
+    BANDS, Control, DyadicTree, Estimate, List, Metric, Partition, Representative, Spectrum,
+    coarsen, represent, span,
 };
 use serde::Serialize;
 
@@ -23,7 +23,7 @@ const STRIDE: usize = 16;
 /// Means of dE*uv (first order) over secondary reflections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Row {
+pub struct CutsRow {
     /// Name of the light.
     pub light: &'static str,
     /// Number of intervals.
@@ -37,10 +37,10 @@ pub struct Row {
 }
 
 /// Measures one light.
-pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
-    let mut rows: Vec<Row> = COUNTS
+pub fn measure(chart: &ColourChart, light: &UnitLight) -> Vec<CutsRow> {
+    let mut rows: Vec<CutsRow> = COUNTS
         .iter()
-        .map(|&intervals| Row {
+        .map(|&intervals| CutsRow {
             light: light.name,
             intervals,
             split: 0.0,
@@ -52,13 +52,13 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
         .reflectances
         .iter()
         .flat_map(|a| chart.reflectances.iter().map(move |b| (a, b)));
-    let spectra: Vec<Leaves> = pairs
+    let spectra: Vec<Spectrum> = pairs
         .step_by(STRIDE)
         .map(|(a, b)| std::array::from_fn(|k| light.power[k] * a[k] * b[k]))
         .collect();
     for spectrum in &spectra {
-        let tree = Tree::<Estimate>::new(spectrum, &chart.cmf);
-        let jacobian = luv_jacobian(tristimulus(spectrum, chart.cmf.leaves()), light.white);
+        let tree = DyadicTree::<Estimate>::new(spectrum, &chart.cmf);
+        let jacobian = luv_jacobian(tristimulus(spectrum, chart.cmf.weights()), light.white);
         let metric = Metric::Luv(jacobian);
         let best = search(&tree, &metric);
         for row in &mut rows {
@@ -77,7 +77,12 @@ pub fn measure(chart: &Chart, light: &Light) -> Vec<Row> {
 }
 
 /// n intervals by halving: the limit is lowered until there are enough.
-fn halved(tree: &Tree<Estimate>, chart: &Chart, metric: &Metric, n: usize) -> List<Estimate> {
+fn halved(
+    tree: &DyadicTree<Estimate>,
+    chart: &ColourChart,
+    metric: &Metric,
+    n: usize,
+) -> List<Estimate> {
     let mut list = List::new(tree, Partition::ROOT);
     while list.partition().count() < n {
         // Just below its present error the list has to take one more step, or several.
@@ -92,8 +97,13 @@ fn halved(tree: &Tree<Estimate>, chart: &Chart, metric: &Metric, n: usize) -> Li
 }
 
 /// n intervals by merging, with the averages of eq. 3.
-fn merged(tree: &Tree<Estimate>, chart: &Chart, metric: &Metric, n: usize) -> List<Estimate> {
-    let mut list = List::new(tree, Partition::LEAVES);
+fn merged(
+    tree: &DyadicTree<Estimate>,
+    chart: &ColourChart,
+    metric: &Metric,
+    n: usize,
+) -> List<Estimate> {
+    let mut list = List::new(tree, Partition::BANDS);
     let settings = Control {
         representative: Representative::Projection,
         floor: n,
@@ -104,12 +114,12 @@ fn merged(tree: &Tree<Estimate>, chart: &Chart, metric: &Metric, n: usize) -> Li
 }
 
 /// Least length for each number of intervals up to the greatest of [`COUNTS`].
-fn search(tree: &Tree<Estimate>, metric: &Metric) -> Vec<f64> {
+fn search(tree: &DyadicTree<Estimate>, metric: &Metric) -> Vec<f64> {
     let most = COUNTS[COUNTS.len() - 1];
     let length = |e: &[f64; 3]| metric.size(*e, [0.0; 3]);
     // candidates[node][count]: sums of errors.
-    let mut candidates: Vec<Vec<Vec<[f64; 3]>>> = vec![vec![Vec::new(); most + 1]; 2 * LEAVES];
-    for n in (1..2 * LEAVES).rev() {
+    let mut candidates: Vec<Vec<Vec<[f64; 3]>>> = vec![vec![Vec::new(); most + 1]; 2 * BANDS];
+    for n in (1..2 * BANDS).rev() {
         candidates[n][1].push(tree.node(n).error);
         let (_, len) = span(n);
         for count in 2..=most.min(len) {
@@ -141,7 +151,7 @@ mod tests {
 
     #[test]
     fn the_search_is_at_least_as_good_as_either_greedy_choice() {
-        let chart = Chart::new(Reflectances::Babelcolor);
+        let chart = ColourChart::new(Reflectances::Babelcolor);
         for row in measure(&chart, &chart.light("D65")) {
             assert!(row.best <= row.merge && row.best <= row.split, "{row:?}");
             assert!(row.best >= 0.0 && row.merge > 0.0, "{row:?}");

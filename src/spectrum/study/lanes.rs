@@ -1,11 +1,11 @@
-//! Spectra as vectors of f32, for measuring what a product and a change to XYZ cost at best: dense (64 leaves, four vectors
+//! Spectra as vectors of f32, for measuring what a product and a change to XYZ cost at best: dense (64 bands, four vectors
 //! of 16) and on a given cut (8 or 16 lanes, zeros in the spare ones). Both run the same code.
 
 use std::ops::{Add, Mul};
 use wide::{f32x8, f32x16};
 
 /// A vector of f32.
-pub(super) trait Lane: Copy + Add<Output = Self> + Mul<Output = Self> {
+pub(super) trait SimdVector: Copy + Add<Output = Self> + Mul<Output = Self> {
     /// Number of lanes.
     const WIDTH: usize;
 
@@ -21,7 +21,7 @@ pub(super) trait Lane: Copy + Add<Output = Self> + Mul<Output = Self> {
 
 macro_rules! lane {
     ($vector:ty, $width:expr) => {
-        impl Lane for $vector {
+        impl SimdVector for $vector {
             const WIDTH: usize = $width;
 
             #[inline]
@@ -47,10 +47,10 @@ lane!(f32x8, 8);
 lane!(f32x16, 16);
 
 /// A spectrum in N vectors.
-pub(super) type Row<V, const N: usize> = [V; N];
+pub(super) type VectorRow<V, const N: usize> = [V; N];
 
 /// Up to `N * V::WIDTH` values as vectors; the rest is zero.
-pub(super) fn row<V: Lane, const N: usize>(values: &[f32]) -> Row<V, N> {
+pub(super) fn row<V: SimdVector, const N: usize>(values: &[f32]) -> VectorRow<V, N> {
     std::array::from_fn(|i| {
         V::load(&values[(i * V::WIDTH).min(values.len())..((i + 1) * V::WIDTH).min(values.len())])
     })
@@ -58,10 +58,10 @@ pub(super) fn row<V: Lane, const N: usize>(values: &[f32]) -> Row<V, N> {
 
 /// A spectrum after each of several materials.
 #[inline]
-pub(super) fn products<V: Lane, const N: usize>(
-    s: &Row<V, N>,
-    materials: &[Row<V, N>],
-    out: &mut [Row<V, N>],
+pub(super) fn products<V: SimdVector, const N: usize>(
+    s: &VectorRow<V, N>,
+    materials: &[VectorRow<V, N>],
+    out: &mut [VectorRow<V, N>],
 ) {
     for (out, r) in out.iter_mut().zip(materials) {
         *out = std::array::from_fn(|i| s[i] * r[i]);
@@ -70,9 +70,9 @@ pub(super) fn products<V: Lane, const N: usize>(
 
 /// Tristimulus values of several spectra.
 #[inline]
-pub(super) fn tristimulus<V: Lane, const N: usize>(
-    spectra: &[Row<V, N>],
-    weights: &[Row<V, N>; 3],
+pub(super) fn tristimulus<V: SimdVector, const N: usize>(
+    spectra: &[VectorRow<V, N>],
+    weights: &[VectorRow<V, N>; 3],
     out: &mut [[f32; 3]],
 ) {
     for (out, s) in out.iter_mut().zip(spectra) {
@@ -86,13 +86,13 @@ pub(super) fn tristimulus<V: Lane, const N: usize>(
     }
 }
 
-/// Several spectra side by side: for each leaf or interval, the values of all of them in M vectors. Sums over intervals
+/// Several spectra side by side: for each band or interval, the values of all of them in M vectors. Sums over intervals
 /// then need no sum over lanes.
 pub(super) type Columns<V, const M: usize> = Vec<[V; M]>;
 
 /// A spectrum after each of several materials.
 #[inline]
-pub(super) fn column_products<V: Lane, const M: usize>(
+pub(super) fn column_products<V: SimdVector, const M: usize>(
     s: &[V],
     materials: &[[V; M]],
     out: &mut [[V; M]],
@@ -104,7 +104,7 @@ pub(super) fn column_products<V: Lane, const M: usize>(
 
 /// Tristimulus values of several spectra.
 #[inline]
-pub(super) fn column_tristimulus<V: Lane, const M: usize>(
+pub(super) fn column_tristimulus<V: SimdVector, const M: usize>(
     spectra: &[[V; M]],
     weights: &[[V; 3]],
 ) -> [[V; M]; 3] {
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn spare_lanes_do_not_count() {
-        let s: Row<f32x8, 1> = row(&[1.0, 2.0, 3.0]);
+        let s: VectorRow<f32x8, 1> = row(&[1.0, 2.0, 3.0]);
         let mut out = [s];
         products(&s, &[row(&[0.5, 0.5, 2.0])], &mut out);
         let mut xyz = [[0.0; 3]];
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn dense_rows_hold_64_values() {
         let values: Vec<f32> = (0..64).map(|v| v as f32).collect();
-        let s: Row<f32x16, 4> = row(&values);
+        let s: VectorRow<f32x16, 4> = row(&values);
         let mut xyz = [[0.0; 3]];
         let ones = row(&[1.0; 64]);
         tristimulus(&[s], &[ones, ones, ones], &mut xyz);

@@ -1,7 +1,7 @@
 //! The paper's tests (section 4) as measurements that anyone can repeat.
 
 pub mod bounds;
-mod chart;
+mod colour_chart;
 pub mod compare;
 pub mod covariance;
 pub mod cuts;
@@ -11,5 +11,5 @@ pub mod table1;
 pub mod table2;
 mod walk;
 
-pub use chart::{Chart, Light, Reflectances};
-pub use walk::{Extent, LEVELS, Sample, Start, sample, walk};
+pub use colour_chart::{ColourChart, Reflectances, UnitLight};
+pub use walk::{Extent, LEVELS, WalkStart, WalkStep, sample, walk};

@@ -5,11 +5,11 @@
 //! on the ratio to the light, which is in the weights of eq. 3, so that its lines cost no interval. All are measured
 //! twice: with the list's tristimulus values, and with the estimated error added back ("corrected").
 
-use super::chart::{Chart, Light};
-use super::walk::{Extent, LEVELS, Sample, Start, sample, walk};
+use super::colour_chart::{ColourChart, UnitLight};
+use super::walk::{Extent, LEVELS, WalkStart, WalkStep, sample, walk};
 use crate::color::{Xyz, luv_jacobian};
 use crate::spectrum::{
-    Bounded, Control, Estimate, Interval, LEAVES, List, Metric, Moment, Operation, Path, control,
+    BANDS, Bounded, Control, Estimate, Interval, List, Metric, Moment, Operation, Path, control,
     represent,
 };
 use serde::Serialize;
@@ -24,7 +24,7 @@ const SEARCH_RANGE: [f64; 2] = [1e-3, 1e2];
 /// One light, mode and level.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Row {
+pub struct ModesRow {
     /// Name of the light, with the adaptation white if it is not the light's own.
     pub light: String,
     /// Name of the mode.
@@ -38,19 +38,19 @@ pub struct Row {
     /// Share of products whose true error in XYZ is above the paper's eps_max, percent.
     pub above_eps_max: f64,
     /// Error of the list's tristimulus values, dE*uv.
-    pub luv: Spread,
+    pub luv: DifferenceSummary,
     /// The same, CIEDE2000.
-    pub de2000: Spread,
+    pub de2000: DifferenceSummary,
     /// With the estimated error added back, dE*uv.
-    pub corrected_luv: Spread,
+    pub corrected_luv: DifferenceSummary,
     /// The same, CIEDE2000.
-    pub corrected_de2000: Spread,
+    pub corrected_de2000: DifferenceSummary,
 }
 
 /// Mean, 95th percentile and greatest of a colour difference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Spread {
+pub struct DifferenceSummary {
     /// Mean.
     pub mean: f64,
     /// 95th percentile.
@@ -59,7 +59,7 @@ pub struct Spread {
     pub max: f64,
 }
 
-impl Spread {
+impl DifferenceSummary {
     /// Of any numbers.
     pub fn new(mut values: Vec<f64>) -> Self {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -79,9 +79,9 @@ pub fn percentile(values: &mut [f64], percent: f64) -> f64 {
 }
 
 /// Runs all modes for one light, which carries its adaptation white.
-pub fn measure(chart: &Chart, light: &Light, name: &str) -> Vec<Row> {
+pub fn measure(chart: &ColourChart, light: &UnitLight, name: &str) -> Vec<ModesRow> {
     let mut rows = Vec::new();
-    let mut record = |mode, limits: [f64; 3], samples: [Vec<Sample>; 3]| {
+    let mut record = |mode, limits: [f64; 3], samples: [Vec<WalkStep>; 3]| {
         rows.extend((0..3).map(|level| row(name, mode, level, limits[level], &samples[level])));
     };
     let eps = Control::PAPER.eps_max;
@@ -118,15 +118,15 @@ pub fn measure(chart: &Chart, light: &Light, name: &str) -> Vec<Row> {
 }
 
 /// The same work with the light in the weights: lists hold the ratio to the light, which begins as 1 everywhere.
-pub(super) fn ratio(chart: &Chart, light: &Light) -> (Chart, Light) {
-    let under = Chart {
+pub(super) fn ratio(chart: &ColourChart, light: &UnitLight) -> (ColourChart, UnitLight) {
+    let under = ColourChart {
         cmf: chart.cmf.under(&light.power),
         reflectances: chart.reflectances.clone(),
     };
     (
         under,
-        Light {
-            power: [1.0; LEAVES],
+        UnitLight {
+            power: [1.0; BANDS],
             ..light.clone()
         },
     )
@@ -134,13 +134,13 @@ pub(super) fn ratio(chart: &Chart, light: &Light) -> (Chart, Light) {
 
 /// The tests with one limit in XYZ for all levels.
 fn fixed<I: Interval>(
-    chart: &Chart,
-    light: &Light,
+    chart: &ColourChart,
+    light: &UnitLight,
     limit: f64,
     settings: &Control,
-) -> [Vec<Sample>; 3] {
-    Run {
-        start: Start::<I>::new(chart, light),
+) -> [Vec<WalkStep>; 3] {
+    ModeTest {
+        start: WalkStart::<I>::new(chart, light),
         chart,
         light,
         metric: &|_| Metric::Xyz,
@@ -152,15 +152,15 @@ fn fixed<I: Interval>(
 /// dE*uv of all reflections with perceptual control of the estimate, of the same corrected, and of the corrected lists
 /// under control of the bound, where each level needs `count` intervals on average.
 pub(super) fn adaptive_at_count(
-    chart: &Chart,
-    light: &Light,
+    chart: &ColourChart,
+    light: &UnitLight,
     count: usize,
 ) -> [(&'static str, [Vec<f64>; 3]); 3] {
     let luv = |colour: Xyz| Metric::Luv(luv_jacobian(colour, light.white));
     let wanted = [count as f64; 3];
     let (_, estimate) = at_equal_count::<Moment>(chart, light, wanted, STRIDE, &luv);
     let (_, bound) = at_equal_count::<Bounded>(chart, light, wanted, STRIDE, &luv);
-    let pick = |samples: &[Vec<Sample>; 3], f: fn(&Sample) -> f64| {
+    let pick = |samples: &[Vec<WalkStep>; 3], f: fn(&WalkStep) -> f64| {
         samples
             .each_ref()
             .map(|level| level.iter().map(f).collect())
@@ -178,15 +178,15 @@ pub(super) fn adaptive_at_count(
 /// One limit for each level, chosen one after the other so that each level needs `wanted` intervals on average, counted on
 /// one in `stride` tertiary products.
 fn at_equal_count<I: Interval>(
-    chart: &Chart,
-    light: &Light,
+    chart: &ColourChart,
+    light: &UnitLight,
     wanted: [f64; 3],
     stride: usize,
     metric: &dyn Fn(Xyz) -> Metric,
-) -> ([f64; 3], [Vec<Sample>; 3]) {
+) -> ([f64; 3], [Vec<WalkStep>; 3]) {
     let settings = Control::within(1.0);
-    let run = Run {
-        start: Start::<I>::new(chart, light),
+    let run = ModeTest {
+        start: WalkStart::<I>::new(chart, light),
         chart,
         light,
         metric,
@@ -215,15 +215,15 @@ fn at_equal_count<I: Interval>(
 }
 
 /// The tests with a metric that may depend on the colour.
-struct Run<'a, I> {
-    start: Start<'a, I>,
-    chart: &'a Chart,
-    light: &'a Light,
+struct ModeTest<'a, I> {
+    start: WalkStart<'a, I>,
+    chart: &'a ColourChart,
+    light: &'a UnitLight,
     metric: &'a dyn Fn(Xyz) -> Metric,
     settings: &'a Control,
 }
 
-impl<I: Interval> Run<'_, I> {
+impl<I: Interval> ModeTest<'_, I> {
     /// Control of one product; eps_min keeps its ratio to eps_max.
     fn step(&self, list: &mut List<I>, path: &Path<'_, I>, limits: &[f64; 3]) -> Operation {
         let eps_max = limits[path.reflections.len() - 1];
@@ -245,7 +245,7 @@ impl<I: Interval> Run<'_, I> {
         )
     }
 
-    fn samples(&self, limits: &[f64; 3]) -> [Vec<Sample>; 3] {
+    fn samples(&self, limits: &[f64; 3]) -> [Vec<WalkStep>; 3] {
         sample(&self.start, &self.source(limits), |list, path| {
             self.step(list, path, limits)
         })
@@ -273,13 +273,20 @@ impl<I: Interval> Run<'_, I> {
     }
 }
 
-fn row(light: &str, mode: &'static str, level: usize, limit: f64, samples: &[Sample]) -> Row {
-    let spread = |f: &dyn Fn(&Sample) -> f64| Spread::new(samples.iter().map(f).collect());
+fn row(
+    light: &str,
+    mode: &'static str,
+    level: usize,
+    limit: f64,
+    samples: &[WalkStep],
+) -> ModesRow {
+    let summary =
+        |f: &dyn Fn(&WalkStep) -> f64| DifferenceSummary::new(samples.iter().map(f).collect());
     let above = samples
         .iter()
         .filter(|s| s.xyz_error > Control::PAPER.eps_max)
         .count();
-    Row {
+    ModesRow {
         light: light.to_owned(),
         mode,
         level: LEVELS[level],
@@ -287,9 +294,9 @@ fn row(light: &str, mode: &'static str, level: usize, limit: f64, samples: &[Sam
         intervals_mean: samples.iter().map(|s| s.intervals as f64).sum::<f64>()
             / samples.len() as f64,
         above_eps_max: 100.0 * above as f64 / samples.len() as f64,
-        luv: spread(&|s| s.luv_error),
-        de2000: spread(&|s| s.de2000),
-        corrected_luv: spread(&|s| s.corrected_luv),
-        corrected_de2000: spread(&|s| s.corrected_de2000),
+        luv: summary(&|s| s.luv_error),
+        de2000: summary(&|s| s.de2000),
+        corrected_luv: summary(&|s| s.corrected_luv),
+        corrected_de2000: summary(&|s| s.corrected_de2000),
     }
 }

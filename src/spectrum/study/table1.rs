@@ -1,14 +1,14 @@
 //! Table 1 (paper 4.1): intervals, errors and operations, measured beside printed.
 
-use super::chart::{Chart, Light};
-use super::walk::{Sample, Start, sample};
+use super::colour_chart::{ColourChart, UnitLight};
+use super::walk::{WalkStart, WalkStep, sample};
 use crate::color::de_luv;
 use crate::spectrum::{Control, Estimate, Metric, Operation, control, represent};
 use serde::Serialize;
 
 /// "Refinement of S".
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Source {
+pub struct SourceRefinement {
     /// Number of intervals.
     pub intervals: usize,
     /// Length of the error in XYZ, Y of the source = 1.
@@ -48,7 +48,7 @@ pub struct Level {
 #[non_exhaustive]
 pub struct Column {
     /// Refinement of the source.
-    pub source: Source,
+    pub source: SourceRefinement,
     /// 24 reflections.
     pub primary: Level,
     /// 24^2 reflections.
@@ -59,14 +59,15 @@ pub struct Column {
 
 impl Level {
     /// Statistics of a level; a product counts as measure error if its true error in XYZ is above `eps_max`.
-    pub fn new(samples: &[Sample], eps_max: f64) -> Self {
-        let mean =
-            |f: &dyn Fn(&Sample) -> f64| samples.iter().map(f).sum::<f64>() / samples.len() as f64;
-        let deviation = |f: &dyn Fn(&Sample) -> f64| {
+    pub fn new(samples: &[WalkStep], eps_max: f64) -> Self {
+        let mean = |f: &dyn Fn(&WalkStep) -> f64| {
+            samples.iter().map(f).sum::<f64>() / samples.len() as f64
+        };
+        let deviation = |f: &dyn Fn(&WalkStep) -> f64| {
             let middle = mean(f);
             mean(&|s| (f(s) - middle).powi(2)).sqrt()
         };
-        let share = |f: &dyn Fn(&Sample) -> bool| 100.0 * mean(&|s| f64::from(u8::from(f(s))));
+        let share = |f: &dyn Fn(&WalkStep) -> bool| 100.0 * mean(&|s| f64::from(u8::from(f(s))));
         Self {
             intervals_mean: mean(&|s| s.intervals as f64),
             intervals_sd: deviation(&|s| s.intervals as f64),
@@ -84,15 +85,15 @@ impl Level {
 
 impl Column {
     /// Runs the paper's tests for one light with the paper's control.
-    pub fn measure(chart: &Chart, light: &Light) -> Self {
-        let start = Start::<Estimate>::new(chart, light);
+    pub fn measure(chart: &ColourChart, light: &UnitLight) -> Self {
+        let start = WalkStart::<Estimate>::new(chart, light);
         let list = represent(
             start.source(),
             &chart.cmf,
             &Metric::Xyz,
             Control::PAPER.eps_max,
         );
-        let source = Source {
+        let source = SourceRefinement {
             intervals: list.partition().count(),
             xyz_error: Metric::Xyz.size(list.error(), list.radius()),
             luv_error: de_luv(list.xyz(&chart.cmf), light.white, light.white),
@@ -119,7 +120,7 @@ impl Column {
 /// The columns C, D65 (the paper's D6500) and F2 as printed.
 pub const PRINTED: [Column; 3] = [
     Column {
-        source: Source {
+        source: SourceRefinement {
             intervals: 8,
             xyz_error: 0.0014,
             luv_error: 0.26,
@@ -133,7 +134,7 @@ pub const PRINTED: [Column; 3] = [
         tertiary: level([5.25, 1.94, 1.53, 8.07, 1.07, 26.92, 0.52, 68.81, 3.75, 6.27]),
     },
     Column {
-        source: Source {
+        source: SourceRefinement {
             intervals: 7,
             xyz_error: 0.0013,
             luv_error: 0.33,
@@ -147,7 +148,7 @@ pub const PRINTED: [Column; 3] = [
         tertiary: level([5.16, 1.88, 1.57, 8.12, 1.15, 29.72, 1.08, 65.14, 4.06, 6.00]),
     },
     Column {
-        source: Source {
+        source: SourceRefinement {
             intervals: 11,
             xyz_error: 0.0015,
             luv_error: 0.27,

@@ -18,14 +18,14 @@
 //! mispredicted branch or two. An adaptive spectrum pays where the cut is at hand: on rows that share it, in memory, and in
 //! every pass after the one that chose it.
 
-use super::chart::{Chart, Light};
+use super::colour_chart::{ColourChart, UnitLight};
 use super::lanes::{
-    Columns, Lane, Row, column_products, column_tristimulus, products, row, tristimulus,
+    Columns, SimdVector, VectorRow, column_products, column_tristimulus, products, row, tristimulus,
 };
-use super::walk::{Extent, Start, walk};
+use super::walk::{Extent, WalkStart, walk};
 use crate::spectrum::{
-    Bounded, CmfTree, Control, Estimate, Interval, LEAVES, Leaves, List, Metric, Moment, Partition,
-    Path, Tree, control, represent,
+    BANDS, Bounded, CmfTree, Control, DyadicTree, Estimate, Interval, List, Metric, Moment,
+    Partition, Path, Spectrum, control, represent,
 };
 use serde::Serialize;
 use std::hint::black_box;
@@ -59,17 +59,17 @@ pub const PRINTED_MS: [(&str, f64, f64); 4] = [
 
 /// The 576 secondary spectra, on both sides.
 struct Work<'a, I> {
-    start: Start<'a, I>,
-    chart: &'a Chart,
-    light: &'a Light,
+    start: WalkStart<'a, I>,
+    chart: &'a ColourChart,
+    light: &'a UnitLight,
     /// Lists after control, and the two materials of each.
     lists: Vec<(List<I>, [usize; 2])>,
-    dense: Vec<Leaves>,
+    dense: Vec<Spectrum>,
 }
 
 impl<'a, I: Interval> Work<'a, I> {
-    fn new(chart: &'a Chart, light: &'a Light) -> Self {
-        let start = Start::<I>::new(chart, light);
+    fn new(chart: &'a ColourChart, light: &'a UnitLight) -> Self {
+        let start = WalkStart::<I>::new(chart, light);
         let list = represent(
             start.source(),
             &chart.cmf,
@@ -118,7 +118,7 @@ impl<'a, I: Interval> Work<'a, I> {
     }
 
     /// Products alone, and products with XYZ, of spectra that are already vectors.
-    fn vectors<V: Lane, const N: usize>(&self, blocks: &[Block<V, N>]) -> [f64; 2] {
+    fn vectors<V: SimdVector, const N: usize>(&self, blocks: &[RowCase<V, N>]) -> [f64; 2] {
         let mut out = vec![blocks[0].spectrum; self.chart.reflectances.len()];
         let mut xyz = vec![[0.0; 3]; out.len()];
         let alone = self.time(|| {
@@ -138,8 +138,8 @@ impl<'a, I: Interval> Work<'a, I> {
     }
 
     /// The same with the 24 products of a block side by side.
-    fn columns(&self, blocks: &[Side]) -> [f64; 2] {
-        let mut out = vec![[f32x8::ZERO; SIDE]; LEAVES];
+    fn columns(&self, blocks: &[ColumnCase]) -> [f64; 2] {
+        let mut out = vec![[f32x8::ZERO; SIDE]; BANDS];
         let alone = self.time(|| {
             for block in blocks {
                 column_products(
@@ -161,7 +161,7 @@ impl<'a, I: Interval> Work<'a, I> {
     }
 
     /// All lists as columns.
-    fn sides(&self) -> Vec<Side> {
+    fn sides(&self) -> Vec<ColumnCase> {
         let cmf = &self.chart.cmf;
         let side = |(list, _): &(List<I>, _)| {
             let nodes: Vec<usize> = list
@@ -180,7 +180,7 @@ impl<'a, I: Interval> Work<'a, I> {
                         .collect()
                 })
                 .collect();
-            Side::new(
+            ColumnCase::new(
                 &values,
                 materials,
                 nodes.iter().map(|&n| *cmf.node(n)).collect(),
@@ -189,16 +189,16 @@ impl<'a, I: Interval> Work<'a, I> {
         self.lists.iter().map(side).collect()
     }
 
-    fn dense_sides(&self) -> Vec<Side> {
-        let cmf = self.chart.cmf.leaves();
-        let side = |s: &Leaves| {
-            let materials = (0..LEAVES)
+    fn dense_sides(&self) -> Vec<ColumnCase> {
+        let cmf = self.chart.cmf.weights();
+        let side = |s: &Spectrum| {
+            let materials = (0..BANDS)
                 .map(|k| self.chart.reflectances.iter().map(|r| r[k]).collect())
                 .collect();
-            Side::new(
+            ColumnCase::new(
                 s,
                 materials,
-                (0..LEAVES)
+                (0..BANDS)
                     .map(|k| [cmf[0][k], cmf[1][k], cmf[2][k]])
                     .collect(),
             )
@@ -207,7 +207,11 @@ impl<'a, I: Interval> Work<'a, I> {
     }
 
     /// The lists of at most `most` and more than `least` intervals, as vectors of their values.
-    fn blocks<V: Lane, const N: usize>(&self, least: usize, most: usize) -> Vec<Block<V, N>> {
+    fn blocks<V: SimdVector, const N: usize>(
+        &self,
+        least: usize,
+        most: usize,
+    ) -> Vec<RowCase<V, N>> {
         let fits = self
             .lists
             .iter()
@@ -215,7 +219,7 @@ impl<'a, I: Interval> Work<'a, I> {
         fits.map(|(list, _)| {
             let values: Vec<f32> = list.intervals().iter().map(|i| i.value() as f32).collect();
             let cut = list.partition();
-            Block {
+            RowCase {
                 spectrum: row(&values),
                 materials: self
                     .start
@@ -229,13 +233,13 @@ impl<'a, I: Interval> Work<'a, I> {
         .collect()
     }
 
-    fn dense_blocks(&self) -> Vec<Block<f32x16, 4>> {
-        let narrow = |leaves: &Leaves| row(&leaves.map(|v| v as f32));
+    fn dense_blocks(&self) -> Vec<RowCase<f32x16, 4>> {
+        let narrow = |spectrum: &Spectrum| row(&spectrum.map(|v| v as f32));
         let materials: Vec<_> = self.chart.reflectances.iter().map(narrow).collect();
-        let weights = self.chart.cmf.leaves().each_ref().map(narrow);
+        let weights = self.chart.cmf.weights().each_ref().map(narrow);
         self.dense
             .iter()
-            .map(|s| Block {
+            .map(|s| RowCase {
                 spectrum: narrow(s),
                 materials: materials.clone(),
                 weights,
@@ -269,13 +273,13 @@ impl<'a, I: Interval> Work<'a, I> {
 const SIDE: usize = 3;
 
 /// A spectrum and all that it meets, on its cut, with the materials side by side.
-struct Side {
+struct ColumnCase {
     spectrum: Vec<f32x8>,
     materials: Columns<f32x8, SIDE>,
     weights: Vec<[f32x8; 3]>,
 }
 
-impl Side {
+impl ColumnCase {
     fn new(values: &[f64], materials: Vec<Vec<f64>>, weights: Vec<[f64; 3]>) -> Self {
         let splat = |v: f64| f32x8::splat(v as f32);
         let lanes =
@@ -289,13 +293,16 @@ impl Side {
 }
 
 /// A spectrum and all that it meets, on its cut.
-struct Block<V, const N: usize> {
-    spectrum: Row<V, N>,
-    materials: Vec<Row<V, N>>,
-    weights: [Row<V, N>; 3],
+struct RowCase<V, const N: usize> {
+    spectrum: VectorRow<V, N>,
+    materials: Vec<VectorRow<V, N>>,
+    weights: [VectorRow<V, N>; 3],
 }
 
-fn on_cut<I: Interval, V: Lane, const N: usize>(tree: &Tree<I>, cut: Partition) -> Row<V, N> {
+fn on_cut<I: Interval, V: SimdVector, const N: usize>(
+    tree: &DyadicTree<I>,
+    cut: Partition,
+) -> VectorRow<V, N> {
     let list = List::new(tree, cut);
     row(&list
         .intervals()
@@ -304,7 +311,11 @@ fn on_cut<I: Interval, V: Lane, const N: usize>(tree: &Tree<I>, cut: Partition) 
         .collect::<Vec<_>>())
 }
 
-fn weights_on<V: Lane, const N: usize>(cut: Partition, cmf: &CmfTree, a: usize) -> Row<V, N> {
+fn weights_on<V: SimdVector, const N: usize>(
+    cut: Partition,
+    cmf: &CmfTree,
+    a: usize,
+) -> VectorRow<V, N> {
     row(&cut
         .iter()
         .map(|(first, len)| cmf.node(crate::spectrum::node(first, len))[a] as f32)
@@ -322,12 +333,12 @@ fn stage(stage: &'static str, adaptive_ns: f64, dense_ns: Option<f64>) -> Stage 
 }
 
 /// Times everything.
-pub fn measure(chart: &Chart) -> Vec<Stage> {
+pub fn measure(chart: &ColourChart) -> Vec<Stage> {
     let light = chart.light("D65");
     let paper = Work::<Estimate>::new(chart, &light);
     let preparation = paper.time(|| {
-        black_box(Start::<Estimate>::new(black_box(chart), &light));
-        black_box(CmfTree::new(*black_box(chart.cmf.leaves())));
+        black_box(WalkStart::<Estimate>::new(black_box(chart), &light));
+        black_box(CmfTree::new(*black_box(chart.cmf.weights())));
     });
     let dense = paper.vectors(&paper.dense_blocks());
     let mut stages = vec![stage("pre-processing", preparation, None)];
@@ -419,7 +430,7 @@ impl<I: Interval> Work<'_, I> {
 }
 
 /// Product, perceptual control within dE*uv 1 and corrected XYZ.
-fn perceptual<I: Interval>(chart: &Chart, light: &Light) -> f64 {
+fn perceptual<I: Interval>(chart: &ColourChart, light: &UnitLight) -> f64 {
     let work = Work::<I>::new(chart, light);
     work.lists(|list, path| {
         let colour = list.corrected_xyz(&chart.cmf);

@@ -1,10 +1,10 @@
 //! All reflections of a light by the chart: 24 primary, 24^2 secondary, 24^3 tertiary (paper 4.1).
 //!
-//! Every list is the product of the controlled list of the level before; the exact colour comes from the 64 leaves.
+//! Every list is the product of the controlled list of the level before; the exact colour comes from the 64 bands.
 
-use super::chart::{Chart, Light};
+use super::colour_chart::{ColourChart, UnitLight};
 use crate::color::{de_luv, de2000, tristimulus};
-use crate::spectrum::{CmfTree, Interval, Leaves, List, Operation, Path, Tree};
+use crate::spectrum::{CmfTree, DyadicTree, Interval, List, Operation, Path, Spectrum};
 
 /// Names of the three levels.
 pub const LEVELS: [&str; 3] = ["primary", "secondary", "tertiary"];
@@ -12,7 +12,7 @@ pub const LEVELS: [&str; 3] = ["primary", "secondary", "tertiary"];
 /// One reflection.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
-pub struct Sample {
+pub struct WalkStep {
     /// Intervals after control.
     pub intervals: usize,
     /// What control did.
@@ -31,36 +31,36 @@ pub struct Sample {
 
 /// What a walk starts from: a light, its tree, its list, and the trees of the patches.
 #[derive(Debug, Clone)]
-pub struct Start<'a, I> {
-    chart: &'a Chart,
-    light: &'a Light,
-    source: Tree<I>,
-    materials: Vec<Tree<I>>,
+pub struct WalkStart<'a, I> {
+    chart: &'a ColourChart,
+    light: &'a UnitLight,
+    source: DyadicTree<I>,
+    materials: Vec<DyadicTree<I>>,
 }
 
-impl<'a, I: Interval> Start<'a, I> {
+impl<'a, I: Interval> WalkStart<'a, I> {
     /// Builds the trees (pre-processing, 3.1.2).
-    pub fn new(chart: &'a Chart, light: &'a Light) -> Self {
+    pub fn new(chart: &'a ColourChart, light: &'a UnitLight) -> Self {
         let materials = chart
             .reflectances
             .iter()
-            .map(|r| Tree::new(r, &chart.cmf))
+            .map(|r| DyadicTree::new(r, &chart.cmf))
             .collect();
         Self {
             chart,
             light,
-            source: Tree::new(&light.power, &chart.cmf),
+            source: DyadicTree::new(&light.power, &chart.cmf),
             materials,
         }
     }
 
     /// The light's tree.
-    pub fn source(&self) -> &Tree<I> {
+    pub fn source(&self) -> &DyadicTree<I> {
         &self.source
     }
 
     /// The patches' trees.
-    pub fn materials(&self) -> &[Tree<I>] {
+    pub fn materials(&self) -> &[DyadicTree<I>] {
         &self.materials
     }
 }
@@ -79,13 +79,13 @@ pub enum Extent {
     Whole,
 }
 
-/// Calls `step` with every product: the list on the cut of the level before, the path that leads to it, the exact leaves.
+/// Calls `step` with every product: the list on the cut of the level before, the path that leads to it, the exact bands.
 /// What `step` makes of the list is what the next level starts from.
 pub fn walk<I: Interval>(
-    start: &Start<'_, I>,
+    start: &WalkStart<'_, I>,
     list: &List<I>,
     extent: Extent,
-    mut step: impl FnMut(&mut List<I>, &Path<'_, I>, &Leaves),
+    mut step: impl FnMut(&mut List<I>, &Path<'_, I>, &Spectrum),
 ) {
     let (depth, stride) = match extent {
         Extent::Part { levels, stride } => (levels, stride),
@@ -93,22 +93,23 @@ pub fn walk<I: Interval>(
     };
     let cmf = &start.chart.cmf;
     let (mut first, mut second, mut third) = (List::black(), List::black(), List::black());
-    let mut visit = |from: &List<I>, to: &mut List<I>, reflections: &[&Tree<I>], exact: &Leaves| {
-        from.reflect(reflections[reflections.len() - 1], cmf, to);
-        step(
-            to,
-            &Path {
-                source: &start.source,
-                reflections,
-            },
-            exact,
-        );
-    };
+    let mut visit =
+        |from: &List<I>, to: &mut List<I>, reflections: &[&DyadicTree<I>], exact: &Spectrum| {
+            from.reflect(reflections[reflections.len() - 1], cmf, to);
+            step(
+                to,
+                &Path {
+                    source: &start.source,
+                    reflections,
+                },
+                exact,
+            );
+        };
     for (i, a) in start.materials.iter().enumerate() {
-        let once = times(&start.light.power, a.leaves());
+        let once = times(&start.light.power, a.spectrum());
         visit(list, &mut first, &[a], &once);
         for (j, b) in start.materials.iter().enumerate().filter(|_| depth > 1) {
-            let twice = times(&once, b.leaves());
+            let twice = times(&once, b.spectrum());
             visit(&first, &mut second, &[a, b], &twice);
             for (_, c) in start
                 .materials
@@ -116,23 +117,28 @@ pub fn walk<I: Interval>(
                 .enumerate()
                 .filter(|(k, _)| depth > 2 && (i + j + k) % stride == 0)
             {
-                visit(&second, &mut third, &[a, b, c], &times(&twice, c.leaves()));
+                visit(
+                    &second,
+                    &mut third,
+                    &[a, b, c],
+                    &times(&twice, c.spectrum()),
+                );
             }
         }
     }
 }
 
-impl Sample {
-    /// Measures a list against the exact leaves.
+impl WalkStep {
+    /// Measures a list against the exact bands.
     pub fn new<I: Interval>(
         list: &List<I>,
         operation: Operation,
-        exact: &Leaves,
-        light: &Light,
+        exact: &Spectrum,
+        light: &UnitLight,
         cmf: &CmfTree,
     ) -> Self {
         let (reference, ours, corrected) = (
-            tristimulus(exact, cmf.leaves()),
+            tristimulus(exact, cmf.weights()),
             list.xyz(cmf),
             list.corrected_xyz(cmf),
         );
@@ -153,14 +159,14 @@ impl Sample {
 
 /// Samples of a whole walk, level by level; `step` controls the list and says what it did.
 pub fn sample<I: Interval>(
-    start: &Start<'_, I>,
+    start: &WalkStart<'_, I>,
     list: &List<I>,
     mut step: impl FnMut(&mut List<I>, &Path<'_, I>) -> Operation,
-) -> [Vec<Sample>; 3] {
+) -> [Vec<WalkStep>; 3] {
     let mut samples = [const { Vec::new() }; 3];
     walk(start, list, Extent::Whole, |list, path, exact| {
         let operation = step(list, path);
-        samples[path.reflections.len() - 1].push(Sample::new(
+        samples[path.reflections.len() - 1].push(WalkStep::new(
             list,
             operation,
             exact,
@@ -171,6 +177,6 @@ pub fn sample<I: Interval>(
     samples
 }
 
-fn times(a: &Leaves, b: &Leaves) -> Leaves {
-    std::array::from_fn(|leaf| a[leaf] * b[leaf])
+fn times(a: &Spectrum, b: &Spectrum) -> Spectrum {
+    std::array::from_fn(|band| a[band] * b[band])
 }

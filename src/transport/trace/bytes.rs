@@ -13,11 +13,11 @@ pub(super) fn number(mut x: u64, out: &mut Vec<u8>) {
 }
 
 /// A packed trace being read.
-pub(super) struct Packed<'a> {
+pub(super) struct TraceReader<'a> {
     pub(super) rest: &'a [u8],
 }
 
-impl Packed<'_> {
+impl TraceReader<'_> {
     #[inline]
     pub(super) fn number(&mut self) -> Read<u64> {
         // Nearly all differences take one byte or two.

@@ -5,7 +5,7 @@
 //! (see [`passed::numbers`]); then its entries, each `8 id + kind` and, except for rays, the weight. A ray takes about
 //! 8 bytes.
 
-use super::bytes::{Packed, broken, number};
+use super::bytes::{TraceReader, broken, number};
 use crate::light::passed::{self, Passed};
 use crate::light::{Filter, Filters, Light};
 use crate::scene::PunctualLight;
@@ -18,7 +18,7 @@ const MOST_PASSED: u64 = 4096;
 
 /// The kind of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
+pub(super) enum EntryKind {
     /// A ray that met a leaf.
     Hit,
     /// A ray that met a leaf of a mirror, one mirror too many.
@@ -33,7 +33,7 @@ pub(super) enum Kind {
     Lamp,
 }
 
-impl Kind {
+impl EntryKind {
     const ALL: [Self; 6] = [
         Self::Hit,
         Self::Mirror,
@@ -52,18 +52,18 @@ impl Kind {
 /// One source of light.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
-    pub(super) kind: Kind,
+    pub(super) kind: EntryKind,
     pub(super) id: u32,
     pub(super) weight: f32,
 }
 
 /// Entries of light that passed something, with what it passed.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Tinted {
+pub(super) struct TintedEntries {
     entries: Vec<(Passed, Entry)>,
 }
 
-impl Tinted {
+impl TintedEntries {
     /// Adds an entry whose light passed panes or mirrors.
     pub(super) fn add(&mut self, passed: &Passed, entry: Entry) {
         self.entries.push((passed.clone(), entry));
@@ -156,7 +156,7 @@ struct Groups {
 }
 
 impl Groups {
-    fn begin(from: &mut Packed) -> Read<Self> {
+    fn begin(from: &mut TraceReader) -> Read<Self> {
         let left = match from.rest.is_empty() {
             true => 0,
             false => from.number()?,
@@ -166,7 +166,7 @@ impl Groups {
     }
 
     /// Reads the numbers of the next group and returns how many entries it has; none after the last.
-    fn next(&mut self, from: &mut Packed) -> Read<Option<u64>> {
+    fn next(&mut self, from: &mut TraceReader) -> Read<Option<u64>> {
         if self.left == 0 {
             return Ok(None);
         }
@@ -183,10 +183,10 @@ impl Groups {
     }
 }
 
-fn entry(from: &mut Packed) -> Read<Entry> {
+fn entry(from: &mut TraceReader) -> Read<Entry> {
     let word = from.number()?;
     let id = u32::try_from(word >> 3).map_err(|_| broken())?;
-    let kind = *Kind::ALL.get((word & 7) as usize).ok_or_else(broken)?;
+    let kind = *EntryKind::ALL.get((word & 7) as usize).ok_or_else(broken)?;
     let weight = match kind.is_ray() {
         true => 1.0,
         false => from.float()?,
@@ -195,7 +195,7 @@ fn entry(from: &mut Packed) -> Read<Entry> {
 }
 
 /// Calls `each` with all entries.
-pub(super) fn entries(from: &mut Packed, mut each: impl FnMut(Entry) -> Read<()>) -> Read<()> {
+pub(super) fn entries(from: &mut TraceReader, mut each: impl FnMut(Entry) -> Read<()>) -> Read<()> {
     let mut groups = Groups::begin(from)?;
     while let Some(count) = groups.next(from)? {
         for _ in 0..count {
@@ -206,7 +206,7 @@ pub(super) fn entries(from: &mut Packed, mut each: impl FnMut(Entry) -> Read<()>
 }
 
 /// The light of a trace, being summed.
-pub(super) struct Sums<const L: usize> {
+pub(super) struct TraceSums<const L: usize> {
     /// Reflected light of patches, before it is scaled.
     pub(super) bounced: [f32; L],
     /// Light straight from lamps.
@@ -217,11 +217,11 @@ pub(super) struct Sums<const L: usize> {
 
 /// Adds the light of all entries.
 pub(super) fn replay<const L: usize>(
-    from: &mut Packed,
+    from: &mut TraceReader,
     light: &Light,
     lamps: &[(PunctualLight, Vec<f32>)],
     stains: &Stains,
-    sums: &mut Sums<L>,
+    sums: &mut TraceSums<L>,
 ) -> Read<()> {
     let (reflected, emitted) = (light.reflected.all::<L>(), light.emitted.all::<L>());
     let mirrors = light.mirrors.all::<L>();
@@ -232,7 +232,7 @@ pub(super) fn replay<const L: usize>(
         for _ in 0..count {
             let Entry { kind, id, weight } = entry(from)?;
             let k = id as usize;
-            let end = if kind == Kind::Lamp {
+            let end = if kind == EntryKind::Lamp {
                 lamps.len()
             } else {
                 emitted.len()
@@ -246,17 +246,17 @@ pub(super) fn replay<const L: usize>(
                 }
             };
             match kind {
-                Kind::Lamp => add(&mut sums.straight, &lamps[k].1),
-                Kind::Emitted | Kind::Patch if light.bright_emitted[k] > 0.0 => {
+                EntryKind::Lamp => add(&mut sums.straight, &lamps[k].1),
+                EntryKind::Emitted | EntryKind::Patch if light.bright_emitted[k] > 0.0 => {
                     add(&mut sums.straight, &emitted[k]);
                 }
                 _ => {}
             }
             match kind {
                 _ if dark => {}
-                Kind::Patch | Kind::Slope => add(&mut sums.bounced, &reflected[k]),
-                Kind::Hit => add(&mut sums.met, &reflected[k]),
-                Kind::Mirror => add(&mut sums.met, mirrors.get(k).ok_or_else(broken)?),
+                EntryKind::Patch | EntryKind::Slope => add(&mut sums.bounced, &reflected[k]),
+                EntryKind::Hit => add(&mut sums.met, &reflected[k]),
+                EntryKind::Mirror => add(&mut sums.met, mirrors.get(k).ok_or_else(broken)?),
                 _ => {}
             }
         }

@@ -3,7 +3,7 @@
 use crate::errors::wrong;
 use haarlight::Error;
 use haarlight::scene::{Options, Scene};
-use haarlight::survey::{Wishes, advise};
+use haarlight::survey::{SurveyOptions, advise};
 use pyo3::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub(crate) struct Data {
     pub(crate) path: PathBuf,
     pub(crate) options: Options,
-    pub(crate) wishes: Wishes,
+    pub(crate) wishes: SurveyOptions,
     pub(crate) scene: Scene,
     /// Lamps whose light was multiplied since the room was read, and by what.
     pub(crate) dimmed: BTreeMap<String, f64>,
@@ -23,7 +23,7 @@ pub(crate) struct Data {
 
 impl Data {
     /// Reads a room and looks it over.
-    pub(crate) fn read(path: PathBuf, options: Options, wishes: Wishes) -> haarlight::Result<Self> {
+    pub(crate) fn read(path: PathBuf, options: Options, wishes: SurveyOptions) -> haarlight::Result<Self> {
         let mut scene = Scene::load(&path, &options)?;
         let problems = advise(&mut scene, wishes);
         if !problems.is_empty() {

@@ -2,12 +2,12 @@
 
 use crate::data::Data;
 use glam::DVec3;
-use haarlight::audit::{self, Reference};
+use haarlight::audit::{self, PathReference};
 use haarlight::gather::{Baked, BakedSurface, Probed};
 use haarlight::keep::{self, Relighter};
 use haarlight::scene::Scene;
 use haarlight::solve::{Bake, Verdict};
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use haarlight::{Error, Result};
 use std::sync::{Arc, Mutex, PoisonError};
 use tempfile::TempPath;
@@ -70,8 +70,8 @@ impl Light {
             .white
     }
 
-    /// Radiosity of all vertices on the leaves, W/m2/nm.
-    pub(crate) fn radiosity(&self) -> Vec<Vec<[f32; LEAVES]>> {
+    /// Radiosity of all vertices on the bands, W/m2/nm.
+    pub(crate) fn radiosity(&self) -> Vec<Vec<[f32; BANDS]>> {
         match (&self.other, self.baked()) {
             (_, None) => Vec::new(),
             (None, Some(baked)) => self.solved.bake.radiosity_spectra(baked),
@@ -126,7 +126,7 @@ impl Light {
             ));
         }
         let bake = &self.solved.bake;
-        let reference = Reference::new(bake, points, AUDIT_PATHS, seed ^ AUDIT_SEED);
+        let reference = PathReference::new(bake, points, AUDIT_PATHS, seed ^ AUDIT_SEED);
         Ok(match self.baked() {
             Some(baked) => audit::Report::of_file(bake, baked, &reference),
             None => audit::Report::against(bake, &reference),

@@ -7,7 +7,7 @@ use haarlight::Error;
 use haarlight::cli::maps;
 use haarlight::cli::stop::Stop;
 use haarlight::lightmap::MapLimits;
-use haarlight::output::{Balance, Brightness, Exposure, camera, mapped_glb};
+use haarlight::output::{Exposure, ExposureSetting, WhiteBalance, camera, mapped_glb};
 use haarlight::store::file;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,8 @@ pub(crate) struct Asked {
     pub(crate) page: usize,
     pub(crate) texels: Option<usize>,
     pub(crate) indirect: bool,
-    pub(crate) brightness: Brightness,
-    pub(crate) balance: Balance,
+    pub(crate) brightness: ExposureSetting,
+    pub(crate) balance: WhiteBalance,
 }
 
 /// What was written.

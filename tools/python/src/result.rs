@@ -12,7 +12,7 @@ use haarlight::Error;
 use haarlight::gather::{Baked, BakedSurface, BakedVertex, refined};
 use haarlight::output::{Exposure, Writing, baked_glb, camera, npz};
 use haarlight::scene::Surface;
-use haarlight::spectrum::LEAVES;
+use haarlight::spectrum::BANDS;
 use haarlight::store::file;
 use haarlight::survey;
 use numpy::Element;
@@ -148,11 +148,11 @@ impl Lit {
         self.light.white()
     }
 
-    /// Edges of the 64 leaves that spectra are held on, (65,) float64, nm.
+    /// Edges of the 64 bands that spectra are held on, (65,) float64, nm.
     #[getter]
     fn edges(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let grid = &self.light.scene().grid;
-        let edges: Vec<f64> = (0..=LEAVES).map(|leaf| grid.left(leaf)).collect();
+        let edges: Vec<f64> = (0..=BANDS).map(|band| grid.left(band)).collect();
         line(py, edges)
     }
 
@@ -219,10 +219,10 @@ impl Lit {
     /// Spectral radiosity of the vertices, W/m2/nm.
     ///
     /// Args:
-    ///     wavelengths: (K,), nm. Light is held as means over 64 leaves, see `edges`; a wavelength gets that of its leaf.
+    ///     wavelengths: (K,), nm. Light is held as means over 64 bands, see `edges`; a wavelength gets that of its band.
     ///
     /// Returns:
-    ///     (N, K) float32; without wavelengths all leaves, (N, 64), not copied.
+    ///     (N, K) float32; without wavelengths all bands, (N, 64), not copied.
     ///
     /// Raises:
     ///     InputError: a wavelength lies outside the range of the room.
@@ -233,19 +233,19 @@ impl Lit {
         wavelengths: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Py<PyAny>> {
         self.baked(py)?;
-        let leaves = match wavelengths {
+        let bands = match wavelengths {
             None => None,
-            Some(given) => Some(self.leaves(py, &arrays::wavelengths(given)?)?),
+            Some(given) => Some(self.bands(py, &arrays::wavelengths(given)?)?),
         };
         let all = self.arrays.spectra.get_or_try_init(py, || {
             let light = Arc::clone(&self.light);
             let flat = done(py, move || Ok(light.radiosity().concat().into_flattened()))?;
-            rows(py, flat, LEAVES)
+            rows(py, flat, BANDS)
         })?;
-        match leaves {
+        match bands {
             None => Ok(all.clone_ref(py)),
-            Some(leaves) => {
-                let taken = all.bind(py).call_method1("take", (leaves, 1))?;
+            Some(bands) => {
+                let taken = all.bind(py).call_method1("take", (bands, 1))?;
                 sealed(&taken)
             }
         }
@@ -259,9 +259,9 @@ impl Lit {
     ///
     /// Returns:
     ///     Probe(lux, xyz, bands, plus_minus): lux (N,); xyz (N, 3), tristimulus irradiance, lm/m2; bands (N, 64), spectral
-    ///     irradiance on the leaves between `edges`, W/m2/nm; plus_minus (N,), lx: the light's stated error, an *estimate* of
+    ///     irradiance on the bands between `edges`, W/m2/nm; plus_minus (N,), lx: the light's stated error, an *estimate* of
     ///     its root mean square (NaN while it is not known). All float64. Bands come from the intervals that the bake
-    ///     carried: bake with `spectrum="dense"` for all that the leaves can tell.
+    ///     carried: bake with `spectrum="dense"` for all that the bands can tell.
     ///
     /// Warns:
     ///     RoomWarning: points lie inside something solid or outside the room.
@@ -289,12 +289,12 @@ impl Lit {
         let relative = self.light.relative_error().unwrap_or(f64::NAN);
         let spread: Vec<f64> = lux.iter().map(|lux| relative * lux).collect();
         let xyz: Vec<f64> = probed.iter().flat_map(|p| p.xyz).collect();
-        let bands: Vec<f64> = probed.iter().flat_map(|p| p.leaves).collect();
+        let bands: Vec<f64> = probed.iter().flat_map(|p| p.spectrum).collect();
         let class = py.import("haarlight._types")?.getattr("Probe")?;
         let probe = class.call1((
             line(py, lux)?,
             rows(py, xyz, 3)?,
-            rows(py, bands, LEAVES)?,
+            rows(py, bands, BANDS)?,
             line(py, spread)?,
         ))?;
         Ok(probe.unbind())
@@ -497,11 +497,11 @@ impl Lit {
 }
 
 impl Lit {
-    /// The leaves that wavelengths lie in.
-    fn leaves(&self, py: Python<'_>, wavelengths: &[f64]) -> PyResult<Vec<usize>> {
+    /// The bands that wavelengths lie in.
+    fn bands(&self, py: Python<'_>, wavelengths: &[f64]) -> PyResult<Vec<usize>> {
         let grid = &self.light.scene().grid;
-        let leaf = |nm: &f64| {
-            grid.leaf_of(*nm).ok_or_else(|| {
+        let band = |nm: &f64| {
+            grid.band_of(*nm).ok_or_else(|| {
                 let what = format!(
                     "{nm} nm lies outside of {} to {} nm",
                     grid.start(),
@@ -513,7 +513,7 @@ impl Lit {
                 )
             })
         };
-        wavelengths.iter().map(leaf).collect()
+        wavelengths.iter().map(band).collect()
     }
 }
 

@@ -6,11 +6,11 @@ use crate::errors::{warn, wrong};
 use crate::records::plain;
 use crate::result::Lit;
 use crate::work::done;
-use haarlight::cli::options::Range;
+use haarlight::cli::options::WavelengthRange;
 use haarlight::scene::effects::Plan;
 use haarlight::scene::facts::Facts;
 use haarlight::scene::Options;
-use haarlight::survey::Wishes;
+use haarlight::survey::SurveyOptions;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
 use serde_json::json;
@@ -25,7 +25,7 @@ use std::sync::Arc;
 ///         `room.spectra.json` beside the room: `{"materials": {"wall": {"reflectance": {"name": "macbeth/white"}}}}`.
 ///         In place of `{"name": ...}` or `{"csv": ...}` arrays may stand: `{"wavelengths": nm, "values": ...}`.
 ///     sky: `"overcast"`, `"clear"` ... or a dictionary as under `"sky"` in a file of spectra, with the sun in it.
-///     range: first and last wavelength, nm; 64 leaves divide them.
+///     range: first and last wavelength, nm; 64 bands divide them.
 ///     lenient: only warn of keys and names in `spectra` that mean nothing.
 ///     scale: metres for each unit of the file.
 ///     flip: turn the faces that look reversed.
@@ -48,7 +48,7 @@ pub(crate) fn load(
     flip: bool,
     allow_dark: bool,
 ) -> PyResult<Room> {
-    let range: Range = format!("{}..{}", range.0, range.1)
+    let range: WavelengthRange = format!("{}..{}", range.0, range.1)
         .parse()
         .map_err(|what: String| wrong(py, "range", what, "give (380, 780)"))?;
     if scale.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
@@ -75,7 +75,7 @@ pub(crate) fn load(
         };
         options.say(json!({ "sky": sky }));
     }
-    let wishes = Wishes { allow_dark, flip };
+    let wishes = SurveyOptions { allow_dark, flip };
     let data = done(py, move || Data::read(path, options, wishes))?;
     warn(py, &data.scene.warnings)?;
     Ok(Room {
@@ -141,7 +141,7 @@ impl Room {
     ///         Without it there are `probe`, `relight` and `audit`.
     ///     keep: keep where light comes from, which `relight` needs.
     ///     vertices: vertices of the mesh at the most.
-    ///     spectrum: how spectra are carried: "perceptual", "guaranteed", "dense" (all 64 leaves), "rgb" ...
+    ///     spectrum: how spectra are carried: "perceptual", "guaranteed", "dense" (all 64 bands), "rgb" ...
     ///     rounds: rounds at the most.
     ///     seed: of all sampling patterns; equal seeds give equal results.
     ///

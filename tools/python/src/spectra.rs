@@ -1,7 +1,7 @@
 //! The spectra that rooms may name.
 
 use crate::errors;
-use haarlight::data::{Kind, named, names, nearest};
+use haarlight::data::{TableKind, named, names, nearest};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -33,8 +33,8 @@ pub(crate) fn spectra<'py>(py: Python<'py>, pattern: &str) -> PyResult<Bound<'py
             continue;
         };
         let kind = match spectrum.kind {
-            Kind::Illuminant => "light",
-            Kind::Reflectance => "reflectance",
+            TableKind::Illuminant => "light",
+            TableKind::Reflectance => "reflectance",
         };
         let wavelengths = spectrum.table.wavelengths().to_vec().into_pyarray(py);
         let values = spectrum.table.values().to_vec().into_pyarray(py);

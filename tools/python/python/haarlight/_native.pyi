@@ -78,7 +78,7 @@ class Result:
         """Tristimulus irradiance of the adaptation white, X, Y, Z, lm/m2."""
     @property
     def edges(self) -> NDArray[np.float64]:
-        """Edges of the 64 leaves of spectra, (65,), nm."""
+        """Edges of the 64 bands of spectra, (65,), nm."""
     @property
     def positions(self) -> NDArray[np.float64]:
         """Places of the vertices, (N, 3), units of the file."""
@@ -98,7 +98,7 @@ class Result:
     def surface(self) -> NDArray[np.uint32]:
         """Which of `Room.surfaces` each vertex belongs to, (N,)."""
     def spectra(self, wavelengths: ArrayLike | None = None) -> NDArray[np.float32]:
-        """Spectral radiosity of the vertices at wavelengths (K,) in nm, or on all leaves: (N, K), W/m2/nm."""
+        """Spectral radiosity of the vertices at wavelengths (K,) in nm, or on all bands: (N, K), W/m2/nm."""
     def probe(self, points: ArrayLike, normals: ArrayLike) -> Probe:
         """Light at points (N, 3) with normals (N, 3) or (3,)."""
     def places(self, points: ArrayLike, normals: ArrayLike) -> list[Literal["room", "inside", "outside"]]:

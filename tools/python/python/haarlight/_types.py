@@ -19,7 +19,7 @@ class Probe(NamedTuple):
     xyz: NDArray[np.float64]
     """Tristimulus irradiance, (N, 3), lm/m2."""
     bands: NDArray[np.float64]
-    """Spectral irradiance on the leaves, (N, 64), W/m2/nm."""
+    """Spectral irradiance on the bands, (N, 64), W/m2/nm."""
     plus_minus: NDArray[np.float64]
     """Stated error of lux, (N,), lx: an estimate of its root mean square; NaN while it is not known."""
 

@@ -4,10 +4,10 @@ use crate::geometry::RayIndex;
 use crate::hierarchy::{Mesh, cuts, spaces};
 use crate::link::is_small;
 use crate::scene::Scene;
-use crate::scene::effects::{Kind, Plan};
+use crate::scene::effects::{EffectKind, Plan};
 
 /// A mesh whose triangles end where spaces end.
-pub(super) struct Parting {
+pub(super) struct PartedMesh {
     pub(super) mesh: Mesh,
     /// Empty where known cuts are repeated.
     pub(super) rays: RayIndex,
@@ -17,11 +17,11 @@ pub(super) struct Parting {
     pub(super) parted: Vec<u32>,
 }
 
-impl Parting {
+impl PartedMesh {
     /// Casts rays to find the spaces, and cuts what parts them. Without occlusion all is one space.
     pub(super) fn find(scene: &Scene, mesh: Mesh, plan: &Plan, seed: u64) -> Self {
         let rays = mesh.index(scene);
-        if !plan.runs(Kind::Occlusion) {
+        if !plan.runs(EffectKind::Occlusion) {
             return Self {
                 spaces: vec![0; mesh.faces.len()],
                 parted: Vec::new(),

@@ -18,12 +18,12 @@ pub(crate) const WIDTH: usize = 8;
 /// Padding of every box, of the scene's half size. Measured: of 4 million segments aimed at edges and corners of a closed box, none leaks.
 pub(crate) const PAD: f32 = 1e-5;
 
-/// Set in [`Node::children`] for a leaf; the rest is the index of a block.
+/// Set in [`BvhNode::children`] for a leaf; the rest is the index of a block.
 pub(crate) const LEAF: u32 = 1 << 31;
 
 /// Eight boxes, coordinate by coordinate, and what is in them.
 #[derive(Clone, Debug)]
-pub(crate) struct Node {
+pub(crate) struct BvhNode {
     /// `bounds[0]` the low and `bounds[1]` the high sides, by axis.
     pub(crate) bounds: [[f32x8; 3]; 2],
     /// A node, or a block with [`LEAF`] set.
@@ -34,9 +34,9 @@ pub(crate) struct Node {
 
 /// The nodes, root first, and the blocks of triangles.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Tree {
+pub(crate) struct Bvh {
     /// Empty when there is no triangle.
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Vec<BvhNode>,
     /// The leaves.
     pub(crate) blocks: Vec<Block>,
     /// Low and high corner of everything, unpadded.
@@ -77,7 +77,7 @@ impl Input<'_> {
     }
 }
 
-impl Tree {
+impl Bvh {
     /// Builds the tree over all triangles with an extent; the others can block nothing.
     pub(crate) fn build(input: Input<'_>) -> Self {
         let mut ids = Vec::new();
@@ -154,7 +154,7 @@ struct Collapse<'a> {
 
 impl Collapse<'_> {
     /// Turns the binary tree into nodes of eight, with a stack of its own.
-    fn run(&self, tree: &mut Tree) {
+    fn run(&self, tree: &mut Bvh) {
         tree.nodes.push(empty_node());
         let mut todo = vec![(0usize, 0usize)];
         while let Some((binary, place)) = todo.pop() {
@@ -220,8 +220,8 @@ impl Collapse<'_> {
     }
 }
 
-fn empty_node() -> Node {
-    Node {
+fn empty_node() -> BvhNode {
+    BvhNode {
         bounds: [[f32x8::ZERO; 3]; 2],
         children: [0; WIDTH],
         count: 0,

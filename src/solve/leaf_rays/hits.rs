@@ -13,14 +13,14 @@ pub(super) const ALONE: u32 = 1 << 31;
 
 /// Where a ray ended.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct End {
+pub(super) struct RayEnd {
     /// Entry of the face, maybe with the flag [`ALONE`]; [`NONE`]: the ray left the room or met a black back.
     pub(super) entry: u32,
     /// Weights of the second and third corner, in 1/65536.
     pub(super) at: [u16; 2],
 }
 
-impl End {
+impl RayEnd {
     const NOWHERE: Self = Self {
         entry: NONE,
         at: [0; 2],
@@ -29,9 +29,9 @@ impl End {
 
 /// What the rays of a leaf found.
 #[derive(Default)]
-pub(super) struct Found {
+pub(super) struct LeafHits {
     /// Where the rays ended.
-    pub(super) ends: Vec<End>,
+    pub(super) ends: Vec<RayEnd>,
     /// The rays that pass panes or meet mirrors, with those panes and mirrors.
     pub(super) passed: Vec<(u32, Passed)>,
     /// The rays that went by mirrors in which lamps have no image.
@@ -45,18 +45,18 @@ pub(super) fn look_from(
     sight: &Sight,
     pattern: &Hemisphere,
     seed: u64,
-) -> Found {
+) -> LeafHits {
     let node = tree.node(leaf);
     let element = &tree.elements[node.element as usize];
     let plane = tree.face_plane[element.face as usize];
-    let pairs = Pairs::new(leaf, pattern.len(), seed);
+    let pairs = RayPairs::new(leaf, pattern.len(), seed);
     let turn = hash(seed ^ 1, u64::from(leaf));
     let (sin, cos) = (std::f64::consts::TAU * sequence02(0, turn)[0]).sin_cos();
     let [x, y] = tangents(node.normal);
     let [x, y] = [x * cos + y * sin, y * cos - x * sin];
-    let mut found = Found {
+    let mut found = LeafHits {
         ends: Vec::with_capacity(pattern.len()),
-        ..Found::default()
+        ..LeafHits::default()
     };
     let mut hits = [None; BEAM];
     let (mut from, mut directions) = ([Vec3::ZERO; BEAM], [Vec3::ZERO; BEAM]);
@@ -72,12 +72,14 @@ pub(super) fn look_from(
             }
         }
         found.ends.extend(hits.iter().map(|hit| {
-            let Some(hit) = hit else { return End::NOWHERE };
+            let Some(hit) = hit else {
+                return RayEnd::NOWHERE;
+            };
             let [u, v] = hit.uv.map(|x| (x * 65536.0).clamp(0.0, 65535.0) as u16);
             let at = if hit.from_behind { [v, u] } else { [u, v] };
             match tree.met(hit) {
-                NONE => End::NOWHERE,
-                entry => End { entry, at },
+                NONE => RayEnd::NOWHERE,
+                entry => RayEnd { entry, at },
             }
         }));
     }
@@ -91,7 +93,7 @@ pub(super) fn look_from(
     found
 }
 
-impl Found {
+impl LeafHits {
     /// Notes what the `k`-th ray of the next beam passes, and where it ends if mirrors send it on.
     fn go_on(&mut self, sight: &Sight, [from, way]: [Vec3; 2], k: usize, hit: &mut Option<Hit>) {
         let ray = (self.ends.len() + k) as u32;
@@ -117,12 +119,12 @@ impl Found {
 
 /// Which two rays of a leaf start from the same point: k and `k ^ mask`. The mask differs from leaf to leaf, so that the
 /// two directions are unrelated.
-pub(super) struct Pairs {
+pub(super) struct RayPairs {
     mask: usize,
     shift: u64,
 }
 
-impl Pairs {
+impl RayPairs {
     /// The pairs of `count` rays, a power of two.
     pub(super) fn new(leaf: u32, count: usize, seed: u64) -> Self {
         let shift = hash(seed, u64::from(leaf));

@@ -4,7 +4,7 @@ use crate::geometry::Segment;
 use crate::light::Passage;
 
 /// What light meets on its way.
-pub(super) trait Ways {
+pub(super) trait Obstacles {
     /// For each segment: is it blocked?
     fn block(&self, segments: &[Segment], out: &mut Vec<bool>);
     /// May light change on its way?

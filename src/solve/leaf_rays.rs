@@ -13,7 +13,7 @@
 //! chosen independently, and each counts if the other met a front. All light that leaves of these areas send to fronts is
 //! received by leaves: nothing need be scaled.
 
-mod found;
+mod hits;
 mod kept;
 
 use super::flux::Closed;
@@ -24,8 +24,8 @@ use crate::light::rows::Rows;
 use crate::link::Sight;
 use crate::team::{Interrupt, Interrupted, Team};
 use crate::transport::hemisphere::{BEAM, Hemisphere};
-use found::{ALONE, End, Found, Pairs, look_from, start};
 use glam::{DVec3, Vec3};
+use hits::{ALONE, LeafHits, RayEnd, RayPairs, look_from, start};
 use rayon::prelude::*;
 
 /// Rays that tell how much of a leaf's light meets fronts: for a leaf of mean area, the least, and the most.
@@ -40,9 +40,9 @@ const LEAST_BARE: f64 = 1e-3;
 const CHUNK: usize = 64;
 /// Rays that tell whether a point is covered.
 const COVER_RAYS: usize = 4;
-/// How the leaves of a hierarchy look out.
+/// The rays of the leaves of a hierarchy, and what they tell of how the leaves look out.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Outlook {
+pub(crate) struct LeafRays {
     /// For each node that is a leaf: share of its light that meets fronts. NaN elsewhere.
     pub target: Vec<f32>,
     /// For each node that is a leaf: share of its area that takes part. NaN elsewhere. Where leaves look for themselves this
@@ -53,7 +53,7 @@ pub(crate) struct Outlook {
     /// The ranks among which the rows of leaves are shared out: rays of other ranks' leaves are not here.
     pub(super) team: Team,
     /// Where the rays of this rank's leaves ended, leaf after leaf.
-    ends: Vec<End>,
+    ends: Vec<RayEnd>,
     /// Which panes those rays pass, and which mirrors they meet.
     pub(super) tints: Tints,
     /// Rays by mirrors in which lamps have no image, ascending: these also bring the emission of their ends.
@@ -65,21 +65,21 @@ pub(crate) struct Outlook {
 }
 
 /// How much was known when it was taken down: nodes, rays, rays by mirrors, and the filters that rays pass.
-pub(super) struct Grown {
+pub(super) struct LeafRaysSize {
     nodes: usize,
     ends: usize,
     lamps: usize,
     filters: usize,
 }
 
-impl Outlook {
+impl LeafRays {
     /// Takes all leaves for uncovered, and all their light to meet fronts, without looking.
     pub(super) fn open(&mut self, tree: &Tree) {
         self.bare = vec![1.0; tree.nodes.len()];
         self.target = vec![1.0; tree.nodes.len()];
     }
 
-    /// An outlook of which nothing is known yet, of the ranks of a team.
+    /// Rays of which nothing is known yet, of the ranks of a team.
     pub(super) fn of_team(team: Team) -> Self {
         Self {
             team,
@@ -173,7 +173,7 @@ impl Outlook {
         let team = self.team;
         let own = new.iter().copied().filter(|&k| team.owns(k as usize));
         let own: Vec<u32> = own.collect();
-        let parts: Result<Vec<Vec<Found>>, _> = own
+        let parts: Result<Vec<Vec<LeafHits>>, _> = own
             .par_chunks(CHUNK)
             .map(|chunk| {
                 interrupt.check()?;
@@ -189,7 +189,7 @@ impl Outlook {
             })
             .collect();
         let parts = parts?;
-        let counts = |found: &Found| {
+        let counts = |found: &LeafHits| {
             let fronts = found.ends.iter().filter(|end| end.entry != NONE).count();
             [fronts as u32, found.ends.len() as u32]
         };
@@ -221,7 +221,7 @@ impl Outlook {
         // Nodes lie far apart in memory, and the look-up needs only their children.
         let children: Vec<u32> = tree.nodes.iter().map(|node| node.child).collect();
         let stands = |met: u32| children[(met & !ALONE) as usize] == NONE;
-        let leaf_at = |end: &End| {
+        let leaf_at = |end: &RayEnd| {
             let [v, w] = end.at.map(|x| f64::from(x) / 65536.0);
             let face = tree.face_node[(end.entry & !ALONE) as usize];
             let leaf = leaf_below(face, [1.0 - v - w, v, w], |k| children[k as usize]);
@@ -237,9 +237,9 @@ impl Outlook {
         });
     }
 
-    /// How much is known, for [`Outlook::shrink`].
-    pub(super) fn grown(&self) -> Grown {
-        Grown {
+    /// How much is known, for [`LeafRays::shrink`].
+    pub(super) fn grown(&self) -> LeafRaysSize {
+        LeafRaysSize {
             nodes: self.target.len(),
             ends: self.ends.len(),
             lamps: self.lamps.len(),
@@ -248,7 +248,7 @@ impl Outlook {
     }
 
     /// Forgets all that was looked up since `to`; `tree` is the hierarchy as refined since.
-    pub(super) fn shrink(&mut self, tree: &Tree, to: &Grown) {
+    pub(super) fn shrink(&mut self, tree: &Tree, to: &LeafRaysSize) {
         self.target.truncate(to.nodes);
         self.bare.truncate(to.nodes);
         self.certain.truncate(to.nodes);
@@ -374,24 +374,6 @@ impl Outlook {
         sum
     }
 
-    /// An outlook of `leaves` (ascending nodes) whose rays met the patches `seen`.
-    #[cfg(test)]
-    pub(super) fn of(nodes: usize, leaves: &[u32], seen: &[Vec<u32>]) -> Self {
-        let mut outlook = Self {
-            target: vec![f32::NAN; nodes],
-            bare: vec![f32::NAN; nodes],
-            range: vec![(0, 0); nodes],
-            ..Self::default()
-        };
-        for (&leaf, seen) in leaves.iter().zip(seen) {
-            let k = leaf as usize;
-            (outlook.target[k], outlook.bare[k]) = (1.0, 1.0);
-            outlook.range[k] = (outlook.met.len() as u32, seen.len() as u32);
-            outlook.met.extend(seen);
-        }
-        outlook
-    }
-
     /// The patches met by those rays of a leaf that count, and the divisor of the sum over them for the leaf's
     /// irradiance.
     pub(super) fn met(&self, leaf: u32) -> (impl Iterator<Item = u32>, f32) {
@@ -411,7 +393,7 @@ impl Outlook {
     /// of their rays; `bright` is the brightness of every patch.
     pub(super) fn variation(&self, leaf: u32, bright: &[f32], seed: u64) -> f64 {
         let (first, count) = self.range[leaf as usize];
-        let pairs = Pairs::new(leaf, count as usize, seed);
+        let pairs = RayPairs::new(leaf, count as usize, seed);
         let mut sums = [[0.0_f64; 3]; 4];
         for k in 0..count as usize {
             // Points that see no fronts tell nothing.
@@ -444,7 +426,7 @@ impl Outlook {
 
     /// Bytes of the rows of this rank's leaves.
     pub(crate) fn row_bytes(&self) -> usize {
-        self.tints.bytes() + (size_of::<End>() + 4) * self.ends.len()
+        self.tints.bytes() + (size_of::<RayEnd>() + 4) * self.ends.len()
     }
 
     /// Bytes held.
@@ -517,7 +499,7 @@ mod tests {
     #[test]
     fn rays_of_a_leaf_start_in_pairs() {
         for (leaf, count) in (0..200).flat_map(|leaf| [(leaf, 16), (leaf, 64), (leaf, 256)]) {
-            let pairs = Pairs::new(leaf, count, 7);
+            let pairs = RayPairs::new(leaf, count, 7);
             let mut rays = vec![Vec::new(); count / 2];
             for k in 0..count {
                 rays[pairs.pair(k)].push(k);
@@ -535,16 +517,16 @@ mod tests {
         nodes.row_mut(1).fill(6.0);
         nodes.row_mut(2).fill(2.0);
         // Pairs of rays: both meet fronts; one does; none does.
-        let outlook = Outlook {
+        let leaf_rays = LeafRays {
             target: vec![1.0],
             bare: vec![0.5],
             range: vec![(0, 6)],
             met: vec![1, 2, 1 | ALONE, NONE, NONE, NONE],
-            ..Outlook::default()
+            ..LeafRays::default()
         };
         let (mut seen, mut whole) = (Rows::zero(1, 4), Rows::zero(1, 4));
-        outlook.irradiance::<4>(&[0], &nodes, &mut seen);
-        outlook.irradiance_of_whole::<4>(&[0], &nodes, &mut whole);
+        leaf_rays.irradiance::<4>(&[0], &nodes, &mut seen);
+        leaf_rays.irradiance_of_whole::<4>(&[0], &nodes, &mut whole);
         // Openness 1, 1/2 and 0; irradiance (6 + 2) / 2, (6 + 0) / 2 and 0. Of the second point no pair counts.
         let near = |row: &[f32], want: f32| row.iter().all(|x| (x - want).abs() < 1e-6);
         assert!(near(seen.row(0), 8.0 / 3.0) && near(whole.row(0), 14.0 / 6.0));

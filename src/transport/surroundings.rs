@@ -5,15 +5,15 @@
 //! heuristic the few rays of the hemisphere that find a small opening added 2 % of noise to the light known from rays towards it. A ray
 //! serves all parts of the sky.
 
-use super::clipped_sky::{Found, Looker};
+use super::clipped_sky::{SkyIrradiance, SkyReceiver};
+use super::obstacles::Obstacles;
 use super::receiver::Receiver;
-use super::ways::Ways;
-use crate::geometry::openings::{BEAM, Choice, Openings, Start, Wall};
+use crate::geometry::openings::{BEAM, OpeningDistribution, Openings, RayStart, Wall};
 use crate::geometry::sampling::{cosine_direction, hash, sequence02, triangle_weights};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::{Mesh, Tree};
 use crate::light::{Passage, Tint};
-use crate::link::{Sight, View};
+use crate::link::{Sight, Visibility};
 use crate::scene::sky::{PARTS, PLACES, Sky};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -30,16 +30,16 @@ const TINTED: [usize; 4] = [16, 64, 512, 512];
 
 /// What is outside a room.
 #[derive(Debug, Clone)]
-pub(crate) struct Outside {
+pub(crate) struct Surroundings {
     pub(crate) sky: Sky,
     pub(crate) openings: Openings,
 }
 
 /// Memory and results of a look outside.
 #[derive(Debug, Default)]
-pub(crate) struct Look {
-    found: Found,
-    choice: Choice,
+pub(crate) struct SkyScratch {
+    found: SkyIrradiance,
+    choice: OpeningDistribution,
     segments: Vec<Segment>,
     open: Vec<(Search, DVec3)>,
     blocked: Vec<bool>,
@@ -51,19 +51,19 @@ pub(crate) struct Look {
     pub(super) tints: [Option<Passage>; PLACES],
 }
 
-impl Look {
+impl SkyScratch {
     /// Finds which segments are blocked.
-    fn block(&mut self, (sight, by): (&Sight, Option<&dyn Ways>)) {
+    fn block(&mut self, (sight, by): (&Sight, Option<&dyn Obstacles>)) {
         match by {
             Some(by) => by.block(&self.segments, &mut self.blocked),
-            None => sight.blocked(&self.segments, &View::Crowded, &mut self.blocked),
+            None => sight.blocked(&self.segments, &Visibility::Crowded, &mut self.blocked),
         }
         self.rays += self.segments.len() as u64;
     }
 }
 
 /// Distance beyond which everything lies outside the room.
-fn reach((sight, by): (&Sight, Option<&dyn Ways>)) -> f64 {
+fn reach((sight, by): (&Sight, Option<&dyn Obstacles>)) -> f64 {
     by.map_or(4.0 * sight.mesh.half_size, |by| by.reach())
 }
 
@@ -77,7 +77,7 @@ enum Search {
 
 /// How a point looks outside.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Way<'a> {
+pub(super) enum SkySampling<'a> {
     /// By the rays of this row of [`RAYS`].
     Rays(usize),
     /// These directions, of this many over the hemisphere, lead out of the room.
@@ -90,13 +90,13 @@ pub(super) enum Way<'a> {
     Unshadowed,
 }
 
-impl Way<'_> {
+impl SkySampling<'_> {
     /// The row of [`RAYS`].
     fn kind(self) -> usize {
         match self {
-            Way::Rays(kind) => kind,
-            Way::Glanced(..) | Way::Unshadowed => 0,
-            Way::Known(..) | Way::Shared(..) => 3,
+            SkySampling::Rays(kind) => kind,
+            SkySampling::Glanced(..) | SkySampling::Unshadowed => 0,
+            SkySampling::Known(..) | SkySampling::Shared(..) => 3,
         }
     }
 }
@@ -109,13 +109,13 @@ pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) 
         tree.nodes.first()?;
         let entry = tree.entry_at(share * area);
         let element = &tree.elements[tree.node(tree.face_node[entry]).element as usize];
-        Some(Start {
+        Some(RayStart {
             point: element.at(triangle_weights(square)),
             normal: tree.face_normal[entry],
             plane: tree.face_plane[entry],
         })
     };
-    let meet = |start: &Start, ways: &[DVec3; BEAM]| {
+    let meet = |start: &RayStart, ways: &[DVec3; BEAM]| {
         let mut hits = [None; BEAM];
         let (from, ways) = (start.point.as_vec3(), ways.map(|d| d.as_vec3()));
         sight.meet(&[from; BEAM], &ways, start.plane, &mut hits);
@@ -131,35 +131,35 @@ pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) 
     (openings, cast.into_inner())
 }
 
-impl Outside {
+impl Surroundings {
     /// Irradiance of a point by each part of the sky, where open level ground has 1, and by the ground, where a plane that faces
     /// down has 1.
     pub(super) fn seen(
         &self,
-        (sight, by): (&Sight, Option<&dyn Ways>),
+        (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
-        way: Way,
-        look: &mut Look,
+        sampling: SkySampling,
+        look: &mut SkyScratch,
     ) -> [f64; PLACES] {
         (look.noise, look.tints) = ([0.0; PLACES], Default::default());
-        if let Way::Unshadowed = way {
+        if let SkySampling::Unshadowed = sampling {
             return self.unshadowed(to);
         }
         // Many points represent a leaf that looks for itself: for them rays are enough.
-        let one_of_many = sight.panes.is_some() && way.kind() == 0;
+        let one_of_many = sight.panes.is_some() && sampling.kind() == 0;
         if Self::is_exact(&self.sky, sight) && !one_of_many {
-            let looker = Looker {
+            let looker = SkyReceiver {
                 sky: &self.sky,
                 sight,
                 by: by.filter(|by| by.change_light()),
                 to,
             };
-            looker.look(TINTED[way.kind()], &mut look.found);
+            looker.look(TINTED[sampling.kind()], &mut look.found);
             look.rays += look.found.rays;
             look.tints = std::mem::take(&mut look.found.tints);
             look.found.seen
         } else {
-            self.by_rays((sight, by), to, way, look)
+            self.by_rays((sight, by), to, sampling, look)
         }
     }
 
@@ -197,28 +197,36 @@ impl Outside {
     }
 
     /// [`Self::seen`] from one of many points.
-    pub(crate) fn lightly(&self, sight: &Sight, to: &Receiver, look: &mut Look) -> [f64; PLACES] {
-        self.seen((sight, None), to, Way::Rays(0), look)
+    pub(crate) fn lightly(
+        &self,
+        sight: &Sight,
+        to: &Receiver,
+        look: &mut SkyScratch,
+    ) -> [f64; PLACES] {
+        self.seen((sight, None), to, SkySampling::Rays(0), look)
     }
 
     /// By rays over the hemisphere, to the openings and to spots.
     pub(super) fn by_rays(
         &self,
-        (sight, by): (&Sight, Option<&dyn Ways>),
+        (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
-        way: Way,
-        look: &mut Look,
+        sampling: SkySampling,
+        look: &mut SkyScratch,
     ) -> [f64; PLACES] {
-        let [wide, mut narrow, spots] = RAYS[way.kind()];
-        if let (Way::Known(..) | Way::Shared(..), true) = (way, sight.small()) {
+        let [wide, mut narrow, spots] = RAYS[sampling.kind()];
+        if let (SkySampling::Known(..) | SkySampling::Shared(..), true) = (sampling, sight.small())
+        {
             // Rooms of few triangles come here because of mirrors and maps; a ray costs next to nothing in them.
             narrow *= FEW;
         }
-        if let Way::Shared(.., images) = way {
+        if let SkySampling::Shared(.., images) = sampling {
             narrow = (narrow / images.max(1)).max(RAYS[1][1]);
         }
-        let wide = match way {
-            Way::Known(open, of) | Way::Glanced(open, of) | Way::Shared(open, of, _) => {
+        let wide = match sampling {
+            SkySampling::Known(open, of)
+            | SkySampling::Glanced(open, of)
+            | SkySampling::Shared(open, of, _) => {
                 look.open.clear();
                 look.open
                     .extend(open.iter().map(|&d| (Search::Hemisphere, d)));
@@ -239,10 +247,10 @@ impl Outside {
     /// Casts rays to bright spots of a map: adds the directions that lead outside.
     fn look_at_spots(
         &self,
-        (sight, by): (&Sight, Option<&dyn Ways>),
+        (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
         count: usize,
-        look: &mut Look,
+        look: &mut SkyScratch,
     ) {
         let turn = hash(to.seed, 0x5c3);
         let ahead: Vec<DVec3> = (0..count as u32)
@@ -255,10 +263,10 @@ impl Outside {
     /// Casts rays to the openings: adds the directions that lead outside.
     fn look_through_openings(
         &self,
-        (sight, by): (&Sight, Option<&dyn Ways>),
+        (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
         count: usize,
-        look: &mut Look,
+        look: &mut SkyScratch,
     ) {
         let plain = |d: DVec3| self.sky.plain(d);
         let from = (to.point, to.normal);
@@ -279,10 +287,10 @@ impl Outside {
     /// Adds those of some directions that lead outside: something may stand beyond an opening, too.
     fn cast(
         &self,
-        (sight, by): (&Sight, Option<&dyn Ways>),
+        (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
         (search, ahead): (Search, &[DVec3]),
-        look: &mut Look,
+        look: &mut SkyScratch,
     ) {
         let far = reach((sight, by));
         let way = |d: &DVec3| Segment::new(to.point, to.point + *d * far, [to.plane, NO_PLANE]);
@@ -297,10 +305,10 @@ impl Outside {
     /// Irradiance by the open directions, by the power heuristic, given the number of rays of each search.
     fn combine(
         &self,
-        (sight, by): (&Sight, Option<&dyn Ways>),
+        (sight, by): (&Sight, Option<&dyn Obstacles>),
         to: &Receiver,
         counts: [f64; 3],
-        look: &mut Look,
+        look: &mut SkyScratch,
     ) -> [f64; PLACES] {
         let [mut seen, mut squares, mut sum] = [[0.0; PLACES]; 3];
         let mut tints: [Tint; PLACES] = Default::default();
@@ -344,7 +352,7 @@ impl Outside {
     }
 
     /// Casts rays over the hemisphere: keeps the directions that lead outside.
-    fn look_around(&self, sight: &Sight, to: &Receiver, count: usize, look: &mut Look) {
+    fn look_around(&self, sight: &Sight, to: &Receiver, count: usize, look: &mut SkyScratch) {
         const TOGETHER: usize = 16;
         look.open.clear();
         let shift = hash(to.seed, 0x5c2);

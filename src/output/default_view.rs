@@ -10,7 +10,7 @@
 //! One-sided backs are not drawn, so rays pass them; a candidate from which much looks like backs stands outside of what it
 //! sees. Everything follows from fixed sequences: the same room has the same views.
 
-use super::lit_space::{FEW, Leg, Met, Room, axis};
+use super::lit_space::{FEW, Leg, LitRoom, PathHit, axis};
 use crate::geometry::sampling::{sequence02, sphere_direction};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::scene::Scene;
@@ -58,7 +58,7 @@ const OUTSIDE: f64 = 1.3;
 
 /// A view of our own.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Viewpoint {
+pub(super) struct DefaultView {
     /// World space.
     pub(super) eye: DVec3,
     pub(super) target: DVec3,
@@ -71,7 +71,7 @@ struct Candidate {
     eye: DVec3,
     angle: f64,
     /// What rays meet in all directions.
-    seen: Vec<Met>,
+    seen: Vec<PathHit>,
     /// From outside, the distance to the room's bounds, which does not count.
     skip: f64,
     /// Share of rays that meet nothing.
@@ -83,8 +83,8 @@ struct Candidate {
 }
 
 /// Views of a room with this field of view, best first; `others` are tried as well. None if nothing is seen from anywhere.
-pub(super) fn views(scene: &Scene, angle: f64, others: &[Viewpoint]) -> Vec<Viewpoint> {
-    let (room, legs) = Room::new(scene);
+pub(super) fn views(scene: &Scene, angle: f64, others: &[DefaultView]) -> Vec<DefaultView> {
+    let (room, legs) = LitRoom::new(scene);
     let mut pool: Vec<Candidate> = room.stand(&legs, angle, others);
     pool.par_iter_mut().for_each(|c| room.judge(c, GLANCE));
     pool.retain(|c| c.score > 0.0);
@@ -95,7 +95,7 @@ pub(super) fn views(scene: &Scene, angle: f64, others: &[Viewpoint]) -> Vec<View
         .for_each(|c| room.judge(c, GAZE));
     room.choose(pool)
         .into_iter()
-        .map(|c| Viewpoint {
+        .map(|c| DefaultView {
             eye: c.eye + room.mesh.centre,
             target: c.eye + room.mesh.centre + c.toward * room.path,
             angle: c.angle,
@@ -103,9 +103,9 @@ pub(super) fn views(scene: &Scene, angle: f64, others: &[Viewpoint]) -> Vec<View
         .collect()
 }
 
-impl Room<'_> {
+impl LitRoom<'_> {
     /// Candidates: along the legs of light, at eyes' height, and the others.
-    fn stand(&self, legs: &[Leg], angle: f64, others: &[Viewpoint]) -> Vec<Candidate> {
+    fn stand(&self, legs: &[Leg], angle: f64, others: &[DefaultView]) -> Vec<Candidate> {
         let candidate = |eye, angle, skip| Candidate {
             eye,
             angle,
@@ -184,7 +184,7 @@ impl Room<'_> {
             let direction = sphere_direction(sequence02(k, 0));
             let met = self.see(c.eye, direction, NO_PLANE).0;
             // Rays that meet nothing matter, too: they are background.
-            met.unwrap_or(Met {
+            met.unwrap_or(PathHit {
                 direction,
                 distance: f64::INFINITY,
                 point: DVec3::ZERO,
@@ -213,7 +213,7 @@ impl Room<'_> {
     }
 
     /// What a ray adds to a view.
-    fn worth(&self, met: &Met, skip: f64) -> f64 {
+    fn worth(&self, met: &PathHit, skip: f64) -> f64 {
         if met.surface == NOTHING {
             return 0.0;
         }
@@ -240,7 +240,7 @@ impl Room<'_> {
     fn choose(&self, mut pool: Vec<Candidate>) -> Vec<Candidate> {
         let count = PLACES.min(self.places.len());
         let every = |k: usize| self.places[k * self.places.len() / count];
-        let places: Vec<Met> = (0..count).map(every).collect();
+        let places: Vec<PathHit> = (0..count).map(every).collect();
         pool.sort_by(|a, b| b.score.total_cmp(&a.score));
         let shows: Vec<Vec<bool>> = pool
             .par_iter()
@@ -275,7 +275,7 @@ impl Room<'_> {
         chosen.iter().filter_map(|&k| pool[k].take()).collect()
     }
 
-    fn shows(&self, eye: DVec3, met: &Met) -> bool {
+    fn shows(&self, eye: DVec3, met: &PathHit) -> bool {
         let segment = Segment::new(eye, met.point, [NO_PLANE, met.plane]);
         met.normal.dot(eye - met.point) > 0.0 && !self.rays.occluded(&segment)
     }

@@ -1,15 +1,15 @@
 //! What blocks light between two points of the reference, and what panes on its way let through.
 
-use super::patch::{Patch, Place, add};
+use super::patch::{Patch, PatchPoint, add};
 use crate::geometry::{NO_PLANE, RayIndex, Segment, lambert_polygon};
 use crate::hierarchy::{Glazing, Mesh, Panes, stratified};
 use crate::scene::Scene;
-use crate::scene::effects::{Kind, Plan};
-use crate::spectrum::{LEAVES, Leaves};
+use crate::scene::effects::{EffectKind, Plan};
+use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
 
-/// The ways of light in a room.
-pub(super) struct Ways<'a> {
+/// What blocks and filters light between two points of a room.
+pub(super) struct ReferenceVisibility<'a> {
     scene: &'a Scene,
     rays: RayIndex,
     /// False: nothing can block.
@@ -19,7 +19,7 @@ pub(super) struct Ways<'a> {
     count: usize,
 }
 
-impl<'a> Ways<'a> {
+impl<'a> ReferenceVisibility<'a> {
     pub(super) fn new(scene: &'a Scene, mesh: &Mesh, count: usize) -> Self {
         let positions: Vec<glam::Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
         let solid = vec![false; mesh.triangles.len()];
@@ -27,15 +27,15 @@ impl<'a> Ways<'a> {
             scene,
             rays: RayIndex::build(&positions, &mesh.triangles, &mesh.plane, &solid),
             // The walls of a convex room do not block each other, but they block the sky.
-            blocks: Plan::of(scene).runs(Kind::Occlusion) || scene.sky.is_some(),
+            blocks: Plan::of(scene).runs(EffectKind::Occlusion) || scene.sky.is_some(),
             panes: Panes::new(scene, mesh.centre),
             count,
         }
     }
 
     /// Form factor from a point to the visible part of a patch, and the transmittance of panes on the way; none: 1.
-    pub(super) fn factor(&self, from: Place, to: &Patch) -> (f64, Option<Leaves>) {
-        let Place {
+    pub(super) fn factor(&self, from: PatchPoint, to: &Patch) -> (f64, Option<Spectrum>) {
+        let PatchPoint {
             at: point,
             normal,
             plane,
@@ -48,7 +48,7 @@ impl<'a> Ways<'a> {
             return (open, None);
         }
         let (mut seen, mut total) = (0.0, 0.0);
-        let mut passed = self.panes.as_ref().map(|_| [0.0; LEAVES]);
+        let mut passed = self.panes.as_ref().map(|_| [0.0; BANDS]);
         for k in 0..self.count {
             let w = stratified(k, self.count, [0.5, 0.5]);
             let q = to.corners[0] * w[0] + to.corners[1] * w[1] + to.corners[2] * w[2];
@@ -74,7 +74,7 @@ impl<'a> Ways<'a> {
     }
 
     /// Adds `amount` of light from `end` to a point, less what panes absorb, unless something blocks it. Nothing in the point's plane does.
-    pub(super) fn bring(&self, sum: &mut Leaves, amount: f64, to: Place, end: DVec3) {
+    pub(super) fn bring(&self, sum: &mut Spectrum, amount: f64, to: PatchPoint, end: DVec3) {
         if !self.blocked(to.at, end, [to.plane, NO_PLANE]) {
             match self.panes {
                 Some(_) => add(sum, &self.passes(to.at, end), amount),
@@ -88,8 +88,8 @@ impl<'a> Ways<'a> {
     }
 
     /// Transmittance of the panes between two points.
-    fn passes(&self, from: DVec3, to: DVec3) -> Leaves {
-        let mut left = [1.0; LEAVES];
+    fn passes(&self, from: DVec3, to: DVec3) -> Spectrum {
+        let mut left = [1.0; BANDS];
         let Some(panes) = &self.panes else {
             return left;
         };

@@ -33,7 +33,7 @@ pub struct Series {
 
 /// A chart of lines with marks.
 #[derive(Debug, Clone)]
-pub struct Chart {
+pub struct LineChart {
     /// What the chart says, in one line.
     pub title: String,
     /// Quantity and unit along x.
@@ -48,7 +48,7 @@ pub struct Chart {
     pub series: Vec<Series>,
 }
 
-impl Chart {
+impl LineChart {
     /// The picture.
     pub fn to_svg(&self) -> String {
         let names = self
@@ -166,14 +166,14 @@ fn grid(svg: &mut Svg, x: &Axis, y: &Axis, [left, right]: [f64; 2], [top, bottom
 mod tests {
     use super::*;
 
-    fn chart() -> Chart {
+    fn chart() -> LineChart {
         let series = |name: &str, scale: f64| Series {
             name: name.into(),
             points: (0..6)
                 .map(|i| [0.05 * 2f64.powi(i), scale * 3.0 / 1.7f64.powi(i)])
                 .collect(),
         };
-        Chart {
+        LineChart {
             title: "Cornell box under F2: error against time".into(),
             x: "CPU time, s".into(),
             y: "mean ΔE*uv".into(),

@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// One of a number of places, given back in the end.
-pub(super) struct Place(Arc<AtomicUsize>);
+pub(super) struct Slot(Arc<AtomicUsize>);
 
-impl Place {
+impl Slot {
     /// Takes one; none if all are taken.
     pub(super) fn take(taken: &Arc<AtomicUsize>, all: usize) -> Option<Self> {
         let place = Self(Arc::clone(taken));
@@ -14,7 +14,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Slot {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::SeqCst);
     }

@@ -3,8 +3,8 @@
 //! A file holds the rays of all leaves in the order of their numbers, whichever ranks have them: so a bake can go on with any number
 //! of ranks.
 
-use super::Outlook;
-use super::found::{ALONE, End};
+use super::LeafRays;
+use super::hits::{ALONE, RayEnd};
 use crate::hierarchy::{NONE, Tree};
 use crate::light::Filters;
 use crate::light::passed::Passed;
@@ -19,8 +19,8 @@ const TOGETHER: usize = 1 << 16;
 /// Flag, beside what a ray passes, of rays that bring the emission of their ends.
 const LAMP: u32 = 1 << 31;
 
-impl Outlook {
-    /// Writes the outlook: where the rays end, or only the leaves that they met, which is half as much and enough as
+impl LeafRays {
+    /// Writes the rays: where the rays end, or only the leaves that they met, which is half as much and enough as
     /// long as no leaf is split. In a room with panes or mirrors (then there are `filters`) also what the rays pass.
     pub(in crate::solve) fn encode(
         &self,
@@ -65,7 +65,7 @@ impl Outlook {
         })
     }
 
-    /// Reads back what [`Outlook::encode_passed`] wrote.
+    /// Reads back what [`LeafRays::encode_passed`] wrote.
     fn decode_passed(&mut self, counts: &[u32], filters: &Filters, from: &mut Decoder) -> Read<()> {
         let all = tinted::all_of(&from.get_all::<u64>()?, filters)?;
         let mut of = self.own::<u32>(counts, from)?;
@@ -110,14 +110,14 @@ impl Outlook {
         from: &mut Decoder,
     ) -> Read<Self> {
         let nodes = tree.nodes.len();
-        let mut outlook = Self {
+        let mut leaf_rays = Self {
             team,
             target: from.get_exactly(nodes)?,
             bare: from.get_exactly(nodes)?,
             certain: from.get_list::<u8>()?.map(|c| c == 1).collect(),
             ..Self::default()
         };
-        if !(outlook.certain.is_empty() || outlook.certain.len() == nodes) {
+        if !(leaf_rays.certain.is_empty() || leaf_rays.certain.len() == nodes) {
             return Err(Broken::new("has patches that do not fit"));
         }
         let counts: Vec<u32> = from.get_all()?;
@@ -125,27 +125,27 @@ impl Outlook {
             return Err(Broken::new("has rays in parts that do not fit"));
         }
         if whole {
-            let entries = outlook.own::<u32>(&counts, from)?;
-            let places = outlook.own::<[u16; 2]>(&counts, from)?;
+            let entries = leaf_rays.own::<u32>(&counts, from)?;
+            let places = leaf_rays.own::<[u16; 2]>(&counts, from)?;
             let ends = entries.into_iter().zip(places);
-            outlook.ends = ends.map(|(entry, at)| End { entry, at }).collect();
+            leaf_rays.ends = ends.map(|(entry, at)| RayEnd { entry, at }).collect();
             let faces = tree.faces.len();
-            let there = |e: &End| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
-            if !outlook.ends.iter().all(there) {
+            let there = |e: &RayEnd| e.entry == NONE || ((e.entry & !ALONE) as usize) < faces;
+            if !leaf_rays.ends.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }
         } else {
-            outlook.met = outlook.own(&counts, from)?;
+            leaf_rays.met = leaf_rays.own(&counts, from)?;
             let there = |&k: &u32| k == NONE || ((k & !ALONE) as usize) < nodes;
-            if !outlook.met.iter().all(there) {
+            if !leaf_rays.met.iter().all(there) {
                 return Err(Broken::new("has rays that end nowhere"));
             }
         }
         if let Some(filters) = filters {
-            outlook.decode_passed(&counts, filters, from)?;
+            leaf_rays.decode_passed(&counts, filters, from)?;
         }
         let mut held = 0;
-        outlook.range = (counts.iter().enumerate())
+        leaf_rays.range = (counts.iter().enumerate())
             .map(|(node, &count)| {
                 if !team.owns(node) {
                     return (NONE, count);
@@ -156,9 +156,9 @@ impl Outlook {
             })
             .collect();
         if whole {
-            outlook.find(tree);
+            leaf_rays.find(tree);
         }
-        Ok(outlook)
+        Ok(leaf_rays)
     }
 
     /// Reads a list with an item for each ray; keeps the items of the rays of this rank's leaves.

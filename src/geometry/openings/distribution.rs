@@ -1,6 +1,6 @@
 //! Directions toward openings: chosen by what each piece of them may bring to a point, with their density.
 
-use super::boxes::Part;
+use super::boxes::OpeningBox;
 use super::gaps::across;
 use super::sides::{MARGIN, Openings};
 use crate::geometry::sampling::hash;
@@ -27,7 +27,7 @@ const LEAST_COSINE: f64 = 0.1;
 
 /// What the parts of the openings may bring to a point, summed up piece by piece.
 #[derive(Debug, Default)]
-pub(crate) struct Choice {
+pub(crate) struct OpeningDistribution {
     parts: Vec<Pieces>,
     sums: Vec<f64>,
 }
@@ -52,7 +52,7 @@ impl Openings {
         rays: f64,
         (point, normal): (DVec3, DVec3),
         brightness: impl Fn(DVec3) -> f64,
-        choice: &mut Choice,
+        choice: &mut OpeningDistribution,
     ) {
         let least = NOTHING / rays;
         choice.sums.clear();
@@ -80,7 +80,7 @@ impl Openings {
             pieces
         }));
         let most = (EACH * rays).min(PIECES as f64) as usize;
-        self.cut(point, most, choice);
+        self.divide(point, most, choice);
         let [mut open, mut blind] = [0.0; 2];
         for pieces in &choice.parts {
             let part = &self.parts[pieces.part as usize];
@@ -106,8 +106,8 @@ impl Openings {
         }
     }
 
-    /// Cuts parts into pieces, coarser ones where they were more than this.
-    fn cut(&self, point: DVec3, most: usize, choice: &mut Choice) {
+    /// Divides parts into pieces, coarser ones where they were more than this.
+    fn divide(&self, point: DVec3, most: usize, choice: &mut OpeningDistribution) {
         let (mut length, parts) = (LENGTH, choice.parts.len().max(1));
         let fewest = (most / parts).isqrt().clamp(1, FEWEST);
         loop {
@@ -172,7 +172,7 @@ impl Openings {
     }
 
     /// A place in a part, chosen by what the parts may bring.
-    pub(crate) fn choose(&self, choice: &Choice, [u, v]: [f64; 2]) -> Option<DVec3> {
+    pub(crate) fn choose(&self, choice: &OpeningDistribution, [u, v]: [f64; 2]) -> Option<DVec3> {
         let total = choice.total();
         if total <= 0.0 {
             return None;
@@ -199,7 +199,12 @@ impl Openings {
     }
 
     /// Density, by solid angle, with which [`choose`](Self::choose) finds a direction of unit length.
-    pub(crate) fn density(&self, choice: &Choice, from: DVec3, direction: DVec3) -> f64 {
+    pub(crate) fn density(
+        &self,
+        choice: &OpeningDistribution,
+        from: DVec3,
+        direction: DVec3,
+    ) -> f64 {
         let total = choice.total();
         let mut sum = 0.0;
         if total > 0.0 {
@@ -215,7 +220,7 @@ impl Openings {
     /// a and leaves it at b.
     pub(super) fn crossed(
         &self,
-        choice: &Choice,
+        choice: &OpeningDistribution,
         from: DVec3,
         direction: DVec3,
         mut each: impl FnMut(usize, f64),
@@ -260,7 +265,7 @@ fn crossed([low, high]: &[DVec3; 2], from: DVec3, inverse: DVec3) -> Option<[f64
 /// The directions of a piece's middle and of two corners, and about its form factor; none if it is behind. By the middle alone a
 /// slit across the horizon, half of it above black ground, was never looked through.
 fn toward(
-    part: &Part,
+    part: &OpeningBox,
     pieces: &Pieces,
     at: [u32; 2],
     point: DVec3,
@@ -295,7 +300,7 @@ impl Pieces {
     }
 
     /// Corner and size of one.
-    fn place(&self, part: &Part, at: [u32; 2]) -> [DVec3; 2] {
+    fn place(&self, part: &OpeningBox, at: [u32; 2]) -> [DVec3; 2] {
         let (mut low, mut size) = (part.low, part.size());
         for (k, axis) in across(part.axis).into_iter().enumerate() {
             size[axis] /= f64::from(self.along[k]);
@@ -305,7 +310,7 @@ impl Pieces {
     }
 
     /// The one that holds a point of the part.
-    fn holding(&self, part: &Part, at: DVec3) -> [u32; 2] {
+    fn holding(&self, part: &OpeningBox, at: DVec3) -> [u32; 2] {
         let axes = across(part.axis);
         [0, 1].map(|k| {
             let share = (at - part.low)[axes[k]] / part.size()[axes[k]].max(1e-300);
@@ -319,7 +324,7 @@ impl Pieces {
     }
 }
 
-impl Choice {
+impl OpeningDistribution {
     /// The parts, and what each may bring.
     pub(super) fn worths(&self) -> impl Iterator<Item = (usize, f64)> {
         let sum = |piece: u32| match piece {

@@ -20,7 +20,7 @@ pub(crate) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0
 /// Which light is to show as white. Written `none`, `auto` or a temperature in kelvin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
-pub enum Balance {
+pub enum WhiteBalance {
     /// D65, the display's own: colours as they are.
     #[default]
     None,
@@ -30,7 +30,7 @@ pub enum Balance {
     Kelvin(f64),
 }
 
-impl FromStr for Balance {
+impl FromStr for WhiteBalance {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -48,7 +48,7 @@ impl FromStr for Balance {
     }
 }
 
-impl fmt::Display for Balance {
+impl fmt::Display for WhiteBalance {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::None => f.write_str("none"),
@@ -58,7 +58,7 @@ impl fmt::Display for Balance {
     }
 }
 
-impl Balance {
+impl WhiteBalance {
     /// The matrix that shows the chosen light as white, of equal luminance. `seen`: what lights the room, tristimulus.
     pub(super) fn matrix(self, seen: Xyz) -> Matrix {
         let white = match self {
@@ -85,7 +85,7 @@ impl Balance {
 }
 
 fn bands() -> Bands {
-    Bands::leaves(&Grid::default())
+    Bands::of(&Grid::default())
 }
 
 /// An eye takes for white what is near the colours of glowing bodies; a coloured light stays coloured.
@@ -105,24 +105,27 @@ mod tests {
             let light = bands().light(&blackbody(kelvin));
             weights.map(|w| light.iter().zip(w).map(|(l, w)| l * w).sum::<f64>())
         };
-        for (balance, kelvin) in [(Balance::Auto, 2700.0), (Balance::Kelvin(3000.0), 3000.0)] {
+        for (balance, kelvin) in [
+            (WhiteBalance::Auto, 2700.0),
+            (WhiteBalance::Kelvin(3000.0), 3000.0),
+        ] {
             let white = seen(kelvin);
             let rgb = LinearSrgb::standard().from_xyz(white.map(|c| c / white[1]));
             let shown = multiply(&balance.matrix(white), rgb);
             assert!(shown.iter().all(|c| (c - 1.0).abs() < 1e-9), "{shown:?}");
         }
-        assert_eq!(Balance::None.matrix(seen(2700.0)), IDENTITY);
+        assert_eq!(WhiteBalance::None.matrix(seen(2700.0)), IDENTITY);
         // Red light stays red, and darkness is nothing to adapt to.
-        assert_eq!(Balance::Auto.matrix([0.41, 0.21, 0.02]), IDENTITY);
-        assert_eq!(Balance::Auto.matrix([0.0; 3]), IDENTITY);
+        assert_eq!(WhiteBalance::Auto.matrix([0.41, 0.21, 0.02]), IDENTITY);
+        assert_eq!(WhiteBalance::Auto.matrix([0.0; 3]), IDENTITY);
     }
 
     #[test]
     fn words_and_kelvin() {
-        assert_eq!("3200K".parse(), Ok(Balance::Kelvin(3200.0)));
-        assert_eq!("auto".parse(), Ok(Balance::Auto));
+        assert_eq!("3200K".parse(), Ok(WhiteBalance::Kelvin(3200.0)));
+        assert_eq!("auto".parse(), Ok(WhiteBalance::Auto));
         for bad in ["", "warm", "10", "NaN", "1e9"] {
-            assert!(bad.parse::<Balance>().is_err(), "{bad}");
+            assert!(bad.parse::<WhiteBalance>().is_err(), "{bad}");
         }
     }
 }

@@ -1,18 +1,18 @@
 //! Makes materials fluoresce as side files wish, and puts what they give out among the light spectra.
 
 use super::check::Check;
-use super::fluorescence::{Fluorescence, Term, Wish};
+use super::fluorescence::{Fluorescence, FluorescenceWish, Term};
 use super::json::short;
 use super::{LightSpectrum, Material};
-use crate::data::{Grid, LEAVES};
+use crate::data::{BANDS, Grid};
 
 /// Rounding of measured reflectances and excitations may let their sum exceed 1 by so much.
 const ROUNDING: f64 = 1e-6;
 
 /// Makes a material fluoresce as it is wished; its reflectance, `measured` or not, leaves room for what is given out.
-pub(super) fn kindle(
+pub(super) fn fluoresce(
     material: &mut Material,
-    wish: &Wish,
+    wish: &FluorescenceWish,
     measured: Option<&str>,
     place: &str,
     grid: &Grid,
@@ -57,8 +57,8 @@ pub(super) fn kindle(
         from: wish.from.clone(),
     };
     let out = fluorescence.efficiency();
-    let rho = measured.map_or([0.0; LEAVES], |_| material.reflectance);
-    let over: Vec<usize> = (0..LEAVES)
+    let rho = measured.map_or([0.0; BANDS], |_| material.reflectance);
+    let over: Vec<usize> = (0..BANDS)
         .filter(|&k| rho[k] + out[k] > 1.0 + ROUNDING)
         .collect();
     if let (Some(first), Some(last)) = (over.first(), over.last()) {

@@ -5,13 +5,13 @@ use crate::scene::sky::{PLACES, Sky};
 use glam::DVec3;
 
 /// What is seen beyond a room.
-pub(super) struct Outside<'a> {
+pub(super) struct SkyBackground<'a> {
     sky: &'a Sky,
     /// Tristimulus value of the lamp of each part.
     parts: [[f64; 3]; PLACES],
 }
 
-impl<'a> Outside<'a> {
+impl<'a> SkyBackground<'a> {
     /// None where no sky is described.
     pub(super) fn new(scene: &'a Scene) -> Option<Self> {
         let sky = scene.sky.as_ref()?;

@@ -1,6 +1,6 @@
 //! The distinct light spectra of a room, and the part that each lamp has in them.
 //!
-//! A lamp is `power(leaf) * shape(leaf)`: `power` is shared by all lamps of one kind ([`LightSpectrum`], here always of
+//! A lamp is `power(band) * shape(band)`: `power` is shared by all lamps of one kind ([`LightSpectrum`], here always of
 //! luminous size 1: `683 lm/W * sum power * y_bar = 1`), `shape` is the lamp's own. A lamp with a measured or named
 //! spectrum has a constant shape, its luminance (cd/m2), intensity (cd) or illuminance (lx). A lamp given by a colour
 //! is D65 shaped by the upsampled colour; its luminous size is glTF's strength or intensity times the luminance Y of
@@ -11,7 +11,7 @@ use super::check::Check;
 use super::reader::Sampled;
 use super::{LightSpectrum, Material, PunctualLight};
 use crate::color::{KM, Observer, Upsampler};
-use crate::data::{Grid, LEAVES, Leaves, Outside, named};
+use crate::data::{BANDS, Grid, Outside, Spectrum, named};
 
 /// Name of the spectrum of all lamps that are given by colour.
 const BY_COLOUR: &str = "cie/D65";
@@ -41,11 +41,11 @@ const SAME_SHAPE: f64 = 1e-9;
 
 /// A lamp's part: which spectrum, and what to multiply it by.
 #[derive(Debug, Clone)]
-pub(crate) struct Lamp {
-    /// Index in [`Lamps::spectra`].
+pub(crate) struct ScaledSpectrum {
+    /// Index in [`LampSpectra::spectra`].
     pub(crate) light: usize,
-    /// Multiplier for each leaf.
-    pub(crate) shape: Leaves,
+    /// Multiplier for each band.
+    pub(crate) shape: Spectrum,
     /// The colour that was upsampled, greatest component 0.5.
     pub(crate) color: [f32; 3],
     /// Multiplier of the upsampled `color`.
@@ -55,17 +55,17 @@ pub(crate) struct Lamp {
 }
 
 /// The distinct light spectra of a room, in order of first use.
-pub(crate) struct Lamps<'a> {
+pub(crate) struct LampSpectra<'a> {
     pub(crate) grid: &'a Grid,
     upsampler: &'a Upsampler,
     /// KM times the nm-integrals of y_bar.
-    luminous: Leaves,
+    luminous: Spectrum,
     spectra: Vec<LightSpectrum>,
     /// What materials fluoresce: no lamp's, and not of size 1.
     pub(crate) excited: Vec<LightSpectrum>,
 }
 
-impl<'a> Lamps<'a> {
+impl<'a> LampSpectra<'a> {
     /// None yet.
     pub(crate) fn new(grid: &'a Grid, upsampler: &'a Upsampler) -> Self {
         let luminous = Observer::cie1931().weights(grid)[1].map(|y| KM * y);
@@ -79,7 +79,7 @@ impl<'a> Lamps<'a> {
     }
 
     /// A lamp of a linear colour (components at least 0, one above) and a luminous size for (1, 1, 1).
-    pub(crate) fn by_colour(&mut self, color: [f32; 3], size: f64) -> Lamp {
+    pub(crate) fn by_colour(&mut self, color: [f32; 3], size: f64) -> ScaledSpectrum {
         let brightest = color.iter().fold(0.0f32, |m, &c| m.max(c));
         let scale = f64::from(brightest) / LAMP_BRIGHTNESS;
         let color = color.map(|c| (f64::from(c) / scale) as f32);
@@ -88,7 +88,7 @@ impl<'a> Lamps<'a> {
         let (light, _) = self.add(BY_COLOUR, self.grid.means(&d65, Outside::Hold));
         let shape = self.upsampler.reflectance(color).map(|r| r * scale);
         let [r, g, b] = color.map(|c| c / LAMP_BRIGHTNESS as f32);
-        Lamp {
+        ScaledSpectrum {
             light,
             shape,
             color,
@@ -98,13 +98,13 @@ impl<'a> Lamps<'a> {
     }
 
     /// A lamp of a known spectrum and luminous size; none: the size of the spectrum itself.
-    pub(crate) fn by_spectrum(&mut self, spectrum: &Sampled, size: Option<f64>) -> Lamp {
-        let (light, own) = self.add(&spectrum.from, spectrum.leaves);
+    pub(crate) fn by_spectrum(&mut self, spectrum: &Sampled, size: Option<f64>) -> ScaledSpectrum {
+        let (light, own) = self.add(&spectrum.from, spectrum.spectrum);
         let size = size.unwrap_or(own);
         let color = [LAMP_BRIGHTNESS as f32; 3];
-        Lamp {
+        ScaledSpectrum {
             light,
-            shape: [size; LEAVES],
+            shape: [size; BANDS],
             color,
             scale: size / LAMP_BRIGHTNESS,
             from: spectrum.from.clone(),
@@ -113,15 +113,15 @@ impl<'a> Lamps<'a> {
 
     /// The luminous size that a spectrum has by itself.
     pub(crate) fn own_size(&self, spectrum: &Sampled) -> f64 {
-        self.size_of(&spectrum.leaves)
+        self.size_of(&spectrum.spectrum)
     }
 
-    fn size_of(&self, power: &Leaves) -> f64 {
+    fn size_of(&self, power: &Spectrum) -> f64 {
         power.iter().zip(&self.luminous).map(|(p, y)| p * y).sum()
     }
 
     /// Shares `power`, brought to luminous size 1, among the lamps of the same spectrum; returns the size it had.
-    fn add(&mut self, name: &str, power: Leaves) -> (usize, f64) {
+    fn add(&mut self, name: &str, power: Spectrum) -> (usize, f64) {
         let size = self.size_of(&power);
         let unit = power.map(|p| p / size);
         let same = self.spectra.iter().position(|s| s.power == unit);
@@ -159,7 +159,7 @@ impl<'a> Lamps<'a> {
         if emissions().any(|e| e.texture.is_some()) {
             return self.spectra;
         }
-        let shapes: Vec<Leaves> = emissions()
+        let shapes: Vec<Spectrum> = emissions()
             .map(|e| e.shape)
             .chain(lights.iter().filter(|l| l.light == light).map(|l| l.shape))
             .collect();
@@ -168,7 +168,7 @@ impl<'a> Lamps<'a> {
         };
         let one = self.luminous_size(light, first);
         let unit = first.map(|s| s / one);
-        let alike = |shape: &Leaves, size: f64| {
+        let alike = |shape: &Spectrum, size: f64| {
             shape
                 .iter()
                 .zip(&unit)
@@ -192,12 +192,12 @@ impl<'a> Lamps<'a> {
             .filter(|e| e.light == light)
         {
             let size = sizes.next().expect("one size for each lamp");
-            emission.shape = [size; LEAVES];
+            emission.shape = [size; BANDS];
             emission.color = [LAMP_BRIGHTNESS as f32; 3];
             emission.scale = size / LAMP_BRIGHTNESS;
         }
         for (lamp, size) in lights.iter_mut().filter(|l| l.light == light).zip(sizes) {
-            lamp.shape = [size; LEAVES];
+            lamp.shape = [size; BANDS];
         }
         if unit.iter().any(|u| *u != unit[0]) {
             self.spectra[light].name = format!("{BY_COLOUR} in one colour");
@@ -211,19 +211,19 @@ impl<'a> Lamps<'a> {
     }
 
     /// Tells the luminous size of a finished spectrum under a shape.
-    pub(crate) fn luminous(&self) -> impl Fn(&LightSpectrum, &Leaves) -> f64 + use<> {
+    pub(crate) fn luminous(&self) -> impl Fn(&LightSpectrum, &Spectrum) -> f64 + use<> {
         let luminous = self.luminous;
         move |spectrum, shape| {
-            let leaves = spectrum.power.iter().zip(shape).zip(&luminous);
-            leaves.map(|((p, s), y)| p * s * y).sum()
+            let bands = spectrum.power.iter().zip(shape).zip(&luminous);
+            bands.map(|((p, s), y)| p * s * y).sum()
         }
     }
 
     /// Luminous size of a spectrum under a shape.
-    fn luminous_size(&self, light: usize, shape: &Leaves) -> f64 {
+    fn luminous_size(&self, light: usize, shape: &Spectrum) -> f64 {
         let power = &self.spectra[light].power;
-        (0..LEAVES)
-            .map(|leaf| power[leaf] * shape[leaf] * self.luminous[leaf])
+        (0..BANDS)
+            .map(|band| power[band] * shape[band] * self.luminous[band])
             .sum()
     }
 }

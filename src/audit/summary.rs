@@ -27,7 +27,7 @@ pub struct Measured {
 /// Mean, 95th percentile and greatest of a measured error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Spread {
+pub struct ErrorSummary {
     /// Mean.
     pub mean: Measured,
     /// Root of the mean square.
@@ -76,7 +76,7 @@ impl Measured {
     }
 }
 
-impl Spread {
+impl ErrorSummary {
     /// Figures of errors `[observed, standard error]`.
     pub(super) fn of(errors: &[[f64; 2]]) -> Self {
         let value: Vec<f64> = errors
@@ -132,7 +132,7 @@ mod tests {
         let mut normal = move || (0..12).map(|_| rng.f64()).sum::<f64>() - 6.0;
         for truth in [0.0, 0.5] {
             let errors: Vec<[f64; 2]> = (0..4000).map(|_| [truth + 0.2 * normal(), 0.2]).collect();
-            let s = Spread::of(&errors);
+            let s = ErrorSummary::of(&errors);
             assert!((s.rms.value - truth).abs() < 0.03, "{truth}: {s:?}");
             assert!(s.rms.low <= truth && truth <= s.rms.high, "{truth}: {s:?}");
             let naive = (errors.iter().map(|e| e[0] * e[0]).sum::<f64>() / 4000.0).sqrt();
@@ -145,7 +145,7 @@ mod tests {
         // Twenty points without noise, one of which is off by 3.
         let mut errors = vec![[0.0, 0.0]; 20];
         errors[7] = [3.0, 0.0];
-        let s = Spread::of(&errors);
+        let s = ErrorSummary::of(&errors);
         assert!((s.mean.value - 0.15).abs() < 1e-12 && s.mean.low < 0.15 && s.mean.high > 0.15);
         assert!((s.rms.value - 3.0 / 20f64.sqrt()).abs() < 1e-12);
         assert_eq!((s.p95.value, s.max.value), (0.0, 3.0));

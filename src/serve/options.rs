@@ -1,13 +1,13 @@
 //! What is to be done with the room that is served.
 
-use crate::output::{Balance, Brightness, Writing};
+use crate::output::{ExposureSetting, WhiteBalance, Writing};
 use crate::scene::Options;
 use crate::solve::Settings;
 use std::path::PathBuf;
 
 /// What is to be done with the room.
 #[derive(Debug, Clone)]
-pub struct Wishes {
+pub struct ServeOptions {
     /// How it is solved.
     pub settings: Settings,
     /// How it is read again when it is changed.
@@ -15,9 +15,9 @@ pub struct Wishes {
     /// Where it is saved.
     pub output: PathBuf,
     /// How bright it is shown.
-    pub brightness: Brightness,
+    pub brightness: ExposureSetting,
     /// Which light shows as white.
-    pub balance: Balance,
+    pub balance: WhiteBalance,
     /// How it is stored.
     pub writing: Writing,
 }

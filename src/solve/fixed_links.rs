@@ -1,6 +1,6 @@
 //! Held links: a solution that differs from the last round in nothing but how spectra are carried.
 //!
-//! This shows by itself what lanes do to colours: the solution is compared with one on all 64 spectral leaves of the
+//! This shows by itself what lanes do to colours: the solution is compared with one on all 64 bands of the
 //! same links, with direct light gathered at the same points of the same elements.
 
 use super::direct::Direct;
@@ -13,7 +13,7 @@ const CONVERGED: f64 = 0.01;
 
 /// A solution on held links.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
+pub struct FixedLinkSolve {
     /// Lanes in use.
     pub lanes: usize,
     /// Error expected by the choice of lanes, mean CIELUV; none where nothing is known.
@@ -28,7 +28,7 @@ impl Bake {
     /// Solves again on the links and leaves of the last round. `error` is what the lanes are chosen for; the solve itself
     /// goes far beyond it. Afterwards [`Bake::light`] and [`Bake::lanes`] are those of this solution. None before the
     /// first round.
-    pub fn hold(&mut self, representation: Representation, error: f64) -> Option<Held> {
+    pub fn hold(&mut self, representation: Representation, error: f64) -> Option<FixedLinkSolve> {
         let threshold = self.rounds.last()?.threshold;
         let white = self.solution.light.white;
         let started = Instant::now();
@@ -40,7 +40,7 @@ impl Bake {
         self.refinement.direct = Direct::default();
         self.gather_direct(&Demand {
             bright: &[],
-            keen: &[],
+            sensitivity: &[],
             threshold,
             least_area: f64::INFINITY,
             hidden: true,
@@ -49,13 +49,13 @@ impl Bake {
         let started = Instant::now();
         let leaves = self.refinement.leaves();
         let rows = self.refinement.link_rows();
-        self.refinement.look_out(&self.room).expect(NOBODY);
+        self.refinement.trace_leaf_rays(&self.room).expect(NOBODY);
         self.refinement.balance = self.refinement.balanced(&rows);
         self.room.settings.error = CONVERGED;
         let (convergence, _) = self.solve(&rows, &leaves);
         self.room.settings.error = error;
         self.solution.light.white = white;
-        Some(Held {
+        Some(FixedLinkSolve {
             lanes: self.solution.lanes.len(),
             spectrum_de_luv: self.solution.spectrum_error,
             iterations: convergence.iterations,

@@ -1,11 +1,11 @@
 //! The data of the paper's tests (4.1): lights C, D65 and F2, and the 24 patches of the ColorChecker.
 //!
-//! Paper grid, leaves take the value at their left edge, K = 1 / sum(S y_bar) is multiplied into the source.
+//! Paper grid, bands take the value at their left edge, K = 1 / sum(S y_bar) is multiplied into the source.
 //! The reflectances that the paper used are not published; two measured charts stand in for them.
 
 use crate::color::{Observer, Xyz, normalization, tristimulus};
 use crate::data::{Outside, Table, named};
-use crate::spectrum::{CmfTree, Grid, Leaves};
+use crate::spectrum::{CmfTree, Grid, Spectrum};
 
 /// Which measurement of the chart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -48,25 +48,25 @@ const PATCHES: [&str; 24] = [
 
 /// Colour matching functions and reflectances.
 #[derive(Debug, Clone)]
-pub struct Chart {
+pub struct ColourChart {
     /// Colour matching functions on the paper's grid.
     pub cmf: CmfTree,
     /// The patches, in chart order.
-    pub reflectances: Vec<Leaves>,
+    pub reflectances: Vec<Spectrum>,
 }
 
 /// A light whose Y is 1.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Light {
+pub struct UnitLight {
     /// As in the tables.
     pub name: &'static str,
-    /// K S on the leaves.
-    pub power: Leaves,
+    /// K S on the bands.
+    pub power: Spectrum,
     /// Its tristimulus values: the adaptation white of the tests.
     pub white: Xyz,
 }
 
-impl Chart {
+impl ColourChart {
     /// The chart as measured by `source`.
     pub fn new(source: Reflectances) -> Self {
         let grid = Grid::paper();
@@ -83,19 +83,19 @@ impl Chart {
     }
 
     /// One of the paper's lights, scaled so that its Y is 1.
-    pub fn light(&self, name: &'static str) -> Light {
+    pub fn light(&self, name: &'static str) -> UnitLight {
         let power = Grid::paper().left_edges(&table(&format!("cie/{name}")), Outside::Zero);
-        let k = normalization(&power, self.cmf.leaves());
+        let k = normalization(&power, self.cmf.weights());
         let power = power.map(|s| k * s);
-        Light {
+        UnitLight {
             name,
             power,
-            white: tristimulus(&power, self.cmf.leaves()),
+            white: tristimulus(&power, self.cmf.weights()),
         }
     }
 
     /// The three lights of Table 1.
-    pub fn lights(&self) -> [Light; 3] {
+    pub fn lights(&self) -> [UnitLight; 3] {
         ["C", "D65", "F2"].map(|name| self.light(name))
     }
 }
