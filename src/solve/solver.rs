@@ -159,8 +159,8 @@ fn is_near<const L: usize>(
     tolerance: f64,
 ) -> bool {
     (0..L).all(|l| {
-        let most = (tolerance / tails[l]).max(ROUNDING);
-        squares[l] <= most * most * whole[l]
+        let (change, whole) = (squares[l].sqrt(), whole[l].sqrt());
+        change * tails[l] <= tolerance * whole || change <= ROUNDING * whole
     })
 }
 
