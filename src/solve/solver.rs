@@ -197,6 +197,8 @@ mod tests {
     const COUNT: usize = 512;
     /// Leaves that a leaf sees on either side.
     const REACH: usize = 4;
+    /// Plain sweeps after which light is within 5e-5: .99 to this power.
+    const SWEEPS: usize = 1000;
     /// Lane 3 is black, in lane 2 every other leaf is.
     const ALBEDO: [f32; L] = [0.99, 0.5, 0.9, 0.0];
 
@@ -262,7 +264,7 @@ mod tests {
     fn it_finds_what_sweeps_find_in_fewer_applications() {
         let (reflection, first) = (reflection(), lit());
         let mut plain = Rows::zero(COUNT, L);
-        for _ in 0..2000 {
+        for _ in 0..SWEEPS {
             let mut next = receive(&plain);
             step::<L>(&mut next, &first, [1.0; L]);
             plain = reflection.of::<L>(&next);
@@ -279,7 +281,7 @@ mod tests {
         // All light that comes in is absorbed: sum (1 - rho) / rho R = first.
         let kept: f32 = quick.all::<L>().iter().map(|r| r[0]).sum::<f32>() / 0.99 * 0.01;
         assert!((kept / 2.0 - 1.0).abs() < 1e-3, "{kept}");
-        assert!(done.iterations < 100, "{done:?}");
+        assert!(6 * done.iterations < SWEEPS, "{done:?}");
     }
 
     #[test]
