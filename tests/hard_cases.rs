@@ -687,16 +687,8 @@ fn ten_thousand_point_lights() {
     let seen = lux(&bake, point, DVec3::Y);
     // The mean of all light is twice the mean of the direct light; the floor gets about as much more as it has.
     assert!(seen > direct && seen < 3.0 * direct, "{seen} {direct}");
-}
-
-#[test]
-fn flux_of_ten_thousand_point_lights() {
-    let bake = baked(point_lights());
-    near(
-        bake.rounds().last().unwrap().flux.received_lm,
-        10_000.0,
-        1e-2,
-    );
+    let flux = bake.rounds().last().unwrap().flux;
+    near(flux.received_lm, 10_000.0, 1e-2);
 }
 
 /// 10 000 glowing squares of 2 cm, 10 cm below the ceiling of a black room, and where they are.
@@ -734,13 +726,9 @@ fn ten_thousand_glowing_squares() {
         near(lux(&bake, point, normal), want, 2e-3);
     }
     assert_eq!(lux(&bake, dvec3(0.0, 2.95, 5.0), DVec3::X), 0.0);
-}
-
-/// The strip of wall above them is dark: leaves that it crosses must not count it as lit.
-#[test]
-fn flux_of_ten_thousand_glowing_squares() {
-    let bake = baked(glowing_squares().0);
-    near(bake.rounds().last().unwrap().flux.received_lm, 4000.0, 1e-2);
+    // The strip of wall above them is dark: leaves that it crosses must not count it as lit.
+    let flux = bake.rounds().last().unwrap().flux;
+    near(flux.received_lm, 4000.0, 1e-2);
 }
 
 /// Rounds after the end change nothing but get finer: no cycle of refining and merging, elements never fewer.

@@ -115,7 +115,11 @@ impl Bake {
             },
             convergence: Figure {
                 value: Some(m.convergence.bound).filter(|e| e.is_finite()),
-                kind: FigureKind::Bound,
+                // Rows of rays sum to what they must in the mean only.
+                kind: match self.room.by_rays() {
+                    true => FigureKind::Estimate,
+                    false => FigureKind::Bound,
+                },
             },
             convergence_de_luv: estimate(Some(convergence_de)),
             total_xyz: of(&|d| d.relative * white / 6.0),

@@ -27,7 +27,7 @@ pub(crate) struct Convergence {
     pub iterations: usize,
     /// Relative change of the worst lane by the last sweep.
     pub residual: f64,
-    /// Bound of the relative error in the norm above, worst lane.
+    /// Bound of the relative error in the norm above, worst lane; by rays an estimate.
     pub bound: f64,
     /// How often all bounces were found for what fluoresces; 0 where nothing does.
     pub fluorescence: usize,
