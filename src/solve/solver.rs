@@ -113,14 +113,18 @@ impl System<'_> {
             turn::<L>(&mut direction, &residual, beta);
             rho = after;
         }
-        // A lane that broke down takes a sweep; light is nowhere below 0.
+        // A lane that broke down takes a sweep; where a lane is an interval of wavelengths, light is nowhere below 0.
+        let least = match self.reflection.mixed {
+            Some(_) => f32::NEG_INFINITY,
+            None => 0.0,
+        };
         let before = guess.all::<L>().iter().zip(shadow.all::<L>());
         for (row, (guess, change)) in reflected.all_mut::<L>().iter_mut().zip(before) {
             for l in 0..L {
                 if left[l].is_nan() || left[l] > start[l] {
                     row[l] = guess[l] + change[l];
                 }
-                row[l] = row[l].max(0.0);
+                row[l] = row[l].max(least);
             }
         }
     }
