@@ -3,7 +3,6 @@
 //! `cargo test --release --test all mirrors::` runs those of one file.
 
 mod audit;
-mod bad_input;
 mod bake;
 mod bispectral;
 mod brightness;

@@ -4,7 +4,6 @@ pub(crate) mod built;
 pub(crate) mod daylit;
 pub(crate) mod desk;
 pub(crate) mod every_effect;
-pub(crate) mod three;
 
 use haarlight::scene::document::Document;
 use haarlight::scene::geometry::Geometry;

@@ -1,7 +1,7 @@
 //! The files in three.js: its own loaders and shaders in a headless browser.
 
 use super::file::Mapped;
-use crate::common::three::{self, url};
+use crate::report::three::{self, url};
 use glam::DVec3;
 use serde_json::{Value, json};
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Layers in three.js: its own loader and shaders in a headless browser, with the lines of the README.
 
-use crate::common::three;
+use crate::report::three;
 use serde_json::json;
 
 const PAGE: &str = include_str!("dimmed.html");

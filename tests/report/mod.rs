@@ -1,6 +1,7 @@
 //! The page of a bake: whole, small, true to the log, and alive in a browser.
 
 pub(crate) mod browser;
+pub(crate) mod three;
 
 use browser::{Browser, CANVAS};
 use flate2::read::GzDecoder;
