@@ -131,6 +131,45 @@ fn srgb_is_wrong_under_lamps_of_lines() {
     }
 }
 
+/// Light that goes from patch to patch as lists, along links and by rays: its loss is within what was asked for, lists know about how
+/// much it is, and they are no longer than that needs.
+#[test]
+fn lists_lose_no_more_than_they_may() {
+    for (name, scene) in [
+        ("links, F2", cornell("cie/F2")),
+        ("links, A", cornell("cie/A")),
+        ("rays", room("furnished.glb")),
+    ] {
+        let mut bake = Bake::new(
+            scene,
+            Settings {
+                rounds: 2,
+                ..Settings::default()
+            },
+        );
+        bake.run();
+        let white = bake.light().white;
+        bake.hold(Representation::Dense, 0.5).unwrap();
+        let truth = bake.leaf_colours();
+        let mut length = 0.0;
+        for asked in [8.0, 2.0, 0.5] {
+            let held = bake.hold(Representation::Lists, asked).unwrap();
+            let (mut sum, mut area) = (0.0, 0.0);
+            for ((is, a), (ought, _)) in bake.leaf_colours().iter().zip(&truth) {
+                sum += a * haarlight::color::de_luv(*is, *ought, white);
+                area += a;
+            }
+            let (off, believed) = (sum / area, held.spectrum_de_luv.unwrap());
+            println!("{name} {asked}: off {off:.4} believed {believed:.4} {:.2} intervals {:.3} s", held.lanes, held.seconds);
+            assert!(off <= SHARE * asked + HAIR, "{name}, {asked}: {off}");
+            assert!(off <= 2.0 * believed + HAIR, "{name}, {asked}: {off} {believed}");
+            assert!(held.lanes > length, "{name}, {asked}: {}", held.lanes);
+            length = held.lanes;
+        }
+        assert!(length < 24.0, "{name}: {length}");
+    }
+}
+
 #[test]
 fn a_grey_room_takes_one_number_however_it_is_asked() {
     let scene = || {
@@ -143,12 +182,12 @@ fn a_grey_room_takes_one_number_however_it_is_asked() {
     for run in all_ways(scene()) {
         match run.representation {
             Representation::Adaptive | Representation::Guaranteed => {
-                assert_eq!(run.lanes, 1, "{run:?}");
+                assert_eq!(run.lanes, 1.0, "{run:?}");
             }
             _ => {}
         }
-        // One vector: the lamp itself. The paper's absolute intervals have to follow its lines.
-        if run.representation != Representation::Paper {
+        // One vector: the lamp itself. Intervals of radiosity itself have to follow its lines.
+        if !matches!(run.representation, Representation::Paper | Representation::Lists) {
             assert!(run.de_luv < HAIR, "{run:?}");
         }
     }

@@ -76,7 +76,7 @@ pub struct BakeArgs {
     /// The cache may take this much, MB.
     #[arg(long, value_name = "MB", default_value_t = 2048)]
     pub cache_limit: u64,
-    /// How spectra are carried: perceptual, guaranteed (bounds instead of estimates), paper, uniform:N,
+    /// How spectra are carried: perceptual, guaranteed (bounds instead of estimates), paper, lists, uniform:N,
     /// characteristic:N, dense (all 64 bands) or rgb.
     #[arg(long, value_name = "HOW", default_value_t, hide_short_help = true)]
     pub spectrum: Representation,

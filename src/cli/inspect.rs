@@ -98,7 +98,7 @@ fn page(facts: &Facts, plan: &Plan, warnings: &[String]) -> String {
             closed.open_edges
         ),
         format!(
-            "  {} to {} nm in 64 leaves",
+            "  {} to {} nm in 64 bands",
             facts.range_nm[0], facts.range_nm[1]
         ),
     ];

@@ -186,7 +186,7 @@ impl FromStr for WavelengthRange {
         // Written so that NaN fails.
         if !(from >= least && to <= most && to - from >= widest) {
             return Err(format!(
-                "wavelengths lie in {least}..{most} nm, and 64 leaves of 1 nm or more need {widest} nm"
+                "wavelengths lie in {least}..{most} nm, and 64 bands of 1 nm or more need {widest} nm"
             ));
         }
         Ok(Self { nm: [from, to] })

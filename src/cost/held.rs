@@ -7,7 +7,7 @@ use crate::color::{de_luv, de2000};
 use crate::solve::{Bake, Representation};
 use serde::Serialize;
 
-/// What perceptual, guaranteed and paper control are asked for, mean CIEDE2000.
+/// What perceptual, guaranteed and paper control and lists are asked for, mean CIEDE2000.
 const ASKED: [f64; 7] = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.1];
 /// Numbers of intervals and vectors that are tried.
 const COUNTS: [u8; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
@@ -20,8 +20,8 @@ pub struct HeldRun {
     pub representation: Representation,
     /// Error the lanes were chosen for, mean CIEDE2000; 0 where they are given.
     pub asked: f64,
-    /// Lanes in use.
-    pub lanes: usize,
+    /// Numbers that hold a spectrum: lanes in use, or the mean length of lists.
+    pub lanes: f64,
     /// Choice of lanes and solve, wall time, s.
     pub seconds: f64,
     /// What the choice believed to cost, mean CIELUV: an estimate, under guaranteed control a bound.
@@ -45,6 +45,7 @@ pub fn held(bake: &mut Bake, white: [f64; 3]) -> Vec<HeldRun> {
         Representation::Adaptive,
         Representation::Guaranteed,
         Representation::Paper,
+        Representation::Lists,
     ]
     .into_iter()
     .flat_map(|r| ASKED.map(|e| (r, e)));

@@ -32,9 +32,10 @@ fn name(r: Representation) -> String {
         Representation::Adaptive => "adaptive (default)".into(),
         Representation::Guaranteed => "adaptive, guaranteed".into(),
         Representation::Paper => "the paper's control".into(),
+        Representation::Lists => "lists".into(),
         Representation::Uniform(n) => format!("{n} uniform intervals"),
         Representation::Characteristic(n) => format!("{n} characteristic vectors"),
-        Representation::Dense => "64 leaves".into(),
+        Representation::Dense => "64 bands".into(),
         Representation::Rgb => "linear sRGB".into(),
     }
 }
@@ -116,10 +117,11 @@ type Is = fn(Representation) -> bool;
 
 /// Geometry held: numbers that hold a spectrum against what that does to colours.
 fn intervals(study: &Study, room: &str) -> String {
-    let kinds: [(&str, Is); 6] = [
+    let kinds: [(&str, Is); 7] = [
         ("adaptive (default)", |r| r == Representation::Adaptive),
         ("adaptive, guaranteed", |r| r == Representation::Guaranteed),
         ("the paper's control", |r| r == Representation::Paper),
+        ("lists", |r| r == Representation::Lists),
         ("uniform intervals", |r| {
             matches!(r, Representation::Uniform(_))
         }),
@@ -135,7 +137,7 @@ fn intervals(study: &Study, room: &str) -> String {
                 .held
                 .iter()
                 .filter(|h| is(h.representation) && h.de2000 > ROUNDING)
-                .map(|h| [h.lanes as f64, h.de2000])
+                .map(|h| [h.lanes, h.de2000])
                 .collect();
             points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(b[1].total_cmp(&a[1])));
             points.dedup();
@@ -148,7 +150,7 @@ fn intervals(study: &Study, room: &str) -> String {
     LineChart {
         title: format!("{room}: spectra alone, on the same links"),
         x: "numbers a patch holds".into(),
-        y: "mean CIEDE2000 from 64 leaves".into(),
+        y: "mean CIEDE2000 from 64 bands".into(),
         x_scale: Scale::Log,
         y_scale: Scale::Log,
         series,

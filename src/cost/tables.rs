@@ -127,7 +127,10 @@ pub fn held(study: &Study) -> TextTable {
             } else {
                 String::new()
             },
-            r.lanes.to_string(),
+            match r.lanes.fract() {
+                0.0 => r.lanes.to_string(),
+                _ => format!("{:.1}", r.lanes),
+            },
             format!("{:.4}", r.de2000),
             format!("{:.3}", r.greatest),
             format!("{:.4}", r.de_luv),
@@ -203,7 +206,7 @@ pub fn markdown(study: &Study, chosen: &Choice, room: &str, machine: &str) -> St
          vertices; `rounds s` leaves out preparation and vertices. {machine}\n\n{}\n{plots}\
          ## All bakes\n\n{}\n\
          ## Spectra alone\n\nThe same {} elements and {} links solved again with other lanes; differences of the elements' \
-         irradiance from that on 64 leaves. `believed` is the program's own figure: an estimate, under guaranteed control \
+         irradiance from that on 64 bands. `believed` is the program's own figure: an estimate, under guaranteed control \
          a bound.\n\n{}\n{knob}",
         study.points,
         choice(chosen),

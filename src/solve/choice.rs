@@ -48,7 +48,7 @@ impl Bake {
     }
 
     pub(super) fn chosen_lanes(&mut self) -> Result<Lanes, Interrupted> {
-        self.solution.spectrum_error = None;
+        (self.solution.spectrum_error, self.solution.list_limit) = (None, None);
         let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);
         let none = spectra.is_empty() || self.refinement.tree.nodes.is_empty();
         let share = SPECTRUM_SHARE * self.room.settings.error;
@@ -85,6 +85,17 @@ impl Bake {
                 let lights: Vec<Spectrum> = spectra.iter().map(|s| s.power).collect();
                 let basis = basis(&lights, &paints(&self.room.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
+            }
+            // Where light passes filters on its way, it does so band by band.
+            Representation::Lists
+                if !none
+                    && self.room.panes.is_none()
+                    && self.room.mirrors.is_none()
+                    && !self.room.plan.runs(EffectKind::Sheets)
+                    && self.room.team.is_alone() =>
+            {
+                self.solution.list_limit = Some(tolerance);
+                Lanes::dense(spectra, weights)
             }
             Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance)?,
             Representation::Guaranteed if !none => {

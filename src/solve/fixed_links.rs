@@ -14,9 +14,9 @@ const CONVERGED: f64 = 0.01;
 /// A solution on held links.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedLinkSolve {
-    /// Lanes in use.
-    pub lanes: usize,
-    /// Error expected by the choice of lanes, mean CIELUV; none where nothing is known.
+    /// Numbers that hold a spectrum: lanes, or the mean length of lists.
+    pub lanes: f64,
+    /// Error expected by the choice of lanes or known to the lists, mean CIELUV; none where nothing is known.
     pub spectrum_de_luv: Option<f64>,
     /// Operator applications.
     pub iterations: usize,
@@ -55,9 +55,10 @@ impl Bake {
         let (convergence, _) = self.solve(&rows, &leaves);
         self.room.settings.error = error;
         self.solution.light.white = white;
+        let carried = convergence.carried;
         Some(FixedLinkSolve {
-            lanes: self.solution.lanes.len(),
-            spectrum_de_luv: self.solution.spectrum_error,
+            lanes: carried.map_or(self.solution.lanes.len() as f64, |c| c.intervals),
+            spectrum_de_luv: carried.map(|c| c.de_luv).or(self.solution.spectrum_error),
             iterations: convergence.iterations,
             seconds: (chosen + started.elapsed()).as_secs_f64(),
         })

@@ -21,6 +21,7 @@ mod landed;
 mod landing;
 mod leaf_rays;
 mod linear;
+mod list_bounces;
 mod lists;
 mod lit;
 mod looking;

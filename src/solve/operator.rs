@@ -99,6 +99,16 @@ impl<'a> Operator<'a> {
         }
     }
 
+    /// A node's share of its parent's area.
+    pub(super) fn share_of(&self, node: usize) -> f64 {
+        f64::from(self.shape.share[node])
+    }
+
+    /// One over a node's area.
+    pub(super) fn inverse_area(&self, node: usize) -> f64 {
+        f64::from(self.shape.inverse[node])
+    }
+
     /// Irradiance on the leaves (by leaf) from radiosity on the leaves (by leaf), both balanced.
     pub fn received<const L: usize>(&self, radiosity: &Rows) -> Rows {
         let nodes = self.tree.nodes.len();

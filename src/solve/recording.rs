@@ -57,7 +57,7 @@ impl Bake {
                 .filter(|l| l.occlusion == Occlusion::Clear)
                 .count(),
             intervals_working: bake.solution.lanes.len(),
-            intervals_mean: bake.intervals_mean(),
+            intervals_mean: (m.convergence.carried).map_or_else(|| bake.intervals_mean(), |c| c.intervals),
             memory_bytes: of_links + of_elements,
             row_bytes: self.refinement.leaf_rays.row_bytes(),
             bytes_per_link: per(of_links, bake.refinement.graph.links.len()),
@@ -92,7 +92,9 @@ impl Bake {
     /// What is known of the error, by source.
     fn errors(&self, m: &RoundMeasurements) -> Errors {
         let estimate = Figure::estimate;
-        let spectrum = self.solution.spectrum_error.unwrap_or(0.0);
+        let carried = m.convergence.carried.map(|carried| carried.de_luv);
+        let known = carried.or(self.solution.spectrum_error);
+        let spectrum = known.unwrap_or(0.0);
         let convergence_de = m.convergence.bound * 100.0 * DE_PER_PERCENT;
         // Sources are independent: their squares add. The distance between rounds shows only geometry.
         let all = |geometry: f64| {
@@ -107,7 +109,7 @@ impl Bake {
             geometry_chromaticity: of(&|d| d.chromaticity),
             geometry_de_luv: of(&|d| d.de_luv),
             spectrum_de_luv: Figure {
-                value: self.solution.spectrum_error.filter(|e| e.is_finite()),
+                value: known.filter(|e| e.is_finite()),
                 kind: match self.room.settings.representation {
                     Representation::Guaranteed => FigureKind::Bound,
                     _ => FigureKind::Estimate,

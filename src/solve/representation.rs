@@ -19,6 +19,9 @@ pub enum Representation {
     /// Radiosity itself on the union of the cuts that the paper's own control (3.1.3, 3.4, errors in XYZ) gives the
     /// lights and their first and second reflections.
     Paper,
+    /// A list for each patch, radiosity itself, multiplied, refined and merged from patch to patch (3.2 to 3.4); all 64 bands in rooms with
+    /// panes, mirrors or sheets, and when several ranks bake.
+    Lists,
     /// Ratios to each light on this many intervals of equal width, in 1..=64.
     Uniform(u8),
     /// Coordinates in a basis of this many vectors made for the room (paper 2.2.2), in 1..=64.
@@ -35,6 +38,7 @@ impl fmt::Display for Representation {
             Self::Adaptive => f.write_str("adaptive"),
             Self::Guaranteed => f.write_str("guaranteed"),
             Self::Paper => f.write_str("paper"),
+            Self::Lists => f.write_str("lists"),
             Self::Uniform(n) => write!(f, "uniform:{n}"),
             Self::Characteristic(n) => write!(f, "characteristic:{n}"),
             Self::Dense => f.write_str("dense"),
@@ -63,10 +67,11 @@ impl FromStr for Representation {
                 "adaptive" | "perceptual" => Ok(Self::Adaptive),
                 "guaranteed" => Ok(Self::Guaranteed),
                 "paper" => Ok(Self::Paper),
+                "lists" => Ok(Self::Lists),
                 "dense" => Ok(Self::Dense),
                 "rgb" => Ok(Self::Rgb),
                 _ => Err(
-                    "perceptual, guaranteed, paper, uniform:N, characteristic:N, dense or rgb"
+                    "perceptual, guaranteed, paper, lists, uniform:N, characteristic:N, dense or rgb"
                         .into(),
                 ),
             },
@@ -97,6 +102,7 @@ mod tests {
             Representation::Adaptive,
             Representation::Guaranteed,
             Representation::Paper,
+            Representation::Lists,
             Representation::Uniform(12),
             Representation::Characteristic(64),
             Representation::Dense,

@@ -22,6 +22,8 @@ pub(crate) struct Solution {
     pub(crate) lanes: Lanes,
     /// Colour difference (CIELUV) that the lanes cause, as far as it is known.
     pub(crate) spectrum_error: Option<f64>,
+    /// Colour difference (CIELUV) that lists may make, where light is carried from patch to patch by lists.
+    pub(crate) list_limit: Option<f64>,
     /// The spectra of panes and mirrors on the present lanes.
     pub(crate) filters: Filters,
     /// Punctual lights, recentred, with their rows.
@@ -43,6 +45,7 @@ impl Solution {
             filters: Filters::new(&room.scene, &lanes),
             lanes,
             spectrum_error: None,
+            list_limit: None,
             lamps: Vec::new(),
             light: Light::default(),
             previous: Rows::default(),

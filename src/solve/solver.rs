@@ -8,13 +8,14 @@
 //! In the norm `sum A R^2` M shrinks by the greatest share s of irradiance that leaves a leaf, and F of balanced links does not grow: what a sweep
 //! changes by d leaves an error of `d s / (1 - s)` at the most. Of rays that is so in the mean.
 
+use super::list_bounces::Carried;
 use super::reflection::Reflection;
 use super::sums::dot_by_area;
 use crate::light::rows::Rows;
 use crate::team::Interrupt;
 
 /// Applications of F at the most. A corridor of 40 m and albedo .99 takes about 40.
-const MOST: usize = 400;
+pub(super) const MOST: usize = 400;
 /// Light is sought to this share of the tolerance between two sweeps: the norm says little of what is closed in.
 const SHARE: f64 = 0.1;
 /// Relative change that may be rounding alone: in a row of 512 leaves it stays at 2e-7.
@@ -31,6 +32,8 @@ pub(crate) struct Convergence {
     pub bound: f64,
     /// How often all bounces were found for what fluoresces; 0 where nothing does.
     pub fluorescence: usize,
+    /// What lists came to, where light was carried by lists.
+    pub carried: Option<Carried>,
 }
 
 /// A room whose leaves reflect so, with what turns radiosity into irradiance.
@@ -39,7 +42,7 @@ pub(super) struct System<'a> {
     /// Area of each leaf that takes part.
     pub(super) areas: Vec<f64>,
     /// From radiosity by leaf to irradiance by leaf.
-    pub(super) receive: &'a dyn Fn(&Rows) -> Rows,
+    pub(super) receive: &'a (dyn Fn(&Rows) -> Rows + Sync),
     /// Ends the solve wherever it is.
     pub(super) interrupt: &'a Interrupt,
 }
@@ -138,7 +141,7 @@ impl System<'_> {
     }
 
     /// Inner products by area; the same for all lanes where these reflect into each other.
-    fn products<const L: usize>(&self, x: &Rows, y: &Rows) -> [f64; L] {
+    pub(super) fn products<const L: usize>(&self, x: &Rows, y: &Rows) -> [f64; L] {
         let each = dot_by_area::<L>(&self.areas, x, y);
         match self.reflection.mixed {
             Some(_) => [each.iter().sum(); L],
@@ -148,7 +151,7 @@ impl System<'_> {
 }
 
 /// The greatest relative length of a lane times its factor, from squares of lengths.
-fn worst<const L: usize>(squares: &[f64; L], whole: &[f64; L], factors: &[f64; L]) -> f64 {
+pub(super) fn worst<const L: usize>(squares: &[f64; L], whole: &[f64; L], factors: &[f64; L]) -> f64 {
     let lanes = squares.iter().zip(whole).zip(factors);
     lanes.fold(0.0, |worst, ((square, whole), factor)| {
         worst.max((square / whole.max(f64::MIN_POSITIVE)).sqrt() * factor)
@@ -156,7 +159,7 @@ fn worst<const L: usize>(squares: &[f64; L], whole: &[f64; L], factors: &[f64; L
 }
 
 /// Is every lane within the tolerance, or as near as rounding lets it come?
-fn is_near<const L: usize>(
+pub(super) fn is_near<const L: usize>(
     squares: &[f64; L],
     whole: &[f64; L],
     tails: &[f64; L],

@@ -3,6 +3,7 @@
 use super::fluorescing::{Glow, Rounds};
 use super::flux::{self, Closed};
 use super::linear;
+use super::list_bounces::{ListBounces, Senders};
 use super::mixed::Mixed;
 use super::operator::Operator;
 use super::refinement::Refinement;
@@ -18,11 +19,12 @@ use std::borrow::Cow;
 /// The leaves under direct light, and how they reflect: what the bounces start from.
 struct BounceStart<'a> {
     leaves: &'a [u32],
+    links: &'a LinkRows,
     /// Direct irradiance by leaf.
     first: &'a Rows,
     reflection: &'a Reflection,
     /// From radiosity by leaf to irradiance by leaf.
-    receive: &'a dyn Fn(&Rows) -> Rows,
+    receive: &'a (dyn Fn(&Rows) -> Rows + Sync),
     /// Relative error at which the solve ends.
     tolerance: f64,
 }
@@ -136,6 +138,7 @@ impl Bake {
         let bounced = if runs {
             let lit = BounceStart {
                 leaves,
+                links: rows,
                 first: &first,
                 reflection: &reflection,
                 receive: &*self.receive::<L>(rows, leaves),
@@ -247,7 +250,34 @@ impl Bake {
             receive: lit.receive,
             interrupt: &self.room.interrupt,
         };
-        system.solve::<L>(lit.first, reflected, lit.tolerance)
+        match self.solution.list_limit {
+            Some(limit) if L == BANDS => {
+                let bounces = ListBounces {
+                    system: &system,
+                    senders: self.senders(lit.links, lit.leaves),
+                    weights: &self.room.weights,
+                    white: self.solution.light.white,
+                    limit,
+                };
+                bounces.solve(lit.first, reflected, lit.tolerance)
+            }
+            _ => system.solve::<L>(lit.first, reflected, lit.tolerance),
+        }
+    }
+
+    /// From whom leaves receive lists.
+    fn senders<'a>(&'a self, rows: &'a LinkRows, leaves: &'a [u32]) -> Senders<'a> {
+        let refinement = &self.refinement;
+        match self.room.by_rays() {
+            true => Senders::Rays(&refinement.leaf_rays, leaves),
+            false => Senders::Links(Operator::new(
+                &refinement.tree,
+                rows,
+                leaves,
+                &refinement.areas,
+                &refinement.balance.factor,
+            )),
+        }
     }
 
     /// As much of the area of leaves as takes part.
@@ -285,7 +315,7 @@ impl Bake {
         &'a self,
         rows: &'a LinkRows,
         leaves: &'a [u32],
-    ) -> Box<dyn Fn(&Rows) -> Rows + 'a> {
+    ) -> Box<dyn Fn(&Rows) -> Rows + Sync + 'a> {
         let Refinement {
             tree,
             leaf_rays,

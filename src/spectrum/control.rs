@@ -35,7 +35,7 @@ impl Metric {
 
     /// The square of [`Metric::size`], mostly without a root (as in the paper's program, 3.1.3).
     #[inline]
-    fn squared(&self, error: Cmf, radius: Cmf) -> f64 {
+    pub(super) fn squared(&self, error: Cmf, radius: Cmf) -> f64 {
         match self {
             Self::Xyz => square(std::array::from_fn(|a| error[a].abs() + radius[a])),
             Self::Luv(j) if radius == [0.0; 3] => square(multiply(j, error)),
@@ -45,7 +45,7 @@ impl Metric {
 
     /// Is the size above a limit? A limit below 0 is below every size.
     #[inline]
-    fn exceeds(&self, limit: f64, error: Cmf, radius: Cmf) -> bool {
+    pub(super) fn exceeds(&self, limit: f64, error: Cmf, radius: Cmf) -> bool {
         limit < 0.0 || self.squared(error, radius) > limit * limit
     }
 }
@@ -245,7 +245,7 @@ pub fn coarsen<I: Interval>(
 ///
 /// Only the values of the pair are read, see [`CmfTree::merge_gain`]: nothing is merged to find out.
 #[inline]
-fn best_pair<I: Interval>(
+pub(super) fn best_pair<I: Interval>(
     list: &List<I>,
     error: Cmf,
     cmf: &CmfTree,

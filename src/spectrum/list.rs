@@ -51,6 +51,12 @@ impl<I: Interval> List<I> {
         self.radius = [0.0; 3];
     }
 
+    /// Writes known records over the list.
+    pub(super) fn load(&mut self, partition: Partition, records: &[I]) {
+        self.reset(partition).copy_from_slice(records);
+        self.settle();
+    }
+
     /// Nothing, as one interval.
     pub fn black() -> Self {
         Self {

@@ -18,7 +18,7 @@
 //! | 5 | bound of the neglected term | [`Bounded`] |
 //! | 5 | a perceptual error | [`Metric::Luv`] |
 //! | 5 | several lights | errors without K; one tree of a reflectance serves all lights |
-//! | - | sums, for radiosity | [`List::add_scaled`], [`coarsen`] |
+//! | - | sums, for radiosity | [`List::add_scaled`], [`reflect_sum`], [`ListTable`], [`coarsen`] |
 //! | - | adding the estimated error back | [`List::corrected_xyz`] |
 //! | - | lists of the ratio to a light | [`CmfTree::under`] |
 //!
@@ -96,10 +96,12 @@ mod list;
 pub mod methods;
 mod partition;
 mod product;
+mod received;
 mod source;
 #[cfg(any(feature = "paper", test))]
 pub mod study;
 mod sum;
+mod table;
 mod tree;
 
 #[cfg(test)]
@@ -112,7 +114,9 @@ pub use interval::{Cmf, Estimate, Interval, Moment, Representative};
 pub use list::List;
 pub use partition::{Intervals, Partition};
 pub use product::Path;
+pub use received::reflect_sum;
 pub use source::represent;
+pub use table::ListTable;
 pub use tree::{CmfTree, DyadicTree, NODES, node, span};
 
 /// The list that patches carry: values, errors with the free part of the neglected term.
