@@ -1,6 +1,6 @@
 //! What each way to carry spectra claims, held against the 64 bands on the same links; and the sweep as a command.
 
-use haarlight::cost::{HeldRun, Knob, Sweep, choose, held};
+use haarlight::cost::{HeldRun, held};
 use haarlight::data::{Outside, named};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
@@ -191,41 +191,6 @@ fn a_grey_room_takes_one_number_however_it_is_asked() {
             assert!(run.de_luv < HAIR, "{run:?}");
         }
     }
-}
-
-#[test]
-fn a_sweep_chooses_the_cheapest_within_the_goal() {
-    let sweep = Sweep {
-        errors: vec![4.0, 1.0],
-        representations: vec![Representation::Adaptive, Representation::Rgb],
-        points: 40,
-        repeats: 1,
-        knob: Knob::LeftOut,
-        seed: 0,
-    };
-    let study = sweep.run(&room("cornell-f2.glb"), &|_, _, _| {});
-    assert_eq!(study.runs.len(), 4);
-    for run in &study.runs {
-        let phases: f64 = run.phases_s.iter().map(|p| p.1).sum();
-        assert!(phases <= run.cpu_s && phases > 0.5 * run.cpu_s, "{run:?}");
-    }
-    let within = |goal: f64| choose(&study, goal).run.unwrap();
-    let least = |goal: f64| {
-        study
-            .runs
-            .iter()
-            .filter(|r| r.de2000.value <= goal)
-            .map(|r| r.cpu_s)
-            .fold(f64::INFINITY, f64::min)
-    };
-    // Spectra that know their error may cost a little more than those that do not.
-    for goal in [1.2, 3.0] {
-        assert!(within(goal).cpu_s <= 1.15 * least(goal), "{goal}");
-        assert!(within(goal).de2000.value <= goal);
-    }
-    // Out of reach: the most accurate, and it is said.
-    let none = choose(&study, 1e-6);
-    assert!(none.why[0].starts_with("No bake came within"), "{none:?}");
 }
 
 #[test]
