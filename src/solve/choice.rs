@@ -58,6 +58,7 @@ impl Bake {
             // Light that excites lies where these representations are blind, or in lanes that they mix.
             Representation::Rgb
             | Representation::Paper
+            | Representation::Lists
             | Representation::Characteristic(_)
             | Representation::Guaranteed
                 if guide.is_some() =>

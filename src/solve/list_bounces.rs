@@ -156,8 +156,13 @@ impl ListBounces<'_> {
                 return None;
             }
             let now = light.spectrum();
-            let all: Spectrum =
-                std::array::from_fn(|b| now[b] + known.iter().map(|rows| f64::from(rows.row(k)[b])).sum::<f64>());
+            let all: Spectrum = std::array::from_fn(|b| {
+                now[b]
+                    + known
+                        .iter()
+                        .map(|rows| f64::from(rows.row(k)[b]))
+                        .sum::<f64>()
+            });
             let metric = self.metric(xyz(&all, self.weights));
             Some(reflect_sum(&light, paints.of(k), cmf, &metric, limit))
         };
@@ -174,7 +179,12 @@ impl ListBounces<'_> {
     }
 
     /// Sums of lists that leaves receive of what leaves send.
-    fn gathered(&self, sent: &ListTable<Moment>, leaves: usize, cmf: &CmfTree) -> ListTable<Moment> {
+    fn gathered(
+        &self,
+        sent: &ListTable<Moment>,
+        leaves: usize,
+        cmf: &CmfTree,
+    ) -> ListTable<Moment> {
         match &self.senders {
             Senders::Links(operator) => operator.received_lists(sent, cmf),
             Senders::Rays(rays, all) => table(leaves, |k| {
@@ -198,11 +208,16 @@ impl ListBounces<'_> {
     fn left_by_a_bounce(&self, first: &Rows) -> f64 {
         let again = self.system.reflection.of::<BANDS>(first);
         let flux = |rows: &Rows| -> f64 {
-            let each = (0..rows.len()).map(|k| self.system.areas[k] * bright(rows.row(k), &self.weights[1]));
+            let each = (0..rows.len())
+                .map(|k| self.system.areas[k] * bright(rows.row(k), &self.weights[1]));
             each.sum()
         };
         let (before, after) = (flux(first), flux(&again));
-        if before > 0.0 { (after / before).min(MOST_LEFT) } else { 0.0 }
+        if before > 0.0 {
+            (after / before).min(MOST_LEFT)
+        } else {
+            0.0
+        }
     }
 
     /// Colour difference as seen at a patch with this light, tristimulus over [`KM`].
@@ -214,7 +229,8 @@ impl ListBounces<'_> {
     fn mean_error(&self, light: [&Rows; 2], lacks: &[[f64; 3]]) -> f64 {
         let (mut sum, mut area) = (0.0, 0.0);
         for (k, lacks) in lacks.iter().enumerate() {
-            let all = std::array::from_fn(|b| light.iter().map(|rows| f64::from(rows.row(k)[b])).sum());
+            let all =
+                std::array::from_fn(|b| light.iter().map(|rows| f64::from(rows.row(k)[b])).sum());
             let size = self.metric(xyz(&all, self.weights)).size(*lacks, [0.0; 3]);
             sum += self.system.areas[k] * size;
             area += self.system.areas[k];
@@ -303,7 +319,10 @@ fn add(rows: &mut Rows, more: &Rows) {
 }
 
 fn bright(row: &[f32], weights: &Spectrum) -> f64 {
-    row.iter().zip(weights).map(|(x, w)| f64::from(*x) * w).sum()
+    row.iter()
+        .zip(weights)
+        .map(|(x, w)| f64::from(*x) * w)
+        .sum()
 }
 
 fn xyz(light: &Spectrum, weights: &[Spectrum; 3]) -> [f64; 3] {

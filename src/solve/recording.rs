@@ -57,7 +57,8 @@ impl Bake {
                 .filter(|l| l.occlusion == Occlusion::Clear)
                 .count(),
             intervals_working: bake.solution.lanes.len(),
-            intervals_mean: (m.convergence.carried).map_or_else(|| bake.intervals_mean(), |c| c.intervals),
+            intervals_mean: (m.convergence.carried)
+                .map_or_else(|| bake.intervals_mean(), |c| c.intervals),
             memory_bytes: of_links + of_elements,
             row_bytes: self.refinement.leaf_rays.row_bytes(),
             bytes_per_link: per(of_links, bake.refinement.graph.links.len()),

@@ -20,7 +20,7 @@ pub enum Representation {
     /// lights and their first and second reflections.
     Paper,
     /// A list for each patch, radiosity itself, multiplied, refined and merged from patch to patch (3.2 to 3.4); all 64 bands in rooms with
-    /// panes, mirrors or sheets, and when several ranks bake.
+    /// panes, mirrors, sheets or fluorescence, and when several ranks bake.
     Lists,
     /// Ratios to each light on this many intervals of equal width, in 1..=64.
     Uniform(u8),

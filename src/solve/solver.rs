@@ -151,7 +151,11 @@ impl System<'_> {
 }
 
 /// The greatest relative length of a lane times its factor, from squares of lengths.
-pub(super) fn worst<const L: usize>(squares: &[f64; L], whole: &[f64; L], factors: &[f64; L]) -> f64 {
+pub(super) fn worst<const L: usize>(
+    squares: &[f64; L],
+    whole: &[f64; L],
+    factors: &[f64; L],
+) -> f64 {
     let lanes = squares.iter().zip(whole).zip(factors);
     lanes.fold(0.0, |worst, ((square, whole), factor)| {
         worst.max((square / whole.max(f64::MIN_POSITIVE)).sqrt() * factor)

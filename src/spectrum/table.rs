@@ -27,7 +27,8 @@ impl<I: Interval> ListTable<I> {
         for table in tables {
             let before = all.records.len();
             let moved = table.at.into_iter();
-            all.at.extend(moved.map(|at| at.map(|(first, cut)| (before + first, cut))));
+            all.at
+                .extend(moved.map(|at| at.map(|(first, cut)| (before + first, cut))));
             all.records.extend(table.records);
         }
         all
