@@ -211,6 +211,7 @@ impl Bake {
                 &self.room.weights,
             )),
         };
+        self.solution.list_limit = self.list_limit();
         self.solution.filters = Filters::new(&self.room.scene, &self.solution.lanes);
         let error: f64 = from.get()?;
         self.solution.spectrum_error = (!error.is_nan()).then_some(error);

@@ -87,15 +87,8 @@ impl Bake {
                 let basis = basis(&lights, &paints(&self.room.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
-            // Where light passes filters on its way, it does so band by band.
-            Representation::Lists
-                if !none
-                    && self.room.panes.is_none()
-                    && self.room.mirrors.is_none()
-                    && !self.room.plan.runs(EffectKind::Sheets)
-                    && self.room.team.is_alone() =>
-            {
-                self.solution.list_limit = Some(tolerance);
+            Representation::Lists if !none => {
+                self.solution.list_limit = self.list_limit();
                 Lanes::dense(spectra, weights)
             }
             Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance)?,
@@ -113,6 +106,20 @@ impl Bake {
                 Lanes::dense(spectra, weights)
             }
         })
+    }
+
+    /// The colour difference (CIELUV) that lists may make, where light is carried by them. Where it passes filters on its way, or excites other
+    /// light, it goes band by band.
+    pub(super) fn list_limit(&self) -> Option<f64> {
+        let room = &self.room;
+        let carried = room.settings.representation == Representation::Lists
+            && room.panes.is_none()
+            && room.mirrors.is_none()
+            && !room.plan.runs(EffectKind::Sheets)
+            && guide(&room.scene, &room.weights).is_none()
+            && room.team.is_alone();
+        let share = SPECTRUM_SHARE * room.settings.error;
+        carried.then(|| room.settings.spectrum.unwrap_or(share))
     }
 
     /// Ratios to each light on as few intervals as the model of the room allows.

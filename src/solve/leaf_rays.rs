@@ -157,6 +157,20 @@ impl LeafRays {
             // A hierarchy only grows: with as many nodes it is the same one.
             return Ok(0);
         }
+        let cast = self.cast(tree, sight, hemisphere, seed, interrupt)?;
+        self.find(tree, 0);
+        Ok(cast)
+    }
+
+    /// Lets new leaves look for themselves, each rank its own. Returns the rays cast by all ranks.
+    pub(super) fn cast(
+        &mut self,
+        tree: &Tree,
+        sight: &Sight,
+        hemisphere: &Hemisphere,
+        seed: u64,
+        interrupt: &Interrupt,
+    ) -> Result<u64, Interrupted> {
         self.target.resize(tree.nodes.len(), f32::NAN);
         self.bare.resize(tree.nodes.len(), f32::NAN);
         self.range.resize(tree.nodes.len(), (0, 0));
@@ -212,12 +226,16 @@ impl LeafRays {
             self.lamps.extend(found.lamps.iter().map(|ray| first + ray));
             self.ends.extend(found.ends);
         }
-        self.find(tree);
         Ok(cast)
     }
 
-    /// Looks up which leaf lies at each end; a leaf found before is kept unless it was split.
-    fn find(&mut self, tree: &Tree) {
+    /// Number of rays whose ends were looked up.
+    pub(super) fn found(&self) -> usize {
+        self.met.len()
+    }
+
+    /// Looks up which leaf lies at each end, from a ray on; a leaf found before is kept unless it was split.
+    pub(super) fn find(&mut self, tree: &Tree, first: usize) {
         // Nodes lie far apart in memory, and the look-up needs only their children.
         let children: Vec<u32> = tree.nodes.iter().map(|node| node.child).collect();
         let stands = |met: u32| children[(met & !ALONE) as usize] == NONE;
@@ -230,7 +248,7 @@ impl LeafRays {
         let known = self.met.len();
         self.met.resize(self.ends.len(), NONE);
         let rays = self.met.par_iter_mut().zip(&self.ends).enumerate();
-        rays.for_each(|(k, (met, end))| {
+        rays.skip(first).for_each(|(k, (met, end))| {
             if end.entry != NONE && !(k < known && stands(*met)) {
                 *met = leaf_at(end);
             }

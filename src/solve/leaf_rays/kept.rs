@@ -156,7 +156,7 @@ impl LeafRays {
             })
             .collect();
         if whole {
-            leaf_rays.find(tree);
+            leaf_rays.find(tree, 0);
         }
         Ok(leaf_rays)
     }
