@@ -292,6 +292,22 @@ fn the_report_is_the_same_at_any_number_of_threads() {
 }
 
 #[test]
+fn the_report_names_the_places_that_are_furthest_off() {
+    let mut bake = Bake::new(furnished(), Settings::default());
+    bake.step();
+    let report = Report::new(&bake, 40, 1024, 9);
+    assert_eq!(report.worst.len(), 5);
+    assert!(report.worst.is_sorted_by(|a, b| a.de2000 >= b.de2000));
+    let most = (report.seen.iter()).max_by(|a, b| a.de2000[0].total_cmp(&b.de2000[0]));
+    let (most, named) = (most.unwrap(), report.worst[0]);
+    assert_eq!(named.at, most.point.to_array());
+    assert_eq!(
+        [named.baked_lux, named.traced_lux],
+        [most.baked[1], most.traced[1]]
+    );
+}
+
+#[test]
 fn the_report_measures_what_finer_rounds_improve() {
     let mut bake = Bake::new(
         furnished(),

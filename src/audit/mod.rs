@@ -14,5 +14,5 @@ mod summary;
 
 pub use path::{Answer, Audit, BATCHES};
 pub use reference::{FacePoint, PathReference};
-pub use report::{AuditedPoint, HONEST, Honesty, Report};
+pub use report::{AuditedPoint, HONEST, Honesty, Report, WorstPoint};
 pub use summary::{ErrorSummary, Measured};

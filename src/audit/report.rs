@@ -34,6 +34,9 @@ pub enum Honesty {
     NoEstimate,
 }
 
+/// Points that are named as the worst.
+const WORST: usize = 5;
+
 /// The outcome of an audit.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
@@ -60,9 +63,41 @@ pub struct Report {
     pub estimate_de2000: Option<f64>,
     /// The judgement on it.
     pub honesty: Honesty,
+    /// The points with the largest colour differences, the worst first.
+    pub worst: Vec<WorstPoint>,
     /// What was seen at each point.
     #[serde(skip)]
     pub seen: Vec<AuditedPoint>,
+}
+
+/// One of the worst points of an audit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct WorstPoint {
+    /// World space, m.
+    pub at: [f64; 3],
+    /// Unit normal.
+    pub normal: [f64; 3],
+    /// Illuminance by the bake, lx.
+    pub baked_lux: f64,
+    /// The same by the path tracer.
+    pub traced_lux: f64,
+    /// CIEDE2000 between the two, noise included.
+    pub de2000: f64,
+}
+
+/// The worst points, the worst first.
+fn worst(seen: &[AuditedPoint]) -> Vec<WorstPoint> {
+    let mut order: Vec<&AuditedPoint> = seen.iter().collect();
+    order.sort_by(|a, b| b.de2000[0].total_cmp(&a.de2000[0]));
+    let named = order.into_iter().take(WORST).map(|point| WorstPoint {
+        at: point.point.to_array(),
+        normal: point.normal.to_array(),
+        baked_lux: point.baked[1],
+        traced_lux: point.traced[1],
+        de2000: point.de2000[0],
+    });
+    named.collect()
 }
 
 /// One point of an audit.
@@ -189,6 +224,7 @@ impl Report {
             estimate_de2000: estimate,
             honesty: judge(estimate, &de2000.mean, NEGLIGIBLE * bake.settings().error),
             de2000,
+            worst: worst(&seen),
             seen,
         }
     }

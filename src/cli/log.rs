@@ -69,6 +69,7 @@
 //! | `relative` | 1 | error of illuminance without sign, the same |
 //! | `bias` | 1 | error of the mean illuminance with sign, bake less truth over truth: `value`, `low`, `high` |
 //! | `noise_de2000` | dE00 | mean standard error of the audit itself |
+//! | `worst` | | the five points that are furthest off: `at` (m), `normal`, `baked_lux`, `traced_lux`, `de2000` |
 //! | `estimate_de2000` | dE00 | what is estimated of the file: light of the last round, and between vertices |
 //! | `honesty` | | `honest`: estimate within 0.7 and 3 times `de2000.mean`, as far as its interval tells; `too_low`, `too_high`, `no_estimate` |
 //!

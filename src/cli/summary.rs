@@ -181,8 +181,15 @@ fn measured(audit: &Report) -> String {
         Honesty::NoEstimate => "there was no estimate",
     };
     let (de, bias) = (&audit.de2000, audit.bias);
+    let worst = audit.worst.first().map_or(String::new(), |point| {
+        let [x, y, z] = point.at;
+        format!(
+            " at {x:.2},{y:.2},{z:.2} ({:.3} lx for {:.3})",
+            point.baked_lux, point.traced_lux
+        )
+    });
     format!(
-        "measured error at {} points: dE00 mean {:.3} ({:.3} .. {:.3}), 95 % below {:.2}, max {:.2}; illuminance {:+.2} % ({:.2} .. {:.2}); {honest}",
+        "measured error at {} points: dE00 mean {:.3} ({:.3} .. {:.3}), 95 % below {:.2}, max {:.2}{worst}; illuminance {:+.2} % ({:.2} .. {:.2}); {honest}",
         audit.points,
         de.mean.value,
         de.mean.low,
