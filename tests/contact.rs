@@ -89,6 +89,55 @@ fn floor_beside(bake: &Bake, low: DVec3, high: DVec3) -> (Vec<[f32; 3]>, usize) 
     (beside, below)
 }
 
+/// A sheet that stands where two floors meet, open above: at its foot each floor has its own light.
+#[test]
+fn a_sheet_on_a_seam_has_two_sides() {
+    let mut room = Room::new();
+    let (wall, screen) = (room.paint(0.5), room.paint(0.5));
+    room.two_sided(screen);
+    let (low, high) = (DVec3::ZERO, dvec3(4.0, 3.0, 5.0));
+    for corners in built::faces(low, high) {
+        // The floor is made of two.
+        if corners.iter().any(|c| c.y > 0.0) {
+            room.polygon(&corners, wall);
+        }
+    }
+    let carpet = room.paint(0.4);
+    for (x, paint) in [(0.0, wall), (2.0, carpet)] {
+        room.quad(dvec3(x, 0.0, 0.0), 5.0 * DVec3::Z, 2.0 * DVec3::X, paint);
+    }
+    room.quad(dvec3(2.0, 0.0, 0.0), 5.0 * DVec3::Z, 2.6 * DVec3::Y, screen);
+    room.point(dvec3(1.0, 1.0, 2.5), 1000.0);
+    let bake = built::baked(room.scene());
+    let foot = floor_at(&bake, 2.0);
+    assert!(foot.iter().all(|side| side.len() > 4), "{foot:?}");
+    let most = |side: &[f32]| side.iter().fold(0.0_f32, |a, &b| a.max(b));
+    let least = |side: &[f32]| side.iter().fold(f32::INFINITY, |a, &b| a.min(b));
+    assert!(most(&foot[1]) < 0.5 * least(&foot[0]), "{foot:?}");
+}
+
+/// Light of the corners at `x` of the floor's triangles on either side, that of smaller x first.
+fn floor_at(bake: &Bake, x: f64) -> [Vec<f32>; 2] {
+    let mut sides = [Vec::new(), Vec::new()];
+    for part in bake.baked(&|_, _| ()).surfaces {
+        let surface = &bake.scene().surfaces[part.surface];
+        let place = |v: u32| position(surface, &part.vertices[v as usize]);
+        for triangle in &part.triangles {
+            let places = triangle.map(place);
+            if places.iter().any(|p| p.y != 0.0) {
+                continue;
+            }
+            let beyond = places.iter().any(|p| p.x > x + 1e-6);
+            for (v, place) in triangle.iter().zip(places) {
+                if (place.x - x).abs() < 1e-6 {
+                    sides[usize::from(beyond)].push(part.vertices[*v as usize].irradiance[1]);
+                }
+            }
+        }
+    }
+    sides
+}
+
 /// Below a block that shows its inside, too, it is dark, below one that hovers a hair, and within one that is sunk in; the
 /// floor beside it is lit up to the edge. In a room of few triangles the floor is cut along the block, in one of many it is
 /// not.

@@ -1,6 +1,7 @@
 //! Looks at light: each place with its normal is gathered once, whichever triangles ask for it.
 
 use crate::gather::{MOSTLY, Vertex};
+use crate::geometry::Segment;
 use crate::solve::{Bake, GatherQuality};
 use crate::transport::{Gathered, Receiver};
 use glam::DVec3;
@@ -45,7 +46,8 @@ pub(crate) struct Looks<'a> {
     /// Is direct light of lamps left out?
     pub(crate) indirect: bool,
     spaces: Vec<(u32, bool)>,
-    known: HashMap<LookKey, u32>,
+    /// Looks at a place: one for each side of what stands there.
+    known: HashMap<LookKey, Vec<u32>>,
     places: Vec<(Receiver, bool)>,
     /// None: something solid covers the place, or lies right upon it.
     seen: Vec<Option<PlaceLight>>,
@@ -98,14 +100,17 @@ impl<'a> Looks<'a> {
         let of = &self.bake.scene().materials[material as usize];
         let apart = of.sheet.is_some() || of.fluorescence.is_some();
         let own = apart.then_some(material);
-        let (key, places) = (
-            ([x, y, z, i, j, k], space, believing, own),
-            &mut self.places,
-        );
-        *self.known.entry(key).or_insert_with(|| {
-            places.push((to, believing));
-            places.len() as u32 - 1
-        })
+        let key = ([x, y, z, i, j, k], space, believing, own);
+        let of_place = self.known.entry(key).or_default();
+        let places = &mut self.places;
+        let joined = |look: &&u32| !parted(self.bake, &places[**look as usize].0, &to);
+        if let Some(look) = of_place.iter().find(joined) {
+            return *look;
+        }
+        let look = places.len() as u32;
+        places.push((to, believing));
+        of_place.push(look);
+        look
     }
 
     fn seen_as(&self, to: &Receiver, row: [f32; 64], trace: Option<Box<[u8]>>) -> PlaceLight {
@@ -238,10 +243,58 @@ impl<'a> Looks<'a> {
     }
 }
 
+/// Does something stand between two points of a plane, each a little inside of its own triangle, at whose common corner a wall may begin? The
+/// ways between them run as far above the plane as the points are apart.
+fn parted(bake: &Bake, one: &Receiver, other: &Receiver) -> bool {
+    let lift = (one.point - other.point).length() * one.normal;
+    let planes = [one.plane, other.plane];
+    let way = Segment::new(one.point + lift, other.point + lift, planes);
+    lift != DVec3::ZERO && bake.rays().occluded(&way)
+}
+
 /// Irradiance without the direct light of lamps. Not below 0: both are sums of the same numbers, rounded differently.
 fn less(mut all: [f32; 64], direct: &[f32; 64]) -> [f32; 64] {
     for (all, direct) in all.iter_mut().zip(direct) {
         *all = (*all - direct).max(0.0);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::tests::baked;
+
+    /// At the foot of a block the floor on one side is not that on the other.
+    #[test]
+    fn a_block_parts_the_places_at_its_foot() {
+        let bake = baked("cornell.glb", 1);
+        let mesh = bake.mesh();
+        let floor = (mesh.positions.iter()).fold(f64::INFINITY, |y, p| y.min(p.y));
+        let of_floor = |t: &usize| mesh.normal[*t].y.abs() > 0.99;
+        let of_floor = |t: &usize| of_floor(t) && mesh.at(*t, [1.0, 0.0, 0.0]).y < floor + 1e-9;
+        let plane = mesh.plane[(0..mesh.triangles.len()).find(of_floor).unwrap()];
+        let at = |point: DVec3| Receiver {
+            point,
+            normal: DVec3::Y,
+            plane,
+            leaf: None,
+            seed: 0,
+        };
+        let mut blocks = 0;
+        for t in 0..mesh.triangles.len() {
+            let corners = mesh.triangles[t].map(|p| mesh.positions[p as usize]);
+            let low: Vec<DVec3> = corners.into_iter().filter(|c| c.y < floor + 1e-9).collect();
+            // The walls' edges are straight; the blocks stand askew.
+            let askew = mesh.normal[t].x.abs().max(mesh.normal[t].z.abs()) < 0.99;
+            if let (&[a, b], true) = (low.as_slice(), askew && mesh.normal[t].y.abs() < 0.1) {
+                let (middle, step) = (0.5 * (a + b), 1e-3 * mesh.half_size * mesh.normal[t]);
+                let place = |k: f64| at(middle + k * step);
+                assert!(parted(&bake, &place(1.0), &place(-1.0)));
+                assert!(!parted(&bake, &place(1.0), &place(2.0)));
+                blocks += 1;
+            }
+        }
+        assert_eq!(blocks, 8);
+    }
 }

@@ -10,7 +10,7 @@
 use super::leaf_rays::LeafRays;
 use super::operator::Operator;
 use super::reflection::Reflection;
-use super::solver::{Convergence, MOST, System, is_near, worst};
+use super::solver::{Carried, Convergence, MOST, System, is_near, worst};
 use crate::color::{KM, luv_jacobian};
 use crate::hierarchy::NONE;
 use crate::light::Rows;
@@ -32,15 +32,6 @@ pub(super) enum Senders<'a> {
     Links(Operator<'a>),
     /// By their own rays: how leaves look out, and the leaves, ascending.
     Rays(&'a LeafRays, &'a [u32]),
-}
-
-/// What light carried by lists came to.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Carried {
-    /// Mean number of intervals of a list, over all patches and bounces.
-    pub(crate) intervals: f64,
-    /// Mean over the leaves, by area, of the error that lists know of, CIELUV.
-    pub(crate) de_luv: f64,
 }
 
 /// Light on its way as lists.

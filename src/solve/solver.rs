@@ -8,7 +8,6 @@
 //! In the norm `sum A R^2` M shrinks by the greatest share s of irradiance that leaves a leaf, and F of balanced links does not grow: what a sweep
 //! changes by d leaves an error of `d s / (1 - s)` at the most. Of rays that is so in the mean.
 
-use super::list_bounces::Carried;
 use super::reflection::Reflection;
 use super::sums::dot_by_area;
 use crate::light::rows::Rows;
@@ -34,6 +33,15 @@ pub(crate) struct Convergence {
     pub fluorescence: usize,
     /// What lists came to, where light was carried by lists.
     pub carried: Option<Carried>,
+}
+
+/// What light carried by lists came to.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Carried {
+    /// Mean number of intervals of a list, over all patches and bounces.
+    pub(crate) intervals: f64,
+    /// Mean over the leaves, by area, of the error that lists know of, CIELUV.
+    pub(crate) de_luv: f64,
 }
 
 /// A room whose leaves reflect so, with what turns radiosity into irradiance.
