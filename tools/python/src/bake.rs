@@ -1,8 +1,8 @@
 //! A bake from its first round to its mesh: news of every round, and an end before the error is reached.
 
+use crate::data::Data;
 use crate::light::Solved;
 use crate::records::flat;
-use crate::data::Data;
 use crate::work::{Listener, Tell, answer, told};
 use haarlight::Error;
 use haarlight::cli::stop::Stop;
@@ -116,14 +116,19 @@ fn solved(
     if wanted.keep {
         bake.keep();
     }
-    let verdict = stop.run(&mut bake, &Talk::new(true), |_, round| {
-        tell.tell(Box::new(round.clone()));
-        answer(answers, ());
-        match forsaken() {
-            true => Err(Error::Internal("nobody waits for the bake".into())),
-            false => Ok(()),
-        }
-    })?;
+    let verdict = stop.run(
+        &mut bake,
+        &Talk::new(true),
+        |_, round| round.remaining_s,
+        |_, round, _| {
+            tell.tell(Box::new(round.clone()));
+            answer(answers, ());
+            match forsaken() {
+                true => Err(Error::Internal("nobody waits for the bake".into())),
+                false => Ok(()),
+            }
+        },
+    )?;
     let late = || stop.is_late(0.0) || forsaken();
     let limits = Limits {
         vertices: wanted.vertices,

@@ -23,7 +23,11 @@ pub(crate) struct Data {
 
 impl Data {
     /// Reads a room and looks it over.
-    pub(crate) fn read(path: PathBuf, options: Options, wishes: SurveyOptions) -> haarlight::Result<Self> {
+    pub(crate) fn read(
+        path: PathBuf,
+        options: Options,
+        wishes: SurveyOptions,
+    ) -> haarlight::Result<Self> {
         let mut scene = Scene::load(&path, &options)?;
         let problems = advise(&mut scene, wishes);
         if !problems.is_empty() {

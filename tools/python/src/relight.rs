@@ -1,7 +1,7 @@
 //! What `Result.relight` is given: another room, or what is to be changed in this one.
 
-use crate::errors::wrong;
 use crate::data::{Data, Room, json_of};
+use crate::errors::wrong;
 use haarlight::Result;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;

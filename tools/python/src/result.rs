@@ -276,7 +276,10 @@ impl Lit {
         let count = asked.len();
         let (probed, strays) = done(py, move || {
             let places = survey::places(light.scene(), &light.metres(&asked));
-            let strays = places.iter().filter(|p| **p != survey::Place::Room).count();
+            let strays = places
+                .iter()
+                .filter(|p| **p != survey::PointLocation::Room)
+                .count();
             Ok((light.probe(&asked)?, strays))
         })?;
         if strays > 0 {
@@ -316,7 +319,10 @@ impl Lit {
         let places = done(py, move || {
             Ok(survey::places(light.scene(), &light.metres(&asked)))
         })?;
-        Ok(places.into_iter().map(survey::Place::name).collect())
+        Ok(places
+            .into_iter()
+            .map(survey::PointLocation::name)
+            .collect())
     }
 
     /// The room under other lamps and paints; no ray is cast.

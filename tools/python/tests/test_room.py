@@ -117,7 +117,7 @@ def test_a_sky_is_a_word_or_a_dictionary(scenes):
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [
-        ({"range": (780, 380)}, "range: wavelengths lie in 360..830 nm"),
+        ({"range": (780, 380)}, "range: wavelengths lie in 300..830 nm"),
         ({"scale": 0}, "scale: is not a number above zero"),
     ],
 )
