@@ -6,7 +6,7 @@
 use colorimetry::illuminant::Illuminant;
 use colorimetry::spectrum::Spectrum;
 use haarlight::color::{Bands, Meter, NAMES};
-use haarlight::data::{Kind, named, names};
+use haarlight::data::{TableKind, named, names};
 use std::process::ExitCode;
 
 const COMPARED: [&str; 5] = ["CCT_K", "Duv", "Ra", "Rf", "Rg"];
@@ -41,7 +41,7 @@ fn main() -> ExitCode {
     let mut worst: [(f64, String); 5] = Default::default();
     let mut count = 0;
     for name in names() {
-        let Some(known) = named(&name).filter(|n| n.kind == Kind::Illuminant) else {
+        let Some(known) = named(&name).filter(|n| n.kind == TableKind::Illuminant) else {
             continue;
         };
         let light = bands.light(&known.table);
