@@ -24,8 +24,8 @@ fn cornell(lamp: &str) -> Scene {
     scene
 }
 
-/// Two rounds, then all ways on their links.
-fn all_ways(scene: Scene) -> Vec<HeldRun> {
+/// A bake of two rounds.
+fn two_rounds(scene: Scene) -> Bake {
     let mut bake = Bake::new(
         scene,
         Settings {
@@ -34,6 +34,12 @@ fn all_ways(scene: Scene) -> Vec<HeldRun> {
         },
     );
     bake.run();
+    bake
+}
+
+/// Two rounds, then all ways on their links.
+fn all_ways(scene: Scene) -> Vec<HeldRun> {
+    let mut bake = two_rounds(scene);
     let white = bake.light().white;
     held(&mut bake, white)
 }
@@ -88,14 +94,7 @@ fn every_way_keeps_what_it_claims_under_line_spectra() {
 /// All 64 intervals, or all 64 vectors, are the 64 bands in another form.
 #[test]
 fn whole_sets_are_exact() {
-    let mut bake = Bake::new(
-        room("cornell-f2.glb"),
-        Settings {
-            rounds: 2,
-            ..Settings::default()
-        },
-    );
-    bake.run();
+    let mut bake = two_rounds(room("cornell-f2.glb"));
     let white = bake.light().white;
     bake.hold(Representation::Dense, 0.5).unwrap();
     let truth = bake.leaf_colours();
@@ -140,14 +139,7 @@ fn lists_lose_no_more_than_they_may() {
         ("links, A", cornell("cie/A")),
         ("rays", room("furnished.glb")),
     ] {
-        let mut bake = Bake::new(
-            scene,
-            Settings {
-                rounds: 2,
-                ..Settings::default()
-            },
-        );
-        bake.run();
+        let mut bake = two_rounds(scene);
         let white = bake.light().white;
         bake.hold(Representation::Dense, 0.5).unwrap();
         let truth = bake.leaf_colours();

@@ -48,7 +48,7 @@ impl Bake {
     }
 
     pub(super) fn chosen_lanes(&mut self) -> Result<Lanes, Interrupted> {
-        (self.solution.spectrum_error, self.solution.list_limit) = (None, None);
+        (self.solution.spectrum_error, self.solution.list_limit) = (None, self.list_limit());
         let (spectra, weights) = (&self.room.scene.spectra, &self.room.weights);
         let none = spectra.is_empty() || self.refinement.tree.nodes.is_empty();
         let share = SPECTRUM_SHARE * self.room.settings.error;
@@ -58,7 +58,6 @@ impl Bake {
             // Light that excites lies where these representations are blind, or in lanes that they mix.
             Representation::Rgb
             | Representation::Paper
-            | Representation::Lists
             | Representation::Characteristic(_)
             | Representation::Guaranteed
                 if guide.is_some() =>
@@ -87,10 +86,6 @@ impl Bake {
                 let basis = basis(&lights, &paints(&self.room.scene), n.into());
                 Lanes::vectors(spectra, basis, weights)
             }
-            Representation::Lists if !none => {
-                self.solution.list_limit = self.list_limit();
-                Lanes::dense(spectra, weights)
-            }
             Representation::Adaptive if !none => self.perceptual(guide.as_ref(), tolerance)?,
             Representation::Guaranteed if !none => {
                 let model = self.model(BOUNDED_PATCHES)?;
@@ -117,7 +112,8 @@ impl Bake {
             && room.mirrors.is_none()
             && !room.plan.runs(EffectKind::Sheets)
             && guide(&room.scene, &room.weights).is_none()
-            && room.team.is_alone();
+            && room.team.is_alone()
+            && !room.scene.spectra.is_empty();
         let share = SPECTRUM_SHARE * room.settings.error;
         carried.then(|| room.settings.spectrum.unwrap_or(share))
     }

@@ -11,9 +11,9 @@ use super::leaf_rays::LeafRays;
 use super::operator::Operator;
 use super::reflection::Reflection;
 use super::solver::{Carried, Convergence, MOST, System, is_near, worst};
-use crate::color::{KM, luv_jacobian};
+use crate::color::{KM, luv_jacobian, tristimulus};
 use crate::hierarchy::NONE;
-use crate::light::Rows;
+use crate::light::{Rows, weighed};
 use crate::spectrum::{
     BANDS, CmfTree, Control, ListTable, Metric, Moment, Path, SpectralList, SpectralTree, Spectrum,
     control, reflect_sum, represent,
@@ -47,14 +47,6 @@ pub(super) struct ListBounces<'a> {
     pub(super) limit: f64,
 }
 
-/// A bounce: what every leaf receives, and sends on.
-struct Bounce {
-    received: Rows,
-    sent: ListTable<Moment>,
-    /// What the light received lacks, tristimulus over [`KM`], by leaf.
-    lacks: Vec<[f64; 3]>,
-}
-
 impl ListBounces<'_> {
     /// Reflected radiosity by direct irradiance, and irradiance by reflected light, by leaf, as [`System::solve`].
     pub(super) fn solve(
@@ -72,18 +64,20 @@ impl ListBounces<'_> {
         let (mut seen, mut lacks) = (Rows::zero(leaves, BANDS), vec![[0.0; 3]; leaves]);
         *reflected = Rows::zero(leaves, BANDS);
         let (mut done, mut counts, mut share) = (Convergence::default(), [0; 2], 1.0 - left);
-        let mut sent = ListTable::dark(leaves);
+        let (mut sent, mut list) = (ListTable::dark(leaves), SpectralList::black());
         loop {
             let limit = share * self.limit;
-            let bounce = match done.iterations {
-                0 => self.first_bounce(first, &paints, &cmf, limit),
-                _ => self.next_bounce(&sent, [first, &seen], &paints, &cmf, limit),
-            };
-            sent = bounce.sent;
-            add(&mut seen, &bounce.received);
-            for (sum, more) in lacks.iter_mut().zip(bounce.lacks) {
-                *sum = std::array::from_fn(|c| sum[c] + more[c]);
+            let arrived = self.gathered(&sent, leaves, &cmf);
+            add(&mut seen, &expanded(&arrived, leaves));
+            for (k, sum) in lacks.iter_mut().enumerate() {
+                if arrived.get(k, &mut list) {
+                    *sum = std::array::from_fn(|c| sum[c] + list.error()[c]);
+                }
             }
+            sent = match done.iterations {
+                0 => self.first_sent(first, &paints, &cmf, limit),
+                _ => self.sent_on(&arrived, [first, &seen], &paints, &cmf, limit),
+            };
             let change = expanded(&sent, leaves);
             add(reflected, &change);
             counts = std::array::from_fn(|k| counts[k] + sent.counts()[k]);
@@ -104,15 +98,21 @@ impl ListBounces<'_> {
         }
     }
 
-    /// Light of the lamps, on its first reflection: the paper's own loop.
-    fn first_bounce(&self, first: &Rows, paints: &Paints, cmf: &CmfTree, limit: f64) -> Bounce {
-        let each = |k: usize| {
-            let row = first.row(k);
-            if row.iter().all(|&x| x == 0.0) {
+    /// What leaves send of the light of the lamps: the paper's own loop.
+    fn first_sent(
+        &self,
+        first: &Rows,
+        paints: &Paints,
+        cmf: &CmfTree,
+        limit: f64,
+    ) -> ListTable<Moment> {
+        table(first.len(), |k| {
+            let light = spectrum_of([first], k);
+            if light == [0.0; BANDS] {
                 return None;
             }
-            let source = SpectralTree::new(&std::array::from_fn(|b| f64::from(row[b])), cmf);
-            let metric = self.metric(xyz(source.spectrum(), self.weights));
+            let source = SpectralTree::new(&light, cmf);
+            let metric = self.metric(&light);
             let list = represent(&source, cmf, &metric, limit);
             let (paint, mut sent) = (paints.of(k), SpectralList::black());
             list.reflect(paint, cmf, &mut sent);
@@ -122,51 +122,25 @@ impl ListBounces<'_> {
             };
             control(&mut sent, &path, cmf, &metric, &Control::within(limit));
             Some(sent)
-        };
-        Bounce {
-            received: Rows::zero(first.len(), BANDS),
-            sent: table(first.len(), each),
-            lacks: vec![[0.0; 3]; first.len()],
-        }
+        })
     }
 
-    /// What the last bounce sent is received and sent on. `known`: the light that leaves have had so far.
-    fn next_bounce(
+    /// What leaves send of the light that arrived; `all`: all light that they have had so far.
+    fn sent_on(
         &self,
-        sent: &ListTable<Moment>,
-        known: [&Rows; 2],
+        arrived: &ListTable<Moment>,
+        all: [&Rows; 2],
         paints: &Paints,
         cmf: &CmfTree,
         limit: f64,
-    ) -> Bounce {
-        let leaves = known[0].len();
-        let arrived = self.gathered(sent, leaves, cmf);
-        let reflect = |k: usize| {
+    ) -> ListTable<Moment> {
+        table(all[0].len(), |k| {
             let mut light = SpectralList::black();
-            if !arrived.get(k, &mut light) {
-                return None;
-            }
-            let now = light.spectrum();
-            let all: Spectrum = std::array::from_fn(|b| {
-                now[b]
-                    + known
-                        .iter()
-                        .map(|rows| f64::from(rows.row(k)[b]))
-                        .sum::<f64>()
-            });
-            let metric = self.metric(xyz(&all, self.weights));
-            Some(reflect_sum(&light, paints.of(k), cmf, &metric, limit))
-        };
-        let lacks = |k: usize| {
-            let mut light = SpectralList::black();
-            arrived.get(k, &mut light);
-            light.error()
-        };
-        Bounce {
-            received: expanded(&arrived, leaves),
-            sent: table(leaves, reflect),
-            lacks: (0..leaves).into_par_iter().map(lacks).collect(),
-        }
+            arrived.get(k, &mut light).then(|| {
+                let metric = self.metric(&spectrum_of(all, k));
+                reflect_sum(&light, paints.of(k), cmf, &metric, limit)
+            })
+        })
     }
 
     /// Sums of lists that leaves receive of what leaves send.
@@ -200,7 +174,7 @@ impl ListBounces<'_> {
         let again = self.system.reflection.of::<BANDS>(first);
         let flux = |rows: &Rows| -> f64 {
             let each = (0..rows.len())
-                .map(|k| self.system.areas[k] * bright(rows.row(k), &self.weights[1]));
+                .map(|k| self.system.areas[k] * weighed(rows.row(k), &self.weights[1]));
             each.sum()
         };
         let (before, after) = (flux(first), flux(&again));
@@ -211,21 +185,23 @@ impl ListBounces<'_> {
         }
     }
 
-    /// Colour difference as seen at a patch with this light, tristimulus over [`KM`].
-    fn metric(&self, light: [f64; 3]) -> Metric {
-        Metric::Luv(luv_jacobian(light, self.white.map(|x| x / KM)))
+    /// Colour difference as seen at a patch with this light.
+    fn metric(&self, light: &Spectrum) -> Metric {
+        let white = self.white.map(|x| x / KM);
+        Metric::Luv(luv_jacobian(tristimulus(light, self.weights), white))
     }
 
     /// Mean over the leaves of what their light lacks, CIELUV.
     fn mean_error(&self, light: [&Rows; 2], lacks: &[[f64; 3]]) -> f64 {
-        let (mut sum, mut area) = (0.0, 0.0);
-        for (k, lacks) in lacks.iter().enumerate() {
-            let all =
-                std::array::from_fn(|b| light.iter().map(|rows| f64::from(rows.row(k)[b])).sum());
-            let size = self.metric(xyz(&all, self.weights)).size(*lacks, [0.0; 3]);
-            sum += self.system.areas[k] * size;
-            area += self.system.areas[k];
-        }
+        let area: f64 = self.system.areas.iter().sum();
+        // Where there is no light there is no white, either.
+        let lacking = lacks.iter().enumerate().filter(|(_, e)| **e != [0.0; 3]);
+        let sum: f64 = lacking
+            .map(|(k, lacks)| {
+                let metric = self.metric(&spectrum_of(light, k));
+                self.system.areas[k] * metric.size(*lacks, [0.0; 3])
+            })
+            .sum();
         if area > 0.0 { sum / area } else { 0.0 }
     }
 }
@@ -309,15 +285,9 @@ fn add(rows: &mut Rows, more: &Rows) {
     super::solver::step::<BANDS>(rows, more, [1.0; BANDS]);
 }
 
-fn bright(row: &[f32], weights: &Spectrum) -> f64 {
-    row.iter()
-        .zip(weights)
-        .map(|(x, w)| f64::from(*x) * w)
-        .sum()
-}
-
-fn xyz(light: &Spectrum, weights: &[Spectrum; 3]) -> [f64; 3] {
-    std::array::from_fn(|c| light.iter().zip(&weights[c]).map(|(x, w)| x * w).sum())
+/// The sum of rows of a leaf.
+fn spectrum_of<const N: usize>(rows: [&Rows; N], leaf: usize) -> Spectrum {
+    std::array::from_fn(|band| rows.iter().map(|r| f64::from(r.row(leaf)[band])).sum())
 }
 
 /// A tree for each reflectance.

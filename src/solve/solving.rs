@@ -6,7 +6,6 @@ use super::linear;
 use super::list_bounces::{ListBounces, Senders};
 use super::mixed::Mixed;
 use super::operator::Operator;
-use super::refinement::Refinement;
 use super::reflection::Reflection;
 use super::solver::{Convergence, System, step};
 use super::{Bake, SolveInput};
@@ -265,7 +264,7 @@ impl Bake {
         }
     }
 
-    /// From whom leaves receive lists.
+    /// From whom leaves receive.
     fn senders<'a>(&'a self, rows: &'a LinkRows, leaves: &'a [u32]) -> Senders<'a> {
         let refinement = &self.refinement;
         match self.room.by_rays() {
@@ -316,23 +315,17 @@ impl Bake {
         rows: &'a LinkRows,
         leaves: &'a [u32],
     ) -> Box<dyn Fn(&Rows) -> Rows + Sync + 'a> {
-        let Refinement {
-            tree,
-            leaf_rays,
-            areas,
-            balance,
-            ..
-        } = &self.refinement;
-        if self.room.by_rays() {
-            return Box::new(move |radiosity| {
+        match self.senders(rows, leaves) {
+            Senders::Links(operator) => {
+                Box::new(move |radiosity| operator.received::<L>(radiosity))
+            }
+            Senders::Rays(leaf_rays, leaves) => Box::new(move |radiosity| {
                 let mut seen = Rows::zero(leaves.len(), L);
                 let nodes = self.refinement.on_nodes::<L>(radiosity, leaves);
                 leaf_rays.irradiance::<L>(leaves, &nodes, &mut seen);
                 seen
-            });
+            }),
         }
-        let operator = Operator::new(tree, rows, leaves, areas, &balance.factor);
-        Box::new(move |radiosity| operator.received::<L>(radiosity))
     }
 
     /// What rows of links sum to; empty where leaves look for themselves.

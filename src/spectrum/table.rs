@@ -42,11 +42,6 @@ impl<I: Interval> ListTable<I> {
         }
     }
 
-    /// Has a patch no light?
-    pub fn is_dark(&self, patch: usize) -> bool {
-        self.at[patch].is_none()
-    }
-
     /// Copies the list of a patch into `list`; false if it has no light.
     pub fn get(&self, patch: usize, list: &mut List<I>) -> bool {
         let Some((first, cut)) = self.at[patch] else {
@@ -59,11 +54,6 @@ impl<I: Interval> ListTable<I> {
     /// Patches with light, and all their intervals.
     pub fn counts(&self) -> [usize; 2] {
         [self.at.iter().flatten().count(), self.records.len()]
-    }
-
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        size_of_val(self.at.as_slice()) + size_of_val(self.records.as_slice())
     }
 }
 
@@ -81,14 +71,14 @@ mod tests {
         table.set(0, &short);
         table.set(1, &SpectralList::black());
         let mut list = SpectralList::black();
-        assert!(!table.get(1, &mut list) && table.is_dark(1));
+        assert!(!table.get(1, &mut list));
         assert!(table.get(2, &mut list));
         assert_eq!(list.spectrum(), long.spectrum());
         assert!(table.get(0, &mut list));
         assert_eq!(list.spectrum(), short.spectrum());
         assert_eq!(table.counts(), [2, 5]);
         let twice = ListTable::joined([table.clone(), table]);
-        assert!(twice.get(5, &mut list) && twice.is_dark(4));
+        assert!(!twice.get(4, &mut list) && twice.get(5, &mut list));
         assert_eq!(list.spectrum(), long.spectrum());
         assert_eq!(twice.counts(), [4, 10]);
     }
