@@ -34,6 +34,34 @@ pub(super) enum Senders<'a> {
     Rays(&'a LeafRays, &'a [u32]),
 }
 
+impl Senders<'_> {
+    /// Sums of lists that leaves receive of what leaves send.
+    fn received(
+        &self,
+        sent: &ListTable<Moment>,
+        leaves: usize,
+        cmf: &CmfTree,
+    ) -> ListTable<Moment> {
+        match self {
+            Senders::Links(operator) => operator.received_lists(sent, cmf),
+            Senders::Rays(rays, all) => table(leaves, |k| {
+                let (met, fronts) = rays.met(all[k]);
+                let mut ends: Vec<u32> = met.collect();
+                ends.sort_unstable();
+                let (mut sum, mut one) = (SpectralList::black(), SpectralList::black());
+                for same in ends.chunk_by(|a, b| a == b) {
+                    // Rays end on leaves.
+                    let place = all.binary_search(&same[0]).ok()?;
+                    if sent.get(place, &mut one) {
+                        sum.add_scaled(same.len() as f64 / f64::from(fronts), &one, cmf);
+                    }
+                }
+                Some(sum)
+            }),
+        }
+    }
+}
+
 /// Light on its way as lists.
 pub(super) struct ListBounces<'a> {
     /// The 64 bands of the leaves: how they reflect, and their areas.
@@ -67,7 +95,7 @@ impl ListBounces<'_> {
         let (mut sent, mut list) = (ListTable::dark(leaves), SpectralList::black());
         loop {
             let limit = share * self.limit;
-            let arrived = self.gathered(&sent, leaves, &cmf);
+            let arrived = self.senders.received(&sent, leaves, &cmf);
             add(&mut seen, &expanded(&arrived, leaves));
             for (k, sum) in lacks.iter_mut().enumerate() {
                 if arrived.get(k, &mut list) {
@@ -141,32 +169,6 @@ impl ListBounces<'_> {
                 reflect_sum(&light, paints.of(k), cmf, &metric, limit)
             })
         })
-    }
-
-    /// Sums of lists that leaves receive of what leaves send.
-    fn gathered(
-        &self,
-        sent: &ListTable<Moment>,
-        leaves: usize,
-        cmf: &CmfTree,
-    ) -> ListTable<Moment> {
-        match &self.senders {
-            Senders::Links(operator) => operator.received_lists(sent, cmf),
-            Senders::Rays(rays, all) => table(leaves, |k| {
-                let (met, fronts) = rays.met(all[k]);
-                let mut ends: Vec<u32> = met.collect();
-                ends.sort_unstable();
-                let (mut sum, mut one) = (SpectralList::black(), SpectralList::black());
-                for same in ends.chunk_by(|a, b| a == b) {
-                    // Rays end on leaves.
-                    let place = all.binary_search(&same[0]).ok()?;
-                    if sent.get(place, &mut one) {
-                        sum.add_scaled(same.len() as f64 / f64::from(fronts), &one, cmf);
-                    }
-                }
-                Some(sum)
-            }),
-        }
     }
 
     /// Share of light that a reflection leaves: all that direct light leaves of itself, by area.
@@ -311,5 +313,40 @@ impl Paints {
 
     fn of(&self, leaf: usize) -> &SpectralTree {
         &self.trees[self.of[leaf] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectrum::Partition;
+    use crate::transport::tests::baked;
+
+    /// Along links and by rays: a part in a hundred less anywhere would fail.
+    #[test]
+    fn lists_arrive_as_rows_do() {
+        for room in ["cornell.glb", "furnished.glb"] {
+            let bake = baked(room, 1);
+            let (links, leaves) = (bake.refinement.link_rows(), bake.refinement.leaves());
+            let count = leaves.len();
+            let (mut radiosity, mut sent) = (Rows::zero(count, BANDS), ListTable::dark(count));
+            for k in 0..count {
+                let row: Spectrum = std::array::from_fn(|b| 1.0 + ((7 * k + b) % 5) as f64);
+                radiosity.row_mut(k).copy_from_slice(&row.map(|x| x as f32));
+                sent.set(k, &SpectralList::from_values(Partition::uniform(6), &row));
+            }
+            let ought = bake.receive::<BANDS>(&links, &leaves)(&radiosity);
+            let cmf = CmfTree::new(bake.room.weights);
+            let senders = bake.senders(&links, &leaves);
+            let is = expanded(&senders.received(&sent, count, &cmf), count);
+            for k in 0..count {
+                for (is, ought) in is.row(k).iter().zip(ought.row(k)) {
+                    assert!(
+                        (is - ought).abs() < 1e-4 * (1.0 + ought),
+                        "{room} {k}: {is} {ought}"
+                    );
+                }
+            }
+        }
     }
 }

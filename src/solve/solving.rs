@@ -265,7 +265,7 @@ impl Bake {
     }
 
     /// From whom leaves receive.
-    fn senders<'a>(&'a self, rows: &'a LinkRows, leaves: &'a [u32]) -> Senders<'a> {
+    pub(super) fn senders<'a>(&'a self, rows: &'a LinkRows, leaves: &'a [u32]) -> Senders<'a> {
         let refinement = &self.refinement;
         match self.room.by_rays() {
             true => Senders::Rays(&refinement.leaf_rays, leaves),
@@ -310,7 +310,7 @@ impl Bake {
     }
 
     /// What turns radiosity of the leaves into what they receive: their rays, or links.
-    fn receive<'a, const L: usize>(
+    pub(super) fn receive<'a, const L: usize>(
         &'a self,
         rows: &'a LinkRows,
         leaves: &'a [u32],
