@@ -1,6 +1,6 @@
 //! Lamps of many faces from afar: each is one lamp, whose faces are points with a normal and an area.
 
-use super::gatherer::{Gatherer, LampElement, Memory};
+use super::gatherer::{Gatherer, Memory, SourceElement};
 use super::receiver::Receiver;
 
 /// Beyond this many radii of its largest face a lamp's faces count as points: the irradiance by a triangle then differs from that by its
@@ -26,7 +26,7 @@ impl Gatherer<'_> {
         if factor > 0.0 {
             let element = fixtures.element(fixtures.below(self.tree, id).start);
             let emitted = f64::from(self.light.bright_emitted[element as usize]);
-            memory.lamps.push(LampElement {
+            memory.sources.push(SourceElement {
                 id: element,
                 fixture: id,
                 faces,
@@ -47,7 +47,7 @@ impl Gatherer<'_> {
     /// the rest of the number. `upto`: the face selected last and the sum of factors before it; numbers must ascend.
     pub(super) fn face_of(
         &self,
-        lamp: &LampElement,
+        lamp: &SourceElement,
         u: f64,
         upto: &mut (usize, f64),
         memory: &Memory,

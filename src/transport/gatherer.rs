@@ -28,10 +28,10 @@ pub(super) enum RadiosityPart {
     Emitted,
 }
 
-/// An element of a lamp whose visible share is found by rays: its exact factor, and the irradiance it would bring
-/// unblocked, share of white.
+/// An element of a lamp, or a bright patch, whose visible share is found by rays that it shares with others: its exact factor, and the
+/// irradiance it would bring unblocked, share of white.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LampElement {
+pub(super) struct SourceElement {
     pub(super) id: u32,
     /// The cluster of elements that emit alike and lie together, see [`Fixtures`](crate::light::Fixtures); [`NONE`] for a single
     /// element.
@@ -64,8 +64,8 @@ pub struct Memory {
     pub(super) tints: Vec<Option<Box<Passage>>>,
     /// The hits close by.
     pub(super) near: Vec<(u32, Hit)>,
-    /// Lamps held back until all of them are known.
-    pub(super) lamps: Vec<LampElement>,
+    /// Lamps or bright patches held back until all of them are known.
+    pub(super) sources: Vec<SourceElement>,
     /// Factors of the faces of lamps with many faces, lamp after lamp.
     pub(super) faces: Vec<f64>,
     /// The path that each segment to a lamp belongs to, and what the lamp brings.

@@ -4,7 +4,7 @@
 //! a lamp is entered until it is even. Ways that a link proved clear cost no ray; others get rays in proportion to their
 //! light.
 
-use super::gatherer::{CLOSE, Gatherer, LampElement, Linked, Memory, RadiosityPart};
+use super::gatherer::{CLOSE, Gatherer, Linked, Memory, RadiosityPart, SourceElement};
 use super::receiver::{Gathered, Receiver};
 use super::slope::SeenPatch;
 use crate::geometry::{Segment, lambert_triangles_x8};
@@ -83,7 +83,7 @@ impl Gatherer<'_> {
                 }
             }
             if held == 0 {
-                self.lamps_together(to, which, memory, out);
+                self.sources_together(to, which, memory, out);
                 return;
             }
             let faces = &faces[..count];
@@ -371,8 +371,8 @@ impl Gatherer<'_> {
         Some((factor, visible))
     }
 
-    /// Visible share of a polygon patch, and whether it was clipped, so that the clipper has its parts; none yet for a lamp that is left
-    /// to rays, see `lamps_together`. `carries` is the unblocked irradiance, share of white. Exact clipping cannot apply filters: behind
+    /// Visible share of a polygon patch, and whether it was clipped, so that the clipper has its parts; none yet for a lamp, or a bright patch
+    /// in a cluttered room, that is left to rays, see `sources_together`. `carries` is the unblocked irradiance, share of white. Exact clipping cannot apply filters: behind
     /// panes rays decide.
     fn visible(
         &self,
@@ -396,9 +396,9 @@ impl Gatherer<'_> {
                 return Some(((seen / factor).min(1.0), true));
             }
         }
-        if lamp {
+        if lamp || self.hemisphere.is_some() {
             // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
-            if self.shafts && clips && carries > SHAFT_WORTH * self.tolerance {
+            if lamp && self.shafts && clips && carries > SHAFT_WORTH * self.tolerance {
                 match self
                     .sight
                     .view_from(to.point, to.normal, &element.corners, planes)
@@ -412,7 +412,7 @@ impl Gatherer<'_> {
                     Visibility::Crowded => {}
                 }
             }
-            memory.lamps.push(LampElement {
+            memory.sources.push(SourceElement {
                 id,
                 fixture: NONE,
                 faces: 0,
@@ -462,11 +462,7 @@ impl Gatherer<'_> {
         }
         // The link's own rays over the whole patch count as some more rays: this halves the noise, and the blur is
         // bounded by the size of the receiving element.
-        let prior = if to.leaf.is_none() || self.hemisphere.is_some() {
-            0.0
-        } else {
-            PRIOR
-        };
+        let prior = if to.leaf.is_none() { 0.0 } else { PRIOR };
         (seen / total * count as f64 + prior * f64::from(known)) / (count as f64 + prior)
     }
 
