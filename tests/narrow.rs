@@ -93,9 +93,21 @@ fn what_lies_in_a_floor_is_raised() {
         let bake = baked_to(ERROR, scene);
         let received = bake.rounds().last().unwrap().flux.received_lm;
         assert!((received / 1000.0 - 1.0).abs() < 0.02, "{received}");
-        bake.probe(&[(dvec3(2.0, 2.49, 0.2), DVec3::NEG_Y)])[0].xyz[1]
+        let on_carpet = |y: f64| (dvec3(2.0, y, 1.4), DVec3::Y);
+        let points = [
+            (dvec3(2.0, 2.49, 0.2), DVec3::NEG_Y),
+            on_carpet(0.0),
+            on_carpet(1e-4),
+            on_carpet(0.003),
+        ];
+        [0, 1, 2, 3].map(|k| bake.probe(&points)[k].xyz[1])
     });
-    assert!((lux[0] / lux[1] - 1.0).abs() < 0.02, "{lux:?}");
+    assert!((lux[0][0] / lux[1][0] - 1.0).abs() < 0.02, "{lux:?}");
+    // On the carpet where the file has it, below where rays meet it, it is as bright as right above.
+    let [_, on, low, above] = lux[0];
+    assert!((on / above - 1.0).abs() < 0.01, "{lux:?}");
+    assert!((low / above - 1.0).abs() < 0.01, "{lux:?}");
+    assert!((above / lux[1][3] - 1.0).abs() < 0.02, "{lux:?}");
 }
 
 /// Shading normals that lean toward a sun behind the face: its own plane hides nothing, and in a vault nothing else would.

@@ -1,5 +1,6 @@
 //! The light at any point: on a face, whose links are then used, or in the air.
 
+use crate::hierarchy::Face;
 use crate::solve::{Bake, weights_of};
 use crate::spectrum::{BANDS, Spectrum};
 use crate::transport::{Gathered, Receiver};
@@ -8,6 +9,9 @@ use glam::DVec3;
 /// Probes nearer to an edge than this share of a triangle's height are moved that far into it: a point on an edge also lies
 /// on the neighbouring wall.
 const PROBE_INSET: f64 = 1e-5;
+
+/// Points nearer to a face than this share of the room's half diagonal lie on it.
+const ON_FACE: f64 = 1e-6;
 
 /// Light at any point, for probes.
 #[derive(Debug, Clone)]
@@ -95,9 +99,9 @@ impl Bake {
     /// Finds the faces that a point in world space lies on, among those whose normals are `wanted`.
     pub(super) fn spot(&self, point: DVec3, wanted: impl Fn(DVec3) -> bool) -> Spot {
         let (mesh, tree) = (self.mesh(), self.tree());
-        let point = point - mesh.centre;
-        let near = 1e-6 * mesh.half_size;
-        let on = |(entry, face): (usize, &crate::hierarchy::Face)| {
+        let point = self.lifted(point - mesh.centre, &wanted);
+        let near = ON_FACE * mesh.half_size;
+        let on = |(entry, face): (usize, &Face)| {
             let n = tree.face_normal[entry];
             if !wanted(n) {
                 return None;
@@ -111,6 +115,32 @@ impl Bake {
         };
         let faces = tree.faces.iter().enumerate().filter_map(on).collect();
         Spot { point, faces }
+    }
+
+    /// A point that lies right behind a raised face, where its surface is in the file, is moved onto that face: behind it all is dark.
+    fn lifted(&self, point: DVec3, wanted: impl Fn(DVec3) -> bool) -> DVec3 {
+        let (mesh, tree) = (self.mesh(), self.tree());
+        if mesh.raised.is_empty() {
+            return point;
+        }
+        let near = ON_FACE * mesh.half_size;
+        let mut heights = vec![0.0_f64; self.scene().surfaces.len()];
+        for raised in &mesh.raised {
+            let height = &mut heights[raised.surfaces[0]];
+            *height = height.max(raised.height);
+        }
+        let lift = |(entry, face): (usize, &Face)| {
+            let n = tree.face_normal[entry];
+            let height = heights[mesh.origin[face.triangle as usize].0 as usize];
+            let [a, b, c] = mesh.corners(*face);
+            let behind = -n.dot(point - a);
+            let is_behind = behind > near && behind <= height + near && wanted(n);
+            (is_behind && weights_of(point, a, b, c).iter().all(|&x| x >= -1e-9))
+                .then_some(behind * n)
+        };
+        let lifts = tree.faces.iter().enumerate().filter_map(lift);
+        let most = lifts.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+        point + most.unwrap_or(DVec3::ZERO)
     }
 
     /// A receiver at a spot with a normal: on its face, if that has the same normal; a point in the air receives from the whole

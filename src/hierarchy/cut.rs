@@ -437,6 +437,7 @@ impl Mesh {
         self.centre = old.centre;
         (self.half_size, self.reach) = (old.half_size, old.reach);
         self.sheets.clone_from(&old.sheets);
+        self.raised.clone_from(&old.raised);
         self.positions.clone_from(&old.positions);
         self.first_triangle.clear();
         let mut welded = HashMap::new();

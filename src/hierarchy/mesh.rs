@@ -72,7 +72,7 @@ pub struct Mesh {
     pub(super) part: Vec<u32>,
     /// Corners of parts, as weights of the corners of the origin.
     pub(super) within: Vec<[[f64; 3]; 3]>,
-    /// Surfaces that lie in others; not kept by meshes that were cut.
+    /// Surfaces that lie in others.
     pub raised: Vec<Raised>,
 }
 
