@@ -100,7 +100,8 @@ fn what_lies_in_a_floor_is_raised() {
             on_carpet(1e-4),
             on_carpet(0.003),
         ];
-        [0, 1, 2, 3].map(|k| bake.probe(&points)[k].xyz[1])
+        let probed = bake.probe(&points);
+        [0, 1, 2, 3].map(|k| probed[k].xyz[1])
     });
     assert!((lux[0][0] / lux[1][0] - 1.0).abs() < 0.02, "{lux:?}");
     // On the carpet where the file has it, below where rays meet it, it is as bright as right above.

@@ -96,51 +96,45 @@ impl Bake {
         self.gather(&receivers)
     }
 
-    /// Finds the faces that a point in world space lies on, among those whose normals are `wanted`.
+    /// Finds the faces that a point in world space lies on, among those whose normals are `wanted`. Where the file has a face that was raised, the
+    /// point is moved onto that face: behind it all is dark.
     pub(super) fn spot(&self, point: DVec3, wanted: impl Fn(DVec3) -> bool) -> Spot {
         let (mesh, tree) = (self.mesh(), self.tree());
-        let point = self.lifted(point - mesh.centre, &wanted);
+        let mut point = point - mesh.centre;
+        let mut found = self.faces_at(point, &wanted);
+        let deepest = found.iter().max_by(|a, b| a.2.total_cmp(&b.2));
+        if let Some(&(entry, _, behind)) = deepest
+            && behind > ON_FACE * mesh.half_size
+        {
+            point += behind * tree.face_normal[entry as usize];
+            found = self.faces_at(point, &wanted);
+        }
+        let faces = found.into_iter().map(|(entry, w, _)| (entry, w)).collect();
+        Spot { point, faces }
+    }
+
+    /// Faces with `wanted` normals that a point lies on, or behind by no more than they were raised: entries, weights of the corners, and how far
+    /// behind it lies.
+    fn faces_at(&self, point: DVec3, wanted: &impl Fn(DVec3) -> bool) -> Vec<(u32, [f64; 3], f64)> {
+        let (mesh, tree) = (self.mesh(), self.tree());
         let near = ON_FACE * mesh.half_size;
-        let on = |(entry, face): (usize, &Face)| {
+        let highest = mesh.raised.iter().map(|raised| raised.height);
+        let highest = highest.fold(0.0, f64::max);
+        let at = |(entry, face): (usize, &Face)| {
             let n = tree.face_normal[entry];
             if !wanted(n) {
                 return None;
             }
             let [a, b, c] = mesh.corners(*face);
-            if n.dot(point - a).abs() > near {
+            let behind = -n.dot(point - a);
+            if behind < -near || behind > near + highest {
                 return None;
             }
             let w = weights_of(point, a, b, c);
-            w.iter().all(|&x| x >= -1e-9).then_some((entry as u32, w))
+            (w.iter().all(|&x| x >= -1e-9) && (behind <= near + mesh.raised_by(face.triangle)))
+                .then_some((entry as u32, w, behind))
         };
-        let faces = tree.faces.iter().enumerate().filter_map(on).collect();
-        Spot { point, faces }
-    }
-
-    /// A point that lies right behind a raised face, where its surface is in the file, is moved onto that face: behind it all is dark.
-    fn lifted(&self, point: DVec3, wanted: impl Fn(DVec3) -> bool) -> DVec3 {
-        let (mesh, tree) = (self.mesh(), self.tree());
-        if mesh.raised.is_empty() {
-            return point;
-        }
-        let near = ON_FACE * mesh.half_size;
-        let mut heights = vec![0.0_f64; self.scene().surfaces.len()];
-        for raised in &mesh.raised {
-            let height = &mut heights[raised.surfaces[0]];
-            *height = height.max(raised.height);
-        }
-        let lift = |(entry, face): (usize, &Face)| {
-            let n = tree.face_normal[entry];
-            let height = heights[mesh.origin[face.triangle as usize].0 as usize];
-            let [a, b, c] = mesh.corners(*face);
-            let behind = -n.dot(point - a);
-            let is_behind = behind > near && behind <= height + near && wanted(n);
-            (is_behind && weights_of(point, a, b, c).iter().all(|&x| x >= -1e-9))
-                .then_some(behind * n)
-        };
-        let lifts = tree.faces.iter().enumerate().filter_map(lift);
-        let most = lifts.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
-        point + most.unwrap_or(DVec3::ZERO)
+        tree.faces.iter().enumerate().filter_map(at).collect()
     }
 
     /// A receiver at a spot with a normal: on its face, if that has the same normal; a point in the air receives from the whole

@@ -54,6 +54,13 @@ impl Mesh {
         (raised, moves)
     }
 
+    /// How far the surface of a triangle was raised at the most.
+    pub fn raised_by(&self, triangle: u32) -> f64 {
+        let surface = self.origin[triangle as usize].0 as usize;
+        let raised = (self.raised.iter()).filter(|raised| raised.surfaces[0] == surface);
+        raised.map(|raised| raised.height).fold(0.0, f64::max)
+    }
+
     fn flat(&self, face: &Face, normal: DVec3) -> PlanarFace {
         let [right, up] = tangents(normal);
         let flat = |p: DVec3| DVec2::new(p.dot(right), p.dot(up));

@@ -1,4 +1,4 @@
-//! Emitting elements and punctual lights at a point: how much of a lamp is seen, and lamps chosen at random.
+//! Emitting elements, bright patches and punctual lights at a point: how much of them is seen, and lamps chosen at random.
 //!
 //! A lamp near a point is divided into parts none of which is near; each has its exact factor (contour integral), and rays
 //! go to parts in proportion to this. The number of rays is fixed beforehand: stopping where the first few agree overlooks
@@ -25,7 +25,7 @@ const NEAR: f64 = 2.0;
 const PARTS: usize = 64;
 /// How often one part is divided for a single ray: 4^3 is [`PARTS`].
 const DIVISIONS: usize = 3;
-/// Rays to all lamps together: the least, and the most.
+/// Rays to all lamps, or all bright patches, together: the least, and the most.
 const RAYS: [usize; 2] = [8, 256];
 /// Rays from each of the many points that represent a leaf. With 4 a furnished room's leaves stay so noisy that a
 /// further round is needed; with 8 that happens in one room of three, and no time is saved.
@@ -79,10 +79,9 @@ fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
             continue;
         }
         // Divided parts go to the end, so that the largest are divided first.
-        let four = quarters(corners);
-        let factors = lambert_triangles_x8(to.point, to.normal, four.into_iter()).to_array();
         parts.remove(next);
-        parts.extend(four.into_iter().zip(factors).filter(|part| part.1 > 0.0));
+        let four = quartered(to, corners).into_iter();
+        parts.extend(four.filter(|part| part.1 > 0.0));
     }
     parts
 }
@@ -95,23 +94,32 @@ fn one_part(to: &Receiver, corners: [DVec3; 3], whole: f64, u: &mut f64) -> Part
         if is_far(to, part.0) {
             break;
         }
-        let four = quarters(part.0);
-        let factors = lambert_triangles_x8(to.point, to.normal, four.into_iter()).to_array();
-        let all: f64 = factors[..4].iter().sum();
-        let mut left = *u * all;
-        let behind = |&k: &usize| {
-            let is_behind = left >= factors[k];
-            left -= if is_behind { factors[k] } else { 0.0 };
-            is_behind
-        };
-        let passed = (0..3).take_while(behind).count();
-        if factors[passed] <= 0.0 {
-            break;
+        match chosen(&quartered(to, part.0), *u) {
+            Some((one, rest)) if one.1 > 0.0 => (part, *u) = (one, rest),
+            _ => break,
         }
-        *u = (left / factors[passed]).clamp(0.0, 1.0);
-        part = (four[passed], factors[passed]);
     }
     part
+}
+
+/// The quarters of a triangle with their factors for a point.
+fn quartered(to: &Receiver, corners: [DVec3; 3]) -> [Part; 4] {
+    let four = quarters(corners);
+    let factors = lambert_triangles_x8(to.point, to.normal, four.into_iter()).to_array();
+    std::array::from_fn(|k| (four[k], factors[k]))
+}
+
+/// The part that `u` chooses by their factors, and the rest of `u`, within 0 to 1 again; none of no parts.
+fn chosen(parts: &[Part], u: f64) -> Option<(Part, f64)> {
+    let all: f64 = parts.iter().map(|part| part.1).sum();
+    let mut left = u * all;
+    let last = parts.len().checked_sub(1)?;
+    let mut k = 0;
+    while k < last && left >= parts[k].1 {
+        left -= parts[k].1;
+        k += 1;
+    }
+    Some((parts[k], (left / parts[k].1).clamp(0.0, 1.0)))
 }
 
 /// Is a triangle far from a point, by [`NEAR`]?
@@ -130,16 +138,8 @@ fn point_of(
     parts: &[Part],
     [u, v]: [f64; 2],
 ) -> Option<(DVec3, f64)> {
-    let all: f64 = parts.iter().map(|part| part.1).sum();
-    let mut left = u * all;
-    let last = parts.len().checked_sub(1)?;
-    let mut k = 0;
-    while k < last && left >= parts[k].1 {
-        left -= parts[k].1;
-        k += 1;
-    }
-    let ([a, b, c], factor) = parts[k];
-    let w = triangle_weights([(left / factor).clamp(0.0, 1.0), v]);
+    let (([a, b, c], factor), u) = chosen(parts, u)?;
+    let w = triangle_weights([u, v]);
     let point = a * w[0] + b * w[1] + c * w[2];
     let area = 0.5 * (b - a).cross(c - a).length();
     Some((point, kernel(to, normal, point - to.point) * area / factor))
@@ -164,7 +164,7 @@ impl Gatherer<'_> {
                 _ => BRIGHT_PATCHES,
             };
             let count = self.rays_to_sources(to, all, patches);
-            let owners = self.aim(to, &sources, count, memory);
+            let owners = self.aim(to, &sources, (all, count), memory);
             self.blocked(&memory.segments, &mut memory.blocked);
             memory.rays += memory.segments.len() as u64;
             let total: f64 = memory.weights.iter().sum();
@@ -287,61 +287,61 @@ impl Gatherer<'_> {
         }
     }
 
-    /// Aims a number of rays at lamps or patches, and stores them with their weights in the memory; returns the one that each goes to.
+    /// Aims `count` rays at lamps or patches that would bring `all`, and stores them with their weights in the memory; returns the one that
+    /// each goes to.
     fn aim(
         &self,
         to: &Receiver,
-        lamps: &[SourceElement],
-        count: usize,
+        sources: &[SourceElement],
+        (all, count): (f64, usize),
         memory: &mut Memory,
     ) -> Vec<usize> {
-        let all: f64 = lamps.iter().map(|lamp| lamp.carries).sum();
-        let turn = hash(to.seed, u64::from(lamps[0].id));
+        let turn = hash(to.seed, u64::from(sources[0].id));
         let mut samples: Vec<[f64; 2]> = (0..count as u32).map(|k| sequence02(k, turn)).collect();
         samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let mut samples = samples.into_iter().peekable();
         memory.segments.clear();
         memory.weights.clear();
         let (mut owners, mut before) = (Vec::with_capacity(count), 0.0);
-        for (k, lamp) in lamps.iter().enumerate() {
-            let upto = match k + 1 == lamps.len() {
+        for (k, source) in sources.iter().enumerate() {
+            let upto = match k + 1 == sources.len() {
                 true => f64::INFINITY,
-                false => before + lamp.carries,
+                false => before + source.carries,
             };
             let mut aim = RayProgress::default();
             while let Some([u, v]) = samples.next_if(|sample| sample[0] * all < upto) {
-                // The rest of the number after the choice of a lamp chooses the point.
-                let u = ((u * all - before) / lamp.carries).clamp(0.0, 1.0);
-                if let Some((segment, weight)) = self.ray_to(to, lamp, [u, v], &mut aim, memory) {
+                // The rest of the number after the choice of a source chooses the point.
+                let u = ((u * all - before) / source.carries).clamp(0.0, 1.0);
+                if let Some((segment, weight)) = self.ray_to(to, source, [u, v], &mut aim, memory) {
                     memory.weights.push(weight);
                     memory.segments.push(segment);
                     owners.push(k);
                 }
             }
-            before += lamp.carries;
+            before += source.carries;
         }
         owners
     }
 
-    /// A ray to a point of a lamp, and its weight; none where the chosen point sends nothing. The numbers of one aim
+    /// A ray to a point of a lamp or patch, and its weight; none where the chosen point sends nothing. The numbers of one aim
     /// ascend.
     fn ray_to(
         &self,
         to: &Receiver,
-        lamp: &SourceElement,
+        source: &SourceElement,
         [mut u, v]: [f64; 2],
         aim: &mut RayProgress,
         memory: &Memory,
     ) -> Option<(Segment, f64)> {
-        let (mut id, mut chance) = (lamp.id, 1.0);
-        if lamp.fixture != NONE {
-            (id, chance, u) = self.face_of(lamp, u, &mut aim.face, memory);
+        let (mut id, mut chance) = (source.id, 1.0);
+        if source.fixture != NONE {
+            (id, chance, u) = self.face_of(source, u, &mut aim.face, memory);
             aim.parts.clear();
         }
         let node = self.tree.node(id);
         let element = self.tree.element(node)?;
         if aim.parts.is_empty() {
-            aim.parts = parts_of(to, element.corners, lamp.factor * chance);
+            aim.parts = parts_of(to, element.corners, source.factor * chance);
         }
         let (point, weight) = point_of(to, node.normal, &aim.parts, [u, v])?;
         let planes = [to.plane, self.tree.face_plane[element.face as usize]];

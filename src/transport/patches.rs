@@ -372,8 +372,8 @@ impl Gatherer<'_> {
     }
 
     /// Visible share of a polygon patch, and whether it was clipped, so that the clipper has its parts; none yet for a lamp, or a bright patch
-    /// in a cluttered room, that is left to rays, see `sources_together`. `carries` is the unblocked irradiance, share of white. Exact clipping cannot apply filters: behind
-    /// panes rays decide.
+    /// in a cluttered room, that is left to rays, see `sources_together`. `carries` is the unblocked irradiance, share of white. Exact
+    /// clipping cannot apply filters: behind panes rays decide.
     fn visible(
         &self,
         to: &Receiver,
@@ -396,22 +396,22 @@ impl Gatherer<'_> {
                 return Some(((seen / factor).min(1.0), true));
             }
         }
-        if lamp || self.hemisphere.is_some() {
-            // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
-            if lamp && self.shafts && clips && carries > SHAFT_WORTH * self.tolerance {
-                match self
-                    .sight
-                    .view_from(to.point, to.normal, &element.corners, planes)
-                {
-                    Visibility::Clear => return Some((1.0, false)),
-                    Visibility::Listed(list) => {
-                        if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
-                            return Some(((seen / factor).min(1.0), true));
-                        }
+        // A lamp that matters is worth a look into the shaft: few blockers give an exact answer.
+        if lamp && self.shafts && clips && carries > SHAFT_WORTH * self.tolerance {
+            match self
+                .sight
+                .view_from(to.point, to.normal, &element.corners, planes)
+            {
+                Visibility::Clear => return Some((1.0, false)),
+                Visibility::Listed(list) => {
+                    if let Some(seen) = self.past(&list, planes, to, element, factor, memory) {
+                        return Some(((seen / factor).min(1.0), true));
                     }
-                    Visibility::Crowded => {}
                 }
+                Visibility::Crowded => {}
             }
+        }
+        if lamp || self.hemisphere.is_some() {
             memory.sources.push(SourceElement {
                 id,
                 fixture: NONE,
