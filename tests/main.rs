@@ -24,6 +24,9 @@ mod flux;
 mod form_factors;
 mod furnace;
 mod fuzz;
+#[allow(dead_code, reason = "what starts it as a program")]
+#[path = "../tools/rooms/main.rs"]
+mod generator;
 mod glare;
 mod guidance;
 mod hard_cases;

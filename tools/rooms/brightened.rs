@@ -6,8 +6,8 @@
 //! Industrial Chemistry, 2012); daylight fluorescent orange takes blue and green light and gives it out around 600 nm. So is the ultraviolet
 //! lamp, a band at 368 nm as that of a "black light" tube, with a trace of visible light.
 
-use crate::glb::{Glb, Mesh};
-use crate::shapes::{block, sphere};
+use super::glb::{Glb, Mesh};
+use super::shapes::{block, sphere};
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 

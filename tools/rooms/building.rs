@@ -3,8 +3,8 @@
 //! The rooms are closed against each other. Their furniture is the same, and each has nodes of its own, so that light is worked out in
 //! every one of them.
 
-use crate::furnished;
-use crate::glb::Glb;
+use super::furnished;
+use super::glb::Glb;
 use glam::dvec3;
 
 /// Triangles of one room, about.

@@ -3,7 +3,7 @@
 //! A face stands wherever a hollow cell meets a solid one (or the outside of the grid) and shows the hollow side. Every
 //! face is a cell of the grid, so that neighbours share whole edges: no T-vertex, no gap, and a closed surface.
 
-use crate::glb::Mesh;
+use super::glb::Mesh;
 use glam::DVec3;
 use std::collections::BTreeMap;
 

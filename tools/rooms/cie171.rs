@@ -2,9 +2,9 @@
 //!
 //! The report's axes are x, y along the floor and z up; here a point (x, y, z) of the report stands at (x, z, -y).
 
-use crate::cells::Cells;
-use crate::glb::{Glb, Mesh};
-use crate::simple::{down, draw, within};
+use super::cells::Cells;
+use super::glb::{Glb, Mesh};
+use super::simple::{down, draw, within};
 use glam::{DVec3, dvec3};
 use serde_json::json;
 use std::f64::consts::PI;

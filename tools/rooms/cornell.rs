@@ -5,7 +5,7 @@
 //! ceiling, so that no two surfaces lie on each other. The blocks have no bottoms, as published.
 //! The measured spectra of walls and lamp come from the side file; the RGB colours are for viewers that know no spectra.
 
-use crate::glb::{Glb, Mesh};
+use super::glb::{Glb, Mesh};
 use glam::DVec3;
 use serde_json::{Value, json};
 

@@ -1,9 +1,9 @@
 //! A room on a dull day behind a curtain that is half drawn, with a paper shade around a bulb and an opal ball around a lamp.
 
-use crate::cells::Cells;
-use crate::glb::{Glb, Mesh, matt};
-use crate::shapes::{block, lathe, sphere, tube};
-use crate::simple::within;
+use super::cells::Cells;
+use super::glb::{Glb, Mesh, matt};
+use super::shapes::{block, lathe, sphere, tube};
+use super::simple::within;
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 use std::f64::consts::{PI, TAU};

@@ -1,9 +1,9 @@
 //! A room with a window and nothing else that shines: sky and sun come from its side file.
 
-use crate::cells::Cells;
-use crate::glb::{Glb, Mesh};
-use crate::shapes::block;
-use crate::simple::within;
+use super::cells::Cells;
+use super::glb::{Glb, Mesh};
+use super::shapes::block;
+use super::simple::within;
 use glam::dvec3;
 use serde_json::{Value, json};
 

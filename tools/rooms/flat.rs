@@ -1,8 +1,8 @@
 //! A furnished flat of two rooms, 4.2 x 3.6 m and 3.18 x 3.6 m, 2.6 m high, joined by a door opening. One tube close below the
 //! ceiling of the first room lights both.
 
-use crate::glb::{Glb, Mesh};
-use crate::shapes::{block, tube};
+use super::glb::{Glb, Mesh};
+use super::shapes::{block, tube};
 use glam::{DMat4, DVec3, dvec3};
 use std::f64::consts::FRAC_PI_2;
 

@@ -3,11 +3,11 @@
 //! Furniture is of boxes, rounded boxes and bodies of revolution, whose number of steps grows with the triangles asked
 //! for: 1 000 to 500 000 and beyond.
 
-use crate::cells::Cells;
-use crate::glb::{Glb, Mesh, matt};
-use crate::shapes::{block, lathe, picture, rounded, sphere, tube};
-use crate::simple::{down, draw, within};
-use crate::textures;
+use super::cells::Cells;
+use super::glb::{Glb, Mesh, matt};
+use super::shapes::{block, lathe, picture, rounded, sphere, tube};
+use super::simple::{down, draw, within};
+use super::textures;
 use glam::{DMat4, dvec3};
 use serde_json::json;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI, TAU};

@@ -1,8 +1,8 @@
 //! A gallery under lamps as they are sold: spots and wall washers by LM-63, a pendant panel by EULUMDAT. The files are of our own
 //! figures, none of a maker's.
 
-use crate::glb::{Glb, Mesh};
-use crate::shapes::block;
+use super::glb::{Glb, Mesh};
+use super::shapes::block;
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 use std::fmt::Write;

@@ -1,8 +1,8 @@
 //! The daylit room with its window glazed in three ways: amber glass with a volume, clear glass, a blue film.
 
-use crate::daylit;
-use crate::glb::{Glb, Mesh};
-use crate::shapes::block;
+use super::daylit;
+use super::glb::{Glb, Mesh};
+use super::shapes::block;
 use glam::dvec3;
 use serde_json::{Value, json};
 

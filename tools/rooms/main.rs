@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Parser)]
 #[command(about = "Writes the project's own rooms (glTF binaries and their spectra)")]
-struct Args {
+pub(crate) struct Args {
     /// Folder to write to.
     #[arg(default_value = "scenes")]
     dir: PathBuf,
@@ -89,7 +89,11 @@ const ROOMS: &[Room] = &[
 ];
 
 fn main() -> anyhow::Result<()> {
-    let args = Args::parse();
+    run(&Args::parse())
+}
+
+/// Writes what is asked for.
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     std::fs::create_dir_all(&args.dir)?;
     let wanted = |name: &str| args.only.as_deref().is_none_or(|only| only == name);
     let mut written = 0;

@@ -1,7 +1,7 @@
 //! A dressing room: a silver mirror beside a lamp, a leaning bronze mirror that throws a spot's light on the wall across, a chrome ball.
 
-use crate::glb::{Glb, Mesh, matt};
-use crate::shapes::{block, sphere};
+use super::glb::{Glb, Mesh, matt};
+use super::shapes::{block, sphere};
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 use std::f64::consts::PI;

@@ -1,6 +1,6 @@
 //! Bodies: boxes, rounded boxes, tubes and bodies of revolution.
 
-use crate::glb::Mesh;
+use super::glb::Mesh;
 use glam::{DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_4, TAU};
 

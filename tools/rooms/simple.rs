@@ -1,7 +1,7 @@
 //! Rooms of cells: two rooms with a doorway, a corridor, a furnace; and a convex empty room.
 
-use crate::cells::Cells;
-use crate::glb::{Glb, Mesh};
+use super::cells::Cells;
+use super::glb::{Glb, Mesh};
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
