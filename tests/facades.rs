@@ -7,8 +7,8 @@ use crate::common::daylit;
 
 use built::Room;
 use daylit::{
-    INDEX, LUX, bake, beside, cie, facade, gathered, glass_of_the_report, past_the_horizon,
-    places_beside, points_beside, row, wish,
+    INDEX, LUX, bake, beside, cie, facade, gathered, glanced, glass_of_the_report,
+    past_the_horizon, places_beside, points_beside, row, wish,
 };
 use glam::DVec3;
 use haarlight::scene::pane::{inside_of, slab};
@@ -40,7 +40,7 @@ fn cie_171_case_5_12() {
         let glass = room.pane(INDEX, [inside; BANDS]);
         let [corner, u, v] = window;
         room.quad(corner, v, u, glass);
-        let bake = bake(room, &wish(kind));
+        let bake = glanced(room, &wish(kind));
         let sky = Distribution::new(kind, direction(60.0, 0.0));
         let places = points_beside();
         let mut off = Vec::new();
@@ -133,9 +133,10 @@ impl Mask {
     }
 }
 
-/// Irradiance of a point outside past the black room, under a sky of 1, by the midpoint rule over the disc.
+/// Irradiance of a point outside past the black room, under a sky of 1, by the midpoint rule over the disc. Of 240 rings no figure of
+/// these tests differed by more than .03 %.
 fn lit(point: DVec3, normal: DVec3, sky: &Distribution) -> f64 {
-    const N: usize = 240;
+    const N: usize = 120;
     let x = normal.any_orthonormal_vector();
     let y = normal.cross(x);
     let mut sum = 0.0;

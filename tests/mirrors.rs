@@ -2,7 +2,7 @@
 
 use crate::common::built;
 
-use built::{Room, baked, close};
+use built::{Room, baked, close, glanced};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
@@ -69,7 +69,7 @@ fn a_lamp_beside_a_mirror_shines_twice() {
         let mut room = beside([reflectance; BANDS]);
         let lamp = dvec3(0.8, 1.5, 2.0);
         room.point(lamp, 4.0 * PI * 100.0);
-        let bake = baked(room.scene());
+        let bake = glanced(room.scene());
         assert!(bake.plan().runs(EffectKind::Mirrors));
         let image = dvec3(-0.8, 1.5, 2.0);
         for (got, place) in lux(&bake, &floor()).into_iter().zip(floor()) {
@@ -90,7 +90,7 @@ fn panels_and_the_sun_shine_twice() {
         [[low, 1.8], [high, 1.8], [high, 2.2], [low, 2.2]].map(|[x, z]| dvec3(x, 1.5, z))
     };
     room.polygon(&corners([0.6, 1.0]), panel);
-    let bake = baked(room.scene());
+    let bake = glanced(room.scene());
     for (got, (point, normal)) in lux(&bake, &floor()).into_iter().zip(floor()) {
         let seen = |x| lambert_polygon(point, normal, &corners(x)).abs();
         let want = 1000.0 * (seen([0.6, 1.0]) + BRIGHT * seen([-1.0, -0.6]));
@@ -99,7 +99,10 @@ fn panels_and_the_sun_shine_twice() {
     let mut room = beside([BRIGHT; BANDS]);
     let toward = dvec3(0.5, 1.0, 0.2).normalize();
     room.punctual(LightKind::Directional, DVec3::ONE, -toward, 500.0);
-    for (k, got) in lux(&baked(room.scene()), &floor()).into_iter().enumerate() {
+    for (k, got) in lux(&glanced(room.scene()), &floor())
+        .into_iter()
+        .enumerate()
+    {
         // The last lies where the light over the top of the mirror goes.
         let times = if k == 3 { 1.0 } else { 1.0 + BRIGHT };
         close(got, 500.0 * toward.y * times, 1e-4, "lux by the sun");
@@ -114,7 +117,7 @@ fn two_mirrors_at_a_right_angle_make_three_lamps() {
     room.quad(DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 3.0, other);
     let lamp = dvec3(0.8, 1.5, 1.2);
     room.point(lamp, 4.0 * PI * 100.0);
-    let bake = baked(room.scene());
+    let bake = glanced(room.scene());
     let places = [(0.3, 0.4), (1.0, 1.0), (2.0, 0.7)].map(|(x, z)| (dvec3(x, 0.0, z), DVec3::Y));
     for (got, place) in lux(&bake, &places).into_iter().zip(places) {
         let at = |x: f64, z: f64| lamp * dvec3(x, 1.0, z);
@@ -171,7 +174,7 @@ fn a_periscope_shows_a_lamp() {
     let panel = room.lamp(0.0, 1000.0);
     let corners = [[-0.1, -0.1], [-0.1, 0.1], [0.1, 0.1], [0.1, -0.1]];
     room.polygon(&corners.map(|[y, z]| dvec3(2.0, 2.0 + y, z)), panel);
-    let bake = baked(room.scene());
+    let bake = glanced(room.scene());
     for (y, z) in [(0.0, 0.0), (0.05, -0.1)] {
         let eye = dvec3(-1.0, y, z);
         let got = lux(&bake, &[(eye, DVec3::X)])[0];
@@ -203,8 +206,7 @@ fn the_sky_is_seen_in_mirrors() {
         ground: Some(0.0),
         ..SkyWish::default()
     };
-    let mut bake = Bake::new(room.scene().under(&wish).unwrap(), Settings::default());
-    bake.run();
+    let bake = glanced(room.scene().under(&wish).unwrap());
     for got in lux(&bake, &floor()) {
         close(got, 100.0, 5e-3, "lux by the sky");
     }
@@ -246,8 +248,7 @@ fn a_periscope_shows_the_sky() {
         ground: Some(0.0),
         ..SkyWish::default()
     };
-    let mut bake = Bake::new(room.scene().under(&wish).unwrap(), Settings::default());
-    bake.run();
+    let bake = glanced(room.scene().under(&wish).unwrap());
     let points = [(0.5, 0.5), (0.3, 0.6)].map(|(y, z)| (corner(-0.9, y, z), DVec3::X));
     for (got, (point, normal)) in lux(&bake, &points).into_iter().zip(points) {
         // Unfolded: the shaft goes on straight, its mouth at x = 2, the floor of the shaft what was its side.
@@ -392,6 +393,7 @@ fn no_light_is_lost_or_made() {
 }
 
 /// Five mirrors and a black floor: mirrors in mirrors, four deep.
+/// After one round: of further ones no figure moves by more than .15 %, where 2 % and the noise of paths are allowed.
 #[test]
 fn a_box_of_mirrors_agrees() {
     let mut room = Room::new();
@@ -402,7 +404,7 @@ fn a_box_of_mirrors_agrees() {
     let panel = room.lamp(0.0, 1000.0);
     room.block(dvec3(1.5, 1.4, 2.0), dvec3(1.9, 1.6, 2.4), panel);
     let up = upwards(&[(1.0, 1.0), (2.0, 2.0), (3.5, 0.4)]);
-    agrees(&baked(room.scene()), &up, 1 << 14, 0.02);
+    agrees(&glanced(room.scene()), &up, 1 << 14, 0.02);
 }
 
 /// The same bytes at any number of threads.

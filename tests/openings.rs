@@ -1,10 +1,10 @@
-//! Small openings far away: as right as a wall of glass. By rays, in rooms of many triangles, beside plain quadrature.
+//! Small openings far away: as right as a wall of glass. By rays, in rooms of many triangles, beside quadrature.
 
 use crate::common::built;
 use crate::common::daylit;
 
 use built::Room;
-use daylit::{LUX, bake, through, wish};
+use daylit::{LUX, glanced, through, wish};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
@@ -111,7 +111,7 @@ const OPENINGS: [(f64, f64); 5] = [(0.02, 2.0), (0.1, 0.1), (0.3, 0.3), (2.0, 1.
 fn holds(terrace: bool, most: f64, rms: f64) {
     let found = OPENINGS.map(|(width, height)| {
         let (room, opening) = long_room(width, height, terrace);
-        let errors = errors(&bake(room, &sky()), opening);
+        let errors = errors(&glanced(room, &sky()), opening);
         let worst = errors.iter().fold(0.0, |worst: f64, e| worst.max(e.abs()));
         let squares: f64 = errors.iter().map(|e| e * e).sum();
         let rms = (squares / errors.len() as f64).sqrt();

@@ -486,7 +486,7 @@ fn panes_in_the_plane_of_their_frame_leak_nothing() {
             }
             false => room.quad(low, v, u, pane),
         }
-        let bake = daylit::bake(room, &wish(12));
+        let bake = daylit::glanced(room, &wish(12));
         let probes = bake.probe(&places_beside());
         probes.iter().map(|p| p.xyz[1]).collect()
     };

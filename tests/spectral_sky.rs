@@ -4,14 +4,13 @@ use crate::common::built;
 use crate::common::daylit;
 
 use built::{Room, sun};
-use daylit::{LUX, bake, beside, places_beside, points, roof, room, through};
+use daylit::{LUX, bake, beside, glanced, places_beside, points, roof, room, through};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
 use haarlight::geometry::NO_PLANE;
 use haarlight::scene::Scene;
 use haarlight::scene::sky::{Dome, SkyBrightness, SkyWish};
-use haarlight::solve::{Bake, Settings};
 use haarlight::spectrum::Spectrum;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -23,17 +22,6 @@ fn wish(turbidity: f64, elevation: f64) -> SkyWish {
         sun: sun([elevation, 0.0], 0.0),
         ..SkyWish::default()
     }
-}
-
-/// One round: what points see of the sky itself does not depend on it.
-fn glanced(room: Room, wish: &SkyWish) -> Bake {
-    let settings = Settings {
-        rounds: 1,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(room.scene().under(wish).unwrap(), settings);
-    bake.run();
-    bake
 }
 
 /// Tristimulus radiance by the formula, linear between its wavelengths.

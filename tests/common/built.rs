@@ -32,7 +32,17 @@ pub(crate) fn baked(scene: Scene) -> Bake {
     run(scene, Settings::default())
 }
 
-/// The same to an error of the user's.
+/// One round: what points see of lamps themselves, in mirrors too, does not depend on it, so that where everything else is black further
+/// rounds change no figure.
+pub(crate) fn glanced(scene: Scene) -> Bake {
+    let settings = Settings {
+        rounds: 1,
+        ..Settings::default()
+    };
+    run(scene, settings)
+}
+
+/// A bake to an error of the user's.
 pub(crate) fn baked_to(error: f64, scene: Scene) -> Bake {
     let settings = Settings {
         error,

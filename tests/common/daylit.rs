@@ -39,16 +39,29 @@ pub(crate) fn bake(room: Room, wish: &SkyWish) -> Bake {
 }
 
 pub(crate) fn bake_at(room: Room, wish: &SkyWish, error: f64) -> Bake {
-    bake_by(room, wish, error, 0)
+    let settings = Settings {
+        error,
+        ..Settings::default()
+    };
+    run(room, wish, settings)
+}
+
+/// One round: what points see of the sky itself does not depend on it, so that in a black room further rounds change no figure.
+pub(crate) fn glanced(room: Room, wish: &SkyWish) -> Bake {
+    glanced_by(room, wish, 0)
 }
 
 /// The same by patterns of another seed.
-pub(crate) fn bake_by(room: Room, wish: &SkyWish, error: f64, seed: u64) -> Bake {
+pub(crate) fn glanced_by(room: Room, wish: &SkyWish, seed: u64) -> Bake {
     let settings = Settings {
-        error,
+        rounds: 1,
         seed,
         ..Settings::default()
     };
+    run(room, wish, settings)
+}
+
+fn run(room: Room, wish: &SkyWish, settings: Settings) -> Bake {
     let mut bake = Bake::new(room.scene().under(wish).unwrap(), settings);
     bake.run();
     bake
@@ -145,30 +158,18 @@ pub(crate) fn points_beside() -> Vec<(DVec3, DVec3)> {
     all.chain(places_beside()).collect()
 }
 
-/// Irradiance at a point through a parallelogram, lit by a sky of 1 (and ground of `ground`), by plain quadrature.
-///
-/// Of a smooth sky the midpoint rule is off by `(h / d)^2 / 12` at a distance of d: 1e-4 at the point nearest to the largest opening.
+/// Irradiance at a point through a parallelogram, lit by a sky of 1 (and ground of `ground`), by quadrature.
 pub(crate) fn through(
     sky: impl Fn(DVec3) -> f64,
     ground: f64,
     opening: [DVec3; 3],
     place: (DVec3, DVec3),
 ) -> f64 {
-    summed::<400>(sky, ground, opening, place)
-}
-
-/// The same by so many points along each side.
-pub(crate) fn summed<const N: usize>(
-    sky: impl Fn(DVec3) -> f64,
-    ground: f64,
-    opening: [DVec3; 3],
-    place: (DVec3, DVec3),
-) -> f64 {
     let seen = |d: DVec3| if d.y > 0.0 { sky(d) } else { ground / PI };
-    gathered::<N>(seen, opening, place)
+    past_the_horizon(seen, opening, place)
 }
 
-/// The same of whatever is seen in each direction.
+/// The same of whatever is seen in each direction, by so many points along each side: the plain midpoint rule, for what has edges.
 pub(crate) fn gathered<const N: usize>(
     seen: impl Fn(DVec3) -> f64,
     [corner, u, v]: [DVec3; 3],
@@ -188,16 +189,56 @@ pub(crate) fn gathered<const N: usize>(
     sum * area / (N * N) as f64
 }
 
-/// The same through an upright window, cut at the horizon, where what is seen jumps.
+/// Nodes of Gauss and Legendre's rule of four points on -1 to 1, and what each weighs; the other half lies on the other side of 0.
+const LEGENDRE: [[f64; 2]; 2] = [
+    [0.339_981_043_584_856_3, 0.652_145_154_862_546_1],
+    [0.861_136_311_594_052_7, 0.347_854_845_137_453_9],
+];
+/// Cells of an opening along each side, a rule of four by four points in each: at the points and openings of CIE 171 it is off by 1.5e-4 at
+/// the most, where the glow about the sun has its tip, as the midpoint rule of 400 by 400 points is by 1.1e-4.
+const CELLS: usize = 32;
+
+/// The same of a sky and a ground that are smooth each: an upright opening is cut at the horizon, where what is seen jumps.
 pub(crate) fn past_the_horizon(
     seen: impl Fn(DVec3) -> f64,
     [corner, u, v]: [DVec3; 3],
     place: (DVec3, DVec3),
 ) -> f64 {
-    let below = v * ((place.0.y - corner.y) / v.y).clamp(0.0, 1.0);
+    let upright = v.x == 0.0 && v.z == 0.0;
+    let share = match upright {
+        true => ((place.0.y - corner.y) / v.y).clamp(0.0, 1.0),
+        false => 0.0,
+    };
+    let below = v * share;
     let parts = [[corner, u, below], [corner + below, u, v - below]];
-    let there = parts.into_iter().filter(|part| part[2].y > 0.0);
-    there.map(|part| gathered::<400>(&seen, part, place)).sum()
+    let there = parts.into_iter().filter(|part| part[2] != DVec3::ZERO);
+    there.map(|part| smooth(&seen, part, place)).sum()
+}
+
+fn smooth(
+    seen: impl Fn(DVec3) -> f64,
+    [corner, u, v]: [DVec3; 3],
+    (point, normal): (DVec3, DVec3),
+) -> f64 {
+    let (area, across) = (u.cross(v).length(), u.cross(v).normalize());
+    let cells = (0..CELLS).flat_map(|cell| {
+        LEGENDRE.into_iter().flat_map(move |[node, weight]| {
+            let at = |x: f64| (cell as f64 + 0.5 + 0.5 * x) / CELLS as f64;
+            [-node, node].map(|x| (at(x), 0.5 * weight / CELLS as f64))
+        })
+    });
+    let line: Vec<(f64, f64)> = cells.collect();
+    let mut sum = 0.0;
+    for (t, of_row) in &line {
+        for (s, weight) in &line {
+            let way = corner + u * *s + v * *t - point;
+            let r2 = way.length_squared();
+            let d = way / r2.sqrt();
+            let brings = normal.dot(d).max(0.0) * across.dot(d).abs() / r2;
+            sum += of_row * weight * seen(d) * brings;
+        }
+    }
+    sum * area
 }
 
 /// The opening in the roof: a corner and two sides.
