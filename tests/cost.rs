@@ -6,6 +6,7 @@ use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Representation, Settings};
 use std::path::Path;
 use std::process::Command;
+use std::sync::LazyLock;
 
 fn room(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -37,6 +38,14 @@ fn two_rounds(scene: Scene) -> Bake {
     bake
 }
 
+/// Lamps whose Cornell box is solved in all ways, once for all tests.
+const LAMPS: [&str; 3] = ["cie/F2", "cie/F11", "cie/A"];
+static UNDER: [LazyLock<Vec<HeldRun>>; 3] = [
+    LazyLock::new(|| all_ways(cornell(LAMPS[0]))),
+    LazyLock::new(|| all_ways(cornell(LAMPS[1]))),
+    LazyLock::new(|| all_ways(cornell(LAMPS[2]))),
+];
+
 /// Two rounds, then all ways on their links.
 fn all_ways(scene: Scene) -> Vec<HeldRun> {
     let mut bake = two_rounds(scene);
@@ -60,9 +69,8 @@ const SHARE: f64 = 0.2;
 
 #[test]
 fn every_way_keeps_what_it_claims_under_line_spectra() {
-    for lamp in ["cie/F2", "cie/F11", "cie/A"] {
-        let runs = all_ways(cornell(lamp));
-        for run in &runs {
+    for (lamp, runs) in LAMPS.iter().zip(&UNDER) {
+        for run in runs.iter() {
             match run.representation {
                 // An estimate, made on a model of the room: a third more is allowed for what the model lacks.
                 Representation::Adaptive => {
@@ -81,8 +89,8 @@ fn every_way_keeps_what_it_claims_under_line_spectra() {
         }
         // More numbers, less error: across a factor of four.
         for way in [Representation::Uniform, Representation::Characteristic] {
-            let few = found(&runs, way(4), 0.0);
-            let many = found(&runs, way(16), 0.0);
+            let few = found(runs, way(4), 0.0);
+            let many = found(runs, way(16), 0.0);
             assert!(
                 many.de_luv < 0.5 * few.de_luv + HAIR,
                 "{lamp}: {few:?} {many:?}"
@@ -118,10 +126,10 @@ fn whole_sets_are_exact() {
 /// average and 5.7 at worst under F2, 1.37 and 4.0 under F11.
 #[test]
 fn srgb_is_wrong_under_lamps_of_lines() {
-    for (lamp, least) in [("cie/F2", [1.5, 4.5]), ("cie/F11", [1.1, 3.0])] {
-        let runs = all_ways(cornell(lamp));
-        let rgb = found(&runs, Representation::Rgb, 0.0);
-        let ours = found(&runs, Representation::Adaptive, 0.5);
+    // F2 and F11.
+    for ((lamp, runs), least) in LAMPS.iter().zip(&UNDER).zip([[1.5, 4.5], [1.1, 3.0]]) {
+        let rgb = found(runs, Representation::Rgb, 0.0);
+        let ours = found(runs, Representation::Adaptive, 0.5);
         assert!(
             rgb.de2000 > least[0] && rgb.greatest > least[1],
             "{lamp}: {rgb:?}"

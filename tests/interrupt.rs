@@ -69,7 +69,9 @@ fn given_up(name: &str, least: usize) {
         whole.step();
     }
     let (before, written) = (state(&whole), file(&whole));
-    whole.step();
+    // This one is asked, and the one that goes on below is not.
+    let (done, times) = step(&mut whole, usize::MAX);
+    assert!(done && times >= least, "{name}: asked {times} times only");
     let after = state(&whole);
 
     let mut other = bake(name);
@@ -88,13 +90,6 @@ fn given_up(name: &str, least: usize) {
         assert!(step(&mut other, usize::MAX).0);
     }
     assert!(state(&other) == before, "{name}: asking changes a round");
-    let mut probed = bake(name);
-    (0..BEFORE).for_each(|_| {
-        probed.step();
-    });
-    let (done, times) = step(&mut probed, usize::MAX);
-    assert!(done && state(&probed) == after, "{name}");
-    assert!(times >= least, "{name}: asked {times} times only");
     for after in [0, 1, times / 4, times / 2, 3 * times / 4, times - 1] {
         assert!(
             !step(&mut other, after).0,

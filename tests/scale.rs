@@ -7,6 +7,7 @@ use built::{Room, sphere};
 use glam::{DVec3, dvec3};
 use haarlight::scene::Scene;
 use haarlight::solve::{Averages, Bake, Round, Settings};
+use std::sync::LazyLock;
 use std::time::Instant;
 
 /// What a room stands on.
@@ -206,23 +207,29 @@ fn plans() -> [Plan; 4] {
     })
 }
 
+/// These rooms to the default error, each of them once for all tests.
+static ALONE: [LazyLock<Seen>; 4] = [
+    LazyLock::new(|| plans()[0].bake(0.5)),
+    LazyLock::new(|| plans()[1].bake(0.5)),
+    LazyLock::new(|| plans()[2].bake(0.5)),
+    LazyLock::new(|| plans()[3].bake(0.5)),
+];
+
 /// Outsides of walls are as large as their insides: averaged over both, white and stated error were half of what they are. What is left is the
 /// floor below the walls, 4.5 % of the room and too narrow to be told from it, and the chance of 160 watched points.
 #[test]
 fn outsides_of_walls_change_nothing() {
-    let bake = |ground| {
-        Plan {
-            ground,
-            ..plans()[0]
-        }
-        .bake(0.5)
+    let thick = &ALONE[0];
+    let thin = Plan {
+        ground: Ground::None,
+        ..plans()[0]
     };
-    let [thick, thin] = [Ground::Floor, Ground::None].map(bake);
-    let [rms, most] = thick.off(&thin);
+    let thin = &thin.bake(0.5);
+    let [rms, most] = thick.off(thin);
     assert!(rms < 0.014 && most < 0.06, "off {rms}, {most}");
     let ratio = thick.white / thin.white;
     assert!((ratio - 1.0).abs() < 0.06, "white {ratio}");
-    let [a, b] = thick.estimates(&thin);
+    let [a, b] = thick.estimates(thin);
     assert!((0.55..1.8).contains(&(a / b)), "estimate {a} for {b}");
     let ratio = thick.averages.counted_m2 / thin.averages.area_m2;
     assert!((ratio - 1.0).abs() < 0.06, "area that counts {ratio}");
@@ -231,9 +238,8 @@ fn outsides_of_walls_change_nothing() {
 /// Light within what is stated, and as much work: on the plain floors are found to be the same room.
 #[test]
 fn a_plain_around_a_room_changes_nothing() {
-    for plan in plans() {
+    for (plan, alone) in plans().into_iter().zip(&ALONE) {
         let fine = plan.bake(0.2);
-        let alone = plan.bake(0.5);
         for ground in [Ground::Plain, Ground::Lying] {
             let plain = Plan { ground, ..plan }.bake(0.5);
             // .5 dE00 are about 1.4 % of a mid grey.
@@ -246,7 +252,7 @@ fn a_plain_around_a_room_changes_nothing() {
                 );
             };
             same(plain.white, alone.white, 1.1, "white");
-            let [a, b] = plain.estimates(&alone);
+            let [a, b] = plain.estimates(alone);
             same(a, b, 2.0, "estimate");
             same(plain.leaves as f64, alone.leaves as f64, 3.0, "leaves");
             same(
@@ -263,8 +269,7 @@ fn a_plain_around_a_room_changes_nothing() {
 /// Positions are rounded as much at all powers of two, and no length or area is absolute: not a bit differs.
 #[test]
 fn sizes_by_powers_of_two_change_no_bit() {
-    for plan in plans() {
-        let one = plan.bake(0.5);
+    for (plan, one) in plans().into_iter().zip(&ALONE) {
         for size in [64.0, 1.0 / 64.0] {
             let other = Plan { size, ..plan }.bake(0.5);
             assert_eq!(one.lux, other.lux, "{size}");
@@ -275,10 +280,9 @@ fn sizes_by_powers_of_two_change_no_bit() {
 /// What is rounded otherwise is split otherwise here and there.
 #[test]
 fn a_hundred_times_as_large_or_small_has_the_same_light() {
-    for plan in plans() {
-        let one = plan.bake(0.5);
+    for (plan, one) in plans().into_iter().zip(&ALONE) {
         for size in [100.0, 0.01] {
-            let [rms, most] = Plan { size, ..plan }.bake(0.5).off(&one);
+            let [rms, most] = Plan { size, ..plan }.bake(0.5).off(one);
             assert!(rms < 0.012 && most < 0.04, "{size}: {rms}, {most}");
         }
     }
