@@ -12,6 +12,7 @@ use haarlight::solve::reference::{Reference, solve_one};
 use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::{BANDS, Grid, Spectrum};
 use nalgebra::DMatrix;
+use std::sync::LazyLock;
 
 fn near(got: f64, want: f64, tolerance: f64) {
     assert!(
@@ -109,6 +110,19 @@ fn painted_box() -> Scene {
     room.scene()
 }
 
+/// What the dense reference finds at points of that box, with its triangles quartered three times: once for all tests.
+static PAINTED: LazyLock<Vec<Spectrum>> = LazyLock::new(|| painted_truth(3));
+
+fn painted_truth(depth: u32) -> Vec<Spectrum> {
+    let scene = painted_box();
+    let reference = Reference::new(&scene, depth, 1).unwrap();
+    reference.gather(&scene, &reference.solve(), &painted_points(), 1)
+}
+
+fn painted_points() -> Vec<(DVec3, DVec3)> {
+    inner_points(DVec3::ZERO, dvec3(3.0, 2.0, 4.0))
+}
+
 /// The order of the reference: mean of a cube of albedo .8 with a lamp of one face is exact, points against the finest.
 #[test]
 fn the_reference_converges() {
@@ -178,12 +192,9 @@ fn the_reference_converges() {
 #[test]
 fn the_solver_agrees_in_every_leaf() {
     let scene = painted_box();
-    let points = inner_points(DVec3::ZERO, dvec3(3.0, 2.0, 4.0));
+    let points = painted_points();
     // The error of its patches, of second order, taken out (Richardson 1911).
-    let [coarse, fine] = [2, 3].map(|depth| {
-        let reference = Reference::new(&scene, depth, 1).unwrap();
-        reference.gather(&scene, &reference.solve(), &points, 1)
-    });
+    let (coarse, fine) = (painted_truth(2), &PAINTED);
     let truth: Vec<[f64; BANDS]> = (fine.iter().zip(&coarse))
         .map(|(f, c)| std::array::from_fn(|l| f[l] + (f[l] - c[l]) / 3.0))
         .collect();
@@ -210,11 +221,7 @@ fn the_solver_agrees_in_every_leaf() {
 /// The solver's estimate against the true distance from the reference, for ever lower error: what it claims holds.
 #[test]
 fn the_solver_converges_to_the_reference() {
-    let scene = painted_box();
-    let reference = Reference::new(&scene, 3, 1).unwrap();
-    let solution = reference.solve();
-    let points = inner_points(DVec3::ZERO, dvec3(3.0, 2.0, 4.0));
-    let truth = reference.gather(&scene, &solution, &points, 1);
+    let (points, truth) = (painted_points(), &PAINTED);
     let mut before = f64::INFINITY;
     for error in [2.0, 0.5, 0.1] {
         let mut bake = Bake::new(
@@ -232,7 +239,7 @@ fn the_solver_converges_to_the_reference() {
         let mean = bake
             .probe(&points)
             .iter()
-            .zip(&truth)
+            .zip(truth.iter())
             .map(|(probed, truth)| {
                 let xyz = weights
                     .each_ref()
@@ -353,9 +360,7 @@ fn the_order_of_the_solver() {
 /// Adaptive rows, rows of 64 bands and the reference: each pair lies as near as the estimates of both claim.
 #[test]
 fn adaptive_dense_and_reference_agree() {
-    let reference = Reference::new(&painted_box(), 3, 1).unwrap();
-    let points = inner_points(DVec3::ZERO, dvec3(3.0, 2.0, 4.0));
-    let truth = reference.gather(&painted_box(), &reference.solve(), &points, 1);
+    let (points, truth) = (painted_points(), &PAINTED);
     let weights = Observer::cie1931()
         .weights(&Grid::default())
         .map(|w| w.map(|x| KM * x));
@@ -409,7 +414,8 @@ fn adaptive_dense_and_reference_agree() {
 }
 
 /// A bake against the reference at points, channel by channel of light: root mean square of what each band is off, and what is claimed.
-/// With patches of 50 cm in place of 25 the reference is off by more than the bake: by .6 % behind a sheet.
+/// With patches of 50 cm in place of 25 the reference is off by more than the bake: by .6 % behind a sheet. Rays beyond 4 between two patches
+/// changed it by 1e-6 behind the pane, beyond 1 by nothing behind the sheet, which hides all or nothing.
 fn off_the_reference(scene: &Scene, rays: usize, points: &[(DVec3, DVec3)]) -> (f64, f64) {
     let reference = Reference::new(scene, 3, rays).unwrap();
     let truth = reference.gather(scene, &reference.solve(), points, 64);
@@ -463,7 +469,7 @@ fn below() -> Vec<(DVec3, DVec3)> {
 fn the_solver_agrees_behind_a_pane() {
     let amber: Spectrum = std::array::from_fn(|l| 0.3 + 0.6 * l as f64 / 63.0);
     let scene = parted(|room| room.pane(1.5, amber));
-    let (rms, claim) = off_the_reference(&scene, 9, &below());
+    let (rms, claim) = off_the_reference(&scene, 4, &below());
     println!("pane: rms {rms:e}, claimed {claim:e}");
     assert!(rms < 0.003 && rms < claim / 0.7, "{rms:e} of {claim:e}");
 }
@@ -473,7 +479,7 @@ fn the_solver_agrees_behind_a_pane() {
 fn the_solver_agrees_behind_a_sheet() {
     let green: Spectrum = std::array::from_fn(|l| 0.4 - 0.3 * (l as f64 / 31.5 - 1.0).abs());
     let scene = parted(|room| room.sheet([0.2; BANDS], [0.5; BANDS], green));
-    let (rms, claim) = off_the_reference(&scene, 4, &below());
+    let (rms, claim) = off_the_reference(&scene, 1, &below());
     println!("sheet: rms {rms:e}, claimed {claim:e}");
     assert!(rms < 0.003 && rms < claim / 0.7, "{rms:e} of {claim:e}");
 }
