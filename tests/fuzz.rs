@@ -6,6 +6,7 @@ use crate::common;
 use common::Room;
 use haarlight::Error;
 use haarlight::cli::points::Points;
+use haarlight::mesh::Limits;
 use haarlight::scene::document::Document;
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
@@ -50,6 +51,16 @@ fn room() -> Room {
 
 /// It is an input problem, or what is loaded is sound and so is a bake of it.
 fn sound(loaded: haarlight::Result<Scene>, bake: bool) -> Result<(), TestCaseError> {
+    sound_within(Settings::default().error, None, loaded, bake)
+}
+
+/// The same where a bake is asked for an error, and its mesh is to have so many vertices at the most.
+fn sound_within(
+    error: f64,
+    vertices: Option<usize>,
+    loaded: haarlight::Result<Scene>,
+    bake: bool,
+) -> Result<(), TestCaseError> {
     let scene = match loaded {
         Err(Error::Input(problems)) => {
             prop_assert!(!problems.is_empty());
@@ -78,11 +89,19 @@ fn sound(loaded: haarlight::Result<Scene>, bake: bool) -> Result<(), TestCaseErr
     if !bake {
         return Ok(());
     }
-    let mut bake = Bake::new(scene, Settings::default());
+    let settings = Settings {
+        error,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(scene, settings);
     for _ in 0..2 {
         bake.step();
     }
-    let baked = bake.baked(&|_, _| {});
+    let limits = Limits {
+        vertices,
+        ..Limits::default()
+    };
+    let baked = bake.baked_within(&limits, &|_, _| {});
     for v in baked.surfaces.iter().flat_map(|s| &s.vertices) {
         let all = v.irradiance.iter().chain(&v.radiosity).chain(&v.light);
         prop_assert!(all.clone().all(|x| x.is_finite()), "{v:?}");
@@ -257,7 +276,12 @@ proptest! {
             json!({"attributes": {"POSITION": position}, "material": 1}),
         );
         let document = Document::from_bytes(Path::new("room.glb"), &room.glb());
-        sound(document.and_then(|d| Scene::from_document(d, &Options::default())), true)?;
+        let scene = document.and_then(|d| Scene::from_document(d, &Options::default()));
+        // A mesh of many thousand triangles takes most of the time, and numbers go wrong in a coarse one too: every sixth case has a fine one.
+        match corners.len() % 6 {
+            0 => sound(scene, true)?,
+            _ => sound_within(4.0, Some(2000), scene, true)?,
+        }
     }
 
     /// Any flip of any byte that still loads is baked as well.
