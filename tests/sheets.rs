@@ -211,8 +211,7 @@ fn divided(front: f64, back: f64, through: f64, wall: f64, crowded: bool) -> Bak
         let (corners, triangles) = sphere(dvec3(0.6, 0.5, 2.3), 0.1, 2);
         room.mesh(corners, triangles, paint);
     }
-    // Sums of fluxes close however coarse the patches are.
-    baked_to(1.0, room.scene())
+    baked_to(ERROR, room.scene())
 }
 
 #[test]
