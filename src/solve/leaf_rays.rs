@@ -157,25 +157,26 @@ impl LeafRays {
             // A hierarchy only grows: with as many nodes it is the same one.
             return Ok(0);
         }
-        let cast = self.cast(tree, sight, hemisphere, seed, interrupt)?;
+        let cast = self.cast(tree, sight, hemisphere, (seed, interrupt), |_| true)?;
         self.find(tree, 0);
         Ok(cast)
     }
 
-    /// Lets new leaves look for themselves, each rank its own. Returns the rays cast by all ranks.
+    /// Lets the new leaves that `is_wanted` names look for themselves, each rank its own. Returns the rays cast by all ranks.
     pub(super) fn cast(
         &mut self,
         tree: &Tree,
         sight: &Sight,
         hemisphere: &Hemisphere,
-        seed: u64,
-        interrupt: &Interrupt,
+        (seed, interrupt): (u64, &Interrupt),
+        is_wanted: impl Fn(u32) -> bool,
     ) -> Result<u64, Interrupted> {
         self.target.resize(tree.nodes.len(), f32::NAN);
         self.bare.resize(tree.nodes.len(), f32::NAN);
         self.range.resize(tree.nodes.len(), (0, 0));
         let new: Vec<u32> = (0..tree.nodes.len() as u32)
             .filter(|&k| tree.node(k).is_leaf() && self.range[k as usize].1 == 0)
+            .filter(|&k| is_wanted(k))
             .collect();
         let mean = mean_area(tree);
         let patterns: Vec<Hemisphere> = (0..)

@@ -14,6 +14,8 @@ use rayon::prelude::*;
 
 /// Levels of leaves that a round splits where reflected light varies.
 const LEVELS: usize = 4;
+/// Greatest standard deviation of the means of a leaf's quarters, of which two may be known, as a share of the brightest light.
+const MOST_VARIATION: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Distinguishes the rays that decide on splits from those that bring light.
 const DECIDING: u64 = 0xdec1de;
 
@@ -97,33 +99,36 @@ impl Refinement {
         let (mut bright, mut sensitivity) =
             (light.bright_reflected.clone(), demand.sensitivity.to_vec());
         let (mut rays, mut decided, mut found) = (0, 0, 0);
+        let brightest = f64::from(bright.iter().copied().fold(0.0, f32::max));
         for _ in 0..LEVELS {
-            let tree = &self.tree;
-            rays += room.with_sight(|sight| {
-                deciding.cast(tree, sight, &room.hemisphere, seed, &room.interrupt)
-            })?;
-            // Ends on leaves that were split just now are as bright as these were: they need not be looked up again.
-            deciding.find(tree, found);
-            found = deciding.found();
-            let nodes = tree.nodes.len() as u32;
+            let (tree, nodes) = (&self.tree, self.tree.nodes.len() as u32);
             // Children of a patch that was a leaf in the last solution are as bright as it was.
             for of_nodes in [&mut bright, &mut sensitivity] {
                 for k in of_nodes.len()..nodes as usize {
                     of_nodes.push(of_nodes[tree.nodes[k].parent as usize]);
                 }
             }
+            let splits = |k: u32, variation: f64| {
+                let node = tree.node(k);
+                node.area > demand.least_area
+                    && tree.elements[node.element as usize].depth < MAX_DEPTH
+                    && variation * f64::from(sensitivity[k as usize]) * tree.share(k).sqrt()
+                        > demand.threshold
+            };
+            let may_split = |k: u32| splits(k, MOST_VARIATION * brightest);
+            rays += room.with_sight(|sight| {
+                let how = (seed, &room.interrupt);
+                deciding.cast(tree, sight, &room.hemisphere, how, may_split)
+            })?;
+            // Ends on leaves that were split just now are as bright as these were: they need not be looked up again.
+            deciding.find(tree, found);
+            found = deciding.found();
             let split = (decided..nodes)
                 .into_par_iter()
                 .filter(|&k| {
-                    let node = self.tree.node(k);
-                    node.is_leaf()
+                    tree.node(k).is_leaf()
                         && room.team.owns(k as usize)
-                        && node.area > demand.least_area
-                        && self.tree.elements[node.element as usize].depth < MAX_DEPTH
-                        && deciding.variation(k, &bright, seed)
-                            * f64::from(sensitivity[k as usize])
-                            * self.tree.share(k).sqrt()
-                            > demand.threshold
+                        && splits(k, deciding.variation(k, &bright, seed))
                 })
                 .collect();
             decided = nodes;
