@@ -1,7 +1,7 @@
 //! Up to sixteen rays through the tree at once: what does each meet first?
 //!
 //! The walk of `packet`, nearest boxes first; every ray ends at the nearest hit so far, and a box that starts behind the
-//! farthest of these ends is passed by. Rays that leave a point in a narrow beam share most of their way.
+//! farthest of these ends is passed by. Rays that leave a point in a narrow beam share most of their way; others go one by one.
 
 use super::bvh::{BvhNode, LEAF, WIDTH};
 use super::index::{Hit, Nearest, RayIndex};
@@ -10,6 +10,11 @@ use super::segment::{NO_PLANE, Segment};
 use super::triangle::PACKET;
 use super::walk::Stack;
 use glam::Vec3;
+
+/// Rays whose directions have a mean shorter than this have little of their way in common, and go one by one. Leaves that cast 16 rays over the
+/// hemisphere (mean .67) gain: CPU seconds of solves with 0, .7, .8, .9, .95 and .98 are 5.3, 4.9, 4.8, 5.0, 4.7 and 5.0 in a garage, with 0 and .9
+/// 63.8 and 60.9 in a canteen, 37.4 and 35.0 in a restaurant, 7.6 and 7.1 in a living room.
+const NARROW: f32 = 0.9;
 
 impl RayIndex {
     /// What rays hit first: as [`RayIndex::closest`] with no limit for each of up to sixteen starts and unit `directions`.
@@ -34,6 +39,15 @@ impl RayIndex {
             return;
         }
         let (segments, far) = self.whole_way(from, directions, ignore_plane);
+        let sum: Vec3 = directions.iter().sum();
+        if sum.length() < NARROW * directions.len() as f32 {
+            for (k, out) in out.iter_mut().enumerate() {
+                let way = segments[k].to - segments[k].from;
+                let hit = self.closest_with(from[k], way, 1.0, ignore_plane, opaque);
+                *out = hit.map(|hit| at_distance(hit, far[k]));
+            }
+            return;
+        }
         let Some(packet) = Packet::new(self, &segments[..directions.len()]) else {
             return;
         };
@@ -56,13 +70,7 @@ impl RayIndex {
             }
         }
         for (k, out) in out.iter_mut().enumerate() {
-            *out = beam.nearest[k].map(|n| {
-                let hit = self.hit(&n, directions[k]);
-                Hit {
-                    t: hit.t * far[k],
-                    ..hit
-                }
-            });
+            *out = beam.nearest[k].map(|n| at_distance(self.hit(&n, directions[k]), far[k]));
         }
     }
 
@@ -87,6 +95,14 @@ impl RayIndex {
             segments[k].to = from + far[k] * direction;
         }
         (segments, far)
+    }
+}
+
+/// A hit of a segment of length `far`, as one of a ray of unit direction.
+fn at_distance(hit: Hit, far: f32) -> Hit {
+    Hit {
+        t: hit.t * far,
+        ..hit
     }
 }
 

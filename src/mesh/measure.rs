@@ -9,13 +9,12 @@
 
 use super::cells::Cell;
 use super::grow::{MeshGrowth, PointLooks, mix};
+use super::parts::Parts;
 use super::write::Settled;
 use crate::color::seen_difference;
 use crate::gather::{Interpolation, LayerLanes, Vertex};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
-use crate::solve::{Bake, weights_of};
-use glam::DVec3;
-use std::collections::HashMap;
+use crate::solve::Bake;
 
 /// Points: the least, the most, and as a share of the looks so far: the mean is then known to some per cent.
 pub(crate) const POINTS: [usize; 2] = [512, 4096];
@@ -61,31 +60,6 @@ pub(crate) struct ErrorSample {
     pub(crate) noise: f64,
 }
 
-/// Triangles of a sheet by the triangle of the mesh that they are part of.
-struct Parts(HashMap<u32, Vec<[u32; 3]>>);
-
-impl Parts {
-    fn new(settled: &Settled) -> Self {
-        let mut parts: HashMap<u32, Vec<[u32; 3]>> = HashMap::new();
-        for (triangle, of) in settled.triangles.iter().zip(&settled.of) {
-            parts.entry(*of).or_default().push(*triangle);
-        }
-        Self(parts)
-    }
-
-    /// The triangle around a point, and weights of its corners there.
-    fn find(&self, settled: &Settled, of: u32, point: DVec3) -> Option<([u32; 3], [f64; 3])> {
-        let place = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|v| settled.at[v as usize]);
-            (*t, weights_of(point, a, b, c))
-        };
-        let depth = |(_, w): &([u32; 3], [f64; 3])| w[0].min(w[1]).min(w[2]);
-        let all = self.0.get(&of)?.iter().map(place);
-        let whole = all.filter(|part| depth(part).is_finite());
-        whole.max_by(|a, b| depth(a).total_cmp(&depth(b)))
-    }
-}
-
 impl MeshGrowth<'_> {
     /// Looks at new random points, one in each stratum of equal counted area.
     pub(super) fn measured(
@@ -105,7 +79,8 @@ impl MeshGrowth<'_> {
         }
         let mut rng = Pcg::new(bake.settings().seed ^ SEED ^ turn << 32);
         let (mut cell, mut upto) = (0, self.cells.all[0].counted());
-        let parts: Vec<Parts> = settled.iter().map(Parts::new).collect();
+        let all = settled.iter();
+        let mut parts: Vec<Parts> = all.map(|s| Parts::new(&s.triangles, &s.of)).collect();
         let mut asked = Vec::with_capacity(count);
         for k in 0..count {
             let target = (k as f64 + rng.f64()) / count as f64 * whole;
@@ -130,7 +105,7 @@ impl MeshGrowth<'_> {
             let drawn = &settled[of.sheet as usize];
             let at = of.corners.map(|c| drawn.at[c.vertex as usize]);
             let point = (0..3).map(|k| weights[k] * at[k]).sum();
-            let part = parts[of.sheet as usize].find(drawn, of.of.0, point);
+            let part = parts[of.sheet as usize].find(&drawn.at, of.of.0, point);
             asked.extend(part.map(|part| (cell, part, looks)));
         }
         // However late it is, the error that is stated is measured.

@@ -15,6 +15,7 @@ mod lines;
 pub(crate) mod looks;
 pub(crate) mod measure;
 mod missed;
+mod parts;
 mod shades;
 mod shadow;
 mod skins;

@@ -29,7 +29,7 @@ use crate::scene::{Scene, short};
 use crate::spectrum::{BANDS, Spectrum};
 use glam::DVec3;
 use lights::ReferenceLamps;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dyn, LU};
 pub use patch::Patch;
 use patch::{PatchPoint, add, radon};
 use rayon::prelude::*;
@@ -113,8 +113,10 @@ impl Reference {
     /// Solves all bands; where surfaces fluoresce, again until their fluorescence settles.
     pub fn solve(&self) -> ReferenceSolution {
         let mut glow = vec![[0.0; BANDS]; self.patches.len()];
+        // Factored once: from round to round only right-hand sides change.
+        let mut factored = vec![None; BANDS];
         loop {
-            let solution = self.solve_with(&glow);
+            let solution = self.solve_with(&glow, &mut factored);
             let next = self.fluoresced(&solution.irradiance);
             let pairs = next.iter().flatten().zip(glow.iter().flatten());
             let moved = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -139,8 +141,14 @@ impl Reference {
         each.collect()
     }
 
-    /// Solves all bands, given the fluorescent exitance of the patches.
-    fn solve_with(&self, glow: &[Spectrum]) -> ReferenceSolution {
+    /// Solves all bands, given the fluorescent exitance of the patches. `factored` holds the systems of bands that were solved before, where
+    /// anything fluoresces: each takes as much memory as the factors.
+    fn solve_with(
+        &self,
+        glow: &[Spectrum],
+        factored: &mut [Option<Factored>],
+    ) -> ReferenceSolution {
+        let again = self.donaldson.iter().any(Option::is_some);
         let n = self.patches.len();
         let mut radiosity = vec![[0.0; BANDS]; n];
         let mut solved = [false; BANDS];
@@ -168,10 +176,14 @@ impl Reference {
                 patch.exitance[band] + glow[i][band] + lit
             });
             let factors = self.factors(band);
-            let system = DMatrix::from_fn(n, n, |i, j| {
-                f64::from(u8::from(i == j)) - scattered(i, &|i| factors[(i, j)])
-            });
-            let answer = solved_system(system, &right);
+            let system = || {
+                DMatrix::from_fn(n, n, |i, j| {
+                    f64::from(u8::from(i == j)) - scattered(i, &|i| factors[(i, j)])
+                })
+            };
+            let known = factored[band].take().unwrap_or_else(|| system().lu());
+            let answer = solved_system(&known, &right);
+            factored[band] = again.then_some(known);
             for (k, &l) in alike.iter().enumerate() {
                 solved[l] = true;
                 for (i, row) in radiosity.iter_mut().enumerate() {
@@ -234,6 +246,9 @@ impl Reference {
     }
 }
 
+/// A system by its lower and upper triangle.
+type Factored = LU<f64, Dyn, Dyn>;
+
 /// Radiosities of `B = right + diag(rho) F B`, a column for each right-hand side; by LU with partial pivoting.
 ///
 /// # Panics
@@ -243,12 +258,11 @@ pub fn solve(factors: &DMatrix<f64>, rho: &[f64], right: DMatrix<f64>) -> DMatri
     let system = DMatrix::from_fn(n, n, |i, j| {
         f64::from(u8::from(i == j)) - rho[i] * factors[(i, j)]
     });
-    solved_system(system, &right)
+    solved_system(&system.lu(), &right)
 }
 
-fn solved_system(system: DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+fn solved_system(system: &Factored, right: &DMatrix<f64>) -> DMatrix<f64> {
     system
-        .lu()
         .solve(right)
         .expect("albedos below 1 leave no row that is not dominated by its diagonal")
 }
