@@ -140,14 +140,6 @@ impl Bake {
         let distance = self
             .watched_distance()
             .map_err(|Broken(what)| Error::Internal(what))?;
-        // Where leaves look for themselves, only the choice of lanes needs a balance.
-        let factor = if self.refinement.balance.factor.is_empty() {
-            self.refinement
-                .balanced(&self.refinement.link_rows())
-                .factor
-        } else {
-            self.refinement.balance.factor.clone()
-        };
         let settings = serde_json::to_string(&self.room.settings)
             .map_err(|problem| Error::Internal(format!("settings: {problem}")))?;
         container::write(path, FileKind::Cache, |out| {
@@ -164,7 +156,7 @@ impl Bake {
             out.put(guess)?;
             out.put(distance.unwrap_or(0.0))?;
             out.put_all(&lit(&self.room.scene))?;
-            self.encode_state(false, &factor, out)?;
+            self.encode_state(false, out)?;
             out.put(baked.surfaces.len() as u64)?;
             for (surface, kept) in baked.surfaces.iter().zip(&baked.kept) {
                 TracedSide::encode(surface, kept, out)?;
@@ -439,7 +431,7 @@ impl Relighter {
             })?;
         }
         let shadowed = punctual::Shadowed { by_leaf, rays: 0 };
-        bake.refinement.frozen = Some((shadowed, bake.refinement.balance.factor.clone()));
+        bake.refinement.frozen = Some(shadowed);
         let before = bake.solution.lanes.clone();
         bake.choose_lanes().expect(NOBODY);
         bake.refinement.frozen = None;

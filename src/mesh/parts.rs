@@ -8,12 +8,12 @@ use glam::{DVec2, DVec3};
 use std::collections::HashMap;
 
 /// A triangle of the output, and weights of its corners at a point.
-pub(super) type Part = ([u32; 3], [f64; 3]);
+pub(super) type PointInTriangle = ([u32; 3], [f64; 3]);
 
 /// Triangles of a sheet by the triangle of the mesh that they are part of.
 pub(super) struct Parts {
     all: HashMap<u32, Vec<[u32; 3]>>,
-    grids: HashMap<u32, Grid>,
+    grids: HashMap<u32, PartGrid>,
 }
 
 impl Parts {
@@ -31,10 +31,10 @@ impl Parts {
 
     /// The triangle around a point of a triangle of the mesh, and weights of its corners there; of several, the one that the point lies
     /// deepest in. `at` are the places of vertices.
-    pub(super) fn find(&mut self, at: &[DVec3], of: u32, point: DVec3) -> Option<Part> {
+    pub(super) fn find(&mut self, at: &[DVec3], of: u32, point: DVec3) -> Option<PointInTriangle> {
         let all = self.all.get(&of)?;
         let grid = self.grids.entry(of);
-        let grid = grid.or_insert_with(|| Grid::new(at, all));
+        let grid = grid.or_insert_with(|| PartGrid::new(at, all));
         let near = grid.near(point).iter().map(|&k| &all[k as usize]);
         // Rounding may put a point outside of all parts.
         deepest(at, near, point)
@@ -44,7 +44,7 @@ impl Parts {
 }
 
 /// How far inside of its triangle a point is.
-fn depth((_, w): &Part) -> f64 {
+fn depth((_, w): &PointInTriangle) -> f64 {
     w[0].min(w[1]).min(w[2])
 }
 
@@ -52,7 +52,7 @@ fn deepest<'a>(
     at: &[DVec3],
     triangles: impl Iterator<Item = &'a [u32; 3]>,
     point: DVec3,
-) -> Option<Part> {
+) -> Option<PointInTriangle> {
     let place = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| at[v as usize]);
         (*t, weights_of(point, a, b, c))
@@ -62,7 +62,7 @@ fn deepest<'a>(
 }
 
 /// Parts by squares of the plane of two axes, over which they are spread most.
-struct Grid {
+struct PartGrid {
     axes: [usize; 2],
     low: DVec2,
     /// Squares for each unit of length.
@@ -73,7 +73,7 @@ struct Grid {
     squares: Vec<Vec<u32>>,
 }
 
-impl Grid {
+impl PartGrid {
     fn new(at: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let points = triangles.iter().flatten().map(|&v| at[v as usize]);
         let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];

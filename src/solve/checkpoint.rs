@@ -38,7 +38,7 @@ impl Bake {
         let print = self.fingerprint();
         let body = |out: &mut Encoder| {
             print.encode(out)?;
-            self.encode_state(true, &self.refinement.balance.factor, out)?;
+            self.encode_state(true, out)?;
             out.put_all(&self.solution.seen)?;
             out.put(self.elapsed().as_secs_f64())
         };
@@ -123,12 +123,7 @@ impl Bake {
     }
 
     /// Writes hierarchy, links and the last solution; `whole`: with what further rounds need.
-    pub(crate) fn encode_state(
-        &self,
-        whole: bool,
-        factor: &[f32],
-        out: &mut Encoder,
-    ) -> io::Result<()> {
+    pub(crate) fn encode_state(&self, whole: bool, out: &mut Encoder) -> io::Result<()> {
         out.put_all(&splits(&self.refinement.tree))?;
         encode_graph(&self.refinement.graph, out)?;
         // Lanes that are not intervals follow from the room.
@@ -145,7 +140,7 @@ impl Bake {
         self.refinement
             .leaf_rays
             .encode(whole, self.filtered(), out)?;
-        out.put_all(factor)?;
+        out.put_all(&self.refinement.balance.factor)?;
         out.put([
             self.refinement.balance.defect_before,
             self.refinement.balance.defect_after,
@@ -249,7 +244,7 @@ impl Bake {
         let factor: Vec<f32> = from.get_all()?;
         // Where leaves look for themselves nothing is balanced.
         let by_rays = self.room.by_rays();
-        let wanted = if by_rays && whole { 0 } else { nodes };
+        let wanted = if by_rays { 0 } else { nodes };
         if factor.len() != wanted || self.refinement.leaf_rays.looks() != by_rays {
             return Err(Broken::new("does not know what its leaves see"));
         }

@@ -174,11 +174,12 @@ impl Bake {
     fn model(&mut self, patches: usize) -> Result<coarse::Coarse, Interrupted> {
         let (room, refinement) = (&self.room, &mut self.refinement);
         let leaves = refinement.leaves();
-        let (shadowed, factor) = match refinement.frozen.take() {
+        let shadowed = match refinement.frozen.take() {
             Some(known) => known,
             None => {
+                refinement.trace_leaf_rays(room)?;
                 let tree = &refinement.tree;
-                let shadowed = room.with_sight(|sight| {
+                room.with_sight(|sight| {
                     punctual::factors(
                         tree,
                         &leaves,
@@ -188,10 +189,7 @@ impl Bake {
                         room.outside.as_ref(),
                         (room.team, &room.interrupt),
                     )
-                })?;
-                refinement.trace_leaf_rays(room)?;
-                let balance = refinement.balanced(&refinement.link_rows());
-                (shadowed, balance.factor)
+                })?
             }
         };
         let painter = room.painter();
@@ -199,7 +197,7 @@ impl Bake {
         Ok(coarse::Coarse::new(
             &refinement.tree,
             &refinement.graph.links,
-            &factor,
+            &refinement.leaf_rays.target,
             &refinement.areas,
             &leaves,
             &dense,

@@ -12,7 +12,7 @@ use crate::hierarchy::{NONE, Node, Tree};
 use crate::light::Through;
 use crate::light::lanes::Lanes;
 use crate::light::rows::{Rows, padded};
-use crate::link::{Link, LinkRows, Occlusion};
+use crate::link::{Link, LinkRows, Occlusion, balance};
 use crate::scene::LightSpectrum;
 use crate::spectrum::{BANDS, Spectrum};
 use crate::team::NEVER;
@@ -56,12 +56,13 @@ pub(crate) trait Dense {
 }
 
 impl Coarse {
-    /// Sums links and sources over a frontier of `tree`, into a limited number of patches.
+    /// Sums links and sources over a frontier of `tree`, into a limited number of patches. Rows are balanced to `target`, what those of each
+    /// leaf must sum to.
     #[expect(clippy::too_many_arguments, reason = "one caller")]
     pub(crate) fn new(
         tree: &Tree,
         links: &[Link],
-        factor: &[f32],
+        target: &[f32],
         areas: &[f64],
         leaves: &[u32],
         dense: &dyn Dense,
@@ -75,7 +76,7 @@ impl Coarse {
             .map(|&g| g as usize + 1)
             .max()
             .unwrap_or(0);
-        let (mut area, mut counted) = (vec![0.0; count], vec![0.0; count]);
+        let [mut area, mut counted, mut met] = [(); 3].map(|()| vec![0.0; count]);
         let mut reflectance = vec![[0.0; BANDS]; count];
         let mut emission = vec![vec![[0.0; BANDS]; count]; lights];
         let mut punctual = emission.clone();
@@ -84,6 +85,7 @@ impl Coarse {
         for &leaf in leaves {
             let (g, a) = (group[leaf as usize] as usize, areas[leaf as usize]);
             area[g] += a;
+            met[g] += a * f64::from(target[leaf as usize]);
             counted[g] += a * (tree.node(leaf).counted / tree.node(leaf).area);
             add(&mut reflectance[g], &dense.reflectance(leaf), a);
             if let Some(passes) = dense.through(leaf) {
@@ -121,16 +123,15 @@ impl Coarse {
         for (pair, passes) in &mut through {
             *passes = passes.map(|x| x / area[pair[0] as usize]);
         }
-        let matrix = exchanges(tree, links, factor, areas, &group, count);
-        let pairs = pairs(&matrix, count);
+        let matrix = exchanges(tree, links, areas, &group, count);
+        let tree = flat_tree(&area, &counted);
+        let areas: Vec<f64> = tree.nodes.iter().map(|node| node.area).collect();
         Self {
-            tree: flat_tree(&area, &counted),
-            links: LinkRows::new(count + 1, &pairs),
+            links: balanced(&tree, &areas, matrix, &met),
+            tree,
             leaves: (1..=count as u32).collect(),
             factor: vec![1.0; count + 1],
-            areas: std::iter::once(area.iter().sum())
-                .chain(area.iter().copied())
-                .collect(),
+            areas,
             reflectance,
             emission,
             punctual,
@@ -338,16 +339,8 @@ fn ordered(area: f64) -> u64 {
 }
 
 /// Exchange between the patches of the model, as in the rows of the real leaves: the exchange of a link with a node above the
-/// frontier is shared among the patches below it by area, and balance factors enter by their mean over a part's leaves.
-fn exchanges(
-    tree: &Tree,
-    links: &[Link],
-    factor: &[f32],
-    areas: &[f64],
-    group: &[u32],
-    count: usize,
-) -> Vec<f64> {
-    let mut mean: Vec<f64> = factor.iter().map(|&f| f64::from(f)).collect();
+/// frontier is shared among the patches below it by area.
+fn exchanges(tree: &Tree, links: &[Link], areas: &[f64], group: &[u32], count: usize) -> Vec<f64> {
     // For each node above the frontier the patches that a link to it reaches, with their weights.
     let mut above: Vec<Vec<(u32, f64)>> = vec![Vec::new(); tree.nodes.len()];
     for (k, node) in tree.nodes.iter().enumerate().rev() {
@@ -356,13 +349,12 @@ fn exchanges(
         }
         let children = || node.child_range().map(|c| c as usize);
         let share = |c: usize| areas[c] / areas[k];
-        mean[k] = children().map(|c| mean[c] * share(c)).sum();
         if group[k] == NONE {
             let mut reached = Vec::new();
             for c in children() {
                 match group[c] {
                     NONE => reached.extend(above[c].iter().map(|&(g, w)| (g, w * share(c)))),
-                    g => reached.push((g, mean[c] * share(c))),
+                    g => reached.push((g, share(c))),
                 }
             }
             above[k] = reached;
@@ -372,7 +364,7 @@ fn exchanges(
     for link in links.iter().filter(|l| l.exchange > 0.0) {
         let [(a, own_a), (b, own_b)] = [link.a, link.b]
             .map(|k| k as usize)
-            .map(|k| (k, [(group[k], mean[k])]));
+            .map(|k| (k, [(group[k], 1.0)]));
         let reached_a: &[_] = if group[a] == NONE { &above[a] } else { &own_a };
         let reached_b: &[_] = if group[b] == NONE { &above[b] } else { &own_b };
         for &(ga, wa) in reached_a {
@@ -384,6 +376,22 @@ fn exchanges(
         }
     }
     matrix
+}
+
+/// The links of a model, its exchanges scaled so that rows sum to what they must: `met` is the area of each patch times that. `areas` are those
+/// of the root and the patches.
+fn balanced(tree: &Tree, areas: &[f64], mut matrix: Vec<f64>, met: &[f64]) -> LinkRows {
+    let count = met.len();
+    let rows = LinkRows::new(count + 1, &pairs(&matrix, count));
+    let of_patches = met.iter().zip(&areas[1..]);
+    let target: Vec<f32> = std::iter::once(1.0)
+        .chain(of_patches.map(|(met, area)| (met / area) as f32))
+        .collect();
+    let factor = &balance(tree, &rows, areas, &target).factor[1..];
+    for (k, exchange) in matrix.iter_mut().enumerate() {
+        *exchange *= f64::from(factor[k / count]) * f64::from(factor[k % count]);
+    }
+    LinkRows::new(count + 1, &pairs(&matrix, count))
 }
 
 /// The exchanges of a model as links.
@@ -433,8 +441,29 @@ mod tests {
     use crate::geometry::sampling::Pcg;
     use crate::link::row_sums;
 
-    /// A patch of the model receives, where all have radiosity 1, the mean of what its leaves receive, however they are
-    /// balanced and whatever covers them. Greater row sums let the model's solve diverge.
+    /// Nothing is reflected or emitted.
+    struct Black;
+
+    impl Dense for Black {
+        fn reflectance(&self, _: u32) -> Spectrum {
+            [0.0; BANDS]
+        }
+        fn emission(&self, _: u32, _: usize) -> Option<Spectrum> {
+            None
+        }
+        fn punctual(&self, _: u32, _: usize) -> Option<Spectrum> {
+            None
+        }
+        fn through(&self, _: u32) -> Option<Spectrum> {
+            None
+        }
+        fn excitation(&self, _: u32, _: usize) -> Option<Spectrum> {
+            None
+        }
+    }
+
+    /// A patch of the model receives, where all have radiosity 1, the mean of what its leaves receive, whatever covers them; once balanced, the
+    /// mean of what they must.
     #[test]
     fn rows_of_the_model_are_those_of_the_leaves() {
         let mut rng = Pcg::new(3);
@@ -457,7 +486,7 @@ mod tests {
             let children = tree.nodes[k].child_range();
             areas[k] = children.map(|c| areas[c as usize]).sum();
         }
-        let factor: Vec<f32> = (0..nodes).map(|_| 0.5 + rng.f64() as f32).collect();
+        let target: Vec<f32> = (0..nodes).map(|_| 0.5 + 0.5 * rng.f64() as f32).collect();
         let mut node = || (rng.f64() * (nodes - 1) as f64) as u32 + 1;
         let links: Vec<Link> = (0..400)
             .map(|_| Link {
@@ -470,20 +499,32 @@ mod tests {
             })
             .filter(|l| l.a != l.b)
             .collect();
-        let wide: Vec<f64> = factor.iter().map(|&f| f64::from(f)).collect();
-        let sums = row_sums(&tree, &LinkRows::new(nodes, &links), &areas, &wide);
+        let sums = row_sums(
+            &tree,
+            &LinkRows::new(nodes, &links),
+            &areas,
+            &vec![1.0; nodes],
+        );
         let group = frontier(&tree, 11);
         let count = 1 + *group.iter().filter(|&&g| g != NONE).max().unwrap() as usize;
         assert!(count > 8, "{count}");
-        let matrix = exchanges(&tree, &links, &factor, &areas, &group, count);
+        let matrix = exchanges(&tree, &links, &areas, &group, count);
+        let flux = |g: usize, of: &dyn Fn(usize) -> f64| -> f64 {
+            let own = leaves.iter().map(|&leaf| leaf as usize);
+            let own = own.filter(|&leaf| group[leaf] as usize == g);
+            own.map(|leaf| areas[leaf] * of(leaf)).sum()
+        };
         for (g, row) in matrix.chunks(count).enumerate() {
-            let flux: f64 = leaves
-                .iter()
-                .filter(|&&leaf| group[leaf as usize] as usize == g)
-                .map(|&leaf| areas[leaf as usize] * sums[leaf as usize])
-                .sum();
-            let model: f64 = row.iter().sum();
+            let (model, flux): (f64, f64) = (row.iter().sum(), flux(g, &|leaf| sums[leaf]));
             assert!((model - flux).abs() < 1e-6 * flux, "{g}: {model} {flux}");
+        }
+        let model = Coarse::new(&tree, &links, &target, &areas, &leaves, &Black, 0, 11);
+        let ones = vec![1.0; count + 1];
+        let sums = row_sums(&model.tree, &model.links, &model.areas, &ones);
+        for g in 0..count {
+            let must = flux(g, &|leaf| f64::from(target[leaf]));
+            let got = model.areas[g + 1] * sums[g + 1];
+            assert!((got - must).abs() < 1e-4 * must, "{g}: {got} {must}");
         }
     }
 }

@@ -29,8 +29,8 @@ pub(crate) struct Refinement {
     pub(crate) areas: Vec<f64>,
     pub(crate) balance: RowBalance,
     pub(crate) direct: Direct,
-    /// What the choice of lanes may take as given when lamps and paints change: shadows of punctual lights, balance.
-    pub(crate) frozen: Option<(Shadowed, Vec<f32>)>,
+    /// What the choice of lanes may take as given when lamps and paints change: shadows of punctual lights.
+    pub(crate) frozen: Option<Shadowed>,
 }
 
 impl Refinement {

@@ -50,7 +50,7 @@ impl FileKind {
     fn version(self) -> u32 {
         match self {
             Self::Checkpoint => 6,
-            Self::Cache => 7,
+            Self::Cache => 8,
         }
     }
 
