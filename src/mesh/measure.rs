@@ -9,7 +9,7 @@
 
 use super::cells::Cell;
 use super::grow::{MeshGrowth, PointLooks, mix};
-use super::parts::Parts;
+use super::parts::OutputParts;
 use super::write::Settled;
 use crate::color::seen_difference;
 use crate::gather::{Interpolation, LayerLanes, Vertex};
@@ -80,7 +80,8 @@ impl MeshGrowth<'_> {
         let mut rng = Pcg::new(bake.settings().seed ^ SEED ^ turn << 32);
         let (mut cell, mut upto) = (0, self.cells.all[0].counted());
         let all = settled.iter();
-        let mut parts: Vec<Parts> = all.map(|s| Parts::new(&s.triangles, &s.of)).collect();
+        let mut parts: Vec<OutputParts> =
+            all.map(|s| OutputParts::new(&s.triangles, &s.of)).collect();
         let mut asked = Vec::with_capacity(count);
         for k in 0..count {
             let target = (k as f64 + rng.f64()) / count as f64 * whole;

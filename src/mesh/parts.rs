@@ -11,12 +11,12 @@ use std::collections::HashMap;
 pub(super) type PointInTriangle = ([u32; 3], [f64; 3]);
 
 /// Triangles of a sheet by the triangle of the mesh that they are part of.
-pub(super) struct Parts {
+pub(super) struct OutputParts {
     all: HashMap<u32, Vec<[u32; 3]>>,
     grids: HashMap<u32, PartGrid>,
 }
 
-impl Parts {
+impl OutputParts {
     /// Triangles, and the triangle of the mesh of each.
     pub(super) fn new(triangles: &[[u32; 3]], of: &[u32]) -> Self {
         let mut all: HashMap<u32, Vec<[u32; 3]>> = HashMap::new();
@@ -61,7 +61,7 @@ fn deepest<'a>(
     whole.max_by(|a, b| depth(a).total_cmp(&depth(b)))
 }
 
-/// Parts by squares of the plane of two axes, over which they are spread most.
+/// OutputParts by squares of the plane of two axes, over which they are spread most.
 struct PartGrid {
     axes: [usize; 2],
     low: DVec2,
@@ -111,7 +111,7 @@ impl PartGrid {
         at.to_array().map(|x| (x as usize).min(self.side - 1))
     }
 
-    /// Parts that may be around a point.
+    /// OutputParts that may be around a point.
     fn near(&self, point: DVec3) -> &[u32] {
         let [x, y] = self.square(point);
         &self.squares[y * self.side + x]
@@ -146,7 +146,7 @@ mod tests {
                 triangles.extend([[b, c, new], [c, a, new]]);
             }
             let of = vec![9; triangles.len()];
-            let mut parts = Parts::new(&triangles, &of);
+            let mut parts = OutputParts::new(&triangles, &of);
             let mut inside = 0;
             for k in 0..2000 {
                 let [v, w] = [random.f64(), random.f64()];
