@@ -4,11 +4,9 @@ use crate::common::built;
 use crate::common::daylit;
 
 use built::Room;
-use daylit::{LUX, glanced, through, wish};
+use daylit::{LUX, glanced, through, traced, wish};
 use glam::{DVec3, dvec3};
-use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
-use haarlight::geometry::NO_PLANE;
 use haarlight::scene::sky::{Distribution, SkyWish, direction};
 use haarlight::solve::Bake;
 
@@ -144,13 +142,9 @@ fn paths_find_small_openings() {
     let (room, opening) = long_room(0.02, 2.0, false);
     let scene = room.scene().under(&sky()).unwrap();
     let bake = Bake::new(scene, haarlight::solve::Settings::default());
-    let (scene, mesh) = (bake.scene(), bake.mesh());
+    let scene = bake.scene();
     let weights = Observer::cie1931().weights(&scene.grid)[1].map(|y| KM * y);
-    let inwards =
-        |(point, normal): (DVec3, DVec3)| (point - mesh.centre + 1e-6 * normal, normal, NO_PLANE);
-    let places: Vec<_> = points().into_iter().map(inwards).collect();
-    let audit = Audit::new(scene, mesh, bake.rays());
-    let answers = audit.irradiance(&places, &vec![1024; places.len()], 3);
+    let answers = traced(&bake, points(), 1024);
     for (answer, want) in answers.iter().zip(truth(opening)) {
         let (got, noise) = answer.linear(&weights);
         println!("{got:.5} for {want:.5}, {noise:.5}");

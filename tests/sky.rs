@@ -6,12 +6,10 @@ use crate::common::daylit;
 use built::{Room, sun};
 use daylit::{
     LUX, bake, bake_at, cie, facade, glanced, glanced_by, past_the_horizon, points, points_beside,
-    roof, room, row, through, wish,
+    roof, room, row, through, traced, wish,
 };
 use glam::{DMat4, DVec3, dvec3};
-use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
-use haarlight::geometry::NO_PLANE;
 use haarlight::output::Exposure;
 use haarlight::output::picture::{Format, Picture};
 use haarlight::scene::sky::{
@@ -337,18 +335,13 @@ fn parallel_light_shines_on_unless_there_is_to_be_no_sun() {
 #[test]
 fn reflected_skylight_agrees_with_paths() {
     // Cut into more triangles the room is the same: its paths are traced once.
-    let mut traced = None;
+    let mut found = None;
     for cuts in [1, 6] {
         let bake = bake(room(0.5, 1.0, cuts), &wish(12));
         let got: f64 = bake.probe(&points()).iter().map(|p| p.xyz[1]).sum();
-        let (scene, mesh) = (bake.scene(), bake.mesh());
+        let scene = bake.scene();
         let weights = Observer::cie1931().weights(&scene.grid)[1].map(|y| KM * y);
-        let answers = traced.get_or_insert_with(|| {
-            let place = |(point, normal)| (point - mesh.centre + 1e-6 * normal, normal, NO_PLANE);
-            let places: Vec<_> = points().into_iter().map(place).collect();
-            let paths = vec![PATHS; places.len()];
-            Audit::new(scene, mesh, bake.rays()).irradiance(&places, &paths, 3)
-        });
+        let answers = found.get_or_insert_with(|| traced(&bake, points(), PATHS));
         let truth: f64 = answers.iter().map(|answer| answer.linear(&weights).0).sum();
         println!("{cuts}: {got:.3} for {truth:.3}");
         assert!((got / truth - 1.0).abs() < 0.01, "{cuts}: {got} {truth}");

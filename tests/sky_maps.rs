@@ -4,13 +4,11 @@ use crate::common::built;
 use crate::common::daylit;
 
 use built::{Room, sun};
-use daylit::{LUX, bake, bake_at, cie, glanced, points, roof, room, through, wish};
+use daylit::{LUX, bake, bake_at, cie, glanced, points, roof, room, through, traced, wish};
 use exr::prelude::*;
 use glam::{DVec3, dvec3};
-use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer, Upsampler};
 use haarlight::data::{Outside, Spectrum, daylight};
-use haarlight::geometry::NO_PLANE;
 use haarlight::scene::LightKind;
 use haarlight::scene::sky::{
     Distribution, SkyBrightness, SkyType, SkyWish, SunPlace, SunWish, direction,
@@ -269,17 +267,12 @@ fn reflected_light_of_a_map_agrees_with_paths() {
         }
     });
     // Cut into more triangles the room is the same: its paths are traced once.
-    let mut traced = None;
+    let mut found = None;
     for cuts in [1, 6] {
         let bake = bake(room(0.5, 1.0, cuts), &of_map(&map));
         let probed = bake.probe(&points());
-        let (scene, mesh) = (bake.scene(), bake.mesh());
-        let answers = traced.get_or_insert_with(|| {
-            let place = |(point, normal)| (point - mesh.centre + 1e-6 * normal, normal, NO_PLANE);
-            let places: Vec<_> = points().into_iter().map(place).collect();
-            let paths = vec![65_536; places.len()];
-            Audit::new(scene, mesh, bake.rays()).irradiance(&places, &paths, 3)
-        });
+        let scene = bake.scene();
+        let answers = found.get_or_insert_with(|| traced(&bake, points(), 65_536));
         for (channel, weights) in Observer::cie1931().weights(&scene.grid).iter().enumerate() {
             let weights = weights.map(|y| KM * y);
             let got: f64 = probed.iter().map(|p| p.xyz[channel]).sum();

@@ -4,11 +4,9 @@ use crate::common::built;
 use crate::common::daylit;
 
 use built::{Room, sun};
-use daylit::{LUX, bake, beside, glanced, places_beside, points, roof, room, through};
+use daylit::{LUX, bake, beside, glanced, places_beside, points, roof, room, through, traced};
 use glam::{DVec3, dvec3};
-use haarlight::audit::Audit;
 use haarlight::color::{KM, Observer};
-use haarlight::geometry::NO_PLANE;
 use haarlight::scene::Scene;
 use haarlight::scene::sky::{Dome, SkyBrightness, SkyWish};
 use haarlight::spectrum::Spectrum;
@@ -124,13 +122,8 @@ fn light_through_openings_has_the_colour_of_the_model() {
 fn reflected_light_agrees_with_paths() {
     let bake = bake(room(0.5, 1.0, 1), &wish(3.0, 50.0));
     let probed = bake.probe(&points());
-    let (scene, mesh) = (bake.scene(), bake.mesh());
-    let places: Vec<_> = points()
-        .into_iter()
-        .map(|(point, normal)| (point - mesh.centre + 1e-6 * normal, normal, NO_PLANE))
-        .collect();
-    let paths = vec![65_536; places.len()];
-    let answers = Audit::new(scene, mesh, bake.rays()).irradiance(&places, &paths, 3);
+    let scene = bake.scene();
+    let answers = traced(&bake, points(), 65_536);
     let agree = |weights: &Spectrum, slack: f64| {
         let sum = |bands: &Spectrum| -> f64 { bands.iter().zip(weights).map(|(x, w)| x * w).sum() };
         let got: f64 = probed.iter().map(|p| sum(&p.spectrum)).sum();

@@ -61,7 +61,7 @@ fn deepest<'a>(
     whole.max_by(|a, b| depth(a).total_cmp(&depth(b)))
 }
 
-/// OutputParts by squares of the plane of two axes, over which they are spread most.
+/// Parts by squares of the plane of two axes, over which they are spread most.
 struct PartGrid {
     axes: [usize; 2],
     low: DVec2,
@@ -111,7 +111,7 @@ impl PartGrid {
         at.to_array().map(|x| (x as usize).min(self.side - 1))
     }
 
-    /// OutputParts that may be around a point.
+    /// Parts that may be around a point.
     fn near(&self, point: DVec3) -> &[u32] {
         let [x, y] = self.square(point);
         &self.squares[y * self.side + x]

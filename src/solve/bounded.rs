@@ -187,8 +187,12 @@ impl Coarse {
                 let area = self.areas[leaf as usize];
                 let row = self.links.row(leaf as usize).iter();
                 // The model's patches stand behind its root.
-                row.map(|&(other, exchange)| (other as usize - 1, f64::from(exchange) / area))
-                    .collect()
+                let factor = |k: u32| f64::from(self.factor[k as usize]);
+                row.map(|&(other, exchange)| {
+                    let exchange = f64::from(exchange) * factor(leaf) * factor(other);
+                    (other as usize - 1, exchange / area)
+                })
+                .collect()
             })
             .collect()
     }

@@ -28,7 +28,8 @@ pub(crate) struct Coarse {
     pub(super) tree: Tree,
     pub(super) links: LinkRows,
     pub(super) leaves: Vec<u32>,
-    factor: Vec<f32>,
+    /// Balance of the rows, by node.
+    pub(super) factor: Vec<f32>,
     pub(super) areas: Vec<f64>,
     /// Reflectance of each patch.
     pub(super) reflectance: Vec<Spectrum>,
@@ -70,12 +71,8 @@ impl Coarse {
         patches: usize,
     ) -> Self {
         let group = frontier(tree, patches);
-        let count = group
-            .iter()
-            .filter(|&&g| g != NONE)
-            .map(|&g| g as usize + 1)
-            .max()
-            .unwrap_or(0);
+        let patches = group.iter().filter(|&&g| g != NONE);
+        let count = patches.map(|&g| g as usize + 1).max().unwrap_or(0);
         let [mut area, mut counted, mut met] = [(); 3].map(|()| vec![0.0; count]);
         let mut reflectance = vec![[0.0; BANDS]; count];
         let mut emission = vec![vec![[0.0; BANDS]; count]; lights];
@@ -124,13 +121,14 @@ impl Coarse {
             *passes = passes.map(|x| x / area[pair[0] as usize]);
         }
         let matrix = exchanges(tree, links, areas, &group, count);
+        let links = LinkRows::new(count + 1, &pairs(&matrix, count));
         let tree = flat_tree(&area, &counted);
         let areas: Vec<f64> = tree.nodes.iter().map(|node| node.area).collect();
         Self {
-            links: balanced(&tree, &areas, matrix, &met),
+            factor: balanced(&tree, &links, &areas, &met),
             tree,
+            links,
             leaves: (1..=count as u32).collect(),
-            factor: vec![1.0; count + 1],
             areas,
             reflectance,
             emission,
@@ -378,20 +376,13 @@ fn exchanges(tree: &Tree, links: &[Link], areas: &[f64], group: &[u32], count: u
     matrix
 }
 
-/// The links of a model, its exchanges scaled so that rows sum to what they must: `met` is the area of each patch times that. `areas` are those
-/// of the root and the patches.
-fn balanced(tree: &Tree, areas: &[f64], mut matrix: Vec<f64>, met: &[f64]) -> LinkRows {
-    let count = met.len();
-    let rows = LinkRows::new(count + 1, &pairs(&matrix, count));
+/// Factors of the root and the patches of a model by which rows sum to what they must: `met` is the area of each patch times that.
+fn balanced(tree: &Tree, links: &LinkRows, areas: &[f64], met: &[f64]) -> Vec<f32> {
     let of_patches = met.iter().zip(&areas[1..]);
     let target: Vec<f32> = std::iter::once(1.0)
         .chain(of_patches.map(|(met, area)| (met / area) as f32))
         .collect();
-    let factor = &balance(tree, &rows, areas, &target).factor[1..];
-    for (k, exchange) in matrix.iter_mut().enumerate() {
-        *exchange *= f64::from(factor[k / count]) * f64::from(factor[k % count]);
-    }
-    LinkRows::new(count + 1, &pairs(&matrix, count))
+    balance(tree, links, areas, &target).factor
 }
 
 /// The exchanges of a model as links.
@@ -519,8 +510,8 @@ mod tests {
             assert!((model - flux).abs() < 1e-6 * flux, "{g}: {model} {flux}");
         }
         let model = Coarse::new(&tree, &links, &target, &areas, &leaves, &Black, 0, 11);
-        let ones = vec![1.0; count + 1];
-        let sums = row_sums(&model.tree, &model.links, &model.areas, &ones);
+        let factor: Vec<f64> = model.factor.iter().map(|&f| f.into()).collect();
+        let sums = row_sums(&model.tree, &model.links, &model.areas, &factor);
         for g in 0..count {
             let must = flux(g, &|leaf| f64::from(target[leaf]));
             let got = model.areas[g + 1] * sums[g + 1];

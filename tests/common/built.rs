@@ -51,7 +51,8 @@ pub(crate) fn baked_to(error: f64, scene: Scene) -> Bake {
     run(scene, settings)
 }
 
-fn run(scene: Scene, settings: Settings) -> Bake {
+/// A bake to its end.
+pub(crate) fn run(scene: Scene, settings: Settings) -> Bake {
     let mut bake = Bake::new(scene, settings);
     bake.run();
     bake

@@ -1,7 +1,10 @@
 //! The rooms of CIE 171:2006, 5.9 and what follows, and light through their openings by quadrature.
 
-use crate::common::built::{Room, sun};
+use crate::common::built::{self, Room, sun};
 use glam::{DVec3, dvec3};
+use haarlight::audit::{Answer, Audit};
+use haarlight::geometry::NO_PLANE;
+use haarlight::scene::Scene;
 use haarlight::scene::sky::{SkyBrightness, SkyType, SkyWish};
 use haarlight::solve::{Bake, Settings};
 use std::f64::consts::PI;
@@ -43,12 +46,16 @@ pub(crate) fn bake_at(room: Room, wish: &SkyWish, error: f64) -> Bake {
         error,
         ..Settings::default()
     };
-    run(room, wish, settings)
+    built::run(under(room, wish), settings)
+}
+
+fn under(room: Room, wish: &SkyWish) -> Scene {
+    room.scene().under(wish).unwrap()
 }
 
 /// One round: what points see of the sky itself does not depend on it, so that in a black room further rounds change no figure.
 pub(crate) fn glanced(room: Room, wish: &SkyWish) -> Bake {
-    glanced_by(room, wish, 0)
+    built::glanced(under(room, wish))
 }
 
 /// The same by patterns of another seed.
@@ -58,13 +65,15 @@ pub(crate) fn glanced_by(room: Room, wish: &SkyWish, seed: u64) -> Bake {
         seed,
         ..Settings::default()
     };
-    run(room, wish, settings)
+    built::run(under(room, wish), settings)
 }
 
-fn run(room: Room, wish: &SkyWish, settings: Settings) -> Bake {
-    let mut bake = Bake::new(room.scene().under(wish).unwrap(), settings);
-    bake.run();
-    bake
+/// What so many paths from each place find in the room of a bake.
+pub(crate) fn traced(bake: &Bake, places: Vec<(DVec3, DVec3)>, paths: usize) -> Vec<Answer> {
+    let (scene, mesh) = (bake.scene(), bake.mesh());
+    let inwards = |(point, normal)| (point - mesh.centre + 1e-6 * normal, normal, NO_PLANE);
+    let places: Vec<_> = places.into_iter().map(inwards).collect();
+    Audit::new(scene, mesh, bake.rays()).irradiance(&places, &vec![paths; places.len()], 3)
 }
 
 /// The room of 5.9 with an opening of a width in the middle of its roof, every panel cut into `cuts` x `cuts` squares.
