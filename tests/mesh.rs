@@ -9,7 +9,7 @@ use haarlight::gather::Baked;
 use haarlight::gather::refined::position;
 use haarlight::mesh::Limits;
 use haarlight::output::{Exposure, Writing, baked_glb};
-use haarlight::scene::{Options, Scene};
+use haarlight::scene::{Meshes, Options, Paint, PointLamp, Scene};
 use haarlight::solve::{Bake, Settings};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -148,6 +148,54 @@ fn what_is_black_keeps_its_triangles() {
         lit += usize::from(!far && part.triangles.len() > surface.triangles.len());
     }
     assert!(lit > 3, "{lit}");
+}
+
+/// A table whose paint is two-sided, as exporters call everything, is written and lit like one whose paint is not.
+#[test]
+fn the_inside_of_a_solid_costs_nothing() {
+    let of = |two_sided: bool| {
+        let mut room = Meshes::default();
+        let wall = room.paint(Paint::default());
+        let wood = room.paint(Paint {
+            albedo: [0.6, 0.4, 0.2],
+            two_sided,
+            ..Paint::default()
+        });
+        let (corners, outwards) = block([0.0; 3], [4.0, 3.0, 5.0]);
+        let inwards: Vec<[u32; 3]> = outwards.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        room.mesh("walls", &corners, &inwards, wall);
+        let (corners, outwards) = block([1.0, 0.0, 1.5], [2.0, 0.7, 3.0]);
+        room.mesh("table", &corners, &outwards, wood);
+        room.lamp(PointLamp {
+            name: "lamp".into(),
+            position: [2.5, 2.5, 2.0],
+            candela: 100.0,
+            color: [1.0; 3],
+        });
+        let scene = Scene::from_meshes(&room, &Options::default()).unwrap();
+        let (bake, baked) = baked(scene, 2.0);
+        let leaves = bake.tree().leaves().count();
+        (leaves, baked.surfaces.len(), baked.irradiance)
+    };
+    assert!(of(true) == of(false));
+}
+
+/// Corners of a block and its faces outwards.
+fn block(low: [f32; 3], high: [f32; 3]) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let corner = |k: usize| std::array::from_fn(|axis| [low, high][k >> axis & 1][axis]);
+    let quads = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    (
+        (0..8).map(corner).collect(),
+        quads.into_iter().flat_map(halves).collect(),
+    )
 }
 
 /// A file, as a viewer reads it: triangles with position and tristimulus radiosity at the corners, by node mesh.

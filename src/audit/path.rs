@@ -213,7 +213,8 @@ impl<'a> Audit<'a> {
             };
             let triangle = hit.triangle as usize;
             let material = &self.scene.materials[self.mesh.material[triangle] as usize];
-            if hit.from_behind && material.sides == Sides::Front {
+            let surface = self.mesh.origin[triangle].0 as usize;
+            if hit.from_behind && self.scene.sides(surface) == Sides::Front {
                 return;
             }
             let normal = if hit.from_behind {

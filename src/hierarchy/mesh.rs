@@ -167,7 +167,7 @@ impl Mesh {
                     })
                 })
                 .collect();
-            let both = scene.materials[surface.material].sides == Sides::Both;
+            let both = scene.sides(s) == Sides::Both;
             for (t, corners) in surface.triangles.iter().enumerate() {
                 let corners = corners.map(|c| ids[c as usize]);
                 let [a, b, c] = corners.map(|c| mesh.positions[c as usize]);

@@ -243,7 +243,7 @@ impl Mirrors {
             towards.entry(mesh.plane[t]).or_insert(mesh.normal[t]);
         }
         for t in all() {
-            let both = scene.materials[mesh.material[t] as usize].sides == Sides::Both;
+            let both = scene.sides(mesh.origin[t].0 as usize) == Sides::Both;
             let surface = mesh.origin[t].0;
             let share = within[&(surface, mesh.plane[t])] / surfaces[&surface];
             for side in 0..1 + usize::from(both) {

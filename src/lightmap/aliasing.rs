@@ -6,6 +6,7 @@
 use super::cells::{ChartCell, DEPTH, Lattice};
 use super::grow::LightmapGrowth;
 use super::sampler::LatticeSample;
+use super::texels::TexelKey;
 use std::collections::BTreeSet;
 
 /// A cell at the finest level whose light is off by this many times what is allowed has an edge in it.
@@ -15,8 +16,6 @@ const SHARE: f64 = 0.5;
 /// Places of the lattice that were moved further than this share of a texel show other light.
 const MOVED: f64 = 1e-3;
 
-/// A texel by its chart and place in the lattice.
-pub(super) type TexelKey = (u32, [u32; 2]);
 /// Means of the light around texels at edges.
 pub(super) type Smoothed = Vec<(TexelKey, Vec<(f64, LatticeSample)>)>;
 

@@ -1,6 +1,6 @@
 //! From the solved light to maps.
 
-use super::aliasing::{Smoothed, TexelKey};
+use super::aliasing::Smoothed;
 use super::cells::ChartCell;
 use super::charts::{Chart, charts};
 use super::grow::{Budget, LightmapGrowth};
@@ -8,7 +8,7 @@ use super::maps::{LightMaps, MapPage, PlacedCharts, margin};
 use super::pack::pack;
 use super::sampler::{LatticeSample, Sampler};
 use super::seams::close;
-use super::texels::{ChartTexels, Corners, Texel, lend, patch};
+use super::texels::{ChartTexels, Corners, Texel, TexelKey, lend, patch};
 use super::unwrap::Conformal;
 use crate::gather::{Baked, BakedSurface, LayerLanes, MapPlace, SurfaceResponse};
 use crate::mesh::looks::Looks;
@@ -142,7 +142,7 @@ impl Bake {
                         }
                     });
                 }
-                let covered = lend(&mut corners, &cells[k]);
+                let covered = lend(&mut corners, &cells[k], Texel::mean);
                 (patch(lattice, &cells[k], &corners), covered)
             })
             .collect();

@@ -40,6 +40,14 @@ impl Lattice {
         }
     }
 
+    /// The lattice of more than a single texel.
+    pub(super) fn opened(&self) -> Self {
+        Self {
+            single: false,
+            ..*self
+        }
+    }
+
     /// Where a point of the finest possible lattice lies.
     pub(super) fn at(&self, point: [u32; 2]) -> DVec2 {
         let share = |k: usize| f64::from(point[k]) / f64::from(self.counts[k] << DEPTH);
@@ -83,6 +91,8 @@ pub(super) struct ChartCell {
     pub(super) hints: Vec<u32>,
     /// Area of the chart in it, in the plane.
     pub(super) area: f64,
+    /// Share of the area that counts, see `hierarchy::counted`.
+    pub(super) counts: f64,
     pub(super) doubt: ChartCellError,
 }
 
@@ -107,6 +117,11 @@ impl ChartCell {
     pub(super) fn share(&self, lattice: &Lattice, at: DVec2) -> DVec2 {
         let [low, high] = [self.point([0, 0]), self.point([2, 2])].map(|p| lattice.at(p));
         (at - low) / (high - low)
+    }
+
+    /// Area that counts.
+    pub(super) fn counted(&self) -> f64 {
+        self.area * self.counts
     }
 
     /// Area of the chart in the cell, the triangles that have some of it, and the middle of the largest part.
@@ -176,6 +191,7 @@ pub(super) fn first(
         facets: (0..chart.flat.len() as u32).collect(),
         hints: Vec::new(),
         area: chart.area,
+        counts: 1.0,
         doubt: ChartCellError::default(),
     };
     if lattice.single {

@@ -83,7 +83,7 @@ pub(super) fn charts(
 ) -> Vec<Chart> {
     let mut out = Vec::new();
     for (number, surface) in scene.surfaces.iter().enumerate() {
-        let both = scene.materials[surface.material].sides == Sides::Both;
+        let both = scene.sides(number) == Sides::Both;
         for back in [false, true].into_iter().filter(|back| both || !back) {
             let side = RegionInput {
                 mesh,

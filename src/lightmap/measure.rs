@@ -6,10 +6,11 @@ use super::cells::bilinear;
 use super::grow::LightmapGrowth;
 use super::maps::PlacedCharts;
 use super::sampler::LatticeSample as Place;
-use crate::geometry::sampling::{Pcg, hash, triangle_weights};
+use crate::geometry::sampling::{Pcg, hash};
 use crate::mesh::measure::{CHANCE, ErrorSample, POINTS, SHARE, SURPRISE};
 use crate::solve::Bake;
 use glam::DVec2;
+use std::collections::HashMap;
 
 /// Distinguishes these random numbers from others.
 const SEED: u64 = 0x0067_0a55;
@@ -22,7 +23,7 @@ pub(super) struct TestPoint {
 }
 
 impl LightmapGrowth<'_> {
-    /// Looks at random points that were never looked at before, one in each stratum of equal area.
+    /// Looks at random points that were never looked at before, one in each stratum of equal counted area.
     pub(super) fn points(
         &mut self,
         bake: &Bake,
@@ -33,32 +34,25 @@ impl LightmapGrowth<'_> {
             true => POINTS[0],
             false => (self.sampler.looks.len() / SHARE).clamp(POINTS[0], POINTS[1]),
         };
-        let facets: Vec<(usize, usize, f64)> = (self.charts.iter().enumerate())
-            .flat_map(|(k, chart)| {
-                let areas = chart
-                    .facets
-                    .iter()
-                    .map(|f| bake.mesh().area[f.triangle as usize]);
-                areas.enumerate().map(move |(facet, area)| (k, facet, area))
-            })
-            .collect();
-        let whole: f64 = facets.iter().map(|f| f.2).sum();
-        if whole <= 0.0 {
+        let tree = bake.tree();
+        if tree.counted() <= 0.0 {
             return Vec::new();
         }
+        let mut facets = HashMap::new();
+        for (k, chart) in self.charts.iter().enumerate() {
+            let of_chart = chart.facets.iter().zip(0_u32..);
+            facets.extend(of_chart.map(|(f, facet)| (f.entry as usize, (k, facet))));
+        }
         let mut rng = Pcg::new(bake.settings().seed ^ SEED ^ turn << 32);
-        let (mut at, mut upto) = (0, facets[0].2);
         let mut points = Vec::with_capacity(count);
         for k in 0..count {
-            let target = (k as f64 + rng.f64()) / count as f64 * whole;
-            while upto <= target && at + 1 < facets.len() {
-                at += 1;
-                upto += facets[at].2;
-            }
-            let weights = triangle_weights([rng.f64(), rng.f64()]);
-            let (number, facet, _) = facets[at];
+            let share = (k as f64 + rng.f64()) / count as f64;
+            let (entry, weights) = tree.random(share, [rng.f64(), rng.f64()]);
+            let Some(&(number, facet)) = facets.get(&entry) else {
+                continue;
+            };
             let chart = &self.charts[number];
-            let vertex = chart.vertex(facet as u32, weights);
+            let vertex = chart.vertex(facet, weights);
             let looks = [0, 1].map(|n| {
                 let seed = hash(bake.settings().seed ^ SEED, 2 * (turn << 32 | k as u64) + n);
                 self.sampler
@@ -67,7 +61,7 @@ impl LightmapGrowth<'_> {
             });
             let place = Place {
                 look: looks[0],
-                at: chart.at(facet as u32, vertex.weights),
+                at: chart.at(facet, vertex.weights),
                 vertex,
             };
             points.push(TestPoint {

@@ -18,6 +18,7 @@ mod sampler;
 mod seams;
 mod texels;
 mod unwrap;
+mod worth;
 
 pub use bake::MapLimits;
 pub use maps::{LightMaps, MapPage};

@@ -14,6 +14,12 @@ pub struct Texel {
 }
 
 impl Texel {
+    /// The mean of some.
+    pub(super) fn mean(some: &[Self]) -> Self {
+        let weight = 1.0 / some.len() as f64;
+        Self::mix(&some.iter().map(|t| (weight, *t)).collect::<Vec<_>>())
+    }
+
     /// Sum of weights times texels.
     pub(super) fn mix(parts: &[(f64, Self)]) -> Self {
         let sum = |get: fn(&Self) -> [f32; 3], c: usize| {
@@ -37,18 +43,28 @@ pub(super) struct ChartTexels {
     pub(super) texels: Vec<Texel>,
 }
 
-/// Texels at corners of cells; none where something covers the place.
-pub(super) type Corners = BTreeMap<[u32; 2], Option<Texel>>;
+/// A texel by its chart and place in the lattice.
+pub(super) type TexelKey = (u32, [u32; 2]);
+
+/// Light at corners of cells; none where something covers the place.
+pub(super) type Corners<T> = BTreeMap<[u32; 2], Option<T>>;
 
 /// Gives covered corners the mean of the other corners of their cells, ring by ring; how many there were. What no light
 /// surrounds stays dark.
-pub(super) fn lend(corners: &mut Corners, cells: &[&ChartCell]) -> usize {
+pub(super) fn lend<T: Copy + Default>(
+    corners: &mut Corners<T>,
+    cells: &[&ChartCell],
+    mean: impl Fn(&[T]) -> T,
+) -> usize {
     let dark = corners.values().filter(|t| t.is_none()).count();
+    if dark == 0 {
+        return 0;
+    }
     loop {
-        let mut lent: BTreeMap<[u32; 2], Vec<Texel>> = BTreeMap::new();
+        let mut lent: BTreeMap<[u32; 2], Vec<T>> = BTreeMap::new();
         for cell in cells {
             let points = cell.corners();
-            let known: Vec<Texel> = points.iter().filter_map(|p| *corners.get(p)?).collect();
+            let known: Vec<T> = points.iter().filter_map(|p| *corners.get(p)?).collect();
             let lacking = points
                 .iter()
                 .filter(|p| corners.get(*p).is_some_and(Option::is_none));
@@ -64,15 +80,17 @@ pub(super) fn lend(corners: &mut Corners, cells: &[&ChartCell]) -> usize {
             return dark;
         }
         for (point, known) in lent {
-            let weight = 1.0 / known.len() as f64;
-            let parts: Vec<_> = known.into_iter().map(|t| (weight, t)).collect();
-            corners.insert(point, Some(Texel::mix(&parts)));
+            corners.insert(point, Some(mean(&known)));
         }
     }
 }
 
 /// The texels of a chart from the corners of its cells, all of which are known.
-pub(super) fn patch(lattice: &Lattice, cells: &[&ChartCell], corners: &Corners) -> ChartTexels {
+pub(super) fn patch(
+    lattice: &Lattice,
+    cells: &[&ChartCell],
+    corners: &Corners<Texel>,
+) -> ChartTexels {
     let [width, height] = lattice.texels([0, 0]);
     if lattice.single {
         let known = corners.values().next().copied().flatten();
@@ -153,9 +171,7 @@ fn filled(mut texels: Vec<Option<Texel>>, width: usize, height: usize) -> Vec<Te
             .filter(|n| ring.get(n).is_none_or(|r| *r < of))
             .filter_map(|n| texels[n])
             .collect();
-        let weight = 1.0 / known.len().max(1) as f64;
-        let parts: Vec<_> = known.into_iter().map(|t| (weight, t)).collect();
-        texels[k] = Some(Texel::mix(&parts));
+        texels[k] = Some(Texel::mean(&known));
         for n in near(k).filter(|&n| texels[n].is_none()) {
             if let std::collections::hash_map::Entry::Vacant(entry) = ring.entry(n) {
                 entry.insert(of + 1);

@@ -192,7 +192,7 @@ impl Cells {
         };
         for (number, surface) in scene.surfaces.iter().enumerate() {
             cells.add(&mut start, number, surface, false);
-            if scene.materials[surface.material].sides == Sides::Both {
+            if scene.sides(number) == Sides::Both {
                 cells.add(&mut start, number, surface, true);
             }
         }

@@ -23,7 +23,7 @@ impl Skins {
         // to make.
         let mut along: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * mesh.triangles.len());
         for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
-            let both = scene.materials[mesh.material[t] as usize].sides == Sides::Both;
+            let both = scene.sides(mesh.origin[t].0 as usize) == Sides::Both;
             for [p, q] in [[a, b], [b, c], [c, a]] {
                 let front = 2 * t as u32;
                 along.push(([p, q], front));

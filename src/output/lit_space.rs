@@ -70,7 +70,8 @@ impl<'a> LitRoom<'a> {
     }
 
     fn sides(&self, triangle: u32) -> Sides {
-        self.scene.materials[self.mesh.material[triangle as usize] as usize].sides
+        self.scene
+            .sides(self.mesh.origin[triangle as usize].0 as usize)
     }
 
     /// The first side that is drawn, and whether a back was met before.

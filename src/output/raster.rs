@@ -272,7 +272,7 @@ impl RasterMeshes for Bare<'_> {
     }
 
     fn two_sided(&self, mesh: usize) -> bool {
-        self.material(mesh).is_some_and(|m| m.sides == Sides::Both)
+        self.scene.sides(mesh) == Sides::Both
     }
 
     fn has_holes(&self, mesh: usize) -> bool {
@@ -438,6 +438,7 @@ mod tests {
                 grid: crate::spectrum::Grid::default(),
                 surfaces: vec![],
                 materials: vec![],
+                solids: Default::default(),
                 images: vec![],
                 spectra: vec![],
                 lights: vec![],

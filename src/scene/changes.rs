@@ -131,6 +131,7 @@ impl Scene {
             for normal in surface.normals.iter_mut().flatten() {
                 *normal = -*normal;
             }
+            self.solids.remove(&k);
             if !self.changes.flipped.remove(&k) {
                 self.changes.flipped.insert(k);
             }

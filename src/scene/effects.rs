@@ -174,10 +174,7 @@ impl Plan {
             EffectKind::Sun,
             said(sky.and_then(|sky| sky.sun_said.as_ref())),
         );
-        plan.add(
-            EffectKind::TwoSided,
-            counted(used.iter().filter(|m| m.sides == Sides::Both), "material"),
-        );
+        plan.add(EffectKind::TwoSided, two_sided(scene));
         plan.add(EffectKind::Panes, panes(scene));
         plan.add(EffectKind::Sheets, sheets(&used));
         plan.add(EffectKind::Mirrors, mirrors(scene, &used));
@@ -327,6 +324,19 @@ fn counted<'a, 'b: 'a>(
         &materials.map(|m| quoted(&m.name)).collect::<Vec<_>>(),
         what,
     )
+}
+
+/// Both sides of what is no solid.
+fn two_sided(scene: &Scene) -> (bool, String) {
+    let both = (0..scene.surfaces.len()).filter(|&s| scene.sides(s) == Sides::Both);
+    let used: BTreeSet<usize> = both.map(|s| scene.surfaces[s].material).collect();
+    let names = used.iter().map(|&m| quoted(&scene.materials[m].name));
+    let (runs, reason) = number_of(&names.collect::<Vec<_>>(), "material");
+    match scene.solids.len() {
+        0 => (runs, reason),
+        1 => (runs, format!("{reason}; one surface is that of a solid")),
+        n => (runs, format!("{reason}; {n} surfaces are those of solids")),
+    }
 }
 
 /// A texture or a vertex colour multiplies: black stays black.

@@ -11,6 +11,7 @@ use super::materials;
 use super::pane;
 use super::parting;
 use super::sky::{self, Sky, SkyWish};
+use super::solids;
 use super::spectra_file::SpectraFile;
 use super::{Image, LightSpectrum, Material, Options, PunctualLight, Scene, Surface};
 use super::{lacking, luminaires};
@@ -73,12 +74,15 @@ impl Scene {
         }
         let mut warnings = geometry.warnings;
         warnings.extend(said);
+        let (surfaces, materials) = (&lit.surfaces, &lit.materials);
+        let solids = solids::solids(surfaces, materials, &lit.lights, &geometry.cameras);
         let scene = Self {
             source: document.source,
             grid: options.grid,
             surfaces: lit.surfaces,
             panes: lit.panes,
             materials: lit.materials,
+            solids,
             images,
             spectra: lit.spectra,
             lights: lit.lights,

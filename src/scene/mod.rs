@@ -44,6 +44,7 @@ mod said;
 pub mod sheet;
 mod sheets;
 pub mod sky;
+mod solids;
 mod source;
 mod spectra_file;
 mod surface;

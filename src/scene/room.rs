@@ -2,7 +2,7 @@
 
 use super::layers::{LayerWish, Layers};
 use super::sky::Sky;
-use super::{Camera, Image, LightSpectrum, Material, PunctualLight, Source, Surface};
+use super::{Camera, Image, LightSpectrum, Material, PunctualLight, Sides, Source, Surface};
 use crate::data::Grid;
 use std::collections::BTreeSet;
 
@@ -21,6 +21,8 @@ pub struct Scene {
     pub panes: Vec<Surface>,
     /// Materials; `Surface::material` points in here.
     pub materials: Vec<Material>,
+    /// Two-sided surfaces that are the skins of solids: their backs see only the dark inside, and take no part.
+    pub solids: BTreeSet<usize>,
     /// Decoded images that some paint, emission or alpha mask uses.
     pub images: Vec<Image>,
     /// The distinct light spectra ("lamps by colour"); emissions and lights point in here.
@@ -35,6 +37,19 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// What was changed since it was read.
     pub changes: Changes,
+}
+
+impl Scene {
+    /// The sides of a surface that take part: those of its material, but for solids.
+    ///
+    /// # Panics
+    /// If there is no such surface.
+    pub fn sides(&self, surface: usize) -> Sides {
+        match self.solids.contains(&surface) {
+            true => Sides::Front,
+            false => self.materials[self.surfaces[surface].material].sides,
+        }
+    }
 }
 
 /// What was changed.

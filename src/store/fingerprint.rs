@@ -115,7 +115,7 @@ impl Fingerprint {
     pub fn shape(scene: &Scene) -> Self {
         let mut print = Self::default();
         let images = images(scene);
-        for surface in &scene.surfaces {
+        for (k, surface) in scene.surfaces.iter().enumerate() {
             let material = &scene.materials[surface.material];
             let mut mix = Mix::default();
             let positions: Vec<[f64; 3]> = surface.positions.iter().map(|p| p.to_array()).collect();
@@ -124,7 +124,7 @@ impl Fingerprint {
                 let normals: Vec<[f32; 3]> = normals.iter().map(|n| n.to_array()).collect();
                 mix.all(&normals);
             }
-            mix.add(u8::from(material.sides == Sides::Both));
+            mix.add(u8::from(scene.sides(k) == Sides::Both));
             // Both sides of a sheet are split together.
             if material.sheet.is_some() {
                 mix.add(2_u8);

@@ -39,8 +39,7 @@ impl<'a> Eyes<'a> {
             return SurveyHit::Nothing;
         };
         let surface = self.mesh.origin[hit.triangle as usize].0 as usize;
-        let sides = self.scene.materials[self.scene.surfaces[surface].material].sides;
-        match (hit.from_behind, sides) {
+        match (hit.from_behind, self.scene.sides(surface)) {
             (false, _) => SurveyHit::Front(surface),
             (true, Sides::Both) => SurveyHit::Behind(surface),
             (true, Sides::Front) => SurveyHit::Back(surface),

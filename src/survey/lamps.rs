@@ -117,7 +117,7 @@ fn look(eyes: &Eyes, rays: u32) -> Option<Away> {
             return None;
         }
         let behind = of_surface(eyes, surface, Facing::Behind, rays);
-        let one_sided = scene.materials[scene.surfaces[surface].material].sides == Sides::Front;
+        let one_sided = scene.sides(surface) == Sides::Front;
         if !one_sided && behind.things > 0 {
             return None;
         }

@@ -348,6 +348,7 @@ impl Room {
             surfaces,
             panes,
             materials: self.materials,
+            solids: Default::default(),
             images: Vec::new(),
             spectra: kept.iter().map(|&k| self.spectra[k].clone()).collect(),
             lights: self.lights,

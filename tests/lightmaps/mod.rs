@@ -358,15 +358,43 @@ fn any_number_of_threads_writes_the_same_bytes() {
 #[test]
 fn small_pages_are_several() {
     let limits = MapLimits {
-        page: 64,
+        page: 32,
         ..MapLimits::default()
     };
     let file = written(solved(room(), 2.0), &limits);
     assert!(file.pages.len() > 1);
-    assert!(file.pages.iter().all(|p| p.width <= 64 && p.height <= 64));
+    assert!(file.pages.iter().all(|p| p.width <= 32 && p.height <= 32));
     let triangles = file.triangles();
     let all: Vec<&Mapped> = triangles.iter().collect();
     assert!(mean(&file.off(&all, 300)) < 2.0);
+}
+
+/// No more texels than are allowed, whichever charts ask for them, save what each needs in any case.
+#[test]
+fn texels_stay_within_their_number() {
+    let bake = solved(room(), 1.0);
+    let texels = |limit: usize| {
+        let limits = MapLimits {
+            texels: Some(limit),
+            ..MapLimits::default()
+        };
+        let maps = bake.light_maps(&limits, &|_, _| {});
+        let used = |page: &haarlight::lightmap::MapPage| {
+            page.surfaces.iter().filter(|s| **s != u32::MAX).count()
+        };
+        (
+            maps.pages.iter().map(used).sum::<usize>(),
+            maps.baked.interpolation.unwrap().mean,
+        )
+    };
+    let least = texels(1).0;
+    let few = texels(least + 200);
+    let more = texels(least + 2000);
+    assert!(
+        few.0 <= least + 200 && more.0 <= least + 2000,
+        "{least} {few:?} {more:?}"
+    );
+    assert!(more.0 > few.0 && more.1 < few.1, "{few:?} {more:?}");
 }
 
 /// A square's shadow from a point lamp: the texels along its edge are mixed as the edge divides them.

@@ -283,6 +283,7 @@ pub(crate) fn room() -> Scene {
         surfaces,
         panes: Vec::new(),
         materials: vec![tiles, wall_paint, light],
+        solids: Default::default(),
         images: vec![image],
         spectra: vec![LightSpectrum {
             name: "cie/D65".into(),

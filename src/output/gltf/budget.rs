@@ -22,7 +22,7 @@ const LESS_ALIKE: f64 = 1.25;
 /// As [`baked_glb`].
 pub fn vertices_within(scene: &Scene, bytes: usize, writing: Writing) -> Result<usize> {
     let sheets = (0..scene.surfaces.len()).flat_map(|s| {
-        let both = scene.materials[scene.surfaces[s].material].sides == Sides::Both;
+        let both = scene.sides(s) == Sides::Both;
         [false, true]
             .into_iter()
             .filter(move |back| both || !back)
