@@ -210,12 +210,8 @@ impl<'a> LightmapGrowth<'a> {
             .par_iter()
             .map(|&k| {
                 let cell = &self.cells[k];
-                if !self.is_bare(cell) {
-                    return if self.is_seen(cell) {
-                        self.unknown
-                    } else {
-                        0.0
-                    };
+                if !self.is_seen(cell) {
+                    return 0.0;
                 }
                 let light = self.light(cell);
                 let told = self.told(cell, &light).0;
@@ -382,16 +378,11 @@ impl<'a> LightmapGrowth<'a> {
         told: f64,
     ) -> ChartCellError {
         let lattice = &self.lattices[cell.chart as usize];
-        if !self.is_bare(cell) {
-            let any = middles
-                .iter()
-                .any(|sample| self.sampler.seen(sample).is_some());
-            // It lies below something, or its corners do: all of it is in doubt then.
-            let square = if any { self.unknown } else { 0.0 };
+        let hidden = |sample: &LatticeSample| self.sampler.seen(sample).is_none();
+        if !self.is_bare(cell) && middles.iter().all(hidden) {
+            // It lies below something.
             return ChartCellError {
-                square,
                 tested: true,
-                inside: square.sqrt(),
                 ..ChartCellError::default()
             };
         }
