@@ -321,8 +321,11 @@ mod tests {
     use crate::scene::{Meshes, Options, Paint, PointLamp, Projection, Scene};
     use glam::DMat4;
 
+    /// Positions, and corners of triangles.
+    type Triangles = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
     /// Corners of a block of 1 m by its lowest corner, and its faces outwards.
-    fn block(x: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    fn block(x: f32) -> Triangles {
         let corner = |k: u32| [0, 1, 2].map(|axis| (k >> axis & 1) as f32);
         let corners = (0..8).map(corner).map(|[a, b, c]| [x + a, b, c]);
         let quads = [
@@ -340,7 +343,7 @@ mod tests {
     }
 
     /// Two-sided meshes with a lamp beside them, or elsewhere.
-    fn scene(meshes: &[(Vec<[f32; 3]>, Vec<[u32; 3]>)], lamp: [f32; 3]) -> Scene {
+    fn scene(meshes: &[Triangles], lamp: [f32; 3]) -> Scene {
         let mut room = Meshes::default();
         let paint = room.paint(Paint {
             two_sided: true,
@@ -358,7 +361,7 @@ mod tests {
         Scene::from_meshes(&room, &Options::default()).unwrap()
     }
 
-    fn found(meshes: &[(Vec<[f32; 3]>, Vec<[u32; 3]>)], lamp: [f32; 3]) -> Vec<usize> {
+    fn found(meshes: &[Triangles], lamp: [f32; 3]) -> Vec<usize> {
         scene(meshes, lamp).solids.into_iter().collect()
     }
 
