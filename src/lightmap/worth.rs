@@ -1,8 +1,7 @@
 //! Which cells are looked at or split next: those that bring most for the looks and texels that they take.
 //!
 //! A chart has texels of one size, so that a cell of a large one may ask for a hundred thousand of them where all of a small chart has four.
-//! By their shares of the error alone a dozen walls of a garage took the texels of 4,000 things: at `--error 1` maps were off by 1.6 between
-//! texels, and by .9 in a living room; by what shares cost by .7 and .6, at the same size.
+//! By their shares of the error alone a dozen walls of a garage took the texels of 4,000 things.
 
 use super::cells::{ChartCell, DEPTH};
 use super::grow::{LightmapGrowth, share, taken};
