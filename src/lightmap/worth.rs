@@ -49,7 +49,7 @@ impl LightmapGrowth<'_> {
                 true => self.added(cell, self.more(cell, self.axes(cell)?)),
                 false => 0,
             };
-            (cell.doubt.square > 0.0 && added <= left_texels).then_some((k, added))
+            (share(cell) > 0.0 && added <= left_texels).then_some((k, added))
         };
         let open: Vec<(usize, usize)> = self.cells.iter().enumerate().filter_map(open).collect();
         let mut asking = vec![0.0; self.charts.len()];
@@ -144,5 +144,8 @@ mod tests {
         assert!(of(&both, one) > 1.5 * of(&alone, one));
         assert!(of(&untested, other) > of(&both, other));
         assert!(growth.worth(1).iter().all(|w| w.1 == other));
+        // What does not count is worth nothing, however far it is off.
+        growth.cells[other].counts = 0.0;
+        assert!(growth.worth(1).is_empty());
     }
 }

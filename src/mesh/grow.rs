@@ -359,8 +359,7 @@ impl<'a> MeshGrowth<'a> {
     fn pick(&self, excess: f64) -> Vec<usize> {
         let all = self.cells.all.par_iter().enumerate();
         let shares = all
-            .filter(|(_, c)| c.doubt.square > 0.0 && c.area > 0.0)
-            .filter(|(_, c)| !self.is_smallest(c))
+            .filter(|(_, c)| share(c) > 0.0 && !self.is_smallest(c))
             .map(|(k, c)| (share(c), k))
             .collect();
         let mut left = EXCESS * excess;
