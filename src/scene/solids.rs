@@ -15,6 +15,8 @@ const ALONG: DVec3 = DVec3::new(0.47, 0.81, 0.35);
 /// How far behind a triangle lies the place that it must enclose, as a share of the solid: a micrometre in a chair, whose plastic is some
 /// millimetres thick.
 const BEHIND: f64 = 1e-6;
+/// A lamp or a camera so near to an inside, as a share of the solid, may be there: a panel lies in the very plane of its ceiling.
+const NEAR: f64 = 1e-3;
 /// Triangles that are asked about one ray at the most: a surface through which more of them go is left as it is, and no file takes forever. Chairs of
 /// 3,356 triangles ask 36 a ray on average and 172 at the most, two things of a living room 34 and 144.
 const MOST_ASKED: usize = 2000;
@@ -45,7 +47,7 @@ pub(super) fn solids(
     objects.par_iter().flat_map_iter(of).collect()
 }
 
-/// Places in the room: a lamp or a camera is there.
+/// Places where a lamp or a camera is; of triangles that shine their middles and what lies a little inside of their corners.
 fn occupants(
     surfaces: &[Surface],
     materials: &[Material],
@@ -53,8 +55,11 @@ fn occupants(
     cameras: &[Camera],
 ) -> Vec<DVec3> {
     let glows = |s: &&Surface| materials[s.material].emission.is_some();
-    let middle =
-        |s: &Surface, t: &[u32; 3]| t.iter().map(|&v| s.positions[v as usize]).sum::<DVec3>() / 3.0;
+    let places = |s: &Surface, t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| s.positions[v as usize]);
+        let middle = (a + b + c) / 3.0;
+        [a, b, c, middle].map(|p| p.lerp(middle, 0.1))
+    };
     let glowing = surfaces.iter().filter(glows);
     let placed = |l: &&PunctualLight| {
         matches!(
@@ -62,7 +67,7 @@ fn occupants(
             LightKind::Point | LightKind::Spot { .. } | LightKind::Profile | LightKind::Surface
         )
     };
-    (glowing.flat_map(|s| s.triangles.iter().map(move |t| middle(s, t))))
+    (glowing.flat_map(|s| s.triangles.iter().flat_map(move |t| places(s, t))))
         .chain(lights.iter().filter(placed).map(|l| l.position))
         .chain(cameras.iter().map(|c| c.to_world.w_axis.truncate()))
         .collect()
@@ -156,14 +161,19 @@ impl Shell {
         }
         let tree = Rectangles::new(self);
         let outer = tree.nodes[0];
+        let size = (outer.high - outer.low).length();
+        let around = DMat3::IDENTITY.to_cols_array_2d().map(DVec3::from);
+        let around = around.into_iter().flat_map(|axis| [axis, -axis]);
+        let around: Vec<DVec3> = around.map(|d| NEAR * size * d).collect();
         let inhabited = occupants.iter().any(|p| {
             let p = self.axes * *p;
-            outer.holds(p.truncate()) && self.turns(&tree, p) != Some(0)
+            let inside = |d: &DVec3| self.turns(&tree, p + *d) != Some(0);
+            outer.is_near(p.truncate(), NEAR * size) && around.iter().any(inside)
         });
         if inhabited {
             return BTreeSet::new();
         }
-        let behind = BEHIND * (outer.high - outer.low).length();
+        let behind = BEHIND * size;
         let exposed = |t: usize| {
             let [a, b, c] = self.triangles[t].map(|v| self.positions[v as usize]);
             let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -184,7 +194,7 @@ impl Shell {
         let mut open = vec![0_usize];
         while let Some(k) = open.pop() {
             let node = &tree.nodes[k];
-            if !node.holds(place.truncate()) {
+            if !node.is_near(place.truncate(), 0.0) {
                 continue;
             }
             if node.inner != 0 {
@@ -246,8 +256,8 @@ struct Rectangle {
 }
 
 impl Rectangle {
-    fn holds(&self, p: DVec2) -> bool {
-        p.cmpge(self.low).all() && p.cmple(self.high).all()
+    fn is_near(&self, p: DVec2, distance: f64) -> bool {
+        p.cmpge(self.low - distance).all() && p.cmple(self.high + distance).all()
     }
 }
 
@@ -398,6 +408,39 @@ mod tests {
         };
         let seen = solids(&scene.surfaces, &scene.materials, &[], &[camera]);
         assert_eq!(seen, BTreeSet::from([0]));
+    }
+
+    /// The panel of a room may lie in the plane of its ceiling, and a strip go through the wall between two.
+    #[test]
+    fn rooms_lit_from_their_border_are_no_solids() {
+        let lit = |rooms: &[Triangles], panel: [[f32; 3]; 4]| {
+            let mut room = Meshes::default();
+            let wall = room.paint(Paint {
+                two_sided: true,
+                ..Paint::default()
+            });
+            let lamp = room.paint(Paint {
+                luminance: [100.0; 3],
+                ..Paint::default()
+            });
+            for (positions, triangles) in rooms {
+                room.mesh("room", positions, triangles, wall);
+            }
+            room.mesh("panel", &panel, &[[0, 1, 2], [0, 2, 3]], lamp);
+            Scene::from_meshes(&room, &Options::default())
+                .unwrap()
+                .solids
+        };
+        let square = |low: [f32; 2], high: [f32; 2], y: f32| {
+            let [[x0, z0], [x1, z1]] = [low, high];
+            [[x0, y, z0], [x1, y, z0], [x1, y, z1], [x0, y, z1]]
+        };
+        let ceiling = square([0.4, 0.4], [0.6, 0.6], 1.0);
+        assert!(lit(&[block(0.0)], ceiling).is_empty());
+        let strip = square([0.5, 0.4], [2.5, 0.6], 0.5);
+        assert!(lit(&[block(0.0), block(2.0)], strip).is_empty());
+        let beside = square([1.2, 0.4], [1.8, 0.6], 0.5);
+        assert_eq!(lit(&[block(0.0), block(2.0)], beside).len(), 2);
     }
 
     /// Faces of which some or all look inwards: backs are outside there.
