@@ -11,6 +11,7 @@
 
 use crate::geometry::{NO_PLANE, RayIndex, Segment};
 use crate::scene::pane::{Pane, PaneKind, texel};
+use crate::scene::sets::{join, root};
 use crate::scene::{Scene, Surface};
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
@@ -349,27 +350,26 @@ fn texel_at(scene: &Scene, surface: &Surface, triangle: u32, weights: [f32; 3]) 
 /// Adds the connected parts of a surface; returns the part of each triangle.
 fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
     // Vertices at equal positions are one: exporters split them where normals or texture coordinates differ.
-    let mut welded: HashMap<[u64; 3], usize> = HashMap::new();
+    let mut welded: HashMap<[u64; 3], u32> = HashMap::new();
     let mut of_vertex = Vec::with_capacity(surface.positions.len());
     for p in &surface.positions {
-        let next = welded.len();
+        let next = welded.len() as u32;
         let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
         of_vertex.push(*welded.entry(key).or_insert(next));
     }
-    let mut parent: Vec<usize> = (0..welded.len()).collect();
+    let mut above: Vec<u32> = (0..welded.len() as u32).collect();
     let triangles = || {
         let all = surface.triangles.iter();
         all.map(|t| t.map(|i| of_vertex[i as usize]))
     };
     for [a, b, c] in triangles() {
         for other in [b, c] {
-            let (x, y) = (root(&mut parent, a), root(&mut parent, other));
-            parent[x.max(y)] = x.min(y);
+            join(&mut above, a, other);
         }
     }
-    let mut number: BTreeMap<usize, u32> = BTreeMap::new();
+    let mut number: BTreeMap<u32, u32> = BTreeMap::new();
     // For each part: how much more often each edge is run along in one direction than in the other; volume and area.
-    let mut edges: BTreeMap<(u32, usize, usize), i64> = BTreeMap::new();
+    let mut edges: BTreeMap<(u32, u32, u32), i64> = BTreeMap::new();
     let first = parts.len() as u32;
     let mut sums: Vec<[f64; 2]> = Vec::new();
     let mut bounds: Vec<[DVec3; 2]> = Vec::new();
@@ -377,7 +377,7 @@ fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
     let mut of = Vec::with_capacity(surface.triangles.len());
     for (corners, triangle) in triangles().zip(&surface.triangles) {
         let next = first + number.len() as u32;
-        let part = *number.entry(root(&mut parent, corners[0])).or_insert(next);
+        let part = *number.entry(root(&mut above, corners[0])).or_insert(next);
         of.push(part);
         sums.resize(number.len(), [0.0; 2]);
         bounds.resize(number.len(), [DVec3::INFINITY, DVec3::NEG_INFINITY]);
@@ -412,12 +412,4 @@ fn parts_of(surface: &Surface, parts: &mut Vec<Part>) -> Vec<u32> {
         }
     }));
     of
-}
-
-fn root(parent: &mut [usize], mut i: usize) -> usize {
-    while parent[i] != i {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-    }
-    i
 }

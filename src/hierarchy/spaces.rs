@@ -11,6 +11,7 @@ use super::cut::Cut;
 use super::mesh::Mesh;
 use crate::geometry::RayIndex;
 use crate::geometry::sampling::{cosine_direction, hash, on_triangle, sequence02};
+use crate::scene::sets::{join, root};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -79,13 +80,13 @@ pub fn spaces(mesh: &Mesh, rays: &RayIndex, cuts: &[Cut], seed: u64) -> Spaces {
             }
         }
         let largest = largest(&mut above);
-        open.retain(|&k| find(&mut above, k) != largest);
+        open.retain(|&k| root(&mut above, k) != largest);
         if open.is_empty() {
             break;
         }
     }
     // A face in parts belongs to the space of the first part that belongs to any.
-    let roots: Vec<u32> = (0..count as u32).map(|k| find(&mut above, k)).collect();
+    let roots: Vec<u32> = (0..count as u32).map(|k| root(&mut above, k)).collect();
     let mut parted = Vec::new();
     for (c, part) in rooms.parts.iter().enumerate() {
         let mut apart = false;
@@ -263,27 +264,11 @@ fn on_polygon(polygon: &[DVec3], k: u32, seed: u64) -> DVec3 {
     point.lerp(middle, CLEAR_OF_BORDER[0])
 }
 
-/// The representative of a face's set; the path to it is halved (Tarjan and van Leeuwen 1984).
-fn find(above: &mut [u32], mut k: u32) -> u32 {
-    while above[k as usize] != k {
-        let next = above[above[k as usize] as usize];
-        above[k as usize] = next;
-        k = next;
-    }
-    k
-}
-
-/// Joins two sets; the lower number represents both, so that the result does not depend on the order.
-fn join(above: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(above, a), find(above, b));
-    above[a.max(b) as usize] = a.min(b);
-}
-
 /// Representative of the set of most faces; the lowest of equals.
 fn largest(above: &mut [u32]) -> u32 {
     let mut sizes = vec![0_u32; above.len()];
     for k in 0..above.len() as u32 {
-        sizes[find(above, k) as usize] += 1;
+        sizes[root(above, k) as usize] += 1;
     }
     (0..sizes.len())
         .max_by_key(|&k| (sizes[k], std::cmp::Reverse(k)))
@@ -295,7 +280,7 @@ fn numbered(mut above: Vec<u32>) -> Vec<u32> {
     let count = above.len();
     let main = largest(&mut above);
     let mut sizes = vec![0_u32; count];
-    let roots: Vec<u32> = (0..count as u32).map(|k| find(&mut above, k)).collect();
+    let roots: Vec<u32> = (0..count as u32).map(|k| root(&mut above, k)).collect();
     for &root in &roots {
         sizes[root as usize] += 1;
     }

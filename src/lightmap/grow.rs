@@ -12,6 +12,7 @@ use super::maps::{MARGIN, margin};
 use super::sampler::{LatticeSample, Sampler};
 use super::texels::{Corners, TexelKey, lend};
 use crate::color::seen_difference;
+use crate::mesh::hints::counting;
 use crate::mesh::turns::{BY_CHANCE, GrowthOutcome, RANGE};
 use crate::solve::Bake;
 use glam::DVec2;
@@ -470,12 +471,7 @@ pub(super) fn share(cell: &ChartCell) -> f64 {
 fn counted(mut cells: Vec<ChartCell>, hints: &[ChartHint]) -> Vec<ChartCell> {
     for cell in &mut cells {
         let within = cell.hints.iter().map(|&h| &hints[h as usize]);
-        let [area, counted] = within.fold([0.0; 2], |[area, counted], hint| {
-            [area + hint.area, counted + hint.area * hint.counts]
-        });
-        if area > 0.0 {
-            cell.counts = counted / area;
-        }
+        cell.counts = counting(within.map(|h| [h.area, h.counts])).unwrap_or(cell.counts);
     }
     cells
 }

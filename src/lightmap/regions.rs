@@ -5,6 +5,7 @@
 
 use crate::hierarchy::{Mesh, NONE, Tree};
 use crate::scene::Surface;
+use crate::scene::sets::{join, root};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 
@@ -81,7 +82,7 @@ impl RegionInput<'_> {
     pub(super) fn regions(&self) -> Vec<Region> {
         let all = self.mesh.first_triangle[self.number]..self.mesh.first_triangle[self.number + 1];
         let first = all.start;
-        let mut parent: Vec<u32> = (0..all.len() as u32).collect();
+        let mut above: Vec<u32> = (0..all.len() as u32).collect();
         let mut along: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
         let real = |t: &u32| self.mesh.area[*t as usize] > 0.0;
         for t in all.clone().filter(real) {
@@ -91,8 +92,7 @@ impl RegionInput<'_> {
                 let others = along.entry(edge).or_default();
                 for &other in others.iter() {
                     if self.runs_on(t, other, edge) {
-                        let [x, y] = [t, other].map(|t| root(&mut parent, t - first));
-                        parent[x.max(y) as usize] = x.min(y);
+                        join(&mut above, t - first, other - first);
                     }
                 }
                 others.push(t);
@@ -101,7 +101,7 @@ impl RegionInput<'_> {
         let mut regions: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for t in all.filter(real) {
             regions
-                .entry(root(&mut parent, t - first))
+                .entry(root(&mut above, t - first))
                 .or_default()
                 .push(t);
         }
@@ -128,13 +128,4 @@ impl RegionInput<'_> {
         };
         planes.into_values().map(flat).collect()
     }
-}
-
-fn root(parent: &mut [u32], mut k: u32) -> u32 {
-    while parent[k as usize] != k {
-        let up = parent[parent[k as usize] as usize];
-        parent[k as usize] = up;
-        k = up;
-    }
-    k
 }

@@ -13,13 +13,16 @@ impl Cells {
         let cell = &mut self.all[k];
         let (first, end) = cell.hints;
         let hints = &self.sheets[cell.sheet as usize].hints[first as usize..end as usize];
-        let [area, counted] = hints.iter().fold([0.0; 2], |[area, counted], hint| {
-            [area + hint.area, counted + hint.area * hint.counts]
-        });
-        if area > 0.0 {
-            cell.counts = counted / area;
-        }
+        cell.counts = counting(hints.iter().map(|h| [h.area, h.counts])).unwrap_or(cell.counts);
     }
+}
+
+/// Share of an area that counts, from its parts: the area of each, and the share of it that counts. None of no area.
+pub(crate) fn counting(parts: impl Iterator<Item = [f64; 2]>) -> Option<f64> {
+    let [area, counted] = parts.fold([0.0; 2], |[area, counted], [part, counts]| {
+        [area + part, counted + part * counts]
+    });
+    (area > 0.0).then(|| counted / area)
 }
 
 /// Gives every sheet the leaves of its faces as hints, and every cell its range of them. Cells must still be the

@@ -5,19 +5,20 @@
 //! fine as its own light needs.
 
 use crate::hierarchy::Mesh;
+use crate::scene::sets::{join, root};
 use crate::scene::{Scene, Sides};
 use rayon::prelude::*;
 
 /// Sides in sets; side 2 t is the front of triangle t, 2 t + 1 its back.
 pub(super) struct Skins {
-    parent: Vec<u32>,
+    above: Vec<u32>,
 }
 
 impl Skins {
     pub(super) fn new(scene: &Scene, mesh: &Mesh) -> Self {
         let count = 2 * mesh.triangles.len() as u32;
         let mut skins = Self {
-            parent: (0..count).collect(),
+            above: (0..count).collect(),
         };
         // Sides by the edge that they run along, in its sense; sorted, as one list for each of a million edges would be slow
         // to make.
@@ -43,29 +44,15 @@ impl Skins {
             for &(_, other) in of([q, p]) {
                 // The two sides of one triangle are never seen together.
                 if side / 2 != other / 2 {
-                    skins.join(side, other);
+                    join(&mut skins.above, side, other);
                 }
             }
         }
         skins
     }
 
-    fn root(&mut self, mut side: u32) -> u32 {
-        while self.parent[side as usize] != side {
-            let up = self.parent[self.parent[side as usize] as usize];
-            self.parent[side as usize] = up;
-            side = up;
-        }
-        side
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b) as usize] = a.min(b);
-    }
-
     /// The set of a side.
     pub(super) fn of(&mut self, triangle: u32, back: bool) -> u32 {
-        self.root(2 * triangle + u32::from(back))
+        root(&mut self.above, 2 * triangle + u32::from(back))
     }
 }

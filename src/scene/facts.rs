@@ -6,6 +6,7 @@
 //! Holes are not subtracted.
 
 use super::profile::Profile;
+use super::sets::{join, root};
 use super::{LightKind, Material, Projection, PunctualLight, Scene, Sides, Surface, Texture};
 use crate::color::{KM, Observer, Upsampler};
 use crate::data::Spectrum;
@@ -408,13 +409,13 @@ impl<'a> SceneMeter<'a> {
 
 /// Matches edges: each must be run through as often one way as the other.
 fn closed(surfaces: &[Surface], weld: f64) -> ClosedHint {
-    let mut ids: BTreeMap<[i64; 3], usize> = BTreeMap::new();
+    let mut ids: BTreeMap<[i64; 3], u32> = BTreeMap::new();
     let mut points: Vec<DVec3> = Vec::new();
-    let mut parent: Vec<usize> = Vec::new();
-    let mut edges: BTreeMap<[usize; 2], i64> = BTreeMap::new();
+    let mut above: Vec<u32> = Vec::new();
+    let mut edges: BTreeMap<[u32; 2], i64> = BTreeMap::new();
     let weld = weld.max(f64::MIN_POSITIVE);
     for surface in surfaces {
-        let local: Vec<usize> = surface
+        let local: Vec<u32> = surface
             .positions
             .iter()
             .map(|p| {
@@ -422,8 +423,8 @@ fn closed(surfaces: &[Surface], weld: f64) -> ClosedHint {
                 *ids.entry(p.to_array().map(|x| (x / weld).round() as i64))
                     .or_insert_with(|| {
                         points.push(*p);
-                        parent.push(parent.len());
-                        parent.len() - 1
+                        above.push(above.len() as u32);
+                        above.len() as u32 - 1
                     })
             })
             .collect();
@@ -433,21 +434,20 @@ fn closed(surfaces: &[Surface], weld: f64) -> ClosedHint {
                 let (a, b) = (corners[k], corners[(k + 1) % 3]);
                 if a != b {
                     *edges.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
-                    let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-                    parent[a.max(b)] = a.min(b);
+                    join(&mut above, a, b);
                 }
             }
         }
     }
     // Bounds and open edges of each part that has an edge.
-    let mut parts: BTreeMap<usize, (DVec3, DVec3, usize)> = BTreeMap::new();
+    let mut parts: BTreeMap<u32, (DVec3, DVec3, usize)> = BTreeMap::new();
     for ([a, b], balance) in edges {
-        let part = root(&mut parent, a);
+        let part = root(&mut above, a);
         let (low, high, open) =
             parts
                 .entry(part)
                 .or_insert((DVec3::INFINITY, DVec3::NEG_INFINITY, 0));
-        for p in [points[a], points[b]] {
+        for p in [a, b].map(|k| points[k as usize]) {
             (*low, *high) = (low.min(p), high.max(p));
         }
         // At most twice the triangles.
@@ -461,14 +461,6 @@ fn closed(surfaces: &[Surface], weld: f64) -> ClosedHint {
         open_edges: parts.values().map(|p| p.2).sum(),
         largest_is_closed: largest.is_some_and(|p| p.2 == 0),
     }
-}
-
-fn root(parent: &mut [usize], mut i: usize) -> usize {
-    while parent[i] != i {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-    }
-    i
 }
 
 #[cfg(test)]

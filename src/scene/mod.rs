@@ -41,6 +41,7 @@ mod reader;
 mod room;
 mod running;
 mod said;
+pub(crate) mod sets;
 pub mod sheet;
 mod sheets;
 pub mod sky;

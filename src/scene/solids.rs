@@ -5,6 +5,7 @@
 //! place that it encloses. Nothing comes in there, whatever else stands in the room, so that leaving these sides out changes no light
 //! outside. Insides with a lamp or a camera in them may be the room itself: they stay.
 
+use super::sets::{join, root};
 use super::{Alpha, Camera, LightKind, Material, PunctualLight, Sides, Surface};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
@@ -136,8 +137,7 @@ impl Shell {
                 uneven.push(same[0].2);
             }
             for e in &same[1..] {
-                let (a, b) = (root(&mut above, same[0].2), root(&mut above, e.2));
-                above[a.max(b) as usize] = a.min(b);
+                join(&mut above, same[0].2, e.2);
             }
         }
         let uneven: BTreeSet<u32> = uneven.into_iter().map(|t| root(&mut above, t)).collect();
@@ -234,15 +234,6 @@ impl Shell {
             (true, false) => -1,
         }
     }
-}
-
-/// The root of a set; the path to it is halved.
-fn root(above: &mut [u32], mut k: u32) -> u32 {
-    while above[k as usize] != k {
-        above[k as usize] = above[above[k as usize] as usize];
-        k = above[k as usize];
-    }
-    k
 }
 
 /// A rectangle across the rays, and what lies in it: triangles `first..end` of the order, or two nodes from `inner` on.
