@@ -695,9 +695,8 @@ fn lambert_x8(bencher: Bencher<'_, '_>) {
         for [a, b] in black_box(pairs) {
             let points: [DVec3; 8] = std::array::from_fn(|k| a[0].lerp(a[1], k as f64 / 8.0));
             let normals = lanes::all_lanes(normal(a));
-            let factors =
-                lanes::lambert_x8(lanes::lanes_of(points), normals, b.map(lanes::all_lanes));
-            sum += factors.reduce_add();
+            let factors = lanes::lambert_x8(&lanes::lanes_of(points), &normals, b);
+            sum += factors.iter().sum::<f64>();
         }
         sum
     });

@@ -9,6 +9,7 @@ use super::packet::Packet;
 use super::segment::{NO_PLANE, Segment};
 use super::triangle::PACKET;
 use super::walk::Stack;
+use fearless_simd::{Level, dispatch, prelude::*};
 use glam::Vec3;
 
 /// Rays whose directions have a mean shorter than this have little of their way in common, and go one by one. Leaves that cast 16 rays over the
@@ -48,8 +49,24 @@ impl RayIndex {
             }
             return;
         }
-        let Some(packet) = Packet::new(self, &segments[..directions.len()]) else {
-            return;
+        let nearest = dispatch!(Level::new(), simd => {
+            self.beam(simd, &segments[..directions.len()], directions, opaque)
+        });
+        for (k, out) in out.iter_mut().enumerate() {
+            *out = nearest[k].map(|n| at_distance(self.hit(&n, directions[k]), far[k]));
+        }
+    }
+
+    #[inline(always)]
+    fn beam<S: Simd>(
+        &self,
+        simd: S,
+        segments: &[Segment],
+        directions: &[Vec3],
+        opaque: &impl Fn(u32, f32, f32) -> bool,
+    ) -> [Option<Nearest>; PACKET] {
+        let Some(packet) = Packet::new(simd, self, segments) else {
+            return [None; PACKET];
         };
         let mut beam = Beam {
             index: self,
@@ -69,9 +86,7 @@ impl RayIndex {
                 beam.enter(&self.tree.nodes[entry as usize], lanes, &mut stack);
             }
         }
-        for (k, out) in out.iter_mut().enumerate() {
-            *out = beam.nearest[k].map(|n| at_distance(self.hit(&n, directions[k]), far[k]));
-        }
+        beam.nearest
     }
 
     /// Segments that end beyond everything, wherever the rays start, and their lengths.
@@ -107,16 +122,16 @@ fn at_distance(hit: Hit, far: f32) -> Hit {
 }
 
 /// Rays on their way, each with what it met first so far.
-struct Beam<'a> {
+struct Beam<'a, S: Simd> {
     index: &'a RayIndex,
     directions: &'a [Vec3],
-    packet: Packet,
+    packet: Packet<S>,
     nearest: [Option<Nearest>; PACKET],
     /// Where the longest ray ends now.
     farthest: f32,
 }
 
-impl Beam<'_> {
+impl<S: Simd> Beam<'_, S> {
     /// Ends the rays of `lanes` at the triangles of a block.
     #[inline(always)]
     fn meet(&mut self, number: usize, lanes: u32, opaque: &impl Fn(u32, f32, f32) -> bool) {
@@ -130,12 +145,12 @@ impl Beam<'_> {
             while met != 0 {
                 let lane = met.trailing_zeros() as usize;
                 met &= met - 1;
-                let det = e.det.as_array()[lane];
+                let det = e.det[lane];
                 let found = Nearest {
-                    t: e.height.as_array()[lane] / det,
+                    t: e.height[lane] / det,
                     block: number,
                     place,
-                    uv: [e.v.as_array()[lane] / det, e.w.as_array()[lane] / det],
+                    uv: [e.v[lane] / det, e.w[lane] / det],
                 };
                 let known = self.nearest[lane].as_ref();
                 if (self.index).is_nearer(&found, known, self.directions[lane])
@@ -177,6 +192,72 @@ impl Beam<'_> {
         }
         for &entry in &sorted[..count] {
             stack.push(entry);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::Pcg;
+    use crate::geometry::vectors::levels;
+
+    /// All that the index says of some segments, one by one, sixteen at a time and by a list.
+    #[inline(always)]
+    fn answers<S: Simd>(
+        simd: S,
+        index: &RayIndex,
+        segments: &[Segment],
+        list: &[u32],
+    ) -> (Vec<u32>, Vec<Option<Hit>>) {
+        let opaque = |id: u32, u: f32, _: f32| u > 0.3 || id % 3 == 0;
+        let (mut hidden, mut hits) = (Vec::new(), Vec::new());
+        for group in segments.chunks(PACKET) {
+            hidden.push(Packet::occluded(simd, index, group, &opaque));
+            hidden.push(Packet::occluded_by(simd, index, list, group, &opaque));
+            let ways: Vec<Vec3> = group.iter().map(|s| s.to - s.from).collect();
+            let beam = index.beam(simd, group, &ways, &opaque);
+            hits.extend(
+                ways.iter()
+                    .zip(beam)
+                    .map(|(&way, n)| Some(index.hit(&n?, way))),
+            );
+            for (s, &way) in group.iter().zip(&ways) {
+                hidden.push(u32::from(index.is_hit(simd, s, &opaque)));
+                let (_, line) = index.line(s);
+                let first = index.first_hit(simd, line, s.from, way, NO_PLANE, &opaque);
+                hits.push(first.map(|n| index.hit(&n, way)));
+            }
+        }
+        (hidden, hits)
+    }
+
+    #[test]
+    fn all_processors_give_the_same_answers() {
+        let mut random = Pcg::new(29);
+        let mut point =
+            |size: f32| (Vec3::new(random.f32(), random.f32(), random.f32()) - 0.5) * size;
+        for round in 0..60 {
+            let middle: Vec<Vec3> = (0..40).map(|_| point(2.0)).collect();
+            let positions: Vec<Vec3> = (0..120).map(|k| middle[k / 3] + point(0.5)).collect();
+            let triangles: Vec<[u32; 3]> = (0..40).map(|k| [0, 1, 2].map(|c| 3 * k + c)).collect();
+            let masked: Vec<bool> = (0..40).map(|k| k % 4 == round % 4).collect();
+            let index = RayIndex::build(&positions, &triangles, &[], &masked);
+            let list: Vec<u32> = (0..40).filter(|k| k % 2 == 0).collect();
+            // Together, in one direction, and anywhere.
+            let (from, to) = (point(4.0), point(4.0));
+            let segments: Vec<Segment> = (0..150)
+                .map(|k| Segment {
+                    from: from + point([0.1, 0.5, 4.0][k / 50]),
+                    to: to + point([0.1, 0.5, 4.0][k / 50]),
+                    planes: [NO_PLANE; 2],
+                })
+                .collect();
+            let mut all = levels()
+                .into_iter()
+                .map(|level| dispatch!(level, simd => answers(simd, &index, &segments, &list)));
+            let first = all.next().unwrap();
+            assert!(all.all(|other| other == first));
         }
     }
 }

@@ -11,9 +11,10 @@ use super::index::RayIndex;
 use super::segment::NO_PLANE;
 use super::shaft::{SIDES, Shaft, dot, splat};
 use super::triangle::{BLOCK, Block};
+use super::vectors::Octet;
 use super::walk::Stack;
+use fearless_simd::{Level, dispatch, f32x8, f64x8, prelude::*};
 use glam::{DVec3, Vec3};
-use wide::{f32x8, f64x8};
 
 /// Triangles between two patches.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,41 +54,34 @@ impl Sides8 {
 
     /// A bit for each child whose box may reach into the shaft. The boxes are padded by ten gaps, which covers the roundings.
     #[inline(always)]
-    fn boxes(&self, node: &BvhNode) -> u32 {
-        let mut out = f32x8::ZERO;
-        for axis in 0..3 {
-            out |= node.bounds[0][axis].simd_gt(f32x8::splat(self.high[axis]))
-                | node.bounds[1][axis].simd_lt(f32x8::splat(self.low[axis]));
+    fn boxes<S: Simd>(&self, simd: S, node: &BvhNode) -> u32 {
+        let side = |k: usize, axis: usize| node.bounds[k][axis].load(simd);
+        let mut out = side(0, 0).simd_gt(self.high[0]) | side(1, 0).simd_lt(self.low[0]);
+        for axis in 1..3 {
+            out |= side(0, axis).simd_gt(self.high[axis]) | side(1, axis).simd_lt(self.low[axis]);
         }
         for k in 0..self.count {
             // The corner of the box that is deepest inside.
-            let mut depth = f32x8::ZERO;
+            let mut depth = f32x8::splat(simd, 0.0);
             for (axis, &x) in self.normal[k].iter().enumerate() {
-                depth += node.bounds[usize::from(x < 0.0)][axis] * f32x8::splat(x);
+                depth += side(usize::from(x < 0.0), axis) * x;
             }
-            out |= depth.simd_gt(f32x8::splat(self.offset[k]));
+            out |= depth.simd_gt(self.offset[k]);
         }
-        !out.to_bitmask() & ((1 << node.count) - 1)
+        !(out.to_bitmask() as u32) & ((1 << node.count) - 1)
     }
 }
 
 /// A bit for each triangle of a block that may block, and for each of these that surely does because one of its corners is in the shaft: the
 /// tests of [`Shaft::holds`] before clipping, in f64.
 #[inline(always)]
-fn triangles(shaft: &Shaft, block: &Block, gap: f64) -> (u32, u32) {
+fn triangles<S: Simd>(simd: S, shaft: &Shaft, block: &Block, gap: f64) -> (u32, u32) {
     let all = (1 << block.count) - 1;
     let [a, b, c] = [
-        widen(&block.corners[0]),
-        widen(&block.corners[1]),
-        widen(&block.corners[2]),
+        widen(simd, &block.corners[0]),
+        widen(simd, &block.corners[1]),
+        widen(simd, &block.corners[2]),
     ];
-    let mut out = f64x8::ZERO;
-    for axis in 0..3 {
-        let least = a[axis].fast_min(b[axis]).fast_min(c[axis]);
-        let most = a[axis].fast_max(b[axis]).fast_max(c[axis]);
-        out |= least.simd_gt(f64x8::splat(shaft.high[axis]));
-        out |= most.simd_lt(f64x8::splat(shaft.low[axis]));
-    }
     let u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
     let v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
     let normal = [
@@ -95,47 +89,48 @@ fn triangles(shaft: &Shaft, block: &Block, gap: f64) -> (u32, u32) {
         u[2] * v[0] - u[0] * v[2],
         u[0] * v[1] - u[1] * v[0],
     ];
-    let slack = dot(normal, normal).sqrt() * f64x8::splat(gap);
+    let slack = dot(normal, normal).sqrt() * gap;
     let at = dot(normal, a);
-    let (mut least, mut most) = (f64x8::splat(f64::INFINITY), f64x8::splat(f64::NEG_INFINITY));
+    let mut least = f64x8::splat(simd, f64::INFINITY);
+    let mut most = f64x8::splat(simd, f64::NEG_INFINITY);
     for &corner in shaft.corners() {
-        let d = dot(normal, splat(corner));
-        least = least.fast_min(d);
-        most = most.fast_max(d);
+        let d = dot(normal, splat(simd, corner));
+        least = least.min(d);
+        most = most.max(d);
     }
-    out |= (least - at).simd_ge(-slack) | (most - at).simd_le(slack);
-    if out.to_bitmask() & all == all {
+    let mut out = (least - at).simd_ge(-slack) | (most - at).simd_le(slack);
+    for axis in 0..3 {
+        let least = a[axis].min(b[axis]).min(c[axis]);
+        let most = a[axis].max(b[axis]).max(c[axis]);
+        out |= least.simd_gt(shaft.high[axis]) | most.simd_lt(shaft.low[axis]);
+    }
+    if out.to_bitmask() as u32 & all == all {
         return (0, 0);
     }
-    let mut inside = [!f64x8::ZERO; 3];
+    // The corners that some side leaves out.
+    let mut outside = [slack.simd_lt(slack); 3];
     for side in shaft.sides() {
-        let n = splat(side.normal);
-        let offset = f64x8::splat(side.offset - gap);
+        let n = splat(simd, side.normal);
+        let offset = side.offset - gap;
         let [a, b, c] = [
             dot(a, n).simd_ge(offset),
             dot(b, n).simd_ge(offset),
             dot(c, n).simd_ge(offset),
         ];
         out |= a & b & c;
-        inside[0] &= !a;
-        inside[1] &= !b;
-        inside[2] &= !c;
+        outside[0] |= a;
+        outside[1] |= b;
+        outside[2] |= c;
     }
-    let may = !out.to_bitmask() & all;
-    (may, (inside[0] | inside[1] | inside[2]).to_bitmask() & may)
+    let may = !(out.to_bitmask() as u32) & all;
+    let outside = outside[0] & outside[1] & outside[2];
+    (may, !(outside.to_bitmask() as u32) & may)
 }
 
 #[inline(always)]
-fn widen(point: &[f32x8; 3]) -> [f64x8; 3] {
-    let mut wide = [f64x8::ZERO; 3];
-    for (wide, x) in wide.iter_mut().zip(point) {
-        let (mut to, x) = ([0.0; BLOCK], x.as_array());
-        for k in 0..BLOCK {
-            to[k] = f64::from(x[k]);
-        }
-        *wide = f64x8::new(to);
-    }
-    wide
+fn widen<S: Simd>(simd: S, point: &[Octet; 3]) -> [f64x8<S>; 3] {
+    let wide = |x: &Octet| f64x8::from_fn(simd, |k| f64::from(x.0[k]));
+    [wide(&point[0]), wide(&point[1]), wide(&point[2])]
 }
 
 /// The list as it grows.
@@ -166,12 +161,10 @@ impl RayIndex {
             ids: Vec::new(),
             cap,
         };
-        let fits = match candidates {
-            Some(list) => list
-                .chunks(BLOCK)
-                .all(|ids| self.sift(shaft, &self.gather(ids), &mut found)),
-            None => self.search(shaft, &mut found),
-        };
+        let fits = dispatch!(Level::new(), simd => match candidates {
+            Some(list) => self.sift_all(simd, shaft, list, &mut found),
+            None => self.search(simd, shaft, &mut found),
+        });
         if !fits {
             ShaftContents::Many
         } else if found.ids.is_empty() {
@@ -183,7 +176,25 @@ impl RayIndex {
     }
 
     /// False when there are too many.
-    fn search(&self, shaft: &Shaft, found: &mut BlockerList) -> bool {
+    #[inline(always)]
+    fn sift_all<S: Simd>(
+        &self,
+        simd: S,
+        shaft: &Shaft,
+        list: &[u32],
+        found: &mut BlockerList,
+    ) -> bool {
+        for ids in list.chunks(BLOCK) {
+            if !self.sift(simd, shaft, &self.gather(ids), found) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// False when there are too many.
+    #[inline(always)]
+    fn search<S: Simd>(&self, simd: S, shaft: &Shaft, found: &mut BlockerList) -> bool {
         if self.tree.nodes.is_empty() {
             return true;
         }
@@ -192,7 +203,7 @@ impl RayIndex {
         while let Some(entry) = stack.pop() {
             if entry & LEAF == 0 {
                 let node = &self.tree.nodes[entry as usize];
-                let mut open = sides.boxes(node);
+                let mut open = sides.boxes(simd, node);
                 while open != 0 {
                     stack.push(node.children[open.trailing_zeros() as usize]);
                     open &= open - 1;
@@ -200,7 +211,7 @@ impl RayIndex {
                 continue;
             }
             let block = &self.tree.blocks[(entry & !LEAF) as usize];
-            if !self.sift(shaft, block, found) {
+            if !self.sift(simd, shaft, block, found) {
                 return false;
             }
         }
@@ -208,9 +219,16 @@ impl RayIndex {
     }
 
     /// Adds the triangles of a block that may block; false when there are too many.
-    fn sift(&self, shaft: &Shaft, block: &Block, found: &mut BlockerList) -> bool {
+    #[inline(always)]
+    fn sift<S: Simd>(
+        &self,
+        simd: S,
+        shaft: &Shaft,
+        block: &Block,
+        found: &mut BlockerList,
+    ) -> bool {
         let gap = f64::from(self.gap);
-        let (mut open, sure) = triangles(shaft, block, gap);
+        let (mut open, sure) = triangles(simd, shaft, block, gap);
         while open != 0 {
             let lane = open.trailing_zeros() as usize;
             open &= open - 1;
@@ -218,7 +236,7 @@ impl RayIndex {
                 && (sure >> lane & 1 == 1 || {
                     let [a, b, c] = block.corner_lane(lane);
                     let corner = |p: [f32; 3]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
-                    shaft.clipped_holds(&[corner(a), corner(b), corner(c)], gap)
+                    shaft.clipped_holds(simd, &[corner(a), corner(b), corner(c)], gap)
                 });
             if blocks && !found.push(block.ids[lane]) {
                 return false;
@@ -254,6 +272,7 @@ mod tests {
     use super::*;
     use crate::geometry::ShaftEnd;
     use crate::geometry::sampling::{Pcg, on_triangle};
+    use crate::geometry::vectors::levels;
     use glam::Vec3;
 
     fn index_of(triangles: &[[DVec3; 3]]) -> RayIndex {
@@ -324,6 +343,13 @@ mod tests {
             assert_eq!(list, plain);
             let all: Vec<u32> = (0..24).collect();
             assert_eq!(index.blockers(&shaft, Some(&all), 100), contents);
+            for level in levels() {
+                let (ids, cap) = (Vec::new(), 100);
+                let mut found = BlockerList { ids, cap };
+                dispatch!(level, simd => index.search(simd, &shaft, &mut found));
+                found.ids.sort_unstable();
+                assert_eq!(found.ids, plain);
+            }
             if !list.is_empty() {
                 assert_eq!(
                     index.blockers(&shaft, None, list.len() - 1),

@@ -5,12 +5,12 @@
 //! a thousand of the lines aimed at edges slip between two of them.
 
 use super::triangle::{BLOCK, Block};
+use super::vectors::Octet;
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
-use wide::f32x8;
 
 /// Children of a node.
 pub(crate) const WIDTH: usize = 8;
@@ -25,7 +25,7 @@ pub(crate) const LEAF: u32 = 1 << 31;
 #[derive(Clone, Debug)]
 pub(crate) struct BvhNode {
     /// `bounds[0]` the low and `bounds[1]` the high sides, by axis.
-    pub(crate) bounds: [[f32x8; 3]; 2],
+    pub(crate) bounds: [[Octet; 3]; 2],
     /// A node, or a block with [`LEAF`] set.
     pub(crate) children: [u32; WIDTH],
     /// How many children there are.
@@ -178,7 +178,7 @@ impl Collapse<'_> {
                     (tree.nodes.len() - 1) as u32
                 };
             }
-            tree.nodes[place].bounds = lanes.map(|side| side.map(f32x8::new));
+            tree.nodes[place].bounds = lanes.map(|side| side.map(Octet));
             tree.nodes[place].count = children.len() as u32;
         }
     }
@@ -222,7 +222,7 @@ impl Collapse<'_> {
 
 fn empty_node() -> BvhNode {
     BvhNode {
-        bounds: [[f32x8::ZERO; 3]; 2],
+        bounds: [[Octet([0.0; WIDTH]); 3]; 2],
         children: [0; WIDTH],
         count: 0,
     }

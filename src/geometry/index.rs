@@ -10,6 +10,7 @@ use super::bvh::{Bvh, Input, LEAF};
 use super::segment::{NO_PLANE, Segment};
 use super::triangle::{BLOCK, Block, Shear};
 use super::walk::{Slabs, Stack, push_by_distance};
+use fearless_simd::{Level, dispatch, prelude::*};
 use glam::Vec3;
 
 /// Hits nearer than this to an end of a segment do not count, of the scene's half size: an end on an edge is off the
@@ -138,16 +139,24 @@ impl RayIndex {
         segment: &Segment,
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> bool {
-        if self.tree.nodes.is_empty() {
-            return false;
-        }
+        !self.tree.nodes.is_empty()
+            && dispatch!(Level::new(), simd => self.is_hit(simd, segment, opaque))
+    }
+
+    #[inline(always)]
+    pub(super) fn is_hit<S: Simd>(
+        &self,
+        simd: S,
+        segment: &Segment,
+        opaque: &impl Fn(u32, f32, f32) -> bool,
+    ) -> bool {
         let (direction, line) = self.line(segment);
-        let slabs = Slabs::new(segment.from, direction);
+        let slabs = Slabs::new(simd, segment.from, direction);
         let mut stack = Stack::new(0u32);
         while let Some(entry) = stack.pop() {
             if entry & LEAF != 0 {
                 let block = &self.tree.blocks[(entry & !LEAF) as usize];
-                if block_occludes(block, &line, segment.planes, opaque) {
+                if block_occludes(simd, block, &line, segment.planes, opaque) {
                     return true;
                 }
             } else {
@@ -215,8 +224,24 @@ impl RayIndex {
         if self.tree.nodes.is_empty() {
             return None;
         }
-        let mut line = Shear::new(from, direction, [self.gap / direction.length(), t_max]);
-        let slabs = Slabs::new(from, direction);
+        let line = Shear::new(from, direction, [self.gap / direction.length(), t_max]);
+        let nearest = dispatch!(Level::new(), simd => {
+            self.first_hit(simd, line, from, direction, ignore_plane, opaque)
+        });
+        nearest.map(|n| self.hit(&n, direction))
+    }
+
+    #[inline(always)]
+    pub(super) fn first_hit<S: Simd>(
+        &self,
+        simd: S,
+        mut line: Shear,
+        from: Vec3,
+        direction: Vec3,
+        ignore_plane: u32,
+        opaque: &impl Fn(u32, f32, f32) -> bool,
+    ) -> Option<Nearest> {
+        let slabs = Slabs::new(simd, from, direction);
         let mut best: Option<Nearest> = None;
         let mut stack = Stack::new((0.0f32, 0u32));
         while let Some((near, entry)) = stack.pop() {
@@ -234,7 +259,7 @@ impl RayIndex {
             }
             let number = (entry & !LEAF) as usize;
             let block = &self.tree.blocks[number];
-            let e = line.block_edges(block);
+            let e = line.block_edges(simd, block);
             let mut met = line.compare(&e);
             if met == 0 {
                 continue;
@@ -262,7 +287,7 @@ impl RayIndex {
                 }
             }
         }
-        best.map(|n| self.hit(&n, direction))
+        best
     }
 
     /// Does `found` come before the nearest hit so far? Equal distances go to the lower id, whatever the order of the
@@ -329,13 +354,14 @@ fn behind(block: &Block, lane: usize, direction: Vec3) -> bool {
 
 /// Does a triangle of the block hide the segment?
 #[inline(always)]
-pub(crate) fn block_occludes(
+fn block_occludes<S: Simd>(
+    simd: S,
     block: &Block,
     line: &Shear,
     planes: [u32; 2],
     opaque: &impl Fn(u32, f32, f32) -> bool,
 ) -> bool {
-    let e = line.block_edges(block);
+    let e = line.block_edges(simd, block);
     let mut met = line.compare(&e);
     while met != 0 {
         let lane = met.trailing_zeros() as usize;
@@ -347,8 +373,7 @@ pub(crate) fn block_occludes(
         if block.masked >> lane & 1 == 0 {
             return true;
         }
-        let det = e.det.as_array()[lane];
-        let (v, w) = (e.v.as_array()[lane], e.w.as_array()[lane]);
+        let (det, v, w) = (e.det[lane], e.v[lane], e.w[lane]);
         if opaque(block.ids[lane], v / det, w / det) {
             return true;
         }

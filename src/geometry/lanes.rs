@@ -4,20 +4,20 @@
 //! from where the outline goes down to where it comes up.
 
 use super::polygon::{IN_PLANE, lambert_polygon};
+use super::vectors::{only, sum};
+use fearless_simd::{Level, dispatch, f64x8, mask64x8, prelude::*};
 use glam::DVec3;
-use wide::f64x8;
 
 /// Three coordinates of eight points.
-pub type Points8 = [f64x8; 3];
+pub type Points8 = [[f64; 8]; 3];
+
+/// The same as vectors.
+type Vectors<S> = [f64x8<S>; 3];
 
 /// The same point in all lanes.
 #[inline]
 pub fn all_lanes(point: DVec3) -> Points8 {
-    [
-        f64x8::splat(point.x),
-        f64x8::splat(point.y),
-        f64x8::splat(point.z),
-    ]
+    [[point.x; 8], [point.y; 8], [point.z; 8]]
 }
 
 /// Up to eight points, the first of any more; free lanes repeat the first.
@@ -25,19 +25,70 @@ pub fn all_lanes(point: DVec3) -> Points8 {
 pub fn lanes_of(points: impl IntoIterator<Item = DVec3>) -> Points8 {
     let mut lanes = [[0.0; 8]; 3];
     for (k, p) in points.into_iter().take(8).enumerate() {
-        for (lane, x) in lanes.iter_mut().zip(p.to_array()) {
-            if k == 0 {
-                lane.fill(x);
-            }
-            lane[k] = x;
-        }
+        put(&mut lanes, k, p);
     }
-    lanes.map(f64x8::new)
+    lanes
 }
 
-/// Form factors from eight elements, each to its own triangle; as [`super::lambert_polygon`].
-#[inline]
-pub fn lambert_x8(point: Points8, normal: Points8, triangle: [Points8; 3]) -> f64x8 {
+/// Puts a point into a lane; the first goes into all.
+#[inline(always)]
+fn put(lanes: &mut Points8, k: usize, p: DVec3) {
+    for (lane, x) in lanes.iter_mut().zip(p.to_array()) {
+        if k == 0 {
+            lane.fill(x);
+        }
+        lane[k] = x;
+    }
+}
+
+/// Form factors from eight elements to a triangle; as [`super::lambert_polygon`].
+pub fn lambert_x8(point: &Points8, normal: &Points8, triangle: &[DVec3; 3]) -> [f64; 8] {
+    dispatch!(Level::new(), simd => {
+        let [a, b, c] = *triangle;
+        let triangle = [splat(simd, a), splat(simd, b), splat(simd, c)];
+        factors(load(simd, point), load(simd, normal), triangle).to_array()
+    })
+}
+
+/// Form factors from one point to up to eight triangles.
+pub fn lambert_triangles_x8(
+    point: DVec3,
+    normal: DVec3,
+    triangles: impl Iterator<Item = [DVec3; 3]>,
+) -> [f64; 8] {
+    let mut corners = [[[0.0; 8]; 3]; 3];
+    for (k, triangle) in triangles.take(8).enumerate() {
+        for (lanes, corner) in corners.iter_mut().zip(triangle) {
+            put(lanes, k, corner);
+        }
+    }
+    dispatch!(Level::new(), simd => {
+        let [a, b, c] = &corners;
+        let triangle = [load(simd, a), load(simd, b), load(simd, c)];
+        factors(splat(simd, point), splat(simd, normal), triangle).to_array()
+    })
+}
+
+#[inline(always)]
+fn load<S: Simd>(simd: S, [x, y, z]: &Points8) -> Vectors<S> {
+    [
+        f64x8::load_array_ref(simd, x),
+        f64x8::load_array_ref(simd, y),
+        f64x8::load_array_ref(simd, z),
+    ]
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, point: DVec3) -> Vectors<S> {
+    [
+        f64x8::splat(simd, point.x),
+        f64x8::splat(simd, point.y),
+        f64x8::splat(simd, point.z),
+    ]
+}
+
+#[inline(always)]
+fn factors<S: Simd>(point: Vectors<S>, normal: Vectors<S>, triangle: [Vectors<S>; 3]) -> f64x8<S> {
     let [a, b, c] = [
         sub(triangle[0], point),
         sub(triangle[1], point),
@@ -48,56 +99,60 @@ pub fn lambert_x8(point: Points8, normal: Points8, triangle: [Points8; 3]) -> f6
     let crosses = [cross(a, b), cross(b, c), cross(c, a)];
 
     let area = add(add(crosses[0], crosses[1]), crosses[2]);
-    let reach = lengths[0].fast_max(lengths[1]).fast_max(lengths[2]);
+    let reach = lengths[0].max(lengths[1]).max(lengths[2]);
     let apart = dot(area, a);
-    let least = reach * f64x8::splat(IN_PLANE);
+    let least = reach * IN_PLANE;
     let out_of_plane = (apart * apart).simd_gt(dot(area, area) * (least * least));
 
-    let lowest = height[0].fast_min(height[1]).fast_min(height[2]);
-    let sum = if lowest.simd_ge(f64x8::ZERO).all() {
+    let lowest = height[0].min(height[1]).min(height[2]);
+    let sum = if lowest.simd_ge(0.0).all_true() {
         edge(a, b, crosses[0], lengths[0] * lengths[1], normal)
             + edge(b, c, crosses[1], lengths[1] * lengths[2], normal)
             + edge(c, a, crosses[2], lengths[2] * lengths[0], normal)
     } else {
         clipped([a, b, c], height, normal)
     };
-    (sum.abs() * f64x8::splat(1.0 / std::f64::consts::TAU)).fast_min(f64x8::ONE) & out_of_plane
+    only(
+        out_of_plane,
+        (sum.abs() * (1.0 / std::f64::consts::TAU)).min(1.0),
+    )
 }
 
 /// The sum over the edges of what is above the horizon.
-#[inline(never)]
-fn clipped(corners: [Points8; 3], height: [f64x8; 3], normal: Points8) -> f64x8 {
-    let zero = f64x8::ZERO;
-    let mut sum = zero;
-    let mut up = [zero; 3];
-    let mut down = [zero; 3];
-    for k in 0..3 {
-        let (a, b) = (corners[k], corners[(k + 1) % 3]);
-        let (ha, hb) = (height[k], height[(k + 1) % 3]);
-        let (above, ahead) = (ha.simd_ge(zero), hb.simd_ge(zero));
-        // The quotient is only used where the signs differ.
-        let t = ha / (ha - hb);
-        let across = [
-            (b[0] - a[0]).mul_add(t, a[0]),
-            (b[1] - a[1]).mul_add(t, a[1]),
-            (b[2] - a[2]).mul_add(t, a[2]),
-        ];
-        sum += free_edge(pick(above, a, across), pick(ahead, b, across), normal) & (above | ahead);
-        down = pick(above & !ahead, across, down);
-        up = pick(ahead & !above, across, up);
-    }
-    sum + free_edge(down, up, normal)
-}
-
-/// Form factors from one point to up to eight triangles.
-#[inline]
-pub fn lambert_triangles_x8(
-    point: DVec3,
-    normal: DVec3,
-    triangles: impl Iterator<Item = [DVec3; 3]> + Clone,
-) -> f64x8 {
-    let corners = [0, 1, 2].map(|k| lanes_of(triangles.clone().map(|t| t[k])));
-    lambert_x8(all_lanes(point), all_lanes(normal), corners)
+#[inline(always)]
+fn clipped<S: Simd>(
+    corners: [Vectors<S>; 3],
+    height: [f64x8<S>; 3],
+    normal: Vectors<S>,
+) -> f64x8<S> {
+    let simd = height[0].simd;
+    // Seldom asked for, and long: a function of its own.
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let zero = f64x8::splat(simd, 0.0);
+            let mut sum = zero;
+            let mut up = [zero; 3];
+            let mut down = [zero; 3];
+            for k in 0..3 {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                let (ha, hb) = (height[k], height[(k + 1) % 3]);
+                let (above, ahead) = (ha.simd_ge(zero), hb.simd_ge(zero));
+                // The quotient is only used where the signs differ.
+                let t = ha / (ha - hb);
+                let across = [
+                    (b[0] - a[0]).mul_add(t, a[0]),
+                    (b[1] - a[1]).mul_add(t, a[1]),
+                    (b[2] - a[2]).mul_add(t, a[2]),
+                ];
+                let part = free_edge(pick(above, a, across), pick(ahead, b, across), normal);
+                sum += only(above | ahead, part);
+                down = pick(above & !ahead, across, down);
+                up = pick(ahead & !above, across, up);
+            }
+            sum + free_edge(down, up, normal)
+        },
+    )
 }
 
 /// Form factor from one point to one polygon, its edges side by side; as [`super::lambert_polygon`], which takes the polygons of
@@ -138,30 +193,48 @@ pub fn lambert_edges_x8(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
             to[axis][lane] = corners[ahead][axis];
         }
     }
-    let (a, b) = (from.map(f64x8::new), to.map(f64x8::new));
+    dispatch!(Level::new(), simd => {
+        edge_sum(load(simd, &from), load(simd, &to), splat(simd, normal), corners[0])
+    })
+}
+
+/// The form factor to a polygon above the horizon from its edges; `corner`: one of its corners.
+#[inline(always)]
+fn edge_sum<S: Simd>(a: Vectors<S>, b: Vectors<S>, normal: Vectors<S>, corner: DVec3) -> f64 {
     let crosses = cross(a, b);
     let squares = dot(a, a);
-    let area = DVec3::from_array(crosses.map(f64x8::reduce_add));
+    let area = DVec3::new(sum(crosses[0]), sum(crosses[1]), sum(crosses[2]));
     let reach = squares.to_array().into_iter().fold(0.0, f64::max);
-    if area.dot(corners[0]).powi(2) <= IN_PLANE * IN_PLANE * area.length_squared() * reach {
+    if area.dot(corner).powi(2) <= IN_PLANE * IN_PLANE * area.length_squared() * reach {
         return 0.0;
     }
     let size = (squares * dot(b, b)).sqrt();
-    let sum = edge(a, b, crosses, size, all_lanes(normal)).reduce_add();
-    (sum.abs() / std::f64::consts::TAU).min(1.0)
+    let total = sum(edge(a, b, crosses, size, normal));
+    (total.abs() / std::f64::consts::TAU).min(1.0)
 }
 
 #[inline(always)]
-fn free_edge(a: Points8, b: Points8, normal: Points8) -> f64x8 {
+fn free_edge<S: Simd>(a: Vectors<S>, b: Vectors<S>, normal: Vectors<S>) -> f64x8<S> {
     edge(a, b, cross(a, b), length(a) * length(b), normal)
 }
 
 /// As `edge` in [`super::polygon`]; 0 where the corners lie in one line. `size` = |a||b|.
 #[inline(always)]
-fn edge(a: Points8, b: Points8, c: Points8, size: f64x8, normal: Points8) -> f64x8 {
-    let ratio = angle_over_sine(dot(a, b), size, || length(c));
+fn edge<S: Simd>(
+    a: Vectors<S>,
+    b: Vectors<S>,
+    c: Vectors<S>,
+    size: f64x8<S>,
+    normal: Vectors<S>,
+) -> f64x8<S> {
+    let ratio = angle_over_sine(
+        dot(a, b),
+        size,
+        #[inline(always)]
+        || length(c),
+    );
     // A point on the edge, or an edge of no length: infinite or NaN above, no angle here.
-    (dot(c, normal) * ratio) & dot(c, c).simd_gt(f64x8::ZERO)
+    only(dot(c, c).simd_gt(0.0), dot(c, normal) * ratio)
 }
 
 /// The angle gamma between a and b over |c|, c = a x b, from x = a.b and `size` = |a||b|; without meaning where c is nil.
@@ -169,14 +242,19 @@ fn edge(a: Points8, b: Points8, c: Points8, size: f64x8, normal: Points8) -> f64
 /// It comes without a root: with w = tan^2(gamma/2) = (|a||b| - x)/(|a||b| + x), gamma/|c| = 2 P(w)/(|a||b| + x),
 /// P(w) = atan(sqrt w)/sqrt w. Beyond a right angle, the same for pi - gamma, and then |c| itself is asked for.
 #[inline(always)]
-pub(crate) fn angle_over_sine(x: f64x8, size: f64x8, sine: impl FnOnce() -> f64x8) -> f64x8 {
+pub(crate) fn angle_over_sine<S: Simd>(
+    x: f64x8<S>,
+    size: f64x8<S>,
+    sine: impl FnOnce() -> f64x8<S>,
+) -> f64x8<S> {
     let folded = x.abs();
-    let over = f64x8::ONE / (size + folded);
-    let w = (size - folded).fast_max(f64x8::ZERO) * over;
+    let over = f64x8::splat(x.simd, 1.0) / (size + folded);
+    let w = (size - folded).max(0.0) * over;
     let ratio = series(w) * (over + over);
-    let wide = x.simd_lt(f64x8::ZERO);
-    if wide.any() {
-        wide.select(f64x8::PI / sine() - ratio, ratio)
+    let wide = x.simd_lt(0.0);
+    if wide.any_true() {
+        let whole = f64x8::splat(x.simd, std::f64::consts::PI);
+        wide.select(whole / sine() - ratio, ratio)
     } else {
         ratio
     }
@@ -207,24 +285,24 @@ const SERIES: [f64; 19] = [
 
 /// The even and the odd powers apart, for a shorter chain.
 #[inline(always)]
-fn series(w: f64x8) -> f64x8 {
+fn series<S: Simd>(w: f64x8<S>) -> f64x8<S> {
     let square = w * w;
-    let mut even = f64x8::splat(SERIES[18]);
-    let mut odd = f64x8::splat(SERIES[17]);
+    let mut even = f64x8::splat(w.simd, SERIES[18]);
+    let mut odd = f64x8::splat(w.simd, SERIES[17]);
     for k in (0..8).rev() {
-        even = even.mul_add(square, f64x8::splat(SERIES[2 * k + 2]));
-        odd = odd.mul_add(square, f64x8::splat(SERIES[2 * k + 1]));
+        even = even.mul_add(square, SERIES[2 * k + 2]);
+        odd = odd.mul_add(square, SERIES[2 * k + 1]);
     }
-    even.mul_add(square, odd.mul_add(w, f64x8::splat(SERIES[0])))
+    even.mul_add(square, odd.mul_add(w, SERIES[0]))
 }
 
 #[inline(always)]
-fn length(a: Points8) -> f64x8 {
+fn length<S: Simd>(a: Vectors<S>) -> f64x8<S> {
     dot(a, a).sqrt()
 }
 
 #[inline(always)]
-fn pick(mask: f64x8, a: Points8, b: Points8) -> Points8 {
+fn pick<S: Simd>(mask: mask64x8<S>, a: Vectors<S>, b: Vectors<S>) -> Vectors<S> {
     [
         mask.select(a[0], b[0]),
         mask.select(a[1], b[1]),
@@ -233,22 +311,22 @@ fn pick(mask: f64x8, a: Points8, b: Points8) -> Points8 {
 }
 
 #[inline(always)]
-fn add(a: Points8, b: Points8) -> Points8 {
+fn add<S: Simd>(a: Vectors<S>, b: Vectors<S>) -> Vectors<S> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 #[inline(always)]
-pub(crate) fn sub(a: Points8, b: Points8) -> Points8 {
+pub(crate) fn sub<S: Simd>(a: [f64x8<S>; 3], b: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-pub(crate) fn dot(a: Points8, b: Points8) -> f64x8 {
+pub(crate) fn dot<S: Simd>(a: [f64x8<S>; 3], b: [f64x8<S>; 3]) -> f64x8<S> {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
 #[inline(always)]
-fn cross(a: Points8, b: Points8) -> Points8 {
+fn cross<S: Simd>(a: Vectors<S>, b: Vectors<S>) -> Vectors<S> {
     [
         a[1].mul_sub(b[2], a[2] * b[1]),
         a[2].mul_sub(b[0], a[0] * b[2]),
@@ -261,6 +339,7 @@ mod tests {
     use super::*;
     use crate::geometry::lambert_polygon;
     use crate::geometry::sampling::{Pcg, sphere_direction};
+    use crate::geometry::vectors::levels;
 
     #[test]
     fn eight_at_once_agree_with_one_at_a_time() {
@@ -278,7 +357,18 @@ mod tests {
                 .collect();
             let eye = point(1.0);
             let normal = sphere_direction([random.f64(), random.f64()]);
-            let fast = lambert_triangles_x8(eye, normal, triangles.iter().copied()).to_array();
+            let fast = lambert_triangles_x8(eye, normal, triangles.iter().copied());
+            let corners = [0, 1, 2].map(|k| lanes_of(triangles.iter().map(|t| t[k])));
+            let others = levels().into_iter().map(|level| {
+                dispatch!(level, simd => {
+                    let [a, b, c] = &corners;
+                    let triangle = [load(simd, a), load(simd, b), load(simd, c)];
+                    factors(splat(simd, eye), splat(simd, normal), triangle).to_array()
+                })
+            });
+            for (fast, other) in others.flat_map(|other| fast.into_iter().zip(other)) {
+                assert!((fast - other).abs() <= 1e-13 * fast + 1e-15 / scale.min(1.0));
+            }
             for (triangle, fast) in triangles.iter().zip(fast) {
                 let plain = lambert_polygon(eye, normal, triangle);
                 let edges = lambert_edges_x8(eye, normal, triangle);
@@ -332,12 +422,7 @@ mod tests {
             DVec3::new(0.2, 0.2, 1.0),
             DVec3::new(0.2, 0.2, 0.999),
         ];
-        let f = lambert_x8(
-            lanes_of(points),
-            all_lanes(DVec3::Z),
-            triangle.map(all_lanes),
-        )
-        .to_array();
+        let f = lambert_x8(&lanes_of(points), &all_lanes(DVec3::Z), &triangle);
         assert!((f[0] - 0.0962250448649376).abs() < 1e-15);
         assert_eq!(&f[1..3], [0.0, 0.0], "in the plane");
         assert!(f[3] > 0.99 && f[3] < 1.0);

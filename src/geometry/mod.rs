@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | [`plane`] | ids for planes: which triangles lie in one plane |
+//! | `vectors` | what vectors need, whatever the processor |
 //! | [`segment`] | the segment that a ray query asks about |
 //! | `triangle` | the watertight segment-triangle test, for one triangle, 8 triangles or 16 segments |
 //! | `tree`, `walk` | the eight-wide tree over the triangles |
@@ -54,6 +55,7 @@ pub mod sampling;
 pub mod segment;
 pub mod shaft;
 mod triangle;
+pub(crate) mod vectors;
 mod walk;
 
 pub use blockers::ShaftContents;

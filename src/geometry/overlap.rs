@@ -20,7 +20,7 @@ impl RayIndex {
                 continue;
             }
             let node = &self.tree.nodes[id as usize];
-            let sides = node.bounds.map(|side| side.map(|lanes| lanes.to_array()));
+            let sides = node.bounds.map(|side| side.map(|lanes| lanes.0));
             let children = &node.children[..node.count as usize];
             for (lane, &child) in children.iter().enumerate() {
                 if (0..3).all(|axis| {

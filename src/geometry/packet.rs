@@ -10,31 +10,31 @@ use super::index::RayIndex;
 use super::segment::{NO_PLANE, Segment};
 use super::triangle::{Block, Edges, PACKET, meet_lines};
 use super::walk::{LEAST_COMPONENT, Stack};
+use fearless_simd::{Level, dispatch, f32x4, f32x8, f32x16, f64x2, mask32x16, prelude::*, u32x16};
 use glam::Vec3;
-use wide::{f32x8, f32x16, u32x16};
 
 /// Up to sixteen segments.
-pub(crate) struct Packet {
-    turn: Turn,
+pub(crate) struct Packet<S: Simd> {
+    turn: Turn<S>,
     /// In turned axes, see [`super::triangle::Shear`].
-    origin: [f32x16; 3],
-    slope: [f32x16; 3],
-    range: [f32x16; 2],
+    origin: [f32x16<S>; 3],
+    slope: [f32x16<S>; 3],
+    range: [f32x16<S>; 2],
     /// In the axes of the world: 1/d, and start/d.
-    inverse: [f32x16; 3],
-    offset: [f32x16; 3],
-    planes: [u32x16; 2],
+    inverse: [f32x16<S>; 3],
+    offset: [f32x16<S>; 3],
+    planes: [u32x16<S>; 2],
     bundle: Bundle,
     /// The lanes that hold a segment.
     open: u32,
 }
 
 /// Which axes of the world become x, y, z.
-enum Turn {
+enum Turn<S: Simd> {
     /// The same for all segments.
     Same([usize; 3]),
-    /// Masks of the lanes whose main axis is x, and y.
-    Mixed([f32x16; 2]),
+    /// The lanes whose main axis is x, and y.
+    Mixed([mask32x16<S>; 2]),
 }
 
 /// Bounds on all segments of a packet.
@@ -69,7 +69,8 @@ impl RayIndex {
     ) {
         assert_eq!(segments.len(), out.len(), "one answer for each segment");
         for (group, answers) in segments.chunks(PACKET).zip(out.chunks_mut(PACKET)) {
-            let hidden = Packet::occluded(self, group, opaque);
+            let hidden =
+                dispatch!(Level::new(), simd => Packet::occluded(simd, self, group, opaque));
             for (k, answer) in answers.iter_mut().enumerate() {
                 *answer = hidden >> k & 1 == 1;
             }
@@ -90,7 +91,7 @@ impl RayIndex {
     ) {
         assert_eq!(segments.len(), out.len(), "one answer for each segment");
         for (group, answers) in segments.chunks(PACKET).zip(out.chunks_mut(PACKET)) {
-            let hidden = Packet::occluded_by(self, list, group, opaque);
+            let hidden = dispatch!(Level::new(), simd => Packet::occluded_by(simd, self, list, group, opaque));
             for (k, answer) in answers.iter_mut().enumerate() {
                 *answer = hidden >> k & 1 == 1;
             }
@@ -98,9 +99,11 @@ impl RayIndex {
     }
 }
 
-impl Packet {
+impl<S: Simd> Packet<S> {
     /// A bit for each segment that something blocks.
-    pub(crate) fn occluded(
+    #[inline(always)]
+    pub(super) fn occluded(
+        simd: S,
         index: &RayIndex,
         segments: &[Segment],
         opaque: &impl Fn(u32, f32, f32) -> bool,
@@ -108,7 +111,7 @@ impl Packet {
         if index.tree.nodes.is_empty() {
             return 0;
         }
-        match Self::new(index, segments) {
+        match Self::new(simd, index, segments) {
             Some(packet) if packet.worthwhile(index) => packet.traverse(index, opaque),
             _ => (0..).zip(segments).fold(0, |hidden, (k, segment)| {
                 hidden | u32::from(index.occluded_with(segment, opaque)) << k
@@ -117,13 +120,15 @@ impl Packet {
     }
 
     /// As [`Self::occluded`], by the triangles of a list.
-    pub(crate) fn occluded_by(
+    #[inline(always)]
+    pub(super) fn occluded_by(
+        simd: S,
         index: &RayIndex,
         list: &[u32],
         segments: &[Segment],
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
-        let Some(packet) = Self::new(index, segments) else {
+        let Some(packet) = Self::new(simd, index, segments) else {
             return 0;
         };
         let mut open = packet.open;
@@ -140,25 +145,30 @@ impl Packet {
 
     /// None of no segments. Free lanes repeat the first.
     #[inline(always)]
-    pub(super) fn new(index: &RayIndex, segments: &[Segment]) -> Option<Self> {
+    pub(super) fn new(simd: S, index: &RayIndex, segments: &[Segment]) -> Option<Self> {
         let first = segments.first()?;
         let count = segments.len().min(PACKET);
-        let mut rows = [row(first); PACKET];
+        let mut rows = [row(simd, first); PACKET];
         for (place, segment) in rows.iter_mut().zip(segments) {
-            *place = row(segment);
+            *place = row(simd, segment);
         }
         let (from, to, planes) = columns(&rows);
         let d = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
         let turn = Turn::of(d);
         let turned = turn.lanes(d);
-        let inverse = f32x16::ONE / turned[2];
-        let gap = f32x16::splat(index.gap) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        let one = f32x16::splat(simd, 1.0);
+        let inverse = one / turned[2];
+        let gap = f32x16::splat(simd, index.gap) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
         let inverses = [safe_inverse(d[0]), safe_inverse(d[1]), safe_inverse(d[2])];
         Some(Self {
             origin: turn.lanes(from),
             slope: [turned[0] * inverse, turned[1] * inverse, inverse],
-            range: [gap, f32x16::ONE - gap],
-            offset: std::array::from_fn(|axis| from[axis] * inverses[axis]),
+            range: [gap, one - gap],
+            offset: [
+                from[0] * inverses[0],
+                from[1] * inverses[1],
+                from[2] * inverses[2],
+            ],
             bundle: Bundle::of(&rows, &inverses, SIDE_SLACK * index.reach()),
             inverse: inverses,
             planes,
@@ -182,6 +192,7 @@ impl Packet {
     }
 
     /// Walks the tree; returns the lanes that are hidden.
+    #[inline(always)]
     fn traverse(&self, index: &RayIndex, opaque: &impl Fn(u32, f32, f32) -> bool) -> u32 {
         let mut open = self.open;
         let mut stack = Stack::new((0u32, open));
@@ -199,7 +210,7 @@ impl Packet {
                 continue;
             }
             let node = &index.tree.nodes[entry as usize];
-            let mut met = self.bundle.enter(node);
+            let mut met = self.boxes(node);
             while met != 0 {
                 let child = met.trailing_zeros() as usize;
                 met &= met - 1;
@@ -215,8 +226,9 @@ impl Packet {
     /// A bit for each segment that meets the box of one child.
     #[inline(always)]
     fn enter(&self, node: &BvhNode, child: usize) -> u32 {
-        let (near, far) = self.slabs(node, child, f32x16::ONE);
-        near.simd_le(far).to_bitmask()
+        let one = f32x16::splat(self.simd(), 1.0);
+        let (near, far) = self.slabs(node, child, one);
+        near.simd_le(far).to_bitmask() as u32
     }
 
     /// The same for segments that end at their nearest hit, and where the first enters.
@@ -224,23 +236,30 @@ impl Packet {
     pub(super) fn enter_near(&self, node: &BvhNode, child: usize) -> (f32, u32) {
         let (near, far) = self.slabs(node, child, self.range[1]);
         let met = near.simd_le(far);
-        (range_of(met.select(near, f32x16::ONE))[0], met.to_bitmask())
+        let first = met.select(near, f32x16::splat(self.simd(), 1.0));
+        (range_of(first)[0], met.to_bitmask() as u32)
     }
 
     /// Where the segments enter and leave the box of one child.
     #[inline(always)]
-    fn slabs(&self, node: &BvhNode, child: usize, end: f32x16) -> (f32x16, f32x16) {
-        let mut near = f32x16::ZERO;
+    fn slabs(&self, node: &BvhNode, child: usize, end: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        let simd = self.simd();
+        let mut near = f32x16::splat(simd, 0.0);
         let mut far = end;
         for axis in 0..3 {
-            let low = f32x16::splat(node.bounds[0][axis].as_array()[child]);
-            let high = f32x16::splat(node.bounds[1][axis].as_array()[child]);
+            let low = f32x16::splat(simd, node.bounds[0][axis].0[child]);
+            let high = f32x16::splat(simd, node.bounds[1][axis].0[child]);
             let a = low.mul_sub(self.inverse[axis], self.offset[axis]);
             let b = high.mul_sub(self.inverse[axis], self.offset[axis]);
-            near = near.fast_max(a.fast_min(b));
-            far = far.fast_min(a.fast_max(b));
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
         }
         (near, far)
+    }
+
+    #[inline(always)]
+    fn simd(&self) -> S {
+        self.range[0].simd
     }
 
     /// The lanes that hold a segment.
@@ -251,53 +270,54 @@ impl Packet {
     /// A bit for each child whose box some segment might meet.
     #[inline(always)]
     pub(super) fn boxes(&self, node: &BvhNode) -> u32 {
-        self.bundle.enter(node)
+        self.bundle.enter(self.simd(), node)
     }
 
     /// A bit for each triangle of a block that some segment might meet.
     #[inline(always)]
     pub(super) fn straddled(&self, block: &Block) -> u32 {
-        self.bundle.straddles(block)
+        self.bundle.straddles(self.simd(), block)
     }
 
     /// Ends a segment at `t`.
     #[inline(always)]
     pub(super) fn shorten(&mut self, lane: usize, t: f32) {
-        let end = &mut self.range[1].as_mut_array()[lane];
+        let end = &mut self.range[1][lane];
         *end = end.min(t);
     }
 
     /// Where the longest segment ends. Free lanes repeat the first and never end: they count as long as it.
     #[inline(always)]
     pub(super) fn farthest(&self) -> f32 {
-        let ends = self.range[1].as_array();
+        let ends = self.range[1].to_array();
         let count = 32 - self.open.leading_zeros() as usize;
         ends[..count].iter().fold(0.0, |a, &b| a.max(b))
     }
 
     /// A bit for each segment of `lanes` that meets one triangle of the block in its range, masks aside, and where.
     #[inline(always)]
-    pub(super) fn meet(&self, block: &Block, place: usize, lanes: u32) -> (u32, Edges<f32x16>) {
+    pub(super) fn meet(&self, block: &Block, place: usize, lanes: u32) -> (u32, Edges<f32x16<S>>) {
+        let simd = self.simd();
         let corners = block.corner_lane(place);
         let [a, b, c] = corners;
         let corners = match &self.turn {
             &Turn::Same([x, y, z]) => [
-                splat([a[x], a[y], a[z]]),
-                splat([b[x], b[y], b[z]]),
-                splat([c[x], c[y], c[z]]),
+                splat(simd, [a[x], a[y], a[z]]),
+                splat(simd, [b[x], b[y], b[z]]),
+                splat(simd, [c[x], c[y], c[z]]),
             ],
             mixed => [
-                mixed.lanes(splat(a)),
-                mixed.lanes(splat(b)),
-                mixed.lanes(splat(c)),
+                mixed.lanes(splat(simd, a)),
+                mixed.lanes(splat(simd, b)),
+                mixed.lanes(splat(simd, c)),
             ],
         };
         let (met, e) = meet_lines(corners, self.origin, self.slope, self.range);
         let mut met = met & lanes;
         let plane = block.planes[place];
         if met != 0 && plane != NO_PLANE {
-            let id = u32x16::splat(plane);
-            met &= !(self.planes[0].simd_eq(id) | self.planes[1].simd_eq(id)).to_bitmask();
+            let own = self.planes[0].simd_eq(plane) | self.planes[1].simd_eq(plane);
+            met &= !(own.to_bitmask() as u32);
         }
         (met, e)
     }
@@ -311,7 +331,7 @@ impl Packet {
         opaque: &impl Fn(u32, f32, f32) -> bool,
     ) -> u32 {
         let mut open = lanes;
-        let mut places = self.bundle.straddles(block);
+        let mut places = self.bundle.straddles(self.simd(), block);
         while places != 0 && open != 0 {
             let place = places.trailing_zeros() as usize;
             places &= places - 1;
@@ -337,28 +357,26 @@ impl Packet {
         while met != 0 {
             let lane = met.trailing_zeros() as usize;
             met &= met - 1;
-            let det = e.det.as_array()[lane];
-            let (v, w) = (e.v.as_array()[lane], e.w.as_array()[lane]);
+            let (det, v, w) = (e.det[lane], e.v[lane], e.w[lane]);
             hidden |= u32::from(opaque(block.ids[place], v / det, w / det)) << lane;
         }
         hidden
     }
 }
 
-impl Turn {
+impl<S: Simd> Turn<S> {
     /// By the greatest component of each direction.
     #[inline(always)]
-    fn of(d: [f32x16; 3]) -> Self {
+    fn of(d: [f32x16<S>; 3]) -> Self {
         let size = [d[0].abs(), d[1].abs(), d[2].abs()];
         let main_z = size[2].simd_ge(size[0]) & size[2].simd_ge(size[1]);
         let main_y = size[1].simd_ge(size[0]) & !main_z;
         let main_x = !(main_y | main_z);
-        let lanes = 0xffff;
-        if main_x.to_bitmask() == lanes {
+        if main_x.all_true() {
             Self::Same([1, 2, 0])
-        } else if main_y.to_bitmask() == lanes {
+        } else if main_y.all_true() {
             Self::Same([2, 0, 1])
-        } else if main_z.to_bitmask() == lanes {
+        } else if main_z.all_true() {
             Self::Same([0, 1, 2])
         } else {
             Self::Mixed([main_x, main_y])
@@ -367,7 +385,7 @@ impl Turn {
 
     /// World axes to turned axes.
     #[inline(always)]
-    fn lanes(&self, [x, y, z]: [f32x16; 3]) -> [f32x16; 3] {
+    fn lanes(&self, [x, y, z]: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
         match self {
             &Self::Same([a, b, c]) => [[x, y, z][a], [x, y, z][b], [x, y, z][c]],
             Self::Mixed([main_x, main_y]) => [
@@ -381,18 +399,21 @@ impl Turn {
 
 /// A segment as one row: ends, then planes.
 #[inline(always)]
-fn row(s: &Segment) -> f32x8 {
+fn row<S: Simd>(simd: S, s: &Segment) -> f32x8<S> {
     let [p, q] = [f32::from_bits(s.planes[0]), f32::from_bits(s.planes[1])];
-    f32x8::new([s.from.x, s.from.y, s.from.z, s.to.x, s.to.y, s.to.z, p, q])
+    [s.from.x, s.from.y, s.from.z, s.to.x, s.to.y, s.to.z, p, q].simd_into(simd)
 }
 
 /// Starts, ends and planes of sixteen rows, side by side.
 #[inline(always)]
-fn columns(rows: &[f32x8; PACKET]) -> ([f32x16; 3], [f32x16; 3], [u32x16; 2]) {
-    let [r0, r1, r2, r3, r4, r5, r6, r7, rest @ ..] = *rows;
-    let low = f32x8::transpose([r0, r1, r2, r3, r4, r5, r6, r7]);
-    let high = f32x8::transpose(rest);
-    let column = |k: usize| join(low[k], high[k]);
+fn columns<S: Simd>(rows: &[f32x8<S>; PACKET]) -> ([f32x16<S>; 3], [f32x16<S>; 3], [u32x16<S>; 2]) {
+    let [a, b, c, d] = [
+        squares(rows, 0),
+        squares(rows, 4),
+        squares(rows, 8),
+        squares(rows, 12),
+    ];
+    let column = |k: usize| a[k].combine(b[k]).combine(c[k].combine(d[k]));
     (
         [column(0), column(1), column(2)],
         [column(3), column(4), column(5)],
@@ -400,59 +421,77 @@ fn columns(rows: &[f32x8; PACKET]) -> ([f32x16; 3], [f32x16; 3], [u32x16; 2]) {
     )
 }
 
+/// The eight columns of four rows from `first` on.
+#[inline(always)]
+fn squares<S: Simd>(rows: &[f32x8<S>; PACKET], first: usize) -> [f32x4<S>; 8] {
+    let (a, e) = rows[first].split();
+    let (b, f) = rows[first + 1].split();
+    let (c, g) = rows[first + 2].split();
+    let (d, h) = rows[first + 3].split();
+    let ([i, j, k, l], [m, n, o, p]) = (transposed([a, b, c, d]), transposed([e, f, g, h]));
+    [i, j, k, l, m, n, o, p]
+}
+
+/// Rows for columns.
+#[inline(always)]
+fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
+    let pairs = |x: f32x4<S>, y: f32x4<S>| -> [f64x2<S>; 2] {
+        [x.zip_low(y).bitcast(), x.zip_high(y).bitcast()]
+    };
+    let ([ab, ab2], [cd, cd2]) = (pairs(a, b), pairs(c, d));
+    [
+        ab.zip_low(cd).bitcast(),
+        ab.zip_high(cd).bitcast(),
+        ab2.zip_low(cd2).bitcast(),
+        ab2.zip_high(cd2).bitcast(),
+    ]
+}
+
 /// The two ends in a row.
 #[inline(always)]
-fn ends_of(row: f32x8) -> (Vec3, Vec3) {
+fn ends_of<S: Simd>(row: f32x8<S>) -> (Vec3, Vec3) {
     let [a, b, c, d, e, f, _, _] = row.to_array();
     (Vec3::new(a, b, c), Vec3::new(d, e, f))
 }
 
 #[inline(always)]
-fn splat([x, y, z]: [f32; 3]) -> [f32x16; 3] {
-    [f32x16::splat(x), f32x16::splat(y), f32x16::splat(z)]
-}
-
-#[inline(always)]
-fn join(low: f32x8, high: f32x8) -> f32x16 {
-    let mut all = [0.0; PACKET];
-    all[..8].copy_from_slice(low.as_array());
-    all[8..].copy_from_slice(high.as_array());
-    f32x16::new(all)
+fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
+    [
+        f32x16::splat(simd, x),
+        f32x16::splat(simd, y),
+        f32x16::splat(simd, z),
+    ]
 }
 
 /// 1/d, finite; as in one segment's slabs.
 #[inline(always)]
-fn safe_inverse(d: f32x16) -> f32x16 {
-    let least = f32x16::splat(LEAST_COMPONENT);
+fn safe_inverse<S: Simd>(d: f32x16<S>) -> f32x16<S> {
+    let least = f32x16::splat(d.simd, LEAST_COMPONENT);
     let tiny = d.abs().simd_lt(least);
-    f32x16::ONE / tiny.select(least | (d & f32x16::splat(-0.0)), d)
+    f32x16::splat(d.simd, 1.0) / tiny.select(least.copysign(d), d)
 }
 
 /// Least and greatest lane.
 #[inline(always)]
-fn range_of(x: f32x16) -> [f32; 2] {
-    let x = x.to_array();
-    let (mut low, mut high) = ([0.0; 8], [0.0; 8]);
-    low.copy_from_slice(&x[..8]);
-    high.copy_from_slice(&x[8..]);
-    let (low, high) = (f32x8::new(low), f32x8::new(high));
-    let [least, most] = [low.fast_min(high).to_array(), low.fast_max(high).to_array()];
-    let (mut a, mut b) = (least[0], most[0]);
-    for k in 1..8 {
-        a = a.min(least[k]);
-        b = b.max(most[k]);
-    }
-    [a, b]
+fn range_of<S: Simd>(x: f32x16<S>) -> [f32; 2] {
+    let (a, b) = x.split();
+    let (least, most) = (a.min(b), a.max(b));
+    let ((a, b), (c, d)) = (least.split(), most.split());
+    let (least, most) = (a.min(b).to_array(), c.max(d).to_array());
+    [
+        least[0].min(least[1]).min(least[2].min(least[3])),
+        most[0].max(most[1]).max(most[2].max(most[3])),
+    ]
 }
 
 impl Bundle {
     /// Bounds on rows and on 1/d.
     #[inline(always)]
-    fn of(rows: &[f32x8; PACKET], inverses: &[f32x16; 3], slack: f32) -> Self {
+    fn of<S: Simd>(rows: &[f32x8<S>; PACKET], inverses: &[f32x16<S>; 3], slack: f32) -> Self {
         let (mut least, mut most) = (rows[0], rows[0]);
         for row in &rows[1..] {
-            least = least.fast_min(*row);
-            most = most.fast_max(*row);
+            least = least.min(*row);
+            most = most.max(*row);
         }
         let mut bundle = Self {
             starts: [ends_of(least).0, ends_of(most).0],
@@ -471,16 +510,19 @@ impl Bundle {
 
     /// A bit for each child whose box some segment of the bundle might meet.
     #[inline(always)]
-    fn enter(&self, node: &BvhNode) -> u32 {
-        let mut near = f32x8::ZERO;
-        let mut far = f32x8::ONE;
-        let mut apart = f32x8::ZERO;
+    fn enter<S: Simd>(&self, simd: S, node: &BvhNode) -> u32 {
+        let mut near = f32x8::splat(simd, 0.0);
+        let mut far = f32x8::splat(simd, 1.0);
+        let mut apart = near.simd_gt(far);
         for axis in 0..3 {
-            let [low, high] = [node.bounds[0][axis], node.bounds[1][axis]];
+            let [low, high] = [
+                node.bounds[0][axis].load(simd),
+                node.bounds[1][axis].load(simd),
+            ];
             let start = [self.starts[0][axis], self.starts[1][axis]];
             let end = [self.ends[0][axis], self.ends[1][axis]];
-            let least = f32x8::splat(start[0].min(end[0]));
-            let most = f32x8::splat(start[1].max(end[1]));
+            let least = start[0].min(end[0]);
+            let most = start[1].max(end[1]);
             apart = apart | low.simd_gt(most) | high.simd_lt(least);
             let way = self.way[axis];
             if way == 0 {
@@ -494,44 +536,45 @@ impl Bundle {
             } else {
                 (start[0], start[1])
             };
-            let a = f32x8::splat(self.inverse[axis][0]);
-            let b = f32x8::splat(self.inverse[axis][1]);
-            let into = first - f32x8::splat(early);
-            let out = last - f32x8::splat(late);
-            near = near.fast_max((into * a).fast_min(into * b));
-            far = far.fast_min((out * a).fast_max(out * b));
+            let [a, b] = self.inverse[axis];
+            let into = first - early;
+            let out = last - late;
+            near = near.max((into * a).min(into * b));
+            far = far.min((out * a).max(out * b));
         }
-        let open = near.simd_le(far).to_bitmask() & !apart.to_bitmask();
+        let open = (near.simd_le(far) & !apart).to_bitmask() as u32;
         open & ((1 << node.count) - 1)
     }
 
     /// A bit for each triangle whose plane may have ends of the bundle on both sides.
     #[inline(always)]
-    fn straddles(&self, block: &Block) -> u32 {
-        let [a, b, c] = block.corners;
-        let u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        let v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
+    fn straddles<S: Simd>(&self, simd: S, block: &Block) -> u32 {
+        let load = |k: usize, axis: usize| -> f32x8<S> { block.corners[k][axis].load(simd) };
+        let a = [load(0, 0), load(0, 1), load(0, 2)];
+        let u = [load(1, 0) - a[0], load(1, 1) - a[1], load(1, 2) - a[2]];
+        let v = [load(2, 0) - a[0], load(2, 1) - a[1], load(2, 2) - a[2]];
         let n = [
             u[1] * v[2] - u[2] * v[1],
             u[2] * v[0] - u[0] * v[2],
             u[0] * v[1] - u[1] * v[0],
         ];
         // The least and greatest height of the two boxes of ends over the plane.
-        let mut low = [f32x8::ZERO; 2];
-        let mut high = [f32x8::ZERO; 2];
-        let mut slack = f32x8::ZERO;
+        let zero = f32x8::splat(simd, 0.0);
+        let mut low = [zero; 2];
+        let mut high = [zero; 2];
+        let mut slack = zero;
         for axis in 0..3 {
             for (k, ends) in [self.starts, self.ends].iter().enumerate() {
-                let p = (f32x8::splat(ends[0][axis]) - a[axis]) * n[axis];
-                let q = (f32x8::splat(ends[1][axis]) - a[axis]) * n[axis];
-                low[k] += p.fast_min(q);
-                high[k] += p.fast_max(q);
+                let p = (f32x8::splat(simd, ends[0][axis]) - a[axis]) * n[axis];
+                let q = (f32x8::splat(simd, ends[1][axis]) - a[axis]) * n[axis];
+                low[k] += p.min(q);
+                high[k] += p.max(q);
             }
             slack += n[axis].abs();
         }
-        slack *= f32x8::splat(self.slack);
-        let below = high[0].fast_max(high[1]).simd_lt(-slack);
-        let above = low[0].fast_min(low[1]).simd_gt(slack);
-        !(below | above).to_bitmask() & ((1 << block.count) - 1)
+        slack *= self.slack;
+        let below = high[0].max(high[1]).simd_lt(-slack);
+        let above = low[0].min(low[1]).simd_gt(slack);
+        !((below | above).to_bitmask() as u32) & ((1 << block.count) - 1)
     }
 }

@@ -8,8 +8,8 @@
 
 use super::clip::HalfSpace;
 use super::segment::NO_PLANE;
+use fearless_simd::{Level, dispatch, f64x8, prelude::*};
 use glam::DVec3;
-use wide::f64x8;
 
 /// A convex end of a shaft, in the space of the index.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -172,20 +172,23 @@ impl Shaft {
             shaft.add(front);
         }
         let size = (shaft.high - shaft.low).length();
-        shaft.add_sides(&sa, &sb, size);
-        shaft.add_sides(&sb, &sa, size);
+        dispatch!(Level::new(), simd => {
+            shaft.add_sides(simd, &sa, &sb, size);
+            shaft.add_sides(simd, &sb, &sa, size);
+        });
         shaft
     }
 
     /// Sides through an edge of one patch and a corner of the other, eight corners at a time: a plane counts when all corners are on one
     /// side of it, up to roundings, and is moved out to the farthest of them.
-    fn add_sides(&mut self, edges: &Shape, corners: &Shape, size: f64) {
-        let lane = |axis: usize| f64x8::new(corners.corners.map(|corner| corner[axis]));
+    #[inline(always)]
+    fn add_sides<S: Simd>(&mut self, simd: S, edges: &Shape, corners: &Shape, size: f64) {
+        let lane = |axis: usize| f64x8::from_fn(simd, |k| corners.corners[k][axis]);
         let points = [lane(0), lane(1), lane(2)];
         for &[p, q] in edges.edges {
             let (p, q) = (edges.corners[p], edges.corners[q]);
-            let edge = splat(q - p);
-            let start = splat(p);
+            let edge = splat(simd, q - p);
+            let start = splat(simd, p);
             let r = [
                 points[0] - start[0],
                 points[1] - start[1],
@@ -197,15 +200,14 @@ impl Shaft {
                 edge[0] * r[1] - edge[1] * r[0],
             ];
             let square = dot(normal, normal);
-            let some =
-                square.simd_gt(dot(edge, edge) * dot(r, r) * f64x8::splat(PARALLEL * PARALLEL));
+            let some = square.simd_gt(dot(edge, edge) * dot(r, r) * (PARALLEL * PARALLEL));
             let length = square.sqrt();
-            let slack = length * f64x8::splat(PARALLEL * size);
-            let (mut least, mut most) = (f64x8::ZERO, f64x8::ZERO);
+            let slack = length * (PARALLEL * size);
+            let (mut least, mut most) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, 0.0));
             for &corner in &self.corners[..self.corner_count] {
-                let d = dot(normal, splat(corner - p));
-                least = least.fast_min(d);
-                most = most.fast_max(d);
+                let d = dot(normal, splat(simd, corner - p));
+                least = least.min(d);
+                most = most.max(d);
             }
             let outward = (most.simd_le(slack) & some).to_bitmask();
             let inward = (least.simd_ge(-slack) & some).to_bitmask() & !outward;
@@ -213,7 +215,7 @@ impl Shaft {
             while found != 0 {
                 let k = found.trailing_zeros() as usize;
                 found &= found - 1;
-                let pick = |x: &f64x8| x.as_array()[k] / length.as_array()[k];
+                let pick = |x: &f64x8<S>| x[k] / length[k];
                 let normal = DVec3::new(pick(&normal[0]), pick(&normal[1]), pick(&normal[2]));
                 let at = normal.dot(p);
                 self.add(if outward >> k & 1 == 1 {
@@ -280,14 +282,15 @@ impl Shaft {
         if least >= -gap || most <= gap {
             return false;
         }
-        crossed == 0 || self.clipped_holds(triangle, gap)
+        crossed == 0 || dispatch!(Level::new(), simd => self.clipped_holds(simd, triangle, gap))
     }
 
     /// The last step of [`Self::holds`]: is something left of a triangle when all sides have clipped it?
-    pub(super) fn clipped_holds(&self, triangle: &[DVec3; 3], gap: f64) -> bool {
+    #[inline(always)]
+    pub(super) fn clipped_holds<S: Simd>(&self, simd: S, triangle: &[DVec3; 3], gap: f64) -> bool {
         let mut outline = ConvexOutline::new(triangle);
         for side in self.sides() {
-            match outline.clip(side, gap) {
+            match outline.clip(simd, side, gap) {
                 Left::Nothing => return false,
                 Left::Some => {}
                 Left::TooMany => return true,
@@ -298,12 +301,16 @@ impl Shaft {
 }
 
 #[inline(always)]
-pub(super) fn splat(p: DVec3) -> [f64x8; 3] {
-    [f64x8::splat(p.x), f64x8::splat(p.y), f64x8::splat(p.z)]
+pub(super) fn splat<S: Simd>(simd: S, p: DVec3) -> [f64x8<S>; 3] {
+    [
+        f64x8::splat(simd, p.x),
+        f64x8::splat(simd, p.y),
+        f64x8::splat(simd, p.z),
+    ]
 }
 
 #[inline(always)]
-pub(super) fn dot(a: [f64x8; 3], b: [f64x8; 3]) -> f64x8 {
+pub(super) fn dot<S: Simd>(a: [f64x8<S>; 3], b: [f64x8<S>; 3]) -> f64x8<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -344,13 +351,13 @@ impl ConvexOutline {
     }
 
     /// Keeps what is deeper than `gap` inside.
-    #[inline]
-    fn clip(&mut self, side: &HalfSpace, gap: f64) -> Left {
-        let [x, y, z] = &self.corners;
-        let points = [f64x8::new(*x), f64x8::new(*y), f64x8::new(*z)];
-        let depth = dot(points, splat(side.normal)) - f64x8::splat(side.offset - gap);
+    #[inline(always)]
+    fn clip<S: Simd>(&mut self, simd: S, side: &HalfSpace, gap: f64) -> Left {
+        let load = |axis: usize| f64x8::load_array_ref(simd, &self.corners[axis]);
+        let points = [load(0), load(1), load(2)];
+        let depth = dot(points, splat(simd, side.normal)) - (side.offset - gap);
         let all = (1 << self.count) - 1;
-        let inside = depth.simd_lt(f64x8::ZERO).to_bitmask() & all;
+        let inside = depth.simd_lt(0.0).to_bitmask() & all;
         if inside == all {
             return Left::Some;
         }

@@ -6,13 +6,15 @@
 //! A corner gets the same plane point whichever triangle asks, and a difference of two rounded products never has the
 //! wrong sign, only zero; zero counts as inside. So no line slips through between two triangles that share an edge.
 //! For that reason no multiply-add is contracted here, and one body of arithmetic serves one triangle, eight triangles
-//! against one segment, and sixteen segments against one triangle: all three give the same bits.
+//! against one segment, and sixteen segments against one triangle: all three give the same bits, whatever vectors the processor has.
 //!
 //! Both faces of a triangle block. A line in the plane of a triangle does not hit it.
 
+use super::vectors::Octet;
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, f32x16, u32x8, u32x16};
 use glam::Vec3;
 use std::ops::{Add, Mul, Sub};
-use wide::{f32x8, f32x16};
 
 /// Number of triangles in a block.
 pub(crate) const BLOCK: usize = 8;
@@ -139,61 +141,73 @@ impl Shear {
 
     /// The eight sets of edge functions.
     #[inline(always)]
-    pub(crate) fn block_edges(&self, block: &Block) -> Edges<f32x8> {
+    pub(crate) fn block_edges<S: Simd>(&self, simd: S, block: &Block) -> Edges<f32x8<S>> {
         let [x, y, z] = self.axes;
         let [a, b, c] = &block.corners;
+        let load = |lanes: &Octet| lanes.load(simd);
         edges(
-            [[a[x], a[y], a[z]], [b[x], b[y], b[z]], [c[x], c[y], c[z]]],
-            splat8(self.origin),
-            splat8(self.slope),
+            [
+                [load(&a[x]), load(&a[y]), load(&a[z])],
+                [load(&b[x]), load(&b[y]), load(&b[z])],
+                [load(&c[x]), load(&c[y]), load(&c[z])],
+            ],
+            splat8(simd, self.origin),
+            splat8(simd, self.slope),
         )
     }
 
     /// Which of the eight are met within the range.
     #[inline(always)]
-    pub(crate) fn compare(&self, e: &Edges<f32x8>) -> u32 {
-        let low = e.u.fast_min(e.v).fast_min(e.w);
-        let high = e.u.fast_max(e.v).fast_max(e.w);
-        let zero = f32x8::ZERO;
+    pub(crate) fn compare<S: Simd>(&self, e: &Edges<f32x8<S>>) -> u32 {
+        let low = e.u.min(e.v).min(e.w);
+        let high = e.u.max(e.v).max(e.w);
         let size = e.det.abs();
-        let height = e.height ^ (e.det & f32x8::splat(-0.0));
-        ((low.simd_ge(zero) | high.simd_le(zero))
-            & height.simd_gt(size * f32x8::splat(self.range[0]))
-            & height.simd_lt(size * f32x8::splat(self.range[1])))
-        .to_bitmask()
+        let sign = e.det.to_bits() & u32x8::splat(e.det.simd, SIGN);
+        let height = f32x8::from_bits(e.height.to_bits() ^ sign);
+        ((low.simd_ge(0.0) | high.simd_le(0.0))
+            & height.simd_gt(size * self.range[0])
+            & height.simd_lt(size * self.range[1]))
+        .to_bitmask() as u32
     }
 }
 
+/// The sign bit of an f32.
+const SIGN: u32 = 1 << 31;
+
 #[inline(always)]
-fn splat8([x, y, z]: [f32; 3]) -> [f32x8; 3] {
-    [f32x8::splat(x), f32x8::splat(y), f32x8::splat(z)]
+fn splat8<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
+    [
+        f32x8::splat(simd, x),
+        f32x8::splat(simd, y),
+        f32x8::splat(simd, z),
+    ]
 }
 
 /// Sixteen lines against one triangle, in the turned axes of each line.
 #[inline(always)]
-pub(crate) fn meet_lines(
-    corners: [[f32x16; 3]; 3],
-    origin: [f32x16; 3],
-    slope: [f32x16; 3],
-    range: [f32x16; 2],
-) -> (u32, Edges<f32x16>) {
+pub(crate) fn meet_lines<S: Simd>(
+    corners: [[f32x16<S>; 3]; 3],
+    origin: [f32x16<S>; 3],
+    slope: [f32x16<S>; 3],
+    range: [f32x16<S>; 2],
+) -> (u32, Edges<f32x16<S>>) {
     let e = edges(corners, origin, slope);
-    let low = e.u.fast_min(e.v).fast_min(e.w);
-    let high = e.u.fast_max(e.v).fast_max(e.w);
-    let zero = f32x16::ZERO;
+    let low = e.u.min(e.v).min(e.w);
+    let high = e.u.max(e.v).max(e.w);
     let size = e.det.abs();
-    let height = e.height ^ (e.det & f32x16::splat(-0.0));
-    let met = (low.simd_ge(zero) | high.simd_le(zero))
+    let sign = e.det.to_bits() & u32x16::splat(e.det.simd, SIGN);
+    let height = f32x16::from_bits(e.height.to_bits() ^ sign);
+    let met = (low.simd_ge(0.0) | high.simd_le(0.0))
         & height.simd_gt(size * range[0])
         & height.simd_lt(size * range[1]);
-    (met.to_bitmask(), e)
+    (met.to_bitmask() as u32, e)
 }
 
 /// Up to eight triangles, coordinate by coordinate. Free places hold a triangle without area at the origin, which nothing meets.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
     /// `corners[k][axis]`, one lane for each triangle.
-    pub(crate) corners: [[f32x8; 3]; 3],
+    pub(crate) corners: [[Octet; 3]; 3],
     /// Id of the plane of each triangle.
     pub(crate) planes: [u32; BLOCK],
     /// Id of each triangle; free places repeat the first.
@@ -209,7 +223,7 @@ impl Block {
     pub(crate) fn new(triangles: impl Iterator<Item = (u32, [Vec3; 3], u32, bool)>) -> Self {
         let mut lanes = [[[0.0f32; BLOCK]; 3]; 3];
         let mut block = Self {
-            corners: [[f32x8::ZERO; 3]; 3],
+            corners: [[Octet([0.0; BLOCK]); 3]; 3],
             planes: [super::NO_PLANE; BLOCK],
             ids: [0; BLOCK],
             count: 0,
@@ -229,7 +243,7 @@ impl Block {
             block.count += 1;
             block.masked |= u32::from(masked) << lane;
         }
-        block.corners = lanes.map(|corner| corner.map(f32x8::new));
+        block.corners = lanes.map(|corner| corner.map(Octet));
         block
     }
 
@@ -242,18 +256,16 @@ impl Block {
 }
 
 #[inline(always)]
-fn pick(point: &[f32x8; 3], lane: usize) -> [f32; 3] {
-    [
-        point[0].as_array()[lane],
-        point[1].as_array()[lane],
-        point[2].as_array()[lane],
-    ]
+fn pick(point: &[Octet; 3], lane: usize) -> [f32; 3] {
+    [point[0].0[lane], point[1].0[lane], point[2].0[lane]]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
+    use crate::geometry::vectors::levels;
+    use fearless_simd::dispatch;
 
     fn point(random: &mut Pcg) -> Vec3 {
         Vec3::new(random.f32(), random.f32(), random.f32()) * 2.0 - 1.0
@@ -293,6 +305,13 @@ mod tests {
 
     #[test]
     fn one_eight_and_sixteen_at_a_time_agree() {
+        for level in levels() {
+            dispatch!(level, simd => all_agree(simd));
+        }
+    }
+
+    #[inline(always)]
+    fn all_agree<S: Simd>(simd: S) {
         let mut random = Pcg::new(7);
         for _ in 0..2_000 {
             let triangles: Vec<_> = (0..BLOCK as u32)
@@ -308,7 +327,7 @@ mod tests {
                     .enumerate()
                     .map(|(k, t)| u32::from(line.meet(t.1).is_some()) << k)
                     .sum::<u32>();
-                assert_eq!(line.compare(&line.block_edges(&block)), plain);
+                assert_eq!(line.compare(&line.block_edges(simd, &block)), plain);
             }
             for axis in 0..3 {
                 let same: Vec<_> = lines
@@ -319,15 +338,14 @@ mod tests {
                 if same.len() < PACKET {
                     continue;
                 }
-                let pick =
-                    |f: &dyn Fn(&Shear) -> f32| f32x16::new(std::array::from_fn(|k| f(same[k])));
+                let pick = |f: &dyn Fn(&Shear) -> f32| f32x16::from_fn(simd, |k| f(same[k]));
                 let origin = [0, 1, 2].map(|k| pick(&|l| l.origin[k]));
                 let slope = [0, 1, 2].map(|k| pick(&|l| l.slope[k]));
                 let range = [0, 1].map(|k| pick(&|l| l.range[k]));
                 for triangle in &triangles {
                     let corners = triangle
                         .1
-                        .map(|c| same[0].axes.map(|k| f32x16::splat(c[k])));
+                        .map(|c| same[0].axes.map(|k| f32x16::splat(simd, c[k])));
                     let (met, _) = meet_lines(corners, origin, slope, range);
                     for (k, line) in same.iter().enumerate() {
                         assert_eq!(met >> k & 1 == 1, line.meet(triangle.1).is_some());

@@ -1,17 +1,18 @@
 //! What every walk through the tree needs: one line against the eight boxes of a node, and a stack.
 
 use super::bvh::{BvhNode, WIDTH};
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
 use glam::Vec3;
-use wide::f32x8;
 
 /// Entries of a traversal's stack before it moves to the heap; a tree of a million triangles seldom needs as many.
 const STACK: usize = 64;
 
 /// A line prepared for boxes.
-pub(crate) struct Slabs {
+pub(crate) struct Slabs<S: Simd> {
     /// 1/d, and start/d.
-    inverse: [f32x8; 3],
-    offset: [f32x8; 3],
+    inverse: [f32x8<S>; 3],
+    offset: [f32x8<S>; 3],
     /// 1 where the line runs down its axis, so that its high side comes first.
     down: [usize; 3],
 }
@@ -29,22 +30,22 @@ fn safe_inverse(d: f32) -> f32 {
     }
 }
 
-impl Slabs {
+impl<S: Simd> Slabs<S> {
     #[inline(always)]
-    pub(crate) fn new(from: Vec3, direction: Vec3) -> Self {
+    pub(crate) fn new(simd: S, from: Vec3, direction: Vec3) -> Self {
         let inverse = [
             safe_inverse(direction.x),
             safe_inverse(direction.y),
             safe_inverse(direction.z),
         ];
         let mut slabs = Self {
-            inverse: [f32x8::ZERO; 3],
-            offset: [f32x8::ZERO; 3],
+            inverse: [f32x8::splat(simd, 0.0); 3],
+            offset: [f32x8::splat(simd, 0.0); 3],
             down: [0; 3],
         };
         for (axis, &x) in inverse.iter().enumerate() {
-            slabs.inverse[axis] = f32x8::splat(x);
-            slabs.offset[axis] = f32x8::splat(from[axis] * x);
+            slabs.inverse[axis] = f32x8::splat(simd, x);
+            slabs.offset[axis] = f32x8::splat(simd, from[axis] * x);
             slabs.down[axis] = usize::from(x < 0.0);
         }
         slabs
@@ -52,20 +53,20 @@ impl Slabs {
 
     /// Where the line enters the eight boxes, and a bit for each that it meets before `t_max`.
     #[inline(always)]
-    pub(crate) fn enter(&self, node: &BvhNode, t_max: f32) -> (f32x8, u32) {
-        let mut near = f32x8::ZERO;
-        let mut far = f32x8::splat(t_max);
+    pub(crate) fn enter(&self, node: &BvhNode, t_max: f32) -> (f32x8<S>, u32) {
+        let simd = self.inverse[0].simd;
+        let mut near = f32x8::splat(simd, 0.0);
+        let mut far = f32x8::splat(simd, t_max);
         for axis in 0..3 {
             let down = self.down[axis];
-            let first = node.bounds[down][axis].mul_sub(self.inverse[axis], self.offset[axis]);
-            let last = node.bounds[1 - down][axis].mul_sub(self.inverse[axis], self.offset[axis]);
-            near = near.fast_max(first);
-            far = far.fast_min(last);
+            let side = |k: usize| node.bounds[k][axis].load(simd);
+            let first = side(down).mul_sub(self.inverse[axis], self.offset[axis]);
+            let last = side(1 - down).mul_sub(self.inverse[axis], self.offset[axis]);
+            near = near.max(first);
+            far = far.min(last);
         }
-        (
-            near,
-            near.simd_le(far).to_bitmask() & ((1 << node.count) - 1),
-        )
+        let met = near.simd_le(far).to_bitmask() as u32;
+        (near, met & ((1 << node.count) - 1))
     }
 }
 
@@ -108,9 +109,9 @@ impl<T: Copy> Stack<T> {
 
 /// Pushes the children that the line meets, the farthest first.
 #[inline(always)]
-pub(crate) fn push_by_distance(
+pub(crate) fn push_by_distance<S: Simd>(
     node: &BvhNode,
-    slabs: &Slabs,
+    slabs: &Slabs<S>,
     t_max: f32,
     stack: &mut Stack<(f32, u32)>,
 ) {

@@ -4,9 +4,9 @@
 //! the hierarchy to each.
 
 use crate::hierarchy::{Element, Mesh, Tree};
+use fearless_simd::{Level, dispatch, f64x8, prelude::*};
 use glam::DVec3;
 use std::ops::Range;
-use wide::f64x8;
 
 /// Parts of a lamp whose exitance differs by no more than this share emit alike: means of equal numbers differ by rounding.
 const ALIKE: f32 = 1e-5;
@@ -110,23 +110,33 @@ impl Fixtures {
         out: &mut Vec<f64>,
     ) -> f64 {
         let begin = out.len();
-        let [point, normal] = [point, normal].map(|p| p.to_array().map(f64x8::splat));
+        dispatch!(Level::new(), simd => self.push_factors(simd, faces, point, normal, out));
+        out[begin..].iter().sum()
+    }
+
+    #[inline(always)]
+    fn push_factors<S: Simd>(
+        &self,
+        simd: S,
+        faces: Range<usize>,
+        point: DVec3,
+        normal: DVec3,
+        out: &mut Vec<f64>,
+    ) {
         for first in faces.clone().step_by(8) {
             let count = (faces.end - first).min(8);
             let lanes = |column: usize| {
                 let mut lanes = [0.0; 8];
                 lanes[..count].copy_from_slice(&self.columns[column][first..first + count]);
-                f64x8::new(lanes)
+                f64x8::simd_from(simd, lanes)
             };
-            let way: [f64x8; 3] = std::array::from_fn(|c| lanes(c) - point[c]);
-            let dot = |a: [f64x8; 3]| a[0] * way[0] + a[1] * way[1] + a[2] * way[2];
-            let square = dot(way);
-            let here = dot(normal).fast_max(f64x8::ZERO);
-            let there = (-dot(std::array::from_fn(|c| lanes(3 + c)))).fast_max(f64x8::ZERO);
-            let factors = here * there / (square * square);
+            let way = [lanes(0) - point.x, lanes(1) - point.y, lanes(2) - point.z];
+            let square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
+            let here = way[0] * normal.x + way[1] * normal.y + way[2] * normal.z;
+            let there = lanes(3) * way[0] + lanes(4) * way[1] + lanes(5) * way[2];
+            let factors = here.max(0.0) * (-there).max(0.0) / (square * square);
             out.extend_from_slice(&factors.to_array()[..count]);
         }
-        out[begin..].iter().sum()
     }
 
     /// Bytes held.

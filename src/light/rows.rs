@@ -85,22 +85,6 @@ impl Rows {
             .par_chunks_mut(rows * self.width)
     }
 
-    /// All rows as vectors V, N to a row. V and N must make up the width; rows start on multiples of V's size.
-    pub(crate) fn vectors<V: Pod, const N: usize>(&self) -> &[[V; N]] {
-        debug_assert_eq!(size_of::<[V; N]>(), self.width * size_of::<f32>());
-        &bytemuck::cast_slice::<Line, V>(&self.lines)
-            .as_chunks::<N>()
-            .0[..self.rows]
-    }
-
-    /// All rows as vectors V, N to a row.
-    pub(crate) fn vectors_mut<V: Pod, const N: usize>(&mut self) -> &mut [[V; N]] {
-        debug_assert_eq!(size_of::<[V; N]>(), self.width * size_of::<f32>());
-        &mut bytemuck::cast_slice_mut::<Line, V>(&mut self.lines)
-            .as_chunks_mut::<N>()
-            .0[..self.rows]
-    }
-
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.lines.len() * size_of::<Line>()

@@ -7,9 +7,10 @@
 
 use crate::geometry::lanes::{angle_over_sine, dot, sub};
 use crate::geometry::polygon::edges;
+use crate::geometry::vectors::{atan, ln, only, sum};
+use fearless_simd::{Level, dispatch, f64x8, prelude::*};
 use glam::DVec3;
 use std::f64::consts::TAU;
-use wide::f64x8;
 
 /// Points and weights of the 6-point Gauss-Legendre rule on [0, 1] (Abramowitz and Stegun 1964, table 25.4).
 const GAUSS: [(f64, f64); 6] = [
@@ -166,11 +167,11 @@ impl<const N: usize> Eight<N> {
     }
 
     /// The columns; the next rows start afresh.
-    fn take(&mut self) -> [f64x8; N] {
+    fn take(&mut self) -> &[[f64; 8]; N] {
         // The first column holds the weights.
         self.columns[0][self.count..].fill(0.0);
         self.count = 0;
-        self.columns.map(f64x8::new)
+        &self.columns
     }
 }
 
@@ -178,36 +179,51 @@ impl<const N: usize> Eight<N> {
 ///
 /// With x at height h over the line and its foot at u from r, the mean over the length L is
 /// `((L - u) ln |s - x| + u ln |r - x| + h angle) / L - 1`, where x sees the edge under the angle.
-fn means([weight, x, y, z, rx, ry, rz, sx, sy, sz]: [f64x8; 10]) -> f64 {
-    let (point, from, to) = ([x, y, z], [rx, ry, rz], [sx, sy, sz]);
+fn means(rows: &[[f64; 8]; 10]) -> f64 {
+    dispatch!(Level::new(), simd => means_of(simd, rows))
+}
+
+#[inline(always)]
+fn means_of<S: Simd>(simd: S, rows: &[[f64; 8]; 10]) -> f64 {
+    let column = |k: usize| f64x8::load_array_ref(simd, &rows[k]);
+    let three = |k: usize| [column(k), column(k + 1), column(k + 2)];
+    let (weight, point, from, to) = (column(0), three(1), three(4), three(7));
     let (edge, before, behind) = (sub(to, from), sub(point, from), sub(point, to));
     let square = dot(edge, edge);
-    let over = f64x8::ONE / square.fast_max(f64x8::splat(LEAST));
+    let one = f64x8::splat(simd, 1.0);
+    let over = one / square.max(LEAST);
     let u = dot(before, edge) * over;
-    let foot = sub(before, edge.map(|e| u * e));
+    let foot = sub(before, [u * edge[0], u * edge[1], u * edge[2]]);
     let (near, far) = (dot(before, before), dot(behind, behind));
-    let rest = f64x8::ONE - u;
-    let logs = rest * ln(far) + u * ln(near);
+    let rest = one - u;
+    let logs = rest * ln(far.max(LEAST)) + u * ln(near.max(LEAST));
     // In units of the edge's length; the angle's sine is proportional to h.
     let hh = dot(foot, foot) * over;
     let size = (near * far).sqrt() * over;
-    let over_sine = angle_over_sine(hh - u * rest, size, || hh.sqrt());
-    let angle = (hh * over_sine) & hh.simd_gt(f64x8::ZERO);
-    let mean = f64x8::HALF * logs + angle - f64x8::ONE;
-    ((weight * mean) & square.simd_gt(f64x8::ZERO)).reduce_add()
-}
-
-fn ln(x: f64x8) -> f64x8 {
-    x.fast_max(f64x8::splat(LEAST)).ln()
+    let over_sine = angle_over_sine(
+        hh - u * rest,
+        size,
+        #[inline(always)]
+        || hh.sqrt(),
+    );
+    let angle = only(hh.simd_gt(0.0), hh * over_sine);
+    let mean = logs * 0.5 + angle - one;
+    sum(only(square.simd_gt(0.0), weight * mean))
 }
 
 /// Sum of weighted second primitives: functions of u whose second derivative is `ln sqrt(u^2 + h^2)`.
-fn second_primitives([weight, u, h]: [f64x8; 3]) -> f64 {
+fn second_primitives(rows: &[[f64; 8]; 3]) -> f64 {
+    dispatch!(Level::new(), simd => second_primitives_of(simd, rows))
+}
+
+#[inline(always)]
+fn second_primitives_of<S: Simd>(simd: S, rows: &[[f64; 8]; 3]) -> f64 {
+    let column = |k: usize| f64x8::load_array_ref(simd, &rows[k]);
+    let (weight, u, h) = (column(0), column(1), column(2));
     let (uu, hh) = (u * u, h * h);
-    let angle = (u / h).atan() & h.simd_gt(f64x8::ZERO);
-    let value =
-        f64x8::splat(0.25) * (uu - hh) * ln(uu + hh) - f64x8::splat(0.75) * uu + h * u * angle;
-    (weight * value).reduce_add()
+    let angle = only(h.simd_gt(0.0), atan(u / h));
+    let logs = (uu - hh) * 0.25 * ln((uu + hh).max(LEAST));
+    sum(weight * (logs - uu * 0.75 + h * u * angle))
 }
 
 /// The part of `polygon` in front of the plane of `other`.
@@ -275,6 +291,7 @@ mod arrayvec {
 mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
+    use crate::geometry::vectors::levels;
 
     fn squares(a: [DVec3; 4], b: [DVec3; 4]) -> f64 {
         let halves = |q: [DVec3; 4]| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]];
@@ -348,6 +365,22 @@ mod tests {
             let lost = 1e-14 * most / scale.min(1.0);
             let got = sum.total();
             assert!((got - plain).abs() < lost, "{got} {plain} at {scale}");
+        }
+        // Whatever the processor.
+        let rows = std::array::from_fn(|_| std::array::from_fn(|_| random.f64()));
+        let sums = |level| {
+            let of_edges = dispatch!(level, simd => means_of(simd, &rows));
+            let rows = [rows[0], rows[1], rows[2]];
+            [
+                of_edges,
+                dispatch!(level, simd => second_primitives_of(simd, &rows)),
+            ]
+        };
+        for (sum, plain) in levels()
+            .into_iter()
+            .flat_map(|level| sums(level).into_iter().zip(sums(Level::new())))
+        {
+            assert!((sum - plain).abs() < 1e-13, "{sum} {plain}");
         }
         // On the edge, at its end, beyond it; and an edge that is a point.
         let (o, e) = (DVec3::ZERO, DVec3::X);

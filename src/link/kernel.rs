@@ -7,7 +7,7 @@
 use super::contour::exchange;
 use super::visibility::{PIECES, Visibility, segment};
 use super::{Link, LinkContext, Occlusion};
-use crate::geometry::lanes::{all_lanes, lambert_x8, lanes_of};
+use crate::geometry::lanes::{Points8, lambert_x8, lanes_of};
 use crate::geometry::{Clipper, Segment, Shadow, nearest_point};
 use crate::hierarchy::{Node, Outline, Sample, Tree};
 use glam::DVec3;
@@ -115,32 +115,40 @@ pub fn point_factors(
     }
     out.resize(points.len(), 0.0);
     for (points, sums) in points.chunks(8).zip(out.chunks_mut(8)) {
+        let points = EightPoints::new(points);
         for (corners, entry) in polygons(tree, node) {
-            add_factors(tree, points, &corners, entry, sums);
+            points.add_factors(tree, &corners, entry, sums);
         }
     }
 }
 
-/// Adds the factors of up to eight points to a face, except where they are behind it or in its plane.
-fn add_factors(
-    tree: &Tree,
-    points: &[Sample],
-    corners: &[DVec3; 3],
-    entry: usize,
-    sums: &mut [f64],
-) {
-    let sees = |s: &Sample| in_front_of(tree, corners, entry, s.point, s.plane);
-    if !points.iter().any(sees) {
-        return;
+/// Up to eight points, also as lanes.
+struct EightPoints<'a> {
+    points: &'a [Sample],
+    at: Points8,
+    normals: Points8,
+}
+
+impl<'a> EightPoints<'a> {
+    fn new(points: &'a [Sample]) -> Self {
+        Self {
+            points,
+            at: lanes_of(points.iter().map(|s| s.point)),
+            normals: lanes_of(points.iter().map(|s| s.normal)),
+        }
     }
-    let factors = lambert_x8(
-        lanes_of(points.iter().map(|s| s.point)),
-        lanes_of(points.iter().map(|s| s.normal)),
-        corners.map(all_lanes),
-    );
-    for ((s, sum), f) in points.iter().zip(sums).zip(factors.to_array()) {
-        if sees(s) {
-            *sum += f;
+
+    /// Adds the factors to a face, except of points that are behind it or in its plane.
+    fn add_factors(&self, tree: &Tree, corners: &[DVec3; 3], entry: usize, sums: &mut [f64]) {
+        let sees = |s: &Sample| in_front_of(tree, corners, entry, s.point, s.plane);
+        if !self.points.iter().any(sees) {
+            return;
+        }
+        let factors = lambert_x8(&self.at, &self.normals, corners);
+        for ((s, sum), f) in self.points.iter().zip(sums).zip(factors) {
+            if sees(s) {
+                *sum += f;
+            }
         }
     }
 }
@@ -431,10 +439,11 @@ fn clipped_visibility(
 ) -> Option<f64> {
     let tree = room.tree;
     tree.samples(s, POINTS, shift, &mut scratch.a);
+    let points = EightPoints::new(&scratch.a);
     let (mut seen, mut total) = (0.0, 0.0);
     for (corners, entry) in polygons(tree, tree.node(t)) {
         let mut open = [0.0; POINTS];
-        add_factors(tree, &scratch.a, &corners, entry, &mut open);
+        points.add_factors(tree, &corners, entry, &mut open);
         let plane = tree.face_plane[entry];
         let mut known = None;
         for (p, &open) in scratch.a.iter().zip(&open) {

@@ -14,12 +14,12 @@
 //! With slopes the rows of leaves sum to their targets within a few per cent, without them within 20 near edges; each row
 //! is scaled to make up the rest. At last each lane is scaled so that all light that is sent arrives.
 
-use super::operator::{Vector, add, pull, scaled};
+use super::operator::{Vector, add, load, pull, scaled, store};
 use crate::hierarchy::{NONE, Node, Sample, Tree};
 use crate::light::rows::Rows;
 use crate::link::{LinkRows, Scratch, point_factors};
+use fearless_simd::{Level, dispatch, f32x4, f32x8, f32x16, prelude::*};
 use rayon::prelude::*;
-use wide::{f32x4, f32x8, f32x16};
 
 /// Passes: the second includes the light that the first found. More change points of a white cube by less than .02 %.
 pub(super) const PASSES: usize = 2;
@@ -157,40 +157,59 @@ impl<'a> Slopes<'a> {
 
     fn unscaled<const L: usize>(&self, radiosity: &Rows) -> Rows {
         let mut out = Rows::zero(self.leaves.len(), L);
-        match L {
-            4 => self.pass::<f32x4, 1>(radiosity, &mut out),
-            8 => self.pass::<f32x8, 1>(radiosity, &mut out),
-            16 => self.pass::<f32x16, 1>(radiosity, &mut out),
-            32 => self.pass::<f32x16, 2>(radiosity, &mut out),
-            _ => self.pass::<f32x16, 4>(radiosity, &mut out),
-        }
+        dispatch!(Level::new(), simd => match L {
+            4 => self.pass::<_, f32x4<_>, 4, 1>(simd, radiosity, &mut out),
+            8 => self.pass::<_, f32x8<_>, 8, 1>(simd, radiosity, &mut out),
+            16 => self.pass::<_, f32x16<_>, 16, 1>(simd, radiosity, &mut out),
+            32 => self.pass::<_, f32x16<_>, 32, 2>(simd, radiosity, &mut out),
+            _ => self.pass::<_, f32x16<_>, 64, 4>(simd, radiosity, &mut out),
+        });
         out
     }
 
     /// Pull, gather over the links, push, with slopes.
-    fn pass<V: Vector, const N: usize>(&self, radiosity: &Rows, out: &mut Rows) {
+    #[inline(always)]
+    fn pass<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+        &self,
+        simd: S,
+        radiosity: &Rows,
+        out: &mut Rows,
+    ) {
         let tree = self.tree;
-        let width = radiosity.width();
-        let mut means = Rows::zero(tree.nodes.len(), width);
-        let rows = means.vectors_mut::<V, N>();
-        for (row, &leaf) in radiosity.vectors::<V, N>().iter().zip(self.leaves) {
+        let mut means = Rows::zero(tree.nodes.len(), L);
+        let rows = means.all_mut::<L>();
+        for (row, &leaf) in radiosity.all::<L>().iter().zip(self.leaves) {
             rows[leaf as usize] = *row;
         }
-        pull(tree, self.areas, rows);
-        let means: &[[V; N]] = rows;
-        let mut even = Rows::zero(tree.nodes.len(), width);
-        let even = even.vectors_mut::<V, N>();
+        pull::<S, V, L>(simd, tree, self.areas, rows);
+        let means: &[[f32; L]] = rows;
+        let mut even = Rows::zero(tree.nodes.len(), L);
+        let even = even.all_mut::<L>();
         even.par_chunks_mut(CHUNK)
             .enumerate()
             .for_each(|(chunk, rows)| {
-                for (k, row) in rows.iter_mut().enumerate() {
-                    *row = self.even(chunk * CHUNK + k, means);
-                }
+                simd.vectorize(
+                    #[inline(always)]
+                    || {
+                        for (k, row) in rows.iter_mut().enumerate() {
+                            let sum = self.even::<S, V, L, N>(simd, chunk * CHUNK + k, means);
+                            store(&sum, row);
+                        }
+                    },
+                );
             });
         let mut slope: Vec<[[V; N]; 3]> = (self.inner.par_chunks(CHUNK))
-            .flat_map_iter(|some| some.iter().map(|&node| self.slope(node as usize, means)))
+            .flat_map_iter(|some| {
+                simd.vectorize(
+                    #[inline(always)]
+                    || {
+                        let slope = |&node: &u32| self.slope::<S, V, L, N>(simd, node, means);
+                        some.iter().map(slope).collect::<Vec<_>>()
+                    },
+                )
+            })
             .collect();
-        let out = out.vectors_mut::<V, N>();
+        let out = out.all_mut::<L>();
         for (k, node) in tree.nodes.iter().enumerate() {
             let place = self.place[k] as usize;
             let above = even[k];
@@ -200,15 +219,16 @@ impl<'a> Slopes<'a> {
             }
             let from = (node.element != NONE).then(|| slope[place]);
             for (part, child) in node.child_range().map(|c| c as usize).enumerate() {
-                add(&mut even[child], 1.0, &above);
-                let Some(from) = &from else { continue };
-                if let Some(corner) = from.get(part) {
-                    add(&mut even[child], 1.0, corner);
+                let mut sum: [V; N] = load(simd, &even[child]);
+                add(&mut sum, 1.0, &above);
+                if let Some(corner) = from.as_ref().and_then(|from| from.get(part)) {
+                    tilt(&mut sum, 1.0, corner);
                 }
-                if !tree.nodes[child].is_leaf() {
+                store(&sum, &mut even[child]);
+                if let Some(from) = from.filter(|_| !tree.nodes[child].is_leaf()) {
                     let turn = if part < 3 { 0.5 } else { -0.5 };
-                    for (to, from) in slope[self.place[child] as usize].iter_mut().zip(from) {
-                        add(to, turn, from);
+                    for (to, from) in slope[self.place[child] as usize].iter_mut().zip(&from) {
+                        tilt(to, turn, from);
                     }
                 }
             }
@@ -216,8 +236,14 @@ impl<'a> Slopes<'a> {
     }
 
     /// Mean irradiance that the links of a node bring.
-    fn even<V: Vector, const N: usize>(&self, node: usize, means: &[[V; N]]) -> [V; N] {
-        let mut sum = [V::zeroed(); N];
+    #[inline(always)]
+    fn even<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+        &self,
+        simd: S,
+        node: usize,
+        means: &[[f32; L]],
+    ) -> [V; N] {
+        let mut sum = [V::splat(simd, 0.0); N];
         for (&(source, exchange), shares) in self.row(node) {
             add(&mut sum, exchange, &means[source as usize]);
             if shares.source != [0; 2] {
@@ -231,22 +257,37 @@ impl<'a> Slopes<'a> {
     }
 
     /// By how much the irradiance at its corners differs from that mean.
-    fn slope<V: Vector, const N: usize>(&self, node: usize, means: &[[V; N]]) -> [[V; N]; 3] {
-        let mut sums = [[V::zeroed(); N]; 3];
-        for (&(source, exchange), shares) in self.row(node) {
+    #[inline(always)]
+    fn slope<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+        &self,
+        simd: S,
+        node: u32,
+        means: &[[f32; L]],
+    ) -> [[V; N]; 3] {
+        let mut sums = [[V::splat(simd, 0.0); N]; 3];
+        for (&(source, exchange), shares) in self.row(node as usize) {
             if shares.receiver != [0; 2] {
                 for (sum, s) in sums.iter_mut().zip(thirds(shares.receiver)) {
                     add(sum, exchange * s, &means[source as usize]);
                 }
             }
         }
-        let inverse = (1.0 / self.areas[node]) as f32;
-        sums.map(|sum| scaled(&sum, inverse))
+        let inverse = (1.0 / self.areas[node as usize]) as f32;
+        let [a, b, c] = &sums;
+        [scaled(a, inverse), scaled(b, inverse), scaled(c, inverse)]
     }
 
     fn row(&self, node: usize) -> impl Iterator<Item = (&(u32, f32), &CornerShares)> {
         let shares = &self.shares[self.links.range(node)];
         self.links.row(node).iter().zip(shares)
+    }
+}
+
+/// Adds a slope to a row.
+#[inline(always)]
+fn tilt<S: Simd, V: Vector<S>, const N: usize>(sum: &mut [V; N], factor: f32, slope: &[V; N]) {
+    for (s, x) in sum.iter_mut().zip(slope) {
+        *s += *x * factor;
     }
 }
 

@@ -5,15 +5,13 @@
 //! A gather waits for rows that lie anywhere in memory, so what counts is how many loads are under way at once: four
 //! sums go on side by side, none waiting for another, and everything else a pass touches is compact (`Shape` in place
 //! of the nodes). The links of a row are sorted by source. Vectors are explicit: from loops over arrays of 16 and 32
-//! lanes the compiler made scalar code, eight times as slow.
+//! lanes the compiler made scalar code, eight times as slow. A row of L lanes is N vectors V.
 
 use crate::hierarchy::{NONE, Tree};
 use crate::light::rows::Rows;
 use crate::link::LinkRows;
-use bytemuck::{Pod, Zeroable};
+use fearless_simd::{Level, dispatch, f32x4, f32x8, f32x16, prelude::*};
 use rayon::prelude::*;
-use std::ops::{Add, Mul};
-use wide::{f32x4, f32x8, f32x16};
 
 /// Nodes that a task gathers; fixed, so that results do not depend on the number of threads.
 const CHUNK: usize = 256;
@@ -127,48 +125,63 @@ impl<'a> Operator<'a> {
         gathered: &mut Rows,
         out: &mut Rows,
     ) {
-        // Lanes of a vector, vectors of a row. Every width sums in the same order, so that a lane has the same value in
-        // all.
-        match L {
-            4 => self.pass::<f32x4, 1>(radiosity, nodes, gathered, out),
-            8 => self.pass::<f32x8, 1>(radiosity, nodes, gathered, out),
-            16 => self.pass::<f32x16, 1>(radiosity, nodes, gathered, out),
-            32 => self.pass::<f32x16, 2>(radiosity, nodes, gathered, out),
-            _ => self.pass::<f32x16, 4>(radiosity, nodes, gathered, out),
-        }
+        // Lanes of a row, vectors of it. Every width sums in the same order, so that a lane has the same value in all.
+        dispatch!(Level::new(), simd => match L {
+            4 => self.pass::<_, f32x4<_>, 4, 1>(simd, radiosity, nodes, gathered, out),
+            8 => self.pass::<_, f32x8<_>, 8, 1>(simd, radiosity, nodes, gathered, out),
+            16 => self.pass::<_, f32x16<_>, 16, 1>(simd, radiosity, nodes, gathered, out),
+            32 => self.pass::<_, f32x16<_>, 32, 2>(simd, radiosity, nodes, gathered, out),
+            _ => self.pass::<_, f32x16<_>, 64, 4>(simd, radiosity, nodes, gathered, out),
+        });
     }
 
-    fn pass<V: Vector, const N: usize>(
+    #[inline(always)]
+    fn pass<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
         &self,
+        simd: S,
         radiosity: &Rows,
         nodes: &mut Rows,
         gathered: &mut Rows,
         out: &mut Rows,
     ) {
-        let mean = nodes.vectors_mut::<V, N>();
-        for (row, &leaf) in radiosity.vectors::<V, N>().iter().zip(self.leaves) {
-            mean[leaf as usize] = scaled(row, self.factor[leaf as usize]);
+        let mean = nodes.all_mut::<L>();
+        for (row, &leaf) in radiosity.all::<L>().iter().zip(self.leaves) {
+            let row: [V; N] = load(simd, row);
+            store(
+                &scaled(&row, self.factor[leaf as usize]),
+                &mut mean[leaf as usize],
+            );
         }
-        self.pull(mean);
-        let mean: &[[V; N]] = mean;
+        self.pull::<S, V, L, N>(simd, mean);
+        let mean: &[[f32; L]] = mean;
         gathered
-            .vectors_mut::<V, N>()
+            .all_mut::<L>()
             .par_chunks_mut(CHUNK)
             .enumerate()
             .for_each(|(chunk, rows)| {
-                for (k, row) in rows.iter_mut().enumerate() {
-                    let node = chunk * CHUNK + k;
-                    let sum = gather::<V, N>(self.links.row(node), mean);
-                    *row = scaled(&sum, self.shape.inverse[node]);
-                }
+                simd.vectorize(
+                    #[inline(always)]
+                    || {
+                        for (k, row) in rows.iter_mut().enumerate() {
+                            let node = chunk * CHUNK + k;
+                            let sum = gather::<S, V, L, N>(simd, self.links.row(node), mean);
+                            store(&scaled(&sum, self.shape.inverse[node]), row);
+                        }
+                    },
+                );
             });
-        self.push(gathered.vectors_mut::<V, N>(), out.vectors_mut::<V, N>());
+        self.push::<S, V, L, N>(simd, gathered.all_mut::<L>(), out.all_mut::<L>());
     }
 
     /// Area-weighted means from the leaves to the root.
-    fn pull<V: Vector, const N: usize>(&self, rows: &mut [[V; N]]) {
+    #[inline(always)]
+    fn pull<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+        &self,
+        simd: S,
+        rows: &mut [[f32; L]],
+    ) {
         for &[node, first, end] in self.shape.inner.iter().rev() {
-            let mut mean = [V::zeroed(); N];
+            let mut mean = [V::splat(simd, 0.0); N];
             let children = first as usize..end as usize;
             for (row, share) in rows[children.clone()]
                 .iter()
@@ -176,59 +189,97 @@ impl<'a> Operator<'a> {
             {
                 add(&mut mean, *share, row);
             }
-            rows[node as usize] = mean;
+            store(&mean, &mut rows[node as usize]);
         }
     }
 
     /// Adds what each node gathered to everything below it; the leaves' sums are balanced and written by leaf.
-    fn push<V: Vector, const N: usize>(&self, rows: &mut [[V; N]], out: &mut [[V; N]]) {
+    #[inline(always)]
+    fn push<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+        &self,
+        simd: S,
+        rows: &mut [[f32; L]],
+        out: &mut [[f32; L]],
+    ) {
         let shape = &self.shape;
         if shape.inner.is_empty()
             && let (Some(row), Some(to)) = (rows.first(), out.first_mut())
         {
-            *to = scaled(row, self.factor[0]);
+            let row: [V; N] = load(simd, row);
+            store(&scaled(&row, self.factor[0]), to);
         }
         for &[node, first, end] in &shape.inner {
             let above = rows[node as usize];
             let children = first as usize..end as usize;
             for (row, child) in rows[children.clone()].iter_mut().zip(children) {
-                add(row, 1.0, &above);
+                let mut sum: [V; N] = load(simd, row);
+                add(&mut sum, 1.0, &above);
+                store(&sum, row);
                 if shape.place[child] != NONE {
-                    out[shape.place[child] as usize] = scaled(row, self.factor[child]);
+                    let sum = scaled(&sum, self.factor[child]);
+                    store(&sum, &mut out[shape.place[child] as usize]);
                 }
             }
         }
     }
 }
 
-/// A vector of f32, or one.
-pub(crate) trait Vector:
-    Pod + Zeroable + Send + Sync + Add<Output = Self> + Mul<Output = Self> + From<f32>
-{
+/// A vector of f32.
+pub(crate) trait Vector<S: Simd>: SimdFloat<S, Element = f32> {}
+impl<S: Simd, V: SimdFloat<S, Element = f32>> Vector<S> for V {}
+
+/// A row as vectors.
+#[inline(always)]
+pub(super) fn load<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+    simd: S,
+    row: &[f32; L],
+) -> [V; N] {
+    let mut out = [V::splat(simd, 0.0); N];
+    for (to, x) in out.iter_mut().zip(row.chunks_exact(V::LEN)) {
+        *to = V::from_slice(simd, x);
+    }
+    out
 }
-impl Vector for f32 {}
-impl Vector for f32x4 {}
-impl Vector for f32x8 {}
-impl Vector for f32x16 {}
+
+/// Vectors as a row.
+#[inline(always)]
+pub(super) fn store<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+    from: &[V; N],
+    row: &mut [f32; L],
+) {
+    for (x, to) in from.iter().zip(row.chunks_exact_mut(V::LEN)) {
+        x.store_slice(to);
+    }
+}
 
 #[inline(always)]
-pub(super) fn scaled<V: Vector, const N: usize>(row: &[V; N], by: f32) -> [V; N] {
-    let by = V::from(by);
-    row.map(|x| x * by)
+pub(super) fn scaled<S: Simd, V: Vector<S>, const N: usize>(row: &[V; N], by: f32) -> [V; N] {
+    let mut out = *row;
+    for x in &mut out {
+        *x *= by;
+    }
+    out
 }
 
 #[inline(always)]
-pub(super) fn add<V: Vector, const N: usize>(sum: &mut [V; N], factor: f32, row: &[V; N]) {
-    let factor = V::from(factor);
-    for (s, x) in sum.iter_mut().zip(row) {
-        *s = *s + factor * *x;
+pub(super) fn add<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+    sum: &mut [V; N],
+    factor: f32,
+    row: &[f32; L],
+) {
+    for (s, x) in sum.iter_mut().zip(row.chunks_exact(V::LEN)) {
+        *s += V::from_slice(s.token(), x) * factor;
     }
 }
 
 /// `sum of exchange * row` over the links of a node, in several sums.
 #[inline(always)]
-fn gather<V: Vector, const N: usize>(links: &[(u32, f32)], rows: &[[V; N]]) -> [V; N] {
-    let mut sums = [[V::zeroed(); N]; SUMS];
+fn gather<S: Simd, V: Vector<S>, const L: usize, const N: usize>(
+    simd: S,
+    links: &[(u32, f32)],
+    rows: &[[f32; L]],
+) -> [V; N] {
+    let mut sums = [[V::splat(simd, 0.0); N]; SUMS];
     let (several, rest) = links.as_chunks::<SUMS>();
     for some in several {
         for (sum, &(source, exchange)) in sums.iter_mut().zip(some) {
@@ -240,22 +291,34 @@ fn gather<V: Vector, const N: usize>(links: &[(u32, f32)], rows: &[[V; N]]) -> [
     }
     let (first, others) = sums.split_at_mut(1);
     for other in others {
-        add(&mut first[0], 1.0, other);
+        for (s, x) in first[0].iter_mut().zip(other) {
+            *s += *x;
+        }
     }
     first[0]
 }
 
 /// Area-weighted means from the leaves to the root.
-pub(super) fn pull<V: Vector, const N: usize>(tree: &Tree, areas: &[f64], rows: &mut [[V; N]]) {
+#[inline(always)]
+pub(super) fn pull<S: Simd, V: Vector<S>, const L: usize>(
+    simd: S,
+    tree: &Tree,
+    areas: &[f64],
+    rows: &mut [[f32; L]],
+) {
     for (k, node) in tree.nodes.iter().enumerate().rev() {
         if node.is_leaf() {
             continue;
         }
-        let mut mean = [V::zeroed(); N];
-        for child in node.child_range().map(|c| c as usize) {
-            add(&mut mean, (areas[child] / areas[k]) as f32, &rows[child]);
+        let children = node.child_range().map(|c| c as usize);
+        for lanes in (0..L).step_by(V::LEN).map(|first| first..first + V::LEN) {
+            let mut mean = V::splat(simd, 0.0);
+            for child in children.clone() {
+                let share = (areas[child] / areas[k]) as f32;
+                mean += V::from_slice(simd, &rows[child][lanes.clone()]) * share;
+            }
+            mean.store_slice(&mut rows[k][lanes]);
         }
-        rows[k] = mean;
     }
 }
 

@@ -10,6 +10,7 @@ use crate::hierarchy::Tree;
 use crate::light::{Light, Rows};
 use crate::link::{Demand, Graph, LinkRows, MAX_DEPTH, Refined, RowBalance, balance};
 use crate::team::Interrupted;
+use fearless_simd::{Level, dispatch, f32x4};
 use rayon::prelude::*;
 
 /// Levels of leaves that a round splits where reflected light varies.
@@ -149,7 +150,10 @@ impl Refinement {
         for (row, &leaf) in by_leaf.all::<L>().iter().zip(leaves) {
             rows.all_mut::<L>()[leaf as usize] = *row;
         }
-        operator::pull::<f32, L>(&self.tree, &self.areas, rows.all_mut::<L>());
+        let all = rows.all_mut::<L>();
+        dispatch!(Level::new(), simd => {
+            operator::pull::<_, f32x4<_>, L>(simd, &self.tree, &self.areas, all);
+        });
         rows
     }
 }

@@ -114,7 +114,7 @@ mod tests {
                                 return 0.0;
                             }
                             let corners = [corners].into_iter();
-                            lambert_triangles_x8(point, to.normal, corners).to_array()[0]
+                            lambert_triangles_x8(point, to.normal, corners)[0]
                         })
                         .collect();
                     let whole: f64 = exact.iter().sum();

@@ -105,7 +105,7 @@ fn one_part(to: &Receiver, corners: [DVec3; 3], whole: f64, u: &mut f64) -> Part
 /// The quarters of a triangle with their factors for a point.
 fn quartered(to: &Receiver, corners: [DVec3; 3]) -> [Part; 4] {
     let four = quarters(corners);
-    let factors = lambert_triangles_x8(to.point, to.normal, four.into_iter()).to_array();
+    let factors = lambert_triangles_x8(to.point, to.normal, four.into_iter());
     std::array::from_fn(|k| (four[k], factors[k]))
 }
 
@@ -427,7 +427,7 @@ impl Gatherer<'_> {
         let node = self.tree.node(id);
         let element = self.tree.element(node)?;
         let factors = lambert_triangles_x8(to.point, to.normal, [element.corners].into_iter());
-        let factor = factors.to_array()[0];
+        let factor = factors[0];
         let plane = self.tree.face_plane[element.face as usize];
         if factor <= 0.0 || plane == to.plane {
             return None;
@@ -513,7 +513,7 @@ mod tests {
     }
 
     fn factor(to: &Receiver, corners: [DVec3; 3]) -> f64 {
-        lambert_triangles_x8(to.point, to.normal, [corners].into_iter()).to_array()[0]
+        lambert_triangles_x8(to.point, to.normal, [corners].into_iter())[0]
     }
 
     #[test]

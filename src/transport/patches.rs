@@ -88,7 +88,7 @@ impl Gatherer<'_> {
             }
             let faces = &faces[..count];
             let triangles = faces.iter().map(|face| face.0);
-            let factors = lambert_triangles_x8(to.point, to.normal, triangles).to_array();
+            let factors = lambert_triangles_x8(to.point, to.normal, triangles);
             for ((_, owner), factor) in faces.iter().zip(factors) {
                 open[*owner].1 += factor;
             }

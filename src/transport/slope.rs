@@ -193,7 +193,7 @@ fn moment(
         return;
     }
     let parts = quarters(corners);
-    let factors = lambert_triangles_x8(to.point, to.normal, parts.into_iter()).to_array();
+    let factors = lambert_triangles_x8(to.point, to.normal, parts.into_iter());
     for ((corners, w), part) in parts.into_iter().zip(quarters(w)).zip(factors) {
         if part > 0.0 {
             moment(to, corners, w, part, limit, depth + 1, out);

@@ -27,10 +27,10 @@ use crate::spectrum::{
     BANDS, Bounded, CmfTree, Control, DyadicTree, Estimate, Interval, List, Metric, Moment,
     Partition, Path, Spectrum, control, represent,
 };
+use fearless_simd::{Level, dispatch, f32x8, f32x16, prelude::*};
 use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;
-use wide::{f32x8, f32x16};
 
 /// Rounds of which the fastest counts.
 const ROUNDS: usize = 15;
@@ -118,50 +118,72 @@ impl<'a, I: Interval> Work<'a, I> {
     }
 
     /// Products alone, and products with XYZ, of spectra that are already vectors.
-    fn vectors<V: SimdVector, const N: usize>(&self, blocks: &[RowCase<V, N>]) -> [f64; 2] {
+    fn vectors<S: Simd, V: SimdVector<S>, const N: usize>(
+        &self,
+        simd: S,
+        blocks: &[RowCase<V, N>],
+    ) -> [f64; 2] {
         let mut out = vec![blocks[0].spectrum; self.chart.reflectances.len()];
         let mut xyz = vec![[0.0; 3]; out.len()];
         let alone = self.time(|| {
-            for block in blocks {
-                products(&block.spectrum, &block.materials, &mut out);
-                black_box(&mut out);
-            }
+            simd.vectorize(
+                #[inline(always)]
+                || {
+                    for block in blocks {
+                        products(&block.spectrum, &block.materials, &mut out);
+                        black_box(&mut out);
+                    }
+                },
+            );
         });
         let both = self.time(|| {
-            for block in blocks {
-                products(&block.spectrum, &block.materials, &mut out);
-                tristimulus(black_box(&out), &block.weights, &mut xyz);
-                black_box(&mut xyz);
-            }
+            simd.vectorize(
+                #[inline(always)]
+                || {
+                    for block in blocks {
+                        products(&block.spectrum, &block.materials, &mut out);
+                        tristimulus(black_box(&out), &block.weights, &mut xyz);
+                        black_box(&mut xyz);
+                    }
+                },
+            );
         });
         [alone, both].map(|ns| ns * self.lists.len() as f64 / blocks.len() as f64)
     }
 
     /// The same with the 24 products of a block side by side.
-    fn columns(&self, blocks: &[ColumnCase]) -> [f64; 2] {
-        let mut out = vec![[f32x8::ZERO; SIDE]; BANDS];
+    fn columns<S: Simd>(&self, simd: S, blocks: &[ColumnCase<S>]) -> [f64; 2] {
+        let mut out = vec![[f32x8::splat(simd, 0.0); SIDE]; BANDS];
         let alone = self.time(|| {
-            for block in blocks {
-                column_products(
-                    &block.spectrum,
-                    &block.materials,
-                    &mut out[..block.spectrum.len()],
-                );
-                black_box(&mut out);
-            }
+            simd.vectorize(
+                #[inline(always)]
+                || {
+                    for block in blocks {
+                        let out = &mut out[..block.spectrum.len()];
+                        column_products(&block.spectrum, &block.materials, out);
+                        black_box(out);
+                    }
+                },
+            );
         });
         let both = self.time(|| {
-            for block in blocks {
-                let out = &mut out[..block.spectrum.len()];
-                column_products(&block.spectrum, &block.materials, out);
-                black_box(column_tristimulus(black_box(out), &block.weights));
-            }
+            simd.vectorize(
+                #[inline(always)]
+                || {
+                    for block in blocks {
+                        let out = &mut out[..block.spectrum.len()];
+                        column_products(&block.spectrum, &block.materials, out);
+                        let out = black_box(out);
+                        black_box(column_tristimulus(simd, out, &block.weights));
+                    }
+                },
+            );
         });
         [alone, both]
     }
 
     /// All lists as columns.
-    fn sides(&self) -> Vec<ColumnCase> {
+    fn sides<S: Simd>(&self, simd: S) -> Vec<ColumnCase<S>> {
         let cmf = &self.chart.cmf;
         let side = |(list, _): &(List<I>, _)| {
             let nodes: Vec<usize> = list
@@ -181,6 +203,7 @@ impl<'a, I: Interval> Work<'a, I> {
                 })
                 .collect();
             ColumnCase::new(
+                simd,
                 &values,
                 materials,
                 nodes.iter().map(|&n| *cmf.node(n)).collect(),
@@ -189,13 +212,14 @@ impl<'a, I: Interval> Work<'a, I> {
         self.lists.iter().map(side).collect()
     }
 
-    fn dense_sides(&self) -> Vec<ColumnCase> {
+    fn dense_sides<S: Simd>(&self, simd: S) -> Vec<ColumnCase<S>> {
         let cmf = self.chart.cmf.weights();
         let side = |s: &Spectrum| {
             let materials = (0..BANDS)
                 .map(|k| self.chart.reflectances.iter().map(|r| r[k]).collect())
                 .collect();
             ColumnCase::new(
+                simd,
                 s,
                 materials,
                 (0..BANDS)
@@ -207,8 +231,9 @@ impl<'a, I: Interval> Work<'a, I> {
     }
 
     /// The lists of at most `most` and more than `least` intervals, as vectors of their values.
-    fn blocks<V: SimdVector, const N: usize>(
+    fn blocks<S: Simd, V: SimdVector<S>, const N: usize>(
         &self,
+        simd: S,
         least: usize,
         most: usize,
     ) -> Vec<RowCase<V, N>> {
@@ -220,21 +245,21 @@ impl<'a, I: Interval> Work<'a, I> {
             let values: Vec<f32> = list.intervals().iter().map(|i| i.value() as f32).collect();
             let cut = list.partition();
             RowCase {
-                spectrum: row(&values),
+                spectrum: row(simd, &values),
                 materials: self
                     .start
                     .materials()
                     .iter()
-                    .map(|r| on_cut(r, cut))
+                    .map(|r| on_cut(simd, r, cut))
                     .collect(),
-                weights: std::array::from_fn(|a| weights_on(cut, &self.chart.cmf, a)),
+                weights: std::array::from_fn(|a| weights_on(simd, cut, &self.chart.cmf, a)),
             }
         })
         .collect()
     }
 
-    fn dense_blocks(&self) -> Vec<RowCase<f32x16, 4>> {
-        let narrow = |spectrum: &Spectrum| row(&spectrum.map(|v| v as f32));
+    fn dense_blocks<S: Simd>(&self, simd: S) -> Vec<RowCase<f32x16<S>, 4>> {
+        let narrow = |spectrum: &Spectrum| row(simd, &spectrum.map(|v| v as f32));
         let materials: Vec<_> = self.chart.reflectances.iter().map(narrow).collect();
         let weights = self.chart.cmf.weights().each_ref().map(narrow);
         self.dense
@@ -273,17 +298,16 @@ impl<'a, I: Interval> Work<'a, I> {
 const SIDE: usize = 3;
 
 /// A spectrum and all that it meets, on its cut, with the materials side by side.
-struct ColumnCase {
-    spectrum: Vec<f32x8>,
-    materials: Columns<f32x8, SIDE>,
-    weights: Vec<[f32x8; 3]>,
+struct ColumnCase<S: Simd> {
+    spectrum: Vec<f32x8<S>>,
+    materials: Columns<f32x8<S>, SIDE>,
+    weights: Vec<[f32x8<S>; 3]>,
 }
 
-impl ColumnCase {
-    fn new(values: &[f64], materials: Vec<Vec<f64>>, weights: Vec<[f64; 3]>) -> Self {
-        let splat = |v: f64| f32x8::splat(v as f32);
-        let lanes =
-            |all: &Vec<f64>| row::<f32x8, SIDE>(&all.iter().map(|v| *v as f32).collect::<Vec<_>>());
+impl<S: Simd> ColumnCase<S> {
+    fn new(simd: S, values: &[f64], materials: Vec<Vec<f64>>, weights: Vec<[f64; 3]>) -> Self {
+        let splat = |v: f64| f32x8::splat(simd, v as f32);
+        let lanes = |all: &Vec<f64>| row(simd, &all.iter().map(|v| *v as f32).collect::<Vec<_>>());
         Self {
             spectrum: values.iter().copied().map(splat).collect(),
             materials: materials.iter().map(lanes).collect(),
@@ -299,27 +323,27 @@ struct RowCase<V, const N: usize> {
     weights: [VectorRow<V, N>; 3],
 }
 
-fn on_cut<I: Interval, V: SimdVector, const N: usize>(
+fn on_cut<S: Simd, I: Interval, V: SimdVector<S>, const N: usize>(
+    simd: S,
     tree: &DyadicTree<I>,
     cut: Partition,
 ) -> VectorRow<V, N> {
     let list = List::new(tree, cut);
-    row(&list
-        .intervals()
-        .iter()
-        .map(|i| i.value() as f32)
-        .collect::<Vec<_>>())
+    let values: Vec<f32> = list.intervals().iter().map(|i| i.value() as f32).collect();
+    row(simd, &values)
 }
 
-fn weights_on<V: SimdVector, const N: usize>(
+fn weights_on<S: Simd, V: SimdVector<S>, const N: usize>(
+    simd: S,
     cut: Partition,
     cmf: &CmfTree,
     a: usize,
 ) -> VectorRow<V, N> {
-    row(&cut
+    let values: Vec<f32> = cut
         .iter()
         .map(|(first, len)| cmf.node(crate::spectrum::node(first, len))[a] as f32)
-        .collect::<Vec<_>>())
+        .collect();
+    row(simd, &values)
 }
 
 /// A row of the table.
@@ -340,9 +364,12 @@ pub fn measure(chart: &ColourChart) -> Vec<Stage> {
         black_box(WalkStart::<Estimate>::new(black_box(chart), &light));
         black_box(CmfTree::new(*black_box(chart.cmf.weights())));
     });
-    let dense = paper.vectors(&paper.dense_blocks());
+    let (dense, given) = dispatch!(Level::new(), simd => {
+        let dense = paper.vectors(simd, &paper.dense_blocks(simd));
+        (dense, paper.on_given_partitions(simd, dense))
+    });
     let mut stages = vec![stage("pre-processing", preparation, None)];
-    stages.extend(paper.on_given_partitions(dense));
+    stages.extend(given);
     stages.extend(paper.with_control(dense));
     let total = Some(dense[1]);
     let estimated = perceptual::<Moment>(chart, &light);
@@ -358,24 +385,24 @@ pub fn measure(chart: &ColourChart) -> Vec<Stage> {
 
 impl<I: Interval> Work<'_, I> {
     /// Products and XYZ of vectors whose cut is at hand, beside those of `dense`: products alone, and both.
-    fn on_given_partitions(&self, dense: [f64; 2]) -> [Stage; 5] {
+    fn on_given_partitions<S: Simd>(&self, simd: S, dense: [f64; 2]) -> [Stage; 5] {
         // Lists of up to 8 intervals run in 8 lanes, longer ones in 16; the mean is over all lists.
         let (short, long) = (
-            self.blocks::<f32x8, 1>(0, 8),
-            self.blocks::<f32x16, 1>(8, 16),
+            self.blocks::<S, f32x8<S>, 1>(simd, 0, 8),
+            self.blocks::<S, f32x16<S>, 1>(simd, 8, 16),
         );
         let share = |blocks: usize| blocks as f64 / (short.len() + long.len()) as f64;
         let (a, b) = (
-            self.vectors(&short),
+            self.vectors(simd, &short),
             if long.is_empty() {
                 [0.0; 2]
             } else {
-                self.vectors(&long)
+                self.vectors(simd, &long)
             },
         );
         let mixed = |k: usize| a[k] * share(short.len()) + b[k] * share(long.len());
-        let columns = self.columns(&self.sides());
-        let dense_columns = self.columns(&self.dense_sides());
+        let columns = self.columns(simd, &self.sides(simd));
+        let dense_columns = self.columns(simd, &self.dense_sides(simd));
         [
             stage("product on a given partition", mixed(0), Some(dense[0])),
             stage(
