@@ -210,7 +210,7 @@ mod tests {
         segments: &[Segment],
         list: &[u32],
     ) -> (Vec<u32>, Vec<Option<Hit>>) {
-        let opaque = |id: u32, u: f32, _: f32| u > 0.3 || id % 3 == 0;
+        let opaque = |id: u32, u: f32, _: f32| u > 0.3 || id.is_multiple_of(3);
         let (mut hidden, mut hits) = (Vec::new(), Vec::new());
         for group in segments.chunks(PACKET) {
             hidden.push(Packet::occluded(simd, index, group, &opaque));

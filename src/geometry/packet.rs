@@ -152,8 +152,9 @@ impl<S: Simd> Packet<S> {
         for (place, segment) in rows.iter_mut().zip(segments) {
             *place = row(simd, segment);
         }
-        let (from, to, planes) = columns(&rows);
-        let d = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
+        let [x, y, z, to_x, to_y, to_z, plane, other] = columns(&rows);
+        let from = [x, y, z];
+        let d = [to_x - x, to_y - y, to_z - z];
         let turn = Turn::of(d);
         let turned = turn.lanes(d);
         let one = f32x16::splat(simd, 1.0);
@@ -171,7 +172,7 @@ impl<S: Simd> Packet<S> {
             ],
             bundle: Bundle::of(&rows, &inverses, SIDE_SLACK * index.reach()),
             inverse: inverses,
-            planes,
+            planes: [plane.to_bits(), other.to_bits()],
             turn,
             open: (1 << count) - 1,
         })
@@ -406,7 +407,7 @@ fn row<S: Simd>(simd: S, s: &Segment) -> f32x8<S> {
 
 /// Starts, ends and planes of sixteen rows, side by side.
 #[inline(always)]
-fn columns<S: Simd>(rows: &[f32x8<S>; PACKET]) -> ([f32x16<S>; 3], [f32x16<S>; 3], [u32x16<S>; 2]) {
+fn columns<S: Simd>(rows: &[f32x8<S>; PACKET]) -> [f32x16<S>; 8] {
     let [a, b, c, d] = [
         squares(rows, 0),
         squares(rows, 4),
@@ -414,11 +415,16 @@ fn columns<S: Simd>(rows: &[f32x8<S>; PACKET]) -> ([f32x16<S>; 3], [f32x16<S>; 3
         squares(rows, 12),
     ];
     let column = |k: usize| a[k].combine(b[k]).combine(c[k].combine(d[k]));
-    (
-        [column(0), column(1), column(2)],
-        [column(3), column(4), column(5)],
-        [column(6).to_bits(), column(7).to_bits()],
-    )
+    [
+        column(0),
+        column(1),
+        column(2),
+        column(3),
+        column(4),
+        column(5),
+        column(6),
+        column(7),
+    ]
 }
 
 /// The eight columns of four rows from `first` on.

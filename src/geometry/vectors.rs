@@ -1,8 +1,8 @@
 //! What several files need of vectors beyond `fearless_simd`: how they lie in memory, and functions of f64.
 //!
 //! Code with vectors is generic over the instructions, `S: Simd`, and chosen by `dispatch!` where a query begins. All of it down to there is
-//! `#[inline(always)]`: a function of its own would be compiled for the oldest processor. Rounding differs only where a processor lacks
-//! fused multiply-add.
+//! `#[inline(always)]`: a function of its own would be compiled for the oldest processor, and call one for each operation. So would a closure
+//! with vectors that is given to an iterator; loops take their place. Rounding differs only where a processor lacks fused multiply-add.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, f64x8, u64x8};

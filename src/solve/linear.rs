@@ -203,8 +203,11 @@ impl<'a> Slopes<'a> {
                 simd.vectorize(
                     #[inline(always)]
                     || {
-                        let slope = |&node: &u32| self.slope::<S, V, L, N>(simd, node, means);
-                        some.iter().map(slope).collect::<Vec<_>>()
+                        let mut slopes = Vec::with_capacity(some.len());
+                        for &node in some {
+                            slopes.push(self.slope::<S, V, L, N>(simd, node, means));
+                        }
+                        slopes
                     },
                 )
             })

@@ -153,7 +153,7 @@ impl<'a, I: Interval> Work<'a, I> {
 
     /// The same with the 24 products of a block side by side.
     fn columns<S: Simd>(&self, simd: S, blocks: &[ColumnCase<S>]) -> [f64; 2] {
-        let mut out = vec![[f32x8::splat(simd, 0.0); SIDE]; BANDS];
+        let mut out = [[f32x8::splat(simd, 0.0); SIDE]; BANDS];
         let alone = self.time(|| {
             simd.vectorize(
                 #[inline(always)]
