@@ -4,6 +4,7 @@
 //! parts for a given sum are `n = c (A s^2)^(1/3)`, at least one, with the c at which `sum of A s^2 / n^2` is the allowed sum. An *estimate*.
 
 use super::grow::share;
+use super::more_vertices;
 use super::turns::SQUARE;
 use crate::solve::{Bake, GatherQuality, INTERPOLATION_SHARE};
 
@@ -22,7 +23,10 @@ impl Bake {
         let shares: Vec<f64> = growth.cells.all.iter().map(share).collect();
         let allowed = INTERPOLATION_SHARE * self.settings().error;
         let allowed = SQUARE * allowed * allowed * growth.seen_area();
-        let most = vertices.map_or(self.more_vertices(), |most| most.saturating_sub(used));
+        let most = match vertices {
+            Some(most) => most.saturating_sub(used),
+            None => more_vertices(used, self.settings().error),
+        };
         parts(&shares, allowed).min(cells + A_VERTEX * most)
     }
 }
