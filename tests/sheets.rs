@@ -484,7 +484,7 @@ fn wrong_sheets_are_refused_by_name() {
 /// What a path tracer finds on both sides of sheets, with colours, in the room of `scenes`.
 #[test]
 fn the_path_tracer_agrees() {
-    let bake = curtained(0.5);
+    let bake = curtained(0.7);
     let reference = PathReference::new(&bake, 150, 1 << 14, 3);
     let written = bake.baked(&|_, _| {});
     for report in [

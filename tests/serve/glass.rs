@@ -213,8 +213,7 @@ fn a_room_behind_panes_is_dimmed_as_it_is_baked() {
         &Change {
             side: json!({}),
             dimmed: Some(("lights", "sun")),
-            // At 1 illuminances are .5 % apart.
-            error: 0.7,
+            error: 1.0,
         },
     );
     assert!(off < 0.012, "{off}");
