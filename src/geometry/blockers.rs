@@ -9,9 +9,9 @@
 use super::bvh::{BvhNode, LEAF};
 use super::index::RayIndex;
 use super::segment::NO_PLANE;
-use super::shaft::{SIDES, Shaft, dot, splat};
+use super::shaft::{SIDES, Shaft, dot};
 use super::triangle::{BLOCK, Block};
-use super::vectors::Octet;
+use super::vectors::{Octet, splat};
 use super::walk::Stack;
 use fearless_simd::{Level, dispatch, f32x8, f64x8, prelude::*};
 use glam::{DVec3, Vec3};

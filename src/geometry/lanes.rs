@@ -4,7 +4,7 @@
 //! from where the outline goes down to where it comes up.
 
 use super::polygon::{IN_PLANE, lambert_polygon};
-use super::vectors::{only, sum};
+use super::vectors::{only, splat, sum};
 use fearless_simd::{Level, dispatch, f64x8, mask64x8, prelude::*};
 use glam::DVec3;
 
@@ -75,15 +75,6 @@ fn load<S: Simd>(simd: S, [x, y, z]: &Points8) -> Vectors<S> {
         f64x8::load_array_ref(simd, x),
         f64x8::load_array_ref(simd, y),
         f64x8::load_array_ref(simd, z),
-    ]
-}
-
-#[inline(always)]
-fn splat<S: Simd>(simd: S, point: DVec3) -> Vectors<S> {
-    [
-        f64x8::splat(simd, point.x),
-        f64x8::splat(simd, point.y),
-        f64x8::splat(simd, point.z),
     ]
 }
 

@@ -8,6 +8,7 @@
 
 use super::clip::HalfSpace;
 use super::segment::NO_PLANE;
+use super::vectors::splat;
 use fearless_simd::{Level, dispatch, f64x8, prelude::*};
 use glam::DVec3;
 
@@ -298,15 +299,6 @@ impl Shaft {
         }
         true
     }
-}
-
-#[inline(always)]
-pub(super) fn splat<S: Simd>(simd: S, p: DVec3) -> [f64x8<S>; 3] {
-    [
-        f64x8::splat(simd, p.x),
-        f64x8::splat(simd, p.y),
-        f64x8::splat(simd, p.z),
-    ]
 }
 
 #[inline(always)]

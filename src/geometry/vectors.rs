@@ -6,6 +6,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, f64x8, u64x8};
+use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2};
 
 /// Eight numbers, aligned as the vector of them.
@@ -18,6 +19,16 @@ impl Octet {
     pub(crate) fn load<S: Simd>(&self, simd: S) -> f32x8<S> {
         f32x8::load_array_ref(simd, &self.0)
     }
+}
+
+/// The same point in all lanes.
+#[inline(always)]
+pub(crate) fn splat<S: Simd>(simd: S, point: DVec3) -> [f64x8<S>; 3] {
+    [
+        f64x8::splat(simd, point.x),
+        f64x8::splat(simd, point.y),
+        f64x8::splat(simd, point.z),
+    ]
 }
 
 /// Sum of the lanes, always in the same order.

@@ -94,7 +94,8 @@ impl Bake {
         if !growth.strict {
             // Vertices of edges on which things stand do not count among those for light: in a restaurant they took all that
             // light may have.
-            growth.most = growth.used() + more_vertices(growth.used(), self.settings().error);
+            let used = growth.used();
+            growth.most = used + more_vertices(used, self.settings().error);
         }
         if limits.is_late() {
             growth.until = Some(Instant::now() + UNSEEN);
