@@ -4,11 +4,11 @@
 use super::grow::{MeshGrowth, SHRINK};
 use super::shades::COVER;
 
-/// What edges of shadows may take once the error is met: share of the triangles, and triangles of a small room.
-const FOR_LINES: f64 = 0.02;
-const LINES: usize = 400;
-/// How often in one call lines are carried on into the next triangles.
-const TURNS: usize = 6;
+/// What edges of shadows may take once growing is over: share of the triangles, and triangles of a small room. At `--error 1` they take
+/// 1,656 for 9,972 in a sunlit room, 3,436 for 56,989 in a home theatre, 1,270 for 56,761 in a living room, 850 for 26,457 in a flat. With
+/// a fiftieth and 400 a round edge in the sunlit room kept teeth of 10 cm.
+const FOR_LINES: f64 = 0.1;
+const LINES: usize = 2000;
 
 impl MeshGrowth<'_> {
     /// Splits cells that were looked at; returns the new cells.
@@ -17,10 +17,7 @@ impl MeshGrowth<'_> {
             true => tested.iter().map(|&k| (k, self.lamps_of(k))).collect(),
             false => Vec::new(),
         };
-        // Within a limit of vertices a line is carried on only when growing picks its next triangle.
-        let turns = if self.strict { 1 } else { TURNS };
-        let late = || self.looks.is_late();
-        let mut fresh = (self.cells).split_along(&self.shades, wanted, SHRINK, (turns, &late));
+        let mut fresh = self.cells.split_along(&self.shades, &wanted, SHRINK);
         for &k in tested {
             if fresh.binary_search(&k).is_err() {
                 self.mark(k);
@@ -34,8 +31,11 @@ impl MeshGrowth<'_> {
     }
 
     /// Carries edges of shadows on to their ends, whatever the error is: half a line is visible. Adds at most [`FOR_LINES`] as
-    /// many triangles as there are, however often it is called.
+    /// many triangles as there are, however often it is called; none where a limit of vertices was asked for, or nothing is looked at.
     pub(super) fn finish_lines(&mut self, progress: &dyn Fn(usize, usize)) {
+        if !self.looking || self.strict || self.looks.is_late() {
+            return;
+        }
         let all = (FOR_LINES * self.cells.all.len() as f64) as usize + LINES;
         let (most, before) = (all.saturating_sub(self.for_lines), self.cells.all.len());
         let late = || self.looks.is_late();
@@ -71,5 +71,32 @@ impl MeshGrowth<'_> {
         let middles = (0..3).filter_map(|e| self.cells.known_middle(cell, e));
         let covered = around.any(hidden) || middles.into_iter().any(hidden);
         self.shades.that_matter(&places, shows) | if covered { COVER } else { 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::GatherQuality;
+    use crate::transport::tests::baked;
+
+    /// Any place close enough to an edge that is known passed for a bend of it, and in every part of the triangle again: this room
+    /// had 36,000 triangles more after nine steps, and no end.
+    #[test]
+    fn lines_come_to_an_end() {
+        let bake = baked("furnished.glb", 1);
+        let mut growth = bake.growth(GatherQuality::Preview, &|| false);
+        growth.allowed = 1.0;
+        growth.begin(&|_, _| {});
+        let goal = 0.1 * growth.sum();
+        growth.grow(goal, &|_, _| {});
+        let before = growth.cells.all.len();
+        (growth.cells).finish_lines(&growth.shades, 20_000, SHRINK, &|| false);
+        let more = growth.cells.all.len() - before;
+        assert!(
+            growth.for_lines > 100 && more < 100,
+            "{} {more}",
+            growth.for_lines
+        );
     }
 }

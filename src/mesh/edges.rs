@@ -225,6 +225,18 @@ impl CellLook<'_> {
         (inside && self.is_edge(from, weights) && self.is_edge(weights, to)).then_some(weights)
     }
 
+    /// Are two marks corners between which the edge of the shadow runs along edges of the cell? Whatever lies within reach of that
+    /// edge would do as a bend, and in all parts of the cell again.
+    fn are_joined(&self, marks: &(Mark, Mark)) -> bool {
+        let (Mark::Corner(p), Mark::Corner(q)) = *marks else {
+            return false;
+        };
+        let is_sharp = |edge: usize| self.cells.sharp_along(self.cell, edge) & self.lamp != 0;
+        // An edge lies between its own corner and the next.
+        let between = if (p + 1) % 3 == q { p } else { q };
+        is_sharp(between) || (is_sharp((between + 1) % 3) && is_sharp((between + 2) % 3))
+    }
+
     /// A line, with all lamps whose light ends along it.
     fn line(&self, marks: [Mark; 2]) -> ([Mark; 2], u64) {
         let [a, b] = [0, 1].map(|k| self.weights(&marks[k]));
@@ -270,7 +282,7 @@ impl CellLook<'_> {
             return ShadowFinding::Even;
         }
         for depth in DEPTHS {
-            for (p, q) in pairs() {
+            for (p, q) in pairs().filter(|pair| !self.are_joined(pair)) {
                 if let Some(at) = self.bend(&p, &q, depth) {
                     let lines = [p, q].map(|end| self.line([end, Mark::Inside(at)]));
                     return ShadowFinding::Edge(ShadowEdge {
@@ -386,32 +398,16 @@ impl Cells {
         }
     }
 
-    /// Splits cells along edges of shadows of lamps, and the cells into which these edges lead, a number of times or until it is
-    /// late; returns the new cells. `shrink` is the share of an expected mean square that remains.
+    /// Splits cells along edges of shadows of lamps; returns the new cells. `shrink` is the share of an expected mean square
+    /// that remains.
     pub(super) fn split_along(
         &mut self,
         shades: &Shades,
-        mut wanted: Vec<(usize, u64)>,
+        wanted: &[(usize, u64)],
         shrink: f64,
-        (turns, late): (usize, &dyn Fn() -> bool),
     ) -> Vec<usize> {
-        let lamps = wanted.iter().fold(0, |all, (_, lamps)| all | lamps);
-        let mut fresh = Vec::new();
-        for _ in 0..turns {
-            if late() {
-                break;
-            }
-            let found = self.look_into(shades, &wanted);
-            let split = self.split_found(shades, &wanted, &found, f64::INFINITY, shrink);
-            if split.is_empty() {
-                break;
-            }
-            wanted = split.iter().map(|&k| (k, lamps)).collect();
-            fresh.extend(split);
-        }
-        fresh.sort_unstable();
-        fresh.dedup();
-        fresh
+        let found = self.look_into(shades, wanted);
+        self.split_found(shades, wanted, &found, f64::INFINITY, shrink)
     }
 
     /// Carries edges of shadows on to their ends: through all triangles that have a corner on one. Those without a line are

@@ -307,9 +307,7 @@ impl<'a> MeshGrowth<'a> {
         loop {
             let excess = self.sum() - goal;
             if excess <= 0.0 {
-                if self.looking && !self.strict && !self.looks.is_late() {
-                    self.finish_lines(progress);
-                }
+                self.finish_lines(progress);
                 return GrowthOutcome::Reached;
             }
             let is_late = match self.until {
@@ -320,12 +318,9 @@ impl<'a> MeshGrowth<'a> {
                 return GrowthOutcome::Late;
             }
             let left = self.most.saturating_sub(self.used());
-            let batch = if self.strict {
-                left / SPLIT
-            } else {
-                usize::MAX
-            };
+            let batch = left / SPLIT;
             if left == 0 || batch == 0 || batch < self.most / (SPLIT * FULL) {
+                self.finish_lines(progress);
                 return GrowthOutcome::Most;
             }
             let mut picked = self.pick(excess);
