@@ -232,9 +232,9 @@ impl CellLook<'_> {
             return false;
         };
         let is_sharp = |edge: usize| self.cells.sharp_along(self.cell, edge) & self.lamp != 0;
-        // An edge lies between its own corner and the next.
-        let between = if (p + 1) % 3 == q { p } else { q };
-        is_sharp(between) || (is_sharp((between + 1) % 3) && is_sharp((between + 2) % 3))
+        // An edge lies between the corner of its number and the next.
+        let edge = if (p + 1) % 3 == q { p } else { q };
+        is_sharp(edge) || (is_sharp((edge + 1) % 3) && is_sharp((edge + 2) % 3))
     }
 
     /// A line, with all lamps whose light ends along it.
@@ -411,17 +411,16 @@ impl Cells {
     }
 
     /// Carries edges of shadows on to their ends: through all triangles that have a corner on one. Those without a line are
-    /// bisected if they are large enough for that to show. Adds at most `most` triangles. Returns the new ones.
+    /// bisected if they are large enough for that to show. Returns the new ones, and how many were split: `most` at the most.
     pub(super) fn finish_lines(
         &mut self,
         shades: &Shades,
         most: usize,
         shrink: f64,
         late: &dyn Fn() -> bool,
-    ) -> Vec<usize> {
+    ) -> (Vec<usize>, usize) {
         let least = BISECTED * shades.bake().mesh().half_size;
-        let full = self.all.len() + most;
-        let mut fresh = Vec::new();
+        let (mut fresh, mut taken) = (Vec::new(), 0);
         let mut some: Vec<usize> = (0..self.all.len()).collect();
         for _ in 0..FINISHING {
             let lamps = |k: usize| {
@@ -439,10 +438,10 @@ impl Cells {
                 ShadowFinding::Other => self.size(&self.all[wanted.0]) > least,
                 _ => false,
             };
-            let room = full.saturating_sub(self.all.len());
-            let open = wanted.iter().zip(&found).filter(is_open).take(room);
+            let open = (wanted.iter().zip(&found).filter(is_open)).take(most - taken);
             let (wanted, found): (Vec<(usize, u64)>, Vec<ShadowFinding>) =
                 open.map(|(wanted, found)| (*wanted, found.clone())).unzip();
+            taken += wanted.len();
             some = self.split_found(shades, &wanted, &found, least, shrink);
             if some.is_empty() || late() {
                 break;
@@ -451,7 +450,7 @@ impl Cells {
         }
         fresh.sort_unstable();
         fresh.dedup();
-        fresh
+        (fresh, taken)
     }
 
     /// Splits cells along the lines found, and bisects those larger than `least` in which light ends otherwise.

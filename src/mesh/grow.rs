@@ -28,8 +28,8 @@ pub(super) const SHRINK: f64 = 0.25;
 const COVERED: f64 = 0.25;
 /// Vertices that splitting one triangle may take, including those of its neighbours: 1 to 5 were measured, twice as many on an
 /// edge of a shadow.
-const SPLIT: usize = 16;
-/// A limit of vertices counts as reached when fewer than this are left.
+pub(super) const SPLIT: usize = 16;
+/// A limit of vertices counts as reached when less than one in this many is left.
 const FULL: usize = 64;
 
 /// Light at the corners of a cell, mean square of its difference from the solved light, and the worst place.
@@ -70,7 +70,7 @@ pub(super) struct MeshGrowth<'a> {
     pub(super) looking: bool,
     /// When growing ends if nothing is looked at any more.
     pub(super) until: Option<Instant>,
-    /// Triangles added to finish edges of shadows.
+    /// Triangles split to finish edges of shadows.
     pub(super) for_lines: usize,
 }
 
