@@ -6,9 +6,11 @@ use built::Room;
 use glam::{DVec3, dvec3};
 use haarlight::gather::Baked;
 use haarlight::gather::refined::position;
+use haarlight::mesh::Limits;
 use haarlight::scene::{LightKind, Scene};
 use haarlight::solve::{Bake, Settings};
 use std::collections::HashMap;
+use std::f64::consts::TAU;
 
 /// How far from the edge a point may be on its wrong side.
 const NEAR: f64 = 0.02;
@@ -222,6 +224,47 @@ fn the_shadow_of_a_square() {
         no_cracks(&out.0, &out.1);
         assert_eq!(wrong, 0, "{kind:?}");
         assert!(count < 2000, "{kind:?}: {count}");
+    }
+}
+
+/// The round shadow of a disc of 32 corners, whose sides are too short to be found one by one: lines are carried on around it. A limit of
+/// vertices that is not reached changes nothing.
+#[test]
+fn the_shadow_of_a_disc() {
+    let mut room = Room::new();
+    let (floor, shade) = (room.paint(0.3), room.paint(0.0));
+    room.two_sided(shade);
+    room.quad(
+        dvec3(-2.0, 0.0, -2.0),
+        4.0 * DVec3::Z,
+        4.0 * DVec3::X,
+        floor,
+    );
+    let turn = |k: u32| {
+        let (sin, cos) = (f64::from(k) * TAU / 32.0).sin_cos();
+        dvec3(cos, 0.0, sin)
+    };
+    let corners: Vec<DVec3> = (0..32)
+        .map(|k| dvec3(-0.2, 1.0, -0.4) + 0.7 * turn(k))
+        .collect();
+    room.polygon(&corners, shade);
+    let toward = dvec3(-0.4, -1.0, 0.3).normalize();
+    room.punctual(LightKind::Directional, DVec3::ZERO, toward, 1000.0);
+    let outline = corners.iter().map(|c| c - toward * (c.y / toward.y));
+    let out = baked(room.scene());
+    let wrong = wrong(&out, &[outline.collect()], |_, _| -1000.0 * toward.y);
+    let count = vertices(&out.1);
+    eprintln!("{count} vertices, {wrong} places wrong");
+    no_cracks(&out.0, &out.1);
+    assert_eq!(wrong, 0);
+    assert!(count < 2000, "{count}");
+    let limits = Limits {
+        vertices: Some(10 * count),
+        ..Limits::default()
+    };
+    let limited = out.0.baked_within(&limits, &|_, _| {});
+    for (free, limited) in out.1.surfaces.iter().zip(&limited.surfaces) {
+        assert_eq!(free.triangles, limited.triangles);
     }
 }
 
