@@ -31,6 +31,8 @@ const BESIDE: f64 = 1e-3;
 const SHARP: f64 = 4e-3;
 /// But no further than this share of the way to the middle of the triangle.
 const INTO: f64 = 0.75;
+/// Where it is asked whether a round shadow reaches into a triangle: share of the way from an edge's middle to the opposite corner.
+const BESIDE_MIDDLE: f64 = 0.04;
 /// Positions along a line at which its sides are looked at.
 const ALONG: [f64; 5] = [0.06, 0.27, 0.5, 0.73, 0.94];
 /// Depths at which an edge of a shadow is found a second time, to see its direction; share of the triangle.
@@ -292,10 +294,27 @@ impl CellLook<'_> {
                 }
             }
         }
-        match found {
-            0 => ShadowFinding::Even,
-            _ => ShadowFinding::Other,
+        match found == 0 && !self.ends_inside() {
+            true => ShadowFinding::Even,
+            false => ShadowFinding::Other,
         }
+    }
+
+    /// Does light end inside though on no edge of the cell? So it is where a round shadow reaches in between two corners that no
+    /// line joins yet.
+    fn ends_inside(&self) -> bool {
+        let is_open = |e: usize| {
+            let [p, q] = [e, (e + 1) % 3];
+            let on_shadow = |k: usize| self.cells.lamps_at(self.cell, k) & self.lamp != 0;
+            on_shadow(p) && on_shadow(q) && !self.are_joined(&(Mark::Corner(p), Mark::Corner(q)))
+        };
+        let [a, b, c] = self.cell.corners.map(|c| c.weights);
+        let middle = self.lit(between(between(a, b, 0.5), c, 1.0 / 3.0));
+        let beside = |e: usize| {
+            let [p, q, r] = [[a, b, c], [b, c, a], [c, a, b]][e];
+            self.lit(between(between(p, q, 0.5), r, BESIDE_MIDDLE))
+        };
+        (0..3).any(|e| is_open(e) && beside(e) != middle)
     }
 }
 
