@@ -39,7 +39,7 @@ const MOST_VERTICES: f64 = 131_072.0;
 const AT: f64 = 0.5;
 /// For each vertex of the input so many more, as large rooms have more places where light bends. At 1 a dungeon of 70,000 triangles had
 /// 223,657 vertices and a mean of 1.80 without them, 305,630 and 1.00 with them; a restaurant of 104,000 triangles 243,857 and 2.29, which left
-/// its floor in folds, 331,246 and 1.45. Rooms of 12,000 triangles end before either limit.
+/// its floor in folds, 331,246 and 1.45; since edges of shadows come to an end .53 and .98. Rooms of 12,000 triangles end before either limit.
 const PER_VERTEX: f64 = 1.0;
 /// Never more than this: the dungeon's took 3 kB each, with all that the room itself takes.
 const MOST_OF_ALL: f64 = 4_194_304.0;
