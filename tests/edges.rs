@@ -8,7 +8,7 @@ use haarlight::gather::Baked;
 use haarlight::gather::refined::position;
 use haarlight::mesh::Limits;
 use haarlight::scene::{LightKind, Scene};
-use haarlight::solve::{Bake, Settings};
+use haarlight::solve::Bake;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
@@ -20,12 +20,7 @@ fn baked(scene: Scene) -> (Bake, Baked) {
 }
 
 fn baked_to(error: f64, scene: Scene) -> (Bake, Baked) {
-    let settings = Settings {
-        error,
-        ..Settings::default()
-    };
-    let mut bake = Bake::new(scene, settings);
-    bake.run();
+    let bake = built::baked_to(error, scene);
     let baked = bake.baked(&|_, _| {});
     (bake, baked)
 }

@@ -286,10 +286,7 @@ impl<'a> MeshGrowth<'a> {
     /// Makes the first vertices.
     pub(super) fn begin(&mut self, progress: &dyn Fn(usize, usize)) {
         if self.looking && !self.looks.is_late() {
-            let most = match self.strict {
-                true => self.most.saturating_sub(self.used()),
-                false => usize::MAX,
-            };
+            let most = self.left_of_limit();
             self.cells.fence(&self.shades, self.looks.spaces(), most);
         }
         let all: Vec<usize> = (0..self.cells.all.len()).collect();
@@ -335,6 +332,14 @@ impl<'a> MeshGrowth<'a> {
             self.test(&untested, progress);
             let fresh = self.split(&tested);
             self.expect(&fresh, false, progress);
+        }
+    }
+
+    /// Vertices that a limit that was asked for leaves; any number without one.
+    pub(super) fn left_of_limit(&self) -> usize {
+        match self.strict {
+            true => self.most.saturating_sub(self.used()),
+            false => usize::MAX,
         }
     }
 
