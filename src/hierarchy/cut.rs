@@ -1,41 +1,45 @@
 //! Triangles cut where others meet them: a floor that runs on below a wall is two floors.
 //!
-//! A patch has one light. If it lies on both sides of a wall it takes light from one side to the other, so every triangle
-//! is cut along the segments in which others cross it or stand on it. The parts are convex; a cut runs on to the border
-//! of the part that it crosses. [`super::spaces`] finds out which triangles are worth cutting (those that belong to
-//! several spaces), and [`Mesh::cut`] makes the new triangles, with the points that their neighbours have on common
-//! edges.
+//! A patch has one light, and a triangle of the output runs from corner to corner. If it lies on both sides of a wall it takes
+//! light from one side to the other, so every triangle is cut along the lines in which large things cross it, stand on it, or
+//! hover right before it: between such a thing (a lamp below a ceiling, a rug, a picture) and the surface is a gap with a
+//! light of its own. Parts are the triangles of a constrained Delaunay triangulation, which runs no line on to where it means
+//! nothing. [`Mesh::cut`] makes them, with the points that neighbours have on common edges.
 //!
-//! A thing that hovers right before a surface (a lamp below a ceiling, a rug, a picture) is as good as on it: between them is
-//! a gap with a light of its own, and a patch that lies partly in the gap would show the gap's light to the room.
 //! Lengths are in scene units; points within [`TOUCH`] of each other are one.
 
 use super::mesh::{Face, Mesh, WHOLE};
 use crate::geometry::RayIndex;
-use glam::DVec3;
+use crate::scene::sets::{join, root};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, HashMap};
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Surfaces nearer than this share of the scene's half size touch: the accuracy of f32 positions in a file.
 const TOUCH: f64 = 1e-6;
 /// Things that hover before a surface nearer than this share of the scene's half size cut the surface. A room with a lamp 1 to 20
-/// mm below its ceiling was 2 to 8 % too bright and is within 1.5 %; beyond 6 cm (2 %) nothing changes. Only in rooms all of whose
-/// cuts are made: in a restaurant, where rays do what links do here, four times the leaves gained nothing.
+/// mm below its ceiling was 2 to 8 % too bright and is within 1.5 %; beyond 6 cm (2 %) nothing changes.
 const HOVER: f64 = 0.01;
-/// Parts that hovering things may add to a triangle: a panel adds up to 8, and 40 cards one above the other thousands.
+/// Points that hovering things may add to a triangle: a panel adds up to 8, and 40 cards one above the other thousands.
 const OUTLINED: usize = 64;
 /// A triangle that more than this many others meet stays whole: it is foliage, not a wall.
 const MOST: usize = 256;
+/// Lines count whose extent is this share of the scene's half size.
+const WORTH: f64 = 0.05;
+/// And this share of the triangle, or of the half size where the triangle is larger: from the foot of a table needles would run to the
+/// far corners of a floor, and light along them.
+const SMALL: f64 = 0.1;
 
-/// A triangle in convex parts.
+/// A triangle, and where it is cut.
 #[derive(Debug, Clone)]
 pub struct Cut {
     /// The triangle.
-    pub(super) triangle: u32,
+    triangle: u32,
     /// Points as weights of its corners; the corners themselves come first.
     points: Vec<[f64; 3]>,
-    /// Corners of the parts among `points`, in the sense of the triangle.
-    parts: Vec<Vec<u32>>,
+    /// Lines from point to point, with no third point on them.
+    lines: Vec<VertexPair>,
 }
 
 impl Cut {
@@ -43,90 +47,92 @@ impl Cut {
         Self {
             triangle,
             points: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            parts: vec![vec![0, 1, 2]],
+            lines: Vec::new(),
         }
     }
 
-    /// Corners of the parts in space.
-    pub(super) fn polygons(&self, mesh: &Mesh) -> Vec<Vec<DVec3>> {
+    /// Where it is cut, recentred.
+    pub fn lines(&self, mesh: &Mesh) -> impl Iterator<Item = [DVec3; 2]> {
         let plane = Plane::of(mesh, self.triangle);
-        let at = |&p: &u32| plane.at(self.points[p as usize]);
-        self.parts
-            .iter()
-            .map(|part| part.iter().map(at).collect())
-            .collect()
+        let at = move |k: u32| plane.at(self.points[k as usize]);
+        self.lines.iter().map(move |&(a, b)| [at(a), at(b)])
+    }
+
+    /// A triangle with segments on it.
+    fn along(triangle: u32, plane: &Plane, segments: &[[DVec3; 2]]) -> Self {
+        let mut cut = Self::whole(triangle);
+        let mut ends = Vec::with_capacity(segments.len());
+        for (k, &segment) in segments.iter().enumerate() {
+            ends.push(segment.map(|p| cut.add(plane, p)));
+            for &other in &segments[..k] {
+                if let Some(crossing) = plane.crossing(segment, other) {
+                    cut.add(plane, crossing);
+                }
+            }
+        }
+        let at: Vec<DVec3> = cut.points.iter().map(|&w| plane.at(w)).collect();
+        let mut lines = BTreeSet::new();
+        for [a, b] in ends {
+            let mut from = a;
+            for next in points_between(&at, [a, b], plane.snap()).chain([b]) {
+                if next != from {
+                    lines.insert(key(from, next));
+                }
+                from = next;
+            }
+        }
+        cut.lines = lines.into_iter().collect();
+        cut
     }
 
     /// Adds a point, or finds the one already there.
-    fn add(&mut self, plane: &Plane, weights: [f64; 3]) -> u32 {
-        let point = plane.at(weights);
+    fn add(&mut self, plane: &Plane, point: DVec3) -> u32 {
         let near = |w: &[f64; 3]| plane.at(*w).distance(point) <= plane.snap();
         if let Some(known) = self.points.iter().position(near) {
             return known as u32;
         }
-        let mut weights: [f64; 3] = std::array::from_fn(|k| {
-            if weights[k] * plane.altitude(k) <= plane.touch {
-                0.0
-            } else {
-                weights[k]
+        let mut weights = plane.weights(point);
+        for (k, w) in weights.iter_mut().enumerate() {
+            if *w * plane.altitude(k) <= plane.touch {
+                *w = 0.0;
             }
-        });
+        }
         let sum: f64 = weights.iter().sum();
-        weights = weights.map(|w| w / sum);
-        self.points.push(weights);
+        self.points.push(weights.map(|w| w / sum));
         self.points.len() as u32 - 1
     }
 
-    /// Cuts the parts that a segment crosses.
-    fn split(&mut self, plane: &Plane, [p, q]: [DVec3; 2]) {
-        let across = plane.normal.cross((q - p).normalize_or_zero());
-        for part in std::mem::take(&mut self.parts) {
-            let corners: Vec<DVec3> = part
-                .iter()
-                .map(|&k| plane.at(self.points[k as usize]))
-                .collect();
-            let side: Vec<f64> = corners
-                .iter()
-                .map(|x| {
-                    let d = across.dot(*x - p);
-                    if d.abs() <= plane.snap() { 0.0 } else { d }
-                })
-                .collect();
-            let both = side.iter().any(|&d| d > 0.0) && side.iter().any(|&d| d < 0.0);
-            if !both || clipped([p, q], &corners, plane).is_none() {
-                self.parts.push(part);
-                continue;
-            }
-            let (mut left, mut right) = (Vec::new(), Vec::new());
-            for k in 0..part.len() {
-                let next = (k + 1) % part.len();
-                if side[k] >= 0.0 {
-                    left.push(part[k]);
-                }
-                if side[k] <= 0.0 {
-                    right.push(part[k]);
-                }
-                if side[k] * side[next] < 0.0 {
-                    let t = side[k] / (side[k] - side[next]);
-                    let (a, b) = (
-                        self.points[part[k] as usize],
-                        self.points[part[next] as usize],
-                    );
-                    let id = self.add(plane, std::array::from_fn(|c| a[c] + t * (b[c] - a[c])));
-                    left.push(id);
-                    right.push(id);
-                }
-            }
-            for mut part in [left, right] {
-                part.dedup();
-                if part.len() > 1 && part.first() == part.last() {
-                    part.pop();
-                }
-                if part.len() > 2 {
-                    self.parts.push(part);
-                }
-            }
+    /// Leaves out lines of what is small beside the triangle, unless they part it: whatever is connected counts as one.
+    fn of_worth(mut self, plane: &Plane) -> Self {
+        let mut above: Vec<u32> = (0..self.points.len() as u32).collect();
+        for &(a, b) in &self.lines {
+            join(&mut above, a, b);
         }
+        let groups: Vec<u32> = (0..above.len() as u32)
+            .map(|k| root(&mut above, k))
+            .collect();
+        let mut sizes = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY, 0); groups.len()];
+        for (&group, &w) in groups.iter().zip(&self.points) {
+            let (low, high, ends) = &mut sizes[group as usize];
+            let at = plane.at(w);
+            (*low, *high) = (low.min(at), high.max(at));
+            *ends += usize::from(w.contains(&0.0));
+        }
+        let counts = |group: u32| {
+            let (low, high, ends) = sizes[group as usize];
+            low.distance(high) >= plane.worth() || (ends > 1 && plane.is_large())
+        };
+        self.lines.retain(|line| counts(groups[line.0 as usize]));
+        // Points that nothing leads to any more go.
+        let mut kept = BTreeSet::from([0, 1, 2]);
+        kept.extend(self.lines.iter().flat_map(|&(a, b)| [a, b]));
+        let kept: Vec<u32> = kept.into_iter().collect();
+        let new = |old: u32| kept.partition_point(|&k| k < old) as u32;
+        self.lines
+            .iter_mut()
+            .for_each(|(a, b)| (*a, *b) = (new(*a), new(*b)));
+        self.points = kept.iter().map(|&k| self.points[k as usize]).collect();
+        self
     }
 
     /// Adopts the points on the triangle's edges: own points move onto them, those of neighbours are added.
@@ -153,80 +159,65 @@ impl Cut {
         }
     }
 
-    /// Cuts along the outlines of hovering things, unless that makes too many parts: then along none.
-    fn outlined(self, plane: &Plane, outlines: Vec<[DVec3; 2]>) -> Self {
-        let most = self.parts.len() + OUTLINED;
-        let mut cut = self.clone();
-        for &outline in outlines.iter().take(MOST + 1) {
-            cut.split(plane, outline);
-            if cut.parts.len() > most {
-                return self;
-            }
-        }
-        match outlines.len() > MOST {
-            true => self,
-            false => cut,
-        }
-    }
-
-    /// Gives every part the points that lie on its edges, so that neighbours have the same points.
-    fn fit(&mut self, plane: &Plane) {
-        let at: Vec<DVec3> = self.points.iter().map(|&w| plane.at(w)).collect();
-        for part in &mut self.parts {
-            let mut fitted = Vec::new();
-            for k in 0..part.len() {
-                let (a, b) = (part[k], part[(k + 1) % part.len()]);
-                let (p, along) = (at[a as usize], at[b as usize] - at[a as usize]);
-                let length = along.length();
-                let along = along / length.max(f64::MIN_POSITIVE);
-                let mut on: Vec<(f64, u32)> = (0..at.len() as u32)
-                    .filter(|&x| x != a && x != b)
-                    .filter_map(|x| {
-                        let d = at[x as usize] - p;
-                        let t = d.dot(along);
-                        let off = (d - along * t).length();
-                        (t > 0.0 && t < length && off <= plane.snap()).then_some((t, x))
-                    })
-                    .collect();
-                on.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-                fitted.push(a);
-                fitted.extend(on.into_iter().map(|(_, x)| x));
-            }
-            *part = fitted;
-        }
-    }
-
-    /// Triangles of all parts: cuts off ears, always that of the greatest altitude that leaves no point on its long
-    /// side.
+    /// The parts: a constrained Delaunay triangulation of the points.
     fn triangles(&self, plane: &Plane) -> Vec<[u32; 3]> {
-        let at = |k: u32| plane.at(self.points[k as usize]);
-        let mut out = Vec::new();
-        for part in &self.parts {
-            let mut ring = part.clone();
-            while ring.len() > 3 {
-                let n = ring.len();
-                let altitude = |k: usize| {
-                    let [a, b, c] = [ring[(k + n - 1) % n], ring[k], ring[(k + 1) % n]].map(at);
-                    let area = (b - a).cross(c - a).dot(plane.normal);
-                    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-                    let bare = (0..n - 3).all(|j| {
-                        let d = at(ring[(k + 2 + j) % n]) - a;
-                        let along = (c - a).normalize_or_zero();
-                        (d - along * d.dot(along)).length() > plane.snap()
-                    });
-                    let altitude = area / longest.max(f64::MIN_POSITIVE);
-                    if bare { altitude } else { altitude - 1e300 }
-                };
-                let best = (0..n)
-                    .max_by(|&i, &j| altitude(i).total_cmp(&altitude(j)).then(j.cmp(&i)))
-                    .unwrap_or(0);
-                out.push([ring[(best + n - 1) % n], ring[best], ring[(best + 1) % n]]);
-                ring.remove(best);
+        let mut net = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
+        // Points that have become one have one place.
+        let mut places = Vec::with_capacity(self.points.len());
+        let mut point_of = Vec::with_capacity(self.points.len());
+        for (&w, point) in self.points.iter().zip(0_u32..) {
+            let [x, y] = plane.flat(w).to_array();
+            let flat = spade::mitigate_underflow(Point2::new(x, y));
+            let place = net.insert(flat).expect("numbers between -1 and 1");
+            if place.index() == point_of.len() {
+                point_of.push(point);
             }
-            out.push([ring[0], ring[1], ring[2]]);
+            places.push(place);
         }
-        out
+        // The border first: rounding may leave its points beside the edge, and what lies outside is of no part.
+        let border = (0..3).flat_map(|k| {
+            let mut on: Vec<(f64, u32)> = (0_u32..)
+                .zip(&self.points)
+                .filter(|(_, w)| w[k] == 0.0)
+                .map(|(point, w)| (w[(k + 1) % 3], point))
+                .collect();
+            on.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let pairs = on.windows(2).map(|pair| (pair[0].1, pair[1].1));
+            pairs.collect::<Vec<_>>()
+        });
+        for (a, b) in border.chain(self.lines.iter().copied()) {
+            let (a, b) = (places[a as usize], places[b as usize]);
+            if a != b && net.can_add_constraint(a, b) {
+                net.add_constraint(a, b);
+            }
+        }
+        net.inner_faces()
+            .map(|face| face.vertices().map(|v| point_of[v.fix().index()]))
+            .filter(|corners| {
+                let outside = |k: usize| corners.iter().all(|&c| self.points[c as usize][k] == 0.0);
+                !(0..3).any(outside)
+            })
+            .collect()
     }
+}
+
+/// Points on the way between two, in order.
+fn points_between(at: &[DVec3], [a, b]: [u32; 2], snap: f64) -> impl Iterator<Item = u32> {
+    let start = at[a as usize];
+    let way = at[b as usize] - start;
+    let length = way.length();
+    let along = way / length.max(f64::MIN_POSITIVE);
+    let mut on: Vec<(f64, u32)> = (0_u32..)
+        .zip(at)
+        .filter(|&(x, _)| x != a && x != b)
+        .filter_map(|(x, &p)| {
+            let t = (p - start).dot(along);
+            let off = (p - start - along * t).length();
+            (t > 0.0 && t < length && off <= snap).then_some((t, x))
+        })
+        .collect();
+    on.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+    on.into_iter().map(|(_, x)| x)
 }
 
 /// The plane of a triangle, and the lengths below which points coincide or touch.
@@ -234,6 +225,8 @@ struct Plane {
     corners: [DVec3; 3],
     normal: DVec3,
     area: f64,
+    longest: f64,
+    half_size: f64,
     touch: f64,
     hover: f64,
 }
@@ -244,8 +237,12 @@ impl Plane {
             triangle,
             back: false,
         };
+        let corners = mesh.corners(face);
+        let [a, b, c] = corners;
         Self {
-            corners: mesh.corners(face),
+            corners,
+            longest: a.distance(b).max(b.distance(c)).max(c.distance(a)),
+            half_size: mesh.half_size,
             normal: mesh.normal[triangle as usize],
             area: mesh.area[triangle as usize],
             touch: TOUCH * mesh.half_size,
@@ -268,6 +265,44 @@ impl Plane {
 
     fn altitude(&self, k: usize) -> f64 {
         2.0 * self.area / self.corners[(k + 1) % 3].distance(self.corners[(k + 2) % 3])
+    }
+
+    /// Weights of the corners of a point in the plane.
+    fn weights(&self, p: DVec3) -> [f64; 3] {
+        std::array::from_fn(|k| {
+            let (a, b) = (self.corners[(k + 1) % 3], self.corners[(k + 2) % 3]);
+            (b - a).cross(p - a).dot(self.normal) / (2.0 * self.area)
+        })
+    }
+
+    /// A point in coordinates of the plane, in lengths of the longest edge.
+    fn flat(&self, w: [f64; 3]) -> DVec2 {
+        let along = (self.corners[1] - self.corners[0]).normalize_or_zero();
+        let d = (self.at(w) - self.corners[0]) / self.longest;
+        DVec2::new(d.dot(along), d.dot(self.normal.cross(along)))
+    }
+
+    /// Where two segments in the plane cross.
+    fn crossing(&self, [p, q]: [DVec3; 2], [r, s]: [DVec3; 2]) -> Option<DVec3> {
+        let (one, other) = (q - p, s - r);
+        let cross = one.cross(other).dot(self.normal);
+        if cross == 0.0 {
+            return None;
+        }
+        let t = (r - p).cross(other).dot(self.normal) / cross;
+        let u = (r - p).cross(one).dot(self.normal) / cross;
+        let on = |x: f64| (0.0..=1.0).contains(&x);
+        (on(t) && on(u)).then(|| p + one * t)
+    }
+
+    /// The extent of what counts on this triangle.
+    fn worth(&self) -> f64 {
+        (WORTH * self.half_size).max(SMALL * self.longest.min(self.half_size))
+    }
+
+    /// May something that is small beside the room count here?
+    fn is_large(&self) -> bool {
+        self.area >= (WORTH * self.half_size).powi(2)
     }
 
     /// Distances of points before the plane; 0 where less than `reach`.
@@ -336,53 +371,67 @@ fn clipped([p, q]: [DVec3; 2], polygon: &[DVec3], plane: &Plane) -> Option<[DVec
         .then(|| [p + along * low, p + along * high])
 }
 
-/// All triangles that others meet, in parts; if `hovering`, also those before which something hovers.
-pub fn cuts(mesh: &Mesh, rays: &RayIndex, hovering: bool) -> Vec<Cut> {
+/// All triangles that something large meets or hovers before.
+pub fn cuts(mesh: &Mesh, rays: &RayIndex) -> Vec<Cut> {
     let mut taking: Vec<u32> = mesh.faces.iter().map(|f| f.triangle).collect();
     taking.dedup();
     taking
         .par_iter()
         .map_init(Vec::new, |near, &triangle| {
-            let plane = Plane::of(mesh, triangle);
-            if (0..3).any(|k| plane.altitude(k) < 8.0 * plane.snap()) {
-                return None;
-            }
-            let [a, b, c] = plane.corners;
-            let reach = DVec3::splat(if hovering { plane.hover } else { plane.touch });
-            let (low, high) = (a.min(b).min(c) - reach, a.max(b).max(c) + reach);
-            rays.near(low.as_vec3(), high.as_vec3(), near);
-            near.sort_unstable();
-            let (mut segments, mut outlines) = (Vec::new(), Vec::new());
-            for &other in near.iter() {
-                let k = other as usize;
-                if mesh.plane[k] == mesh.plane[triangle as usize] || mesh.area[k] <= 0.0 {
-                    continue;
-                }
-                let corners = mesh.triangles[k].map(|v| mesh.positions[v as usize]);
-                segments.extend(plane.met(corners));
-                if hovering && outlines.len() <= MOST {
-                    let vertices = mesh.triangles[k];
-                    outlines.extend(plane.hovering(corners).into_iter().map(|(e, segment)| {
-                        let edge = key(vertices[e], vertices[(e + 1) % 3]);
-                        ((mesh.plane[k], edge), segment)
-                    }));
-                }
-                if segments.len() > MOST {
-                    return None;
-                }
-            }
-            let mut cut = Cut::whole(triangle);
-            for segment in segments {
-                cut.split(&plane, segment);
-            }
-            // An edge of two triangles in one plane is not an outline.
-            let is_once = |edge: &_| outlines.iter().filter(|(other, _)| other == edge).count() < 2;
-            let outlines = outlines.iter().filter(|(edge, _)| is_once(edge));
-            let cut = cut.outlined(&plane, outlines.map(|(_, segment)| *segment).collect());
-            (cut.parts.len() > 1).then_some(cut)
+            cut_of(mesh, rays, triangle, near)
         })
         .flatten()
         .collect()
+}
+
+/// Where a triangle is cut, if it is.
+fn cut_of(mesh: &Mesh, rays: &RayIndex, triangle: u32, near: &mut Vec<u32>) -> Option<Cut> {
+    let plane = Plane::of(mesh, triangle);
+    let narrow = (0..3).any(|k| plane.altitude(k) < 8.0 * plane.snap());
+    if narrow || plane.longest < WORTH * plane.half_size {
+        return None;
+    }
+    let [a, b, c] = plane.corners;
+    let reach = if plane.is_large() {
+        plane.hover
+    } else {
+        plane.touch
+    };
+    let (low, high) = (a.min(b).min(c) - reach, a.max(b).max(c) + reach);
+    rays.near(low.as_vec3(), high.as_vec3(), near);
+    near.sort_unstable();
+    let (mut segments, mut outlines) = (Vec::new(), Vec::new());
+    for &other in near.iter() {
+        let k = other as usize;
+        if mesh.plane[k] == mesh.plane[triangle as usize] || mesh.area[k] <= 0.0 {
+            continue;
+        }
+        let vertices = mesh.triangles[k];
+        let corners = vertices.map(|v| mesh.positions[v as usize]);
+        segments.extend(plane.met(corners));
+        if segments.len() > MOST {
+            return None;
+        }
+        if plane.is_large() && outlines.len() <= MOST {
+            let is_large = mesh.area[k] >= (WORTH * plane.half_size).powi(2);
+            outlines.extend(plane.hovering(corners).into_iter().map(|(e, segment)| {
+                let edge = key(vertices[e], vertices[(e + 1) % 3]);
+                ((mesh.plane[k], edge), is_large, segment)
+            }));
+        }
+    }
+    let standing = Cut::along(triangle, &plane, &segments).of_worth(&plane);
+    // An edge of two triangles in one plane is not an outline.
+    let is_once = |edge: &_| outlines.iter().filter(|(other, ..)| other == edge).count() < 2;
+    let outlines = outlines
+        .iter()
+        .filter(|(edge, is_large, _)| *is_large && is_once(edge));
+    segments.extend(outlines.map(|(.., segment)| *segment));
+    let all = (segments.len() <= 2 * MOST)
+        .then(|| Cut::along(triangle, &plane, &segments).of_worth(&plane))
+        .filter(|all| all.points.len() <= standing.points.len() + OUTLINED);
+    let cut = all.unwrap_or(standing);
+    (!cut.lines.is_empty()).then_some(cut)
 }
 
 /// The lower and the higher vertex of an edge.
@@ -458,7 +507,6 @@ impl Mesh {
             };
             let plane = Plane::of(&old, t as u32);
             cut.share(vertices, &edges);
-            cut.fit(&plane);
             let ids = self.weld(&cut, vertices, &plane, &mut welded);
             for corners in cut.triangles(&plane) {
                 let id = self.within.len() as u32;

@@ -270,6 +270,17 @@ impl Mesh {
         }
     }
 
+    /// How far a point on a triangle is from its nearest edge.
+    pub(super) fn distance_to_border(&self, triangle: usize, at: DVec3) -> f64 {
+        let corners = self.triangles[triangle].map(|v| self.positions[v as usize]);
+        let to_edge = |k: usize| {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            let inward = self.normal[triangle].cross((b - a).normalize_or_zero());
+            inward.dot(at - a)
+        };
+        to_edge(0).min(to_edge(1)).min(to_edge(2))
+    }
+
     /// Corners of a face, counter-clockwise seen from that side.
     pub fn corners(&self, face: Face) -> [DVec3; 3] {
         let [a, b, c] = self.triangles[face.triangle as usize].map(|v| self.positions[v as usize]);

@@ -20,6 +20,6 @@ pub(crate) use mesh::Frame;
 pub use mesh::{Face, Mesh, Raised};
 pub use mirrors::{BOUNCES, MirrorImage, Mirrors, Route};
 pub use panes::{Crossing, Glazing, Panes};
-pub use spaces::{Spaces, spaces};
+pub use spaces::spaces;
 pub use tree::{Element, NONE, Node, Sample, Tree, TreeSize};
 pub(crate) use tree::{leaf_below, stratified};

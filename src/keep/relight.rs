@@ -148,7 +148,6 @@ impl Bake {
             Fingerprint::paint(&self.room.scene).encode(out)?;
             out.put_text(&settings)?;
             out.put_all(&self.room.spaces)?;
-            out.put_all(&self.room.parted)?;
             out.put_all(&self.room.counted.splits)?;
             out.put_all(&self.room.counted.shares)?;
             out.put_all(self.room.frame.map(Frame::numbers).as_slice())?;
@@ -263,7 +262,7 @@ impl Relighter {
         let paint = Fingerprint::decode(from)?;
         let settings: Settings = serde_json::from_str(&from.get_text()?)
             .map_err(|problem| Broken::new(format!("has settings that do not read: {problem}")))?;
-        let (spaces, parted) = (from.get_all()?, from.get_all()?);
+        let spaces = from.get_all()?;
         let (splits, shares) = (from.get_all()?, from.get_all()?);
         let frame: Vec<[f64; 4]> = from.get_all()?;
         let closed = from
@@ -271,7 +270,6 @@ impl Relighter {
             .map(|c| if c == 1 { Closed::Yes } else { Closed::No });
         let analysis = RoomAnalysis {
             spaces,
-            parted,
             closed,
             counted: Counted { splits, shares },
             frame: frame.first().copied().map(Frame::of_numbers),

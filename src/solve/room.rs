@@ -94,9 +94,8 @@ pub(crate) struct Room {
     pub(crate) frame: Option<Frame>,
     /// Points that are watched from round to round.
     pub(crate) probes: WatchedPoints,
-    /// Space of each face, and which cuts were made for spaces, see [`spaces`](crate::hierarchy::spaces).
+    /// Space of each face, see [`spaces`](crate::hierarchy::spaces).
     pub(crate) spaces: Vec<u32>,
-    pub(crate) parted: Vec<u32>,
     /// Is the origin of light recorded, for relighting?
     pub(crate) keep: bool,
     /// The ranks that bake this room together.
@@ -108,8 +107,6 @@ pub(crate) struct Room {
 /// What rays have told of a room before the first round.
 pub(crate) struct RoomAnalysis {
     pub(crate) spaces: Vec<u32>,
-    /// Which cuts of triangles were made for spaces.
-    pub(crate) parted: Vec<u32>,
     /// Of all points, and of those that nothing covers.
     pub(crate) closed: [Closed; 2],
     /// The part that counts, and the box around it.
@@ -192,16 +189,9 @@ impl Room {
     ) -> (Self, Tree) {
         let mesh = Mesh::framed(&scene, frame);
         let mut plan = plan_of(&scene, &mesh);
-        let parting = match analysis {
-            Some(known) => PartedMesh::again(&scene, mesh, known.spaces, known.parted),
-            None => PartedMesh::find(&scene, mesh, &plan, settings.seed),
-        };
-        let PartedMesh {
-            mesh,
-            rays,
-            spaces,
-            parted,
-        } = parting;
+        let known = analysis.map(|known| known.spaces);
+        let PartedMesh { mesh, rays, spaces } =
+            PartedMesh::new(&scene, mesh, &plan, settings.seed, known);
         let tree = Tree::new(&mesh, &spaces);
         let mirrors = Mirrors::new(&scene, &mesh);
         if let Some(mirrors) = &mirrors {
@@ -231,7 +221,6 @@ impl Room {
             mesh,
             rays,
             spaces,
-            parted,
         };
         (room, tree)
     }

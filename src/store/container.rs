@@ -49,8 +49,8 @@ impl FileKind {
     /// Raised whenever the body changes its meaning.
     fn version(self) -> u32 {
         match self {
-            Self::Checkpoint => 6,
-            Self::Cache => 8,
+            Self::Checkpoint => 7,
+            Self::Cache => 9,
         }
     }
 
@@ -271,9 +271,9 @@ mod tests {
         let part = read(&path, FileKind::Cache, |_| Ok(())).unwrap_err();
         assert!(part.to_string().contains("after its end"), "{part}");
         let mut bytes = std::fs::read(&path).unwrap();
-        bytes[12] = 9;
+        bytes[12] = 99;
         std::fs::write(&path, &bytes).unwrap();
-        assert!(refused(&path, FileKind::Cache).contains("version 9"));
+        assert!(refused(&path, FileKind::Cache).contains("version 99"));
         std::fs::write(&path, b"").unwrap();
         assert!(refused(&path, FileKind::Cache).contains("no cache"));
         let text = refused(&folder.path().join("nowhere"), FileKind::Cache);

@@ -66,6 +66,8 @@ pub struct Memory {
     pub(super) near: Vec<(u32, Hit)>,
     /// Lamps or bright patches held back until all of them are known.
     pub(super) sources: Vec<SourceElement>,
+    /// Far clusters of lamps, and what each brings at the most, share of white.
+    pub(super) far: Vec<(u32, f64)>,
     /// Factors of the faces of lamps with many faces, lamp after lamp.
     pub(super) faces: Vec<f64>,
     /// The path that each segment to a lamp belongs to, and what the lamp brings.

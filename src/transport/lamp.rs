@@ -1,20 +1,17 @@
-//! Emitting elements, bright patches and punctual lights at a point: how much of them is seen, and lamps chosen at random.
+//! Emitting elements and bright patches at a point: how much of them is seen.
 //!
 //! A lamp near a point is divided into parts none of which is near; each has its exact factor (contour integral), and rays
 //! go to parts in proportion to this. The number of rays is fixed beforehand: stopping where the first few agree overlooks
 //! thin things, and lost 4 to 8 % of the light of lamps behind louvres.
 
 use super::gatherer::{Gatherer, Memory, RadiosityPart, SourceElement};
-use super::luminaire;
-use super::punctual::punctual_factor;
 use super::receiver::{Gathered, Receiver};
 use super::slope::SeenPatch;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
-use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8, quarters};
+use crate::geometry::{Segment, lambert_triangles_x8, quarters};
 use crate::hierarchy::NONE;
 use crate::light::{Passage, Tint, lightness_sensitivity};
 use crate::link::open_weight;
-use crate::scene::LightKind;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -32,13 +29,11 @@ const RAYS: [usize; 2] = [8, 256];
 const LEAF_RAYS: usize = 16;
 /// All lamps together may misplace as much as this many patches. With 1, 2 and 4 three furnished rooms end at the same
 /// errors (.37, .31, .26 mean CIEDE2000) within .01.
-const PATCHES: f64 = 4.0;
+pub(super) const PATCHES: f64 = 4.0;
 /// The same of all bright patches together. With 4, 2 and 1 half of 2,500 points of the file are off by more than .455, .425, .419 dE00 in a
 /// garage and .401, .397, .386 in a living room (grey, `--error 1`), from 42, 65, 94 and 15, 28, 51 such rays a look; with rays for each patch by itself,
 /// 440 and 73 a look, by .437 and .368, and the garage took 54 CPU seconds for 43 to 46.
 const BRIGHT_PATCHES: f64 = 1.0;
-/// Elements that represent a far cluster of lamps.
-const CHOSEN: usize = 4;
 
 /// A triangle and its factor for a point.
 type Part = ([DVec3; 3], f64);
@@ -48,13 +43,6 @@ type Part = ([DVec3; 3], f64);
 struct RayProgress {
     parts: Vec<Part>,
     face: (usize, f64),
-}
-
-/// A chosen lamp, the segment to it, and the factor from its exitance to irradiance by all lamps that it represents.
-struct Chosen {
-    element: u32,
-    factor: f64,
-    segment: Segment,
 }
 
 /// The kernel of a differential area at the end of `way`, per area; 0 if the area is turned away.
@@ -88,7 +76,7 @@ fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
 
 /// One of the parts into which a lamp's triangle of exact factor `whole` would be divided, chosen by their factors: what one ray needs. The rest
 /// of `u` after the choice can be used again.
-fn one_part(to: &Receiver, corners: [DVec3; 3], whole: f64, u: &mut f64) -> Part {
+pub(super) fn one_part(to: &Receiver, corners: [DVec3; 3], whole: f64, u: &mut f64) -> Part {
     let mut part = (corners, whole);
     for _ in 0..DIVISIONS {
         if is_far(to, part.0) {
@@ -132,7 +120,7 @@ fn is_far(to: &Receiver, corners: [DVec3; 3]) -> bool {
 
 /// A point of one of the parts, chosen by their factors, with the weight that lets the kernel there represent all parts: 1 in
 /// the mean. The rest of `u` after the choice of a part chooses the point.
-fn point_of(
+pub(super) fn point_of(
     to: &Receiver,
     normal: DVec3,
     parts: &[Part],
@@ -273,18 +261,22 @@ impl Gatherer<'_> {
 
     /// How many rays are worth while to lamps or patches that would bring `all`, share of white, and may misplace as much as a number
     /// of patches.
-    fn rays_to_sources(&self, to: &Receiver, all: f64, patches: f64) -> usize {
-        // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses; errors in the dark are more visible. Where
-        // many points represent a leaf, their number compensates.
-        let here = to
-            .leaf
-            .and_then(|leaf| self.light.arrival.get(leaf as usize));
-        let here = here.map_or(all, |arrival| f64::from(arrival.all));
-        let wanted = 0.5 * all * lightness_sensitivity(here) / (patches * self.tolerance);
+    pub(super) fn rays_to_sources(&self, to: &Receiver, all: f64, patches: f64) -> usize {
+        // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses. Where many points represent a leaf, their number compensates.
+        let wanted = 0.5 * all / (patches * self.tolerance_at(to, all));
         match self.shafts {
             true => (wanted.powf(4.0 / 3.0).ceil() as usize).clamp(RAYS[0], RAYS[1]),
             false => LEAF_RAYS,
         }
+    }
+
+    /// What may be misplaced at a point: errors in the dark are more visible. `known`: its brightness, if no leaf tells.
+    pub(super) fn tolerance_at(&self, to: &Receiver, known: f64) -> f64 {
+        let leaf = to
+            .leaf
+            .and_then(|leaf| self.light.arrival.get(leaf as usize));
+        let here = leaf.map_or(known, |arrival| f64::from(arrival.all));
+        self.tolerance / lightness_sensitivity(here)
     }
 
     /// Aims `count` rays at lamps or patches that would bring `all`, and stores them with their weights in the memory; returns the one that
@@ -347,146 +339,12 @@ impl Gatherer<'_> {
         let planes = [to.plane, self.tree.face_plane[element.face as usize]];
         (weight > 0.0).then(|| (Segment::new(to.point, point, planes), weight))
     }
-
-    /// Adds the light of the emitting elements of a far cluster, by some of them chosen at random. `carries`: its rough
-    /// amount, share of white.
-    pub(super) fn lamps_by_chance(
-        &self,
-        to: &Receiver,
-        id: u32,
-        carries: f64,
-        memory: &mut Memory,
-        out: &mut Gathered,
-    ) {
-        let turn = hash(to.seed ^ 1, u64::from(id));
-        let wanted = CHOSEN as f64 * carries / self.tolerance;
-        let count = (wanted.ceil() as usize).clamp(1, CHOSEN);
-        for k in 0..count {
-            let u = sequence02(k as u32, turn);
-            let Some(chosen) = self.one_emitter(to, id, u) else {
-                continue;
-            };
-            memory.rays += 1;
-            if !self.blocks_one(&chosen.segment) {
-                let tint = self.through(&chosen.segment);
-                let factor = chosen.factor / count as f64;
-                self.add_emitted(chosen.element, factor, tint.as_ref(), out);
-            }
-        }
-    }
-
-    /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
-    /// its share of the light as probability, provided nothing blocks the segments: without bias.
-    pub(super) fn one_lamp(&self, to: &Receiver, [u, v]: [f64; 2]) -> [Option<(f64, Segment)>; 2] {
-        let punctual = self.one_punctual(to, [u, v]).map(|(bright, end)| {
-            let segment = Segment::new(to.point, end, [to.plane, NO_PLANE]);
-            (bright, segment)
-        });
-        let room = self.light.lit.first().copied().unwrap_or(NONE);
-        let emitter = self.one_emitter(to, room, [u, v]);
-        let emitter = emitter.map(|chosen| {
-            let emitted = f64::from(self.light.bright_emitted[chosen.element as usize]);
-            (chosen.factor * emitted, chosen.segment)
-        });
-        [punctual, emitter]
-    }
-
-    /// Chooses a punctual light: the brightness of all of them, and the end of the ray.
-    fn one_punctual(&self, to: &Receiver, [u, v]: [f64; 2]) -> Option<(f64, DVec3)> {
-        let far = self.one_direction(to, [u, v]);
-        let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
-        let each: Vec<(f64, DVec3)> = lamps
-            .filter_map(|((lamp, _), &bright)| {
-                let (factor, end) = match (lamp.kind, lamp.kind.place().zip(far)) {
-                    (_, Some((place, (d, factors)))) => {
-                        (factors[place], to.point + d * self.distance())
-                    }
-                    (LightKind::Surface, _) => {
-                        // The choice of a lamp must be independent of the choice of its point.
-                        let turn = hash(u.to_bits() ^ v.to_bits().rotate_left(32), 0x73);
-                        let at = sequence02(1, turn);
-                        luminaire::whole(lamp, to, self.light.half_size, at)?
-                    }
-                    _ => punctual_factor(lamp, to, self.far())?,
-                };
-                Some((factor * f64::from(bright), end))
-            })
-            .collect();
-        let all: f64 = each.iter().map(|(bright, _)| bright).sum();
-        let mut left = v * all;
-        let (_, end) = each.into_iter().find(|&(bright, _)| {
-            left -= bright;
-            left < 0.0
-        })?;
-        Some((all, end))
-    }
-
-    /// Chooses a point of an emitting element below a node; [`NONE`] stands for no node.
-    fn one_emitter(&self, to: &Receiver, below: u32, [mut u, v]: [f64; 2]) -> Option<Chosen> {
-        let (id, chance) = self.emitting_element(to, below, &mut u)?;
-        let node = self.tree.node(id);
-        let element = self.tree.element(node)?;
-        let factors = lambert_triangles_x8(to.point, to.normal, [element.corners].into_iter());
-        let factor = factors[0];
-        let plane = self.tree.face_plane[element.face as usize];
-        if factor <= 0.0 || plane == to.plane {
-            return None;
-        }
-        let part = one_part(to, element.corners, factor, &mut u);
-        let (point, weight) = point_of(to, node.normal, &[part], [u, v])?;
-        (weight > 0.0).then(|| Chosen {
-            element: id,
-            factor: factor * weight / chance,
-            segment: Segment::new(to.point, point, [to.plane, plane]),
-        })
-    }
-
-    /// Chooses an emitting element below a node, and returns its probability; `u` can be used again. The choice descends
-    /// the hierarchy (Conty Estevez and Kulla 2018).
-    fn emitting_element(&self, to: &Receiver, below: u32, u: &mut f64) -> Option<(u32, f64)> {
-        let worth = |id: u32| {
-            let node = self.tree.node(id);
-            let emitted = f64::from(self.light.bright_emitted[id as usize]);
-            if !self.can_see(to, node) {
-                return 0.0;
-            }
-            let distance = (node.centre - to.point).length_squared();
-            emitted * node.area / distance.max(node.radius * node.radius)
-        };
-        let fork = |id: u32| self.light.lit[id as usize];
-        let mut id = Some(below).filter(|&id| id != NONE).map(fork)?;
-        let mut chance = 1.0;
-        if id == NONE || worth(id) <= 0.0 {
-            return None;
-        }
-        // An element emits evenly, whatever its children.
-        while self.tree.node(id).element == NONE {
-            let children = self.tree.node(id).child_range();
-            let children = children.map(fork).filter(|&child| child != NONE);
-            let worths = children.map(|child| (child, worth(child)));
-            let all: f64 = worths.clone().map(|c| c.1).sum();
-            let mut left = *u * all;
-            let mut chosen = None;
-            for (child, worth) in worths.filter(|c| c.1 > 0.0) {
-                chosen = Some((child, worth, (left / worth).min(1.0 - f64::EPSILON)));
-                if left < worth {
-                    break;
-                }
-                left -= worth;
-            }
-            let (child, worth, rest) = chosen?;
-            (id, *u, chance) = (child, rest, chance * worth / all);
-        }
-        Some((id, chance))
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::sampling::Pcg;
-    use crate::light::brightness;
-    use crate::transport::tests::{baked, middle};
 
     fn to() -> Receiver {
         Receiver {
@@ -556,44 +414,5 @@ mod tests {
                 assert!((mean - 1.0).abs() < 5e-3, "{height}, one part: {mean}");
             }
         }
-    }
-
-    /// Against the exact sum over all lamps.
-    #[test]
-    fn one_lamp_by_chance_is_all_lamps_on_the_mean() {
-        const SAMPLES: u32 = 1024;
-        let bake = baked("furnished.glb", 1);
-        assert!(!bake.lamps().is_empty());
-        let (mut off, mut all) = (0.0, 0.0);
-        bake.room.with_sight(|sight| {
-            // So many rays that they have no noise.
-            let gatherer = Gatherer {
-                tolerance: 1e-6,
-                ..bake.gatherer(sight)
-            };
-            let mut memory = Memory::default();
-            let tree = bake.tree();
-            for leaf in tree.leaves().step_by(97) {
-                let to = Receiver {
-                    seed: 0,
-                    ..middle(tree, leaf)
-                };
-                let row = gatherer.direct(&to, &mut memory);
-                let want = brightness(bake.lanes().tristimulus(&row), bake.light().white);
-                let one = |k| {
-                    gatherer
-                        .one_lamp(&to, sequence02(k, 0))
-                        .into_iter()
-                        .flatten()
-                };
-                let open = (0..SAMPLES)
-                    .flat_map(one)
-                    .filter(|(_, segment)| !sight.blocks_one(segment));
-                let mean = open.map(|(bright, _)| bright).sum::<f64>() / f64::from(SAMPLES);
-                off += (mean - want).abs();
-                all += want;
-            }
-        });
-        assert!(all > 1.0 && off < 0.02 * all, "{off} of {all}");
     }
 }

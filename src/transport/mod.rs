@@ -5,7 +5,8 @@
 //! | `receiver`, `gatherer` | a point, its light, and what a gather works with |
 //! | `point` | all light at a point |
 //! | `patches`, `slope`, `shadows` | patches of few faces with their exact factors, past what blocks them |
-//! | `lamp`, `fixture` | parts of lamps near a point, lamps chosen at random, lamps of many faces from afar |
+//! | `lamp`, `fixture` | parts of lamps near a point, lamps of many faces from afar |
+//! | `chance` | lamps chosen at random |
 //! | `punctual`, `luminaire` | lights without extent, and lamps that emit from a surface by a profile |
 //! | `hemisphere`, `sweep` | beams of rays that find the patches they end on |
 //! | `via`, `mirrored` | the same lamps and patches by way of mirrors |
@@ -14,6 +15,7 @@
 //! | `ways` | what light from outside meets on its way |
 //! | `trace` | where a point's light comes from, kept for relighting |
 
+mod chance;
 mod clipped_sky;
 mod fixture;
 mod gatherer;

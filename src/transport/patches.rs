@@ -84,6 +84,7 @@ impl Gatherer<'_> {
             }
             if held == 0 {
                 self.sources_together(to, which, memory, out);
+                self.lamps_by_chance(to, memory, out);
                 return;
             }
             let faces = &faces[..count];
@@ -141,7 +142,7 @@ impl Gatherer<'_> {
             return;
         }
         if which == RadiosityPart::Emitted {
-            self.lamps_by_chance(to, id, factor * emitted, memory, out);
+            memory.far.push((id, factor * emitted));
             return;
         }
         let count = CLUSTER_POINTS[usize::from(factor * reflected > self.tolerance)];

@@ -44,12 +44,8 @@ impl Gatherer<'_> {
         self.lamps_of(to, memory, out);
         self.lamps_in_mirrors(to, memory, out);
         // No ray may carry more than this.
-        self.bright(
-            to,
-            GLARE * self.tolerance * hemisphere.len() as f64,
-            memory,
-            out,
-        );
+        let most = GLARE * self.tolerance_at(to, 1.0);
+        self.bright(to, most * hemisphere.len() as f64, memory, out);
         for (x, d) in out.irradiance.iter_mut().zip(&out.direct) {
             *x += d;
         }

@@ -1,0 +1,253 @@
+//! Lamps chosen at random: some that stand for all of far clusters, and one that stands for all of a room.
+
+use super::gatherer::{Gatherer, Memory};
+use super::lamp::{PATCHES, one_part, point_of};
+use super::luminaire;
+use super::punctual::punctual_factor;
+use super::receiver::{Gathered, Receiver};
+use crate::geometry::sampling::{hash, sequence02};
+use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8};
+use crate::hierarchy::NONE;
+use crate::scene::LightKind;
+use glam::DVec3;
+
+/// A chosen lamp, the segment to it, and the factor from its exitance to irradiance by all lamps that it represents.
+struct Chosen {
+    element: u32,
+    factor: f64,
+    segment: Segment,
+}
+
+/// The cluster at a place on the line of what all of them carry, what it carries, and how far along it the place is, 0 to 1.
+fn chosen_cluster(clusters: &[(u32, f64)], mut at: f64) -> (u32, f64, f64) {
+    let mut k = 0;
+    while k + 1 < clusters.len() && at >= clusters[k].1 {
+        at -= clusters[k].1;
+        k += 1;
+    }
+    let (id, carries) = clusters[k];
+    (id, carries, (at / carries).clamp(0.0, 1.0 - f64::EPSILON))
+}
+
+impl Gatherer<'_> {
+    /// Adds the light of far clusters of emitting elements, by some of the elements chosen at random: as many rays as all clusters
+    /// together are worth.
+    pub(super) fn lamps_by_chance(&self, to: &Receiver, memory: &mut Memory, out: &mut Gathered) {
+        let far = std::mem::take(&mut memory.far);
+        let all: f64 = far.iter().map(|cluster| cluster.1).sum();
+        if all > 0.0 {
+            let turn = hash(to.seed ^ 1, u64::from(far[0].0));
+            let count = self.rays_to_sources(to, all, PATCHES);
+            let mut sums = [0.0; 2];
+            for k in 0..count as u32 {
+                let [u, v] = sequence02(k, turn);
+                let (id, carries, u) = chosen_cluster(&far, u * all);
+                let Some(chosen) = self.one_emitter(to, id, [u, v]) else {
+                    continue;
+                };
+                memory.rays += 1;
+                if self.blocks_one(&chosen.segment) {
+                    continue;
+                }
+                let tint = self.through(&chosen.segment);
+                let factor = chosen.factor * all / carries;
+                let emitted = f64::from(self.light.bright_emitted[chosen.element as usize]);
+                let bright = factor * emitted * self.left_by(tint.as_ref());
+                sums = [sums[0] + bright, sums[1] + bright * bright];
+                let count = count as f64;
+                self.add_emitted(chosen.element, factor / count, tint.as_ref(), out);
+            }
+            let [mean, square] = sums.map(|sum| sum / count as f64);
+            memory.noise += (square - mean * mean).max(0.0) / count as f64;
+        }
+        memory.far = far;
+        memory.far.clear();
+    }
+
+    /// Brightness of the direct light at a point, from one punctual light and one emitting element, each chosen with about
+    /// its share of the light as probability, provided nothing blocks the segments: without bias.
+    pub(super) fn one_lamp(&self, to: &Receiver, [u, v]: [f64; 2]) -> [Option<(f64, Segment)>; 2] {
+        let punctual = self.one_punctual(to, [u, v]).map(|(bright, end)| {
+            let segment = Segment::new(to.point, end, [to.plane, NO_PLANE]);
+            (bright, segment)
+        });
+        let room = self.light.lit.first().copied().unwrap_or(NONE);
+        let emitter = self.one_emitter(to, room, [u, v]);
+        let emitter = emitter.map(|chosen| {
+            let emitted = f64::from(self.light.bright_emitted[chosen.element as usize]);
+            (chosen.factor * emitted, chosen.segment)
+        });
+        [punctual, emitter]
+    }
+
+    /// Chooses a punctual light: the brightness of all of them, and the end of the ray.
+    fn one_punctual(&self, to: &Receiver, [u, v]: [f64; 2]) -> Option<(f64, DVec3)> {
+        let far = self.one_direction(to, [u, v]);
+        let lamps = self.lamps.iter().zip(&self.light.bright_lamps);
+        let each: Vec<(f64, DVec3)> = lamps
+            .filter_map(|((lamp, _), &bright)| {
+                let (factor, end) = match (lamp.kind, lamp.kind.place().zip(far)) {
+                    (_, Some((place, (d, factors)))) => {
+                        (factors[place], to.point + d * self.distance())
+                    }
+                    (LightKind::Surface, _) => {
+                        // The choice of a lamp must be independent of the choice of its point.
+                        let turn = hash(u.to_bits() ^ v.to_bits().rotate_left(32), 0x73);
+                        let at = sequence02(1, turn);
+                        luminaire::whole(lamp, to, self.light.half_size, at)?
+                    }
+                    _ => punctual_factor(lamp, to, self.far())?,
+                };
+                Some((factor * f64::from(bright), end))
+            })
+            .collect();
+        let all: f64 = each.iter().map(|(bright, _)| bright).sum();
+        let mut left = v * all;
+        let (_, end) = each.into_iter().find(|&(bright, _)| {
+            left -= bright;
+            left < 0.0
+        })?;
+        Some((all, end))
+    }
+
+    /// Chooses a point of an emitting element below a node; [`NONE`] stands for no node.
+    fn one_emitter(&self, to: &Receiver, below: u32, [mut u, v]: [f64; 2]) -> Option<Chosen> {
+        let (id, chance) = self.emitting_element(to, below, &mut u)?;
+        let node = self.tree.node(id);
+        let element = self.tree.element(node)?;
+        let factors = lambert_triangles_x8(to.point, to.normal, [element.corners].into_iter());
+        let factor = factors[0];
+        let plane = self.tree.face_plane[element.face as usize];
+        if factor <= 0.0 || plane == to.plane {
+            return None;
+        }
+        let part = one_part(to, element.corners, factor, &mut u);
+        let (point, weight) = point_of(to, node.normal, &[part], [u, v])?;
+        (weight > 0.0).then(|| Chosen {
+            element: id,
+            factor: factor * weight / chance,
+            segment: Segment::new(to.point, point, [to.plane, plane]),
+        })
+    }
+
+    /// Chooses an emitting element below a node, and returns its probability; `u` can be used again. The choice descends
+    /// the hierarchy (Conty Estevez and Kulla 2018).
+    fn emitting_element(&self, to: &Receiver, below: u32, u: &mut f64) -> Option<(u32, f64)> {
+        let worth = |id: u32| {
+            let node = self.tree.node(id);
+            let emitted = f64::from(self.light.bright_emitted[id as usize]);
+            if !self.can_see(to, node) {
+                return 0.0;
+            }
+            let distance = (node.centre - to.point).length_squared();
+            emitted * node.area / distance.max(node.radius * node.radius)
+        };
+        let fork = |id: u32| self.light.lit[id as usize];
+        let mut id = Some(below).filter(|&id| id != NONE).map(fork)?;
+        let mut chance = 1.0;
+        if id == NONE || worth(id) <= 0.0 {
+            return None;
+        }
+        // An element emits evenly, whatever its children.
+        while self.tree.node(id).element == NONE {
+            let children = self.tree.node(id).child_range();
+            let children = children.map(fork).filter(|&child| child != NONE);
+            let worths = children.map(|child| (child, worth(child)));
+            let all: f64 = worths.clone().map(|c| c.1).sum();
+            let mut left = *u * all;
+            let mut chosen = None;
+            for (child, worth) in worths.filter(|c| c.1 > 0.0) {
+                chosen = Some((child, worth, (left / worth).min(1.0 - f64::EPSILON)));
+                if left < worth {
+                    break;
+                }
+                left -= worth;
+            }
+            let (child, worth, rest) = chosen?;
+            (id, *u, chance) = (child, rest, chance * worth / all);
+        }
+        Some((id, chance))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::brightness;
+    use crate::transport::tests::{baked, middle};
+
+    /// Lamps of which some stand for all, against all of them.
+    #[test]
+    fn far_lamps_by_chance_are_all_lamps_on_the_mean() {
+        const SEEDS: u64 = 256;
+        let bake = baked("furnished.glb", 1);
+        let (mut off, mut sums) = (0.0, [0.0; 2]);
+        bake.room.with_sight(|sight| {
+            let exact = Gatherer {
+                tolerance: 1e-6,
+                ..bake.gatherer(sight)
+            };
+            let chance = Gatherer {
+                tolerance: 1.0,
+                ..bake.gatherer(sight)
+            };
+            let mut memory = Memory::default();
+            let mut bright = |gatherer: &Gatherer, to: &Receiver| {
+                let row = gatherer.direct(to, &mut memory);
+                brightness(bake.lanes().tristimulus(&row), bake.light().white)
+            };
+            for leaf in bake.tree().leaves().step_by(97) {
+                let to = |seed| Receiver {
+                    seed,
+                    ..middle(bake.tree(), leaf)
+                };
+                let want = bright(&exact, &to(0));
+                let all: f64 = (0..SEEDS).map(|seed| bright(&chance, &to(seed))).sum();
+                let mean = all / SEEDS as f64;
+                off += (mean - want).abs();
+                sums = [sums[0] + mean, sums[1] + want];
+            }
+        });
+        assert!(sums[1] > 1.0 && off < 0.05 * sums[1], "{off} of {sums:?}");
+        assert!((sums[0] / sums[1] - 1.0).abs() < 5e-3, "{sums:?}");
+    }
+
+    /// Against the exact sum over all lamps.
+    #[test]
+    fn one_lamp_by_chance_is_all_lamps_on_the_mean() {
+        const SAMPLES: u32 = 1024;
+        let bake = baked("furnished.glb", 1);
+        assert!(!bake.lamps().is_empty());
+        let (mut off, mut all) = (0.0, 0.0);
+        bake.room.with_sight(|sight| {
+            // So many rays that they have no noise.
+            let gatherer = Gatherer {
+                tolerance: 1e-6,
+                ..bake.gatherer(sight)
+            };
+            let mut memory = Memory::default();
+            let tree = bake.tree();
+            for leaf in tree.leaves().step_by(97) {
+                let to = Receiver {
+                    seed: 0,
+                    ..middle(tree, leaf)
+                };
+                let row = gatherer.direct(&to, &mut memory);
+                let want = brightness(bake.lanes().tristimulus(&row), bake.light().white);
+                let one = |k| {
+                    gatherer
+                        .one_lamp(&to, sequence02(k, 0))
+                        .into_iter()
+                        .flatten()
+                };
+                let open = (0..SAMPLES)
+                    .flat_map(one)
+                    .filter(|(_, segment)| !sight.blocks_one(segment));
+                let mean = open.map(|(bright, _)| bright).sum::<f64>() / f64::from(SAMPLES);
+                off += (mean - want).abs();
+                all += want;
+            }
+        });
+        assert!(all > 1.0 && off < 0.02 * all, "{off} of {all}");
+    }
+}
