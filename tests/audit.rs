@@ -480,16 +480,18 @@ fn calibrate(path: &Path, points: usize, most_paths: usize) -> Vec<String> {
     wrong
 }
 
-/// A sixth of this room's light comes from the underside of its lamp's housing, which one path in some hundred finds.
-const RARE: &str = "flat.glb";
+/// Rooms whose light paths find rarely, with the paths that each needs. A sixth of the flat's comes from the underside of its lamp's housing,
+/// which one path in some hundred finds: with 4096 paths a point the reference itself is off by 1.7 dE00, and does not know how rarely it
+/// finds most of it. Among mirrors it is off by 2.3.
+const RARE: [(&str, usize); 2] = [("flat.glb", 1 << 16), ("mirrored.glb", 1 << 16)];
 
-/// With 4096 paths a point the reference itself is off by 1.7 dE00, and does not know how rarely it finds most of it.
 #[test]
 fn calibration_where_paths_find_light_rarely() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("scenes")
-        .join(RARE);
-    let wrong = calibrate(&path, 100, 1 << 16);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let rooms = RARE.iter();
+    let wrong: Vec<String> = rooms
+        .flat_map(|(name, paths)| calibrate(&folder.join(name), 100, *paths))
+        .collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
@@ -503,7 +505,7 @@ fn calibration_of_the_estimate() {
         .filter(|p| p.extension().is_some_and(|e| e == "glb"))
         // What a bake has left there is no room of ours.
         .filter(|p| !p.to_string_lossy().ends_with(".baked.glb"))
-        .filter(|p| !p.ends_with(RARE))
+        .filter(|p| !RARE.iter().any(|(name, _)| p.ends_with(name)))
         .collect();
     paths.sort();
     let wrong: Vec<String> = paths

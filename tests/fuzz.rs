@@ -78,7 +78,12 @@ fn sound(loaded: haarlight::Result<Scene>, bake: bool) -> Result<(), TestCaseErr
     if !bake {
         return Ok(());
     }
-    let mut bake = Bake::new(scene, Settings::default());
+    // Three of 300 rooms of a few odd triangles use up all vertices that they may have: at the default two thirds of the time.
+    let settings = Settings {
+        error: 4.0,
+        ..Settings::default()
+    };
+    let mut bake = Bake::new(scene, settings);
     for _ in 0..2 {
         bake.step();
     }

@@ -228,12 +228,12 @@ fn lamps_go_out_in_a_furnished_room() {
         }
         scene
     };
-    let cached = Cached::new(room("furnished.glb"), settings(3.0, 3));
+    let cached = Cached::new(room("furnished.glb"), settings(1.5, 3));
     let (_, relit) = cached.relit(changed());
-    let mut fresh = Bake::new(changed(), settings(3.0, 3));
+    let mut fresh = Bake::new(changed(), settings(1.5, 3));
     fresh.run();
     let stated = relit.record.error_de2000.value.unwrap();
-    let measured = difference(&fresh, &relit.baked, 1);
+    let measured = difference(&fresh, &relit.baked, 4);
     println!(
         "furnished: measured {measured}, stated {stated} and {}",
         estimate(&fresh)
@@ -242,7 +242,7 @@ fn lamps_go_out_in_a_furnished_room() {
         measured < stated.hypot(estimate(&fresh)),
         "{measured} {stated}"
     );
-    assert!(difference(&fresh, &cached.baked, 1) > 3.0 * measured);
+    assert!(difference(&fresh, &cached.baked, 4) > 3.0 * measured);
 }
 
 /// Lamps behind panes and in mirrors, the colours of panes and mirrors themselves: what a fresh bake finds.

@@ -148,16 +148,16 @@ impl Plan {
         let seen = Seen {
             lux,
             white: bake.light().white[1],
-            leaves: bake.light().leaves.len(),
+            leaves: bake.rounds().iter().map(|r| r.elements).collect(),
             averages: bake.averages(),
             errors: bake.rounds().iter().map(estimate).collect(),
         };
         println!(
-            "{self:?}: {verdict:?} in {} rounds, {} leaves, {} links, estimate {:.3}, white {:.0}, {:.2} s",
+            "{self:?}: {verdict:?} in {} rounds, {:?} leaves, {} links, estimates {:.3?}, white {:.0}, {:.2} s",
             bake.rounds().len(),
             seen.leaves,
             last.links,
-            seen.errors.last().unwrap(),
+            seen.errors,
             seen.white,
             started.elapsed().as_secs_f64(),
         );
@@ -169,17 +169,20 @@ impl Plan {
 struct Seen {
     lux: Vec<f64>,
     white: f64,
-    leaves: usize,
     averages: Averages,
-    /// Estimates, round by round.
+    /// Leaves and estimates, round by round.
+    leaves: Vec<usize>,
     errors: Vec<f64>,
 }
 
 impl Seen {
-    /// What both say after as many rounds, the most that both have: a further round leaves a third of it.
-    fn estimates(&self, other: &Self) -> [f64; 2] {
+    /// Estimates and numbers of leaves of both after as many rounds, the most that both have: a further round leaves a third of the error with
+    /// three times the leaves.
+    fn alike(&self, other: &Self) -> [[f64; 2]; 2] {
         let rounds = self.errors.len().min(other.errors.len());
-        [self, other].map(|seen| seen.errors[rounds - 1])
+        let leaves = |seen: &Self| seen.leaves[rounds - 1] as f64;
+        let both = [self, other];
+        [both.map(|seen| seen.errors[rounds - 1]), both.map(leaves)]
     }
 
     /// Root mean square of the relative difference, and the greatest.
@@ -229,7 +232,7 @@ fn outsides_of_walls_change_nothing() {
     assert!(rms < 0.014 && most < 0.06, "off {rms}, {most}");
     let ratio = thick.white / thin.white;
     assert!((ratio - 1.0).abs() < 0.06, "white {ratio}");
-    let [a, b] = thick.estimates(thin);
+    let [[a, b], _] = thick.alike(thin);
     assert!((0.55..1.8).contains(&(a / b)), "estimate {a} for {b}");
     let ratio = thick.averages.counted_m2 / thin.averages.area_m2;
     assert!((ratio - 1.0).abs() < 0.06, "area that counts {ratio}");
@@ -252,9 +255,11 @@ fn a_plain_around_a_room_changes_nothing() {
                 );
             };
             same(plain.white, alone.white, 1.1, "white");
-            let [a, b] = plain.estimates(alone);
+            let [[a, b], [leaves, of_alone]] = plain.alike(alone);
             same(a, b, 2.0, "estimate");
-            same(plain.leaves as f64, alone.leaves as f64, 3.0, "leaves");
+            same(leaves, of_alone, 3.0, "leaves");
+            // The chance of 160 watched points.
+            assert!(plain.errors.len().abs_diff(alone.errors.len()) <= 1);
             same(
                 plain.averages.counted_m2,
                 alone.averages.counted_m2,

@@ -20,6 +20,9 @@ const SLENDER: f64 = 0.25;
 /// each side has its own light.
 pub(super) const FENCE: u64 = 1 << 62;
 
+/// In place of the way along an edge: what is looked at in a covered cell tells nothing of a bare neighbour.
+const COVERED: u8 = 3;
+
 /// A corner of a cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {
@@ -76,6 +79,8 @@ pub(super) struct Cell {
     pub(super) sheet: u32,
     /// Triangle of the mesh, and its entry in the hierarchy.
     pub(super) of: (u32, u32),
+    /// Does something cover the entry?
+    pub(super) covered: bool,
     pub(super) corners: [Corner; 3],
     /// Edge k leads from corner k to the next.
     pub(super) edges: [u32; 3],
@@ -111,9 +116,9 @@ pub(super) struct SurfaceSide {
     /// Vertex between two: in their middle (0), or at this share from the first to the second. Along an edge on which
     /// something stands, also by the direction in which the triangle runs along it.
     between: HashMap<(u32, u32, u64, u8), u32>,
-    /// Vertices on the edge of a shadow: the vertex before its light was divided, the lamps whose light ends there, and
-    /// those of them that light its side.
-    pub(super) sides: HashMap<(u32, u64, u64), u32>,
+    /// Vertices on the edge of a shadow: the vertex before its light was divided, the lamps whose light ends there, those of them that
+    /// light its side, and whether that side is covered.
+    pub(super) sides: HashMap<(u32, u64, u64, bool), u32>,
     pub(super) base: HashMap<u32, u32>,
     /// Vertices on edges on which something stands: the vertex from which each was divided.
     pub(super) parted: HashMap<u32, u32>,
@@ -214,7 +219,7 @@ impl Cells {
         let (covered, bare): (Vec<u32>, Vec<u32>) = all.partition(|&t| start.space(t, back).1);
         for triangle in bare.into_iter().chain(covered) {
             let entry = start.entry(triangle, back);
-            let space = start.space(triangle, back).0;
+            let (space, covered) = start.space(triangle, back);
             let local = mesh.origin[triangle as usize].1 as usize;
             let group = match surface.normals {
                 Some(_) => u32::MAX,
@@ -256,6 +261,7 @@ impl Cells {
             self.all.push(Cell {
                 sheet: number_of_sheet,
                 of: (triangle, entry),
+                covered,
                 corners,
                 edges,
                 area: mesh.area[triangle as usize],
@@ -323,11 +329,12 @@ impl Cells {
             .copied()
     }
 
-    /// Direction in which a cell runs along an edge on which something stands; 0 along all other edges, whose sides
-    /// share vertices.
+    /// Direction in which a cell runs along an edge on which something stands; 0 along all other edges, whose sides share vertices
+    /// if both are covered or both bare.
     fn way_along(&self, cell: &Cell, k: usize) -> u8 {
         let edge = &self.edges[cell.edges[k] as usize];
         match edge.sharp & FENCE {
+            _ if cell.covered => COVERED,
             0 => 0,
             _ if edge.ends[0] == cell.corners[k].point => 1,
             _ => 2,
@@ -427,16 +434,16 @@ impl Cells {
 
     /// Bisects a cell at a split edge: one half takes its place, the other is appended.
     fn bisect(&mut self, k: usize, edge: usize, shrink: f64) {
+        let whole = self.all[k].clone();
         let Cell {
             sheet,
             of,
             corners,
             edges,
-            area,
-            counts,
             hints,
             doubt,
-        } = self.all[k];
+            ..
+        } = whole;
         let way = self.way_along(&self.all[k], edge);
         let [a, b, c] = [0, 1, 2].map(|k| corners[(edge + k) % 3]);
         let [ab, bc, ca] = [0, 1, 2].map(|k| edges[(edge + k) % 3]);
@@ -473,12 +480,9 @@ impl Cells {
             Some(_) => [[None; 3]; 2],
         };
         let half = |corners, edges, share: f64, hints, missed| Cell {
-            sheet,
-            of,
             corners,
             edges,
-            area: share * area,
-            counts,
+            area: share * whole.area,
             hints,
             doubt: CellError {
                 square: shrink * doubt.square,
@@ -486,6 +490,7 @@ impl Cells {
                 missed,
                 ..CellError::default()
             },
+            ..whole.clone()
         };
         let first = half(
             [a, m, c],
@@ -544,22 +549,6 @@ impl SurfaceSide {
             });
             vertices.len() as u32 - 1
         })
-    }
-
-    /// Parts hints at the line from `m` to `c`: those on the side of `a` come first; where the others begin.
-    pub(super) fn part(&mut self, hints: (u32, u32), m: Corner, c: Corner, a: Corner) -> u32 {
-        let flat = |w: [f64; 3]| [w[1], w[2]];
-        let (m, c, a) = (flat(m.weights), flat(c.weights), flat(a.weights));
-        let side = |p: [f64; 2]| (c[0] - m[0]) * (p[1] - m[1]) - (c[1] - m[1]) * (p[0] - m[0]);
-        let of_a = side(a);
-        let some = &mut self.hints[hints.0 as usize..hints.1 as usize];
-        let (first, second): (Vec<Hint>, Vec<Hint>) =
-            some.iter().partition(|hint| side(hint.at) * of_a >= 0.0);
-        let border = hints.0 + first.len() as u32;
-        for (place, hint) in some.iter_mut().zip(first.into_iter().chain(second)) {
-            *place = hint;
-        }
-        border
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the solved light tells of a triangle before any look: every leaf of the hierarchy in it has a value.
 
-use super::cells::{Cells, Hint};
+use super::cells::{Cells, Corner, Hint, SurfaceSide};
 use crate::geometry::quarters;
 use crate::hierarchy::Tree;
 use crate::solve::Bake;
@@ -14,6 +14,24 @@ impl Cells {
         let (first, end) = cell.hints;
         let hints = &self.sheets[cell.sheet as usize].hints[first as usize..end as usize];
         cell.counts = counting(hints.iter().map(|h| [h.area, h.counts])).unwrap_or(cell.counts);
+    }
+}
+
+impl SurfaceSide {
+    /// Parts hints at the line from `m` to `c`: those on the side of `a` come first; where the others begin.
+    pub(super) fn part(&mut self, hints: (u32, u32), m: Corner, c: Corner, a: Corner) -> u32 {
+        let flat = |w: [f64; 3]| [w[1], w[2]];
+        let (m, c, a) = (flat(m.weights), flat(c.weights), flat(a.weights));
+        let side = |p: [f64; 2]| (c[0] - m[0]) * (p[1] - m[1]) - (c[1] - m[1]) * (p[0] - m[0]);
+        let of_a = side(a);
+        let some = &mut self.hints[hints.0 as usize..hints.1 as usize];
+        let (first, second): (Vec<Hint>, Vec<Hint>) =
+            some.iter().partition(|hint| side(hint.at) * of_a >= 0.0);
+        let border = hints.0 + first.len() as u32;
+        for (place, hint) in some.iter_mut().zip(first.into_iter().chain(second)) {
+            *place = hint;
+        }
+        border
     }
 }
 

@@ -150,13 +150,20 @@ impl Cells {
     /// `beside` the corner.
     pub(super) fn take_side(&mut self, (cell, k, lamps): Sharp, lit: u64, beside: [f64; 3]) {
         let Cell {
-            sheet, of, corners, ..
+            sheet,
+            of,
+            covered,
+            corners,
+            ..
         } = &mut self.all[cell];
         let sheet = &mut self.sheets[*sheet as usize];
         let vertex = corners[k].vertex;
         let base = sheet.base.get(&vertex).copied().unwrap_or(vertex);
         let fresh = sheet.vertices.len() as u32;
-        let side = *sheet.sides.entry((base, lamps, lit)).or_insert(fresh);
+        let side = *sheet
+            .sides
+            .entry((base, lamps, lit, *covered))
+            .or_insert(fresh);
         if side == fresh {
             sheet.vertices.push(sheet.vertices[base as usize]);
             sheet.base.insert(side, base);

@@ -90,7 +90,13 @@ impl Goal {
         let (last, before) = (past.last()?, past.iter().rev().nth(1));
         // Four times the links for next to nothing: the rest is the noise of visibility in the gather.
         let fall = before.and_then(|before| Some(last.error? / before.error?));
+        // An error that was lower before is no such rest: finer leaves have found light that coarse ones did not know of.
+        let errors = past.iter().filter_map(|round| round.error);
+        let is_lowest = last
+            .error
+            .is_some_and(|last| errors.fold(last, f64::min) > STALLED * last);
         let stalled = fall.is_some_and(|fall| (STALLED..1.0 / STALLED).contains(&fall))
+            && is_lowest
             && last.links > WORTH_STALLING;
         let exhausted = (has_many(past) || stalled).then_some(Verdict::Exhausted);
         self.done(past).or(exhausted)

@@ -28,14 +28,15 @@ impl Bake {
             .iter()
             .map(|g| self.solution.lanes.tristimulus(&g.irradiance))
             .collect();
-        let by_rays = self.room.by_rays();
+        let leaves = self.solution.light.leaves.len();
+        let kept = (self.rounds.last()).map_or(1.0, |r| r.elements as f64 / leaves.max(1) as f64);
+        let share = estimate::share(round, self.room.by_rays(), kept);
         let before = std::mem::replace(&mut self.solution.seen, seen);
         estimate::compare(
             &before,
             &self.solution.seen,
             self.solution.light.white,
-            round,
-            by_rays,
+            share,
         )
     }
 

@@ -1,7 +1,7 @@
 //! Lamps chosen at random: some that stand for all of far clusters, and one that stands for all of a room.
 
 use super::gatherer::{Gatherer, Memory};
-use super::lamp::{PATCHES, one_part, point_of};
+use super::lamp::{one_part, point_of};
 use super::luminaire;
 use super::punctual::punctual_factor;
 use super::receiver::{Gathered, Receiver};
@@ -10,6 +10,9 @@ use crate::geometry::{NO_PLANE, Segment, lambert_triangles_x8};
 use crate::hierarchy::NONE;
 use crate::scene::LightKind;
 use glam::DVec3;
+
+/// Rays to far lamps, for as much of their light as may be misplaced at a point. No cluster brings more than that may be in a bright place.
+const CHOSEN: f64 = 4.0;
 
 /// A chosen lamp, the segment to it, and the factor from its exitance to irradiance by all lamps that it represents.
 struct Chosen {
@@ -37,7 +40,7 @@ impl Gatherer<'_> {
         let all: f64 = far.iter().map(|cluster| cluster.1).sum();
         if all > 0.0 {
             let turn = hash(to.seed ^ 1, u64::from(far[0].0));
-            let count = self.rays_to_sources(to, all, PATCHES);
+            let count = (CHOSEN * all / self.tolerance_at(to, 1.0)).ceil();
             let mut sums = [0.0; 2];
             for k in 0..count as u32 {
                 let [u, v] = sequence02(k, turn);
@@ -54,11 +57,10 @@ impl Gatherer<'_> {
                 let emitted = f64::from(self.light.bright_emitted[chosen.element as usize]);
                 let bright = factor * emitted * self.left_by(tint.as_ref());
                 sums = [sums[0] + bright, sums[1] + bright * bright];
-                let count = count as f64;
                 self.add_emitted(chosen.element, factor / count, tint.as_ref(), out);
             }
-            let [mean, square] = sums.map(|sum| sum / count as f64);
-            memory.noise += (square - mean * mean).max(0.0) / count as f64;
+            let [mean, square] = sums.map(|sum| sum / count);
+            memory.noise += (square - mean * mean).max(0.0) / count;
         }
         memory.far = far;
         memory.far.clear();

@@ -29,7 +29,7 @@ const RAYS: [usize; 2] = [8, 256];
 const LEAF_RAYS: usize = 16;
 /// All lamps together may misplace as much as this many patches. With 1, 2 and 4 three furnished rooms end at the same
 /// errors (.37, .31, .26 mean CIEDE2000) within .01.
-pub(super) const PATCHES: f64 = 4.0;
+const PATCHES: f64 = 4.0;
 /// The same of all bright patches together. With 4, 2 and 1 half of 2,500 points of the file are off by more than .455, .425, .419 dE00 in a
 /// garage and .401, .397, .386 in a living room (grey, `--error 1`), from 42, 65, 94 and 15, 28, 51 such rays a look; with rays for each patch by itself,
 /// 440 and 73 a look, by .437 and .368, and the garage took 54 CPU seconds for 43 to 46.
@@ -261,7 +261,7 @@ impl Gatherer<'_> {
 
     /// How many rays are worth while to lamps or patches that would bring `all`, share of white, and may misplace as much as a number
     /// of patches.
-    pub(super) fn rays_to_sources(&self, to: &Receiver, all: f64, patches: f64) -> usize {
+    fn rays_to_sources(&self, to: &Receiver, all: f64, patches: f64) -> usize {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses. Where many points represent a leaf, their number compensates.
         let wanted = 0.5 * all / (patches * self.tolerance_at(to, all));
         match self.shafts {
