@@ -487,3 +487,43 @@ fn a_board_on_an_edge_parts_its_light() {
     assert!((drawn - there).abs() < 0.05 * there, "{drawn} for {there}");
     assert!(dark > 0);
 }
+
+/// A plate of 3 mm on a floor darkens a centimetre around it, and not everything as far as the next vertex: rays ran from its corners.
+#[test]
+fn no_dark_rays_run_from_a_plate_on_a_floor() {
+    let mut room = Room::new();
+    let (wall, lamp, black) = (room.paint(0.5), room.lamp(0.5, 1000.0), room.paint(0.02));
+    let size = dvec3(5.0, 2.5, 6.0);
+    room.hollow(DVec3::ZERO, size, [wall, wall, wall, lamp, wall, wall]);
+    let corner = |k: u32, far: f64| {
+        let (sin, cos) = ((f64::from(k) + 0.3) * TAU / 9.0).sin_cos();
+        let r = far * (0.5 + 0.1 * f64::from(k * 5 % 3));
+        dvec3(2.6 + r * cos, 0.0, 3.1 + 0.8 * r * sin)
+    };
+    let (foot, up): (Vec<DVec3>, DVec3) =
+        ((0..9).map(|k| corner(k, 1.0)).collect(), 0.003 * DVec3::Y);
+    let mut positions = foot.clone();
+    positions.extend(foot.iter().map(|p| *p + up));
+    positions.push(dvec3(2.6, 0.003, 3.1));
+    let triangles = (0..9).flat_map(|k| {
+        let next = (k + 1) % 9;
+        [
+            [k, 9 + k, next],
+            [next, 9 + k, 9 + next],
+            [9 + k, 18, 9 + next],
+        ]
+    });
+    room.mesh(positions, triangles.collect(), black);
+    let (bake, baked) = baked(room.scene());
+    let mut least = f64::INFINITY;
+    for k in 0..9 {
+        for t in 0..8 {
+            let on = corner(k, 1.0).lerp(corner((k + 1) % 9, 1.0), f64::from(t) / 8.0);
+            let out = (on - dvec3(2.6, 0.0, 3.1)).normalize();
+            let light = |far: f64| drawn(&bake, &baked, on + far * out, DVec3::Y);
+            least = least.min(light(0.06) / light(0.3));
+        }
+    }
+    eprintln!("{} vertices, {least:.3}", vertices(&baked));
+    assert!(least > 0.9, "{least}");
+}

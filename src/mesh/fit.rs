@@ -3,7 +3,7 @@
 //! Straight lines between points of a curve lie on one side of the curve: with vertices on the light itself rooms were drawn .5 to 1.5 %
 //! too dark at `--error 1`, as light is highest where it bends most. Where it bends evenly over a triangle, lines miss on average a third
 //! of what they miss in the middles of its three edges together (the rule of edge middles, exact to the second degree), and these were
-//! looked at. Every vertex is moved by the mean of that over the triangles around it, by area.
+//! looked at. Every vertex is moved by the mean of that over the triangles around it, by area; those at [rims](super::rims) otherwise.
 
 use super::grow::MeshGrowth;
 
@@ -17,7 +17,9 @@ impl MeshGrowth<'_> {
     /// only a factor, so that the light of each lamp keeps its share and can be changed afterwards.
     pub(super) fn fitted(&self) -> Vec<f32> {
         let mut missed = vec![[0.0; 2]; self.looks.len()];
-        for cell in &self.cells.all {
+        let mut at_rim = vec![[0.0; 2]; self.looks.len()];
+        let rims = self.rims();
+        for (number, cell) in self.cells.all.iter().enumerate() {
             let sheet = cell.sheet as usize;
             let seen = |vertex: u32| {
                 let look = self.look(sheet, vertex)?;
@@ -32,6 +34,15 @@ impl MeshGrowth<'_> {
                     None => cell.doubt.missed[k].map(f64::from),
                 }
             };
+            for [a, b, e] in self.from_rim(&rims, number) {
+                let middle = self.cells.known_middle(cell, e).and_then(seen);
+                if let (Some((look, own)), Some((_, other)), Some((_, middle))) =
+                    (corners[a], corners[b], middle)
+                {
+                    at_rim[look][0] += cell.area * Self::lacks([own, other, middle]);
+                    at_rim[look][1] += cell.area;
+                }
+            }
             let known: Vec<f64> = (0..3).filter_map(middle).collect();
             let lux = corners.into_iter().flatten().map(|(_, lux)| lux);
             let most = MOST * lux.fold(f64::INFINITY, f64::min);
@@ -44,7 +55,11 @@ impl MeshGrowth<'_> {
                 missed[look][1] += cell.area;
             }
         }
-        let factor = |(look, [missed, area]): (usize, [f64; 2])| {
+        let factor = |(look, within): (usize, [f64; 2])| {
+            let [missed, area] = match at_rim[look][0] > 0.0 {
+                true => at_rim[look],
+                false => within,
+            };
             let own = self.looks.at(look as u32).map_or(0.0, |seen| seen.xyz[1]);
             match missed != 0.0 && own > 0.0 && area > 0.0 {
                 true => (1.0 + missed / (area * own)) as f32,

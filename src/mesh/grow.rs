@@ -117,7 +117,7 @@ impl<'a> MeshGrowth<'a> {
         }
     }
 
-    fn want(&mut self, sheet: usize, vertex: u32) -> u32 {
+    pub(super) fn want(&mut self, sheet: usize, vertex: u32) -> u32 {
         let looked = &mut self.looked[sheet];
         let sheet = &self.cells.sheets[sheet];
         looked.resize(sheet.vertices.len(), UNKNOWN);

@@ -16,6 +16,7 @@ pub(crate) mod looks;
 pub(crate) mod measure;
 mod missed;
 mod parts;
+mod rims;
 mod shades;
 mod shadow;
 mod skins;
@@ -112,6 +113,7 @@ impl Bake {
             let end = growth.grow(turns.aim, progress);
             // Where there was no time to grow, the last measurement still holds.
             if end != GrowthOutcome::Late || growth.cells.all.len() != cells {
+                growth.look_from_rims(progress);
                 settled = self.settled(&growth);
                 samples = growth.measured(self, &settled, turns.turn, progress);
             }
