@@ -34,7 +34,7 @@ impl MeshGrowth<'_> {
                     None => cell.doubt.missed[k].map(f64::from),
                 }
             };
-            for [a, b, e] in self.from_rim(&rims, number) {
+            for [a, b, e] in self.rim_edges(&rims, number) {
                 let middle = self.cells.known_middle(cell, e).and_then(seen);
                 if let (Some((look, own)), Some((_, other)), Some((_, middle))) =
                     (corners[a], corners[b], middle)

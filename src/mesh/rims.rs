@@ -29,7 +29,7 @@ impl MeshGrowth<'_> {
     }
 
     /// Edges of a cell that lead away from a rim: the corner at the rim, the other, and the number of the edge.
-    pub(super) fn from_rim(
+    pub(super) fn rim_edges(
         &self,
         rims: &Rims,
         k: usize,
@@ -57,7 +57,7 @@ impl MeshGrowth<'_> {
         let rims = self.rims();
         for k in 0..self.cells.all.len() {
             let light = self.light(k);
-            for [a, b, e] in self.from_rim(&rims, k) {
+            for [a, b, e] in self.rim_edges(&rims, k) {
                 if self.difference(light[a], light[b]) > self.allowed {
                     let middle = self.cells.middle(k, e);
                     self.want(self.cells.all[k].sheet as usize, middle);
