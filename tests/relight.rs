@@ -279,14 +279,15 @@ fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
         fresh.run();
         let stated = relit.record.error_de2000.value.unwrap();
         let measured = difference(&fresh, &relit.baked, 1);
+        let same = difference(&cached.bake, &cached.baked, 1);
         println!(
-            "{name}: measured {measured}, stated {stated} and {}",
+            "{name}: measured {measured}, stated {stated}, {} {same}",
             estimate(&fresh)
         );
-        // Estimates are to be at least .7 of what is measured.
+        // Estimates are to be at least .7 of what is measured; vertices stand off their own light as without a change.
         assert!(
-            0.7 * measured < stated.hypot(estimate(&fresh)),
-            "{name}: {measured} {stated}"
+            0.7 * measured < stated.hypot(estimate(&fresh)).hypot(same),
+            "{name}: {measured} {stated} {same}"
         );
         assert!(
             difference(&fresh, &cached.baked, 1) > 3.0 * measured,

@@ -6,6 +6,8 @@
 //! looked at. Every vertex is moved by the mean of that over the triangles around it, by area; those at [rims](super::rims) otherwise.
 
 use super::grow::MeshGrowth;
+use super::rims::lacks;
+use std::collections::HashMap;
 
 /// Where lines miss more than this share of the light at the darkest corner of a triangle, they miss the edge of a shadow and not a curve, and no
 /// vertex is moved: beside sun patches dark corners got up to twice their light, and streaks ran from them. With .1, .25 and .5 the error between
@@ -13,36 +15,28 @@ use super::grow::MeshGrowth;
 const MOST: f64 = 0.25;
 
 impl MeshGrowth<'_> {
-    /// Factor of the light of each look where it belongs to a vertex. The same for all vertices of a look, so that there is no seam;
-    /// only a factor, so that the light of each lamp keeps its share and can be changed afterwards.
-    pub(super) fn fitted(&self) -> Vec<f32> {
+    /// For each look the one that vertices of it take their light from, nearly always itself, and a factor of that light. The same for all
+    /// vertices of a look, so that there is no seam; only a factor, so that the light of each lamp keeps its share and can be changed
+    /// afterwards.
+    pub(super) fn fitted(&self) -> Vec<(u32, f32)> {
         let mut missed = vec![[0.0; 2]; self.looks.len()];
-        let mut at_rim = vec![[0.0; 2]; self.looks.len()];
+        let mut beyond: HashMap<u32, Vec<(u32, f64)>> = HashMap::new();
         let rims = self.rims();
-        for (number, cell) in self.cells.all.iter().enumerate() {
+        for cell in &self.cells.all {
             let sheet = cell.sheet as usize;
             let seen = |vertex: u32| {
                 let look = self.look(sheet, vertex)?;
-                Some((look as usize, self.looks.at(look)?.xyz[1]))
+                Some((look, self.looks.at(look)?.xyz[1]))
             };
             let corners = cell.corners.map(|c| seen(c.vertex));
+            let looked = |k: usize| self.cells.known_middle(cell, k).and_then(seen);
             let middle = |k: usize| {
                 let [a, b] = [corners[k]?, corners[(k + 1) % 3]?];
-                let known = self.cells.known_middle(cell, k).and_then(seen);
-                match known {
+                match looked(k) {
                     Some((_, middle)) => Some(middle - 0.5 * (a.1 + b.1)),
                     None => cell.doubt.missed[k].map(f64::from),
                 }
             };
-            for [a, b, e] in self.rim_edges(&rims, number) {
-                let middle = self.cells.known_middle(cell, e).and_then(seen);
-                if let (Some((look, own)), Some((_, other)), Some((_, middle))) =
-                    (corners[a], corners[b], middle)
-                {
-                    at_rim[look][0] += cell.area * Self::lacks([own, other, middle]);
-                    at_rim[look][1] += cell.area;
-                }
-            }
             let known: Vec<f64> = (0..3).filter_map(middle).collect();
             let lux = corners.into_iter().flatten().map(|(_, lux)| lux);
             let most = MOST * lux.fold(f64::INFINITY, f64::min);
@@ -50,22 +44,40 @@ impl MeshGrowth<'_> {
                 true => known.iter().sum::<f64>() / known.len().max(1) as f64,
                 false => 0.0,
             };
-            for (look, _) in corners.into_iter().flatten() {
-                missed[look][0] += cell.area * mean;
-                missed[look][1] += cell.area;
+            for k in 0..3 {
+                let edges = self.rim_edges(&rims, cell, k);
+                let (Some(own), false) = (corners[k], edges.as_ref().is_some_and(Vec::is_empty))
+                else {
+                    continue;
+                };
+                let mut moved = mean;
+                if let Some(edges) = edges {
+                    let ends = edges.iter().map(|&[e, b]| Some((corners[b]?, looked(e)?)));
+                    let known: Vec<_> = ends.flatten().collect();
+                    beyond
+                        .entry(own.0)
+                        .or_default()
+                        .extend(known.iter().map(|ends| ends.1));
+                    let lacks = known.iter().map(|(b, m)| lacks([own.1, b.1, m.1]));
+                    moved = moved.max(lacks.sum::<f64>() / edges.len() as f64);
+                }
+                let [sum, area] = &mut missed[own.0 as usize];
+                (*sum, *area) = (*sum + cell.area * moved, *area + cell.area);
             }
         }
-        let factor = |(look, within): (usize, [f64; 2])| {
-            let [missed, area] = match at_rim[look][0] > 0.0 {
-                true => at_rim[look],
-                false => within,
-            };
-            let own = self.looks.at(look as u32).map_or(0.0, |seen| seen.xyz[1]);
-            match missed != 0.0 && own > 0.0 && area > 0.0 {
-                true => (1.0 + missed / (area * own)) as f32,
-                false => 1.0,
+        let fitted = |(look, [missed, area]): (u32, [f64; 2])| {
+            let own = self.looks.at(look).map_or(0.0, |seen| seen.xyz[1]);
+            if missed == 0.0 || own <= 0.0 || area <= 0.0 {
+                return (look, 1.0);
             }
+            let fit = own + missed / area;
+            let off = |(_, lux): &(u32, f64)| (lux - fit).abs();
+            let all = beyond.get(&look).into_iter().flatten().copied();
+            let best = all
+                .chain([(look, own)])
+                .min_by(|a, b| off(a).total_cmp(&off(b)));
+            best.map_or((look, 1.0), |(from, lux)| (from, (fit / lux) as f32))
         };
-        missed.into_iter().enumerate().map(factor).collect()
+        (0..).zip(missed).map(fitted).collect()
     }
 }

@@ -66,18 +66,18 @@ impl Bake {
     fn settle(
         &self,
         growth: &MeshGrowth,
-        fitted: &[f32],
+        fitted: &[(u32, f32)],
         sheet: usize,
         mut faces: Triangles,
         ground: Ground,
     ) -> Settled {
         let mut looks = vec![UNSEEN; ground.at.len()];
+        let mut factor = vec![1.0; ground.at.len()];
         for &v in faces.0.iter().flatten() {
-            looks[v as usize] = growth.look(sheet, v).unwrap_or(UNSEEN);
+            if let Some(look) = growth.look(sheet, v) {
+                (looks[v as usize], factor[v as usize]) = fitted[look as usize];
+            }
         }
-        let factor: Vec<f32> = (looks.iter())
-            .map(|&look| fitted.get(look as usize).copied().unwrap_or(1.0))
-            .collect();
         let seen = |&look: &u32| (look != UNSEEN).then(|| growth.looks.at(look))?;
         let lightness = |(look, &factor): (&u32, &f32)| {
             let xyz = seen(look)?.xyz.map(|x| f64::from(factor) * x);

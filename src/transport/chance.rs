@@ -11,7 +11,9 @@ use crate::hierarchy::NONE;
 use crate::scene::LightKind;
 use glam::DVec3;
 
-/// Rays to far lamps, for as much of their light as may be misplaced at a point. No cluster brings more than that may be in a bright place.
+/// Rays to far lamps, for as much of their light as may be misplaced at a point. No cluster brings more than that may be in a bright place. With 1, 4
+/// and 16 at `--error 1` a gallery lit by coves has errors between vertices of .95, .91 and .90 (root mean square) and takes 22, 22 and 26 CPU seconds, a living
+/// room 1.48, 1.28 and 1.46, and 40, 39 and 41.
 const CHOSEN: f64 = 4.0;
 
 /// A chosen lamp, the segment to it, and the factor from its exitance to irradiance by all lamps that it represents.
