@@ -27,7 +27,7 @@ impl MeshGrowth<'_> {
             .collect()
     }
 
-    /// If a corner of a cell is at a rim: edges of the cell that lead away from there, each with the corner at its other end. None below things.
+    /// If a corner of a cell is at a rim: edges of the cell that lead away from there, each with the corner at its other end; no edge below things.
     pub(super) fn rim_edges(&self, rims: &Rims, cell: &Cell, k: usize) -> Option<Vec<[usize; 2]>> {
         let at = cell.corners.map(|c| rims.contains(&(cell.sheet, c.point)));
         let edges = [[k, (k + 1) % 3], [(k + 2) % 3, (k + 2) % 3]];
