@@ -426,8 +426,10 @@ fn cut_of(mesh: &Mesh, rays: &RayIndex, triangle: u32, near: &mut Vec<u32>) -> O
     let outlines = outlines
         .iter()
         .filter(|(edge, is_large, _)| *is_large && is_once(edge));
+    let met = segments.len();
     segments.extend(outlines.map(|(.., segment)| *segment));
-    let all = (segments.len() <= 2 * MOST)
+    let all = (met + 1..=2 * MOST)
+        .contains(&segments.len())
         .then(|| Cut::along(triangle, &plane, &segments).of_worth(&plane))
         .filter(|all| all.points.len() <= standing.points.len() + OUTLINED);
     let cut = all.unwrap_or(standing);

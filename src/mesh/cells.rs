@@ -74,7 +74,7 @@ pub(super) struct CellError {
 }
 
 /// A triangle of the output.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
     pub(super) sheet: u32,
     /// Triangle of the mesh, and its entry in the hierarchy.
@@ -434,7 +434,7 @@ impl Cells {
 
     /// Bisects a cell at a split edge: one half takes its place, the other is appended.
     fn bisect(&mut self, k: usize, edge: usize, shrink: f64) {
-        let whole = self.all[k].clone();
+        let whole = self.all[k];
         let Cell {
             sheet,
             of,
@@ -490,7 +490,7 @@ impl Cells {
                 missed,
                 ..CellError::default()
             },
-            ..whole.clone()
+            ..whole
         };
         let first = half(
             [a, m, c],

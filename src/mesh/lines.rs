@@ -60,7 +60,7 @@ impl Cells {
 
     /// Puts a point inside a cell, which becomes three.
     pub(super) fn star(&mut self, k: usize, weights: [f64; 3]) -> ShadowEnd {
-        let cell = self.all[k].clone();
+        let cell = self.all[k];
         let own = within(&cell.corners, [weights[1], weights[2]]);
         let places = cell.corners.map(|c| self.points[c.point as usize]);
         let point = self.points.len() as u32;

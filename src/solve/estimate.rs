@@ -95,12 +95,8 @@ pub(super) fn share(round: usize, by_rays: bool, kept: f64) -> f64 {
     match (by_rays, round) {
         // The first two rounds err alike, as far as their leaves are as large.
         (true, 0 | 1) => {
-            let q = kept.sqrt();
-            if q < SHARE / (1.0 + SHARE) {
-                q / (1.0 - q)
-            } else {
-                SHARE
-            }
+            let q = kept.sqrt().min(1.0);
+            (q / (1.0 - q)).min(SHARE)
         }
         (true, _) => SHARE_OF_RAYS,
         (false, 0 | 1) => SHARE_OF_FIRST,
