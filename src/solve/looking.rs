@@ -28,9 +28,20 @@ impl Bake {
             .iter()
             .map(|g| self.solution.lanes.tristimulus(&g.irradiance))
             .collect();
-        let leaves = self.solution.light.leaves.len();
-        let kept = (self.rounds.last()).map_or(1.0, |r| r.elements as f64 / leaves.max(1) as f64);
-        let share = estimate::share(round, self.room.by_rays(), kept);
+        let by_rays = self.room.by_rays();
+        let (links, leaves) = (
+            self.refinement.graph.links.len(),
+            self.solution.light.leaves.len(),
+        );
+        let kept = (self.rounds.last()).map_or(1.0, |r| {
+            let (before, now) = if by_rays {
+                (r.elements, leaves)
+            } else {
+                (r.links, links)
+            };
+            before.max(1) as f64 / now.max(1) as f64
+        });
+        let share = estimate::share(round, by_rays, kept);
         let before = std::mem::replace(&mut self.solution.seen, seen);
         estimate::compare(
             &before,
