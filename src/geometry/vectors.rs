@@ -5,8 +5,9 @@
 //! with vectors that is given to an iterator; loops take their place. Rounding differs only where a processor lacks fused multiply-add.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x8, f64x8, u64x8};
+use fearless_simd::{f32x8, f64x8, u32x8, u64x8};
 use glam::DVec3;
+use std::f32::consts::LOG2_E;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2};
 
 /// Eight numbers, aligned as the vector of them.
@@ -85,6 +86,35 @@ pub(crate) fn ln<S: Simd>(x: f64x8<S>) -> f64x8<S> {
     let [high, low] = LN_2.map(|bits| c(f64::from_bits(bits)));
     let rest = exponent.mul_add(low, x2 * x * p / q);
     exponent.mul_add(high, rest + x2.mul_add(c(-0.5), x))
+}
+
+/// e^x of numbers up to 88; below e^-87 it stays there. The polynomial and ln 2 in two parts are those of Cephes (`expf.c`).
+#[inline(always)]
+pub(crate) fn exp<S: Simd>(x: f32x8<S>) -> f32x8<S> {
+    const P: [f32; 6] = [
+        0.5,
+        1.666_666_5e-1,
+        4.166_579_6e-2,
+        8.333_452e-3,
+        1.398_2e-3,
+        1.987_569_1e-4,
+    ];
+    const LN_2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
+    /// Added to a number it leaves a whole one in the last bits.
+    const WHOLE: f32 = 12_582_912.0;
+    let simd = x.simd;
+    let c = |x: f32| f32x8::splat(simd, x);
+    let x = x.max(c(-87.0));
+    let shifted = x.mul_add(c(LOG2_E), c(WHOLE));
+    let bits: u32x8<S> = shifted.to_bits();
+    let power = f32x8::from_bits((bits + u32x8::splat(simd, 127)) << 23);
+    let whole = shifted - c(WHOLE);
+    let r = whole.mul_add(c(-LN_2[1]), whole.mul_add(c(-LN_2[0]), x));
+    let mut p = c(P[5]);
+    for k in (0..5).rev() {
+        p = p.mul_add(r, c(P[k]));
+    }
+    p.mul_add(r * r, r + 1.0) * power
 }
 
 /// Arc tangent: the rational function of Cephes (`atan.c`).
@@ -179,6 +209,38 @@ mod tests {
                 }
             }
             assert!(of_ln < 2.0 && of_atan < 2.0, "{of_ln} {of_atan}");
+        }
+    }
+
+    #[test]
+    fn powers_of_e_are_those_of_f64() {
+        for level in levels() {
+            let mut worst = 0.0_f64;
+            for k in 0..10_000 {
+                let x: [f32; 8] =
+                    std::array::from_fn(|lane| 88.0 - (8 * k + lane) as f32 * 2.1875e-3);
+                let got = dispatch!(level, simd => exp(f32x8::simd_from(simd, x)).to_array());
+                for (x, got) in x.into_iter().zip(got) {
+                    worst = worst.max((f64::from(got) / f64::from(x).exp() - 1.0).abs());
+                }
+            }
+            assert!(worst < 2.0 * f64::from(f32::EPSILON), "{worst}");
+            let ends = [
+                0.0,
+                -0.0,
+                -87.5,
+                f32::NEG_INFINITY,
+                f32::MIN,
+                1.0,
+                -1.0,
+                2.0,
+            ];
+            let got = dispatch!(level, simd => exp(f32x8::simd_from(simd, ends)).to_array());
+            assert_eq!(got[..2], [1.0; 2]);
+            assert!(
+                got[2..5].iter().all(|x| (0.0..2e-38).contains(x)),
+                "{got:?}"
+            );
         }
     }
 

@@ -6,11 +6,13 @@
 
 use super::lanes::Lanes;
 use super::passed::{self, Passed, Steps};
+use crate::geometry::vectors::{Octet, exp};
 use crate::hierarchy::{Crossing, Glazing, Route};
 use crate::scene::Scene;
 use crate::scene::mirror::Mirror;
-use crate::scene::pane::Pane;
+use crate::scene::pane::{Pane, PaneKind, Slab};
 use crate::spectrum::BANDS;
+use fearless_simd::{Level, dispatch, f32x8, prelude::*};
 use glam::Vec3;
 
 /// Transmittance or reflectance by lane.
@@ -19,9 +21,9 @@ pub type Filter = [f32; BANDS];
 /// The spectra of panes and mirrors on some lanes.
 #[derive(Debug, Clone, Default)]
 pub struct Filters {
-    /// By material: transmittance of the inside of its pane or reflectance of its mirror, lane by lane; empty for other
-    /// materials.
-    inside: Vec<Vec<f32>>,
+    /// By material and lane: reflectance of its mirror, transmittance of its paint, logarithm of that of the inside of its glass; empty for
+    /// other materials. The last number fills the octet.
+    inside: Vec<Vec<Octet>>,
     /// By material: its pane.
     panes: Vec<Option<Pane>>,
     /// Weight of each lane in brightness.
@@ -50,7 +52,13 @@ impl Filters {
             if !neutral {
                 lanes.averages(spectrum, &mut row);
             }
-            row
+            if (material.pane.as_ref()).is_some_and(|p| matches!(p.kind, PaneKind::Glass { .. })) {
+                // Finite, as light may go no way at all through what is black; a mean may exceed 1 by a rounding.
+                row.iter_mut()
+                    .for_each(|x| *x = x.ln().max(f32::MIN).min(0.0));
+            }
+            let octet = |some: &[f32]| Octet(std::array::from_fn(|k| some[k.min(some.len() - 1)]));
+            row.chunks(8).map(octet).collect()
         });
         let all: f64 = lanes.xyz().iter().map(|xyz| xyz[1].abs()).sum();
         let weights = lanes
@@ -82,7 +90,14 @@ impl Filters {
         };
         let [cosine, thickness, texel] =
             [crossing.cosine, crossing.thickness, crossing.texel].map(f64::from);
-        self.multiply(material, pane.passing(cosine, thickness, texel), filter);
+        match pane.slab(cosine, thickness, texel) {
+            Some((slab, share)) => {
+                dispatch!(Level::new(), simd => {
+                    through(simd, &slab, share, &self.inside[material], filter);
+                });
+            }
+            None => self.multiply(material, pane.passing(cosine, thickness, texel), filter),
+        }
     }
 
     /// Multiplies a filter by the reflectance of one mirror.
@@ -113,12 +128,10 @@ impl Filters {
     }
 
     fn multiply(&self, material: usize, passing: impl Fn(f64) -> f64, filter: &mut Filter) {
-        let mut last = (f32::NAN, 1.0);
-        for (x, &inside) in filter.iter_mut().zip(&self.inside[material]) {
-            if inside != last.0 {
-                last = (inside, passing(f64::from(inside)) as f32);
+        for (x, inside) in filter.chunks_exact_mut(8).zip(&self.inside[material]) {
+            for (x, inside) in x.iter_mut().zip(inside.0) {
+                *x *= passing(f64::from(inside)) as f32;
             }
-            *x *= last.1;
         }
     }
 
@@ -158,6 +171,29 @@ impl Filters {
     pub fn brightness(&self, filter: &Filter) -> f64 {
         let lanes = filter.iter().zip(&self.weights);
         lanes.map(|(x, w)| f64::from(*x) * w).sum()
+    }
+}
+
+/// Multiplies a filter by what a share of a slab lets through, of which the inside's transmittance has these logarithms:
+/// [`Pane::passing`] for eight lanes at once, with one power for each and one division.
+#[inline(always)]
+fn through<S: Simd>(simd: S, slab: &Slab, share: f64, logs: &[Octet], filter: &mut Filter) {
+    let c = |x: f64| f32x8::splat(simd, x as f32);
+    // Along the face nothing gets in. A way that is no number of f32 would make a clear pane black.
+    let (way, share) = slab.way.map_or((0.0, 0.0), |way| (way.min(1e30), share));
+    let way = c(way);
+    // `(1 - R)^2 a / (1 - R^2 a^2)` of both polarisations; none where all is reflected, as far as f32 can tell.
+    let [(once_s, twice_s), (once_p, twice_p)] = slab.reflected.map(|r| match r < 1.0 - 1e-7 {
+        true => (c(0.5 * share * (1.0 - r) * (1.0 - r)), c(r * r)),
+        false => (c(0.0), c(0.0)),
+    });
+    for (x, log) in filter.chunks_exact_mut(8).zip(logs) {
+        let a = exp(way * log.load(simd));
+        let a2 = a * a;
+        let [below_s, below_p] = [twice_s, twice_p].map(|twice| 1.0 - twice * a2);
+        let above = once_s.mul_add(below_p, once_p * below_s);
+        let passes = a * above / (below_s * below_p);
+        (f32x8::from_slice(simd, x) * passes).store_slice(x);
     }
 }
 
@@ -274,6 +310,43 @@ pub(crate) fn accumulate(sum: &mut [f32], weight: f32, row: &[f32], tint: Option
         Some(tint) => {
             for ((x, r), t) in sum.iter_mut().zip(row).zip(tint) {
                 *x += weight * r * t;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All lanes of glass at once, and each by itself in f64.
+    #[test]
+    fn eight_lanes_of_glass_are_what_each_is() {
+        let insides = [0.0, 1e-30, 1e-3, 0.2, 0.5, 0.9, 0.999, 1.0];
+        let logs = [Octet(insides.map(|x: f64| (x.ln() as f32).max(f32::MIN)))];
+        for level in crate::geometry::vectors::levels() {
+            for ior in [1.0, 1.33, 1.5, 2.4, 1e9] {
+                for (thickness, share) in [
+                    (0.0, 1.0),
+                    (1.0, 1.0),
+                    (0.3, 0.7),
+                    (20.0, 0.5),
+                    (1e300, 1.0),
+                ] {
+                    for cosine in [0.0, 1e-12, 0.01, 0.3, 0.7, 1.0] {
+                        let slab = Slab::new(ior, thickness, cosine);
+                        let mut filter = [0.5; BANDS];
+                        dispatch!(level, simd => through(simd, &slab, share, &logs, &mut filter));
+                        for (inside, x) in insides.into_iter().zip(filter) {
+                            let want = 0.5 * share * slab.passes(inside);
+                            let off = (f64::from(x) - want).abs();
+                            assert!(
+                                off < 1e-6,
+                                "{ior} {thickness} {cosine} {inside}: {x} {want}"
+                            );
+                        }
+                    }
+                }
             }
         }
     }

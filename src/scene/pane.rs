@@ -74,15 +74,24 @@ impl Pane {
     /// Transmittance at a cosine of incidence, for a thickness in units and the texture's value, as a function of what
     /// [`Pane::spectrum`] is.
     pub fn passing(&self, cosine: f64, thickness: f64, texel: f64) -> impl Fn(f64) -> f64 + use<> {
-        let (slab, share, alpha) = match self.kind {
-            PaneKind::Glass { ior, share, .. } => {
-                (Some(Slab::new(ior, thickness, cosine)), share * texel, 0.0)
-            }
-            PaneKind::Cover { alpha, .. } => (None, 1.0, (alpha * texel).clamp(0.0, 1.0)),
+        let slab = self.slab(cosine, thickness, texel);
+        let alpha = match self.kind {
+            PaneKind::Glass { .. } => 0.0,
+            PaneKind::Cover { alpha, .. } => (alpha * texel).clamp(0.0, 1.0),
         };
         move |spectrum| match &slab {
-            Some(slab) => share * slab.passes(spectrum),
+            Some((slab, share)) => share * slab.passes(spectrum),
             None => (1.0 - alpha) * (1.0 - alpha * (1.0 - spectrum)),
+        }
+    }
+
+    /// The slab that light meets, and which share of it; none where paint covers.
+    pub(crate) fn slab(&self, cosine: f64, thickness: f64, texel: f64) -> Option<(Slab, f64)> {
+        match self.kind {
+            PaneKind::Glass { ior, share, .. } => {
+                Some((Slab::new(ior, thickness, cosine), share * texel))
+            }
+            PaneKind::Cover { .. } => None,
         }
     }
 
@@ -122,15 +131,15 @@ pub fn slab(ior: f64, inside: f64, thickness: f64, cosine: f64) -> f64 {
 }
 
 /// A slab at one angle.
-struct Slab {
+pub(crate) struct Slab {
     /// What one face reflects of each polarisation.
-    reflected: [f64; 2],
+    pub(crate) reflected: [f64; 2],
     /// How many units of thickness light goes through; none: it gets in nowhere.
-    way: Option<f64>,
+    pub(crate) way: Option<f64>,
 }
 
 impl Slab {
-    fn new(ior: f64, thickness: f64, cosine: f64) -> Self {
+    pub(crate) fn new(ior: f64, thickness: f64, cosine: f64) -> Self {
         let c = cosine.clamp(0.0, 1.0);
         // Of the refracted ray: Snell's law.
         let r = (1.0 - (1.0 - c * c) / (ior * ior)).max(0.0).sqrt();
@@ -142,7 +151,7 @@ impl Slab {
         }
     }
 
-    fn passes(&self, inside: f64) -> f64 {
+    pub(crate) fn passes(&self, inside: f64) -> f64 {
         let Some(way) = self.way else { return 0.0 };
         let a = match inside {
             1.0 => 1.0,
