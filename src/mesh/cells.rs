@@ -390,8 +390,7 @@ impl Cells {
                 k += 1;
             }
         }
-        fresh.sort_unstable();
-        fresh.dedup();
+        self.turn_needles(&mut fresh);
         fresh
     }
 

@@ -6,7 +6,6 @@
 //! looked at again.
 
 use super::cells::{Cell, Cells, FENCE, ShadowEnd, within};
-use super::lines::Sharp;
 use super::shades::{COVER, Shades, each};
 use super::shadow::{EdgeCrossing, Mark, ShadowEdge, ShadowFinding};
 use crate::link::Sight;
@@ -25,12 +24,8 @@ const FOUND: f64 = 1e-6;
 const STRAIGHT: f64 = 5e-4;
 /// Crossings this near to the end of an edge count as that end. No edge shorter than this arises from crossings.
 const NEAR: f64 = 4e-4;
-/// Distance from an edge of a shadow at which the light of a side is looked at, and the greatest such distance where the
-/// first still lies in half shadow: wider half shadows have no edge.
-const BESIDE: f64 = 1e-3;
-const SHARP: f64 = 4e-3;
-/// But no further than this share of the way to the middle of the triangle.
-const INTO: f64 = 0.75;
+/// Half shadows that reach further than this from a line have no edge.
+pub(super) const SHARP: f64 = 4e-3;
 /// Where it is asked whether a round shadow reaches into a triangle: share of the way from an edge's middle to the opposite corner. A disc's
 /// shadow loses the last place that was on its wrong side, and five rooms have up to .4 % more vertices; other shares were not tried.
 const BESIDE_MIDDLE: f64 = 0.04;
@@ -64,7 +59,7 @@ struct CellLook<'a> {
 }
 
 /// A place on the way between two.
-fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
+pub(super) fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
     std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
 }
 
@@ -497,60 +492,5 @@ impl Cells {
         }
         let split = self.split(shrink);
         self.take_sides(shades, split)
-    }
-
-    /// Gives corners on edges of shadows the vertices of their sides, in new cells and at points that were not on such edges
-    /// before; returns all of these cells.
-    pub(super) fn take_sides(&mut self, shades: &Shades, mut fresh: Vec<usize>) -> Vec<usize> {
-        let corners = self.sharp_corners(&fresh);
-        let half_size = shades.bake().mesh().half_size;
-        let cells = &*self;
-        let sides: Vec<(u64, [f64; 3])> = shades.bake().room.with_sight(|sight| {
-            let side = |(): &mut (), sharp: &Sharp| cells.side(shades, sight, half_size, *sharp);
-            shades.bake().team().map(&corners, || (), side)
-        });
-        for (corner, (lit, beside)) in corners.into_iter().zip(sides) {
-            self.take_side(corner, lit, beside);
-            fresh.push(corner.0);
-        }
-        fresh.sort_unstable();
-        fresh.dedup();
-        fresh
-    }
-
-    /// The lamps that light the inside of a cell at a corner, and a place there outside half shadow, if there is one nearby.
-    fn side(
-        &self,
-        shades: &Shades,
-        sight: &Sight,
-        half_size: f64,
-        (k, corner, lamps): Sharp,
-    ) -> (u64, [f64; 3]) {
-        let cell = &self.all[k];
-        let sheet = &self.sheets[cell.sheet as usize];
-        let from = cell.corners[corner].weights;
-        let own = |k: usize, at: usize| cell.corners[at].weights[k] / 3.0;
-        let middle: [f64; 3] = std::array::from_fn(|k| own(k, 0) + own(k, 1) + own(k, 2));
-        // Distance of the middle from the edges that meet here.
-        let near = [corner, (corner + 2) % 3].map(|e| {
-            let edge = &self.edges[cell.edges[e] as usize];
-            2.0 / 3.0 * cell.area / edge.length
-        });
-        let distance = near[0].min(near[1]);
-        let mut step = (BESIDE * half_size / distance).min(INTO);
-        let place = |step: f64| between(from, middle, step);
-        let first = shades.place(cell, sheet, place(step));
-        let lit = each(lamps)
-            .filter(|&lamp| shades.lit(sight, lamp, &first))
-            .fold(0, |all, lamp| all | lamp);
-        let wholly = |step: f64| {
-            let to = shades.place(cell, sheet, place(step));
-            let expected = |lamp: u64| Some(lit & lamp != 0);
-            each(lamps).all(|lamp| shades.wholly(sight, lamp, &to) == expected(lamp))
-        };
-        while !wholly(step) && 2.0 * step <= INTO && step * distance < SHARP * half_size {
-            step *= 2.0;
-        }
-        (lit, place(step))
     }
 }
