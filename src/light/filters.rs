@@ -55,7 +55,7 @@ impl Filters {
             if (material.pane.as_ref()).is_some_and(|p| matches!(p.kind, PaneKind::Glass { .. })) {
                 // Finite, as light may go no way at all through what is black; a mean may exceed 1 by a rounding.
                 row.iter_mut()
-                    .for_each(|x| *x = x.ln().max(f32::MIN).min(0.0));
+                    .for_each(|x| *x = x.clamp(0.0, 1.0).ln().max(f32::MIN));
             }
             let octet = |some: &[f32]| Octet(std::array::from_fn(|k| some[k.min(some.len() - 1)]));
             row.chunks(8).map(octet).collect()

@@ -185,7 +185,8 @@ mod tests {
             for (k, &edge) in cell.edges.iter().enumerate() {
                 let mut ends = cells.edges[edge as usize].ends;
                 let mut own = [k, (k + 1) % 3].map(|k| cell.corners[k].point);
-                (ends.sort_unstable(), own.sort_unstable());
+                ends.sort_unstable();
+                own.sort_unstable();
                 assert_eq!(ends, own);
             }
             let hints = &cells.sheets[cell.sheet as usize].hints;
