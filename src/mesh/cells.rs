@@ -169,8 +169,8 @@ pub(super) fn key(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// Both triangles of an edge must get the same bits, whichever weights are zero.
-fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
+/// A place on the way between two. Both triangles of an edge must get the same bits, whichever weights are zero.
+pub(super) fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
     std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
 }
 

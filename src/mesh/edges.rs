@@ -5,7 +5,7 @@
 //! shadow is looked for where its edges would meet if both ran on straight. All other triangles are bisected, and
 //! looked at again.
 
-use super::cells::{Cell, Cells, FENCE, ShadowEnd, within};
+use super::cells::{Cell, Cells, FENCE, ShadowEnd, between, within};
 use super::shades::{COVER, Shades, each};
 use super::shadow::{EdgeCrossing, Mark, ShadowEdge, ShadowFinding};
 use crate::link::Sight;
@@ -56,11 +56,6 @@ struct CellLook<'a> {
     /// All lamps of interest.
     lamps: u64,
     half_size: f64,
-}
-
-/// A place on the way between two.
-pub(super) fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
-    std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
 }
 
 fn flat(w: [f64; 3]) -> DVec2 {

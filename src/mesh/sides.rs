@@ -1,7 +1,7 @@
 //! The sides of edges of shadows: which vertex a triangle has there, and where its light is looked at.
 
-use super::cells::{Cell, Cells};
-use super::edges::{SHARP, between};
+use super::cells::{Cell, Cells, between};
+use super::edges::SHARP;
 use super::lines::Sharp;
 use super::shades::{Shades, each};
 use crate::link::Sight;

@@ -29,18 +29,13 @@ impl Bake {
             .map(|g| self.solution.lanes.tristimulus(&g.irradiance))
             .collect();
         let by_rays = self.room.by_rays();
-        let (links, leaves) = (
-            self.refinement.graph.links.len(),
-            self.solution.light.leaves.len(),
-        );
-        let kept = (self.rounds.last()).map_or(1.0, |r| {
-            let (before, now) = if by_rays {
-                (r.elements, leaves)
-            } else {
-                (r.links, links)
-            };
-            before.max(1) as f64 / now.max(1) as f64
-        });
+        let fineness = |links: usize, leaves: usize| match by_rays {
+            true => leaves.max(1) as f64,
+            false => links.max(1) as f64,
+        };
+        let links = self.refinement.graph.links.len();
+        let now = fineness(links, self.solution.light.leaves.len());
+        let kept = (self.rounds.last()).map_or(1.0, |r| fineness(r.links, r.elements) / now);
         let share = estimate::share(round, by_rays, kept);
         let before = std::mem::replace(&mut self.solution.seen, seen);
         estimate::compare(
