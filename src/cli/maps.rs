@@ -6,7 +6,8 @@ use super::talk::Talk;
 use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
 use crate::lightmap::{LightMaps, MapLimits};
-use crate::output::{BakedGlb, Exposure, maps};
+use crate::output::maps::{self, Precision};
+use crate::output::{BakedGlb, Exposure};
 use crate::scene::Scene;
 use crate::solve::Bake;
 use crate::store::file;
@@ -144,14 +145,15 @@ pub fn write(
     let index = maps::index(scene, maps, glb, look, ktx2, &name)?;
     let json = serde_json::to_vec_pretty(&index)
         .map_err(|problem| Error::Internal(format!("index of light maps: {problem}")))?;
+    let precision = Precision::of(maps);
     let mut files: Vec<(PathBuf, Vec<u8>)> = vec![(output.with_extension("maps.json"), json)];
     let of_layers = (0..).zip(&maps.layers).map(|(l, pages)| (Some(l), pages));
     for (layer, pages) in std::iter::once((None, &maps.pages)).chain(of_layers) {
         for (k, page) in pages.iter().enumerate() {
-            let exr = maps::to_exr(page, index.lux_per_unit)?;
+            let exr = maps::to_exr(page, index.lux_per_unit, precision)?;
             files.push((page_path(k, layer, "exr"), exr));
             if ktx2 {
-                let ktx2 = maps::to_ktx2(page, index.lux_per_unit);
+                let ktx2 = maps::to_ktx2(page, index.lux_per_unit, precision);
                 files.push((page_path(k, layer, "ktx2"), ktx2));
             }
         }

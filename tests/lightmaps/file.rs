@@ -168,7 +168,15 @@ pub(crate) fn triangles(glb: &[u8], index: &Value) -> Vec<Mapped> {
 
 /// The EXR pages that the index names.
 pub(crate) fn pages(folder: &Path, index: &Value) -> Vec<Texels> {
-    let unit = index["lux_per_unit"].as_f64().unwrap();
+    listed(
+        folder,
+        &index["pages"],
+        index["lux_per_unit"].as_f64().unwrap(),
+    )
+}
+
+/// The EXR pages of a list.
+pub(crate) fn listed(folder: &Path, pages: &Value, unit: f64) -> Vec<Texels> {
     let read = |page: &Value| {
         use exr::prelude::*;
         let image = read_first_rgba_layer_from_file(
@@ -188,10 +196,5 @@ pub(crate) fn pages(folder: &Path, index: &Value) -> Vec<Texels> {
             rgb: rgb.iter().map(|t| t.map(|c| f64::from(c) * unit)).collect(),
         }
     };
-    index["pages"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(read)
-        .collect()
+    pages.as_array().unwrap().iter().map(read).collect()
 }

@@ -1,6 +1,6 @@
 //! Light maps: what an engine reads back from the files is the light that `probe` finds, within the error that is stated.
 
-mod file;
+pub(crate) mod file;
 mod room;
 mod shown;
 
@@ -12,7 +12,8 @@ use haarlight::audit::{PathReference, Report};
 use haarlight::color::{LinearSrgb, de2000};
 use haarlight::hierarchy::Face;
 use haarlight::lightmap::{LightMaps, MapLimits};
-use haarlight::output::{BakedGlb, Exposure, mapped_glb, maps};
+use haarlight::output::maps::{self, Precision};
+use haarlight::output::{BakedGlb, Exposure, mapped_glb};
 use haarlight::scene::{Options, Scene};
 use haarlight::solve::{Bake, Settings};
 use serde_json::Value;
@@ -58,7 +59,7 @@ fn written(bake: Bake, limits: &MapLimits) -> Written {
     let index = maps::index(bake.scene(), &maps, &glb, &look, true, &name).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for (k, page) in maps.pages.iter().enumerate() {
-        let exr = maps::to_exr(page, index.lux_per_unit).unwrap();
+        let exr = maps::to_exr(page, index.lux_per_unit, Precision::Half).unwrap();
         std::fs::write(folder.path().join(name(k, None, "exr")), exr).unwrap();
     }
     std::fs::write(folder.path().join("room.glb"), &glb.bytes).unwrap();
@@ -348,7 +349,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
             .unwrap();
         pool.install(|| {
             let file = written(solved(room(), 2.0), &MapLimits::default());
-            let exr = maps::to_exr(&file.maps.pages[0], 1.0).unwrap();
+            let exr = maps::to_exr(&file.maps.pages[0], 1.0, Precision::Half).unwrap();
             (file.glb.bytes, exr, file.index.to_string())
         })
     };

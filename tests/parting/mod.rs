@@ -2,6 +2,7 @@
 
 mod dimmed;
 mod kept;
+mod pages;
 
 use crate::common::built;
 

@@ -1,7 +1,7 @@
-//! OpenEXR of a page: channels R, G, B as half floats, ZIP-compressed.
+//! OpenEXR of a page: channels R, G, B as floats of 16 or 32 bits, ZIP-compressed.
 
 use super::super::exr::encoded;
-use super::texels;
+use super::{Precision, texels};
 use crate::error::Result;
 use crate::lightmap::MapPage;
 use exr::prelude::*;
@@ -10,14 +10,18 @@ use exr::prelude::*;
 ///
 /// # Errors
 /// An internal fault of the encoder.
-pub fn to_exr(page: &MapPage, lux_per_unit: f64) -> Result<Vec<u8>> {
+pub fn to_exr(page: &MapPage, lux_per_unit: f64, precision: Precision) -> Result<Vec<u8>> {
     let texels = texels(page, lux_per_unit);
     let channels = ["R", "G", "B"]
         .into_iter()
         .enumerate()
         .map(|(c, name)| {
-            let plane = texels.iter().map(|t| f16::from_f32(t[c])).collect();
-            AnyChannel::new(name, FlatSamples::F16(plane))
+            let plane = texels.iter().map(|t| t[c]);
+            let samples = match precision {
+                Precision::Half => FlatSamples::F16(plane.map(f16::from_f32).collect()),
+                Precision::Single => FlatSamples::F32(plane.collect()),
+            };
+            AnyChannel::new(name, samples)
         })
         .collect();
     encoded((page.width, page.height), channels)

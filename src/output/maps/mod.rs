@@ -1,7 +1,8 @@
-//! Side files of light maps: irradiance in half floats, for programs that keep the room's own materials, and what belongs where.
+//! Side files of light maps: irradiance in floats, for programs that keep the room's own materials, and what belongs where.
 //!
 //! `NAME.map-K.exr` (and `.ktx2`) hold page K: linear sRGB irradiance (Y of the colour is illuminance) in units of `lux_per_unit`, 1
-//! unless a number of 16 bits could not hold it. Row 0 is the top: texture coordinates as in glTF.
+//! unless a number of 16 bits could not hold it. Row 0 is the top: texture coordinates as in glTF. Numbers have 16 bits, with layers 32, so that
+//! what is read of these adds up to the whole.
 //! `NAME.maps.json` lists the pages and, for each primitive with light, where its light is, see [`Index`].
 //!
 //! Radiosity is base colour times irradiance, lm/m2; radiance a pi-th of it. three.js shows base colour times texel times
@@ -29,6 +30,25 @@ pub const VERSION: u32 = 1;
 /// Greatest number in a page, and least of the brightest: numbers of 16 bits end at 65,504 and lose precision below 6e-5.
 const GREATEST: f64 = 32_768.0;
 const LEAST: f64 = 1.0;
+
+/// Floats of which pages are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// 16 bits.
+    Half,
+    /// 32 bits.
+    Single,
+}
+
+impl Precision {
+    /// 32 bits where there are layers: halves of two lamps' light were off by 6e-4 of the brightest sum, these are by 1.3e-7.
+    pub fn of(maps: &LightMaps) -> Self {
+        match maps.layers.is_empty() {
+            true => Self::Half,
+            false => Self::Single,
+        }
+    }
+}
 
 /// `NAME.maps.json`.
 #[derive(Debug, Clone, Serialize)]

@@ -1,7 +1,7 @@
 //! Ambient cubes as a 3-D texture, KTX 2.0, in the layout of Bevy's irradiance volumes: see the module above.
 
 use super::Probes;
-use crate::output::maps::ktx2;
+use crate::output::maps::{Precision, ktx2};
 
 /// The texture's bytes: R16G16B16A16_SFLOAT, alpha 1.
 pub fn to_volume(probes: &Probes) -> Vec<u8> {
@@ -16,5 +16,5 @@ pub fn to_volume(probes: &Probes) -> Vec<u8> {
             texels.extend(probes.cube[row..row + nx].iter().map(texel));
         }
     }
-    ktx2([nx, 2 * ny, 3 * nz], &texels)
+    ktx2([nx, 2 * ny, 3 * nz], &texels, Precision::Half)
 }
