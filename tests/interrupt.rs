@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Rounds before the one that is given up.
 const BEFORE: usize = 2;
 
-fn bake(name: &str) -> Bake {
+fn room(name: &str) -> (Scene, Settings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("scenes")
         .join(name);
@@ -19,6 +19,11 @@ fn bake(name: &str) -> Bake {
         error: 1.0,
         ..Settings::default()
     };
+    (scene, settings)
+}
+
+fn bake(name: &str) -> Bake {
+    let (scene, settings) = room(name);
     Bake::new(scene, settings)
 }
 
@@ -132,4 +137,32 @@ fn through_sheets() {
 #[test]
 fn where_paints_fluoresce() {
     given_up("brightened.glb", 100);
+}
+
+/// Prepares a room until it was asked `after` times; and how often was it asked?
+fn prepared(name: &str, after: usize) -> (Option<Bake>, usize) {
+    let (scene, settings) = room(name);
+    let asked = Arc::new(AtomicUsize::new(0));
+    let count = asked.clone();
+    let stop = move || count.fetch_add(1, Ordering::Relaxed) >= after;
+    let bake = Bake::new_unless(scene, settings, Arc::new(stop));
+    (bake, asked.load(Ordering::Relaxed))
+}
+
+/// The preparing of a room can be given up from its first step to the last lamp, also while openings to a sky are looked for behind panes.
+/// Asking changes nothing.
+#[test]
+fn preparing() {
+    for (name, least) in [("furnished.glb", 12), ("glazed.glb", 1000)] {
+        let (whole, times) = prepared(name, usize::MAX);
+        assert!(times >= least, "{name}: asked {times} times only");
+        for after in (0..8).chain([times / 4, times / 2, times - 1]) {
+            let (bake, _) = prepared(name, after);
+            assert!(bake.is_none(), "{name}: not after {after} of {times}");
+        }
+        let (mut whole, mut plain) = (whole.unwrap(), bake(name));
+        assert!(step(&mut whole, usize::MAX).0);
+        plain.step();
+        assert!(state(&whole) == state(&plain), "{name}: asking changes it");
+    }
 }

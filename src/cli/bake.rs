@@ -8,9 +8,9 @@ pub use super::bake_args::BakeArgs;
 use super::baking::{Order, Recorders};
 use super::options::Common;
 use super::paths;
-use super::rooms::load;
-use super::stop::Stop;
-use super::talk::Talk;
+use super::rooms::load_unless;
+use super::stop::{KILLED, Stop};
+use super::talk::{Talk, tell};
 use crate::error::{Problem, Result};
 use crate::output::camera;
 use crate::output::gltf::Packing;
@@ -38,7 +38,7 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         .unwrap_or_else(|| args.room.with_extension("baked.glb"));
     let cache = cache(args);
     talk.phase("reading");
-    let mut scene = load(&args.room, &args.reading, |parts| {
+    let mut scene = load_unless(&args.room, &args.reading, &stop.survey(), |parts| {
         problems(args, &output, cache.as_deref(), parts, team)
     })?;
     args.parting.part(&mut scene, &talk)?;
@@ -59,8 +59,15 @@ pub fn run(args: &BakeArgs, common: &Common) -> Result<u8> {
         grid: grid.as_ref(),
         told,
     };
+    let Some(mut bake) = order.prepare(scene) else {
+        talk.clear();
+        tell(
+            "haarlight: interrupted before it was known where the light of lamps goes; nothing was written",
+        );
+        return Ok(KILLED);
+    };
     let mut kept = Recorders::new(order, load_s)?;
-    let mut bake = order.begin(scene, &mut kept)?;
+    order.begin(&mut bake, &mut kept)?;
     let verdict = order.rounds(&mut bake, &mut kept)?;
     let lit = order.gather(&bake, verdict, &mut kept)?;
     let written = order.write(&bake, &lit, &mut kept)?;

@@ -12,7 +12,7 @@ use super::parting;
 use super::paths::text;
 use super::report::PageBuilder;
 use super::results::print;
-use super::rooms::{prepare, write_npz};
+use super::rooms::{prepare_unless, write_npz};
 use super::snapshots::Snapshots;
 use super::stop::Stop;
 use super::summary;
@@ -143,17 +143,25 @@ impl Recorders {
 }
 
 impl Order<'_> {
-    /// Prepares the room, or goes on where a checkpoint ends.
-    pub(super) fn begin(self, scene: Scene, kept: &mut Recorders) -> Result<Bake> {
+    /// Prepares the room; none if Ctrl-C ended that.
+    pub(super) fn prepare(self, scene: Scene) -> Option<Bake> {
         let Self {
             args, common, talk, ..
         } = self;
-        let before = kept.seconds.load;
-        let mut bake = prepare(scene, &args.solving, common, args.spectrum, talk);
+        let asked = self.stop.preparing();
+        let mut bake = prepare_unless(scene, &args.solving, common, args.spectrum, talk, asked)?;
         if self.cache.is_some() {
             bake.keep();
         }
-        let plan = PlanRecord::new(&bake, args.solving.time);
+        Some(bake)
+    }
+
+    /// Takes note of the plan, and goes on where a checkpoint ends.
+    pub(super) fn begin(self, bake: &mut Bake, kept: &mut Recorders) -> Result<()> {
+        let Self {
+            args, common, talk, ..
+        } = self;
+        let plan = PlanRecord::new(bake, args.solving.time);
         kept.log(&plan)?;
         let report = args.report().map(|path| PageBuilder::new(path, &plan));
         kept.report = report.transpose()?;
@@ -164,12 +172,12 @@ impl Order<'_> {
                 let to_end_s = None;
                 kept.note(&RoundRecord { round, to_end_s })?;
             }
-            kept.see(&bake);
+            kept.see(bake);
             let rounds = bake.rounds().len();
             talk.say(&format!("going on after round {rounds} of {}", text(path)));
         }
-        kept.seconds.prepare = self.stop.elapsed_s() - before;
-        Ok(bake)
+        kept.seconds.prepare = self.stop.elapsed_s() - kept.seconds.load;
+        Ok(())
     }
 
     /// Rounds until it is enough.

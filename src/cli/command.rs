@@ -16,7 +16,8 @@ Examples:
   haarlight probe room.glb --points desk.csv       lux at points (columns x,y,z,nx,ny,nz)
   haarlight spectra cie/F                          names that a room's .spectra.json may use
 
-Exit codes: 0 done, 1 stopped before the asked-for error was reached, 2 bad input, 3 a fault of the program.
+Exit codes: 0 done, 1 stopped before the asked-for error was reached, 2 bad input, 3 a fault of the program, 130 ended by
+Ctrl-C without a file.
 Results go to stdout or files, talk to stderr.";
 
 /// Bakes light into glTF rooms in full spectrum, and says how wrong it still is.

@@ -9,7 +9,8 @@ use crate::output::npz;
 use crate::scene::Scene;
 use crate::solve::{Bake, Representation, Settings};
 use crate::store::file;
-use crate::survey::advise;
+use crate::survey::advise_unless;
+use crate::team::{Asked, Interrupt, NEVER};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -23,9 +24,19 @@ pub(super) fn load(
     reading: &Reading,
     others: impl FnOnce(&[PathBuf]) -> Vec<Problem>,
 ) -> Result<Scene> {
+    load_unless(room, reading, &NEVER, others)
+}
+
+/// [`load`], but the room is not looked over once that is interrupted.
+pub(super) fn load_unless(
+    room: &Path,
+    reading: &Reading,
+    interrupt: &Interrupt,
+    others: impl FnOnce(&[PathBuf]) -> Vec<Problem>,
+) -> Result<Scene> {
     match Scene::load(room, &reading.options()) {
         Ok(mut scene) => {
-            let mut problems = advise(&mut scene, reading.wishes());
+            let mut problems = advise_unless(&mut scene, reading.wishes(), interrupt);
             problems.extend(others(&paths::parts(&scene)));
             if problems.is_empty() {
                 Ok(scene)
@@ -58,13 +69,38 @@ pub(super) fn prepare(
     representation: Representation,
     talk: &Talk,
 ) -> Bake {
-    let settings = Settings {
+    let settings = settings(solving, common, representation);
+    telling(Bake::new(scene, settings), common, talk)
+}
+
+/// [`prepare`], unless `asked` ends it before there is anything to write.
+pub(super) fn prepare_unless(
+    scene: Scene,
+    solving: &Solving,
+    common: &Common,
+    representation: Representation,
+    talk: &Talk,
+    asked: Asked,
+) -> Option<Bake> {
+    let settings = settings(solving, common, representation);
+    Some(telling(
+        Bake::new_unless(scene, settings, asked)?,
+        common,
+        talk,
+    ))
+}
+
+fn settings(solving: &Solving, common: &Common, representation: Representation) -> Settings {
+    Settings {
         error: solving.error,
         representation,
         seed: common.seed,
         ..Settings::default()
-    };
-    let mut bake = Bake::new(scene, settings);
+    }
+}
+
+/// Lets a bake tell of its phases.
+fn telling(mut bake: Bake, common: &Common, talk: &Talk) -> Bake {
     bake.spread_over(common.team);
     let parts = talk.parts();
     bake.watch(Arc::new(move |ended| {

@@ -71,7 +71,7 @@ pub fn run(args: &ServeArgs, common: &Common) -> Result<u8> {
     let (end, twice) = (server.end(), AtomicBool::new(false));
     ctrlc::set_handler(move || {
         if twice.swap(true, Ordering::SeqCst) {
-            std::process::exit(KILLED);
+            std::process::exit(KILLED.into());
         }
         end();
     })

@@ -14,6 +14,7 @@ use crate::hierarchy::{NONE, Tree};
 use crate::light::lanes::Lanes;
 use crate::light::{Filters, Glass};
 use crate::link::Sight;
+use crate::team::Interrupted;
 use glam::{DVec3, Vec3};
 
 /// Rays from lamps: an error of about .1 % of the flux.
@@ -158,7 +159,7 @@ impl Room {
         lanes: &Lanes,
         filters: &Filters,
         sight: &Sight,
-    ) -> (Sent, Vec<Landing>) {
+    ) -> Result<(Sent, Vec<Landing>), Interrupted> {
         let follower = Follower {
             tree,
             sight,
@@ -171,6 +172,7 @@ impl Room {
         sent.lamps_lm = all;
         let mut first = 0;
         for (flux, lamp) in lamps {
+            self.interrupt.check()?;
             // At least a packet, so that every lamp has rays.
             let count = (f64::from(RAYS) * flux[1] / all).ceil() as usize;
             let count = count.next_multiple_of(TOGETHER);
@@ -201,6 +203,7 @@ impl Room {
         }
         for light in &self.scene.lights {
             if light.kind.is_parallel() {
+                self.interrupt.check()?;
                 let irradiance = lanes.emission(light.light, &light.shape, 1.0);
                 landings.extend(follower.parallel(
                     light.direction,
@@ -209,6 +212,6 @@ impl Room {
                 ));
             }
         }
-        (sent, landings)
+        Ok((sent, landings))
     }
 }

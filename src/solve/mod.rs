@@ -136,11 +136,26 @@ impl Bake {
         Self::with(scene, settings, None)
     }
 
+    /// [`Bake::new`], unless `asked` ends it before it is known where the light of lamps goes: then there is nothing.
+    pub fn new_unless(scene: Scene, settings: Settings, asked: Asked) -> Option<Self> {
+        Self::prepared(scene, settings, None, Interrupt::by(asked)).ok()
+    }
+
     /// Prepares a room of which rays have already told which faces share a space and what is closed.
     pub(crate) fn with(scene: Scene, settings: Settings, analysis: Option<RoomAnalysis>) -> Self {
+        Self::prepared(scene, settings, analysis, Interrupt::default()).expect(NOBODY)
+    }
+
+    fn prepared(
+        scene: Scene,
+        settings: Settings,
+        analysis: Option<RoomAnalysis>,
+        interrupt: Interrupt,
+    ) -> Result<Self, Interrupted> {
         let started = Instant::now();
-        let (room, tree) = Room::new(scene, settings, analysis);
-        Self {
+        let (mut room, tree) = Room::new(scene, settings, analysis, interrupt)?;
+        room.interrupt = Interrupt::default();
+        Ok(Self {
             refinement: Refinement {
                 tree,
                 ..Refinement::default()
@@ -151,7 +166,7 @@ impl Bake {
             watch: None,
             started,
             taken_back_s: None,
-        }
+        })
     }
 
     /// One round: a finer hierarchy, its links, a solution, and what is known of its error.

@@ -1,5 +1,6 @@
 //! What lies outside a room: its sky, if any of it is seen.
 
+use super::NOBODY;
 use super::flux::{self, Closed};
 use super::room::{RAISED, Room, Settings, plan_of};
 use crate::geometry::openings::Openings;
@@ -7,6 +8,7 @@ use crate::hierarchy::{Mesh, Mirrors, Tree};
 use crate::light::Filters;
 use crate::scene::Scene;
 use crate::scene::effects::{EffectKind, Plan};
+use crate::team::{Interrupt, Interrupted};
 use crate::transport::{Surroundings, find_openings};
 
 /// Why a closed room has neither sky nor sun.
@@ -23,27 +25,32 @@ pub fn running(scene: Scene) -> Plan {
         }
         return plan;
     }
-    let (mut room, tree) = Room::shaped(scene, Settings::default(), None);
-    room.look_for_sky(&tree);
+    let never = Interrupt::default();
+    let (mut room, tree) = Room::shaped(scene, Settings::default(), None, never).expect(NOBODY);
+    room.look_for_sky(&tree).expect(NOBODY);
     room.plan
 }
 
 impl Room {
     /// Finds out by rays what is closed, what is outside, and where the light of lamps goes first.
-    pub(super) fn look_around(&mut self, tree: &Tree) {
-        self.look_for_sky(tree);
+    pub(super) fn look_around(&mut self, tree: &Tree) -> Result<(), Interrupted> {
+        self.look_for_sky(tree)?;
         let lanes = self.dense_lanes();
         let filters = Filters::new(&self.scene, &lanes);
         (self.sent, self.landings) =
-            self.with_sight(|sight| self.follow_lamps(tree, &lanes, &filters, sight));
+            self.with_sight(|sight| self.follow_lamps(tree, &lanes, &filters, sight))?;
+        Ok(())
     }
 
     /// Finds out by rays what is closed and what is outside.
-    fn look_for_sky(&mut self, tree: &Tree) {
+    fn look_for_sky(&mut self, tree: &Tree) -> Result<(), Interrupted> {
         [self.closed, self.sealed] = self.with_sight(|sight| {
             flux::closedness(&self.mesh, tree, &self.rays, sight, self.settings.seed)
         });
+        self.interrupt.check()?;
         self.look_outside(tree, true);
+        // Openings that were looked for in vain are none.
+        self.interrupt.check()
     }
 
     /// Looks for the openings of a room with a sky; takes the sky out of a room that is closed, which then costs nothing and is
@@ -99,8 +106,8 @@ impl Room {
     /// Finds where rays leave the room, and counts the rays cast.
     fn find_openings(&mut self, tree: &Tree) -> Openings {
         let seed = self.settings.seed;
-        let (openings, cast) =
-            self.with_sight(|sight| find_openings(&self.mesh, tree, sight, seed));
+        let (openings, cast) = self
+            .with_sight(|sight| find_openings(&self.mesh, tree, (sight, &self.interrupt), seed));
         self.opening_rays += cast;
         openings
     }

@@ -4,6 +4,7 @@ use crate::geometry::RayIndex;
 use crate::hierarchy::{Mesh, cuts, spaces};
 use crate::scene::Scene;
 use crate::scene::effects::{EffectKind, Plan};
+use crate::team::{Interrupt, Interrupted};
 
 /// A mesh whose triangles end where spaces end.
 pub(super) struct PartedMesh {
@@ -22,11 +23,14 @@ impl PartedMesh {
         plan: &Plan,
         seed: u64,
         known: Option<Vec<u32>>,
-    ) -> Self {
+        interrupt: &Interrupt,
+    ) -> Result<Self, Interrupted> {
         let mut rays = mesh.index(scene);
         let occlusion = plan.runs(EffectKind::Occlusion);
         if occlusion {
+            interrupt.check()?;
             let cuts = cuts(&mesh, &rays);
+            interrupt.check()?;
             if !cuts.is_empty() {
                 mesh = mesh.cut(&cuts);
                 if known.is_none() {
@@ -34,6 +38,7 @@ impl PartedMesh {
                 }
             }
         }
+        interrupt.check()?;
         let spaces = match known {
             Some(mut spaces) => {
                 rays = RayIndex::build(&[], &[], &[], &[]);
@@ -43,6 +48,6 @@ impl PartedMesh {
             None if occlusion => spaces(&mesh, &rays, seed),
             None => vec![0; mesh.faces.len()],
         };
-        Self { mesh, rays, spaces }
+        Ok(Self { mesh, rays, spaces })
     }
 }

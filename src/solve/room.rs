@@ -14,7 +14,7 @@ use crate::link::{Opaque, Sight, is_small};
 use crate::scene::Scene;
 use crate::scene::effects::{EffectKind, Plan};
 use crate::spectrum::Spectrum;
-use crate::team::{Interrupt, Team};
+use crate::team::{Interrupt, Interrupted, Team};
 use crate::transport::Surroundings;
 use crate::transport::hemisphere::Hemisphere;
 
@@ -100,7 +100,7 @@ pub(crate) struct Room {
     pub(crate) keep: bool,
     /// The ranks that bake this room together.
     pub(crate) team: Team,
-    /// Ends a round before it is done.
+    /// Ends the preparing, or a round, before it is done.
     pub(crate) interrupt: Interrupt,
 }
 
@@ -146,17 +146,18 @@ impl Room {
         scene: Scene,
         settings: Settings,
         analysis: Option<RoomAnalysis>,
-    ) -> (Self, Tree) {
+        interrupt: Interrupt,
+    ) -> Result<(Self, Tree), Interrupted> {
         let closed = analysis.as_ref().map(|known| known.closed);
-        let (mut room, tree) = Self::shaped(scene, settings, analysis);
+        let (mut room, tree) = Self::shaped(scene, settings, analysis, interrupt)?;
         match closed {
             Some(closed) => {
                 [room.closed, room.sealed] = closed;
                 room.look_outside(&tree, false);
             }
-            None => room.look_around(&tree),
+            None => room.look_around(&tree)?,
         }
-        (room, tree)
+        Ok((room, tree))
     }
 
     /// [`Self::new`] without looking around outside.
@@ -164,20 +165,23 @@ impl Room {
         scene: Scene,
         settings: Settings,
         analysis: Option<RoomAnalysis>,
-    ) -> (Self, Tree) {
+        interrupt: Interrupt,
+    ) -> Result<(Self, Tree), Interrupted> {
         let counted = analysis.as_ref().map(|known| known.counted.clone());
         let frame = analysis.as_ref().and_then(|known| known.frame);
-        let (mut room, mut tree) = Self::framed(scene, settings, analysis, frame);
+        let (mut room, mut tree) = Self::framed(scene, settings, analysis, frame, interrupt)?;
         let found = counted.is_none();
         room.counted = counted.unwrap_or_else(|| room.count(&mut tree));
         tree.weigh(&room.counted);
         if let Some(frame) = room.frame_of(&tree).filter(|_| found) {
-            (room, tree) = Self::framed(room.scene, room.settings, None, Some(frame));
+            (room, tree) =
+                Self::framed(room.scene, room.settings, None, Some(frame), room.interrupt)?;
             room.counted = room.count(&mut tree);
             tree.weigh(&room.counted);
         }
+        room.interrupt.check()?;
         room.probes = WatchedPoints::new(&tree, room.settings.seed);
-        (room, tree)
+        Ok((room, tree))
     }
 
     /// Builds the room so that only what lies in a frame counts, which is not weighed yet.
@@ -186,13 +190,18 @@ impl Room {
         settings: Settings,
         analysis: Option<RoomAnalysis>,
         frame: Option<Frame>,
-    ) -> (Self, Tree) {
+        interrupt: Interrupt,
+    ) -> Result<(Self, Tree), Interrupted> {
+        interrupt.check()?;
         let mesh = Mesh::framed(&scene, frame);
+        interrupt.check()?;
         let mut plan = plan_of(&scene, &mesh);
         let known = analysis.map(|known| known.spaces);
         let PartedMesh { mesh, rays, spaces } =
-            PartedMesh::new(&scene, mesh, &plan, settings.seed, known);
+            PartedMesh::new(&scene, mesh, &plan, settings.seed, known, &interrupt)?;
+        interrupt.check()?;
         let tree = Tree::new(&mesh, &spaces);
+        interrupt.check()?;
         let mirrors = Mirrors::new(&scene, &mesh);
         if let Some(mirrors) = &mirrors {
             plan.say(EffectKind::Mirrors, &mirrors.said());
@@ -214,7 +223,7 @@ impl Room {
             probes: WatchedPoints::default(),
             keep: false,
             team: Team::default(),
-            interrupt: Interrupt::default(),
+            interrupt,
             scene,
             settings,
             plan,
@@ -222,7 +231,7 @@ impl Room {
             rays,
             spaces,
         };
-        (room, tree)
+        Ok((room, tree))
     }
 
     /// Runs `f` with what blocks light in this room.

@@ -29,6 +29,11 @@ use eyes::Eyes;
 
 use crate::error::Problem;
 use crate::scene::Scene;
+use crate::team::{Interrupt, NEVER};
+
+/// What is said of a room that was not looked over.
+const GIVEN_UP: &str = "the room was not looked over, as that was interrupted: \
+                        of openings, of surfaces in others and of lamps that shine away from it nothing is told";
 
 /// What the user has decided already.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -55,18 +60,24 @@ pub struct SurveyOptions {
 /// # Ok::<(), haarlight::Error>(())
 /// ```
 pub fn advise(scene: &mut Scene, wishes: SurveyOptions) -> Vec<Problem> {
+    advise_unless(scene, wishes, &NEVER)
+}
+
+/// [`advise`] that is given up once it is interrupted, with a warning: a bake does not need it, unless it turns faces.
+pub fn advise_unless(
+    scene: &mut Scene,
+    wishes: SurveyOptions,
+    interrupt: &Interrupt,
+) -> Vec<Problem> {
     if let Some(problem) = content::nothing(scene) {
         return vec![problem];
     }
     scene.warnings.extend(size::hint(scene));
-    let eyes = Eyes::new(scene);
-    let warnings = [openings::hint, lying::hint, curved::hint].map(|hint| hint(&eyes));
+    let is_over = || !wishes.flip && interrupt.is_raised();
     let mut problem = content::no_lamp(scene);
-    let mut away = match problem {
-        None => lamps::away(&eyes),
-        Some(_) => None,
-    };
-    scene.warnings.extend(warnings.into_iter().flatten());
+    let found = looked_over(scene, problem.is_none(), &is_over);
+    let (warnings, mut away) = found.unwrap_or_else(|| (vec![GIVEN_UP.to_owned()], None));
+    scene.warnings.extend(warnings);
     if problem.is_none() {
         if wishes.flip {
             match &away {
@@ -90,5 +101,62 @@ pub fn advise(scene: &mut Scene, wishes: SurveyOptions) -> Vec<Problem> {
             Vec::new()
         }
         problem => problem.into_iter().collect(),
+    }
+}
+
+/// Warnings, and lamps that shine away if there are lamps; none if it was over before.
+fn looked_over(
+    scene: &Scene,
+    has_lamps: bool,
+    is_over: &dyn Fn() -> bool,
+) -> Option<(Vec<String>, Option<lamps::Away>)> {
+    let go_on = || (!is_over()).then_some(());
+    go_on()?;
+    let eyes = Eyes::new(scene);
+    let mut warnings = Vec::new();
+    for hint in [openings::hint, lying::hint, curved::hint] {
+        go_on()?;
+        warnings.extend(hint(&eyes));
+    }
+    go_on()?;
+    let away = has_lamps.then(|| lamps::away(&eyes)).flatten();
+    Some((warnings, away))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Options;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// What is said of a room whose faces all look away, if it is interrupted when it was asked so often.
+    fn said(wishes: SurveyOptions, after: usize) -> (Vec<Problem>, Vec<String>) {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut room = Scene::load(folder.join("scenes/convex.glb"), &Options::default()).unwrap();
+        room.flip(0..room.surfaces.len());
+        let asked = AtomicUsize::new(0);
+        let interrupt = Interrupt::by(Arc::new(move || {
+            asked.fetch_add(1, Ordering::Relaxed) >= after
+        }));
+        let problems = advise_unless(&mut room, wishes, &interrupt);
+        (problems, room.warnings)
+    }
+
+    #[test]
+    fn a_survey_is_given_up_unless_it_turns_faces() {
+        let plain = SurveyOptions::default();
+        for after in 0..5 {
+            let (problems, warnings) = said(plain, after);
+            assert!(problems.is_empty(), "{after}: {problems:?}");
+            assert_eq!(warnings, [GIVEN_UP], "{after}");
+        }
+        assert_eq!(said(plain, 5).0.len(), 1);
+        let flip = SurveyOptions {
+            flip: true,
+            ..plain
+        };
+        let (problems, warnings) = said(flip, 0);
+        assert!(problems.is_empty() && !warnings.contains(&GIVEN_UP.to_owned()));
     }
 }

@@ -15,6 +15,7 @@ use crate::hierarchy::{Mesh, Tree};
 use crate::light::{Passage, Tint};
 use crate::link::{Sight, Visibility};
 use crate::scene::sky::{PARTS, PLACES, Sky};
+use crate::team::Interrupt;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -101,8 +102,14 @@ impl SkySampling<'_> {
     }
 }
 
-/// The places where rays from the surfaces of a room leave it, and the number of rays cast.
-pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) -> (Openings, u64) {
+/// The places where rays from the surfaces of a room leave it, and the number of rays cast. Once it is interrupted no ray leaves any more, so
+/// that it ends.
+pub(crate) fn find_openings(
+    mesh: &Mesh,
+    tree: &Tree,
+    (sight, interrupt): (&Sight, &Interrupt),
+    seed: u64,
+) -> (Openings, u64) {
     let cast = AtomicU64::new(0);
     let area = tree.nodes.first().map_or(0.0, |root| root.area);
     let start = |share: f64, square: [f64; 2]| {
@@ -116,6 +123,12 @@ pub(crate) fn find_openings(mesh: &Mesh, tree: &Tree, sight: &Sight, seed: u64) 
         })
     };
     let meet = |start: &RayStart, ways: &[DVec3; BEAM]| {
+        if interrupt.is_raised() {
+            return [Some(Wall {
+                distance: 0.0,
+                normal: start.normal,
+            }); BEAM];
+        }
         let mut hits = [None; BEAM];
         let (from, ways) = (start.point.as_vec3(), ways.map(|d| d.as_vec3()));
         sight.meet(&[from; BEAM], &ways, start.plane, &mut hits);
