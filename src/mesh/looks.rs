@@ -179,24 +179,23 @@ impl<'a> Looks<'a> {
         self.places.len()
     }
 
-    /// Does all looks asked for. `progress` is told (done, of) in places of this call.
+    /// Does all looks asked for, leaf by leaf, as those of a leaf ask for the same patches. `progress` is told (done, of) in places of this
+    /// call.
     pub(crate) fn complete(&mut self, progress: &dyn Fn(usize, usize)) {
-        let first = self.seen.len();
-        let wanted = self.places.len() - first;
-        while self.seen.len() < self.places.len() {
-            let done = self.seen.len();
-            progress(done - first, wanted);
-            let end = self.places.len().min(done + PART);
+        let mut wanted: Vec<usize> = (self.seen.len()..self.places.len()).collect();
+        wanted.sort_by_key(|&k| self.places[k].0.leaf);
+        self.seen.resize_with(self.places.len(), || None);
+        for (part, some) in wanted.chunks(PART).enumerate() {
+            progress(part * PART, wanted.len());
             let late = self.is_late() && !self.patient;
             let (believed, open): (Vec<usize>, Vec<usize>) =
-                (done..end).partition(|&k| late || self.places[k].1);
-            self.seen.resize_with(end, || None);
+                some.iter().partition(|&&k| late || self.places[k].1);
             for k in believed {
                 self.seen[k] = self.told(&self.places[k].0);
             }
             self.gather(open);
         }
-        progress(wanted, wanted);
+        progress(wanted.len(), wanted.len());
     }
 
     /// Gathers at some places.

@@ -154,13 +154,17 @@ impl Gatherer<'_> {
         }
         // An element emits evenly, whatever its children.
         while self.tree.node(id).element == NONE {
-            let children = self.tree.node(id).child_range();
-            let children = children.map(fork).filter(|&child| child != NONE);
-            let worths = children.map(|child| (child, worth(child)));
-            let all: f64 = worths.clone().map(|c| c.1).sum();
+            // No node has more children.
+            let mut worths = [0.0; 4];
+            let children = self.tree.node(id).child_range().map(fork);
+            let lit = |(child, _): &(u32, &mut f64)| *child != NONE;
+            for (child, out) in children.clone().zip(&mut worths).filter(lit) {
+                *out = worth(child);
+            }
+            let all: f64 = worths.iter().sum();
             let mut left = *u * all;
             let mut chosen = None;
-            for (child, worth) in worths.filter(|c| c.1 > 0.0) {
+            for (child, worth) in children.zip(worths).filter(|c| c.1 > 0.0) {
                 chosen = Some((child, worth, (left / worth).min(1.0 - f64::EPSILON)));
                 if left < worth {
                     break;
