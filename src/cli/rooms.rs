@@ -7,7 +7,7 @@ use crate::error::{Error, Problem, Result};
 use crate::gather::Baked;
 use crate::output::npz;
 use crate::scene::Scene;
-use crate::solve::{Bake, Representation, Settings};
+use crate::solve::{Bake, NOBODY, Representation, Settings};
 use crate::store::file;
 use crate::survey::advise_unless;
 use crate::team::{Asked, Interrupt, NEVER};
@@ -69,8 +69,8 @@ pub(super) fn prepare(
     representation: Representation,
     talk: &Talk,
 ) -> Bake {
-    let settings = settings(solving, common, representation);
-    telling(Bake::new(scene, settings), common, talk)
+    let never = Arc::new(|| false);
+    prepare_unless(scene, solving, common, representation, talk, never).expect(NOBODY)
 }
 
 /// [`prepare`], unless `asked` ends it before there is anything to write.
@@ -82,25 +82,13 @@ pub(super) fn prepare_unless(
     talk: &Talk,
     asked: Asked,
 ) -> Option<Bake> {
-    let settings = settings(solving, common, representation);
-    Some(telling(
-        Bake::new_unless(scene, settings, asked)?,
-        common,
-        talk,
-    ))
-}
-
-fn settings(solving: &Solving, common: &Common, representation: Representation) -> Settings {
-    Settings {
+    let settings = Settings {
         error: solving.error,
         representation,
         seed: common.seed,
         ..Settings::default()
-    }
-}
-
-/// Lets a bake tell of its phases.
-fn telling(mut bake: Bake, common: &Common, talk: &Talk) -> Bake {
+    };
+    let mut bake = Bake::new_unless(scene, settings, asked)?;
     bake.spread_over(common.team);
     let parts = talk.parts();
     bake.watch(Arc::new(move |ended| {
@@ -108,7 +96,7 @@ fn telling(mut bake: Bake, common: &Common, talk: &Talk) -> Bake {
         let next = place.and_then(|k| PHASES.get(k + 1)).unwrap_or(&"");
         parts.begins("round", next);
     }));
-    bake
+    Some(bake)
 }
 
 /// Writes a baked mesh with its spectra for NumPy.

@@ -138,6 +138,9 @@ impl Gatherer<'_> {
     /// the hierarchy (Conty Estevez and Kulla 2018).
     fn emitting_element(&self, to: &Receiver, below: u32, u: &mut f64) -> Option<(u32, f64)> {
         let worth = |id: u32| {
+            if id == NONE {
+                return 0.0;
+            }
             let node = self.tree.node(id);
             let emitted = f64::from(self.light.bright_emitted[id as usize]);
             if !self.can_see(to, node) {
@@ -149,7 +152,7 @@ impl Gatherer<'_> {
         let fork = |id: u32| self.light.lit[id as usize];
         let mut id = Some(below).filter(|&id| id != NONE).map(fork)?;
         let mut chance = 1.0;
-        if id == NONE || worth(id) <= 0.0 {
+        if worth(id) <= 0.0 {
             return None;
         }
         // An element emits evenly, whatever its children.
@@ -157,8 +160,7 @@ impl Gatherer<'_> {
             // No node has more children.
             let mut worths = [0.0; 4];
             let children = self.tree.node(id).child_range().map(fork);
-            let lit = |(child, _): &(u32, &mut f64)| *child != NONE;
-            for (child, out) in children.clone().zip(&mut worths).filter(lit) {
+            for (child, out) in children.clone().zip(&mut worths) {
                 *out = worth(child);
             }
             let all: f64 = worths.iter().sum();
