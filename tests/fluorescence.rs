@@ -118,9 +118,7 @@ fn a_furnace_has_the_gain_of_its_walls() {
         alike(got, want, 2e-3, &format!("{height} {crowded}"));
         // Every wall shows what it sends out: E, without what it gives out of itself as a lamp that is E again.
         let written = bake.baked(&|_, _| {});
-        let vertex = &written.surfaces[2].vertices[0];
-        alike(vertex.radiosity.map(f64::from), want, 1e-2, "shown");
-        let mut room = [0.0; 3];
+        let (mut room, mut squares, mut count) = ([0.0; 3], 0.0, 0.0);
         for part in written.surfaces.iter().filter(|part| part.surface < 6) {
             let sum = part.vertices.iter().fold([0.0; 3], |sum, vertex| {
                 std::array::from_fn(|c| sum[c] + f64::from(vertex.radiosity[c]))
@@ -129,8 +127,18 @@ fn a_furnace_has_the_gain_of_its_walls() {
             // All vertices of a wall look in the same directions.
             alike(shown, want, 1e-2, &format!("wall {}", part.surface));
             room = std::array::from_fn(|c| room[c] + shown[c] / 6.0);
+            let shares = part
+                .vertices
+                .iter()
+                .flat_map(|vertex| (0..3).map(|c| f64::from(vertex.radiosity[c]) / want[c] - 1.0));
+            squares += shares.map(|off| off * off).sum::<f64>();
+            count += 3.0 * part.vertices.len() as f64;
         }
         alike(room, want, 4e-3, "all walls");
+        // Paths beside the ball choose among lamps that are everywhere: single vertices are noisy, of eight seeds by 3.6 % at the most.
+        let each = f64::sqrt(squares / count);
+        let most = if crowded { 1e-2 } else { 2e-3 };
+        assert!(each < most, "vertices are off by {each}");
         let flux = round.flux;
         assert!(
             flux.fluoresced_lm > 0.0 && flux.worst_band < 0.02,

@@ -118,7 +118,8 @@ impl Gatherer<'_> {
                 trace.hit(leaf, share, tint(ray));
             }
         }
-        let near_share = share * self.nearby(&near, out.backs, to.seed, memory) as f32;
+        let how = (f64::from(share), out.backs);
+        let near_share = share * self.nearby(&near, to, how, memory) as f32;
         for (&(leaf, _), ray) in near.iter().zip(near_rays) {
             add(leaf, near_share, ray);
             if let Some(trace) = &mut out.trace {
@@ -248,5 +249,58 @@ mod tests {
                 assert!((sums[0] / sums[1] - 1.0).abs() < 2e-3, "{room}: {sums:?}");
             });
         }
+    }
+
+    /// With as many paths as the light is worth, against a single turn and a great many.
+    #[test]
+    fn light_of_what_lies_close_by_is_less_noisy_by_more_paths() {
+        const SEEDS: u64 = 16;
+        let bake = baked("furnished.glb", 2);
+        bake.room.with_sight(|sight| {
+            let with = |tolerance: f64| Gatherer {
+                tolerance,
+                ..bake.gatherer(sight)
+            };
+            let fine = with(bake.gatherer(sight).tolerance / 8.0);
+            let (many, few) = (with(1e-9), with(f64::INFINITY));
+            let hemisphere = fine.hemisphere.unwrap();
+            let share = 1.0 / hemisphere.len() as f64;
+            let mut memory = Memory::default();
+            let (mut places, mut off) = (0, [0.0; 2]);
+            for leaf in bake.tree().leaves().step_by(17) {
+                let to = middle(bake.tree(), leaf);
+                let mut met = Vec::new();
+                let ends = (&mut met, &mut Vec::new());
+                let backs = fine.cast(&to, hemisphere, ends, &mut Vec::new(), &mut Vec::new());
+                let how = (share, share * backs as f64);
+                met.retain(|(leaf, hit)| fine.is_near(*leaf, hit, how.1));
+                if met.len() < 64 {
+                    continue;
+                }
+                let mut light = |gatherer: &Gatherer, seed: u64| {
+                    gatherer.nearby(&met, &Receiver { seed, ..to }, how, &mut memory)
+                };
+                let mut all = |gatherer: &Gatherer, first: u64| -> Vec<f64> {
+                    let seeds = first..first + SEEDS;
+                    seeds.map(|seed| light(gatherer, seed)).collect()
+                };
+                let truth = all(&many, 0).iter().sum::<f64>() / SEEDS as f64;
+                // Where leaves tell it themselves, few paths change nothing.
+                if (truth - 1.0).abs() < 0.2 {
+                    continue;
+                }
+                let bright =
+                    |hit: &(u32, Hit)| f64::from(bake.light().bright_reflected[hit.0 as usize]);
+                let carries = share * met.iter().map(bright).sum::<f64>();
+                let visible = carries / fine.tolerance_at(&to, carries);
+                for (off, gatherer) in off.iter_mut().zip([&fine, &few]) {
+                    let lights = all(gatherer, SEEDS).into_iter();
+                    let each = lights.map(|light| visible * (light - truth).abs());
+                    *off += each.sum::<f64>() / SEEDS as f64;
+                }
+                places += 1;
+            }
+            assert!(places > 40 && off[0] < 0.6 * off[1], "{places} {off:?}");
+        });
     }
 }
