@@ -1,22 +1,30 @@
-//! The light of a bake that must end before its first round is done: where rays from the lamps landed, see [`landing`](super::landing).
+//! The light of a bake that must end before its first round is done: where rays from the lamps landed, see [`landing`](super::landing), and
+//! what random points see of a sky.
 //!
 //! A leaf has, as irradiance `E = flux / area`, the light landed on the smallest node around it that enough rays met, and the same reflected light
-//! everywhere: `E rho / (1 - rho)` of the means over the room. All of this light has the mean spectrum of the lamps. It is not a solution, and its
-//! error is unknown.
+//! everywhere: of what light that landed reflects, `E / (1 - rho)` by the means over the room. All of this light has the mean spectrum of lamps and sky. It is not a solution, and
+//! its error is unknown.
 
 use super::direct::Direct;
+use super::landed::Landing;
 use super::leaf_rays::LeafRays;
 use super::refinement::Refinement;
 use super::{Bake, Solution};
+use crate::geometry::sampling::sequence02;
 use crate::hierarchy::{NONE, TreeSize};
 use crate::light::Rows;
 use crate::spectrum::BANDS;
+use crate::transport::{Gathered, Gatherer, Memory, Receiver};
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Rays that suffice for the light of a node: its standard deviation is then a quarter.
 const RAYS: u32 = 16;
 
-/// Mean albedo that is believed at the most, as in the guess of the white.
+/// Points that look at a sky: enough rays for a thousand patches.
+const GLANCES: u32 = 16_384;
+
+/// Mean albedo that is believed at the most, as in the guess of the white, so that the sum of all bounces is finite.
 const ALBEDO: f64 = 0.9;
 
 impl Bake {
@@ -42,19 +50,23 @@ impl Bake {
             .painter()
             .paint(&refinement.tree, &leaves, &self.solution.lanes);
         self.solution.light_lamps(room);
+        self.solution.light.half_size = room.mesh.half_size;
         let guess = room.guess(&refinement.tree);
         self.solution.light.white = room.settings.white.unwrap_or(guess.white);
-        let direct = self.landed_on(&leaves);
-        let spectrum = self.spectrum_of_lamps(&leaves, &sources.emission);
+        let (mut landings, from_sky) = self.landings_of_sky();
+        landings.extend(&self.room.landings);
+        let direct = self.landed_on(&leaves, &landings);
+        let spectrum = self.spectrum_of_lamps(&leaves, &sources.emission, from_sky);
         let area = self.refinement.tree.counted().max(f64::MIN_POSITIVE);
-        let landed: f64 = self
-            .room
-            .landings
-            .iter()
-            .map(|l| f64::from(l.flux[1]))
-            .sum();
-        let albedo = self.albedo(&leaves, &sources.reflectance, &spectrum);
-        let even = landed / area * albedo / (1.0 - albedo);
+        let albedos = self.albedos(&sources.reflectance, &spectrum);
+        let counted: Vec<f64> = (leaves.iter())
+            .map(|&leaf| self.refinement.counted(leaf))
+            .collect();
+        let mean = |of: &dyn Fn(usize) -> f64| -> f64 {
+            (0..leaves.len()).map(|k| counted[k] * of(k)).sum::<f64>() / area
+        };
+        let albedo = mean(&|k| albedos[k]).min(ALBEDO);
+        let even = mean(&|k| direct[k] * albedos[k]) / (1.0 - albedo);
         let mut rows = Vec::with_capacity(leaves.len() * BANDS);
         let mut irradiance = Rows::zero(leaves.len(), BANDS);
         let mut reflected = irradiance.clone();
@@ -78,11 +90,56 @@ impl Bake {
         self.light_arrives();
     }
 
+    /// Where light of the sky lands, and its flux on each lane: points at random, more where it counts, look at it by few rays.
+    fn landings_of_sky(&self) -> (Vec<Landing>, [f32; BANDS]) {
+        let (tree, mut sum) = (&self.refinement.tree, [0.0; BANDS]);
+        if self.room.outside.is_none() || tree.faces.is_empty() {
+            return (Vec::new(), sum);
+        }
+        let look = |gatherer: &Gatherer, memory: &mut Memory, k: u32| {
+            let share = (f64::from(k) + 0.5) / f64::from(GLANCES);
+            let (entry, weights) = tree.random(share, sequence02(k, 19));
+            let leaf = tree.leaf_at(entry as u32, weights);
+            let to = Receiver {
+                point: tree.elements[tree.node(tree.face_node[entry]).element as usize].at(weights),
+                normal: tree.face_normal[entry],
+                plane: tree.face_plane[entry],
+                leaf: Some(leaf),
+                seed: u64::from(k),
+            };
+            let mut seen = Gathered::dark();
+            gatherer.outside(&to, None, false, memory, &mut seen);
+            let node = tree.node(leaf);
+            let stands_for = tree.counted() / f64::from(GLANCES) * node.area / node.counted;
+            let flux = seen.direct.map(|x| x * stands_for as f32);
+            let landing = Landing {
+                entry: entry as u32,
+                weights: [weights[1], weights[2]].map(|w| w as f32),
+                flux: self.solution.lanes.tristimulus(&flux).map(|x| x as f32),
+            };
+            (landing, flux)
+        };
+        let found: Vec<_> = self.room.with_sight(|sight| {
+            let gatherer = Gatherer {
+                shafts: false,
+                ..self.gatherer(sight)
+            };
+            let points = (0..GLANCES).into_par_iter();
+            points
+                .map_init(Memory::default, |memory, k| look(&gatherer, memory, k))
+                .collect()
+        });
+        for (_, flux) in &found {
+            sum = std::array::from_fn(|lane| sum[lane] + flux[lane]);
+        }
+        (found.into_iter().map(|f| f.0).collect(), sum)
+    }
+
     /// Illuminance of leaves by the rays that landed on or around them.
-    fn landed_on(&self, leaves: &[u32]) -> Vec<f64> {
+    fn landed_on(&self, leaves: &[u32], landings: &[Landing]) -> Vec<f64> {
         let tree = &self.refinement.tree;
         let mut sums = vec![(0_u32, 0.0_f64); tree.nodes.len()];
-        for landing in &self.room.landings {
+        for landing in landings {
             let [u, v] = landing.weights.map(f64::from);
             let mut node = tree.leaf_at(landing.entry, [1.0 - u - v, u, v]);
             while node != NONE {
@@ -102,28 +159,31 @@ impl Bake {
         leaves.iter().map(around).collect()
     }
 
-    /// Share of the lamps' light that surfaces reflect on average over the area that counts; at most [`ALBEDO`], so that the sum of all
-    /// bounces is finite.
-    fn albedo(&self, leaves: &[u32], reflectance: &Rows, spectrum: &[f64]) -> f64 {
-        let (lanes, tree) = (&self.solution.lanes, &self.refinement.tree);
-        let sum = leaves.iter().enumerate().map(|(k, &leaf)| {
+    /// Share of the light that each leaf reflects.
+    fn albedos(&self, reflectance: &Rows, spectrum: &[f64]) -> Vec<f64> {
+        let of = |k: usize| {
             let sent = reflectance.row(k).iter().zip(spectrum);
             let sent: Vec<f32> = sent.map(|(rho, x)| rho * *x as f32).collect();
-            tree.node(leaf).counted * lanes.tristimulus(&sent)[1]
-        });
-        (sum.sum::<f64>() / tree.counted().max(f64::MIN_POSITIVE)).min(ALBEDO)
+            self.solution.lanes.tristimulus(&sent)[1]
+        };
+        (0..reflectance.len()).map(of).collect()
     }
 
-    /// Irradiance on each lane for one lux of the light of all lamps together; 0 where none shines.
-    fn spectrum_of_lamps(&self, leaves: &[u32], emission: &Rows) -> Vec<f64> {
-        let mut sum = [0.0_f32; BANDS];
+    /// Irradiance on each lane for one lux of the light of all lamps together and of the `sum` from the sky; 0 where none shines.
+    fn spectrum_of_lamps(
+        &self,
+        leaves: &[u32],
+        emission: &Rows,
+        mut sum: [f32; BANDS],
+    ) -> Vec<f64> {
         for (k, &leaf) in leaves.iter().enumerate() {
             let area = self.refinement.tree.node(leaf).area as f32;
             for (sum, x) in sum.iter_mut().zip(emission.row(k)) {
                 *sum += area * x;
             }
         }
-        for (light, row) in &self.solution.lamps {
+        let lamps = self.solution.lamps.iter();
+        for (light, row) in lamps.filter(|(light, _)| !light.kind.is_dome()) {
             let solid = super::punctual::solid_angle(light.kind);
             // Parallel light counts as if it met a quarter of all surfaces, as in the guess of the white.
             let solid = solid.unwrap_or(0.25 * self.refinement.tree.counted()) as f32;

@@ -178,13 +178,12 @@ impl Bake {
     }
 
     /// [`Bake::step`], unless `asked` ends it before the round is done: then there is no round, and the bake is what it was before; if the
-    /// round was the first, it has the light that rays from the lamps give, see `early`. Some rounds are always done: those of a bake by
+    /// round was the first, it has the light that rays from the lamps and to the sky give, see `early`. Some rounds are always done: those of a bake by
     /// several ranks, which would all have to be interrupted at the very same place, and the first round of a bake that keeps where light
-    /// comes from, or that has a sky, whose light no rays from lamps give.
+    /// comes from.
     pub fn step_unless(&mut self, asked: Asked) -> Option<&Round> {
         let is_first = self.rounds.is_empty();
-        let is_needed = self.room.keep || self.room.scene.sky.is_some();
-        if !self.room.team.is_alone() || (is_first && is_needed) {
+        if !self.room.team.is_alone() || (is_first && self.room.keep) {
             return Some(self.step());
         }
         let begun = Instant::now();

@@ -38,7 +38,7 @@ impl Obstacles for Gatherer<'_> {
 impl Gatherer<'_> {
     /// Adds light from outside. `known`: the directions, and of how many over the hemisphere, that lead outside, if rays have
     /// told. `own`: is this a point for its own sake?
-    pub(super) fn outside(
+    pub(crate) fn outside(
         &self,
         to: &Receiver,
         known: Option<(&[DVec3], usize)>,
