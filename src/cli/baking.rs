@@ -226,7 +226,13 @@ impl Order<'_> {
         };
         let clock = Instant::now();
         let seen = snapshots.seen(bake.scene());
-        let time = left - kept.drawing;
+        // How long the first drawing takes is not known: half.
+        let is_first = kept.last_pictures == 0.0;
+        let time = if is_first {
+            0.5 * left
+        } else {
+            left - kept.drawing
+        };
         let late = || team.first_says(clock.elapsed().as_secs_f64() > time);
         let light = bake.sketch_within(&seen, &late, &|done, of| {
             talk.progress("gathering", done, of);

@@ -10,6 +10,7 @@ use crate::output::{Exposure, Format, Picture, exr, picture};
 use crate::scene::{Camera, Scene};
 use crate::store::file;
 use crate::team::Team;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Proportions that pictures may have.
@@ -62,7 +63,7 @@ impl Snapshots {
             let picture = Picture::draw(scene, surfaces, camera, look, format(camera))?;
             self.write(&format!("{start}-{name}.png"), scene, &picture.to_png()?)
         };
-        self.drawn().iter().map(draw).collect()
+        self.each(draw).into_iter().collect()
     }
 
     /// PNGs and EXRs of the final mesh; their paths.
@@ -72,17 +73,25 @@ impl Snapshots {
         surfaces: &[BakedSurface],
         look: &Exposure,
     ) -> Result<(Vec<String>, Vec<String>)> {
-        let (mut shown, mut measured) = (Vec::new(), Vec::new());
-        for (name, camera) in self.drawn() {
+        let draw = |(name, camera): &(String, Camera)| {
             let picture = Picture::draw(scene, surfaces, camera, look, format(camera))?;
-            shown.push(self.write(&format!("final-{name}.png"), scene, &picture.to_png()?)?);
-            measured.push(self.write(
-                &format!("final-{name}.exr"),
-                scene,
-                &exr::to_exr(&picture)?,
-            )?);
-        }
-        Ok((shown, measured))
+            let file =
+                |end: &str, bytes: &[u8]| self.write(&format!("final-{name}.{end}"), scene, bytes);
+            let (shown, measured) = rayon::join(
+                || file("png", &picture.to_png()?),
+                || file("exr", &exr::to_exr(&picture)?),
+            );
+            Ok((shown?, measured?))
+        };
+        self.each(draw).into_iter().collect()
+    }
+
+    /// Draws for all cameras at once: much of it is packing files, which takes one thread each.
+    fn each<T: Send>(
+        &self,
+        draw: impl Fn(&(String, Camera)) -> Result<T> + Sync,
+    ) -> Vec<Result<T>> {
+        self.drawn().par_iter().map(&draw).collect()
     }
 
     fn write(&self, name: &str, scene: &Scene, bytes: &[u8]) -> Result<String> {

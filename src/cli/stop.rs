@@ -22,8 +22,7 @@ const ROUNDS: f64 = 0.45;
 /// Share of the time given at which a round that took longer than was expected is taken back: the gather can do with what is left,
 /// and a round that is all but done is worth more than the light between vertices.
 const ROUND_ENDS: f64 = 0.6;
-/// The same for the first, without which there is no solution: all but what the file takes. In a restaurant of 150,000 vertices that
-/// was 3 s on two busy cores.
+/// The same for the first, without which there is no solution; earlier where the file takes more than the rest, see [`UNPREPARED`].
 const FIRST_ENDS: f64 = 0.75;
 /// Share of the time given by which the gather ends: measuring what came of it and writing take the rest.
 const GATHER: f64 = 0.85;
@@ -166,10 +165,18 @@ impl Stop {
         (self.team.first_says(late)).then_some(Verdict::OutOfTime)
     }
 
-    /// Is it time for a round to end that is not done, at this share of the time?
-    fn ends_round(&self, share: f64) -> bool {
-        let late = |time| self.elapsed_s() > share * time;
-        self.interrupted_s().is_some() || self.time.is_some_and(late)
+    /// Is it time for a round to end that is not done, so many `seconds` after the start?
+    fn ends_round(&self, seconds: f64) -> bool {
+        self.interrupted_s().is_some() || self.elapsed_s() > seconds
+    }
+
+    /// Seconds from the start at which a round has to be taken back, if it begins now.
+    fn round_end_s(&self, is_first: bool) -> f64 {
+        let time = self.time.unwrap_or(f64::INFINITY);
+        match is_first {
+            true => (FIRST_ENDS * time).min(time - UNPREPARED * self.elapsed_s()),
+            false => ROUND_ENDS * time,
+        }
     }
 
     /// Steps a bake to its end; `each` is told of every round, with how many seconds it is expected to take from there to the end, as
@@ -213,9 +220,8 @@ impl Stop {
         if is_first && !self.any_time {
             return Some(bake.step().clone());
         }
-        let share = if is_first { FIRST_ENDS } else { ROUND_ENDS };
-        let stop = self.clone();
-        bake.step_unless(Arc::new(move || stop.ends_round(share)))
+        let (stop, end_s) = (self.clone(), self.round_end_s(is_first));
+        bake.step_unless(Arc::new(move || stop.ends_round(end_s)))
             .cloned()
     }
 
@@ -277,10 +283,24 @@ mod tests {
 
     #[test]
     fn a_round_ends_for_either() {
-        assert!(Stop::new(Some(1e-9)).ends_round(1.0));
+        let ends = |stop: &Stop| stop.ends_round(stop.round_end_s(false));
+        assert!(ends(&Stop::new(Some(1e-9))));
         let stop = Stop::new(Some(1e9));
-        assert!(!stop.ends_round(1.0));
+        assert!(!ends(&stop) && !ends(&Stop::new(None)));
         stop.interrupt();
-        assert!(stop.ends_round(1.0));
+        assert!(ends(&stop));
+    }
+
+    #[test]
+    fn a_first_round_leaves_time_for_the_file() {
+        // Four seconds have passed, and the file takes a little more than that.
+        let stop = |time| Stop {
+            started: Instant::now() - Duration::from_secs(4),
+            ..Stop::new(Some(time))
+        };
+        let end_s = stop(10.0).round_end_s(true);
+        assert!(end_s > 5.0 && end_s < 6.0, "{end_s}");
+        assert_eq!(stop(100.0).round_end_s(true), 75.0);
+        assert_eq!(stop(100.0).round_end_s(false), 60.0);
     }
 }
