@@ -277,9 +277,13 @@ fn time_that_is_up_leaves_a_whole_result_and_code_1() {
         "log",
         "--report",
         "page.html",
+        "--cache",
     ];
-    let verdict: Value = serde_json::from_str(&printed(&desk.run(&args, 1))).unwrap();
+    let output = desk.run(&args, 1);
+    let verdict: Value = serde_json::from_str(&printed(&output)).unwrap();
     assert_eq!(verdict["verdict"], "out_of_time");
+    assert!(said(&output).contains("no cache"), "{}", said(&output));
+    assert!(verdict["outputs"]["cache"].is_null(), "{verdict}");
     // Not even the first round was done: there is light, and nothing is known of its error.
     assert_eq!(
         (&verdict["exit_code"], &verdict["rounds"]),

@@ -80,11 +80,13 @@ fn given_up(name: &str, least: usize) {
     let after = state(&whole);
 
     let mut other = bake(name);
+    other.keep();
     // Of a first round that is given up nothing is left but the light that rays from the lamps and to the sky tell.
     assert!(!step(&mut other, 0).0 && other.rounds().is_empty());
     let brightness = other.mean_irradiance()[1] / whole.mean_irradiance()[1];
     assert!((0.5..2.0).contains(&brightness), "{name}: {brightness}");
     assert!(file(&other).len() > 1000, "{name}: no file");
+    assert!(!other.keeps());
     assert!(step(&mut other, usize::MAX).0);
     for _ in 1..BEFORE {
         assert!(step(&mut other, usize::MAX).0);

@@ -352,6 +352,11 @@ impl Order<'_> {
     /// Writes the cache, if one is asked for; what went wrong.
     fn write_cache(self, bake: &Bake, baked: &Baked, kept: &mut Recorders) -> Option<Error> {
         let path = self.cache?;
+        if !bake.keeps() {
+            self.talk
+                .warn("no cache: not even the first round was done");
+            return None;
+        }
         match bake.write_cache(baked, path, self.args.cache_limit << 20) {
             Ok(size) => {
                 let mb = size as f64 / f64::from(1 << 20);

@@ -178,12 +178,12 @@ impl Bake {
     }
 
     /// [`Bake::step`], unless `asked` ends it before the round is done: then there is no round, and the bake is what it was before; if the
-    /// round was the first, it has the light that rays from the lamps and to the sky give, see `early`. Some rounds are always done: those of a bake by
-    /// several ranks, which would all have to be interrupted at the very same place, and the first round of a bake that keeps where light
-    /// comes from.
+    /// round was the first, it has the light that rays from the lamps and to the sky give, see `early`, and keeps nothing until
+    /// [`Bake::keep`] asks for it again. Rounds of a bake by several ranks are always done: they would all have to be interrupted at the
+    /// very same place.
     pub fn step_unless(&mut self, asked: Asked) -> Option<&Round> {
         let is_first = self.rounds.is_empty();
-        if !self.room.team.is_alone() || (is_first && self.room.keep) {
+        if !self.room.team.is_alone() {
             return Some(self.step());
         }
         let begun = Instant::now();
@@ -203,6 +203,7 @@ impl Bake {
                     Some(before) => self.take_back(before),
                     None => {
                         self.begin_again(&grown);
+                        self.room.keep = false;
                         self.light_by_landings();
                     }
                 }
