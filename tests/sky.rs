@@ -5,8 +5,8 @@ use crate::common::daylit;
 
 use built::{Room, sun};
 use daylit::{
-    LUX, bake, bake_at, cie, facade, glanced, glanced_by, past_the_horizon, points, points_beside,
-    roof, room, row, through, traced, wish,
+    LUX, bake, bake_at, cie, facade, given_up, glanced, glanced_by, past_the_horizon, points,
+    points_beside, roof, room, row, through, traced, wish,
 };
 use glam::{DMat4, DVec3, dvec3};
 use haarlight::color::{KM, Observer};
@@ -100,6 +100,18 @@ fn cie_171_case_5_9_closed_form() {
             "{} {want}",
             got.xyz[1]
         );
+    }
+}
+
+/// All light that comes in through the roof lands somewhere, also where the first round is given up; exactly and by rays.
+#[test]
+fn a_round_that_is_given_up_leaves_the_light_of_the_sky() {
+    for (kind, opening, cuts) in [(5, 4.0, 1), (1, 1.0, 1), (5, 4.0, 8), (12, 1.0, 8)] {
+        let bake = given_up(room(0.0, opening, cuts), &wish(kind));
+        let area = 4.0 * 12.0 + 2.0 * 16.0 - opening * opening;
+        let (got, want) = (bake.mean_irradiance()[1], LUX * opening * opening / area);
+        println!("type {kind}, {opening} m, {cuts}: {got} for {want}");
+        assert!((got / want - 1.0).abs() < 0.03, "{got} for {want}");
     }
 }
 

@@ -1,9 +1,9 @@
 //! The light of a bake that must end before its first round is done: where rays from the lamps landed, see [`landing`](super::landing), and
 //! what random points see of a sky.
 //!
-//! A leaf has, as irradiance `E = flux / area`, the light landed on the smallest node around it that enough rays met, and the same reflected light
-//! everywhere: of what light that landed reflects, `E / (1 - rho)` by the means over the room. All of this light has the mean spectrum of lamps and sky. It is not a solution, and
-//! its error is unknown.
+//! A leaf has, as irradiance `E = flux / area`, the light landed on the smallest node around it that enough rays met, and everywhere the same
+//! light besides: what landed light is reflected where it lands, spread over the room and divided by `1 - rho` of its mean albedo. All of this
+//! light has the mean spectrum of lamps and sky. It is not a solution, and its error is unknown.
 
 use super::direct::Direct;
 use super::landed::Landing;
@@ -21,7 +21,7 @@ use std::borrow::Cow;
 /// Rays that suffice for the light of a node: its standard deviation is then a quarter.
 const RAYS: u32 = 16;
 
-/// Points that look at a sky: enough rays for a thousand patches.
+/// Points that look at a sky: [`RAYS`] for each of a thousand patches.
 const GLANCES: u32 = 16_384;
 
 /// Mean albedo that is believed at the most, as in the guess of the white, so that the sum of all bounces is finite.
@@ -110,7 +110,11 @@ impl Bake {
             let mut seen = Gathered::dark();
             gatherer.outside(&to, None, false, memory, &mut seen);
             let node = tree.node(leaf);
-            let stands_for = tree.counted() / f64::from(GLANCES) * node.area / node.counted;
+            // Rounding may choose the last face though none of it counts.
+            let stands_for = match node.counted > 0.0 {
+                true => tree.counted() / f64::from(GLANCES) * node.area / node.counted,
+                false => 0.0,
+            };
             let flux = seen.direct.map(|x| x * stands_for as f32);
             let landing = Landing {
                 entry: entry as u32,

@@ -68,6 +68,13 @@ pub(crate) fn glanced_by(room: Room, wish: &SkyWish, seed: u64) -> Bake {
     built::run(under(room, wish), settings)
 }
 
+/// A bake of which not even the first round is done: it has the light that random points see.
+pub(crate) fn given_up(room: Room, wish: &SkyWish) -> Bake {
+    let mut bake = Bake::new(under(room, wish), Settings::default());
+    assert!(bake.step_unless(std::sync::Arc::new(|| true)).is_none());
+    bake
+}
+
 /// What so many paths from each place find in the room of a bake.
 pub(crate) fn traced(bake: &Bake, places: Vec<(DVec3, DVec3)>, paths: usize) -> Vec<Answer> {
     let (scene, mesh) = (bake.scene(), bake.mesh());
