@@ -59,11 +59,10 @@ impl Snapshots {
         surfaces: &[BakedSurface],
         look: &Exposure,
     ) -> Result<Vec<String>> {
-        let draw = |(name, camera): &(String, Camera)| {
+        self.each(|(name, camera)| {
             let picture = Picture::draw(scene, surfaces, camera, look, format(camera))?;
             self.write(&format!("{start}-{name}.png"), scene, &picture.to_png()?)
-        };
-        self.each(draw).into_iter().collect()
+        })
     }
 
     /// PNGs and EXRs of the final mesh; their paths.
@@ -73,7 +72,7 @@ impl Snapshots {
         surfaces: &[BakedSurface],
         look: &Exposure,
     ) -> Result<(Vec<String>, Vec<String>)> {
-        let draw = |(name, camera): &(String, Camera)| {
+        let both = self.each(|(name, camera)| {
             let picture = Picture::draw(scene, surfaces, camera, look, format(camera))?;
             let file =
                 |end: &str, bytes: &[u8]| self.write(&format!("final-{name}.{end}"), scene, bytes);
@@ -82,16 +81,17 @@ impl Snapshots {
                 || file("exr", &exr::to_exr(&picture)?),
             );
             Ok((shown?, measured?))
-        };
-        self.each(draw).into_iter().collect()
+        })?;
+        Ok(both.into_iter().unzip())
     }
 
-    /// Draws for all cameras at once: much of it is packing files, which takes one thread each.
+    /// Draws for all cameras at once: much of it is packing files, which takes one thread each. What goes wrong with the first counts.
     fn each<T: Send>(
         &self,
         draw: impl Fn(&(String, Camera)) -> Result<T> + Sync,
-    ) -> Vec<Result<T>> {
-        self.drawn().par_iter().map(&draw).collect()
+    ) -> Result<Vec<T>> {
+        let drawn: Vec<_> = self.drawn().par_iter().map(&draw).collect();
+        drawn.into_iter().collect()
     }
 
     fn write(&self, name: &str, scene: &Scene, bytes: &[u8]) -> Result<String> {

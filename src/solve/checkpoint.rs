@@ -333,7 +333,6 @@ impl Bake {
             self.without_mirrors::<L>(Cow::Borrowed(reflected), on_nodes, &light.leaves);
         light.mirrors = std::mem::take(&mut self.solution.light.mirrors);
         light.emitted = self.refinement.on_nodes::<L>(&emission, &light.leaves);
-        light.half_size = self.room.mesh.half_size;
         light.apart = self.solution.lanes.excites().is_some();
         light.measure(&self.refinement.tree, &self.room.mesh, &self.solution.lanes);
         self.solution.light = light;

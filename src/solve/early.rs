@@ -5,7 +5,7 @@
 //! light besides: what landed light is reflected where it lands, spread over the room and divided by `1 - rho` of its mean albedo. All of this
 //! light has the mean spectrum of lamps and sky. It is not a solution, and its error is unknown.
 
-use super::direct::Direct;
+use super::direct::{Direct, receiver};
 use super::landed::Landing;
 use super::leaf_rays::LeafRays;
 use super::refinement::Refinement;
@@ -50,7 +50,6 @@ impl Bake {
             .painter()
             .paint(&refinement.tree, &leaves, &self.solution.lanes);
         self.solution.light_lamps(room);
-        self.solution.light.half_size = room.mesh.half_size;
         let guess = room.guess(&refinement.tree);
         self.solution.light.white = room.settings.white.unwrap_or(guess.white);
         let (mut landings, from_sky) = self.landings_of_sky();
@@ -100,12 +99,10 @@ impl Bake {
             let share = (f64::from(k) + 0.5) / f64::from(GLANCES);
             let (entry, weights) = tree.random(share, sequence02(k, 19));
             let leaf = tree.leaf_at(entry as u32, weights);
+            let on_face = receiver(tree, tree.face_node[entry], weights, u64::from(k));
             let to = Receiver {
-                point: tree.elements[tree.node(tree.face_node[entry]).element as usize].at(weights),
-                normal: tree.face_normal[entry],
-                plane: tree.face_plane[entry],
                 leaf: Some(leaf),
-                seed: u64::from(k),
+                ..on_face
             };
             let mut seen = Gathered::dark();
             gatherer.outside(&to, None, false, memory, &mut seen);

@@ -154,7 +154,6 @@ impl Bake {
         let light = &mut solution.light;
         light.emitted = refinement.on_nodes::<L>(&sources.emission, &leaves);
         light.neighbours = Neighbours::new(nodes, &refinement.graph);
-        light.half_size = room.mesh.half_size;
         solution.previous = std::mem::replace(&mut light.reflected, Rows::zero(nodes, L));
         light.measure(&refinement.tree, &room.mesh, &solution.lanes);
         Ok(())

@@ -54,8 +54,9 @@ impl Solution {
         }
     }
 
-    /// Puts the punctual lights on the present lanes.
+    /// Puts the punctual lights on the present lanes, and tells how far off those are that shine from far away.
     pub(crate) fn light_lamps(&mut self, room: &Room) {
+        self.light.half_size = room.mesh.half_size;
         self.lamps = punctual::lamps(&room.scene, &room.mesh, &self.lanes);
     }
 
