@@ -574,3 +574,44 @@ fn no_comb_at_the_half_shadow_of_a_table() {
     // .15 of it; .31 without turned edges.
     assert!(worst < 0.2 * open, "{worst} of {open} lx");
 }
+
+/// Panels and small lamps on a wall: the wall is cut along them, and bisection joined their corners by needles that drew hairs over the bare wall.
+#[test]
+fn no_hairs_between_panels_on_a_wall() {
+    let mut room = Room::new();
+    let (wall, panel) = (room.paint(0.6), room.paint(0.3));
+    let (sconce, lamp) = (room.lamp(0.0, 52.0), room.lamp(0.0, 25.0));
+    room.hollow(DVec3::ZERO, dvec3(6.0, 2.4, 5.0), [wall; 6]);
+    for x in [0.4, 1.7, 3.0, 4.3] {
+        room.block(dvec3(x, 0.0, 0.0), dvec3(x + 0.77, 1.9, 0.03), panel);
+    }
+    for x in [1.43, 2.73, 4.03] {
+        room.block(
+            dvec3(x - 0.05, 1.4, 0.0),
+            dvec3(x + 0.05, 1.55, 0.1),
+            sconce,
+        );
+    }
+    room.quad(dvec3(2.5, 2.39, 2.0), DVec3::X, 0.5 * DVec3::Z, lamp);
+    let (bake, baked) = baked(room.scene());
+    no_cracks(&bake, &baked);
+    // A decimetre above the panels light changes slowly along the wall.
+    let mut worst = 0.0_f64;
+    for y in (0..19).map(|k| 2.0 + 0.02 * f64::from(k)) {
+        let light = |k: i32| {
+            drawn(
+                &bake,
+                &baked,
+                dvec3(0.1 + 0.01 * f64::from(k), y, 0.0),
+                DVec3::Z,
+            )
+        };
+        let row: Vec<f64> = (0..580).map(light).collect();
+        for nine in row.windows(9) {
+            worst = worst.max((nine[4] / (0.5 * (nine[0] + nine[8])) - 1.0).abs());
+        }
+    }
+    eprintln!("{} vertices, {worst:.3}", vertices(&baked));
+    // .06; .09 where parts of a triangle are not turned against each other.
+    assert!(worst < 0.075, "{worst}");
+}

@@ -28,7 +28,8 @@ const MOST: usize = 256;
 /// Lines count whose extent is this share of the scene's half size.
 const WORTH: f64 = 0.05;
 /// And this share of the triangle, or of the half size where the triangle is larger: from the foot of a table needles would run to the
-/// far corners of a floor, and light along them.
+/// far corners of a floor, and light along them. At `--error 1`, with this and without it, mean and root mean square between vertices: sunlit
+/// room .128, .52 and .231, 3.53; home theatre .380, 1.10 and .525, 2.97; furnished room .427, 1.31 and .461, 1.42.
 const SMALL: f64 = 0.1;
 
 /// A triangle, and where it is cut.

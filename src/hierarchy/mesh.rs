@@ -260,6 +260,19 @@ impl Mesh {
         }
     }
 
+    /// Of the triangles that were cut from the same triangle of the input as one, that in which a point lies.
+    pub fn part_at(&self, triangle: u32, point: DVec3) -> u32 {
+        let depth = |t: u32| self.distance_to_border(t as usize, point);
+        if self.part[triangle as usize] == WHOLE || depth(triangle) >= 0.0 {
+            return triangle;
+        }
+        let origin = self.origin[triangle as usize];
+        let first = self.origin.partition_point(|other| *other < origin);
+        let parts = (first..).take_while(|t| self.origin.get(*t) == Some(&origin));
+        let deepest = (parts.map(|t| t as u32)).max_by(|a, b| depth(*a).total_cmp(&depth(*b)));
+        deepest.unwrap_or(triangle)
+    }
+
     /// [`Self::on_origin`] in single precision, for textures.
     pub fn on_origin_f32(&self, triangle: usize, weights: [f32; 3]) -> [f32; 3] {
         match self.part[triangle] {

@@ -47,7 +47,6 @@ impl MeshGrowth<'_> {
     /// Lamps whose shadow would matter in a cell, and [`COVER`] if anything covers part of the cell.
     fn lamps_of(&self, k: usize) -> u64 {
         let cell = &self.cells.all[k];
-        let sheet = &self.cells.sheets[cell.sheet as usize];
         let light = self.light(k);
         let mean = [0, 1, 2].map(|c| (light[0][c] + light[1][c] + light[2][c]) / 3.0);
         let least = self.allowed;
@@ -55,7 +54,7 @@ impl MeshGrowth<'_> {
             let brighter = [0, 1, 2].map(|c| mean[c] + more[c]);
             self.difference(mean, brighter) > least
         };
-        let at = |w| self.shades.place(cell, sheet, cell.at(w));
+        let at = |w| self.shades.place(&self.cells, cell, cell.at(w));
         let places = [
             [0.8, 0.1, 0.1],
             [0.1, 0.8, 0.1],

@@ -4,6 +4,7 @@
 //! An edge is split for all triangles that have it, so a vertex never lies on the edge of a triangle that does not use
 //! it. For which triangles share an edge, see [`Skins`](super::skins::Skins).
 
+use super::divided::{Divided, MeshTriangle, barycentric, between};
 use super::missed::missed_by_halves;
 use super::skins::Skins;
 use crate::gather::Vertex;
@@ -29,7 +30,7 @@ pub(super) struct Corner {
     pub(super) point: u32,
     /// Index in the sheet's vertices.
     pub(super) vertex: u32,
-    /// Weights of the corners of the triangle of the mesh.
+    /// Weights of the corners of the cell's triangle of the mesh; outside of it if cells were turned, see [`Divided`].
     pub(super) weights: [f64; 3],
 }
 
@@ -77,8 +78,8 @@ pub(super) struct CellError {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
     pub(super) sheet: u32,
-    /// Triangle of the mesh, and its entry in the hierarchy.
-    pub(super) of: (u32, u32),
+    /// Triangle of the mesh, and its entry in the hierarchy: the cell lies in it, or in parts that belong together with it.
+    pub(super) of: MeshTriangle,
     /// Does something cover the entry?
     pub(super) covered: bool,
     pub(super) corners: [Corner; 3],
@@ -130,6 +131,7 @@ pub(super) struct SurfaceSide {
 #[derive(Debug)]
 pub(super) struct Cells {
     pub(super) sheets: Vec<SurfaceSide>,
+    pub(super) divided: Divided,
     pub(super) all: Vec<Cell>,
     pub(super) edges: Vec<Edge>,
     pub(super) points: Vec<DVec3>,
@@ -169,11 +171,6 @@ pub(super) fn key(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// A place on the way between two. Both triangles of an edge must get the same bits, whichever weights are zero.
-pub(super) fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
-    std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
-}
-
 impl Cells {
     /// Starts from the triangles of the mesh. `spaces` holds the space of each entry and whether something covers it.
     pub(super) fn new(scene: &Scene, mesh: &Mesh, tree: &Tree, spaces: &[(u32, bool)]) -> Self {
@@ -186,6 +183,7 @@ impl Cells {
         };
         let mut cells = Self {
             sheets: Vec::new(),
+            divided: Divided::new(mesh, tree, spaces),
             all: Vec::new(),
             edges: Vec::new(),
             points: mesh.positions.clone(),
@@ -256,7 +254,12 @@ impl Cells {
             let edges = [0, 1, 2].map(|k| {
                 let (a, b) = key(corners[k].point, corners[(k + 1) % 3].point);
                 let known = start.edges.entry((skin, a, b));
-                *known.or_insert_with(|| self.edge(a, b))
+                let edge = *known.or_insert_with(|| self.edge(a, b));
+                let mut ends = [k, (k + 1) % 3].map(|k| corners[k]);
+                ends.sort_by_key(|corner| corner.point);
+                let weights = ends.map(|corner| corner.weights);
+                self.divided.span(edge, (triangle, entry), weights);
+                edge
             });
             self.all.push(Cell {
                 sheet: number_of_sheet,
@@ -309,15 +312,43 @@ impl Cells {
         let Cell {
             sheet, of, corners, ..
         } = self.all[cell];
-        let sharp = self.sharp_along(&self.all[cell], k) != 0;
-        let way = self.way_along(&self.all[cell], k);
-        let [a, b, c] = [0, 1, 2].map(|e| corners[(k + e) % 3]);
-        let sheet = &mut self.sheets[sheet as usize];
-        let middle = sheet.between(of, [a, b], 0.5, way);
-        if sharp {
-            sheet.beside_line(middle, of, [a, b, c]);
+        let middle = self.on_edge(cell, k, 0.5);
+        if self.sharp_along(&self.all[cell], k) != 0 {
+            let around = [0, 1, 2].map(|e| corners[(k + e) % 3]);
+            self.sheets[sheet as usize].beside_line(&self.divided, middle, of, around);
         }
         middle
+    }
+
+    /// Vertex on an edge of a cell, made if need be: at share `at` of the way between the ends of the edge, in its sense.
+    fn on_edge(&mut self, cell: usize, k: usize, at: f64) -> u32 {
+        let way = self.way_along(&self.all[cell], k);
+        let Cell {
+            sheet,
+            of,
+            corners,
+            edges,
+            ..
+        } = self.all[cell];
+        let edge = edges[k];
+        let [mut a, mut b] = [corners[k], corners[(k + 1) % 3]];
+        if self.edges[edge as usize].ends[0] != a.point {
+            (a, b) = (b, a);
+        }
+        let (of, [from, to]) = self.divided.span(edge, of, [a.weights, b.weights]);
+        let SurfaceSide {
+            vertices,
+            between: known,
+            ..
+        } = &mut self.sheets[sheet as usize];
+        let name = match at == 0.5 {
+            true => (a.vertex.min(b.vertex), a.vertex.max(b.vertex), 0, way),
+            false => (a.vertex, b.vertex, at.to_bits(), way),
+        };
+        *known.entry(name).or_insert_with(|| {
+            vertices.push(self.divided.place(of, between(from, to, at)));
+            vertices.len() as u32 - 1
+        })
     }
 
     /// Vertex in the middle of an edge of a cell, if it exists.
@@ -443,7 +474,6 @@ impl Cells {
             doubt,
             ..
         } = whole;
-        let way = self.way_along(&self.all[k], edge);
         let [a, b, c] = [0, 1, 2].map(|k| corners[(edge + k) % 3]);
         let [ab, bc, ca] = [0, 1, 2].map(|k| edges[(edge + k) % 3]);
         let Edge {
@@ -456,6 +486,8 @@ impl Cells {
             return;
         };
         let at = crossed.unwrap_or(0.5);
+        let vertex = self.on_edge(k, edge, at);
+        self.divided.halve(ab, of, at, halves);
         let (from, to, of_a) = match ends[0] == a.point {
             true => (a, b, at),
             false => {
@@ -465,7 +497,7 @@ impl Cells {
         };
         let m = Corner {
             point,
-            vertex: self.sheets[sheet as usize].between(of, [from, to], at, way),
+            vertex,
             weights: between(from.weights, to.weights, at),
         };
         let mc = self.edge(point, c.point);
@@ -526,43 +558,9 @@ impl Cells {
 /// Triangles of a sheet by their vertices, with the triangle of the mesh that each is part of.
 pub(super) type Triangles = (Vec<[u32; 3]>, Vec<u32>);
 
-impl SurfaceSide {
-    /// Vertex at share `at` from `a` to `b`; for `way` see [`Cells::way_along`].
-    fn between(
-        &mut self,
-        (triangle, entry): (u32, u32),
-        [a, b]: [Corner; 2],
-        at: f64,
-        way: u8,
-    ) -> u32 {
-        let vertices = &mut self.vertices;
-        let name = match at == 0.5 {
-            true => (a.vertex.min(b.vertex), a.vertex.max(b.vertex), 0, way),
-            false => (a.vertex, b.vertex, at.to_bits(), way),
-        };
-        *self.between.entry(name).or_insert_with(|| {
-            vertices.push(Vertex {
-                triangle,
-                weights: between(a.weights, b.weights, at),
-                entry,
-            });
-            vertices.len() as u32 - 1
-        })
-    }
-}
-
 /// Weights of the corners of a cell at a place of its triangle of the mesh.
 pub(super) fn within(corners: &[Corner; 3], at: [f64; 2]) -> [f64; 3] {
-    let [a, b, c] = corners.map(|c| [c.weights[1], c.weights[2]]);
-    let cross = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
-        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-    };
-    let whole = cross(a, b, c);
-    [
-        cross(at, b, c) / whole,
-        cross(a, at, c) / whole,
-        cross(a, b, at) / whole,
-    ]
+    barycentric(corners.map(|c| [c.weights[1], c.weights[2]]), at)
 }
 
 impl Cell {

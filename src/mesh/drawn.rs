@@ -10,19 +10,19 @@ use std::collections::HashMap;
 impl Bake {
     /// Tristimulus irradiance that a baked mesh shows at points of faces, world space; none where there is no triangle.
     pub fn drawn(&self, baked: &Baked, places: &[(Face, DVec3)]) -> Vec<Option<[f64; 3]>> {
-        let mut wanted: HashMap<(u32, bool), Vec<usize>> = HashMap::new();
+        // By triangle of the input: where it was cut, triangles of the output may lie in several parts.
+        let input = |triangle: u32| self.mesh().origin[triangle as usize];
+        let mut wanted: HashMap<((u32, u32), bool), Vec<usize>> = HashMap::new();
         for (k, (face, _)) in places.iter().enumerate() {
-            wanted
-                .entry((face.triangle, face.back))
-                .or_default()
-                .push(k);
+            let here = wanted.entry((input(face.triangle), face.back));
+            here.or_default().push(k);
         }
         // The least weight of each place in the triangle that it lies in best, and the light there.
         let mut best = vec![(f64::NEG_INFINITY, None); places.len()];
         for (part, of) in baked.surfaces.iter().zip(&baked.of) {
             let surface = &self.scene().surfaces[part.surface];
             for (triangle, of) in part.triangles.iter().zip(of) {
-                let Some(here) = wanted.get(&(*of, part.back)) else {
+                let Some(here) = wanted.get(&(input(*of), part.back)) else {
                     continue;
                 };
                 let corners = triangle.map(|v| &part.vertices[v as usize]);

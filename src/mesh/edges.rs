@@ -5,7 +5,8 @@
 //! shadow is looked for where its edges would meet if both ran on straight. All other triangles are bisected, and
 //! looked at again.
 
-use super::cells::{Cell, Cells, FENCE, ShadowEnd, between, within};
+use super::cells::{Cell, Cells, FENCE, ShadowEnd, within};
+use super::divided::between;
 use super::shades::{COVER, Shades, each};
 use super::shadow::{EdgeCrossing, Mark, ShadowEdge, ShadowFinding};
 use crate::link::Sight;
@@ -64,8 +65,7 @@ fn flat(w: [f64; 3]) -> DVec2 {
 
 impl CellLook<'_> {
     fn receiver(&self, weights: [f64; 3]) -> Receiver {
-        let sheet = &self.cells.sheets[self.cell.sheet as usize];
-        self.shades.place(self.cell, sheet, weights)
+        self.shades.place(self.cells, self.cell, weights)
     }
 
     fn lit(&self, weights: [f64; 3]) -> bool {

@@ -5,7 +5,7 @@
 //! share the other diagonal. The diagonal with fewer creases is drawn: creases are the sum, over the edges around, of length times the
 //! jump of the gradient of lightness, which an eye takes for a line (data-dependent triangulation, Dyn, Levin & Rippa 1990).
 
-use super::cells::{Cells, SurfaceSide, Triangles, key};
+use super::cells::{Cells, FENCE, SurfaceSide, key};
 use glam::DVec3;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -19,9 +19,11 @@ const LESS: f64 = 0.3;
 const FLAT: f64 = 0.9999;
 
 /// The unchanging part of a sheet: where its vertices are, and which edges are lines where light ends.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub(super) struct Ground {
     pub(super) at: Vec<DVec3>,
+    /// For each triangle, before any is turned, one of the mesh that stands for all that belong together.
+    pub(super) of: Vec<u32>,
     lines: HashSet<(u32, u32)>,
 }
 
@@ -29,16 +31,19 @@ pub(super) struct Ground {
 pub(super) fn grounds(cells: &Cells) -> Vec<Ground> {
     let ground = |sheet: &SurfaceSide| Ground {
         at: vec![DVec3::ZERO; sheet.vertices.len()],
+        of: Vec::new(),
         lines: HashSet::new(),
     };
     let mut grounds: Vec<Ground> = cells.sheets.iter().map(ground).collect();
     for cell in &cells.all {
         let ground = &mut grounds[cell.sheet as usize];
+        ground.of.push(cells.divided.first(cell.of));
         for k in 0..3 {
             let [a, b] = [cell.corners[k], cell.corners[(k + 1) % 3]];
             ground.at[a.vertex as usize] = cells.points[a.point as usize];
             let ends = cells.along.get(&key(a.point, b.point));
-            if ends.is_some_and(|lamps| *lamps != 0) {
+            let is_fenced = cells.edges[cell.edges[k] as usize].sharp & FENCE != 0;
+            if is_fenced || ends.is_some_and(|lamps| *lamps != 0) {
                 ground.lines.insert(key(a.vertex, b.vertex));
             }
         }
@@ -49,7 +54,7 @@ pub(super) fn grounds(cells: &Cells) -> Vec<Ground> {
 /// Triangles of a sheet as drawn.
 struct Faces<'a> {
     triangles: &'a mut [[u32; 3]],
-    /// Triangle of the mesh of each.
+    /// See [`Ground`].
     of: &'a [u32],
     at: &'a [DVec3],
     /// Lightness of vertices; none where nothing was seen.
@@ -59,10 +64,10 @@ struct Faces<'a> {
 }
 
 /// Turns the diagonals of a sheet with the given lightness at vertices.
-pub(super) fn turn(ground: &Ground, (triangles, of): &mut Triangles, light: &[Option<f64>]) {
+pub(super) fn turn(ground: &Ground, triangles: &mut [[u32; 3]], light: &[Option<f64>]) {
     let mut faces = Faces {
         triangles,
-        of,
+        of: &ground.of,
         at: &ground.at,
         light,
         beside: HashMap::new(),
@@ -185,7 +190,7 @@ mod tests {
     use glam::dvec3;
 
     /// A strip of squares, two triangles each, all bisected the same way.
-    fn strip() -> (Ground, Triangles) {
+    fn strip() -> (Ground, Vec<[u32; 3]>) {
         let at = (0..10).map(|k| dvec3(f64::from(k / 2), f64::from(k % 2), 0.0));
         let squares = (0..4).flat_map(|k: u32| {
             let [a, d, b, c] = [0, 1, 2, 3].map(|i| 2 * k + i);
@@ -193,9 +198,10 @@ mod tests {
         });
         let ground = Ground {
             at: at.collect(),
+            of: vec![0; 8],
             lines: HashSet::new(),
         };
-        (ground, (squares.collect(), vec![0; 8]))
+        (ground, squares.collect())
     }
 
     /// Lightness that falls off across diagonals that are not drawn: all are turned.
@@ -210,40 +216,44 @@ mod tests {
         // The fold lies in the third square from (2.5, 0) to (1.5, 1): light along x + y = 2 and 3 is drawn straight.
         for (a, b) in [(2, 5), (4, 7)] {
             let has = |t: &&[u32; 3]| t.contains(&a) || t.contains(&b);
-            let along = faces.0.iter().filter(|t| t.contains(&a) && t.contains(&b));
+            let along = faces.iter().filter(|t| t.contains(&a) && t.contains(&b));
             assert_eq!(
                 along.count(),
                 0,
                 "{:?}",
-                faces.0.iter().filter(has).collect::<Vec<_>>()
+                faces.iter().filter(has).collect::<Vec<_>>()
             );
         }
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| ground.at[v as usize]);
             0.5 * (b - a).cross(c - a).z
         };
-        assert!(faces.0.iter().all(|t| area(t) > 0.0));
-        assert!((faces.0.iter().map(area).sum::<f64>() - 4.0).abs() < 1e-12);
+        assert!(faces.iter().all(|t| area(t) > 0.0));
+        assert!((faces.iter().map(area).sum::<f64>() - 4.0).abs() < 1e-12);
     }
 
     #[test]
     fn lines_parts_of_other_triangles_and_even_light_stay() {
         let (ground, as_bisected) = strip();
-        let same = |ground: &Ground, of: Vec<u32>, light: Vec<Option<f64>>| {
-            let mut faces = (as_bisected.0.clone(), of);
+        let same = |ground: &Ground, light: Vec<Option<f64>>| {
+            let mut faces = as_bisected.clone();
             turn(ground, &mut faces, &light);
-            faces.0 == as_bisected.0
+            faces == as_bisected
         };
         let folded = folded(&ground.at);
-        assert!(!same(&ground, vec![0; 8], folded.clone()));
-        assert!(same(&ground, (0..8).collect(), folded.clone()));
+        assert!(!same(&ground, folded.clone()));
         let slope = ground.at.iter().map(|p| Some(3.0 * p.x - p.y)).collect();
-        assert!(same(&ground, vec![0; 8], slope));
-        assert!(same(&ground, vec![0; 8], vec![None; 10]));
-        let lines = Ground {
-            at: ground.at.clone(),
-            lines: (0..4).map(|k| key(2 * k, 2 * k + 3)).collect(),
+        assert!(same(&ground, slope));
+        assert!(same(&ground, vec![None; 10]));
+        let apart = Ground {
+            of: (0..8).collect(),
+            ..ground.clone()
         };
-        assert!(same(&lines, vec![0; 8], folded));
+        assert!(same(&apart, folded.clone()));
+        let lines = Ground {
+            lines: (0..4).map(|k| key(2 * k, 2 * k + 3)).collect(),
+            ..ground
+        };
+        assert!(same(&lines, folded));
     }
 }

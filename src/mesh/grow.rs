@@ -11,7 +11,6 @@ use super::looks::Looks;
 use super::shades::Shades;
 use super::turns::{BENDS, BY_CHANCE, EXCESS, GrowthOutcome, RANGE, largest};
 use crate::color::seen_difference;
-use crate::gather::Vertex;
 use crate::geometry::sampling::{hash, triangle_weights};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -420,11 +419,7 @@ impl<'a> MeshGrowth<'a> {
                     triangle_weights([unit(seed), unit(hash(seed, 1))])
                 }
             };
-            let inside = Vertex {
-                triangle: cell.of.0,
-                weights: cell.at(weights),
-                entry: cell.of.1,
-            };
+            let inside = self.cells.divided.place(cell.of, cell.at(weights));
             let sheet = &self.cells.sheets[sheet];
             let inside = self.looks.want(&inside, sheet.surface, sheet.back);
             asked.push((middles, inside, weights));

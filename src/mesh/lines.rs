@@ -6,7 +6,7 @@
 //! before.
 
 use super::cells::{Cell, CellError, Cells, Corner, ShadowEnd, SurfaceSide, key, within};
-use crate::gather::Vertex;
+use super::divided::{Divided, MeshTriangle};
 
 /// A corner of a cell that lies on the edge of a shadow: cell, corner, lamps.
 pub(super) type Sharp = (usize, usize, u64);
@@ -67,11 +67,7 @@ impl Cells {
         self.points
             .push(places[0] * own[0] + places[1] * own[1] + places[2] * own[2]);
         let sheet = &mut self.sheets[cell.sheet as usize];
-        sheet.vertices.push(Vertex {
-            triangle: cell.of.0,
-            weights,
-            entry: cell.of.1,
-        });
+        sheet.vertices.push(self.divided.place(cell.of, weights));
         let vertex = sheet.vertices.len() as u32 - 1;
         let middle = Corner {
             point,
@@ -167,12 +163,7 @@ impl Cells {
         if side == fresh {
             sheet.vertices.push(sheet.vertices[base as usize]);
             sheet.base.insert(side, base);
-            let look = Vertex {
-                triangle: of.0,
-                weights: beside,
-                entry: of.1,
-            };
-            sheet.beside.insert(side, look);
+            sheet.beside.insert(side, self.divided.place(*of, beside));
         }
         corners[k].vertex = side;
     }
@@ -187,12 +178,13 @@ impl SurfaceSide {
     /// side of `c`.
     pub(super) fn beside_line(
         &mut self,
+        divided: &Divided,
         vertex: u32,
-        (triangle, entry): (u32, u32),
+        of: MeshTriangle,
         [a, b, c]: [Corner; 3],
     ) {
-        let of = |corner: Corner| self.beside.get(&corner.vertex).copied();
-        let near = [a, b].map(|end| of(end).filter(|look| look.triangle == triangle));
+        let beside = |corner: Corner| self.beside.get(&corner.vertex).copied();
+        let near = [a, b].map(|end| beside(end).filter(|look| look.triangle == of.0));
         let weights = match near {
             [Some(a), Some(b)] => [0, 1, 2].map(|k| 0.5 * (a.weights[k] + b.weights[k])),
             _ => [0, 1, 2].map(|k| {
@@ -200,11 +192,7 @@ impl SurfaceSide {
                 (1.0 - INTO) * middle + INTO * c.weights[k]
             }),
         };
-        let look = Vertex {
-            triangle,
-            weights,
-            entry,
-        };
-        self.beside.entry(vertex).or_insert(look);
+        let beside = self.beside.entry(vertex);
+        beside.or_insert_with(|| divided.place(of, weights));
     }
 }

@@ -12,7 +12,7 @@ use super::grow::{MeshGrowth, PointLooks, mix};
 use super::parts::OutputParts;
 use super::write::Settled;
 use crate::color::seen_difference;
-use crate::gather::{Interpolation, LayerLanes, Vertex};
+use crate::gather::{Interpolation, LayerLanes};
 use crate::geometry::sampling::{Pcg, hash, triangle_weights};
 use crate::solve::Bake;
 
@@ -80,8 +80,9 @@ impl MeshGrowth<'_> {
         let mut rng = Pcg::new(bake.settings().seed ^ SEED ^ turn << 32);
         let (mut cell, mut upto) = (0, self.cells.all[0].counted());
         let all = settled.iter();
-        let mut parts: Vec<OutputParts> =
-            all.map(|s| OutputParts::new(&s.triangles, &s.of)).collect();
+        let mut parts: Vec<OutputParts> = all
+            .map(|s| OutputParts::new(&s.triangles, &s.together))
+            .collect();
         let mut asked = Vec::with_capacity(count);
         for k in 0..count {
             let target = (k as f64 + rng.f64()) / count as f64 * whole;
@@ -93,11 +94,7 @@ impl MeshGrowth<'_> {
             let of = &self.cells.all[cell];
             let sheet = &self.cells.sheets[of.sheet as usize];
             let rng_seed = turn << 32 | k as u64;
-            let vertex = Vertex {
-                triangle: of.of.0,
-                weights: of.at(weights),
-                entry: of.of.1,
-            };
+            let vertex = self.cells.divided.place(of.of, of.at(weights));
             let mut look = |turn: u64| {
                 let seed = hash(bake.settings().seed ^ SEED, 2 * rng_seed + turn);
                 self.looks.again(&vertex, sheet.surface, sheet.back, seed)
@@ -106,7 +103,8 @@ impl MeshGrowth<'_> {
             let drawn = &settled[of.sheet as usize];
             let at = of.corners.map(|c| drawn.at[c.vertex as usize]);
             let point = (0..3).map(|k| weights[k] * at[k]).sum();
-            let part = parts[of.sheet as usize].find(&drawn.at, of.of.0, point);
+            let first = self.cells.divided.first(of.of);
+            let part = parts[of.sheet as usize].find(&drawn.at, first, point);
             asked.extend(part.map(|part| (cell, part, looks)));
         }
         // However late it is, the error that is stated is measured.

@@ -4,6 +4,7 @@
 mod ahead;
 mod along;
 mod cells;
+mod divided;
 mod drawn;
 mod edges;
 mod fences;

@@ -1,10 +1,11 @@
 //! Turns edges between needles.
 //!
 //! The edge of a small shadow puts many points close together on an edge of a triangle, and the triangle beyond is bisected at each of
-//! them towards the same corner: a fan of needles, which draw light of the shadow across a floor. Two parts of one triangle of the mesh
+//! them towards the same corner: a fan of needles, which draw light of the shadow across a floor. Two parts of one triangle of the input
 //! that share an edge, unless light ends along it, may as well share the other diagonal, and do where that is clearly the better shape.
 
 use super::cells::{Cell, CellError, Cells, Corner, key};
+use super::divided::MeshTriangle;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The flatter of two triangles must become this many times as high for its length: right angles made by bisection stay as they are. At
@@ -78,9 +79,17 @@ impl Cells {
             let lamps = self.along.get(&key(p.point, q.point));
             lamps.is_some_and(|lamps| *lamps != 0)
         };
-        if !is_one_place || one.of != other.of || one.covered != other.covered || is_line(a, b) {
+        if !is_one_place || !self.divided.are_together(one.of, other.of) || is_line(a, b) {
             return None;
         }
+        // Weights of both in one triangle of the mesh: in that of the larger cell.
+        let of = if one.area >= other.area {
+            one.of
+        } else {
+            other.of
+        };
+        let [a, b, c] = [a, b, c].map(|corner| self.moved(corner, one.of, of));
+        let d = self.moved(d, other.of, of);
         let area = one.area + other.area;
         let [left, right] = [[c, d, b], [d, c, a]].map(|corners| area * cross(corners));
         let whole = cross([a, b, c]) + cross([b, a, d]);
@@ -96,11 +105,12 @@ impl Cells {
             return None;
         }
         let cd = self.edge(c.point, d.point);
-        let (hints, border) = self.merged(&[one, other], [c, d, b]);
+        let (hints, border) = self.merged(&[one, other], of, [c, d, b]);
         let [bc, ca] = [1, 2].map(|k| one.edges[(i + k) % 3]);
         let [ad, db] = [1, 2].map(|k| other.edges[(j + k) % 3]);
         let mean = (one.doubt.square * one.area + other.doubt.square * other.area) / area;
         let half = |corners, edges, area, hints| Cell {
+            of,
             corners,
             edges,
             area,
@@ -119,6 +129,18 @@ impl Cells {
         Some([bc, ad])
     }
 
+    /// The same corner with weights in another triangle of the mesh.
+    fn moved(&self, corner: Corner, from: MeshTriangle, to: MeshTriangle) -> Corner {
+        if from == to {
+            return corner;
+        }
+        let [v, w] = (self.divided).moved(from, to, [corner.weights[1], corner.weights[2]]);
+        Corner {
+            weights: [1.0 - v - w, v, w],
+            ..corner
+        }
+    }
+
     /// Height of a triangle as a share of its longest edge.
     fn height(&self, corners: [Corner; 3], area: f64) -> f64 {
         let [a, b, c] = corners.map(|corner| self.points[corner.point as usize]);
@@ -127,7 +149,18 @@ impl Cells {
     }
 
     /// Hints of two cells in one range, those on the side of the last of three corners first; and where the others begin.
-    fn merged(&mut self, both: &[Cell; 2], [c, d, b]: [Corner; 3]) -> ((u32, u32), u32) {
+    fn merged(
+        &mut self,
+        both: &[Cell; 2],
+        of: MeshTriangle,
+        [c, d, b]: [Corner; 3],
+    ) -> ((u32, u32), u32) {
+        for cell in both.iter().filter(|cell| cell.of != of) {
+            let (first, end) = cell.hints;
+            for hint in &mut self.sheets[cell.sheet as usize].hints[first as usize..end as usize] {
+                hint.at = self.divided.moved(cell.of, of, hint.at);
+            }
+        }
         let sheet = &mut self.sheets[both[0].sheet as usize];
         let [one, other] = [both[0].hints, both[1].hints];
         let hints = if one.1 == other.0 {

@@ -1,8 +1,7 @@
 //! Does light come straight from a lamp to a place? Told by rays to the middles of lamps, and to the rims of those with an
 //! extent.
 
-use super::cells::{Cell, FENCE, SurfaceSide};
-use crate::gather::Vertex;
+use super::cells::{Cell, Cells, FENCE};
 use crate::geometry::sampling::around;
 use crate::geometry::{NO_PLANE, Segment};
 use crate::link::Sight;
@@ -83,12 +82,9 @@ impl<'a> Shades<'a> {
     }
 
     /// A place of a cell as a receiver, by weights of the corners of its triangle of the mesh.
-    pub(super) fn place(&self, cell: &Cell, sheet: &SurfaceSide, weights: [f64; 3]) -> Receiver {
-        let vertex = Vertex {
-            triangle: cell.of.0,
-            weights,
-            entry: cell.of.1,
-        };
+    pub(super) fn place(&self, cells: &Cells, cell: &Cell, weights: [f64; 3]) -> Receiver {
+        let sheet = &cells.sheets[cell.sheet as usize];
+        let vertex = cells.divided.place(cell.of, weights);
         self.bake.texel(&vertex, sheet.surface, sheet.back)
     }
 

@@ -1,6 +1,7 @@
 //! The sides of edges of shadows: which vertex a triangle has there, and where its light is looked at.
 
-use super::cells::{Cell, Cells, between};
+use super::cells::{Cell, Cells};
+use super::divided::between;
 use super::edges::SHARP;
 use super::lines::Sharp;
 use super::shades::{Shades, each};
@@ -50,17 +51,16 @@ impl Cells {
         (k, corner, lamps): Sharp,
     ) -> Side {
         let cell = &self.all[k];
-        let sheet = &self.sheets[cell.sheet as usize];
         let from = cell.corners[corner].weights;
         let (target, distance) = self.away(cell, corner, lamps);
         let mut step = (BESIDE * half_size / distance).min(INTO);
         let place = |step: f64| between(from, target, step);
-        let first = shades.place(cell, sheet, place(step));
+        let first = shades.place(self, cell, place(step));
         let lit = each(lamps)
             .filter(|&lamp| shades.lit(sight, lamp, &first))
             .fold(0, |all, lamp| all | lamp);
         let wholly = |step: f64| {
-            let to = shades.place(cell, sheet, place(step));
+            let to = shades.place(self, cell, place(step));
             let expected = |lamp: u64| Some(lit & lamp != 0);
             each(lamps).all(|lamp| shades.wholly(sight, lamp, &to) == expected(lamp))
         };
@@ -69,7 +69,7 @@ impl Cells {
             step *= 2.0;
             is_clear = wholly(step);
         }
-        let at = |weights| shades.place(cell, sheet, weights).point;
+        let at = |weights| shades.place(self, cell, weights).point;
         let far = match is_clear && step < INTO {
             true => at(from).distance(at(place(step))),
             false => f64::INFINITY,

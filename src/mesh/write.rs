@@ -15,8 +15,9 @@ const UNSEEN: u32 = u32::MAX;
 /// Light of the vertices of a sheet, as written.
 pub(super) struct Settled {
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Triangle of the mesh of each.
+    /// Triangle of the mesh of each, and one that stands for all that belong together with it.
     pub(super) of: Vec<u32>,
+    pub(super) together: Vec<u32>,
     /// Positions of the vertices.
     pub(super) at: Vec<DVec3>,
     /// Irradiance of each vertex that a triangle uses.
@@ -85,7 +86,7 @@ impl Bake {
         };
         let light: Vec<Option<f64>> = looks.iter().zip(&factor).map(lightness).collect();
         growth.join(sheet, &mut faces.0, |v| Some(seen(&looks[v as usize])?.xyz));
-        turn(&ground, &mut faces, &light);
+        turn(&ground, &mut faces.0, &light);
         let row = |(look, factor): (&u32, &f32)| Some(seen(look)?.row.map(|x| x * factor));
         let mut rows: Vec<Option<[f32; 64]>> = looks.iter().zip(&factor).map(row).collect();
         let (triangles, of) = faces;
@@ -93,6 +94,7 @@ impl Bake {
         Settled {
             triangles,
             of,
+            together: ground.of,
             at: ground.at,
             rows,
             looks,

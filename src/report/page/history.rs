@@ -7,7 +7,7 @@
 
 use crate::gather::Baked;
 use crate::gather::refined::position;
-use crate::hierarchy::{NONE, Tree};
+use crate::hierarchy::{Face, NONE, Tree};
 use crate::solve::{Bake, weights_of};
 use glam::DVec3;
 
@@ -100,18 +100,18 @@ pub(super) fn corners(bake: &Bake, baked: &Baked, order: &[usize]) -> Vec<Output
             let places = triangle.map(|v| position(surface, &part.vertices[v as usize]));
             let [a, b, c] = places.map(|p| p - mesh.centre);
             let area = (b - a).cross(c - a).length() / 6.0;
-            let entry = tree.entry[of as usize][usize::from(part.back)];
-            let face = mesh.corners(crate::hierarchy::Face {
-                triangle: of,
-                back: part.back,
-            });
             for (i, &vertex) in triangle.iter().enumerate() {
                 let mut weights = [1.0 / 6.0; 3];
                 weights[i] = 2.0 / 3.0;
                 let point: DVec3 = a * weights[0] + b * weights[1] + c * weights[2];
-                let leaf = match entry {
+                let face = Face {
+                    triangle: mesh.part_at(of, point),
+                    back: part.back,
+                };
+                let [p, q, r] = mesh.corners(face);
+                let leaf = match tree.entry[face.triangle as usize][usize::from(face.back)] {
                     NONE => NONE,
-                    entry => tree.leaf_at(entry, weights_of(point, face[0], face[1], face[2])),
+                    entry => tree.leaf_at(entry, weights_of(point, p, q, r)),
                 };
                 out.push(OutputCorner {
                     vertex: first + vertex as usize,
