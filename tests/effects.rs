@@ -316,7 +316,7 @@ fn paths_agree_with_all_effects_at_once() {
     // A few bright paths make some references uncertain: each counts by how narrow its interval is.
     let (mut bias, mut weights) = (0.0, 0.0);
     for seed in 3..7 {
-        let reference = PathReference::new(&bake, 150, 1 << 14, seed);
+        let reference = PathReference::new(&bake, 150, 1 << 13, seed);
         let report = Report::against(&bake, &reference);
         println!(
             "dE00 {:?}, bias {:?}, noise {:.3}, estimate {:?}",
