@@ -645,7 +645,7 @@ fn threads_change_nothing() {
 #[test]
 fn what_is_kept_knows_what_fluoresces() {
     let settings = Settings {
-        error: 2.0,
+        error: 4.0,
         rounds: 3,
         ..Settings::default()
     };
