@@ -3,7 +3,7 @@
 use crate::common::built;
 use crate::common::daylit;
 
-use built::{Room, baked, close};
+use built::{Room, baked, close, glanced};
 use daylit::{INDEX, LUX, beside, cie, glass_of_the_report, places_beside, row, wish};
 use glam::{DVec3, dvec3};
 use haarlight::audit::Audit;
@@ -18,6 +18,7 @@ use haarlight::solve::{Bake, Representation, Settings};
 use haarlight::spectrum::{BANDS, Spectrum};
 use std::f64::consts::PI;
 use std::process::Command;
+use std::sync::LazyLock;
 
 const CLEAR: Spectrum = [1.0; BANDS];
 
@@ -99,7 +100,7 @@ fn lamps_shine_through_slabs() {
         let power = room.power(0)[30];
         let pane = room.pane(1.5, [inside; BANDS]);
         level(&mut room, 1.0, pane);
-        let bake = baked(room.scene());
+        let bake = glanced(room.scene());
         for (place, got) in places().iter().zip(spectra(&bake, &places())) {
             let d = dvec3(2.0, 2.0, 2.0) - *place;
             let cosine = d.y / d.length();
@@ -129,9 +130,9 @@ fn three_panes_in_a_row_multiply() {
         for (k, pane) in panes.into_iter().enumerate().take(count) {
             level(&mut room, 0.5 + 0.2 * k as f64, pane);
         }
-        spectra(&baked(room.scene()), &places()[..1])[0]
+        spectra(&glanced(room.scene()), &places()[..1])[0]
     });
-    let plain = spectra(&baked(lit(0.0).scene()), &places()[..1])[0];
+    let plain = spectra(&glanced(lit(0.0).scene()), &places()[..1])[0];
     let (amber, blue) = (amber(), blue());
     let xyz = |bands: &dyn Fn(usize) -> f64| {
         Observer::cie1931()
@@ -176,7 +177,7 @@ fn however_it_is_modelled_a_pane_is_one() {
                     room.mesh(corners.collect(), quads.collect(), pane);
                 }
             }
-            spectra(&baked(room.scene()), &places()[1..2])[0]
+            spectra(&glanced(room.scene()), &places()[1..2])[0]
         })
         .collect();
     for other in &got[1..] {
@@ -235,7 +236,7 @@ fn parallel_light_and_spots_pass() {
                 let pane = room.pane(1.5, [0.9; BANDS]);
                 level(&mut room, 1.5, pane);
             }
-            spectra(&baked(room.scene()), &[dvec3(2.4, 0.0, 2.2)])[0][30]
+            spectra(&glanced(room.scene()), &[dvec3(2.4, 0.0, 2.2)])[0][30]
         };
         let cosine = match kind {
             LightKind::Spot { .. } => 3.0 / dvec3(0.4, 3.0, 0.2).length(),
@@ -254,26 +255,29 @@ fn exact() -> Settings {
     }
 }
 
+/// Two rooms beside a lit one, behind an amber and a blue pane.
+fn tinted(settings: Settings) -> Bake {
+    let mut room = parted(0.6);
+    let panes = [amber(), blue()].map(|inside| room.pane(1.5, inside));
+    for (x, pane) in [1.2, 2.8].into_iter().zip(panes) {
+        room.quad(dvec3(x, 0.0, 0.0), DVec3::Y * 3.0, DVec3::Z * 4.0, pane);
+    }
+    built::run(room.scene(), settings)
+}
+
+/// The same with rows of all bands, once for all tests.
+static TINTED: LazyLock<Bake> = LazyLock::new(|| tinted(exact()));
+
 /// Lanes that are chosen for all lights behind panes stay within the share of the error that they may cause.
 #[test]
 fn lanes_serve_what_lies_behind_panes() {
-    let at = |settings: Settings| {
-        let mut room = parted(0.6);
-        let panes = [amber(), blue()].map(|inside| room.pane(1.5, inside));
-        for (x, pane) in [1.2, 2.8].into_iter().zip(panes) {
-            room.quad(dvec3(x, 0.0, 0.0), DVec3::Y * 3.0, DVec3::Z * 4.0, pane);
-        }
-        let mut bake = Bake::new(room.scene(), settings);
-        bake.run();
-        let places = [0.5, 2.0, 3.5].map(|x| (dvec3(x, 0.0, 1.0), DVec3::Y));
-        let xyz: Vec<[f64; 3]> = bake.probe(&places).iter().map(|p| p.xyz).collect();
-        (xyz, bake.light().white, bake.lanes().len())
-    };
-    let (adaptive, white, lanes) = at(Settings::default());
-    let (dense, ..) = at(exact());
+    let bake = tinted(Settings::default());
+    let places = [0.5, 2.0, 3.5].map(|x| (dvec3(x, 0.0, 1.0), DVec3::Y));
+    let (white, lanes) = (bake.light().white, bake.lanes().len());
     assert!(lanes < BANDS, "{lanes} lanes");
-    for (adaptive, dense) in adaptive.iter().zip(dense) {
-        let off = de2000(*adaptive, dense, white);
+    let pairs = bake.probe(&places).into_iter().zip(TINTED.probe(&places));
+    for (adaptive, dense) in pairs.map(|(a, b)| (a.xyz, b.xyz)) {
+        let off = de2000(adaptive, dense, white);
         println!("{lanes} lanes: {off:.3}");
         assert!(off < 0.25, "{off}: {adaptive:?} {dense:?}");
     }
@@ -319,17 +323,10 @@ fn a_lamp_behind_a_tinted_pane_has_the_spectrum_of_both() {
     }
 }
 
-/// Two rooms beside a lit one, behind an amber and a blue pane: each has its own colour, as a path tracer has it.
+/// Each of these rooms has its own colour, as a path tracer has it.
 #[test]
 fn two_tints_between_rooms_stay_apart() {
-    let mut room = parted(0.6);
-    let panes = [amber(), blue()].map(|inside| room.pane(1.5, inside));
-    for (x, pane) in [1.2, 2.8].into_iter().zip(panes) {
-        room.quad(dvec3(x, 0.0, 0.0), DVec3::Y * 3.0, DVec3::Z * 4.0, pane);
-    }
-    let mut bake = Bake::new(room.scene(), exact());
-    bake.run();
-    agrees(&bake, &[(0.5, 1.0), (2.0, 1.0), (3.5, 1.0)]);
+    agrees(&TINTED, &[(0.5, 1.0), (2.0, 1.0), (3.5, 1.0)]);
 }
 
 /// A floor of 4 m x 4 m under parallel light of 500 lx from above.
