@@ -1,6 +1,7 @@
 //! The path tracer against closed forms, by a chi-squared criterion; the report that is made of it.
 
 use crate::common::built;
+use crate::common::traced;
 
 use built::{Room, sphere};
 use glam::{DVec3, dvec3};
@@ -537,18 +538,18 @@ fn calibration_on_rooms_of_other_tools() {
 
 #[test]
 fn the_cornell_box_has_no_plateau() {
-    has_no_plateau("cornell", 0.1, 1 << 15);
+    has_no_plateau("cornell", 0.1, &traced::CORNELL);
 }
 
 /// In the dark corners too.
 #[test]
 fn two_rooms_have_no_plateau() {
-    has_no_plateau("two-rooms", 0.05, 1 << 18);
+    has_no_plateau("two-rooms", 0.05, &traced::of("two-rooms", 1 << 18));
 }
 
 /// Away from edges illuminance is off by less than 1 % of its mean by default and .3 % when `asked` (RMS), and colour
 /// differences are below .5 and .2. The path tracer's own noise is taken off (errors of independent estimates add in squares).
-fn has_no_plateau(room: &str, asked: f64, paths: usize) {
+fn has_no_plateau(room: &str, asked: f64, reference: &PathReference) {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let room = scenes.join(format!("{room}.glb"));
     let bake = |error: f64| {
@@ -559,7 +560,6 @@ fn has_no_plateau(room: &str, asked: f64, paths: usize) {
         };
         Bake::new(scene, settings)
     };
-    let reference = PathReference::new(&bake(0.5), 200, paths, 3);
     for (error, least, colour) in [(0.5, 0.01, 0.5), (asked, 0.003, 0.2)] {
         let mut bake = bake(error);
         bake.run();
@@ -581,7 +581,7 @@ fn has_no_plateau(room: &str, asked: f64, paths: usize) {
                     && inside(c, a)
             })
         };
-        let report = Report::against(&bake, &reference);
+        let report = Report::against(&bake, reference);
         let away: Vec<_> = (report.seen.iter())
             .filter(|s| !near_edge(s.point))
             .collect();

@@ -1,8 +1,10 @@
 //! Dust changes nothing: the same room with any number of tiny triangles in it has the same light, found as well, on both sides of every
 //! number at which a program might switch to other means.
 
+use crate::common::traced::CORNELL;
+
 use glam::{DMat4, DVec3};
-use haarlight::audit::{PathReference, Report};
+use haarlight::audit::Report;
 use haarlight::color::de2000;
 use haarlight::geometry::sampling::{Pcg, sphere_direction};
 use haarlight::scene::{Options, Scene};
@@ -59,8 +61,7 @@ fn mean(x: &[f64]) -> [f64; 2] {
 #[test]
 fn error_changes_smoothly_with_dust() {
     let clean = Bake::new(cornell(), Settings::default());
-    let reference = PathReference::new(&clean, 200, 1 << 15, 3);
-    let seen = Report::against(&clean, &reference).seen;
+    let seen = Report::against(&clean, &CORNELL).seen;
     let points: Vec<(DVec3, DVec3)> = seen.iter().map(|s| (s.point, s.normal)).collect();
     let mesh = clean.mesh();
     let corners = || mesh.positions.iter().map(|p| *p + mesh.centre);
