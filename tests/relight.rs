@@ -32,8 +32,7 @@ fn settings(error: f64, rounds: usize) -> Settings {
 
 /// A cache of a bake, and the bake.
 struct Cached {
-    _folder: tempfile::TempDir,
-    path: PathBuf,
+    cache: Vec<u8>,
     bake: Bake,
     baked: Baked,
 }
@@ -48,20 +47,38 @@ impl Cached {
         let baked = bake.baked(&|_, _| {});
         let size = bake.write_cache(&baked, &path, u64::MAX).unwrap();
         assert_eq!(size, std::fs::metadata(&path).unwrap().len());
-        Self {
-            _folder: folder,
-            path,
-            bake,
-            baked,
-        }
+        let cache = std::fs::read(&path).unwrap();
+        Self { cache, bake, baked }
+    }
+
+    fn open(&self, scene: Scene) -> haarlight::Result<Relighter> {
+        opened(&self.cache, scene)
     }
 
     fn relit(&self, scene: Scene) -> (Relighter, Relit) {
-        let mut relighter = Relighter::open(&self.path, scene).unwrap();
+        let mut relighter = self.open(scene).unwrap();
         let relit = relighter.relight().unwrap();
         (relighter, relit)
     }
 }
+
+/// Opens the bytes of a cache for a room.
+fn opened(cache: &[u8], scene: Scene) -> haarlight::Result<Relighter> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cache");
+    std::fs::write(&path, cache).unwrap();
+    Relighter::open(&path, scene)
+}
+
+/// Rooms that several tests change, each of them baked once.
+static CORNELL: LazyLock<Cached> =
+    LazyLock::new(|| Cached::new(room("cornell.glb"), settings(1.0, 9)));
+static FURNISHED: LazyLock<Cached> =
+    LazyLock::new(|| Cached::new(room("furnished.glb"), settings(1.5, 3)));
+static GLAZED: LazyLock<Cached> =
+    LazyLock::new(|| Cached::new(room("glazed.glb"), settings(2.0, 4)));
+static MIRRORED: LazyLock<Cached> =
+    LazyLock::new(|| Cached::new(room("mirrored.glb"), settings(2.0, 4)));
 
 /// Tristimulus irradiance of all vertices.
 fn irradiance(baked: &Baked) -> Vec<[f64; 3]> {
@@ -138,15 +155,20 @@ fn estimate(bake: &Bake) -> f64 {
 /// Nothing changed: the bake to rounding, on the same mesh. There is no ray index, so a ray would see everything.
 #[test]
 fn without_a_change_the_bake_comes_out() {
-    for (name, settings) in [
-        ("cornell.glb", settings(1.0, 9)),
+    let [closed, two, furnished] = [
         ("cornell-closed.glb", settings(2.0, 9)),
         ("two-rooms.glb", settings(2.0, 9)),
         ("furnished.glb", settings(3.0, 2)),
-        ("glazed.glb", settings(3.0, 2)),
-        ("mirrored.glb", settings(3.0, 2)),
+    ]
+    .map(|(name, settings)| Cached::new(room(name), settings));
+    for (name, cached) in [
+        ("cornell.glb", &*CORNELL),
+        ("cornell-closed.glb", &closed),
+        ("two-rooms.glb", &two),
+        ("furnished.glb", &furnished),
+        ("glazed.glb", &GLAZED),
+        ("mirrored.glb", &MIRRORED),
     ] {
-        let cached = Cached::new(room(name), settings);
         let (relighter, relit) = cached.relit(room(name));
         assert!(!relit.record.changed);
         assert_eq!(relighter.lanes().lanes(), cached.bake.lanes().lanes());
@@ -185,7 +207,7 @@ fn other_lamps_and_paints_give_what_a_fresh_bake_gives() {
         }
         scene
     };
-    let cached = Cached::new(room("cornell.glb"), settings(1.0, 9));
+    let cached = &CORNELL;
     let (relighter, relit) = cached.relit(changed());
     assert!(relit.record.changed);
     let mut fresh = Bake::new(changed(), settings(1.0, 9));
@@ -228,7 +250,7 @@ fn lamps_go_out_in_a_furnished_room() {
         }
         scene
     };
-    let cached = Cached::new(room("furnished.glb"), settings(1.5, 3));
+    let cached = &FURNISHED;
     let (_, relit) = cached.relit(changed());
     let mut fresh = Bake::new(changed(), settings(1.5, 3));
     fresh.run();
@@ -248,7 +270,7 @@ fn lamps_go_out_in_a_furnished_room() {
 /// Lamps behind panes and in mirrors, the colours of panes and mirrors themselves: what a fresh bake finds.
 #[test]
 fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
-    for name in ["glazed.glb", "mirrored.glb"] {
+    for (name, cached) in [("glazed.glb", &GLAZED), ("mirrored.glb", &MIRRORED)] {
         let changed = || {
             let mut scene = room(name);
             for (k, light) in scene.spectra.iter_mut().enumerate() {
@@ -272,7 +294,6 @@ fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
             }
             scene
         };
-        let cached = Cached::new(room(name), settings(2.0, 4));
         let (_, relit) = cached.relit(changed());
         assert!(relit.record.changed);
         let mut fresh = Bake::new(changed(), settings(2.0, 4));
@@ -300,13 +321,10 @@ fn panes_and_mirrors_leave_what_they_leave_in_a_fresh_bake() {
 #[test]
 fn moved_panes_and_dull_mirrors_are_refused() {
     let refused = |name: &str, change: &dyn Fn(&mut Scene)| {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("cache");
         let (_, cache) = SMALL.iter().find(|(of, _)| *of == name).unwrap();
-        std::fs::write(&path, cache).unwrap();
         let mut other = room(name);
         change(&mut other);
-        let error = Relighter::open(&path, other).err().unwrap();
+        let error = opened(cache, other).err().unwrap();
         assert_eq!(error.exit_code(), 2);
         error.to_string()
     };
@@ -344,7 +362,7 @@ fn light_adds_up() {
         ..settings(1.0, 2)
     };
     let cached = Cached::new(room("furnished.glb"), dense);
-    let mut relighter = Relighter::open(&cached.path, room("furnished.glb")).unwrap();
+    let mut relighter = cached.open(room("furnished.glb")).unwrap();
     let mut under = |keep: &dyn Fn(&str) -> f64| {
         let mut scene = room("furnished.glb");
         for material in &mut scene.materials {
@@ -380,11 +398,11 @@ fn light_adds_up() {
 
 #[test]
 fn another_shape_is_refused_with_what_changed() {
-    let cached = Cached::new(room("furnished.glb"), settings(9.0, 1));
+    let cached = &FURNISHED;
     let refused = |scene: Scene| {
-        let error = Relighter::open(&cached.path, scene).err().unwrap();
+        let error = cached.open(scene).err().unwrap();
         assert_eq!(error.exit_code(), 2);
-        let mut open = Relighter::open(&cached.path, room("furnished.glb")).unwrap();
+        let mut open = cached.open(room("furnished.glb")).unwrap();
         assert!(open.change(room("convex.glb")).is_err());
         error.to_string()
     };
@@ -411,7 +429,8 @@ fn another_shape_is_refused_with_what_changed() {
     let text = refused(room("convex.glb"));
     assert!(text.contains("another shape"), "{text}");
     // A cache that would be too large is refused before it is written.
-    let at = cached.path.with_extension("other");
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path().join("other");
     let error = cached
         .bake
         .write_cache(&cached.baked, &at, 1000)
@@ -454,10 +473,7 @@ fn a_resumed_bake_writes_the_same_cache() {
 
 /// Rooms and their caches: one of few triangles, and such with panes and mirrors.
 static SMALL: LazyLock<[(&str, Vec<u8>); 3]> = LazyLock::new(|| {
-    let of = |name: &'static str, settings| {
-        let cached = Cached::new(room(name), settings);
-        (name, std::fs::read(&cached.path).unwrap())
-    };
+    let of = |name: &'static str, settings| (name, Cached::new(room(name), settings).cache);
     [
         of("two-rooms.glb", settings(5.0, 2)),
         of("glazed.glb", settings(9.0, 1)),
@@ -494,10 +510,7 @@ proptest! {
         let sum = container::checksum(&bytes);
         bytes.truncate(bytes.len() - 8);
         bytes.extend(sum.to_le_bytes());
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("c");
-        std::fs::write(&path, &bytes).unwrap();
-        let done = Relighter::open(&path, room(name)).and_then(|mut r| r.relight());
+        let done = opened(&bytes, room(name)).and_then(|mut r| r.relight());
         if let Err(error) = done {
             prop_assert_eq!(error.exit_code(), 2);
         }
