@@ -684,6 +684,7 @@ fn what_is_kept_knows_what_fluoresces() {
             seen += 1;
         }
     }
+    println!("off by {:.1e} of what is relit", gap / whole);
     assert!(seen > 100 && gap < 5e-3 * whole, "{seen} {gap} {whole}");
 }
 

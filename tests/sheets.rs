@@ -562,6 +562,7 @@ fn what_is_kept_knows_sheets() {
             on_sheets += 1;
         }
     }
+    println!("off by {:.1e} of what is relit", gap / whole);
     assert!(
         on_sheets > 100 && gap < 2e-3 * whole,
         "{on_sheets} {gap} {whole}"
