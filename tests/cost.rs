@@ -27,10 +27,14 @@ fn cornell(lamp: &str) -> Scene {
 
 /// A bake of two rounds.
 fn two_rounds(scene: Scene) -> Bake {
+    rounds(2, scene)
+}
+
+fn rounds(rounds: usize, scene: Scene) -> Bake {
     let mut bake = Bake::new(
         scene,
         Settings {
-            rounds: 2,
+            rounds,
             ..Settings::default()
         },
     );
@@ -143,7 +147,7 @@ const LISTS: [f64; 3] = [8.0, 2.0, 0.5];
 
 /// What lists lose in the mean, what they believe to lose, and how long they are: where rays carry light, as [`held`] finds it on links.
 fn lists_by_rays() -> [[f64; 3]; 3] {
-    let mut bake = two_rounds(room("furnished.glb"));
+    let mut bake = rounds(1, room("furnished.glb"));
     let white = bake.light().white;
     bake.hold(Representation::Dense, 0.5).unwrap();
     let truth = bake.leaf_colours();
