@@ -139,7 +139,7 @@ fn by_the_program(room: &str, options: &[&str]) -> Vec<Vec<u8>> {
         "-o",
         "out.glb",
         "--error",
-        "2",
+        "4",
         // Pictures may take a tenth of that, however busy the machine is.
         "--time",
         "10000",
