@@ -30,7 +30,8 @@ pub struct Baked {
     pub covered: usize,
     /// Triangles that were to be divided further when the limits were reached.
     pub capped: usize,
-    /// Triangle of [`Mesh`](crate::hierarchy::Mesh) that each triangle is part of; empty after relighting.
+    /// Triangle of [`Mesh`](crate::hierarchy::Mesh) that each triangle lies in, at least in part: where a triangle of the input was cut, others of it
+    /// may hold the rest. Empty after relighting.
     pub of: Vec<Vec<u32>>,
     /// How far light between vertices is from what gathering there finds; none in a sketch and after relighting.
     pub interpolation: Option<Interpolation>,

@@ -555,7 +555,7 @@ impl Cells {
     }
 }
 
-/// Triangles of a sheet by their vertices, with the triangle of the mesh that each is part of.
+/// Triangles of a sheet by their vertices, each with a triangle of the mesh that it lies in, at least in part.
 pub(super) type Triangles = (Vec<[u32; 3]>, Vec<u32>);
 
 /// Weights of the corners of a cell at a place of its triangle of the mesh.

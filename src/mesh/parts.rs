@@ -10,14 +10,14 @@ use std::collections::HashMap;
 /// A triangle of the output, and weights of its corners at a point.
 pub(super) type PointInTriangle = ([u32; 3], [f64; 3]);
 
-/// Triangles of a sheet by the triangle of the mesh that they are part of.
+/// Triangles of a sheet by a triangle of the mesh that stands for all that belong together, see [`Divided`](super::divided::Divided).
 pub(super) struct OutputParts {
     all: HashMap<u32, Vec<[u32; 3]>>,
     grids: HashMap<u32, PartGrid>,
 }
 
 impl OutputParts {
-    /// Triangles, and the triangle of the mesh of each.
+    /// Triangles, and the triangle of the mesh that stands for each.
     pub(super) fn new(triangles: &[[u32; 3]], of: &[u32]) -> Self {
         let mut all: HashMap<u32, Vec<[u32; 3]>> = HashMap::new();
         for (triangle, of) in triangles.iter().zip(of) {
@@ -29,7 +29,7 @@ impl OutputParts {
         }
     }
 
-    /// The triangle around a point of a triangle of the mesh, and weights of its corners there; of several, the one that the point lies
+    /// The triangle around a point of what a triangle of the mesh stands for, and weights of its corners there; of several, the one that the point lies
     /// deepest in. `at` are the places of vertices.
     pub(super) fn find(&mut self, at: &[DVec3], of: u32, point: DVec3) -> Option<PointInTriangle> {
         let all = self.all.get(&of)?;
