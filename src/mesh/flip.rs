@@ -61,6 +61,8 @@ struct Faces<'a> {
     light: &'a [Option<f64>],
     /// Triangles at each edge, by its vertices.
     beside: HashMap<(u32, u32), [Option<u32>; 2]>,
+    /// Edges of more than two triangles, one of which lies upon another: they stay.
+    crowded: HashSet<(u32, u32)>,
 }
 
 /// Turns the diagonals of a sheet with the given lightness at vertices.
@@ -71,7 +73,9 @@ pub(super) fn turn(ground: &Ground, triangles: &mut [[u32; 3]], light: &[Option<
         at: &ground.at,
         light,
         beside: HashMap::new(),
+        crowded: HashSet::new(),
     };
+    faces.find_crowded();
     for t in 0..faces.triangles.len() as u32 {
         faces.tie(t);
     }
@@ -84,11 +88,27 @@ pub(super) fn turn(ground: &Ground, triangles: &mut [[u32; 3]], light: &[Option<
     }
 }
 
+fn edges([a, b, c]: [u32; 3]) -> [(u32, u32); 3] {
+    [key(a, b), key(b, c), key(c, a)]
+}
+
 impl Faces<'_> {
+    fn find_crowded(&mut self) {
+        let mut all: Vec<(u32, u32)> = self.triangles.iter().flat_map(|t| edges(*t)).collect();
+        all.sort_unstable();
+        let crowded = all.chunk_by(|a, b| a == b).filter(|same| same.len() > 2);
+        self.crowded = crowded.map(|same| same[0]).collect();
+    }
+
+    /// Edges of a triangle that may have one triangle or two.
+    fn free_edges(&self, t: u32) -> Vec<(u32, u32)> {
+        let all = edges(self.triangles[t as usize]).into_iter();
+        all.filter(|edge| !self.crowded.contains(edge)).collect()
+    }
+
     fn tie(&mut self, t: u32) {
-        let [a, b, c] = self.triangles[t as usize];
-        for (p, q) in [(a, b), (b, c), (c, a)] {
-            let both = self.beside.entry(key(p, q)).or_default();
+        for edge in self.free_edges(t) {
+            let both = self.beside.entry(edge).or_default();
             match both[0] {
                 None => both[0] = Some(t),
                 Some(_) => both[1] = Some(t),
@@ -97,9 +117,8 @@ impl Faces<'_> {
     }
 
     fn untie(&mut self, t: u32) {
-        let [a, b, c] = self.triangles[t as usize];
-        for (p, q) in [(a, b), (b, c), (c, a)] {
-            if let Some(both) = self.beside.get_mut(&key(p, q)) {
+        for edge in self.free_edges(t) {
+            if let Some(both) = self.beside.get_mut(&edge) {
                 if both[0] == Some(t) {
                     both[0] = both[1].take();
                 } else {
@@ -161,7 +180,8 @@ impl Faces<'_> {
         let k = (0..3).find(|&k| key(one[k], one[(k + 1) % 3]) == edge)?;
         let [a, b, c] = [0, 1, 2].map(|i| one[(k + i) % 3]);
         let &d = other.iter().find(|v| **v != a && **v != b)?;
-        let is_edge = (self.beside.get(&key(c, d))).is_some_and(|both| both[0].is_some());
+        let is_edge = (self.beside.get(&key(c, d))).is_some_and(|both| both[0].is_some())
+            || self.crowded.contains(&key(c, d));
         let then = [[c, d, b], [d, c, a]];
         let n = self.normal(one) + self.normal(other);
         let is_whole = |t: &[u32; 3]| self.normal(*t).dot(n) > SLIVER * n.length_squared();
@@ -172,7 +192,9 @@ impl Faces<'_> {
             return None;
         }
         let before = self.creases([[a, b, c], [b, a, d]], [t, s]);
-        if self.creases(then, [t, s]) >= (1.0 - LESS) * before {
+        // A crease that is no number is never smoother: in a dark room light has no white to be compared with.
+        let is_smoother = self.creases(then, [t, s]) < (1.0 - LESS) * before;
+        if !is_smoother {
             return None;
         }
         self.untie(t);
@@ -232,6 +254,18 @@ mod tests {
         assert!((faces.iter().map(area).sum::<f64>() - 4.0).abs() < 1e-12);
     }
 
+    /// As in files that have triangles twice: turning ends, and the edges of such triangles stay.
+    #[test]
+    fn triangles_upon_each_other_are_no_reason_to_turn_for_ever() {
+        let (mut ground, mut faces) = strip();
+        faces.extend([faces[2], faces[3], faces[5]]);
+        ground.of = vec![0; faces.len()];
+        turn(&ground, &mut faces, &folded(&ground.at));
+        for (of, twice) in [(2, 8), (3, 9), (5, 10)] {
+            assert_eq!(faces[of], faces[twice]);
+        }
+    }
+
     #[test]
     fn lines_parts_of_other_triangles_and_even_light_stay() {
         let (ground, as_bisected) = strip();
@@ -245,6 +279,7 @@ mod tests {
         let slope = ground.at.iter().map(|p| Some(3.0 * p.x - p.y)).collect();
         assert!(same(&ground, slope));
         assert!(same(&ground, vec![None; 10]));
+        assert!(same(&ground, vec![Some(f64::NAN); 10]));
         let apart = Ground {
             of: (0..8).collect(),
             ..ground.clone()
