@@ -75,7 +75,6 @@ pub(super) fn turn(ground: &Ground, triangles: &mut [[u32; 3]], light: &[Option<
         beside: HashMap::new(),
         crowded: HashSet::new(),
     };
-    faces.find_crowded();
     for t in 0..faces.triangles.len() as u32 {
         faces.tie(t);
     }
@@ -93,31 +92,24 @@ fn edges([a, b, c]: [u32; 3]) -> [(u32, u32); 3] {
 }
 
 impl Faces<'_> {
-    fn find_crowded(&mut self) {
-        let mut all: Vec<(u32, u32)> = self.triangles.iter().flat_map(|t| edges(*t)).collect();
-        all.sort_unstable();
-        let crowded = all.chunk_by(|a, b| a == b).filter(|same| same.len() > 2);
-        self.crowded = crowded.map(|same| same[0]).collect();
-    }
-
-    /// Edges of a triangle that may have one triangle or two.
-    fn free_edges(&self, t: u32) -> Vec<(u32, u32)> {
-        let all = edges(self.triangles[t as usize]).into_iter();
-        all.filter(|edge| !self.crowded.contains(edge)).collect()
-    }
-
     fn tie(&mut self, t: u32) {
-        for edge in self.free_edges(t) {
+        for edge in edges(self.triangles[t as usize]) {
+            if self.crowded.contains(&edge) {
+                continue;
+            }
             let both = self.beside.entry(edge).or_default();
-            match both[0] {
-                None => both[0] = Some(t),
-                Some(_) => both[1] = Some(t),
+            match both.iter().position(Option::is_none) {
+                Some(free) => both[free] = Some(t),
+                None => {
+                    self.beside.remove(&edge);
+                    self.crowded.insert(edge);
+                }
             }
         }
     }
 
     fn untie(&mut self, t: u32) {
-        for edge in self.free_edges(t) {
+        for edge in edges(self.triangles[t as usize]) {
             if let Some(both) = self.beside.get_mut(&edge) {
                 if both[0] == Some(t) {
                     both[0] = both[1].take();

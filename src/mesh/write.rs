@@ -15,8 +15,9 @@ const UNSEEN: u32 = u32::MAX;
 /// Light of the vertices of a sheet, as written.
 pub(super) struct Settled {
     pub(super) triangles: Vec<[u32; 3]>,
-    /// A triangle of the mesh that each lies in, at least in part, and one that stands for all that belong together with it.
+    /// A triangle of the mesh that each lies in, at least in part.
     pub(super) of: Vec<u32>,
+    /// A triangle of the mesh that stands for all that belong together with it.
     pub(super) together: Vec<u32>,
     /// Positions of the vertices.
     pub(super) at: Vec<DVec3>,
