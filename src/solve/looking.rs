@@ -1,6 +1,7 @@
 //! What a solution can be asked: light at receivers, and which receivers are covered.
 
 use super::estimate::{self, Distance};
+use super::solution::NOISY_VERTEX;
 use super::{Bake, Closed, GatherQuality, flux};
 use crate::geometry::{NO_PLANE, Segment};
 use crate::hierarchy::NONE;
@@ -69,7 +70,7 @@ impl Bake {
                 *hemisphere = &sketched;
             }
             if quality != GatherQuality::Full {
-                gatherer.most_backs = MOSTLY;
+                (gatherer.most_backs, gatherer.noisy) = (MOSTLY, NOISY_VERTEX);
             }
             let at = |memory: &mut Memory, r: &Receiver| gatherer.at(r, memory).pack();
             self.room.team.map(receivers, Memory::default, at)

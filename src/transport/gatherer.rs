@@ -120,6 +120,8 @@ pub struct Gatherer<'a> {
     pub(crate) via: Option<Via>,
     /// What one patch may misplace, share of the white's irradiance.
     pub tolerance: f64,
+    /// That, times this, is what light close by may err by chance, see `transport::nearby`.
+    pub(crate) noisy: f64,
     /// Must the visible factors sum to 1? Then indirect light is divided by their sum.
     pub closed: bool,
     /// The directions of rays for indirect light, where rays find patches sooner than links do; none: by links.

@@ -24,12 +24,6 @@ const STEPS: u64 = 8;
 /// Rays that meet something close by and are followed in a turn, and turns at the most.
 const FOLLOWED: usize = 64;
 const TURNS: f64 = 16.0;
-/// What one patch may misplace, times this, is the standard error if light differs from path to path by as much as leaves have. With one turn, 16, 8
-/// and 4 points at the default are off by 5.7, 3.0, 3.5 and 3.1 % in a home theatre, by 2.7, 2.1, 2.1 and 2.0 in a living room (root mean
-/// square, one seed). With one turn and with 16, `--error 1` takes 35 and 35 CPU seconds in a garage, 50 and 47 in the home theatre, 40 and 40 in
-/// the living room, and mean errors between vertices are .37 and .38, .53 and .48, .43 and .41; with 8, in another run, 41, 61 and 45 s, .33, .46
-/// and .42.
-const NOISY: f64 = 16.0;
 /// Where direct light varies by less than this share over a leaf, any point of it has the mean.
 const EVEN: f32 = 0.05;
 
@@ -55,7 +49,7 @@ impl Gatherer<'_> {
     }
 
     /// Reflected light of all points that rays, each of a `share` of the hemisphere, met close by, as a share of that of their leaves: by as many
-    /// paths as it is worth.
+    /// paths as make the standard error what it may be if light differs from path to path by as much as leaves have.
     pub(super) fn nearby(
         &self,
         hits: &[(u32, Hit)],
@@ -65,7 +59,7 @@ impl Gatherer<'_> {
     ) -> f64 {
         let bright = |hit: &(u32, Hit)| f64::from(self.light.bright_reflected[hit.0 as usize]);
         let carries = share * hits.iter().map(bright).sum::<f64>();
-        let worth = carries / (NOISY * self.tolerance_at(to, carries));
+        let worth = carries / (self.noisy * self.tolerance_at(to, carries));
         let turns = (worth * worth / FOLLOWED as f64).ceil().clamp(1.0, TURNS);
         let mut pairs = Vec::new();
         for turn in 0..turns as u32 {

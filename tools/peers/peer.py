@@ -4,6 +4,10 @@ The light at a place is found in two ways, weighted against each other (Veach's 
 looked at, and a ray goes out by the cosine to the next surface, where the same is done again. No reflectance of the place
 is needed for that. Mitsuba's own `path` passes over the last .9 thousandth of a ray to a lamp: bars 4 mm before a lamp
 that is 5 m away hide nothing from it, and a garage came out .9 % too bright. So lamps are looked at by whole rays here.
+
+Mitsuba's rays begin .09 thousandth of the largest coordinate before a surface. So the room's middle is the origin, and the rays
+of a place, which stands before its surface already, begin at the place: in a slit of a centimetre, 20 m from the origin of a
+restaurant, 1.7 mm decided whether lamps are seen.
 """
 
 import time
@@ -32,6 +36,8 @@ class Peer:
         self.kind = "mono" if grey else "rgb" if room.is_painted() else "spectral"
         mi.set_variant(f"llvm_ad_{self.kind}")
         self.dr, self.mi, self.room, self.size = dr, mi, room, room.size()
+        corners = np.concatenate([part.corners.reshape(-1, 3) for part in room.parts])
+        self.middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
         self.spectra = spectra.Spectra() if self.kind != "spectral" else spectra.give(room, path)
         scene = {"type": "scene"}
         for k, part in enumerate(merged(room)):
@@ -105,7 +111,7 @@ class Peer:
         if part.colors is not None and material.paint is None:
             mesh.add_attribute("vertex_color", 3, (part.colors * material.base_color).ravel().astype(np.float32))
         parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = corners.ravel().astype(np.float32)
+        parameters["vertex_positions"] = (corners - self.middle).ravel().astype(np.float32)
         parameters["faces"] = np.arange(3 * n, dtype=np.uint32)
         if uv is not None:
             # A picture given as an array begins at v = 0, as in glTF.
@@ -115,15 +121,16 @@ class Peer:
 
     def lamp(self, lamp):
         mi = self.mi
+        position = lamp.position - self.middle
         if lamp.kind == "point":
-            return {"type": "point", "position": list(lamp.position), "intensity": self.value(lamp.intensity, lamp.power)}
+            return {"type": "point", "position": list(position), "intensity": self.value(lamp.intensity, lamp.power)}
         if lamp.kind == "directional":
             return {"type": "directional", "direction": list(lamp.direction), "irradiance": self.value(lamp.intensity, lamp.power)}
         up = [0, 1, 0] if abs(lamp.direction[1]) < 0.9 else [1, 0, 0]
-        target = list(lamp.position + lamp.direction)
+        target = list(position + lamp.direction)
         degrees = float(np.degrees(lamp.outer))
         return {
-            "type": "spot", "to_world": mi.ScalarTransform4f().look_at(list(lamp.position), target, up),
+            "type": "spot", "to_world": mi.ScalarTransform4f().look_at(list(position), target, up),
             # The picture does the fall-off, which is not the one that Mitsuba has.
             "cutoff_angle": degrees, "beam_width": degrees * (1 - 1e-6),
             "intensity": self.value(lamp.intensity, lamp.power), "texture": self.fall_off(lamp),
@@ -143,7 +150,7 @@ class Peer:
     def tables(self, places):
         mi = self.mi
         rows = lambda values: np.ascontiguousarray(values.T).astype(np.float32)
-        return mi.Point3f(rows(places.points)), mi.Vector3f(rows(places.normals))
+        return mi.Point3f(rows(places.points - self.middle)), mi.Vector3f(rows(places.normals))
 
     def backs(self, places, looks, seed):
         """The share of directions, by the cosine, in which the nearest thing is a black back."""
@@ -195,7 +202,7 @@ class Peer:
     def paths(self, here, to_lamp, onwards, sampler):
         """Irradiance at `here` by one path each, first directions from numbers given."""
         dr, mi, scene = self.dr, self.mi, self.scene
-        lamp, radiance = self.look(here, to_lamp)
+        lamp, radiance = self.look(here, to_lamp, at_place=True)
         cosine = dr.maximum(dr.dot(here.n, lamp.d), 0)
         light = radiance * (cosine * dr.select(lamp.delta, 1, lamp.pdf / (lamp.pdf + cosine / dr.pi)))
 
@@ -233,11 +240,11 @@ class Peer:
         s["ray"], s["last"], s["density"], s["on"] = hit.spawn_ray(hit.to_world(sample.wo)), mi.Interaction3f(hit), sample.pdf, on
         return s
 
-    def look(self, here, number, active=True):
+    def look(self, here, number, active=True, at_place=False):
         """A lamp picked by chance, and what it sends here past all that stands between."""
         dr, scene = self.dr, self.scene
         lamp, radiance = scene.sample_emitter_direction(here, number, False, active)
-        ray = here.spawn_ray_to(lamp.p)
+        ray = self.mi.Ray3f(here.p, lamp.p - here.p) if at_place else here.spawn_ray_to(lamp.p)
         far = dr.norm(lamp.p - ray.o)
         ray.d, ray.maxt = (lamp.p - ray.o) / far, dr.inf
         first = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
