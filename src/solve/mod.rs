@@ -97,7 +97,7 @@ pub(crate) const NOBODY: &str = "nobody interrupts it";
 pub(crate) enum GatherQuality {
     /// Points anywhere.
     Full,
-    /// Vertices: nobody sees those that lie inside something.
+    /// Vertices: nobody sees those that lie inside something, and as there are many, they follow fewer paths.
     Vertex,
     /// A picture of an unfinished bake.
     Preview,
