@@ -13,7 +13,8 @@ use crate::transport::Gatherer;
 const GATHER_SHARE: f64 = 0.1;
 /// What light close by may err by chance at a point, in units of that, see `transport::nearby`. With 16 and with 4 points at the default are off by
 /// 3.7, 5.1 and 2.7, 3.0 % in a canteen, by 3.8, 2.7 and 3.0, 2.1 in a home theatre, by 2.6, 2.1 and 2.8, 2.4 in a garage (root mean square beside
-/// Mitsuba, two seeds), by 2.3 and 2.3 in a restaurant (one), in the same time. Four times as many turns change little (3.1, 2.2 to 2.9, 2.4 in the theatre).
+/// Mitsuba, two seeds), by 2.3 and 2.3 in a restaurant (one), in the same time. Four times as many turns change little (3.1, 2.2 and 2.9, 2.4 in the theatre, beside an earlier
+/// reference).
 const NOISY_POINT: f64 = 4.0;
 /// The same at vertices, which are many. With one turn and with 16, `--error 1` takes 35 and 35 CPU seconds in a garage, 50 and 47 in the home
 /// theatre, 40 and 40 in a living room, and mean errors between vertices are .37 and .38, .53 and .48, .43 and .41; with 8, in another run, 41, 61

@@ -214,6 +214,27 @@ fn believed(pairs: &[[f64; 2]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::GatherQuality;
+    use crate::transport::MOSTLY;
+    use crate::transport::tests::{baked, middle};
+
+    /// A vertex casts the same rays but for fewer paths.
+    #[test]
+    fn points_follow_more_paths_than_vertices() {
+        let bake = baked("furnished.glb", 2);
+        let leaves = bake.tree().leaves().step_by(17);
+        let places: Vec<Receiver> = leaves.map(|leaf| middle(bake.tree(), leaf)).collect();
+        let points = bake.gather_with(&places, GatherQuality::Full);
+        let vertices = bake.gather_with(&places, GatherQuality::Vertex);
+        let both = points.iter().zip(&vertices);
+        let (mut more, mut fewer) = (0, 0);
+        // What lies inside something is not gathered at a vertex.
+        for (point, vertex) in both.filter(|(_, vertex)| vertex.backs <= MOSTLY) {
+            more += usize::from(point.rays > vertex.rays);
+            fewer += usize::from(point.rays < vertex.rays);
+        }
+        assert!(more > 40 && fewer == 0, "{more} {fewer}");
+    }
 
     #[test]
     fn what_does_not_stand_out_of_its_noise_is_not_believed() {

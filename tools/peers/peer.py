@@ -36,8 +36,7 @@ class Peer:
         self.kind = "mono" if grey else "rgb" if room.is_painted() else "spectral"
         mi.set_variant(f"llvm_ad_{self.kind}")
         self.dr, self.mi, self.room, self.size = dr, mi, room, room.size()
-        corners = np.concatenate([part.corners.reshape(-1, 3) for part in room.parts])
-        self.middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        self.middle = sum(room.box()) / 2
         self.spectra = spectra.Spectra() if self.kind != "spectral" else spectra.give(room, path)
         scene = {"type": "scene"}
         for k, part in enumerate(merged(room)):

@@ -91,10 +91,15 @@ class Room:
         materials = all(flat(m.base_color) and flat(m.emission) and not m.spectra for m in self.materials)
         return materials and all(flat(lamp.intensity) for lamp in self.lamps) and not self.is_painted()
 
+    def box(self):
+        """The least and the greatest coordinates."""
+        corners = np.concatenate([part.corners.reshape(-1, 3) for part in self.parts])
+        return corners.min(axis=0), corners.max(axis=0)
+
     def size(self):
         """Greatest extent."""
-        corners = np.concatenate([part.corners.reshape(-1, 3) for part in self.parts])
-        return float(np.ptp(corners, axis=0).max())
+        low, high = self.box()
+        return float((high - low).max())
 
 
 def matrix(node):
