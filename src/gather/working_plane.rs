@@ -149,7 +149,7 @@ impl Bake {
         let mut lit: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
         for leaf in tree.leaves() {
             let node = tree.node(leaf);
-            let light = arrival.get(leaf as usize).map_or(0.0, |a| f64::from(a.all));
+            let light = arrival.get(leaf as usize).map_or(0.0, |&a| f64::from(a));
             let Some(element) = tree.element(node).filter(|_| light > 0.0) else {
                 continue;
             };

@@ -391,7 +391,7 @@ pub(crate) fn leaf_below(face: u32, mut weights: [f64; 3], first: impl Fn(u32) -
 }
 
 /// The child of an element that contains a point, given by barycentric weights, which become weights on the child.
-pub(super) fn quarter(w: &mut [f64; 3]) -> u32 {
+pub(crate) fn quarter(w: &mut [f64; 3]) -> u32 {
     // Children 0, 1, 2 have the corners, child 3 is the middle (rotated).
     match w.iter().position(|&x| x >= 0.5) {
         Some(k) => {

@@ -17,7 +17,7 @@ pub use fixtures::Fixtures;
 pub use fluorescent::Fluorescent;
 pub(crate) use fluorescent::{balance, guide};
 pub use rows::{Rows, padded};
-pub use solution::{Arrival, Light, Neighbours};
+pub use solution::{Light, Neighbours};
 pub(crate) use solution::{brightness, lightness_sensitivity, weighed};
 pub use through::Through;
 pub(crate) use through::mixed;

@@ -9,18 +9,6 @@ use crate::hierarchy::{Mesh, NONE, Tree};
 use crate::link::{Graph, Occlusion};
 use rayon::prelude::*;
 
-/// Light that arrives on a leaf, in brightness, share of the white's.
-#[derive(Debug, Clone, Copy, Default)]
-#[non_exhaustive]
-pub struct Arrival {
-    /// All light.
-    pub all: f32,
-    /// Its part straight from lamps.
-    pub direct: f32,
-    /// Half the range of direct light over the leaf.
-    pub half_range: f32,
-}
-
 /// The light in a room after a round.
 #[derive(Debug, Clone, Default)]
 pub struct Light {
@@ -45,8 +33,8 @@ pub struct Light {
     pub brightest: Vec<f32>,
     /// Standard deviation of brightness over the leaves of a node.
     pub deviation: Vec<f32>,
-    /// Light that arrives on every node that is a leaf; 0 elsewhere.
-    pub arrival: Vec<Arrival>,
+    /// Brightness of the light that arrives on every node that is a leaf, share of the white's; 0 elsewhere.
+    pub arrival: Vec<f32>,
     /// The hierarchy as rays need it.
     pub descent: Descent,
     /// For each node the first node, itself or below, that is an emitting element or has several children with emission below;
@@ -80,6 +68,7 @@ impl Light {
             &self.bright_emitted,
             &self.brightest,
             &self.deviation,
+            &self.arrival,
         ];
         let rows = [
             &self.reflected,
@@ -89,7 +78,6 @@ impl Light {
         ];
         rows.iter().map(|rows| rows.bytes()).sum::<usize>()
             + scalars.iter().map(|list| 4 * list.len()).sum::<usize>()
-            + size_of_val(self.arrival.as_slice())
             + self.descent.bytes()
             + self.through.bytes()
             + self.fixtures.bytes()

@@ -9,7 +9,7 @@ use super::operator::Operator;
 use super::reflection::Reflection;
 use super::solver::{Convergence, System, step};
 use super::{Bake, SolveInput};
-use crate::light::{Arrival, Light, Neighbours, Rows, padded, weighed};
+use crate::light::{Light, Neighbours, Rows, padded, weighed};
 use crate::link::LinkRows;
 use crate::scene::effects::EffectKind;
 use crate::spectrum::{BANDS, Spectrum};
@@ -497,13 +497,9 @@ impl Bake {
         let light = &self.solution.light;
         let weights = self.solution.bright_weights();
         let bright = |row: &[f32]| weighed(row, &weights) as f32;
-        let mut arrival = vec![Arrival::default(); self.refinement.tree.nodes.len()];
+        let mut arrival = vec![0.0; self.refinement.tree.nodes.len()];
         for (k, &leaf) in light.leaves.iter().enumerate() {
-            arrival[leaf as usize] = Arrival {
-                all: bright(light.irradiance.row(k)),
-                direct: bright(self.refinement.direct.row(leaf)),
-                half_range: self.refinement.direct.half_range(leaf),
-            };
+            arrival[leaf as usize] = bright(light.irradiance.row(k));
         }
         self.solution.light.arrival = arrival;
         self.solution.light.bright_lamps = self.solution.bright_lamps();

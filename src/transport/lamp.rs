@@ -9,7 +9,7 @@ use super::receiver::{Gathered, Receiver};
 use super::slope::SeenPatch;
 use crate::geometry::sampling::{hash, sequence02, triangle_weights};
 use crate::geometry::{Segment, lambert_triangles_x8, quarters};
-use crate::hierarchy::NONE;
+use crate::hierarchy::{NONE, quarter};
 use crate::light::{Passage, Tint, lightness_sensitivity};
 use crate::link::open_weight;
 use glam::DVec3;
@@ -77,13 +77,37 @@ fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
 /// One of the parts into which a lamp's triangle of exact factor `whole` would be divided, chosen by their factors: what one ray needs. The rest
 /// of `u` after the choice can be used again.
 pub(super) fn one_part(to: &Receiver, corners: [DVec3; 3], whole: f64, u: &mut f64) -> Part {
-    let mut part = (corners, whole);
+    part_by(to, (corners, whole), |quarters| {
+        let (part, rest) = chosen(quarters, *u)?;
+        *u = rest;
+        Some(part)
+    })
+}
+
+/// The part that [`one_part`] would choose with a point in it, given by barycentric weights.
+pub(super) fn part_around(
+    to: &Receiver,
+    corners: [DVec3; 3],
+    whole: f64,
+    mut weights: [f64; 3],
+) -> Part {
+    part_by(to, (corners, whole), |quarters| {
+        Some(quarters[quarter(&mut weights) as usize])
+    })
+}
+
+/// A part of a part that is not near, of its quarters those that `choose` takes.
+fn part_by(
+    to: &Receiver,
+    mut part: Part,
+    mut choose: impl FnMut(&[Part; 4]) -> Option<Part>,
+) -> Part {
     for _ in 0..DIVISIONS {
         if is_far(to, part.0) {
             break;
         }
-        match chosen(&quartered(to, part.0), *u) {
-            Some((one, rest)) if one.1 > 0.0 => (part, *u) = (one, rest),
+        match choose(&quartered(to, part.0)) {
+            Some(one) if one.1 > 0.0 => part = one,
             _ => break,
         }
     }
@@ -126,11 +150,18 @@ pub(super) fn point_of(
     parts: &[Part],
     [u, v]: [f64; 2],
 ) -> Option<(DVec3, f64)> {
-    let (([a, b, c], factor), u) = chosen(parts, u)?;
+    let (part, u) = chosen(parts, u)?;
+    let [a, b, c] = part.0;
     let w = triangle_weights([u, v]);
     let point = a * w[0] + b * w[1] + c * w[2];
+    Some((point, weight_at(to, normal, &part, point)))
+}
+
+/// The kernel at a point of a part, over its mean: what a point there counts that stands for the whole part.
+pub(super) fn weight_at(to: &Receiver, normal: DVec3, part: &Part, point: DVec3) -> f64 {
+    let ([a, b, c], factor) = *part;
     let area = 0.5 * (b - a).cross(c - a).length();
-    Some((point, kernel(to, normal, point - to.point) * area / factor))
+    kernel(to, normal, point - to.point) * area / factor
 }
 
 impl Gatherer<'_> {
@@ -275,7 +306,7 @@ impl Gatherer<'_> {
         let leaf = to
             .leaf
             .and_then(|leaf| self.light.arrival.get(leaf as usize));
-        let here = leaf.map_or(known, |arrival| f64::from(arrival.all));
+        let here = leaf.map_or(known, |&arrival| f64::from(arrival));
         self.tolerance / lightness_sensitivity(here)
     }
 

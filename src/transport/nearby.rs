@@ -6,8 +6,8 @@
 //!
 //! `B(p) = B (D(p) + B(q)) / H`
 //!
-//! with H the leaf's irradiance, B its reflected radiosity, D(p) the direct light of one lamp chosen at random and q the point where one
-//! further ray ends, which may be close by again (a path, as in Kajiya 1986). Only brightness follows the path: colours stay those of the leaf.
+//! with H the leaf's irradiance, B its reflected radiosity, D(p) the direct light of one lamp chosen at random or met by the next ray, and q the
+//! point where that ray ends, which may be close by again (a path, as in Kajiya 1986). Only brightness follows the path: colours stay those of the leaf.
 //! Their number follows from how much light leaves have there. To stop as soon as paths agree made such places dark: what is rare and bright
 //! comes late.
 
@@ -24,8 +24,6 @@ const STEPS: u64 = 8;
 /// Rays that meet something close by and are followed in a turn, and turns at the most.
 const FOLLOWED: usize = 64;
 const TURNS: f64 = 16.0;
-/// Where direct light varies by less than this share over a leaf, any point of it has the mean.
-const EVEN: f32 = 0.05;
 
 /// The light reflected at a point close by, by one path.
 struct LightPath {
@@ -96,7 +94,7 @@ impl Gatherer<'_> {
         // All paths advance one step at a time: rays from neighbouring places go together.
         for step in 0..STEPS {
             let samples = |dimension: u64| hash(seed, 2 * step + dimension);
-            self.light_ends(&mut paths, backs, samples(1), memory);
+            self.light_ends(&mut paths, samples(1), memory);
             let last = |leaf, hit: &Hit| step + 1 == STEPS || !self.is_near(leaf, hit, backs);
             self.go_on(&mut paths, last, samples(0), memory);
         }
@@ -104,7 +102,7 @@ impl Gatherer<'_> {
     }
 
     /// Adds the direct light at the ends of paths; ends those where no light arrives.
-    fn light_ends(&self, paths: &mut [LightPath], backs: f64, samples: u64, memory: &mut Memory) {
+    fn light_ends(&self, paths: &mut [LightPath], samples: u64, memory: &mut Memory) {
         let mut to_lamps = std::mem::take(&mut memory.to_lamps);
         memory.segments.clear();
         to_lamps.clear();
@@ -113,15 +111,11 @@ impl Gatherer<'_> {
                 continue;
             };
             let arrival = self.light.arrival[leaf as usize];
-            if arrival.all <= 0.0 {
+            if arrival <= 0.0 {
                 path.end = None;
                 continue;
             }
-            path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival.all);
-            if backs <= WITHIN && arrival.half_range <= EVEN * arrival.direct {
-                path.sum += path.through * f64::from(arrival.direct);
-                continue;
-            }
+            path.through *= f64::from(self.light.bright_reflected[leaf as usize] / arrival);
             let sample = sequence02(path.sample, samples);
             let lamps = self.one_lamp(&to, sample);
             for (bright, segment) in lamps.into_iter().flatten() {
@@ -161,15 +155,23 @@ impl Gatherer<'_> {
             let mut next = self.sight.meet_one(start, ahead, to.plane);
             memory.rays += 1;
             let mirrored = next.and_then(|hit| self.sight.mirrored(start, ahead, &hit));
-            if let Some(mirrored) = mirrored {
+            if let Some(mirrored) = &mirrored {
                 path.through *= self.left_by(Some(&self.along(&mirrored.route)));
                 next = mirrored.hit;
             }
             let Some((leaf, hit)) = next.and_then(|hit| Some((self.met(&hit)?, hit))) else {
                 continue;
             };
-            if let (Some(glass), None) = (&self.glass, mirrored) {
+            if let (Some(glass), None) = (&self.glass, &mirrored) {
                 path.through *= glass.brightness(start, start + ahead * hit.t);
+            }
+            let emitted = f64::from(self.light.bright_emitted[leaf as usize]);
+            if emitted > 0.0 {
+                let share = match mirrored {
+                    None => self.share_of_met(&to, &hit),
+                    Some(mirrored) => f64::from(u8::from(mirrored.image.is_none())),
+                };
+                path.sum += path.through * share * emitted;
             }
             if last(leaf, &hit) {
                 path.sum += path.through * f64::from(self.light.bright_reflected[leaf as usize]);

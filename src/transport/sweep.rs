@@ -187,14 +187,19 @@ impl Gatherer<'_> {
         if entry == NONE {
             return None;
         }
-        let [u, v] = hit.uv.map(f64::from);
-        let first = 1.0 - u - v;
-        let weights = if hit.from_behind {
-            [first, v, u]
-        } else {
-            [first, u, v]
-        };
+        let weights = weights_on_face(hit);
         Some(self.light.descent.leaf_at(self.tree, entry, weights))
+    }
+}
+
+/// Barycentric weights of a hit on the face that it met; a back has its corners the other way round.
+pub(super) fn weights_on_face(hit: &Hit) -> [f64; 3] {
+    let [u, v] = hit.uv.map(f64::from);
+    let first = 1.0 - u - v;
+    if hit.from_behind {
+        [first, v, u]
+    } else {
+        [first, u, v]
     }
 }
 

@@ -93,3 +93,67 @@ fn points_have_a_variance_and_a_range() {
     assert!((mean(&[0.0, 2.0]).variance() - 2.0).abs() < 1e-12);
     assert_eq!(mean(&[0.0, 2.0]).half_range(), 1.0);
 }
+
+/// Light everywhere on a leaf but for spots that cover a twentieth of it.
+struct Spotted;
+
+impl LeafSampler for Spotted {
+    fn weights(&self) -> &[f64] {
+        &[1.0]
+    }
+    fn direct(&self, _: &Tree, to: &Receiver, _: f64, _: &mut Memory) -> Option<[f32; 64]> {
+        let place = to.point.dot(glam::DVec3::new(997.0, 1009.0, 1013.0));
+        Some(
+            [if place.rem_euclid(1.0) < 0.05 {
+                0.0
+            } else {
+                3.0
+            }; 64],
+        )
+    }
+    fn unshadowed(&self, _: &Tree, _: u32, _: f64) -> f64 {
+        3.0
+    }
+    fn landed(&self, _: &Tree) -> Landed {
+        Landed::default()
+    }
+    fn by_chance(&self) -> bool {
+        true
+    }
+    fn openness(&self, _: &Tree, _: &Receiver, _: &mut Memory) -> f32 {
+        1.0
+    }
+}
+
+/// Eight points miss such a shadow on two of three leaves; where light matters there are more.
+#[test]
+fn shadows_on_leaves_that_matter_are_found() {
+    let stake = |split: f64| Stake {
+        split,
+        flux: 0.0,
+        tolerance: 0.1,
+        may_split: true,
+        tiny: false,
+    };
+    let points = [0.0, 1.0, 3.0, 5.0, 1e9, f64::INFINITY, f64::NAN];
+    let points = points.map(|split| stake(split).deciding(3.0));
+    assert_eq!(points, [8, 8, 32, 64, 64, 64, 8]);
+    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
+    let mesh = Mesh::new(&Scene::load(&room, &Options::default()).unwrap());
+    let mut tree = Tree::new(&mesh, &vec![0; mesh.faces.len()]);
+    for _ in 0..3 {
+        for leaf in tree.leaves().collect::<Vec<_>>() {
+            tree.subdivide(leaf);
+        }
+    }
+    let found = |split: f64| {
+        let uneven = tree.leaves().filter(|&leaf| {
+            let mut memory = Memory::default();
+            let mean = by_chance(&tree, leaf, &Spotted, &stake(split), &mut memory);
+            mean.half_range * split > 1.0
+        });
+        uneven.count() as f64 / tree.leaves().count() as f64
+    };
+    let (much, little) = (found(5.0), found(1.0));
+    assert!(much > 0.9 && little < 0.6, "{much} {little}");
+}
