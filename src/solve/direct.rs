@@ -52,7 +52,7 @@ const DECIDING: usize = 64;
 /// shadow on a sunlit floor of 6 m2 was missed with half of the seeds, and a wall beside it was lit by 2.3 times its light. With this factor and
 /// that most, and with 1 in its place and up to 256 points, points at the default are off by 2.35, 1.41 and 2.44, 1.55 % in this room (7.72 with the
 /// second seed before), by 2.63, 2.28 and 2.50 in a garage, by 2.85, 2.03 and 2.89 in a home theatre and by 2.63 and 1.76 in a canteen (root mean
-/// square beside Mitsuba, seeds 0 and 1, or 0), in 1.0 and 1.5 times the garage's and the canteen's time.
+/// square beside Mitsuba, seeds 0 and 1, or 0; while near paths took the mean of even leaves), in 1.0 and 1.5 times the garage's and the canteen's time.
 const MISSED: f64 = 3.0;
 /// Rough share of all direct light that a leaf may misplace by too few points. With this a garage's leaves receive from
 /// the first round on what its lamp sends, within a per cent.
