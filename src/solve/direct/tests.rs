@@ -4,7 +4,10 @@ use crate::scene::{Options, Scene};
 use std::path::Path;
 
 /// Light and openness that depend on the place.
-struct Fake;
+struct Fake {
+    light: fn(&Receiver) -> f32,
+    open: fn(&Receiver) -> f32,
+}
 
 fn light(to: &Receiver) -> f32 {
     if to.point.x > 0.1 { 3.0 } else { 0.0 }
@@ -19,7 +22,7 @@ impl LeafSampler for Fake {
         &[1.0]
     }
     fn direct(&self, _: &Tree, to: &Receiver, _: f64, _: &mut Memory) -> Option<[f32; 64]> {
-        Some([light(to); 64])
+        Some([(self.light)(to); 64])
     }
     fn unshadowed(&self, _: &Tree, _: u32, _: f64) -> f64 {
         3.0
@@ -31,21 +34,27 @@ impl LeafSampler for Fake {
         true
     }
     fn openness(&self, _: &Tree, to: &Receiver, _: &mut Memory) -> f32 {
-        open(to)
+        (self.open)(to)
     }
+}
+
+/// A convex room, of which every face is divided so many times.
+fn divided(times: usize) -> Tree {
+    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
+    let mesh = Mesh::new(&Scene::load(&room, &Options::default()).unwrap());
+    let mut tree = Tree::new(&mesh, &vec![0; mesh.faces.len()]);
+    for _ in 0..times {
+        for leaf in tree.leaves().collect::<Vec<_>>() {
+            tree.subdivide(leaf);
+        }
+    }
+    tree
 }
 
 /// Summed over leaves, for any number of points: a bias of 1 % would show.
 #[test]
 fn random_points_find_the_light_that_others_see() {
-    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
-    let mesh = Mesh::new(&Scene::load(&room, &Options::default()).unwrap());
-    let mut tree = Tree::new(&mesh, &vec![0; mesh.faces.len()]);
-    for _ in 0..4 {
-        for leaf in tree.leaves().collect::<Vec<_>>() {
-            tree.subdivide(leaf);
-        }
-    }
+    let (tree, fake) = (divided(4), Fake { light, open });
     for flux in [0.0, 10.0] {
         let stake = Stake {
             split: 0.0,
@@ -58,7 +67,7 @@ fn random_points_find_the_light_that_others_see() {
         for leaf in tree.leaves() {
             let area = tree.node(leaf).area;
             let mut memory = Memory::default();
-            let mean = by_chance(&tree, leaf, &Fake, &stake, &mut memory);
+            let mean = by_chance(&tree, leaf, &fake, &stake, &mut memory);
             let mut ended = LeafSamples::default();
             mean.end(&mut ended, 1);
             found[0] += area * f64::from(ended.rows[0]);
@@ -95,33 +104,11 @@ fn points_have_a_variance_and_a_range() {
 }
 
 /// Light everywhere on a leaf but for spots that cover a twentieth of it.
-struct Spotted;
-
-impl LeafSampler for Spotted {
-    fn weights(&self) -> &[f64] {
-        &[1.0]
-    }
-    fn direct(&self, _: &Tree, to: &Receiver, _: f64, _: &mut Memory) -> Option<[f32; 64]> {
-        let place = to.point.dot(glam::DVec3::new(997.0, 1009.0, 1013.0));
-        Some(
-            [if place.rem_euclid(1.0) < 0.05 {
-                0.0
-            } else {
-                3.0
-            }; 64],
-        )
-    }
-    fn unshadowed(&self, _: &Tree, _: u32, _: f64) -> f64 {
-        3.0
-    }
-    fn landed(&self, _: &Tree) -> Landed {
-        Landed::default()
-    }
-    fn by_chance(&self) -> bool {
-        true
-    }
-    fn openness(&self, _: &Tree, _: &Receiver, _: &mut Memory) -> f32 {
-        1.0
+fn spotted(to: &Receiver) -> f32 {
+    let place = to.point.dot(glam::DVec3::new(997.0, 1009.0, 1013.0));
+    match place.rem_euclid(1.0) < 0.05 {
+        true => 0.0,
+        false => 3.0,
     }
 }
 
@@ -138,18 +125,15 @@ fn shadows_on_leaves_that_matter_are_found() {
     let points = [0.0, 1.0, 3.0, 5.0, 1e9, f64::INFINITY, f64::NAN];
     let points = points.map(|split| stake(split).deciding(3.0));
     assert_eq!(points, [8, 8, 32, 64, 64, 64, 8]);
-    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/convex.glb");
-    let mesh = Mesh::new(&Scene::load(&room, &Options::default()).unwrap());
-    let mut tree = Tree::new(&mesh, &vec![0; mesh.faces.len()]);
-    for _ in 0..3 {
-        for leaf in tree.leaves().collect::<Vec<_>>() {
-            tree.subdivide(leaf);
-        }
-    }
+    let tree = divided(3);
+    let spotted = Fake {
+        light: spotted,
+        open: |_| 1.0,
+    };
     let found = |split: f64| {
         let uneven = tree.leaves().filter(|&leaf| {
             let mut memory = Memory::default();
-            let mean = by_chance(&tree, leaf, &Spotted, &stake(split), &mut memory);
+            let mean = by_chance(&tree, leaf, &spotted, &stake(split), &mut memory);
             mean.half_range * split > 1.0
         });
         uneven.count() as f64 / tree.leaves().count() as f64
