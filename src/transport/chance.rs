@@ -329,7 +329,7 @@ mod tests {
         assert!(all > 1.0 && off < 0.02 * all, "{off} of {all}");
     }
 
-    /// In a corner of a room all of whose walls glow no sample exceeds what a wall gives: choices alone brought up to seven times that,
+    /// In a corner of a room all of whose walls glow no sample exceeds what a wall gives: choices alone brought up to 320 times that,
     /// too seldom to be found by a vertex, which was dark.
     #[test]
     fn lamps_all_around_have_no_rare_light() {
