@@ -241,9 +241,11 @@ fn outsides_of_walls_change_nothing() {
 /// Light within what is stated, and as much work: on the plain floors are found to be the same room.
 #[test]
 fn a_plain_around_a_room_changes_nothing() {
+    let grounds = [Ground::Plain, Ground::Lying];
+    let mut estimates = [1.0; 2];
     for (plan, alone) in plans().into_iter().zip(&ALONE) {
         let fine = plan.bake(0.2);
-        for ground in [Ground::Plain, Ground::Lying] {
+        for (ground, estimates) in grounds.into_iter().zip(&mut estimates) {
             let plain = Plan { ground, ..plan }.bake(0.5);
             // .5 dE00 are about 1.4 % of a mid grey.
             let [rms, most] = plain.off(&fine);
@@ -256,9 +258,10 @@ fn a_plain_around_a_room_changes_nothing() {
             };
             same(plain.white, alone.white, 1.1, "white");
             let [[a, b], [leaves, of_alone]] = plain.alike(alone);
-            same(a, b, 2.0, "estimate");
+            // One estimate has the chance of 160 watched points, all of them together have less.
+            same(a, b, 3.0, "estimate");
+            *estimates *= a / b;
             same(leaves, of_alone, 3.0, "leaves");
-            // The chance of 160 watched points.
             assert!(plain.errors.len().abs_diff(alone.errors.len()) <= 1);
             same(
                 plain.averages.counted_m2,
@@ -268,6 +271,10 @@ fn a_plain_around_a_room_changes_nothing() {
             );
             assert!(plain.averages.area_m2 > 1e6);
         }
+    }
+    for (ground, product) in grounds.into_iter().zip(estimates) {
+        let mean = f64::powf(product, 1.0 / plans().len() as f64);
+        assert!((0.67..1.5).contains(&mean), "{ground:?}: estimates {mean}");
     }
 }
 

@@ -18,7 +18,7 @@ use glam::DVec3;
 const POINTS: usize = 160;
 /// Error of a round as a share of its distance to the round before. Measured against the audit at default error:
 /// Cornell box 1.5, two rooms 1.4, convex room 2.3.
-const SHARE: f64 = 1.5;
+pub(crate) const SHARE: f64 = 1.5;
 /// As [`SHARE`], where points look for themselves. Their rays are new every round: errors of two rounds have little in
 /// common. Measured with 600 points in two furnished rooms: 0.94 and 1.01.
 const SHARE_OF_RAYS: f64 = 0.95;

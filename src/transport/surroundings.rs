@@ -21,8 +21,10 @@ use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Rays over the hemisphere, to the openings, and towards spots if any: from a random point of a leaf, from a point of a quadrature rule,
-/// from a point for its own sake, and from one whose rays over the hemisphere are known.
-const RAYS: [[usize; 3]; 4] = [[16, 16, 16], [64, 64, 64], [512, 1024, 1024], [0, 256, 256]];
+/// from a point for its own sake, and from one whose rays over the hemisphere are known. With 1024 rays to the openings for a point's own sake,
+/// points are off by up to 1.1 % below a clear sky (CIE 171 5.9, twelve trials; .20 in root mean square) and by up to 1.2 % beside a wall of glass
+/// (four; .39), with 2048 by .46 (.10) and .60 (.17), in the same time (all with scrambled points).
+const RAYS: [[usize; 3]; 4] = [[16, 16, 16], [64, 64, 64], [512, 2048, 1024], [0, 256, 256]];
 /// Factor of the rays to the openings in rooms of few triangles. With 4, a sky in a periscope is off by more than 1 %.
 const FEW: usize = 16;
 

@@ -156,8 +156,12 @@ impl Group {
     }
 
     /// The box with what gaps may have missed at its edges. `least`: widths that an opening is known to, and of one that is flat.
-    fn part(&self, axis: usize, [least, flat]: [DVec3; 2]) -> OpeningBox {
+    ///
+    /// It is flat along its shortest side, whatever its gaps are: a few rays over opposite rims of a roof leave by gaps in its walls, and a box
+    /// about these, sampled along the whole roof's width, made all points of CIE 171 5.9 off by 1 % with every fourth seed.
+    fn part(&self, [least, flat]: [DVec3; 2]) -> OpeningBox {
         let size = self.tight.size();
+        let axis = size.min_position();
         let mut more = size.max(least) * (BEYOND / self.tight.count as f64);
         more[axis] = 0.0;
         OpeningBox {
@@ -231,7 +235,7 @@ pub(super) fn enclose(
         groups[k] = low;
         groups.push(high);
     }
-    let part = |group: &Group| group.part(gaps[group.gaps.start].axis, widths);
+    let part = |group: &Group| group.part(widths);
     let least = (STRAY as f64).max(LEAST_WORTH * gaps.len() as f64) as usize;
     let enough = |group: &&Group| group.tight.count >= least.min(gaps.len());
     groups.iter().filter(enough).map(part).collect()
@@ -281,6 +285,21 @@ mod tests {
         assert_eq!(gaps.iter().filter(held).count(), gaps.len() - stray.len());
         let all = area(&parts);
         assert!(all < 1.15 * (0.008 + 0.012 + 0.012), "{all}");
+    }
+
+    /// Rays over two opposite rims of a roof leave by gaps in the walls below it.
+    #[test]
+    fn a_box_is_flat_along_its_shortest_side() {
+        let rim = |k: u32| {
+            let [y, z] = sequence02(k, 3);
+            Gap {
+                axis: 0,
+                ..gap(f64::from(k % 2), 0.98 + 0.02 * y, z)
+            }
+        };
+        let mut gaps: Vec<Gap> = (0..LEAST as u32 - 1).map(rim).collect();
+        let parts = enclose(&mut gaps, WITHIN, WIDTHS, 8);
+        assert_eq!(parts.iter().map(|p| p.axis).collect::<Vec<_>>(), [1]);
     }
 
     /// What is open as a whole is one box.
