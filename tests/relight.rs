@@ -232,6 +232,31 @@ fn other_lamps_and_paints_give_what_a_fresh_bake_gives() {
     }
 }
 
+/// However little the light changes, the room was not refined for it: the errors of the last two rounds count as alike, 1.5 of their distance in
+/// place of .95.
+#[test]
+fn light_that_a_room_was_not_refined_for_is_less_certain() {
+    let mut scene = room("furnished.glb");
+    for r in &mut scene.materials[0].reflectance {
+        *r *= 1.0 - 1e-6;
+    }
+    let (_, relit) = FURNISHED.relit(scene);
+    assert!(relit.record.changed);
+    // Wavelengths and the solve err about as before: lanes are chosen anew.
+    let error = &FURNISHED.bake.rounds().last().unwrap().error;
+    let [all, wavelengths, solve] = [
+        &error.total_de2000,
+        &error.spectrum_de_luv,
+        &error.convergence_de_luv,
+    ]
+    .map(|figure| figure.value.unwrap());
+    let others = wavelengths.hypot(solve);
+    let geometry = (all * all - others * others).sqrt();
+    let want = (geometry * 1.5 / 0.95).hypot(others);
+    let stated = relit.record.error_de2000.value.unwrap();
+    assert!((stated / want - 1.0).abs() < 0.05, "{stated} for {want}");
+}
+
 /// In the furnished room the window and the panel go out; walls are painted, the bulb is made ten times as strong.
 #[test]
 fn lamps_go_out_in_a_furnished_room() {
@@ -256,14 +281,13 @@ fn lamps_go_out_in_a_furnished_room() {
     fresh.run();
     let stated = relit.record.error_de2000.value.unwrap();
     let measured = difference(&fresh, &relit.baked, 1);
-    let same = difference(&cached.bake, &cached.baked, 1);
     println!(
-        "furnished: measured {measured}, stated {stated}, {} and {same}",
+        "furnished: measured {measured}, stated {stated} and {}",
         estimate(&fresh)
     );
     assert!(
-        measured < stated.hypot(estimate(&fresh)).hypot(same),
-        "{measured} {stated} {same}"
+        measured < stated.hypot(estimate(&fresh)),
+        "{measured} {stated}"
     );
     assert!(difference(&fresh, &cached.baked, 4) > 3.0 * measured);
 }

@@ -258,10 +258,10 @@ fn a_plain_around_a_room_changes_nothing() {
             };
             same(plain.white, alone.white, 1.1, "white");
             let [[a, b], [leaves, of_alone]] = plain.alike(alone);
-            // One estimate has the chance of 160 watched points, all of them together have less.
-            same(a, b, 3.0, "estimate");
+            same(a, b, 2.0, "estimate");
             *estimates *= a / b;
             same(leaves, of_alone, 3.0, "leaves");
+            // The chance of 160 watched points.
             assert!(plain.errors.len().abs_diff(alone.errors.len()) <= 1);
             same(
                 plain.averages.counted_m2,
@@ -272,6 +272,7 @@ fn a_plain_around_a_room_changes_nothing() {
             assert!(plain.averages.area_m2 > 1e6);
         }
     }
+    // That chance is less for all rooms together.
     for (ground, product) in grounds.into_iter().zip(estimates) {
         let mean = f64::powf(product, 1.0 / plans().len() as f64);
         assert!((0.67..1.5).contains(&mean), "{ground:?}: estimates {mean}");

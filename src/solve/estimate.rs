@@ -3,7 +3,7 @@
 //! At fixed random points (distributed by counted area) the light is gathered after every round, each round with its own sampling
 //! patterns. Errors fall by a factor q of about 0.6 a round. If the errors of two rounds were independent, the distance d between the
 //! rounds would make the error of the later one `d / sqrt(1 + 1 / q^2) = 0.5 d`; if they were alike, `d q / (1 - q) = 1.5 d`. The
-//! truth lies between; [`SHARE`] was measured against the audit. The first round may be far coarser than the second, and q is then the root
+//! truth lies between; [`SHARE_ALIKE`] was measured against the audit. The first round may be far coarser than the second, and q is then the root
 //! of how much it has for each link of the second, or for each leaf where points look for themselves. A glazed room's second round has 8 times
 //! the leaves and is left with .26 of the distance (.55 by this), a curtained room's 1.3 times and is left with more than 1.5; a Cornell box's
 //! has 6 times the links and .5 (.74), a corridor's 9 times and .2 (.49), that of a Cornell box of other make 40 times and at most .15 (.19).
@@ -16,10 +16,10 @@ use glam::DVec3;
 
 /// Points watched.
 const POINTS: usize = 160;
-/// Error of a round as a share of its distance to the round before. Measured against the audit at default error:
+/// Error of a round as a share of its distance to the round before, where both err alike. Measured against the audit at default error:
 /// Cornell box 1.5, two rooms 1.4, convex room 2.3.
-pub(crate) const SHARE: f64 = 1.5;
-/// As [`SHARE`], where points look for themselves. Their rays are new every round: errors of two rounds have little in
+pub(crate) const SHARE_ALIKE: f64 = 1.5;
+/// As [`SHARE_ALIKE`], where points look for themselves. Their rays are new every round: errors of two rounds have little in
 /// common. Measured with 600 points in two furnished rooms: 0.94 and 1.01.
 const SHARE_OF_RAYS: f64 = 0.95;
 
@@ -94,10 +94,10 @@ pub(super) fn share(round: usize, by_rays: bool, kept: f64) -> f64 {
         // The first two rounds err alike, as far as one is as fine as the other.
         (0 | 1, _) => {
             let q = kept.sqrt().min(1.0);
-            (q / (1.0 - q)).min(SHARE)
+            (q / (1.0 - q)).min(SHARE_ALIKE)
         }
         (_, true) => SHARE_OF_RAYS,
-        (_, false) => SHARE,
+        (_, false) => SHARE_ALIKE,
     }
 }
 
@@ -153,11 +153,13 @@ mod tests {
             let shares =
                 [0.0, 0.01, 0.127, 0.3, 0.36, 0.8, 1.0].map(|kept| share(1, by_rays, kept));
             assert!(shares.is_sorted(), "{shares:?}");
-            assert_eq!([shares[0], shares[6]], [0.0, SHARE]);
-            assert!((shares[1] - 1.0 / 9.0).abs() < 1e-12 && (shares[4] - SHARE).abs() < 1e-9);
+            assert_eq!([shares[0], shares[6]], [0.0, SHARE_ALIKE]);
+            assert!(
+                (shares[1] - 1.0 / 9.0).abs() < 1e-12 && (shares[4] - SHARE_ALIKE).abs() < 1e-9
+            );
         }
         assert_eq!(share(2, true, 0.127), SHARE_OF_RAYS);
-        assert_eq!(share(2, false, 0.127), SHARE);
+        assert_eq!(share(2, false, 0.127), SHARE_ALIKE);
     }
 
     #[test]

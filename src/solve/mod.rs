@@ -60,7 +60,7 @@ use crate::link::{Demand, is_small};
 use crate::scene::effects::Plan;
 use crate::scene::{PunctualLight, Scene};
 use crate::team::{Asked, Interrupt, Interrupted, Team};
-pub(crate) use estimate::SHARE as SHARE_ALIKE;
+pub(crate) use estimate::SHARE_ALIKE;
 pub use fixed_links::FixedLinkSolve;
 pub use flux::Closed;
 use forecast::{BY_LINKS, BY_RAYS, Goal, Past};
