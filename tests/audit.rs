@@ -409,23 +409,29 @@ fn a_file_is_not_held_to_what_lies_inside_of_something() {
     assert!(file.de2000.mean.value < 1.0, "{:?}", file.de2000);
 }
 
-/// In a furnace the bake is right to the last digits: the audit must not take its own noise for an error.
+/// In a furnace the bake is right to the last digits: the audit must not take its own noise for an error. An interval of 95 % misses now and then,
+/// the mean of eight does not.
 #[test]
 fn the_report_finds_nothing_where_nothing_is_wrong() {
+    const SEEDS: u64 = 8;
     let mut room = Room::new();
     let wall = room.lamp(0.5, 100.0);
     room.hollow(DVec3::ZERO, dvec3(3.0, 2.5, 4.0), [wall; 6]);
     let mut bake = Bake::new(room.scene(), Settings::default());
     bake.run();
-    let report = Report::new(&bake, 100, 4096, 3);
-    println!("{report:?}");
-    assert!(report.relative.rms.low < 1e-3, "{:?}", report.relative);
-    assert!(
-        report.bias.low < 0.0 && report.bias.high > 0.0,
-        "{:?}",
-        report.bias
-    );
-    assert_eq!(report.covered, 0);
+    let (mut missed, mut sum, mut square) = (0, 0.0, 0.0);
+    for seed in 0..SEEDS {
+        let report = Report::new(&bake, 100, 4096, seed);
+        println!("{report:?}");
+        assert!(report.relative.rms.low < 1e-3, "{:?}", report.relative);
+        assert_eq!(report.covered, 0);
+        let bias = report.bias;
+        missed += u32::from(bias.low > 0.0 || bias.high < 0.0);
+        sum += bias.value;
+        square += (0.5 * (bias.high - bias.low) / 1.96).powi(2);
+    }
+    assert!(missed <= 2, "{missed} of {SEEDS} intervals miss");
+    assert!(sum.abs() < 3.0 * square.sqrt(), "{sum} for {square}");
 }
 
 /// Bakes a room with default settings and audits every round; what is wrong with the estimates. An estimate must lie

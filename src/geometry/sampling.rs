@@ -3,7 +3,7 @@
 //! The generator is PCG-XSH-RR 64/32 (O'Neill, "PCG: A Family of Simple Fast Space-Efficient Statistically Good Algorithms
 //! for Random Number Generation", HMC-CS-2014-0905). The sequence is the first two dimensions of Sobol's (van der Corput
 //! and Sobol, as in Kollig and Keller, "Efficient Multidimensional Sampling", Eurographics 2002): any 2^k points that start at a
-//! multiple of 2^k have one point in every elementary interval of area 2^-k. A bitwise shift (`shift`, from
+//! multiple of 2^k have one point in every elementary interval of area 2^-k. Scrambling (`scramble`, from
 //! [`hash`]) gives every pair of elements its own set and keeps that property.
 
 use glam::DVec3;
@@ -72,25 +72,46 @@ pub fn hash(a: u64, b: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Point `k` of the (0,2)-sequence in [0,1)^2, shifted bitwise by the two halves of `shift` (0: unshifted).
-pub fn sequence02(k: u32, shift: u64) -> [f64; 2] {
-    let x = k.reverse_bits() ^ (shift >> 32) as u32;
-    // Sobol's second dimension: direction numbers v_0 = 2^31, v_{i+1} = v_i ^ (v_i >> 1).
-    let mut y = shift as u32;
-    let mut direction = 1u32 << 31;
-    let mut bits = k;
-    while bits != 0 {
-        if bits & 1 == 1 {
-            y ^= direction;
+/// Point `k` of the (0,2)-sequence in [0,1)^2, as it is with a `scramble` of 0. Else both coordinates are scrambled (Owen 1995), and the sequence has
+/// an order of its own: points of one `k` by two scrambles are independent. In one order for all, where a path went told where it went next.
+pub fn sequence02(k: u32, scramble: u64) -> [f64; 2] {
+    let [x, y] = match scramble {
+        0 => [k, pascal(k)],
+        _ => {
+            let k = shuffled(k.reverse_bits(), hash(scramble, 0) as u32).reverse_bits();
+            let [x, y] = [(scramble >> 32) as u32, scramble as u32];
+            [shuffled(k, x), shuffled(pascal(k), y)]
         }
-        direction ^= direction >> 1;
-        bits >>= 1;
-    }
+    };
     // Half a step inwards, so that no point lies on an edge of what it is mapped to.
-    [
-        (f64::from(x) + 0.5) * TWO_POW_MINUS_32,
-        (f64::from(y) + 0.5) * TWO_POW_MINUS_32,
-    ]
+    [x, y].map(|x| (f64::from(x.reverse_bits()) + 0.5) * TWO_POW_MINUS_32)
+}
+
+/// A permutation in which every bit depends on lower ones alone (Laine and Karras, "Stratified Sampling for Stochastic Transparency", 2011; with these
+/// factors Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). Of the digits of a coordinate, last one first, it is Owen's; of those
+/// of an index, last one first, it keeps aligned blocks of 2^k together.
+fn shuffled(reversed: u32, seed: u32) -> u32 {
+    let mut x = reversed.wrapping_add(seed);
+    for factor in [0x6c50_b47c, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6] {
+        x ^= x.wrapping_mul(factor);
+    }
+    x
+}
+
+/// Bits times Pascal's triangle modulo 2, the generator matrix of Sobol's second dimension, which is the fivefold Kronecker product of
+/// ((1, 1), (0, 1)).
+fn pascal(mut k: u32) -> u32 {
+    let halves = [
+        0x5555_5555,
+        0x3333_3333,
+        0x0f0f_0f0f,
+        0x00ff_00ff,
+        0x0000_ffff,
+    ];
+    for (step, half) in halves.into_iter().enumerate() {
+        k ^= (k >> (1 << step)) & half;
+    }
+    k
 }
 
 /// Area-preserving map from the unit square to barycentric weights, after Heitz, "A Low-Distortion Map Between Triangle and
@@ -180,15 +201,69 @@ mod tests {
         );
     }
 
+    /// By direction numbers: v_0 = 2^31, v_{i+1} = v_i ^ (v_i >> 1).
+    #[test]
+    fn the_second_dimension_is_that_of_sobol() {
+        for k in (0..2000).chain([1 << 20, u32::MAX, 0xdead_beef]) {
+            let (mut y, mut direction) = (0, 1u32 << 31);
+            for bit in 0..32 {
+                if k >> bit & 1 == 1 {
+                    y ^= direction;
+                }
+                direction ^= direction >> 1;
+            }
+            assert_eq!(pascal(k).reverse_bits(), y, "{k}");
+        }
+    }
+
+    /// Pairs of points of one index by two scrambles fill all four dimensions.
+    #[test]
+    fn scrambles_are_independent_of_each_other() {
+        let n = 1 << 14;
+        for (a, b) in [(1, 2), (hash(1, 2), hash(1, 3)), (7, !7)] {
+            let mut seen = vec![0; 256];
+            for k in 0..n {
+                let cell = |x: [f64; 2]| (x[0] * 4.0) as usize * 4 + (x[1] * 4.0) as usize;
+                seen[cell(sequence02(k, a)) * 16 + cell(sequence02(k, b))] += 1;
+            }
+            let mean = f64::from(n) / 256.0;
+            let chi: f64 = seen
+                .iter()
+                .map(|&n| (f64::from(n) - mean).powi(2) / mean)
+                .sum();
+            // 255 degrees of freedom: 400 is beyond six standard deviations.
+            assert!(chi < 400.0, "{a} {b}: {chi}");
+        }
+    }
+
+    /// Means of smooth functions err by N^-1.5; points that are only shifted stand at the same place of all their intervals, and err by N^-1.
+    #[test]
+    fn points_stand_at_random_places_of_their_intervals() {
+        let (n, trials) = (1024, 64);
+        let off = |trial: u64| {
+            let points = (0..n).map(|k| sequence02(k, hash(trial, 9)));
+            let sum = points.fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
+            sum.map(|sum| (sum / f64::from(n) - 0.5).powi(2))
+        };
+        let all = (0..trials).map(off);
+        let sum = all.fold([0.0; 2], |sum, off| [sum[0] + off[0], sum[1] + off[1]]);
+        for sum in sum {
+            let rms = (sum / trials as f64).sqrt();
+            // A point at random in each of N intervals: N^-1.5 / sqrt(12). Shifted by the same, N^-1 / sqrt(12).
+            let want = f64::from(n).powf(-1.5) / 12.0_f64.sqrt();
+            assert!((0.5 * want..2.0 * want).contains(&rms), "{rms} for {want}");
+        }
+    }
+
     #[test]
     fn every_elementary_interval_has_one_point() {
-        for shift in [0, hash(3, 4)] {
+        for scramble in [0, hash(3, 4)] {
             for log in 0..=8u32 {
                 for start in [0, 5 << log] {
                     for columns in 0..=log {
                         let mut seen = vec![0; 1 << log];
                         for k in start..start + (1 << log) {
-                            let [x, y] = sequence02(k, shift);
+                            let [x, y] = sequence02(k, scramble);
                             let column = (x * f64::from(1u32 << columns)) as usize;
                             let row = (y * f64::from(1u32 << (log - columns))) as usize;
                             seen[row << columns | column] += 1;

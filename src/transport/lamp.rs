@@ -57,7 +57,7 @@ fn kernel(to: &Receiver, normal: DVec3, way: DVec3) -> f64 {
 
 /// Divides a lamp's triangle of exact factor `whole` until no part is near or there are [`PARTS`]; their factors sum to
 /// `whole`.
-fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
+pub(super) fn parts_of(to: &Receiver, corners: [DVec3; 3], whole: f64) -> Vec<Part> {
     let mut parts = vec![(corners, whole)];
     let mut next = 0;
     while next < parts.len() && parts.len() + 3 <= PARTS {

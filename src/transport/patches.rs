@@ -5,8 +5,10 @@
 //! light.
 
 use super::gatherer::{CLOSE, Gatherer, Linked, Memory, RadiosityPart, SourceElement};
+use super::lamp::{parts_of, point_of};
 use super::receiver::{Gathered, Receiver};
 use super::slope::SeenPatch;
+use crate::geometry::sampling::{hash, sequence02};
 use crate::geometry::{Segment, lambert_triangles_x8};
 use crate::hierarchy::{Element, NONE, Node};
 use crate::light::{Passage, Tint, accumulate};
@@ -422,33 +424,40 @@ impl Gatherer<'_> {
             });
             return None;
         }
-        let share = self.visible_by_rays(to, (id, known), (element, planes), carries, memory);
+        let share = self.visible_by_rays(
+            to,
+            (id, known),
+            (element, planes),
+            [factor, carries],
+            memory,
+        );
         Some((share, false))
     }
 
-    /// Visible share of an element by rays; `known`: what its link found.
+    /// Visible share of an element of a factor by rays; `known`: what its link found.
     fn visible_by_rays(
         &self,
         to: &Receiver,
         (id, known): (u32, f32),
         (element, planes): (&Element, [u32; 2]),
-        carries: f64,
+        [factor, carries]: [f64; 2],
         memory: &mut Memory,
     ) -> f64 {
         // Stratified rays err by about 0.5 n^(-3/4) where a boundary crosses.
         let wanted = (0.5 * carries / self.tolerance).powf(4.0 / 3.0).ceil() as usize;
         let count = wanted.clamp(RAYS[0], RAYS[1]);
-        let shift = pattern(to.seed, id, 2);
+        let turn = hash(to.seed, u64::from(id));
         let normal = self.tree.node(id).normal;
         memory.segments.clear();
         memory.weights.clear();
-        for k in 0..count {
-            let p = element.at(crate::hierarchy::stratified(k, RAYS[1], shift));
-            let d = p - to.point;
-            let r2 = d.length_squared();
-            let (c1, c2) = (to.normal.dot(d), -normal.dot(d));
-            if c1 > 0.0 && c2 > 0.0 && r2 > 0.0 {
-                memory.weights.push(c1 * c2 / (r2 * r2));
+        // Rays to points chosen evenly over the area made a furnished room's bright patches dark by .3 %: near parts weigh more and are hidden less,
+        // and the share of few such rays is not without bias.
+        let parts = parts_of(to, element.corners, factor);
+        for k in 0..count as u32 {
+            if let Some((p, weight)) = point_of(to, normal, &parts, sequence02(k, turn))
+                && weight > 0.0
+            {
+                memory.weights.push(weight);
                 memory.segments.push(Segment::new(to.point, p, planes));
             }
         }

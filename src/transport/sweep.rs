@@ -248,7 +248,7 @@ mod tests {
                     sums = [sums[0] + one, sums[1] + other];
                 }
                 assert!(
-                    sums[1] > 0.1 && off < 0.02 * sums[1],
+                    sums[1] > 0.1 && off < 0.01 * sums[1],
                     "{room}: {off} of {sums:?}"
                 );
                 assert!((sums[0] / sums[1] - 1.0).abs() < 2e-3, "{room}: {sums:?}");
